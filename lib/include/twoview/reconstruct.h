@@ -1,0 +1,47 @@
+/* twoview: the main job, two images in memory to a pose and points. */
+#ifndef TWOVIEW_RECONSTRUCT_H
+#define TWOVIEW_RECONSTRUCT_H
+
+#include "twoview/feature.h"
+#include "twoview/match.h"
+#include "twoview/triangulate.h"
+#include "twoview/two_view.h"
+
+TV_BEGIN_DECLS
+
+/* One view of the pair. mask: null, or an image of the same size, 0 where no corner is wanted. */
+typedef struct tv_view {
+  tv_image image;
+  const tv_camera *camera;
+  const tv_image *mask;
+} tv_view;
+
+/* What tv_reconstruct found. The arrays lie in the context and hold until the next call with it. */
+typedef struct tv_reconstruction {
+  uint32_t struct_size; /* set by tv_reconstruction_init */
+  int32_t num_keypoints[2];
+  const tv_keypoint *keypoints[2];
+  const uint8_t *descriptors[2]; /* num_keypoints x TV_DESCRIPTOR_BYTES */
+  int32_t num_matches;
+  int32_t num_points; /* inliers whose point is TV_POINT_OK */
+  const tv_correspondence *matches;
+  const uint8_t *inlier_mask; /* num_matches */
+  const tv_point *points;     /* num_matches; TV_POINT_INVALID where the match is no inlier, or where
+                                 there is no full pose */
+} tv_reconstruction;
+
+TV_API void tv_reconstruction_init(tv_reconstruction *reconstruction);
+
+/* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate.
+   Each options pointer may be null (defaults). two_view: initialised by tv_two_view_init.
+   Statuses as the stages'. */
+TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
+                                const tv_feature_options *feature_options,
+                                const tv_match_options *match_options,
+                                const tv_estimate_options *estimate_options,
+                                tv_triangulation triangulation, tv_two_view *two_view,
+                                tv_reconstruction *reconstruction);
+
+TV_END_DECLS
+
+#endif

@@ -1,0 +1,120 @@
+/* twoview: the geometry of two views from matched pixels. */
+#ifndef TWOVIEW_TWO_VIEW_H
+#define TWOVIEW_TWO_VIEW_H
+
+#include "twoview/camera.h"
+#include "twoview/context.h"
+
+TV_BEGIN_DECLS
+
+typedef enum tv_method {
+  TV_METHOD_FIVE_POINT = 0,  /* Nister, "An efficient solution to the five-point relative pose
+                                problem", PAMI 2004; the default, cameras needed */
+  TV_METHOD_EIGHT_POINT = 1, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
+                                paper's path */
+  TV_METHOD_SEVEN_POINT = 2,
+  TV_METHOD_UPRIGHT = 3      /* three points and gravity */
+} tv_method;
+
+/* COLMAP's kinds of two-view geometry, and no-motion. */
+typedef enum tv_config {
+  TV_CONFIG_DEGENERATE = 0,         /* no model explains the matches */
+  TV_CONFIG_CALIBRATED = 1,         /* essential matrix: R, t */
+  TV_CONFIG_UNCALIBRATED = 2,       /* fundamental matrix: F only */
+  TV_CONFIG_PLANAR = 3,             /* homography of a plane: R, t and perhaps an alternative */
+  TV_CONFIG_PANORAMIC = 4,          /* pure rotation: R only */
+  TV_CONFIG_PLANAR_OR_PANORAMIC = 5, /* homography, uncalibrated: H only */
+  TV_CONFIG_NO_MOTION = 6           /* the camera did not move: R = I */
+} tv_config;
+
+typedef enum tv_verdict {
+  TV_VERDICT_REFUSED = 0,
+  TV_VERDICT_DOUBTFUL = 1,
+  TV_VERDICT_OK = 2
+} tv_verdict;
+
+/* Why a verdict is not "ok": bits of tv_two_view.reasons. */
+typedef enum tv_reason {
+  TV_REASON_TOO_FEW_MATCHES = 1 << 0,
+  TV_REASON_LOW_INLIER_RATIO = 1 << 1,
+  TV_REASON_LOW_PARALLAX = 1 << 2,
+  TV_REASON_TWO_PLANAR_SOLUTIONS = 1 << 3,
+  TV_REASON_PURE_ROTATION = 1 << 4,
+  TV_REASON_NO_MOTION = 1 << 5,
+  TV_REASON_SECOND_MOTION = 1 << 6,
+  TV_REASON_CROWDED_MATCHES = 1 << 7,
+  TV_REASON_REPEATED_STRUCTURE = 1 << 8
+} tv_reason;
+
+/* "calibrated", "planar_or_panoramic", "ok", "low_parallax" ...; "unknown" for any other number.
+   Static storage. */
+TV_API const char *tv_config_string(tv_config config);
+TV_API const char *tv_verdict_string(tv_verdict verdict);
+TV_API const char *tv_reason_string(tv_reason reason);
+
+/* Filled by tv_estimate_options_init. */
+typedef struct tv_estimate_options {
+  uint32_t struct_size;     /* set by tv_estimate_options_init */
+  int32_t method;           /* a tv_method; default five-point */
+  double max_error_px;      /* inlier threshold: Sampson distance in pixels of the images as given,
+                               the same for every lens; (0, 1e9], default 1.0 */
+  double confidence;        /* stop when a better model is this unlikely to have been missed;
+                               [0, 1), default 0.9999 */
+  int32_t max_iterations;   /* hard bound on samples, [1, 10^6], default 10000 */
+  int32_t fixed_iterations; /* 0 (default): adaptive stop. N: exactly N samples, near constant time */
+  uint64_t seed;            /* of the sampler; default constant, never the clock */
+} tv_estimate_options;
+
+TV_API void tv_estimate_options_init(tv_estimate_options *options);
+
+/* Everything that was found. Matrices are row-major; those whose has_ flag is 0 hold zeros. */
+typedef struct tv_two_view {
+  uint32_t struct_size; /* set by tv_two_view_init */
+  int32_t config;       /* a tv_config */
+  int32_t verdict;      /* a tv_verdict */
+  uint32_t reasons;     /* tv_reason bits */
+  int32_t num_matches;
+  int32_t num_inliers; /* of the model that config names */
+  uint8_t has_R, has_t, has_E, has_F, has_H, has_alternative, has_covariance, reserved;
+  int32_t num_iterations; /* samples drawn */
+  double R[9], t[3];      /* cam1_from_cam0: x1 = R x0 + t, |t| = 1 */
+  double E[9];            /* [t]x R, Frobenius norm 1, the sign that this gives */
+  double F[9];            /* K1^-T E K0^-1, Frobenius norm 1; of undistorted pixels */
+  double H[9];            /* undistorted pixels of image 0 to image 1; H[8] = 1 where finite */
+  double alternative_R[9], alternative_t[3]; /* the second pose of a plane */
+  double covariance[25]; /* radians^2, order (w0 w1 w2 a b): R_true = exp([w]x) R,
+                            t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), k the index
+                            of the smallest |t_k| (the lowest on a tie), b2 = t x b1 */
+  int32_t essential_inliers, fundamental_inliers, homography_inliers,
+      rotation_inliers;       /* evidence: inliers of each model, -1 where it was not estimated */
+  double coverage;            /* share of an 8x8 grid on image 0 that holds an inlier, [0, 1] */
+  double median_parallax_rad; /* of the inliers' rays, rotation removed */
+  double rms_error_px;        /* Sampson distance over the inliers */
+  uint64_t seed;              /* as used */
+} tv_two_view;
+
+TV_API void tv_two_view_init(tv_two_view *result);
+
+/* Estimates the two-view geometry of num_matches matched pixels.
+   camera0, camera1: both given, or both null (uncalibrated: F and H only, methods eight-point and
+   seven-point; otherwise TV_ERR_ARGUMENT).
+   pixels0, pixels1: num_matches x 2 (x, y), as the images have them (distorted).
+   ratios: null, or num_matches values, lower more certain (tv_correspondence.ratio): surer matches
+   are sampled first.
+   inlier_mask: null, or num_matches bytes, 1 for each inlier of the model that config names.
+   result: initialised by tv_two_view_init.
+   A match outside its lens's valid region, or not finite, is never an inlier.
+   "No geometry" is TV_OK with config, verdict and reasons. The matches' order does not matter, and
+   swapped views give the inverse: R the transpose, bit for bit, and t = -R^T t.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
+   TV_ERR_NOT_FINITE (options only).
+   Time: at most max_iterations samples, each of at most 10 models scored on num_matches. */
+TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,
+                                      const tv_camera *camera1, const double *pixels0,
+                                      const double *pixels1, const float *ratios,
+                                      int32_t num_matches, const tv_estimate_options *options,
+                                      tv_two_view *result, uint8_t *inlier_mask);
+
+TV_END_DECLS
+
+#endif

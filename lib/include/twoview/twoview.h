@@ -1,0 +1,16 @@
+/* twoview: FAST-SIFT matching and two-view geometry. One include for all stages; see README.md. */
+#ifndef TWOVIEW_TWOVIEW_H
+#define TWOVIEW_TWOVIEW_H
+
+#include "twoview/camera.h"
+#include "twoview/context.h"
+#include "twoview/feature.h"
+#include "twoview/image.h"
+#include "twoview/match.h"
+#include "twoview/reconstruct.h"
+#include "twoview/status.h"
+#include "twoview/triangulate.h"
+#include "twoview/two_view.h"
+#include "twoview/version.h"
+
+#endif

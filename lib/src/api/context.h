@@ -1,0 +1,36 @@
+// The inside of tv_context. It lies at the front of the caller's memory; the arena is the rest.
+#pragma once
+
+#include "base/arena.h"
+#include "kernels/kernels.h"
+#include "twoview/context.h"
+
+struct tv_context {
+  tv_limits limits;  // max_matches resolved, never 0
+  const tvk_table* kernels;
+  tv::Arena arena;      // scratch of the running call
+  size_t result_bytes;  // front of the arena that holds the last tv_reconstruct's arrays
+  tv_clock clock;
+  void* clock_user;
+  uint64_t stage_ns[TV_NUM_STAGES];
+};
+
+namespace tv {
+
+// Adds the time from its construction to its end to a stage.
+class StageTimer {
+ public:
+  StageTimer(tv_context* context, tv_stage stage)
+      : context_(context), stage_(stage), start_ns_(now()) {}
+  ~StageTimer() { context_->stage_ns[stage_] += now() - start_ns_; }
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  uint64_t now() const { return context_->clock ? context_->clock(context_->clock_user) : 0; }
+  tv_context* context_;
+  tv_stage stage_;
+  uint64_t start_ns_;
+};
+
+}  // namespace tv

@@ -1,0 +1,55 @@
+// The arena: the context's memory, handed out from the front in a fixed order and given back by
+// rewinding. The library's only allocator.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace tv {
+
+inline constexpr size_t kArenaAlignment = 64;
+
+struct Arena {
+  uint8_t* memory;
+  size_t size_bytes;
+  size_t used_bytes;
+  size_t high_water_bytes;
+};
+
+inline Arena arena_over(void* memory, size_t size_bytes) {
+  return Arena{static_cast<uint8_t*>(memory), size_bytes, 0, 0};
+}
+
+// What arena_alloc takes for `count` elements of T, padding included.
+template <typename T>
+constexpr size_t arena_bytes(size_t count) {
+  return (count * sizeof(T) + kArenaAlignment - 1) / kArenaAlignment * kArenaAlignment;
+}
+
+// Uninitialised memory for `count` elements, aligned to kArenaAlignment; null when the arena is
+// spent, which the size query makes impossible: callers check in debug builds only.
+template <typename T>
+T* arena_alloc(Arena& arena, size_t count) {
+  static_assert(__is_trivially_copyable(T), "the arena runs no constructors");
+  const size_t bytes = arena_bytes<T>(count);
+  if (bytes > arena.size_bytes - arena.used_bytes) return nullptr;
+  T* memory = reinterpret_cast<T*>(arena.memory + arena.used_bytes);
+  arena.used_bytes += bytes;
+  if (arena.used_bytes > arena.high_water_bytes) arena.high_water_bytes = arena.used_bytes;
+  return memory;
+}
+
+// Gives back, at the end of a scope, all that was taken from the arena within it.
+class ArenaScope {
+ public:
+  explicit ArenaScope(Arena& arena) : arena_(arena), used_bytes_(arena.used_bytes) {}
+  ~ArenaScope() { arena_.used_bytes = used_bytes_; }
+  ArenaScope(const ArenaScope&) = delete;
+  ArenaScope& operator=(const ArenaScope&) = delete;
+
+ private:
+  Arena& arena_;
+  size_t used_bytes_;
+};
+
+}  // namespace tv

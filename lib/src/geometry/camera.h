@@ -1,0 +1,31 @@
+// Camera models behind one interface: pixels to unit rays and back, with Jacobians.
+#pragma once
+
+#include "twoview/camera.h"
+
+#include <Eigen/Core>
+
+namespace tv {
+
+using Vec2 = Eigen::Matrix<double, 2, 1>;
+using Vec3 = Eigen::Matrix<double, 3, 1>;
+using Mat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;  // as the C API stores it
+using Mat23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
+using Mat32 = Eigen::Matrix<double, 3, 2>;
+
+// A checked camera with what unprojection needs to know beforehand.
+struct Camera {
+  tv_camera model;
+  double valid_angle_rad;       // rays beyond it are outside
+  double valid_radius_undistorted;  // the same as a radius on the plane z = 1 (Brown-Conrady)
+  double valid_radius_distorted;    // and after distortion: Newton is never asked for more
+};
+
+// The camera must have passed tv_camera_check.
+Camera prepare_camera(const tv_camera& camera);
+
+// False: outside the valid angle (or behind); outputs untouched. jacobian may be null.
+bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobian);
+bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobian);
+
+}  // namespace tv
