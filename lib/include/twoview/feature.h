@@ -75,8 +75,8 @@ TV_API tv_status tv_orient(tv_context *context, const tv_image *image,
 
 /* Describes the image at the points that the caller gives (x, y, size, angle_rad are read).
    descriptors: num_keypoints x TV_DESCRIPTOR_BYTES, row i for keypoint i: 4x4 cells of 8 directions,
-   index (cell_y * 4 + cell_x) * 8 + direction in the frame turned by angle_rad, direction clockwise
-   from x as seen in the image (UBC order, as OpenCV's and COLMAP's). A point beyond the image's
+   index (cell_y * 4 + cell_x) * 8 + direction in the frame turned by angle_rad, direction counter-
+   clockwise from x as seen in the image (UBC order, as OpenCV's and COLMAP's). A point beyond the image's
    border is described from what the image's nearest pixels show; a flat patch gives zeros. */
 TV_API tv_status tv_describe(tv_context *context, const tv_image *image,
                              const tv_feature_options *options, const tv_keypoint *keypoints,

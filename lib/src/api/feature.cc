@@ -1,0 +1,196 @@
+#include "twoview/feature.h"
+
+#include <algorithm>
+
+#include "api/validate.h"
+#include "feature/corners.h"
+#include "feature/describe.h"
+
+namespace tv {
+namespace {
+
+struct Request {
+  tv_feature_options options;
+  tv_status status;
+};
+
+// What all entry points check first.
+Request check_request(const tv_context* context, const tv_image* image, const tv_image* mask,
+                      const tv_feature_options* options) {
+  Request request{};
+  if (context == nullptr) {
+    request.status = TV_ERR_NULL;
+    return request;
+  }
+  request.status = check_image(*context, image);
+  if (request.status == TV_OK) request.status = check_mask(mask, *image);
+  if (request.status == TV_OK) {
+    request.status = read_feature_options(*context, options, &request.options);
+  }
+  return request;
+}
+
+tv_keypoint* detect_into_arena(tv_context* context, const tv_image& image, const tv_image* mask,
+                               const tv_feature_options& options, int32_t* count) {
+  StageTimer timer(context, TV_STAGE_DETECT);
+  tv_keypoint* corners =
+      arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(options.max_keypoints));
+  *count = find_corners(*context->kernels, image, mask, options, options.max_keypoints,
+                        context->arena, corners);
+  return corners;
+}
+
+Octaves octaves_for(tv_context* context, const tv_image& image, const tv_keypoint* keypoints,
+                    int32_t count) {
+  StageTimer timer(context, TV_STAGE_PYRAMID);
+  const OctaveRange range = octave_range(keypoints, count);
+  return make_octaves(*context->kernels, image, range.first, range.last, context->arena);
+}
+
+// Writes as many as fit; returns how many there are.
+int32_t orient_keypoints(const tv_context& context, const Octaves& octaves, int32_t orientation,
+                         const tv_keypoint* keypoints, int32_t count, tv_keypoint* oriented,
+                         int32_t capacity) {
+  int32_t total = 0;
+  for (int32_t k = 0; k < count; ++k) {
+    float angles_rad[2] = {0.0f, 0.0f};
+    const int32_t peaks =
+        orientation == TV_ORIENTATION_GRADIENT
+            ? dominant_angles(*context.kernels, octaves, keypoints[k], angles_rad)
+            : 1;
+    for (int32_t p = 0; p < peaks; ++p, ++total) {
+      if (total >= capacity) continue;
+      oriented[total] = keypoints[k];
+      oriented[total].angle_rad = angles_rad[p];
+    }
+  }
+  return total;
+}
+
+size_t bytes_of(int32_t count, size_t element) { return static_cast<size_t>(count) * element; }
+
+}  // namespace
+}  // namespace tv
+
+void tv_feature_options_init(tv_feature_options* options) {
+  if (options == nullptr) return;
+  *options = tv_feature_options{};
+  options->struct_size = sizeof(tv_feature_options);
+  options->max_keypoints = 2048;
+  options->arc = 9;
+  options->threshold = 10;
+  options->min_threshold = 5;
+  options->levels = 1;
+  options->scale_factor = 2.0f;
+  options->cell_px = 0;
+  options->subpixel = 1;
+  options->orientation = TV_ORIENTATION_GRADIENT;
+  options->descriptor = TV_DESCRIPTOR_ROOTSIFT;
+  options->keypoint_size = 5.0f;
+}
+
+tv_status tv_detect(tv_context* context, const tv_image* image, const tv_image* mask,
+                    const tv_feature_options* options, tv_keypoint* keypoints,
+                    int32_t cap_keypoints, int32_t* num_keypoints) {
+  const tv::Request request = tv::check_request(context, image, mask, options);
+  if (request.status != TV_OK) return request.status;
+  if (num_keypoints == nullptr || (keypoints == nullptr && cap_keypoints > 0)) return TV_ERR_NULL;
+  if (cap_keypoints < 0) return TV_ERR_ARGUMENT;
+  tv::ArenaScope scope(context->arena);
+  int32_t count = 0;
+  const tv_keypoint* corners =
+      tv::detect_into_arena(context, *image, mask, request.options, &count);
+  *num_keypoints = count;
+  if (count > cap_keypoints) return TV_ERR_CAPACITY;
+  std::copy(corners, corners + count, keypoints);
+  return TV_OK;
+}
+
+tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature_options* options,
+                    const tv_keypoint* keypoints, int32_t num_keypoints, tv_keypoint* oriented,
+                    int32_t cap_oriented, int32_t* num_oriented) {
+  const tv::Request request = tv::check_request(context, image, nullptr, options);
+  if (request.status != TV_OK) return request.status;
+  if (num_oriented == nullptr || (keypoints == nullptr && num_keypoints > 0) ||
+      (oriented == nullptr && cap_oriented > 0)) {
+    return TV_ERR_NULL;
+  }
+  if (num_keypoints < 0 || cap_oriented < 0) return TV_ERR_ARGUMENT;
+  const size_t keypoint = sizeof(tv_keypoint);
+  if (tv::overlap(keypoints, tv::bytes_of(num_keypoints, keypoint), oriented,
+                  tv::bytes_of(cap_oriented, keypoint))) {
+    return TV_ERR_OVERLAP;
+  }
+  const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
+  if (status != TV_OK) return status;
+  tv::ArenaScope scope(context->arena);
+  const tv::Octaves octaves = tv::octaves_for(context, *image, keypoints, num_keypoints);
+  tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
+  const int32_t orientation = request.options.orientation;
+  const int32_t total = tv::orient_keypoints(*context, octaves, orientation, keypoints,
+                                             num_keypoints, nullptr, 0);
+  *num_oriented = total;
+  if (total > cap_oriented) return TV_ERR_CAPACITY;
+  tv::orient_keypoints(*context, octaves, orientation, keypoints, num_keypoints, oriented,
+                       cap_oriented);
+  return TV_OK;
+}
+
+tv_status tv_describe(tv_context* context, const tv_image* image,
+                      const tv_feature_options* options, const tv_keypoint* keypoints,
+                      int32_t num_keypoints, uint8_t* descriptors) {
+  const tv::Request request = tv::check_request(context, image, nullptr, options);
+  if (request.status != TV_OK) return request.status;
+  if (num_keypoints < 0) return TV_ERR_ARGUMENT;
+  if (num_keypoints == 0) return TV_OK;
+  if (keypoints == nullptr || descriptors == nullptr) return TV_ERR_NULL;
+  if (tv::overlap(keypoints, tv::bytes_of(num_keypoints, sizeof(tv_keypoint)), descriptors,
+                  tv::bytes_of(num_keypoints, TV_DESCRIPTOR_BYTES))) {
+    return TV_ERR_OVERLAP;
+  }
+  const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
+  if (status != TV_OK) return status;
+  tv::ArenaScope scope(context->arena);
+  const tv::Octaves octaves = tv::octaves_for(context, *image, keypoints, num_keypoints);
+  tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
+  for (int32_t k = 0; k < num_keypoints; ++k) {
+    tv::describe_keypoint(*context->kernels, octaves, keypoints[k], request.options.descriptor,
+                          descriptors + tv::bytes_of(k, TV_DESCRIPTOR_BYTES));
+  }
+  return TV_OK;
+}
+
+tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image* mask,
+                     const tv_feature_options* options, tv_keypoint* keypoints,
+                     uint8_t* descriptors, int32_t cap_keypoints, int32_t* num_keypoints) {
+  const tv::Request request = tv::check_request(context, image, mask, options);
+  if (request.status != TV_OK) return request.status;
+  if (num_keypoints == nullptr ||
+      (cap_keypoints > 0 && (keypoints == nullptr || descriptors == nullptr))) {
+    return TV_ERR_NULL;
+  }
+  if (cap_keypoints < 0) return TV_ERR_ARGUMENT;
+  if (tv::overlap(keypoints, tv::bytes_of(cap_keypoints, sizeof(tv_keypoint)), descriptors,
+                  tv::bytes_of(cap_keypoints, TV_DESCRIPTOR_BYTES))) {
+    return TV_ERR_OVERLAP;
+  }
+  tv::ArenaScope scope(context->arena);
+  const tv_feature_options& o = request.options;
+  int32_t num_corners = 0;
+  const tv_keypoint* corners = tv::detect_into_arena(context, *image, mask, o, &num_corners);
+  const tv::Octaves octaves = tv::octaves_for(context, *image, corners, num_corners);
+  tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
+  tv_keypoint* oriented =
+      tv::arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(o.max_keypoints));
+  const int32_t total = tv::orient_keypoints(*context, octaves, o.orientation, corners,
+                                             num_corners, oriented, o.max_keypoints);
+  const int32_t count = std::min(total, o.max_keypoints);
+  *num_keypoints = count;
+  if (count > cap_keypoints) return TV_ERR_CAPACITY;
+  std::copy(oriented, oriented + count, keypoints);
+  for (int32_t k = 0; k < count; ++k) {
+    tv::describe_keypoint(*context->kernels, octaves, keypoints[k], o.descriptor,
+                          descriptors + tv::bytes_of(k, TV_DESCRIPTOR_BYTES));
+  }
+  return TV_OK;
+}

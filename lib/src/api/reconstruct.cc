@@ -1,0 +1,131 @@
+#include "twoview/reconstruct.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "api/validate.h"
+
+namespace tv {
+namespace {
+
+// The arrays of one reconstruction, at the front of the arena.
+struct Results {
+  tv_keypoint* keypoints[2];
+  uint8_t* descriptors[2];
+  double* pixels[2];
+  tv_correspondence* matches;
+  float* ratios;
+  uint8_t* inlier_mask;
+  tv_point* points;
+};
+
+Results alloc_results(Arena& arena, int32_t max_keypoints) {
+  const size_t n = static_cast<size_t>(max_keypoints);
+  Results r;
+  for (int v = 0; v < 2; ++v) {
+    r.keypoints[v] = arena_alloc<tv_keypoint>(arena, n);
+    r.descriptors[v] = arena_alloc<uint8_t>(arena, n * TV_DESCRIPTOR_BYTES);
+    r.pixels[v] = arena_alloc<double>(arena, 2 * n);
+  }
+  r.matches = arena_alloc<tv_correspondence>(arena, n);
+  r.ratios = arena_alloc<float>(arena, n);
+  r.inlier_mask = arena_alloc<uint8_t>(arena, n);
+  r.points = arena_alloc<tv_point>(arena, n);
+  return r;
+}
+
+void gather_pixels(Results& r, int32_t num_matches) {
+  for (int32_t k = 0; k < num_matches; ++k) {
+    const tv_correspondence& m = r.matches[k];
+    const tv_keypoint& a = r.keypoints[0][m.idx0];
+    const tv_keypoint& b = r.keypoints[1][m.idx1];
+    r.pixels[0][2 * k] = a.x;
+    r.pixels[0][2 * k + 1] = a.y;
+    r.pixels[1][2 * k] = b.x;
+    r.pixels[1][2 * k + 1] = b.y;
+    r.ratios[k] = m.ratio;
+  }
+}
+
+// Triangulates the inliers of a full pose; all other points are invalid. Returns how many are good.
+tv_status triangulate_inliers(tv_context* context, tv_triangulation method, const tv_view& view0,
+                              const tv_view& view1, const tv_two_view& two_view,
+                              int32_t num_matches, Results& r, int32_t* num_points) {
+  StageTimer timer(context, TV_STAGE_TRIANGULATE);
+  *num_points = 0;
+  if (num_matches == 0) return TV_OK;
+  const bool full_pose = two_view.has_R != 0 && two_view.has_t != 0;
+  if (full_pose) {
+    const tv_status status =
+        tv_triangulate(method, view0.camera, view1.camera, two_view.R, two_view.t, r.pixels[0],
+                       r.pixels[1], num_matches, r.points);
+    if (status != TV_OK) return status;
+  }
+  for (int32_t k = 0; k < num_matches; ++k) {
+    if (!full_pose || r.inlier_mask[k] == 0) {
+      r.points[k] = tv_point{};
+      r.points[k].status = TV_POINT_INVALID;
+    }
+    *num_points += r.points[k].status == TV_POINT_OK;
+  }
+  return TV_OK;
+}
+
+}  // namespace
+}  // namespace tv
+
+void tv_reconstruction_init(tv_reconstruction* reconstruction) {
+  if (reconstruction == nullptr) return;
+  *reconstruction = tv_reconstruction{};
+  reconstruction->struct_size = sizeof(tv_reconstruction);
+}
+
+tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_view* view1,
+                         const tv_feature_options* feature_options,
+                         const tv_match_options* match_options,
+                         const tv_estimate_options* estimate_options,
+                         tv_triangulation triangulation, tv_two_view* two_view,
+                         tv_reconstruction* reconstruction) {
+  if (context == nullptr || view0 == nullptr || view1 == nullptr || two_view == nullptr ||
+      reconstruction == nullptr) {
+    return TV_ERR_NULL;
+  }
+  if (reconstruction->struct_size != sizeof(tv_reconstruction)) return TV_ERR_STRUCT_SIZE;
+  tv_feature_options features;
+  tv_status status = tv::read_feature_options(*context, feature_options, &features);
+  if (status != TV_OK) return status;
+  tv::ArenaScope scope(context->arena);
+  tv::Results r = tv::alloc_results(context->arena, context->limits.max_keypoints);
+  const int32_t capacity = context->limits.max_keypoints;
+  const tv_view* views[2] = {view0, view1};
+  int32_t num_keypoints[2] = {0, 0}, num_matches = 0, num_points = 0;
+  for (int v = 0; v < 2; ++v) {
+    status = tv_extract(context, &views[v]->image, views[v]->mask, &features, r.keypoints[v],
+                        r.descriptors[v], capacity, &num_keypoints[v]);
+    if (status != TV_OK) return status;
+  }
+  status = tv_match(context, r.descriptors[0], num_keypoints[0], r.descriptors[1],
+                    num_keypoints[1], match_options, r.matches, capacity, &num_matches);
+  if (status != TV_OK) return status;
+  tv::gather_pixels(r, num_matches);
+  tv_two_view estimate = *two_view;
+  status = tv_estimate_two_view(context, view0->camera, view1->camera, r.pixels[0], r.pixels[1],
+                                r.ratios, num_matches, estimate_options, &estimate,
+                                r.inlier_mask);
+  if (status != TV_OK) return status;
+  status = tv::triangulate_inliers(context, triangulation, *view0, *view1, estimate, num_matches,
+                                   r, &num_points);
+  if (status != TV_OK) return status;
+  *two_view = estimate;
+  for (int v = 0; v < 2; ++v) {
+    reconstruction->num_keypoints[v] = num_keypoints[v];
+    reconstruction->keypoints[v] = r.keypoints[v];
+    reconstruction->descriptors[v] = r.descriptors[v];
+  }
+  reconstruction->num_matches = num_matches;
+  reconstruction->num_points = num_points;
+  reconstruction->matches = r.matches;
+  reconstruction->inlier_mask = r.inlier_mask;
+  reconstruction->points = r.points;
+  return TV_OK;
+}

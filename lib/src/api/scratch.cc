@@ -1,0 +1,33 @@
+#include "api/scratch.h"
+
+#include <algorithm>
+
+#include "feature/corners.h"
+#include "match/match.h"
+#include "robust/two_view.h"
+#include "twoview/reconstruct.h"
+
+namespace tv {
+
+size_t extract_scratch_bytes(const tv_limits& limits) {
+  const size_t keypoints = arena_bytes<tv_keypoint>(static_cast<size_t>(limits.max_keypoints));
+  return 2 * keypoints + std::max(corners_bytes(limits.max_width, limits.max_height,
+                                                limits.max_keypoints),
+                                  octaves_bytes(limits.max_width, limits.max_height));
+}
+
+size_t reconstruct_result_bytes(const tv_limits& limits) {
+  const size_t n = static_cast<size_t>(limits.max_keypoints);
+  return 2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
+              arena_bytes<double>(2 * n)) +
+         arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(n) + arena_bytes<tv_point>(n) +
+         arena_bytes<float>(n);
+}
+
+size_t scratch_bytes(const tv_limits& limits) {
+  const size_t stage = std::max({extract_scratch_bytes(limits), match_bytes(limits.max_keypoints),
+                                 two_view_scratch_bytes(limits.max_matches)});
+  return reconstruct_result_bytes(limits) + stage;
+}
+
+}  // namespace tv

@@ -1,0 +1,75 @@
+#include "api/validate.h"
+
+namespace tv {
+namespace {
+
+bool within(int32_t value, int32_t low, int32_t high) { return value >= low && value <= high; }
+
+// Written so that NaN is not within.
+bool within(float value, float low, float high) { return value >= low && value <= high; }
+
+constexpr float kMaxKeypointSize = 512.0f;
+constexpr float kMaxCoordinate = 1e5f;
+
+}  // namespace
+
+tv_status check_image(const tv_context& context, const tv_image* image) {
+  if (image == nullptr || image->data == nullptr) return TV_ERR_NULL;
+  if (image->width < 1 || image->height < 1 || image->stride_bytes < image->width ||
+      image->stride_bytes > INT64_MAX / 65536) {
+    return TV_ERR_ARGUMENT;
+  }
+  if (image->width > context.limits.max_width || image->height > context.limits.max_height) {
+    return TV_ERR_LIMITS;
+  }
+  return TV_OK;
+}
+
+tv_status check_mask(const tv_image* mask, const tv_image& image) {
+  if (mask == nullptr) return TV_OK;
+  if (mask->data == nullptr) return TV_ERR_NULL;
+  const bool same_size = mask->width == image.width && mask->height == image.height;
+  return same_size && mask->stride_bytes >= mask->width ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
+                               tv_feature_options* checked) {
+  if (options == nullptr) {
+    tv_feature_options_init(checked);
+    if (checked->max_keypoints > context.limits.max_keypoints) {
+      checked->max_keypoints = context.limits.max_keypoints;
+    }
+    return TV_OK;
+  }
+  const tv_feature_options& o = *options;
+  if (o.struct_size != sizeof(tv_feature_options)) return TV_ERR_STRUCT_SIZE;
+  const bool valid =
+      o.max_keypoints >= 1 && within(o.arc, 9, 12) && within(o.threshold, 1, 254) &&
+      within(o.min_threshold, 0, o.threshold) && within(o.levels, 1, 8) &&
+      within(o.scale_factor, 1.1f, 2.0f) && (o.cell_px == 0 || within(o.cell_px, 8, 16384)) &&
+      within(o.subpixel, 0, 1) &&
+      within(o.orientation, TV_ORIENTATION_UPRIGHT, TV_ORIENTATION_GRADIENT) &&
+      within(o.descriptor, TV_DESCRIPTOR_SIFT, TV_DESCRIPTOR_ROOTSIFT) &&
+      within(o.keypoint_size, 1.0f, 32.0f);
+  if (!valid) return TV_ERR_ARGUMENT;
+  if (o.max_keypoints > context.limits.max_keypoints) return TV_ERR_LIMITS;
+  *checked = o;
+  return TV_OK;
+}
+
+tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {
+  for (int32_t k = 0; k < count; ++k) {
+    const tv_keypoint& p = keypoints[k];
+    if (!is_finite(p.x) || !is_finite(p.y) || !is_finite(p.size) || !is_finite(p.angle_rad)) {
+      return TV_ERR_NOT_FINITE;
+    }
+    if (!within(p.x, -kMaxCoordinate, kMaxCoordinate) ||
+        !within(p.y, -kMaxCoordinate, kMaxCoordinate) || p.size <= 0.0f ||
+        p.size > kMaxKeypointSize || !within(p.angle_rad, -1000.0f, 1000.0f)) {
+      return TV_ERR_ARGUMENT;
+    }
+  }
+  return TV_OK;
+}
+
+}  // namespace tv

@@ -1,0 +1,134 @@
+#include "feature/describe.h"
+
+#include "base/math.h"
+
+namespace tv {
+namespace {
+
+// A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma) and holds four samples.
+constexpr double kStepPerSize = 1.5 / 4.0;
+
+// A second direction counts from this share of the highest peak on (Lowe, section 5).
+constexpr double kSecondPeak = 0.8;
+
+const Level& level_of(const Octaves& octaves, const tv_keypoint& keypoint) {
+  const int32_t octave = octave_of(keypoint.size);
+  return octaves.levels[octave < octaves.count ? octave : octaves.count - 1];
+}
+
+// A keypoint further outside than this sees the border's pixels only, wherever it is. Keeps every
+// sample's position within 32 bits for images up to 16384 and keypoints up to 512 pixels.
+constexpr double kMaxOutside = 8192.0;
+
+int32_t to_q16(double x) {
+  const double scaled = x * 65536.0;
+  return static_cast<int32_t>(scaled < 0 ? scaled - 0.5 : scaled + 0.5);
+}
+
+double near_image(double x, int32_t side) {
+  return x < -kMaxOutside ? -kMaxOutside : x > side + kMaxOutside ? side + kMaxOutside : x;
+}
+
+// Samples a square patch of `side` samples whose middle is the keypoint and whose x axis points
+// along angle_rad.
+void sample_around(const tvk_table& kernels, const Level& level, const tv_keypoint& keypoint,
+                   double angle_rad, int32_t side, int16_t* patch) {
+  const double step = keypoint.size * kStepPerSize / level.scale;
+  double sine = 0.0, cosine = 1.0;
+  if (angle_rad != 0.0) sincos(angle_rad, &sine, &cosine);
+  const int32_t du_x = to_q16(step * cosine), du_y = to_q16(step * sine);
+  // The first sample, half a patch before the middle along both axes.
+  const double half = 0.5 * (side - 1);
+  const int32_t x = to_q16(near_image(to_level(level, keypoint.x), level.width)) -
+                    static_cast<int32_t>(half * (du_x - du_y));
+  const int32_t y = to_q16(near_image(to_level(level, keypoint.y), level.height)) -
+                    static_cast<int32_t>(half * (du_y + du_x));
+  kernels.sample_patch(level.data, level.stride, level.width, level.height, x, y, du_x, du_y, side,
+                       patch);
+}
+
+// (1 4 6 4 1) / 16 around the circle, left at 16 times the value.
+void smooth_circle(const int32_t* histogram, int64_t* smooth) {
+  constexpr int32_t n = TVK_ORIENT_BINS;
+  for (int32_t k = 0; k < n; ++k) {
+    smooth[k] = static_cast<int64_t>(histogram[(k + n - 2) % n]) + histogram[(k + 2) % n] +
+                4 * (static_cast<int64_t>(histogram[(k + n - 1) % n]) + histogram[(k + 1) % n]) +
+                6 * static_cast<int64_t>(histogram[k]);
+  }
+}
+
+// Peak of the parabola through a bin and its neighbours.
+float peak_angle(const int64_t* smooth, int32_t bin) {
+  constexpr int32_t n = TVK_ORIENT_BINS;
+  const double left = static_cast<double>(smooth[(bin + n - 1) % n]);
+  const double middle = static_cast<double>(smooth[bin]);
+  const double right = static_cast<double>(smooth[(bin + 1) % n]);
+  const double curvature = left - 2.0 * middle + right;
+  const double shift = curvature < 0.0 ? 0.5 * (left - right) / curvature : 0.0;
+  double turn = (bin + shift) / n;
+  if (turn > 0.5) turn -= 1.0;
+  const float angle_rad = static_cast<float>(turn * 2.0 * kPi);
+  return angle_rad == 0.0f ? 0.0f : angle_rad;
+}
+
+}  // namespace
+
+int32_t octave_of(float keypoint_size) {
+  double step = keypoint_size * kStepPerSize;
+  int32_t octave = 0;
+  while (step >= 1.4142135623730951 && octave + 1 < kMaxOctaves) {
+    step *= 0.5;
+    ++octave;
+  }
+  return octave;
+}
+
+OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count) {
+  OctaveRange range{kMaxOctaves - 1, 0};
+  for (int32_t k = 0; k < count; ++k) {
+    const int32_t octave = octave_of(keypoints[k].size);
+    if (octave < range.first) range.first = octave;
+    if (octave > range.last) range.last = octave;
+  }
+  return range;
+}
+
+int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
+                        const tv_keypoint& keypoint, float angles_rad[2]) {
+  int16_t patch[TVK_ORIENT_SIDE * TVK_ORIENT_SIDE];
+  int32_t histogram[TVK_ORIENT_BINS];
+  int64_t smooth[TVK_ORIENT_BINS];
+  sample_around(kernels, level_of(octaves, keypoint), keypoint, 0.0, TVK_ORIENT_SIDE, patch);
+  kernels.orientation_histogram(patch, histogram);
+  smooth_circle(histogram, smooth);
+  // The two highest local maxima; the lower bin wins a tie.
+  int32_t best = 0, second = -1;
+  for (int32_t k = 1; k < TVK_ORIENT_BINS; ++k) {
+    if (smooth[k] > smooth[best]) best = k;
+  }
+  for (int32_t k = 0; k < TVK_ORIENT_BINS; ++k) {
+    const int64_t left = smooth[(k + TVK_ORIENT_BINS - 1) % TVK_ORIENT_BINS];
+    const int64_t right = smooth[(k + 1) % TVK_ORIENT_BINS];
+    if (k == best || smooth[k] <= left || smooth[k] <= right) continue;
+    if (second < 0 || smooth[k] > smooth[second]) second = k;
+  }
+  angles_rad[0] = peak_angle(smooth, best);
+  if (second < 0 || static_cast<double>(smooth[second]) <
+                        kSecondPeak * static_cast<double>(smooth[best])) {
+    return 1;
+  }
+  angles_rad[1] = peak_angle(smooth, second);
+  return 2;
+}
+
+void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
+                       const tv_keypoint& keypoint, int32_t kind, uint8_t* descriptor) {
+  int16_t patch[TVK_PATCH_SIDE * TVK_PATCH_SIDE];
+  int32_t histogram[TVK_DESCRIPTOR_SIZE];
+  sample_around(kernels, level_of(octaves, keypoint), keypoint, keypoint.angle_rad, TVK_PATCH_SIDE,
+                patch);
+  kernels.gradient_histogram(patch, histogram);
+  kernels.quantize_descriptor(histogram, kind == TV_DESCRIPTOR_ROOTSIFT, descriptor);
+}
+
+}  // namespace tv

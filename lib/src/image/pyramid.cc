@@ -1,0 +1,140 @@
+#include "image/pyramid.h"
+
+namespace tv {
+namespace {
+
+// Which source pixels make up target pixel x, and their shares of 256.
+struct Footprint {
+  int32_t first;
+  int32_t weights[3];
+};
+
+Footprint footprint(int32_t x, double factor) {
+  const double begin = x * factor, end = (x + 1) * factor;
+  Footprint f{static_cast<int32_t>(begin), {0, 0, 0}};
+  int32_t rest = 256;
+  for (int k = 0; k < 3 && rest > 0; ++k) {
+    const double low = begin > f.first + k ? begin : f.first + k;
+    const double high = end < f.first + k + 1 ? end : f.first + k + 1;
+    const double share = high > low ? (high - low) / factor : 0.0;
+    int32_t weight = static_cast<int32_t>(256 * share + 0.5);
+    if (weight > rest || high >= end) weight = rest;
+    f.weights[k] = weight;
+    rest -= weight;
+  }
+  return f;
+}
+
+void halve(const tvk_table& kernels, const Level& source, uint8_t* pixels, int32_t width,
+           int32_t height) {
+  for (int32_t y = 0; y < height; ++y) {
+    const uint8_t* row = source.data + 2 * y * source.stride;
+    kernels.halve_row(row, row + source.stride, width, pixels + static_cast<int64_t>(y) * width);
+  }
+}
+
+void average(const tvk_table& kernels, const Level& source, double factor, LevelBuffers& buffers,
+             uint8_t* pixels, int32_t width, int32_t height) {
+  for (int32_t x = 0; x < width; ++x) {
+    const Footprint f = footprint(x, factor);
+    buffers.first[x] = f.first;
+    for (int k = 0; k < 3; ++k) buffers.column_weights[3 * x + k] = f.weights[k];
+  }
+  for (int32_t y = 0; y < height; ++y) {
+    const Footprint f = footprint(y, factor);
+    const uint8_t* rows[3];
+    for (int k = 0; k < 3; ++k) {
+      const int32_t row = f.weights[k] != 0 ? f.first + k : f.first;
+      rows[k] = source.data + row * source.stride;
+    }
+    kernels.average_rows(rows, f.weights, source.width, buffers.sums);
+    kernels.average_columns(buffers.sums, buffers.first, buffers.column_weights, width,
+                            pixels + static_cast<int64_t>(y) * width);
+  }
+}
+
+void blur(const tvk_table& kernels, const Level& source, uint8_t* pixels) {
+  const int32_t last = source.height - 1;
+  for (int32_t y = 0; y <= last; ++y) {
+    const uint8_t* row = source.data + y * source.stride;
+    kernels.blur_row(y > 0 ? row - source.stride : row, row, y < last ? row + source.stride : row,
+                     source.width, pixels + static_cast<int64_t>(y) * source.width);
+  }
+}
+
+size_t area(int32_t width, int32_t height) {
+  return static_cast<size_t>(width) * static_cast<size_t>(height);
+}
+
+}  // namespace
+
+size_t level_buffers_bytes(int32_t max_width, int32_t max_height) {
+  const size_t width = static_cast<size_t>(max_width);
+  return 2 * arena_bytes<uint8_t>(area(max_width, max_height)) + arena_bytes<uint16_t>(width) +
+         arena_bytes<int32_t>(width) + arena_bytes<int32_t>(3 * width);
+}
+
+LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_height) {
+  const size_t width = static_cast<size_t>(max_width);
+  LevelBuffers buffers;
+  for (uint8_t*& pixels : buffers.pixels) {
+    pixels = arena_alloc<uint8_t>(arena, area(max_width, max_height));
+  }
+  buffers.sums = arena_alloc<uint16_t>(arena, width);
+  buffers.first = arena_alloc<int32_t>(arena, width);
+  buffers.column_weights = arena_alloc<int32_t>(arena, 3 * width);
+  return buffers;
+}
+
+bool next_level(const tvk_table& kernels, const Level& level, double factor, int32_t index,
+                LevelBuffers& buffers, Level* next) {
+  const int32_t width = static_cast<int32_t>(level.width / factor);
+  const int32_t height = static_cast<int32_t>(level.height / factor);
+  if (width < kMinLevelSide || height < kMinLevelSide) return false;
+  uint8_t* pixels = buffers.pixels[index & 1];
+  if (factor == 2.0) {
+    halve(kernels, level, pixels, width, height);
+  } else {
+    average(kernels, level, factor, buffers, pixels, width, height);
+  }
+  *next = Level{pixels, width, height, width, level.scale * factor};
+  return true;
+}
+
+size_t octaves_bytes(int32_t max_width, int32_t max_height) {
+  // Each octave but the first is a halved image and its blur; the areas fall by four.
+  size_t bytes = arena_bytes<uint8_t>(area(max_width, max_height));
+  for (int32_t o = 1; o < kMaxOctaves; ++o) {
+    bytes += 2 * arena_bytes<uint8_t>(area(max_width >> o, max_height >> o));
+  }
+  return bytes;
+}
+
+Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t first, int32_t last,
+                     Arena& arena) {
+  Octaves octaves{};
+  Level level = full_level(image);
+  for (int32_t o = 0; o < kMaxOctaves; ++o) {
+    if (o >= first || o == last) {
+      uint8_t* blurred = arena_alloc<uint8_t>(arena, area(level.width, level.height));
+      blur(kernels, level, blurred);
+      octaves.levels[o] = Level{blurred, level.width, level.height, level.width, level.scale};
+    }
+    octaves.count = o + 1;
+    const int32_t width = level.width / 2, height = level.height / 2;
+    if (o >= last || width < kMinLevelSide || height < kMinLevelSide) break;
+    uint8_t* halved = arena_alloc<uint8_t>(arena, area(width, height));
+    halve(kernels, level, halved, width, height);
+    level = Level{halved, width, height, width, level.scale * 2};
+  }
+  const int32_t coarsest = octaves.count - 1;
+  if (octaves.levels[coarsest].data == nullptr) {  // the image ended before `first`
+    uint8_t* blurred = arena_alloc<uint8_t>(arena, area(level.width, level.height));
+    blur(kernels, level, blurred);
+    octaves.levels[coarsest] =
+        Level{blurred, level.width, level.height, level.width, level.scale};
+  }
+  return octaves;
+}
+
+}  // namespace tv

@@ -1,0 +1,86 @@
+/* The kernels: the inner loops over pixels, patches and descriptors.
+
+   TVK_LIST names each kernel once; the table, the sets and the checker (test/kernel) all come from
+   it. The C files are the definition: integer arithmetic, or single IEEE operations in a written
+   order, so that every set gives the same bytes. A set is the same source compiled for another
+   instruction set, with intrinsics only where they were measured to pay. */
+#ifndef TWOVIEW_KERNELS_H
+#define TWOVIEW_KERNELS_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define TVK_CIRCLE_RADIUS 3 /* of the segment test */
+
+#define TVK_PATCH_SIDE 22      /* samples a side of a descriptor's patch: 20 gradients and a rim */
+#define TVK_ORIENT_SIDE 15     /* the same for the orientation's patch: 13 and a rim */
+#define TVK_ORIENT_BINS 36
+#define TVK_DESCRIPTOR_SIZE 128
+
+/* fast_score_row: rows[0..6] are the image rows y-3..y+3. Writes for each x in [0, width) the largest
+     threshold at which (x, y) is a corner with `arc` (9..12) contiguous brighter or darker circle
+     pixels, where that is at least `threshold` (>= 1), else 0. 0 in the 3-pixel rim.
+   suppress_row: x of the scores in `cur` that are above 0 and above all eight neighbours; returns how
+     many. xs has room for (width + 1) / 2. The first and last x are never kept.
+   average_rows: columns of up to three rows, weights (of 256) in row_weights, to sums in [0, 65280].
+   average_columns: out[x] = (sum over k < 3 of column_weights[3 x + k] * sums[first[x] + k] + 2^15)
+     >> 16; where a weight is 0 the sum is not read.
+   halve_row: out[x] = (a[2x] + a[2x+1] + b[2x] + b[2x+1] + 2) / 4.
+   blur_row: 3x3 binomial (1 2 1)/4 in both directions, edges repeated, rounded once at the end.
+   sample_patch: side x side bilinear samples; sample (i, j) lies at (x + i du_x - j du_y,
+     y + i du_y + j du_x), all in 1/65536 pixel; positions are clamped to the image. Values in 1/16
+     grey level.
+   orientation_histogram: 36 directions, clockwise as seen, of the gradients within 6 samples of the
+     middle of an upright TVK_ORIENT_SIDE patch, Gaussian weight of sigma 2 samples.
+   gradient_histogram: SIFT's 4x4x8 histogram of a TVK_PATCH_SIDE patch (feature/describe.h), with
+     trilinear sharing and Gaussian window.
+   quantize_descriptor: SIFT's normalisation, clipping at 0.2, and 128 bytes; root: RootSIFT.
+   widen: bytes to int16.
+   squared_distances: out[j] = |query|^2 + |row j|^2 - 2 query . row j, for 128-element rows.
+   update_columns: per column j: the two smallest of dist so far and the row index of the smallest. */
+#define TVK_LIST(X)                                                                                \
+  X(fast_score_row, void,                                                                          \
+    (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
+  X(suppress_row, int32_t,                                                                         \
+    (const uint8_t *prev, const uint8_t *cur, const uint8_t *next, int32_t width, uint16_t *xs))   \
+  X(average_rows, void,                                                                            \
+    (const uint8_t *const rows[3], const int32_t row_weights[3], int32_t width, uint16_t *sums))   \
+  X(average_columns, void,                                                                         \
+    (const uint16_t *sums, const int32_t *first, const int32_t *column_weights, int32_t out_width, \
+     uint8_t *out))                                                                                \
+  X(halve_row, void, (const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out))        \
+  X(blur_row, void,                                                                                \
+    (const uint8_t *above, const uint8_t *row, const uint8_t *below, int32_t width, uint8_t *out)) \
+  X(sample_patch, void,                                                                            \
+    (const uint8_t *image, int64_t stride, int32_t width, int32_t height, int32_t x, int32_t y,    \
+     int32_t du_x, int32_t du_y, int32_t side, int16_t *patch))                                    \
+  X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
+  X(gradient_histogram, void, (const int16_t *patch, int32_t *histogram))                          \
+  X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
+  X(widen, void, (const uint8_t *bytes, int32_t count, int16_t *out))                              \
+  X(squared_distances, void,                                                                       \
+    (const int16_t *query, int32_t query_norm, const int16_t *rows, const int32_t *norms,          \
+     int32_t num_rows, int32_t *out))                                                              \
+  X(update_columns, void,                                                                          \
+    (const int32_t *dist, int32_t num_columns, int32_t row, int32_t *best, int32_t *second,        \
+     int32_t *best_row))
+
+typedef struct tvk_table {
+  int32_t set; /* a tv_kernels */
+#define TVK_MEMBER(name, result, parameters) result(*name) parameters;
+  TVK_LIST(TVK_MEMBER)
+#undef TVK_MEMBER
+} tvk_table;
+
+/* The set of a tv_kernels number that this CPU can run, the fastest for 0 (auto); null if this CPU or
+   this build lacks it. */
+const tvk_table *tvk_select(int32_t set);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

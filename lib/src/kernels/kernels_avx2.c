@@ -1,0 +1,4 @@
+/* The same source compiled for AVX2 (without FMA, whose rounding differs). */
+#define TVK_SET TV_KERNELS_AVX2
+#define TVK_TABLE tvk_table_avx2
+#include "kernels/kernels_impl.h"

@@ -1,0 +1,83 @@
+/* The rows of the pyramid: area averages, halving, blur; and bilinear patches. */
+
+static void average_rows(const uint8_t *const rows[3], const int32_t row_weights[3], int32_t width,
+                         uint16_t *sums) {
+  const uint8_t *a = rows[0], *b = rows[1], *c = rows[2];
+  const int32_t wa = row_weights[0], wb = row_weights[1], wc = row_weights[2];
+  int32_t x;
+  for (x = 0; x < width; ++x) sums[x] = (uint16_t)(wa * a[x] + wb * b[x] + wc * c[x]);
+}
+
+static void average_columns(const uint16_t *sums, const int32_t *first,
+                            const int32_t *column_weights, int32_t out_width, uint8_t *out) {
+  int32_t x;
+  for (x = 0; x < out_width; ++x) {
+    const uint16_t *s = sums + first[x];
+    const int32_t *w = column_weights + 3 * x;
+    int32_t sum = 1 << 15;
+    sum += w[0] * s[0];
+    if (w[1]) sum += w[1] * s[1];
+    if (w[2]) sum += w[2] * s[2];
+    out[x] = (uint8_t)(sum >> 16);
+  }
+}
+
+static void halve_row(const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out) {
+  int32_t x;
+  for (x = 0; x < out_width; ++x) {
+    out[x] = (uint8_t)((a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1] + 2) >> 2);
+  }
+}
+
+static inline int32_t blur_column(const uint8_t *above, const uint8_t *row, const uint8_t *below,
+                                  int32_t x) {
+  return above[x] + 2 * row[x] + below[x];
+}
+
+static void blur_row(const uint8_t *above, const uint8_t *row, const uint8_t *below, int32_t width,
+                     uint8_t *out) {
+  const int32_t last = width - 1;
+  int32_t x;
+  for (x = 1; x < last; ++x) {
+    out[x] = (uint8_t)((blur_column(above, row, below, x - 1) + 2 * blur_column(above, row, below, x) +
+                        blur_column(above, row, below, x + 1) + 8) >> 4);
+  }
+  out[0] = (uint8_t)((3 * blur_column(above, row, below, 0) +
+                      blur_column(above, row, below, last > 0 ? 1 : 0) + 8) >> 4);
+  if (last > 0) {
+    out[last] = (uint8_t)((3 * blur_column(above, row, below, last) +
+                           blur_column(above, row, below, last - 1) + 8) >> 4);
+  }
+}
+
+static inline int32_t clamp_i32(int32_t value, int32_t low, int32_t high) {
+  return value < low ? low : value > high ? high : value;
+}
+
+/* One bilinear sample, position in 1/65536 pixel inside the image; value in 1/16 grey level. The
+   right and lower neighbours of the last column and row are themselves. */
+static inline int16_t sample_bilinear(const uint8_t *image, int64_t stride, int32_t width,
+                                      int32_t height, int32_t x, int32_t y) {
+  const int32_t ix = x >> 16, iy = y >> 16;
+  const int32_t fx = (x >> 8) & 255, fy = (y >> 8) & 255;
+  const uint8_t *top = image + (int64_t)iy * stride + ix;
+  const uint8_t *bottom = top + (iy + 1 < height ? stride : 0);
+  const int32_t right = ix + 1 < width ? 1 : 0;
+  const int32_t upper = 256 * top[0] + fx * (top[right] - top[0]);
+  const int32_t lower = 256 * bottom[0] + fx * (bottom[right] - bottom[0]);
+  return (int16_t)((256 * upper + fy * (lower - upper) + 2048) >> 12);
+}
+
+static void sample_patch(const uint8_t *image, int64_t stride, int32_t width, int32_t height,
+                         int32_t x, int32_t y, int32_t du_x, int32_t du_y, int32_t side,
+                         int16_t *patch) {
+  const int32_t max_x = (width - 1) << 16, max_y = (height - 1) << 16;
+  int32_t i, j;
+  for (j = 0; j < side; ++j) {
+    for (i = 0; i < side; ++i) {
+      const int32_t sx = clamp_i32(x + i * du_x - j * du_y, 0, max_x);
+      const int32_t sy = clamp_i32(y + i * du_y + j * du_x, 0, max_y);
+      patch[j * side + i] = sample_bilinear(image, stride, width, height, sx, sy);
+    }
+  }
+}
