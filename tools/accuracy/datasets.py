@@ -1,0 +1,183 @@
+"""The data sets: pairs, images, cameras; formats and rules as docs/ and `twoview evaluate` have them."""
+
+import functools
+import hashlib
+import os
+
+import numpy as np
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+MAX_NATIVE_WIDTH = 1241  # wider images are scaled down
+RESIZE_LONG_SIDE = 640   # to this long side
+# In these two the ground truth of pairs_flagged.txt is exact (calibrated turn-tables): "flagged" only
+# says that plain SIFT could not confirm the pair.
+FLAGGED_SETS = ("middlebury_dinoSR", "middlebury_templeSR")
+
+
+def data_dir():
+    return os.environ.get("TWOVIEW_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
+
+
+def all_sets(folder=None):
+    """Names of the sets that have a pairs.txt."""
+    folder = folder or data_dir()
+    if not os.path.isdir(folder):
+        return []
+    return sorted(name for name in os.listdir(folder)
+                  if os.path.isfile(os.path.join(folder, name, "pairs.txt")))
+
+
+class Pair:
+    """One line of pairs.txt."""
+
+    def __init__(self, line):
+        fields = line.split()
+        if len(fields) != 38:
+            raise ValueError(f"a pair has 38 fields, not {len(fields)}: {line[:60]}")
+        self.line = " ".join(fields)
+        self.name0, self.name1 = fields[:2]
+        if fields[2:4] != ["0", "0"]:
+            raise ValueError(f"{self.name0} {self.name1}: no set measured here has turned images")
+        numbers = np.array([float(f) for f in fields[4:]])
+        self.K0, self.K1 = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3)
+        T = numbers[18:].reshape(4, 4)
+        self.R, self.t = T[:3, :3], T[:3, 3]
+
+
+def read_pairs(path):
+    with open(path, encoding="utf-8") as f:
+        return [Pair(line) for line in f if line.strip() and not line.startswith("#")]
+
+
+def read_cameras(set_dir):
+    """{entry name: {fx, fy, cx, cy, k1, .., image_width, image_height}}, empty without a file."""
+    path = os.path.join(set_dir, "cameras.yaml")
+    if not os.path.isfile(path):
+        return {}
+    import yaml
+    with open(path, encoding="utf-8") as f:
+        return yaml.safe_load(f) or {}
+
+
+def choose_camera(cameras, name, K):
+    """The entry of an image: the only one; else the one whose name begins the file's name; else the
+    one whose fx and cx are the pair line's. None without a camera file."""
+    if len(cameras) <= 1:
+        return next(iter(cameras.values()), None)
+    begins = [entry for entry in cameras if name.startswith(entry)]
+    if begins:
+        return cameras[max(begins, key=len)]
+    for entry in cameras.values():
+        if np.allclose([entry["fx"], entry["cx"]], [K[0, 0], K[0, 2]], rtol=1e-9, atol=1e-9):
+            return entry
+    raise ValueError(f"{name}: no entry of cameras.yaml has its name or its K")
+
+
+def distortion_of(entry):
+    return [float(entry.get(k, 0)) for k in ("k1", "k2", "p1", "p2", "k3")] if entry else [0.0] * 5
+
+
+def scale_of(width, height, resize):
+    """Factor that brings the long side to `resize`; never above 1; 0 or None leaves the image."""
+    return min(1.0, resize / max(width, height)) if resize else 1.0
+
+
+def scale_K(K, scale):
+    """K of an image scaled by `scale`; pixel (0,0) is a pixel's centre."""
+    scaled = np.array(K, float)
+    scaled[:2] *= scale
+    scaled[:2, 2] = scale * (K[:2, 2] + 0.5) - 0.5
+    return scaled
+
+
+def default_resize(width):
+    """The rule of the tables: native up to MAX_NATIVE_WIDTH, else long side RESIZE_LONG_SIDE."""
+    return RESIZE_LONG_SIDE if width > MAX_NATIVE_WIDTH else 0
+
+
+def undistort(points, K, distortion):
+    """Pixels (n x 2) to normalised undistorted points, Brown-Conrady, by Newton's method; NaN where
+    it does not converge."""
+    points = np.asarray(points, float).reshape(-1, 2)
+    target = (points - K[:2, 2]) / [K[0, 0], K[1, 1]]
+    if not any(distortion):
+        return target
+    k1, k2, p1, p2, k3 = distortion
+    x, y = target.T.copy()
+    for _ in range(50):
+        s = x * x + y * y
+        radial = 1 + s * (k1 + s * (k2 + s * k3))
+        slope = k1 + s * (2 * k2 + 3 * k3 * s)  # d radial / d s
+        error_x = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x) - target[:, 0]
+        error_y = y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y - target[:, 1]
+        xx = radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x
+        xy = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y
+        yy = radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x
+        with np.errstate(all="ignore"):
+            determinant = xx * yy - xy * xy
+            x = x - (yy * error_x - xy * error_y) / determinant
+            y = y - (xx * error_y - xy * error_x) / determinant
+    with np.errstate(invalid="ignore"):
+        bad = ~(np.hypot(error_x, error_y) < 1e-9)
+    x[bad] = y[bad] = np.nan
+    return np.column_stack([x, y])
+
+
+class Set:
+    """A data set with its images in memory once they were read."""
+
+    def __init__(self, set_dir, resize=None, flagged=False, max_pairs=None):
+        """resize: None is the tables' rule, 0 native, else the long side. max_pairs: that many,
+        evenly spaced."""
+        self.dir = set_dir
+        self.name = os.path.basename(os.path.normpath(set_dir))
+        self.pair_files = [os.path.join(set_dir, "pairs.txt")]
+        flagged_file = os.path.join(set_dir, "pairs_flagged.txt")
+        if flagged and self.name in FLAGGED_SETS and os.path.isfile(flagged_file):
+            self.pair_files.append(flagged_file)
+        self.pairs = [pair for path in self.pair_files for pair in read_pairs(path)]
+        if max_pairs and max_pairs < len(self.pairs):
+            step = np.linspace(0, len(self.pairs) - 1, max_pairs)
+            self.pairs = [self.pairs[i] for i in sorted(set(np.round(step).astype(int)))]
+        self.cameras = read_cameras(set_dir)
+        if resize is None:
+            resize = default_resize(self._native_size(self.pairs[0].name0)[0])
+        self.resize = resize
+
+    def path(self, name):
+        return os.path.join(self.dir, "images", name)
+
+    def _native_size(self, name):
+        import cv2
+        image = cv2.imread(self.path(name), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise FileNotFoundError(self.path(name))
+        return image.shape[1], image.shape[0]
+
+    @functools.lru_cache(maxsize=None)
+    def gray(self, name):
+        """(8-bit luma, scale)"""
+        import cv2
+        image = cv2.imread(self.path(name), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise FileNotFoundError(self.path(name))
+        scale = scale_of(image.shape[1], image.shape[0], self.resize)
+        if scale < 1.0:  # sampled at exactly `scale`, which rounding the size alone would not do
+            image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        return np.ascontiguousarray(image), scale
+
+    @functools.lru_cache(maxsize=None)
+    def file_hash(self, name):
+        with open(self.path(name), "rb") as f:
+            return hashlib.sha256(f.read()).hexdigest()
+
+    def camera(self, pair, side):
+        """(K at the images' scale, distortion) of image `side` of a pair."""
+        name, K = ((pair.name0, pair.K0), (pair.name1, pair.K1))[side]
+        entry = choose_camera(self.cameras, name, K)
+        return scale_K(K, self.gray(name)[1]), distortion_of(entry)
+
+    def max_size(self):
+        """(width, height) that holds every image of the pairs."""
+        shapes = [self.gray(n)[0].shape for p in self.pairs for n in (p.name0, p.name1)]
+        return max(s[1] for s in shapes), max(s[0] for s in shapes)
