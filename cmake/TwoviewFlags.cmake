@@ -1,0 +1,14 @@
+# Flags of every target of the project. Those that only the library needs stand in lib/CMakeLists.txt.
+
+add_library(twoview_flags INTERFACE)
+target_compile_options(twoview_flags INTERFACE
+  -Wall -Wextra -Wshadow
+  $<$<BOOL:${TWOVIEW_WERROR}>:-Werror>
+  # a * b + c stays two roundings on every CPU: results are the same bytes everywhere.
+  -ffp-contract=off)
+
+if(TWOVIEW_SANITIZE)
+  string(REPLACE ";" "," sanitizers "${TWOVIEW_SANITIZE}")
+  add_compile_options(-fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=${sanitizers})
+endif()

@@ -1,0 +1,34 @@
+# How tests are registered.
+
+# Exit status of a test that cannot run here, after it has printed why.
+set(TWOVIEW_SKIP_CODE 77)
+# Both builds' tests run in one ctest (scripts/test): a sanitizer build's names say so.
+set(TWOVIEW_TEST_PREFIX "")
+if(TWOVIEW_SANITIZE)
+  set(TWOVIEW_TEST_PREFIX "asan/")
+endif()
+
+# tv_register_test(name LABEL label COMMAND command...)
+function(tv_register_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "COMMAND")
+  set(test ${TWOVIEW_TEST_PREFIX}${arg_LABEL}/${name})
+  add_test(NAME ${test} COMMAND ${arg_COMMAND} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+  set_tests_properties(${test} PROPERTIES
+    LABELS ${arg_LABEL}
+    SKIP_RETURN_CODE ${TWOVIEW_SKIP_CODE}
+    TIMEOUT 600
+    ENVIRONMENT "TWOVIEW_PROGRAM=${PROJECT_BINARY_DIR}/bin/twoview;UBSAN_OPTIONS=print_stacktrace=1")
+endfunction()
+
+# tv_add_test(name LABEL label SOURCES file... [LIBS library...]): a Unity test, built and registered.
+function(tv_add_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "SOURCES;LIBS")
+  set(target ${arg_LABEL}_${name})
+  add_executable(${target} ${arg_SOURCES})
+  target_link_libraries(${target} PRIVATE twoview_flags twoview_unity ${arg_LIBS})
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/test)
+  target_compile_definitions(${target} PRIVATE TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE})
+  set_target_properties(${target} PROPERTIES
+    RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test/bin)
+  tv_register_test(${name} LABEL ${arg_LABEL} COMMAND ${target})
+endfunction()

@@ -1,0 +1,23 @@
+# The command line, where its libraries are found. TWOVIEW_TOOLS=ON makes a missing one an error.
+
+find_package(yaml-cpp QUIET)
+find_package(CLI11 QUIET)
+find_package(nlohmann_json QUIET)
+
+set(missing "")
+foreach(package OpenCV yaml-cpp CLI11 nlohmann_json)
+  if(NOT ${package}_FOUND)
+    list(APPEND missing ${package})
+  endif()
+endforeach()
+
+if(NOT EXISTS ${PROJECT_SOURCE_DIR}/tools/twoview/CMakeLists.txt)
+  list(APPEND missing tools/twoview)
+endif()
+if(NOT missing)
+  add_subdirectory(${PROJECT_SOURCE_DIR}/tools/twoview ${PROJECT_BINARY_DIR}/tools/twoview)
+elseif(TWOVIEW_TOOLS STREQUAL "AUTO")
+  message(STATUS "The command line is not built; not found: ${missing}")
+else()
+  message(FATAL_ERROR "TWOVIEW_TOOLS is ON and these are not found: ${missing}")
+endif()

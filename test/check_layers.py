@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+"""Keeps the layers of docs and DESIGN: which folder of lib/src may include which, and who may see
+Eigen, pixels, the heap and the internals at all. Reads the #include lines; prints each offence."""
+import re
+import sys
+from pathlib import Path
+
+# A layer and the layers it may include.
+LAYERS = {
+    "base": set(),
+    "kernels": {"base"},
+    "image": {"kernels", "base"},
+    "feature": {"image", "kernels", "base"},
+    "match": {"feature", "image", "kernels", "base"},
+    "geometry": {"kernels", "base"},
+    "robust": {"geometry", "kernels", "base"},
+    "odometry": {"match", "robust", "feature", "image", "geometry", "kernels", "base"},
+    "api": {"odometry", "match", "robust", "feature", "image", "geometry", "kernels", "base"},
+}
+WITHOUT_EIGEN = {"base", "kernels", "image", "feature", "match"}
+WITHOUT_PIXELS = {"geometry", "robust"}
+PIXELS = ("twoview/image.h", "image/")
+# Headers whose use would bring in the heap, files, threads, clocks or libstdc++.
+BANNED = {
+    "vector", "string", "map", "set", "unordered_map", "unordered_set", "deque", "list", "memory",
+    "functional", "iostream", "fstream", "sstream", "ostream", "istream", "cstdio", "stdio.h",
+    "cstdlib", "stdlib.h", "stdexcept", "exception", "thread", "mutex", "future", "chrono", "ctime",
+    "time.h", "random", "regex", "locale", "any", "typeinfo",
+}
+OUTSIDE = ("drivers", "examples", "tools", "python", "bench")  # public headers only
+SUFFIXES = {".c", ".cc", ".cpp", ".h", ".hpp"}
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
+
+
+def read_includes(root):
+    """Maps each source file, named from the root, to the headers it includes."""
+    files = {}
+    for top in ("lib",) + OUTSIDE:
+        for path in sorted((root / top).rglob("*")):
+            if path.suffix in SUFFIXES and path.is_file():
+                files[path.relative_to(root).as_posix()] = INCLUDE.findall(path.read_text())
+    return files
+
+
+def resolve(header, files):
+    """The project's file that an include names, or None for a system header."""
+    for folder in ("lib/src/", "lib/include/"):
+        if folder + header in files:
+            return folder + header
+    return None
+
+
+def closure(start, files):
+    """All headers that `start` includes, by whatever way, as they are spelt."""
+    seen, open_files = set(), [start]
+    while open_files:
+        for header in files[open_files.pop()]:
+            if header not in seen:
+                seen.add(header)
+                found = resolve(header, files)
+                if found:
+                    open_files.append(found)
+    return seen
+
+
+def offences(files):
+    for name, headers in files.items():
+        if name.startswith("lib/src/"):
+            layer = name.split("/")[2]
+            if layer not in LAYERS:
+                yield f"{name}: folder {layer} is no layer"
+                continue
+            for header in headers:
+                target = header.split("/")[0]
+                if header.startswith(".") or ("/" not in header and resolve_beside(name, header, files)):
+                    yield f"{name}: {header}: write includes from lib/src, layer first"
+                elif target in LAYERS and target != layer and target not in LAYERS[layer]:
+                    yield f"{name}: {layer} may not include {header}"
+                elif target == "twoview" and layer == "base":
+                    yield f"{name}: base depends on nobody, so not on {header}"
+                elif header in BANNED:
+                    yield f"{name}: <{header}> has no place in the library"
+            everything = closure(name, files)
+            if layer in WITHOUT_EIGEN and any(h.startswith("Eigen/") for h in everything):
+                yield f"{name}: {layer} includes Eigen"
+            if layer in WITHOUT_PIXELS:
+                for header in sorted(h for h in everything if h.startswith(PIXELS)):
+                    yield f"{name}: {layer} sees pixels through {header}"
+        elif name.startswith("lib/include/"):
+            for header in headers:
+                if "/" in header and not header.startswith("twoview/"):
+                    yield f"{name}: a public header includes {header}"
+        else:
+            for header in headers:
+                if (resolve(header, files) or "").startswith("lib/src/") or "lib/src" in header:
+                    yield f"{name}: {header} is internal; only the public headers are for use here"
+
+
+def resolve_beside(name, header, files):
+    return f"{name.rsplit('/', 1)[0]}/{header}" in files
+
+
+def self_check():
+    """Each rule must catch an example that breaks it: a checker that finds nothing proves nothing."""
+    good = {
+        "lib/include/twoview/image.h": ["stdint.h"],
+        "lib/include/twoview/two_view.h": ["twoview/image.h"],
+        "lib/src/base/arena.h": ["cstdint"],
+        "lib/src/image/pyramid.h": ["base/arena.h"],
+        "lib/src/geometry/camera.h": ["Eigen/Core"],
+        "lib/src/match/match.cc": ["image/pyramid.h", "cmath"],
+        "tools/twoview/main.cc": ["twoview/image.h", "vector"],
+    }
+    assert not list(offences(good)), list(offences(good))
+    for name, header in [
+        ("lib/src/image/pyramid.h", "feature/corners.h"),
+        ("lib/src/base/arena.h", "twoview/image.h"),
+        ("lib/src/match/match.cc", "geometry/camera.h"),
+        ("lib/src/match/match.cc", "Eigen/Core"),
+        ("lib/src/match/match.cc", "vector"),
+        ("lib/src/geometry/camera.h", "twoview/image.h"),
+        ("lib/src/geometry/camera.h", "twoview/two_view.h"),
+        ("lib/src/image/pyramid.h", "../base/arena.h"),
+        ("lib/src/engine/x.cc", "cmath"),
+        ("lib/include/twoview/image.h", "Eigen/Core"),
+        ("tools/twoview/main.cc", "base/arena.h"),
+    ]:
+        bad = {file: list(headers) for file, headers in good.items()}
+        bad.setdefault(name, []).append(header)
+        assert list(offences(bad)), f"the check misses {name} including {header}"
+
+
+def main():
+    self_check()
+    files = read_includes(Path(sys.argv[1]))
+    if not any(name.startswith("lib/src/") for name in files):
+        sys.exit(f"no sources under {sys.argv[1]}/lib/src")
+    found = list(offences(files))
+    for offence in found:
+        print(offence)
+    print(f"{len(files)} files, {len(found)} offences")
+    sys.exit(1 if found else 0)
+
+
+main()

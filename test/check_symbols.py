@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""What the built library needs and gives: no heap, no printing, no libstdc++; libc and libm alone at
+run time; and nothing exported but tv_*. usage: check_symbols.py --nm NM --readelf READELF SO ARCHIVE"""
+import argparse
+import re
+import subprocess
+import sys
+
+# All that the library may ask of others. A new name here is a decision: say why.
+ALLOWED = {
+    "memcpy", "memmove", "memset", "memcmp",  # the compiler writes these calls itself
+    "sqrt", "sqrtf",  # exact by IEEE 754, so the same everywhere; the only libm functions
+    "__cpu_model", "__cpu_indicator_init",  # libgcc's, for the choice of kernels on x86
+    "__stack_chk_fail", "__stack_chk_guard",  # where the compiler guards the stack by default
+    "_GLOBAL_OFFSET_TABLE_",
+    "__aeabi_memcpy", "__aeabi_memmove", "__aeabi_memset", "__aeabi_memclr",  # ARM's names
+}
+# Weak references that every shared object has, from the compiler's start files.
+STARTUP = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable",
+           "_ITM_registerTMCloneTable", "__deregister_frame_info", "__register_frame_info"}
+NEEDED = re.compile(r"^(libc|libm|ld-linux[\w-]*)\.so\.\d+$")
+
+
+def run(*command):
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+def names(nm_output):
+    """Symbol names of `nm --format=posix`, without version suffixes."""
+    return {line.split()[0].split("@")[0] for line in nm_output.splitlines()
+            if line.strip() and not line.endswith(":")}
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--nm", default="nm")
+    parser.add_argument("--readelf", default="readelf")
+    parser.add_argument("shared")
+    parser.add_argument("archive")
+    args = parser.parse_args()
+    nm = (args.nm, "--format=posix")
+    found = []
+
+    imported = names(run(*nm, "--dynamic", "--undefined-only", args.shared))
+    found += [f"{args.shared} needs {name}" for name in sorted(imported - ALLOWED - STARTUP)]
+    exported = names(run(*nm, "--dynamic", "--defined-only", args.shared))
+    found += [f"{args.shared} exports {name}" for name in sorted(exported)
+              if not name.startswith("tv_")]
+    if "tv_context_size" not in exported:
+        found.append(f"{args.shared} does not export tv_context_size")
+    needed = re.findall(r"\(NEEDED\).*\[(.*)\]", run(args.readelf, "-d", args.shared))
+    found += [f"{args.shared} loads {name}" for name in needed if not NEEDED.match(name)]
+
+    wanted = names(run(*nm, "--undefined-only", args.archive))
+    own = names(run(*nm, "--defined-only", "--extern-only", args.archive))
+    found += [f"{args.archive} needs {name}" for name in sorted(wanted - own - ALLOWED)]
+
+    for line in found:
+        print(line)
+    print(f"{len(exported)} functions exported; {len(imported)} symbols and {len(needed)} libraries"
+          f" needed; {len(found)} offences")
+    sys.exit(1 if found else 0)
+
+
+main()
