@@ -130,6 +130,7 @@ class Set:
         """resize: None is the tables' rule, 0 native, else the long side. max_pairs: that many,
         evenly spaced."""
         self.dir = set_dir
+        self.max_pairs = max_pairs
         self.name = os.path.basename(os.path.normpath(set_dir))
         self.pair_files = [os.path.join(set_dir, "pairs.txt")]
         flagged_file = os.path.join(set_dir, "pairs_flagged.txt")

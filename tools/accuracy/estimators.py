@@ -72,15 +72,22 @@ def _poselib(matches, order, threshold_px, seed):
     return np.array(pose.R), np.array(pose.t), int(info["num_inliers"])
 
 
-def _pycolmap_cameras(matches):
+def pycolmap_module():
+    """pycolmap, told to log warnings and errors only."""
     import pycolmap
+    pycolmap.logging.minloglevel = 1
+    return pycolmap
+
+
+def _pycolmap_cameras(matches):
+    pycolmap = pycolmap_module()
     return [pycolmap.Camera(model="PINHOLE", width=w, height=h,
                             params=[K[0, 0], K[1, 1], K[0, 2] + 0.5, K[1, 2] + 0.5])
             for (K, _), (w, h) in zip(matches.cameras, matches.sizes)]
 
 
 def _pycolmap_essential(matches, order, threshold_px, seed):
-    import pycolmap
+    pycolmap = pycolmap_module()
     points0, points1 = (p + 0.5 for p in matches.pinhole_pixels(order))
     options = pycolmap.RANSACOptions()
     options.max_error, options.random_seed = threshold_px, seed
@@ -93,7 +100,7 @@ def _pycolmap_essential(matches, order, threshold_px, seed):
 
 
 def _pycolmap_calibrated(matches, order, threshold_px, seed):
-    import pycolmap
+    pycolmap = pycolmap_module()
     points0, points1 = (p + 0.5 for p in matches.pinhole_pixels(order))
     options = pycolmap.TwoViewGeometryOptions()
     options.compute_relative_pose = True

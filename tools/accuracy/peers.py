@@ -161,8 +161,7 @@ def extract(gray, config):
 def _extract_pycolmap(gray):
     """COLMAP's own SIFT (RootSIFT by default); its origin is the pixel's corner. The descriptors
     stay COLMAP's objects, for its matcher."""
-    import pycolmap
-    pycolmap.logging.minloglevel = pycolmap.logging.WARNING.value
+    pycolmap = estimators.pycolmap_module()
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads, options.use_gpu = 1, False
     options.sift.max_num_features = CAP
@@ -191,8 +190,7 @@ def match(descriptors0, descriptors1, ratio=RATIO):
 
 def _match_pycolmap(features0, features1):
     """COLMAP's matcher with its defaults (ratio 0.8, distance 0.7, mutual)."""
-    import pycolmap
-    pycolmap.logging.minloglevel = pycolmap.logging.WARNING.value
+    pycolmap = estimators.pycolmap_module()
     options = pycolmap.FeatureMatchingOptions()
     options.num_threads, options.use_gpu = 1, False
     matcher = pycolmap.FeatureMatcher.create(options, pycolmap.Device.cpu)

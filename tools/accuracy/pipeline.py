@@ -11,7 +11,8 @@ import metrics
 import twoview_ctypes
 
 
-def _context(library, data, feature_options):
+def make_context(library, data, feature_options=None):
+    """A context that holds the set's images and features."""
     width, height = data.max_size()
     limits = {"max_width": width, "max_height": height}
     cap = library.feature_options(feature_options).max_keypoints
@@ -103,7 +104,7 @@ def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_o
             most = max([len(m) for m, _ in matched] + [1])
             context = twoview_ctypes.Context(library, max_width=64, max_height=64, max_matches=most)
     else:
-        context = _context(library, data, feature_options)
+        context = make_context(library, data, feature_options)
         matched = match_pairs(context, data, feature_options, match_options)
         if save:
             with open(save, "wb") as f:
