@@ -8,11 +8,14 @@ if(TWOVIEW_SANITIZE)
   set(TWOVIEW_TEST_PREFIX "asan/")
 endif()
 
-# tv_register_test(name LABEL label COMMAND command...)
+# tv_register_test(name LABEL label COMMAND command... [DIRECTORY working_directory])
 function(tv_register_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "COMMAND")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL;DIRECTORY" "COMMAND")
+  if(NOT arg_DIRECTORY)
+    set(arg_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+  endif()
   set(test ${TWOVIEW_TEST_PREFIX}${arg_LABEL}/${name})
-  add_test(NAME ${test} COMMAND ${arg_COMMAND} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+  add_test(NAME ${test} COMMAND ${arg_COMMAND} WORKING_DIRECTORY ${arg_DIRECTORY})
   set_tests_properties(${test} PROPERTIES
     LABELS ${arg_LABEL}
     SKIP_RETURN_CODE ${TWOVIEW_SKIP_CODE}
