@@ -47,17 +47,19 @@ Octaves octaves_for(tv_context* context, const tv_image& image, const tv_keypoin
   return make_octaves(*context->kernels, image, range.first, range.last, context->arena);
 }
 
-// Writes as many as fit; returns how many there are.
+// Writes as many as fit; returns how many there are, with at most max_seconds second orientations:
+// the first keypoints have the first claim on them.
 int32_t orient_keypoints(const tv_context& context, const Octaves& octaves, int32_t orientation,
-                         const tv_keypoint* keypoints, int32_t count, tv_keypoint* oriented,
-                         int32_t capacity) {
-  int32_t total = 0;
+                         const tv_keypoint* keypoints, int32_t count, int32_t max_seconds,
+                         tv_keypoint* oriented, int32_t capacity) {
+  int32_t total = 0, seconds = 0;
   for (int32_t k = 0; k < count; ++k) {
     float angles_rad[2] = {0.0f, 0.0f};
-    const int32_t peaks =
-        orientation == TV_ORIENTATION_GRADIENT
-            ? dominant_angles(*context.kernels, octaves, keypoints[k], angles_rad)
-            : 1;
+    int32_t peaks = 1;
+    if (orientation == TV_ORIENTATION_GRADIENT) {
+      peaks = dominant_angles(*context.kernels, octaves, keypoints[k], angles_rad);
+    }
+    if (peaks == 2 && ++seconds > max_seconds) peaks = 1;
     for (int32_t p = 0; p < peaks; ++p, ++total) {
       if (total >= capacity) continue;
       oriented[total] = keypoints[k];
@@ -77,7 +79,7 @@ void tv_feature_options_init(tv_feature_options* options) {
   *options = tv_feature_options{};
   options->struct_size = sizeof(tv_feature_options);
   options->max_keypoints = 2048;
-  options->arc = 9;
+  options->arc = 12;
   options->threshold = 10;
   options->min_threshold = 5;
   options->levels = 1;
@@ -86,7 +88,7 @@ void tv_feature_options_init(tv_feature_options* options) {
   options->subpixel = 1;
   options->orientation = TV_ORIENTATION_GRADIENT;
   options->descriptor = TV_DESCRIPTOR_ROOTSIFT;
-  options->keypoint_size = 5.0f;
+  options->keypoint_size = 4.0f;
 }
 
 tv_status tv_detect(tv_context* context, const tv_image* image, const tv_image* mask,
@@ -128,11 +130,11 @@ tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
   const int32_t orientation = request.options.orientation;
   const int32_t total = tv::orient_keypoints(*context, octaves, orientation, keypoints,
-                                             num_keypoints, nullptr, 0);
+                                             num_keypoints, num_keypoints, nullptr, 0);
   *num_oriented = total;
   if (total > cap_oriented) return TV_ERR_CAPACITY;
-  tv::orient_keypoints(*context, octaves, orientation, keypoints, num_keypoints, oriented,
-                       cap_oriented);
+  tv::orient_keypoints(*context, octaves, orientation, keypoints, num_keypoints, num_keypoints,
+                       oriented, cap_oriented);
   return TV_OK;
 }
 
@@ -182,9 +184,9 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
   tv_keypoint* oriented =
       tv::arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(o.max_keypoints));
-  const int32_t total = tv::orient_keypoints(*context, octaves, o.orientation, corners,
-                                             num_corners, oriented, o.max_keypoints);
-  const int32_t count = std::min(total, o.max_keypoints);
+  const int32_t count = tv::orient_keypoints(*context, octaves, o.orientation, corners, num_corners,
+                                             o.max_keypoints - num_corners, oriented,
+                                             o.max_keypoints);
   *num_keypoints = count;
   if (count > cap_keypoints) return TV_ERR_CAPACITY;
   std::copy(oriented, oriented + count, keypoints);

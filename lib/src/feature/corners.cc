@@ -131,7 +131,7 @@ bool is_better(const tv_keypoint& a, const tv_keypoint& b) {
 tv_keypoint make_keypoint(const Corner& corner, const Level& level, int32_t index,
                           const tv_feature_options& options) {
   double x = corner.x, y = corner.y;
-  if (options.subpixel != 0) refine_corner(level, corner.x, corner.y, &x, &y);
+  if (options.subpixel != 0) refine_corner(level, options.arc, corner.x, corner.y, &x, &y);
   tv_keypoint keypoint;
   keypoint.x = static_cast<float>(to_full(level, x));
   keypoint.y = static_cast<float>(to_full(level, y));

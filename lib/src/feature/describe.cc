@@ -8,6 +8,9 @@ namespace {
 // A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma) and holds four samples.
 constexpr double kStepPerSize = 1.5 / 4.0;
 
+// Samples lie one to two pixels apart: closer would blur, wider would alias (docs/decisions/0003).
+constexpr double kMaxStep = 2.0;
+
 // A second direction counts from this share of the highest peak on (Lowe, section 5).
 constexpr double kSecondPeak = 0.8;
 
@@ -76,7 +79,7 @@ float peak_angle(const int64_t* smooth, int32_t bin) {
 int32_t octave_of(float keypoint_size) {
   double step = keypoint_size * kStepPerSize;
   int32_t octave = 0;
-  while (step >= 1.4142135623730951 && octave + 1 < kMaxOctaves) {
+  while (step >= kMaxStep && octave + 1 < kMaxOctaves) {
     step *= 0.5;
     ++octave;
   }

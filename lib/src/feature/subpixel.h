@@ -5,10 +5,10 @@
 
 namespace tv {
 
-// The point that the gradients around pixel (x, y) are most nearly perpendicular to (W. Foerstner,
-// E. Guelch, "A fast operator for detection and precise location of distinct points", 1987). The
-// pixel itself where the gradients do not settle it, or where it would move by more than a pixel and
-// a half.
-void refine_corner(const Level& level, int32_t x, int32_t y, double* refined_x, double* refined_y);
+// The top of the quadratic that fits the segment test's contrast (the score before the threshold) at
+// pixel (x, y) and its eight neighbours best, by least squares. The pixel itself where the fit has
+// no top within 0.75 pixel of it, or where a circle would leave the image.
+void refine_corner(const Level& level, int32_t arc, int32_t x, int32_t y, double* refined_x,
+                   double* refined_y);
 
 }  // namespace tv

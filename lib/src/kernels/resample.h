@@ -54,30 +54,48 @@ static inline int32_t clamp_i32(int32_t value, int32_t low, int32_t high) {
   return value < low ? low : value > high ? high : value;
 }
 
-/* One bilinear sample, position in 1/65536 pixel inside the image; value in 1/16 grey level. The
-   right and lower neighbours of the last column and row are themselves. */
-static inline int16_t sample_bilinear(const uint8_t *image, int64_t stride, int32_t width,
-                                      int32_t height, int32_t x, int32_t y) {
-  const int32_t ix = x >> 16, iy = y >> 16;
-  const int32_t fx = (x >> 8) & 255, fy = (y >> 8) & 255;
+/* Bilinear value, in 1/16 grey level, between four pixels; fx, fy in 1/256. */
+static inline int16_t bilinear(int32_t a, int32_t b, int32_t c, int32_t d, int32_t fx, int32_t fy) {
+  const int32_t upper = 256 * a + fx * (b - a);
+  const int32_t lower = 256 * c + fx * (d - c);
+  return (int16_t)((256 * upper + fy * (lower - upper) + 2048) >> 12);
+}
+
+/* Position clamped to the image; the neighbours of the last column and row are themselves. */
+static int16_t sample_clamped(const uint8_t *image, int64_t stride, int32_t width, int32_t height,
+                              int32_t x, int32_t y) {
+  const int32_t sx = clamp_i32(x, 0, (width - 1) << 16), sy = clamp_i32(y, 0, (height - 1) << 16);
+  const int32_t ix = sx >> 16, iy = sy >> 16;
   const uint8_t *top = image + (int64_t)iy * stride + ix;
   const uint8_t *bottom = top + (iy + 1 < height ? stride : 0);
   const int32_t right = ix + 1 < width ? 1 : 0;
-  const int32_t upper = 256 * top[0] + fx * (top[right] - top[0]);
-  const int32_t lower = 256 * bottom[0] + fx * (bottom[right] - bottom[0]);
-  return (int16_t)((256 * upper + fy * (lower - upper) + 2048) >> 12);
+  return bilinear(top[0], top[right], bottom[0], bottom[right], (sx >> 8) & 255, (sy >> 8) & 255);
+}
+
+static int is_inside(int32_t x, int32_t y, int32_t width, int32_t height) {
+  return x >= 0 && y >= 0 && x < (width - 1) << 16 && y < (height - 1) << 16;
 }
 
 static void sample_patch(const uint8_t *image, int64_t stride, int32_t width, int32_t height,
                          int32_t x, int32_t y, int32_t du_x, int32_t du_y, int32_t side,
                          int16_t *patch) {
-  const int32_t max_x = (width - 1) << 16, max_y = (height - 1) << 16;
+  const int32_t end = side - 1;
+  const int inside = is_inside(x, y, width, height) &&
+                     is_inside(x + end * du_x, y + end * du_y, width, height) &&
+                     is_inside(x - end * du_y, y + end * du_x, width, height) &&
+                     is_inside(x + end * (du_x - du_y), y + end * (du_y + du_x), width, height);
   int32_t i, j;
   for (j = 0; j < side; ++j) {
-    for (i = 0; i < side; ++i) {
-      const int32_t sx = clamp_i32(x + i * du_x - j * du_y, 0, max_x);
-      const int32_t sy = clamp_i32(y + i * du_y + j * du_x, 0, max_y);
-      patch[j * side + i] = sample_bilinear(image, stride, width, height, sx, sy);
+    int32_t sx = x - j * du_y, sy = y + j * du_x;
+    int16_t *row = patch + j * side;
+    for (i = 0; i < side; ++i, sx += du_x, sy += du_y) {
+      if (inside) {
+        const uint8_t *top = image + (int64_t)(sy >> 16) * stride + (sx >> 16);
+        const uint8_t *bottom = top + stride;
+        row[i] = bilinear(top[0], top[1], bottom[0], bottom[1], (sx >> 8) & 255, (sy >> 8) & 255);
+      } else {
+        row[i] = sample_clamped(image, stride, width, height, sx, sy);
+      }
     }
   }
 }
