@@ -22,18 +22,22 @@ def make_K(fx, cx):
 class TestResize(unittest.TestCase):
     def test_keeps_pixel_centres_where_they_are(self):
         # Halving: the centre between pixels 0 and 1 of a row is the new pixel 0.
-        K = datasets.scale_K(np.array([[500.0, 0, 0.5], [0, 400, 239.5], [0, 0, 1]]), 0.5)
+        K = datasets.scale_K(np.array([[500.0, 0, 0.5], [0, 400, 239.5], [0, 0, 1]]), 0.5, 0.5)
         self.assertAlmostEqual(K[0, 0], 250.0)
         self.assertAlmostEqual(K[1, 1], 200.0)
         self.assertAlmostEqual(K[0, 2], 0.0)
         self.assertAlmostEqual(K[1, 2], 119.5)
         self.assertEqual(K[2, 2], 1.0)
 
+    def test_follows_each_axis(self):
+        K = datasets.scale_K(np.array([[500.0, 0, 99.5], [0, 500, 99.5], [0, 0, 1]]), 0.5, 0.25)
+        np.testing.assert_allclose(K, [[250.0, 0, 49.5], [0, 125, 24.5], [0, 0, 1]])
+
     def test_never_scales_up(self):
-        self.assertEqual(datasets.scale_of(320, 240, 640), 1.0)
-        self.assertEqual(datasets.scale_of(1536, 1024, 640), 640 / 1536)
-        self.assertEqual(datasets.scale_of(1024, 1536, 640), 640 / 1536)
-        self.assertEqual(datasets.scale_of(1536, 1024, 0), 1.0)
+        self.assertEqual(datasets.resized_shape(320, 240, 640), (320, 240))
+        self.assertEqual(datasets.resized_shape(1536, 1024, 640), (640, 427))
+        self.assertEqual(datasets.resized_shape(1024, 1536, 640), (427, 640))
+        self.assertEqual(datasets.resized_shape(1536, 1024, 0), (1536, 1024))
 
     def test_leaves_kitti_alone_and_shrinks_strecha_and_bicycle(self):
         self.assertEqual(datasets.default_resize(1241), 0)

@@ -77,15 +77,20 @@ def distortion_of(entry):
     return [float(entry.get(k, 0)) for k in ("k1", "k2", "p1", "p2", "k3")] if entry else [0.0] * 5
 
 
-def scale_of(width, height, resize):
-    """Factor that brings the long side to `resize`; never above 1; 0 or None leaves the image."""
-    return min(1.0, resize / max(width, height)) if resize else 1.0
+def resized_shape(width, height, resize):
+    """(width, height) with the long side brought down to `resize`, never up; 0 or None leaves it."""
+    longer = max(width, height)
+    if not resize or longer <= resize:
+        return width, height
+    return tuple(max(1, int(side * resize / longer + 0.5)) for side in (width, height))
 
 
-def scale_K(K, scale):
-    """K of an image scaled by `scale`; pixel (0,0) is a pixel's centre."""
+def scale_K(K, scale_x, scale_y):
+    """K of a resized image; pixel (0,0) is a pixel's centre. The two factors differ a little where
+    the shorter side was rounded."""
+    scale = np.array([scale_x, scale_y])
     scaled = np.array(K, float)
-    scaled[:2] *= scale
+    scaled[:2] *= scale[:, None]
     scaled[:2, 2] = scale * (K[:2, 2] + 0.5) - 0.5
     return scaled
 
@@ -157,15 +162,16 @@ class Set:
 
     @functools.lru_cache(maxsize=None)
     def gray(self, name):
-        """(8-bit luma, scale)"""
+        """(8-bit luma, scale in x, scale in y)"""
         import cv2
         image = cv2.imread(self.path(name), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise FileNotFoundError(self.path(name))
-        scale = scale_of(image.shape[1], image.shape[0], self.resize)
-        if scale < 1.0:  # sampled at exactly `scale`, which rounding the size alone would not do
-            image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-        return np.ascontiguousarray(image), scale
+        height, width = image.shape
+        size = resized_shape(width, height, self.resize)
+        if size != (width, height):
+            image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        return np.ascontiguousarray(image), size[0] / width, size[1] / height
 
     @functools.lru_cache(maxsize=None)
     def file_hash(self, name):
@@ -176,7 +182,7 @@ class Set:
         """(K at the images' scale, distortion) of image `side` of a pair."""
         name, K = ((pair.name0, pair.K0), (pair.name1, pair.K1))[side]
         entry = choose_camera(self.cameras, name, K)
-        return scale_K(K, self.gray(name)[1]), distortion_of(entry)
+        return scale_K(K, *self.gray(name)[1:]), distortion_of(entry)
 
     def max_size(self):
         """(width, height) that holds every image of the pairs."""
