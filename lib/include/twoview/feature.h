@@ -31,24 +31,29 @@ typedef enum tv_descriptor {
   TV_DESCRIPTOR_ROOTSIFT = 1 /* square root of the unit-L1 descriptor x 512, saturated */
 } tv_descriptor;
 
-/* Filled by tv_feature_options_init. The defaults are those of the accuracy and speed tables. */
+/* Filled by tv_feature_options_init. The defaults serve the demo, the accuracy and the speed tables;
+   docs/decisions/0001-features.md has the measurements behind them. */
 typedef struct tv_feature_options {
   uint32_t struct_size;  /* set by tv_feature_options_init */
-  int32_t max_keypoints; /* a bound on descriptors an image, second orientations included;
-                            [1, the context's max_keypoints], default 2048 */
-  int32_t arc;           /* contiguous pixels of the 16-pixel circle: 9, 10, 11 or 12 */
-  int32_t threshold;     /* grey levels, [1, 254]; a bigger value gives fewer, stronger corners */
-  int32_t min_threshold; /* 0: threshold is fixed. Else [1, threshold]: the threshold falls as far
-                            as this until max_keypoints corners are found */
-  int32_t levels;        /* pyramid levels, [1, 8] */
-  float scale_factor;    /* between levels, [1.1, 2] */
-  int32_t cell_px;       /* side of the grid cell, in pixels of each level, in which corners are
-                            budgeted so that they spread; [8, 16384], 0: no grid */
-  int32_t subpixel;      /* 1: refine the corner's position below a pixel; 0: integer positions */
-  int32_t orientation;   /* a tv_orientation */
-  int32_t descriptor;    /* a tv_descriptor */
-  float keypoint_size;   /* tv_keypoint.size of a corner on level 0, in pixels, [1, 32]; larger sees
-                            more of the surroundings: more distinctive, less local */
+  int32_t max_keypoints; /* a bound on descriptors an image, second orientations included, which get
+                            the room that corners leave; [1, the context's], default 2048 */
+  int32_t arc;           /* contiguous pixels of the 16-pixel circle: 9, 10, 11 or 12 (default, the
+                            paper's); a longer arc gives fewer, sharper corners */
+  int32_t threshold;     /* grey levels, [1, 254], default 10; a bigger value gives fewer, stronger
+                            corners */
+  int32_t min_threshold; /* 0: threshold is fixed. Else [1, threshold], default 3: the threshold falls
+                            as far as this until max_keypoints corners are found */
+  int32_t levels;        /* pyramid levels, [1, 8], default 1; more bridge changes of scale and cost
+                            precision, for coarse corners take their place in max_keypoints */
+  float scale_factor;    /* between levels, [1.1, 2], default 2 */
+  int32_t cell_px;       /* 0 (default): the best corners, wherever they are. Else [8, 16384]: side of
+                            the grid cell, in pixels of each level, in which corners are budgeted so
+                            that they spread */
+  int32_t subpixel;      /* 1 (default): refine the corner's position below a pixel; 0: integers */
+  int32_t orientation;   /* a tv_orientation, default gradient */
+  int32_t descriptor;    /* a tv_descriptor, default RootSIFT */
+  float keypoint_size;   /* tv_keypoint.size of a corner on level 0, in pixels, [1, 32], default 4;
+                            larger sees more of the surroundings: more distinctive, less local */
 } tv_feature_options;
 
 TV_API void tv_feature_options_init(tv_feature_options *options);

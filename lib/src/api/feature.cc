@@ -81,7 +81,7 @@ void tv_feature_options_init(tv_feature_options* options) {
   options->max_keypoints = 2048;
   options->arc = 12;
   options->threshold = 10;
-  options->min_threshold = 5;
+  options->min_threshold = 3;
   options->levels = 1;
   options->scale_factor = 2.0f;
   options->cell_px = 0;
