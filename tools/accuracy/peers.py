@@ -29,6 +29,7 @@ _FAST = {"front": "fast", "threshold": 10, "size": 5, "orientation": "upright", 
 GROUPS = {
     "fast": [
         {**_FAST, "estimator": "magsac"},
+        {**_FAST, "size": 4, "estimator": "magsac"},
         {**_FAST, "orientation": "gradient", "estimator": "magsac"},
         {**_FAST, "threshold": 5, "orientation": "gradient", "grid": 64, "estimator": "magsac"},
     ],
