@@ -18,130 +18,130 @@ if np is not None:
     import estimators
     import metrics
     import peers
-    
-    
-    def texture(seed, size=160):
-        noise = np.random.default_rng(seed).uniform(0, 255, (size, size)).astype(np.float32)
-        return cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 2.0), None, 0, 255,
-                             cv2.NORM_MINMAX).astype(np.uint8)
-    
-    
-    class TestFrontEnd(unittest.TestCase):
-        def test_orientation_runs_clockwise_from_x(self):
-            ramp = np.tile(np.arange(64, dtype=np.uint8) * 3, (64, 1))  # brighter to the right
-            for turns, degrees in ((0, 0), (1, 270), (2, 180), (3, 90)):
-                gray = np.ascontiguousarray(np.rot90(ramp, turns))
-                (_, found), = peers.orientations(gray, np.array([[32.0, 32.0]]), 5)
-                self.assertAlmostEqual(abs((found - degrees + 180) % 360 - 180), 0.0, delta=0.5)
-    
-        def test_an_oriented_descriptor_survives_a_quarter_turn_and_an_upright_one_does_not(self):
-            gray = texture(11)
-            turned = np.ascontiguousarray(np.rot90(gray))  # (x, y) moves to (y, width - 1 - x)
-            shares = {}
-            for orientation in ("upright", "gradient"):
-                config = {**peers.GROUPS["fast"][0], "orientation": orientation}
-                (p0, d0), (p1, d1) = (peers.extract(g, config) for g in (gray, turned))
-                i0, i1, _ = peers.match(d0, d1)
-                where = np.column_stack([p0[i0, 1], gray.shape[1] - 1 - p0[i0, 0]])
-                right = np.hypot(*(p1[i1] - where).T) < 1.5
-                shares[orientation] = np.count_nonzero(right) / len(p0)
-            self.assertGreater(shares["gradient"], 0.4)
-            self.assertLess(shares["upright"], 0.02)
-    
-        def test_keeps_the_cap_and_the_strongest(self):
-            points = np.array([[x, y] for y in range(0, 100) for x in range(0, 100)], float)
-            scores = np.random.default_rng(2).permutation(len(points)).astype(float)
-            kept = peers._strongest(points, scores, 0, (100, 100))
-            self.assertEqual(len(kept), peers.CAP)
-            self.assertEqual(set(scores[kept]), set(range(len(points) - peers.CAP, len(points))))
-    
-        def test_a_grid_spreads_what_is_kept(self):
-            points = np.array([[x, y] for y in range(0, 128) for x in range(0, 128)], float)
-            scores = np.where(points[:, 0] < 64, 100.0, 1.0)  # the left half is stronger
-            share = lambda grid: np.mean(
-                points[peers._strongest(points, scores, grid, (128, 128))][:, 0] < 64)
-            self.assertEqual(share(0), 1.0)
-            self.assertEqual(share(64), 0.5)
-    
-        def test_matching_is_mutual_and_obeys_the_ratio(self):
-            random = np.random.default_rng(3)
-            d0 = random.integers(0, 20, (40, 128)).astype(np.float32)
-            d1 = np.concatenate([d0[:10] + 1, random.integers(0, 20, (30, 128))]).astype(np.float32)
-            d1 = np.concatenate([d1, d1[:1]])  # a second copy: the first is ambiguous
-            i0, i1, ratios = peers.match(d0, d1)
-            self.assertEqual(list(i0), list(range(1, 10)))
-            self.assertEqual(list(i1), list(range(1, 10)))
-            self.assertTrue((ratios < peers.RATIO).all())
-    
-    
-    class TestEstimators(unittest.TestCase):
-        def test_every_installed_peer_finds_an_exact_pose_through_two_lenses(self):
-            random = np.random.default_rng(4)
-            points = random.uniform([-2, -1.5, 4], [2, 1.5, 8], (300, 3))
-            R, _ = cv2.Rodrigues(np.array([0.05, -0.1, 0.02]))
-            t = np.array([-0.8, 0.1, 0.2])
-            cameras = ((np.array([[500.0, 0, 320], [0, 505, 240], [0, 0, 1]]),
-                        [-0.1, 0.02, 0.001, -0.002, 0.0]),
-                       (np.array([[450.0, 0, 300], [0, 452, 250], [0, 0, 1]]),
-                        [-0.2, 0.05, 0.0, 0.001, 0.0]))
-            zero = np.zeros(3)
-            pixels0 = cv2.projectPoints(points, zero, zero, cameras[0][0],
-                                        np.array(cameras[0][1]))[0].reshape(-1, 2)
-            pixels1 = cv2.projectPoints(points, cv2.Rodrigues(R)[0], t, cameras[1][0],
-                                        np.array(cameras[1][1]))[0].reshape(-1, 2)
-            pixels1[::5] = random.uniform([0, 0], [640, 480], (60, 2))
-            matches = estimators.Matches(pixels0, pixels1, cameras, ((640, 480), (640, 480)))
-            ran = 0
-            for kind, (name, module, _) in estimators.PEERS.items():
-                try:
-                    estimators.module_version(module)
-                except ImportError:
-                    continue
-                found = estimators.run_peer(kind, matches, 1.0, 1)
-                self.assertIsNotNone(found, name)
-                error = metrics.pose_error(found[0], found[1], R, t)
-                self.assertLess(error["pose_error_deg"], 0.1, name)
-                self.assertLess(error["translation_error_signed_deg"], 0.1, name)
-                self.assertGreaterEqual(found[2], 235, name)
-                ran += 1
-            self.assertGreaterEqual(ran, 3)
-    
-        def test_too_few_matches_is_a_failure(self):
-            cameras = ((np.diag([500.0, 500, 1]), [0.0] * 5),) * 2
-            matches = estimators.Matches(np.zeros((4, 2)), np.zeros((4, 2)), cameras,
-                                         ((640, 480),) * 2)
-            self.assertIsNone(estimators.run_peer("magsac", matches))
-    
-    
-    class TestCache(unittest.TestCase):
-        def test_a_second_run_reads_what_the_first_wrote(self):
-            with tempfile.TemporaryDirectory() as folder:
-                images = os.path.join(folder, "images")
-                os.mkdir(images)
-                gray = texture(5)
-                cv2.imwrite(os.path.join(images, "a.png"), gray)
-                cv2.imwrite(os.path.join(images, "b.png"), np.roll(gray, 4, axis=1))
-                K = "200 0 80 0 200 80 0 0 1"
-                with open(os.path.join(folder, "pairs.txt"), "w", encoding="utf-8") as f:
-                    f.write(f"a.png b.png 0 0 {K} {K} 1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1\n")
-                kept, peers.CACHE_DIR = peers.CACHE_DIR, os.path.join(folder, "cache")
-                self.addCleanup(setattr, peers, "CACHE_DIR", kept)
-                peer = peers.Peer(peers.GROUPS["fast"][0], num_seeds=2)
-                first = peer.run(datasets.Set(folder))
-                self.assertEqual(len(first), 2)
-                original = peers.extract
-                self.addCleanup(setattr, peers, "extract", original)
-                peers.extract = None  # a call would fail
-                self.assertEqual(peer.run(datasets.Set(folder)), first)
-                cv2.imwrite(os.path.join(images, "b.png"), np.roll(gray, 5, axis=1))
-                with self.assertRaises(TypeError):  # another image: not from the cache
-                    peer.run(datasets.Set(folder))
-    
-    
-    if __name__ == "__main__":
-        unittest.main()
 
 
 def setUpModule():
     if np is None:
         raise unittest.SkipTest("no numpy or cv2: run scripts/bootstrap test")
+
+
+def texture(seed, size=160):
+    noise = np.random.default_rng(seed).uniform(0, 255, (size, size)).astype(np.float32)
+    return cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 2.0), None, 0, 255,
+                         cv2.NORM_MINMAX).astype(np.uint8)
+
+
+class TestFrontEnd(unittest.TestCase):
+    def test_orientation_runs_clockwise_from_x(self):
+        ramp = np.tile(np.arange(64, dtype=np.uint8) * 3, (64, 1))  # brighter to the right
+        for turns, degrees in ((0, 0), (1, 270), (2, 180), (3, 90)):
+            gray = np.ascontiguousarray(np.rot90(ramp, turns))
+            (_, found), = peers.orientations(gray, np.array([[32.0, 32.0]]), 5)
+            self.assertAlmostEqual(abs((found - degrees + 180) % 360 - 180), 0.0, delta=0.5)
+
+    def test_an_oriented_descriptor_survives_a_quarter_turn_and_an_upright_one_does_not(self):
+        gray = texture(11)
+        turned = np.ascontiguousarray(np.rot90(gray))  # (x, y) moves to (y, width - 1 - x)
+        shares = {}
+        for orientation in ("upright", "gradient"):
+            config = {**peers.GROUPS["fast"][0], "orientation": orientation}
+            (p0, d0), (p1, d1) = (peers.extract(g, config) for g in (gray, turned))
+            i0, i1, _ = peers.match(d0, d1)
+            where = np.column_stack([p0[i0, 1], gray.shape[1] - 1 - p0[i0, 0]])
+            right = np.hypot(*(p1[i1] - where).T) < 1.5
+            shares[orientation] = np.count_nonzero(right) / len(p0)
+        self.assertGreater(shares["gradient"], 0.4)
+        self.assertLess(shares["upright"], 0.02)
+
+    def test_keeps_the_cap_and_the_strongest(self):
+        points = np.array([[x, y] for y in range(0, 100) for x in range(0, 100)], float)
+        scores = np.random.default_rng(2).permutation(len(points)).astype(float)
+        kept = peers._strongest(points, scores, 0, (100, 100))
+        self.assertEqual(len(kept), peers.CAP)
+        self.assertEqual(set(scores[kept]), set(range(len(points) - peers.CAP, len(points))))
+
+    def test_a_grid_spreads_what_is_kept(self):
+        points = np.array([[x, y] for y in range(0, 128) for x in range(0, 128)], float)
+        scores = np.where(points[:, 0] < 64, 100.0, 1.0)  # the left half is stronger
+        share = lambda grid: np.mean(
+            points[peers._strongest(points, scores, grid, (128, 128))][:, 0] < 64)
+        self.assertEqual(share(0), 1.0)
+        self.assertEqual(share(64), 0.5)
+
+    def test_matching_is_mutual_and_obeys_the_ratio(self):
+        random = np.random.default_rng(3)
+        d0 = random.integers(0, 20, (40, 128)).astype(np.float32)
+        d1 = np.concatenate([d0[:10] + 1, random.integers(0, 20, (30, 128))]).astype(np.float32)
+        d1 = np.concatenate([d1, d1[:1]])  # a second copy: the first is ambiguous
+        i0, i1, ratios = peers.match(d0, d1)
+        self.assertEqual(list(i0), list(range(1, 10)))
+        self.assertEqual(list(i1), list(range(1, 10)))
+        self.assertTrue((ratios < peers.RATIO).all())
+
+
+class TestEstimators(unittest.TestCase):
+    def test_every_installed_peer_finds_an_exact_pose_through_two_lenses(self):
+        random = np.random.default_rng(4)
+        points = random.uniform([-2, -1.5, 4], [2, 1.5, 8], (300, 3))
+        R, _ = cv2.Rodrigues(np.array([0.05, -0.1, 0.02]))
+        t = np.array([-0.8, 0.1, 0.2])
+        cameras = ((np.array([[500.0, 0, 320], [0, 505, 240], [0, 0, 1]]),
+                    [-0.1, 0.02, 0.001, -0.002, 0.0]),
+                   (np.array([[450.0, 0, 300], [0, 452, 250], [0, 0, 1]]),
+                    [-0.2, 0.05, 0.0, 0.001, 0.0]))
+        zero = np.zeros(3)
+        pixels0 = cv2.projectPoints(points, zero, zero, cameras[0][0],
+                                    np.array(cameras[0][1]))[0].reshape(-1, 2)
+        pixels1 = cv2.projectPoints(points, cv2.Rodrigues(R)[0], t, cameras[1][0],
+                                    np.array(cameras[1][1]))[0].reshape(-1, 2)
+        pixels1[::5] = random.uniform([0, 0], [640, 480], (60, 2))
+        matches = estimators.Matches(pixels0, pixels1, cameras, ((640, 480), (640, 480)))
+        ran = 0
+        for kind, (name, module, _) in estimators.PEERS.items():
+            try:
+                estimators.module_version(module)
+            except ImportError:
+                continue
+            found = estimators.run_peer(kind, matches, 1.0, 1)
+            self.assertIsNotNone(found, name)
+            error = metrics.pose_error(found[0], found[1], R, t)
+            self.assertLess(error["pose_error_deg"], 0.1, name)
+            self.assertLess(error["translation_error_signed_deg"], 0.1, name)
+            self.assertGreaterEqual(found[2], 235, name)
+            ran += 1
+        self.assertGreaterEqual(ran, 3)
+
+    def test_too_few_matches_is_a_failure(self):
+        cameras = ((np.diag([500.0, 500, 1]), [0.0] * 5),) * 2
+        matches = estimators.Matches(np.zeros((4, 2)), np.zeros((4, 2)), cameras,
+                                     ((640, 480),) * 2)
+        self.assertIsNone(estimators.run_peer("magsac", matches))
+
+
+class TestCache(unittest.TestCase):
+    def test_a_second_run_reads_what_the_first_wrote(self):
+        with tempfile.TemporaryDirectory() as folder:
+            images = os.path.join(folder, "images")
+            os.mkdir(images)
+            gray = texture(5)
+            cv2.imwrite(os.path.join(images, "a.png"), gray)
+            cv2.imwrite(os.path.join(images, "b.png"), np.roll(gray, 4, axis=1))
+            K = "200 0 80 0 200 80 0 0 1"
+            with open(os.path.join(folder, "pairs.txt"), "w", encoding="utf-8") as f:
+                f.write(f"a.png b.png 0 0 {K} {K} 1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1\n")
+            kept, peers.CACHE_DIR = peers.CACHE_DIR, os.path.join(folder, "cache")
+            self.addCleanup(setattr, peers, "CACHE_DIR", kept)
+            peer = peers.Peer(peers.GROUPS["fast"][0], num_seeds=2)
+            first = peer.run(datasets.Set(folder))
+            self.assertEqual(len(first), 2)
+            original = peers.extract
+            self.addCleanup(setattr, peers, "extract", original)
+            peers.extract = None  # a call would fail
+            self.assertEqual(peer.run(datasets.Set(folder)), first)
+            cv2.imwrite(os.path.join(images, "b.png"), np.roll(gray, 5, axis=1))
+            with self.assertRaises(TypeError):  # another image: not from the cache
+                peer.run(datasets.Set(folder))
+
+
+if __name__ == "__main__":
+    unittest.main()
