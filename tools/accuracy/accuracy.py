@@ -279,8 +279,8 @@ def compare_pipelines(arguments, sets):
     names = [OURS] + [peer.name for peer in systems]
     mean = {n: mean_summary([summaries[d.name][n] for d in sets]) for n in names}
     print_table(f"mean over {len(sets)} sets", mean)
-    say("\nmatches: mean; ms: median of a pair, images in memory, one thread; fail: pairs without a "
-        f"pose.\nPeers: mean over {arguments.seeds} seeds that shuffle the matches; their gradient "
+    say("\nmatches: mean; ms: median of a pair, one thread; fail: pairs without a pose.\n"
+        f"Peers: mean over {arguments.seeds} seeds that shuffle the matches; their gradient "
         "orientation and\nmatching run in numpy, so their ms are no measure of OpenCV's speed: "
         "scripts/bench is.")
     sizes = {data.name: len(data.pairs) for data in sets}
@@ -322,8 +322,8 @@ def main():
     parser.add_argument("--no-cache", action="store_true",
                         help="run the peers again (.cache/accuracy keeps their results)")
     parser.add_argument("--check", action="store_true",
-                        help="exit status 1 when a mean is lower than a peer's or a set is worse by "
-                             "more than two standard errors")
+                        help="exit status 1 when a mean is lower than a peer's or a set is worse "
+                             "by more than two standard errors")
     parser.add_argument("--program", default=PROGRAM)
     parser.add_argument("--ours", choices=("program", "library"), default="program")
     parser.add_argument("--lib", help="libtwoview.so (default: of build/release)")

@@ -1,4 +1,4 @@
-"""The data sets: pairs, images, cameras; formats and rules as docs/ and `twoview evaluate` have them."""
+"""The data sets: pairs, images, cameras, as `twoview evaluate` reads them."""
 
 import functools
 import hashlib
@@ -9,8 +9,8 @@ import numpy as np
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 MAX_NATIVE_WIDTH = 1241  # wider images are scaled down
 RESIZE_LONG_SIDE = 640   # to this long side
-# In these two the ground truth of pairs_flagged.txt is exact (calibrated turn-tables): "flagged" only
-# says that plain SIFT could not confirm the pair.
+# In these two the truth of pairs_flagged.txt is a calibrated gantry's: "flagged" only says that plain
+# SIFT could not confirm the pair.
 FLAGGED_SETS = ("middlebury_dinoSR", "middlebury_templeSR")
 
 
@@ -78,7 +78,7 @@ def distortion_of(entry):
 
 
 def resized_shape(width, height, resize):
-    """(width, height) with the long side brought down to `resize`, never up; 0 or None leaves it."""
+    """(width, height) with the long side brought down to `resize`, never up; 0 or None: as is."""
     longer = max(width, height)
     if not resize or longer <= resize:
         return width, height

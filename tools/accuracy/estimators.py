@@ -1,7 +1,7 @@
 """Robust estimators behind one call: ours, OpenCV's USAC, PoseLib's and COLMAP's.
 
-Each peer gets undistorted pixels and pinhole cameras; ours gets the image's own pixels and the lens.
-OpenCV's takes one K, so the second view is mapped to the first K: pixels, because USAC_MAGSAC fed
+Each peer gets undistorted pixels and pinhole cameras; ours gets the image's own pixels and the
+lens. OpenCV's takes one K, so the second view is mapped to the first K: pixels, because USAC_MAGSAC fed
 normalised points is much worse.
 """
 
@@ -156,7 +156,7 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
 
 
 def run_twoview(context, matches, options=None, seed_step=0):
-    """(R or None, t or None, inliers, tv_two_view) of the library; seed_step is added to its seed."""
+    """(R or None, t or None, inliers, tv_two_view) of ours; seed_step is added to its seed."""
     import twoview_ctypes
     cameras = [twoview_ctypes.make_camera(K, *size, distortion)
                for (K, distortion), size in zip(matches.cameras, matches.sizes)]

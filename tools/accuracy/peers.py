@@ -1,9 +1,9 @@
 """Peers' front ends, and whole peer rows with their results kept in .cache/accuracy.
 
-OpenCV's FAST + SIFT is run as a user who knows it would: the cap's strongest corners, KeyPoint size 5
-(the default 7 loses 6 points of AUC5), plain SIFT, ratio 0.8 and mutual neighbours, pixel
-coordinates. OpenCV has no arc 12 and no public orientation: `gradient` is Lowe's histogram on SIFT's
-base level, in numpy here.
+OpenCV's FAST + SIFT is run as a user who knows it would: the cap's strongest corners, KeyPoint size
+5 (the default 7 loses 6 points of AUC5), plain SIFT, ratio 0.8 and mutual neighbours, pixel
+coordinates. OpenCV has no arc 12 and no public orientation: `gradient` is Lowe's histogram on
+SIFT's base level, in numpy here.
 """
 
 import hashlib
@@ -173,7 +173,7 @@ def _extract_pycolmap(gray):
 
 
 def match(descriptors0, descriptors1, ratio=RATIO):
-    """(idx0, idx1, ratio): nearest neighbours of each other that pass the ratio test from 0 to 1."""
+    """(idx0, idx1, ratio): each the other's nearest, ratio test from 0 to 1."""
     if len(descriptors0) < 2 or len(descriptors1) < 2:
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
     d0, d1 = descriptors0.astype(np.float32), descriptors1.astype(np.float32)

@@ -66,7 +66,7 @@ def main():
     parser.add_argument("--estimator", default="twoview")
     parser.add_argument("--lib", help="libtwoview.so (default: build/release/lib)")
     parser.add_argument("--max-pairs", type=int, help="of each set, evenly spaced")
-    parser.add_argument("--resize", type=int, help="long side; 0 native (default: the tables' rule)")
+    parser.add_argument("--resize", type=int, help="long side; 0 native (default: tables' rule)")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--flagged", action="store_true")
