@@ -128,10 +128,12 @@ bool is_better(const tv_keypoint& a, const tv_keypoint& b) {
   return a.x < b.x;
 }
 
-tv_keypoint make_keypoint(const Corner& corner, const Level& level, int32_t index,
-                          const tv_feature_options& options) {
+tv_keypoint make_keypoint(const tvk_table& kernels, const Corner& corner, const Level& level,
+                          int32_t index, const tv_feature_options& options) {
   double x = corner.x, y = corner.y;
-  if (options.subpixel != 0) refine_corner(level, options.arc, corner.x, corner.y, &x, &y);
+  if (options.subpixel != 0) {
+    refine_corner(kernels, level, options.arc, corner.x, corner.y, &x, &y);
+  }
   tv_keypoint keypoint;
   keypoint.x = static_cast<float>(to_full(level, x));
   keypoint.y = static_cast<float>(to_full(level, y));
@@ -186,7 +188,7 @@ int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_ima
   const int32_t kept = spread_over_grid(work.sorted, sorted, share, level, options.cell_px,
                                         work.cell_counts, work.candidates);
   for (int32_t k = 0; k < kept; ++k) {
-    keypoints[k] = make_keypoint(work.sorted[k], level, index, options);
+    keypoints[k] = make_keypoint(kernels, work.sorted[k], level, index, options);
   }
   return kept;
 }

@@ -82,6 +82,44 @@ static void fast_score_row(const uint8_t *const rows[7], int32_t width, int32_t 
   memcpy(scores + x, chunk_scores, (size_t)(end - x));
 }
 
+/* By how much the best arc around one pixel is brighter or darker than it; below 0 where none is. The
+   circle is laid out twice, so that runs need not wrap. */
+static int32_t fast_contrast(const uint8_t *centre, int64_t stride, int32_t arc) {
+  int16_t circle[32], low[32], high[32], low4[28], high4[28];
+  int32_t brighter = -255, darker = 255, i;
+  for (i = 0; i < 16; ++i) {
+    circle[i] = centre[(fast_circle_row[i] - 3) * stride + fast_circle_column[i]];
+  }
+  for (i = 0; i < 16; ++i) circle[i + 16] = circle[i];
+  for (i = 0; i < 31; ++i) {
+    low[i] = circle[i] < circle[i + 1] ? circle[i] : circle[i + 1];
+    high[i] = circle[i] > circle[i + 1] ? circle[i] : circle[i + 1];
+  }
+  for (i = 0; i < 28; ++i) {
+    low4[i] = low[i] < low[i + 2] ? low[i] : low[i + 2];
+    high4[i] = high[i] > high[i + 2] ? high[i] : high[i + 2];
+  }
+  for (i = 0; i < 16; ++i) {
+    const int16_t *l = low4 + i, *h = high4 + i;
+    int32_t lowest = l[0] < l[4] ? l[0] : l[4], highest = h[0] > h[4] ? h[0] : h[4];
+    lowest = lowest < l[arc - 4] ? lowest : l[arc - 4];
+    highest = highest > h[arc - 4] ? highest : h[arc - 4];
+    brighter = brighter > lowest ? brighter : lowest;
+    darker = darker < highest ? darker : highest;
+  }
+  brighter -= *centre;
+  darker = *centre - darker;
+  return brighter > darker ? brighter : darker;
+}
+
+static void fast_contrasts(const uint8_t *centre, int64_t stride, int32_t arc,
+                           int32_t *contrasts) {
+  int32_t i;
+  for (i = 0; i < 9; ++i) {
+    contrasts[i] = fast_contrast(centre + (i / 3 - 1) * stride + i % 3 - 1, stride, arc);
+  }
+}
+
 static int32_t suppress_row(const uint8_t *prev, const uint8_t *cur, const uint8_t *next,
                             int32_t width, uint16_t *xs) {
   int32_t count = 0, x;
