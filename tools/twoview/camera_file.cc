@@ -1,0 +1,181 @@
+#include "camera_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "error.h"
+#include "image_file.h"
+#include "output.h"
+#include "yaml_values.h"
+
+namespace cli {
+namespace {
+
+constexpr size_t kMaxFileBytes = 1 << 20;
+
+// A whole number of pixels that an image may have.
+int32_t side_at(const YAML::Node& map, const std::string& entry, const std::string& file) {
+  const double value = number_at(map, entry, file);
+  if (value == 0) throw BadInput(file + ": " + entry + " is 0");
+  if (value != std::floor(value) || value < 1 || value > 1e6)
+    throw BadInput(file + ": " + entry + " is not a number of pixels");
+  return static_cast<int32_t>(value);
+}
+
+void require_focal(double value, const std::string& entry, const std::string& file) {
+  if (value == 0) throw BadInput(file + ": " + entry + " is 0");
+  if (value < 0) throw BadInput(file + ": " + entry + " is negative");
+}
+
+void read_matrix(const YAML::Node& root, const std::string& file, tv_camera& camera) {
+  const std::vector<double> K = numbers_at(root, "camera_matrix", file);
+  if (K.size() != 9)
+    throw BadInput(file + ": camera_matrix has " + std::to_string(K.size()) + " numbers, not 9");
+  require_focal(K[0], "fx (camera_matrix[0])", file);
+  require_focal(K[4], "fy (camera_matrix[4])", file);
+  if (K[1] != 0) throw BadInput(file + ": camera_matrix[1] is not 0; skew is not supported");
+  if (K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
+    throw BadInput(file + ": camera_matrix is not [fx 0 cx; 0 fy cy; 0 0 1]");
+  camera.fx = K[0];
+  camera.cx = K[2];
+  camera.fy = K[4];
+  camera.cy = K[5];
+}
+
+void read_distortion(const YAML::Node& root, const std::string& file, tv_camera& camera) {
+  const YAML::Node model_node = root["distortion_model"];
+  std::string model = model_node && model_node.IsScalar() ? model_node.Scalar() : "";
+  const std::string known[] = {"", "plumb_bob", "rational_polynomial", "equidistant", "none"};
+  if (std::find(std::begin(known), std::end(known), model) == std::end(known))
+    throw BadInput(file + ": distortion_model '" + model +
+                   "' is not one of plumb_bob, rational_polynomial, equidistant");
+  const YAML::Node node = root["distortion_coefficients"];
+  if (!node || node.IsNull() || model == "none") {
+    if (model.empty() || model == "none") return;
+    throw BadInput(file + ": distortion_coefficients is missing");
+  }
+  const std::vector<double> k = numbers_at(root, "distortion_coefficients", file);
+  const bool equidistant = model == "equidistant";
+  const bool fits = equidistant ? k.size() == 4 : k.empty() || k.size() == 4 || k.size() == 5 || k.size() == 8;
+  if (!fits)
+    throw BadInput(file + ": distortion_coefficients has " + std::to_string(k.size()) +
+                   " numbers, not " + (equidistant ? "4" : "5 or 8"));
+  std::copy(k.begin(), k.end(), camera.k);
+  // An equidistant lens with four zeros is still no pinhole.
+  const bool straight = std::all_of(k.begin(), k.end(), [](double v) { return v == 0; });
+  camera.model = equidistant ? TV_CAMERA_KANNALA_BRANDT
+                             : straight ? TV_CAMERA_PINHOLE : TV_CAMERA_BROWN_CONRADY;
+}
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
+}  // namespace
+
+tv_camera parse_camera(const std::string& text, const std::string& name) {
+  const YAML::Node root = parse_yaml(text, name);
+  tv_camera camera{};
+  camera.width = side_at(root, "image_width", name);
+  camera.height = side_at(root, "image_height", name);
+  read_matrix(root, name, camera);
+  read_distortion(root, name, camera);
+  check(tv_camera_check(&camera), name);
+  return camera;
+}
+
+tv_camera load_camera(const std::string& path) {
+  return parse_camera(read_file(path, kMaxFileBytes), path);
+}
+
+NamedCameras parse_camera_set(const std::string& text, const std::string& name) {
+  NamedCameras cameras;
+  for (const auto& item : parse_yaml(text, name)) {
+    const std::string key = item.first.IsScalar() ? item.first.Scalar() : "?";
+    const std::string where = name + ": " + key;
+    if (!item.second.IsMap()) throw BadInput(where + " is not a map of names and values");
+    tv_camera camera{};
+    camera.width = side_at(item.second, "image_width", where);
+    camera.height = side_at(item.second, "image_height", where);
+    camera.fx = number_at(item.second, "fx", where);
+    camera.fy = number_at(item.second, "fy", where);
+    camera.cx = number_at(item.second, "cx", where);
+    camera.cy = number_at(item.second, "cy", where);
+    require_focal(camera.fx, "fx", where);
+    require_focal(camera.fy, "fy", where);
+    const char* const entries[] = {"k1", "k2", "p1", "p2", "k3"};
+    for (int i = 0; i < 5; ++i) {
+      if (item.second[entries[i]]) camera.k[i] = number_at(item.second, entries[i], where);
+      if (camera.k[i] != 0) camera.model = TV_CAMERA_BROWN_CONRADY;
+    }
+    check(tv_camera_check(&camera), where);
+    cameras.emplace_back(key, camera);
+  }
+  if (cameras.empty()) throw BadInput(name + ": no camera in it");
+  return cameras;
+}
+
+NamedCameras load_camera_set(const std::string& path) {
+  return parse_camera_set(read_file(path, kMaxFileBytes), path);
+}
+
+const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,
+                               const double K[9]) {
+  if (cameras.size() == 1) return &cameras[0].second;
+  const std::string file = image_name.substr(image_name.find_last_of('/') + 1);
+  const tv_camera* best = nullptr;
+  size_t best_length = 0;
+  for (const auto& [name, camera] : cameras) {
+    if (name.size() > best_length && file.compare(0, name.size(), name) == 0) {
+      best = &camera;
+      best_length = name.size();
+    }
+  }
+  if (best || !K) return best;
+  const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-6 * std::abs(b); };
+  for (const auto& [name, camera] : cameras)
+    if (same(K[0], camera.fx) && same(K[2], camera.cx)) return &camera;
+  return nullptr;
+}
+
+void require_size(const tv_camera& camera, const std::string& camera_name, int width, int height,
+                  const std::string& image_name) {
+  if (camera.width == width && camera.height == height) return;
+  throw BadInput("image " + image_name + " is " + size_text(width, height) + ", but camera " +
+                 camera_name + " is for " + size_text(camera.width, camera.height));
+}
+
+tv_camera resized(const tv_camera& camera, int width, int height) {
+  tv_camera result = camera;
+  const double sx = static_cast<double>(width) / camera.width;
+  const double sy = static_cast<double>(height) / camera.height;
+  result.fx = sx * camera.fx;
+  result.fy = sy * camera.fy;
+  result.cx = sx * (camera.cx + 0.5) - 0.5;
+  result.cy = sy * (camera.cy + 0.5) - 0.5;
+  result.width = width;
+  result.height = height;
+  return result;
+}
+
+tv_camera turned(const tv_camera& camera, int quarters) {
+  tv_camera result = camera;
+  for (int i = 0; i < (quarters & 3); ++i) {
+    // (x, y) goes to (y, width - 1 - x); in the camera frame (X, Y) goes to (Y, -X).
+    const tv_camera before = result;
+    result.width = before.height;
+    result.height = before.width;
+    result.fx = before.fy;
+    result.fy = before.fx;
+    result.cx = before.cy;
+    result.cy = before.width - 1 - before.cx;
+    if (result.model == TV_CAMERA_BROWN_CONRADY) {  // the tangential terms turn along
+      result.k[2] = -before.k[3];
+      result.k[3] = before.k[2];
+    }
+  }
+  return result;
+}
+
+}  // namespace cli

@@ -1,0 +1,40 @@
+// Camera files: OpenCV's YAML and ROS camera_info; and the cameras.yaml of a data set.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "twoview/camera.h"
+
+namespace cli {
+
+// Reads either format. Throws BadInput that names the file and the entry that is missing, zero, not
+// finite, or of the wrong length.
+tv_camera load_camera(const std::string& path);
+
+// The same from the file's text; `name` is for the messages.
+tv_camera parse_camera(const std::string& text, const std::string& name);
+
+// A data set's cameras, each with the name it has there, in the file's order.
+using NamedCameras = std::vector<std::pair<std::string, tv_camera>>;
+NamedCameras load_camera_set(const std::string& path);
+NamedCameras parse_camera_set(const std::string& text, const std::string& name);
+
+// The entry that serves an image: the only one, else the one whose name begins the file's name (the
+// longest, if several do), else the one with this fx and cx. Null when none fits.
+const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,
+                               const double K[9]);
+
+// Throws BadInput with both sizes unless the camera is for images of this size.
+void require_size(const tv_camera& camera, const std::string& camera_name, int width, int height,
+                  const std::string& image_name);
+
+// The camera of an image that was resized from the camera's size to width x height: per axis with
+// s = new size / old size, f' = s f and c' = s (c + 0.5) - 0.5.
+tv_camera resized(const tv_camera& camera, int width, int height);
+
+// The camera of an image that was turned by quarter turns counter-clockwise.
+tv_camera turned(const tv_camera& camera, int quarters);
+
+}  // namespace cli

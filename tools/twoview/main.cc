@@ -1,0 +1,66 @@
+// twoview: the command line.
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+
+#include "error.h"
+#include "output.h"
+#include "verbs.h"
+
+namespace {
+
+// One line, whatever the message holds.
+int refuse(std::string message) {
+  for (char& c : message)
+    if (static_cast<unsigned char>(c) < ' ') c = ' ';
+  std::fprintf(stderr, "twoview: %s\n", message.c_str());
+  return cli::kExitBadInput;
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App program("FAST-SIFT matching and two-view geometry", "twoview");
+  program.set_version_flag("--version", std::string("twoview ") + tv_version_string());
+  program.require_subcommand(1);
+  cli::Run run;
+  cli::add_reconstruct(program, run);
+  cli::add_detect(program, run);
+  cli::add_match(program, run);
+  cli::add_evaluate(program, run);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::CallForVersion& e) {
+    cli::print(std::string(e.what()) + "\n");
+    return 0;
+  } catch (const CLI::Success&) {  // --help
+    const auto chosen = program.get_subcommands();
+    cli::print(chosen.empty() ? program.help() : chosen[0]->help("twoview"));
+    return 0;
+  } catch (const CLI::ParseError& e) {
+    return refuse(std::string(e.what()) + " (see twoview --help)");
+  }
+  return run();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // A full disk and a reader that went away come back as errors of write().
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
+  try {
+    return run_program(argc, argv);
+  } catch (const cli::BadInput& e) {
+    return refuse(e.what());
+  } catch (const std::bad_alloc&) {
+    return refuse("not enough memory");
+  } catch (const std::exception& e) {
+    return refuse(e.what());
+  }
+}

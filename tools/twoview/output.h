@@ -1,0 +1,51 @@
+// Files that appear whole or not at all.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cli {
+
+// A set of files for one folder. Each is written to a temporary name beside its target and renamed
+// by commit(); without commit() nothing stays, not even the folder if it was made for the set.
+// A target that exists and is no regular file (a device, a pipe) is written as it is.
+// Every failure throws BadInput.
+class OutputSet {
+ public:
+  // Makes the folder where it is missing and checks that it can be written to.
+  explicit OutputSet(const std::filesystem::path& folder);
+  ~OutputSet();
+  OutputSet(const OutputSet&) = delete;
+  OutputSet& operator=(const OutputSet&) = delete;
+
+  void add(const std::string& name, std::string_view bytes);
+  void commit();
+
+  // Deletes those of `names` in the folder that this set does not hold: what an earlier run left.
+  void remove_others(const std::vector<std::string>& names) const;
+
+  const std::filesystem::path& folder() const { return folder_; }
+  std::vector<std::string> names() const;
+
+ private:
+  struct Entry {
+    std::string name;
+    std::filesystem::path temporary;  // empty: written already
+  };
+  void discard() noexcept;
+  void make_folder();
+
+  std::filesystem::path folder_;
+  std::vector<std::filesystem::path> made_;  // folders made here, outermost first
+  std::vector<Entry> entries_;
+};
+
+// The whole of a text or image file; refuses what is missing, no file, empty, or above max_bytes.
+std::string read_file(const std::string& path, size_t max_bytes);
+
+// Writes to stdout and flushes. A reader that has gone away is no failure; a full disk is.
+void print(std::string_view text);
+
+}  // namespace cli

@@ -1,0 +1,230 @@
+// twoview reconstruct A B: two images to a pose, a cloud, pictures and a report.
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "camera_file.h"
+#include "canvas.h"
+#include "error.h"
+#include "output.h"
+#include "pictures.h"
+#include "report.h"
+#include "tables.h"
+#include "truth.h"
+#include "verbs.h"
+
+namespace cli {
+namespace {
+
+const std::vector<std::string> kFiles = {"result.json",  "cloud.ply", "matches.png",
+                                         "epipolar.png", "views.png", "report.html"};
+
+struct Arguments {
+  Common common;
+  std::string image[2], camera, camera_of[2], truth;
+};
+
+// The camera file of each image; both empty without cameras.
+void choose_camera_files(const Arguments& a, std::string (&files)[2]) {
+  if (!a.camera.empty() && (!a.camera_of[0].empty() || !a.camera_of[1].empty()))
+    throw BadInput("give --camera, or --camera0 and --camera1, not both");
+  for (int i = 0; i < 2; ++i) files[i] = a.camera.empty() ? a.camera_of[i] : a.camera;
+  if (files[0].empty() != files[1].empty())
+    throw BadInput(std::string("--camera") + (files[0].empty() ? "0" : "1") + " is missing");
+  const int32_t method = a.common.options.estimate.method;
+  const bool can_do_without = method == TV_METHOD_EIGHT_POINT || method == TV_METHOD_SEVEN_POINT;
+  if (files[0].empty() && !can_do_without)
+    throw BadInput("--method " + method_name(method) +
+                   " needs cameras: give --camera, or --camera0 and --camera1");
+}
+
+void load_inputs(const Arguments& a, Outcome& outcome) {
+  std::string files[2];
+  choose_camera_files(a, files);
+  outcome.has_cameras = !files[0].empty();
+  for (int i = 0; i < 2; ++i) {
+    Picture& picture = outcome.picture[i];
+    picture = load_picture(a.image[i]);
+    if (outcome.has_cameras) {
+      outcome.camera[i] = load_camera(files[i]);
+      require_size(outcome.camera[i], files[i], picture.luma.cols, picture.luma.rows, picture.path);
+    }
+    shrink(picture, a.common.options.resize);
+    if (outcome.has_cameras)
+      outcome.camera[i] = resized(outcome.camera[i], picture.luma.cols, picture.luma.rows);
+  }
+}
+
+nlohmann::ordered_json options_of(const Arguments& a) {
+  nlohmann::ordered_json json = options_json(a.common.options, kAllOptions);
+  std::string files[2];
+  choose_camera_files(a, files);
+  for (int i = 0; i < 2; ++i) {
+    const std::string key = "camera" + std::to_string(i);
+    json[key] = files[i].empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(files[i]);
+  }
+  return json;
+}
+
+// Every output, in the order in which a reader wants them.
+void make_files(const Outcome& outcome, OutputSet& files) {
+  const std::vector<CloudPoint> cloud = cloud_of(outcome);
+  const tv_reconstruction& r = outcome.reconstruction;
+  const bool has_cloud = !cloud.empty() && has_full_pose(outcome.two_view);
+  const bool has_lines = has_epipolar_geometry(outcome) && outcome.two_view.num_inliers > 0;
+  std::vector<Figure> figures;
+  files.add("result.json", json_text(outcome.json));
+  if (has_cloud) {
+    figures.push_back({"The cloud from the front and from the side",
+                       "Each point in its colour in image 0. One baseline is the distance between the cameras.",
+                       views_picture(outcome, cloud), false});
+    files.add("cloud.ply", cloud_ply(cloud));
+    files.add("views.png", png_bytes(figures.back().picture));
+  }
+  figures.push_back({"Matches",
+                     "Lines join the two images of a point; their colour tells how far it moved. "
+                     "What the geometry rejected is faint and red.",
+                     matches_picture(outcome.picture[0], outcome.picture[1], r.keypoints[0], r.keypoints[1],
+                                     r.matches, r.num_matches, r.inlier_mask), true});
+  files.add("matches.png", png_bytes(figures.back().picture));
+  if (has_lines) {
+    figures.push_back({"Epipolar lines",
+                       "Each point must lie on the line of its colour. The lines of an image meet in its epipole, "
+                       "the direction in which the other camera stands: outside the image when the flight was "
+                       "sideways, inside when it was forward.",
+                       epipolar_picture(outcome), true});
+    files.add("epipolar.png", png_bytes(figures.back().picture));
+  }
+  files.add("report.html", report_html(outcome, cloud, figures));
+}
+
+template <class... T>
+std::string line(const char* name, const char* format, T... values) {
+  char head[32], text[512];
+  std::snprintf(head, sizeof head, "%-13s", name);
+  std::snprintf(text, sizeof text, format, values...);
+  return head + std::string(text) + "\n";
+}
+
+// Standard deviations of a pose: the root of half the trace of each block would be per axis; a
+// reader wants the whole angle, so the root of the trace.
+std::string uncertainty_line(const tv_two_view& v) {
+  const double* c = v.covariance;
+  return line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
+              std::sqrt(c[0] + c[6] + c[12]) * 180 / M_PI, std::sqrt(c[18] + c[24]) * 180 / M_PI);
+}
+
+std::string pose_lines(const tv_two_view& v) {
+  std::string text;
+  if (v.has_R)
+    text += line("rotation", "%.3f deg between the views",
+                 rotation_error_deg(rotation_of(v), {1, 0, 0, 0, 1, 0, 0, 0, 1}));
+  if (has_full_pose(v)) {
+    // Where camera 1 stands as camera 0 sees it, which is easier to picture than t.
+    const Vector3 c = applied(transposed(rotation_of(v)), translation_of(v));
+    text += line("direction", "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), one baseline away",
+                 -c[0], -c[1], -c[2]);
+  }
+  if (v.has_covariance) text += uncertainty_line(v);
+  return text;
+}
+
+std::string truth_line(const nlohmann::ordered_json& truth) {
+  std::string text = "no pose to compare";
+  const auto part = [&](const char* key, const char* format) {
+    if (!truth[key].is_number()) return;
+    char number[96];
+    std::snprintf(number, sizeof number, format, truth[key].get<double>());
+    text += number;
+  };
+  if (truth["rotation_error_deg"].is_number()) text.clear();
+  part("rotation_error_deg", "rotation off by %.3f deg");
+  part("translation_error_deg", ", direction by %.3f deg");
+  part("depth_error_median_percent", ", depth by %.2f %% (median)");
+  part("depth_error_p95_percent", ", %.2f %% (95th percentile)");
+  return line("truth", "%s", text.c_str());
+}
+
+std::string summary(const Outcome& outcome, const OutputSet& files, size_t context_bytes) {
+  const Style style = stdout_style();
+  const tv_two_view& v = outcome.two_view;
+  const tv_reconstruction& r = outcome.reconstruction;
+  const Picture &a = outcome.picture[0], &b = outcome.picture[1];
+  std::string text;
+  text += line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows, b.name.c_str(),
+               b.luma.cols, b.luma.rows);
+  const char* const colours[] = {style.poor, style.fair, style.good};
+  const std::string reasons = reasons_in_words(v.reasons);
+  text += line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
+               tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
+               config_in_words(v.config).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
+  text += line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
+  text += line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
+               v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
+  text += pose_lines(v);
+  const auto& j = outcome.json;
+  if (j["median_parallax_deg"].is_number())
+    text += line("parallax", "%.2f deg (median)", j["median_parallax_deg"].get<double>());
+  if (r.num_points > 0)
+    text += line("cloud", "%d points, reprojection %.2f px rms", r.num_points,
+                 j["rms_reprojection_px"].get<double>());
+  if (j["truth"].is_object()) text += truth_line(j["truth"]);
+  text += line("work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
+               j["kernels"].get<std::string>().c_str(), static_cast<double>(context_bytes) / (1 << 20));
+  std::string names;
+  for (const std::string& name : files.names()) names += " " + name;
+  return text + line("files", "%s:%s", files.folder().c_str(), names.c_str());
+}
+
+int reconstruct(Arguments& a) {
+  Common& common = a.common;
+  common.options.settle();
+  Outcome outcome;
+  load_inputs(a, outcome);
+  const bool has_truth = !a.truth.empty();
+  Truth truth;
+  if (has_truth) {
+    truth = load_truth(a.truth);
+    check_truth(truth, outcome.picture[0]);
+  }
+  OutputSet files(common.output);
+  Session session(common.options);
+  const uint64_t total_ns = reconstruct_pair(session, common.options, outcome);
+
+  outcome.json = result_json(outcome);
+  if (has_truth)
+    outcome.json["truth"] = truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
+  outcome.json["timings_ms"] = session.take_times(total_ns, true);
+  outcome.json["context_bytes"] = session.context_bytes();
+  outcome.json["options"] = options_of(a);
+  outcome.json["kernels"] = session.kernels();
+  make_files(outcome, files);
+
+  if (common.json) print(json_text(outcome.json));
+  if (common.speaks()) print(summary(outcome, files, session.context_bytes()));
+  files.commit();
+  files.remove_others(kFiles);
+  if (has_full_pose(outcome.two_view)) return kExitPose;
+  const std::string reasons = reasons_in_words(outcome.two_view.reasons);
+  std::fprintf(stderr, "twoview: no full pose: %s%s%s\n", config_in_words(outcome.two_view.config).c_str(),
+               reasons.empty() ? "" : ": ", reasons.c_str());
+  return kExitNoPose;
+}
+
+}  // namespace
+
+void add_reconstruct(CLI::App& program, Run& run) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* verb = program.add_subcommand("reconstruct", "two images to a pose, a point cloud and a report");
+  verb->add_option("A", a->image[0], "image 0")->required()->type_name("IMAGE");
+  verb->add_option("B", a->image[1], "image 1")->required()->type_name("IMAGE");
+  verb->add_option("--camera", a->camera, "camera of both images, OpenCV or ROS YAML")->type_name("FILE");
+  verb->add_option("--camera0", a->camera_of[0], "camera of image 0")->type_name("FILE");
+  verb->add_option("--camera1", a->camera_of[1], "camera of image 1")->type_name("FILE");
+  verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")->type_name("FILE");
+  add_common(*verb, a->common, kAllOptions, "folder for the results");
+  verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
+}
+
+}  // namespace cli

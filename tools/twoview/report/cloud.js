@@ -1,0 +1,183 @@
+// A point cloud that turns under the mouse. Plain canvas: no library, no network, no GPU needed.
+// The page gives an element #cloud-data with JSON {points, colours: base64, cameras, unit}.
+(function () {
+  "use strict";
+  const data = JSON.parse(document.getElementById("cloud-data").textContent);
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const view = new DataView(bytes(data.points).buffer);
+  const colours = bytes(data.colours);
+  const count = view.byteLength / 12;
+  const points = new Float32Array(3 * count);
+  for (let i = 0; i < points.length; ++i) points[i] = view.getFloat32(4 * i, true);
+
+  const canvas = document.getElementById("cloud");
+  const context = canvas.getContext("2d");
+
+  // The middle and the size of what most points span: a few far points must not decide.
+  const middle = [0, 1, 2].map((axis) => (share(axis, 0.03) + share(axis, 0.97)) / 2);
+  let radius = 0;
+  for (let axis = 0; axis < 3; ++axis)
+    radius = Math.max(radius, (share(axis, 0.97) - share(axis, 0.03)) / 2);
+  radius = radius || 1;
+  function share(axis, part) {
+    const values = [];
+    for (let i = 0; i < count; ++i) values.push(points[3 * i + axis]);
+    values.sort((a, b) => a - b);
+    return values[Math.min(count - 1, Math.floor(part * count))];
+  }
+
+  // Yaw turns about the image's vertical, pitch about its horizontal; at 0, 0 one looks as camera 0.
+  const start = { yaw: -0.45, pitch: 0.22, zoom: 1, x: 0, y: 0 };
+  let pose = Object.assign({}, start);
+  let turning = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let frame = 0;
+
+  function resize() {
+    const ratio = window.devicePixelRatio || 1;
+    canvas.width = Math.round(canvas.clientWidth * ratio);
+    canvas.height = Math.round(canvas.clientHeight * ratio);
+    draw();
+  }
+
+  function projector() {
+    const cy = Math.cos(pose.yaw), sy = Math.sin(pose.yaw);
+    const cp = Math.cos(pose.pitch), sp = Math.sin(pose.pitch);
+    const distance = 3.2 * radius / pose.zoom;
+    const focal = 1.25 * Math.min(canvas.width, 1.6 * canvas.height);
+    return function (px, py, pz) {
+      const x = px - middle[0], y = py - middle[1], z = pz - middle[2];
+      const u = cy * x + sy * z, w = -sy * x + cy * z;
+      const v = cp * y - sp * w, depth = sp * y + cp * w + distance;
+      if (depth < 0.02 * distance) return null;
+      return [canvas.width / 2 + focal * (u / depth + pose.x), canvas.height / 2 + focal * (v / depth + pose.y), depth];
+    };
+  }
+
+  function line(project, a, b, colour, width) {
+    const p = project(a[0], a[1], a[2]), q = project(b[0], b[1], b[2]);
+    if (!p || !q) return;
+    context.strokeStyle = colour;
+    context.lineWidth = width * (window.devicePixelRatio || 1);
+    context.beginPath();
+    context.moveTo(p[0], p[1]);
+    context.lineTo(q[0], q[1]);
+    context.stroke();
+  }
+
+  function draw() {
+    context.fillStyle = "#14181d";
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    const project = projector();
+    const drawn = [];
+    for (let i = 0; i < count; ++i) {
+      const p = project(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
+      if (p) drawn.push([p, i]);
+    }
+    drawn.sort((a, b) => b[0][2] - a[0][2]);
+    const size = (count > 8000 ? 1.3 : count > 2500 ? 1.9 : 2.7) * (window.devicePixelRatio || 1) * 3.2 * radius;
+    for (const [p, i] of drawn) {
+      const r = Math.min(12, Math.max(0.8, size / p[2]));
+      const lift = (c) => 46 + (c * 209) / 255;
+      context.fillStyle = "rgb(" + lift(colours[3 * i]) + "," + lift(colours[3 * i + 1]) + "," + lift(colours[3 * i + 2]) + ")";
+      context.beginPath();
+      context.arc(p[0], p[1], r, 0, 6.2832);
+      context.fill();
+    }
+    data.cameras.forEach(function (camera, index) {
+      const colour = index ? "#ffb260" : "#ffffff";
+      for (let i = 0; i < 4; ++i) {
+        line(project, camera.centre, camera.corners[i], colour, 1);
+        line(project, camera.corners[i], camera.corners[(i + 1) % 4], colour, 1.6);
+      }
+    });
+    axes(project);
+  }
+
+  // Small axes in the corner, by the directions of the camera's frame.
+  function axes() {
+    const ratio = window.devicePixelRatio || 1, length = 34 * ratio;
+    const at = [56 * ratio, canvas.height - 56 * ratio];
+    const cy = Math.cos(pose.yaw), sy = Math.sin(pose.yaw);
+    const cp = Math.cos(pose.pitch), sp = Math.sin(pose.pitch);
+    const turn = ([x, y, z]) => [cy * x + sy * z, cp * y - sp * (-sy * x + cy * z)];
+    context.font = 12 * ratio + "px sans-serif";
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    [["x", [1, 0, 0], "#ff7b72"], ["y", [0, 1, 0], "#7ee787"], ["z", [0, 0, 1], "#79c0ff"]].forEach(
+      function ([name, axis, colour]) {
+        const d = turn(axis);
+        context.strokeStyle = context.fillStyle = colour;
+        context.lineWidth = 2 * ratio;
+        context.beginPath();
+        context.moveTo(at[0], at[1]);
+        context.lineTo(at[0] + length * d[0], at[1] + length * d[1]);
+        context.stroke();
+        context.fillText(name, at[0] + 1.32 * length * d[0], at[1] + 1.32 * length * d[1]);
+      });
+  }
+
+  function request() {
+    if (!frame) frame = window.requestAnimationFrame(function () { frame = 0; draw(); });
+  }
+
+  let held = new Map();
+  canvas.addEventListener("pointerdown", function (event) {
+    turning = false;
+    canvas.setPointerCapture(event.pointerId);
+    held.set(event.pointerId, [event.clientX, event.clientY]);
+  });
+  canvas.addEventListener("pointermove", function (event) {
+    const last = held.get(event.pointerId);
+    if (!last) return;
+    const dx = event.clientX - last[0], dy = event.clientY - last[1];
+    if (held.size === 2) {
+      const other = [...held].find(([id]) => id !== event.pointerId)[1];
+      const before = Math.hypot(last[0] - other[0], last[1] - other[1]);
+      const after = Math.hypot(event.clientX - other[0], event.clientY - other[1]);
+      if (before > 0) zoom(after / before);
+    } else if (event.shiftKey || event.buttons & 6) {
+      const focal = 1.25 * Math.min(canvas.clientWidth, 1.6 * canvas.clientHeight);
+      pose.x += dx / focal;
+      pose.y += dy / focal;
+    } else {
+      pose.yaw += 0.007 * dx;
+      pose.pitch = Math.max(-1.57, Math.min(1.57, pose.pitch - 0.007 * dy));
+    }
+    held.set(event.pointerId, [event.clientX, event.clientY]);
+    request();
+  });
+  ["pointerup", "pointercancel"].forEach((name) =>
+    canvas.addEventListener(name, (event) => held.delete(event.pointerId)));
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("wheel", function (event) {
+    event.preventDefault();
+    turning = false;
+    zoom(Math.exp(-0.0012 * event.deltaY));
+  }, { passive: false });
+  function zoom(factor) {
+    pose.zoom = Math.max(0.15, Math.min(40, pose.zoom * factor));
+    request();
+  }
+  function look(yaw, pitch) {
+    turning = false;
+    pose = Object.assign({}, start, { yaw: yaw, pitch: pitch });
+    request();
+  }
+  canvas.addEventListener("dblclick", () => look(start.yaw, start.pitch));
+  document.getElementById("view-front").addEventListener("click", () => look(0, 0));
+  document.getElementById("view-side").addEventListener("click", () => look(Math.PI / 2, 0));
+  document.getElementById("view-top").addEventListener("click", () => look(0, 1.57));
+
+  // A slow swing until someone takes hold of it.
+  let began = 0;
+  function swing(now) {
+    if (!turning) return;
+    began = began || now;
+    pose.yaw = start.yaw * Math.cos((now - began) / 2600);
+    draw();
+    window.requestAnimationFrame(swing);
+  }
+  window.addEventListener("resize", resize);
+  resize();
+  window.requestAnimationFrame(swing);
+})();

@@ -1,0 +1,32 @@
+// The known truth of a pair, and how far an answer is from it.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "image_file.h"
+#include "measures.h"
+
+namespace cli {
+
+// A YAML file: R [9] row-major and t [3] of cam1_from_cam0; optional `baseline`, the length of t in
+// metres; optional `depth0`, the path (from the file's folder) of a float depth map of image 0, in
+// the baseline's unit, 0, negative or not finite where unknown.
+struct Truth {
+  Matrix3 R{};
+  Vector3 t{};
+  double baseline = 0;  // |t| where the file gives none
+  cv::Mat depth0;       // empty: none
+};
+Truth load_truth(const std::string& path);
+
+// Errors against the truth; null where they are not known.
+nlohmann::ordered_json truth_json(const Truth& truth, const Picture& picture0,
+                                  const tv_two_view& two_view,
+                                  const tv_reconstruction& reconstruction);
+
+// Throws BadInput unless the depth map has the size of image 0's file.
+void check_truth(const Truth& truth, const Picture& picture0);
+
+}  // namespace cli

@@ -1,0 +1,87 @@
+#include "yaml_values.h"
+
+#include <cctype>
+#include <charconv>
+#include <cmath>
+
+#include "error.h"
+
+namespace cli {
+namespace {
+
+// Strict but for a leading plus and a trailing point ("0."), which OpenCV writes; YAML's and
+// OpenCV's words for NaN and infinity are read as what they mean.
+bool read_number(std::string text, double& value) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (!text.empty() && text[0] == '+') text.erase(0, 1);
+  const std::string bare = !text.empty() && text[0] == '-' ? text.substr(1) : text;
+  if (bare == ".nan" || bare == "nan") return value = NAN, true;
+  if (bare == ".inf" || bare == "inf") return value = INFINITY, true;
+  const char* const end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  return result.ec == std::errc() && result.ptr == end;
+}
+
+double finite(const YAML::Node& node, const std::string& entry, const std::string& file) {
+  double value = 0;
+  if (!node.IsScalar() || !read_number(node.Scalar(), value))
+    throw BadInput(file + ": " + entry + " is not a number");
+  if (!std::isfinite(value)) throw BadInput(file + ": " + entry + " is not finite");
+  return value;
+}
+
+YAML::Node find(const YAML::Node& map, const std::string& entry, const std::string& file) {
+  const YAML::Node node = map[entry];
+  if (!node || node.IsNull()) throw BadInput(file + ": " + entry + " is missing");
+  return node;
+}
+
+void append(const YAML::Node& list, const std::string& entry, const std::string& file,
+            std::vector<double>& values) {
+  size_t index = 0;
+  for (const YAML::Node& item : list) {
+    const std::string name = entry + "[" + std::to_string(index++) + "]";
+    if (item.IsSequence())
+      append(item, name, file, values);
+    else
+      values.push_back(finite(item, name, file));
+  }
+}
+
+}  // namespace
+
+YAML::Node parse_yaml(const std::string& text, const std::string& file) {
+  std::string body = text;
+  if (body.compare(0, 3, "\xef\xbb\xbf") == 0) body.erase(0, 3);
+  // "%YAML:1.0" is a comment of the same length to us, so that line numbers stay.
+  if (body.compare(0, 6, "%YAML:") == 0) body[0] = '#';
+  YAML::Node root;
+  try {
+    root = YAML::Load(body);
+  } catch (const YAML::Exception& e) {
+    const std::string where = e.mark.is_null() ? "" : "line " + std::to_string(e.mark.line + 1) + ": ";
+    throw BadInput(file + ": " + where + e.msg);
+  }
+  if (!root.IsMap()) throw BadInput(file + ": no YAML map of names and values");
+  return root;
+}
+
+double number_at(const YAML::Node& map, const std::string& entry, const std::string& file) {
+  return finite(find(map, entry, file), entry, file);
+}
+
+std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,
+                               const std::string& file) {
+  YAML::Node node = find(map, entry, file);
+  if (node.IsMap()) {
+    const YAML::Node data = node["data"];
+    if (!data) throw BadInput(file + ": " + entry + " has no data");
+    node.reset(data);
+  }
+  if (!node.IsSequence()) throw BadInput(file + ": " + entry + " is not a list of numbers");
+  std::vector<double> values;
+  append(node, entry, file, values);
+  return values;
+}
+
+}  // namespace cli
