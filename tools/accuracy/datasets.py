@@ -9,8 +9,8 @@ import numpy as np
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 MAX_NATIVE_WIDTH = 1241  # wider images are scaled down
 RESIZE_LONG_SIDE = 640   # to this long side
-# In these two the truth of pairs_flagged.txt is a calibrated gantry's: "flagged" only says that plain
-# SIFT could not confirm the pair.
+# Here the truth of pairs_flagged.txt is a calibrated gantry's; "flagged" only says that plain SIFT
+# could not confirm the pair.
 FLAGGED_SETS = ("middlebury_dinoSR", "middlebury_templeSR")
 
 

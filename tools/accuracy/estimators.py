@@ -1,8 +1,8 @@
 """Robust estimators behind one call: ours, OpenCV's USAC, PoseLib's and COLMAP's.
 
 Each peer gets undistorted pixels and pinhole cameras; ours gets the image's own pixels and the
-lens. OpenCV's takes one K, so the second view is mapped to the first K: pixels, because USAC_MAGSAC fed
-normalised points is much worse.
+lens. OpenCV's takes one K, so the second view is mapped to the first K: pixels, because USAC_MAGSAC
+fed normalised points is much worse.
 """
 
 import numpy as np
