@@ -64,71 +64,75 @@ static void orientation_histogram(const int16_t *patch, int32_t *histogram) {
   }
 }
 
-enum { PATCH_INNER = TVK_PATCH_SIDE - 2 };
+enum { PATCH_INNER = TVK_PATCH_SIDE - 2, CELL_SAMPLES = 8 };
 
-/* Share of sample u = 0..19 in each of the four cells along an axis: with p = (u - 9.5) / 4 cells from
-   the middle, 256 exp(-p^2 / 8) max(0, 1 - |p + 1.5 - cell|). */
-static const int16_t cell_weights[PATCH_INNER][4] = {
-  {16, 0, 0, 0},
-  {55, 0, 0, 0},
-  {103, 0, 0, 0},
-  {161, 0, 0, 0},
-  {177, 25, 0, 0},
-  {137, 82, 0, 0},
-  {87, 145, 0, 0},
-  {30, 213, 0, 0},
-  {0, 220, 31, 0},
-  {0, 160, 96, 0},
-  {0, 96, 160, 0},
-  {0, 31, 220, 0},
-  {0, 0, 213, 30},
-  {0, 0, 145, 87},
-  {0, 0, 82, 137},
-  {0, 0, 25, 177},
-  {0, 0, 0, 161},
-  {0, 0, 0, 103},
-  {0, 0, 0, 55},
-  {0, 0, 0, 16},
+/* Along an axis cell c = 0..3 is fed by samples u = 4 c + i, i = 0..7 of the twenty, with the share
+   256 exp(-p^2 / 8) max(0, 1 - |p + 1.5 - c|), where p = (u - 9.5) / 4 cells from the middle. */
+static const int16_t cell_weights[4][CELL_SAMPLES] = {
+    {16, 55, 103, 161, 177, 137, 87, 30},
+    {25, 82, 145, 213, 220, 160, 96, 31},
+    {31, 96, 160, 220, 213, 145, 82, 25},
+    {30, 87, 137, 177, 161, 103, 55, 16},
 };
 
-/* first_cell[u] and the next one are the only cells with a share. */
-static const int8_t first_cell[PATCH_INNER] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
-                                               1, 1, 2, 2, 2, 2, 2, 2, 2, 2};
+/* The gradients lie flat, TVK_PATCH_SIDE to a row, so that one long loop runs over all of them; the
+   two at the end of each row straddle its border and are never read. */
+enum { PATCH_FLAT = PATCH_INNER * TVK_PATCH_SIDE };
 
-/* Adds one row of samples to the 4 x 8 sums of its cells along x. UBC order turns counter-clockwise. */
-static void gradient_row(const int16_t *row, int32_t *cells) {
-  int32_t x, magnitude[PATCH_INNER], direction[PATCH_INNER];
-  for (x = 0; x < PATCH_INNER; ++x) {
-    const int32_t dx = row[x + 1] - row[x - 1];
-    const int32_t dy = row[x - TVK_PATCH_SIDE] - row[x + TVK_PATCH_SIDE];
-    magnitude[x] = gradient_magnitude(dx, dy);
-    direction[x] = gradient_direction(dx, dy);
+static void patch_gradients(const int16_t *patch, int16_t *magnitude, int16_t *direction) {
+  int32_t k;
+  for (k = 0; k < PATCH_FLAT - 2; ++k) {
+    const int16_t *at = patch + TVK_PATCH_SIDE + 1 + k;
+    const int32_t dx = at[1] - at[-1];
+    const int32_t dy = at[-TVK_PATCH_SIDE] - at[TVK_PATCH_SIDE]; /* UBC order: counter-clockwise */
+    magnitude[k] = (int16_t)gradient_magnitude(dx, dy);
+    direction[k] = (int16_t)(gradient_direction(dx, dy) >> 5);
   }
-  for (x = 0; x < PATCH_INNER; ++x) {
-    const int32_t bin = direction[x] >> 13, share = (direction[x] >> 5) & 255;
-    const int32_t upper = (magnitude[x] * share + 128) >> 8, lower = magnitude[x] - upper;
-    const int32_t next = (bin + 1) & 7, cell = first_cell[x];
-    const int32_t w0 = cell_weights[x][cell], w1 = cell_weights[x][cell + 1];
-    int32_t *near = cells + cell * 8, *far = near + 8;
-    near[bin] += w0 * lower;
-    near[next] += w0 * upper;
-    far[bin] += w1 * lower;
-    far[next] += w1 * upper;
+}
+
+/* What each gradient gives to direction `bin` of eight: a tent, 256 units wide to each side. */
+static void share_of_direction(const int16_t *magnitude, const int16_t *direction, int32_t bin,
+                               int16_t *share) {
+  int32_t k;
+  for (k = 0; k < PATCH_FLAT - 2; ++k) {
+    const int16_t turned = (int16_t)(((direction[k] - 256 * bin + 1024) & 2047) - 1024);
+    const int16_t away = (int16_t)(turned < 0 ? -turned : turned);
+    const int16_t tent = (int16_t)(away < 256 ? 256 - away : 0);
+    share[k] = (int16_t)((magnitude[k] * (tent < 255 ? tent : 255)) >> 8);
+  }
+}
+
+/* Sums over the rows of each cell; columns[x][cell_y * 8 + bin]. */
+static void pool_rows(const int16_t *share, int32_t bin, int16_t columns[PATCH_INNER][32]) {
+  int32_t cell, i, x;
+  for (cell = 0; cell < 4; ++cell) {
+    const int16_t *rows = share + 4 * cell * TVK_PATCH_SIDE;
+    int32_t sums[PATCH_INNER];
+    for (x = 0; x < PATCH_INNER; ++x) sums[x] = 128;
+    for (i = 0; i < CELL_SAMPLES; ++i) {
+      for (x = 0; x < PATCH_INNER; ++x) {
+        sums[x] += cell_weights[cell][i] * rows[i * TVK_PATCH_SIDE + x];
+      }
+    }
+    for (x = 0; x < PATCH_INNER; ++x) columns[x][cell * 8 + bin] = (int16_t)(sums[x] >> 8);
   }
 }
 
 static void gradient_histogram(const int16_t *patch, int32_t *histogram) {
-  int32_t x, y, k;
-  memset(histogram, 0, TVK_DESCRIPTOR_SIZE * sizeof histogram[0]);
-  for (y = 0; y < PATCH_INNER; ++y) {
-    int32_t cells[4 * 8];
-    memset(cells, 0, sizeof cells);
-    gradient_row(patch + (y + 1) * TVK_PATCH_SIDE + 1, cells);
-    for (k = 0; k < 2; ++k) {
-      const int32_t cell_y = first_cell[y] + k, w = cell_weights[y][cell_y];
-      int32_t *out = histogram + cell_y * 32;
-      for (x = 0; x < 32; ++x) out[x] += w * ((cells[x] + 128) >> 8);
+  int16_t magnitude[PATCH_FLAT], direction[PATCH_FLAT], share[PATCH_FLAT];
+  int16_t columns[PATCH_INNER][32];
+  int32_t bin, cell, i, k;
+  patch_gradients(patch, magnitude, direction);
+  for (bin = 0; bin < 8; ++bin) {
+    share_of_direction(magnitude, direction, bin, share);
+    pool_rows(share, bin, columns);
+  }
+  for (cell = 0; cell < 4; ++cell) {
+    int32_t sums[32] = {0};
+    for (i = 0; i < CELL_SAMPLES; ++i) {
+      for (k = 0; k < 32; ++k) sums[k] += cell_weights[cell][i] * columns[4 * cell + i][k];
     }
+    for (k = 0; k < 32; ++k) histogram[((k / 8) * 4 + cell) * 8 + k % 8] = sums[k];
   }
 }
 

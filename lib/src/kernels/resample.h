@@ -76,6 +76,33 @@ static int is_inside(int32_t x, int32_t y, int32_t width, int32_t height) {
   return x >= 0 && y >= 0 && x < (width - 1) << 16 && y < (height - 1) << 16;
 }
 
+enum { SAMPLE_CHUNK = 24 }; /* at least a patch's side, and whole vectors */
+
+/* A row of samples in three steps, so that all but the loads can run in vectors. */
+static void sample_row(const uint8_t *image, int64_t stride, int32_t x, int32_t y, int32_t du_x,
+                       int32_t du_y, int32_t side, int16_t *out) {
+  int32_t offset[SAMPLE_CHUNK];
+  int16_t fx[SAMPLE_CHUNK], fy[SAMPLE_CHUNK], value[SAMPLE_CHUNK];
+  uint8_t a[SAMPLE_CHUNK] = {0}, b[SAMPLE_CHUNK] = {0}, c[SAMPLE_CHUNK] = {0}, d[SAMPLE_CHUNK] = {0};
+  const int32_t pitch = (int32_t)stride;
+  int32_t i;
+  for (i = 0; i < SAMPLE_CHUNK; ++i) {
+    const int32_t sx = x + i * du_x, sy = y + i * du_y;
+    offset[i] = (sy >> 16) * pitch + (sx >> 16);
+    fx[i] = (int16_t)((sx >> 8) & 255);
+    fy[i] = (int16_t)((sy >> 8) & 255);
+  }
+  for (i = 0; i < side; ++i) {
+    const uint8_t *top = image + offset[i], *bottom = top + stride;
+    a[i] = top[0];
+    b[i] = top[1];
+    c[i] = bottom[0];
+    d[i] = bottom[1];
+  }
+  for (i = 0; i < SAMPLE_CHUNK; ++i) value[i] = bilinear(a[i], b[i], c[i], d[i], fx[i], fy[i]);
+  memcpy(out, value, (size_t)side * sizeof out[0]);
+}
+
 static void sample_patch(const uint8_t *image, int64_t stride, int32_t width, int32_t height,
                          int32_t x, int32_t y, int32_t du_x, int32_t du_y, int32_t side,
                          int16_t *patch) {
@@ -86,16 +113,14 @@ static void sample_patch(const uint8_t *image, int64_t stride, int32_t width, in
                      is_inside(x + end * (du_x - du_y), y + end * (du_y + du_x), width, height);
   int32_t i, j;
   for (j = 0; j < side; ++j) {
-    int32_t sx = x - j * du_y, sy = y + j * du_x;
+    const int32_t row_x = x - j * du_y, row_y = y + j * du_x;
     int16_t *row = patch + j * side;
-    for (i = 0; i < side; ++i, sx += du_x, sy += du_y) {
-      if (inside) {
-        const uint8_t *top = image + (int64_t)(sy >> 16) * stride + (sx >> 16);
-        const uint8_t *bottom = top + stride;
-        row[i] = bilinear(top[0], top[1], bottom[0], bottom[1], (sx >> 8) & 255, (sy >> 8) & 255);
-      } else {
-        row[i] = sample_clamped(image, stride, width, height, sx, sy);
-      }
+    if (inside) {
+      sample_row(image, stride, row_x, row_y, du_x, du_y, side, row);
+      continue;
+    }
+    for (i = 0; i < side; ++i) {
+      row[i] = sample_clamped(image, stride, width, height, row_x + i * du_x, row_y + i * du_y);
     }
   }
 }
