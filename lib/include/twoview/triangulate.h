@@ -23,7 +23,8 @@ typedef enum tv_point_status {
   TV_POINT_INFINITE = 1, /* rays parallel within what a double can tell: position is the unit
                             direction in camera 0 */
   TV_POINT_BEHIND = 2,   /* the rays meet behind a camera: position is where */
-  TV_POINT_INVALID = 3   /* no ray (pixel outside the lens model) or input not finite: zeros */
+  TV_POINT_INVALID = 3   /* no ray (pixel outside the lens model), input not finite, or opposed rays
+                            along the baseline: zeros */
 } tv_point_status;
 
 typedef struct tv_point {
@@ -36,13 +37,13 @@ typedef struct tv_point {
   int32_t reserved;   /* 0 */
 } tv_point;
 
-/* Triangulates num_points matches.
+/* Triangulates num_points matches. This release has LINEAR_LS, ITERATIVE_LS and MIDPOINT.
    cam1_from_cam0: x1 = R x0 + t; R row-major 3x3, a rotation to 1e-6; t not zero.
    pixels0, pixels1: num_points x 2 (x, y), distorted pixels as the image has them.
-   points: the caller's array of num_points.
+   points: the caller's array of num_points; overlaps neither pixels0 nor pixels1.
    A pixel that is not finite makes its point TV_POINT_INVALID, not an error.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT (method, count, R, t), TV_ERR_NOT_FINITE (R, t),
-   TV_ERR_CAMERA. Needs no context; thread-safe. */
+   TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context; thread-safe. */
 TV_API tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
                                 const tv_camera *camera1, const double R[9], const double t[3],
                                 const double *pixels0, const double *pixels1, int32_t num_points,

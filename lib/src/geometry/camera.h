@@ -4,6 +4,7 @@
 #include "twoview/camera.h"
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>  // cross()
 
 namespace tv {
 
@@ -15,10 +16,10 @@ using Mat32 = Eigen::Matrix<double, 3, 2>;
 
 // A checked camera with what unprojection needs to know beforehand.
 struct Camera {
-  tv_camera model;
-  double valid_angle_rad;       // rays beyond it are outside
+  tv_camera model;                  // a Brown-Conrady without any distortion is a pinhole here
+  double valid_angle_rad;           // rays beyond it are outside
   double valid_radius_undistorted;  // the same as a radius on the plane z = 1 (Brown-Conrady)
-  double valid_radius_distorted;    // and after distortion: Newton is never asked for more
+  double valid_radius_distorted;    // a bound after distortion: Newton is never asked for more
 };
 
 // The camera must have passed tv_camera_check.

@@ -1,0 +1,125 @@
+// The boundary of the camera models: validate, call, pack.
+#include "twoview/camera.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "geometry/camera.h"
+
+namespace {
+
+bool is_finite(double x) { return std::fabs(x) < std::numeric_limits<double>::infinity(); }
+
+// Checks the camera and what goes into the model: null, then the camera, then finite numbers.
+tv_status check_input(const tv_camera *camera, const double *values, int num_values,
+                      const void *output) {
+  if (camera == nullptr || values == nullptr || output == nullptr) return TV_ERR_NULL;
+  const tv_status status = tv_camera_check(camera);
+  if (status != TV_OK) return status;
+  for (int i = 0; i < num_values; ++i) {
+    if (!is_finite(values[i])) return TV_ERR_NOT_FINITE;
+  }
+  return TV_OK;
+}
+
+int32_t scaled_size(int32_t size, double scale) {
+  const double rounded = size * scale + 0.5;
+  return rounded < 1.0 ? 1 : static_cast<int32_t>(rounded);
+}
+
+}  // namespace
+
+tv_status tv_camera_check(const tv_camera *camera) {
+  if (camera == nullptr) return TV_ERR_NULL;
+  if (camera->model < TV_CAMERA_PINHOLE || camera->model > TV_CAMERA_KANNALA_BRANDT) {
+    return TV_ERR_CAMERA;
+  }
+  if (camera->width < 1 || camera->height < 1) return TV_ERR_CAMERA;
+  if (!is_finite(camera->fx) || !is_finite(camera->fy)) return TV_ERR_CAMERA;
+  if (!(camera->fx > 0.0) || !(camera->fy > 0.0)) return TV_ERR_CAMERA;
+  if (!is_finite(camera->cx) || !is_finite(camera->cy)) return TV_ERR_CAMERA;
+  for (double k : camera->k) {
+    if (!is_finite(k)) return TV_ERR_CAMERA;
+  }
+  return TV_OK;
+}
+
+tv_status tv_camera_valid_angle(const tv_camera *camera, double *angle_rad) {
+  const tv_status status = check_input(camera, &camera->fx, 0, angle_rad);
+  if (status != TV_OK) return status;
+  *angle_rad = tv::prepare_camera(*camera).valid_angle_rad;
+  return TV_OK;
+}
+
+tv_status tv_camera_project(const tv_camera *camera, const double point[3], double pixel[2],
+                            double *jacobian) {
+  const tv_status status = check_input(camera, point, 3, pixel);
+  if (status != TV_OK) return status;
+  tv::Vec2 projected;
+  tv::Mat23 d_pixel;
+  if (!tv::project(tv::prepare_camera(*camera), tv::Vec3(point[0], point[1], point[2]), &projected,
+                   jacobian ? &d_pixel : nullptr)) {
+    return TV_ERR_OUTSIDE;
+  }
+  pixel[0] = projected[0];
+  pixel[1] = projected[1];
+  if (jacobian) {
+    for (int i = 0; i < 6; ++i) jacobian[i] = d_pixel(i / 3, i % 3);
+  }
+  return TV_OK;
+}
+
+tv_status tv_camera_unproject(const tv_camera *camera, const double pixel[2], double ray[3],
+                              double *jacobian) {
+  const tv_status status = check_input(camera, pixel, 2, ray);
+  if (status != TV_OK) return status;
+  tv::Vec3 unprojected;
+  tv::Mat32 d_ray;
+  if (!tv::unproject(tv::prepare_camera(*camera), tv::Vec2(pixel[0], pixel[1]), &unprojected,
+                     jacobian ? &d_ray : nullptr)) {
+    return TV_ERR_OUTSIDE;
+  }
+  for (int i = 0; i < 3; ++i) ray[i] = unprojected[i];
+  if (jacobian) {
+    for (int i = 0; i < 6; ++i) jacobian[i] = d_ray(i / 2, i % 2);
+  }
+  return TV_OK;
+}
+
+tv_status tv_camera_undistort(const tv_camera *camera, const double pixel[2],
+                              double undistorted[2]) {
+  const tv_status status = check_input(camera, pixel, 2, undistorted);
+  if (status != TV_OK) return status;
+  tv::Vec3 ray;
+  if (!tv::unproject(tv::prepare_camera(*camera), tv::Vec2(pixel[0], pixel[1]), &ray, nullptr)) {
+    return TV_ERR_OUTSIDE;
+  }
+  if (!(ray[2] > 0.0)) return TV_ERR_OUTSIDE;
+  const double x = camera->fx * (ray[0] / ray[2]) + camera->cx;
+  const double y = camera->fy * (ray[1] / ray[2]) + camera->cy;
+  if (!is_finite(x) || !is_finite(y)) return TV_ERR_OUTSIDE;
+  undistorted[0] = x;
+  undistorted[1] = y;
+  return TV_OK;
+}
+
+tv_status tv_camera_scale(const tv_camera *camera, double scale, tv_camera *scaled) {
+  const tv_status status = check_input(camera, &scale, 1, scaled);
+  if (status != TV_OK) return status;
+  if (!(scale > 0.0 && scale <= 16.0)) return TV_ERR_ARGUMENT;
+  const double largest = std::numeric_limits<int32_t>::max();
+  if (camera->width * scale + 0.5 > largest || camera->height * scale + 0.5 > largest) {
+    return TV_ERR_ARGUMENT;
+  }
+  tv_camera result = *camera;
+  result.fx = scale * camera->fx;
+  result.fy = scale * camera->fy;
+  result.cx = scale * (camera->cx + 0.5) - 0.5;
+  result.cy = scale * (camera->cy + 0.5) - 0.5;
+  result.width = scaled_size(camera->width, scale);
+  result.height = scaled_size(camera->height, scale);
+  if (tv_camera_check(&result) != TV_OK) return TV_ERR_ARGUMENT;  // over- or underflow
+  *scaled = result;
+  return TV_OK;
+}

@@ -1,0 +1,44 @@
+// Triangulation: the point that two rays see. Methods of R. Hartley, P. Sturm, "Triangulation",
+// CVIU 68(2), 1997, on rays through the camera models. Derivation: docs/algorithms/triangulation.md.
+#pragma once
+
+#include "geometry/camera.h"
+#include "twoview/triangulate.h"
+
+namespace tv {
+
+// The sine of the angle between two rays at which they count as parallel. A ray's direction carries
+// a few units of 2^-53 from the pixel's rounding, the unprojection and the rotation; depth is the
+// baseline divided by this sine, so that below 16 * 2^-52 nothing of the depth is known.
+inline constexpr double kParallelSine = 0x1p-48;
+
+// A pair of cameras with what every point needs. The cameras must outlive it.
+struct TriangulationPair {
+  const Camera* cameras[2];
+  Mat3 cam1_from_cam0_R;
+  Mat3 cam0_from_cam1_R;
+  Vec3 direction;  // t / |t|
+  Vec3 center1;    // camera 1's centre in camera 0's frame, for |t| = 1
+  double baseline; // |t|
+};
+
+// R is a rotation, t not zero.
+TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1, const Mat3& R,
+                                        const Vec3& t);
+
+// Whether this release has the method.
+bool is_triangulation_method(tv_triangulation method);
+
+// Writes every field of *point; nothing in it is ever NaN or infinite.
+void triangulate_point(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
+                       const Vec2& pixel1, tv_point* point);
+
+// The same for unit rays that the caller has already (ray i in camera i's frame, through pixel i).
+void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, const Vec3& ray0,
+                      const Vec3& ray1, const Vec2& pixel0, const Vec2& pixel1, tv_point* point);
+
+void triangulate_point(tv_triangulation method, const Camera& camera0, const Camera& camera1,
+                       const Mat3& R, const Vec3& t, const Vec2& pixel0, const Vec2& pixel1,
+                       tv_point* point);
+
+}  // namespace tv
