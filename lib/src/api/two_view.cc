@@ -1,0 +1,272 @@
+#include "twoview/two_view.h"
+
+#include <cstring>
+
+#include "api/validate.h"
+#include "robust/covariance.h"
+#include "robust/two_view.h"
+
+namespace tv {
+namespace {
+
+constexpr uint64_t kDefaultSeed = 20130814;  // any constant would do
+
+constexpr tv_estimate_options kDefaults = {
+    sizeof(tv_estimate_options), TV_METHOD_FIVE_POINT, 1.0, 0.9999, 10000, 0, kDefaultSeed};
+
+tv_status read_estimate_options(const tv_estimate_options* options, bool calibrated,
+                                tv_estimate_options* checked) {
+  *checked = kDefaults;
+  if (options != nullptr) {
+    if (options->struct_size != sizeof(tv_estimate_options)) return TV_ERR_STRUCT_SIZE;
+    *checked = *options;
+  } else if (!calibrated) {
+    checked->method = TV_METHOD_EIGHT_POINT;
+  }
+  if (!is_finite(checked->max_error_px) || !is_finite(checked->confidence)) {
+    return TV_ERR_NOT_FINITE;
+  }
+  const bool in_range = checked->max_error_px > 0 && checked->max_error_px <= 1e9 &&
+                        checked->confidence >= 0 && checked->confidence < 1 &&
+                        checked->max_iterations >= 1 && checked->max_iterations <= 1000000 &&
+                        checked->fixed_iterations >= 0 && checked->fixed_iterations <= 1000000;
+  const bool method_known = checked->method == TV_METHOD_EIGHT_POINT ||
+                            checked->method == TV_METHOD_SEVEN_POINT ||
+                            (checked->method == TV_METHOD_FIVE_POINT && calibrated);
+  return in_range && method_known ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+uint64_t hash_of(const double* a, const double* b) {
+  const double values[4] = {a[0], a[1], b[0], b[1]};
+  uint64_t hash = 0;
+  for (double value : values) {
+    const double positive_zero = value + 0.0;
+    uint64_t bits;
+    std::memcpy(&bits, &positive_zero, sizeof bits);
+    hash = (hash ^ bits) * 0x9e3779b97f4a7c15ULL;
+    hash ^= hash >> 29;
+  }
+  return hash;
+}
+
+// Whether the two views are to be exchanged for the computation: a choice that depends neither on
+// which was named first nor on the order of the matches, so that both calls compute the same thing.
+bool exchanged(const tv_camera* camera0, const tv_camera* camera1, const double* pixels0,
+               const double* pixels1, int32_t num) {
+  uint64_t forward = 0, backward = 0;
+  for (int32_t i = 0; i < num; ++i) {
+    forward += hash_of(pixels0 + 2 * i, pixels1 + 2 * i);
+    backward += hash_of(pixels1 + 2 * i, pixels0 + 2 * i);
+  }
+  if (forward != backward) return forward > backward;
+  return camera0 != nullptr && std::memcmp(camera0, camera1, sizeof(tv_camera)) > 0;
+}
+
+void store(const Mat3& m, double out[9]) {
+  for (int k = 0; k < 9; ++k) out[k] = m(k / 3, k % 3);
+}
+
+// t of the inverse pose, -R' t, each entry in this order of operations.
+Pose inverse_pose(const Pose& pose) {
+  Pose inverse;
+  inverse.R = pose.R.transpose();
+  for (int i = 0; i < 3; ++i) {
+    inverse.t[i] = -((pose.R(0, i) * pose.t[0] + pose.R(1, i) * pose.t[1]) +
+                     pose.R(2, i) * pose.t[2]);
+  }
+  return inverse;
+}
+
+Mat3 inverse_intrinsics(const Mat3& K) {
+  Mat3 inverse;
+  inverse << 1 / K(0, 0), 0, -K(0, 2) / K(0, 0), 0, 1 / K(1, 1), -K(1, 2) / K(1, 1), 0, 0, 1;
+  return inverse;
+}
+
+// H of the other direction: the adjugate, which is the inverse up to scale.
+Mat3 adjugate(const Mat3& H) {
+  Mat3 result;
+  const Vec3 c0 = H.col(0), c1 = H.col(1), c2 = H.col(2);
+  result.row(0) = c1.cross(c2).transpose();
+  result.row(1) = c2.cross(c0).transpose();
+  result.row(2) = c0.cross(c1).transpose();
+  return result;
+}
+
+// H[8] = 1 where that is finite, else unit norm.
+bool scale_homography(Mat3* H) {
+  const double norm = H->norm();
+  if (!(norm > 0) || !is_finite(norm)) return false;
+  *H /= norm;
+  if ((*H)(2, 2) > 1e-12 || (*H)(2, 2) < -1e-12) *H /= Mat3(*H)(2, 2);
+  return true;
+}
+
+// The share of an 8x8 grid on the caller's image 0 that holds an inlier.
+double coverage(const TwoViewProblem& problem, const Matches& matches, const uint8_t* inlier,
+                int view) {
+  const double* pixels = problem.pixels[view];
+  double low[2] = {0, 0}, high[2] = {0, 0};
+  if (problem.calibrated) {
+    low[0] = low[1] = -0.5;
+    high[0] = problem.camera[view].model.width - 0.5;
+    high[1] = problem.camera[view].model.height - 0.5;
+  } else {
+    for (int k = 0; k < matches.pairs.num; ++k) {
+      for (int d = 0; d < 2; ++d) {
+        const double x = pixels[2 * matches.order[k] + d];
+        if (k == 0 || x < low[d]) low[d] = x;
+        if (k == 0 || x > high[d]) high[d] = x;
+      }
+    }
+  }
+  bool cells[64] = {};
+  int filled = 0;
+  for (int k = 0; k < matches.pairs.num; ++k) {
+    if (inlier[k] == 0) continue;
+    int cell[2];
+    for (int d = 0; d < 2; ++d) {
+      const double place = 8 * (pixels[2 * matches.order[k] + d] - low[d]) / (high[d] - low[d]);
+      cell[d] = place >= 7 ? 7 : (place > 0 ? static_cast<int>(place) : 0);
+    }
+    bool& place = cells[8 * cell[1] + cell[0]];
+    filled += !place;
+    place = true;
+  }
+  return filled / 64.0;
+}
+
+void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewModel& model,
+          const TwoViewOutcome& outcome, bool swapped, tv_two_view* result) {
+  tv_two_view packed{};
+  packed.struct_size = sizeof(tv_two_view);
+  packed.config = outcome.config;
+  packed.verdict = outcome.verdict;
+  packed.reasons = outcome.reasons;
+  packed.num_matches = problem.num;
+  packed.num_inliers = outcome.num_inliers;
+  packed.num_iterations = model.num_iterations;
+  packed.seed = problem.options.seed;
+  packed.essential_inliers = outcome.essential_inliers;
+  packed.fundamental_inliers = outcome.fundamental_inliers;
+  packed.homography_inliers = outcome.homography_inliers;
+  packed.rotation_inliers = outcome.rotation_inliers;
+  packed.median_parallax_rad = outcome.median_parallax_rad;
+  packed.rms_error_px = outcome.rms_error_px;
+  packed.coverage = coverage(problem, matches, outcome.inlier, swapped ? 1 : 0);
+  if (packed.coverage > 0 && packed.coverage < 4.5 / 64 &&
+      packed.config != TV_CONFIG_DEGENERATE) {
+    packed.reasons |= TV_REASON_CROWDED_MATCHES;
+    if (packed.verdict == TV_VERDICT_OK) packed.verdict = TV_VERDICT_DOUBTFUL;
+  }
+  const Pose& pose = outcome.epipolar.pose;
+  packed.has_R = outcome.has_R;
+  packed.has_t = outcome.has_t;
+  if (outcome.has_R) store(swapped ? Mat3(pose.R.transpose()) : pose.R, packed.R);
+  const Mat3 inverse0 = inverse_intrinsics(matches.intrinsics[0]);
+  const Mat3 inverse1 = inverse_intrinsics(matches.intrinsics[1]);
+  if (outcome.has_t) {
+    const Pose inverse = inverse_pose(pose);
+    for (int k = 0; k < 3; ++k) packed.t[k] = swapped ? inverse.t[k] : pose.t[k];
+    const Mat3 E = essential_from_pose(pose).normalized();
+    packed.has_E = 1;
+    store(swapped ? Mat3(E.transpose()) : E, packed.E);
+    if (outcome.has_alternative) {
+      const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
+      packed.has_alternative = 1;
+      store(other.R, packed.alternative_R);
+      for (int k = 0; k < 3; ++k) packed.alternative_t[k] = other.t[k];
+    }
+    if (outcome.has_covariance) {
+      packed.has_covariance = 1;
+      if (swapped) {
+        invert_covariance(pose, inverse, outcome.covariance, packed.covariance);
+      } else {
+        std::memcpy(packed.covariance, outcome.covariance, sizeof packed.covariance);
+      }
+    }
+  }
+  if (outcome.has_t || outcome.config == TV_CONFIG_UNCALIBRATED) {
+    const Mat3 F = (inverse1.transpose() * outcome.epipolar.M * inverse0).normalized();
+    packed.has_F = 1;
+    store(swapped ? Mat3(F.transpose()) : F, packed.F);
+  }
+  if (outcome.has_H) {
+    const Mat3 forward = matches.intrinsics[1] * outcome.H * inverse0;
+    Mat3 H = swapped ? adjugate(forward) : forward;
+    packed.has_H = scale_homography(&H);
+    if (packed.has_H) store(H, packed.H);
+  }
+  *result = packed;
+}
+
+}  // namespace
+}  // namespace tv
+
+void tv_estimate_options_init(tv_estimate_options* options) {
+  if (options != nullptr) *options = tv::kDefaults;
+}
+
+void tv_two_view_init(tv_two_view* result) {
+  if (result == nullptr) return;
+  *result = tv_two_view{};
+  result->struct_size = sizeof(tv_two_view);
+}
+
+tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
+                               const tv_camera* camera1, const double* pixels0,
+                               const double* pixels1, const float* ratios, int32_t num_matches,
+                               const tv_estimate_options* options, tv_two_view* result,
+                               uint8_t* inlier_mask) {
+  if (context == nullptr || result == nullptr ||
+      (num_matches > 0 && (pixels0 == nullptr || pixels1 == nullptr))) {
+    return TV_ERR_NULL;
+  }
+  if (result->struct_size != sizeof(tv_two_view)) return TV_ERR_STRUCT_SIZE;
+  if (num_matches < 0 || (camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
+  const bool calibrated = camera0 != nullptr;
+  tv::TwoViewProblem problem{};
+  tv_status status = tv::read_estimate_options(options, calibrated, &problem.options);
+  if (status != TV_OK) return status;
+  if (num_matches > context->limits.max_matches) return TV_ERR_LIMITS;
+  if (calibrated) {
+    status = tv_camera_check(camera0);
+    if (status == TV_OK) status = tv_camera_check(camera1);
+    if (status != TV_OK) return status;
+  }
+  const size_t n = static_cast<size_t>(num_matches);
+  if (inlier_mask != nullptr &&
+      (tv::overlap(inlier_mask, n, pixels0, 16 * n) || tv::overlap(inlier_mask, n, pixels1, 16 * n) ||
+       (ratios != nullptr && tv::overlap(inlier_mask, n, ratios, 4 * n)) ||
+       tv::overlap(inlier_mask, n, result, sizeof *result))) {
+    return TV_ERR_OVERLAP;
+  }
+  tv::ArenaScope scope(context->arena);
+  tv::Matches matches{};
+  tv::TwoViewModel model{};
+  bool swapped;
+  {
+    tv::StageTimer timer(context, TV_STAGE_ESTIMATE);
+    swapped = tv::exchanged(camera0, camera1, pixels0, pixels1, num_matches);
+    problem.calibrated = calibrated;
+    if (calibrated) {
+      problem.camera[0] = tv::prepare_camera(swapped ? *camera1 : *camera0);
+      problem.camera[1] = tv::prepare_camera(swapped ? *camera0 : *camera1);
+    }
+    problem.pixels[0] = swapped ? pixels1 : pixels0;
+    problem.pixels[1] = swapped ? pixels0 : pixels1;
+    problem.ratios = ratios;
+    problem.num = num_matches;
+    tv::prepare_matches(problem, context->arena, &matches);
+    tv::search_two_view(problem, matches, context->arena, &model);
+  }
+  tv::StageTimer timer(context, TV_STAGE_REFINE);
+  tv::TwoViewOutcome outcome;
+  tv::finish_two_view(problem, matches, model, context->arena, &outcome);
+  tv::pack(problem, matches, model, outcome, swapped, result);
+  if (inlier_mask != nullptr) {
+    std::memset(inlier_mask, 0, n);
+    for (int k = 0; k < matches.pairs.num; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];
+  }
+  return TV_OK;
+}

@@ -1,0 +1,96 @@
+#include "geometry/essential.h"
+
+#include "base/math.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tv {
+
+Mat3 cross_matrix(const Vec3& v) {
+  Mat3 m;
+  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+  return m;
+}
+
+Mat3 essential_from_pose(const Pose& pose) { return cross_matrix(pose.t) * pose.R; }
+
+Mat3 rotation_step(const Vec3& w) {
+  const double scale = 1.0 / std::sqrt(1.0 + 0.25 * w.squaredNorm());
+  const double qw = scale, x = 0.5 * w[0] * scale, y = 0.5 * w[1] * scale, z = 0.5 * w[2] * scale;
+  Mat3 R;
+  R << 1 - 2 * (y * y + z * z), 2 * (x * y - qw * z), 2 * (x * z + qw * y),
+      2 * (x * y + qw * z), 1 - 2 * (x * x + z * z), 2 * (y * z - qw * x),
+      2 * (x * z - qw * y), 2 * (y * z + qw * x), 1 - 2 * (x * x + y * y);
+  return R;
+}
+
+Mat3 orthonormalised(const Mat3& R) {
+  const Vec3 x = R.row(0).transpose().normalized();
+  Vec3 y = R.row(1).transpose();
+  y = (y - y.dot(x) * x).normalized();
+  Mat3 result;
+  result.row(0) = x.transpose();
+  result.row(1) = y.transpose();
+  result.row(2) = x.cross(y).transpose();
+  return result;
+}
+
+void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2) {
+  int k = 0;
+  for (int i = 1; i < 3; ++i) {
+    if (std::fabs(t[i]) < std::fabs(t[k])) k = i;
+  }
+  Vec3 axis = Vec3::Zero();
+  axis[k] = 1;
+  *b1 = axis.cross(t).normalized();
+  *b2 = t.cross(*b1);
+}
+
+Mat3 rotation_about(const Vec3& unit_axis, double angle_rad) {
+  double sine, cosine;
+  sincos(angle_rad, &sine, &cosine);
+  const Mat3 K = cross_matrix(unit_axis);
+  return Mat3::Identity() + sine * K + (1 - cosine) * (K * K);
+}
+
+bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t) {
+  const double norm_sq = E.squaredNorm();
+  if (!(norm_sq > 1e-300) || !(norm_sq < 1e300)) return false;
+  const Mat3 unit = E * std::sqrt(2.0 / norm_sq);  // singular values 1, 1, 0
+  // Rows of cof(E) are cross products of E's rows; cof(E) = t t' R.
+  const Vec3 r0 = unit.row(0), r1 = unit.row(1), r2 = unit.row(2);
+  Mat3 cofactors;
+  cofactors.row(0) = r1.cross(r2).transpose();
+  cofactors.row(1) = r2.cross(r0).transpose();
+  cofactors.row(2) = r0.cross(r1).transpose();
+  // t is E's left null vector: the longest cross product of two columns.
+  const Vec3 c0 = unit.col(0), c1 = unit.col(1), c2 = unit.col(2);
+  const Vec3 candidates[3] = {c1.cross(c2), c2.cross(c0), c0.cross(c1)};
+  int best = 0;
+  for (int i = 1; i < 3; ++i) {
+    if (candidates[i].squaredNorm() > candidates[best].squaredNorm()) best = i;
+  }
+  if (!(candidates[best].squaredNorm() > 1e-24)) return false;
+  *t = candidates[best].normalized();
+  const Mat3 product = cross_matrix(*t) * unit;
+  R[0] = orthonormalised(cofactors - product);
+  R[1] = orthonormalised(cofactors + product);
+  return true;
+}
+
+DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, double angle_rad) {
+  const Vec3 a = pose.R * ray0;
+  const double aa = a.squaredNorm(), ff = ray1.squaredNorm(), af = a.dot(ray1);
+  const double at = a.dot(pose.t), ft = ray1.dot(pose.t);
+  DepthSigns d;
+  d.depth0 = af * ft - ff * at;
+  d.depth1 = aa * ft - af * at;
+  // depth0 / (ff |a|) = -(a's part across f1) . t for unit a: a turn by angle_rad moves it by at
+  // most angle_rad times the length of t's part across f1; likewise depth1.
+  d.tolerance0 = angle_rad * ff * std::sqrt(aa) * std::sqrt(std::max(0.0, 1 - ft * ft / ff));
+  d.tolerance1 = angle_rad * aa * std::sqrt(ff) * std::sqrt(std::max(0.0, 1 - at * at / aa));
+  return d;
+}
+
+}  // namespace tv

@@ -1,0 +1,51 @@
+// Relative poses and essential matrices: E = [t]x R for x1 = R x0 + t, |t| = 1.
+#pragma once
+
+#include "geometry/camera.h"
+
+namespace tv {
+
+struct Pose {
+  Mat3 R = Mat3::Identity();
+  Vec3 t = Vec3::Zero();  // unit length
+};
+
+Mat3 cross_matrix(const Vec3& v);
+Mat3 essential_from_pose(const Pose& pose);
+
+// exp([w]x) to first order and exactly a rotation (the unit quaternion (1, w/2), normalised): for
+// steps of an optimiser, free of trigonometry.
+Mat3 rotation_step(const Vec3& w);
+
+// The nearest rows that are exactly orthonormal, by Gram-Schmidt: undoes the drift of products.
+Mat3 orthonormalised(const Mat3& R);
+
+// b1 = normalise(e_k x t), k the index of the smallest |t_k| (the lowest on a tie), b2 = t x b1.
+void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);
+
+// The rotation that turns by `angle_rad` about a unit axis.
+Mat3 rotation_about(const Vec3& unit_axis, double angle_rad);
+
+// R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1, in closed form (B. K. P. Horn, "Recovering baseline
+// and orientation from essential matrix", 1990). E need not be exactly essential. False when E is
+// zero or not finite.
+bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
+
+// Where two rays meet, as signs only. The numerators of the depths that minimise
+// |d0 R f0 + t - d1 f1| (the normal equations of the midpoint; their denominator is positive), for
+// rays of any length.
+struct DepthSigns {
+  double depth0, depth1;
+  double tolerance0, tolerance1;  // what a change of the rays' angle by `angle_rad` does to them
+};
+DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, double angle_rad);
+
+// +1 in front of both cameras, -1 behind one, 0 when the parallax is within angle_rad: a point that
+// far away says nothing.
+inline int depth_vote(const DepthSigns& d) {
+  const bool behind = d.depth0 < -d.tolerance0 || d.depth1 < -d.tolerance1;
+  const bool front = d.depth0 > d.tolerance0 && d.depth1 > d.tolerance1;
+  return behind ? -1 : (front ? 1 : 0);
+}
+
+}  // namespace tv

@@ -1,0 +1,155 @@
+// Real roots of polynomials of a small fixed degree, by Sturm's theorem.
+#pragma once
+
+#include <cmath>
+
+namespace tv {
+
+// Sturm's chain of a polynomial: p[0] = p, p[1] = p', p[k-1] = (a[k] z + b[k]) p[k] - c[k] p[k+1],
+// c > 0. Only the quotients are kept: evaluation from the chain's constant end takes three
+// multiplications a link. (D. G. Hook, P. R. McAree, "Using Sturm sequences to bracket real roots of
+// polynomial equations", Graphics Gems, 1990, with the quotients in place of the polynomials.)
+template <int kDegree>
+struct SturmChain {
+  int length;  // links; shorter than the degree for a polynomial with repeated roots
+  double slope[kDegree + 1], offset[kDegree + 1], scale[kDegree + 1];
+  double last;  // sign of the chain's end
+};
+
+// p: coefficients, lowest power first, p[kDegree] != 0.
+template <int kDegree>
+SturmChain<kDegree> sturm_chain(const double* p) {
+  double previous[kDegree + 1], current[kDegree + 1];
+  for (int i = 0; i <= kDegree; ++i) previous[i] = p[i];
+  for (int i = 0; i < kDegree; ++i) current[i] = (i + 1) * p[i + 1] / (kDegree * p[kDegree]);
+  const double sign = p[kDegree] < 0 ? -1.0 : 1.0;  // p' is scaled to leading coefficient +-1
+  for (int i = 0; i < kDegree; ++i) current[i] *= sign;
+  SturmChain<kDegree> chain;
+  chain.length = 0;
+  chain.last = sign;
+  // current has degree d and leading coefficient +-1 throughout.
+  for (int d = kDegree - 1; d >= 0; --d) {
+    const double lead = current[d];  // 1 or -1
+    const double slope = previous[d + 1] * lead;
+    const double offset =
+        d > 0 ? (previous[d] - slope * current[d - 1]) * lead : previous[0] * lead;
+    chain.slope[chain.length] = slope;
+    chain.offset[chain.length] = offset;
+    chain.scale[chain.length] = 0;
+    ++chain.length;
+    chain.last = lead;
+    if (d == 0) break;
+    // -remainder = slope z current + offset current - previous, of degree below d
+    double remainder[kDegree + 1];
+    for (int i = 0; i < d; ++i) {
+      remainder[i] = (offset * current[i] + (i > 0 ? slope * current[i - 1] : 0.0)) - previous[i];
+    }
+    const double lead_size = std::fabs(remainder[d - 1]);
+    if (!(lead_size > 1e-300)) break;
+    chain.scale[chain.length - 1] = lead_size;
+    const double inverse = 1.0 / lead_size;
+    for (int i = 0; i <= d; ++i) previous[i] = current[i];
+    for (int i = 0; i < d - 1; ++i) current[i] = remainder[i] * inverse;
+    current[d - 1] = remainder[d - 1] < 0 ? -1.0 : 1.0;
+  }
+  return chain;
+}
+
+// How often the chain's sign changes at z.
+template <int kDegree>
+int sign_changes(const SturmChain<kDegree>& chain, double z) {
+  double next = 0, current = chain.last;
+  int changes = 0;
+  for (int k = chain.length - 1; k >= 0; --k) {
+    const double previous = (chain.slope[k] * z + chain.offset[k]) * current - chain.scale[k] * next;
+    changes += (previous < 0) != (current < 0);
+    next = current;
+    current = previous;
+  }
+  return changes;
+}
+
+template <int kDegree>
+double polynomial_value(const double* p, double z, double* derivative) {
+  double value = p[kDegree], slope = 0;
+  for (int i = kDegree - 1; i >= 0; --i) {
+    slope = slope * z + value;
+    value = value * z + p[i];
+  }
+  *derivative = slope;
+  return value;
+}
+
+// The one root in (low, high]: Newton's steps, kept within the bracket by bisection.
+template <int kDegree>
+double bracketed_root(const double* p, double low, double high) {
+  double slope;
+  const bool low_negative = polynomial_value<kDegree>(p, low, &slope) < 0;
+  double z = 0.5 * (low + high);
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    const double value = polynomial_value<kDegree>(p, z, &slope);
+    if ((value < 0) == low_negative) {
+      low = z;
+    } else {
+      high = z;
+    }
+    const double newton = z - value / slope;
+    const bool inside = newton > low && newton < high;
+    const double next = inside ? newton : 0.5 * (low + high);
+    const double step = std::fabs(next - z);
+    z = next;
+    if (step <= 1e-14 * (1 + std::fabs(z))) break;
+  }
+  return z;
+}
+
+// Real roots within +-1e6, ascending; repeated ones once. p: lowest power first. A leading
+// coefficient of zero gives none. Returns their number.
+template <int kDegree>
+int real_roots(const double* p, double* roots) {
+  if (!(std::fabs(p[kDegree]) > 1e-300) || !(std::fabs(p[kDegree]) < 1e300)) return 0;
+  const SturmChain<kDegree> chain = sturm_chain<kDegree>(p);
+  struct Interval {
+    double low, high;
+    int changes_low, changes_high;
+  };
+  Interval stack[64];
+  constexpr double kBound = 1e6;
+  int depth = 0, num_roots = 0;
+  stack[depth++] = {-kBound, kBound, sign_changes<kDegree>(chain, -kBound),
+                    sign_changes<kDegree>(chain, kBound)};
+  while (depth > 0) {
+    const Interval interval = stack[--depth];
+    const int count = interval.changes_low - interval.changes_high;
+    if (count <= 0) continue;
+    const double width = interval.high - interval.low;
+    // Newton starts from a bracket that is short against the root's size.
+    const double size = std::fabs(interval.high) > std::fabs(interval.low)
+                            ? std::fabs(interval.low)
+                            : std::fabs(interval.high);
+    const bool tiny = width <= 1e-12 * (1 + size);
+    if (tiny || (count == 1 && width <= 0.5 + size)) {
+      roots[num_roots++] = tiny ? 0.5 * (interval.low + interval.high)
+                                : bracketed_root<kDegree>(p, interval.low, interval.high);
+      if (num_roots == kDegree) break;
+      continue;
+    }
+    double middle;
+    if (interval.low < 0 && interval.high > 0) {
+      middle = 0;
+    } else if (width <= 2) {
+      middle = 0.5 * (interval.low + interval.high);
+    } else {  // by size, since roots are spread evenly over angles, not over the line
+      const double low = interval.low < 0 ? -interval.high : interval.low;
+      const double high = interval.low < 0 ? -interval.low : interval.high;
+      const double size_middle = low < 1 ? 1.0 : (high > 16 * low ? 4 * low : std::sqrt(low * high));
+      middle = interval.low < 0 ? -size_middle : size_middle;
+    }
+    const int changes = sign_changes<kDegree>(chain, middle);
+    stack[depth++] = {middle, interval.high, changes, interval.changes_high};
+    stack[depth++] = {interval.low, middle, interval.changes_low, changes};
+  }
+  return num_roots;
+}
+
+}  // namespace tv

@@ -1,0 +1,87 @@
+// Matches as rays with their pixel scale, and what a model leaves of them, in pixels.
+//
+// A match is a pair of rays f0, f1 and, for each, the 3x2 Jacobian J = d ray / d pixel. Sampson's
+// distance of f1' M f0 = 0 (P. D. Sampson 1982; Hartley & Zisserman 11.4.3) is then
+//     r = f1' M f0 / sqrt(|J0' M' f1|^2 + |J1' M f0|^2),
+// in pixels of the images as they are, whatever the lens. Rays are points (x, y, 1) of the plane
+// z = 1 where the model allows (this is exactly the textbook's formula for a pinhole), unit vectors
+// for a fisheye.
+#pragma once
+
+#include <cstdint>
+
+#include "base/arena.h"
+#include "geometry/camera.h"
+
+namespace tv {
+
+inline constexpr int kScoreBlock = 32;
+inline constexpr int kCostOne = 1 << 16;  // what an outlier costs in an integer score
+
+// Structure of arrays: component-major, so that a loop over matches can be vectorised.
+struct RayPairs {
+  int num;
+  bool on_plane;      // both views: rays have z = 1, so the third rows of the Jacobians are zero
+  double* ray[2][3];
+  double* jacobian[2][6];  // row-major 3x2
+  // For scoring only, single precision, padded with zeros to a multiple of kScoreBlock.
+  // On the plane: x0 y0 x1 y1, then J J' of view 0 and of view 1 (xx, xy, yy).
+  // Else: the rays (6) and the Jacobians (12).
+  float* fast[18];
+};
+
+size_t ray_pairs_bytes(int max_matches);
+RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane);
+
+inline Vec3 ray_of(const RayPairs& pairs, int view, int i) {
+  return Vec3(pairs.ray[view][0][i], pairs.ray[view][1][i], pairs.ray[view][2][i]);
+}
+Mat32 jacobian_of(const RayPairs& pairs, int view, int i);
+
+void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian);
+void fill_fast(RayPairs& pairs);  // after the last set_ray
+
+// The angle, in radians, that one pixel of noise in both images makes between the two rays.
+double pixel_angle(const RayPairs& pairs, int i);
+
+// Squared Sampson distance; +inf for a match that the model says nothing about (both rays at the
+// epipoles).
+double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
+
+// Sum over all matches of min(r^2 / T^2, 1), each truncated to a multiple of 1/kCostOne: an integer,
+// so that neither order nor vector width matters. May stop as soon as the sum exceeds `bound`.
+int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound);
+
+// What a homography (or a rotation) leaves: d = the displacement in image 1, in pixels, between what
+// H predicts from view 0 and what view 1 saw; weighted for noise in both images alike,
+//     r^2 = d' (I + D D')^-1 d,  D = d (prediction) / d pixel0,
+// Sampson's distance of the two equations (Hartley & Zisserman 4.2.6).
+struct TransferResidual {
+  double r_sq;
+  double d_sq;  // |d|^2
+};
+TransferResidual transfer_residual(const RayPairs& pairs, int i, const Mat3& H);
+
+enum class Loss { kTruncated, kCauchy };
+
+struct RobustLoss {
+  Loss kind;
+  double scale_px;
+};
+
+
+// Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with P parameters,
+// columns[p] = dM / dparameter p. upper: P (P + 1) / 2, row by row. Returns the sum of rho, in
+// units of scale^2. indices null: matches 0 .. count - 1.
+template <int P>
+double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                const Mat3& M, const Mat3 columns[P], const RobustLoss& loss,
+                                double upper[P * (P + 1) / 2], double gradient[P]);
+
+// The same for the transfer residual of a matrix H; columns null: P = 9, H's entries themselves.
+template <int P>
+double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                 const Mat3& H, const Mat3* columns, const RobustLoss& loss,
+                                 double upper[P * (P + 1) / 2], double gradient[P]);
+
+}  // namespace tv

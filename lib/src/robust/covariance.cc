@@ -1,0 +1,63 @@
+#include "robust/covariance.h"
+
+namespace tv {
+
+bool pose_covariance(const RayPairs& pairs, const int32_t* inliers, int count, const Pose& pose,
+                     double covariance[25]) {
+  if (count <= 5) return false;
+  double upper[15], gradient[5];
+  // A scale that no residual reaches: plain least squares.
+  constexpr double kNoLimit = 1e140;
+  PoseModel model{pose};
+  model.normal_equations(pairs, inliers, count, RobustLoss{Loss::kTruncated, kNoLimit}, upper,
+                         gradient);
+  const Mat3 E = essential_from_pose(pose);
+  double sum = 0;
+  for (int k = 0; k < count; ++k) sum += sampson_sq(pairs, inliers[k], E);
+  double inverse[25];
+  if (!invert_symmetric5(upper, inverse)) return false;
+  const double variance = sum / (count - 5);
+  for (int k = 0; k < 25; ++k) {
+    covariance[k] = variance * inverse[k];
+    if (!(covariance[k] - covariance[k] == 0.0)) return false;
+  }
+  return true;
+}
+
+void invert_covariance(const Pose& pose, const Pose& inverse, const double covariance[25],
+                       double inverse_covariance[25]) {
+  Vec3 b1, b2, c1, c2;
+  tangent_basis(pose.t, &b1, &b2);
+  tangent_basis(inverse.t, &c1, &c2);
+  double J[5][5] = {};
+  for (int k = 0; k < 5; ++k) {
+    Vec3 w = Vec3::Zero(), move = Vec3::Zero();  // of the inverse, for a unit step of parameter k
+    if (k < 3) {
+      Vec3 axis = Vec3::Zero();
+      axis[k] = 1;
+      w = -(pose.R.transpose() * axis);
+      move = pose.R.transpose() * axis.cross(pose.t);
+    } else {
+      move = -(pose.R.transpose() * (k == 3 ? b1 : b2));
+    }
+    for (int r = 0; r < 3; ++r) J[r][k] = w[r];
+    J[3][k] = move.dot(c1);
+    J[4][k] = move.dot(c2);
+  }
+  double half[5][5];
+  for (int r = 0; r < 5; ++r) {
+    for (int c = 0; c < 5; ++c) {
+      half[r][c] = 0;
+      for (int k = 0; k < 5; ++k) half[r][c] += J[r][k] * covariance[5 * k + c];
+    }
+  }
+  for (int r = 0; r < 5; ++r) {
+    for (int c = r; c < 5; ++c) {
+      double sum = 0;
+      for (int k = 0; k < 5; ++k) sum += half[r][k] * J[c][k];
+      inverse_covariance[5 * r + c] = inverse_covariance[5 * c + r] = sum;
+    }
+  }
+}
+
+}  // namespace tv

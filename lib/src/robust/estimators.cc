@@ -1,0 +1,203 @@
+#include "robust/estimators.h"
+
+#include <cmath>
+
+#include "geometry/fundamental_7pt.h"
+#include "geometry/fundamental_8pt.h"
+#include "geometry/homography_4pt.h"
+#include "geometry/rotation_2pt.h"
+
+namespace tv {
+namespace {
+
+// Local optimisation looks this many thresholds far, so that matches can come in.
+constexpr double kNear = 5;
+constexpr int kLocalIterations = 10;
+
+inline int64_t quantised(double q) {
+  return q < 1 ? static_cast<int64_t>(q * kCostOne) : kCostOne;
+}
+
+template <int kCount>
+void gather(const RayPairs& pairs, const int32_t* sample, Vec3* rays0, Vec3* rays1) {
+  for (int k = 0; k < kCount; ++k) {
+    rays0[k] = ray_of(pairs, 0, sample[k]);
+    rays1[k] = ray_of(pairs, 1, sample[k]);
+  }
+}
+
+}  // namespace
+
+bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
+                 double threshold_px, double* r_sq) {
+  *r_sq = sampson_sq(pairs, i, E);
+  if (!(*r_sq <= threshold_px * threshold_px)) return false;
+  return depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
+                                threshold_px * pixel_angle(pairs, i))) >= 0;
+}
+
+int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
+                 int32_t* indices) {
+  const double limit_sq = limit_px * limit_px;
+  int near = 0;
+  for (int i = 0; i < count; ++i) {
+    if (sampson_sq(pairs, i, M) <= limit_sq) indices[near++] = i;
+  }
+  return near;
+}
+
+bool pose_from_essential(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& E,
+                         double threshold_px, bool strict, Pose* pose) {
+  Mat3 R[2];
+  Vec3 t;
+  if (!decompose_essential(E, R, &t)) return false;
+  // Each rotation with +t and with -t: the second's depths are the negatives of the first's.
+  int votes[4] = {}, signs[4] = {}, behind[4] = {};
+  for (int k = 0; k < count; ++k) {
+    const int i = indices[k];
+    const double angle = threshold_px * pixel_angle(pairs, i);
+    for (int r = 0; r < 2; ++r) {
+      DepthSigns d = depth_signs(Pose{R[r], t}, ray_of(pairs, 0, i), ray_of(pairs, 1, i), angle);
+      for (int s = 0; s < 2; ++s) {
+        const int vote = depth_vote(d);
+        votes[2 * r + s] += vote;
+        behind[2 * r + s] += vote < 0;
+        signs[2 * r + s] += (d.depth0 > 0) + (d.depth1 > 0);
+        d.depth0 = -d.depth0;
+        d.depth1 = -d.depth1;
+      }
+    }
+  }
+  int best = 0;
+  for (int c = 1; c < 4; ++c) {
+    if (votes[c] > votes[best] || (votes[c] == votes[best] && signs[c] > signs[best])) best = c;
+  }
+  if (strict && behind[best] > 0) return false;
+  *pose = Pose{R[best / 2], best % 2 == 0 ? t : Vec3(-t)};
+  return true;
+}
+
+int PoseEstimator::generate_models(const int32_t* sample, Pose* models) const {
+  Vec3 rays0[5], rays1[5];
+  gather<5>(pairs, sample, rays0, rays1);
+  Mat3 essentials[kMaxRelpose5pt];
+  const int count = relpose_5pt(rays0, rays1, essentials);
+  int num_models = 0;
+  for (int k = 0; k < count; ++k) {
+    num_models += pose_from_essential(pairs, sample, 5, essentials[k], threshold_px, true,
+                                      &models[num_models]);
+  }
+  return num_models;
+}
+
+int64_t PoseEstimator::fast_cost(const Pose& model, int64_t bound) const {
+  return msac_cost_fast(pairs, essential_from_pose(model), threshold_px, bound);
+}
+
+int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {
+  const Mat3 E = essential_from_pose(model);
+  const double inverse_sq = 1 / (threshold_px * threshold_px);
+  int64_t cost = 0;
+  *num_inliers = 0;
+  for (int i = 0; i < pairs.num; ++i) {
+    double r_sq;
+    const bool inlier = pose_inlier(pairs, i, E, model, threshold_px, &r_sq);
+    *num_inliers += inlier;
+    cost += inlier ? quantised(r_sq * inverse_sq) : kCostOne;
+  }
+  return cost;
+}
+
+void PoseEstimator::refine_model(Pose* model) const {
+  const int count = near_matches(pairs, pairs.num, essential_from_pose(*model),
+                                 kNear * threshold_px, indices);
+  PoseModel refined{*model};
+  refine(pairs, indices, count, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
+         &refined);
+  *model = refined.pose;
+}
+
+template <int kPoints>
+int FundamentalEstimator<kPoints>::generate_models(const int32_t* sample, Mat3* models) const {
+  Vec3 rays0[kPoints], rays1[kPoints];
+  gather<kPoints>(pairs, sample, rays0, rays1);
+  if constexpr (kPoints == 7) {
+    return fundamental_7pt(rays0, rays1, models);
+  } else {
+    return fundamental_8pt(rays0, rays1, models) ? 1 : 0;
+  }
+}
+
+template <int kPoints>
+int64_t FundamentalEstimator<kPoints>::fast_cost(const Mat3& model, int64_t bound) const {
+  return msac_cost_fast(pairs, model, threshold_px, bound);
+}
+
+template <int kPoints>
+int64_t FundamentalEstimator<kPoints>::full_cost(const Mat3& model, int* num_inliers) const {
+  const double inverse_sq = 1 / (threshold_px * threshold_px);
+  int64_t cost = 0;
+  *num_inliers = 0;
+  for (int i = 0; i < pairs.num; ++i) {
+    const double q = sampson_sq(pairs, i, model) * inverse_sq;
+    *num_inliers += q <= 1;
+    cost += quantised(q);
+  }
+  return cost;
+}
+
+template <int kPoints>
+void FundamentalEstimator<kPoints>::refine_model(Mat3* model) const {
+  const int count = near_matches(pairs, pairs.num, *model, kNear * threshold_px, indices);
+  FundamentalModel refined = fundamental_model(*model);
+  refine(pairs, indices, count, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
+         &refined);
+  *model = refined.matrix().normalized();
+}
+
+template struct FundamentalEstimator<7>;
+template struct FundamentalEstimator<8>;
+
+int64_t TransferEstimator::cost(const Mat3& H, int64_t bound, int* num_inliers) const {
+  const double inverse_sq = 1 / (threshold_px * threshold_px);
+  int64_t sum = 0;
+  int inliers = 0;
+  for (int k = 0; k < num_subset && sum <= bound; ++k) {
+    const double q = transfer_residual(pairs, subset[k], H).r_sq * inverse_sq;
+    inliers += q <= 1;
+    sum += quantised(q);
+  }
+  if (num_inliers != nullptr) *num_inliers = inliers;
+  return sum;
+}
+
+int HomographyEstimator::generate_models(const int32_t* sample, Mat3* models) const {
+  int32_t chosen[4];
+  for (int k = 0; k < 4; ++k) chosen[k] = subset[sample[k]];
+  Vec3 rays0[4], rays1[4];
+  gather<4>(pairs, chosen, rays0, rays1);
+  return homography_4pt(rays0, rays1, models) ? 1 : 0;
+}
+
+void HomographyEstimator::refine_model(Mat3* model) const {
+  HomographyModel refined{*model};
+  refine(pairs, subset, num_subset, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
+         &refined);
+  *model = refined.H;
+}
+
+int RotationEstimator::generate_models(const int32_t* sample, Mat3* models) const {
+  const int32_t chosen[2] = {subset[sample[0]], subset[sample[1]]};
+  Vec3 rays0[2], rays1[2];
+  gather<2>(pairs, chosen, rays0, rays1);
+  return rotation_2pt(rays0, rays1, models) ? 1 : 0;
+}
+
+void RotationEstimator::refine_model(Mat3* model) const {
+  RotationModel refined{*model};
+  refine(pairs, subset, num_subset, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
+         &refined);
+  *model = refined.R;
+}
+
+}  // namespace tv

@@ -1,0 +1,86 @@
+// The models that the robust loop (loop.h) estimates.
+#pragma once
+
+#include "geometry/relpose_5pt.h"
+#include "robust/matches.h"
+#include "robust/refine.h"
+
+namespace tv {
+
+// A pose from five rays.
+struct PoseEstimator {
+  using Model = Pose;
+  static constexpr int kSampleSize = 5;
+  static constexpr int kMaxModels = kMaxRelpose5pt;
+  const RayPairs& pairs;  // the matches that take part
+  double threshold_px;
+  int32_t* indices;  // scratch, as many as matches
+  int generate_models(const int32_t* sample, Model* models) const;
+  int64_t fast_cost(const Model& model, int64_t bound) const;
+  int64_t full_cost(const Model& model, int* num_inliers) const;
+  void refine_model(Model* model) const;
+};
+
+// A fundamental matrix (on rays) from eight or seven.
+template <int kPoints>
+struct FundamentalEstimator {
+  using Model = Mat3;
+  static constexpr int kSampleSize = kPoints;
+  static constexpr int kMaxModels = kPoints == 7 ? 3 : 1;
+  const RayPairs& pairs;
+  double threshold_px;
+  int32_t* indices;
+  int generate_models(const int32_t* sample, Model* models) const;
+  int64_t fast_cost(const Model& model, int64_t bound) const;
+  int64_t full_cost(const Model& model, int* num_inliers) const;
+  void refine_model(Model* model) const;
+};
+
+// A homography from four rays, a rotation from two; over the listed matches only.
+struct TransferEstimator {
+  const RayPairs& pairs;
+  double threshold_px;
+  const int32_t* subset;
+  int num_subset;
+  int64_t cost(const Mat3& H, int64_t bound, int* num_inliers) const;
+};
+
+struct HomographyEstimator : TransferEstimator {
+  using Model = Mat3;
+  static constexpr int kSampleSize = 4;
+  static constexpr int kMaxModels = 1;
+  int generate_models(const int32_t* sample, Model* models) const;
+  int64_t fast_cost(const Model& model, int64_t bound) const { return cost(model, bound, nullptr); }
+  int64_t full_cost(const Model& model, int* num_inliers) const {
+    return cost(model, INT64_MAX, num_inliers);
+  }
+  void refine_model(Model* model) const;
+};
+
+struct RotationEstimator : TransferEstimator {
+  using Model = Mat3;
+  static constexpr int kSampleSize = 2;
+  static constexpr int kMaxModels = 1;
+  int generate_models(const int32_t* sample, Model* models) const;
+  int64_t fast_cost(const Model& model, int64_t bound) const { return cost(model, bound, nullptr); }
+  int64_t full_cost(const Model& model, int* num_inliers) const {
+    return cost(model, INT64_MAX, num_inliers);
+  }
+  void refine_model(Model* model) const;
+};
+
+// Whether match i is an inlier of a pose: its Sampson distance, and not behind a camera by more than
+// the threshold's parallax. Writes the squared distance.
+bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
+                 double threshold_px, double* r_sq);
+
+// Matches among the first `count` whose Sampson distance is below limit_px. Returns how many.
+int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
+                 int32_t* indices);
+
+// The pose of an essential matrix that puts most of the listed matches in front of both cameras;
+// false when E is none, or when a listed match is clearly behind and `strict`.
+bool pose_from_essential(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& E,
+                         double threshold_px, bool strict, Pose* pose);
+
+}  // namespace tv

@@ -1,0 +1,214 @@
+#include "robust/matches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace tv {
+namespace {
+
+bool is_finite(double x) { return x - x == 0.0; }
+
+uint64_t mix(uint64_t h) {  // the finaliser of splitmix64 (G. Steele et al., 2014)
+  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  h = (h ^ (h >> 27)) * 0x94d049bb133111ebULL;
+  return h ^ (h >> 31);
+}
+
+uint64_t bits_of(double x) {
+  const double positive_zero = x + 0.0;
+  uint64_t bits;
+  std::memcpy(&bits, &positive_zero, sizeof bits);
+  return bits;
+}
+
+struct Coordinates {
+  double v[4];  // x0 y0 x1 y1
+};
+
+Coordinates coordinates(const TwoViewProblem& p, int32_t i) {
+  return {{p.pixels[0][2 * i], p.pixels[0][2 * i + 1], p.pixels[1][2 * i], p.pixels[1][2 * i + 1]}};
+}
+
+bool same_place(const TwoViewProblem& p, int32_t i, int32_t j) {
+  const Coordinates a = coordinates(p, i), b = coordinates(p, j);
+  return a.v[0] == b.v[0] && a.v[1] == b.v[1] && a.v[2] == b.v[2] && a.v[3] == b.v[3];
+}
+
+struct SortKey {
+  float ratio;
+  int32_t index;
+};
+
+// A ratio that is not a number counts as the worst.
+float sort_ratio(const TwoViewProblem& p, int32_t i) {
+  if (p.ratios == nullptr) return 0;
+  const float ratio = p.ratios[i];
+  return ratio < 3e38f ? ratio : 3e38f;
+}
+
+bool sorts_before(const TwoViewProblem& p, const SortKey& a, const SortKey& b) {
+  if (a.ratio != b.ratio) return a.ratio < b.ratio;
+  const Coordinates ca = coordinates(p, a.index), cb = coordinates(p, b.index);
+  for (int k = 0; k < 4; ++k) {
+    if (ca.v[k] != cb.v[k]) return ca.v[k] < cb.v[k];
+  }
+  return a.index < b.index;  // equal matches: which is which makes no difference
+}
+
+// Keeps the first of equal matches in order[0 ..), the others behind them. Returns how many differ.
+int move_repeats_last(const TwoViewProblem& p, const SortKey* sorted, int count, int32_t* table,
+                      uint32_t table_size, int32_t* order) {
+  for (uint32_t s = 0; s < table_size; ++s) table[s] = -1;
+  int num_unique = 0, num_repeats = 0;
+  for (int k = 0; k < count; ++k) {
+    const int32_t i = sorted[k].index;
+    const Coordinates c = coordinates(p, i);
+    uint64_t hash = 0;
+    for (int d = 0; d < 4; ++d) hash = mix(hash + 0x9e3779b97f4a7c15ULL + bits_of(c.v[d]));
+    uint32_t slot = static_cast<uint32_t>(hash) & (table_size - 1);
+    while (table[slot] >= 0 && !same_place(p, table[slot], i)) slot = (slot + 1) & (table_size - 1);
+    if (table[slot] < 0) {
+      table[slot] = i;
+      order[num_unique++] = i;
+    } else {
+      order[count - 1 - num_repeats++] = i;
+    }
+  }
+  return num_unique;
+}
+
+uint32_t table_size_for(int max_matches) {
+  uint32_t size = 16;
+  while (size < 2 * static_cast<uint32_t>(max_matches)) size *= 2;
+  return size;
+}
+
+// The ray of a pixel and d ray / d pixel, on the plane z = 1 or of unit length.
+bool ray_of_pixel(const Camera& camera, const double* pixel, bool on_plane, Vec3* ray,
+                  Mat32* jacobian) {
+  const tv_camera& model = camera.model;
+  if (model.model == TV_CAMERA_PINHOLE && on_plane) {
+    *ray = Vec3((pixel[0] - model.cx) / model.fx, (pixel[1] - model.cy) / model.fy, 1);
+    *jacobian << 1 / model.fx, 0, 0, 1 / model.fy, 0, 0;
+    return true;
+  }
+  Vec3 unit;
+  Mat32 slope;
+  if (!unproject(camera, Vec2(pixel[0], pixel[1]), &unit, &slope)) return false;
+  if (!on_plane) {
+    *ray = unit;
+    *jacobian = slope;
+    return true;
+  }
+  if (!(unit[2] > 1e-3)) return false;  // Brown-Conrady's valid angle ends before 90 degrees
+  *ray = Vec3(unit[0] / unit[2], unit[1] / unit[2], 1);
+  for (int r = 0; r < 2; ++r) {
+    for (int c = 0; c < 2; ++c) {
+      (*jacobian)(r, c) = (slope(r, c) - (*ray)[r] * slope(2, c)) / unit[2];
+    }
+  }
+  (*jacobian)(2, 0) = (*jacobian)(2, 1) = 0;
+  return true;
+}
+
+bool sane(const Vec3& ray, const Mat32& jacobian) {
+  double sum = ray.squaredNorm() + jacobian.squaredNorm();
+  return is_finite(sum) && sum < 1e200;
+}
+
+// Without cameras: a pinhole that puts the centroid on the axis and the mean squared distance of the
+// points from it at 2 (Hartley 1997).
+Camera normalising_camera(const double* pixels, const int32_t* order, int count) {
+  double mean[2] = {0, 0}, spread = 0;
+  for (int k = 0; k < count; ++k) {
+    for (int d = 0; d < 2; ++d) mean[d] += pixels[2 * order[k] + d];
+  }
+  for (int d = 0; d < 2; ++d) mean[d] = count > 0 ? mean[d] / count : 0;
+  for (int k = 0; k < count; ++k) {
+    const double x = pixels[2 * order[k]] - mean[0], y = pixels[2 * order[k] + 1] - mean[1];
+    spread += x * x + y * y;
+  }
+  Camera camera{};
+  camera.model.model = TV_CAMERA_PINHOLE;
+  const double focal = count > 0 ? std::sqrt(0.5 * spread / count) : 1;
+  camera.model.fx = camera.model.fy = focal > 0 && is_finite(focal) ? focal : 1;
+  camera.model.cx = mean[0];
+  camera.model.cy = mean[1];
+  return camera;
+}
+
+double box_area(const double* pixels, const int32_t* order, int count) {
+  double low[2] = {0, 0}, high[2] = {0, 0};
+  for (int k = 0; k < count; ++k) {
+    for (int d = 0; d < 2; ++d) {
+      const double x = pixels[2 * order[k] + d];
+      if (k == 0 || x < low[d]) low[d] = x;
+      if (k == 0 || x > high[d]) high[d] = x;
+    }
+  }
+  return (high[0] - low[0] + 1) * (high[1] - low[1] + 1);
+}
+
+}  // namespace
+
+size_t matches_bytes(int max_matches) {
+  const size_t n = static_cast<size_t>(max_matches);
+  return ray_pairs_bytes(max_matches) + arena_bytes<int32_t>(n) + arena_bytes<SortKey>(n) +
+         arena_bytes<int32_t>(table_size_for(max_matches));
+}
+
+void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches) {
+  const size_t n = static_cast<size_t>(problem.num);
+  matches->order = arena_alloc<int32_t>(arena, n);
+  const bool on_plane = !problem.calibrated ||
+                        (problem.camera[0].model.model != TV_CAMERA_KANNALA_BRANDT &&
+                         problem.camera[1].model.model != TV_CAMERA_KANNALA_BRANDT);
+  matches->pairs = alloc_ray_pairs(arena, problem.num, on_plane);
+  ArenaScope scope(arena);
+  SortKey* keys = arena_alloc<SortKey>(arena, n);
+  const uint32_t table_size = table_size_for(problem.num);
+  int32_t* table = arena_alloc<int32_t>(arena, table_size);
+  int count = 0;
+  for (int32_t i = 0; i < problem.num; ++i) {
+    const Coordinates c = coordinates(problem, i);
+    const double sum = (std::fabs(c.v[0]) + std::fabs(c.v[1])) +
+                       (std::fabs(c.v[2]) + std::fabs(c.v[3]));
+    if (!(sum < 1e12)) continue;  // NaN, infinite, or no pixel of any image
+    Vec3 ray;
+    Mat32 jacobian;
+    bool usable = true;
+    for (int v = 0; v < 2 && usable && problem.calibrated; ++v) {
+      usable = ray_of_pixel(problem.camera[v], &c.v[2 * v], on_plane, &ray, &jacobian) &&
+               sane(ray, jacobian);
+    }
+    if (usable) keys[count++] = SortKey{sort_ratio(problem, i), i};
+  }
+  std::sort(keys, keys + count, [&problem](const SortKey& a, const SortKey& b) {
+    return sorts_before(problem, a, b);
+  });
+  matches->num_unique =
+      move_repeats_last(problem, keys, count, table, table_size, matches->order);
+  matches->pairs.num = count;
+  for (int v = 0; v < 2; ++v) {
+    const Camera camera =
+        problem.calibrated
+            ? problem.camera[v]
+            : normalising_camera(problem.pixels[v], matches->order, matches->num_unique);
+    for (int k = 0; k < count; ++k) {
+      Vec3 ray;
+      Mat32 jacobian;
+      ray_of_pixel(camera, problem.pixels[v] + 2 * matches->order[k], on_plane, &ray, &jacobian);
+      set_ray(matches->pairs, v, k, ray, jacobian);
+    }
+    const tv_camera& m = camera.model;
+    matches->intrinsics[v] << m.fx, 0, m.cx, 0, m.fy, m.cy, 0, 0, 1;
+  }
+  const tv_camera& second = problem.camera[1].model;
+  matches->area_px = problem.calibrated
+                         ? static_cast<double>(second.width) * second.height
+                         : box_area(problem.pixels[1], matches->order, matches->num_unique);
+  fill_fast(matches->pairs);
+}
+
+}  // namespace tv

@@ -1,0 +1,222 @@
+// D. W. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963. With a
+// robust loss the weights are those of the current residuals (iteratively reweighted).
+#include "robust/refine.h"
+
+#include <cmath>
+
+namespace tv {
+
+double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                   const RobustLoss& loss, double* upper,
+                                   double* gradient) const {
+  const Mat3 translation = cross_matrix(pose.t);
+  Vec3 b1, b2;
+  tangent_basis(pose.t, &b1, &b2);
+  Mat3 columns[5];
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    columns[k] = translation * (cross_matrix(axis) * pose.R);
+  }
+  columns[3] = cross_matrix(b1) * pose.R;
+  columns[4] = cross_matrix(b2) * pose.R;
+  return sampson_normal_equations<5>(pairs, indices, count, translation * pose.R, columns, loss,
+                                     upper, gradient);
+}
+
+PoseModel PoseModel::stepped(const double* step) const {
+  Vec3 b1, b2;
+  tangent_basis(pose.t, &b1, &b2);
+  PoseModel result;
+  result.pose.R = orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * pose.R);
+  result.pose.t = (pose.t + step[3] * b1 + step[4] * b2).normalized();
+  return result;
+}
+
+FundamentalModel fundamental_model(const Mat3& M) {
+  const Svd3 svd = svd3(M);
+  return FundamentalModel{svd.U, svd.V, svd.s[0] > 0 ? svd.s[1] / svd.s[0] : 0.0};
+}
+
+Mat3 FundamentalModel::matrix() const {
+  return U.col(0) * V.col(0).transpose() + s * (U.col(1) * V.col(1).transpose());
+}
+
+double FundamentalModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                          const RobustLoss& loss, double* upper,
+                                          double* gradient) const {
+  Mat3 columns[7];
+  Mat3 S = Mat3::Zero();
+  S(0, 0) = 1;
+  S(1, 1) = s;
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    const Mat3 turn = cross_matrix(axis);
+    columns[k] = U * turn * S * V.transpose();
+    columns[3 + k] = -(U * S * turn * V.transpose());
+  }
+  columns[6] = U.col(1) * V.col(1).transpose();
+  return sampson_normal_equations<7>(pairs, indices, count, matrix(), columns, loss, upper,
+                                     gradient);
+}
+
+FundamentalModel FundamentalModel::stepped(const double* step) const {
+  FundamentalModel result;
+  result.U = orthonormalised(U * rotation_step(Vec3(step[0], step[1], step[2])));
+  result.V = orthonormalised(V * rotation_step(Vec3(step[3], step[4], step[5])));
+  result.s = s + step[6];
+  return result;
+}
+
+double HomographyModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                         const RobustLoss& loss, double* upper,
+                                         double* gradient) const {
+  return transfer_normal_equations<9>(pairs, indices, count, H, nullptr, loss, upper, gradient);
+}
+
+HomographyModel HomographyModel::stepped(const double* step) const {
+  HomographyModel result;
+  for (int k = 0; k < 9; ++k) result.H(k / 3, k % 3) = H(k / 3, k % 3) + step[k];
+  result.H /= result.H.norm();
+  return result;
+}
+
+double RotationModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                       const RobustLoss& loss, double* upper,
+                                       double* gradient) const {
+  Mat3 columns[3];
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    columns[k] = cross_matrix(axis) * R;
+  }
+  return transfer_normal_equations<3>(pairs, indices, count, R, columns, loss, upper, gradient);
+}
+
+RotationModel RotationModel::stepped(const double* step) const {
+  return RotationModel{orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * R)};
+}
+
+namespace {
+
+// A = L D L' in place of a full lower triangle; false when a pivot is not above `smallest`.
+template <int P>
+bool factorise(double A[P][P], double D[P], double smallest) {
+  for (int j = 0; j < P; ++j) {
+    double pivot = A[j][j];
+    for (int k = 0; k < j; ++k) pivot -= A[j][k] * A[j][k] * D[k];
+    if (!(pivot > smallest)) return false;
+    D[j] = pivot;
+    for (int i = j + 1; i < P; ++i) {
+      double value = A[i][j];
+      for (int k = 0; k < j; ++k) value -= A[i][k] * A[j][k] * D[k];
+      A[i][j] = value / pivot;
+    }
+  }
+  return true;
+}
+
+template <int P>
+void solve_factorised(const double A[P][P], const double D[P], double x[P]) {
+  for (int i = 0; i < P; ++i) {
+    for (int k = 0; k < i; ++k) x[i] -= A[i][k] * x[k];
+  }
+  for (int i = 0; i < P; ++i) x[i] /= D[i];
+  for (int i = P - 1; i >= 0; --i) {
+    for (int k = i + 1; k < P; ++k) x[i] -= A[k][i] * x[k];
+  }
+}
+
+template <int P>
+void unpack_lower(const double upper[P * (P + 1) / 2], double A[P][P]) {
+  int slot = 0;
+  for (int i = 0; i < P; ++i) {
+    for (int j = i; j < P; ++j) A[j][i] = upper[slot++];
+  }
+}
+
+}  // namespace
+
+template <int P>
+bool solve_damped(const double upper[P * (P + 1) / 2], const double gradient[P], double lambda,
+                  double step[P]) {
+  double A[P][P], D[P];
+  unpack_lower<P>(upper, A);
+  double largest = 0;
+  for (int i = 0; i < P; ++i) {
+    if (A[i][i] > largest) largest = A[i][i];
+  }
+  if (!(largest > 0)) return false;
+  for (int i = 0; i < P; ++i) A[i][i] += lambda * (A[i][i] + 1e-9 * largest);
+  if (!factorise<P>(A, D, 0.0)) return false;
+  for (int i = 0; i < P; ++i) step[i] = -gradient[i];
+  solve_factorised<P>(A, D, step);
+  return true;
+}
+
+bool invert_symmetric5(const double upper[15], double inverse[25]) {
+  double A[5][5], D[5];
+  unpack_lower<5>(upper, A);
+  double largest = 0;
+  for (int i = 0; i < 5; ++i) {
+    if (A[i][i] > largest) largest = A[i][i];
+  }
+  if (!factorise<5>(A, D, 1e-13 * largest)) return false;
+  for (int c = 0; c < 5; ++c) {
+    double x[5] = {};
+    x[c] = 1;
+    solve_factorised<5>(A, D, x);
+    for (int r = 0; r < 5; ++r) inverse[5 * r + c] = x[r];
+  }
+  for (int r = 0; r < 5; ++r) {  // exactly symmetric
+    for (int c = 0; c < r; ++c) inverse[5 * r + c] = inverse[5 * c + r];
+  }
+  return true;
+}
+
+template <typename Model>
+double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
+              int max_iterations, Model* model) {
+  constexpr int P = Model::kParameters;
+  constexpr double kSmallStep = 1e-10, kSmallGain = 1e-12;
+  double upper[P * (P + 1) / 2], gradient[P], step[P];
+  double cost = model->normal_equations(pairs, indices, count, loss, upper, gradient);
+  double lambda = 1e-4;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    if (!solve_damped<P>(upper, gradient, lambda, step)) break;
+    double step_sq = 0;
+    for (int p = 0; p < P; ++p) step_sq += step[p] * step[p];
+    if (!(step_sq > kSmallStep * kSmallStep)) break;
+    double new_upper[P * (P + 1) / 2], new_gradient[P];
+    const Model moved = model->stepped(step);
+    const double new_cost =
+        moved.normal_equations(pairs, indices, count, loss, new_upper, new_gradient);
+    if (!(new_cost < cost)) {
+      lambda *= 10;
+      if (lambda > 1e6) break;
+      continue;
+    }
+    const double gain = cost - new_cost;
+    *model = moved;
+    cost = new_cost;
+    lambda *= 0.1;
+    if (lambda < 1e-10) lambda = 1e-10;
+    for (int k = 0; k < P * (P + 1) / 2; ++k) upper[k] = new_upper[k];
+    for (int p = 0; p < P; ++p) gradient[p] = new_gradient[p];
+    if (gain < kSmallGain * cost) break;
+  }
+  return cost;
+}
+
+template bool solve_damped<5>(const double*, const double*, double, double*);
+template double refine<PoseModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
+                                  PoseModel*);
+template double refine<FundamentalModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
+                                         int, FundamentalModel*);
+template double refine<HomographyModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
+                                        int, HomographyModel*);
+template double refine<RotationModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
+                                      RotationModel*);
+
+}  // namespace tv

@@ -1,0 +1,65 @@
+// Nonlinear refinement of a model on its inliers, by Levenberg-Marquardt with analytic Jacobians.
+#pragma once
+
+#include "geometry/essential.h"
+#include "geometry/null_space.h"
+#include "geometry/residuals.h"
+
+namespace tv {
+
+// A pose; five parameters (w0, w1, w2, a, b): R <- exp([w]) R, t <- normalise(t + a b1 + b b2).
+// Sampson's distance.
+struct PoseModel {
+  static constexpr int kParameters = 5;
+  Pose pose;
+  double normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                          const RobustLoss& loss, double* upper, double* gradient) const;
+  PoseModel stepped(const double* step) const;
+};
+
+// A fundamental matrix U diag(1, s, 0) V' with rotations U, V: seven parameters (A. Bartoli, P. Sturm,
+// "Nonlinear estimation of the fundamental matrix with minimal parameters", PAMI 2004).
+struct FundamentalModel {
+  static constexpr int kParameters = 7;
+  Mat3 U, V;
+  double s;
+  Mat3 matrix() const;
+  double normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                          const RobustLoss& loss, double* upper, double* gradient) const;
+  FundamentalModel stepped(const double* step) const;
+};
+FundamentalModel fundamental_model(const Mat3& M);
+
+// A homography by its nine entries; the scale is free, which damping takes care of. Transfer residual.
+struct HomographyModel {
+  static constexpr int kParameters = 9;
+  Mat3 H;
+  double normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                          const RobustLoss& loss, double* upper, double* gradient) const;
+  HomographyModel stepped(const double* step) const;
+};
+
+// A rotation. Transfer residual.
+struct RotationModel {
+  static constexpr int kParameters = 3;
+  Mat3 R;
+  double normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                          const RobustLoss& loss, double* upper, double* gradient) const;
+  RotationModel stepped(const double* step) const;
+};
+
+// Solves (A + lambda diag(A)) step = -gradient for the packed upper triangle of a symmetric
+// non-negative A, by LDL'. False when it is singular.
+template <int P>
+bool solve_damped(const double upper[P * (P + 1) / 2], const double gradient[P], double lambda,
+                  double step[P]);
+
+// The inverse of the packed symmetric A, full row-major. False when it is singular.
+bool invert_symmetric5(const double upper[15], double inverse[25]);
+
+// Lowers the robust cost over the listed matches. Returns the final cost, in units of scale^2.
+template <typename Model>
+double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
+              int max_iterations, Model* model);
+
+}  // namespace tv

@@ -1,0 +1,31 @@
+// Which matches the robust loop tries next.
+#pragma once
+
+#include <cstdint>
+
+#include "base/random.h"
+
+namespace tv {
+
+// PROSAC (O. Chum, J. Matas, "Matching with PROSAC: progressive sample consensus", CVPR 2005): the
+// matches are sorted, surest first; samples come from a pool of the first ones, which grows so that
+// after kProsacSamples samples it has treated the sure ones as often as uniform sampling would. Once
+// the pool holds all, or without an order, sampling is uniform.
+struct Sampler {
+  Random random;
+  int num, size;         // matches, and how many a sample takes
+  bool progressive;
+  int pool;              // samples come from the first `pool` matches
+  double average;        // T_n of the paper for the pool
+  int64_t next_growth;   // T'_n: the sample at which the pool grows
+  int64_t drawn;
+};
+
+inline constexpr double kProsacSamples = 20000;
+
+Sampler make_sampler(uint64_t seed, int num, int size, bool progressive);
+
+// `size` different indices. num >= size.
+void draw_sample(Sampler& sampler, int32_t* sample);
+
+}  // namespace tv

@@ -1,0 +1,368 @@
+#include "robust/two_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/math.h"
+#include "robust/covariance.h"
+#include "robust/loop.h"
+
+namespace tv {
+namespace {
+
+// A model from a few lucky samples is not the best that local optimisation can reach: go on a little.
+constexpr int kMinIterations = 50;
+
+// A sample gives a model; what is left must be enough to test it against chance.
+constexpr int kFewMatches = 8;
+
+RayPairs searched(const Matches& matches) {
+  RayPairs pairs = matches.pairs;
+  pairs.num = matches.num_unique;
+  return pairs;
+}
+
+LoopOptions loop_options(const tv_estimate_options& options) {
+  return LoopOptions{options.confidence, kMinIterations, options.max_iterations,
+                     options.fixed_iterations};
+}
+
+template <typename Estimator>
+LoopResult<typename Estimator::Model> run(Estimator estimator, const TwoViewProblem& problem) {
+  Sampler sampler = make_sampler(problem.options.seed, estimator.pairs.num,
+                                 Estimator::kSampleSize, problem.ratios != nullptr);
+  return robust_loop(estimator, sampler, loop_options(problem.options));
+}
+
+}  // namespace
+
+size_t two_view_scratch_bytes(int max_matches) {
+  const size_t n = static_cast<size_t>(max_matches);
+  return matches_bytes(max_matches) + verdict_bytes(max_matches) + 2 * arena_bytes<int32_t>(n) +
+         arena_bytes<uint8_t>(n) + arena_bytes<double>(n);
+}
+
+void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
+                     TwoViewModel* model) {
+  *model = TwoViewModel{};
+  ArenaScope scope(arena);
+  const RayPairs pairs = searched(matches);
+  int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(pairs.num));
+  const double threshold = problem.options.max_error_px;
+  EpipolarModel& epipolar = model->epipolar;
+  const int sample_size = problem.options.method == TV_METHOD_FIVE_POINT    ? 5
+                          : problem.options.method == TV_METHOD_EIGHT_POINT ? 8
+                                                                            : 7;
+  if (pairs.num < sample_size) return;
+  if (problem.options.method == TV_METHOD_FIVE_POINT) {
+    const LoopResult<Pose> result = run(PoseEstimator{pairs, threshold, indices}, problem);
+    model->num_iterations = result.num_iterations;
+    epipolar.found = epipolar.has_pose = result.found;
+    if (result.found) epipolar.pose = result.model;
+    return;
+  }
+  const LoopResult<Mat3> result =
+      problem.options.method == TV_METHOD_EIGHT_POINT
+          ? run(FundamentalEstimator<8>{pairs, threshold, indices}, problem)
+          : run(FundamentalEstimator<7>{pairs, threshold, indices}, problem);
+  model->num_iterations = result.num_iterations;
+  epipolar.found = result.found;
+  if (!result.found) return;
+  epipolar.M = result.model;
+  if (!problem.calibrated) return;
+  // The paper's path: the essential matrix nearest to F, the pose of most points in front.
+  const int count = near_matches(pairs, pairs.num, epipolar.M, threshold, indices);
+  Svd3 svd = svd3(epipolar.M);
+  const Mat3 essential = svd.U.col(0) * svd.V.col(0).transpose() +
+                         svd.U.col(1) * svd.V.col(1).transpose();
+  epipolar.has_pose = pose_from_essential(pairs, indices, count, essential, threshold, false,
+                                          &epipolar.pose);
+  epipolar.found = epipolar.has_pose;
+}
+
+namespace {
+
+struct Finish {
+  const TwoViewProblem& problem;
+  const Matches& matches;
+  RayPairs pairs;  // without repeats
+  double threshold;
+  int32_t* indices;  // scratch
+  int32_t* support;  // the unique inliers of the epipolar model
+  int num_support;
+  TwoViewOutcome* out;
+};
+
+// Lowers a robust cost over the matches near the pose.
+Pose refined_pose(const Finish& f, const Pose& start) {
+  PoseModel model{start};
+  // First let the model settle with a redescending loss of the threshold's size, then weigh the
+  // inliers by a smooth one: see docs/decisions/0002-robust-loop.md.
+  for (int round = 0; round < 2; ++round) {
+    const int count = near_matches(f.pairs, f.pairs.num, essential_from_pose(model.pose),
+                                   f.threshold, f.indices);
+    if (count < 5) break;
+    refine(f.pairs, f.indices, count, RobustLoss{Loss::kCauchy, 0.5 * f.threshold}, 20, &model);
+  }
+  return model.pose;
+}
+
+Mat3 refined_fundamental(const Finish& f, const Mat3& start) {
+  FundamentalModel model = fundamental_model(start);
+  for (int round = 0; round < 2; ++round) {
+    const int count =
+        near_matches(f.pairs, f.pairs.num, model.matrix(), f.threshold, f.indices);
+    if (count < 7) break;
+    refine(f.pairs, f.indices, count, RobustLoss{Loss::kCauchy, 0.5 * f.threshold}, 20, &model);
+  }
+  return model.matrix().normalized();
+}
+
+void collect_support(Finish& f) {
+  const EpipolarModel& epipolar = f.out->epipolar;
+  f.num_support = 0;
+  for (int i = 0; i < f.matches.pairs.num; ++i) {
+    double r_sq;
+    const bool inlier =
+        epipolar.has_pose
+            ? pose_inlier(f.matches.pairs, i, epipolar.M, epipolar.pose, f.threshold, &r_sq)
+            : sampson_sq(f.matches.pairs, i, epipolar.M) <= f.threshold * f.threshold;
+    f.out->inlier[i] = inlier;
+    if (inlier && i < f.pairs.num) f.support[f.num_support++] = i;
+  }
+}
+
+void refine_epipolar(Finish& f) {
+  EpipolarModel& epipolar = f.out->epipolar;
+  if (epipolar.has_pose) {
+    epipolar.pose = refined_pose(f, epipolar.pose);
+    epipolar.M = essential_from_pose(epipolar.pose);
+  } else {
+    epipolar.M = refined_fundamental(f, epipolar.M);
+  }
+  collect_support(f);
+}
+
+// The matches that the named transfer explains become the inliers.
+void inliers_of_transfer(Finish& f, const Mat3& H) {
+  const double limit = kTransferThresholdScale * f.threshold;
+  for (int i = 0; i < f.matches.pairs.num; ++i) {
+    f.out->inlier[i] = transfer_residual(f.matches.pairs, i, H).r_sq <= limit * limit;
+  }
+}
+
+// A plane allows two motions. Each is refined as a pose; with the epipolar model's they compete for
+// the lowest cost, and a second one that is different and not clearly worse is the alternative.
+void choose_planar_pose(Finish& f, const Rivals& rivals) {
+  Vec3 mean = Vec3::Zero();
+  for (int k = 0; k < f.num_support; ++k) mean += ray_of(f.pairs, 0, f.support[k]).normalized();
+  PlanarPose planar[2];
+  const int count = decompose_homography(rivals.H, mean, planar);
+  const PoseEstimator scorer{f.pairs, f.threshold, f.indices};
+  Pose poses[3] = {f.out->epipolar.pose};
+  int inliers[3];
+  int64_t cost[3] = {scorer.full_cost(poses[0], &inliers[0])};
+  int num_poses = 1;
+  for (int k = 0; k < count; ++k) {
+    poses[num_poses] = refined_pose(f, planar[k].pose);
+    cost[num_poses] = scorer.full_cost(poses[num_poses], &inliers[num_poses]);
+    ++num_poses;
+  }
+  int best = 0;
+  for (int k = 1; k < num_poses; ++k) best = cost[k] < cost[best] ? k : best;
+  f.out->epipolar.pose = poses[best];
+  f.out->epipolar.M = essential_from_pose(poses[best]);
+  collect_support(f);
+  int other = -1;
+  for (int k = 0; k < num_poses; ++k) {
+    const double turned = (poses[k].R - poses[best].R).squaredNorm() +
+                          (poses[k].t - poses[best].t).squaredNorm();
+    const bool different = turned > 1e-4;  // half a degree
+    if (k != best && different && 10 * inliers[k] >= 9 * inliers[best] &&
+        (other < 0 || cost[k] < cost[other])) {
+      other = k;
+    }
+  }
+  if (other >= 0) {
+    f.out->has_alternative = true;
+    f.out->alternative = poses[other];
+    f.out->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  }
+}
+
+// Whether the pair is to be called by one of the rivals, or degenerate.
+tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
+  const EpipolarModel& epipolar = f.out->epipolar;
+  const bool calibrated = f.problem.calibrated;
+  const int n = f.pairs.num;
+  // A pure rotation or no motion is meaningful by its own count; an epipolar model by its own.
+  const double disc = std::min(1.0, kPi * kTransferThresholdScale * kTransferThresholdScale * 2 *
+                                         f.threshold * f.threshold / f.matches.area_px);
+  const bool rotation_meaningful =
+      rivals.has_rotation &&
+      log_false_alarms(n, rivals.rotation_inliers, 2, 1, disc) < kLogMeaningful;
+  const bool still_meaningful =
+      log_false_alarms(n, rivals.identity_inliers, 1, 1, disc) < kLogMeaningful;
+  const bool homography_meaningful =
+      rivals.has_homography &&
+      log_false_alarms(n, rivals.homography_inliers, 4, 1, disc) < kLogMeaningful;
+  bool epipolar_meaningful = false;
+  if (epipolar.found && f.num_support > sample_size) {
+    const double p = chance_of_agreement(f.matches, epipolar.M, f.threshold, f.problem.options.seed);
+    epipolar_meaningful = log_false_alarms(n, f.num_support, sample_size,
+                                           sample_size == 5 ? 10 : 3, p) < kLogMeaningful;
+  }
+  // A rival speaks for the pair when it explains half of what the epipolar model does, and the rest
+  // does not agree on an epipole.
+  const int half = f.num_support / 2;
+  const bool rotation_enough =
+      rotation_meaningful && rivals.rotation_inliers > half &&
+      !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold);
+  const bool homography_enough =
+      homography_meaningful && rivals.homography_inliers > half &&
+      !leaves_parallax(f.matches, rivals.H, f.out->inlier, f.threshold);
+  const int rival_inliers = calibrated ? rivals.rotation_inliers : rivals.homography_inliers;
+  const bool still = still_meaningful && 20 * rivals.identity_inliers >= 19 * rival_inliers &&
+                     (calibrated ? rotation_enough : homography_enough);
+  if (still) return TV_CONFIG_NO_MOTION;
+  if (rotation_enough) return TV_CONFIG_PANORAMIC;
+  if (!epipolar_meaningful && !homography_enough) return TV_CONFIG_DEGENERATE;
+  if (!calibrated) {
+    return homography_enough ? TV_CONFIG_PLANAR_OR_PANORAMIC : TV_CONFIG_UNCALIBRATED;
+  }
+  if (!epipolar.has_pose) return TV_CONFIG_DEGENERATE;
+  return homography_enough ? TV_CONFIG_PLANAR : TV_CONFIG_CALIBRATED;
+}
+
+double parallax(const Finish& f, int i) {
+  const Vec3 a = f.out->epipolar.pose.R * ray_of(f.matches.pairs, 0, i);
+  const Vec3 b = ray_of(f.matches.pairs, 1, i);
+  return atan2(a.cross(b).norm(), a.dot(b));
+}
+
+// The evidence of a full pose: parallax, error, covariance.
+void measure_pose(Finish& f, double* values) {
+  TwoViewOutcome& out = *f.out;
+  double sum = 0;
+  for (int k = 0; k < f.num_support; ++k) {
+    values[k] = parallax(f, f.support[k]);
+    sum += pixel_angle(f.pairs, f.support[k]);
+  }
+  double* middle = values + (f.num_support - 1) / 2;
+  std::nth_element(values, middle, values + f.num_support);
+  out.median_parallax_rad = *middle;
+  if (*middle < 3 * f.threshold * sum / f.num_support) out.reasons |= TV_REASON_LOW_PARALLAX;
+  out.has_covariance = pose_covariance(f.pairs, f.support, f.num_support, out.epipolar.pose,
+                                       out.covariance);
+}
+
+void measure_inliers(Finish& f) {
+  TwoViewOutcome& out = *f.out;
+  const bool by_transfer = out.config == TV_CONFIG_PANORAMIC ||
+                           out.config == TV_CONFIG_NO_MOTION ||
+                           out.config == TV_CONFIG_PLANAR_OR_PANORAMIC;
+  const RayPairs& pairs = f.matches.pairs;
+  double sum = 0;
+  for (int i = 0; i < pairs.num; ++i) {
+    if (out.inlier[i] == 0) continue;
+    ++out.num_inliers;
+    sum += by_transfer ? transfer_residual(pairs, i, out.H).r_sq
+                       : sampson_sq(pairs, i, out.epipolar.M);
+  }
+  if (out.num_inliers > 0) out.rms_error_px = std::sqrt(sum / out.num_inliers);
+}
+
+void judge(Finish& f) {
+  TwoViewOutcome& out = *f.out;
+  const int num_unique = f.pairs.num;
+  if (num_unique < kFewMatches) out.reasons |= TV_REASON_TOO_FEW_MATCHES;
+  if (out.config == TV_CONFIG_DEGENERATE) {
+    if (num_unique >= kFewMatches) out.reasons |= TV_REASON_LOW_INLIER_RATIO;
+    out.verdict = TV_VERDICT_REFUSED;
+    return;
+  }
+  if (4 * out.num_inliers < f.matches.pairs.num) out.reasons |= TV_REASON_LOW_INLIER_RATIO;
+  if (out.config == TV_CONFIG_NO_MOTION) out.reasons |= TV_REASON_NO_MOTION;
+  if (out.config == TV_CONFIG_PANORAMIC) out.reasons |= TV_REASON_PURE_ROTATION;
+  if (out.config == TV_CONFIG_NO_MOTION || out.config == TV_CONFIG_PANORAMIC) {
+    out.verdict = TV_VERDICT_REFUSED;  // no full pose
+  } else {
+    out.verdict = out.reasons == 0 ? TV_VERDICT_OK : TV_VERDICT_DOUBTFUL;
+  }
+}
+
+}  // namespace
+
+void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
+                     const TwoViewModel& model, Arena& arena, TwoViewOutcome* outcome) {
+  *outcome = TwoViewOutcome{};
+  const size_t n = static_cast<size_t>(matches.pairs.num);
+  outcome->inlier = arena_alloc<uint8_t>(arena, n);
+  for (size_t i = 0; i < n; ++i) outcome->inlier[i] = 0;
+  ArenaScope scope(arena);
+  Finish f{problem,
+           matches,
+           searched(matches),
+           problem.options.max_error_px,
+           arena_alloc<int32_t>(arena, n),
+           arena_alloc<int32_t>(arena, n),
+           0,
+           outcome};
+  TwoViewOutcome& out = *outcome;
+  out.epipolar = model.epipolar;
+  if (out.epipolar.found) {
+    refine_epipolar(f);
+    (problem.calibrated ? out.essential_inliers : out.fundamental_inliers) = f.num_support;
+  }
+  if (f.num_support < 5) {  // no epipolar model: a rival may still explain the matches
+    f.num_support = f.pairs.num;
+    for (int i = 0; i < f.pairs.num; ++i) f.support[i] = i;
+    out.epipolar.found = false;
+  }
+  const Rivals rivals = find_rivals(matches, f.support, f.num_support, problem.calibrated,
+                                    f.threshold, problem.options.seed, arena);
+  out.rotation_inliers = rivals.rotation_inliers;
+  out.homography_inliers = rivals.homography_inliers;
+  if (!out.epipolar.found) f.num_support = 0;
+  const int sample_size = problem.options.method == TV_METHOD_FIVE_POINT    ? 5
+                          : problem.options.method == TV_METHOD_EIGHT_POINT ? 8
+                                                                            : 7;
+  out.config = choose_config(f, rivals, sample_size);
+  out.H = rivals.H;
+  out.has_H = out.config == TV_CONFIG_PLANAR || out.config == TV_CONFIG_PLANAR_OR_PANORAMIC;
+  switch (out.config) {
+    case TV_CONFIG_PLANAR:
+      choose_planar_pose(f, rivals);
+      out.essential_inliers = f.num_support;
+      out.has_R = out.has_t = true;
+      break;
+    case TV_CONFIG_CALIBRATED:
+      out.has_R = out.has_t = true;
+      break;
+    case TV_CONFIG_PANORAMIC:
+      out.epipolar.pose.R = out.H = rivals.R;
+      out.has_R = true;
+      inliers_of_transfer(f, out.H);
+      break;
+    case TV_CONFIG_NO_MOTION:
+      if (problem.calibrated) {
+        out.epipolar.pose.R = out.H = Mat3::Identity();
+        out.has_R = true;
+      }
+      inliers_of_transfer(f, out.H);
+      break;
+    case TV_CONFIG_PLANAR_OR_PANORAMIC:
+      inliers_of_transfer(f, out.H);
+      break;
+    case TV_CONFIG_DEGENERATE:
+      for (size_t i = 0; i < n; ++i) out.inlier[i] = 0;
+      break;
+    case TV_CONFIG_UNCALIBRATED:
+      break;
+  }
+  if (out.has_t) measure_pose(f, arena_alloc<double>(arena, n));
+  measure_inliers(f);
+  judge(f);
+}
+
+}  // namespace tv

@@ -1,0 +1,44 @@
+// Two-view estimation behind the API boundary.
+#pragma once
+
+#include "robust/matches.h"
+#include "robust/verdict.h"
+
+namespace tv {
+
+// The model as the search leaves it and as refinement ends it.
+struct TwoViewModel {
+  EpipolarModel epipolar;
+  int num_iterations = 0;
+};
+
+// All that the boundary packs. In canonical view order, on rays.
+struct TwoViewOutcome {
+  tv_config config = TV_CONFIG_DEGENERATE;
+  tv_verdict verdict = TV_VERDICT_REFUSED;
+  uint32_t reasons = 0;
+  EpipolarModel epipolar;
+  bool has_R = false, has_t = false, has_H = false, has_alternative = false,
+       has_covariance = false;
+  Mat3 H = Mat3::Zero();
+  Pose alternative;
+  double covariance[25] = {};
+  int num_inliers = 0, essential_inliers = -1, fundamental_inliers = -1, homography_inliers = -1,
+      rotation_inliers = -1;
+  double median_parallax_rad = 0, rms_error_px = 0;
+  uint8_t* inlier = nullptr;  // of matches.pairs
+};
+
+// The arena that one estimate takes.
+size_t two_view_scratch_bytes(int max_matches);
+
+// The robust loop (TV_STAGE_ESTIMATE).
+void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
+                     TwoViewModel* model);
+
+// Refinement on all inliers, rivals, verdict, covariance (TV_STAGE_REFINE). outcome->inlier lies in
+// the arena.
+void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
+                     const TwoViewModel& model, Arena& arena, TwoViewOutcome* outcome);
+
+}  // namespace tv

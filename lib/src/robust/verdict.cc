@@ -1,0 +1,165 @@
+#include "robust/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/math.h"
+#include "robust/loop.h"
+
+namespace tv {
+namespace {
+
+constexpr double kInfinity = __builtin_inf();
+
+// The rivals need few samples, since only one that explains most of the support matters, and few
+// matches to be told apart.
+constexpr int kRivalSamples = 100;
+constexpr int kMaxSubset = 256;
+
+double log_factorial(int n) {
+  if (n < 16) {
+    double product = 1;
+    for (int k = 2; k <= n; ++k) product *= k;
+    return log(product);
+  }
+  const double x = n;
+  return (x + 0.5) * log(x) - x + 0.91893853320467274178 + 1 / (12 * x) - 1 / (360 * x * x * x);
+}
+
+struct Best {
+  bool found = false;
+  Mat3 model = Mat3::Zero();
+};
+
+template <typename Estimator>
+Best search(Estimator estimator, const int32_t* support, int num_support, uint64_t seed) {
+  if (num_support < Estimator::kSampleSize) return {};
+  Sampler sampler = make_sampler(seed, estimator.num_subset, Estimator::kSampleSize, false);
+  const LoopOptions options{0.999, 10, kRivalSamples, 0};
+  const LoopResult<Mat3> result = robust_loop(estimator, sampler, options);
+  if (!result.found) return {};
+  Best best{true, result.model};
+  estimator.subset = support;
+  estimator.num_subset = num_support;
+  estimator.refine_model(&best.model);
+  return best;
+}
+
+int count_inliers(const RayPairs& pairs, int count, const Mat3& H, double threshold_px) {
+  int inliers = 0;
+  for (int i = 0; i < count; ++i) {
+    inliers += transfer_residual(pairs, i, H).r_sq <= threshold_px * threshold_px;
+  }
+  return inliers;
+}
+
+}  // namespace
+
+double log_binomial(int n, int k) {
+  return log_factorial(n) - log_factorial(k) - log_factorial(n - k);
+}
+
+double log_false_alarms(int n, int k, int m, int models, double p) {
+  if (k <= m) return kInfinity;
+  return log(static_cast<double>(models) * (n - m)) + log_binomial(n, k) + log_binomial(k, m) +
+         (k - m) * log(p);
+}
+
+double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
+                           uint64_t seed) {
+  constexpr int kPairings = 1024;
+  constexpr double kPriorWeight = 100;
+  const RayPairs& pairs = matches.pairs;
+  // A band of half width sqrt(2) T: Sampson's distance shares the error between the two images. Its
+  // length is about the image's side.
+  const double prior = std::min(1.0, 2.8284271247461903 * threshold_px /
+                                          std::sqrt(matches.area_px));
+  const int n = matches.num_unique;
+  if (n < 2) return 1;
+  Random random = random_seeded(seed);
+  // One wrong match at a time, in the arrays' own form.
+  double storage[18];
+  RayPairs one = pairs;
+  one.num = 1;
+  for (int k = 0; k < 3; ++k) one.ray[0][k] = &storage[k], one.ray[1][k] = &storage[3 + k];
+  for (int k = 0; k < 6; ++k) {
+    one.jacobian[0][k] = &storage[6 + k];
+    one.jacobian[1][k] = &storage[12 + k];
+  }
+  int agreeing = 0;
+  for (int pairing = 0; pairing < kPairings; ++pairing) {
+    const int i = static_cast<int>(random_below(random, static_cast<uint32_t>(n)));
+    int j = static_cast<int>(random_below(random, static_cast<uint32_t>(n - 1)));
+    j += j >= i;
+    set_ray(one, 0, 0, ray_of(pairs, 0, i), jacobian_of(pairs, 0, i));
+    set_ray(one, 1, 0, ray_of(pairs, 1, j), jacobian_of(pairs, 1, j));
+    agreeing += sampson_sq(one, 0, M) <= threshold_px * threshold_px;
+  }
+  return (agreeing + kPriorWeight * prior) / (kPairings + kPriorWeight);
+}
+
+size_t verdict_bytes(int max_matches) {
+  return arena_bytes<int32_t>(kMaxSubset) + arena_bytes<uint8_t>(static_cast<size_t>(max_matches));
+}
+
+Rivals find_rivals(const Matches& matches, const int32_t* support, int num_support, bool calibrated,
+                   double threshold_px, uint64_t seed, Arena& arena) {
+  ArenaScope scope(arena);
+  int32_t* subset = arena_alloc<int32_t>(arena, kMaxSubset);
+  const int num_subset = num_support < kMaxSubset ? num_support : kMaxSubset;
+  for (int k = 0; k < num_subset; ++k) {
+    subset[k] = support[static_cast<int64_t>(k) * num_support / num_subset];
+  }
+  const double limit = kTransferThresholdScale * threshold_px;
+  const TransferEstimator base{matches.pairs, limit, subset, num_subset};
+  const int n = matches.num_unique;
+  Rivals rivals{};
+  rivals.rotation_inliers = rivals.homography_inliers = -1;
+  if (calibrated) {
+    const Best rotation = search(RotationEstimator{base}, support, num_support, seed);
+    rivals.has_rotation = rotation.found;
+    if (rotation.found) {
+      rivals.R = rotation.model;
+      rivals.rotation_inliers = count_inliers(matches.pairs, n, rivals.R, limit);
+    }
+  }
+  const Best homography = search(HomographyEstimator{base}, support, num_support, seed);
+  rivals.has_homography = homography.found;
+  if (homography.found) {
+    rivals.H = homography.model;
+    rivals.homography_inliers = count_inliers(matches.pairs, n, rivals.H, limit);
+  }
+  // The same pixel in both images, whatever the camera; with two equal cameras the identity.
+  const Mat3 K0 = matches.intrinsics[0], K1 = matches.intrinsics[1];
+  Mat3 inverse;
+  inverse << 1 / K1(0, 0), 0, -K1(0, 2) / K1(0, 0), 0, 1 / K1(1, 1), -K1(1, 2) / K1(1, 1), 0, 0, 1;
+  const Mat3 identity = calibrated ? Mat3::Identity() : Mat3(inverse * K0);
+  rivals.identity_inliers = count_inliers(matches.pairs, n, identity, limit);
+  return rivals;
+}
+
+bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlier,
+                     double threshold_px) {
+  const double limit = kTransferThresholdScale * threshold_px;
+  const double half_width = 1.4142135623730951 * threshold_px;
+  int unexplained = 0, agreeing = 0;
+  double expected = 0;
+  for (int i = 0; i < matches.num_unique; ++i) {
+    const TransferResidual residual = transfer_residual(matches.pairs, i, H);
+    if (residual.r_sq <= limit * limit) continue;
+    ++unexplained;
+    agreeing += inlier[i] != 0;
+    const double ratio = half_width * half_width / residual.d_sq;
+    expected += ratio < 1 ? (2 / kPi) * asin(std::sqrt(ratio)) : 1.0;
+  }
+  if (unexplained < 3 || agreeing < 3) return false;
+  const double n = unexplained, share = agreeing / n, chance = expected / n;
+  if (share <= chance) return false;
+  const double divergence =
+      share * log(share / chance) +
+      (agreeing < unexplained ? (1 - share) * log((1 - share) / (1 - chance)) : 0.0);
+  // The epipole was chosen by the best two of them.
+  return log_binomial(unexplained, 2) - n * divergence < kLogMeaningful;
+}
+
+}  // namespace tv
