@@ -58,13 +58,14 @@ def run_program(program, data, extra):
             if os.path.isfile(cameras):
                 shutil.copy(cameras, folder)
         command = [program, "evaluate", pairs_file, "--images", os.path.join(data.dir, "images"),
-                   "--json"]
+                   "-o", os.path.join(folder, "report.json"), "--quiet"]
         if data.resize:
             command += ["--resize", str(data.resize)]
-        done = subprocess.run(command + extra, stdout=subprocess.PIPE, check=False)
+        done = subprocess.run(command + extra, check=False)
         if done.returncode != 0:
             sys.exit(f"accuracy: {' '.join(command + extra)}: exit status {done.returncode}")
-        report = json.loads(done.stdout)
+        with open(os.path.join(folder, "report.json"), encoding="utf-8") as f:
+            report = json.load(f)
     listed = {(p["name0"], p["name1"]): p for p in report.pop("pairs")}
     rows = []
     for pair in data.pairs:

@@ -153,20 +153,27 @@ class Set:
     def path(self, name):
         return os.path.join(self.dir, "images", name)
 
-    def _native_size(self, name):
+    def _read(self, name):
+        """The luma of an image file, by the program's way: colours first, so that it is the same
+        whatever the format (asked for grey, OpenCV takes a JPEG's own luma instead)."""
         import cv2
-        image = cv2.imread(self.path(name), cv2.IMREAD_GRAYSCALE)
-        if image is None:
-            raise FileNotFoundError(self.path(name))
+        image = cv2.imread(self.path(name), cv2.IMREAD_UNCHANGED)
+        if image is None or image.dtype != np.uint8:
+            raise ValueError(f"{self.path(name)}: no image, or not of 8 bits")
+        if image.ndim == 3:
+            codes = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
+            image = cv2.cvtColor(image, codes[image.shape[2]])
+        return image
+
+    def _native_size(self, name):
+        image = self._read(name)
         return image.shape[1], image.shape[0]
 
     @functools.lru_cache(maxsize=None)
     def gray(self, name):
         """(8-bit luma, scale in x, scale in y)"""
         import cv2
-        image = cv2.imread(self.path(name), cv2.IMREAD_GRAYSCALE)
-        if image is None:
-            raise FileNotFoundError(self.path(name))
+        image = self._read(name)
         height, width = image.shape
         size = resized_shape(width, height, self.resize)
         if size != (width, height):
@@ -174,9 +181,12 @@ class Set:
         return np.ascontiguousarray(image), size[0] / width, size[1] / height
 
     @functools.lru_cache(maxsize=None)
-    def file_hash(self, name):
+    def pixel_hash(self, name):
+        """Of the file and of what was decoded and resized from it."""
+        digest = hashlib.sha256(self.gray(name)[0].tobytes())
         with open(self.path(name), "rb") as f:
-            return hashlib.sha256(f.read()).hexdigest()
+            digest.update(f.read())
+        return digest.hexdigest()
 
     def camera(self, pair, side):
         """(K at the images' scale, distortion) of image `side` of a pair."""

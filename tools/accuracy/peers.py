@@ -218,8 +218,8 @@ class Peer:
 
     def _pair_key(self, data, pair):
         cameras = [data.camera(pair, i) for i in (0, 1)]
-        text = json.dumps([self.key, data.resize, pair.line, data.file_hash(pair.name0),
-                           data.file_hash(pair.name1),
+        text = json.dumps([self.key, data.resize, pair.line, data.pixel_hash(pair.name0),
+                           data.pixel_hash(pair.name1),
                            [[K.tolist(), list(d)] for K, d in cameras]], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
