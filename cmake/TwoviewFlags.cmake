@@ -3,6 +3,7 @@
 add_library(twoview_flags INTERFACE)
 target_compile_options(twoview_flags INTERFACE
   -Wall -Wextra -Wshadow
+  $<$<COMPILE_LANGUAGE:C>:-Werror=implicit-function-declaration>
   $<$<BOOL:${TWOVIEW_WERROR}>:-Werror>
   # a * b + c stays two roundings on every CPU: results are the same bytes everywhere.
   -ffp-contract=off)

@@ -30,8 +30,13 @@ function(tv_add_test name)
   add_executable(${target} ${arg_SOURCES})
   target_link_libraries(${target} PRIVATE twoview_flags twoview_unity ${arg_LIBS})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/test)
-  target_compile_definitions(${target} PRIVATE TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE})
+  target_compile_definitions(${target} PRIVATE
+    TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
+    TWOVIEW_CACHE_DIR="${PROJECT_SOURCE_DIR}/.cache")
+  # What users compile is C99 (rules/install); a test may use what makes it short.
   set_target_properties(${target} PROPERTIES
+    C_STANDARD 11
+    C_EXTENSIONS ON
     RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test/bin)
   tv_register_test(${name} LABEL ${arg_LABEL} COMMAND ${target})
 endfunction()
