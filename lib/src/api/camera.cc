@@ -46,7 +46,8 @@ tv_status tv_camera_check(const tv_camera *camera) {
 }
 
 tv_status tv_camera_valid_angle(const tv_camera *camera, double *angle_rad) {
-  const tv_status status = check_input(camera, &camera->fx, 0, angle_rad);
+  if (camera == nullptr || angle_rad == nullptr) return TV_ERR_NULL;
+  const tv_status status = tv_camera_check(camera);
   if (status != TV_OK) return status;
   *angle_rad = tv::prepare_camera(*camera).valid_angle_rad;
   return TV_OK;

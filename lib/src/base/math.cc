@@ -117,8 +117,8 @@ double atan_series_beyond_first(double z) {
   return z * s * p;
 }
 
-// atan(smaller / larger) for 0 <= smaller <= larger, 0 < larger, both finite, as an unevaluated sum:
-// atan(c) + atan((smaller - c larger) / (larger + c smaller)) with c the nearest eighth.
+// atan(smaller / larger) for 0 <= smaller <= larger, 0 < larger, both finite, as an unevaluated
+// sum: atan(c) + atan((smaller - c larger) / (larger + c smaller)) with c the nearest eighth.
 Pair atan_of_ratio(double smaller, double larger) {
   const double ratio = smaller / larger;
   if (ratio < 0.125) return {ratio, atan_series_beyond_first(ratio)};

@@ -1,5 +1,5 @@
-// Elementary functions whose bits are equal on every CPU: only + - * /, sqrt and integer operations,
-// in a written order, compiled without contraction. Nothing from libm but sqrt.
+// Elementary functions whose bits are equal on every CPU: only + - * /, sqrt and integer
+// operations, in a written order, compiled without contraction. Nothing from libm but sqrt.
 //
 // Errors are below 1 ulp (atan2 below 1.5; asin, acos and tan below 2.5); NaN in gives NaN out.
 // Formulas, bounds and tests: docs/algorithms/math.md.

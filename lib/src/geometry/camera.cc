@@ -263,8 +263,8 @@ bool is_small(const Point2& step, const Point2& p) {
   return std::fabs(step.x) + std::fabs(step.y) <= kConverged * scale;
 }
 
-// The usual case: plain Newton, which lands in two to five steps. Wherever it lands inside the valid
-// disc is the answer, for the map is one-to-one there.
+// The usual case: plain Newton, which lands in two to five steps. Wherever it lands inside the
+// valid disc is the answer, for the map is one-to-one there.
 bool brown_invert_fast(const Camera& camera, const Point2& target, double target_sq, Point2* out) {
   const double limit_sq = camera.valid_radius_undistorted * camera.valid_radius_undistorted;
   Point2 p = target;
@@ -302,9 +302,9 @@ double brown_invert_radius(const Camera& camera, double distorted) {
   return r;
 }
 
-// Near the edge of the valid disc, or under strong distortion: from the radial solution, Newton with
-// step halving. The map is the gradient of a convex function on the disc, so each Newton direction
-// lowers the error.
+// Near the edge of the valid disc, or under strong distortion: from the radial solution, Newton
+// with step halving. The map is the gradient of a convex function on the disc, so each Newton
+// direction lowers the error.
 bool brown_invert_safe(const Camera& camera, const Point2& target, double target_sq, Point2* out) {
   const double limit = camera.valid_radius_undistorted;
   const double length = std::sqrt(target_sq);

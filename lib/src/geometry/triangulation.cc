@@ -194,9 +194,9 @@ Vec3 solve_least_squares(const TriangulationPair& pair, const Rays& rays, int ma
 
 // ---- what is said about a point ----
 
-// Squared distance in pixels between a pixel and the projection of a point of camera `index`. A
-// point behind is projected through the centre. Where the lens model cannot see it at all: the angle
-// off the pixel's ray, times the focal length.
+// Squared distance in pixels between a pixel and the projection of a point in the camera's frame. A
+// point behind is projected through the centre. Where the lens model cannot see it at all: the
+// angle off the pixel's ray, times the focal length.
 double error_sq_px(const Camera& camera, const Vec3& ray, const Vec2& pixel, const Vec3& point) {
   const double along = dot(ray, point);
   const Vec3 ahead = along < 0.0 ? Vec3(-point[0], -point[1], -point[2]) : point;

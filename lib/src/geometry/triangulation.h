@@ -1,5 +1,6 @@
 // Triangulation: the point that two rays see. Methods of R. Hartley, P. Sturm, "Triangulation",
-// CVIU 68(2), 1997, on rays through the camera models. Derivation: docs/algorithms/triangulation.md.
+// CVIU 68(2), 1997, on rays through the camera models. Derivation:
+// docs/algorithms/triangulation.md.
 #pragma once
 
 #include "geometry/camera.h"
@@ -19,7 +20,7 @@ struct TriangulationPair {
   Mat3 cam0_from_cam1_R;
   Vec3 direction;  // t / |t|
   Vec3 center1;    // camera 1's centre in camera 0's frame, for |t| = 1
-  double baseline; // |t|
+  double baseline;  // |t|
 };
 
 // R is a rotation, t not zero.

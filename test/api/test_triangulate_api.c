@@ -1,0 +1,178 @@
+/* tv_triangulate: what the header promises of statuses and outputs. */
+#include <math.h>
+#include <string.h>
+
+#include "twoview/twoview.h"
+#include "unity.h"
+
+#define NUM_POINTS 4
+
+static tv_camera camera0, camera1;
+static double R[9], t[3];
+static double pixels0[2 * NUM_POINTS], pixels1[2 * NUM_POINTS];
+static tv_point points[NUM_POINTS + 1], untouched[NUM_POINTS + 1];
+
+/* Four points 2 to 5 ahead, seen from 1 apart. */
+static const double truth[NUM_POINTS][3] = {
+    {0.1, 0.2, 2}, {-0.3, 0.1, 3}, {0.5, -0.4, 4}, {1, 0.5, 5}};
+
+void setUp(void) {
+  int i;
+  memset(&camera0, 0, sizeof camera0);
+  camera0.model = TV_CAMERA_PINHOLE;
+  camera0.width = 640, camera0.height = 480;
+  camera0.fx = camera0.fy = 500, camera0.cx = 320, camera0.cy = 240;
+  camera1 = camera0;
+  camera1.cx = 350;
+  for (i = 0; i < 9; ++i) R[i] = i % 4 == 0;
+  t[0] = -1, t[1] = 0, t[2] = 0;
+  for (i = 0; i < NUM_POINTS; ++i) {
+    double moved[3];
+    memcpy(moved, truth[i], sizeof moved);
+    moved[0] -= 1;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera0, truth[i], pixels0 + 2 * i, NULL));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera1, moved, pixels1 + 2 * i, NULL));
+  }
+  memset(points, 0x5a, sizeof points);
+  memset(untouched, 0x5a, sizeof untouched);
+}
+
+void tearDown(void) {}
+
+static tv_status run(tv_triangulation method) {
+  return tv_triangulate(method, &camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, points);
+}
+
+static void expect_refusal(tv_status expected) {
+  TEST_ASSERT_EQUAL_INT(expected, run(TV_TRIANGULATION_ITERATIVE_LS));
+  TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
+}
+
+static void test_every_method_of_this_release_finds_the_points(void) {
+  const tv_triangulation methods[3] = {TV_TRIANGULATION_LINEAR_LS, TV_TRIANGULATION_ITERATIVE_LS,
+                                       TV_TRIANGULATION_MIDPOINT};
+  int m, i, axis;
+  for (m = 0; m < 3; ++m) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, run(methods[m]));
+    for (i = 0; i < NUM_POINTS; ++i) {
+      TEST_ASSERT_EQUAL_INT(TV_POINT_OK, points[i].status);
+      for (axis = 0; axis < 3; ++axis) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, truth[i][axis], points[i].position[axis]);
+      }
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&untouched[NUM_POINTS], &points[NUM_POINTS], sizeof(tv_point));
+  }
+}
+
+static void test_other_methods_are_refused(void) {
+  const int methods[6] = {TV_TRIANGULATION_POLY, TV_TRIANGULATION_POLY_ABS,
+                          TV_TRIANGULATION_LINEAR_EIGEN, TV_TRIANGULATION_ITERATIVE_EIGEN, 7, -1};
+  int m;
+  for (m = 0; m < 6; ++m) {
+    TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, run((tv_triangulation)methods[m]));
+    TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
+  }
+}
+
+static void test_null_pointers_are_refused(void) {
+  const tv_triangulation m = TV_TRIANGULATION_MIDPOINT;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_triangulate(m, NULL, &camera1, R, t, pixels0, pixels1, 4, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_triangulate(m, &camera0, NULL, R, t, pixels0, pixels1, 4, points));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_triangulate(m, &camera0, &camera1, NULL, t, pixels0, pixels1, 4, points));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_triangulate(m, &camera0, &camera1, R, NULL, pixels0, pixels1, 4, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_triangulate(m, &camera0, &camera1, R, t, NULL, pixels1, 4, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_triangulate(m, &camera0, &camera1, R, t, pixels0, NULL, 4, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_triangulate(m, &camera0, &camera1, R, t, pixels0, pixels1, 4, NULL));
+  TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
+}
+
+static void test_no_points_are_fine_and_fewer_are_not(void) {
+  const tv_triangulation m = TV_TRIANGULATION_MIDPOINT;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(m, &camera0, &camera1, R, t, NULL, NULL, 0, NULL));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_ARGUMENT, tv_triangulate(m, &camera0, &camera1, R, t, pixels0, pixels1, -1, points));
+  TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
+}
+
+static void test_r_is_a_rotation_to_a_millionth(void) {
+  const double c = cos(0.3), s = sin(0.3);
+  R[0] = 1 + 1e-5, expect_refusal(TV_ERR_ARGUMENT), setUp();
+  R[1] = 1e-5, expect_refusal(TV_ERR_ARGUMENT), setUp();
+  R[0] = R[4] = R[8] = -1, expect_refusal(TV_ERR_ARGUMENT), setUp(); /* a reflection */
+  R[8] = -1, expect_refusal(TV_ERR_ARGUMENT), setUp();
+  memset(R, 0, sizeof R), expect_refusal(TV_ERR_ARGUMENT), setUp();
+  R[0] = 1e200, expect_refusal(TV_ERR_ARGUMENT), setUp();
+  R[0] = c, R[1] = -s, R[3] = s, R[4] = c;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(TV_TRIANGULATION_ITERATIVE_LS));
+  setUp();
+  R[0] = 1 + 1e-7;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(TV_TRIANGULATION_ITERATIVE_LS));
+}
+
+static void test_t_is_not_zero(void) {
+  t[0] = 0;
+  expect_refusal(TV_ERR_ARGUMENT);
+  t[2] = 1e-300;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(TV_TRIANGULATION_ITERATIVE_LS));
+}
+
+static void test_numbers_that_are_not_finite_are_refused(void) {
+  const double bad[3] = {NAN, INFINITY, -INFINITY};
+  int i, j;
+  for (i = 0; i < 3; ++i) {
+    for (j = 0; j < 9; ++j) R[j] = bad[i], expect_refusal(TV_ERR_NOT_FINITE), setUp();
+    for (j = 0; j < 3; ++j) t[j] = bad[i], expect_refusal(TV_ERR_NOT_FINITE), setUp();
+    camera0.fx = bad[i], expect_refusal(TV_ERR_CAMERA), setUp();
+    camera1.k[3] = bad[i], expect_refusal(TV_ERR_CAMERA), setUp();
+  }
+}
+
+static void test_a_bad_pixel_spoils_its_point_only(void) {
+  const double zeros[3] = {0, 0, 0};
+  int i;
+  pixels0[3] = NAN;
+  pixels1[4] = INFINITY;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(TV_TRIANGULATION_ITERATIVE_LS));
+  for (i = 0; i < NUM_POINTS; ++i) {
+    TEST_ASSERT_EQUAL_INT(i == 1 || i == 2 ? TV_POINT_INVALID : TV_POINT_OK, points[i].status);
+  }
+  TEST_ASSERT_EQUAL_MEMORY(zeros, points[1].position, sizeof zeros);
+  TEST_ASSERT_EQUAL_MEMORY(zeros, points[2].position, sizeof zeros);
+}
+
+static void test_points_may_not_lie_over_pixels(void) {
+  const tv_triangulation m = TV_TRIANGULATION_MIDPOINT;
+  union {
+    tv_point points[NUM_POINTS];
+    double pixels[2 * NUM_POINTS];
+  } both, before;
+  memcpy(both.pixels, pixels0, sizeof both.pixels);
+  memset((char *)&both + sizeof both.pixels, 0, sizeof both - sizeof both.pixels);
+  before = both;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_triangulate(m, &camera0, &camera1, R, t, both.pixels,
+                                                       pixels1, NUM_POINTS, both.points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_triangulate(m, &camera0, &camera1, R, t, pixels1,
+                                                       both.pixels, NUM_POINTS, both.points));
+  TEST_ASSERT_EQUAL_MEMORY(&before, &both, sizeof both);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_every_method_of_this_release_finds_the_points);
+  RUN_TEST(test_other_methods_are_refused);
+  RUN_TEST(test_null_pointers_are_refused);
+  RUN_TEST(test_no_points_are_fine_and_fewer_are_not);
+  RUN_TEST(test_r_is_a_rotation_to_a_millionth);
+  RUN_TEST(test_t_is_not_zero);
+  RUN_TEST(test_numbers_that_are_not_finite_are_refused);
+  RUN_TEST(test_a_bad_pixel_spoils_its_point_only);
+  RUN_TEST(test_points_may_not_lie_over_pixels);
+  return UNITY_END();
+}
