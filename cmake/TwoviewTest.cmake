@@ -28,7 +28,7 @@ function(tv_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "SOURCES;LIBS")
   set(target ${arg_LABEL}_${name})
   add_executable(${target} ${arg_SOURCES})
-  target_link_libraries(${target} PRIVATE twoview_flags twoview_unity ${arg_LIBS})
+  target_link_libraries(${target} PRIVATE twoview_flags twoview_unity ${arg_LIBS} m)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/test)
   target_compile_definitions(${target} PRIVATE
     TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
