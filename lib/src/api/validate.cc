@@ -8,6 +8,11 @@ bool within(int32_t value, int32_t low, int32_t high) { return value >= low && v
 // Written so that NaN is not within.
 bool within(float value, float low, float high) { return value >= low && value <= high; }
 
+// Bounded so that no row's offset overflows.
+bool is_stride(int64_t stride_bytes, int32_t width) {
+  return stride_bytes >= width && stride_bytes <= INT64_MAX / 65536;
+}
+
 constexpr float kMaxKeypointSize = 512.0f;
 constexpr float kMaxCoordinate = 1e5f;
 
@@ -15,8 +20,7 @@ constexpr float kMaxCoordinate = 1e5f;
 
 tv_status check_image(const tv_context& context, const tv_image* image) {
   if (image == nullptr || image->data == nullptr) return TV_ERR_NULL;
-  if (image->width < 1 || image->height < 1 || image->stride_bytes < image->width ||
-      image->stride_bytes > INT64_MAX / 65536) {
+  if (image->width < 1 || image->height < 1 || !is_stride(image->stride_bytes, image->width)) {
     return TV_ERR_ARGUMENT;
   }
   if (image->width > context.limits.max_width || image->height > context.limits.max_height) {
@@ -29,7 +33,7 @@ tv_status check_mask(const tv_image* mask, const tv_image& image) {
   if (mask == nullptr) return TV_OK;
   if (mask->data == nullptr) return TV_ERR_NULL;
   const bool same_size = mask->width == image.width && mask->height == image.height;
-  return same_size && mask->stride_bytes >= mask->width ? TV_OK : TV_ERR_ARGUMENT;
+  return same_size && is_stride(mask->stride_bytes, mask->width) ? TV_OK : TV_ERR_ARGUMENT;
 }
 
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,

@@ -1,0 +1,227 @@
+/* Limits, size, init, times: every status of context.h, and what it leaves untouched. */
+
+#include <unity.h>
+
+#include "support/api.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static tv_limits small_limits(void) {
+  tv_limits limits;
+  tv_limits_init(&limits);
+  limits.max_width = 64;
+  limits.max_height = 48;
+  limits.max_keypoints = 32;
+  return limits;
+}
+
+static void test_limits_have_the_documented_defaults(void) {
+  tv_limits limits;
+  tv_limits_init(&limits);
+  TEST_ASSERT_EQUAL_UINT(sizeof limits, limits.struct_size);
+  TEST_ASSERT_EQUAL_INT(640, limits.max_width);
+  TEST_ASSERT_EQUAL_INT(480, limits.max_height);
+  TEST_ASSERT_EQUAL_INT(2048, limits.max_keypoints);
+  TEST_ASSERT_EQUAL_INT(0, limits.max_matches);
+  TEST_ASSERT_EQUAL_INT(TV_KERNELS_AUTO, limits.kernels);
+  tv_limits_init(NULL);
+}
+
+static void check_size_status(tv_status expected, const tv_limits *limits) {
+  size_t size = 77;
+  tv_context *context = NULL;
+  uint8_t memory[TV_CONTEXT_ALIGNMENT];
+  memset(memory, API_PATTERN, sizeof memory);
+  TEST_ASSERT_EQUAL_INT(expected, tv_context_size(limits, &size));
+  TEST_ASSERT_EQUAL_UINT64(77, size);
+  TEST_ASSERT_EQUAL_INT(expected, tv_context_init(&context, limits, memory, sizeof memory));
+  TEST_ASSERT_NULL(context);
+  TEST_ASSERT_TRUE(api_is_pattern(memory, sizeof memory));
+}
+
+static void test_limits_out_of_range_are_refused(void) {
+  static const int32_t bad_sides[] = {0, -1, 16385, INT32_MAX, INT32_MIN};
+  static const int32_t bad_counts[] = {0, -1, 65536, INT32_MAX, INT32_MIN};
+  static const int32_t bad_matches[] = {-1, 1000001, INT32_MAX, INT32_MIN};
+  static const int32_t bad_kernels[] = {-1, TV_KERNELS_NEON + 1, INT32_MAX, INT32_MIN};
+  tv_limits limits;
+  size_t k;
+  check_size_status(TV_ERR_NULL, NULL);
+#define REFUSED(field, values)                              \
+  for (k = 0; k < sizeof values / sizeof values[0]; ++k) { \
+    limits = small_limits();                               \
+    limits.field = values[k];                              \
+    check_size_status(TV_ERR_ARGUMENT, &limits);           \
+  }
+  REFUSED(max_width, bad_sides)
+  REFUSED(max_height, bad_sides)
+  REFUSED(max_keypoints, bad_counts)
+  REFUSED(max_matches, bad_matches)
+  REFUSED(kernels, bad_kernels)
+#undef REFUSED
+}
+
+static void test_a_struct_of_another_size_is_refused(void) {
+  tv_limits limits = small_limits();
+  limits.struct_size = 0;
+  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
+  limits.struct_size = sizeof limits + 4;
+  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
+}
+
+static void test_the_size_query_needs_somewhere_to_write(void) {
+  const tv_limits limits = small_limits();
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_size(&limits, NULL));
+}
+
+static void test_the_extreme_limits_have_a_size(void) {
+  tv_limits limits = small_limits();
+  size_t small = 0, large = 0;
+  limits.max_width = limits.max_height = limits.max_keypoints = limits.max_matches = 1;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &small));
+  limits.max_width = limits.max_height = 16384;
+  limits.max_keypoints = 65535;
+  limits.max_matches = 1000000;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &large));
+  TEST_ASSERT_TRUE(small < 65536);
+  TEST_ASSERT_TRUE(large > (size_t)16384 * 16384);
+}
+
+static void test_the_size_never_falls_when_a_limit_rises(void) {
+  tv_limits limits = small_limits();
+  size_t before = 0, after = 0;
+  int32_t k;
+  for (k = 1; k < 400; ++k) {
+    limits.max_width = 1 + k;
+    limits.max_height = 1 + k / 2;
+    limits.max_keypoints = 1 + k / 3;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &after));
+    TEST_ASSERT_TRUE(after >= before);
+    before = after;
+  }
+}
+
+static void test_memory_that_is_null_misaligned_or_a_byte_short_is_refused(void) {
+  const tv_limits limits = small_limits();
+  api_context a = api_make(&limits);
+  tv_context *context = NULL;
+  uint8_t *memory = a.memory;
+  memset(memory, API_PATTERN, a.size_bytes);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_init(NULL, &limits, memory, a.size_bytes));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_init(&context, &limits, NULL, a.size_bytes));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_MEMORY,
+                        tv_context_init(&context, &limits, memory, a.size_bytes - 1));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_MEMORY, tv_context_init(&context, &limits, memory, 0));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT,
+                        tv_context_init(&context, &limits, memory + 1, a.size_bytes));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT, tv_context_init(&context, &limits, memory + 32,
+                                                          a.size_bytes));
+  TEST_ASSERT_NULL(context);
+  TEST_ASSERT_TRUE(api_is_pattern(memory, a.size_bytes));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, memory, a.size_bytes));
+  TEST_ASSERT_EQUAL_PTR(memory, context);
+  api_release(&a);
+}
+
+static void test_a_kernel_set_is_what_was_asked_for_or_refused(void) {
+  tv_limits limits = small_limits();
+  int32_t set;
+  int refused = 0;
+  for (set = TV_KERNELS_AUTO; set <= TV_KERNELS_NEON; ++set) {
+    api_context a = api_make(&limits);
+    tv_context *context = NULL;
+    tv_status status;
+    tv_limits wanted = limits;
+    wanted.kernels = set;
+    memset(a.memory, API_PATTERN, a.size_bytes);
+    status = tv_context_init(&context, &wanted, a.memory, a.size_bytes);
+    if (status == TV_OK) {
+      const tv_kernels got = tv_context_kernels(context);
+      TEST_ASSERT_TRUE(set == TV_KERNELS_AUTO ? got != TV_KERNELS_AUTO : (int32_t)got == set);
+      api_release(&a);
+    } else {
+      TEST_ASSERT_EQUAL_INT(TV_ERR_KERNELS, status);
+      TEST_ASSERT_NULL(context);
+      TEST_ASSERT_TRUE(set > TV_KERNELS_C);
+      TEST_ASSERT_TRUE(api_is_pattern(a.memory, a.size_bytes));
+      ++refused;
+      free(a.block);
+    }
+  }
+  TEST_ASSERT_TRUE(refused > 0); /* no CPU has both AVX2 and NEON */
+}
+
+static void test_a_null_context_is_answered(void) {
+  uint64_t times[TV_NUM_STAGES];
+  TEST_ASSERT_EQUAL_INT(TV_KERNELS_AUTO, tv_context_kernels(NULL));
+  TEST_ASSERT_EQUAL_UINT64(0, tv_context_high_water(NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_set_clock(NULL, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_take_times(NULL, times));
+}
+
+static void test_strings_name_every_value(void) {
+  static const char *const names[] = {"auto", "c", "sse2", "avx2", "avx512", "neon"};
+  int k, other;
+  for (k = 0; k <= TV_KERNELS_NEON; ++k) {
+    TEST_ASSERT_EQUAL_STRING(names[k], tv_kernels_string((tv_kernels)k));
+  }
+  TEST_ASSERT_EQUAL_STRING("unknown", tv_kernels_string((tv_kernels)6));
+  TEST_ASSERT_EQUAL_STRING("unknown", tv_kernels_string((tv_kernels)-1));
+  for (k = TV_OK; k <= TV_ERR_KERNELS; ++k) {
+    TEST_ASSERT_TRUE(strcmp(tv_status_string((tv_status)k), "unknown status") != 0);
+    for (other = TV_OK; other < k; ++other) {
+      TEST_ASSERT_TRUE(strcmp(tv_status_string((tv_status)k), tv_status_string((tv_status)other)));
+    }
+  }
+  TEST_ASSERT_EQUAL_STRING("unknown status", tv_status_string((tv_status)13));
+  TEST_ASSERT_EQUAL_STRING("unknown status", tv_status_string((tv_status)-1));
+  TEST_ASSERT_EQUAL_STRING(TV_VERSION_STRING, tv_version_string());
+}
+
+static uint64_t ticking(void *user) { return *(uint64_t *)user += 5; }
+
+static void test_times_come_from_the_callers_clock_and_start_again(void) {
+  static uint8_t pixels[64 * 48];
+  const tv_limits limits = small_limits();
+  api_context a = api_make(&limits);
+  const tv_image image = api_image(pixels, 64, 48, 64);
+  tv_keypoint keypoints[32];
+  uint64_t times[TV_NUM_STAGES], ticks = 100;
+  tv_feature_options options;
+  int32_t count, k;
+  tv_feature_options_init(&options);
+  options.max_keypoints = 32;
+  api_draw(1, pixels, 64, 48);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_detect(a.context, &image, NULL, &options, keypoints, 32, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times));
+  for (k = 0; k < TV_NUM_STAGES; ++k) TEST_ASSERT_EQUAL_UINT64(0, times[k]);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_set_clock(a.context, ticking, &ticks));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_detect(a.context, &image, NULL, &options, keypoints, 32, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_take_times(a.context, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times));
+  TEST_ASSERT_EQUAL_UINT64(5, times[TV_STAGE_DETECT]);
+  TEST_ASSERT_EQUAL_UINT64(0, times[TV_STAGE_MATCH]);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times));
+  TEST_ASSERT_EQUAL_UINT64(0, times[TV_STAGE_DETECT]);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_set_clock(a.context, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_detect(a.context, &image, NULL, &options, keypoints, 32, &count));
+  TEST_ASSERT_EQUAL_UINT64(110, ticks);
+  api_release(&a);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_limits_have_the_documented_defaults);
+  RUN_TEST(test_limits_out_of_range_are_refused);
+  RUN_TEST(test_a_struct_of_another_size_is_refused);
+  RUN_TEST(test_the_size_query_needs_somewhere_to_write);
+  RUN_TEST(test_the_extreme_limits_have_a_size);
+  RUN_TEST(test_the_size_never_falls_when_a_limit_rises);
+  RUN_TEST(test_memory_that_is_null_misaligned_or_a_byte_short_is_refused);
+  RUN_TEST(test_a_kernel_set_is_what_was_asked_for_or_refused);
+  RUN_TEST(test_a_null_context_is_answered);
+  RUN_TEST(test_strings_name_every_value);
+  RUN_TEST(test_times_come_from_the_callers_clock_and_start_again);
+  return UNITY_END();
+}

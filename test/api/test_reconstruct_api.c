@@ -1,0 +1,298 @@
+/* tv_reconstruct: every status of reconstruct.h, what it leaves untouched, where its arrays lie, and
+   equal bytes. How good the poses are is checked elsewhere. */
+
+#include <math.h>
+#include <stdio.h>
+#include <unity.h>
+
+#include "support/api.h"
+#include "support/real_pair.h"
+
+enum { WIDTH = 200, HEIGHT = 150, CAP = 300 };
+
+static uint8_t drawn[2][WIDTH * HEIGHT];
+static tv_camera camera;
+static tv_view views[2];
+static tv_two_view two_view;
+static tv_reconstruction reconstruction;
+static api_context a;
+
+static tv_limits limits_of(int32_t width, int32_t height, int32_t max_keypoints) {
+  tv_limits limits;
+  tv_limits_init(&limits);
+  limits.max_width = width;
+  limits.max_height = height;
+  limits.max_keypoints = max_keypoints;
+  return limits;
+}
+
+static tv_camera camera_of(int32_t width, int32_t height) {
+  tv_camera c;
+  memset(&c, 0, sizeof c);
+  c.model = TV_CAMERA_PINHOLE;
+  c.width = width;
+  c.height = height;
+  c.fx = c.fy = width;
+  c.cx = 0.5 * (width - 1);
+  c.cy = 0.5 * (height - 1);
+  return c;
+}
+
+/* The second image is the first, moved sideways by twice as much in its lower half. */
+static void draw_pair(uint64_t seed) {
+  int32_t x, y;
+  api_draw(seed, drawn[0], WIDTH, HEIGHT);
+  for (y = 0; y < HEIGHT; ++y) {
+    const int32_t shift = y < HEIGHT / 2 ? 6 : 12;
+    for (x = 0; x < WIDTH; ++x) {
+      drawn[1][y * WIDTH + x] = drawn[0][y * WIDTH + (x + shift < WIDTH ? x + shift : WIDTH - 1)];
+    }
+  }
+}
+
+void setUp(void) {
+  const tv_limits limits = limits_of(WIDTH, HEIGHT, CAP);
+  int v;
+  a = api_make(&limits);
+  draw_pair(81);
+  camera = camera_of(WIDTH, HEIGHT);
+  for (v = 0; v < 2; ++v) {
+    views[v].image = api_image(drawn[v], WIDTH, HEIGHT, WIDTH);
+    views[v].camera = &camera;
+    views[v].mask = NULL;
+  }
+  tv_two_view_init(&two_view);
+  tv_reconstruction_init(&reconstruction);
+}
+
+void tearDown(void) { api_release(&a); }
+
+static tv_status run(tv_context *context) {
+  return tv_reconstruct(context, &views[0], &views[1], NULL, NULL, NULL,
+                        TV_TRIANGULATION_ITERATIVE_LS, &two_view, &reconstruction);
+}
+
+/* Fills the outputs but for struct_size with a pattern, which a refusal leaves. */
+static void refused(tv_status expected, const tv_feature_options *feature_options,
+                    const tv_match_options *match_options,
+                    const tv_estimate_options *estimate_options, int triangulation) {
+  const size_t skip = sizeof two_view.struct_size;
+  memset((uint8_t *)&two_view + skip, API_PATTERN, sizeof two_view - skip);
+  memset((uint8_t *)&reconstruction + skip, API_PATTERN, sizeof reconstruction - skip);
+  TEST_ASSERT_EQUAL_INT(
+      expected, tv_reconstruct(a.context, &views[0], &views[1], feature_options, match_options,
+                               estimate_options, (tv_triangulation)triangulation, &two_view,
+                               &reconstruction));
+  TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&two_view + skip, sizeof two_view - skip));
+  TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&reconstruction + skip, sizeof reconstruction - skip));
+}
+
+static void test_null_pointers_are_refused(void) {
+  const tv_triangulation method = TV_TRIANGULATION_ITERATIVE_LS;
+  tv_view *v = views;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(NULL, v, v + 1, NULL, NULL, NULL, method,
+                                                    &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, NULL, v + 1, NULL, NULL, NULL,
+                                                    method, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, NULL, NULL, NULL, NULL, method,
+                                                    &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, NULL, NULL, method,
+                                                    NULL, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, NULL, NULL, method,
+                                                    &two_view, NULL));
+  views[1].image.data = NULL;
+  refused(TV_ERR_NULL, NULL, NULL, NULL, method);
+  tv_reconstruction_init(NULL);
+}
+
+static void test_structs_of_another_size_are_refused(void) {
+  tv_feature_options feature_options;
+  tv_match_options match_options;
+  tv_estimate_options estimate_options;
+  const int method = TV_TRIANGULATION_ITERATIVE_LS;
+  tv_feature_options_init(&feature_options);
+  tv_match_options_init(&match_options);
+  tv_estimate_options_init(&estimate_options);
+  feature_options.struct_size = match_options.struct_size = estimate_options.struct_size = 3;
+  refused(TV_ERR_STRUCT_SIZE, &feature_options, NULL, NULL, method);
+  refused(TV_ERR_STRUCT_SIZE, NULL, &match_options, NULL, method);
+  refused(TV_ERR_STRUCT_SIZE, NULL, NULL, &estimate_options, method);
+  two_view.struct_size += 8;
+  refused(TV_ERR_STRUCT_SIZE, NULL, NULL, NULL, method);
+  tv_two_view_init(&two_view);
+  reconstruction.struct_size = 0;
+  refused(TV_ERR_STRUCT_SIZE, NULL, NULL, NULL, method);
+}
+
+static void test_what_the_stages_refuse_is_refused(void) {
+  const int method = TV_TRIANGULATION_ITERATIVE_LS;
+  tv_feature_options feature_options;
+  tv_match_options match_options;
+  tv_estimate_options estimate_options;
+  tv_camera bad = camera;
+  tv_image mask = api_image(drawn[0], WIDTH - 1, HEIGHT, WIDTH);
+  tv_feature_options_init(&feature_options);
+  feature_options.max_keypoints = CAP;
+  feature_options.arc = 8;
+  refused(TV_ERR_ARGUMENT, &feature_options, NULL, NULL, method);
+  feature_options.arc = 9;
+  feature_options.max_keypoints = CAP + 1;
+  refused(TV_ERR_LIMITS, &feature_options, NULL, NULL, method);
+  tv_match_options_init(&match_options);
+  match_options.ratio = 0;
+  refused(TV_ERR_ARGUMENT, NULL, &match_options, NULL, method);
+  tv_estimate_options_init(&estimate_options);
+  estimate_options.max_error_px = NAN;
+  refused(TV_ERR_NOT_FINITE, NULL, NULL, &estimate_options, method);
+  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, 7);
+  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, -1);
+  views[1].mask = &mask;
+  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, method);
+  views[1].mask = NULL;
+  bad.fx = 0;
+  views[1].camera = &bad;
+  refused(TV_ERR_CAMERA, NULL, NULL, NULL, method);
+  views[1].camera = &camera;
+  views[1].image.width = WIDTH + 1;
+  views[1].image.stride_bytes = WIDTH + 1;
+  refused(TV_ERR_LIMITS, NULL, NULL, NULL, method);
+}
+
+static void test_one_camera_alone_is_refused(void) {
+  views[0].camera = NULL;
+  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, TV_TRIANGULATION_ITERATIVE_LS);
+}
+
+static int lies_in_context(const void *pointer, size_t bytes) {
+  const uint8_t *p = (const uint8_t *)pointer;
+  return p >= a.memory && p + bytes <= a.memory + a.size_bytes;
+}
+
+static void test_the_result_is_whole_and_lies_in_the_context(void) {
+  const tv_reconstruction *r = &reconstruction;
+  int32_t k, v, inliers = 0, good = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
+  TEST_ASSERT_TRUE(r->num_matches > 20);
+  TEST_ASSERT_EQUAL_INT(r->num_matches, two_view.num_matches);
+  for (v = 0; v < 2; ++v) {
+    TEST_ASSERT_TRUE(r->num_keypoints[v] >= r->num_matches && r->num_keypoints[v] <= CAP);
+    TEST_ASSERT_TRUE(lies_in_context(r->keypoints[v], CAP * sizeof(tv_keypoint)));
+    TEST_ASSERT_TRUE(lies_in_context(r->descriptors[v], CAP * TV_DESCRIPTOR_BYTES));
+  }
+  TEST_ASSERT_TRUE(lies_in_context(r->matches, CAP * sizeof(tv_correspondence)));
+  TEST_ASSERT_TRUE(lies_in_context(r->inlier_mask, CAP));
+  TEST_ASSERT_TRUE(lies_in_context(r->points, CAP * sizeof(tv_point)));
+  for (k = 0; k < r->num_matches; ++k) {
+    TEST_ASSERT_TRUE(r->inlier_mask[k] <= 1);
+    TEST_ASSERT_TRUE(r->inlier_mask[k] == 1 || r->points[k].status == TV_POINT_INVALID);
+    TEST_ASSERT_TRUE(r->matches[k].idx0 < r->num_keypoints[0]);
+    TEST_ASSERT_TRUE(r->matches[k].idx1 < r->num_keypoints[1]);
+    inliers += r->inlier_mask[k];
+    good += r->points[k].status == TV_POINT_OK;
+  }
+  TEST_ASSERT_EQUAL_INT(inliers, two_view.num_inliers);
+  TEST_ASSERT_EQUAL_INT(good, r->num_points);
+}
+
+static void test_no_geometry_is_a_result(void) {
+  memset(drawn, 90, sizeof drawn);
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
+  TEST_ASSERT_EQUAL_INT(0, reconstruction.num_matches);
+  TEST_ASSERT_EQUAL_INT(0, reconstruction.num_points);
+  TEST_ASSERT_EQUAL_INT(TV_CONFIG_DEGENERATE, two_view.config);
+  TEST_ASSERT_EQUAL_INT(0, two_view.has_R);
+  views[0].image = api_image(drawn[0], 1, 1, 1);
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
+}
+
+/* Everything that the result points to, in one hash. */
+static uint64_t hash_of_result(void) {
+  const tv_reconstruction *r = &reconstruction;
+  const size_t n = (size_t)r->num_matches;
+  const struct {
+    const void *data;
+    size_t bytes;
+  } parts[] = {{&two_view, sizeof two_view},
+               {r->keypoints[0], (size_t)r->num_keypoints[0] * sizeof(tv_keypoint)},
+               {r->keypoints[1], (size_t)r->num_keypoints[1] * sizeof(tv_keypoint)},
+               {r->descriptors[0], (size_t)r->num_keypoints[0] * TV_DESCRIPTOR_BYTES},
+               {r->descriptors[1], (size_t)r->num_keypoints[1] * TV_DESCRIPTOR_BYTES},
+               {r->matches, n * sizeof(tv_correspondence)},
+               {r->inlier_mask, n},
+               {r->points, n * sizeof(tv_point)}};
+  uint64_t hash = 14695981039346656037u; /* FNV-1a */
+  size_t p, k;
+  for (p = 0; p < sizeof parts / sizeof parts[0]; ++p) {
+    for (k = 0; k < parts[p].bytes; ++k) {
+      hash = (hash ^ ((const uint8_t *)parts[p].data)[k]) * 1099511628211u;
+    }
+  }
+  return hash;
+}
+
+static void test_the_same_call_gives_the_same_bytes(void) {
+  const tv_limits limits = limits_of(WIDTH, HEIGHT, CAP);
+  api_context b = api_make(&limits);
+  uint64_t first;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
+  first = hash_of_result();
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
+  TEST_ASSERT_TRUE(first == hash_of_result());
+  draw_pair(82); /* another pair in between, in another context and in this one */
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
+  TEST_ASSERT_TRUE(first != hash_of_result());
+  draw_pair(81);
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
+  TEST_ASSERT_TRUE(first == hash_of_result());
+  api_release(&b);
+}
+
+/* The size query asks for what a full call uses, not for much more. */
+static void test_a_full_call_uses_most_of_the_memory(void) {
+  size_t high_water;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
+  high_water = tv_context_high_water(a.context);
+  TEST_ASSERT_TRUE(high_water <= a.size_bytes);
+  TEST_ASSERT_TRUE(high_water > a.size_bytes / 10 * 8);
+}
+
+static void test_a_real_pair_has_the_same_bytes_with_every_kernel_set(void) {
+  real_pair pair;
+  tv_limits limits;
+  tv_camera real_camera;
+  uint64_t first = 0;
+  int v;
+  if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
+  limits = limits_of(pair.width, pair.height, 2048);
+  real_camera = camera_of(pair.width, pair.height);
+  for (v = 0; v < 2; ++v) {
+    views[v].image = api_image(pair.luma[v], pair.width, pair.height, pair.width);
+    views[v].camera = &real_camera;
+  }
+  for (limits.kernels = TV_KERNELS_C; limits.kernels <= TV_KERNELS_NEON; ++limits.kernels) {
+    api_context b;
+    if (api_try(&limits, &b) == TV_ERR_KERNELS) continue;
+    TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
+    TEST_ASSERT_TRUE(reconstruction.num_matches > 100);
+    if (limits.kernels == TV_KERNELS_C) first = hash_of_result();
+    TEST_ASSERT_TRUE(first == hash_of_result());
+    api_release(&b);
+  }
+  free(pair.luma[0]);
+  free(pair.luma[1]);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_null_pointers_are_refused);
+  RUN_TEST(test_structs_of_another_size_are_refused);
+  RUN_TEST(test_what_the_stages_refuse_is_refused);
+  RUN_TEST(test_one_camera_alone_is_refused);
+  RUN_TEST(test_the_result_is_whole_and_lies_in_the_context);
+  RUN_TEST(test_no_geometry_is_a_result);
+  RUN_TEST(test_the_same_call_gives_the_same_bytes);
+  RUN_TEST(test_a_full_call_uses_most_of_the_memory);
+  RUN_TEST(test_a_real_pair_has_the_same_bytes_with_every_kernel_set);
+  return UNITY_END();
+}

@@ -1,0 +1,432 @@
+/* Every kernel of every set that this machine runs, against the C set: the same bytes out of random
+   and extreme data, odd sizes and misaligned pointers, and nothing written outside the outputs.
+   Inputs are heap blocks of the exact size, so the address sanitizer sees a read beyond them.
+   The cases come from TVK_LIST: a kernel without a case does not link.
+
+   check_kernels          runs the checks
+   check_kernels --time   prints nanoseconds per call of typical size, a column per set */
+#define _POSIX_C_SOURCE 199309L /* clock_gettime */
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unity.h>
+
+#include "kernels/kernels.h"
+#include "support/random.h"
+#include "twoview/context.h"
+
+enum { MAX_BLOCKS = 32, GUARD_BYTES = 64, PATTERN = 0xA5, ROUNDS = 600 };
+
+typedef struct block {
+  uint8_t *memory, *data;
+  size_t bytes;
+  int is_output;
+} block;
+
+/* One run of a case: the same seed gives the same inputs, whatever the set. */
+typedef struct trial {
+  const tvk_table *set;
+  uint64_t seed;
+  int typical;   /* the size of a 640x480 image's work, for --time */
+  int64_t calls; /* how often to call the kernel on the same input */
+  block blocks[MAX_BLOCKS];
+  int num_blocks;
+} trial;
+
+static void *take(trial *t, size_t bytes, size_t unit, int is_output) {
+  const size_t offset = GUARD_BYTES + unit * (size_t)random_int(&t->seed, 0, 15);
+  block *b = &t->blocks[t->num_blocks++];
+  TEST_ASSERT_TRUE(t->num_blocks <= MAX_BLOCKS);
+  b->memory = (uint8_t *)malloc(offset + bytes + (is_output ? GUARD_BYTES : 0));
+  TEST_ASSERT_NOT_NULL(b->memory);
+  b->data = b->memory + offset;
+  b->bytes = bytes;
+  b->is_output = is_output;
+  memset(b->memory, PATTERN, offset + bytes + (is_output ? GUARD_BYTES : 0));
+  return b->data;
+}
+
+static void release(trial *t) {
+  while (t->num_blocks > 0) free(t->blocks[--t->num_blocks].memory);
+}
+
+#define INPUT(t, type, count) ((type *)take(t, (size_t)(count) * sizeof(type), sizeof(type), 0))
+#define OUTPUT(t, type, count) ((type *)take(t, (size_t)(count) * sizeof(type), sizeof(type), 1))
+#define REPEAT(t, call)                          \
+  do {                                           \
+    int64_t left_;                               \
+    for (left_ = (t)->calls; left_ > 0; --left_) call; \
+  } while (0)
+
+/* In [low, high], or the typical value. */
+static int32_t pick(trial *t, int32_t low, int32_t high, int32_t typical) {
+  const int32_t value = random_int(&t->seed, low, high);
+  return t->typical ? typical : value;
+}
+
+/* Noise; black and white; one grey; a ramp with small steps, where ties are many. */
+static void fill_bytes(trial *t, uint8_t *bytes, int32_t count) {
+  const int32_t kind = random_int(&t->seed, 0, 3), base = random_int(&t->seed, 0, 255);
+  int32_t k;
+  for (k = 0; k < count; ++k) {
+    const int32_t noise = random_int(&t->seed, 0, 255);
+    bytes[k] = (uint8_t)(kind == 0 ? noise
+                         : kind == 1 ? (noise & 1) * 255
+                         : kind == 2 ? base
+                                     : base + k / 4 + (noise & 3));
+  }
+}
+
+static uint8_t *row_of_bytes(trial *t, int32_t count) {
+  uint8_t *row = INPUT(t, uint8_t, count);
+  fill_bytes(t, row, count);
+  return row;
+}
+
+static void case_fast_score_row(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640), arc = pick(t, 9, 12, 12);
+  const int32_t extreme = random_int(&t->seed, 0, 3);
+  const int32_t threshold = extreme == 0   ? pick(t, 1, 1, 10)
+                            : extreme == 1 ? pick(t, 254, 254, 10)
+                                           : pick(t, 1, 254, 10);
+  const uint8_t *rows[7];
+  uint8_t *scores;
+  int k;
+  for (k = 0; k < 7; ++k) rows[k] = row_of_bytes(t, width);
+  scores = OUTPUT(t, uint8_t, width);
+  REPEAT(t, t->set->fast_score_row(rows, width, arc, threshold, scores));
+}
+
+static void case_fast_contrasts(trial *t) {
+  const int32_t stride = pick(t, 9, 40, 640), arc = pick(t, 9, 12, 12);
+  const uint8_t *image = row_of_bytes(t, 8 * stride + 9); /* ends with the last circle's pixel */
+  int32_t *contrasts = OUTPUT(t, int32_t, 9);
+  REPEAT(t, t->set->fast_contrasts(image + 4 * stride + 4, stride, arc, contrasts));
+}
+
+static void case_suppress_row(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640), room = (width + 1) / 2;
+  const int32_t highest = random_int(&t->seed, 0, 1) ? 254 : 2;
+  const int32_t sparsity = pick(t, 0, 20, 20);
+  uint8_t *rows[3];
+  uint16_t *xs;
+  int32_t *found, k, x;
+  for (k = 0; k < 3; ++k) {
+    rows[k] = INPUT(t, uint8_t, width);
+    for (x = 0; x < width; ++x) {
+      const int32_t score = random_int(&t->seed, 1, highest);
+      rows[k][x] = (uint8_t)(random_int(&t->seed, 0, sparsity) == 0 ? score : 0);
+    }
+  }
+  xs = OUTPUT(t, uint16_t, room);
+  found = OUTPUT(t, int32_t, 1);
+  REPEAT(t, *found = t->set->suppress_row(rows[0], rows[1], rows[2], width, xs));
+  TEST_ASSERT_TRUE(*found >= 0 && *found <= room);
+  memset(xs + *found, PATTERN, (size_t)(room - *found) * sizeof xs[0]); /* free to be scratch */
+}
+
+static void case_average_rows(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640);
+  const uint8_t *rows[3];
+  int32_t weights[3], k;
+  uint16_t *sums;
+  for (k = 0; k < 3; ++k) rows[k] = row_of_bytes(t, width);
+  weights[0] = random_int(&t->seed, 0, 256);
+  weights[1] = random_int(&t->seed, 0, 256 - weights[0]);
+  weights[2] = 256 - weights[0] - weights[1];
+  sums = OUTPUT(t, uint16_t, width);
+  REPEAT(t, t->set->average_rows(rows, weights, width, sums));
+}
+
+static void case_average_columns(trial *t) {
+  const int32_t out_width = pick(t, 1, 200, 533);
+  int32_t *first = INPUT(t, int32_t, out_width), *weights = INPUT(t, int32_t, 3 * out_width);
+  int32_t width = 0, x;
+  uint16_t *sums;
+  uint8_t *out;
+  for (x = 0; x < out_width; ++x) {
+    const int32_t used = random_int(&t->seed, 1, 3);
+    first[x] = width > 0 ? width - random_int(&t->seed, 0, 1) : 0;
+    weights[3 * x] = used == 1 ? 256 : random_int(&t->seed, 0, 256);
+    weights[3 * x + 1] = used == 1   ? 0
+                         : used == 2 ? 256 - weights[3 * x]
+                                     : random_int(&t->seed, 0, 256 - weights[3 * x]);
+    weights[3 * x + 2] = 256 - weights[3 * x] - weights[3 * x + 1];
+    if (first[x] + used > width) width = first[x] + used;
+  }
+  sums = INPUT(t, uint16_t, width); /* ends with the last one that has a weight */
+  for (x = 0; x < width; ++x) {
+    const int32_t noise = random_int(&t->seed, 0, 65280);
+    sums[x] = (uint16_t)(random_int(&t->seed, 0, 3) == 0 ? 65280 : noise);
+  }
+  out = OUTPUT(t, uint8_t, out_width);
+  REPEAT(t, t->set->average_columns(sums, first, weights, out_width, out));
+}
+
+static void case_halve_row(trial *t) {
+  const int32_t out_width = pick(t, 1, 200, 320);
+  const uint8_t *a = row_of_bytes(t, 2 * out_width), *b = row_of_bytes(t, 2 * out_width);
+  uint8_t *out = OUTPUT(t, uint8_t, out_width);
+  REPEAT(t, t->set->halve_row(a, b, out_width, out));
+}
+
+static void case_blur_row(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640);
+  const uint8_t *above = row_of_bytes(t, width), *row = row_of_bytes(t, width);
+  const uint8_t *below = random_int(&t->seed, 0, 3) == 0 ? row : row_of_bytes(t, width);
+  uint8_t *out = OUTPUT(t, uint8_t, width);
+  REPEAT(t, t->set->blur_row(above, row, below, width, out));
+}
+
+static void case_sample_patch(trial *t) {
+  static const int32_t sides[4] = {TVK_PATCH_SIDE, TVK_ORIENT_SIDE, 1, 7};
+  const int32_t width = pick(t, 1, 90, 640), height = pick(t, 1, 90, 480);
+  const int32_t stride = width + random_int(&t->seed, 0, 9);
+  const int32_t side = t->typical ? TVK_PATCH_SIDE : sides[random_int(&t->seed, 0, 3)];
+  const int32_t bytes = (height - 1) * stride + width; /* none behind the last row's last pixel */
+  /* Steps from none to far beyond the image; a step of whole pixels from a whole position ends on
+     the last column or row exactly. */
+  const int32_t whole = random_int(&t->seed, 0, 3) == 0;
+  const int32_t farthest = random_int(&t->seed, 0, 7) == 0 ? 160 << 16 : 2 << 16;
+  const int32_t margin = 40 << 16;
+  int32_t du_x = pick(t, -farthest, farthest, 80000), du_y = pick(t, -farthest, farthest, 40000);
+  int32_t x = pick(t, -margin, (width << 16) + margin, 300 << 16);
+  int32_t y = pick(t, -margin, (height << 16) + margin, 200 << 16);
+  const uint8_t *image = row_of_bytes(t, bytes);
+  int16_t *patch = OUTPUT(t, int16_t, side * side);
+  if (whole) {
+    x = random_int(&t->seed, 0, width) << 16;
+    y = random_int(&t->seed, 0, height) << 16;
+    du_x = 1 << 16;
+    du_y = 0;
+  }
+  REPEAT(t, t->set->sample_patch(image, stride, width, height, x, y, du_x, du_y, side, patch));
+}
+
+/* Samples as sample_patch makes them: 1/16 grey level. */
+static const int16_t *random_patch(trial *t, int32_t side) {
+  const int32_t kind = random_int(&t->seed, 0, 3), base = random_int(&t->seed, 0, 4000);
+  int16_t *patch = INPUT(t, int16_t, side * side);
+  int32_t k;
+  for (k = 0; k < side * side; ++k) {
+    const int32_t noise = random_int(&t->seed, 0, 4080);
+    patch[k] = (int16_t)(kind == 0   ? noise
+                         : kind == 1 ? (noise & 1) * 4080
+                         : kind == 2 ? base + noise % 3
+                                     : (k / side * 131 + k % side * 57) % 4081);
+  }
+  return patch;
+}
+
+static void case_orientation_histogram(trial *t) {
+  const int16_t *patch = random_patch(t, TVK_ORIENT_SIDE);
+  int32_t *histogram = OUTPUT(t, int32_t, TVK_ORIENT_BINS);
+  REPEAT(t, t->set->orientation_histogram(patch, histogram));
+}
+
+static void case_gradient_histogram(trial *t) {
+  const int16_t *patch = random_patch(t, TVK_PATCH_SIDE);
+  int32_t *histogram = OUTPUT(t, int32_t, TVK_DESCRIPTOR_SIZE);
+  REPEAT(t, t->set->gradient_histogram(patch, histogram));
+}
+
+static void case_quantize_descriptor(trial *t) {
+  /* gradient_histogram's sums stay below 972^2 / 256 * 5770. */
+  static const int32_t highest[5] = {0, 1, 300, 1 << 18, 21300000};
+  const int32_t high = t->typical ? 1 << 18 : highest[random_int(&t->seed, 0, 4)];
+  const int32_t spikes = random_int(&t->seed, 0, 2) == 0, root = pick(t, 0, 1, 1);
+  int32_t *histogram = INPUT(t, int32_t, TVK_DESCRIPTOR_SIZE), k;
+  uint8_t *descriptor = OUTPUT(t, uint8_t, TVK_DESCRIPTOR_SIZE);
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
+    const int32_t value = random_int(&t->seed, 0, high);
+    histogram[k] = spikes && random_int(&t->seed, 0, 63) > 0 ? 0 : value;
+  }
+  REPEAT(t, t->set->quantize_descriptor(histogram, root, descriptor));
+}
+
+static void case_widen(trial *t) {
+  const int32_t count = pick(t, 0, 300, TVK_DESCRIPTOR_SIZE);
+  const uint8_t *bytes = row_of_bytes(t, count);
+  int16_t *out = OUTPUT(t, int16_t, count);
+  REPEAT(t, t->set->widen(bytes, count, out));
+}
+
+static int32_t random_row(trial *t, int16_t *row) {
+  const int32_t extreme = random_int(&t->seed, 0, 3);
+  int32_t norm = 0, k;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
+    const int32_t noise = random_int(&t->seed, 0, 255);
+    row[k] = (int16_t)(extreme == 0 ? 255 : extreme == 1 ? 0 : noise);
+    norm += row[k] * row[k];
+  }
+  return norm;
+}
+
+static void case_squared_distances(trial *t) {
+  const int32_t num_rows = pick(t, 0, 40, 1000);
+  int16_t *query = INPUT(t, int16_t, TVK_DESCRIPTOR_SIZE);
+  int16_t *rows = INPUT(t, int16_t, num_rows * TVK_DESCRIPTOR_SIZE);
+  int32_t *norms = INPUT(t, int32_t, num_rows), *out = OUTPUT(t, int32_t, num_rows);
+  const int32_t query_norm = random_row(t, query);
+  int32_t k;
+  for (k = 0; k < num_rows; ++k) norms[k] = random_row(t, rows + k * TVK_DESCRIPTOR_SIZE);
+  REPEAT(t, t->set->squared_distances(query, query_norm, rows, norms, num_rows, out));
+}
+
+static void case_update_columns(trial *t) {
+  const int32_t num_columns = pick(t, 0, 200, 1000);
+  const int32_t highest = random_int(&t->seed, 0, 1) ? 8323200 : 3; /* 128 * 255^2; ties */
+  const int32_t row = random_int(&t->seed, 0, 65534);
+  int32_t *dist = INPUT(t, int32_t, num_columns), *best = OUTPUT(t, int32_t, num_columns);
+  int32_t *second = OUTPUT(t, int32_t, num_columns), *best_row = OUTPUT(t, int32_t, num_columns);
+  int32_t k;
+  for (k = 0; k < num_columns; ++k) {
+    const int32_t seen = random_int(&t->seed, 0, 2);
+    dist[k] = random_int(&t->seed, 0, highest);
+    best[k] = random_int(&t->seed, 0, highest);
+    second[k] = random_int(&t->seed, best[k], highest);
+    best_row[k] = random_int(&t->seed, 0, 65534);
+    if (seen < 2) second[k] = INT32_MAX;
+    if (seen == 0) {
+      best[k] = INT32_MAX;
+      best_row[k] = -1;
+    }
+  }
+  REPEAT(t, t->set->update_columns(dist, num_columns, row, best, second, best_row));
+}
+
+static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {
+  trial t;
+  memset(&t, 0, sizeof t);
+  t.set = set;
+  t.seed = seed;
+  t.typical = typical;
+  t.calls = calls;
+  return t;
+}
+
+static int is_pattern(const uint8_t *begin, const uint8_t *end) {
+  for (; begin < end; ++begin) {
+    if (*begin != PATTERN) return 0;
+  }
+  return 1;
+}
+
+/* What differs, or null. */
+static const char *difference(const trial *expected, const trial *actual) {
+  int k;
+  for (k = 0; k < actual->num_blocks; ++k) {
+    const block *b = &actual->blocks[k];
+    if (!b->is_output) {
+      if (memcmp(expected->blocks[k].data, b->data, b->bytes) != 0) return "an input was changed";
+      continue;
+    }
+    if (memcmp(expected->blocks[k].data, b->data, b->bytes) != 0) return "differs from the C set";
+    if (!is_pattern(b->memory, b->data)) return "wrote before an output";
+    if (!is_pattern(b->data + b->bytes, b->data + b->bytes + GUARD_BYTES)) {
+      return "wrote behind an output";
+    }
+  }
+  return NULL;
+}
+
+static void check(const char *name, void (*run)(trial *)) {
+  const tvk_table *reference = tvk_select(TV_KERNELS_C);
+  int32_t set;
+  uint64_t seed;
+  for (set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
+    const tvk_table *table = tvk_select(set);
+    if (table == NULL) continue;
+    TEST_ASSERT_EQUAL_INT(set, table->set);
+    for (seed = 0; seed < ROUNDS; ++seed) {
+      trial expected = make_trial(reference, seed, 0, 1), actual = make_trial(table, seed, 0, 1);
+      const char *what;
+      run(&expected);
+      run(&actual);
+      what = difference(&expected, &actual);
+      release(&expected);
+      release(&actual);
+      if (what != NULL) {
+        char message[160];
+        snprintf(message, sizeof message, "%s of set %d, seed %d: %s", name, (int)set, (int)seed,
+                 what);
+        TEST_FAIL_MESSAGE(message);
+      }
+    }
+  }
+}
+
+#define TEST(name, result, parameters) \
+  static void test_##name##_equals_the_c_set(void) { check(#name, case_##name); }
+TVK_LIST(TEST)
+#undef TEST
+
+static double now_ns(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
+}
+
+/* The least of several runs of about a millisecond each. */
+static double time_per_call(const tvk_table *set, void (*run)(trial *)) {
+  double best = 1e30;
+  int64_t calls = 1;
+  int repeat = 0;
+  while (repeat < 9) {
+    trial t = make_trial(set, 1, 1, 1);
+    double setup, total; /* setup includes one call */
+    const double start = now_ns();
+    run(&t);
+    setup = now_ns() - start;
+    release(&t);
+    t = make_trial(set, 1, 1, calls + 1);
+    total = now_ns();
+    run(&t);
+    total = now_ns() - total - setup;
+    release(&t);
+    if (total < 1e6) {
+      calls *= 2;
+      continue;
+    }
+    if (total / (double)calls < best) best = total / (double)calls;
+    ++repeat;
+  }
+  return best;
+}
+
+static void print_times(const char *name, void (*run)(trial *)) {
+  int32_t set;
+  printf("%-24s", name);
+  for (set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
+    if (tvk_select(set) != NULL) printf(" %10.1f", time_per_call(tvk_select(set), run));
+  }
+  printf("\n");
+}
+
+static int print_all_times(void) {
+  static const char *const names[] = {"c", "sse2", "avx2", "avx512", "neon"};
+  int32_t set;
+  printf("%-24s", "ns per call");
+  for (set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
+    if (tvk_select(set) != NULL) printf(" %10s", names[set - TV_KERNELS_C]);
+  }
+  printf("\n");
+#define TIME(name, result, parameters) print_times(#name, case_##name);
+  TVK_LIST(TIME)
+#undef TIME
+  return 0;
+}
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(int argc, char **argv) {
+  if (argc == 2 && strcmp(argv[1], "--time") == 0) return print_all_times();
+  UNITY_BEGIN();
+#define RUN(name, result, parameters) RUN_TEST(test_##name##_equals_the_c_set);
+  TVK_LIST(RUN)
+#undef RUN
+  return UNITY_END();
+}

@@ -1,0 +1,206 @@
+// FAST's corners and scores, on real and synthetic images, against the definition read word for word:
+// a pixel is a corner at threshold t when `arc` contiguous pixels of its circle are all brighter than
+// it by more than t, or all darker; its score is the largest such t, found by trying each.
+
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+#include "base/arena.h"
+#include "feature/corners.h"
+#include "support/random.h"
+#include "support/real_pair.h"
+
+namespace {
+
+// Clockwise from above the centre, (x, y) with y down: Rosten's figure 1.
+constexpr int kCircle[16][2] = {{0, -3}, {1, -3}, {2, -2}, {3, -1}, {3, 0},  {3, 1},
+                                {2, 2},  {1, 3},  {0, 3},  {-1, 3}, {-2, 2}, {-3, 1},
+                                {-3, 0}, {-3, -1}, {-2, -2}, {-1, -3}};
+
+constexpr int kMaxWidth = 800, kMaxHeight = 600;
+uint8_t expected_scores[kMaxHeight][kMaxWidth];
+uint8_t pixels[kMaxHeight * kMaxWidth];
+alignas(64) uint8_t arena_memory[24 << 20];
+tv_keypoint keypoints[kMaxWidth * kMaxHeight / 4];
+real_pair real;
+
+bool is_corner(const tv_image& image, int x, int y, int arc, int t) {
+  int brighter_run = 0, darker_run = 0;
+  const int centre = image.data[y * image.stride_bytes + x];
+  for (int k = 0; k < 16 + arc - 1; ++k) {
+    const int* at = kCircle[k % 16];
+    const int p = image.data[(y + at[1]) * image.stride_bytes + x + at[0]];
+    brighter_run = p > centre + t ? brighter_run + 1 : 0;
+    darker_run = p < centre - t ? darker_run + 1 : 0;
+    if (brighter_run >= arc || darker_run >= arc) return true;
+  }
+  return false;
+}
+
+void fill_expected(const tv_image& image, int arc) {
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      int score = 0;
+      if (x >= 3 && y >= 3 && x < image.width - 3 && y < image.height - 3) {
+        while (score < 255 && is_corner(image, x, y, arc, score + 1)) ++score;
+      }
+      expected_scores[y][x] = static_cast<uint8_t>(score);
+    }
+  }
+}
+
+void check_score_map(const tvk_table& kernels, const tv_image& image, int arc, int threshold) {
+  for (int y = 3; y < image.height - 3; ++y) {
+    const uint8_t* rows[7];
+    uint8_t scores[kMaxWidth];
+    for (int k = 0; k < 7; ++k) rows[k] = image.data + (y - 3 + k) * image.stride_bytes;
+    kernels.fast_score_row(rows, image.width, arc, threshold, scores);
+    for (int x = 0; x < image.width; ++x) {
+      const int score = expected_scores[y][x] >= threshold ? expected_scores[y][x] : 0;
+      if (score == scores[x]) continue;
+      char message[128];
+      snprintf(message, sizeof message, "arc %d threshold %d at (%d, %d)", arc, threshold, x, y);
+      TEST_ASSERT_EQUAL_INT_MESSAGE(score, scores[x], message);
+    }
+  }
+}
+
+// The contrast is the score carried on below 0: the pixel is a corner at t where it is above t.
+void check_contrasts(const tvk_table& kernels, const tv_image& image, int arc) {
+  for (int y = 4; y < image.height - 4; y += 3) {
+    for (int x = 4; x < image.width - 4; x += 3) {
+      int32_t contrasts[9];
+      kernels.fast_contrasts(image.data + y * image.stride_bytes + x, image.stride_bytes, arc,
+                             contrasts);
+      for (int k = 0; k < 9; ++k) {
+        const int c = contrasts[k], cx = x + k % 3 - 1, cy = y + k / 3 - 1;
+        TEST_ASSERT_FALSE(is_corner(image, cx, cy, arc, c));
+        TEST_ASSERT_TRUE(is_corner(image, cx, cy, arc, c - 1));
+      }
+    }
+  }
+}
+
+bool is_peak(int x, int y, int threshold) {
+  const int score = expected_scores[y][x];
+  if (score < threshold) return false;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if ((dx != 0 || dy != 0) && expected_scores[y + dy][x + dx] >= score) return false;
+    }
+  }
+  return true;
+}
+
+void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int threshold) {
+  tv_feature_options options;
+  memset(&options, 0, sizeof options);
+  options.arc = arc;
+  options.threshold = threshold;
+  options.levels = 1;
+  options.scale_factor = 2.0f;
+  options.keypoint_size = 4.0f;
+  tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
+  const int32_t budget = image.width * image.height / 4;
+  TEST_ASSERT_LESS_OR_EQUAL(sizeof arena_memory,
+                            tv::corners_bytes(image.width, image.height, budget));
+  const int32_t count =
+      tv::find_corners(kernels, image, nullptr, options, budget, arena, keypoints);
+  int32_t expected = 0;
+  for (int y = 3; y < image.height - 3; ++y) {
+    for (int x = 3; x < image.width - 3; ++x) expected += is_peak(x, y, threshold);
+  }
+  TEST_ASSERT_EQUAL_INT32(expected, count);
+  for (int32_t k = 0; k < count; ++k) {
+    const tv_keypoint& p = keypoints[k];
+    const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
+    TEST_ASSERT_TRUE(p.x == x && p.y == y && is_peak(x, y, threshold));
+    TEST_ASSERT_EQUAL_INT(expected_scores[y][x], static_cast<int>(p.score));
+    if (k == 0) continue;  // strictly in order, so that none is there twice
+    const tv_keypoint& q = keypoints[k - 1];
+    TEST_ASSERT_TRUE(q.score > p.score ||
+                     (q.score == p.score && (q.y < p.y || (q.y == p.y && q.x < p.x))));
+  }
+}
+
+void check_image(const tv_image& image) {
+  constexpr int thresholds[] = {1, 5, 10, 20, 60, 253, 254};
+  for (int arc = 9; arc <= 12; ++arc) {
+    fill_expected(image, arc);
+    for (int set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
+      const tvk_table* kernels = tvk_select(set);
+      if (kernels == nullptr) continue;
+      check_contrasts(*kernels, image, arc);
+      for (int threshold : thresholds) {
+        check_score_map(*kernels, image, arc, threshold);
+        check_corners(*kernels, image, arc, threshold);
+      }
+    }
+  }
+}
+
+tv_image filled(int width, int height, int (*value)(int x, int y)) {
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      pixels[y * width + x] = static_cast<uint8_t>(value(x, y));
+    }
+  }
+  return tv_image{pixels, width, height, width};
+}
+
+uint64_t noise_state;
+int noise(int, int) { return random_int(&noise_state, 0, 255); }
+int black_and_white(int, int) { return random_int(&noise_state, 0, 7) == 0 ? 255 : 0; }
+int faint(int, int) { return 100 + random_int(&noise_state, 0, 2); }
+int checkerboard(int x, int y) { return ((x / 9 + y / 9) & 1) * 255; }
+int single_dots(int x, int y) { return x % 11 == 5 && y % 10 == 4 ? 255 : 0; }
+int holes(int x, int y) { return 255 - single_dots(x, y); }
+int white(int, int) { return 255; }
+// A step of 255 of which the score's two ends, 0 and 254, both come.
+int soft_squares(int x, int y) { return (x % 16 < 8 && y % 16 < 8 ? x * 37 + y * 11 : 0) & 255; }
+
+void test_corners_equal_the_definition_on_a_real_image() {
+  check_image(tv_image{real.luma[0], real.width, real.height, real.width});
+}
+
+void test_corners_equal_the_definition_on_synthetic_images() {
+  noise_state = 1;
+  int (*const values[])(int, int) = {noise,       black_and_white, faint, checkerboard,
+                                     single_dots, holes,           white, soft_squares};
+  for (auto value : values) check_image(filled(150, 61, value));
+}
+
+// Widths around the kernel's chunk of 64, and images that hold one candidate pixel or none.
+void test_corners_equal_the_definition_in_images_of_any_size() {
+  noise_state = 2;
+  for (int width = 1; width <= 12; ++width) {
+    for (int height = 5; height <= 9; ++height) check_image(filled(width, height, black_and_white));
+  }
+  for (int width = 66; width <= 72; ++width) check_image(filled(width, 12, black_and_white));
+  for (int width = 130; width <= 138; ++width) check_image(filled(width, 9, noise));
+}
+
+// The score's two ends: 254 is the largest t that 255 grey levels allow.
+void test_a_white_dot_on_black_scores_254() {
+  const tv_image image = filled(33, 30, single_dots);
+  fill_expected(image, 12);
+  TEST_ASSERT_EQUAL_INT(254, expected_scores[4][5]);
+  check_corners(*tvk_select(TV_KERNELS_C), image, 12, 254);
+}
+
+}  // namespace
+
+void setUp() {}
+void tearDown() {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_corners_equal_the_definition_on_synthetic_images);
+  RUN_TEST(test_corners_equal_the_definition_in_images_of_any_size);
+  RUN_TEST(test_a_white_dot_on_black_scores_254);
+  const bool has_real_image = real_pair_load(&real) != 0;
+  if (has_real_image) RUN_TEST(test_corners_equal_the_definition_on_a_real_image);
+  const int failures = UNITY_END();
+  return failures == 0 && !has_real_image ? TWOVIEW_SKIP_CODE : failures;
+}

@@ -1,0 +1,176 @@
+// Sub-pixel positions: corners rendered at known places, symmetric ones among them.
+
+#include <string.h>
+#include <unity.h>
+
+#include <cmath>
+
+#include "feature/subpixel.h"
+#include "support/random.h"
+#include "twoview/context.h"
+
+namespace {
+
+constexpr int kSide = 40;
+constexpr int kOversampling = 16;
+uint8_t pixels[kSide * kSide];
+const tv::Level level{pixels, kSide, kSide, kSide, 1.0};
+
+// Inside a wedge of the given opening (radians) whose tip is at the origin and whose axis is turned
+// by `turn`.
+bool in_wedge(double x, double y, double turn, double opening) {
+  const double along = x * std::cos(turn) + y * std::sin(turn);
+  const double across = std::fabs(y * std::cos(turn) - x * std::sin(turn));
+  return along > 0 && across < along * std::tan(opening / 2);
+}
+
+// Pixels are averages over their area, as a sensor's are, then blurred a little by the lens.
+void render_wedge(double tip_x, double tip_y, double turn, double opening, int dark, int bright) {
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      int inside = 0;
+      for (int j = 0; j < kOversampling; ++j) {
+        for (int i = 0; i < kOversampling; ++i) {
+          // Two pixels wide: the pixel and half of each neighbour.
+          const double sx = x - 1 + 2 * (i + 0.5) / kOversampling;
+          const double sy = y - 1 + 2 * (j + 0.5) / kOversampling;
+          inside += in_wedge(sx - tip_x, sy - tip_y, turn, opening);
+        }
+      }
+      const double share = static_cast<double>(inside) / (kOversampling * kOversampling);
+      pixels[y * kSide + x] = static_cast<uint8_t>(dark + (bright - dark) * share + 0.5);
+    }
+  }
+}
+
+// A round blob has its corner in its middle, whatever the segment test's bias on wedges.
+void render_blob(double centre_x, double centre_y, double sigma, int base, int height) {
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const double d_sq = (x - centre_x) * (x - centre_x) + (y - centre_y) * (y - centre_y);
+      pixels[y * kSide + x] =
+          static_cast<uint8_t>(base + height * std::exp(-d_sq / (2 * sigma * sigma)) + 0.5);
+    }
+  }
+}
+
+int score_at(int x, int y, int arc) {
+  const uint8_t* rows[7];
+  uint8_t scores[kSide];
+  for (int k = 0; k < 7; ++k) rows[k] = pixels + (y - 3 + k) * kSide;
+  tvk_select(TV_KERNELS_C)->fast_score_row(rows, kSide, arc, 1, scores);
+  return scores[x];
+}
+
+// The pixel of the highest score, the first of equals; false where there is no corner.
+bool find_corner(int arc, int* best_x, int* best_y) {
+  int best = 0;
+  for (int y = 3; y < kSide - 3; ++y) {
+    for (int x = 3; x < kSide - 3; ++x) {
+      const int score = score_at(x, y, arc);
+      if (score <= best) continue;
+      best = score;
+      *best_x = x;
+      *best_y = y;
+    }
+  }
+  return best > 0;
+}
+
+void refine(int arc, int x, int y, double* rx, double* ry) {
+  tv::refine_corner(*tvk_select(TV_KERNELS_AUTO), level, arc, x, y, rx, ry);
+}
+
+void test_a_blobs_middle_is_found_below_a_pixel() {
+  uint64_t seed = 31;
+  double sum_integer = 0, sum_refined = 0;
+  constexpr int kTrials = 200;
+  for (int k = 0; k < kTrials; ++k) {
+    const double cx = 19.5 + random_unit(&seed), cy = 19.5 + random_unit(&seed);
+    const bool dark = k % 2 != 0;
+    render_blob(cx, cy, 1.5 + random_unit(&seed), dark ? 220 : 20, dark ? -180 : 180);
+    int x = 0, y = 0;
+    double rx, ry;
+    TEST_ASSERT_TRUE(find_corner(9 + k % 4, &x, &y));
+    refine(9 + k % 4, x, y, &rx, &ry);
+    sum_integer += std::hypot(x - cx, y - cy);
+    sum_refined += std::hypot(rx - cx, ry - cy);
+  }
+  // A uniform position in a pixel lies 0.383 from its centre on average.
+  TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.383, sum_integer / kTrials);
+  TEST_ASSERT_TRUE(sum_refined / kTrials <= 0.15);
+}
+
+// The segment test places a wedge's corner a little inside it, the same for all sub-pixel shifts: what
+// counts is that the position follows the shift.
+void test_a_wedge_that_moves_takes_its_corner_along() {
+  uint64_t seed = 32;
+  double sum_integer = 0, sum_refined = 0;
+  int trials = 0;
+  for (int k = 0; k < 40; ++k) {
+    const double turn = 6.283185307 * random_unit(&seed), opening = 0.9 + 0.7 * random_unit(&seed);
+    double dx[8], dy[8], ix[8], iy[8];
+    int found = 0;
+    for (int s = 0; s < 8; ++s) {
+      const double tip_x = 19 + random_unit(&seed), tip_y = 19 + random_unit(&seed);
+      int x = 0, y = 0;
+      double rx, ry;
+      render_wedge(tip_x, tip_y, turn, opening, k % 2 ? 30 : 210, k % 2 ? 210 : 30);
+      if (!find_corner(9 + k % 4, &x, &y)) continue;
+      refine(9 + k % 4, x, y, &rx, &ry);
+      dx[found] = rx - tip_x;
+      dy[found] = ry - tip_y;
+      ix[found] = x - tip_x;
+      iy[found] = y - tip_y;
+      ++found;
+    }
+    for (int s = 1; s < found; ++s) {
+      sum_refined += std::hypot(dx[s] - dx[0], dy[s] - dy[0]);
+      sum_integer += std::hypot(ix[s] - ix[0], iy[s] - iy[0]);
+      ++trials;
+    }
+  }
+  TEST_ASSERT_TRUE(trials > 150);
+  TEST_ASSERT_TRUE(sum_refined < 0.6 * sum_integer);
+}
+
+void test_refinement_never_moves_more_than_its_limit() {
+  uint64_t seed = 33;
+  int moved = 0, kept = 0;
+  for (int k = 0; k < 4000; ++k) {
+    if (k % 100 == 0) random_bytes(&seed, pixels, sizeof pixels);
+    const int x = random_int(&seed, 0, kSide - 1), y = random_int(&seed, 0, kSide - 1);
+    double rx, ry;
+    refine(9 + k % 4, x, y, &rx, &ry);
+    TEST_ASSERT_TRUE(std::fabs(rx - x) <= 0.75 && std::fabs(ry - y) <= 0.75);
+    const bool is_inside = x >= 4 && y >= 4 && x < kSide - 4 && y < kSide - 4;
+    TEST_ASSERT_TRUE(is_inside || (rx == x && ry == y));
+    (rx == x && ry == y ? kept : moved) += 1;
+  }
+  TEST_ASSERT_TRUE(moved > 100 && kept > 100);
+}
+
+void test_a_flat_or_symmetric_place_stays() {
+  double rx, ry;
+  memset(pixels, 90, sizeof pixels);
+  refine(9, 20, 20, &rx, &ry);
+  TEST_ASSERT_TRUE(rx == 20 && ry == 20);
+  render_blob(20, 20, 2.0, 20, 200);
+  refine(12, 20, 20, &rx, &ry);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 20, rx);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 20, ry);
+}
+
+}  // namespace
+
+void setUp() {}
+void tearDown() {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_blobs_middle_is_found_below_a_pixel);
+  RUN_TEST(test_a_wedge_that_moves_takes_its_corner_along);
+  RUN_TEST(test_refinement_never_moves_more_than_its_limit);
+  RUN_TEST(test_a_flat_or_symmetric_place_stays);
+  return UNITY_END();
+}
