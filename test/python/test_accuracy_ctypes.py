@@ -77,9 +77,9 @@ class TestLibrary(unittest.TestCase):
             self.skipTest("build/release is not built")
         library = tv.Library()
         image = np.random.default_rng(5).integers(0, 256, (24, 32)).astype(np.uint8)
-        image = np.kron(image, np.ones((8, 8), np.uint8))  # squares: corners
+        image = np.kron(image, np.ones((8, 8), np.uint8))  # squares: at most 11 of 16
         context = tv.Context(library, max_width=256, max_height=192)
-        keypoints, descriptors = context.extract(image)
+        keypoints, descriptors = context.extract(image, {"arc": 9})
         self.assertGreater(len(keypoints), 20)
         self.assertEqual(descriptors.shape, (len(keypoints), 128))
         links = context.match(descriptors, descriptors)
