@@ -1,5 +1,5 @@
-/* tv_detect, tv_orient, tv_describe, tv_extract: every status of feature.h, what it leaves untouched,
-   the options' promises, memory, and equal bytes. */
+/* tv_detect, tv_orient, tv_describe, tv_extract: every status of feature.h, what it leaves
+   untouched, the options' promises, memory, and equal bytes. */
 
 #include <math.h>
 #include <unity.h>
@@ -348,7 +348,8 @@ static void test_the_mask_keeps_corners_where_it_is_not_zero(void) {
 }
 
 static void test_a_blank_or_tiny_image_has_no_corners(void) {
-  static const int32_t sizes[][2] = {{1, 1}, {1, HEIGHT}, {WIDTH, 1}, {6, 6}, {WIDTH, 6}, {6, HEIGHT}};
+  static const int32_t sizes[][2] = {{1, 1}, {1, HEIGHT}, {WIDTH, 1},
+                                     {6, 6}, {WIDTH, 6},  {6, HEIGHT}};
   size_t k;
   memset(pixels, 128, sizeof pixels);
   options.levels = 8;
@@ -363,7 +364,8 @@ static void test_a_blank_or_tiny_image_has_no_corners(void) {
 }
 
 static void test_any_point_of_a_1x1_image_is_described(void) {
-  const tv_keypoint points[3] = {{0, 0, 4, 0, 1, 0}, {-300, 9e4f, 512, 3, 1, 0}, {0, 0, 1e-30f, 1, 1, 0}};
+  const tv_keypoint points[3] = {
+      {0, 0, 4, 0, 1, 0}, {-300, 9e4f, 512, 3, 1, 0}, {0, 0, 1e-30f, 1, 1, 0}};
   int32_t count = 0;
   image = api_image(pixels, 1, 1, 1);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(a.context, &image, &options, points, 3, descriptors));
@@ -404,7 +406,9 @@ static void test_the_threshold_adapts(void) {
   options.max_keypoints = strict + 40;
   count = detect(a.context, keypoints);
   TEST_ASSERT_EQUAL_INT(strict + 40, count);
-  for (k = 0; k < count; ++k) lowest = keypoints[k].score < lowest ? (int32_t)keypoints[k].score : lowest;
+  for (k = 0; k < count; ++k) {
+    if (keypoints[k].score < lowest) lowest = (int32_t)keypoints[k].score;
+  }
   TEST_ASSERT_TRUE(lowest < 120 && lowest >= 20);
   options.max_keypoints = CAP;
   options.min_threshold = 119;

@@ -28,7 +28,8 @@ static inline tv_status api_try(const tv_limits *limits, api_context *a) {
   TEST_ASSERT_NOT_NULL(a->block);
   memset(a->block, API_PATTERN, block_bytes);
   start = (uintptr_t)a->block + API_GUARD_BYTES + TV_CONTEXT_ALIGNMENT - 1;
-  a->memory = a->block + (start / TV_CONTEXT_ALIGNMENT * TV_CONTEXT_ALIGNMENT - (uintptr_t)a->block);
+  start = start / TV_CONTEXT_ALIGNMENT * TV_CONTEXT_ALIGNMENT;
+  a->memory = a->block + (start - (uintptr_t)a->block);
   status = tv_context_init(&a->context, limits, a->memory, a->size_bytes);
   if (status != TV_OK) free(a->block);
   return status;

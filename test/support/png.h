@@ -63,7 +63,8 @@ static inline int png_symbol(png_bits *in, const png_code *code) {
 }
 
 static inline void png_read_codes(png_bits *in, int kind, png_code *literals, png_code *distances) {
-  static const uint8_t order[19] = {16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15};
+  static const uint8_t order[19] = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
+                                    11, 4,  12, 3, 13, 2, 14, 1, 15};
   uint8_t lengths[288 + 32] = {0};
   int num_literals = 288, num_distances = 30, k = 0;
   if (kind == 1) {
@@ -97,8 +98,8 @@ static inline void png_read_codes(png_bits *in, int kind, png_code *literals, pn
 
 /* Inflates into out; returns whether exactly out_size bytes came. */
 static inline int png_inflate(const uint8_t *bytes, size_t size, uint8_t *out, size_t out_size) {
-  static const uint16_t bases[29] = {3,  4,  5,  6,  7,  8,  9,  10, 11,  13,  15,  17,  19,  23, 27,
-                                     31, 35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258};
+  static const uint16_t bases[29] = {3,  4,  5,  6,  7,  8,  9,  10,  11,  13,  15,  17,  19, 23,
+                                     27, 31, 35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258};
   static const uint8_t extras[29] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2,
                                      2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 0};
   static const uint16_t distance_bases[30] = {1,   2,   3,   4,   5,    7,    9,    13,   17,   25,

@@ -1,5 +1,5 @@
-/* A real pair of images for tests: Middlebury's Motorcycle from the cache of scripts/bootstrap, else
-   a pair of TWOVIEW_DATA. */
+/* A real pair of images for tests: Middlebury's Motorcycle from the cache of scripts/bootstrap,
+   else a pair of TWOVIEW_DATA. */
 #ifndef TEST_SUPPORT_REAL_PAIR_H
 #define TEST_SUPPORT_REAL_PAIR_H
 

@@ -1,6 +1,7 @@
-// FAST's corners and scores, on real and synthetic images, against the definition read word for word:
-// a pixel is a corner at threshold t when `arc` contiguous pixels of its circle are all brighter than
-// it by more than t, or all darker; its score is the largest such t, found by trying each.
+// FAST's corners and scores, on real and synthetic images, against the definition read word for
+// word: a pixel is a corner at threshold t when `arc` contiguous pixels of its circle are all
+// brighter than it by more than t, or all darker; its score is the largest such t, found by trying
+// each.
 
 #include <stdlib.h>
 #include <string.h>

@@ -77,14 +77,15 @@ static int match_by_definition(int num0, int num1, float ratio) {
   return count;
 }
 
-static int32_t run(tv_context *context, const uint8_t *a, int32_t num_a, const uint8_t *b,
-                   int32_t num_b, float ratio, tv_correspondence *out) {
+static int32_t run(const api_context *a, const uint8_t *rows0, int32_t num0,
+                   const uint8_t *rows1, int32_t num1, float ratio, tv_correspondence *out) {
   tv_match_options options;
   int32_t count = -1;
   tv_match_options_init(&options);
   options.ratio = ratio;
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_match(context, a, num_a, b, num_b, &options, out, MAX_DESCRIPTORS, &count));
+      TV_OK, tv_match(a->context, rows0, num0, rows1, num1, &options, out, MAX_DESCRIPTORS,
+                      &count));
   return count;
 }
 
@@ -93,10 +94,10 @@ static void check(int32_t num0, int32_t num1, float ratio) {
   int k, c, other;
   for (c = 0; c < num_contexts; ++c) {
     TEST_ASSERT_EQUAL_INT(count,
-                          run(contexts[c].context, descriptors0, num0, descriptors1, num1, ratio, found));
+                          run(&contexts[c], descriptors0, num0, descriptors1, num1, ratio, found));
     if (count > 0) TEST_ASSERT_EQUAL_MEMORY(expected, found, (size_t)count * sizeof found[0]);
     TEST_ASSERT_EQUAL_INT(count,
-                          run(contexts[c].context, descriptors1, num1, descriptors0, num0, ratio, swapped));
+                          run(&contexts[c], descriptors1, num1, descriptors0, num0, ratio, swapped));
     for (k = 0; k < count; ++k) {
       for (other = 0; swapped[other].idx1 != found[k].idx0; ++other) {
         TEST_ASSERT_TRUE(other + 1 < count);
@@ -147,24 +148,25 @@ static void test_noisy_copies_are_found(void) {
   uint64_t state = 12;
   int32_t count, k;
   fill(&state, 2);
-  count = run(contexts[0].context, descriptors0, MAX_DESCRIPTORS, descriptors1, MAX_DESCRIPTORS, 0.8f, found);
+  count = run(&contexts[0], descriptors0, MAX_DESCRIPTORS, descriptors1, MAX_DESCRIPTORS, 0.8f,
+              found);
   TEST_ASSERT_EQUAL_INT(MAX_DESCRIPTORS * 4 / 5, count);
   for (k = 0; k < count; ++k) TEST_ASSERT_EQUAL_INT(found[k].idx0, found[k].idx1);
 }
 
 static void test_an_empty_side_gives_no_matches(void) {
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, descriptors0, 5, descriptors1, 0, 1.0f, found));
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, NULL, 0, descriptors1, 5, 1.0f, found));
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, NULL, 0, NULL, 0, 1.0f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], descriptors0, 5, descriptors1, 0, 1.0f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], NULL, 0, descriptors1, 5, 1.0f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], NULL, 0, NULL, 0, 1.0f, found));
 }
 
 static void test_one_descriptor_never_passes_the_ratio_test(void) {
   memset(descriptors0, 7, sizeof descriptors0);
   memset(descriptors1, 7, sizeof descriptors1);
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, descriptors0, 1, descriptors1, 1, 1.0f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], descriptors0, 1, descriptors1, 1, 1.0f, found));
   descriptors1[SIZE] = 200;
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, descriptors0, 1, descriptors1, 2, 1.0f, found));
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, descriptors1, 2, descriptors0, 1, 1.0f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], descriptors0, 1, descriptors1, 2, 1.0f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], descriptors1, 2, descriptors0, 1, 1.0f, found));
 }
 
 static void test_equal_distances_are_rejected(void) {
@@ -172,7 +174,7 @@ static void test_equal_distances_are_rejected(void) {
   fill(&state, 0);
   memcpy(descriptors1, descriptors0, sizeof descriptors0);
   memcpy(descriptors1 + SIZE, descriptors1, SIZE); /* rows 0 and 1 are as near to query 0 */
-  TEST_ASSERT_EQUAL_INT(8, run(contexts[0].context, descriptors0, 10, descriptors1, 10, 1.0f, found));
+  TEST_ASSERT_EQUAL_INT(8, run(&contexts[0], descriptors0, 10, descriptors1, 10, 1.0f, found));
   TEST_ASSERT_EQUAL_INT(2, found[0].idx0);
 }
 
@@ -183,9 +185,9 @@ static void test_the_ratio_test_works_in_both_directions(void) {
   descriptors0[0] = 10;
   descriptors0[SIZE + 1] = 11;
   memset(descriptors1 + SIZE, 255, SIZE);
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, descriptors0, 2, descriptors1, 2, 0.8f, found));
-  TEST_ASSERT_EQUAL_INT(0, run(contexts[0].context, descriptors1, 2, descriptors0, 2, 0.8f, found));
-  TEST_ASSERT_EQUAL_INT(1, run(contexts[0].context, descriptors0, 2, descriptors1, 2, 0.95f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], descriptors0, 2, descriptors1, 2, 0.8f, found));
+  TEST_ASSERT_EQUAL_INT(0, run(&contexts[0], descriptors1, 2, descriptors0, 2, 0.8f, found));
+  TEST_ASSERT_EQUAL_INT(1, run(&contexts[0], descriptors0, 2, descriptors1, 2, 0.95f, found));
   TEST_ASSERT_EQUAL_UINT32(100, found[0].dist_sq);
   TEST_ASSERT_EQUAL_FLOAT((float)sqrt(100.0 / 121.0), found[0].ratio);
 }
@@ -197,12 +199,12 @@ static void test_a_small_array_gets_the_count_and_nothing_else(void) {
   fill(&state, 2);
   memset(few, 0x5A, sizeof few);
   memset(untouched, 0x5A, sizeof untouched);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100, descriptors1, 100,
-                                                  NULL, few, 4, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100, descriptors1,
+                                                  100, NULL, few, 4, &count));
   TEST_ASSERT_EQUAL_INT(80, count);
   TEST_ASSERT_EQUAL_MEMORY(untouched, few, sizeof few);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100, descriptors1, 100,
-                                                  NULL, NULL, 0, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100, descriptors1,
+                                                  100, NULL, NULL, 0, &count));
 }
 
 int main(void) {

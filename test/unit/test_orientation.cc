@@ -21,8 +21,8 @@ uint8_t pixels[kSide * kSide];
 alignas(64) uint8_t arena_memory[1 << 20];
 const tv_keypoint middle{40.0f, 40.0f, 4.0f, 0.0f, 1.0f, 0};
 
-// Fills the image with pattern(u, v), where (u, v) is the pixel in a frame turned by `angle` clockwise
-// as seen (from x towards y) around the middle.
+// Fills the image with pattern(u, v), where (u, v) is the pixel in a frame turned by `angle`
+// clockwise as seen (from x towards y) around the middle.
 template <typename Pattern>
 void render(double angle, Pattern pattern) {
   const double c = std::cos(angle), s = std::sin(angle);

@@ -102,17 +102,46 @@ void test_the_largest_factor_reads_nothing_outside() {
 void test_a_constant_image_stays_constant() {
   for (int grey : {0, 1, 77, 254, 255}) {
     memset(pixels, grey, sizeof pixels);
-    for (float factor : {1.1f, 1.37f, 1.7f, 2.0f}) {
+    for (float factor : {1.1f, 1.2f, 1.37f, 1.7f, 1.85f, 2.0f}) {
       tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
       tv::LevelBuffers buffers = tv::alloc_level_buffers(arena, 201, 155);
       tv::Level level{pixels, 201, 155, 211, 1.0};
-      for (int k = 0; tv::next_level(*tvk_select(TV_KERNELS_AUTO), level, factor, k, buffers, &level);
-           ++k) {
+      const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
+      for (int k = 0; tv::next_level(kernels, level, factor, k, buffers, &level); ++k) {
         for (int p = 0; p < level.width * level.height; ++p) {
           TEST_ASSERT_EQUAL_INT(grey, level.data[p]);
         }
       }
       TEST_ASSERT_TRUE(level.width < 201);
+    }
+  }
+}
+
+// Bilinear at positions clamped to the image, in 1/16 grey level. Fractions are cut to 1/256 pixel along
+// each axis, which two black and white neighbours turn into 16 * 255 / 256 each; rounding adds 0.5.
+void test_patches_are_bilinear_samples() {
+  constexpr double kMaxError = 2 * 16 * 255 / 256.0 + 0.5;
+  constexpr int kPatch = 12, kWidth = 37, kHeight = 29, kStride = 41;
+  uint64_t seed = 24;
+  const tv::Level image = noise_image(&seed, kWidth, kHeight, kStride);
+  for (int trial = 0; trial < 4000; ++trial) {
+    const int x = random_int(&seed, -10 * 65536, 45 * 65536);
+    const int y = random_int(&seed, -10 * 65536, 37 * 65536);
+    const int du_x = random_int(&seed, -70000, 70000), du_y = random_int(&seed, -70000, 70000);
+    int16_t patch[kPatch * kPatch];
+    tvk_select(trial % 2 ? TV_KERNELS_AUTO : TV_KERNELS_C)
+        ->sample_patch(image.data, kStride, kWidth, kHeight, x, y, du_x, du_y, kPatch, patch);
+    for (int k = 0; k < kPatch * kPatch; ++k) {
+      const int i = k % kPatch, j = k / kPatch;
+      const double sx = std::fmin(kWidth - 1, std::fmax(0, (x + i * du_x - j * du_y) / 65536.0));
+      const double sy = std::fmin(kHeight - 1, std::fmax(0, (y + i * du_y + j * du_x) / 65536.0));
+      const int ix = static_cast<int>(std::fmin(kWidth - 2, sx));
+      const int iy = static_cast<int>(std::fmin(kHeight - 2, sy));
+      const uint8_t* p = image.data + iy * kStride + ix;
+      const double fx = sx - ix, fy = sy - iy;
+      const double grey = (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) +
+                          fy * ((1 - fx) * p[kStride] + fx * p[kStride + 1]);
+      TEST_ASSERT_DOUBLE_WITHIN(kMaxError, 16 * grey, patch[k]);
     }
   }
 }
@@ -216,6 +245,7 @@ int main() {
   RUN_TEST(test_levels_are_area_averages);
   RUN_TEST(test_the_largest_factor_reads_nothing_outside);
   RUN_TEST(test_a_constant_image_stays_constant);
+  RUN_TEST(test_patches_are_bilinear_samples);
   RUN_TEST(test_coordinates_go_to_a_level_and_back);
   RUN_TEST(test_a_ramp_keeps_its_place_on_every_level);
   RUN_TEST(test_octaves_are_halved_then_blurred);

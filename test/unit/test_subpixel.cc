@@ -101,8 +101,8 @@ void test_a_blobs_middle_is_found_below_a_pixel() {
   TEST_ASSERT_TRUE(sum_refined / kTrials <= 0.15);
 }
 
-// The segment test places a wedge's corner a little inside it, the same for all sub-pixel shifts: what
-// counts is that the position follows the shift.
+// The segment test places a wedge's corner a little inside it, the same for all sub-pixel shifts:
+// what counts is that the position follows the shift.
 void test_a_wedge_that_moves_takes_its_corner_along() {
   uint64_t seed = 32;
   double sum_integer = 0, sum_refined = 0;
