@@ -57,7 +57,8 @@ void read_distortion(const YAML::Node& root, const std::string& file, tv_camera&
   }
   const std::vector<double> k = numbers_at(root, "distortion_coefficients", file);
   const bool equidistant = model == "equidistant";
-  const bool fits = equidistant ? k.size() == 4 : k.empty() || k.size() == 4 || k.size() == 5 || k.size() == 8;
+  const bool fits =
+      equidistant ? k.size() == 4 : k.empty() || k.size() == 4 || k.size() == 5 || k.size() == 8;
   if (!fits)
     throw BadInput(file + ": distortion_coefficients has " + std::to_string(k.size()) +
                    " numbers, not " + (equidistant ? "4" : "5 or 8"));
@@ -65,7 +66,8 @@ void read_distortion(const YAML::Node& root, const std::string& file, tv_camera&
   // An equidistant lens with four zeros is still no pinhole.
   const bool straight = std::all_of(k.begin(), k.end(), [](double v) { return v == 0; });
   camera.model = equidistant ? TV_CAMERA_KANNALA_BRANDT
-                             : straight ? TV_CAMERA_PINHOLE : TV_CAMERA_BROWN_CONRADY;
+                 : straight  ? TV_CAMERA_PINHOLE
+                             : TV_CAMERA_BROWN_CONRADY;
 }
 
 std::string size_text(int width, int height) {

@@ -47,7 +47,9 @@ void put_text(cv::Mat& sheet, const std::string& text, cv::Point2d at, double he
   const cv::Point corner(static_cast<int>(std::floor(at.x)) - 2,
                          static_cast<int>(std::floor(at.y - size.height / double(kOver))) - 2);
   cv::Mat mask(cv::Size((size.width + 2 * margin) / kOver + 2,
-                        (size.height + descent + 2 * margin) / kOver + 3) * kOver, CV_8U, cv::Scalar(0));
+                        (size.height + descent + 2 * margin) / kOver + 3) *
+                   kOver,
+               CV_8U, cv::Scalar(0));
   cv::putText(mask, text,
               cv::Point(static_cast<int>((at.x - corner.x) * kOver),
                         static_cast<int>((at.y - corner.y) * kOver)),
@@ -65,7 +67,8 @@ void put_text(cv::Mat& sheet, const std::string& text, cv::Point2d at, double he
 std::string fitted(const std::string& text, double height, double width) {
   if (text_width(text, height) <= width) return text;
   for (size_t keep = text.size(); keep > 4; --keep) {
-    const std::string cut = text.substr(0, keep / 2) + "..." + text.substr(text.size() - (keep - keep / 2));
+    const std::string cut =
+        text.substr(0, keep / 2) + "..." + text.substr(text.size() - (keep - keep / 2));
     if (text_width(cut, height) <= width) return cut;
   }
   return "...";
@@ -88,25 +91,29 @@ void put_disc(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& c
     }
 }
 
-void put_ring(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& colour, int thickness) {
-  cv::circle(sheet, fixed_point(centre), static_cast<int>(std::lround(radius * (1 << kShift))), colour,
-             thickness, cv::LINE_AA, kShift);
+void put_ring(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& colour,
+              int thickness) {
+  cv::circle(sheet, fixed_point(centre), static_cast<int>(std::lround(radius * (1 << kShift))),
+             colour, thickness, cv::LINE_AA, kShift);
 }
 
-void put_arrow(cv::Mat& sheet, cv::Point2d tail, cv::Point2d tip, const Colour& colour, int thickness) {
+void put_arrow(cv::Mat& sheet, cv::Point2d tail, cv::Point2d tip, const Colour& colour,
+               int thickness) {
   const cv::Point2d along = tip - tail;
   const double length = std::hypot(along.x, along.y);
   if (length == 0) return;
   const cv::Point2d forward = along / length, side(-forward.y, forward.x);
   const double head = std::min(14.0, length / 2);
   put_line(sheet, tail, tip - head * 0.7 * forward, colour, thickness);
-  const cv::Point corners[] = {fixed_point(tip), fixed_point(tip - head * forward + head * 0.45 * side),
+  const cv::Point corners[] = {fixed_point(tip),
+                               fixed_point(tip - head * forward + head * 0.45 * side),
                                fixed_point(tip - head * forward - head * 0.45 * side)};
   cv::fillConvexPoly(sheet, corners, 3, colour, cv::LINE_AA, kShift);
 }
 
 Colour turbo(double share) {
-  cv::Mat value(1, 1, CV_8U, cv::Scalar(std::lround(30 + 205 * std::min(std::max(share, 0.0), 1.0))));
+  cv::Mat value(1, 1, CV_8U,
+                cv::Scalar(std::lround(30 + 205 * std::min(std::max(share, 0.0), 1.0))));
   cv::Mat colour;
   cv::applyColorMap(value, colour, cv::COLORMAP_TURBO);
   const cv::Vec3b bgr = colour.at<cv::Vec3b>(0, 0);
@@ -134,7 +141,8 @@ PairSheet::PairSheet(const cv::Mat& image0, const cv::Mat& image1, double dim) {
   const cv::Size size0 = scaled(image0), size1 = scaled(image1);
   frame_[0] = {cv::Point(margin, top), size0};
   frame_[1] = {stacked ? cv::Point(margin, top + size0.height + top)
-                       : cv::Point(margin + size0.width + gap, top), size1};
+                       : cv::Point(margin + size0.width + gap, top),
+               size1};
   const int width = std::max({frame_[0].br().x, frame_[1].br().x, 560}) + margin;
   const int height = std::max(frame_[0].br().y, frame_[1].br().y) + bottom;
   sheet_ = cv::Mat(height, width, CV_8UC3, ink::paper);
@@ -153,7 +161,8 @@ cv::Point2d PairSheet::at(int image, double x, double y) const {
   return {frame_[image].x + (x + 0.5) * scale_ - 0.5, frame_[image].y + (y + 0.5) * scale_ - 0.5};
 }
 
-void PairSheet::label(const std::string& name0, const std::string& name1, const std::string& caption) {
+void PairSheet::label(const std::string& name0, const std::string& name1,
+                      const std::string& caption) {
   const std::string* names[] = {&name0, &name1};
   for (int i = 0; i < 2; ++i)
     put_text(sheet_, fitted(*names[i], 11, std::max(frame_[i].width, 200)),

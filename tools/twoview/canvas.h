@@ -24,7 +24,8 @@ double text_width(const std::string& text, double height);
 std::string fitted(const std::string& text, double height, double width);
 
 // Anti-aliased to a fraction of a pixel.
-void put_line(cv::Mat& sheet, cv::Point2d a, cv::Point2d b, const Colour& colour, int thickness = 1);
+void put_line(cv::Mat& sheet, cv::Point2d a, cv::Point2d b, const Colour& colour,
+              int thickness = 1);
 void put_disc(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& colour);
 void put_ring(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& colour,
               int thickness = 1);

@@ -16,8 +16,8 @@ void add_common(CLI::App& verb, Common& common, unsigned groups, const std::stri
 
 uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& outcome) {
   const Picture &p0 = outcome.picture[0], &p1 = outcome.picture[1];
-  tv_context* context = session.context(std::max(p0.luma.cols, p1.luma.cols),
-                                        std::max(p0.luma.rows, p1.luma.rows));
+  tv_context* context =
+      session.context(std::max(p0.luma.cols, p1.luma.cols), std::max(p0.luma.rows, p1.luma.rows));
   tv_view views[2] = {};
   for (int i = 0; i < 2; ++i) {
     views[i].image = outcome.picture[i].view();

@@ -55,7 +55,8 @@ int detect(Arguments& a) {
 
 void add_detect(CLI::App& program, Run& run) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* verb = program.add_subcommand("detect", "keypoints of an image, as CSV and as a picture");
+  CLI::App* verb =
+      program.add_subcommand("detect", "keypoints of an image, as CSV and as a picture");
   verb->add_option("IMAGE", a->image, "image")->required()->type_name("IMAGE");
   add_common(*verb, a->common, kFeature, "folder for keypoints.csv and keypoints.png");
   verb->final_callback([a, &run] { run = [a] { return detect(*a); }; });

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <optional>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "canvas.h"
 #include "pictures.h"
@@ -42,7 +42,8 @@ class Epipolar {
     if (!by_rays_) return {straight(to, applied(m, Vector3{other.x, other.y, 1}))};
     const double pixel[2] = {other.x, other.y};
     Vector3 ray;
-    if (tv_camera_unproject(&outcome_.camera[1 - to], pixel, ray.data(), nullptr) != TV_OK) return {};
+    if (tv_camera_unproject(&outcome_.camera[1 - to], pixel, ray.data(), nullptr) != TV_OK)
+      return {};
     return bent(outcome_.camera[to], applied(m, ray));
   }
 
@@ -59,7 +60,8 @@ class Epipolar {
         std::hypot(pixel[0], pixel[1]) < 1e7)
       return {pixel[0], pixel[1]};
     exact = camera.model == TV_CAMERA_PINHOLE;
-    const Vector3 image_point = {camera.fx * e[0] + camera.cx * e[2], camera.fy * e[1] + camera.cy * e[2], e[2]};
+    const Vector3 image_point = {camera.fx * e[0] + camera.cx * e[2],
+                                 camera.fy * e[1] + camera.cy * e[2], e[2]};
     return finite_pixel(image_point);
   }
 
@@ -79,7 +81,8 @@ class Epipolar {
     const double length = std::hypot(line[0], line[1]);
     if (length == 0) return {};
     const cv::Mat& luma = outcome_.picture[image].luma;
-    const Pixel middle(luma.cols / 2.0, luma.rows / 2.0), normal(line[0] / length, line[1] / length);
+    const Pixel middle(luma.cols / 2.0, luma.rows / 2.0),
+        normal(line[0] / length, line[1] / length);
     const Pixel foot = middle - (middle.dot(normal) + line[2] / length) * normal;
     const double reach = luma.cols + luma.rows;
     return {foot - reach * Pixel(-normal.y, normal.x), foot + reach * Pixel(-normal.y, normal.x)};
@@ -146,7 +149,8 @@ void draw_epipole(PairSheet& pair, int image, const cv::Mat& luma, Pixel epipole
   const double edge = 14;
   if (epipole.x >= 0 && epipole.y >= 0 && epipole.x < luma.cols && epipole.y < luma.rows) {
     const Pixel at = pair.at(image, epipole.x, epipole.y) - corner;
-    for (const auto& [colour, width] : {std::pair(ink::paper, 4), std::pair(Colour(255, 255, 255), 2)}) {
+    for (const auto& [colour, width] :
+         {std::pair(ink::paper, 4), std::pair(Colour(255, 255, 255), 2)}) {
       put_ring(part, at, 10, colour, width);
       put_line(part, at - Pixel(16, 0), at + Pixel(16, 0), colour, width);
       put_line(part, at - Pixel(0, 16), at + Pixel(0, 16), colour, width);
@@ -166,12 +170,15 @@ void draw_epipole(PairSheet& pair, int image, const cv::Mat& luma, Pixel epipole
 
 std::string epipole_text(int image, Pixel epipole, bool exact, const cv::Mat& luma) {
   char text[96];
-  const bool inside = epipole.x >= 0 && epipole.y >= 0 && epipole.x < luma.cols && epipole.y < luma.rows;
+  const bool inside =
+      epipole.x >= 0 && epipole.y >= 0 && epipole.x < luma.cols && epipole.y < luma.rows;
   if (std::hypot(epipole.x, epipole.y) > 1e6)
     std::snprintf(text, sizeof text, "epipole %d at infinity (arrow)", image);
   else
     std::snprintf(text, sizeof text, "epipole %d at (%.0f, %.0f)%s", image, epipole.x, epipole.y,
-                  inside ? " (cross)" : exact ? ", outside (arrow)" : ", beyond the lens (arrow)");
+                  inside  ? " (cross)"
+                  : exact ? ", outside (arrow)"
+                          : ", beyond the lens (arrow)");
   return text;
 }
 
@@ -192,11 +199,13 @@ cv::Mat epipolar_picture(const Outcome& outcome) {
     cv::Mat layer = part.clone();
     for (size_t i = 0; i < chosen.size(); ++i) {
       const tv_correspondence& match = r.matches[chosen[i]];
-      const tv_keypoint& other = image == 1 ? r.keypoints[0][match.idx0] : r.keypoints[1][match.idx1];
+      const tv_keypoint& other =
+          image == 1 ? r.keypoints[0][match.idx0] : r.keypoints[1][match.idx1];
       for (const Curve& piece : geometry.curve(image, Pixel(other.x, other.y)))
         for (size_t j = 1; j < piece.size(); ++j)
           put_line(layer, pair.at(image, piece[j - 1].x, piece[j - 1].y) - corner,
-                   pair.at(image, piece[j].x, piece[j].y) - corner, distinct(static_cast<int>(i)), 2);
+                   pair.at(image, piece[j].x, piece[j].y) - corner, distinct(static_cast<int>(i)),
+                   2);
     }
     cv::addWeighted(layer, 0.75, part, 0.25, 0, part);
     for (size_t i = 0; i < chosen.size(); ++i) {

@@ -43,8 +43,8 @@ struct PairReport {
 
 // The camera of the image as the file has it: K of the pair's line, where it gives one, with the
 // lens of the data set's entry.
-tv_camera camera_of(const NamedCameras& cameras, const std::string& image_name, const Picture& picture,
-                    const std::array<double, 9>* K) {
+tv_camera camera_of(const NamedCameras& cameras, const std::string& image_name,
+                    const Picture& picture, const std::array<double, 9>* K) {
   tv_camera camera{};
   const tv_camera* entry = nullptr;
   if (!cameras.empty()) {
@@ -73,7 +73,8 @@ Matrix3 turn_matrix(int quarters) {
   return turn;
 }
 
-void load_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair, Outcome& outcome) {
+void load_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair,
+               Outcome& outcome) {
   const std::string* names[] = {&pair.name0, &pair.name1};
   const std::array<double, 9>* Ks[] = {&pair.K0, &pair.K1};
   const int turns[] = {pair.turns0, pair.turns1};
@@ -104,15 +105,16 @@ void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
       match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
 }
 
-PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair, Session& session) {
+PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair,
+                         Session& session) {
   PairReport report;
   report.has_truth = pair.has_truth;
   Json& json = report.json;
   json["name0"] = pair.name0;
   json["name1"] = pair.name1;
-  for (const char* key : {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
-                          "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict",
-                          "time_ms"})
+  for (const char* key : {"rotation_error_deg", "translation_error_deg",
+                          "translation_error_signed_deg", "pose_error_deg", "num_matches",
+                          "num_inliers", "precision", "config", "verdict", "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;
@@ -143,7 +145,8 @@ Json auc_json(const std::vector<PairReport>& reports, double (Errors::*error)() 
     if (report.has_truth) errors.push_back((report.errors.*error)());
   Json json;
   for (const int threshold : kThresholdsDeg)
-    json[std::to_string(threshold)] = errors.empty() ? Json(nullptr) : Json(auc_percent(errors, threshold));
+    json[std::to_string(threshold)] =
+        errors.empty() ? Json(nullptr) : Json(auc_percent(errors, threshold));
   return json;
 }
 
@@ -164,7 +167,8 @@ Json median_error(const std::vector<PairReport>& reports) {
   return finite_or_null((errors[(errors.size() - 1) / 2] + errors[errors.size() / 2]) / 2);
 }
 
-Json report_json(const Arguments& a, const std::vector<PairReport>& reports, const Session& session) {
+Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
+                 const Session& session) {
   const Options& options = a.common.options;
   Json json;
   json["auc"] = auc_json(reports, &Errors::pose);
@@ -204,21 +208,24 @@ std::string table(const Json& report) {
   std::string text = style.dim + padded("image 0", name) + " " + padded("image 1", name) +
                      " matches inliers  prec %  R deg   t deg      ms  config" + style.off + "\n";
   for (const Json& pair : report["pairs"]) {
-    text += padded(pair["name0"].get<std::string>(), name) + " " + padded(pair["name1"].get<std::string>(), name);
+    text += padded(pair["name0"].get<std::string>(), name) + " " +
+            padded(pair["name1"].get<std::string>(), name);
     if (pair.contains("error")) {
       text += std::string(" ") + style.poor + pair["error"].get<std::string>() + style.off + "\n";
       continue;
     }
-    text += " " + cell(pair["num_matches"], "%7.0f", 7) + " " + cell(pair["num_inliers"], "%7.0f", 7) + " " +
-            cell(pair["precision"], "%7.1f", 7, 100) + " " + cell(pair["rotation_error_deg"], "%6.2f", 6) + " " +
-            cell(pair["translation_error_deg"], "%7.2f", 7) + " " + cell(pair["time_ms"], "%7.1f", 7) + "  " +
-            pair["config"].get<std::string>() + ", " + pair["verdict"].get<std::string>() + "\n";
+    text += " " + cell(pair["num_matches"], "%7.0f", 7) + " " +
+            cell(pair["num_inliers"], "%7.0f", 7) + " " + cell(pair["precision"], "%7.1f", 7, 100) +
+            " " + cell(pair["rotation_error_deg"], "%6.2f", 6) + " " +
+            cell(pair["translation_error_deg"], "%7.2f", 7) + " " +
+            cell(pair["time_ms"], "%7.1f", 7) + "  " + pair["config"].get<std::string>() + ", " +
+            pair["verdict"].get<std::string>() + "\n";
   }
   text += style.bold;
   for (const char* key : {"auc", "auc_signed"}) {
     const Json& auc = report[key];
-    text += padded(key, 11) + " at 5, 10, 20 deg:" + cell(auc["5"], "%6.1f", 6) + cell(auc["10"], "%6.1f", 6) +
-            cell(auc["20"], "%6.1f", 6) + " %\n";
+    text += padded(key, 11) + " at 5, 10, 20 deg:" + cell(auc["5"], "%6.1f", 6) +
+            cell(auc["10"], "%6.1f", 6) + cell(auc["20"], "%6.1f", 6) + " %\n";
   }
   return text + std::to_string(report["num_pairs"].get<size_t>()) + " pairs; median pose error" +
          cell(report["median_pose_error_deg"], " %.2f deg", 4) + ", mean time" +
@@ -234,7 +241,8 @@ class Progress {
   }
   void tell(size_t index, size_t count, const Pair& pair) const {
     if (shown_)
-      std::fprintf(stderr, "\r\033[K%zu of %zu: %s %s", index + 1, count, pair.name0.c_str(), pair.name1.c_str());
+      std::fprintf(stderr, "\r\033[K%zu of %zu: %s %s", index + 1, count, pair.name0.c_str(),
+                   pair.name1.c_str());
   }
 
  private:
@@ -281,7 +289,8 @@ int evaluate(Arguments& a) {
   const Json report = report_json(a, reports, session);
   files.add(name, json_text(report));
   if (common.json) print(json_text(report));
-  if (common.speaks()) print(table(report) + "files      " + (files.folder() / name).string() + "\n");
+  if (common.speaks())
+    print(table(report) + "files      " + (files.folder() / name).string() + "\n");
   files.commit();
   return 0;
 }

@@ -48,8 +48,8 @@ cv::Mat decode(const std::string& path) {
   const ImageHeader header = read_image_header(bytes);
   const auto refuse_huge = [&](int64_t width, int64_t height) {
     if (width > kMaxSide || height > kMaxSide)
-      throw BadInput("image " + path + " is too large: " + size_text(width, height) +
-                     ", at most " + std::to_string(kMaxSide) + " a side");
+      throw BadInput("image " + path + " is too large: " + size_text(width, height) + ", at most " +
+                     std::to_string(kMaxSide) + " a side");
   };
   refuse_huge(header.width, header.height);
   cv::Mat pixels;
@@ -63,7 +63,8 @@ cv::Mat decode(const std::string& path) {
   }
   if (header.truncated) throw BadInput("image " + path + " is truncated");
   if (pixels.empty())
-    throw BadInput("image " + path + (header.width > 0 ? " is damaged" : " is no image that can be read"));
+    throw BadInput("image " + path +
+                   (header.width > 0 ? " is damaged" : " is no image that can be read"));
   refuse_huge(pixels.cols, pixels.rows);
   return pixels;
 }

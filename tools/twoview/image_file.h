@@ -13,9 +13,9 @@ constexpr int kMaxSide = 16384;  // pixels, the library's limit
 // An image as the library and the pictures need it.
 struct Picture {
   std::string path;
-  std::string name;  // without the folder
-  cv::Mat luma;      // 8 bits
-  cv::Mat colour;    // 8-bit BGR, of the same size
+  std::string name;                     // without the folder
+  cv::Mat luma;                         // 8 bits
+  cv::Mat colour;                       // 8-bit BGR, of the same size
   int file_width = 0, file_height = 0;  // before resizing
 
   tv_image view() const;

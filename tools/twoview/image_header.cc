@@ -45,8 +45,8 @@ ImageHeader read_jpeg(Bytes bytes) {
       ++at;
       continue;
     }
-    const bool is_size = marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 &&
-                         marker != 0xcc;
+    const bool is_size =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (is_size) {
       header.height = static_cast<int64_t>(number(bytes, at + 5, 2, true));
       header.width = static_cast<int64_t>(number(bytes, at + 7, 2, true));
@@ -65,7 +65,8 @@ ImageHeader read_bmp(Bytes bytes) {
   const bool is_core = number(bytes, 14, 4, false) == 12;
   const int count = is_core ? 2 : 4;
   header.width = static_cast<int64_t>(number(bytes, 18, count, false));
-  header.height = static_cast<int64_t>(number(bytes, 18 + static_cast<size_t>(count), count, false));
+  header.height =
+      static_cast<int64_t>(number(bytes, 18 + static_cast<size_t>(count), count, false));
   if (!is_core && header.height > INT32_MAX) header.height = (int64_t{1} << 32) - header.height;
   return header;
 }

@@ -1,6 +1,7 @@
 // twoview: the command line.
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -31,6 +32,10 @@ int run_program(int argc, char** argv) {
   cli::add_detect(program, run);
   cli::add_match(program, run);
   cli::add_evaluate(program, run);
+  const auto verbs = program.get_subcommands([](const CLI::App*) { return true; });
+  const auto is_named = [&](const CLI::App* verb) { return verb->get_name() == argv[1]; };
+  if (argc > 1 && argv[1][0] != '-' && std::none_of(verbs.begin(), verbs.end(), is_named))
+    return refuse("no verb '" + std::string(argv[1]) + "' (see twoview --help)");
   try {
     program.parse(argc, argv);
   } catch (const CLI::CallForVersion& e) {

@@ -17,8 +17,8 @@ struct Arguments {
   std::string image[2];
 };
 
-std::vector<tv_correspondence> match_features(tv_context* context, const Features& f0, const Features& f1,
-                                              const tv_match_options& options) {
+std::vector<tv_correspondence> match_features(tv_context* context, const Features& f0,
+                                              const Features& f1, const tv_match_options& options) {
   std::vector<tv_correspondence> matches(std::min(f0.keypoints.size(), f1.keypoints.size()) + 1);
   int32_t count = 0;
   check(tv_match(context, f0.descriptors.data(), static_cast<int32_t>(f0.keypoints.size()),
@@ -67,8 +67,8 @@ int match(Arguments& a) {
   if (common.json) print(json_text(json));
   if (common.speaks()) {
     char text[160];
-    std::snprintf(text, sizeof text, "%zu matches of %zu and %zu keypoints in %.1f ms\n", matches.size(),
-                  features[0].keypoints.size(), features[1].keypoints.size(),
+    std::snprintf(text, sizeof text, "%zu matches of %zu and %zu keypoints in %.1f ms\n",
+                  matches.size(), features[0].keypoints.size(), features[1].keypoints.size(),
                   static_cast<double>(total_ns) * 1e-6);
     print(text + ("files        " + files.folder().string() + ": matches.csv matches.png\n"));
   }
@@ -80,7 +80,8 @@ int match(Arguments& a) {
 
 void add_match(CLI::App& program, Run& run) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* verb = program.add_subcommand("match", "matches of two images, as CSV and as a picture");
+  CLI::App* verb =
+      program.add_subcommand("match", "matches of two images, as CSV and as a picture");
   verb->add_option("A", a->image[0], "image 0")->required()->type_name("IMAGE");
   verb->add_option("B", a->image[1], "image 1")->required()->type_name("IMAGE");
   add_common(*verb, a->common, kFeature | kMatch, "folder for matches.csv and matches.png");

@@ -91,7 +91,8 @@ double match_precision(const tv_camera& camera0, const tv_camera& camera1, const
     const double pixel0[2] = {k0.x, k0.y}, pixel1[2] = {k1.x, k1.y};
     Vector3 x0, x1;
     if (tv_camera_unproject(&camera0, pixel0, x0.data(), nullptr) != TV_OK ||
-        tv_camera_unproject(&camera1, pixel1, x1.data(), nullptr) != TV_OK || x0[2] <= 0 || x1[2] <= 0)
+        tv_camera_unproject(&camera1, pixel1, x1.data(), nullptr) != TV_OK || x0[2] <= 0 ||
+        x1[2] <= 0)
       continue;
     for (Vector3* x : {&x0, &x1}) *x = {(*x)[0] / (*x)[2], (*x)[1] / (*x)[2], 1};
     const Vector3 line1 = applied(E, x0), line0 = applied(transposed(E), x1);

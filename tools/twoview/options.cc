@@ -17,8 +17,8 @@ const Names kOrientations = {"upright", "gradient"};
 const Names kDescriptors = {"sift", "rootsift"};
 const Names kMethods = {"five-point", "eight-point", "seven-point", "upright"};
 const Names kKernels = {"auto", "c", "sse2", "avx2", "avx512", "neon"};
-const Names kTriangulations = {"poly",           "poly-abs",  "linear-eigen",  "linear-ls",
-                               "iterative-eigen", "iterative-ls", "midpoint"};
+const Names kTriangulations = {
+    "poly", "poly-abs", "linear-eigen", "linear-ls", "iterative-eigen", "iterative-ls", "midpoint"};
 
 struct Choice {
   int32_t* value;
@@ -162,11 +162,16 @@ std::string value_text(const Option& option) {
 
 const char* group_title(OptionGroup group) {
   switch (group) {
-    case kFeature: return "Corners and descriptors";
-    case kMatch: return "Matching";
-    case kEstimate: return "Geometry";
-    case kTriangulate: return "Triangulation";
-    default: return "General";
+    case kFeature:
+      return "Corners and descriptors";
+    case kMatch:
+      return "Matching";
+    case kEstimate:
+      return "Geometry";
+    case kTriangulate:
+      return "Triangulation";
+    default:
+      return "General";
   }
 }
 
@@ -180,7 +185,8 @@ Options::Options() {
 
 void Options::settle() {
   // A threshold below the default floor is meant: the floor follows it, unless it was given too.
-  if (!min_threshold_given) feature.min_threshold = std::min(feature.min_threshold, feature.threshold);
+  if (!min_threshold_given)
+    feature.min_threshold = std::min(feature.min_threshold, feature.threshold);
 }
 
 void add_options(CLI::App& verb, Options& options, unsigned groups) {

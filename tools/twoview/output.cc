@@ -85,8 +85,7 @@ void OutputSet::add(const std::string& name, std::string_view bytes) {
 
   const bool direct = exists && !S_ISREG(info.st_mode);
   Entry entry{name, {}};
-  if (!direct)
-    entry.temporary = folder_ / ("." + name + "." + std::to_string(::getpid()) + ".tmp");
+  if (!direct) entry.temporary = folder_ / ("." + name + "." + std::to_string(::getpid()) + ".tmp");
   const fs::path& path = direct ? target : entry.temporary;
 
   Descriptor file;

@@ -10,10 +10,13 @@
 namespace cli {
 namespace {
 
-constexpr int kMaxLines = 220;  // more lines than this hide what they should show
+constexpr int kMaxLines = 110;  // more lines than this hide what they should show
 
 std::string counted(int count, const char* noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : noun[std::string(noun).size() - 1] == 'h' ? "es" : "s");
+  return std::to_string(count) + " " + noun +
+         (count == 1                                  ? ""
+          : noun[std::string(noun).size() - 1] == 'h' ? "es"
+                                                      : "s");
 }
 
 // Every n-th of a list, spread evenly, at most `most`.
@@ -45,7 +48,8 @@ cv::Mat keypoints_picture(const Picture& picture, const std::vector<tv_keypoint>
     const double radius = std::max(2.0, k->size * scale / 2);
     const Colour colour = levels == 1 ? ink::accent : turbo(double(k->level) / (levels - 1));
     put_ring(sheet, at, radius, colour);
-    put_line(sheet, at, at + radius * cv::Point2d(std::cos(k->angle_rad), std::sin(k->angle_rad)), colour);
+    put_line(sheet, at, at + radius * cv::Point2d(std::cos(k->angle_rad), std::sin(k->angle_rad)),
+             colour);
   }
   cv::Mat page(sheet.rows + 74, std::max(sheet.cols + 24, 560), CV_8UC3, ink::paper);
   sheet.copyTo(page(cv::Rect(12, 34, sheet.cols, sheet.rows)));
@@ -55,7 +59,8 @@ cv::Mat keypoints_picture(const Picture& picture, const std::vector<tv_keypoint>
   put_text(page, count, {12, base}, 11, ink::text);
   double x = 12 + text_width(count, 11) + 36;
   for (int level = 0; level < levels && x < page.cols - 90; ++level, x += 92) {
-    put_disc(page, {x, base - 5}, 5, levels == 1 ? ink::accent : turbo(double(level) / (levels - 1)));
+    put_disc(page, {x, base - 5}, 5,
+             levels == 1 ? ink::accent : turbo(double(level) / (levels - 1)));
     put_text(page, "level " + std::to_string(level), {x + 11, base}, 10, ink::faint);
   }
   return page;
@@ -84,9 +89,12 @@ cv::Mat matches_picture(const Picture& picture0, const Picture& picture1,
   for (const int i : good) lengths.push_back(moved(i));
   const double low = lengths.empty() ? 0 : percentile(lengths, 0.02);
   const double high = lengths.empty() ? 1 : percentile(lengths, 0.98);
-  const auto colour_of = [&](int i) { return turbo((moved(i) - low) / std::max(high - low, 1e-9)); };
+  const auto colour_of = [&](int i) {
+    return turbo((moved(i) - low) / std::max(high - low, 1e-9));
+  };
 
-  const std::vector<int> bad_lines = thinned(bad, kMaxLines / 3), good_lines = thinned(good, kMaxLines);
+  const std::vector<int> bad_lines = thinned(bad, kMaxLines / 3),
+                         good_lines = thinned(good, kMaxLines);
   cv::Mat layer = pair.sheet().clone();
   for (const int i : bad_lines) put_line(layer, end0(i), end1(i), ink::bad);
   cv::addWeighted(layer, 0.3, pair.sheet(), 0.7, 0, pair.sheet());
@@ -100,8 +108,10 @@ cv::Mat matches_picture(const Picture& picture0, const Picture& picture1,
 
   std::string caption = counted(count, "match");
   if (inlier_mask)
-    caption += ": " + counted(int(good.size()), "inlier") + ", " + std::to_string(bad.size()) + " rejected (red)";
-  if (good_lines.size() < good.size()) caption += "; " + std::to_string(good_lines.size()) + " drawn as lines";
+    caption += ": " + counted(int(good.size()), "inlier") + ", " + std::to_string(bad.size()) +
+               " rejected (red)";
+  if (good_lines.size() < good.size())
+    caption += "; " + std::to_string(good_lines.size()) + " drawn as lines";
   if (!good.empty()) {
     char range[64];
     std::snprintf(range, sizeof range, "; colour: moved %.0f to %.0f px", low, high);

@@ -62,7 +62,8 @@ nlohmann::ordered_json options_of(const Arguments& a) {
   choose_camera_files(a, files);
   for (int i = 0; i < 2; ++i) {
     const std::string key = "camera" + std::to_string(i);
-    json[key] = files[i].empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(files[i]);
+    json[key] =
+        files[i].empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(files[i]);
   }
   return json;
 }
@@ -76,24 +77,28 @@ void make_files(const Outcome& outcome, OutputSet& files) {
   std::vector<Figure> figures;
   files.add("result.json", json_text(outcome.json));
   if (has_cloud) {
-    figures.push_back({"The cloud from the front and from the side",
-                       "Each point in its colour in image 0. One baseline is the distance between the cameras.",
-                       views_picture(outcome, cloud), false});
+    figures.push_back(
+        {"The cloud from the front and from the side",
+         "Each point in its colour in image 0. One baseline is the distance between the cameras.",
+         views_picture(outcome, cloud), false});
     files.add("cloud.ply", cloud_ply(cloud));
     files.add("views.png", png_bytes(figures.back().picture));
   }
   figures.push_back({"Matches",
                      "Lines join the two images of a point; their colour tells how far it moved. "
                      "What the geometry rejected is faint and red.",
-                     matches_picture(outcome.picture[0], outcome.picture[1], r.keypoints[0], r.keypoints[1],
-                                     r.matches, r.num_matches, r.inlier_mask), true});
+                     matches_picture(outcome.picture[0], outcome.picture[1], r.keypoints[0],
+                                     r.keypoints[1], r.matches, r.num_matches, r.inlier_mask),
+                     true});
   files.add("matches.png", png_bytes(figures.back().picture));
   if (has_lines) {
-    figures.push_back({"Epipolar lines",
-                       "Each point must lie on the line of its colour. The lines of an image meet in its epipole, "
-                       "the direction in which the other camera stands: outside the image when the flight was "
-                       "sideways, inside when it was forward.",
-                       epipolar_picture(outcome), true});
+    figures.push_back(
+        {"Epipolar lines",
+         "Each point must lie on the line of its colour. The lines of an image meet in its "
+         "epipole, "
+         "the direction in which the other camera stands: outside the image when the flight was "
+         "sideways, inside when it was forward.",
+         epipolar_picture(outcome), true});
     files.add("epipolar.png", png_bytes(figures.back().picture));
   }
   files.add("report.html", report_html(outcome, cloud, figures));
@@ -123,7 +128,8 @@ std::string pose_lines(const tv_two_view& v) {
   if (has_full_pose(v)) {
     // Where camera 1 stands as camera 0 sees it, which is easier to picture than t.
     const Vector3 c = applied(transposed(rotation_of(v)), translation_of(v));
-    text += line("direction", "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), one baseline away",
+    text += line("direction",
+                 "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), one baseline away",
                  -c[0], -c[1], -c[2]);
   }
   if (v.has_covariance) text += uncertainty_line(v);
@@ -152,8 +158,8 @@ std::string summary(const Outcome& outcome, const OutputSet& files, size_t conte
   const tv_reconstruction& r = outcome.reconstruction;
   const Picture &a = outcome.picture[0], &b = outcome.picture[1];
   std::string text;
-  text += line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows, b.name.c_str(),
-               b.luma.cols, b.luma.rows);
+  text += line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows,
+               b.name.c_str(), b.luma.cols, b.luma.rows);
   const char* const colours[] = {style.poor, style.fair, style.good};
   const std::string reasons = reasons_in_words(v.reasons);
   text += line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
@@ -170,8 +176,9 @@ std::string summary(const Outcome& outcome, const OutputSet& files, size_t conte
     text += line("cloud", "%d points, reprojection %.2f px rms", r.num_points,
                  j["rms_reprojection_px"].get<double>());
   if (j["truth"].is_object()) text += truth_line(j["truth"]);
-  text += line("work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
-               j["kernels"].get<std::string>().c_str(), static_cast<double>(context_bytes) / (1 << 20));
+  text +=
+      line("work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
+           j["kernels"].get<std::string>().c_str(), static_cast<double>(context_bytes) / (1 << 20));
   std::string names;
   for (const std::string& name : files.names()) names += " " + name;
   return text + line("files", "%s:%s", files.folder().c_str(), names.c_str());
@@ -194,7 +201,8 @@ int reconstruct(Arguments& a) {
 
   outcome.json = result_json(outcome);
   if (has_truth)
-    outcome.json["truth"] = truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
+    outcome.json["truth"] =
+        truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
   outcome.json["timings_ms"] = session.take_times(total_ns, true);
   outcome.json["context_bytes"] = session.context_bytes();
   outcome.json["options"] = options_of(a);
@@ -207,8 +215,9 @@ int reconstruct(Arguments& a) {
   files.remove_others(kFiles);
   if (has_full_pose(outcome.two_view)) return kExitPose;
   const std::string reasons = reasons_in_words(outcome.two_view.reasons);
-  std::fprintf(stderr, "twoview: no full pose: %s%s%s\n", config_in_words(outcome.two_view.config).c_str(),
-               reasons.empty() ? "" : ": ", reasons.c_str());
+  std::fprintf(stderr, "twoview: no full pose: %s%s%s\n",
+               config_in_words(outcome.two_view.config).c_str(), reasons.empty() ? "" : ": ",
+               reasons.c_str());
   return kExitNoPose;
 }
 
@@ -216,13 +225,16 @@ int reconstruct(Arguments& a) {
 
 void add_reconstruct(CLI::App& program, Run& run) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* verb = program.add_subcommand("reconstruct", "two images to a pose, a point cloud and a report");
+  CLI::App* verb =
+      program.add_subcommand("reconstruct", "two images to a pose, a point cloud and a report");
   verb->add_option("A", a->image[0], "image 0")->required()->type_name("IMAGE");
   verb->add_option("B", a->image[1], "image 1")->required()->type_name("IMAGE");
-  verb->add_option("--camera", a->camera, "camera of both images, OpenCV or ROS YAML")->type_name("FILE");
+  verb->add_option("--camera", a->camera, "camera of both images, OpenCV or ROS YAML")
+      ->type_name("FILE");
   verb->add_option("--camera0", a->camera_of[0], "camera of image 0")->type_name("FILE");
   verb->add_option("--camera1", a->camera_of[1], "camera of image 1")->type_name("FILE");
-  verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")->type_name("FILE");
+  verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
+      ->type_name("FILE");
   add_common(*verb, a->common, kAllOptions, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
 }

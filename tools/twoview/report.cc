@@ -15,11 +15,20 @@ std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
     switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      default: result += c;
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
     }
   }
   return result;
@@ -32,7 +41,8 @@ std::string formatted(const char* format, double value) {
 }
 
 // Replaces each {{name}} once; what is put in is not looked through again.
-std::string filled(const std::string& page, const std::vector<std::pair<std::string, std::string>>& values) {
+std::string filled(const std::string& page,
+                   const std::vector<std::pair<std::string, std::string>>& values) {
   std::string result;
   size_t at = 0;
   for (size_t open; (open = page.find("{{", at)) != std::string::npos;) {
@@ -57,9 +67,10 @@ std::string number_of(const Json& value, const char* format) {
 
 std::string cards(const Outcome& outcome) {
   const Json& j = outcome.json;
-  std::string text = card(std::to_string(outcome.reconstruction.num_points), "", "points in the cloud");
-  text += card(std::to_string(outcome.two_view.num_inliers), "of " + std::to_string(outcome.two_view.num_matches),
-               "matches that agree");
+  std::string text =
+      card(std::to_string(outcome.reconstruction.num_points), "", "points in the cloud");
+  text += card(std::to_string(outcome.two_view.num_inliers),
+               "of " + std::to_string(outcome.two_view.num_matches), "matches that agree");
   text += card(number_of(j["median_parallax_deg"], "%.2f"), "deg", "median parallax");
   text += card(number_of(j["rms_reprojection_px"], "%.2f"), "px", "reprojection, rms");
   const Json& truth = j["truth"];
@@ -67,7 +78,8 @@ std::string cards(const Outcome& outcome) {
     text += card(number_of(truth["rotation_error_deg"], "%.3f"), "deg", "rotation error");
     text += card(number_of(truth["translation_error_deg"], "%.2f"), "deg", "direction error");
     if (truth["depth_error_median_percent"].is_number())
-      text += card(number_of(truth["depth_error_median_percent"], "%.2f"), "%", "depth error, median");
+      text +=
+          card(number_of(truth["depth_error_median_percent"], "%.2f"), "%", "depth error, median");
   }
   text += card(number_of(j["timings_ms"]["total"], "%.1f"), "ms", "computing time");
   return text;
@@ -94,9 +106,11 @@ std::string matrix_text(const Json& list, size_t columns) {
 std::string row(const std::string& name, const Json& value) {
   const bool is_matrix = value.is_array() && (value.size() == 9 || value.size() == 25);
   if (is_matrix)
-    return "<tr><th>" + name + "</th><td class=\"matrix\">" + matrix_text(value, value.size() == 9 ? 3 : 5) + "</td></tr>\n";
+    return "<tr><th>" + name + "</th><td class=\"matrix\">" +
+           matrix_text(value, value.size() == 9 ? 3 : 5) + "</td></tr>\n";
   if (value.is_array() && value.size() == 3 && value[0].is_number_float())
-    return "<tr><th>" + name + "</th><td class=\"matrix\">" + matrix_text(value, 3) + "</td></tr>\n";
+    return "<tr><th>" + name + "</th><td class=\"matrix\">" + matrix_text(value, 3) +
+           "</td></tr>\n";
   if (value.is_array()) {
     std::string list;
     for (const Json& item : value) list += (list.empty() ? "" : ", ") + leaf_text(item);
@@ -117,8 +131,9 @@ std::string object_table(const std::string& title, const Json& object) {
 
 std::string tables(const Json& j) {
   std::string found, pose;
-  for (const char* key : {"num_keypoints", "num_matches", "num_inliers", "config", "verdict", "reasons",
-                          "num_points", "median_parallax_deg", "rms_reprojection_px", "scale", "num_iterations"})
+  for (const char* key :
+       {"num_keypoints", "num_matches", "num_inliers", "config", "verdict", "reasons", "num_points",
+        "median_parallax_deg", "rms_reprojection_px", "scale", "num_iterations"})
     found += row(key, j[key]);
   for (const char* key : {"R", "t", "E", "F", "H", "covariance"})
     if (!j[key].is_null()) pose += row(key, j[key]);
@@ -145,8 +160,10 @@ std::string cloud_section(const std::vector<CloudPoint>& cloud) {
   return "<section>\n<h2>The cloud</h2>\n<div class=\"stage\"><canvas id=\"cloud\"></canvas>\n"
          "<div class=\"buttons\"><button id=\"view-front\">front</button>"
          "<button id=\"view-side\">side</button><button id=\"view-top\">top</button></div></div>\n"
-         "<p class=\"hint\">Drag to turn, wheel or pinch to zoom, shift and drag to move, double click "
-         "to start again. Camera 0 is white, camera 1 orange; x right, y down, z forward. Lengths are in "
+         "<p class=\"hint\">Drag to turn, wheel or pinch to zoom, shift and drag to move, double "
+         "click "
+         "to start again. Camera 0 is white, camera 1 orange; x right, y down, z forward. Lengths "
+         "are in "
          "baselines, the distance between the cameras.</p>\n</section>\n";
 }
 
@@ -163,15 +180,15 @@ std::string cloud_script(const Outcome& outcome, const std::vector<CloudPoint>& 
   const Json data = {{"points", base64(points)},
                      {"colours", base64(colours)},
                      {"cameras", {camera_json(outcome, 0, size), camera_json(outcome, 1, size)}}};
-  return "<script type=\"application/json\" id=\"cloud-data\">" + data.dump() + "</script>\n<script>\n" +
-         kReportScript + "</script>\n";
+  return "<script type=\"application/json\" id=\"cloud-data\">" + data.dump() +
+         "</script>\n<script>\n" + kReportScript + "</script>\n";
 }
 
 std::string figure_section(const Figure& figure) {
   return "<section>\n<h2>" + figure.title + "</h2>\n<figure><img alt=\"" + figure.title +
          "\" src=\"data:image/" + (figure.is_photo ? "jpeg" : "png") + ";base64," +
-         base64(figure.is_photo ? jpeg_bytes(figure.picture) : png_bytes(figure.picture)) + "\">\n<figcaption>" + figure.caption +
-         "</figcaption></figure>\n</section>\n";
+         base64(figure.is_photo ? jpeg_bytes(figure.picture) : png_bytes(figure.picture)) +
+         "\">\n<figcaption>" + figure.caption + "</figcaption></figure>\n</section>\n";
 }
 
 }  // namespace
@@ -193,25 +210,26 @@ std::string base64(const std::string& bytes) {
 std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& cloud,
                         const std::vector<Figure>& figures) {
   const tv_two_view& v = outcome.two_view;
-  const std::string name0 = escaped(outcome.picture[0].name), name1 = escaped(outcome.picture[1].name);
+  const std::string name0 = escaped(outcome.picture[0].name),
+                    name1 = escaped(outcome.picture[1].name);
   const std::string reasons = reasons_in_words(v.reasons);
   std::string sections;
   for (const Figure& figure : figures) sections += figure_section(figure);
   const char* const classes[] = {"poor", "fair", "good"};
-  return filled(kReportPage,
-                {{"title", name0 + " and " + name1 + ": twoview"},
-                 {"style", kReportStyle},
-                 {"images", name0 + "<small>and</small>" + name1},
-                 {"verdict_class", classes[v.verdict]},
-                 {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
-                 {"verdict_words", escaped(config_in_words(v.config) + (reasons.empty() ? "" : ": " + reasons))},
-                 {"cards", cards(outcome)},
-                 {"cloud", cloud_section(cloud)},
-                 {"figures", sections},
-                 {"tables", tables(outcome.json)},
-                 {"json", escaped(json_text(outcome.json))},
-                 {"version", tv_version_string()},
-                 {"script", cloud_script(outcome, cloud)}});
+  return filled(kReportPage, {{"title", name0 + " and " + name1 + ": twoview"},
+                              {"style", kReportStyle},
+                              {"images", name0 + "<small>and</small>" + name1},
+                              {"verdict_class", classes[v.verdict]},
+                              {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
+                              {"verdict_words", escaped(config_in_words(v.config) +
+                                                        (reasons.empty() ? "" : ": " + reasons))},
+                              {"cards", cards(outcome)},
+                              {"cloud", cloud_section(cloud)},
+                              {"figures", sections},
+                              {"tables", tables(outcome.json)},
+                              {"json", escaped(json_text(outcome.json))},
+                              {"version", tv_version_string()},
+                              {"script", cloud_script(outcome, cloud)}});
 }
 
 }  // namespace cli

@@ -1,5 +1,6 @@
 #include "result.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace cli {
@@ -55,6 +56,26 @@ double rms_reprojection_px(const tv_reconstruction& reconstruction) {
   return count ? std::sqrt(sum / count) : NAN;
 }
 
+// As nlohmann's dump(2), but a list of plain values stays on one line.
+void append_json(std::string& text, const Json& json, size_t depth) {
+  const auto is_plain = [](const Json& item) { return item.is_primitive(); };
+  const bool is_short = json.is_array() && std::all_of(json.begin(), json.end(), is_plain);
+  if (json.is_primitive() || json.empty() || is_short) {
+    text += json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return;
+  }
+  text += json.is_object() ? "{" : "[";
+  const char* separator = "\n";
+  for (const auto& [key, value] : json.items()) {
+    text += separator + std::string(2 * (depth + 1), ' ');
+    if (json.is_object())
+      text += Json(key).dump(-1, ' ', false, Json::error_handler_t::replace) + ": ";
+    append_json(text, value, depth + 1);
+    separator = ",\n";
+  }
+  text += "\n" + std::string(2 * depth, ' ') + (json.is_object() ? "}" : "]");
+}
+
 }  // namespace
 
 std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
@@ -68,8 +89,8 @@ std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
     const int x = std::min(std::max(static_cast<int>(std::lround(keypoint.x)), 0), colour.cols - 1);
     const int y = std::min(std::max(static_cast<int>(std::lround(keypoint.y)), 0), colour.rows - 1);
     const cv::Vec3b bgr = colour.at<cv::Vec3b>(y, x);
-    cloud.push_back({point.position[0], point.position[1], point.position[2], bgr[2], bgr[1], bgr[0],
-                     static_cast<float>(static_cast<double>(point.angle_rad) * kDegrees),
+    cloud.push_back({point.position[0], point.position[1], point.position[2], bgr[2], bgr[1],
+                     bgr[0], static_cast<float>(static_cast<double>(point.angle_rad) * kDegrees),
                      point.error_px});
   }
   return cloud;
@@ -127,8 +148,9 @@ Json result_json(const Outcome& outcome) {
                       {"coverage", finite_or_null(v.coverage)}};
   json["covariance"] = numbers_or_null(v.covariance, 25, v.has_covariance);
   json["num_points"] = r.num_points;
-  json["median_parallax_deg"] =
-      v.num_inliers > 0 && outcome.has_cameras ? finite_or_null(v.median_parallax_rad * kDegrees) : Json(nullptr);
+  json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
+                                    ? finite_or_null(v.median_parallax_rad * kDegrees)
+                                    : Json(nullptr);
   json["rms_reprojection_px"] = finite_or_null(rms_reprojection_px(r));
   json["scale"] = "unit";
   json["scale_sigma"] = nullptr;
@@ -149,20 +171,29 @@ std::string reasons_in_words(uint32_t reasons) {
 
 std::string config_in_words(int32_t config) {
   switch (config) {
-    case TV_CONFIG_CALIBRATED: return "a general scene, full pose";
-    case TV_CONFIG_UNCALIBRATED: return "fundamental matrix only, no cameras";
-    case TV_CONFIG_PLANAR: return "a plane";
-    case TV_CONFIG_PANORAMIC: return "rotation only";
-    case TV_CONFIG_PLANAR_OR_PANORAMIC: return "a homography: a plane or a rotation";
-    case TV_CONFIG_NO_MOTION: return "no motion";
-    default: return "no model explains the matches";
+    case TV_CONFIG_CALIBRATED:
+      return "a general scene, full pose";
+    case TV_CONFIG_UNCALIBRATED:
+      return "fundamental matrix only, no cameras";
+    case TV_CONFIG_PLANAR:
+      return "a plane";
+    case TV_CONFIG_PANORAMIC:
+      return "rotation only";
+    case TV_CONFIG_PLANAR_OR_PANORAMIC:
+      return "a homography: a plane or a rotation";
+    case TV_CONFIG_NO_MOTION:
+      return "no motion";
+    default:
+      return "no model explains the matches";
   }
 }
 
 Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 std::string json_text(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  std::string text;
+  append_json(text, json, 0);
+  return text + "\n";
 }
 
 }  // namespace cli

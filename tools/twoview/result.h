@@ -30,7 +30,8 @@ struct CloudPoint {
 };
 std::vector<CloudPoint> cloud_of(const Outcome& outcome);
 
-// A camera as a small pyramid in the frame of camera 0, `size` deep; needs a full pose for camera 1.
+// A camera as a small pyramid in the frame of camera 0, `size` deep; needs a full pose for
+// camera 1.
 struct Frustum {
   Vector3 centre;
   std::array<Vector3, 4> corners;  // around the image

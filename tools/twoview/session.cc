@@ -12,7 +12,7 @@ namespace {
 
 uint64_t clock_ns(void*) { return now_ns(); }
 
-constexpr const char* kStages[TV_NUM_STAGES] = {"pyramid", "detect", "describe",   "match",
+constexpr const char* kStages[TV_NUM_STAGES] = {"pyramid",  "detect", "describe",   "match",
                                                 "estimate", "refine", "triangulate"};
 
 }  // namespace
@@ -38,7 +38,8 @@ tv_context* Session::context(int width, int height) {
   tv_context* context = nullptr;
   const tv_status status = tv_context_new(&context, &limits);
   if (status == TV_ERR_KERNELS)
-    check(status, std::string("--kernels ") + tv_kernels_string(static_cast<tv_kernels>(limits.kernels)));
+    check(status,
+          std::string("--kernels ") + tv_kernels_string(static_cast<tv_kernels>(limits.kernels)));
   if (status == TV_ERR_MEMORY)
     throw BadInput("not enough memory: a context for " + std::to_string(limits.max_width) + "x" +
                    std::to_string(limits.max_height) + " needs " +

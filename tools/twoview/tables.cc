@@ -20,7 +20,8 @@ std::string keypoints_csv(const tv_keypoint* keypoints, size_t count) {
   std::string text = "x,y,size,angle_rad,score,level\n";
   for (size_t i = 0; i < count; ++i) {
     const tv_keypoint& k = keypoints[i];
-    for (const float value : {k.x, k.y, k.size, k.angle_rad, k.score}) append_number(text, value, ',');
+    for (const float value : {k.x, k.y, k.size, k.angle_rad, k.score})
+      append_number(text, value, ',');
     append_number(text, k.level, '\n');
   }
   return text;
@@ -50,15 +51,21 @@ void append_float(std::string& bytes, float value) {
 std::string cloud_ply(const std::vector<CloudPoint>& cloud) {
   std::string bytes =
       "ply\nformat binary_little_endian 1.0\n"
-      "comment twoview " + std::string(tv_version_string()) + "\n"
+      "comment twoview " +
+      std::string(tv_version_string()) +
+      "\n"
       "comment frame of camera 0: x right, y down, z forward; unit: the distance of the cameras\n"
-      "element vertex " + std::to_string(cloud.size()) + "\n"
+      "element vertex " +
+      std::to_string(cloud.size()) +
+      "\n"
       "property float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n"
       "property float angle_deg\nproperty float error_px\nend_header\n";
   for (const CloudPoint& point : cloud) {
-    for (const double value : {point.x, point.y, point.z}) append_float(bytes, static_cast<float>(value));
-    for (const uint8_t value : {point.red, point.green, point.blue}) bytes += static_cast<char>(value);
+    for (const double value : {point.x, point.y, point.z})
+      append_float(bytes, static_cast<float>(value));
+    for (const uint8_t value : {point.red, point.green, point.blue})
+      bytes += static_cast<char>(value);
     append_float(bytes, point.angle_deg);
     append_float(bytes, point.error_px);
   }

@@ -17,8 +17,8 @@ std::array<double, N> fixed(const YAML::Node& root, const std::string& entry,
                             const std::string& file) {
   const std::vector<double> values = numbers_at(root, entry, file);
   if (values.size() != N)
-    throw BadInput(file + ": " + entry + " has " + std::to_string(values.size()) + " numbers, not " +
-                   std::to_string(N));
+    throw BadInput(file + ": " + entry + " has " + std::to_string(values.size()) +
+                   " numbers, not " + std::to_string(N));
   std::array<double, N> result;
   std::copy(values.begin(), values.end(), result.begin());
   return result;
@@ -75,12 +75,10 @@ void check_truth(const Truth& truth, const Picture& picture0) {
 nlohmann::ordered_json truth_json(const Truth& truth, const Picture& picture0,
                                   const tv_two_view& two_view,
                                   const tv_reconstruction& reconstruction) {
-  nlohmann::ordered_json json = {{"rotation_error_deg", nullptr},
-                                 {"translation_error_deg", nullptr},
-                                 {"translation_error_signed_deg", nullptr},
-                                 {"depth_error_median_percent", nullptr},
-                                 {"depth_error_p95_percent", nullptr},
-                                 {"num_depths", 0}};
+  nlohmann::ordered_json json = {
+      {"rotation_error_deg", nullptr},           {"translation_error_deg", nullptr},
+      {"translation_error_signed_deg", nullptr}, {"depth_error_median_percent", nullptr},
+      {"depth_error_p95_percent", nullptr},      {"num_depths", 0}};
   if (two_view.has_R)
     json["rotation_error_deg"] = rotation_error_deg(rotation_of(two_view), truth.R);
   if (!has_full_pose(two_view)) return json;

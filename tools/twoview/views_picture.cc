@@ -19,11 +19,12 @@ struct Range {
 };
 
 // What 98 per cent of the points span, so that a few far ones do not shrink the rest to a spot.
-Range span_of(const std::vector<CloudPoint>& cloud, double CloudPoint::* axis) {
+Range span_of(const std::vector<CloudPoint>& cloud, double CloudPoint::*axis) {
   std::vector<double> values;
   for (const CloudPoint& point : cloud) values.push_back(point.*axis);
   Range range{percentile(values, 0.01), percentile(values, 0.99)};
-  const double pad = std::max(0.05 * range.length(), 1e-3 * std::max(1.0, std::abs(range.middle())));
+  const double pad =
+      std::max(0.05 * range.length(), 1e-3 * std::max(1.0, std::abs(range.middle())));
   return {range.low - pad, range.high + pad};
 }
 
@@ -60,23 +61,28 @@ class Plot {
   }
   cv::Mat part() { return sheet_(frame_); }
 
-  void axes(const std::string& title, const std::string& across_name, const std::string& down_name) {
+  void axes(const std::string& title, const std::string& across_name,
+            const std::string& down_name) {
     cv::Mat inside = part();
     inside.setTo(ink::panel);
     const double step = nice_step(std::min(frame_.width, frame_.height) / scale_, 5);
     for (double a = std::ceil(across_.low / step) * step; a <= across_.high; a += step) {
       const double x = at(a, 0).x;
       put_line(inside, {x, 0}, {x, double(frame_.height)}, ink::grid);
-      put_text(sheet_, tick_text(a, step), {frame_.x + x, frame_.br().y + 20.0}, 10, ink::faint, Align::kCentre);
+      put_text(sheet_, tick_text(a, step), {frame_.x + x, frame_.br().y + 20.0}, 10, ink::faint,
+               Align::kCentre);
     }
     for (double d = std::ceil(down_.low / step) * step; d <= down_.high; d += step) {
       const double y = at(0, d).y;
       put_line(inside, {0, y}, {double(frame_.width), y}, ink::grid);
-      put_text(sheet_, tick_text(d, step), {frame_.x - 8.0, frame_.y + y + 4}, 10, ink::faint, Align::kRight);
+      put_text(sheet_, tick_text(d, step), {frame_.x - 8.0, frame_.y + y + 4}, 10, ink::faint,
+               Align::kRight);
     }
     put_text(sheet_, title, {double(frame_.x), frame_.y - 20.0}, 14, ink::text);
-    put_text(sheet_, across_name, {double(frame_.br().x), frame_.br().y + 44.0}, 11, ink::text, Align::kRight);
-    put_text(sheet_, down_name, {frame_.br().x - 12.0, frame_.br().y - 14.0}, 11, ink::text, Align::kRight);
+    put_text(sheet_, across_name, {double(frame_.br().x), frame_.br().y + 44.0}, 11, ink::text,
+             Align::kRight);
+    put_text(sheet_, down_name, {frame_.br().x - 12.0, frame_.br().y - 14.0}, 11, ink::text,
+             Align::kRight);
   }
 
  private:
@@ -97,11 +103,12 @@ Colour shown(const CloudPoint& point) {
 }
 
 // Draws the points, the farthest from the viewer first. Returns how many lie outside.
-int draw_cloud(Plot& plot, const std::vector<CloudPoint>& cloud, double CloudPoint::* across,
-               double CloudPoint::* away, double radius) {
+int draw_cloud(Plot& plot, const std::vector<CloudPoint>& cloud, double CloudPoint::*across,
+               double CloudPoint::*away, double radius) {
   std::vector<size_t> order(cloud.size());
   std::iota(order.begin(), order.end(), size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return cloud[a].*away > cloud[b].*away; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return cloud[a].*away > cloud[b].*away; });
   cv::Mat part = plot.part();
   int outside = 0;
   for (const size_t i : order) {
@@ -147,7 +154,8 @@ cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& clo
   const double wanted = std::max(width * y.length() / x.length(), width * y.length() / z.length());
   const int height = static_cast<int>(std::min(std::max(wanted, 380.0), 720.0));
   cv::Mat sheet(top + height + bottom, 2 * (left + width) + right, CV_8UC3, ink::paper);
-  const double radius = std::min(std::max(std::sqrt(0.05 * width * height / double(cloud.size())) / 2, 1.6), 4.2);
+  const double radius =
+      std::min(std::max(std::sqrt(0.12 * width * height / double(cloud.size())) / 2, 1.8), 5.0);
 
   Plot front(sheet, {left, top, width, height}, x, y);
   front.axes("From the front, as camera 0 sees it", "x, right [baselines]", "y, down [baselines]");
@@ -163,12 +171,14 @@ cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& clo
 
   char caption[256];
   const double parallax = v.median_parallax_rad * 57.29577951308232;
-  std::snprintf(caption, sizeof caption,
-                "%zu points; one baseline is the distance between the cameras; median parallax %.2f deg%s",
-                cloud.size(), parallax, show_cameras ? "; cameras: 0 white, 1 blue" : "");
+  std::snprintf(
+      caption, sizeof caption,
+      "%zu points; one baseline is the distance between the cameras; median parallax %.2f deg%s",
+      cloud.size(), parallax, show_cameras ? "; cameras: 0 white, 1 blue" : "");
   std::string text = caption;
   if (outside_front + outside_side > 0)
-    text += "; beyond the frame: " + std::to_string(outside_front) + " and " + std::to_string(outside_side);
+    text += "; beyond the frame: " + std::to_string(outside_front) + " and " +
+            std::to_string(outside_side);
   put_text(sheet, text, {double(left), sheet.rows - 16.0}, 11, ink::faint);
   return sheet;
 }

@@ -59,7 +59,8 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   try {
     root = YAML::Load(body);
   } catch (const YAML::Exception& e) {
-    const std::string where = e.mark.is_null() ? "" : "line " + std::to_string(e.mark.line + 1) + ": ";
+    const std::string where =
+        e.mark.is_null() ? "" : "line " + std::to_string(e.mark.line + 1) + ": ";
     throw BadInput(file + ": " + where + e.msg);
   }
   if (!root.IsMap()) throw BadInput(file + ": no YAML map of names and values");

@@ -26,7 +26,7 @@
     return values[Math.min(count - 1, Math.floor(part * count))];
   }
 
-  // Yaw turns about the image's vertical, pitch about its horizontal; at 0, 0 one looks as camera 0.
+  // Yaw turns about the image's vertical, pitch about its horizontal; 0, 0 looks as camera 0 does.
   const start = { yaw: -0.45, pitch: 0.22, zoom: 1, x: 0, y: 0 };
   let pose = Object.assign({}, start);
   let turning = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -49,7 +49,11 @@
       const u = cy * x + sy * z, w = -sy * x + cy * z;
       const v = cp * y - sp * w, depth = sp * y + cp * w + distance;
       if (depth < 0.02 * distance) return null;
-      return [canvas.width / 2 + focal * (u / depth + pose.x), canvas.height / 2 + focal * (v / depth + pose.y), depth];
+      return [
+        canvas.width / 2 + focal * (u / depth + pose.x),
+        canvas.height / 2 + focal * (v / depth + pose.y),
+        depth,
+      ];
     };
   }
 
@@ -74,11 +78,13 @@
       if (p) drawn.push([p, i]);
     }
     drawn.sort((a, b) => b[0][2] - a[0][2]);
-    const size = (count > 8000 ? 1.3 : count > 2500 ? 1.9 : 2.7) * (window.devicePixelRatio || 1) * 3.2 * radius;
+    const dot = count > 8000 ? 1.3 : count > 2500 ? 1.9 : 2.9;
+    const size = dot * (window.devicePixelRatio || 1) * 3.2 * radius;
+    const lift = (c) => Math.round(46 + (c * 209) / 255);
     for (const [p, i] of drawn) {
       const r = Math.min(12, Math.max(0.8, size / p[2]));
-      const lift = (c) => 46 + (c * 209) / 255;
-      context.fillStyle = "rgb(" + lift(colours[3 * i]) + "," + lift(colours[3 * i + 1]) + "," + lift(colours[3 * i + 2]) + ")";
+      const rgb = [0, 1, 2].map((k) => lift(colours[3 * i + k]));
+      context.fillStyle = "rgb(" + rgb.join(",") + ")";
       context.beginPath();
       context.arc(p[0], p[1], r, 0, 6.2832);
       context.fill();
@@ -90,7 +96,7 @@
         line(project, camera.corners[i], camera.corners[(i + 1) % 4], colour, 1.6);
       }
     });
-    axes(project);
+    axes();
   }
 
   // Small axes in the corner, by the directions of the camera's frame.

@@ -1,0 +1,190 @@
+"""What the command line's tests share: running the program, images and cameras made on the spot.
+
+Python's own library only. The program is the one that TWOVIEW_PROGRAM names, or the first argument.
+"""
+import json
+import os
+import random
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
+from pathlib import Path
+
+SKIP_CODE = 77
+RESULT_FILES = ["cloud.ply", "epipolar.png", "matches.png", "report.html", "result.json", "views.png"]
+
+
+def program():
+    path = os.environ.get("TWOVIEW_PROGRAM", "")
+    if not path or not os.path.exists(path):
+        print(f"skipped: TWOVIEW_PROGRAM names no program: '{path}'")
+        sys.exit(SKIP_CODE)
+    return path
+
+
+def main():
+    """unittest.main, but the program may be the first argument."""
+    if len(sys.argv) > 1 and os.path.isfile(sys.argv[1]):
+        os.environ["TWOVIEW_PROGRAM"] = os.path.abspath(sys.argv.pop(1))
+    program()
+    unittest.main(verbosity=2)
+
+
+def png(width, height, samples, channels=1, depth=8):
+    """A PNG file's bytes; samples is a flat sequence, row by row, or bytes already (8 bits)."""
+    colour_type = {1: 0, 2: 4, 3: 2, 4: 6}[channels]
+    if depth == 16:
+        data = struct.pack(f">{len(samples)}H", *samples)
+    else:
+        data = bytes(samples)
+    row = width * channels * depth // 8
+    raw = b"".join(b"\0" + data[y * row : (y + 1) * row] for y in range(height))
+    header = struct.pack(">IIBBBBB", width, height, depth, colour_type, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + png_chunk(b"IHDR", header)
+        + png_chunk(b"IDAT", zlib.compress(raw, 1))
+        + png_chunk(b"IEND", b"")
+    )
+
+
+def png_chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def png_size(data):
+    """Width and height of a whole PNG file; fails on one that is cut."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n" and data[-8:-4] == b"IEND", "no whole PNG"
+    return struct.unpack(">II", data[16:24])
+
+
+def texture(width, height, seed=7):
+    """Small patches of random grey on grey: corners everywhere, no two places alike."""
+    rng = random.Random(seed)
+    rows = [bytearray([128]) * width for _ in range(height)]
+    for _ in range(width * height // 40):
+        x, y = rng.randrange(width), rng.randrange(height)
+        w, h = rng.randrange(1, 8), rng.randrange(1, 8)
+        value = rng.randrange(20, 236)
+        for row in rows[y : y + h]:
+            row[x : x + w] = bytes([value]) * len(row[x : x + w])
+    return rows
+
+
+# A sideways flight past five walls that stand one above the other in the image: a pixel at distance Z
+# (in baselines) moves left by FOCAL / Z.
+WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
+SHIFTS = (24, 6, 15, 10, 20)
+
+
+def stereo_pair(seed=7):
+    """The two images as flat bytes."""
+    wide = texture(WIDTH + max(SHIFTS), HEIGHT, seed)
+    left, right = bytearray(), bytearray()
+    for y, row in enumerate(wide):
+        shift = SHIFTS[y * len(SHIFTS) // HEIGHT]
+        left += row[:WIDTH]
+        right += row[shift : shift + WIDTH]
+    return bytes(left), bytes(right)
+
+
+def true_depth(x, y):
+    return FOCAL / SHIFTS[int(y) * len(SHIFTS) // HEIGHT]
+
+
+def pfm(width, height, value_at):
+    rows = []
+    for y in reversed(range(height)):
+        rows.append(struct.pack(f"<{width}f", *(value_at(x, y) for x in range(width))))
+    return f"Pf\n{width} {height}\n-1.0\n".encode() + b"".join(rows)
+
+
+def camera_yaml(width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL, cx=None, cy=None, k=(0, 0, 0, 0, 0)):
+    """OpenCV's own format."""
+    cx = (WIDTH - 1) / 2 if cx is None else cx
+    cy = (HEIGHT - 1) / 2 if cy is None else cy
+    return f"""%YAML:1.0
+---
+image_width: {width}
+image_height: {height}
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ {fx}, 0., {cx}, 0., {fy}, {cy}, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: {len(k)}
+   dt: d
+   data: [ {", ".join(str(v) for v in k)} ]
+"""
+
+
+class CliTest(unittest.TestCase):
+    """Each test has a folder of its own with a.png, b.png and cam.yaml in it."""
+
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="twoview_cli_"))
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        left, right = stereo_pair()
+        self.a = self.write("a.png", png(WIDTH, HEIGHT, left))
+        self.b = self.write("b.png", png(WIDTH, HEIGHT, right))
+        self.camera = self.write("cam.yaml", camera_yaml())
+        self.out = self.folder / "out"
+
+    def write(self, name, data):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data.encode() if isinstance(data, str) else data)
+        return path
+
+    def run_program(self, *arguments, **options):
+        options.setdefault("timeout", 300)
+        return subprocess.run(
+            [program(), *map(str, arguments)], capture_output=True, cwd=self.folder, **options
+        )
+
+    def reconstruct(self, *more, a=None, b=None, camera=True, out=None, **options):
+        arguments = ["reconstruct", a or self.a, b or self.b, "-o", out or self.out]
+        if camera:
+            arguments += ["--camera", self.camera]
+        return self.run_program(*arguments, *more, **options)
+
+    def succeed(self, done, status=0):
+        self.assertEqual(done.returncode, status, done.stderr.decode())
+        return done
+
+    def one_line(self, done, *words):
+        """Exactly one line on stderr, which holds the words."""
+        text = done.stderr.decode()
+        self.assertEqual(text.count("\n"), 1, text)
+        self.assertTrue(text.startswith("twoview: ") and text.endswith("\n"), text)
+        for word in words:
+            self.assertIn(word, text)
+
+    def assert_refused(self, done, *words, out=None):
+        """Status 2, one clear line, and nothing written."""
+        self.assertEqual(done.returncode, 2, done.stdout.decode() + done.stderr.decode())
+        self.one_line(done, *words)
+        self.assertEqual(done.stdout, b"")
+        self.assertFalse((out or self.out).exists(), "something was written")
+
+    def assert_no_pose(self, done, *words):
+        """Status 3, one clear line, and a result.json that says why."""
+        self.assertEqual(done.returncode, 3, done.stderr.decode())
+        self.one_line(done, "no full pose", *words)
+        result = self.result()
+        self.assertIsNone(result["t"])
+        self.assertNotIn("cloud.ply", self.listing())
+        return result
+
+    def result(self, out=None):
+        return json.loads(((out or self.out) / "result.json").read_text())
+
+    def listing(self, folder=None):
+        """Every name in the folder, hidden ones too."""
+        return sorted(os.listdir(folder or self.out))

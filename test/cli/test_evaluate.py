@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+"""twoview evaluate: its report, SuperGlue's measures, and what it does with broken sets."""
+import json
+import math
+import os
+import sys
+import unittest
+from pathlib import Path
+
+import cli_support as cli
+from cli_support import FOCAL, HEIGHT, WIDTH
+
+PAIR_KEYS = """name0 name1 rotation_error_deg translation_error_deg translation_error_signed_deg
+pose_error_deg num_matches num_inliers precision config verdict time_ms""".split()
+K = [FOCAL, 0, (WIDTH - 1) / 2, 0, FOCAL, (HEIGHT - 1) / 2, 0, 0, 1]
+SIDEWAYS = [1, 0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+
+
+def pair_line(name0="a.png", name1="b.png", K0=None, K1=None, T=None, turns=(0, 0)):
+    fields = [name0, name1, *turns, *(K0 or K), *(K1 or K), *(T or SIDEWAYS)]
+    return " ".join(str(f) for f in fields) + "\n"
+
+
+def auc(errors, threshold):
+    """SuperGlue's pose_auc, in per cent."""
+    errors = sorted(errors)
+    points = [(0.0, 0.0)] + [(e, (i + 1) / len(errors)) for i, e in enumerate(errors) if e < threshold]
+    points.append((threshold, points[-1][1]))
+    area = sum((e1 - e0) * (r0 + r1) / 2 for (e0, r0), (e1, r1) in zip(points, points[1:]))
+    return 100 * area / threshold
+
+
+class Evaluate(cli.CliTest):
+    def evaluate(self, text, *more, out=None):
+        pairs = self.write("set/pairs.txt", text)
+        return self.run_program("evaluate", pairs, "--images", self.folder, "-o", out or self.out, *more)
+
+    def report(self, *arguments, **options):
+        self.succeed(self.evaluate(*arguments, **options))
+        return json.loads((self.out / "report.json").read_text())
+
+    def test_the_report_has_every_key_and_small_errors(self):
+        report = self.report("# a comment\n\n" + pair_line())
+        for key in "auc auc_signed num_pairs pairs options seed version".split():
+            self.assertIn(key, report)
+        self.assertEqual(report["num_pairs"], 1)
+        pair = report["pairs"][0]
+        self.assertEqual([key for key in PAIR_KEYS if key in pair], PAIR_KEYS)
+        self.assertLess(pair["pose_error_deg"], 0.5)
+        self.assertGreater(pair["precision"], 0.9)
+        self.assertEqual(pair["pose_error_deg"], max(pair["rotation_error_deg"], pair["translation_error_deg"]))
+        self.assertGreater(report["auc"]["5"], 90)
+
+    def test_auc_is_superglues_and_failures_are_infinite(self):
+        wrong = lambda deg: [math.cos(math.radians(deg)), 0, math.sin(math.radians(deg)), -1, 0, 1, 0, 0,
+                             -math.sin(math.radians(deg)), 0, math.cos(math.radians(deg)), 0, 0, 0, 0, 1]
+        lines = [pair_line()] + [pair_line(T=wrong(deg)) for deg in (3, 7, 7, 15, 40)]
+        lines.append(pair_line(name1="gone.png"))
+        report = self.report("".join(lines))
+        errors = [p["pose_error_deg"] for p in report["pairs"]]
+        self.assertIsNone(errors[-1])
+        self.assertIn("gone.png", report["pairs"][-1]["error"])
+        errors = [math.inf if e is None else e for e in errors]
+        self.assertAlmostEqual(errors[1], 3, delta=0.5)
+        for threshold in (5, 10, 20):
+            self.assertAlmostEqual(report["auc"][str(threshold)], auc(errors, threshold), delta=1e-9)
+
+    def test_the_sign_of_the_translation_counts_in_auc_signed_only(self):
+        backwards = list(SIDEWAYS)
+        backwards[3] = 1
+        report = self.report(pair_line(T=backwards))
+        pair = report["pairs"][0]
+        self.assertLess(pair["translation_error_deg"], 0.5)
+        self.assertGreater(pair["translation_error_signed_deg"], 179.5)
+        self.assertGreater(report["auc"]["20"], 95)
+        self.assertEqual(report["auc_signed"]["20"], 0)
+
+    def test_without_truth_the_errors_are_null(self):
+        line = " ".join(pair_line().split()[:22]) + "\n"
+        report = self.report(line)
+        pair = report["pairs"][0]
+        for key in ("rotation_error_deg", "translation_error_deg", "pose_error_deg", "precision"):
+            self.assertIsNone(pair[key])
+        self.assertGreater(pair["num_inliers"], 50)
+        self.assertIsNone(report["auc"]["5"])
+
+    def test_a_broken_line_is_named_by_its_number(self):
+        for line, words in ((pair_line() + "a.png b.png 0 0 1 2 3\n", ("line 2", "7 fields")),
+                            ("\n#\n" + pair_line().replace("300.0", "wide", 1), ("line 3", "wide")),
+                            (pair_line().replace("300.0", "0", 1), ("line 1", "K0")),
+                            (pair_line(T=[2] + SIDEWAYS[1:]), ("line 1", "rotation")),
+                            (pair_line().replace("300.0", "nan", 1), ("line 1", "nan"))):
+            with self.subTest(words=words):
+                self.assert_refused(self.evaluate(line), "pairs.txt", *words)
+        self.assert_refused(self.evaluate("# nothing\n"), "no pair")
+
+    def test_missing_files_and_flags_are_refused(self):
+        done = self.run_program("evaluate", "no.txt", "--images", ".", "-o", self.out)
+        self.assert_refused(done, "no.txt")
+        pairs = self.write("set/pairs.txt", pair_line())
+        self.assert_refused(self.run_program("evaluate", pairs, "-o", self.out), "--images")
+
+    def test_an_output_that_ends_in_json_is_the_file(self):
+        self.succeed(self.evaluate(pair_line(), out=self.folder / "deep" / "r.json"))
+        self.assertEqual(self.listing(self.folder / "deep"), ["r.json"])
+
+    def test_max_pairs_takes_the_first(self):
+        report = self.report(pair_line() + pair_line(name0="b.png", name1="a.png"), "--max-pairs", "1")
+        self.assertEqual([p["name0"] for p in report["pairs"]], ["a.png"])
+
+    def test_json_prints_the_report_alone_and_quiet_prints_nothing(self):
+        done = self.succeed(self.evaluate(pair_line(), "--json"))
+        self.assertEqual(json.loads(done.stdout), json.loads((self.out / "report.json").read_text()))
+        self.assertEqual(done.stderr, b"")
+        done = self.succeed(self.evaluate(pair_line(), "--quiet"))
+        self.assertEqual(done.stdout + done.stderr, b"")
+
+    def test_quarter_turns_leave_the_errors_small(self):
+        for turns in ((1, 0), (0, 1), (3, 2), (3, 3)):
+            pair = self.report(pair_line(turns=turns))["pairs"][0]
+            with self.subTest(turns=turns):
+                self.assertLess(pair["pose_error_deg"], 1)
+                self.assertGreater(pair["precision"], 0.85)
+
+    def test_resized_images_keep_small_errors(self):
+        pair = self.report(pair_line(), "--resize", "300")["pairs"][0]
+        self.assertLess(pair["pose_error_deg"], 1)
+
+    def test_a_camera_of_the_set_gives_the_distortion(self):
+        entry = lambda name, k1, fx=FOCAL: (
+            f"{name}:\n  {{fx: {fx}, fy: {FOCAL}, cx: {K[2]}, cy: {K[5]}, k1: {k1}, k2: 0, p1: 0, p2: 0, "
+            f"k3: 0, image_width: {WIDTH}, image_height: {HEIGHT}}}\n")
+        error = lambda: self.report(pair_line())["pairs"][0]["pose_error_deg"]
+        self.write("set/cameras.yaml", entry("cam", 0))
+        straight = error()
+        self.assertLess(straight, 1e-3)
+        self.write("set/cameras.yaml", entry("cam", 0.4))
+        self.assertGreater(error(), 1e-2)
+        # With several entries, the one whose name begins the file's name, ...
+        self.write("set/cameras.yaml", entry("z", 0.4) + entry("a", 0) + entry("b", 0))
+        self.assertEqual(error(), straight)
+        # ... else the one with the line's fx and cx.
+        self.write("set/cameras.yaml", entry("y", 0.4, 999) + entry("z", 0))
+        self.assertEqual(error(), straight)
+        self.write("set/cameras.yaml", entry("y", 0, 999) + entry("z", 0, 998))
+        self.assertIn("cameras.yaml", self.report(pair_line())["pairs"][0]["error"])
+
+    def test_a_camera_of_another_size_is_told_for_its_pair(self):
+        self.write("set/cameras.yaml", "c: {fx: 300, fy: 300, cx: 1, cy: 1, image_width: 9, image_height: 9}\n")
+        self.assertIn("9x9", self.report(pair_line())["pairs"][0]["error"])
+
+    def test_a_broken_cameras_file_is_refused(self):
+        self.write("set/cameras.yaml", "c: {fx: 0, fy: 300, cx: 1, cy: 1, image_width: 9, image_height: 9}\n")
+        self.assert_refused(self.evaluate(pair_line()), "cameras.yaml", "fx", "is 0")
+
+    def test_images_of_growing_size_share_one_context(self):
+        small = [cli.stereo_pair()[0][y * WIDTH : y * WIDTH + 100] for y in range(80)]
+        self.write("small.png", cli.png(100, 80, b"".join(small)))
+        report = self.report(pair_line("small.png", "small.png") + pair_line() +
+                             pair_line("small.png", "a.png") + pair_line())
+        self.assertEqual(report["pairs"][1]["pose_error_deg"], report["pairs"][3]["pose_error_deg"])
+
+    def test_an_unwritable_folder_is_told_before_the_work(self):
+        done = self.evaluate(pair_line(), out=self.a / "out")
+        self.assert_refused(done, "is not a folder", out=self.a / "out")
+
+
+class RealData(cli.CliTest):
+    def test_stereo_pairs_of_a_distorted_drone_camera(self):
+        folder = Path(os.environ.get("TWOVIEW_DATA", "")) / "euroc_v101_start"
+        if not (folder / "pairs.txt").exists():
+            self.skipTest("no TWOVIEW_DATA with euroc_v101_start")
+        self.succeed(self.run_program("evaluate", folder / "pairs.txt", "--images", folder / "images",
+                                      "-o", self.out))
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual(report["num_pairs"], 5)
+        self.assertGreater(report["auc"]["10"], 70)
+        for pair in report["pairs"]:
+            self.assertGreater(pair["precision"], 0.9)
+
+
+if __name__ == "__main__":
+    cli.main()

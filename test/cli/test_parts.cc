@@ -1,0 +1,239 @@
+// The pieces of the command line that can be asked directly. Owning objects live in functions that
+// give plain values: Unity leaves a failing test by longjmp.
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "camera_file.h"
+#include "error.h"
+#include "image_header.h"
+#include "measures.h"
+#include "options.h"
+#include "pairs_file.h"
+#include "report.h"
+#include "tables.h"
+
+// After all others: it defines isnan and isinf as macros.
+#include "unity.h"
+
+using namespace cli;
+
+void setUp(void) {}
+void tearDown(void) {}
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double auc_of(std::initializer_list<double> errors, double threshold) {
+  return auc_percent(errors, threshold);
+}
+
+void test_auc_is_the_area_under_straight_lines_of_recall() {
+  TEST_ASSERT_EQUAL_DOUBLE(0, auc_of({}, 5));
+  TEST_ASSERT_EQUAL_DOUBLE(100, auc_of({0, 0, 0}, 5));
+  TEST_ASSERT_EQUAL_DOUBLE(0, auc_of({kInfinity, 7}, 5));
+  TEST_ASSERT_EQUAL_DOUBLE(0, auc_of({5}, 5));
+  // (0,0) to (2,1/2) to (4,1), flat to 5: 0.5 + 1.5 + 1 = 3 of 5.
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 60, auc_of({4, 2}, 5));
+  // One of two fails: 0.5 * (1 * 0.5) + 4 * 0.5 = 2.25 of 5.
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 45, auc_of({1, kInfinity}, 5));
+}
+
+void test_percentile_lies_between_its_neighbours() {
+  TEST_ASSERT_EQUAL_DOUBLE(3, percentile({3}, 0.95));
+  TEST_ASSERT_EQUAL_DOUBLE(2.5, percentile({4, 1, 3, 2}, 0.5));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 3.85, percentile({4, 1, 3, 2}, 0.95));
+  TEST_ASSERT_EQUAL_DOUBLE(4, percentile({4, 1, 3, 2}, 1));
+}
+
+Matrix3 turn_about_y(double angle) {
+  return {std::cos(angle), 0, std::sin(angle), 0, 1, 0, -std::sin(angle), 0, std::cos(angle)};
+}
+
+void test_rotation_error_is_exact_from_tiny_to_half_a_turn() {
+  const Matrix3 identity = turn_about_y(0);
+  for (const double deg : {1e-9, 1e-3, 1.0, 90.0, 179.999, 180.0})
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + deg), deg,
+                              rotation_error_deg(turn_about_y(deg * M_PI / 180), identity));
+}
+
+void test_translation_error_forgets_the_sign_only_when_asked() {
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 180, translation_error_signed_deg({1, 0, 0}, {-2, 0, 0}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, translation_error_deg({1, 0, 0}, {-2, 0, 0}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 45, translation_error_deg({-1, 1, 0}, {3, 0, 0}));
+  TEST_ASSERT_TRUE(translation_error_deg({0, 0, 0}, {1, 0, 0}) == kInfinity);
+}
+
+tv_camera lens() {
+  tv_camera camera{};
+  camera.model = TV_CAMERA_BROWN_CONRADY;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = 500;
+  camera.fy = 510;
+  camera.cx = 310;
+  camera.cy = 250;
+  const double k[] = {-0.2, 0.05, 0.004, -0.003, 0.01};
+  std::copy(k, k + 5, camera.k);
+  return camera;
+}
+
+void test_a_resized_camera_keeps_pixel_areas() {
+  const tv_camera half = resized(lens(), 320, 240);
+  TEST_ASSERT_EQUAL_DOUBLE(250, half.fx);
+  TEST_ASSERT_EQUAL_DOUBLE(255, half.fy);
+  TEST_ASSERT_EQUAL_DOUBLE(154.75, half.cx);
+  TEST_ASSERT_EQUAL_DOUBLE(124.75, half.cy);
+  TEST_ASSERT_EQUAL_INT(320, half.width);
+}
+
+void test_a_turned_camera_sees_the_turned_point_at_the_turned_pixel() {
+  const tv_camera camera = lens();
+  double point[3] = {0.3, -0.2, 1.1}, pixel[2];
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera, point, pixel, nullptr));
+  double width = camera.width, height = camera.height;
+  for (int quarters = 1; quarters <= 4; ++quarters) {
+    const double turned_pixel[] = {pixel[1], width - 1 - pixel[0]};
+    const double turned_point[] = {point[1], -point[0], point[2]};
+    std::memcpy(pixel, turned_pixel, sizeof pixel);
+    std::memcpy(point, turned_point, sizeof point);
+    std::swap(width, height);
+    const tv_camera other = turned(camera, quarters);
+    double seen[2];
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&other, point, seen, nullptr));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, pixel[0], seen[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, pixel[1], seen[1]);
+  }
+}
+
+tv_camera parsed_camera(const char* distortion) {
+  return parse_camera(std::string("%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
+                                  "camera_matrix: !!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n"
+                                  "  data: [ 5.0e+02, 0., 310., 0., +510., 250.5, 0., 0., 1. ]\n") +
+                          distortion,
+                      "cam.yaml");
+}
+
+void test_camera_files_give_the_numbers_and_the_model() {
+  const tv_camera plain = parsed_camera("");
+  TEST_ASSERT_EQUAL_INT(TV_CAMERA_PINHOLE, plain.model);
+  TEST_ASSERT_EQUAL_DOUBLE(500, plain.fx);
+  TEST_ASSERT_EQUAL_DOUBLE(510, plain.fy);
+  TEST_ASSERT_EQUAL_DOUBLE(310, plain.cx);
+  TEST_ASSERT_EQUAL_DOUBLE(250.5, plain.cy);
+  const tv_camera rational =
+      parsed_camera("distortion_coefficients: {data: [1e-3, 2, 3, 4, 5, 6, 7, 8]}\n");
+  TEST_ASSERT_EQUAL_INT(TV_CAMERA_BROWN_CONRADY, rational.model);
+  TEST_ASSERT_EQUAL_DOUBLE(1e-3, rational.k[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(8, rational.k[7]);
+  const tv_camera fisheye = parsed_camera(
+      "distortion_model: equidistant\ndistortion_coefficients: {rows: 1, data: [0, 0, 0, 0]}\n");
+  TEST_ASSERT_EQUAL_INT(TV_CAMERA_KANNALA_BRANDT, fisheye.model);
+}
+
+// The fx of the entry that is chosen; 0 for none.
+double chosen_fx(const char* image, double fx, double cx) {
+  const NamedCameras cameras = parse_camera_set(
+      "cam: {image_width: 8, image_height: 8, fx: 1, fy: 1, cx: 1, cy: 1}\n"
+      "cam1: {image_width: 8, image_height: 8, fx: 2, fy: 2, cx: 2, cy: 2, k1: 0.1}\n",
+      "cameras.yaml");
+  const double K[9] = {fx, 0, cx, 0, fx, 0, 0, 0, 1};
+  const tv_camera* camera = choose_camera(cameras, image, K);
+  return camera ? camera->fx : 0;
+}
+
+void test_the_longest_name_that_begins_the_files_name_serves_it() {
+  TEST_ASSERT_EQUAL_DOUBLE(1, chosen_fx("cam0_7.png", 2, 2));
+  TEST_ASSERT_EQUAL_DOUBLE(2, chosen_fx("folder/cam1_7.png", 1, 1));
+  TEST_ASSERT_EQUAL_DOUBLE(2, chosen_fx("left.png", 2, 2));
+  TEST_ASSERT_EQUAL_DOUBLE(0, chosen_fx("left.png", 2, 1));
+}
+
+// How many pairs a text holds, or minus the length of the refusal.
+int parsed_pairs(const std::string& text) {
+  try {
+    return static_cast<int>(parse_pairs(text, "p").size());
+  } catch (const BadInput& e) {
+    return -static_cast<int>(std::strlen(e.what()));
+  }
+}
+
+void test_pairs_lines_have_two_four_twenty_two_or_thirty_eight_fields() {
+  const std::string K = " 9 0 4 0 9 4 0 0 1", T = " 1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1";
+  TEST_ASSERT_EQUAL_INT(1, parsed_pairs("a b"));
+  TEST_ASSERT_EQUAL_INT(2, parsed_pairs("  \r\n# x\na b 0 3\n\na b 0 0" + K + K + "\n"));
+  TEST_ASSERT_EQUAL_INT(1, parsed_pairs("a b 0 0" + K + K + T + "\r\n"));
+  TEST_ASSERT_LESS_THAN_INT(0, parsed_pairs("a b 0 0" + K + K + T + " 1"));
+  TEST_ASSERT_LESS_THAN_INT(0, parsed_pairs("a b 0.5 0"));
+  TEST_ASSERT_LESS_THAN_INT(0, parsed_pairs(""));
+}
+
+// Reads the header of every prefix of the bytes; gives what the whole says, width * 1e6 + height,
+// negative when it is called truncated.
+double header_of(const std::string& bytes) {
+  ImageHeader header;
+  for (size_t length = 0; length <= bytes.size(); ++length) {
+    const std::string prefix = bytes.substr(0, length);  // its own memory, for the sanitizer
+    header = read_image_header(prefix);
+  }
+  const double size = static_cast<double>(header.width) * 1e6 + static_cast<double>(header.height);
+  return header.truncated ? -size : size;
+}
+
+void test_headers_are_read_within_their_bytes() {
+  using namespace std::string_literals;
+  const std::string png = "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\1\2\0\0\0\7\b\0\0\0\0CCCC"s;
+  TEST_ASSERT_EQUAL_DOUBLE(-258e6 - 7, header_of(png));
+  TEST_ASSERT_EQUAL_DOUBLE(258e6 + 7, header_of(png + "\0\0\0\0IENDCCCC"s));
+  const std::string jpeg =
+      "\xff\xd8\xff\xe0\0\4xx\xff\xc2\0\x0b\b\0\7\1\2\1\1\x11\0\xff\xda\0\2dd"s;
+  TEST_ASSERT_EQUAL_DOUBLE(-258e6 - 7, header_of(jpeg));
+  TEST_ASSERT_EQUAL_DOUBLE(258e6 + 7, header_of(jpeg + "\xff\xd9"s));
+  TEST_ASSERT_EQUAL_DOUBLE(2e6 + 3, header_of("P5 #c\n2 3\n255\n123456"));
+  TEST_ASSERT_EQUAL_DOUBLE(-2e6 - 3, header_of("P6 2 3 255\n12345678901234567"));
+  TEST_ASSERT_EQUAL_DOUBLE(7e6 + 9, header_of("BM............\x28\0\0\0\7\0\0\0\xf7\xff\xff\xff"s));
+  TEST_ASSERT_EQUAL_DOUBLE(
+      5e6 + 6, header_of("II*\0\b\0\0\0\2\0\0\1\3\0\1\0\0\0\5\0\0\0\1\1\4\0\1\0\0\0\6\0\0\0"s));
+  TEST_ASSERT_EQUAL_DOUBLE(0, header_of("GIF89a whatever follows"));
+}
+
+bool base64_is(const char* bytes, const char* expected) { return base64(bytes) == expected; }
+
+void test_base64_has_the_vectors_of_rfc_4648() {
+  TEST_ASSERT_TRUE(base64_is("", ""));
+  TEST_ASSERT_TRUE(base64_is("f", "Zg=="));
+  TEST_ASSERT_TRUE(base64_is("fo", "Zm8="));
+  TEST_ASSERT_TRUE(base64_is("foo", "Zm9v"));
+  TEST_ASSERT_TRUE(base64_is("foobar", "Zm9vYmFy"));
+}
+
+bool csv_is(const tv_keypoint& keypoint, const char* row) {
+  return keypoints_csv(&keypoint, 1) == "x,y,size,angle_rad,score,level\n" + std::string(row);
+}
+
+void test_csv_numbers_are_the_shortest_that_read_back() {
+  TEST_ASSERT_TRUE(csv_is({0.1f, 12.5f, 7, -0.0f, 254, 3}, "0.1,12.5,7,-0,254,3\n"));
+  TEST_ASSERT_EQUAL_DOUBLE(0.8, shortest(0.8f));
+  TEST_ASSERT_EQUAL_DOUBLE(1.1, shortest(1.1f));
+}
+
+}  // namespace
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
+  RUN_TEST(test_percentile_lies_between_its_neighbours);
+  RUN_TEST(test_rotation_error_is_exact_from_tiny_to_half_a_turn);
+  RUN_TEST(test_translation_error_forgets_the_sign_only_when_asked);
+  RUN_TEST(test_a_resized_camera_keeps_pixel_areas);
+  RUN_TEST(test_a_turned_camera_sees_the_turned_point_at_the_turned_pixel);
+  RUN_TEST(test_camera_files_give_the_numbers_and_the_model);
+  RUN_TEST(test_the_longest_name_that_begins_the_files_name_serves_it);
+  RUN_TEST(test_pairs_lines_have_two_four_twenty_two_or_thirty_eight_fields);
+  RUN_TEST(test_headers_are_read_within_their_bytes);
+  RUN_TEST(test_base64_has_the_vectors_of_rfc_4648);
+  RUN_TEST(test_csv_numbers_are_the_shortest_that_read_back);
+  return UNITY_END();
+}

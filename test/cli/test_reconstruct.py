@@ -1,0 +1,280 @@
+#!/usr/bin/env python3
+"""twoview reconstruct, from two images to its files."""
+import json
+import math
+import os
+import re
+import struct
+import unittest
+
+import cli_support as cli
+from cli_support import FOCAL, HEIGHT, WIDTH
+
+RESULT_KEYS = """image0 image1 num_keypoints num_matches num_inliers config verdict reasons R t E F H
+alternative evidence covariance num_points median_parallax_deg rms_reprojection_px scale scale_sigma imu
+truth timings_ms context_bytes options seed version kernels""".split()
+STAGES = "pyramid detect describe match estimate refine triangulate total".split()
+OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
+max_error_px confidence max_iterations fixed_iterations seed kernels triangulation camera0 camera1
+resize""".split()
+TRUTH = "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [-1, 0, 0]\nbaseline: 0.5\ndepth0: depth.pfm\n"
+
+
+def read_ply(path):
+    data = path.read_bytes()
+    end = data.index(b"end_header\n") + len(b"end_header\n")
+    header = data[:end].decode()
+    properties = re.findall(r"^property (\w+) (\w+)$", header, re.M)
+    count = int(re.search(r"^element vertex (\d+)$", header, re.M).group(1))
+    points = list(struct.iter_unpack("<fffBBBff", data[end:]))
+    return header, properties, count, points
+
+
+class Reconstruct(cli.CliTest):
+    def test_a_sideways_flight_gives_a_full_pose_and_every_file(self):
+        done = self.succeed(self.reconstruct())
+        self.assertEqual(done.stderr, b"")
+        self.assertEqual(self.listing(), cli.RESULT_FILES)
+        result = self.result()
+        for key in RESULT_KEYS:
+            self.assertIn(key, result)
+        for key in STAGES:
+            self.assertGreaterEqual(result["timings_ms"][key], 0)
+        self.assertEqual((result["image0"], result["image1"]), ("a.png", "b.png"))
+        self.assertEqual(result["config"], "calibrated")
+        self.assertEqual(result["scale"], "unit")
+        self.assertIsNone(result["truth"])
+        self.assertEqual(len(result["covariance"]), 25)
+        self.assertAlmostEqual(result["t"][0], -1, delta=1e-3)
+        self.assertAlmostEqual(math.hypot(*result["t"]), 1, delta=1e-12)
+        self.assertAlmostEqual(math.hypot(*result["E"]), 1, delta=1e-9)
+        self.assertEqual(set(result["evidence"]),
+                         {"essential", "fundamental", "homography", "rotation", "coverage"})
+
+    def test_E_is_t_cross_R_with_its_sign(self):
+        self.succeed(self.reconstruct())
+        result = self.result()
+        R, t = result["R"], result["t"]
+        skew = [0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0]
+        E = [sum(skew[3 * i + k] * R[3 * k + j] for k in range(3)) for i in range(3) for j in range(3)]
+        for ours, expected in zip(result["E"], E):
+            self.assertAlmostEqual(ours, expected / math.sqrt(2), delta=1e-9)
+
+    def test_errors_against_the_truth_are_told(self):
+        self.write("depth.pfm", cli.pfm(WIDTH, HEIGHT, lambda x, y: 0.5 * cli.true_depth(x, y)))
+        truth = self.write("truth.yaml", TRUTH)
+        done = self.succeed(self.reconstruct("--truth", truth))
+        errors = self.result()["truth"]
+        self.assertLess(errors["rotation_error_deg"], 0.1)
+        self.assertLess(errors["translation_error_deg"], 0.5)
+        self.assertLess(errors["depth_error_median_percent"], 1)
+        self.assertGreaterEqual(errors["depth_error_p95_percent"], errors["depth_error_median_percent"])
+        self.assertIn("truth", done.stdout.decode())
+
+    def test_unknown_depths_are_left_out(self):
+        self.write("depth.pfm", cli.pfm(WIDTH, HEIGHT, lambda x, y: (0, -1, math.inf, math.nan)[x % 4]))
+        self.succeed(self.reconstruct("--truth", self.write("truth.yaml", TRUTH)))
+        self.assertIsNone(self.result()["truth"]["depth_error_median_percent"])
+        self.assertIsNotNone(self.result()["truth"]["rotation_error_deg"])
+
+    def test_a_translation_told_backwards_has_no_sign_free_error(self):
+        self.succeed(self.reconstruct("--truth", self.write("truth.yaml", TRUTH.replace("-1", "1").replace(
+            "depth0: depth.pfm\n", ""))))
+        errors = self.result()["truth"]
+        self.assertLess(errors["translation_error_deg"], 0.5)
+        self.assertGreater(errors["translation_error_signed_deg"], 179)
+
+    def test_the_cloud_has_the_depths_and_the_colours_of_image_0(self):
+        left, right = cli.stereo_pair()
+        colour = [c for v in left for c in (v, v // 2, 255 - v)]
+        a = self.write("colour.png", cli.png(WIDTH, HEIGHT, colour, channels=3))
+        other = [c for v in right for c in (v, v // 2, 255 - v)]
+        b = self.write("colour1.png", cli.png(WIDTH, HEIGHT, other, channels=3))
+        self.succeed(self.reconstruct(a=a, b=b))
+        header, properties, count, points = read_ply(self.out / "cloud.ply")
+        self.assertTrue(header.startswith("ply\nformat binary_little_endian 1.0\n"))
+        self.assertEqual(properties, [("float", "x"), ("float", "y"), ("float", "z"), ("uchar", "red"),
+                                      ("uchar", "green"), ("uchar", "blue"), ("float", "angle_deg"),
+                                      ("float", "error_px")])
+        self.assertEqual(len(points), count)
+        self.assertEqual(count, self.result()["num_points"])
+        near = 0
+        for x, y, z, red, green, blue, angle, error in points:
+            row = round(FOCAL * y / z + (HEIGHT - 1) / 2)
+            near += abs(z / cli.true_depth(0, min(max(row, 0), HEIGHT - 1)) - 1) < 0.03
+            self.assertEqual((green, blue), (red // 2, 255 - red))
+            self.assertTrue(0 < angle < 10 and 0 <= error < 5)
+        self.assertGreater(near, 0.9 * count)
+
+    def test_json_prints_the_result_alone(self):
+        done = self.succeed(self.reconstruct("--json"))
+        self.assertEqual(done.stderr, b"")
+        self.assertEqual(json.loads(done.stdout), self.result())
+
+    def test_quiet_prints_nothing(self):
+        done = self.succeed(self.reconstruct("--quiet"))
+        self.assertEqual((done.stdout, done.stderr), (b"", b""))
+
+    def test_the_summary_is_a_dozen_lines_without_colour_codes(self):
+        text = self.succeed(self.reconstruct()).stdout.decode()
+        self.assertTrue(8 <= text.count("\n") <= 14, text)
+        self.assertNotIn("\033", text)
+
+    def test_equal_runs_give_equal_bytes(self):
+        self.succeed(self.reconstruct())
+        first = {name: (self.out / name).read_bytes() for name in self.listing()}
+        self.succeed(self.reconstruct())
+        for name in ("cloud.ply", "matches.png", "epipolar.png", "views.png"):
+            self.assertEqual((self.out / name).read_bytes(), first[name], name)
+        before, after = json.loads(first["result.json"]), self.result()
+        del before["timings_ms"], after["timings_ms"]
+        self.assertEqual(before, after)
+
+    def test_swapped_images_give_the_inverse(self):
+        self.succeed(self.reconstruct())
+        self.succeed(self.reconstruct(a=self.b, b=self.a, out=self.folder / "swapped"))
+        one, two = self.result(), self.result(self.folder / "swapped")
+        transposed = [one["R"][3 * j + i] for i in range(3) for j in range(3)]
+        self.assertEqual(two["R"], transposed)
+        for i in range(3):
+            inverse = -sum(transposed[3 * i + k] * one["t"][k] for k in range(3))
+            self.assertAlmostEqual(two["t"][i], inverse, delta=1e-12)
+
+    def test_every_option_is_obeyed_and_echoed(self):
+        self.succeed(self.reconstruct())
+        for key in OPTIONS:
+            self.assertIn(key, self.result()["options"])
+        chosen = {"max_keypoints": 300, "arc": 9, "threshold": 15, "levels": 2, "scale_factor": 1.5,
+                  "orientation": "upright", "descriptor": "sift", "ratio": 0.75, "method": "eight-point",
+                  "max_error_px": 1.5, "confidence": 0.99, "max_iterations": 500, "seed": 2**64 - 1,
+                  "kernels": "c", "triangulation": "midpoint", "resize": 300}
+        flags = [f"--{key.replace('_', '-')}={value}" for key, value in chosen.items()]
+        self.succeed(self.reconstruct(*flags))
+        result = self.result()
+        for key, value in chosen.items():
+            self.assertEqual(result["options"][key], value, key)
+        self.assertEqual(result["seed"], 2**64 - 1)
+        self.assertEqual(result["kernels"], "c")
+        self.assertLessEqual(max(result["num_keypoints"]), 300)
+        self.assertEqual(result["image_size0"], [300, 225])
+
+    def test_fixed_iterations_draw_exactly_that_many_samples(self):
+        self.succeed(self.reconstruct("--fixed-iterations", "77"))
+        self.assertEqual(self.result()["num_iterations"], 77)
+
+    def test_resized_images_keep_the_pose_and_never_grow(self):
+        self.succeed(self.reconstruct("--resize", "5000"))
+        self.assertEqual(self.result()["image_size0"], [WIDTH, HEIGHT])
+        self.succeed(self.reconstruct("--resize", "256"))
+        self.assertEqual(self.result()["image_size0"], [256, 192])
+        self.assertAlmostEqual(self.result()["t"][0], -1, delta=2e-3)
+
+    def test_two_cameras_serve_their_own_images(self):
+        # Image 1 moved by 12 pixels, and its principal point along with it: the same rays.
+        shifted = cli.camera_yaml(cx=(WIDTH - 1) / 2 + 12)
+        rows = []
+        right = cli.stereo_pair()[1]
+        for y in range(HEIGHT):
+            row = right[y * WIDTH : (y + 1) * WIDTH]
+            rows.append(bytes([row[0]]) * 12 + row[:-12])
+        b = self.write("shifted.png", cli.png(WIDTH, HEIGHT, b"".join(rows)))
+        self.succeed(self.reconstruct("--camera0", self.camera, "--camera1",
+                                      self.write("cam1.yaml", shifted), b=b, camera=False))
+        self.assertAlmostEqual(self.result()["t"][0], -1, delta=1e-3)
+        self.assertAlmostEqual(self.result()["R"][0], 1, delta=1e-4)
+
+    def test_without_cameras_F_is_found_and_no_pose(self):
+        done = self.reconstruct("--method", "eight-point", camera=False)
+        result = self.assert_no_pose(done)
+        self.assertIn(result["config"], ("uncalibrated", "planar_or_panoramic"))
+        self.assertIsNotNone(result["F"] or result["H"])
+        self.assertIsNone(result["median_parallax_deg"])
+        self.assertIsNone(result["options"]["camera0"])
+        self.assertIn("matches.png", self.listing())
+
+    def test_files_of_an_earlier_pair_do_not_stay_beside_new_ones(self):
+        self.succeed(self.reconstruct())
+        (self.out / "mine.txt").write_text("kept")
+        self.reconstruct(b=self.a)
+        self.assertNotIn("cloud.ply", self.listing())
+        self.assertNotIn("views.png", self.listing())
+        self.assertIn("mine.txt", self.listing())
+
+    def test_pictures_are_whole_and_of_a_size_to_look_at(self):
+        self.succeed(self.reconstruct())
+        for name in ("matches.png", "epipolar.png", "views.png"):
+            width, height = cli.png_size((self.out / name).read_bytes())
+            self.assertTrue(400 <= width <= 2400 and 300 <= height <= 2400, (name, width, height))
+
+    def test_the_report_holds_all_that_it_shows(self):
+        a = self.write("x<b>&.png", self.a.read_bytes())
+        self.succeed(self.reconstruct(a=a))
+        page = (self.out / "report.html").read_text()
+        self.assertTrue(page.startswith("<!doctype html>") and page.rstrip().endswith("</html>"))
+        self.assertIsNone(re.search(r"(src|href)=\"(?!data:)", page))
+        self.assertNotIn("http:", page)
+        self.assertNotIn("https:", page)
+        self.assertNotIn("{{", re.sub(r"<script.*?</script>", "", page, flags=re.S))
+        self.assertEqual(page.count("data:image/"), 3)
+        self.assertIn("x&lt;b&gt;&amp;.png", page)
+        self.assertNotIn("<b>&", page)
+        data = json.loads(re.search(r'id="cloud-data">(.*?)</script>', page, re.S).group(1))
+        self.assertEqual(len(data["cameras"]), 2)
+
+    def test_a_ROS_camera_reads_as_the_same_camera(self):
+        self.succeed(self.reconstruct())
+        expected = self.result()
+        ros = f"""image_width: {WIDTH}
+image_height: {HEIGHT}
+camera_name: front
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [{FOCAL}, 0, {(WIDTH - 1) / 2}, 0, {FOCAL}, {(HEIGHT - 1) / 2}, 0, 0, 1]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [0, 0, 0, 0, 0]
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]
+"""
+        self.camera.write_text(ros)
+        self.succeed(self.reconstruct())
+        for key in ("R", "t", "covariance", "num_inliers"):
+            self.assertEqual(self.result()[key], expected[key], key)
+
+    def test_lenses_with_eight_and_with_four_equidistant_coefficients_are_read(self):
+        tiny = (1e-9,) * 8
+        self.camera.write_text(cli.camera_yaml(k=tiny))
+        self.succeed(self.reconstruct())
+        self.assertAlmostEqual(self.result()["t"][0], -1, delta=1e-3)
+        self.camera.write_text(cli.camera_yaml(k=(0, 0, 0, 0)) + "distortion_model: equidistant\n")
+        done = self.reconstruct()
+        self.assertIn(done.returncode, (0, 2, 3))
+        if done.returncode == 2:
+            self.one_line(done)
+
+    def test_help_and_version_are_no_failures(self):
+        for arguments in (["--help"], ["reconstruct", "--help"], ["--version"]):
+            done = self.succeed(self.run_program(*arguments))
+            self.assertEqual(done.stderr, b"")
+            self.assertGreater(len(done.stdout), 10)
+        self.assertIn("--max-error-px", self.run_program("reconstruct", "--help").stdout.decode())
+
+    def test_a_reader_that_goes_away_is_no_failure(self):
+        read, write = os.pipe()
+        os.close(read)
+        with os.fdopen(write, "w") as closed:
+            import subprocess
+
+            done = subprocess.run([cli.program(), "reconstruct", self.a, self.b, "--camera", self.camera,
+                                   "-o", self.out], stdout=closed, stderr=subprocess.PIPE)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.listing(), cli.RESULT_FILES)
+
+
+if __name__ == "__main__":
+    cli.main()
