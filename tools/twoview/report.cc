@@ -104,19 +104,14 @@ std::string matrix_text(const Json& list, size_t columns) {
 }
 
 std::string row(const std::string& name, const Json& value) {
-  const bool is_matrix = value.is_array() && (value.size() == 9 || value.size() == 25);
-  if (is_matrix)
-    return "<tr><th>" + name + "</th><td class=\"matrix\">" +
-           matrix_text(value, value.size() == 9 ? 3 : 5) + "</td></tr>\n";
-  if (value.is_array() && value.size() == 3 && value[0].is_number_float())
-    return "<tr><th>" + name + "</th><td class=\"matrix\">" + matrix_text(value, 3) +
-           "</td></tr>\n";
+  std::string text;
   if (value.is_array()) {
-    std::string list;
-    for (const Json& item : value) list += (list.empty() ? "" : ", ") + leaf_text(item);
-    return "<tr><th>" + name + "</th><td>" + (list.empty() ? "&ndash;" : list) + "</td></tr>\n";
+    for (const Json& item : value) text += (text.empty() ? "" : ", ") + leaf_text(item);
+    if (text.empty()) text = "&ndash;";
+  } else {
+    text = leaf_text(value);
   }
-  return "<tr><th>" + name + "</th><td>" + leaf_text(value) + "</td></tr>\n";
+  return "<tr><th>" + name + "</th><td>" + text + "</td></tr>\n";
 }
 
 std::string table(const std::string& title, const std::string& rows) {
@@ -129,20 +124,30 @@ std::string object_table(const std::string& title, const Json& object) {
   return table(title, rows);
 }
 
+std::string matrix(const std::string& name, const Json& list, size_t columns) {
+  return list.is_array() ? "<figure><figcaption>" + name + "</figcaption><pre>" +
+                               matrix_text(list, columns) + "</pre></figure>\n"
+                         : "";
+}
+
+// R, t and what follows from them, side by side.
+std::string matrices(const Json& j) {
+  std::string text = matrix("R", j["R"], 3) + matrix("t", j["t"], 1) + matrix("E", j["E"], 3) +
+                     matrix("F", j["F"], 3) + matrix("H", j["H"], 3);
+  if (j["alternative"].is_object())
+    text += matrix("alternative R", j["alternative"]["R"], 3) +
+            matrix("alternative t", j["alternative"]["t"], 1);
+  text += matrix("covariance, rad&sup2; (w0 w1 w2 a b)", j["covariance"], 5);
+  return text.empty() ? "" : "<div class=\"matrices\">\n" + text + "</div>\n";
+}
+
 std::string tables(const Json& j) {
-  std::string found, pose;
+  std::string found;
   for (const char* key :
        {"num_keypoints", "num_matches", "num_inliers", "config", "verdict", "reasons", "num_points",
         "median_parallax_deg", "rms_reprojection_px", "scale", "num_iterations"})
     found += row(key, j[key]);
-  for (const char* key : {"R", "t", "E", "F", "H", "covariance"})
-    if (!j[key].is_null()) pose += row(key, j[key]);
-  if (j["alternative"].is_object()) {
-    pose += row("alternative R", j["alternative"]["R"]);
-    pose += row("alternative t", j["alternative"]["t"]);
-  }
   std::string text = table("What was found", found);
-  if (!pose.empty()) text += table("x1 = R x0 + t", pose);
   if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);
   text += object_table("Inliers of each model", j["evidence"]);
   text += object_table("Time, ms", j["timings_ms"]);
@@ -226,6 +231,7 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
                               {"cards", cards(outcome)},
                               {"cloud", cloud_section(cloud)},
                               {"figures", sections},
+                              {"matrices", matrices(outcome.json)},
                               {"tables", tables(outcome.json)},
                               {"json", escaped(json_text(outcome.json))},
                               {"version", tv_version_string()},

@@ -58,22 +58,26 @@ double rms_reprojection_px(const tv_reconstruction& reconstruction) {
 
 // As nlohmann's dump(2), but a list of plain values stays on one line.
 void append_json(std::string& text, const Json& json, size_t depth) {
-  const auto is_plain = [](const Json& item) { return item.is_primitive(); };
-  const bool is_short = json.is_array() && std::all_of(json.begin(), json.end(), is_plain);
-  if (json.is_primitive() || json.empty() || is_short) {
+  if (json.is_primitive() || json.empty()) {
     text += json.dump(-1, ' ', false, Json::error_handler_t::replace);
     return;
   }
+  const auto is_plain = [](const Json& item) { return item.is_primitive(); };
+  const bool is_short = json.is_array() && std::all_of(json.begin(), json.end(), is_plain);
+  const std::string indent = "\n" + std::string(2 * depth, ' ');
+  std::string separator = is_short ? "" : indent + "  ";
   text += json.is_object() ? "{" : "[";
-  const char* separator = "\n";
   for (const auto& [key, value] : json.items()) {
-    text += separator + std::string(2 * (depth + 1), ' ');
-    if (json.is_object())
-      text += Json(key).dump(-1, ' ', false, Json::error_handler_t::replace) + ": ";
+    text += separator;
+    if (json.is_object()) {
+      append_json(text, key, depth);
+      text += ": ";
+    }
     append_json(text, value, depth + 1);
-    separator = ",\n";
+    separator = is_short ? ", " : "," + indent + "  ";
   }
-  text += "\n" + std::string(2 * depth, ' ') + (json.is_object() ? "}" : "]");
+  if (!is_short) text += indent;
+  text += json.is_object() ? "}" : "]";
 }
 
 }  // namespace

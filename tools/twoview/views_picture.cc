@@ -174,7 +174,7 @@ cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& clo
   std::snprintf(
       caption, sizeof caption,
       "%zu points; one baseline is the distance between the cameras; median parallax %.2f deg%s",
-      cloud.size(), parallax, show_cameras ? "; cameras: 0 white, 1 blue" : "");
+      cloud.size(), parallax, show_cameras ? "; cameras: 0 white, 1 orange" : "");
   std::string text = caption;
   if (outside_front + outside_side > 0)
     text += "; beyond the frame: " + std::to_string(outside_front) + " and " +

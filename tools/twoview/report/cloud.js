@@ -43,7 +43,7 @@
     const cy = Math.cos(pose.yaw), sy = Math.sin(pose.yaw);
     const cp = Math.cos(pose.pitch), sp = Math.sin(pose.pitch);
     const distance = 3.2 * radius / pose.zoom;
-    const focal = 1.25 * Math.min(canvas.width, 1.6 * canvas.height);
+    const focal = 1.05 * Math.min(canvas.width, 1.6 * canvas.height);
     return function (px, py, pz) {
       const x = px - middle[0], y = py - middle[1], z = pz - middle[2];
       const u = cy * x + sy * z, w = -sy * x + cy * z;
@@ -142,7 +142,7 @@
       const after = Math.hypot(event.clientX - other[0], event.clientY - other[1]);
       if (before > 0) zoom(after / before);
     } else if (event.shiftKey || event.buttons & 6) {
-      const focal = 1.25 * Math.min(canvas.clientWidth, 1.6 * canvas.clientHeight);
+      const focal = 1.05 * Math.min(canvas.clientWidth, 1.6 * canvas.clientHeight);
       pose.x += dx / focal;
       pose.y += dy / focal;
     } else {
