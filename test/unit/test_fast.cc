@@ -162,7 +162,12 @@ int white(int, int) { return 255; }
 int soft_squares(int x, int y) { return (x % 16 < 8 && y % 16 < 8 ? x * 37 + y * 11 : 0) & 255; }
 
 void test_corners_equal_the_definition_on_a_real_image() {
-  check_image(tv_image{real.luma[0], real.width, real.height, real.width});
+#ifdef __SANITIZE_ADDRESS__
+  const int32_t height = real.height / 5;  // what the sanitizers look for is in every row
+#else
+  const int32_t height = real.height;
+#endif
+  check_image(tv_image{real.luma[0], real.width, height, real.width});
 }
 
 void test_corners_equal_the_definition_on_synthetic_images() {
