@@ -228,6 +228,9 @@ void test_a_pole_of_the_rational_factor_ends_the_valid_region(void) {
   TEST_ASSERT_TRUE(camera.valid_radius_undistorted <= 1.0);
   Vec2 pixel;
   TEST_ASSERT_FALSE(tv::project(camera, Vec3(1.01, 0, 1), &pixel, nullptr));
+  // Numerator and denominator change sign together: only the pole itself tells.
+  model.k[0] = -0.999;
+  TEST_ASSERT_TRUE(prepared(model).valid_radius_undistorted <= 1.0);
 }
 
 void test_the_map_is_one_to_one_in_the_valid_disc_with_strong_tangential_terms(void) {
@@ -260,6 +263,29 @@ void test_the_map_is_one_to_one_in_the_valid_disc_with_strong_tangential_terms(v
   }
 }
 
+void test_no_pixel_gives_a_ray_beyond_the_valid_angle(void) {
+  tv::Random random = tv::random_seeded(kSeed);
+  int num_refused = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    tv_camera model = brown(uniform(&random, -0.4, -0.1), 0, uniform(&random, -0.05, 0.05),
+                            uniform(&random, -0.05, 0.05), 0);
+    const Camera camera = prepared(model);
+    for (int i = 0; i < 100; ++i) {
+      const double r = camera.valid_radius_distorted * uniform(&random, 0.9, 1.0);
+      const double azimuth = uniform(&random, -3.2, 3.2);
+      const Vec2 pixel(model.cx + model.fx * r * std::cos(azimuth),
+                       model.cy + model.fy * r * std::sin(azimuth));
+      Vec3 ray;
+      if (!tv::unproject(camera, pixel, &ray, nullptr)) {
+        ++num_refused;
+        continue;
+      }
+      TEST_ASSERT_TRUE(std::acos(ray[2]) <= camera.valid_angle_rad + 1e-8);
+    }
+  }
+  TEST_ASSERT_TRUE(num_refused > 1000 && num_refused < 29000);
+}
+
 void test_outside_is_refused_and_outputs_stay(void) {
   const Camera barrel = prepared(brown(-0.3, 0, 0, 0, 0));
   Vec2 pixel(-7, -7);
@@ -276,6 +302,10 @@ void test_outside_is_refused_and_outputs_stay(void) {
   const Camera fisheye = prepared(kCameras[8].camera);
   TEST_ASSERT_FALSE(tv::project(fisheye, Vec3(0, 0, -1), &pixel, nullptr));
   TEST_ASSERT_FALSE(tv::unproject(fisheye, Vec2(399.5 + 220 * 3.15, 399.5), &ray, nullptr));
+  tv_camera folding = kCameras[8].camera;
+  folding.k[0] = -0.1;  // valid to theta = 1.8257
+  TEST_ASSERT_FALSE(tv::project(prepared(folding), Vec3(std::sin(1.83), 0, std::cos(1.83)), &pixel,
+                                nullptr));
   TEST_ASSERT_TRUE(pixel == Vec2(-7, -7) && ray == Vec3(-7, -7, -7));
   TEST_ASSERT_TRUE(tv::unproject(barrel, Vec2(671.3, 240), &ray, nullptr));
   TEST_ASSERT_TRUE(tv::project(fisheye, Vec3(1, 0, -0.1), &pixel, nullptr));
@@ -350,6 +380,7 @@ int main(void) {
   RUN_TEST(test_a_dip_of_the_derivative_between_samples_is_found);
   RUN_TEST(test_a_pole_of_the_rational_factor_ends_the_valid_region);
   RUN_TEST(test_the_map_is_one_to_one_in_the_valid_disc_with_strong_tangential_terms);
+  RUN_TEST(test_no_pixel_gives_a_ray_beyond_the_valid_angle);
   RUN_TEST(test_outside_is_refused_and_outputs_stay);
   RUN_TEST(test_not_finite_input_is_refused);
   RUN_TEST(test_projection_does_not_depend_on_the_points_distance);

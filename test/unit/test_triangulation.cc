@@ -192,6 +192,30 @@ void test_linear_ls_equals_hartley_and_sturms_equations_solved_by_qr(void) {
   }
 }
 
+void test_linear_ls_of_a_fisheye_equals_equations_on_the_viewing_sphere(void) {
+  tv::Random random = tv::random_seeded(kSeed);
+  const Camera camera = tv::prepare_camera(fisheye());
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 point0(uniform(&random, -3, 3), uniform(&random, 1, 3), uniform(&random, -1, 2));
+    const Mat3 R = rotation(uniform(&random, -0.1, 0.1), 0.1, uniform(&random, -3, 3));
+    const Vec3 t(0.4, -0.3, 0.2);
+    const Vec2 pixel0 = seen(camera, point0) + Vec2(noise(&random, 1), noise(&random, 1));
+    const Vec2 pixel1 = seen(camera, R * point0 + t) + Vec2(noise(&random, 1), noise(&random, 1));
+    Vec3 ray0, ray1;
+    TEST_ASSERT_TRUE(tv::unproject(camera, pixel0, &ray0, nullptr));
+    TEST_ASSERT_TRUE(tv::unproject(camera, pixel1, &ray1, nullptr));
+    // Distances from the two lines: I - d d^T is the same for every basis of the tangent plane.
+    Eigen::Matrix<double, 6, 3> A;
+    Eigen::Matrix<double, 6, 1> b;
+    A << kIdentity - ray0 * ray0.transpose(), (kIdentity - ray1 * ray1.transpose()) * R;
+    b << Vec3::Zero(), -(kIdentity - ray1 * ray1.transpose()) * t;
+    const Vec3 expected = A.colPivHouseholderQr().solve(b);
+    const tv_point point =
+        triangulated(TV_TRIANGULATION_LINEAR_LS, camera, camera, R, t, pixel0, pixel1);
+    TEST_ASSERT_TRUE((position(point) - expected).norm() < 1e-9 * (1 + expected.norm()));
+  }
+}
+
 void test_iterative_ls_is_the_fixed_point_of_its_weights(void) {
   tv::Random random = tv::random_seeded(kSeed);
   const Camera camera = tv::prepare_camera(pinhole());
@@ -301,6 +325,16 @@ void test_rays_that_meet_behind_say_so_and_where(void) {
     TEST_ASSERT_EQUAL_INT(TV_POINT_BEHIND, point.status);
     TEST_ASSERT_TRUE((position(point) - behind).norm() < 1e-9);
     TEST_ASSERT_TRUE(point.error_px < 1e-9f);
+    // With a pixel off, the error is that of the point projected through the centre.
+    const Vec2 pixel0 = seen(camera, -behind);
+    const Vec2 pixel1 = seen(camera, -(behind + kSideways)) + Vec2(1, 30);
+    const tv_point off =
+        triangulated(method, camera, camera, kIdentity, kSideways, pixel0, pixel1);
+    const double squares =
+        (seen(camera, -position(off)) - pixel0).squaredNorm() +
+        (seen(camera, -(position(off) + kSideways)) - pixel1).squaredNorm();
+    TEST_ASSERT_EQUAL_INT(TV_POINT_BEHIND, off.status);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, std::sqrt(squares / 2), off.error_px);
   }
 }
 
@@ -413,6 +447,7 @@ int main(void) {
   RUN_TEST(test_far_points_keep_the_digits_that_their_parallax_has);
   RUN_TEST(test_points_beside_and_behind_the_image_plane_of_a_fisheye_are_found);
   RUN_TEST(test_linear_ls_equals_hartley_and_sturms_equations_solved_by_qr);
+  RUN_TEST(test_linear_ls_of_a_fisheye_equals_equations_on_the_viewing_sphere);
   RUN_TEST(test_iterative_ls_is_the_fixed_point_of_its_weights);
   RUN_TEST(test_midpoint_equals_the_point_nearest_to_both_lines);
   RUN_TEST(test_error_is_the_rms_reprojection_through_the_lens);

@@ -348,12 +348,11 @@ bool unproject_central(const Camera& camera, const Point2& target, Vec3* ray, Ma
   if (!(target_sq <= limit * limit)) return false;
   Point2 p = target;
   if (model.model == TV_CAMERA_BROWN_CONRADY) {
+    // Both stay within the valid disc, but for a last step of 1e-11.
     if (!brown_invert_fast(camera, target, target_sq, &p) &&
         !brown_invert_safe(camera, target, target_sq, &p)) {
       return false;
     }
-    const double edge = camera.valid_radius_undistorted * kEdgeSlack;
-    if (!(p.x * p.x + p.y * p.y <= edge * edge)) return false;
   }
   const double length_sq = 1.0 + p.x * p.x + p.y * p.y;
   if (!(length_sq < kInfinity)) return false;
