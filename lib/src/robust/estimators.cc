@@ -11,7 +11,7 @@ namespace tv {
 namespace {
 
 // Local optimisation looks this many thresholds far, so that matches can come in.
-constexpr double kNear = 5;
+constexpr double kNear = 3;
 constexpr int kLocalIterations = 10;
 
 inline int64_t quantised(double q) {
@@ -29,9 +29,9 @@ void gather(const RayPairs& pairs, const int32_t* sample, Vec3* rays0, Vec3* ray
 }  // namespace
 
 bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
-                 double threshold_px, double* r_sq) {
+                 double limit_px, double threshold_px, double* r_sq) {
   *r_sq = sampson_sq(pairs, i, E);
-  if (!(*r_sq <= threshold_px * threshold_px)) return false;
+  if (!(*r_sq <= limit_px * limit_px)) return false;
   return depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
                                 threshold_px * pixel_angle(pairs, i))) >= 0;
 }
@@ -42,6 +42,17 @@ int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_p
   int near = 0;
   for (int i = 0; i < count; ++i) {
     if (sampson_sq(pairs, i, M) <= limit_sq) indices[near++] = i;
+  }
+  return near;
+}
+
+int near_matches(const RayPairs& pairs, int count, const Pose& pose, double limit_px,
+                 double threshold_px, int32_t* indices) {
+  const Mat3 E = essential_from_pose(pose);
+  int near = 0;
+  for (int i = 0; i < count; ++i) {
+    double r_sq;
+    if (pose_inlier(pairs, i, E, pose, limit_px, threshold_px, &r_sq)) indices[near++] = i;
   }
   return near;
 }
@@ -101,7 +112,7 @@ int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {
   *num_inliers = 0;
   for (int i = 0; i < pairs.num; ++i) {
     double r_sq;
-    const bool inlier = pose_inlier(pairs, i, E, model, threshold_px, &r_sq);
+    const bool inlier = pose_inlier(pairs, i, E, model, threshold_px, threshold_px, &r_sq);
     *num_inliers += inlier;
     cost += inlier ? quantised(r_sq * inverse_sq) : kCostOne;
   }
@@ -109,8 +120,8 @@ int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {
 }
 
 void PoseEstimator::refine_model(Pose* model) const {
-  const int count = near_matches(pairs, pairs.num, essential_from_pose(*model),
-                                 kNear * threshold_px, indices);
+  const int count = near_matches(pairs, pairs.num, *model, kNear * threshold_px, threshold_px,
+                                 indices);
   PoseModel refined{*model};
   refine(pairs, indices, count, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
          &refined);

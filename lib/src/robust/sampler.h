@@ -21,7 +21,7 @@ struct Sampler {
   int64_t drawn;
 };
 
-inline constexpr double kProsacSamples = 20000;
+inline constexpr double kProsacSamples = 5000;
 
 Sampler make_sampler(uint64_t seed, int num, int size, bool progressive);
 

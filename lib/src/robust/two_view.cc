@@ -88,32 +88,58 @@ struct Finish {
   RayPairs pairs;  // without repeats
   double threshold;
   int32_t* indices;  // scratch
+  double* values;    // scratch
   int32_t* support;  // the unique inliers of the epipolar model
   int num_support;
   TwoViewOutcome* out;
 };
 
-// Lowers a robust cost over the matches near the pose.
+// The final refinement minimises Cauchy's loss over the matches within kFinalNear thresholds. Its
+// scale follows the noise, kFinalScale times the standard deviation that the inliers' median
+// residual tells, since the threshold says little about it: sub-pixel matches are far better than
+// 1 px, and their tails are heavy. docs/decisions/0002-robust-loop.md has the measurements.
+constexpr double kFinalNear = 1.5, kFinalScale = 1.5;
+constexpr int kFinalRounds = 2, kFinalIterations = 20;
+
+// 1.4826 times the median residual of the listed matches within the threshold.
+double noise_px(const Finish& f, const Mat3& M, int count) {
+  int within = 0;
+  for (int k = 0; k < count; ++k) {
+    const double r_sq = sampson_sq(f.pairs, f.indices[k], M);
+    if (r_sq <= f.threshold * f.threshold) f.values[within++] = r_sq;
+  }
+  if (within == 0) return f.threshold;
+  double* middle = f.values + within / 2;
+  std::nth_element(f.values, middle, f.values + within);
+  return 1.4826 * std::sqrt(*middle);
+}
+
+RobustLoss final_loss(const Finish& f, const Mat3& M, int count) {
+  const double scale = kFinalScale * noise_px(f, M, count);
+  return RobustLoss{Loss::kCauchy,
+                    std::fmax(0.02 * f.threshold, std::fmin(scale, f.threshold))};
+}
+
 Pose refined_pose(const Finish& f, const Pose& start) {
   PoseModel model{start};
-  // First let the model settle with a redescending loss of the threshold's size, then weigh the
-  // inliers by a smooth one: see docs/decisions/0002-robust-loop.md.
-  for (int round = 0; round < 2; ++round) {
-    const int count = near_matches(f.pairs, f.pairs.num, essential_from_pose(model.pose),
+  for (int round = 0; round < kFinalRounds; ++round) {
+    const int count = near_matches(f.pairs, f.pairs.num, model.pose, kFinalNear * f.threshold,
                                    f.threshold, f.indices);
     if (count < 5) break;
-    refine(f.pairs, f.indices, count, RobustLoss{Loss::kCauchy, 0.5 * f.threshold}, 20, &model);
+    const RobustLoss loss = final_loss(f, essential_from_pose(model.pose), count);
+    refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
   }
   return model.pose;
 }
 
 Mat3 refined_fundamental(const Finish& f, const Mat3& start) {
   FundamentalModel model = fundamental_model(start);
-  for (int round = 0; round < 2; ++round) {
-    const int count =
-        near_matches(f.pairs, f.pairs.num, model.matrix(), f.threshold, f.indices);
+  for (int round = 0; round < kFinalRounds; ++round) {
+    const int count = near_matches(f.pairs, f.pairs.num, model.matrix(),
+                                   kFinalNear * f.threshold, f.indices);
     if (count < 7) break;
-    refine(f.pairs, f.indices, count, RobustLoss{Loss::kCauchy, 0.5 * f.threshold}, 20, &model);
+    refine(f.pairs, f.indices, count, final_loss(f, model.matrix(), count), kFinalIterations,
+           &model);
   }
   return model.matrix().normalized();
 }
@@ -125,7 +151,8 @@ void collect_support(Finish& f) {
     double r_sq;
     const bool inlier =
         epipolar.has_pose
-            ? pose_inlier(f.matches.pairs, i, epipolar.M, epipolar.pose, f.threshold, &r_sq)
+            ? pose_inlier(f.matches.pairs, i, epipolar.M, epipolar.pose, f.threshold,
+                          f.threshold, &r_sq)
             : sampson_sq(f.matches.pairs, i, epipolar.M) <= f.threshold * f.threshold;
     f.out->inlier[i] = inlier;
     if (inlier && i < f.pairs.num) f.support[f.num_support++] = i;
@@ -241,15 +268,15 @@ double parallax(const Finish& f, int i) {
 }
 
 // The evidence of a full pose: parallax, error, covariance.
-void measure_pose(Finish& f, double* values) {
+void measure_pose(Finish& f) {
   TwoViewOutcome& out = *f.out;
   double sum = 0;
   for (int k = 0; k < f.num_support; ++k) {
-    values[k] = parallax(f, f.support[k]);
+    f.values[k] = parallax(f, f.support[k]);
     sum += pixel_angle(f.pairs, f.support[k]);
   }
-  double* middle = values + (f.num_support - 1) / 2;
-  std::nth_element(values, middle, values + f.num_support);
+  double* middle = f.values + (f.num_support - 1) / 2;
+  std::nth_element(f.values, middle, f.values + f.num_support);
   out.median_parallax_rad = *middle;
   if (*middle < 3 * f.threshold * sum / f.num_support) out.reasons |= TV_REASON_LOW_PARALLAX;
   out.has_covariance = pose_covariance(f.pairs, f.support, f.num_support, out.epipolar.pose,
@@ -305,6 +332,7 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
            searched(matches),
            problem.options.max_error_px,
            arena_alloc<int32_t>(arena, n),
+           arena_alloc<double>(arena, n),
            arena_alloc<int32_t>(arena, n),
            0,
            outcome};
@@ -360,7 +388,7 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
     case TV_CONFIG_UNCALIBRATED:
       break;
   }
-  if (out.has_t) measure_pose(f, arena_alloc<double>(arena, n));
+  if (out.has_t) measure_pose(f);
   measure_inliers(f);
   judge(f);
 }
