@@ -28,7 +28,9 @@ typedef struct tv_camera {
 } tv_camera;
 
 /* TV_OK, or TV_ERR_NULL, or TV_ERR_CAMERA: unknown model, size below 1, fx or fy not above 0, a
-   number that is not finite. */
+   number that is not finite.
+   The functions below find the valid region anew at each call (about 10 microseconds with
+   distortion on a desktop core); tv_estimate_two_view and tv_triangulate find it once. */
 TV_API tv_status tv_camera_check(const tv_camera *camera);
 
 /* The model is used only where its distortion is monotonic: up to this angle (radians) off the

@@ -1,15 +1,15 @@
 // The boundary of the camera models: validate, call, pack.
 #include "twoview/camera.h"
 
-#include <cmath>
 #include <cstdint>
 #include <limits>
 
+#include "api/validate.h"
 #include "geometry/camera.h"
 
 namespace {
 
-bool is_finite(double x) { return std::fabs(x) < std::numeric_limits<double>::infinity(); }
+using tv::is_finite;
 
 // Checks the camera and what goes into the model: null, then the camera, then finite numbers.
 tv_status check_input(const tv_camera *camera, const double *values, int num_values,

@@ -1,11 +1,12 @@
 // Names of statuses and of results, in static storage.
 #include "twoview/status.h"
 
+#include "api/enum_value.h"
 #include "twoview/context.h"
 #include "twoview/two_view.h"
 
 const char *tv_status_string(tv_status status) {
-  switch (static_cast<int>(status)) {
+  switch (tv::enum_value(status)) {
     case TV_OK: return "ok";
     case TV_ERR_NULL: return "a required pointer is null";
     case TV_ERR_ARGUMENT: return "an argument is out of its range";
@@ -26,7 +27,7 @@ const char *tv_status_string(tv_status status) {
 const char *tv_version_string(void) { return TV_VERSION_STRING; }
 
 const char *tv_kernels_string(tv_kernels kernels) {
-  switch (static_cast<int>(kernels)) {
+  switch (tv::enum_value(kernels)) {
     case TV_KERNELS_AUTO: return "auto";
     case TV_KERNELS_C: return "c";
     case TV_KERNELS_SSE2: return "sse2";
@@ -38,7 +39,7 @@ const char *tv_kernels_string(tv_kernels kernels) {
 }
 
 const char *tv_config_string(tv_config config) {
-  switch (static_cast<int>(config)) {
+  switch (tv::enum_value(config)) {
     case TV_CONFIG_DEGENERATE: return "degenerate";
     case TV_CONFIG_CALIBRATED: return "calibrated";
     case TV_CONFIG_UNCALIBRATED: return "uncalibrated";
@@ -51,7 +52,7 @@ const char *tv_config_string(tv_config config) {
 }
 
 const char *tv_verdict_string(tv_verdict verdict) {
-  switch (static_cast<int>(verdict)) {
+  switch (tv::enum_value(verdict)) {
     case TV_VERDICT_REFUSED: return "refused";
     case TV_VERDICT_DOUBTFUL: return "doubtful";
     case TV_VERDICT_OK: return "ok";
@@ -60,7 +61,7 @@ const char *tv_verdict_string(tv_verdict verdict) {
 }
 
 const char *tv_reason_string(tv_reason reason) {
-  switch (static_cast<int>(reason)) {
+  switch (tv::enum_value(reason)) {
     case TV_REASON_TOO_FEW_MATCHES: return "too_few_matches";
     case TV_REASON_LOW_INLIER_RATIO: return "low_inlier_ratio";
     case TV_REASON_LOW_PARALLAX: return "low_parallax";

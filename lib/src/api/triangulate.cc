@@ -2,9 +2,11 @@
 #include "twoview/triangulate.h"
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
-#include <limits>
 
+#include "api/enum_value.h"
+#include "api/validate.h"
 #include "geometry/triangulation.h"
 
 namespace {
@@ -13,7 +15,7 @@ constexpr double kRotationTolerance = 1e-6;
 
 bool all_finite(const double *values, int num_values) {
   for (int i = 0; i < num_values; ++i) {
-    if (!(std::fabs(values[i]) < std::numeric_limits<double>::infinity())) return false;
+    if (!tv::is_finite(values[i])) return false;
   }
   return true;
 }
@@ -33,13 +35,6 @@ bool is_rotation(const double R[9]) {
   return det > 0.0;
 }
 
-// Whether [a, a + a_bytes) and [b, b + b_bytes) share a byte.
-bool overlap(const void *a, uint64_t a_bytes, const void *b, uint64_t b_bytes) {
-  const uint64_t a_first = reinterpret_cast<uintptr_t>(a);
-  const uint64_t b_first = reinterpret_cast<uintptr_t>(b);
-  return a_first < b_first ? b_first - a_first < a_bytes : a_first - b_first < b_bytes;
-}
-
 }  // namespace
 
 tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
@@ -51,17 +46,16 @@ tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
   if (num_points > 0 && (pixels0 == nullptr || pixels1 == nullptr || points == nullptr)) {
     return TV_ERR_NULL;
   }
-  if (!tv::is_triangulation_method(method)) return TV_ERR_ARGUMENT;
+  if (!tv::is_triangulation_method(tv::enum_value(method))) return TV_ERR_ARGUMENT;
   if (tv_camera_check(camera0) != TV_OK || tv_camera_check(camera1) != TV_OK) return TV_ERR_CAMERA;
   if (!all_finite(R, 9) || !all_finite(t, 3)) return TV_ERR_NOT_FINITE;
   if (!is_rotation(R)) return TV_ERR_ARGUMENT;
   if (t[0] == 0.0 && t[1] == 0.0 && t[2] == 0.0) return TV_ERR_ARGUMENT;
 
-  const uint64_t count = static_cast<uint64_t>(num_points);
-  const uint64_t points_bytes = count * sizeof(tv_point);
-  const uint64_t pixels_bytes = count * 2 * sizeof(double);
-  if (overlap(points, points_bytes, pixels0, pixels_bytes) ||
-      overlap(points, points_bytes, pixels1, pixels_bytes)) {
+  const size_t points_bytes = static_cast<size_t>(num_points) * sizeof(tv_point);
+  const size_t pixels_bytes = static_cast<size_t>(num_points) * 2 * sizeof(double);
+  if (tv::overlap(points, points_bytes, pixels0, pixels_bytes) ||
+      tv::overlap(points, points_bytes, pixels1, pixels_bytes)) {
     return TV_ERR_OVERLAP;
   }
 
@@ -71,7 +65,7 @@ tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
   for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = R[i];
   const tv::TriangulationPair pair = tv::prepare_triangulation(
       prepared0, prepared1, rotation, tv::Vec3(t[0], t[1], t[2]));
-  for (int32_t i = 0; i < num_points; ++i) {
+  for (size_t i = 0; i < static_cast<size_t>(num_points); ++i) {
     const tv::Vec2 pixel0(pixels0[2 * i], pixels0[2 * i + 1]);
     const tv::Vec2 pixel1(pixels1[2 * i], pixels1[2 * i + 1]);
     tv::triangulate_point(method, pair, pixel0, pixel1, &points[i]);

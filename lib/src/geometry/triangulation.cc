@@ -249,7 +249,7 @@ Vec3 solve(tv_triangulation method, const TriangulationPair& pair, const Rays& r
 
 }  // namespace
 
-bool is_triangulation_method(tv_triangulation method) {
+bool is_triangulation_method(int method) {
   return method == TV_TRIANGULATION_LINEAR_LS || method == TV_TRIANGULATION_ITERATIVE_LS ||
          method == TV_TRIANGULATION_MIDPOINT;
 }

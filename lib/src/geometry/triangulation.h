@@ -27,8 +27,8 @@ struct TriangulationPair {
 TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1, const Mat3& R,
                                         const Vec3& t);
 
-// Whether this release has the method.
-bool is_triangulation_method(tv_triangulation method);
+// Whether the number is a tv_triangulation that this release has.
+bool is_triangulation_method(int method);
 
 // Writes every field of *point; nothing in it is ever NaN or infinite.
 void triangulate_point(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
