@@ -1,4 +1,4 @@
-# Flags of every target of the project. Those that only the library needs stand in lib/CMakeLists.txt.
+# Flags of every target of the project; those that only the library needs: lib/CMakeLists.txt.
 
 add_library(twoview_flags INTERFACE)
 target_compile_options(twoview_flags INTERFACE

@@ -15,15 +15,18 @@ function(tv_register_test name)
     set(arg_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
   endif()
   set(test ${TWOVIEW_TEST_PREFIX}${arg_LABEL}/${name})
+  set(environment TWOVIEW_PROGRAM=${PROJECT_BINARY_DIR}/bin/twoview
+    UBSAN_OPTIONS=print_stacktrace=1)
   add_test(NAME ${test} COMMAND ${arg_COMMAND} WORKING_DIRECTORY ${arg_DIRECTORY})
   set_tests_properties(${test} PROPERTIES
     LABELS ${arg_LABEL}
     SKIP_RETURN_CODE ${TWOVIEW_SKIP_CODE}
     TIMEOUT 600
-    ENVIRONMENT "TWOVIEW_PROGRAM=${PROJECT_BINARY_DIR}/bin/twoview;UBSAN_OPTIONS=print_stacktrace=1")
+    ENVIRONMENT "${environment}")
 endfunction()
 
-# tv_add_test(name LABEL label SOURCES file... [LIBS library...]): a Unity test, built and registered.
+# tv_add_test(name LABEL label SOURCES file... [LIBS library...])
+# A Unity test, built and registered.
 function(tv_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "SOURCES;LIBS")
   set(target ${arg_LABEL}_${name})

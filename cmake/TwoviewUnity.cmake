@@ -1,6 +1,6 @@
 # The test framework as target twoview_unity: the folder named by TWOVIEW_UNITY_DIR, an installed
-# Unity, the copy that scripts/bootstrap took from the source package of Debian's cjson, or upstream's
-# release.
+# Unity, the copy that scripts/bootstrap took from the source package of Debian's cjson, or
+# upstream's release.
 
 set(TWOVIEW_UNITY_DIR "" CACHE PATH "Folder with unity.c, unity.h and unity_internals.h")
 

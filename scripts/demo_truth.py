@@ -4,9 +4,9 @@
 usage: demo_truth.py motorcycle_disp.npz DIR
 DIR gets camera0.yaml, camera1.yaml (OpenCV's format), truth.yaml and depth0.pfm.
 
-Middlebury 2014 (D. Scharstein et al., GCPR 2014): the pair is rectified, so the motion is sideways and
-a pixel's depth is focal * baseline / (disparity + cx1 - cx0). The values are those of the pair as
-scikit-image ships it, 741x500. Python's own library is enough for a file this small.
+Middlebury 2014 (D. Scharstein et al., GCPR 2014): the pair is rectified, so the motion is sideways
+and a pixel's depth is focal * baseline / (disparity + cx1 - cx0). The values are those of the pair
+as scikit-image ships it, 741x500. Python's own library is enough for a file this small.
 """
 import array
 import ast

@@ -72,7 +72,7 @@ def offences(files):
                 continue
             for header in headers:
                 target = header.split("/")[0]
-                if header.startswith(".") or ("/" not in header and resolve_beside(name, header, files)):
+                if header.startswith(".") or lies_beside(name, header, files):
                     yield f"{name}: {header}: write includes from lib/src, layer first"
                 elif target in LAYERS and target != layer and target not in LAYERS[layer]:
                     yield f"{name}: {layer} may not include {header}"
@@ -96,12 +96,12 @@ def offences(files):
                     yield f"{name}: {header} is internal; only the public headers are for use here"
 
 
-def resolve_beside(name, header, files):
+def lies_beside(name, header, files):
     return f"{name.rsplit('/', 1)[0]}/{header}" in files
 
 
 def self_check():
-    """Each rule must catch an example that breaks it: a checker that finds nothing proves nothing."""
+    """Each rule must catch an example that breaks it: a check that finds nothing proves nothing."""
     good = {
         "lib/include/twoview/image.h": ["stdint.h"],
         "lib/include/twoview/two_view.h": ["twoview/image.h"],

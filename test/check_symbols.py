@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""What the built library needs and gives: no heap, no printing, no libstdc++; libc and libm alone at
-run time; and nothing exported but tv_*. usage: check_symbols.py --nm NM --readelf READELF SO ARCHIVE"""
+"""What the built library needs and gives: no heap, no printing, no libstdc++; libc and libm alone
+at run time; and nothing exported but tv_*.
+usage: check_symbols.py --nm NM --readelf READELF SO ARCHIVE"""
 import argparse
 import re
 import subprocess
