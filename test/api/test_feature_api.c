@@ -164,6 +164,7 @@ static void test_output_pointers_are_checked(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_detect(c, v, NULL, NULL, keypoints, CAP, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_detect(c, v, NULL, NULL, NULL, CAP, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_detect(c, v, NULL, NULL, keypoints, -1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_detect(c, v, NULL, NULL, (tv_keypoint *)v->data, 1, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_extract(c, v, NULL, NULL, keypoints, NULL, CAP, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_extract(c, v, NULL, NULL, NULL, descriptors, CAP, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,

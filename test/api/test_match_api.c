@@ -59,6 +59,8 @@ static void test_counts_out_of_range_are_refused(void) {
   refused(TV_ERR_ARGUMENT, a.context, descriptors0, -1, descriptors1, 1, NULL, 1);
   refused(TV_ERR_ARGUMENT, a.context, descriptors0, 1, descriptors1, INT32_MIN, NULL, 1);
   refused(TV_ERR_ARGUMENT, a.context, descriptors0, 1, descriptors1, 1, NULL, -1);
+  refused(TV_ERR_OVERLAP, a.context, (const uint8_t *)found, 1, descriptors1, 1, NULL, 1);
+  refused(TV_ERR_OVERLAP, a.context, descriptors0, 1, (const uint8_t *)found, 1, NULL, 1);
   refused(TV_ERR_LIMITS, a.context, descriptors0, COUNT + 1, descriptors1, 1, NULL, COUNT);
   refused(TV_ERR_LIMITS, a.context, descriptors0, 1, descriptors1, COUNT + 1, NULL, COUNT);
   refused(TV_ERR_LIMITS, a.context, descriptors0, INT32_MAX, descriptors1, 1, NULL, COUNT);

@@ -105,7 +105,7 @@ void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
   const int32_t budget = image.width * image.height / 4;
   TEST_ASSERT_LESS_OR_EQUAL(sizeof arena_memory,
-                            tv::corners_bytes(image.width, image.height, budget));
+                            tv::corners_bytes(image.width, image.height));
   const int32_t count =
       tv::find_corners(kernels, image, nullptr, options, budget, arena, keypoints);
   int32_t expected = 0;

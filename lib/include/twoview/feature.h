@@ -44,7 +44,8 @@ typedef struct tv_feature_options {
   int32_t min_threshold; /* 0: threshold is fixed. Else [1, threshold], default 3: the threshold falls
                             as far as this until max_keypoints corners are found */
   int32_t levels;        /* pyramid levels, [1, 8], default 1; more bridge changes of scale and cost
-                            precision, for coarse corners take their place in max_keypoints */
+                            precision, for coarse corners take their place in max_keypoints: each
+                            level has a share by its area, and what it leaves goes to coarser ones */
   float scale_factor;    /* between levels, [1.1, 2], default 2 */
   int32_t cell_px;       /* 0 (default): the best corners, wherever they are. Else [8, 16384]: side of
                             the grid cell, in pixels of each level, in which corners are budgeted so
@@ -64,7 +65,8 @@ TV_API void tv_feature_options_init(tv_feature_options *options);
    *num_keypoints: how many were written; on TV_ERR_CAPACITY how many there are. Capacity of
    options->max_keypoints is always enough.
    options may be null (defaults).
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY,
+   TV_ERR_OVERLAP.
    An image too small for any corner gives 0 keypoints and TV_OK. */
 TV_API tv_status tv_detect(tv_context *context, const tv_image *image, const tv_image *mask,
                            const tv_feature_options *options, tv_keypoint *keypoints,

@@ -30,7 +30,8 @@ TV_API void tv_match_options_init(tv_match_options *options);
    correspondences: the caller's array; capacity of min(num0, num1) is always enough.
    *num_correspondences: how many were written; on TV_ERR_CAPACITY how many there are.
    A side with one descriptor only has no second neighbour: the ratio test cannot pass.
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY,
+   TV_ERR_OVERLAP.
    Time: num0 * num1 * 128 multiply-adds. */
 TV_API tv_status tv_match(tv_context *context, const uint8_t *descriptors0, int32_t num0,
                           const uint8_t *descriptors1, int32_t num1,

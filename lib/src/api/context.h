@@ -8,8 +8,7 @@
 struct tv_context {
   tv_limits limits;  // max_matches resolved, never 0
   const tvk_table* kernels;
-  tv::Arena arena;      // scratch of the running call
-  size_t result_bytes;  // front of the arena that holds the last tv_reconstruct's arrays
+  tv::Arena arena;  // scratch of the running call; its front outlives a tv_reconstruct
   tv_clock clock;
   void* clock_user;
   uint64_t stage_ns[TV_NUM_STAGES];

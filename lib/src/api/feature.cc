@@ -69,6 +69,11 @@ int32_t orient_keypoints(const tv_context& context, const Octaves& octaves, int3
   return total;
 }
 
+size_t image_bytes(const tv_image& image) {
+  return static_cast<size_t>(image.height - 1) * static_cast<size_t>(image.stride_bytes) +
+         static_cast<size_t>(image.width);
+}
+
 size_t bytes_of(int32_t count, size_t element) { return static_cast<size_t>(count) * element; }
 
 }  // namespace
@@ -98,6 +103,10 @@ tv_status tv_detect(tv_context* context, const tv_image* image, const tv_image* 
   if (request.status != TV_OK) return request.status;
   if (num_keypoints == nullptr || (keypoints == nullptr && cap_keypoints > 0)) return TV_ERR_NULL;
   if (cap_keypoints < 0) return TV_ERR_ARGUMENT;
+  if (tv::overlap(image->data, tv::image_bytes(*image), keypoints,
+                  tv::bytes_of(cap_keypoints, sizeof(tv_keypoint)))) {
+    return TV_ERR_OVERLAP;
+  }
   tv::ArenaScope scope(context->arena);
   int32_t count = 0;
   const tv_keypoint* corners =

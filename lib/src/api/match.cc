@@ -29,6 +29,13 @@ tv_status tv_match(tv_context* context, const uint8_t* descriptors0, int32_t num
   if (num0 > context->limits.max_keypoints || num1 > context->limits.max_keypoints) {
     return TV_ERR_LIMITS;
   }
+  const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);
+  if (tv::overlap(correspondences, out_bytes, descriptors0,
+                  static_cast<size_t>(num0) * TV_DESCRIPTOR_BYTES) ||
+      tv::overlap(correspondences, out_bytes, descriptors1,
+                  static_cast<size_t>(num1) * TV_DESCRIPTOR_BYTES)) {
+    return TV_ERR_OVERLAP;
+  }
   tv::StageTimer timer(context, TV_STAGE_MATCH);
   tv::ArenaScope scope(context->arena);
   const int32_t most = num0 < num1 ? num0 : num1;

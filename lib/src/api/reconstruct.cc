@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "api/enum_value.h"
 #include "api/validate.h"
+#include "geometry/triangulation.h"
 
 namespace tv {
 namespace {
@@ -91,6 +93,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
     return TV_ERR_NULL;
   }
   if (reconstruction->struct_size != sizeof(tv_reconstruction)) return TV_ERR_STRUCT_SIZE;
+  if (!tv::is_triangulation_method(tv::enum_value(triangulation))) return TV_ERR_ARGUMENT;
   tv_feature_options features;
   tv_status status = tv::read_feature_options(*context, feature_options, &features);
   if (status != TV_OK) return status;

@@ -11,8 +11,7 @@ namespace tv {
 
 size_t extract_scratch_bytes(const tv_limits& limits) {
   const size_t keypoints = arena_bytes<tv_keypoint>(static_cast<size_t>(limits.max_keypoints));
-  return 2 * keypoints + std::max(corners_bytes(limits.max_width, limits.max_height,
-                                                limits.max_keypoints),
+  return 2 * keypoints + std::max(corners_bytes(limits.max_width, limits.max_height),
                                   octaves_bytes(limits.max_width, limits.max_height));
 }
 

@@ -176,8 +176,7 @@ Workspace alloc_workspace(Arena& arena, int32_t width, int32_t height) {
   return work;
 }
 
-// The corners of a level within its share, more of them (up to the budget) kept behind in case that
-// another level has too few.
+// The corners of a level within its share of the budget; returns how many.
 int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_image* mask,
                       const tv_feature_options& options, int32_t index, int32_t share,
                       Workspace& work, tv_keypoint* keypoints) {
@@ -195,9 +194,8 @@ int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_ima
 
 }  // namespace
 
-size_t corners_bytes(int32_t max_width, int32_t max_height, int32_t max_keypoints) {
+size_t corners_bytes(int32_t max_width, int32_t max_height) {
   const size_t width = static_cast<size_t>(max_width);
-  (void)max_keypoints;
   return level_buffers_bytes(max_width, max_height) + 3 * arena_bytes<uint8_t>(width) +
          arena_bytes<uint16_t>((width + 1) / 2) +
          2 * arena_bytes<Corner>(candidate_capacity(max_width, max_height)) +

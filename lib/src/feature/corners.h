@@ -7,7 +7,7 @@
 
 namespace tv {
 
-size_t corners_bytes(int32_t max_width, int32_t max_height, int32_t max_keypoints);
+size_t corners_bytes(int32_t max_width, int32_t max_height);
 
 // Writes at most `budget` keypoints in descending order of (score, then level, y, x); returns how
 // many. keypoints has room for budget.

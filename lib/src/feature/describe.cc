@@ -11,7 +11,7 @@ constexpr double kStepPerSize = 1.5 / 4.0;
 // Samples lie one to two pixels apart: closer would blur, wider would alias (docs/decisions/0003).
 constexpr double kMaxStep = 2.0;
 
-// A second direction counts from this share of the highest peak on (Lowe, section 5).
+// A second direction counts above this share of the highest peak (Lowe, section 5).
 constexpr double kSecondPeak = 0.8;
 
 const Level& level_of(const Octaves& octaves, const tv_keypoint& keypoint) {
@@ -116,7 +116,7 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
     if (second < 0 || smooth[k] > smooth[second]) second = k;
   }
   angles_rad[0] = peak_angle(smooth, best);
-  if (second < 0 || static_cast<double>(smooth[second]) <
+  if (second < 0 || static_cast<double>(smooth[second]) <=
                         kSecondPeak * static_cast<double>(smooth[best])) {
     return 1;
   }

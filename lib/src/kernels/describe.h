@@ -47,19 +47,23 @@ static const int16_t orientation_weights[ORIENT_INNER][ORIENT_INNER] = {
   {0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0},
 };
 
+/* Each gradient is shared between the two directions, 10 degrees apart, that it lies between. */
 static void orientation_histogram(const int16_t *patch, int32_t *histogram) {
-  int32_t x, y, magnitude[ORIENT_INNER], bin[ORIENT_INNER];
+  int32_t x, y, magnitude[ORIENT_INNER], direction[ORIENT_INNER];
   memset(histogram, 0, TVK_ORIENT_BINS * sizeof histogram[0]);
   for (y = 0; y < ORIENT_INNER; ++y) {
     const int16_t *row = patch + (y + 1) * TVK_ORIENT_SIDE + 1;
     for (x = 0; x < ORIENT_INNER; ++x) {
       const int32_t dx = row[x + 1] - row[x - 1];
       const int32_t dy = row[x + TVK_ORIENT_SIDE] - row[x - TVK_ORIENT_SIDE];
-      magnitude[x] = gradient_magnitude(dx, dy) * orientation_weights[y][x];
-      bin[x] = (gradient_direction(dx, dy) * TVK_ORIENT_BINS + 32768) >> 16;
+      magnitude[x] = (gradient_magnitude(dx, dy) * orientation_weights[y][x] + 128) >> 8;
+      direction[x] = (gradient_direction(dx, dy) * TVK_ORIENT_BINS) >> 8; /* 1/256 of a bin */
     }
     for (x = 0; x < ORIENT_INNER; ++x) {
-      histogram[bin[x] == TVK_ORIENT_BINS ? 0 : bin[x]] += magnitude[x];
+      const int32_t bin = direction[x] >> 8, share = direction[x] & 255;
+      const int32_t next = bin + 1 == TVK_ORIENT_BINS ? 0 : bin + 1;
+      histogram[bin] += magnitude[x] * (256 - share);
+      histogram[next] += magnitude[x] * share;
     }
   }
 }
