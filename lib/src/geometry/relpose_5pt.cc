@@ -191,12 +191,26 @@ Vec3 null_vector(const ZMatrix& b, double z) {
   return best;
 }
 
+// Turns the basis about, by a fixed reflection without zeros. The null space comes with ones and zeros
+// in it; the essential matrix of a camera that moved exactly along an axis has zeros too, and where
+// they meet W would have no part in it: a root at infinity, in every sample.
+void mix_basis(double basis[4][9]) {
+  constexpr double v[4] = {1.0, 1.3, 1.7, 2.3};
+  constexpr double scale = 2.0 / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3]);
+  for (int i = 0; i < 9; ++i) {
+    const double along = scale * ((v[0] * basis[0][i] + v[1] * basis[1][i]) +
+                                  (v[2] * basis[2][i] + v[3] * basis[3][i]));
+    for (int b = 0; b < 4; ++b) basis[b][i] -= along * v[b];
+  }
+}
+
 }  // namespace
 
 int relpose_5pt(const Vec3 rays0[5], const Vec3 rays1[5], Mat3 essentials[kMaxRelpose5pt]) {
   double constraints[5][9], basis[4][9];  // basis: X, Y, Z, W
   for (int k = 0; k < 5; ++k) epipolar_row(rays0[k], rays1[k], constraints[k]);
   if (!null_space<5>(constraints, basis)) return 0;
+  mix_basis(basis);
   double rows[10][20];
   cubic_constraints(basis, rows);
   if (!eliminate(rows)) return 0;
