@@ -43,11 +43,16 @@ void load_inputs(const Arguments& a, Outcome& outcome) {
   std::string files[2];
   choose_camera_files(a, files);
   outcome.has_cameras = !files[0].empty();
+  tv_camera camera[2]{};
+  if (outcome.has_cameras) {
+    camera[0] = load_camera(files[0]);  // one file is read once: it may be a pipe
+    camera[1] = files[1] == files[0] ? camera[0] : load_camera(files[1]);
+  }
   for (int i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
     picture = load_picture(a.image[i]);
     if (outcome.has_cameras) {
-      outcome.camera[i] = load_camera(files[i]);
+      outcome.camera[i] = camera[i];
       require_size(outcome.camera[i], files[i], picture.luma.cols, picture.luma.rows, picture.path);
     }
     shrink(picture, a.common.options.resize);
