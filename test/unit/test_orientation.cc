@@ -59,9 +59,9 @@ double difference(double a, double b) { return std::fabs(std::remainder(a - b, 2
 
 // Bins are 10 degrees wide; a sample is shared between two, and a parabola finds the peak between
 // them: exact on a bin's middle and halfway between two, a fraction of a degree off elsewhere.
-void check_rotation(double (*pattern)(double, double), double max_mean_degrees) {
-  constexpr double max_degrees = 1.5;
-  double sum = 0.0;
+void check_rotation(double (*pattern)(double, double), double max_mean_degrees,
+                    double max_degrees) {
+  double sum = 0.0, worst = 0.0;
   int trials = 0;
   for (int degrees = -179; degrees <= 180; ++degrees) {
     const double angle = degrees * kPi / 180;
@@ -73,18 +73,19 @@ void check_rotation(double (*pattern)(double, double), double max_mean_degrees) 
       TEST_ASSERT_EQUAL_INT(1, angles_of(keypoint, angles_rad));
       TEST_ASSERT_TRUE(angles_rad[0] > -3.1415930f && angles_rad[0] <= 3.1415930f);
       const double error = 180 / kPi * difference(angle, angles_rad[0]);
-      TEST_ASSERT_TRUE(error <= max_degrees);
+      worst = error > worst ? error : worst;
       sum += error;
       ++trials;
     }
   }
-  printf("orientation: mean error %.2f degrees\n", sum / trials);
+  printf("orientation: error %.2f degrees in the mean, %.2f at most\n", sum / trials, worst);
   TEST_ASSERT_TRUE(sum / trials <= max_mean_degrees);
+  TEST_ASSERT_TRUE(worst <= max_degrees);
 }
 
 void test_the_angle_follows_the_rotation() {
-  check_rotation(ramp, 0.5);
-  check_rotation(bent_ramp, 0.4);
+  check_rotation(ramp, 0.5, 1.0);
+  check_rotation(bent_ramp, 0.4, 2.0);  // the bend leans the peak
 }
 
 // x to the right is 0, y downwards a quarter turn: clockwise as seen.
