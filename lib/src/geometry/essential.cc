@@ -2,7 +2,6 @@
 
 #include "base/math.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace tv {
@@ -74,22 +73,29 @@ bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t) {
   if (!(candidates[best].squaredNorm() > 1e-24)) return false;
   *t = candidates[best].normalized();
   const Mat3 product = cross_matrix(*t) * unit;
-  R[0] = orthonormalised(cofactors - product);
-  R[1] = orthonormalised(cofactors + product);
+  R[0] = cofactors - product;
+  R[1] = cofactors + product;
   return true;
 }
 
 DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, double angle_rad) {
-  const Vec3 a = pose.R * ray0;
-  const double aa = a.squaredNorm(), ff = ray1.squaredNorm(), af = a.dot(ray1);
-  const double at = a.dot(pose.t), ft = ray1.dot(pose.t);
+  double a[3];
+  for (int r = 0; r < 3; ++r) {
+    a[r] = (pose.R(r, 0) * ray0[0] + pose.R(r, 1) * ray0[1]) + pose.R(r, 2) * ray0[2];
+  }
+  const double aa = (a[0] * a[0] + a[1] * a[1]) + a[2] * a[2];
+  const double ff = (ray1[0] * ray1[0] + ray1[1] * ray1[1]) + ray1[2] * ray1[2];
+  const double af = (a[0] * ray1[0] + a[1] * ray1[1]) + a[2] * ray1[2];
+  const double at = (a[0] * pose.t[0] + a[1] * pose.t[1]) + a[2] * pose.t[2];
+  const double ft = (ray1[0] * pose.t[0] + ray1[1] * pose.t[1]) + ray1[2] * pose.t[2];
   DepthSigns d;
   d.depth0 = af * ft - ff * at;
   d.depth1 = aa * ft - af * at;
-  // depth0 / (ff |a|) = -(a's part across f1) . t for unit a: a turn by angle_rad moves it by at
-  // most angle_rad times the length of t's part across f1; likewise depth1.
-  d.tolerance0 = angle_rad * ff * std::sqrt(aa) * std::sqrt(std::max(0.0, 1 - ft * ft / ff));
-  d.tolerance1 = angle_rad * aa * std::sqrt(ff) * std::sqrt(std::max(0.0, 1 - at * at / aa));
+  // depth0 / (ff |a|) = -(unit a's part across f1) . t: turning a by angle_rad moves it by at most
+  // angle_rad times the length of t's part across f1; likewise depth1.
+  const double turn = angle_rad * angle_rad * aa * ff;
+  d.tolerance0_sq = turn * (ff - ft * ft);
+  d.tolerance1_sq = turn * (aa - at * at);
   return d;
 }
 

@@ -27,8 +27,8 @@ void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);
 Mat3 rotation_about(const Vec3& unit_axis, double angle_rad);
 
 // R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1, in closed form (B. K. P. Horn, "Recovering baseline
-// and orientation from essential matrix", 1990). E need not be exactly essential. False when E is
-// zero or not finite.
+// and orientation from essential matrix", 1990). They are rotations as exactly as E is essential:
+// orthonormalise the one that is kept. False when E is zero or not finite.
 bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 
 // Where two rays meet, as signs only. The numerators of the depths that minimise
@@ -36,16 +36,17 @@ bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 // rays of any length.
 struct DepthSigns {
   double depth0, depth1;
-  double tolerance0, tolerance1;  // what a change of the rays' angle by `angle_rad` does to them
+  double tolerance0_sq, tolerance1_sq;  // squares of what turning a ray by `angle_rad` does to them
 };
 DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, double angle_rad);
 
 // +1 in front of both cameras, -1 behind one, 0 when the parallax is within angle_rad: a point that
 // far away says nothing.
 inline int depth_vote(const DepthSigns& d) {
-  const bool behind = d.depth0 < -d.tolerance0 || d.depth1 < -d.tolerance1;
-  const bool front = d.depth0 > d.tolerance0 && d.depth1 > d.tolerance1;
-  return behind ? -1 : (front ? 1 : 0);
+  const bool clear0 = d.depth0 * d.depth0 > d.tolerance0_sq;
+  const bool clear1 = d.depth1 * d.depth1 > d.tolerance1_sq;
+  if ((clear0 && d.depth0 < 0) || (clear1 && d.depth1 < 0)) return -1;
+  return clear0 && clear1 ? 1 : 0;
 }
 
 }  // namespace tv

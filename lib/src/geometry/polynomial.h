@@ -98,7 +98,8 @@ double bracketed_root(const double* p, double low, double high) {
     const double next = inside ? newton : 0.5 * (low + high);
     const double step = std::fabs(next - z);
     z = next;
-    if (step <= 1e-14 * (1 + std::fabs(z))) break;
+    // Newton squares its error: after a step this short, the next would be rounding.
+    if (step <= (inside ? 1e-9 : 1e-15) * (1 + std::fabs(z))) break;
   }
   return z;
 }

@@ -3,6 +3,7 @@
 #include "base/math.h"
 
 #include <cmath>
+#include <cstring>
 
 namespace tv {
 namespace {
@@ -50,6 +51,23 @@ inline double robust(Loss kind, double q, double* weight) {
   return log(1 + q);
 }
 
+// The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is a
+// plain vector operation: read as unsigned integers, floats in [0, 1) are those below 1.0f's bits; a
+// NaN or a negative rounding error is above and costs 1.
+inline int32_t sum_of_costs(const float q[kScoreBlock]) {
+  uint32_t bits[kScoreBlock];
+  float capped[kScoreBlock];
+  std::memcpy(bits, q, sizeof bits);
+  constexpr uint32_t kOneBits = 0x3f800000u;
+  for (int i = 0; i < kScoreBlock; ++i) bits[i] = bits[i] < kOneBits ? bits[i] : kOneBits;
+  std::memcpy(capped, bits, sizeof bits);
+  int32_t sum = 0;
+  for (int i = 0; i < kScoreBlock; ++i) {
+    sum += static_cast<int32_t>(capped[i] * static_cast<float>(kCostOne));
+  }
+  return sum;
+}
+
 // One block on the plane: kScoreBlock matches, a fixed trip count.
 inline int32_t block_cost_plane(const RayPairs& p, int begin, const float m[9], float inverse_sq) {
   const float* x0 = p.fast[0] + begin;
@@ -62,7 +80,7 @@ inline int32_t block_cost_plane(const RayPairs& p, int begin, const float m[9], 
   const float* a1 = p.fast[7] + begin;
   const float* b1 = p.fast[8] + begin;
   const float* c1 = p.fast[9] + begin;
-  int32_t sum = 0;
+  float q[kScoreBlock];
   for (int i = 0; i < kScoreBlock; ++i) {
     const float u = (m[0] * x0[i] + m[1] * y0[i]) + m[2];
     const float v = (m[3] * x0[i] + m[4] * y0[i]) + m[5];
@@ -72,17 +90,15 @@ inline int32_t block_cost_plane(const RayPairs& p, int begin, const float m[9], 
     const float t = (m[1] * x1[i] + m[4] * y1[i]) + m[7];
     const float n1 = u * (a1[i] * u + b1[i] * v) + v * (b1[i] * u + c1[i] * v);
     const float n0 = s * (a0[i] * s + b0[i] * t) + t * (b0[i] * s + c0[i] * t);
-    const float q = c * c * inverse_sq / (n0 + n1);
-    const float capped = q < 1.0f ? q : 1.0f;  // NaN costs 1
-    sum += static_cast<int32_t>(capped * static_cast<float>(kCostOne));
+    q[i] = c * c * inverse_sq / (n0 + n1);
   }
-  return sum;
+  return sum_of_costs(q);
 }
 
 inline int32_t block_cost_general(const RayPairs& p, int begin, const float m[9],
                                   float inverse_sq) {
   const float* const* f = p.fast;
-  int32_t sum = 0;
+  float q[kScoreBlock];
   for (int k = 0; k < kScoreBlock; ++k) {
     const int i = begin + k;
     float u[3], s[3];
@@ -97,17 +113,15 @@ inline int32_t block_cost_general(const RayPairs& p, int begin, const float m[9]
       const float h = (f[12 + j][i] * u[0] + f[14 + j][i] * u[1]) + f[16 + j][i] * u[2];
       n += g * g + h * h;
     }
-    const float q = c * c * inverse_sq / n;
-    const float capped = q < 1.0f ? q : 1.0f;
-    sum += static_cast<int32_t>(capped * static_cast<float>(kCostOne));
+    q[k] = c * c * inverse_sq / n;
   }
-  return sum;
+  return sum_of_costs(q);
 }
 
 }  // namespace
 
 size_t ray_pairs_bytes(int max_matches) {
-  return 18 * arena_bytes<double>(static_cast<size_t>(max_matches)) +
+  return 19 * arena_bytes<double>(static_cast<size_t>(max_matches)) +
          18 * arena_bytes<float>(padded(max_matches));
 }
 
@@ -119,16 +133,11 @@ RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane) {
     for (int k = 0; k < 3; ++k) pairs.ray[v][k] = arena_alloc<double>(arena, n);
     for (int k = 0; k < 6; ++k) pairs.jacobian[v][k] = arena_alloc<double>(arena, n);
   }
+  pairs.pixel_angle = arena_alloc<double>(arena, n);
   for (int k = 0; k < (on_plane ? 10 : 18); ++k) {
     pairs.fast[k] = arena_alloc<float>(arena, padded(max_matches));
   }
   return pairs;
-}
-
-Mat32 jacobian_of(const RayPairs& pairs, int view, int i) {
-  Mat32 jacobian;
-  for (int k = 0; k < 6; ++k) jacobian(k / 2, k % 2) = pairs.jacobian[view][k][i];
-  return jacobian;
 }
 
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian) {
@@ -136,9 +145,30 @@ void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jac
   for (int k = 0; k < 6; ++k) pairs.jacobian[view][k][i] = jacobian(k / 2, k % 2);
 }
 
-void fill_fast(RayPairs& pairs) {
+namespace {
+
+// |J|^2 is twice the squared angle of a pixel; lengths across the ray count, those along it do not.
+double pixel_angle(const RayPairs& pairs, int i) {
+  double sum = 0;
+  for (int v = 0; v < 2; ++v) {
+    const Vec3 ray = ray_of(pairs, v, i);
+    const Mat32 J = jacobian_of(pairs, v, i);
+    const double inverse_sq = 1 / ray.squaredNorm();
+    for (int k = 0; k < 2; ++k) {
+      const Vec3 column = J.col(k);
+      const double along = column.dot(ray);
+      sum += (column.squaredNorm() - along * along * inverse_sq) * inverse_sq;
+    }
+  }
+  return std::sqrt(0.5 * sum);
+}
+
+}  // namespace
+
+void finish_rays(RayPairs& pairs) {
   const int end = static_cast<int>(padded(pairs.num));
   for (int i = 0; i < pairs.num; ++i) {
+    pairs.pixel_angle[i] = pixel_angle(pairs, i);
     for (int v = 0; v < 2; ++v) {
       const Mat32 J = jacobian_of(pairs, v, i);
       if (pairs.on_plane) {
@@ -166,22 +196,6 @@ void fill_fast(RayPairs& pairs) {
   }
 }
 
-double pixel_angle(const RayPairs& pairs, int i) {
-  // |J|^2 is twice the squared angle of a pixel; lengths across the ray count, those along it do not.
-  double sum = 0;
-  for (int v = 0; v < 2; ++v) {
-    const Vec3 ray = ray_of(pairs, v, i);
-    const Mat32 J = jacobian_of(pairs, v, i);
-    const double length_sq = ray.squaredNorm();
-    for (int k = 0; k < 2; ++k) {
-      const Vec3 column = J.col(k);
-      const double along = column.dot(ray);
-      sum += (column.squaredNorm() - along * along / length_sq) / length_sq;
-    }
-  }
-  return std::sqrt(0.5 * sum);
-}
-
 double sampson_sq(const RayPairs& pairs, int i, const Mat3& M) {
   Epipolar e;
   epipolar(pairs, i, M, &e);
@@ -207,51 +221,75 @@ int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px
 
 namespace {
 
-// The prediction's displacement d (pixels of image 1) and A = d d / d h (2x3), h = H f0.
-// P = the left inverse of J1 that sends f1 to zero, so that d = P h / (m . h), with m = e_z on the
-// plane and f1 on the sphere. False when H sends the ray behind.
+// The prediction's displacement d (pixels of image 1) and slope = d d / d h (2x3), h = H f0.
+// With P the left inverse of J1 that sends f1 to zero, d = P h / (m . h), where m = e_z on the plane
+// and f1 on the sphere. False when H sends the ray behind.
 struct Transfer {
-  Vec3 f0;
+  double f0[3];
   double d[2];
-  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> slope;  // d d / d h
+  double slope[2][3];
   double weight[3];  // (I + D D')^-1: 00, 01, 11
 };
 
-bool transfer(const RayPairs& pairs, int i, const Mat3& H, Transfer* t) {
-  t->f0 = ray_of(pairs, 0, i);
-  const Vec3 f1 = ray_of(pairs, 1, i);
-  const Mat32 J0 = jacobian_of(pairs, 0, i), J1 = jacobian_of(pairs, 1, i);
-  Mat23 P;
-  Vec3 m;
+inline void left_inverse(const RayPairs& pairs, int i, double P[2][3], double m[3]) {
+  double* const* J = pairs.jacobian[1];
+  double* const* f = pairs.ray[1];
   if (pairs.on_plane) {
-    const double det = J1(0, 0) * J1(1, 1) - J1(0, 1) * J1(1, 0);
-    const double inverse = 1 / det;
-    P << J1(1, 1) * inverse, -J1(0, 1) * inverse, 0, -J1(1, 0) * inverse, J1(0, 0) * inverse, 0;
-    for (int r = 0; r < 2; ++r) P(r, 2) = -(P(r, 0) * f1[0] + P(r, 1) * f1[1]);
-    m = Vec3(0, 0, 1);
-  } else {
-    const double a = J1.col(0).squaredNorm(), b = J1.col(0).dot(J1.col(1)),
-                 c = J1.col(1).squaredNorm();
-    const double inverse = 1 / (a * c - b * b);
-    P.row(0) = (c * J1.col(0) - b * J1.col(1)).transpose() * inverse;
-    P.row(1) = (a * J1.col(1) - b * J1.col(0)).transpose() * inverse;
-    m = f1;
+    const double a = J[0][i], b = J[1][i], c = J[2][i], d = J[3][i];
+    const double inverse = 1 / (a * d - b * c);
+    P[0][0] = d * inverse;
+    P[0][1] = -b * inverse;
+    P[1][0] = -c * inverse;
+    P[1][1] = a * inverse;
+    for (int r = 0; r < 2; ++r) P[r][2] = -(P[r][0] * f[0][i] + P[r][1] * f[1][i]);
+    m[0] = m[1] = 0;
+    m[2] = 1;
+    return;
   }
-  const Vec3 h = H * t->f0;
-  const double depth = m.dot(h);
+  double a = 0, b = 0, c = 0;
+  for (int k = 0; k < 3; ++k) {
+    a += J[2 * k][i] * J[2 * k][i];
+    b += J[2 * k][i] * J[2 * k + 1][i];
+    c += J[2 * k + 1][i] * J[2 * k + 1][i];
+    m[k] = f[k][i];
+  }
+  const double inverse = 1 / (a * c - b * b);
+  for (int k = 0; k < 3; ++k) {
+    P[0][k] = (c * J[2 * k][i] - b * J[2 * k + 1][i]) * inverse;
+    P[1][k] = (a * J[2 * k + 1][i] - b * J[2 * k][i]) * inverse;
+  }
+}
+
+bool transfer(const RayPairs& pairs, int i, const Mat3& H, Transfer* t) {
+  double P[2][3], m[3], h[3], moved[3][2];  // moved = H J0
+  left_inverse(pairs, i, P, m);
+  for (int k = 0; k < 3; ++k) t->f0[k] = pairs.ray[0][k][i];
+  double* const* J0 = pairs.jacobian[0];
+  for (int r = 0; r < 3; ++r) {
+    h[r] = (H(r, 0) * t->f0[0] + H(r, 1) * t->f0[1]) + H(r, 2) * t->f0[2];
+    for (int c = 0; c < 2; ++c) {
+      moved[r][c] = (H(r, 0) * J0[c][i] + H(r, 1) * J0[2 + c][i]) + H(r, 2) * J0[4 + c][i];
+    }
+  }
+  const double depth = (m[0] * h[0] + m[1] * h[1]) + m[2] * h[2];
   if (!(depth > 0)) return false;
   const double inverse = 1 / depth;
-  const Vec2 d = P * h * inverse;
-  t->slope = (P - d * m.transpose()) * inverse;
-  const Eigen::Matrix<double, 2, 2> D = t->slope * (H * J0);
-  const double g00 = 1 + D.row(0).squaredNorm(), g11 = 1 + D.row(1).squaredNorm(),
-               g01 = D.row(0).dot(D.row(1));
-  const double det = 1 / (g00 * g11 - g01 * g01);
-  t->d[0] = d[0];
-  t->d[1] = d[1];
-  t->weight[0] = g11 * det;
-  t->weight[1] = -g01 * det;
-  t->weight[2] = g00 * det;
+  double D[2][2];
+  for (int r = 0; r < 2; ++r) {
+    t->d[r] = ((P[r][0] * h[0] + P[r][1] * h[1]) + P[r][2] * h[2]) * inverse;
+    for (int k = 0; k < 3; ++k) t->slope[r][k] = (P[r][k] - t->d[r] * m[k]) * inverse;
+    for (int c = 0; c < 2; ++c) {
+      D[r][c] = (t->slope[r][0] * moved[0][c] + t->slope[r][1] * moved[1][c]) +
+                t->slope[r][2] * moved[2][c];
+    }
+  }
+  const double g00 = 1 + (D[0][0] * D[0][0] + D[0][1] * D[0][1]);
+  const double g11 = 1 + (D[1][0] * D[1][0] + D[1][1] * D[1][1]);
+  const double g01 = D[0][0] * D[1][0] + D[0][1] * D[1][1];
+  const double inverse_det = 1 / (g00 * g11 - g01 * g01);
+  t->weight[0] = g11 * inverse_det;
+  t->weight[1] = -g01 * inverse_det;
+  t->weight[2] = g00 * inverse_det;
   return true;
 }
 
@@ -353,11 +391,11 @@ double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, 
     for (int r = 0; r < 2; ++r) {
       for (int p = 0; p < P; ++p) {
         if (columns == nullptr) {
-          row[r][p] = t.slope(r, p / 3) * t.f0[p % 3];
+          row[r][p] = t.slope[r][p / 3] * t.f0[p % 3];
         } else {
-          const Vec3 moved = columns[p] * t.f0;
-          row[r][p] = (t.slope(r, 0) * moved[0] + t.slope(r, 1) * moved[1]) +
-                      t.slope(r, 2) * moved[2];
+          const Vec3 moved = columns[p] * Vec3(t.f0[0], t.f0[1], t.f0[2]);
+          row[r][p] = (t.slope[r][0] * moved[0] + t.slope[r][1] * moved[1]) +
+                      t.slope[r][2] * moved[2];
         }
       }
     }

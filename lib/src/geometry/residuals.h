@@ -24,6 +24,8 @@ struct RayPairs {
   bool on_plane;      // both views: rays have z = 1, so the third rows of the Jacobians are zero
   double* ray[2][3];
   double* jacobian[2][6];  // row-major 3x2
+  double* pixel_angle;  // the angle, in radians, that a pixel of noise in both images makes between
+                        // the two rays
   // For scoring only, single precision, padded with zeros to a multiple of kScoreBlock.
   // On the plane: x0 y0 x1 y1, then J J' of view 0 and of view 1 (xx, xy, yy).
   // Else: the rays (6) and the Jacobians (12).
@@ -36,13 +38,14 @@ RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane);
 inline Vec3 ray_of(const RayPairs& pairs, int view, int i) {
   return Vec3(pairs.ray[view][0][i], pairs.ray[view][1][i], pairs.ray[view][2][i]);
 }
-Mat32 jacobian_of(const RayPairs& pairs, int view, int i);
+inline Mat32 jacobian_of(const RayPairs& pairs, int view, int i) {
+  Mat32 jacobian;
+  for (int k = 0; k < 6; ++k) jacobian(k / 2, k % 2) = pairs.jacobian[view][k][i];
+  return jacobian;
+}
 
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian);
-void fill_fast(RayPairs& pairs);  // after the last set_ray
-
-// The angle, in radians, that one pixel of noise in both images makes between the two rays.
-double pixel_angle(const RayPairs& pairs, int i);
+void finish_rays(RayPairs& pairs);  // after the last set_ray: fills what follows from the rays
 
 // Squared Sampson distance; +inf for a match that the model says nothing about (both rays at the
 // epipoles).

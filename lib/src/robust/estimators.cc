@@ -33,7 +33,7 @@ bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
   *r_sq = sampson_sq(pairs, i, E);
   if (!(*r_sq <= limit_px * limit_px)) return false;
   return depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
-                                threshold_px * pixel_angle(pairs, i))) >= 0;
+                                threshold_px * pairs.pixel_angle[i])) >= 0;
 }
 
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
@@ -64,27 +64,33 @@ bool pose_from_essential(const RayPairs& pairs, const int32_t* indices, int coun
   if (!decompose_essential(E, R, &t)) return false;
   // Each rotation with +t and with -t: the second's depths are the negatives of the first's.
   int votes[4] = {}, signs[4] = {}, behind[4] = {};
-  for (int k = 0; k < count; ++k) {
-    const int i = indices[k];
-    const double angle = threshold_px * pixel_angle(pairs, i);
-    for (int r = 0; r < 2; ++r) {
-      DepthSigns d = depth_signs(Pose{R[r], t}, ray_of(pairs, 0, i), ray_of(pairs, 1, i), angle);
-      for (int s = 0; s < 2; ++s) {
-        const int vote = depth_vote(d);
-        votes[2 * r + s] += vote;
-        behind[2 * r + s] += vote < 0;
-        signs[2 * r + s] += (d.depth0 > 0) + (d.depth1 > 0);
-        d.depth0 = -d.depth0;
-        d.depth1 = -d.depth1;
-      }
+  for (int r = 0; r < 2; ++r) {
+    const Pose candidate{R[r], t};
+    for (int k = 0; k < count; ++k) {
+      const int i = indices[k];
+      const DepthSigns d = depth_signs(candidate, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
+                                       threshold_px * pairs.pixel_angle[i]);
+      const DepthSigns opposite{-d.depth0, -d.depth1, d.tolerance0_sq, d.tolerance1_sq};
+      const int vote = depth_vote(d), opposite_vote = depth_vote(opposite);
+      votes[2 * r] += vote;
+      votes[2 * r + 1] += opposite_vote;
+      behind[2 * r] += vote < 0;
+      behind[2 * r + 1] += opposite_vote < 0;
+      signs[2 * r] += (d.depth0 > 0) + (d.depth1 > 0);
+      signs[2 * r + 1] += (d.depth0 < 0) + (d.depth1 < 0);
+      if (strict && behind[2 * r] > 0 && behind[2 * r + 1] > 0) break;
     }
   }
   int best = 0;
   for (int c = 1; c < 4; ++c) {
-    if (votes[c] > votes[best] || (votes[c] == votes[best] && signs[c] > signs[best])) best = c;
+    if (strict ? behind[c] < behind[best] ||
+                     (behind[c] == behind[best] && signs[c] > signs[best])
+               : votes[c] > votes[best] || (votes[c] == votes[best] && signs[c] > signs[best])) {
+      best = c;
+    }
   }
   if (strict && behind[best] > 0) return false;
-  *pose = Pose{R[best / 2], best % 2 == 0 ? t : Vec3(-t)};
+  *pose = Pose{orthonormalised(R[best / 2]), best % 2 == 0 ? t : Vec3(-t)};
   return true;
 }
 

@@ -208,7 +208,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   matches->area_px = problem.calibrated
                          ? static_cast<double>(second.width) * second.height
                          : box_area(problem.pixels[1], matches->order, matches->num_unique);
-  fill_fast(matches->pairs);
+  finish_rays(matches->pairs);
 }
 
 }  // namespace tv

@@ -117,7 +117,7 @@ double noise_px(const Finish& f, const Mat3& M, int count) {
 RobustLoss final_loss(const Finish& f, const Mat3& M, int count) {
   const double scale = kFinalScale * noise_px(f, M, count);
   return RobustLoss{Loss::kCauchy,
-                    std::fmax(0.02 * f.threshold, std::fmin(scale, f.threshold))};
+                    std::max(0.02 * f.threshold, std::min(scale, f.threshold))};
 }
 
 Pose refined_pose(const Finish& f, const Pose& start) {
@@ -273,7 +273,7 @@ void measure_pose(Finish& f) {
   double sum = 0;
   for (int k = 0; k < f.num_support; ++k) {
     f.values[k] = parallax(f, f.support[k]);
-    sum += pixel_angle(f.pairs, f.support[k]);
+    sum += f.pairs.pixel_angle[f.support[k]];
   }
   double* middle = f.values + (f.num_support - 1) / 2;
   std::nth_element(f.values, middle, f.values + f.num_support);
