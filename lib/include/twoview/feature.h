@@ -37,7 +37,7 @@ typedef struct tv_feature_options {
   uint32_t struct_size;  /* set by tv_feature_options_init */
   int32_t max_keypoints; /* a bound on descriptors an image, second orientations included, which get
                             the room that corners leave; [1, the context's], default 2048 */
-  int32_t arc;           /* contiguous pixels of the 16-pixel circle: 9, 10, 11 or 12 (default, the
+  int32_t arc;           /* contiguous pixels of the 16-pixel circle: 9 (default), 10, 11 or 12 (the
                             paper's); a longer arc gives fewer, sharper corners */
   int32_t threshold;     /* grey levels, [1, 254], default 10; a bigger value gives fewer, stronger
                             corners */

@@ -84,7 +84,7 @@ void tv_feature_options_init(tv_feature_options* options) {
   *options = tv_feature_options{};
   options->struct_size = sizeof(tv_feature_options);
   options->max_keypoints = 2048;
-  options->arc = 12;
+  options->arc = 9;
   options->threshold = 10;
   options->min_threshold = 3;
   options->levels = 1;
