@@ -42,7 +42,8 @@ extern "C" {
    quantize_descriptor: SIFT's normalisation, clipping at 0.2, and 128 bytes; root: RootSIFT.
    widen: bytes to int16.
    squared_distances: out[j] = |query|^2 + |row j|^2 - 2 query . row j, for 128-element rows.
-   update_columns: per column j: the two smallest of dist so far and the row index of the smallest. */
+   update_columns: per column j: the two smallest of dist so far and the row index of the smallest;
+     returns the smallest of dist. */
 #define TVK_LIST(X)                                                                                \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
@@ -68,7 +69,7 @@ extern "C" {
   X(squared_distances, void,                                                                       \
     (const int16_t *query, int32_t query_norm, const int16_t *rows, const int32_t *norms,          \
      int32_t num_rows, int32_t *out))                                                              \
-  X(update_columns, void,                                                                          \
+  X(update_columns, int32_t,                                                                       \
     (const int32_t *dist, int32_t num_columns, int32_t row, int32_t *best, int32_t *second,        \
      int32_t *best_row))
 

@@ -33,20 +33,22 @@ struct Nearest {
   int32_t best, second, idx;
 };
 
-Nearest nearest_in_row(const int32_t* dist, int32_t count) {
-  Nearest nearest{kFar, kFar, -1};
+// Rows of one side that stay in the first-level cache while all of the other side meet them.
+constexpr int32_t kBlock = 64;
+
+// Takes in the distances to rows first .. first + count - 1, which come in ascending order.
+void update_row(const int32_t* dist, int32_t first, int32_t count, Nearest* nearest) {
   for (int32_t j = 0; j < count; ++j) {
     const int32_t d = dist[j];
-    if (d >= nearest.second) continue;
-    if (d < nearest.best) {
-      nearest.second = nearest.best;
-      nearest.best = d;
-      nearest.idx = j;
+    if (d >= nearest->second) continue;
+    if (d < nearest->best) {
+      nearest->second = nearest->best;
+      nearest->best = d;
+      nearest->idx = first + j;
     } else {
-      nearest.second = d;
+      nearest->second = d;
     }
   }
-  return nearest;
 }
 
 // Distance to the nearest over distance to the second nearest; 1 where there is no second, or where
@@ -61,7 +63,7 @@ float distance_ratio(int32_t best, int32_t second) {
 size_t match_bytes(int32_t max_keypoints) {
   const size_t n = static_cast<size_t>(max_keypoints);
   return 2 * (arena_bytes<int16_t>(n * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(n)) +
-         4 * arena_bytes<int32_t>(n) + arena_bytes<Nearest>(n) +
+         3 * arena_bytes<int32_t>(n) + arena_bytes<Nearest>(n) +
          arena_bytes<tv_correspondence>(n);
 }
 
@@ -73,7 +75,7 @@ int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0,
   const Side side0 = prepare(kernels, descriptors0, num0, arena);
   const Side side1 = prepare(kernels, descriptors1, num1, arena);
   const size_t columns = static_cast<size_t>(num1);
-  int32_t* dist = arena_alloc<int32_t>(arena, columns);
+  int32_t dist[kBlock];
   int32_t* best = arena_alloc<int32_t>(arena, columns);
   int32_t* second = arena_alloc<int32_t>(arena, columns);
   int32_t* best_row = arena_alloc<int32_t>(arena, columns);
@@ -81,11 +83,17 @@ int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0,
   std::fill(best, best + num1, kFar);
   std::fill(second, second + num1, kFar);
   std::fill(best_row, best_row + num1, -1);
-  for (int32_t i = 0; i < num0; ++i) {
-    kernels.squared_distances(side0.rows + static_cast<int64_t>(i) * TV_DESCRIPTOR_BYTES,
-                              side0.norms[i], side1.rows, side1.norms, num1, dist);
-    kernels.update_columns(dist, num1, i, best, second, best_row);
-    rows[i] = nearest_in_row(dist, num1);
+  std::fill(rows, rows + num0, Nearest{kFar, kFar, -1});
+  for (int32_t first = 0; first < num1; first += kBlock) {
+    const int32_t width = std::min(kBlock, num1 - first);
+    const int16_t* block = side1.rows + static_cast<int64_t>(first) * TV_DESCRIPTOR_BYTES;
+    for (int32_t i = 0; i < num0; ++i) {
+      kernels.squared_distances(side0.rows + static_cast<int64_t>(i) * TV_DESCRIPTOR_BYTES,
+                                side0.norms[i], block, side1.norms + first, width, dist);
+      const int32_t smallest = kernels.update_columns(dist, width, i, best + first, second + first,
+                                                      best_row + first);
+      if (smallest < rows[i].second) update_row(dist, first, width, &rows[i]);
+    }
   }
   int32_t count = 0;
   for (int32_t i = 0; i < num0; ++i) {
