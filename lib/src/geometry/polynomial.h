@@ -84,7 +84,12 @@ double polynomial_value(const double* p, double z, double* derivative) {
 template <int kDegree>
 double bracketed_root(const double* p, double low, double high) {
   double slope;
-  const bool low_negative = polynomial_value<kDegree>(p, low, &slope) < 0;
+  const double at_low = polynomial_value<kDegree>(p, low, &slope);
+  const double at_high = polynomial_value<kDegree>(p, high, &slope);
+  const bool low_negative = at_low < 0;
+  if (low_negative == (at_high < 0)) {  // the root is an end of the bracket, within rounding
+    return std::fabs(at_low) < std::fabs(at_high) ? low : high;
+  }
   double z = 0.5 * (low + high);
   for (int iteration = 0; iteration < 60; ++iteration) {
     const double value = polynomial_value<kDegree>(p, z, &slope);

@@ -1,0 +1,161 @@
+// Synthetic pairs that own their conditioning, for tests of the geometry. Static storage throughout:
+// a failing Unity test leaves by longjmp.
+#ifndef TEST_SUPPORT_SCENE_H
+#define TEST_SUPPORT_SCENE_H
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "base/math.h"
+#include "base/random.h"
+#include "geometry/camera.h"
+#include "geometry/essential.h"
+#include "twoview/two_view.h"
+#include "unity.h"
+
+namespace scene {
+
+using tv::Mat3;
+using tv::Vec2;
+using tv::Vec3;
+
+constexpr int kMaxMatches = 2000;
+
+inline double uniform(tv::Random* random, double low, double high) {
+  return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
+}
+
+// A sum of 12: near enough to a normal distribution.
+inline double normal(tv::Random* random) {
+  double sum = -6;
+  for (int i = 0; i < 12; ++i) sum += uniform(random, 0, 1);
+  return sum;
+}
+
+inline Vec3 direction(tv::Random* random) {
+  for (;;) {
+    const Vec3 v(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+    if (v.squaredNorm() < 1 && v.squaredNorm() > 0.01) return v.normalized();
+  }
+}
+
+inline tv_camera pinhole() {
+  return tv_camera{TV_CAMERA_PINHOLE, 640, 480, 0, 500, 505, 321, 238, {}};
+}
+
+inline tv_camera distorted() {  // EuRoC's
+  return tv_camera{TV_CAMERA_BROWN_CONRADY, 752, 480, 0, 458.654, 457.296, 367.215, 248.375,
+                   {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}};
+}
+
+inline tv_camera fisheye() {
+  return tv_camera{TV_CAMERA_KANNALA_BRANDT, 640, 640, 0, 190, 190, 319.5, 319.5,
+                   {0.01, -0.003, 0.0002, 0}};
+}
+
+enum class Kind { kGeneral, kPlanar, kForward, kRotation, kStill };
+
+struct Options {
+  Kind kind = Kind::kGeneral;
+  int num = 300;
+  double inlier_share = 1;
+  double noise_px = 0.5;
+  tv_camera camera[2] = {pinhole(), pinhole()};
+  uint64_t seed = 1;
+};
+
+struct Scene {
+  Options options;
+  Mat3 R;
+  Vec3 t;  // unit, or zero
+  double pixels[2][2 * kMaxMatches];
+  float ratios[kMaxMatches];
+  uint8_t inlier[kMaxMatches];
+};
+
+// A pixel in the inner part of the image.
+inline Vec2 random_pixel(tv::Random* random, const tv_camera& camera) {
+  return Vec2(uniform(random, 5, camera.width - 6), uniform(random, 5, camera.height - 6));
+}
+
+inline void choose_motion(tv::Random* random, Scene* s) {
+  const Kind kind = s->options.kind;
+  s->R = tv::rotation_about(direction(random), uniform(random, 0.02, 0.2));
+  s->t = direction(random);
+  if (kind == Kind::kForward) s->t = Vec3(0.1, -0.05, -1).normalized();
+  if (kind == Kind::kRotation || kind == Kind::kStill) s->t.setZero();
+  if (kind == Kind::kStill) s->R = Mat3::Identity();
+}
+
+// Depths from 2 to 8 times the baseline, or those of a plane four baselines away.
+inline bool true_match(tv::Random* random, const tv::Camera* cameras, const Vec3& normal_of_plane,
+                       Scene* s, Vec2* p0, Vec2* p1) {
+  *p0 = random_pixel(random, s->options.camera[0]);
+  Vec3 ray;
+  if (!tv::unproject(cameras[0], *p0, &ray, nullptr)) return false;
+  double depth = uniform(random, 2, 8);
+  if (s->options.kind == Kind::kPlanar) depth = 4 / normal_of_plane.dot(ray);
+  if (!(depth > 1 && depth < 20)) return false;
+  if (!tv::project(cameras[1], s->R * (depth * ray) + s->t, p1, nullptr)) return false;
+  const tv_camera& second = s->options.camera[1];
+  return (*p1)[0] > 0 && (*p1)[0] < second.width - 1 && (*p1)[1] > 0 &&
+         (*p1)[1] < second.height - 1;
+}
+
+inline void make(const Options& options, Scene* s) {
+  TEST_ASSERT_TRUE(options.num <= kMaxMatches);
+  s->options = options;
+  tv::Random random = tv::random_seeded(options.seed);
+  choose_motion(&random, s);
+  const tv::Camera cameras[2] = {tv::prepare_camera(options.camera[0]),
+                                 tv::prepare_camera(options.camera[1])};
+  const Vec3 plane =
+      Vec3(uniform(&random, -0.4, 0.4), uniform(&random, -0.4, 0.4), 1).normalized();
+  const int num_true = static_cast<int>(options.num * options.inlier_share + 0.5);
+  int restarts = 0;
+  for (int i = 0; i < options.num; ++i) {
+    Vec2 p[2];
+    s->inlier[i] = i < num_true;
+    if (s->inlier[i]) {
+      int tries = 0;
+      while (tries < 1000 && !true_match(&random, cameras, plane, s, &p[0], &p[1])) ++tries;
+      if (tries == 1000) {  // the views hardly overlap
+        TEST_ASSERT_TRUE(++restarts < 100);
+        choose_motion(&random, s);
+        i = -1;
+        continue;
+      }
+      for (int v = 0; v < 2; ++v) {
+        for (int k = 0; k < 2; ++k) p[v][k] += options.noise_px * normal(&random);
+      }
+    } else {
+      for (int v = 0; v < 2; ++v) p[v] = random_pixel(&random, options.camera[v]);
+    }
+    for (int v = 0; v < 2; ++v) {
+      for (int k = 0; k < 2; ++k) s->pixels[v][2 * i + k] = p[v][k];
+    }
+    s->ratios[i] = static_cast<float>(uniform(&random, s->inlier[i] ? 0.2 : 0.5, 0.8));
+  }
+}
+
+inline double degrees(double rad) { return rad * 180 / tv::kPi; }
+
+// Angle of R_est R_gt'.
+inline double rotation_error_deg(const double R[9], const Mat3& truth) {
+  Mat3 estimate;
+  for (int k = 0; k < 9; ++k) estimate(k / 3, k % 3) = R[k];
+  const Mat3 d = estimate * truth.transpose();
+  const Vec3 axis(d(2, 1) - d(1, 2), d(0, 2) - d(2, 0), d(1, 0) - d(0, 1));
+  return degrees(tv::atan2(axis.norm(), d.trace() - 1));
+}
+
+// Angle between the directions, with their signs.
+inline double translation_error_deg(const double t[3], const Vec3& truth) {
+  const Vec3 estimate(t[0], t[1], t[2]);
+  return degrees(tv::atan2(estimate.cross(truth).norm(), estimate.dot(truth)));
+}
+
+}  // namespace scene
+
+#endif
