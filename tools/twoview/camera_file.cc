@@ -61,7 +61,7 @@ void read_distortion(const YAML::Node& root, const std::string& file, tv_camera&
       equidistant ? k.size() == 4 : k.empty() || k.size() == 4 || k.size() == 5 || k.size() == 8;
   if (!fits)
     throw BadInput(file + ": distortion_coefficients has " + std::to_string(k.size()) +
-                   " numbers, not " + (equidistant ? "4" : "5 or 8"));
+                   " numbers, not " + (equidistant ? "4" : "4, 5 or 8"));
   std::copy(k.begin(), k.end(), camera.k);
   // An equidistant lens with four zeros is still no pinhole.
   const bool straight = std::all_of(k.begin(), k.end(), [](double v) { return v == 0; });

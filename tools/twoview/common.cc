@@ -9,6 +9,9 @@ void add_common(CLI::App& verb, Common& common, unsigned groups, const std::stri
   CLI::Option* output = verb.add_option("-o,--output", common.output, output_help);
   output->required();
   output->type_name("PATH");
+  output->check([](const std::string& path) {
+    return path.empty() ? std::string("the path is empty") : std::string();
+  });
   verb.add_flag("--json", common.json, "print the result alone, as JSON, on stdout");
   verb.add_flag("--quiet", common.quiet, "print nothing on stdout");
   add_options(verb, common.options, groups | kCommon);

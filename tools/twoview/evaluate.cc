@@ -266,6 +266,7 @@ void split_output(const std::string& output, fs::path& folder, std::string& name
 int evaluate(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
+  if (!fs::is_directory(a.images)) throw BadInput("--images: " + a.images + " is not a folder");
   std::vector<Pair> pairs = load_pairs(a.pairs);
   if (a.max_pairs > 0 && pairs.size() > static_cast<size_t>(a.max_pairs))
     pairs.resize(static_cast<size_t>(a.max_pairs));
@@ -304,7 +305,11 @@ void add_evaluate(CLI::App& program, Run& run) {
       ->required()
       ->type_name("FILE");
   verb->add_option("--images", a->images, "folder of the images")->required()->type_name("DIR");
-  verb->add_option("--max-pairs", a->max_pairs, "take the first N pairs; 0: all")->type_name("N");
+  verb->add_option("--max-pairs", a->max_pairs, "take the first N pairs; 0: all")
+      ->check([](const std::string& count) {
+        return count[0] == '-' ? count + " is negative" : std::string();
+      })
+      ->type_name("N");
   add_common(*verb, a->common, kAllOptions, "folder for report.json, or the file itself");
   verb->final_callback([a, &run] { run = [a] { return evaluate(*a); }; });
 }

@@ -33,8 +33,10 @@ int run_program(int argc, char** argv) {
   cli::add_match(program, run);
   cli::add_evaluate(program, run);
   const auto verbs = program.get_subcommands([](const CLI::App*) { return true; });
-  const auto is_named = [&](const CLI::App* verb) { return verb->get_name() == argv[1]; };
-  if (argc > 1 && argv[1][0] != '-' && std::none_of(verbs.begin(), verbs.end(), is_named))
+  const auto is_named_first = [&](const CLI::App* verb) {
+    return argc > 1 && verb->get_name() == argv[1];
+  };
+  if (argc > 1 && argv[1][0] != '-' && std::none_of(verbs.begin(), verbs.end(), is_named_first))
     return refuse("no verb '" + std::string(argv[1]) + "' (see twoview --help)");
   try {
     program.parse(argc, argv);
@@ -46,7 +48,9 @@ int run_program(int argc, char** argv) {
     cli::print(chosen.empty() ? program.help() : chosen[0]->help("twoview"));
     return 0;
   } catch (const CLI::ParseError& e) {
-    return refuse(std::string(e.what()) + " (see twoview --help)");
+    const auto chosen = std::find_if(verbs.begin(), verbs.end(), is_named_first);
+    const std::string verb = chosen == verbs.end() ? "" : (*chosen)->get_name() + " ";
+    return refuse(std::string(e.what()) + " (see twoview " + verb + "--help)");
   }
   return run();
 }

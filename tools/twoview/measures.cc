@@ -36,6 +36,10 @@ double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1
 
 double norm(const Vector3& v) { return std::sqrt(dot(v, v)); }
 
+double determinant(const Matrix3& a) {
+  return dot({a[0], a[1], a[2]}, cross({a[3], a[4], a[5]}, {a[6], a[7], a[8]}));
+}
+
 double rotation_error_deg(const Matrix3& R_est, const Matrix3& R_gt) {
   const Matrix3 d = product(R_est, transposed(R_gt));
   // sin from the skew part, cos from the trace: no loss at 0 degrees, where acos has one.

@@ -18,6 +18,7 @@ Vector3 applied(const Matrix3& a, const Vector3& v);  // a v
 Vector3 cross(const Vector3& a, const Vector3& b);
 double dot(const Vector3& a, const Vector3& b);
 double norm(const Vector3& v);
+double determinant(const Matrix3& a);
 
 // Angle of R_est R_gt^T, degrees; exact for small angles too.
 double rotation_error_deg(const Matrix3& R_est, const Matrix3& R_gt);

@@ -7,6 +7,8 @@
 #include <variant>
 #include <vector>
 
+#include "error.h"
+
 namespace cli {
 namespace {
 
@@ -187,6 +189,11 @@ void Options::settle() {
   // A threshold below the default floor is meant: the floor follows it, unless it was given too.
   if (!min_threshold_given)
     feature.min_threshold = std::min(feature.min_threshold, feature.threshold);
+  if (feature.min_threshold > feature.threshold)
+    throw BadInput("--min-threshold " + std::to_string(feature.min_threshold) +
+                   " is above --threshold " + std::to_string(feature.threshold));
+  if (feature.cell_px > 0 && feature.cell_px < 8)
+    throw BadInput("--cell-px: " + std::to_string(feature.cell_px) + " is not 0 or in [8, 16384]");
 }
 
 void add_options(CLI::App& verb, Options& options, unsigned groups) {

@@ -23,6 +23,14 @@ struct Descriptor {
   }
 };
 
+// A link such as /dev/stdout, which stands for an open file whatever that file is: to rename over it
+// would take the link away from every program.
+bool stands_for_open_file(const fs::path& path) {
+  std::error_code error;
+  const std::string link = fs::read_symlink(path, error).string();
+  return !error && link.rfind("/proc/", 0) == 0;
+}
+
 // 0, or the errno of the first failure. Data are pushed to the disk, so that a full one is noticed
 // before the file gets its final name.
 int write_all(int fd, std::string_view bytes) {
@@ -83,13 +91,13 @@ void OutputSet::add(const std::string& name, std::string_view bytes) {
   if (exists && S_ISDIR(info.st_mode))
     throw BadInput("cannot write " + target.string() + ": it is a folder");
 
-  const bool direct = exists && !S_ISREG(info.st_mode);
+  const bool direct = exists && (!S_ISREG(info.st_mode) || stands_for_open_file(target));
   Entry entry{name, {}};
   if (!direct) entry.temporary = folder_ / ("." + name + "." + std::to_string(::getpid()) + ".tmp");
   const fs::path& path = direct ? target : entry.temporary;
 
   Descriptor file;
-  const int flags = O_WRONLY | O_CLOEXEC | (direct ? 0 : O_CREAT | O_EXCL | O_NOFOLLOW);
+  const int flags = O_WRONLY | O_CLOEXEC | (direct ? O_APPEND : O_CREAT | O_EXCL | O_NOFOLLOW);
   file.fd = ::open(path.c_str(), flags, 0666);
   if (file.fd < 0) throw BadInput("cannot write " + target.string() + ": " + reason(errno));
   entries_.push_back(entry);  // from here on discard() removes the temporary file

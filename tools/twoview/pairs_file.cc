@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "error.h"
+#include "measures.h"
 #include "output.h"
 
 namespace cli {
@@ -44,6 +45,7 @@ void check_rotation(const std::array<double, 9>& R) {
       for (int k = 0; k < 3; ++k) dot += R[size_t(3 * i + k)] * R[size_t(3 * j + k)];
       if (std::abs(dot - (i == j)) > 1e-3) throw BadInput("T_0to1 holds no rotation");
     }
+  if (determinant(R) < 0) throw BadInput("T_0to1 holds a reflection, no rotation");
 }
 
 Pair parse_line(const std::string& line) {

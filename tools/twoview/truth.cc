@@ -53,6 +53,7 @@ Truth load_truth(const std::string& path) {
   const Matrix3 identity = product(truth.R, transposed(truth.R));
   for (size_t i = 0; i < 9; ++i)
     if (std::abs(identity[i] - (i % 4 == 0)) > 1e-3) throw BadInput(path + ": R is no rotation");
+  if (determinant(truth.R) < 0) throw BadInput(path + ": R is no rotation but a reflection");
   if (norm(truth.t) == 0) throw BadInput(path + ": t is 0");
   truth.baseline = root["baseline"] ? number_at(root, "baseline", path) : norm(truth.t);
   if (truth.baseline <= 0) throw BadInput(path + ": baseline is not above 0");
