@@ -201,13 +201,14 @@ void choose_planar_pose(Finish& f, const Rivals& rivals) {
   f.out->epipolar.M = essential_from_pose(poses[best]);
   collect_support(f);
   int other = -1;
+  double farthest = 1e-4;  // half a degree
   for (int k = 0; k < num_poses; ++k) {
     const double turned = (poses[k].R - poses[best].R).squaredNorm() +
                           (poses[k].t - poses[best].t).squaredNorm();
-    const bool different = turned > 1e-4;  // half a degree
-    if (k != best && different && 10 * inliers[k] >= 9 * inliers[best] &&
-        (other < 0 || cost[k] < cost[other])) {
+    // Of the other two, one may be the best again, stopped elsewhere in a flat valley.
+    if (k != best && turned > farthest && 10 * inliers[k] >= 9 * inliers[best]) {
       other = k;
+      farthest = turned;
     }
   }
   if (other >= 0) {
