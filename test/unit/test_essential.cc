@@ -107,8 +107,12 @@ void test_points_within_the_tolerance_of_infinity_do_not_vote(void) {
     const Vec3 ray1(far[0] + parallax, far[1], 1);
     const int vote = tv::depth_vote(tv::depth_signs(pose, far, ray1, 4.5e-4));
     const double size = std::fabs(parallax);
-    if (size < 4e-4) TEST_ASSERT_EQUAL_INT(0, vote);
-    if (size > 5e-4) TEST_ASSERT_EQUAL_INT(parallax > 0 ? 1 : -1, vote);
+    if (size < 4e-4) {
+      TEST_ASSERT_EQUAL_INT(0, vote);
+    }
+    if (size > 5e-4) {
+      TEST_ASSERT_EQUAL_INT(parallax > 0 ? 1 : -1, vote);
+    }
   }
   TEST_ASSERT_EQUAL_INT(0, tv::depth_vote(tv::depth_signs(pose, far, far, 0)));
 }

@@ -59,8 +59,12 @@ void test_progressive_samples_start_with_the_surest_and_end_with_all(void) {
     TEST_ASSERT_TRUE(sampler.pool >= last_pool);
     last_pool = sampler.pool;
     expect_distinct(sample, 5, sampler.pool);
-    if (k == 0) TEST_ASSERT_EQUAL_INT(5, sampler.pool);
-    if (k == 20) TEST_ASSERT_LESS_THAN_INT(60, sampler.pool);
+    if (k == 0) {
+      TEST_ASSERT_EQUAL_INT(5, sampler.pool);
+    }
+    if (k == 20) {
+      TEST_ASSERT_LESS_THAN_INT(60, sampler.pool);
+    }
   }
   TEST_ASSERT_EQUAL_INT(kNum, sampler.pool);
 }
