@@ -1,0 +1,238 @@
+// What kind of pair tv_estimate_two_view says it is, over many synthetic pairs, lenses and hostile
+// inputs. TWOVIEW_SEED moves the pairs.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "support/scene.h"
+#include "twoview/two_view.h"
+
+namespace {
+
+using scene::Kind;
+
+constexpr int kCapMatches = 4000;
+alignas(TV_CONTEXT_ALIGNMENT) uint8_t memory[8 << 20];
+tv_context* context;
+scene::Scene pair;
+uint8_t mask[kCapMatches];
+uint64_t base_seed = 1000;
+
+tv_estimate_options defaults(int method) {
+  tv_estimate_options options;
+  tv_estimate_options_init(&options);
+  options.method = method;
+  options.max_iterations = 3000;
+  return options;
+}
+
+tv_two_view estimate(const tv_camera* cameras, const double* pixels0, const double* pixels1,
+                     const float* ratios, int num, const tv_estimate_options& options) {
+  tv_two_view result;
+  tv_two_view_init(&result);
+  const tv_camera* second = cameras == nullptr ? nullptr : cameras + 1;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context, cameras, second, pixels0, pixels1,
+                                                    ratios, num, &options, &result, mask));
+  const double* arrays[] = {result.R, result.t, result.E, result.F, result.H, result.alternative_R,
+                            result.alternative_t, result.covariance};
+  const int sizes[] = {9, 3, 9, 9, 9, 9, 3, 25};
+  double sum = result.coverage + result.median_parallax_rad + result.rms_error_px;
+  for (int a = 0; a < 8; ++a) {
+    for (int k = 0; k < sizes[a]; ++k) sum += arrays[a][k];
+  }
+  TEST_ASSERT_TRUE(std::isfinite(sum));
+  int inliers = 0;
+  for (int i = 0; i < num; ++i) inliers += mask[i];
+  TEST_ASSERT_EQUAL_INT(result.num_inliers, inliers);
+  TEST_ASSERT_TRUE(result.coverage >= 0 && result.coverage <= 1);
+  return result;
+}
+
+tv_two_view estimate_pair(bool calibrated, int method) {
+  return estimate(calibrated ? pair.options.camera : nullptr, pair.pixels[0], pair.pixels[1],
+                  pair.ratios, pair.options.num, defaults(method));
+}
+
+scene::Options options_of(Kind kind, int num, double inlier_share, uint64_t seed) {
+  scene::Options options;
+  options.kind = kind;
+  options.num = num;
+  options.inlier_share = inlier_share;
+  options.seed = base_seed + seed;
+  return options;
+}
+
+// At least nine in ten, over shares of inliers and noise up to half the threshold.
+void test_config_names_the_kind_of_pair(void) {
+  const Kind kinds[5] = {Kind::kGeneral, Kind::kForward, Kind::kPlanar, Kind::kRotation,
+                         Kind::kStill};
+  const int configs[2][5] = {
+      {TV_CONFIG_UNCALIBRATED, TV_CONFIG_UNCALIBRATED, TV_CONFIG_PLANAR_OR_PANORAMIC,
+       TV_CONFIG_PLANAR_OR_PANORAMIC, TV_CONFIG_NO_MOTION},
+      {TV_CONFIG_CALIBRATED, TV_CONFIG_CALIBRATED, TV_CONFIG_PLANAR, TV_CONFIG_PANORAMIC,
+       TV_CONFIG_NO_MOTION}};
+  for (int calibrated = 0; calibrated < 2; ++calibrated) {
+    for (int k = 0; k < 5; ++k) {
+      int right = 0;
+      for (int trial = 0; trial < 20; ++trial) {
+        scene::Options options = options_of(kinds[k], 300, trial % 2 == 0 ? 0.6 : 0.9, 20 * k + trial);
+        options.noise_px = trial % 4 < 2 ? 0.2 : 0.5;
+        scene::make(options, &pair);
+        const tv_two_view r = estimate_pair(
+            calibrated == 1, calibrated == 1 ? TV_METHOD_FIVE_POINT : TV_METHOD_SEVEN_POINT);
+        right += r.config == configs[calibrated][k];
+      }
+      TEST_ASSERT_GREATER_OR_EQUAL_INT(18, right);
+    }
+  }
+}
+
+void test_each_kind_has_what_it_promises(void) {
+  for (Kind kind : {Kind::kGeneral, Kind::kPlanar, Kind::kRotation, Kind::kStill}) {
+    scene::make(options_of(kind, 300, 0.7, 200), &pair);
+    for (int calibrated = 0; calibrated < 2; ++calibrated) {
+      const tv_two_view r = estimate_pair(
+          calibrated == 1, calibrated == 1 ? TV_METHOD_FIVE_POINT : TV_METHOD_SEVEN_POINT);
+      const bool full = r.config == TV_CONFIG_CALIBRATED || r.config == TV_CONFIG_PLANAR;
+      const bool rotation =
+          calibrated == 1 && (r.config == TV_CONFIG_PANORAMIC || r.config == TV_CONFIG_NO_MOTION);
+      TEST_ASSERT_EQUAL_INT(full || rotation, r.has_R);
+      TEST_ASSERT_EQUAL_INT(full, r.has_t);
+      TEST_ASSERT_EQUAL_INT(full, r.has_E);
+      TEST_ASSERT_EQUAL_INT(full || r.config == TV_CONFIG_UNCALIBRATED, r.has_F);
+      TEST_ASSERT_EQUAL_INT(
+          r.config == TV_CONFIG_PLANAR || r.config == TV_CONFIG_PLANAR_OR_PANORAMIC, r.has_H);
+      TEST_ASSERT_EQUAL_INT(r.verdict != TV_VERDICT_OK, r.reasons != 0);
+      TEST_ASSERT_EQUAL_INT(calibrated == 1 ? -1 : 0, r.fundamental_inliers < 0 ? -1 : 0);
+      if (rotation) {
+        TEST_ASSERT_TRUE(scene::rotation_error_deg(r.R, pair.R) < 0.2);
+        TEST_ASSERT_EQUAL_INT(TV_VERDICT_REFUSED, r.verdict);
+      }
+    }
+  }
+}
+
+// A chance of 0.01 a pair is what the test of meaning allows; of 72 pairs two are a rare accident.
+void test_random_matches_are_degenerate(void) {
+  const int num[9] = {5, 6, 7, 8, 10, 20, 50, 100, 500};
+  const int methods[3] = {TV_METHOD_FIVE_POINT, TV_METHOD_SEVEN_POINT, TV_METHOD_EIGHT_POINT};
+  int accepted = 0;
+  for (int k = 0; k < 9; ++k) {
+    for (int trial = 0; trial < 8; ++trial) {
+      scene::make(options_of(Kind::kGeneral, num[k], 0, 300 + 20 * k + trial), &pair);
+      for (int m = 0; m < 3; ++m) {
+        const tv_two_view r = estimate_pair(m == 0 || trial % 2 == 0, methods[m]);
+        accepted += r.config != TV_CONFIG_DEGENERATE;
+        TEST_ASSERT_EQUAL_INT(r.config == TV_CONFIG_DEGENERATE, r.verdict == TV_VERDICT_REFUSED);
+        TEST_ASSERT_EQUAL_INT(r.config == TV_CONFIG_DEGENERATE, r.num_inliers == 0);
+      }
+    }
+  }
+  TEST_ASSERT_LESS_OR_EQUAL_INT(3, accepted);
+}
+
+void test_every_pair_of_lenses_gives_the_pose(void) {
+  const tv_camera lenses[3] = {scene::pinhole(), scene::distorted(), scene::fisheye()};
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      double sum = 0;
+      for (int trial = 0; trial < 4; ++trial) {
+        scene::Options options = options_of(Kind::kGeneral, 400, 0.6, 500 + 10 * (3 * a + b) + trial);
+        options.camera[0] = lenses[a];
+        options.camera[1] = lenses[b];
+        scene::make(options, &pair);
+        const tv_two_view r = estimate_pair(true, TV_METHOD_FIVE_POINT);
+        TEST_ASSERT_EQUAL_INT(TV_CONFIG_CALIBRATED, r.config);
+        sum += std::fmax(scene::rotation_error_deg(r.R, pair.R),
+                         scene::translation_error_deg(r.t, pair.t));
+      }
+      TEST_ASSERT_TRUE(sum / 4 < 1);
+    }
+  }
+}
+
+void test_degenerate_points_end_and_give_no_pose(void) {
+  static double a[2000], b[2000];
+  const tv_camera lenses[3][2] = {{scene::pinhole(), scene::pinhole()},
+                                  {scene::distorted(), scene::distorted()},
+                                  {scene::fisheye(), scene::fisheye()}};
+  tv::Random random = tv::random_seeded(base_seed);
+  for (int kind = 0; kind < 7; ++kind) {
+    for (int i = 0; i < 1000; ++i) {
+      const double x = scene::uniform(&random, 0, 600), y = scene::uniform(&random, 0, 470);
+      double p[4] = {x, y, x, y};                              // 0: the same image twice
+      if (kind == 1) p[0] = p[1] = p[2] = p[3] = 100;          // one point
+      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;      // a line, shifted
+      if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;          // a line, turned over
+      if (kind == 4) p[0] = p[1] = 10;                         // all from one
+      if (kind == 5) p[0] = i % 4 * 50, p[1] = p[3] = i % 2, p[2] = p[0] + 4;  // eight, repeated
+      if (kind == 6) p[2] = x + 2;                             // a shift: a plane, or far away
+      for (int k = 0; k < 2; ++k) a[2 * i + k] = p[k], b[2 * i + k] = p[2 + k];
+    }
+    for (int c = 0; c < 3; ++c) {
+      const tv_two_view r =
+          estimate(lenses[c], a, b, nullptr, 1000, defaults(TV_METHOD_FIVE_POINT));
+      if (kind == 0 || kind == 1 || kind == 4 || kind == 5) {
+        TEST_ASSERT_EQUAL_INT(0, r.has_t);
+      }
+    }
+    estimate(nullptr, a, b, nullptr, 1000, defaults(TV_METHOD_EIGHT_POINT));
+    estimate(nullptr, a, b, nullptr, 1000, defaults(TV_METHOD_SEVEN_POINT));
+  }
+}
+
+// Of poses of scenes with fresh noise, the share within the covariance's 90 % ellipsoid.
+void test_covariance_covers_the_error(void) {
+  using Mat5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
+  int inside = 0, total = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    scene::Options options = options_of(Kind::kGeneral, 200, 1, 600 + trial);
+    options.noise_px = 0.3;
+    scene::make(options, &pair);
+    const tv_two_view r = estimate_pair(true, TV_METHOD_FIVE_POINT);
+    if (r.config != TV_CONFIG_CALIBRATED) continue;
+    TEST_ASSERT_EQUAL_INT(1, r.has_covariance);
+    const tv::Mat3 d = pair.R * tv::Mat3(Eigen::Map<const tv::Mat3>(r.R)).transpose();
+    const tv::Vec3 t(r.t[0], r.t[1], r.t[2]);
+    tv::Vec3 b1, b2;
+    tv::tangent_basis(t, &b1, &b2);
+    Eigen::Matrix<double, 5, 1> e;
+    e << 0.5 * (d(2, 1) - d(1, 2)), 0.5 * (d(0, 2) - d(2, 0)), 0.5 * (d(1, 0) - d(0, 1)),
+        b1.dot(pair.t) / t.dot(pair.t), b2.dot(pair.t) / t.dot(pair.t);
+    const Mat5 information = Mat5(Eigen::Map<const Mat5>(r.covariance)).inverse();
+    inside += e.dot(information * e) < 9.236;  // chi-square, 5 degrees of freedom
+    ++total;
+  }
+  TEST_ASSERT_GREATER_THAN_INT(50, total);
+  TEST_ASSERT_GREATER_THAN_INT(7 * total / 10, inside);
+}
+
+}  // namespace
+
+void setUp(void) {
+  tv_limits limits;
+  tv_limits_init(&limits);
+  limits.max_width = limits.max_height = 64;
+  limits.max_keypoints = 1;
+  limits.max_matches = kCapMatches;
+  size_t size_bytes;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size_bytes));
+  TEST_ASSERT_TRUE(size_bytes <= sizeof memory);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, memory, size_bytes));
+}
+
+void tearDown(void) {}
+
+int main(void) {
+  const char* seed = std::getenv("TWOVIEW_SEED");
+  if (seed != nullptr) base_seed = std::strtoull(seed, nullptr, 10);
+  std::printf("TWOVIEW_SEED=%llu\n", static_cast<unsigned long long>(base_seed));
+  UNITY_BEGIN();
+  RUN_TEST(test_config_names_the_kind_of_pair);
+  RUN_TEST(test_each_kind_has_what_it_promises);
+  RUN_TEST(test_random_matches_are_degenerate);
+  RUN_TEST(test_every_pair_of_lenses_gives_the_pose);
+  RUN_TEST(test_degenerate_points_end_and_give_no_pose);
+  RUN_TEST(test_covariance_covers_the_error);
+  return UNITY_END();
+}
