@@ -22,10 +22,22 @@ const Names kKernels = {"auto", "c", "sse2", "avx2", "avx512", "neon"};
 const Names kTriangulations = {
     "poly", "poly-abs", "linear-eigen", "linear-ls", "iterative-eigen", "iterative-ls", "midpoint"};
 
+// Values that the interface names and this version's library refuses.
+const Names kNotYet = {"upright", "poly", "poly-abs", "linear-eigen", "iterative-eigen"};
+
 struct Choice {
   int32_t* value;
   const Names* names;
+  bool all = true;  // false: without those of kNotYet
 };
+
+Names offered(const Choice& choice) {
+  Names names;
+  for (const std::string& name : *choice.names)
+    if (choice.all || std::find(kNotYet.begin(), kNotYet.end(), name) == kNotYet.end())
+      names.push_back(name);
+  return names;
+}
 
 struct Option {
   const char* name;
@@ -63,7 +75,7 @@ std::vector<Option> table(Options& o) {
        "diameter of a corner on level 0, pixels"},
       {"ratio", kMatch, &o.match.ratio, 0, 1, open_low,
        "nearest over second nearest distance, both directions"},
-      {"method", kEstimate, Choice{&e.method, &kMethods}, 0, 0, closed, "minimal solver"},
+      {"method", kEstimate, Choice{&e.method, &kMethods, false}, 0, 0, closed, "minimal solver"},
       {"max-error-px", kEstimate, &e.max_error_px, 0, 1e9, open_low,
        "inlier threshold, Sampson distance in pixels"},
       {"confidence", kEstimate, &e.confidence, 0, 1, open_high,
@@ -72,7 +84,7 @@ std::vector<Option> table(Options& o) {
       {"fixed-iterations", kEstimate, &e.fixed_iterations, 0, 1e6, closed,
        "exactly this many samples; 0: adaptive stop"},
       {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
-      {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations}, 0, 0, closed,
+      {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations, false}, 0, 0, closed,
        "method"},
       {"kernels", kCommon, Choice{&o.kernels, &kKernels}, 0, 0, closed, "kernel set"},
       {"resize", kCommon, &o.resize, 0, 16384, closed,
@@ -116,9 +128,12 @@ std::string joined(const Names& names, const char* separator) {
 void set(const Option& option, const std::string& text) {
   const std::string flag = "--" + std::string(option.name);
   if (const Choice* choice = std::get_if<Choice>(&option.target)) {
+    const Names names = offered(*choice);
+    if (std::find(names.begin(), names.end(), text) == names.end()) {
+      throw CLI::ValidationError(
+          flag, "'" + text + "' is none of this version's " + joined(names, ", "));
+    }
     const auto found = std::find(choice->names->begin(), choice->names->end(), text);
-    if (found == choice->names->end())
-      throw CLI::ValidationError(flag, "'" + text + "' is none of " + joined(*choice->names, ", "));
     *choice->value = static_cast<int32_t>(found - choice->names->begin());
     return;
   }
@@ -208,7 +223,7 @@ void add_options(CLI::App& verb, Options& options, unsigned groups) {
         },
         option.help);
     const Choice* choice = std::get_if<Choice>(&option.target);
-    flag->type_name(choice ? joined(*choice->names, "|") : range_text(option));
+    flag->type_name(choice ? joined(offered(*choice), "|") : range_text(option));
     flag->default_str(value_text(option));
     flag->group(group_title(option.group));
   }

@@ -13,7 +13,7 @@ typedef enum tv_method {
   TV_METHOD_EIGHT_POINT = 1, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
                                 paper's path */
   TV_METHOD_SEVEN_POINT = 2,
-  TV_METHOD_UPRIGHT = 3      /* three points and gravity */
+  TV_METHOD_UPRIGHT = 3      /* three points and gravity; this version answers TV_ERR_ARGUMENT */
 } tv_method;
 
 /* COLMAP's kinds of two-view geometry, and no-motion. */
@@ -103,7 +103,8 @@ TV_API void tv_two_view_init(tv_two_view *result);
    are sampled first.
    inlier_mask: null, or num_matches bytes, 1 for each inlier of the model that config names.
    result: initialised by tv_two_view_init.
-   A match outside its lens's valid region, or not finite, is never an inlier.
+   A match outside its lens's valid region, not finite, or with coordinates that add up to a million
+   pixels and more, is never an inlier.
    "No geometry" is TV_OK with config, verdict and reasons. The matches' order does not matter, and
    swapped views give the inverse: R the transpose, bit for bit, and t = -R^T t.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,

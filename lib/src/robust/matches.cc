@@ -9,6 +9,9 @@ namespace {
 
 bool is_finite(double x) { return x - x == 0.0; }
 
+// The four coordinates of a match add up to less than this; images end at 16384 pixels a side.
+constexpr double kMaxCoordinates = 1e6;
+
 uint64_t mix(uint64_t h) {  // the finaliser of splitmix64 (G. Steele et al., 2014)
   h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9ULL;
   h = (h ^ (h >> 27)) * 0x94d049bb133111ebULL;
@@ -174,7 +177,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
     const Coordinates c = coordinates(problem, i);
     const double sum = (std::fabs(c.v[0]) + std::fabs(c.v[1])) +
                        (std::fabs(c.v[2]) + std::fabs(c.v[3]));
-    if (!(sum < 1e12)) continue;  // NaN, infinite, or no pixel of any image
+    if (!(sum < kMaxCoordinates)) continue;  // NaN, infinite, or no pixel of any image
     Vec3 ray;
     Mat32 jacobian;
     bool usable = true;

@@ -240,9 +240,10 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
     epipolar_meaningful = log_false_alarms(n, f.num_support, sample_size,
                                            sample_size == 5 ? 10 : 3, p) < kLogMeaningful;
   }
-  // A rival speaks for the pair when it explains half of what the epipolar model does, and the rest
-  // does not agree on an epipole.
-  const int half = f.num_support / 2;
+  // A rival speaks for the pair when it explains half of what the epipolar model does (of all matches
+  // where there is none: a failed search is no proof of a rotation), and the rest does not agree on
+  // an epipole.
+  const int half = (epipolar.found ? f.num_support : n) / 2;
   const bool rotation_enough =
       rotation_meaningful && rivals.rotation_inliers > half &&
       !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold);
@@ -272,6 +273,7 @@ double parallax(const Finish& f, int i) {
 void measure_pose(Finish& f) {
   TwoViewOutcome& out = *f.out;
   double sum = 0;
+  if (f.num_support == 0) return;
   for (int k = 0; k < f.num_support; ++k) {
     f.values[k] = parallax(f, f.support[k]);
     sum += f.pairs.pixel_angle[f.support[k]];
