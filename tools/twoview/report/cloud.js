@@ -42,7 +42,7 @@
   function projector() {
     const cy = Math.cos(pose.yaw), sy = Math.sin(pose.yaw);
     const cp = Math.cos(pose.pitch), sp = Math.sin(pose.pitch);
-    const distance = 3.2 * radius / pose.zoom;
+    const distance = 4.2 * radius / pose.zoom;
     const focal = 1.05 * Math.min(canvas.width, 1.6 * canvas.height);
     return function (px, py, pz) {
       const x = px - middle[0], y = py - middle[1], z = pz - middle[2];
