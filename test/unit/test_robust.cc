@@ -53,9 +53,13 @@ void test_progressive_samples_start_with_the_surest_and_end_with_all(void) {
   constexpr int kNum = 200;
   tv::Sampler sampler = tv::make_sampler(9, kNum, 5, true);
   int last_pool = 5;
-  for (int k = 0; k < 2 * static_cast<int>(tv::kProsacSamples); ++k) {
+  for (int k = 0; k < static_cast<int>(3 * kNum * tv::kProsacSamples); ++k) {
     int32_t sample[5];
     tv::draw_sample(sampler, sample);
+    if (k % 2 == 1) {  // every other one is uniform
+      expect_distinct(sample, 5, kNum);
+      continue;
+    }
     TEST_ASSERT_TRUE(sampler.pool >= last_pool);
     last_pool = sampler.pool;
     expect_distinct(sample, 5, sampler.pool);

@@ -15,10 +15,14 @@
 
 namespace tv {
 
+inline constexpr int kWindow = 8, kWindowShare = 2;
+inline constexpr int kMostForFewInliers = 1000;
+
 struct LoopOptions {
   double confidence;
   int min_iterations, max_iterations;
-  int fixed_iterations;  // 0: adaptive stop
+  int fixed_iterations;        // 0: adaptive stop
+  int few_inliers_iterations;  // at least this many / inliers, up to kMostForFewInliers
 };
 
 template <typename Model>
@@ -43,51 +47,77 @@ inline int samples_needed(double confidence, int num_inliers, int num, int sampl
   return needed < most ? static_cast<int>(needed) + 1 : most;
 }
 
+// samples_needed, and not fewer than the options ask.
+inline int samples_wanted(const LoopOptions& options, int num_inliers, int num, int sample_size) {
+  const int most = options.max_iterations;
+  int wanted = samples_needed(options.confidence, num_inliers, num, sample_size, most);
+  int least = options.min_iterations;
+  // A sample of inliers alone is not yet one from which local optimisation finds the best minimum:
+  // with few inliers there are several, and samples cost little.
+  if (options.few_inliers_iterations > 0 && num_inliers > 0) {
+    int more = options.few_inliers_iterations / num_inliers;
+    if (more > kMostForFewInliers) more = kMostForFewInliers;
+    if (more > least) least = more;
+  }
+  if (wanted < least) wanted = least;
+  return wanted < most ? wanted : most;
+}
+
+template <typename Model>
+void take_if_better(const Model& model, int64_t cost, int num_inliers, LoopResult<Model>* best) {
+  if (cost >= best->cost) return;
+  best->found = true;
+  best->model = model;
+  best->cost = cost;
+  best->num_inliers = num_inliers;
+}
+
+// Local optimisation takes every sampled model that is the best so far (O. Chum, J. Matas, J. Kittler,
+// "Locally optimized RANSAC", 2003), and the best of each window of samples: the best minimum does
+// not always start from the best sample. A window is longer where optimising takes longer.
 template <typename Estimator>
 LoopResult<typename Estimator::Model> robust_loop(Estimator& estimator, Sampler& sampler,
                                                   const LoopOptions& options) {
   using Model = typename Estimator::Model;
   LoopResult<Model> best;
-  int64_t best_sampled = INT64_MAX;  // before local optimisation
   const bool fixed = options.fixed_iterations > 0;
   const int most = fixed ? options.fixed_iterations : options.max_iterations;
+  const int window = kWindow + sampler.num / kWindowShare;
   int wanted = most;
+  int window_iterations = 0;
+  int64_t best_sampled = INT64_MAX, window_cost = INT64_MAX;  // before local optimisation
+  Model window_model;
   int32_t sample[Estimator::kSampleSize];
   Model models[Estimator::kMaxModels];
   while (best.num_iterations < wanted) {
     draw_sample(sampler, sample);
     ++best.num_iterations;
+    ++window_iterations;
+    bool improved = false;
     const int num_models = estimator.generate_models(sample, models);
-    int winner = -1;
     for (int k = 0; k < num_models; ++k) {
-      if (estimator.fast_cost(models[k], best_sampled) >= best_sampled) continue;
+      if (estimator.fast_cost(models[k], window_cost) >= window_cost) continue;
       int num_inliers;
       const int64_t cost = estimator.full_cost(models[k], &num_inliers);
-      if (cost >= best_sampled) continue;
-      best_sampled = cost;
-      winner = k;
-      if (cost < best.cost) {
-        best.found = true;
-        best.model = models[k];
-        best.cost = cost;
-        best.num_inliers = num_inliers;
+      if (cost >= window_cost) continue;
+      window_cost = cost;
+      window_model = models[k];
+      if (cost < best_sampled) {
+        best_sampled = cost;
+        improved = true;
       }
+      take_if_better(models[k], cost, num_inliers, &best);
     }
-    if (winner < 0) continue;
-    Model refined = models[winner];
-    estimator.refine_model(&refined);
+    const bool window_over = window_iterations >= window && window_cost < INT64_MAX;
+    if (!improved && !window_over) continue;
+    estimator.refine_model(&window_model);
     int num_inliers;
-    const int64_t cost = estimator.full_cost(refined, &num_inliers);
-    if (cost < best.cost) {
-      best.model = refined;
-      best.cost = cost;
-      best.num_inliers = num_inliers;
-    }
-    if (fixed) continue;
-    wanted = samples_needed(options.confidence, best.num_inliers, sampler.num,
-                            Estimator::kSampleSize, most);
-    if (wanted < options.min_iterations) wanted = options.min_iterations;
-    if (wanted > most) wanted = most;
+    const int64_t cost = estimator.full_cost(window_model, &num_inliers);
+    take_if_better(window_model, cost, num_inliers, &best);
+    window_iterations = 0;
+    window_cost = INT64_MAX;
+    if (fixed || !best.found) continue;
+    wanted = samples_wanted(options, best.num_inliers, sampler.num, Estimator::kSampleSize);
   }
   return best;
 }

@@ -21,7 +21,8 @@ void draw_distinct(Random& random, int bound, int count, int32_t* sample) {
 }  // namespace
 
 Sampler make_sampler(uint64_t seed, int num, int size, bool progressive) {
-  Sampler sampler{random_seeded(seed), num, size, progressive, size, kProsacSamples, 1, 0};
+  Sampler sampler{random_seeded(seed), num, size, progressive, size, kProsacSamples * num, 1, 0,
+                  false};
   for (int i = 0; i < size; ++i) {
     sampler.average *= static_cast<double>(size - i) / static_cast<double>(num - i);
   }
@@ -29,7 +30,9 @@ Sampler make_sampler(uint64_t seed, int num, int size, bool progressive) {
 }
 
 void draw_sample(Sampler& sampler, int32_t* sample) {
-  if (!sampler.progressive) return draw_distinct(sampler.random, sampler.num, sampler.size, sample);
+  const bool uniform = !sampler.progressive || sampler.uniform_next;
+  sampler.uniform_next = !sampler.uniform_next;
+  if (uniform) return draw_distinct(sampler.random, sampler.num, sampler.size, sample);
   ++sampler.drawn;
   while (sampler.drawn > sampler.next_growth && sampler.pool < sampler.num) {
     const double n = sampler.pool;

@@ -9,19 +9,21 @@ namespace tv {
 
 // PROSAC (O. Chum, J. Matas, "Matching with PROSAC: progressive sample consensus", CVPR 2005): the
 // matches are sorted, surest first; samples come from a pool of the first ones, which grows so that
-// after kProsacSamples samples it has treated the sure ones as often as uniform sampling would. Once
-// the pool holds all, or without an order, sampling is uniform.
+// after kProsacSamples samples a match it has treated the sure ones as often as uniform sampling
+// would. Once the pool holds all, or without an order, sampling is uniform. Every other sample is
+// uniform from the start: the surest matches may lie on one plane, or on what repeats.
 struct Sampler {
   Random random;
   int num, size;         // matches, and how many a sample takes
   bool progressive;
   int pool;              // samples come from the first `pool` matches
   double average;        // T_n of the paper for the pool
-  int64_t next_growth;   // T'_n: the sample at which the pool grows
-  int64_t drawn;
+  int64_t next_growth;   // T'_n: the draw at which the pool grows
+  int64_t drawn;  // from the pool
+  bool uniform_next;
 };
 
-inline constexpr double kProsacSamples = 5000;
+inline constexpr double kProsacSamples = 10;
 
 Sampler make_sampler(uint64_t seed, int num, int size, bool progressive);
 

@@ -36,7 +36,7 @@ Best search(Estimator estimator, const int32_t* support, int num_support, uint64
   if (num_support < Estimator::kSampleSize) return {};
   Sampler sampler = make_sampler(seed, estimator.num_subset, Estimator::kSampleSize, false);
   const int most = Estimator::kSampleSize == 2 ? kRotationSamples : kHomographySamples;
-  const LoopOptions options{0.999, 5, most, 0};
+  const LoopOptions options{0.999, 5, most, 0, 0};
   const LoopResult<Mat3> result = robust_loop(estimator, sampler, options);
   if (!result.found) return {};
   Best best{true, result.model};
