@@ -96,7 +96,10 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
     set_ray(one, 1, 0, ray_of(pairs, 1, j), jacobian_of(pairs, 1, j));
     agreeing += sampson_sq(one, 0, M) <= threshold_px * threshold_px;
   }
-  return (agreeing + kPriorWeight * prior) / (kPairings + kPriorWeight);
+  // Of few matches there are fewer different pairings than were drawn.
+  const double different = 0.5 * n * (n - 1.0);
+  const double weight = different < kPairings ? different : kPairings;
+  return (weight * agreeing / kPairings + kPriorWeight * prior) / (weight + kPriorWeight);
 }
 
 size_t verdict_bytes(int max_matches) {
