@@ -75,7 +75,8 @@ void test_config_names_the_kind_of_pair(void) {
     for (int k = 0; k < 5; ++k) {
       int right = 0;
       for (int trial = 0; trial < 20; ++trial) {
-        scene::Options options = options_of(kinds[k], 300, trial % 2 == 0 ? 0.6 : 0.9, 20 * k + trial);
+        scene::Options options =
+            options_of(kinds[k], 300, trial % 2 == 0 ? 0.6 : 0.9, 20 * k + trial);
         options.noise_px = trial % 4 < 2 ? 0.2 : 0.5;
         scene::make(options, &pair);
         const tv_two_view r = estimate_pair(
@@ -137,7 +138,8 @@ void test_every_pair_of_lenses_gives_the_pose(void) {
     for (int b = 0; b < 3; ++b) {
       double sum = 0;
       for (int trial = 0; trial < 4; ++trial) {
-        scene::Options options = options_of(Kind::kGeneral, 400, 0.6, 500 + 10 * (3 * a + b) + trial);
+        scene::Options options =
+            options_of(Kind::kGeneral, 400, 0.6, 500 + 10 * (3 * a + b) + trial);
         options.camera[0] = lenses[a];
         options.camera[1] = lenses[b];
         scene::make(options, &pair);

@@ -72,7 +72,8 @@ void test_one_of_the_two_motions_is_the_true_one(void) {
   for (int trial = 0; trial < 500; ++trial) {
     const Plane p = make_plane(&random);
     tv::PlanarPose poses[2];
-    const int count = tv::decompose_homography(uniform(&random, 0.1, 9) * p.H, Vec3(0, 0, 1), poses);
+    const Mat3 scaled = uniform(&random, 0.1, 9) * p.H;
+    const int count = tv::decompose_homography(scaled, Vec3(0, 0, 1), poses);
     TEST_ASSERT_EQUAL_INT(2, count);
     double best = 10;
     for (int k = 0; k < 2; ++k) {

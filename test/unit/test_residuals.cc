@@ -1,4 +1,5 @@
-// Residuals in pixels: against the textbook, against each other, and their slopes against differences.
+// Residuals in pixels: against the textbook, against each other, and their slopes against
+// differences.
 #include "geometry/residuals.h"
 
 #include <cmath>
@@ -177,7 +178,8 @@ void test_transfer_residual_of_a_pinhole_is_the_textbooks(void) {
   }
 }
 
-// gradient = half the slope of scale^2 * cost: compared along each parameter by central differences.
+// gradient = half the slope of scale^2 * cost: compared along each parameter by central
+// differences.
 template <typename Model>
 void check_gradient(const Model& model, const RobustLoss& loss, const double* steps) {
   constexpr int P = Model::kParameters;

@@ -236,7 +236,8 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   }
   const size_t n = static_cast<size_t>(num_matches);
   if (inlier_mask != nullptr &&
-      (tv::overlap(inlier_mask, n, pixels0, 16 * n) || tv::overlap(inlier_mask, n, pixels1, 16 * n) ||
+      (tv::overlap(inlier_mask, n, pixels0, 16 * n) ||
+       tv::overlap(inlier_mask, n, pixels1, 16 * n) ||
        (ratios != nullptr && tv::overlap(inlier_mask, n, ratios, 4 * n)) ||
        tv::overlap(inlier_mask, n, result, sizeof *result))) {
     return TV_ERR_OVERLAP;

@@ -26,9 +26,9 @@ void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);
 // The rotation that turns by `angle_rad` about a unit axis.
 Mat3 rotation_about(const Vec3& unit_axis, double angle_rad);
 
-// R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1, in closed form (B. K. P. Horn, "Recovering baseline
-// and orientation from essential matrix", 1990). They are rotations as exactly as E is essential:
-// orthonormalise the one that is kept. False when E is zero or not finite.
+// R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1, in closed form (B. K. P. Horn, "Recovering
+// baseline and orientation from essential matrix", 1990). They are rotations as exactly as E is
+// essential: orthonormalise the one that is kept. False when E is zero or not finite.
 bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 
 // Where two rays meet, as signs only. The numerators of the depths that minimise

@@ -1,5 +1,5 @@
-// Four points: the direct linear transform, Hartley & Zisserman 4.1. Decomposition: Y. Ma, S. Soatto,
-// J. Kosecka, S. Sastry, "An Invitation to 3-D Vision", algorithm 5.2.
+// Four points: the direct linear transform, Hartley & Zisserman 4.1. Decomposition: Y. Ma, S.
+// Soatto, J. Kosecka, S. Sastry, "An Invitation to 3-D Vision", algorithm 5.2.
 #include "geometry/homography_4pt.h"
 
 #include <algorithm>

@@ -16,8 +16,8 @@ struct PlanarPose {
   double baseline_over_depth = 0;  // |t| / distance of the plane from camera 0
 };
 
-// H ~ R + t n' / d with H's sign as above (det H > 0 for a plane seen from one side). Writes the two
-// motions whose normals look away from the camera at `mean_ray0`'s side; returns 0 when H is a
+// H ~ R + t n' / d with H's sign as above (det H > 0 for a plane seen from one side). Writes the
+// two motions whose normals look away from the camera at `mean_ray0`'s side; returns 0 when H is a
 // rotation (within rounding) or singular.
 int decompose_homography(const Mat3& H, const Vec3& mean_ray0, PlanarPose poses[2]);
 

@@ -7,8 +7,8 @@ namespace tv {
 
 // Sturm's chain of a polynomial: p[0] = p, p[1] = p', p[k-1] = (a[k] z + b[k]) p[k] - c[k] p[k+1],
 // c > 0. Only the quotients are kept: evaluation from the chain's constant end takes three
-// multiplications a link. (D. G. Hook, P. R. McAree, "Using Sturm sequences to bracket real roots of
-// polynomial equations", Graphics Gems, 1990, with the quotients in place of the polynomials.)
+// multiplications a link. (D. G. Hook, P. R. McAree, "Using Sturm sequences to bracket real roots
+// of polynomial equations", Graphics Gems, 1990, with the quotients in place of the polynomials.)
 template <int kDegree>
 struct SturmChain {
   int length;  // links; shorter than the degree for a polynomial with repeated roots
@@ -61,7 +61,8 @@ int sign_changes(const SturmChain<kDegree>& chain, double z) {
   double next = 0, current = chain.last;
   int changes = 0;
   for (int k = chain.length - 1; k >= 0; --k) {
-    const double previous = (chain.slope[k] * z + chain.offset[k]) * current - chain.scale[k] * next;
+    const double quotient = chain.slope[k] * z + chain.offset[k];
+    const double previous = quotient * current - chain.scale[k] * next;
     changes += (previous < 0) != (current < 0);
     next = current;
     current = previous;
@@ -148,7 +149,8 @@ int real_roots(const double* p, double* roots) {
     } else {  // by size, since roots are spread evenly over angles, not over the line
       const double low = interval.low < 0 ? -interval.high : interval.low;
       const double high = interval.low < 0 ? -interval.low : interval.high;
-      const double size_middle = low < 1 ? 1.0 : (high > 16 * low ? 4 * low : std::sqrt(low * high));
+      const double size_middle =
+          low < 1 ? 1.0 : (high > 16 * low ? 4 * low : std::sqrt(low * high));
       middle = interval.low < 0 ? -size_middle : size_middle;
     }
     const int changes = sign_changes<kDegree>(chain, middle);

@@ -1,9 +1,9 @@
 // D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 2004.
 //
 // The five epipolar constraints leave E = x X + y Y + z Z + W. The cubic constraints det E = 0 and
-// 2 E E' E - tr(E E') E = 0 are ten equations in twenty monomials; elimination leaves a 3x3 matrix of
-// polynomials in z, whose determinant has degree ten. Its real roots give x and y. Measured against
-// the definition in test/unit/test_relpose_5pt.cc.
+// 2 E E' E - tr(E E') E = 0 are ten equations in twenty monomials; elimination leaves a 3x3 matrix
+// of polynomials in z, whose determinant has degree ten. Its real roots give x and y. Measured
+// against the definition in test/unit/test_relpose_5pt.cc.
 #include "geometry/relpose_5pt.h"
 
 #include "geometry/null_space.h"
@@ -191,9 +191,9 @@ Vec3 null_vector(const ZMatrix& b, double z) {
   return best;
 }
 
-// Turns the basis about, by a fixed reflection without zeros. The null space comes with ones and zeros
-// in it; the essential matrix of a camera that moved exactly along an axis has zeros too, and where
-// they meet W would have no part in it: a root at infinity, in every sample.
+// Turns the basis about, by a fixed reflection without zeros. The null space comes with ones and
+// zeros in it; the essential matrix of a camera that moved exactly along an axis has zeros too, and
+// where they meet W would have no part in it: a root at infinity, in every sample.
 void mix_basis(double basis[4][9]) {
   constexpr double v[4] = {1.0, 1.3, 1.7, 2.3};
   constexpr double scale = 2.0 / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3]);

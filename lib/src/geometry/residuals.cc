@@ -51,9 +51,9 @@ inline double robust(Loss kind, double q, double* weight) {
   return log(1 + q);
 }
 
-// The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is a
-// plain vector operation: read as unsigned integers, floats in [0, 1) are those below 1.0f's bits; a
-// NaN or a negative rounding error is above and costs 1.
+// The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is
+// a plain vector operation: read as unsigned integers, floats in [0, 1) are those below 1.0f's
+// bits; a NaN or a negative rounding error is above and costs 1.
 inline int32_t sum_of_costs(const float q[kScoreBlock]) {
   uint32_t bits[kScoreBlock];
   float capped[kScoreBlock];
@@ -222,8 +222,8 @@ int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px
 namespace {
 
 // The prediction's displacement d (pixels of image 1) and slope = d d / d h (2x3), h = H f0.
-// With P the left inverse of J1 that sends f1 to zero, d = P h / (m . h), where m = e_z on the plane
-// and f1 on the sphere. False when H sends the ray behind.
+// With P the left inverse of J1 that sends f1 to zero, d = P h / (m . h), where m = e_z on the
+// plane and f1 on the sphere. False when H sends the ray behind.
 struct Transfer {
   double f0[3];
   double d[2];
@@ -338,8 +338,10 @@ double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, i
     const double s = e.c * inverse_n, inverse_root = std::sqrt(inverse_n);
     double u0[3], u1[3];
     for (int r = 0; r < 3; ++r) {
-      const double g0 = pairs.jacobian[0][2 * r][i] * e.s0[0] + pairs.jacobian[0][2 * r + 1][i] * e.s0[1];
-      const double g1 = pairs.jacobian[1][2 * r][i] * e.s1[0] + pairs.jacobian[1][2 * r + 1][i] * e.s1[1];
+      double* const* J0 = pairs.jacobian[0] + 2 * r;
+      double* const* J1 = pairs.jacobian[1] + 2 * r;
+      const double g0 = J0[0][i] * e.s0[0] + J0[1][i] * e.s0[1];
+      const double g1 = J1[0][i] * e.s1[0] + J1[1][i] * e.s1[1];
       u0[r] = (e.f0[r] - s * g0) * inverse_root;
       u1[r] = s * g1 * inverse_root;
     }

@@ -51,12 +51,13 @@ void finish_rays(RayPairs& pairs);  // after the last set_ray: fills what follow
 // epipoles).
 double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 
-// Sum over all matches of min(r^2 / T^2, 1), each truncated to a multiple of 1/kCostOne: an integer,
-// so that neither order nor vector width matters. May stop as soon as the sum exceeds `bound`.
+// Sum over all matches of min(r^2 / T^2, 1), each truncated to a multiple of 1/kCostOne: an
+// integer, so that neither order nor vector width matters. May stop as soon as the sum exceeds
+// `bound`.
 int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound);
 
-// What a homography (or a rotation) leaves: d = the displacement in image 1, in pixels, between what
-// H predicts from view 0 and what view 1 saw; weighted for noise in both images alike,
+// What a homography (or a rotation) leaves: d = the displacement in image 1, in pixels, between
+// what H predicts from view 0 and what view 1 saw; weighted for noise in both images alike,
 //     r^2 = d' (I + D D')^-1 d,  D = d (prediction) / d pixel0,
 // Sampson's distance of the two equations (Hartley & Zisserman 4.2.6).
 struct TransferResidual {
@@ -73,9 +74,9 @@ struct RobustLoss {
 };
 
 
-// Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with P parameters,
-// columns[p] = dM / dparameter p. upper: P (P + 1) / 2, row by row. Returns the sum of rho, in
-// units of scale^2. indices null: matches 0 .. count - 1.
+// Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with P
+// parameters, columns[p] = dM / dparameter p. upper: P (P + 1) / 2, row by row. Returns the sum of
+// rho, in units of scale^2. indices null: matches 0 .. count - 1.
 template <int P>
 double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
                                 const Mat3& M, const Mat3 columns[P], const RobustLoss& loss,

@@ -6,8 +6,8 @@
 namespace tv {
 
 // sigma^2 (J' J)^-1 over the listed inliers, sigma^2 = sum r^2 / (count - 5): Gauss-Newton's
-// covariance at the optimum, in the parameters (w, a, b) of PoseModel. False when a parameter is not
-// determined.
+// covariance at the optimum, in the parameters (w, a, b) of PoseModel. False when a parameter is
+// not determined.
 bool pose_covariance(const RayPairs& pairs, const int32_t* inliers, int count, const Pose& pose,
                      double covariance[25]);
 

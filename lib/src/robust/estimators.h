@@ -69,8 +69,8 @@ struct RotationEstimator : TransferEstimator {
   void refine_model(Model* model) const;
 };
 
-// Whether match i is within limit_px of a pose's epipolar line, and not behind a camera by more than
-// the threshold's parallax. Writes the squared distance.
+// Whether match i is within limit_px of a pose's epipolar line, and not behind a camera by more
+// than the threshold's parallax. Writes the squared distance.
 bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
                  double limit_px, double threshold_px, double* r_sq);
 
@@ -78,7 +78,8 @@ bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
                  int32_t* indices);
 
-// The same for a pose, which also has them not behind a camera by more than the threshold's parallax.
+// The same for a pose, which also has them not behind a camera by more than the threshold's
+// parallax.
 int near_matches(const RayPairs& pairs, int count, const Pose& pose, double limit_px,
                  double threshold_px, int32_t* indices);
 

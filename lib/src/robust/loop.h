@@ -72,9 +72,10 @@ void take_if_better(const Model& model, int64_t cost, int num_inliers, LoopResul
   best->num_inliers = num_inliers;
 }
 
-// Local optimisation takes every sampled model that is the best so far (O. Chum, J. Matas, J. Kittler,
-// "Locally optimized RANSAC", 2003), and the best of each window of samples: the best minimum does
-// not always start from the best sample. A window is longer where optimising takes longer.
+// Local optimisation takes every sampled model that is the best so far (O. Chum, J. Matas, J.
+// Kittler, "Locally optimized RANSAC", 2003), and the best of each window of samples: the best
+// minimum does not always start from the best sample. A window is longer where optimising takes
+// longer.
 template <typename Estimator>
 LoopResult<typename Estimator::Model> robust_loop(Estimator& estimator, Sampler& sampler,
                                                   const LoopOptions& options) {

@@ -120,8 +120,8 @@ bool sane(const Vec3& ray, const Mat32& jacobian) {
   return is_finite(sum) && sum < 1e200;
 }
 
-// Without cameras: a pinhole that puts the centroid on the axis and the mean squared distance of the
-// points from it at 2 (Hartley 1997).
+// Without cameras: a pinhole that puts the centroid on the axis and the mean squared distance of
+// the points from it at 2 (Hartley 1997).
 Camera normalising_camera(const double* pixels, const int32_t* order, int count) {
   double mean[2] = {0, 0}, spread = 0;
   for (int k = 0; k < count; ++k) {

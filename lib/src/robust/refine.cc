@@ -1,5 +1,5 @@
-// D. W. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963. With a
-// robust loss the weights are those of the current residuals (iteratively reweighted).
+// D. W. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963. With
+// a robust loss the weights are those of the current residuals (iteratively reweighted).
 #include "robust/refine.h"
 
 #include <cmath>

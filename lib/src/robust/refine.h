@@ -17,8 +17,8 @@ struct PoseModel {
   PoseModel stepped(const double* step) const;
 };
 
-// A fundamental matrix U diag(1, s, 0) V' with rotations U, V: seven parameters (A. Bartoli, P. Sturm,
-// "Nonlinear estimation of the fundamental matrix with minimal parameters", PAMI 2004).
+// A fundamental matrix U diag(1, s, 0) V' with rotations U, V: seven parameters (A. Bartoli, P.
+// Sturm, "Nonlinear estimation of the fundamental matrix with minimal parameters", PAMI 2004).
 struct FundamentalModel {
   static constexpr int kParameters = 7;
   Mat3 U, V;
@@ -30,7 +30,8 @@ struct FundamentalModel {
 };
 FundamentalModel fundamental_model(const Mat3& M);
 
-// A homography by its nine entries; the scale is free, which damping takes care of. Transfer residual.
+// A homography by its nine entries; the scale is free, which damping takes care of. Transfer
+// residual.
 struct HomographyModel {
   static constexpr int kParameters = 9;
   Mat3 H;

@@ -11,7 +11,8 @@ namespace tv {
 namespace {
 
 // A model from a few lucky samples is not the best that local optimisation can reach: go on a
-// little, and longer where inliers are few. docs/decisions/0002-robust-loop.md has the measurements.
+// little, and longer where inliers are few. docs/decisions/0002-robust-loop.md has the
+// measurements.
 constexpr int kMinIterations = 50, kFewInliersIterations = 20000;
 
 // A sample gives a model; what is left must be enough to test it against chance.
@@ -237,7 +238,8 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
       log_false_alarms(n, rivals.homography_inliers, 4, 1, disc) < kLogMeaningful;
   bool epipolar_meaningful = false;
   if (epipolar.found && f.num_support > sample_size) {
-    const double p = chance_of_agreement(f.matches, epipolar.M, f.threshold, f.problem.options.seed);
+    const double p =
+        chance_of_agreement(f.matches, epipolar.M, f.threshold, f.problem.options.seed);
     epipolar_meaningful = log_false_alarms(n, f.num_support, sample_size,
                                            sample_size == 5 ? 10 : 3, p) < kLogMeaningful;
   }

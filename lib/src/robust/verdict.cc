@@ -12,7 +12,8 @@ namespace {
 constexpr double kInfinity = __builtin_inf();
 
 // The rivals need few samples, since only one that explains most of the support matters, and few
-// matches to be told apart: of models that explain half of it, these samples miss one in a thousand.
+// matches to be told apart: of models that explain half of it, these samples miss one in a
+// thousand.
 constexpr int kRotationSamples = 30, kHomographySamples = 100;
 constexpr int kMaxSubset = 128;
 

@@ -21,8 +21,8 @@ struct Rivals {
   int rotation_inliers, homography_inliers, identity_inliers;
 };
 
-// A residual in two dimensions is held against the same quantile as the epipolar one: at 95 per cent
-// chi-square is 3.84 with one degree of freedom, 5.99 with two.
+// A residual in two dimensions is held against the same quantile as the epipolar one: at 95 per
+// cent chi-square is 3.84 with one degree of freedom, 5.99 with two.
 inline constexpr double kTransferThresholdScale = 1.2489995996796797;  // sqrt(5.99 / 3.84)
 
 // log C(n, k), by Stirling's series.
@@ -36,9 +36,9 @@ double log_false_alarms(int n, int k, int m, int models, double p);
 
 inline constexpr double kLogMeaningful = -4.605170185988091;  // NFA < 0.01
 
-// The probability that a match of view 0's point with a wrong point of view 1 agrees with M: counted
-// over wrong pairings of these very points, so that crowded points are allowed for; weighed with the
-// share of the image that a band of the threshold's width covers.
+// The probability that a match of view 0's point with a wrong point of view 1 agrees with M:
+// counted over wrong pairings of these very points, so that crowded points are allowed for; weighed
+// with the share of the image that a band of the threshold's width covers.
 double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
                            uint64_t seed);
 
@@ -49,8 +49,8 @@ Rivals find_rivals(const Matches& matches, const int32_t* support, int num_suppo
 // Whether the matches that a rival H leaves unexplained agree on an epipole more than chance would
 // have it. A match that H misses by a vector d falls into the epipolar band, were d's direction
 // random, with probability (2/pi) asin(w / |d|), w the band's half width. By Hoeffding (1963), of n
-// such matches k or more do with probability at most exp(-n KL(k/n || mean)). inlier[i]: whether match
-// i is an inlier of the epipolar model. True: there is a translation, or depth off the plane.
+// such matches k or more do with probability at most exp(-n KL(k/n || mean)). inlier[i]: whether
+// match i is an inlier of the epipolar model. True: there is a translation, or depth off the plane.
 bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlier,
                      double threshold_px);
 
