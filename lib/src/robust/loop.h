@@ -15,7 +15,10 @@
 
 namespace tv {
 
+// A window of local optimisation is kWindow samples and one more for every kWindowShare matches.
 inline constexpr int kWindow = 8, kWindowShare = 2;
+
+// The most samples that few inliers alone can ask for (LoopOptions::few_inliers_iterations).
 inline constexpr int kMostForFewInliers = 1000;
 
 struct LoopOptions {
