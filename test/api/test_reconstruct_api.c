@@ -68,99 +68,106 @@ void setUp(void) {
 void tearDown(void) { api_release(&a); }
 
 static tv_status run(tv_context *context) {
-  return tv_reconstruct(context, &views[0], &views[1], NULL, NULL, NULL,
-                        TV_TRIANGULATION_ITERATIVE_LS, &two_view, &reconstruction);
+  return tv_reconstruct(context, &views[0], &views[1], NULL, &two_view, &reconstruction);
 }
 
 /* Fills the outputs but for struct_size with a pattern, which a refusal leaves. */
-static void refused(tv_status expected, const tv_feature_options *feature_options,
-                    const tv_match_options *match_options,
-                    const tv_estimate_options *estimate_options, int triangulation) {
+static void refused(tv_status expected, const tv_reconstruct_options *options) {
   const size_t skip = sizeof two_view.struct_size;
   memset((uint8_t *)&two_view + skip, API_PATTERN, sizeof two_view - skip);
   memset((uint8_t *)&reconstruction + skip, API_PATTERN, sizeof reconstruction - skip);
-  TEST_ASSERT_EQUAL_INT(
-      expected, tv_reconstruct(a.context, &views[0], &views[1], feature_options, match_options,
-                               estimate_options, (tv_triangulation)triangulation, &two_view,
-                               &reconstruction));
+  TEST_ASSERT_EQUAL_INT(expected, tv_reconstruct(a.context, &views[0], &views[1], options,
+                                                 &two_view, &reconstruction));
   TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&two_view + skip, sizeof two_view - skip));
   TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&reconstruction + skip, sizeof reconstruction - skip));
 }
 
+/* Every stage's options, at their defaults. */
+typedef struct stage_options {
+  tv_feature_options feature;
+  tv_match_options match;
+  tv_estimate_options estimate;
+  tv_reconstruct_options all;
+} stage_options;
+
+static void default_stages(stage_options *o) {
+  tv_feature_options_init(&o->feature);
+  tv_match_options_init(&o->match);
+  tv_estimate_options_init(&o->estimate);
+  tv_reconstruct_options_init(&o->all);
+  o->feature.max_keypoints = CAP;
+  o->all.feature = &o->feature;
+  o->all.match = &o->match;
+  o->all.estimate = &o->estimate;
+}
+
 static void test_null_pointers_are_refused(void) {
-  const tv_triangulation method = TV_TRIANGULATION_ITERATIVE_LS;
   tv_view *v = views;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(NULL, v, v + 1, NULL, NULL, NULL, method,
-                                                    &two_view, &reconstruction));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, NULL, v + 1, NULL, NULL, NULL,
-                                                    method, &two_view, &reconstruction));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, NULL, NULL, NULL, NULL, method,
-                                                    &two_view, &reconstruction));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, NULL, NULL, method,
-                                                    NULL, &reconstruction));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, NULL, NULL, method,
-                                                    &two_view, NULL));
+  tv_reconstruction *r = &reconstruction;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(NULL, v, v + 1, NULL, &two_view, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, NULL, v + 1, NULL, &two_view, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, NULL, NULL, &two_view, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, NULL, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_reconstruct(a.context, v, v + 1, NULL, &two_view, NULL));
   views[1].image.data = NULL;
-  refused(TV_ERR_NULL, NULL, NULL, NULL, method);
+  refused(TV_ERR_NULL, NULL);
   tv_reconstruction_init(NULL);
+  tv_reconstruct_options_init(NULL);
 }
 
 static void test_structs_of_another_size_are_refused(void) {
-  tv_feature_options feature_options;
-  tv_match_options match_options;
-  tv_estimate_options estimate_options;
-  const int method = TV_TRIANGULATION_ITERATIVE_LS;
-  tv_feature_options_init(&feature_options);
-  tv_match_options_init(&match_options);
-  tv_estimate_options_init(&estimate_options);
-  feature_options.struct_size = match_options.struct_size = estimate_options.struct_size = 3;
-  refused(TV_ERR_STRUCT_SIZE, &feature_options, NULL, NULL, method);
-  refused(TV_ERR_STRUCT_SIZE, NULL, &match_options, NULL, method);
-  refused(TV_ERR_STRUCT_SIZE, NULL, NULL, &estimate_options, method);
+  stage_options o;
+  uint32_t *sizes[4] = {&o.feature.struct_size, &o.match.struct_size, &o.estimate.struct_size,
+                        &o.all.struct_size};
+  int k;
+  for (k = 0; k < 4; ++k) {
+    default_stages(&o);
+    *sizes[k] = 3;
+    refused(TV_ERR_STRUCT_SIZE, &o.all);
+  }
   two_view.struct_size += 8;
-  refused(TV_ERR_STRUCT_SIZE, NULL, NULL, NULL, method);
+  refused(TV_ERR_STRUCT_SIZE, NULL);
   tv_two_view_init(&two_view);
   reconstruction.struct_size = 0;
-  refused(TV_ERR_STRUCT_SIZE, NULL, NULL, NULL, method);
+  refused(TV_ERR_STRUCT_SIZE, NULL);
 }
 
 static void test_what_the_stages_refuse_is_refused(void) {
-  const int method = TV_TRIANGULATION_ITERATIVE_LS;
-  tv_feature_options feature_options;
-  tv_match_options match_options;
-  tv_estimate_options estimate_options;
+  stage_options o;
   tv_camera bad = camera;
   tv_image mask = api_image(drawn[0], WIDTH - 1, HEIGHT, WIDTH);
-  tv_feature_options_init(&feature_options);
-  feature_options.max_keypoints = CAP;
-  feature_options.arc = 8;
-  refused(TV_ERR_ARGUMENT, &feature_options, NULL, NULL, method);
-  feature_options.arc = 9;
-  feature_options.max_keypoints = CAP + 1;
-  refused(TV_ERR_LIMITS, &feature_options, NULL, NULL, method);
-  tv_match_options_init(&match_options);
-  match_options.ratio = 0;
-  refused(TV_ERR_ARGUMENT, NULL, &match_options, NULL, method);
-  tv_estimate_options_init(&estimate_options);
-  estimate_options.max_error_px = NAN;
-  refused(TV_ERR_NOT_FINITE, NULL, NULL, &estimate_options, method);
-  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, 7);
-  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, -1);
+  default_stages(&o);
+  o.feature.arc = 8;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  default_stages(&o);
+  o.feature.max_keypoints = CAP + 1;
+  refused(TV_ERR_LIMITS, &o.all);
+  default_stages(&o);
+  o.match.ratio = 0;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  default_stages(&o);
+  o.estimate.max_error_px = NAN;
+  refused(TV_ERR_NOT_FINITE, &o.all);
+  default_stages(&o);
+  o.all.triangulation = 7;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  o.all.triangulation = -1;
+  refused(TV_ERR_ARGUMENT, &o.all);
   views[1].mask = &mask;
-  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, method);
+  refused(TV_ERR_ARGUMENT, NULL);
   views[1].mask = NULL;
   bad.fx = 0;
   views[1].camera = &bad;
-  refused(TV_ERR_CAMERA, NULL, NULL, NULL, method);
+  refused(TV_ERR_CAMERA, NULL);
   views[1].camera = &camera;
   views[1].image.width = WIDTH + 1;
   views[1].image.stride_bytes = WIDTH + 1;
-  refused(TV_ERR_LIMITS, NULL, NULL, NULL, method);
+  refused(TV_ERR_LIMITS, NULL);
 }
 
 static void test_one_camera_alone_is_refused(void) {
   views[0].camera = NULL;
-  refused(TV_ERR_ARGUMENT, NULL, NULL, NULL, TV_TRIANGULATION_ITERATIVE_LS);
+  refused(TV_ERR_ARGUMENT, NULL);
 }
 
 static int lies_in_context(const void *pointer, size_t bytes) {

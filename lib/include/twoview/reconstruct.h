@@ -16,6 +16,17 @@ typedef struct tv_view {
   const tv_image *mask;
 } tv_view;
 
+/* Filled by tv_reconstruct_options_init. Null stage options mean that stage's defaults. */
+typedef struct tv_reconstruct_options {
+  uint32_t struct_size;  /* set by tv_reconstruct_options_init */
+  int32_t triangulation; /* a tv_triangulation; default TV_TRIANGULATION_ITERATIVE_LS */
+  const tv_feature_options *feature;
+  const tv_match_options *match;
+  const tv_estimate_options *estimate;
+} tv_reconstruct_options;
+
+TV_API void tv_reconstruct_options_init(tv_reconstruct_options *options);
+
 /* What tv_reconstruct found. The arrays lie in the context and hold until the next call with it. */
 typedef struct tv_reconstruction {
   uint32_t struct_size; /* set by tv_reconstruction_init */
@@ -33,13 +44,10 @@ typedef struct tv_reconstruction {
 TV_API void tv_reconstruction_init(tv_reconstruction *reconstruction);
 
 /* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate.
-   Each options pointer may be null (defaults). two_view: initialised by tv_two_view_init.
+   options: null means the defaults. two_view: initialised by tv_two_view_init.
    Statuses as the stages'. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
-                                const tv_feature_options *feature_options,
-                                const tv_match_options *match_options,
-                                const tv_estimate_options *estimate_options,
-                                tv_triangulation triangulation, tv_two_view *two_view,
+                                const tv_reconstruct_options *options, tv_two_view *two_view,
                                 tv_reconstruction *reconstruction);
 
 TV_END_DECLS

@@ -63,6 +63,10 @@ typedef struct tv_estimate_options {
   int32_t max_iterations;   /* hard bound on samples, [1, 10^6], default 10000 */
   int32_t fixed_iterations; /* 0 (default): adaptive stop. N: exactly N samples, near constant time */
   uint64_t seed;            /* of the sampler; default constant, never the clock */
+  double gravity0[3], gravity1[3]; /* the direction of gravity ("down") in each camera's frame, of any
+                                      length above 0; read when gravity_sigma_rad > 0 */
+  double gravity_sigma_rad; /* standard deviation of each direction about each axis across it,
+                               [0, pi]; 0 (default): gravity is not known */
 } tv_estimate_options;
 
 TV_API void tv_estimate_options_init(tv_estimate_options *options);
@@ -90,6 +94,8 @@ typedef struct tv_two_view {
   double coverage;            /* share of an 8x8 grid on image 0 that holds an inlier, [0, 1] */
   double median_parallax_rad; /* of the inliers' rays, rotation removed */
   double rms_error_px;        /* Sampson distance over the inliers */
+  double noise_px;            /* standard deviation of a matched pixel along one axis, as the
+                                 residuals of a full pose tell it; 0 without one */
   uint64_t seed;              /* as used */
 } tv_two_view;
 

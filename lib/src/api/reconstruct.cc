@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 
-#include "api/enum_value.h"
 #include "api/validate.h"
 #include "geometry/triangulation.h"
 
@@ -73,8 +72,25 @@ tv_status triangulate_inliers(tv_context* context, tv_triangulation method, cons
   return TV_OK;
 }
 
+constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
+                                              TV_TRIANGULATION_ITERATIVE_LS, nullptr, nullptr,
+                                              nullptr};
+
+tv_status read_reconstruct_options(const tv_reconstruct_options* options,
+                                   tv_reconstruct_options* checked) {
+  *checked = kDefaults;
+  if (options == nullptr) return TV_OK;
+  if (options->struct_size != sizeof(tv_reconstruct_options)) return TV_ERR_STRUCT_SIZE;
+  *checked = *options;
+  return is_triangulation_method(checked->triangulation) ? TV_OK : TV_ERR_ARGUMENT;
+}
+
 }  // namespace
 }  // namespace tv
+
+void tv_reconstruct_options_init(tv_reconstruct_options* options) {
+  if (options != nullptr) *options = tv::kDefaults;
+}
 
 void tv_reconstruction_init(tv_reconstruction* reconstruction) {
   if (reconstruction == nullptr) return;
@@ -83,19 +99,18 @@ void tv_reconstruction_init(tv_reconstruction* reconstruction) {
 }
 
 tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_view* view1,
-                         const tv_feature_options* feature_options,
-                         const tv_match_options* match_options,
-                         const tv_estimate_options* estimate_options,
-                         tv_triangulation triangulation, tv_two_view* two_view,
+                         const tv_reconstruct_options* options, tv_two_view* two_view,
                          tv_reconstruction* reconstruction) {
   if (context == nullptr || view0 == nullptr || view1 == nullptr || two_view == nullptr ||
       reconstruction == nullptr) {
     return TV_ERR_NULL;
   }
   if (reconstruction->struct_size != sizeof(tv_reconstruction)) return TV_ERR_STRUCT_SIZE;
-  if (!tv::is_triangulation_method(tv::enum_value(triangulation))) return TV_ERR_ARGUMENT;
+  tv_reconstruct_options checked;
+  tv_status status = tv::read_reconstruct_options(options, &checked);
+  if (status != TV_OK) return status;
   tv_feature_options features;
-  tv_status status = tv::read_feature_options(*context, feature_options, &features);
+  status = tv::read_feature_options(*context, checked.feature, &features);
   if (status != TV_OK) return status;
   tv::ArenaScope scope(context->arena);
   tv::Results r = tv::alloc_results(context->arena, context->limits.max_keypoints);
@@ -108,16 +123,16 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
     if (status != TV_OK) return status;
   }
   status = tv_match(context, r.descriptors[0], num_keypoints[0], r.descriptors[1],
-                    num_keypoints[1], match_options, r.matches, capacity, &num_matches);
+                    num_keypoints[1], checked.match, r.matches, capacity, &num_matches);
   if (status != TV_OK) return status;
   tv::gather_pixels(r, num_matches);
   tv_two_view estimate = *two_view;
   status = tv_estimate_two_view(context, view0->camera, view1->camera, r.pixels[0], r.pixels[1],
-                                r.ratios, num_matches, estimate_options, &estimate,
+                                r.ratios, num_matches, checked.estimate, &estimate,
                                 r.inlier_mask);
   if (status != TV_OK) return status;
-  status = tv::triangulate_inliers(context, triangulation, *view0, *view1, estimate, num_matches,
-                                   r, &num_points);
+  status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),
+                                   *view0, *view1, estimate, num_matches, r, &num_points);
   if (status != TV_OK) return status;
   *two_view = estimate;
   for (int v = 0; v < 2; ++v) {

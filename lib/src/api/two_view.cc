@@ -12,7 +12,8 @@ namespace {
 constexpr uint64_t kDefaultSeed = 20130814;  // any constant would do
 
 constexpr tv_estimate_options kDefaults = {
-    sizeof(tv_estimate_options), TV_METHOD_FIVE_POINT, 1.0, 0.9999, 10000, 0, kDefaultSeed};
+    sizeof(tv_estimate_options), TV_METHOD_FIVE_POINT, 1.0, 0.9999, 10000, 0, kDefaultSeed,
+    {0, 0, 0}, {0, 0, 0}, 0};
 
 tv_status read_estimate_options(const tv_estimate_options* options, bool calibrated,
                                 tv_estimate_options* checked) {
