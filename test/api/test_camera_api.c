@@ -242,6 +242,49 @@ static void test_scale_out_of_range_is_refused(void) {
   TEST_ASSERT_EQUAL_INT(1, scaled.height);
 }
 
+static void test_many_points_have_the_pixels_of_each_one(void) {
+  const tv_camera cameras[2] = {ardrone2(), barrel()};
+  const double points[5][3] = {{0.1, 0.2, 1}, {0, 0, -1}, {NAN, 0, 1}, {9, 0, 1}, {-0.3, 0.1, 2}};
+  int c, i;
+  for (c = 0; c < 2; ++c) {
+    double pixels[12];
+    uint8_t inside[6];
+    memset(pixels, 0x5A, sizeof pixels);
+    memset(inside, 0x5A, sizeof inside);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project_points(&cameras[c], points[0], 5, pixels, inside));
+    for (i = 0; i < 5; ++i) {
+      double pixel[2] = {0, 0};
+      const tv_status status = tv_camera_project(&cameras[c], points[i], pixel, NULL);
+      TEST_ASSERT_EQUAL_INT(status == TV_OK, inside[i]);
+      TEST_ASSERT_EQUAL_MEMORY(pixel, pixels + 2 * i, sizeof pixel);
+    }
+    TEST_ASSERT_TRUE(inside[0] == 1 && inside[1] == 0 && inside[2] == 0 && inside[4] == 1);
+    TEST_ASSERT_EQUAL_INT(0x5A, inside[5]);
+  }
+}
+
+static void test_many_points_refuse_what_one_refuses(void) {
+  tv_camera camera = barrel();
+  double memory[5] = {0.1, 0.2, 1, -4, -5};
+  const double point[3] = {0.1, 0.2, 1};
+  uint8_t inside[1] = {7};
+  double *pixels = memory + 3;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project_points(&camera, NULL, 0, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_project_points(NULL, point, 1, pixels, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_project_points(&camera, NULL, 1, pixels, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_project_points(&camera, point, 1, NULL, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_project_points(&camera, point, 1, pixels, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_camera_project_points(&camera, point, -1, pixels, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_camera_project_points(&camera, memory, 1, memory + 2, inside));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, tv_camera_project_points(&camera, point, 1, pixels, (uint8_t *)pixels + 9));
+  camera.fx = 0;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_camera_project_points(&camera, point, 1, pixels, inside));
+  TEST_ASSERT_TRUE(memory[3] == -4 && memory[4] == -5 && inside[0] == 7);
+}
+
 static void test_every_number_has_its_name(void) {
   int i, j;
   for (i = TV_OK; i <= TV_ERR_KERNELS; ++i) {
@@ -278,6 +321,8 @@ int main(void) {
   RUN_TEST(test_valid_angle_of_each_model);
   RUN_TEST(test_scale_keeps_pixel_centres);
   RUN_TEST(test_scale_out_of_range_is_refused);
+  RUN_TEST(test_many_points_have_the_pixels_of_each_one);
+  RUN_TEST(test_many_points_refuse_what_one_refuses);
   RUN_TEST(test_every_number_has_its_name);
   return UNITY_END();
 }

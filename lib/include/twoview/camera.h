@@ -30,7 +30,7 @@ typedef struct tv_camera {
 /* TV_OK, or TV_ERR_NULL, or TV_ERR_CAMERA: unknown model, size below 1, fx or fy not above 0, a
    number that is not finite.
    The functions below find the valid region anew at each call (about 10 microseconds with
-   distortion on a desktop core); tv_estimate_two_view and tv_triangulate find it once. */
+   distortion on a desktop core); those that take many points find it once. */
 TV_API tv_status tv_camera_check(const tv_camera *camera);
 
 /* The model is used only where its distortion is monotonic: up to this angle (radians) off the
@@ -44,6 +44,13 @@ TV_API tv_status tv_camera_valid_angle(const tv_camera *camera, double *angle_ra
    angle). */
 TV_API tv_status tv_camera_project(const tv_camera *camera, const double point[3], double pixel[2],
                                    double *jacobian);
+
+/* The pixels of many points, the valid region found once: num_points x 3 in, num_points x 2 out.
+   inside: num_points bytes, 1 where the point has a pixel; else 0 and the pixel is zeros (behind the
+   camera, beyond the valid angle, or not finite).
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (num_points below 0), TV_ERR_CAMERA, TV_ERR_OVERLAP. */
+TV_API tv_status tv_camera_project_points(const tv_camera *camera, const double *points,
+                                          int32_t num_points, double *pixels, uint8_t *inside);
 
 /* Unit ray through a pixel, by Newton's method on the distortion.
    jacobian: null, or 3x2 row-major d ray / d pixel.

@@ -71,6 +71,32 @@ tv_status tv_camera_project(const tv_camera *camera, const double point[3], doub
   return TV_OK;
 }
 
+tv_status tv_camera_project_points(const tv_camera *camera, const double *points,
+                                   int32_t num_points, double *pixels, uint8_t *inside) {
+  if (camera == nullptr) return TV_ERR_NULL;
+  if (num_points > 0 && (points == nullptr || pixels == nullptr || inside == nullptr)) {
+    return TV_ERR_NULL;
+  }
+  if (num_points < 0) return TV_ERR_ARGUMENT;
+  const tv_status status = tv_camera_check(camera);
+  if (status != TV_OK) return status;
+  const size_t n = static_cast<size_t>(num_points);
+  if (tv::overlap(pixels, 16 * n, points, 24 * n) || tv::overlap(inside, n, points, 24 * n) ||
+      tv::overlap(inside, n, pixels, 16 * n)) {
+    return TV_ERR_OVERLAP;
+  }
+  const tv::Camera prepared = tv::prepare_camera(*camera);
+  for (size_t i = 0; i < n; ++i) {
+    const double *p = points + 3 * i;
+    tv::Vec2 pixel(0, 0);
+    const bool finite = is_finite(p[0]) && is_finite(p[1]) && is_finite(p[2]);
+    inside[i] = finite && tv::project(prepared, tv::Vec3(p[0], p[1], p[2]), &pixel, nullptr);
+    pixels[2 * i] = pixel[0];
+    pixels[2 * i + 1] = pixel[1];
+  }
+  return TV_OK;
+}
+
 tv_status tv_camera_unproject(const tv_camera *camera, const double pixel[2], double ray[3],
                               double *jacobian) {
   const tv_status status = check_input(camera, pixel, 2, ray);
