@@ -19,29 +19,17 @@ import numpy as np
 
 import datasets
 import estimators
+import identical
 import metrics
 import peers
 import pipeline
+from tables import (MIN_PAIRS, OURS, mean_summary, print_table, progress, runs_of, say, summarise)
 
 PROGRAM = os.path.join(datasets.ROOT, "build", "release", "bin", "twoview")
-OURS = "twoview"
-MIN_PAIRS = 15      # sets of at least so many pairs count by themselves
 QUICK_PAIRS = 8
 QUICK_RESAMPLES = 1000
 ERRORS = ("rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
           "pose_error_deg")
-
-
-def say(text="", end="\n"):
-    print(text, end=end, flush=True)
-
-
-def progress(name):
-    def report(done, total):
-        if sys.stderr.isatty():
-            print(f"\r  {name}: {done}/{total}  ", end="" if done < total else "\r\033[K",
-                  file=sys.stderr, flush=True)
-    return report
 
 
 # ---- ours --------------------------------------------------------------------------------------
@@ -91,53 +79,7 @@ def run_library(path, data, extra):
     return rows, {}
 
 
-# ---- numbers -----------------------------------------------------------------------------------
-
-def time_ms(row):
-    return row["time_ms"] if "time_ms" in row else sum(row["ms"].values())
-
-
-def runs_of(rows):
-    """Pose errors, seeds x pairs."""
-    seeds = sorted({row["seed"] for row in rows})
-    return np.array([[r["pose_error_deg"] for r in rows if r["seed"] == s] for s in seeds])
-
-
-def summarise(rows):
-    runs = runs_of(rows)
-    return {"num_pairs": runs.shape[1], "num_seeds": runs.shape[0],
-            "auc": {f"{t:g}": metrics.auc_of_runs(runs, t) for t in metrics.THRESHOLDS_DEG},
-            "median_error_deg": float(np.median(runs)),
-            "failures": float(np.isinf(runs).sum() / runs.shape[0]),
-            "num_matches": float(np.mean([r["num_matches"] for r in rows])),
-            "precision": float(np.mean([r["precision"] for r in rows])),
-            "time_ms": float(np.median([time_ms(r) for r in rows]))}
-
-
-def mean_summary(summaries):
-    """Mean over sets, each set with the same weight."""
-    keys = ("median_error_deg", "failures", "num_matches", "precision", "time_ms")
-    return {"num_sets": len(summaries),
-            "auc": {t: float(np.mean([s["auc"][t] for s in summaries]))
-                    for t in summaries[0]["auc"]},
-            **{k: float(np.mean([s[k] for s in summaries])) for k in keys}}
-
-
-def table_line(name, summary, width):
-    auc = " ".join(f"{v:6.1f}" for v in summary["auc"].values())
-    return (f"  {name:<{width}} {auc} {summary['median_error_deg']:8.2f} "
-            f"{summary['failures']:5.1f} {summary['num_matches']:8.0f} "
-            f"{100 * summary['precision']:6.1f} {summary['time_ms']:8.1f}")
-
-
-def print_table(title, summaries):
-    width = max(len(name) for name in summaries)
-    say(f"\n{title}")
-    say(f"  {'':<{width}} {'AUC5':>6} {'AUC10':>6} {'AUC20':>6} {'median':>8} {'fail':>5} "
-        f"{'matches':>8} {'prec%':>6} {'ms':>8}")
-    for name, summary in summaries.items():
-        say(table_line(name, summary, width))
-
+# ---- the paired comparison ----------------------------------------------------------------------
 
 def print_comparison(peer, compared, sizes):
     say(f"\n{OURS} minus {peer}: difference of AUC, standard error, 95 % interval")
@@ -183,71 +125,6 @@ def machine():
         pass
     return {"cpu": model, "cpus": os.cpu_count(), "system": platform.platform(),
             "python": platform.python_version()}
-
-
-# ---- estimators on identical matches -----------------------------------------------------------
-
-def compare_estimators(arguments, sets):
-    """Every estimator at every threshold on the same matches, ours and the peers'."""
-    import time
-
-    import twoview_ctypes
-    library = twoview_ctypes.Library(arguments.lib)
-    kinds = [OURS] + [k for k, (_, module, _) in estimators.PEERS.items() if has_module(module)]
-    table = {}
-    per_set = {}
-    for data in sets:
-        if arguments.matches == "ours":
-            context = pipeline.make_context(library, data)
-            matched = pipeline.match_pairs(context, data)
-        else:
-            peer = peers.Peer(peers.GROUPS["poselib"][0], use_cache=False)
-            features = {}
-            matched = [(m, {"extract": e, "match": f, "keypoints": n}) for m, e, f, n in
-                       (peer.matches(data, pair, features) for pair in data.pairs)]
-            context = pipeline.make_context(library, data)
-        summaries = {}
-        for kind in kinds:
-            for threshold in arguments.thresholds:
-                rows = pipeline.evaluate_matches(
-                    data, matched, {"max_error_px": threshold},
-                    "twoview" if kind == OURS else kind, context, arguments.seeds)
-                for row in rows:
-                    row["time_ms"] = row["ms"]["estimate"]
-                title = OURS if kind == OURS else estimators.PEERS[kind][0]
-                name = f"{title} {threshold:g} px"
-                summaries[name] = summarise(rows)
-                table.setdefault(name, {})[data.name] = rows
-        per_set[data.name] = summaries
-        print_table(f"{data.name}: {len(data.pairs)} pairs, identical matches "
-                    f"({arguments.matches})", summaries)
-    mean = {name: mean_summary([per_set[d.name][name] for d in sets]) for name in table}
-    print_table(f"mean over {len(sets)} sets, identical matches ({arguments.matches})", mean)
-    say("\nms: median of the estimator alone. Peers see the matches shuffled, "
-        f"{arguments.seeds} seeds; ours another seed each time.")
-    comparisons = {}
-    for threshold in arguments.thresholds:
-        first = f"{OURS} {threshold:g} px"
-        for name in table:
-            if not name.startswith(OURS) and name.endswith(f" {threshold:g} px"):
-                compared = metrics.paired_bootstrap(
-                    {s: (runs_of(table[first][s]), runs_of(table[name][s])) for s in table[name]},
-                    arguments.resamples)
-                comparisons[name] = compared
-                m = compared["mean"]
-                say(f"  {first} minus {name:<48} " + "  ".join(
-                    f"AUC{t} {d['difference']:+5.1f} ±{d['standard_error']:.1f}"
-                    for t, d in m.items()))
-    return {"mode": "estimators", "matches": arguments.matches, "sets": per_set, "mean": mean,
-            "comparisons": comparisons}
-
-
-def has_module(module):
-    try:
-        estimators.module_version(module)
-    except ImportError:
-        return False
-    return True
 
 
 # ---- whole pipelines ---------------------------------------------------------------------------
@@ -314,11 +191,12 @@ def main():
     parser.add_argument("--sets", help="names, separated by commas (default: all with pairs)")
     parser.add_argument("--quick", action="store_true",
                         help=f"at most {QUICK_PAIRS} pairs a set, evenly spaced")
-    parser.add_argument("--flagged", action="store_true",
-                        help="also pairs_flagged.txt of " + " and ".join(datasets.FLAGGED_SETS))
+    parser.add_argument("--flagged", action=argparse.BooleanOptionalAction, default=True,
+                        help="also pairs_flagged.txt of " + " and ".join(datasets.FLAGGED_SETS)
+                        + " (default; --no-flagged leaves them out)")
     parser.add_argument("--peers", default="fast",
                         help=f"of {','.join(peers.GROUPS)} (default: fast; empty: none)")
-    parser.add_argument("--seeds", type=int, default=3, help="of the peers (default 3)")
+    parser.add_argument("--seeds", type=int, default=5, help="of the peers (default 5)")
     parser.add_argument("--resamples", type=int, help="of the bootstrap (default 2000)")
     parser.add_argument("--no-cache", action="store_true",
                         help="run the peers again (.cache/accuracy keeps their results)")
@@ -330,9 +208,15 @@ def main():
     parser.add_argument("--lib", help="libtwoview.so (default: of build/release)")
     parser.add_argument("--estimators", action="store_true",
                         help="instead: all estimators on identical matches")
-    parser.add_argument("--matches", choices=("ours", "sift"), default="ours",
-                        help="with --estimators: whose matches (sift: OpenCV's RootSIFT)")
-    parser.add_argument("--thresholds", default="0.5,1,2", help="with --estimators: pixels")
+    parser.add_argument("--matches", default="ours,sift",
+                        help="with --estimators: whose matches, ours, sift (OpenCV's RootSIFT) or "
+                             "both (default)")
+    parser.add_argument("--kinds", help="with --estimators: only these peers, of "
+                        + ",".join(estimators.PEERS))
+    parser.add_argument("--options", nargs="+", metavar="KEY=VALUE",
+                        help="with --estimators: fields of tv_estimate_options for ours")
+    parser.add_argument("--thresholds", default="0.5,1,2",
+                        help="with --estimators: pixels; each peer counts at its best")
     arguments = parser.parse_args(own)
     arguments.extra = extra
     arguments.thresholds = [float(t) for t in arguments.thresholds.split(",")]
@@ -351,7 +235,7 @@ def main():
             sys.exit(f"accuracy: {arguments.program} is not built: scripts/test builds it")
     sets = [datasets.Set(os.path.join(datasets.data_dir(), name), flagged=arguments.flagged,
                          max_pairs=QUICK_PAIRS if arguments.quick else None) for name in names]
-    result = (compare_estimators if arguments.estimators else compare_pipelines)(arguments, sets)
+    result = (identical.compare if arguments.estimators else compare_pipelines)(arguments, sets)
     result["machine"] = machine()
     result["protocol"] = {
         "cap": peers.CAP, "ratio": peers.RATIO, "seeds": arguments.seeds,

@@ -1,4 +1,4 @@
-"""Robust estimators behind one call: ours, OpenCV's USAC, PoseLib's and COLMAP's.
+"""Robust estimators behind one call: ours, OpenCV's USAC, PoseLib's, COLMAP's and OpenGV's.
 
 Each peer gets undistorted pixels and pinhole cameras; ours gets the image's own pixels and the
 lens. OpenCV's takes one K, so the second view is mapped to the first K: pixels, because USAC_MAGSAC
@@ -118,6 +118,50 @@ def _pycolmap_calibrated(matches, order, threshold_px, seed):
     return pose.rotation.matrix(), t, len(geometry.inlier_matches)
 
 
+def _unit_rays(rays):
+    rays = np.column_stack([rays, np.ones(len(rays))])
+    return np.ascontiguousarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+
+def _sampson_squared(rays0, rays1, R, t):
+    """Squared Sampson distance of normalised points."""
+    tx, ty, tz = t
+    E = np.array([[0, -tz, ty], [tz, 0, -tx], [-ty, tx, 0]]) @ R
+    p0, p1 = (np.column_stack([p, np.ones(len(p))]) for p in (rays0, rays1))
+    line1, line0 = p0 @ E.T, p1 @ E
+    norm = np.sum(line1[:, :2] ** 2, axis=1) + np.sum(line0[:, :2] ** 2, axis=1)
+    return np.sum(p1 * line1, axis=1) ** 2 / np.maximum(norm, 1e-300)
+
+
+def _opengv(refine):
+    def run(matches, order, threshold_px, seed):
+        import pyopengv  # seeds itself; the order of the matches is what `seed` changes
+        del seed
+        rays0, rays1 = matches.rays0[order], matches.rays1[order]
+        unit0, unit1 = _unit_rays(rays0), _unit_rays(rays1)
+        K0, K1 = (K for K, _ in matches.cameras)
+        focal = (K0[0, 0] + K0[1, 1] + K1[0, 0] + K1[1, 1]) / 4
+        # the sum of 1 - cos of both reprojection errors, as OpenGV's own programs have it
+        threshold = 2 * (1 - np.cos(np.arctan(threshold_px / focal)))
+        try:
+            T = pyopengv.relative_pose_ransac(unit0, unit1, "NISTER", threshold, MAX_ITERATIONS,
+                                              CONFIDENCE)
+        except RuntimeError:
+            return None
+        T = np.asarray(T, float)
+        for final in (False, True):  # T: camera 1 in camera 0
+            if T.shape != (3, 4) or not np.isfinite(T).all() or not np.any(T[:, 3]):
+                return None
+            R, t = T[:, :3].T, -T[:, :3].T @ T[:, 3]
+            t = t / np.linalg.norm(t)
+            inliers = _sampson_squared(rays0, rays1, R, t) < (threshold_px / focal) ** 2
+            if final or not refine or np.count_nonzero(inliers) < 6:
+                return R, t, int(np.count_nonzero(inliers))
+            T = np.asarray(pyopengv.relative_pose_optimize_nonlinear(
+                unit0[inliers], unit1[inliers], T[:, 3].copy(), T[:, :3].copy()), float)
+    return run
+
+
 PEERS = {
     "magsac": ("OpenCV USAC_MAGSAC", "cv2", _opencv("USAC_MAGSAC")),
     "usac": ("OpenCV USAC_DEFAULT", "cv2", _opencv("USAC_DEFAULT")),
@@ -125,6 +169,8 @@ PEERS = {
     "poselib": ("PoseLib E", "poselib", _poselib),
     "pycolmap": ("COLMAP E", "pycolmap", _pycolmap_essential),
     "pycolmap_tvg": ("COLMAP calibrated two-view geometry", "pycolmap", _pycolmap_calibrated),
+    "opengv": ("OpenGV NISTER", "pyopengv", _opengv(refine=False)),
+    "opengv_nonlinear": ("OpenGV NISTER + nonlinear", "pyopengv", _opengv(refine=True)),
 }
 
 
@@ -137,6 +183,13 @@ def module_version(module):
             return metadata.version("poselib")
         except metadata.PackageNotFoundError:
             return getattr(poselib, "__version__", "unknown")
+    if module == "pyopengv":  # Debian's, without a version of its own
+        import pyopengv
+        del pyopengv
+        import subprocess
+        told = subprocess.run(["dpkg-query", "-W", "-f", "${Version}", "python3-opengv"],
+                              capture_output=True, text=True, check=False).stdout
+        return told.split("+")[0] or "unknown"
     return __import__(module).__version__
 
 

@@ -216,7 +216,7 @@ class Peer:
                     "numpy": np.__version__,
                     "versions": {m: estimators.module_version(m) for m in sorted(modules)}}
 
-    def _pair_key(self, data, pair):
+    def pair_key(self, data, pair):
         cameras = [data.camera(pair, i) for i in (0, 1)]
         text = json.dumps([self.key, data.resize, pair.line, data.pixel_hash(pair.name0),
                            data.pixel_hash(pair.name1),
@@ -233,7 +233,7 @@ class Peer:
                 stored = json.load(f)
         features, rows, changed = {}, [], False
         for number, pair in enumerate(data.pairs):
-            key = self._pair_key(data, pair)
+            key = self.pair_key(data, pair)
             have = stored.get(key, [])
             if len(have) < self.num_seeds:
                 have = self._run_pair(data, pair, features)
