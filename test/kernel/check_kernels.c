@@ -297,6 +297,93 @@ static void case_update_columns(trial *t) {
   REPEAT(t, *smallest = t->set->update_columns(dist, num_columns, row, best, second, best_row));
 }
 
+/* Rays near the axis and slopes of a lens of some 500 pixels; now and then an extreme match. */
+static void fill_matches(trial *t, double *const *arrays, int32_t n, int32_t on_plane) {
+  const int32_t extreme = random_int(&t->seed, 0, 3);
+  int32_t a, i;
+  for (a = 0; a < 18; ++a) {
+    const int32_t is_ray = a < 6, last = is_ray ? a % 3 == 2 : a % 6 >= 4;
+    for (i = 0; i < n; ++i) {
+      const double noise = 2 * random_unit(&t->seed) - 1;
+      arrays[a][i] = is_ray ? (last ? 1 : 0.6 * noise) : 0.002 * noise;
+      if (last && on_plane) arrays[a][i] = is_ray ? 1 : 0;
+    }
+    if (extreme == 0) arrays[a][random_int(&t->seed, 0, n - 1)] *= 1e60;
+    if (extreme == 1) arrays[a][random_int(&t->seed, 0, n - 1)] = 0;
+    if (extreme == 2) memset(arrays[a], 0, (size_t)n * sizeof arrays[a][0]);
+  }
+}
+
+typedef struct match_arrays {
+  int32_t n, on_plane, count, first;
+  double *arrays[18], *m;
+  const double *read[18];
+  int32_t *indices;
+} match_arrays;
+
+static match_arrays take_matches(trial *t) {
+  match_arrays a;
+  int32_t k;
+  a.n = pick(t, 1, 100, 500);
+  a.on_plane = pick(t, 0, 1, 1);
+  for (k = 0; k < 18; ++k) a.arrays[k] = INPUT(t, double, a.n);
+  fill_matches(t, a.arrays, a.n, a.on_plane);
+  for (k = 0; k < 18; ++k) a.read[k] = a.arrays[k];
+  a.m = INPUT(t, double, 9);
+  for (k = 0; k < 9; ++k) a.m[k] = 2 * random_unit(&t->seed) - 1;
+  if (random_int(&t->seed, 0, 9) == 0) memset(a.m, 0, 9 * sizeof a.m[0]);
+  a.first = pick(t, 0, a.n - 1, 0);
+  a.count = pick(t, 0, a.n - a.first, a.n);
+  a.indices = NULL;
+  if (random_int(&t->seed, 0, 1)) {
+    a.indices = INPUT(t, int32_t, a.count);
+    for (k = 0; k < a.count; ++k) a.indices[k] = random_int(&t->seed, 0, a.n - 1);
+  }
+  return a;
+}
+
+static void case_sampson_squares(trial *t) {
+  const match_arrays a = take_matches(t);
+  double *squares = OUTPUT(t, double, a.count);
+  REPEAT(t, t->set->sampson_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
+}
+
+static void case_sampson_sums(trial *t) {
+  const match_arrays a = take_matches(t);
+  const int32_t cauchy = random_int(&t->seed, 0, 1);
+  double *sums = OUTPUT(t, double, TVK_SAMPSON_SUMS * TVK_WIDTH);
+  int32_t k;
+  for (k = 0; k < TVK_SAMPSON_SUMS * TVK_WIDTH; ++k) sums[k] = k / TVK_WIDTH == 55;
+  REPEAT(t, t->set->sampson_sums(a.read, a.indices, a.first, a.count, a.on_plane, a.m, 1.0, cauchy,
+                                 sums));
+}
+
+static void case_sampson_score(trial *t) {
+  const int32_t num_blocks = pick(t, 0, 8, 16), on_plane = pick(t, 0, 1, 1);
+  const int32_t n = num_blocks * TVK_SCORE_BLOCK, scale = random_int(&t->seed, 0, 2);
+  const float inverse_sq = scale == 0 ? 1e-18f : scale == 1 ? 1.0f : 1e37f;
+  const int64_t most = (int64_t)n * TVK_SCORE_ONE, bound = random_int(&t->seed, 0, 1)
+                                                              ? most
+                                                              : (int64_t)(random_unit(&t->seed) * (double)most);
+  const float *read[18];
+  float *m = INPUT(t, float, 9);
+  int64_t *score = OUTPUT(t, int64_t, 1);
+  int32_t k, i;
+  for (k = 0; k < 18; ++k) {
+    float *array = INPUT(t, float, n);
+    const int32_t is_slope = on_plane ? k >= 4 : k >= 6;
+    for (i = 0; i < n; ++i) {
+      const float noise = (float)(2 * random_unit(&t->seed) - 1);
+      array[i] = is_slope ? (on_plane && k % 3 == 2 ? 0.0f : 4e-6f) + 1e-6f * noise : noise;
+      if (random_int(&t->seed, 0, 50) == 0) array[i] *= 1e30f;
+      if (random_int(&t->seed, 0, 50) == 0) array[i] = 0;
+    }
+    read[k] = array;
+  }
+  for (k = 0; k < 9; ++k) m[k] = (float)(2 * random_unit(&t->seed) - 1);
+  REPEAT(t, *score = t->set->sampson_score(read, num_blocks, on_plane, m, inverse_sq, bound));
+}
+
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {
   trial t;
   memset(&t, 0, sizeof t);

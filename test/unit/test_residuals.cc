@@ -144,6 +144,24 @@ void test_fast_score_stops_above_the_bound_only(void) {
   TEST_ASSERT_TRUE(tv::msac_cost_fast(matches.pairs, E, 1, full / 2) < full);
 }
 
+void test_squares_of_many_are_those_of_each(void) {
+  const tv_camera lenses[] = {scene::pinhole(), scene::distorted(), scene::fisheye()};
+  for (int lens = 0; lens < 3; ++lens) {
+    prepare(with_cameras(lenses[lens], lenses[lens], 40 + static_cast<uint64_t>(lens)));
+    const Mat3 E = tv::cross_matrix(pair.t) * pair.R;
+    double squares[200];
+    tv::sampson_squares(matches.pairs, 3, 101, E, squares);
+    for (int k = 0; k < 101; ++k) {
+      TEST_ASSERT_TRUE(squares[k] == tv::sampson_sq(matches.pairs, 3 + k, E));
+    }
+    const int32_t listed[5] = {7, 7, 150, 0, 12};
+    tv::sampson_squares(matches.pairs, listed, 5, E, squares);
+    for (int k = 0; k < 5; ++k) {
+      TEST_ASSERT_TRUE(squares[k] == tv::sampson_sq(matches.pairs, listed[k], E));
+    }
+  }
+}
+
 void test_matrices_that_say_nothing_cost_the_most(void) {
   prepare(with_cameras(scene::pinhole(), scene::distorted(), 31));
   const int64_t most = static_cast<int64_t>(matches.pairs.num) * tv::kCostOne;
@@ -261,6 +279,7 @@ int main(void) {
   RUN_TEST(test_sampson_is_in_pixels_of_the_image_for_every_lens);
   RUN_TEST(test_fast_score_is_the_sum_of_the_capped_residuals);
   RUN_TEST(test_fast_score_stops_above_the_bound_only);
+  RUN_TEST(test_squares_of_many_are_those_of_each);
   RUN_TEST(test_matrices_that_say_nothing_cost_the_most);
   RUN_TEST(test_transfer_residual_of_a_pinhole_is_the_textbooks);
   RUN_TEST(test_slopes_of_a_pose_agree_with_differences);

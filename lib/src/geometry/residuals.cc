@@ -1,6 +1,7 @@
 #include "geometry/residuals.h"
 
 #include "base/math.h"
+#include "twoview/context.h"
 
 #include <cmath>
 #include <cstring>
@@ -51,71 +52,28 @@ inline double robust(Loss kind, double q, double* weight) {
   return log(1 + q);
 }
 
-// The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is
-// a plain vector operation: read as unsigned integers, floats in [0, 1) are those below 1.0f's
-// bits; a NaN or a negative rounding error is above and costs 1.
-inline int32_t sum_of_costs(const float q[kScoreBlock]) {
-  uint32_t bits[kScoreBlock];
-  float capped[kScoreBlock];
-  std::memcpy(bits, q, sizeof bits);
-  constexpr uint32_t kOneBits = 0x3f800000u;
-  for (int i = 0; i < kScoreBlock; ++i) bits[i] = bits[i] < kOneBits ? bits[i] : kOneBits;
-  std::memcpy(capped, bits, sizeof bits);
-  int32_t sum = 0;
-  for (int i = 0; i < kScoreBlock; ++i) {
-    sum += static_cast<int32_t>(capped[i] * static_cast<float>(kCostOne));
-  }
-  return sum;
+// A model's entries, row by row.
+struct Entries {
+  double m[9];
+};
+
+Entries entries_of(const Mat3& M) {
+  Entries e;
+  for (int k = 0; k < 9; ++k) e.m[k] = M(k / 3, k % 3);
+  return e;
 }
 
-// One block on the plane: kScoreBlock matches, a fixed trip count.
-inline int32_t block_cost_plane(const RayPairs& p, int begin, const float m[9], float inverse_sq) {
-  const float* x0 = p.fast[0] + begin;
-  const float* y0 = p.fast[1] + begin;
-  const float* x1 = p.fast[2] + begin;
-  const float* y1 = p.fast[3] + begin;
-  const float* a0 = p.fast[4] + begin;
-  const float* b0 = p.fast[5] + begin;
-  const float* c0 = p.fast[6] + begin;
-  const float* a1 = p.fast[7] + begin;
-  const float* b1 = p.fast[8] + begin;
-  const float* c1 = p.fast[9] + begin;
-  float q[kScoreBlock];
-  for (int i = 0; i < kScoreBlock; ++i) {
-    const float u = (m[0] * x0[i] + m[1] * y0[i]) + m[2];
-    const float v = (m[3] * x0[i] + m[4] * y0[i]) + m[5];
-    const float w = (m[6] * x0[i] + m[7] * y0[i]) + m[8];
-    const float c = (x1[i] * u + y1[i] * v) + w;
-    const float s = (m[0] * x1[i] + m[3] * y1[i]) + m[6];
-    const float t = (m[1] * x1[i] + m[4] * y1[i]) + m[7];
-    const float n1 = u * (a1[i] * u + b1[i] * v) + v * (b1[i] * u + c1[i] * v);
-    const float n0 = s * (a0[i] * s + b0[i] * t) + t * (b0[i] * s + c0[i] * t);
-    q[i] = c * c * inverse_sq / (n0 + n1);
-  }
-  return sum_of_costs(q);
-}
+struct Arrays {
+  const double* p[18];
+};
 
-inline int32_t block_cost_general(const RayPairs& p, int begin, const float m[9],
-                                  float inverse_sq) {
-  const float* const* f = p.fast;
-  float q[kScoreBlock];
-  for (int k = 0; k < kScoreBlock; ++k) {
-    const int i = begin + k;
-    float u[3], s[3];
-    for (int r = 0; r < 3; ++r) {
-      u[r] = (m[3 * r] * f[0][i] + m[3 * r + 1] * f[1][i]) + m[3 * r + 2] * f[2][i];
-      s[r] = (m[r] * f[3][i] + m[3 + r] * f[4][i]) + m[6 + r] * f[5][i];
-    }
-    const float c = (f[3][i] * u[0] + f[4][i] * u[1]) + f[5][i] * u[2];
-    float n = 0;
-    for (int j = 0; j < 2; ++j) {
-      const float g = (f[6 + j][i] * s[0] + f[8 + j][i] * s[1]) + f[10 + j][i] * s[2];
-      const float h = (f[12 + j][i] * u[0] + f[14 + j][i] * u[1]) + f[16 + j][i] * u[2];
-      n += g * g + h * h;
-    }
-    q[k] = c * c * inverse_sq / n;
+Arrays arrays_of(const RayPairs& pairs) {
+  Arrays a;
+  for (int v = 0; v < 2; ++v) {
+    for (int k = 0; k < 3; ++k) a.p[3 * v + k] = pairs.ray[v][k];
+    for (int k = 0; k < 6; ++k) a.p[6 + 6 * v + k] = pairs.jacobian[v][k];
   }
-  return sum_of_costs(q);
+  return a;
 }
 
 }  // namespace
@@ -127,6 +85,7 @@ size_t ray_pairs_bytes(int max_matches) {
 
 RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane) {
   RayPairs pairs{};
+  pairs.kernels = tvk_select(TV_KERNELS_C);
   const size_t n = static_cast<size_t>(max_matches);
   pairs.on_plane = on_plane;
   for (int v = 0; v < 2; ++v) {
@@ -203,20 +162,28 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M) {
   return q >= 0 ? q : kInfinity;
 }
 
+void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares) {
+  pairs.kernels->sampson_squares(arrays_of(pairs).p, nullptr, first, count, pairs.on_plane,
+                                 entries_of(M).m, squares);
+}
+
+void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
+                     double* squares) {
+  pairs.kernels->sampson_squares(arrays_of(pairs).p, indices, 0, count, pairs.on_plane,
+                                 entries_of(M).m, squares);
+}
+
 int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound) {
   float m[9];
   for (int k = 0; k < 9; ++k) m[k] = static_cast<float>(M(k / 3, k % 3));
   const double inverse = 1 / (threshold_px * threshold_px);
   const float inverse_sq = static_cast<float>(inverse < 1e37 ? inverse : 1e37);
-  const int end = static_cast<int>(padded(pairs.num));
+  const int num_blocks = static_cast<int>(padded(pairs.num)) / kScoreBlock;
   // The padding costs kCostOne each.
-  int64_t sum = -static_cast<int64_t>(end - pairs.num) * kCostOne;
-  for (int begin = 0; begin < end; begin += kScoreBlock) {
-    sum += pairs.on_plane ? block_cost_plane(pairs, begin, m, inverse_sq)
-                          : block_cost_general(pairs, begin, m, inverse_sq);
-    if (sum > bound) break;
-  }
-  return sum;
+  const int64_t padding = static_cast<int64_t>(num_blocks * kScoreBlock - pairs.num) * kCostOne;
+  const int64_t most = bound < INT64_MAX - padding ? bound + padding : INT64_MAX;
+  return pairs.kernels->sampson_score(pairs.fast, num_blocks, pairs.on_plane, m, inverse_sq, most) -
+         padding;
 }
 
 namespace {
@@ -308,57 +275,58 @@ TransferResidual transfer_residual(const RayPairs& pairs, int i, const Mat3& H) 
   return {r_sq >= 0 ? r_sq : kInfinity, t.d[0] * t.d[0] + t.d[1] * t.d[1]};
 }
 
+// The lanes of one of the kernel's sums, in a fixed order.
+inline double over_lanes(const double* x) {
+  return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
+}
+
+// Sums over M's nine entries; returns the loss. The logarithms of Cauchy's loss are those of
+// products of few enough factors, each at most 1 + TVK_SAMPSON_LARGEST.
+double sampson_sums(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
+                    const RobustLoss& loss, double upper[45], double gradient[9]) {
+  constexpr int kFactors = 64;
+  const Arrays arrays = arrays_of(pairs);
+  const Entries entries = entries_of(M);
+  const double inverse_sq = 1 / (loss.scale_px * loss.scale_px);
+  const bool cauchy = loss.kind == Loss::kCauchy;
+  double sums[TVK_SAMPSON_SUMS][TVK_WIDTH] = {};
+  double* products = sums[TVK_SAMPSON_SUMS - 1];
+  double cost = 0;
+  for (int first = 0; first < count; first += TVK_WIDTH * kFactors) {
+    const int some = count - first < TVK_WIDTH * kFactors ? count - first : TVK_WIDTH * kFactors;
+    for (int l = 0; l < TVK_WIDTH; ++l) products[l] = 1;
+    pairs.kernels->sampson_sums(arrays.p, indices ? indices + first : nullptr, first, some,
+                                pairs.on_plane, entries.m, inverse_sq, cauchy, sums[0]);
+    for (int l = 0; l < TVK_WIDTH && cauchy; ++l) cost += log(products[l]);
+  }
+  for (int k = 0; k < 45; ++k) upper[k] = over_lanes(sums[k]);
+  for (int k = 0; k < 9; ++k) gradient[k] = over_lanes(sums[45 + k]);
+  return cauchy ? cost : over_lanes(sums[54]);
+}
+
 template <int P>
 double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
                                 const Mat3& M, const Mat3 columns[P], const RobustLoss& loss,
                                 double upper[P * (P + 1) / 2], double gradient[P]) {
-  double D[9][P];
-  for (int p = 0; p < P; ++p) {
-    for (int k = 0; k < 9; ++k) D[k][p] = columns[p](k / 3, k % 3);
+  double packed[45], slope[9], full[9][9];
+  const double cost = sampson_sums(pairs, indices, count, M, loss, packed, slope);
+  int slot = 0;
+  for (int i = 0; i < 9; ++i) {
+    for (int j = i; j < 9; ++j) full[i][j] = full[j][i] = packed[slot++];
   }
-  for (int k = 0; k < P * (P + 1) / 2; ++k) upper[k] = 0;
-  for (int p = 0; p < P; ++p) gradient[p] = 0;
-  const double inverse_sq = 1 / (loss.scale_px * loss.scale_px);
-  double cost = 0;
-  for (int k = 0; k < count; ++k) {
-    const int i = indices ? indices[k] : k;
-    Epipolar e;
-    epipolar(pairs, i, M, &e);
-    const double inverse_n = 1 / e.n;
-    const double q = e.c * e.c * inverse_n * inverse_sq;
-    if (!(q >= 0 && q < kLargestQ)) {
-      cost += loss.kind == Loss::kTruncated ? 1.0 : kLogLargestQ;
-      continue;
+  slot = 0;
+  for (int p = 0; p < P; ++p) {
+    double product[9];
+    gradient[p] = 0;
+    for (int i = 0; i < 9; ++i) {
+      gradient[p] += columns[p](i / 3, i % 3) * slope[i];
+      product[i] = 0;
+      for (int j = 0; j < 9; ++j) product[i] += full[i][j] * columns[p](j / 3, j % 3);
     }
-    double weight;
-    cost += robust(loss.kind, q, &weight);
-    if (weight == 0) continue;
-    // dr/dM_ij = (f1_i (f0_j - s g0_j) - s g1_i f0_j) / sqrt(n), s = c / n, g0 = J0 J0' M' f1,
-    // g1 = J1 J1' M f0.
-    const double s = e.c * inverse_n, inverse_root = std::sqrt(inverse_n);
-    double u0[3], u1[3];
-    for (int r = 0; r < 3; ++r) {
-      double* const* J0 = pairs.jacobian[0] + 2 * r;
-      double* const* J1 = pairs.jacobian[1] + 2 * r;
-      const double g0 = J0[0][i] * e.s0[0] + J0[1][i] * e.s0[1];
-      const double g1 = J1[0][i] * e.s1[0] + J1[1][i] * e.s1[1];
-      u0[r] = (e.f0[r] - s * g0) * inverse_root;
-      u1[r] = s * g1 * inverse_root;
-    }
-    double row[P];
-    for (int p = 0; p < P; ++p) row[p] = 0;
-    for (int a = 0; a < 3; ++a) {
-      for (int b = 0; b < 3; ++b) {
-        const double entry = e.f1[a] * u0[b] - u1[a] * e.f0[b];
-        for (int p = 0; p < P; ++p) row[p] += entry * D[3 * a + b][p];
-      }
-    }
-    const double residual = e.c * inverse_root;
-    int slot = 0;
-    for (int p = 0; p < P; ++p) {
-      const double weighted = weight * row[p];
-      gradient[p] += weighted * residual;
-      for (int r = p; r < P; ++r) upper[slot++] += weighted * row[r];
+    for (int r = p; r < P; ++r) {
+      double sum = 0;
+      for (int i = 0; i < 9; ++i) sum += columns[r](i / 3, i % 3) * product[i];
+      upper[slot++] = sum;
     }
   }
   return cost;

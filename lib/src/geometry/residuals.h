@@ -12,14 +12,16 @@
 
 #include "base/arena.h"
 #include "geometry/camera.h"
+#include "kernels/kernels.h"
 
 namespace tv {
 
-inline constexpr int kScoreBlock = 32;
-inline constexpr int kCostOne = 1 << 16;  // what an outlier costs in an integer score
+inline constexpr int kScoreBlock = TVK_SCORE_BLOCK;
+inline constexpr int kCostOne = TVK_SCORE_ONE;  // what an outlier costs in an integer score
 
 // Structure of arrays: component-major, so that a loop over matches can be vectorised.
 struct RayPairs {
+  const tvk_table* kernels;
   int num;
   bool on_plane;      // both views: rays have z = 1, so the third rows of the Jacobians are zero
   double* ray[2][3];
@@ -50,6 +52,11 @@ void finish_rays(RayPairs& pairs);  // after the last set_ray: fills what follow
 // Squared Sampson distance; +inf for a match that the model says nothing about (both rays at the
 // epipoles).
 double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
+
+// sampson_sq of the matches first .. first + count - 1, or of those listed.
+void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares);
+void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
+                     double* squares);
 
 // Sum over all matches of min(r^2 / T^2, 1), each truncated to a multiple of 1/kCostOne: an
 // integer, so that neither order nor vector width matters. May stop as soon as the sum exceeds

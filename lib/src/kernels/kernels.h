@@ -20,6 +20,12 @@ extern "C" {
 #define TVK_ORIENT_BINS 36
 #define TVK_DESCRIPTOR_SIZE 128
 
+#define TVK_WIDTH 8                  /* lanes of the kernels on doubles */
+#define TVK_SCORE_BLOCK 32           /* matches */
+#define TVK_SCORE_ONE 65536          /* what a match outside the threshold costs */
+#define TVK_SAMPSON_LARGEST 16384.0  /* r^2 / scale^2 beyond which Cauchy's loss is level */
+#define TVK_SAMPSON_SUMS 56          /* numbers that sampson_sums adds up */
+
 /* fast_score_row: rows[0..6] are the image rows y-3..y+3. Writes for each x in [0, width) the largest
      threshold at which (x, y) is a corner with `arc` (9..12) contiguous brighter or darker circle
      pixels, where that is at least `threshold` (>= 1), else 0. 0 in the 3-pixel rim.
@@ -43,7 +49,17 @@ extern "C" {
    widen: bytes to int16.
    squared_distances: out[j] = |query|^2 + |row j|^2 - 2 query . row j, for 128-element rows.
    update_columns: per column j: the two smallest of dist so far and the row index of the smallest;
-     returns the smallest of dist. */
+     returns the smallest of dist.
+   Of matches (geometry/residuals.h), arrays: rays (3 and 3) and slopes d ray / d pixel (6 and 6,
+   row-major 3x2); on_plane: the rays end in 1 and the slopes' last rows are zero, and are not read;
+   m: a model matrix, row-major; matches indices[0 .. count), or first, first + 1, .. where null:
+   sampson_squares: squares[k] = r^2 of Sampson's distance, infinite where that is no number.
+   sampson_sums: to sums[TVK_WIDTH n + k % TVK_WIDTH] adds match k's part of sum n: with slopes g of r by
+     m's entries and the loss's weight w, upper triangle of w g g' (45, row by row), w g r (9), the
+     truncated loss (r^2 / scale^2 or 1); the last is a product, of Cauchy's 1 + r^2 / scale^2.
+   sampson_score: arrays in single precision, on the plane x0 y0 x1 y1 and the upper triangles of J J'
+     (3 and 3), else all 18: the sum over num_blocks blocks of min(r^2 / T^2, 1) TVK_SCORE_ONE, each
+     truncated to an integer; ends after the block that makes it exceed `bound`. */
 #define TVK_LIST(X)                                                                                \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
@@ -71,7 +87,16 @@ extern "C" {
      int32_t num_rows, int32_t *out))                                                              \
   X(update_columns, int32_t,                                                                       \
     (const int32_t *dist, int32_t num_columns, int32_t row, int32_t *best, int32_t *second,        \
-     int32_t *best_row))
+     int32_t *best_row))                                                                           \
+  X(sampson_squares, void,                                                                         \
+    (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
+     int32_t on_plane, const double *m, double *squares))                                          \
+  X(sampson_sums, void,                                                                            \
+    (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
+     int32_t on_plane, const double *m, double inverse_sq, int32_t cauchy, double *sums))          \
+  X(sampson_score, int64_t,                                                                        \
+    (const float *const *arrays, int32_t num_blocks, int32_t on_plane, const float *m,             \
+     float inverse_sq, int64_t bound))
 
 typedef struct tvk_table {
   int32_t set; /* a tv_kernels */

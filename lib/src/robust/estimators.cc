@@ -28,32 +28,50 @@ void gather(const RayPairs& pairs, const int32_t* sample, Vec3* rays0, Vec3* ray
 
 }  // namespace
 
+namespace {
+
+// Calls use(i, r^2) for the first `count` matches.
+template <typename Use>
+void for_each_square(const RayPairs& pairs, int count, const Mat3& M, Use use) {
+  constexpr int kChunk = 64;
+  double squares[kChunk];
+  for (int first = 0; first < count; first += kChunk) {
+    const int some = count - first < kChunk ? count - first : kChunk;
+    sampson_squares(pairs, first, some, M, squares);
+    for (int k = 0; k < some; ++k) use(first + k, squares[k]);
+  }
+}
+
+bool in_front(const RayPairs& pairs, int i, const Pose& pose, double threshold_px) {
+  return depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
+                                threshold_px * pairs.pixel_angle[i])) >= 0;
+}
+
+}  // namespace
+
 bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
                  double limit_px, double threshold_px, double* r_sq) {
   *r_sq = sampson_sq(pairs, i, E);
-  if (!(*r_sq <= limit_px * limit_px)) return false;
-  return depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
-                                threshold_px * pairs.pixel_angle[i])) >= 0;
+  return *r_sq <= limit_px * limit_px && in_front(pairs, i, pose, threshold_px);
 }
 
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
                  int32_t* indices) {
   const double limit_sq = limit_px * limit_px;
   int near = 0;
-  for (int i = 0; i < count; ++i) {
-    if (sampson_sq(pairs, i, M) <= limit_sq) indices[near++] = i;
-  }
+  for_each_square(pairs, count, M, [&](int i, double r_sq) {
+    if (r_sq <= limit_sq) indices[near++] = i;
+  });
   return near;
 }
 
 int near_matches(const RayPairs& pairs, int count, const Pose& pose, double limit_px,
                  double threshold_px, int32_t* indices) {
-  const Mat3 E = essential_from_pose(pose);
+  const double limit_sq = limit_px * limit_px;
   int near = 0;
-  for (int i = 0; i < count; ++i) {
-    double r_sq;
-    if (pose_inlier(pairs, i, E, pose, limit_px, threshold_px, &r_sq)) indices[near++] = i;
-  }
+  for_each_square(pairs, count, essential_from_pose(pose), [&](int i, double r_sq) {
+    if (r_sq <= limit_sq && in_front(pairs, i, pose, threshold_px)) indices[near++] = i;
+  });
   return near;
 }
 
@@ -112,16 +130,16 @@ int64_t PoseEstimator::fast_cost(const Pose& model, int64_t bound) const {
 }
 
 int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {
-  const Mat3 E = essential_from_pose(model);
   const double inverse_sq = 1 / (threshold_px * threshold_px);
   int64_t cost = 0;
-  *num_inliers = 0;
-  for (int i = 0; i < pairs.num; ++i) {
-    double r_sq;
-    const bool inlier = pose_inlier(pairs, i, E, model, threshold_px, threshold_px, &r_sq);
-    *num_inliers += inlier;
+  int inliers = 0;
+  for_each_square(pairs, pairs.num, essential_from_pose(model), [&](int i, double r_sq) {
+    const bool inlier =
+        r_sq <= threshold_px * threshold_px && in_front(pairs, i, model, threshold_px);
+    inliers += inlier;
     cost += inlier ? quantised(r_sq * inverse_sq) : kCostOne;
-  }
+  });
+  *num_inliers = inliers;
   return cost;
 }
 
@@ -154,12 +172,13 @@ template <int kPoints>
 int64_t FundamentalEstimator<kPoints>::full_cost(const Mat3& model, int* num_inliers) const {
   const double inverse_sq = 1 / (threshold_px * threshold_px);
   int64_t cost = 0;
-  *num_inliers = 0;
-  for (int i = 0; i < pairs.num; ++i) {
-    const double q = sampson_sq(pairs, i, model) * inverse_sq;
-    *num_inliers += q <= 1;
+  int inliers = 0;
+  for_each_square(pairs, pairs.num, model, [&](int, double r_sq) {
+    const double q = r_sq * inverse_sq;
+    inliers += q <= 1;
     cost += quantised(q);
-  }
+  });
+  *num_inliers = inliers;
   return cost;
 }
 

@@ -168,6 +168,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
                         (problem.camera[0].model.model != TV_CAMERA_KANNALA_BRANDT &&
                          problem.camera[1].model.model != TV_CAMERA_KANNALA_BRANDT);
   matches->pairs = alloc_ray_pairs(arena, problem.num, on_plane);
+  if (problem.kernels != nullptr) matches->pairs.kernels = problem.kernels;
   ArenaScope scope(arena);
   SortKey* keys = arena_alloc<SortKey>(arena, n);
   const uint32_t table_size = table_size_for(problem.num);

@@ -14,6 +14,7 @@ struct TwoViewProblem {
   const float* ratios;      // or null
   int num;
   tv_estimate_options options;
+  const tvk_table* kernels;  // null: those of the base ISA
 };
 
 struct Matches {

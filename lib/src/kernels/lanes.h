@@ -1,0 +1,57 @@
+/* Doubles in lanes: the same IEEE operations on TVK_LANES numbers at a time. Work on doubles is laid
+   out for TVK_WIDTH lanes whatever the set, so that sums over lanes have one written order. */
+#ifndef TWOVIEW_KERNELS_LANES_H
+#define TWOVIEW_KERNELS_LANES_H
+
+#include <math.h>
+#include <stdint.h>
+
+#include "kernels/kernels.h"
+
+#if defined(TVK_AVX512)
+#define TVK_LANES 8
+#elif defined(TVK_AVX2)
+#define TVK_LANES 4
+#else
+#define TVK_LANES 2
+#endif
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+typedef double lanes __attribute__((vector_size(8 * TVK_LANES)));
+typedef int64_t lane_mask __attribute__((vector_size(8 * TVK_LANES))); /* all ones or all zeros */
+typedef double unaligned_lanes
+    __attribute__((vector_size(8 * TVK_LANES), aligned(8), may_alias));
+
+static inline lanes lanes_of(double x) { return (lanes){0} + x; }
+static inline lanes lanes_load(const double *p) { return *(const unaligned_lanes *)p; }
+static inline void lanes_store(double *p, lanes x) { *(unaligned_lanes *)p = x; }
+static inline lanes lanes_select(lane_mask mask, lanes a, lanes b) {
+  return (lanes)((mask & (lane_mask)a) | (~mask & (lane_mask)b));
+}
+/* a where the mask is set, else 0. */
+static inline lanes lanes_keep(lane_mask mask, lanes a) { return (lanes)(mask & (lane_mask)a); }
+static inline lanes lanes_abs(lanes a) { return (lanes)((lane_mask)a & INT64_MAX); }
+static inline lanes lanes_sqrt(lanes a) {
+#if defined(TVK_AVX512)
+  return (lanes)_mm512_sqrt_pd((__m512d)a);
+#elif defined(TVK_AVX2)
+  return (lanes)_mm256_sqrt_pd((__m256d)a);
+#elif defined(__SSE2__)
+  return (lanes)_mm_sqrt_pd((__m128d)a);
+#else
+  int k;
+  for (k = 0; k < TVK_LANES; ++k) a[k] = sqrt(a[k]);
+  return a;
+#endif
+}
+static inline int lanes_any(lane_mask mask) {
+  int64_t any = 0;
+  int k;
+  for (k = 0; k < TVK_LANES; ++k) any |= mask[k];
+  return any != 0;
+}
+
+#endif

@@ -1,0 +1,252 @@
+/* Sampson's distance over arrays of matches (geometry/residuals.h). */
+
+#include "kernels/lanes.h"
+
+/* What follows takes the matches of a block in TVK_LANES lanes: rays, and slopes d ray / d pixel. */
+typedef struct sampson_block {
+  lanes f0[3], f1[3], J0[6], J1[6];
+} sampson_block;
+
+/* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the other
+   lanes. */
+static inline void load_block(const double *const *arrays, const int32_t *indices, int32_t first,
+                              int32_t count, int on_plane, sampson_block *b) {
+  int32_t index[TVK_LANES];
+  int a, l;
+  for (l = 0; l < TVK_LANES; ++l) {
+    index[l] = l < count ? (indices ? indices[l] : first + l) : (indices ? indices[0] : first);
+  }
+  for (a = 0; a < 18; ++a) {
+    lanes x = {0};
+    /* On the plane rays end in 1 and slopes in zeros. */
+    if (on_plane && (a == 2 || a == 5 || a == 10 || a == 11 || a == 16 || a == 17)) continue;
+    if (!indices && count == TVK_LANES) {
+      x = lanes_load(arrays[a] + first);
+    } else {
+      for (l = 0; l < TVK_LANES; ++l) x[l] = arrays[a][index[l]];
+    }
+    if (a < 6) {
+      (a < 3 ? b->f0 : b->f1)[a % 3] = x;
+    } else {
+      (a < 12 ? b->J0 : b->J1)[a % 6] = x;
+    }
+  }
+}
+
+typedef struct epipolar_terms {
+  lanes c, n; /* f1' M f0; |J0' M' f1|^2 + |J1' M f0|^2 */
+  lanes s0[2], s1[2];
+} epipolar_terms;
+
+static inline void epipolar_of(const sampson_block *b, const double m[9], int on_plane,
+                               epipolar_terms *e) {
+  lanes line0[3], line1[3];
+  int r, k;
+  for (r = 0; r < 3; ++r) {
+    const lanes last1 = on_plane ? lanes_of(m[3 * r + 2]) : m[3 * r + 2] * b->f0[2];
+    const lanes last0 = on_plane ? lanes_of(m[6 + r]) : m[6 + r] * b->f1[2];
+    line1[r] = (m[3 * r] * b->f0[0] + m[3 * r + 1] * b->f0[1]) + last1;
+    line0[r] = (m[r] * b->f1[0] + m[3 + r] * b->f1[1]) + last0;
+  }
+  e->c = (b->f1[0] * line1[0] + b->f1[1] * line1[1]) +
+         (on_plane ? line1[2] : b->f1[2] * line1[2]);
+  for (k = 0; k < 2; ++k) {
+    e->s0[k] = b->J0[k] * line0[0] + b->J0[2 + k] * line0[1];
+    e->s1[k] = b->J1[k] * line1[0] + b->J1[2 + k] * line1[1];
+    if (!on_plane) {
+      e->s0[k] += b->J0[4 + k] * line0[2];
+      e->s1[k] += b->J1[4 + k] * line1[2];
+    }
+  }
+  e->n = (e->s0[0] * e->s0[0] + e->s0[1] * e->s0[1]) + (e->s1[0] * e->s1[0] + e->s1[1] * e->s1[1]);
+}
+
+static inline void squares_of(const double *const *arrays, const int32_t *indices, int32_t first,
+                              int32_t count, int on_plane, const double m[9], double *squares) {
+  int32_t done;
+  for (done = 0; done < count; done += TVK_LANES) {
+    const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
+    sampson_block b;
+    epipolar_terms e;
+    lanes q;
+    int l;
+    load_block(arrays, indices ? indices + done : indices, first + done, left, on_plane, &b);
+    epipolar_of(&b, m, on_plane, &e);
+    q = e.c * e.c / e.n;
+    q = lanes_select(q >= 0.0, q, lanes_of((double)INFINITY));
+    if (left == TVK_LANES) {
+      lanes_store(squares + done, q);
+    } else {
+      for (l = 0; l < left; ++l) squares[done + l] = q[l];
+    }
+  }
+}
+
+static void sampson_squares(const double *const *arrays, const int32_t *indices, int32_t first,
+                            int32_t count, int32_t on_plane, const double *m, double *squares) {
+  if (on_plane) {
+    squares_of(arrays, indices, first, count, 1, m, squares);
+  } else {
+    squares_of(arrays, indices, first, count, 0, m, squares);
+  }
+}
+
+/* The slopes of r by M's entries: dr/dM_ij = (f1_i (f0_j - s g0_j) - s g1_i f0_j) / sqrt(n), with
+   s = c / n, g0 = J0 J0' M' f1, g1 = J1 J1' M f0. */
+static inline void slopes_of(const sampson_block *b, const epipolar_terms *e, lanes s, lanes root,
+                             int on_plane, lanes slopes[9]) {
+  lanes u0[3], u1[3];
+  int i, j;
+  for (i = 0; i < 3; ++i) {
+    if (on_plane && i == 2) {
+      u0[2] = root;
+      u1[2] = lanes_of(0);
+      continue;
+    }
+    u0[i] = (b->f0[i] - s * (b->J0[2 * i] * e->s0[0] + b->J0[2 * i + 1] * e->s0[1])) * root;
+    u1[i] = s * (b->J1[2 * i] * e->s1[0] + b->J1[2 * i + 1] * e->s1[1]) * root;
+  }
+  for (i = 0; i < 3; ++i) {
+    for (j = 0; j < 3; ++j) {
+      const lanes f1 = on_plane && i == 2 ? lanes_of(1) : b->f1[i];
+      const lanes f0 = on_plane && j == 2 ? lanes_of(1) : b->f0[j];
+      slopes[3 * i + j] = f1 * u0[j] - u1[i] * f0;
+    }
+  }
+}
+
+/* One block's part of the sums; `sums` points to the block's first lane. */
+static inline void add_block(const sampson_block *b, int32_t count, int on_plane, const double m[9],
+                             double inverse_sq, int cauchy, double *sums) {
+  epipolar_terms e;
+  lanes slopes[9], number = {0}, in_use;
+  lane_mask used, ok;
+  lanes q, weight, inverse_n, c, root, s, residual;
+  int i, j, l, slot = 0;
+  for (l = 0; l < TVK_LANES; ++l) number[l] = l;
+  used = number < (double)count;
+  epipolar_of(b, m, on_plane, &e);
+  inverse_n = 1.0 / e.n;
+  q = e.c * e.c * inverse_n * inverse_sq;
+  in_use = lanes_keep(used, lanes_of(1));
+  if (cauchy) {
+    ok = used & (q < TVK_SAMPSON_LARGEST);
+    weight = lanes_keep(ok, 1.0 / (1.0 + q));
+    lanes_store(sums + TVK_WIDTH * 55,
+                lanes_load(sums + TVK_WIDTH * 55) *
+                    lanes_select(ok, 1.0 + q, lanes_select(used, lanes_of(TVK_SAMPSON_LARGEST),
+                                                           lanes_of(1))));
+  } else {
+    ok = used & (q < 1.0);
+    weight = lanes_keep(ok, lanes_of(1));
+    lanes_store(sums + TVK_WIDTH * 54,
+                lanes_load(sums + TVK_WIDTH * 54) + lanes_select(ok, q, in_use));
+  }
+  inverse_n = lanes_keep(ok, inverse_n);
+  c = lanes_keep(ok, e.c);
+  root = lanes_sqrt(inverse_n);
+  s = c * inverse_n;
+  slopes_of(b, &e, s, root, on_plane, slopes);
+  residual = c * root;
+  for (i = 0; i < 9; ++i) {
+    const lanes weighted = weight * slopes[i];
+    for (j = i; j < 9; ++j, ++slot) {
+      double *sum = sums + TVK_WIDTH * slot;
+      lanes_store(sum, lanes_load(sum) + weighted * slopes[j]);
+    }
+    lanes_store(sums + TVK_WIDTH * (45 + i),
+                lanes_load(sums + TVK_WIDTH * (45 + i)) + weighted * residual);
+  }
+}
+
+static inline void sums_of(const double *const *arrays, const int32_t *indices, int32_t first,
+                           int32_t count, int on_plane, const double m[9], double inverse_sq,
+                           int cauchy, double *sums) {
+  int32_t done;
+  for (done = 0; done < count; done += TVK_LANES) {
+    const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
+    sampson_block b;
+    load_block(arrays, indices ? indices + done : indices, first + done, left, on_plane, &b);
+    add_block(&b, left, on_plane, m, inverse_sq, cauchy, sums + done % TVK_WIDTH);
+  }
+}
+
+static void sampson_sums(const double *const *arrays, const int32_t *indices, int32_t first,
+                         int32_t count, int32_t on_plane, const double *m, double inverse_sq,
+                         int32_t cauchy, double *sums) {
+  if (on_plane) {
+    sums_of(arrays, indices, first, count, 1, m, inverse_sq, cauchy, sums);
+  } else {
+    sums_of(arrays, indices, first, count, 0, m, inverse_sq, cauchy, sums);
+  }
+}
+
+/* The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is
+   a plain vector operation: read as unsigned integers, floats in [0, 1) are those below 1.0f's
+   bits; a NaN or a negative rounding error is above and costs 1. */
+static inline int32_t sum_of_costs(const float q[TVK_SCORE_BLOCK]) {
+  const uint32_t one = 0x3f800000u;
+  uint32_t bits[TVK_SCORE_BLOCK];
+  float capped[TVK_SCORE_BLOCK];
+  int32_t sum = 0, i;
+  memcpy(bits, q, sizeof bits);
+  for (i = 0; i < TVK_SCORE_BLOCK; ++i) bits[i] = bits[i] < one ? bits[i] : one;
+  memcpy(capped, bits, sizeof bits);
+  for (i = 0; i < TVK_SCORE_BLOCK; ++i) sum += (int32_t)(capped[i] * (float)TVK_SCORE_ONE);
+  return sum;
+}
+
+static inline int32_t score_on_plane(const float *const *f, int32_t begin, const float m[9],
+                                     float inverse_sq) {
+  const float *x0 = f[0] + begin, *y0 = f[1] + begin, *x1 = f[2] + begin, *y1 = f[3] + begin;
+  const float *a0 = f[4] + begin, *b0 = f[5] + begin, *c0 = f[6] + begin;
+  const float *a1 = f[7] + begin, *b1 = f[8] + begin, *c1 = f[9] + begin;
+  float q[TVK_SCORE_BLOCK];
+  int32_t i;
+  for (i = 0; i < TVK_SCORE_BLOCK; ++i) {
+    const float u = (m[0] * x0[i] + m[1] * y0[i]) + m[2];
+    const float v = (m[3] * x0[i] + m[4] * y0[i]) + m[5];
+    const float w = (m[6] * x0[i] + m[7] * y0[i]) + m[8];
+    const float c = (x1[i] * u + y1[i] * v) + w;
+    const float s = (m[0] * x1[i] + m[3] * y1[i]) + m[6];
+    const float t = (m[1] * x1[i] + m[4] * y1[i]) + m[7];
+    const float n1 = u * (a1[i] * u + b1[i] * v) + v * (b1[i] * u + c1[i] * v);
+    const float n0 = s * (a0[i] * s + b0[i] * t) + t * (b0[i] * s + c0[i] * t);
+    q[i] = c * c * inverse_sq / (n0 + n1);
+  }
+  return sum_of_costs(q);
+}
+
+static inline int32_t score_general(const float *const *f, int32_t begin, const float m[9],
+                                    float inverse_sq) {
+  float q[TVK_SCORE_BLOCK];
+  int32_t k, r, j;
+  for (k = 0; k < TVK_SCORE_BLOCK; ++k) {
+    const int32_t i = begin + k;
+    float u[3], s[3], c, n = 0;
+    for (r = 0; r < 3; ++r) {
+      u[r] = (m[3 * r] * f[0][i] + m[3 * r + 1] * f[1][i]) + m[3 * r + 2] * f[2][i];
+      s[r] = (m[r] * f[3][i] + m[3 + r] * f[4][i]) + m[6 + r] * f[5][i];
+    }
+    c = (f[3][i] * u[0] + f[4][i] * u[1]) + f[5][i] * u[2];
+    for (j = 0; j < 2; ++j) {
+      const float g = (f[6 + j][i] * s[0] + f[8 + j][i] * s[1]) + f[10 + j][i] * s[2];
+      const float h = (f[12 + j][i] * u[0] + f[14 + j][i] * u[1]) + f[16 + j][i] * u[2];
+      n += g * g + h * h;
+    }
+    q[k] = c * c * inverse_sq / n;
+  }
+  return sum_of_costs(q);
+}
+
+static int64_t sampson_score(const float *const *arrays, int32_t num_blocks, int32_t on_plane,
+                             const float *m, float inverse_sq, int64_t bound) {
+  int64_t sum = 0;
+  int32_t block;
+  for (block = 0; block < num_blocks && sum <= bound; ++block) {
+    const int32_t begin = block * TVK_SCORE_BLOCK;
+    sum += on_plane ? score_on_plane(arrays, begin, m, inverse_sq)
+                    : score_general(arrays, begin, m, inverse_sq);
+  }
+  return sum;
+}
