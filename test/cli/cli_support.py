@@ -62,6 +62,30 @@ def png_size(data):
     return struct.unpack(">II", data[16:24])
 
 
+def png_samples(data):
+    """The flat samples of a PNG file without palette and interlacing, 8 or 16 bits."""
+    width, height = png_size(data)
+    depth, colour_type = data[24], data[25]
+    channels = {0: 1, 4: 2, 2: 3, 6: 4}[colour_type]
+    packed, at = b"", 8
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        if data[at + 4 : at + 8] == b"IDAT":
+            packed += data[at + 8 : at + 8 + length]
+        at += 12 + length
+    raw, step, row_bytes = zlib.decompress(packed), channels * depth // 8, width * channels * depth // 8
+    above, out = bytearray(row_bytes), bytearray()
+    for y in range(height):
+        kind, row = raw[y * (row_bytes + 1)], bytearray(raw[y * (row_bytes + 1) + 1 :][:row_bytes])
+        for i in range(row_bytes):
+            a, b, c = (row[i - step], above[i], above[i - step]) if i >= step else (0, above[i], 0)
+            nearest = min((abs(b - c), 0, a), (abs(a - c), 1, b), (abs(a + b - 2 * c), 2, c))[2]
+            row[i] = (row[i] + (0, a, b, (a + b) // 2, nearest)[kind]) & 255
+        out += row
+        above = row
+    return bytes(out) if depth == 8 else list(struct.unpack(f">{len(out) // 2}H", out))
+
+
 def texture(width, height, seed=7):
     """Small patches of random grey on grey: corners everywhere, no two places alike."""
     rng = random.Random(seed)

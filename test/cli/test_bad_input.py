@@ -3,8 +3,10 @@
 import base64
 import os
 import resource
+import signal
 import struct
 import subprocess
+import time
 import unittest
 from pathlib import Path
 
@@ -167,6 +169,25 @@ class Cameras(cli.CliTest):
         self.refuse_camera(camera_yaml().replace("0., 0., 1. ]", "0. ]"), "camera_matrix has 7")
         self.refuse_camera(camera_yaml(k=(1, 2, 3)), "distortion_coefficients has 3")
 
+    def test_shapes_that_are_not_those_of_their_data_are_refused(self):
+        self.refuse_camera(camera_yaml().replace("rows: 3", "rows: 2"), "camera_matrix", "rows x cols = 2 x 3")
+        self.refuse_camera(camera_yaml().replace("rows: 3", "rows: 1").replace("cols: 3", "cols: 9"),
+                           "camera_matrix", "rows is not 3")
+        self.refuse_camera(camera_yaml().replace("cols: 5", "cols: 4"), "distortion_coefficients has 5",
+                           "rows x cols = 1 x 4")
+        self.refuse_camera(camera_yaml().replace("cols: 5", "cols: many"), "cols", "not a number")
+
+    def test_a_name_given_twice_is_refused_with_its_line(self):
+        self.refuse_camera(camera_yaml() + "image_width: 320\n", "line 15", "image_width is given twice")
+        self.refuse_camera(camera_yaml().replace("   rows: 3\n", "   rows: 3\n   rows: 3\n"),
+                           "line 7", "rows is given twice")
+
+    def test_aliases_are_refused_for_a_few_lines_could_hold_endless_numbers(self):
+        lines = ["a: &a [1,1,1,1,1,1,1,1,1,1]"]
+        for name, last in zip("bcdefghij", "abcdefghi"):
+            lines.append(f"{name}: &{name} [{','.join(['*' + last] * 10)}]")
+        self.refuse_camera("\n".join(lines) + "\ncamera_matrix: *j\n" + camera_yaml()[14:], "alias")
+
     def test_skew_and_negative_focal_lengths_are_refused(self):
         self.refuse_camera(camera_yaml(fx=-300), "negative")
         self.refuse_camera(camera_yaml().replace("300.0, 0.,", "300.0, 2.,", 1), "skew")
@@ -311,6 +332,31 @@ class Surroundings(cli.CliTest):
         self.assertEqual(done.returncode, 2)
         self.one_line(done, "views.png", "is a folder")
         self.assertEqual(self.listing(), ["views.png"])
+
+    def test_a_signal_leaves_nothing_behind(self):
+        self.out.mkdir()
+        os.mkfifo(self.out / "epipolar.png")  # to open it waits for a reader: a run that does not end
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            with self.subTest(signal=number):
+                run = subprocess.Popen(
+                    [cli.program(), "reconstruct", self.a, self.b, "--camera", self.camera, "-o", self.out,
+                     "--quiet"], stderr=subprocess.PIPE, cwd=self.folder)
+                deadline = time.monotonic() + 60
+                while not any("matches.png" in name for name in self.listing()):
+                    self.assertLess(time.monotonic(), deadline)
+                    time.sleep(0.01)
+                self.assertGreater(len(self.listing()), 3)  # temporary files
+                run.send_signal(number)
+                self.assertEqual(run.wait(timeout=60), -number)
+                run.stderr.close()
+                self.assertEqual(self.listing(), ["epipolar.png"])
+
+    def test_nohup_is_obeyed(self):
+        run = subprocess.Popen(
+            [cli.program(), "detect", self.a, "-o", self.out, "--quiet"],
+            preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+        run.send_signal(signal.SIGHUP)
+        self.assertEqual(run.wait(timeout=60), 0)
 
     def test_a_full_stdout_is_told(self):
         with open("/dev/full", "w") as full:

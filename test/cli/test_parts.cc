@@ -6,8 +6,10 @@
 #include <limits>
 
 #include "camera_file.h"
+#include "canvas.h"
 #include "error.h"
 #include "image_header.h"
+#include "matches_file.h"
 #include "measures.h"
 #include "options.h"
 #include "pairs_file.h"
@@ -219,6 +221,57 @@ void test_csv_numbers_are_the_shortest_that_read_back() {
   TEST_ASSERT_EQUAL_DOUBLE(1.1, shortest(1.1f));
 }
 
+void test_a_written_camera_reads_back_to_the_same_bits() {
+  tv_camera cameras[4] = {lens(), lens(), lens(), lens()};
+  cameras[1].model = TV_CAMERA_KANNALA_BRANDT;
+  cameras[1].k[4] = 0;
+  cameras[2].k[7] = 1e-300;
+  cameras[3].model = TV_CAMERA_PINHOLE;
+  std::memset(cameras[3].k, 0, sizeof cameras[3].k);
+  for (tv_camera& camera : cameras) {
+    camera.fx = 0.1 + 0.2;
+    camera.k[1] = camera.model == TV_CAMERA_PINHOLE ? 0 : -1.0 / 3;
+    const tv_camera again = parse_camera(camera_yaml(camera), "c");
+    TEST_ASSERT_EQUAL_MEMORY(&camera, &again, sizeof camera);
+  }
+}
+
+// How many matches a text holds and the sum of their first coordinates; -1 when it is refused.
+double parsed_matches(const char* text) {
+  try {
+    const MatchList matches = parse_matches(text, "m");
+    double sum = 100.0 * static_cast<double>(matches.size());
+    for (size_t i = 0; i < matches.size(); ++i) sum += matches.pixels[0][2 * i];
+    return sum;
+  } catch (const BadInput&) {
+    return -1;
+  }
+}
+
+void test_matches_come_with_commas_blanks_and_names() {
+  TEST_ASSERT_EQUAL_DOUBLE(101, parsed_matches("1 2 3 4"));
+  TEST_ASSERT_EQUAL_DOUBLE(206, parsed_matches("# c\n\n1,2,3,4,9\r\n 5 ; 6;7\t8 x\n"));
+  TEST_ASSERT_EQUAL_DOUBLE(104, parsed_matches("y1,x1,y0,x0\n1,2,3,4\n"));
+  TEST_ASSERT_EQUAL_DOUBLE(101, parsed_matches("\xef\xbb\xbf+1 2 -3 4e5"));
+  TEST_ASSERT_EQUAL_DOUBLE(-1, parsed_matches("1 2 3"));
+  TEST_ASSERT_EQUAL_DOUBLE(-1, parsed_matches("1,,2,3,4"));
+  TEST_ASSERT_EQUAL_DOUBLE(-1, parsed_matches("x0,y0,x1\n1,2,3"));
+  TEST_ASSERT_EQUAL_DOUBLE(-1, parsed_matches("1 2 3 4\nx0 y0 x1 y1\n"));
+  TEST_ASSERT_EQUAL_DOUBLE(-1, parsed_matches("x0 y0 x1 y1\n"));
+}
+
+bool plain_is(const char* text, const char* expected) { return plain_letters(text) == expected; }
+
+void test_the_font_gets_letters_that_it_has() {
+  TEST_ASSERT_TRUE(plain_is("left_01 (2).png", "left_01 (2).png"));
+  TEST_ASSERT_TRUE(
+      plain_is("\u00dcbung-\u015alask\u0142\u00e9\u00df.png", "Ubung-Slaskles.png"));
+  TEST_ASSERT_TRUE(plain_is("e\u0301t\u00e9", "ete"));
+  TEST_ASSERT_TRUE(plain_is("\u98de\u673a\U0001F681.png", "___.png"));
+  TEST_ASSERT_TRUE(plain_is("a\xff\xc3", "a__"));
+  TEST_ASSERT_TRUE(plain_is("\xe9\xa3", "__"));
+}
+
 }  // namespace
 
 int main() {
@@ -235,5 +288,8 @@ int main() {
   RUN_TEST(test_headers_are_read_within_their_bytes);
   RUN_TEST(test_base64_has_the_vectors_of_rfc_4648);
   RUN_TEST(test_csv_numbers_are_the_shortest_that_read_back);
+  RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);
+  RUN_TEST(test_matches_come_with_commas_blanks_and_names);
+  RUN_TEST(test_the_font_gets_letters_that_it_has);
   return UNITY_END();
 }

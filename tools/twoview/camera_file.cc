@@ -1,6 +1,7 @@
 #include "camera_file.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <utility>
 
@@ -32,6 +33,12 @@ void read_matrix(const YAML::Node& root, const std::string& file, tv_camera& cam
   const std::vector<double> K = numbers_at(root, "camera_matrix", file);
   if (K.size() != 9)
     throw BadInput(file + ": camera_matrix has " + std::to_string(K.size()) + " numbers, not 9");
+  const YAML::Node node = root["camera_matrix"];
+  if (node.IsMap()) {
+    for (const char* side : {"rows", "cols"})
+      if (node[side] && number_at(node, side, file + ": camera_matrix") != 3)
+        throw BadInput(file + ": camera_matrix: " + side + " is not 3");
+  }
   require_focal(K[0], "fx (camera_matrix[0])", file);
   require_focal(K[4], "fy (camera_matrix[4])", file);
   if (K[1] != 0) throw BadInput(file + ": camera_matrix[1] is not 0; skew is not supported");
@@ -89,6 +96,30 @@ tv_camera parse_camera(const std::string& text, const std::string& name) {
 
 tv_camera load_camera(const std::string& path) {
   return parse_camera(read_file(path, kMaxFileBytes), path);
+}
+
+std::string camera_yaml(const tv_camera& camera) {
+  const auto matrix = [](const char* name, const char* shape, const std::vector<double>& values) {
+    std::string text = name + std::string(": !!opencv-matrix\n") + shape + "   dt: d\n   data: [ ";
+    for (size_t i = 0; i < values.size(); ++i) {
+      char digits[32];
+      const auto end = std::to_chars(digits, digits + sizeof digits, values[i]).ptr;
+      text += (i ? ", " : "") + std::string(digits, end);
+    }
+    return text + " ]\n";
+  };
+  const bool is_fisheye = camera.model == TV_CAMERA_KANNALA_BRANDT;
+  const bool is_rational = std::any_of(camera.k + 5, camera.k + 8, [](double k) { return k != 0; });
+  const int count = is_fisheye ? 4 : is_rational ? 8 : 5;
+  std::vector<double> k(camera.k, camera.k + count);
+  if (camera.model == TV_CAMERA_PINHOLE) k.assign(5, 0);
+  return "%YAML:1.0\n---\nimage_width: " + std::to_string(camera.width) +
+         "\nimage_height: " + std::to_string(camera.height) + "\n" +
+         matrix("camera_matrix", "   rows: 3\n   cols: 3\n",
+                {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1}) +
+         (is_fisheye ? "distortion_model: equidistant\n" : "") +
+         matrix("distortion_coefficients",
+                ("   rows: 1\n   cols: " + std::to_string(k.size()) + "\n").c_str(), k);
 }
 
 NamedCameras parse_camera_set(const std::string& text, const std::string& name) {

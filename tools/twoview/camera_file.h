@@ -16,6 +16,9 @@ tv_camera load_camera(const std::string& path);
 // The same from the file's text; `name` is for the messages.
 tv_camera parse_camera(const std::string& text, const std::string& name);
 
+// The text of a file in OpenCV's format that reads back to the same camera, bit for bit.
+std::string camera_yaml(const tv_camera& camera);
+
 // A data set's cameras, each with the name it has there, in the file's order.
 using NamedCameras = std::vector<std::pair<std::string, tv_camera>>;
 NamedCameras load_camera_set(const std::string& path);

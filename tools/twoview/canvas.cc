@@ -25,7 +25,44 @@ void blend(cv::Vec3b& pixel, const Colour& colour, double share) {
     pixel[c] = cv::saturate_cast<uint8_t>(pixel[c] + share * (colour[c] - pixel[c]));
 }
 
+// The character at the front of `text`, of which it takes `length` bytes; -1 and one byte where that
+// is no UTF-8.
+int32_t front_character(const char* text, size_t size, size_t& length) {
+  const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
+  const uint8_t first = byte(0);
+  length = first < 0x80 ? 1 : first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF5 ? 4 : 0;
+  bool is_whole = length > 0 && length <= size;
+  int32_t character = length == 1 ? first : first & (0x7F >> length);
+  for (size_t i = 1; is_whole && i < length; ++i) {
+    is_whole = (byte(i) & 0xC0) == 0x80;
+    character = character << 6 | (byte(i) & 0x3F);
+  }
+  if (is_whole) return character;
+  length = 1;
+  return -1;
+}
+
 }  // namespace
+
+std::string plain_letters(const std::string& text) {
+  // U+00C0 to U+017F.
+  static const char letters[] =
+      "AAAAAAACEEEEIIIIDNOOOOOxOUUUUYTsaaaaaaaceeeeiiiidnooooo_ouuuuyty"
+      "AaAaAaCcCcCcCcDdDdEeEeEeEeEeGgGgGgGgHhHhIiIiIiIiIiIiJjKkkLlLlLlLlLlNnNnNnnNnOoOoOoOoRrRrRr"
+      "SsSsSsSsTtTtTtUuUuUuUuUuUuWwYyYZzZzZzs";
+  static_assert(sizeof letters == 0x180 - 0xC0 + 1, "one letter each");
+  std::string plain;
+  for (size_t at = 0, length; at < text.size(); at += length) {
+    const int32_t character = front_character(text.data() + at, text.size() - at, length);
+    if (character >= ' ' && character < 0x7F)
+      plain += static_cast<char>(character);
+    else if (character >= 0xC0 && character < 0x180)
+      plain += letters[character - 0xC0];
+    else if (character < 0x300 || character >= 0x370)  // not the accent of a letter before it
+      plain += '_';
+  }
+  return plain;
+}
 
 double text_width(const std::string& text, double height) {
   int baseline = 0;
@@ -163,9 +200,9 @@ cv::Point2d PairSheet::at(int image, double x, double y) const {
 
 void PairSheet::label(const std::string& name0, const std::string& name1,
                       const std::string& caption) {
-  const std::string* names[] = {&name0, &name1};
+  const std::string names[] = {plain_letters(name0), plain_letters(name1)};
   for (int i = 0; i < 2; ++i)
-    put_text(sheet_, fitted(*names[i], 11, std::max(frame_[i].width, 200)),
+    put_text(sheet_, fitted(names[i], 11, std::max(frame_[i].width, 200)),
              {double(frame_[i].x), frame_[i].y - 11.0}, 11, ink::text);
   put_text(sheet_, fitted(caption, 11, sheet_.cols - 24), {12, sheet_.rows - 15.0}, 11, ink::text);
 }

@@ -14,7 +14,7 @@ void add_common(CLI::App& verb, Common& common, unsigned groups, const std::stri
   });
   verb.add_flag("--json", common.json, "print the result alone, as JSON, on stdout");
   verb.add_flag("--quiet", common.quiet, "print nothing on stdout");
-  add_options(verb, common.options, groups | kCommon);
+  add_options(verb, common.options, groups);
 }
 
 uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& outcome) {

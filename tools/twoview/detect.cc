@@ -58,7 +58,7 @@ void add_detect(CLI::App& program, Run& run) {
   CLI::App* verb =
       program.add_subcommand("detect", "keypoints of an image, as CSV and as a picture");
   verb->add_option("IMAGE", a->image, "image")->required()->type_name("IMAGE");
-  add_common(*verb, a->common, kFeature, "folder for keypoints.csv and keypoints.png");
+  add_common(*verb, a->common, kFeature | kCommon, "folder for keypoints.csv and keypoints.png");
   verb->final_callback([a, &run] { run = [a] { return detect(*a); }; });
 }
 

@@ -87,11 +87,19 @@ tv_image Picture::view() const {
   return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};
 }
 
-Picture load_picture(const std::string& path) {
-  cv::Mat pixels = decode(path);
-  if (pixels.depth() == CV_16U) pixels = to_8_bits(pixels);
-  if (pixels.depth() != CV_8U)
+cv::Mat load_pixels(const std::string& path) {
+  const cv::Mat pixels = decode(path);
+  if (pixels.depth() != CV_8U && pixels.depth() != CV_16U)
     throw BadInput("image " + path + " has samples that are not 8 or 16 bits");
+  const int channels = pixels.channels();
+  if (channels != 1 && channels != 3 && channels != 4)
+    throw BadInput("image " + path + " has " + std::to_string(channels) + " channels");
+  return pixels;
+}
+
+Picture load_picture(const std::string& path) {
+  cv::Mat pixels = load_pixels(path);
+  if (pixels.depth() == CV_16U) pixels = to_8_bits(pixels);
   Picture picture;
   picture.path = path;
   picture.name = std::filesystem::path(path).filename().string();
@@ -106,12 +114,9 @@ Picture load_picture(const std::string& path) {
       pixels = opaque;
       [[fallthrough]];
     }
-    case 3:
+    default:
       picture.colour = pixels;
       cv::cvtColor(pixels, picture.luma, cv::COLOR_BGR2GRAY);
-      break;
-    default:
-      throw BadInput("image " + path + " has " + std::to_string(pixels.channels()) + " channels");
   }
   picture.file_width = pixels.cols;
   picture.file_height = pixels.rows;

@@ -30,6 +30,10 @@ struct Picture {
 // truncated, above kMaxSide a side (from the header where it is known), or of another depth.
 Picture load_picture(const std::string& path);
 
+// Every pixel as the file has it: 8 or 16 bits, 1, 3 (BGR) or 4 (BGRA) channels. Throws BadInput as
+// load_picture.
+cv::Mat load_pixels(const std::string& path);
+
 // Scales down by area averaging so that the longer side is `longer`; never up; 0: nothing.
 void shrink(Picture& picture, int longer);
 

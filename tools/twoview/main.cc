@@ -31,6 +31,8 @@ int run_program(int argc, char** argv) {
   cli::add_reconstruct(program, run);
   cli::add_detect(program, run);
   cli::add_match(program, run);
+  cli::add_triangulate(program, run);
+  cli::add_undistort(program, run);
   cli::add_evaluate(program, run);
   const auto verbs = program.get_subcommands([](const CLI::App*) { return true; });
   const auto is_named_first = [&](const CLI::App* verb) {
@@ -61,6 +63,7 @@ int main(int argc, char** argv) {
   // A full disk and a reader that went away come back as errors of write().
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
+  cli::clean_up_on_signals();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
   try {

@@ -4,14 +4,30 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
+#include <mutex>
+#include <thread>
 
 #include "error.h"
 
 namespace cli {
 namespace fs = std::filesystem;
 namespace {
+
+// The sets that are alive, for the thread that waits for signals. Whoever makes, renames or deletes
+// a temporary file holds the mutex, so that the thread sees every file that there is. Never freed:
+// the thread outlives main().
+struct Living {
+  std::mutex mutex;
+  std::vector<OutputSet*> sets;
+};
+Living& living() {
+  static Living* const instance = new Living;
+  return *instance;
+}
 
 std::string reason(int error) { return std::strerror(error); }
 
@@ -51,15 +67,22 @@ int sync(int fd) {
 }  // namespace
 
 OutputSet::OutputSet(const fs::path& folder) : folder_(folder.empty() ? "." : folder) {
+  const std::lock_guard<std::mutex> lock(living().mutex);
   try {
     make_folder();
+    living().sets.push_back(this);
   } catch (...) {
     discard();
     throw;
   }
 }
 
-OutputSet::~OutputSet() { discard(); }
+OutputSet::~OutputSet() {
+  const std::lock_guard<std::mutex> lock(living().mutex);
+  std::vector<OutputSet*>& sets = living().sets;
+  sets.erase(std::remove(sets.begin(), sets.end(), this), sets.end());
+  discard();
+}
 
 void OutputSet::make_folder() {
   std::error_code error;
@@ -98,9 +121,15 @@ void OutputSet::add(const std::string& name, std::string_view bytes) {
 
   Descriptor file;
   const int flags = O_WRONLY | O_CLOEXEC | (direct ? O_APPEND : O_CREAT | O_EXCL | O_NOFOLLOW);
-  file.fd = ::open(path.c_str(), flags, 0666);
-  if (file.fd < 0) throw BadInput("cannot write " + target.string() + ": " + reason(errno));
-  entries_.push_back(entry);  // from here on discard() removes the temporary file
+  {
+    // A pipe may keep open() waiting: no lock for what leaves nothing behind.
+    std::unique_lock<std::mutex> lock(living().mutex, std::defer_lock);
+    if (!direct) lock.lock();
+    file.fd = ::open(path.c_str(), flags, 0666);
+    if (file.fd < 0) throw BadInput("cannot write " + target.string() + ": " + reason(errno));
+    if (direct) lock.lock();
+    entries_.push_back(entry);  // from here on discard() removes the temporary file
+  }
   int error = write_all(file.fd, bytes);
   if (error == 0 && !direct) error = sync(file.fd);
   const int fd = file.fd;
@@ -110,6 +139,7 @@ void OutputSet::add(const std::string& name, std::string_view bytes) {
 }
 
 void OutputSet::commit() {
+  const std::lock_guard<std::mutex> lock(living().mutex);
   for (Entry& entry : entries_) {
     if (entry.temporary.empty()) continue;
     const fs::path target = folder_ / entry.name;
@@ -141,6 +171,30 @@ std::vector<std::string> OutputSet::names() const {
   std::vector<std::string> names;
   for (const Entry& entry : entries_) names.push_back(entry.name);
   return names;
+}
+
+void clean_up_on_signals() {
+  sigset_t awaited;
+  sigemptyset(&awaited);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction action;
+    if (::sigaction(signal, nullptr, &action) == 0 && action.sa_handler != SIG_IGN)
+      sigaddset(&awaited, signal);  // what nohup ignores stays ignored
+  }
+  // Blocked in this and every later thread; the one below takes them.
+  ::pthread_sigmask(SIG_BLOCK, &awaited, nullptr);
+  std::thread([awaited] {
+    int signal = 0;
+    if (::sigwait(&awaited, &signal) != 0) return;
+    living().mutex.lock();  // for good
+    for (OutputSet* set : living().sets) set->discard();
+    ::signal(signal, SIG_DFL);
+    sigset_t one;
+    sigemptyset(&one);
+    sigaddset(&one, signal);
+    ::pthread_sigmask(SIG_UNBLOCK, &one, nullptr);
+    ::raise(signal);
+  }).detach();
 }
 
 std::string read_file(const std::string& path, size_t max_bytes) {

@@ -30,6 +30,7 @@ class OutputSet {
   std::vector<std::string> names() const;
 
  private:
+  friend void clean_up_on_signals();
   struct Entry {
     std::string name;
     std::filesystem::path temporary;  // empty: written already
@@ -41,6 +42,10 @@ class OutputSet {
   std::vector<std::filesystem::path> made_;  // folders made here, outermost first
   std::vector<Entry> entries_;
 };
+
+// From now on Ctrl-C, SIGTERM and SIGHUP end the program only after what the OutputSets have not
+// committed is gone. Call once, before any other thread starts.
+void clean_up_on_signals();
 
 // The whole of a text or image file; refuses what is missing, no file, empty, or above max_bytes.
 std::string read_file(const std::string& path, size_t max_bytes);

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "camera_file.h"
+#include "camera_options.h"
 #include "canvas.h"
 #include "error.h"
 #include "output.h"
@@ -22,32 +23,26 @@ const std::vector<std::string> kFiles = {"result.json",  "cloud.ply", "matches.p
 
 struct Arguments {
   Common common;
-  std::string image[2], camera, camera_of[2], truth;
+  std::string image[2], truth;
+  CameraOptions cameras;
 };
 
-// The camera file of each image; both empty without cameras.
-void choose_camera_files(const Arguments& a, std::string (&files)[2]) {
-  if (!a.camera.empty() && (!a.camera_of[0].empty() || !a.camera_of[1].empty()))
-    throw BadInput("give --camera, or --camera0 and --camera1, not both");
-  for (int i = 0; i < 2; ++i) files[i] = a.camera.empty() ? a.camera_of[i] : a.camera;
-  if (files[0].empty() != files[1].empty())
-    throw BadInput(std::string("--camera") + (files[0].empty() ? "0" : "1") + " is missing");
+// The camera file of each image; both empty without cameras, which some methods can do without.
+std::array<std::string, 2> camera_files(const Arguments& a) {
+  const std::array<std::string, 2> files = a.cameras.files();
   const int32_t method = a.common.options.estimate.method;
   const bool can_do_without = method == TV_METHOD_EIGHT_POINT || method == TV_METHOD_SEVEN_POINT;
   if (files[0].empty() && !can_do_without)
     throw BadInput("--method " + method_name(method) +
                    " needs cameras: give --camera, or --camera0 and --camera1");
+  return files;
 }
 
 void load_inputs(const Arguments& a, Outcome& outcome) {
-  std::string files[2];
-  choose_camera_files(a, files);
+  const std::array<std::string, 2> files = camera_files(a);
   outcome.has_cameras = !files[0].empty();
-  tv_camera camera[2]{};
-  if (outcome.has_cameras) {
-    camera[0] = load_camera(files[0]);  // one file is read once: it may be a pipe
-    camera[1] = files[1] == files[0] ? camera[0] : load_camera(files[1]);
-  }
+  std::array<tv_camera, 2> camera{};
+  if (outcome.has_cameras) camera = CameraOptions::load(files);
   for (int i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
     picture = load_picture(a.image[i]);
@@ -63,8 +58,7 @@ void load_inputs(const Arguments& a, Outcome& outcome) {
 
 nlohmann::ordered_json options_of(const Arguments& a) {
   nlohmann::ordered_json json = options_json(a.common.options, kAllOptions);
-  std::string files[2];
-  choose_camera_files(a, files);
+  const std::array<std::string, 2> files = camera_files(a);
   for (int i = 0; i < 2; ++i) {
     const std::string key = "camera" + std::to_string(i);
     json[key] =
@@ -234,10 +228,7 @@ void add_reconstruct(CLI::App& program, Run& run) {
       program.add_subcommand("reconstruct", "two images to a pose, a point cloud and a report");
   verb->add_option("A", a->image[0], "image 0")->required()->type_name("IMAGE");
   verb->add_option("B", a->image[1], "image 1")->required()->type_name("IMAGE");
-  verb->add_option("--camera", a->camera, "camera of both images, OpenCV or ROS YAML")
-      ->type_name("FILE");
-  verb->add_option("--camera0", a->camera_of[0], "camera of image 0")->type_name("FILE");
-  verb->add_option("--camera1", a->camera_of[1], "camera of image 1")->type_name("FILE");
+  a->cameras.add_to(*verb);
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
       ->type_name("FILE");
   add_common(*verb, a->common, kAllOptions, "folder for the results");

@@ -188,7 +188,7 @@ std::string config_in_words(int32_t config) {
     case TV_CONFIG_NO_MOTION:
       return "no motion";
     default:
-      return "no model explains the matches";
+      return "no model explains the matches better than chance";
   }
 }
 

@@ -42,6 +42,23 @@ std::string matches_csv(const tv_keypoint* keypoints0, const tv_keypoint* keypoi
   return text;
 }
 
+const char* point_status_name(int32_t status) {
+  constexpr const char* names[] = {"ok", "infinite", "behind", "invalid"};
+  return names[status];
+}
+
+std::string points_csv(const std::vector<tv_point>& points) {
+  constexpr double degrees = 57.29577951308232;  // of a radian
+  std::string text = "x,y,z,angle_deg,error_px,status\n";
+  for (const tv_point& point : points) {
+    for (const double value : point.position) append_number(text, value, ',');
+    append_number(text, static_cast<float>(point.angle_rad * degrees), ',');
+    append_number(text, point.error_px, ',');
+    text += point_status_name(point.status) + std::string("\n");
+  }
+  return text;
+}
+
 void append_float(std::string& bytes, float value) {
   uint32_t bits;
   std::memcpy(&bits, &value, sizeof bits);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <opencv2/core.hpp>
 
 #include "error.h"
 #include "output.h"
@@ -22,6 +23,18 @@ std::array<double, N> fixed(const YAML::Node& root, const std::string& entry,
   std::array<double, N> result;
   std::copy(values.begin(), values.end(), result.begin());
   return result;
+}
+
+KnownPose read_pose(const YAML::Node& root, const std::string& path) {
+  KnownPose pose;
+  pose.R = fixed<9>(root, "R", path);
+  pose.t = fixed<3>(root, "t", path);
+  const Matrix3 identity = product(pose.R, transposed(pose.R));
+  for (size_t i = 0; i < 9; ++i)
+    if (!(std::abs(identity[i] - (i % 4 == 0)) <= 1e-3)) throw BadInput(path + ": R is no rotation");
+  if (determinant(pose.R) < 0) throw BadInput(path + ": R is no rotation but a reflection");
+  if (norm(pose.t) == 0) throw BadInput(path + ": t is 0");
+  return pose;
 }
 
 // The depth errors of the cloud's points in per cent, each against the nearest pixel of the map.
@@ -45,16 +58,20 @@ std::vector<double> depth_errors_percent(const Truth& truth, const Picture& pict
 
 }  // namespace
 
+KnownPose load_pose(const std::string& path) {
+  KnownPose pose = read_pose(parse_yaml(read_file(path, kMaxFileBytes), path), path);
+  const cv::SVD svd(cv::Mat(3, 3, CV_64F, pose.R.data()));
+  const cv::Mat nearest = svd.u * svd.vt;
+  std::copy(nearest.begin<double>(), nearest.end<double>(), pose.R.begin());
+  return pose;
+}
+
 Truth load_truth(const std::string& path) {
   const YAML::Node root = parse_yaml(read_file(path, kMaxFileBytes), path);
   Truth truth;
-  truth.R = fixed<9>(root, "R", path);
-  truth.t = fixed<3>(root, "t", path);
-  const Matrix3 identity = product(truth.R, transposed(truth.R));
-  for (size_t i = 0; i < 9; ++i)
-    if (std::abs(identity[i] - (i % 4 == 0)) > 1e-3) throw BadInput(path + ": R is no rotation");
-  if (determinant(truth.R) < 0) throw BadInput(path + ": R is no rotation but a reflection");
-  if (norm(truth.t) == 0) throw BadInput(path + ": t is 0");
+  const KnownPose pose = read_pose(root, path);
+  truth.R = pose.R;
+  truth.t = pose.t;
   truth.baseline = root["baseline"] ? number_at(root, "baseline", path) : norm(truth.t);
   if (truth.baseline <= 0) throw BadInput(path + ": baseline is not above 0");
   if (const YAML::Node depth = root["depth0"]) {

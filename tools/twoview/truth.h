@@ -10,6 +10,14 @@
 
 namespace cli {
 
+// R and t of cam1_from_cam0 out of a YAML or JSON file, such as result.json. R is the rotation nearest
+// to the file's nine numbers, which may be rounded. Throws BadInput.
+struct KnownPose {
+  Matrix3 R{};
+  Vector3 t{};
+};
+KnownPose load_pose(const std::string& path);
+
 // A YAML file: R [9] row-major and t [3] of cam1_from_cam0; optional `baseline`, the length of t in
 // metres; optional `depth0`, the path (from the file's folder) of a float depth map of image 0, in
 // the baseline's unit, 0, negative or not finite where unknown.

@@ -28,6 +28,8 @@ using Run = std::function<int()>;
 void add_reconstruct(CLI::App& program, Run& run);
 void add_detect(CLI::App& program, Run& run);
 void add_match(CLI::App& program, Run& run);
+void add_triangulate(CLI::App& program, Run& run);
+void add_undistort(CLI::App& program, Run& run);
 void add_evaluate(CLI::App& program, Run& run);
 
 // The main job on outcome.picture and outcome.camera: fills two_view and reconstruction; the wall

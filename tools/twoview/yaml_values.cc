@@ -1,8 +1,12 @@
 #include "yaml_values.h"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <set>
+#include <sstream>
 
 #include "error.h"
 
@@ -29,6 +33,54 @@ double finite(const YAML::Node& node, const std::string& entry, const std::strin
   if (!std::isfinite(value)) throw BadInput(file + ": " + entry + " is not finite");
   return value;
 }
+
+// Refuses what YAML::Load lets pass: a name that a map has twice (it would take the first), and
+// aliases, with which a small file can stand for endless numbers.
+class StrictReader : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { value(mark, "~"); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    refuse(mark, "aliases are not supported");
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                const std::string& text) override {
+    value(mark, text);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    value(mark, "");
+    levels_.push_back({});
+  }
+  void OnSequenceEnd() override { levels_.pop_back(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    value(mark, "");
+    levels_.push_back({true, true, {}});
+  }
+  void OnMapEnd() override { levels_.pop_back(); }
+
+ private:
+  struct Level {
+    bool is_map = false, name_is_next = false;
+    std::set<std::string> names;
+  };
+
+  // A map's items are a name and a value in turn.
+  void value(const YAML::Mark& mark, const std::string& text) {
+    if (levels_.empty() || !levels_.back().is_map) return;
+    Level& level = levels_.back();
+    if (level.name_is_next && !level.names.insert(text).second)
+      refuse(mark, text + " is given twice");
+    level.name_is_next = !level.name_is_next;
+  }
+  [[noreturn]] static void refuse(const YAML::Mark& mark, const std::string& why) {
+    throw YAML::ParserException(mark, why);
+  }
+
+  std::vector<Level> levels_;
+};
 
 YAML::Node find(const YAML::Node& map, const std::string& entry, const std::string& file) {
   const YAML::Node node = map[entry];
@@ -57,6 +109,9 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   if (body.compare(0, 6, "%YAML:") == 0) body[0] = '#';
   YAML::Node root;
   try {
+    std::istringstream stream(body);
+    StrictReader reader;
+    YAML::Parser(stream).HandleNextDocument(reader);
     root = YAML::Load(body);
   } catch (const YAML::Exception& e) {
     const std::string where =
@@ -73,15 +128,23 @@ double number_at(const YAML::Node& map, const std::string& entry, const std::str
 
 std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,
                                const std::string& file) {
-  YAML::Node node = find(map, entry, file);
+  const YAML::Node node = find(map, entry, file);
+  YAML::Node list = node;
   if (node.IsMap()) {
-    const YAML::Node data = node["data"];
-    if (!data) throw BadInput(file + ": " + entry + " has no data");
-    node.reset(data);
+    list.reset(node["data"]);
+    if (!list) throw BadInput(file + ": " + entry + " has no data");
   }
-  if (!node.IsSequence()) throw BadInput(file + ": " + entry + " is not a list of numbers");
+  if (!list.IsSequence()) throw BadInput(file + ": " + entry + " is not a list of numbers");
   std::vector<double> values;
-  append(node, entry, file, values);
+  append(list, entry, file, values);
+  if (node.IsMap() && node["rows"] && node["cols"]) {
+    const double rows = number_at(node, "rows", file + ": " + entry);
+    const double cols = number_at(node, "cols", file + ": " + entry);
+    if (rows * cols != static_cast<double>(values.size()))
+      throw BadInput(file + ": " + entry + " has " + std::to_string(values.size()) +
+                     " numbers, not rows x cols = " + node["rows"].Scalar() + " x " +
+                     node["cols"].Scalar());
+  }
   return values;
 }
 
