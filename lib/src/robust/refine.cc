@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "robust/gravity.h"
+
 namespace tv {
 
 double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
@@ -212,6 +214,8 @@ double refine(const RayPairs& pairs, const int32_t* indices, int count, const Ro
 template bool solve_damped<5>(const double*, const double*, double, double*);
 template double refine<PoseModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
                                   PoseModel*);
+template double refine<GravityPoseModel>(const RayPairs&, const int32_t*, int,
+                                         const RobustLoss&, int, GravityPoseModel*);
 template double refine<FundamentalModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
                                          int, FundamentalModel*);
 template double refine<HomographyModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,

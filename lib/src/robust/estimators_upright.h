@@ -1,0 +1,26 @@
+// The pose of three rays and gravity, for the robust loop (loop.h).
+#pragma once
+
+#include "geometry/relpose_upright_3pt.h"
+#include "robust/estimators.h"
+#include "robust/gravity.h"
+
+namespace tv {
+
+// Scores as PoseEstimator does. Gravity is noisy, and a sampled pose is off by as much: local
+// optimisation turns it freely, with gravity as a prior, and with a threshold that begins wide
+// enough and halves to the true one.
+struct UprightEstimator : PoseEstimator {
+  static constexpr int kSampleSize = 3;
+  static constexpr int kMaxModels = kMaxRelposeUpright3pt;
+  const GravityPrior& gravity;
+  Mat3 level0, level1;  // level_from_camera of gravity.down
+  double width_first;   // of local optimisation, thresholds
+  int generate_models(const int32_t* sample, Pose* models) const;
+  void refine_model(Pose* model) const;
+};
+
+UprightEstimator make_upright_estimator(const RayPairs& pairs, double threshold_px,
+                                        int32_t* indices, const GravityPrior& gravity);
+
+}  // namespace tv

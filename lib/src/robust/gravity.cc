@@ -1,0 +1,103 @@
+#include "robust/gravity.h"
+
+#include <cmath>
+
+namespace tv {
+namespace {
+
+// Finer than any accelerometer; keeps the weights finite.
+constexpr double kSmallestSigmaRad = 1e-6;
+
+// Chi-square of two degrees of freedom at 99 per cent.
+constexpr double kAgreementSq = 9.21;
+
+}  // namespace
+
+GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad) {
+  GravityPrior prior;
+  if (!(sigma_rad > 0)) return prior;
+  const double* gravity[2] = {gravity0, gravity1};
+  for (int v = 0; v < 2; ++v) {
+    // By the largest entry first: the squares of a vector of any length stay finite.
+    double largest = 0, sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double size = std::fabs(gravity[v][k]);
+      if (size > largest) largest = size;
+      sum += 0.25 * size;
+    }
+    if (!(largest > 0) || !(sum - sum == 0.0)) return prior;  // zero; infinite or no number
+    const Vec3 scaled(gravity[v][0] / largest, gravity[v][1] / largest, gravity[v][2] / largest);
+    prior.down[v] = scaled.normalized();
+  }
+  prior.known = true;
+  prior.sigma_rad = sigma_rad > kSmallestSigmaRad ? sigma_rad : kSmallestSigmaRad;
+  return prior;
+}
+
+double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px,
+                         double scale_px, double upper[15], double gradient[5]) {
+  const Vec3 h = R * prior.down[0];
+  // A turn by w moves h by w x h, so that J = -[h]x, J'J = I - h h' and J'(h - down1) = down1 x h:
+  // the two rows of a tangent basis, whichever it is, summed. The chord grows up to half a turn,
+  // where the components of the residual in a tangent plane would fall again.
+  const double weight =
+      prior.weight * (noise_px * noise_px) / (2 * prior.sigma_rad * prior.sigma_rad);
+  const Vec3 slope = prior.down[1].cross(h);
+  int slot = 0;
+  for (int p = 0; p < 3; ++p) {
+    gradient[p] += weight * slope[p];
+    for (int r = p; r < 3; ++r) upper[slot++] += weight * ((p == r ? 1.0 : 0.0) - h[p] * h[r]);
+    slot += 2;  // the columns of t
+  }
+  return weight * (h - prior.down[1]).squaredNorm() / (scale_px * scale_px);
+}
+
+double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]) {
+  const Vec3 h = R * prior.down[0];
+  Vec3 b1, b2;
+  tangent_basis(h, &b1, &b2);
+  // The residual in h's tangent plane, stretched to the chord's length.
+  const double chord = (h - prior.down[1]).norm();
+  double e[2] = {-b1.dot(prior.down[1]), -b2.dot(prior.down[1])};
+  const double length = std::sqrt(e[0] * e[0] + e[1] * e[1]);
+  if (length > 0) {
+    e[0] *= chord / length;
+    e[1] *= chord / length;
+  } else {
+    e[0] = chord;  // 0, or opposite
+  }
+  // Its covariance: both directions', and the rotation's through the rows h x b.
+  const Vec3 rows[2] = {h.cross(b1), h.cross(b2)};
+  double S[2][2];
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      S[i][j] = i == j ? 2 * prior.sigma_rad * prior.sigma_rad : 0.0;
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) S[i][j] += rows[i][r] * covariance[5 * r + c] * rows[j][c];
+      }
+    }
+  }
+  const double determinant = S[0][0] * S[1][1] - S[0][1] * S[1][0];
+  const double z_sq = (S[1][1] * e[0] * e[0] - (S[0][1] + S[1][0]) * e[0] * e[1] +
+                       S[0][0] * e[1] * e[1]) / determinant;
+  if (!(z_sq > kAgreementSq)) return 1;
+  const double ratio = kAgreementSq / z_sq;
+  return ratio * ratio;
+}
+
+double GravityPoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                          const RobustLoss& loss, double* upper,
+                                          double* gradient) const {
+  const double cost =
+      PoseModel{pose}.normal_equations(pairs, indices, count, loss, upper, gradient);
+  if (prior == nullptr || !prior->known) return cost;
+  return cost + add_gravity_prior(*prior, pose.R, noise_px, loss.scale_px, upper, gradient);
+}
+
+GravityPoseModel GravityPoseModel::stepped(const double* step) const {
+  GravityPoseModel result = *this;
+  result.pose = PoseModel{pose}.stepped(step).pose;
+  return result;
+}
+
+}  // namespace tv

@@ -1,0 +1,41 @@
+// The direction of gravity in both views, as a prior of a pose. docs/algorithms/gravity.md.
+#pragma once
+
+#include "robust/refine.h"
+
+namespace tv {
+
+struct GravityPrior {
+  bool known = false;
+  Vec3 down[2] = {Vec3::Zero(), Vec3::Zero()};  // unit vectors, each in its camera's frame
+  double sigma_rad = 0;  // of each direction, about each axis across it
+  double weight = 1;     // (0, 1]: less where the points contradict it (gravity_weight)
+};
+
+// The prior of a caller's vectors of any length; not known when sigma_rad is 0 or when a vector has
+// no direction.
+GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad);
+
+// Adds the prior's rows to the normal equations of PoseModel. With h = R down0, |h - down1|^2 over
+// its variance 2 sigma^2 counts noise_px^2 beside the matches' r^2, noise_px being their standard
+// deviation. Returns what it adds to the cost, which is in units of scale_px^2.
+double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px,
+                         double scale_px, double upper[15], double gradient[5]);
+
+// How far to believe the prior beside a pose that the points alone gave, with its covariance: 1
+// while the two agree at 99 per cent, then falling with the fourth power of their distance in
+// standard deviations. So a direction that is wrong pulls no further than one on that limit.
+double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]);
+
+// PoseModel with the prior; without one (null, or not known) it is PoseModel, bit for bit.
+struct GravityPoseModel {
+  static constexpr int kParameters = PoseModel::kParameters;
+  Pose pose;
+  const GravityPrior* prior = nullptr;
+  double noise_px = 0;
+  double normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                          const RobustLoss& loss, double* upper, double* gradient) const;
+  GravityPoseModel stepped(const double* step) const;
+};
+
+}  // namespace tv
