@@ -164,6 +164,38 @@ void test_gravity_that_disagrees_pulls_less_the_farther_it_is(void) {
   TEST_ASSERT_TRUE(tv::gravity_weight(opposite, Mat3::Identity(), covariance) < 1e-4);
 }
 
+// The sum of the informations, by the inverse of the inverse.
+void test_information_of_gravity_is_added_to_that_of_the_points(void) {
+  using Matrix5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
+  tv::Random random = tv::random_seeded(26);
+  for (int trial = 0; trial < 200; ++trial) {
+    GravityPrior prior = any_prior(&random);
+    prior.weight = uniform(&random, 0.1, 1);
+    const Pose pose = any_pose(&random);
+    Matrix5 C;
+    for (int k = 0; k < 25; ++k) C(k / 5, k % 5) = 2 * kSigma * uniform(&random, -1, 1);
+    C = (C * C.transpose() + 1e-6 * Matrix5::Identity()).eval();
+    const Rows rows = rows_at(prior, pose.R, 1, 1);  // 1: J'J over the variance itself
+    Matrix5 information = C.inverse();
+    int slot = 0;
+    for (int p = 0; p < 5; ++p) {
+      for (int r = p; r < 5; ++r) {
+        information(p, r) += rows.upper[slot];
+        if (r != p) information(r, p) += rows.upper[slot];
+        ++slot;
+      }
+    }
+    const Matrix5 expected = information.inverse();
+    double covariance[25];
+    for (int k = 0; k < 25; ++k) covariance[k] = C(k / 5, k % 5);
+    tv::add_gravity_information(prior, pose.R, covariance);
+    for (int k = 0; k < 25; ++k) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9 * C.trace(), expected(k / 5, k % 5), covariance[k]);
+      TEST_ASSERT_EQUAL_DOUBLE(covariance[k], covariance[5 * (k % 5) + k / 5]);
+    }
+  }
+}
+
 void test_a_prior_that_is_not_known_changes_nothing(void) {
   constexpr int kNum = 40;
   static double memory[40000];
@@ -210,6 +242,7 @@ int main(void) {
   RUN_TEST(test_rows_are_added_to_what_is_there);
   RUN_TEST(test_gravity_that_agrees_has_its_full_weight);
   RUN_TEST(test_gravity_that_disagrees_pulls_less_the_farther_it_is);
+  RUN_TEST(test_information_of_gravity_is_added_to_that_of_the_points);
   RUN_TEST(test_a_prior_that_is_not_known_changes_nothing);
   return UNITY_END();
 }

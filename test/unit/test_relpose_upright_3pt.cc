@@ -50,7 +50,8 @@ double nearest_pose(const Sample& s, const Pose* poses, int count) {
   double best = 10;
   for (int k = 0; k < count; ++k) {
     const double turned = (poses[k].R - s.truth.R).norm();
-    const double moved = std::fmin((poses[k].t - s.truth.t).norm(), (poses[k].t + s.truth.t).norm());
+    const double moved =
+        std::fmin((poses[k].t - s.truth.t).norm(), (poses[k].t + s.truth.t).norm());
     best = std::fmin(best, turned + moved);
   }
   return best;

@@ -1,15 +1,14 @@
 // O. Naroditsky, X. S. Zhou, J. Gallier, S. I. Roumeliotis, K. Daniilidis, "Two efficient solutions
-// for visual odometry using directional correspondence", PAMI 2012: with one direction known in both
-// views, three points leave a quartic. The derivation here is our own (docs/algorithms/gravity.md).
+// for visual odometry using directional correspondence", PAMI 2012: with one direction known in
+// both views, three points leave a quartic. The derivation here: docs/algorithms/gravity.md.
 //
 // In level frames x1 = Rz(yaw) x0 + t, so that t is orthogonal to the three vectors
 // n_k = (Rz p_k) x q_k, and det(n_0, n_1, n_2) = 0 in the yaw alone. Written with complex numbers
 // P = px + i py, Q = qx + i qy, u = exp(i yaw):
 //   n_xy = i (pz Q - qz u P),   n_z = Im(conj(u P) Q),
 //   det = sum over cyclic (i, j, k) of n_z,k Im(conj(n_xy,i) n_xy,j).
-// The products conj(u) u vanish from the second factor's degree: the determinant has degree 2 in
-// (cos, sin) and not 3, so it is a quartic in tan(yaw / 2), without the pair of imaginary roots that
-// the plain substitution leaves in a polynomial of degree six.
+// Where u meets conj(u) in the second factor they cancel: the determinant has degree 2 in (cos,
+// sin), not 3, and is a quartic in tan(yaw / 2), not a polynomial of degree six.
 #include "geometry/relpose_upright_3pt.h"
 
 #include "geometry/polynomial.h"
@@ -60,7 +59,7 @@ YawPolynomial turned(const YawPolynomial& f, double cosine, double sine) {
 }
 
 // cos, sin of multiples of 72 degrees. A polynomial with five coefficients cannot vanish at five
-// angles; so of these offsets one puts half a turn from it, where tan(yaw / 2) is infinite, far from
+// angles; so one of these offsets puts half a turn from it, where the tangent is infinite, far from
 // every root.
 constexpr double kOffsets[5][2] = {{1, 0},
                                    {0.30901699437494745, 0.95105651629515353},

@@ -11,6 +11,45 @@ constexpr double kSmallestSigmaRad = 1e-6;
 // Chi-square of two degrees of freedom at 99 per cent.
 constexpr double kAgreementSq = 9.21;
 
+// What a pose's covariance C says about h = R down0 in a basis b of h's tangent plane: the
+// derivatives of (b[0], b[1]) . (w x h) by w are the rows H = h x b.
+struct TangentRows {
+  Vec3 b[2];
+  double across[2][5];  // H C
+  double S[3];          // H C H': 00, 01, 11
+};
+
+TangentRows tangent_rows(const Vec3& h, const double covariance[25]) {
+  TangentRows rows;
+  tangent_basis(h, &rows.b[0], &rows.b[1]);
+  const Vec3 H[2] = {h.cross(rows.b[0]), h.cross(rows.b[1])};
+  for (int i = 0; i < 2; ++i) {
+    for (int c = 0; c < 5; ++c) {
+      rows.across[i][c] = (H[i][0] * covariance[c] + H[i][1] * covariance[5 + c]) +
+                          H[i][2] * covariance[10 + c];
+    }
+  }
+  int slot = 0;
+  for (int i = 0; i < 2; ++i) {
+    for (int j = i; j < 2; ++j) {
+      const double* across = rows.across[i];
+      rows.S[slot++] = (across[0] * H[j][0] + across[1] * H[j][1]) + across[2] * H[j][2];
+    }
+  }
+  return rows;
+}
+
+// (S + variance I)^-1, symmetric: a, b; b, c.
+struct Inverse2 {
+  double a, b, c;
+};
+
+Inverse2 inverse_sum(const TangentRows& rows, double variance) {
+  const double a = rows.S[0] + variance, b = rows.S[1], c = rows.S[2] + variance;
+  const double inverse = 1 / (a * c - b * b);
+  return Inverse2{c * inverse, -b * inverse, a * inverse};
+}
+
 }  // namespace
 
 GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad) {
@@ -54,11 +93,10 @@ double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_
 
 double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]) {
   const Vec3 h = R * prior.down[0];
-  Vec3 b1, b2;
-  tangent_basis(h, &b1, &b2);
+  const TangentRows rows = tangent_rows(h, covariance);
   // The residual in h's tangent plane, stretched to the chord's length.
   const double chord = (h - prior.down[1]).norm();
-  double e[2] = {-b1.dot(prior.down[1]), -b2.dot(prior.down[1])};
+  double e[2] = {-rows.b[0].dot(prior.down[1]), -rows.b[1].dot(prior.down[1])};
   const double length = std::sqrt(e[0] * e[0] + e[1] * e[1]);
   if (length > 0) {
     e[0] *= chord / length;
@@ -66,23 +104,28 @@ double gravity_weight(const GravityPrior& prior, const Mat3& R, const double cov
   } else {
     e[0] = chord;  // 0, or opposite
   }
-  // Its covariance: both directions', and the rotation's through the rows h x b.
-  const Vec3 rows[2] = {h.cross(b1), h.cross(b2)};
-  double S[2][2];
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) {
-      S[i][j] = i == j ? 2 * prior.sigma_rad * prior.sigma_rad : 0.0;
-      for (int r = 0; r < 3; ++r) {
-        for (int c = 0; c < 3; ++c) S[i][j] += rows[i][r] * covariance[5 * r + c] * rows[j][c];
-      }
-    }
-  }
-  const double determinant = S[0][0] * S[1][1] - S[0][1] * S[1][0];
-  const double z_sq = (S[1][1] * e[0] * e[0] - (S[0][1] + S[1][0]) * e[0] * e[1] +
-                       S[0][0] * e[1] * e[1]) / determinant;
+  const Inverse2 inverse = inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad);
+  const double z_sq = (inverse.a * e[0] * e[0] + 2 * inverse.b * e[0] * e[1]) +
+                      inverse.c * e[1] * e[1];
   if (!(z_sq > kAgreementSq)) return 1;
   const double ratio = kAgreementSq / z_sq;
   return ratio * ratio;
+}
+
+void add_gravity_information(const GravityPrior& prior, const Mat3& R, double covariance[25]) {
+  const TangentRows rows = tangent_rows(R * prior.down[0], covariance);
+  const Inverse2 inverse =
+      inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad / prior.weight);
+  for (int r = 0; r < 5; ++r) {
+    const double* u = rows.across[0];
+    const double* v = rows.across[1];
+    for (int c = r; c < 5; ++c) {
+      const double less = (inverse.a * u[r] * u[c] + inverse.b * (u[r] * v[c] + v[r] * u[c])) +
+                          inverse.c * v[r] * v[c];
+      covariance[5 * r + c] -= less;
+      covariance[5 * c + r] = covariance[5 * r + c];
+    }
+  }
 }
 
 double GravityPoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,

@@ -27,6 +27,10 @@ double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_
 // standard deviations. So a direction that is wrong pulls no further than one on that limit.
 double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]);
 
+// The covariance of a pose that the points gave, once the prior has been added to them: the two
+// informations' sum, C - C H' (H C H' + 2 sigma^2 / weight I)^-1 H C with the prior's rows H.
+void add_gravity_information(const GravityPrior& prior, const Mat3& R, double covariance[25]);
+
 // PoseModel with the prior; without one (null, or not known) it is PoseModel, bit for bit.
 struct GravityPoseModel {
   static constexpr int kParameters = PoseModel::kParameters;
