@@ -185,7 +185,7 @@ static void expect_sound(int count, int cameras_given) {
   TEST_ASSERT_TRUE(result.config >= 0 && result.config <= TV_CONFIG_NO_MOTION);
   TEST_ASSERT_TRUE(result.verdict >= 0 && result.verdict <= TV_VERDICT_OK);
   TEST_ASSERT_EQUAL_INT(result.verdict == TV_VERDICT_OK, result.reasons == 0);
-  TEST_ASSERT_EQUAL_INT(0, result.reserved);
+  TEST_ASSERT_TRUE(result.has_alternative_covariance <= result.has_alternative);
   TEST_ASSERT_EQUAL_INT(count, result.num_matches);
   for (i = 0; i < count; ++i) {
     TEST_ASSERT_TRUE(mask[i] <= 1);
@@ -198,6 +198,7 @@ static void expect_sound(int count, int cameras_given) {
   expect_flagged(result.has_E, result.E, 9);
   expect_flagged(result.has_F, result.F, 9);
   expect_flagged(result.has_H, result.H, 9);
+  expect_flagged(result.has_alternative_covariance, result.alternative_covariance, 25);
   expect_flagged(result.has_alternative, result.alternative_R, 9);
   expect_flagged(result.has_alternative, result.alternative_t, 3);
   expect_flagged(result.has_covariance, result.covariance, 25);

@@ -291,10 +291,9 @@ void test_few_matches_give_a_pose_of_the_right_size_of_error(void) {
   TEST_ASSERT_TRUE(10 * refused < scenes);
 }
 
-// sigma^2 comes from residuals cut at two sigma, whose variance is 0.77 of the whole's; 5 per cent
-// of the matches are cut too. So the ratio is about 0.81, +- 0.08 from 300 residuals' own scatter;
-// the bounds are four of these away.
-void test_the_covariance_is_the_bound_of_its_own_inliers(void) {
+// Cauchy's loss at 1.5 sigma has a variance of 1.15 times the bound, and the wrong side of chance
+// another 5 per cent; +- 0.1 from 300 residuals' own scatter: the bounds are four of these away.
+void test_the_covariance_is_near_the_bound(void) {
   tv::Random random = tv::random_seeded(kSeed);
   Kind k = kind(kGeneral);
   k.outliers = 0;
@@ -305,7 +304,7 @@ void test_the_covariance_is_the_bound_of_its_own_inliers(void) {
     const Mat5 bound = scene.information.inverse();
     for (int p = 0; p < 3; ++p) {  // the basis (b1, b2) may differ between estimate and truth
       const double ratio = r.covariance[6 * p] / bound(p, p);
-      TEST_ASSERT_TRUE(ratio > 0.5 && ratio < 1.2);
+      TEST_ASSERT_TRUE(ratio > 0.8 && ratio < 1.65);
     }
   }
 }
@@ -424,7 +423,7 @@ int main(void) {
   RUN_TEST(test_a_barrel_lens_costs_no_more_than_its_own_bound);
   RUN_TEST(test_eight_and_seven_points_end_near_the_bound);
   RUN_TEST(test_few_matches_give_a_pose_of_the_right_size_of_error);
-  RUN_TEST(test_the_covariance_is_the_bound_of_its_own_inliers);
+  RUN_TEST(test_the_covariance_is_near_the_bound);
   RUN_TEST(test_swapped_views_give_the_inverse);
   RUN_TEST(test_the_order_of_the_matches_does_not_matter);
   RUN_TEST(test_the_same_seed_gives_the_same_bytes_and_is_echoed);

@@ -13,7 +13,7 @@ typedef enum tv_method {
   TV_METHOD_EIGHT_POINT = 1, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
                                 paper's path */
   TV_METHOD_SEVEN_POINT = 2,
-  TV_METHOD_UPRIGHT = 3      /* three points and gravity; this version answers TV_ERR_ARGUMENT */
+  TV_METHOD_UPRIGHT = 3      /* three points and gravity; cameras and gravity needed */
 } tv_method;
 
 /* COLMAP's kinds of two-view geometry, and no-motion. */
@@ -79,7 +79,8 @@ typedef struct tv_two_view {
   uint32_t reasons;     /* tv_reason bits */
   int32_t num_matches;
   int32_t num_inliers; /* of the model that config names */
-  uint8_t has_R, has_t, has_E, has_F, has_H, has_alternative, has_covariance, reserved;
+  uint8_t has_R, has_t, has_E, has_F, has_H, has_alternative, has_covariance,
+      has_alternative_covariance;
   int32_t num_iterations; /* samples drawn */
   double R[9], t[3];      /* cam1_from_cam0: x1 = R x0 + t, |t| = 1 */
   double E[9];            /* [t]x R, Frobenius norm 1, the sign that this gives */
@@ -89,6 +90,7 @@ typedef struct tv_two_view {
   double covariance[25]; /* radians^2, order (w0 w1 w2 a b): R_true = exp([w]x) R,
                             t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), k the index
                             of the smallest |t_k| (the lowest on a tie), b2 = t x b1 */
+  double alternative_covariance[25]; /* the same around the alternative pose */
   int32_t essential_inliers, fundamental_inliers, homography_inliers,
       rotation_inliers;       /* evidence: inliers of each model, -1 where it was not estimated */
   double coverage;            /* share of an 8x8 grid on image 0 that holds an inlier, [0, 1] */

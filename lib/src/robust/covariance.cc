@@ -1,26 +1,49 @@
 #include "robust/covariance.h"
 
+#include <cmath>
+
 namespace tv {
 
-bool pose_covariance(const RayPairs& pairs, const int32_t* inliers, int count, const Pose& pose,
-                     double covariance[25]) {
+namespace {
+
+// Normal residuals, cut at three deviations, under Cauchy's loss with a scale of 1.5 deviations:
+// the variance of the M-estimate over that of the residuals.
+constexpr double kVarianceOfCauchy = 1.1405946331327699;
+
+constexpr double kLeastResidual = 0.05;  // of the loss's scale
+
+}  // namespace
+
+bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
+                      double scale_px, PoseUncertainty* uncertainty) {
   if (count <= 5) return false;
   double upper[15], gradient[5];
   // A scale that no residual reaches: plain least squares.
   constexpr double kNoLimit = 1e140;
-  PoseModel model{pose};
-  model.normal_equations(pairs, inliers, count, RobustLoss{Loss::kTruncated, kNoLimit}, upper,
+  const PoseModel model{pose};
+  model.normal_equations(pairs, indices, count, RobustLoss{Loss::kTruncated, kNoLimit}, upper,
                          gradient);
-  const Mat3 E = essential_from_pose(pose);
-  double sum = 0;
-  for (int k = 0; k < count; ++k) sum += sampson_sq(pairs, inliers[k], E);
   double inverse[25];
   if (!invert_symmetric5(upper, inverse)) return false;
-  const double variance = sum / (count - 5);
-  for (int k = 0; k < 25; ++k) {
-    covariance[k] = variance * inverse[k];
-    if (!(covariance[k] - covariance[k] == 0.0)) return false;
+  const Mat3 E = essential_from_pose(pose);
+  const double inverse_sq = 1 / (scale_px * scale_px);
+  double psi_sq = 0, slope = 0;
+  for (int k = 0; k < count; ++k) {
+    const double r_sq = sampson_sq(pairs, indices[k], E);
+    const double q = r_sq * inverse_sq, weight = 1 / (1 + q);
+    psi_sq += r_sq * weight * weight;
+    slope += (1 - q) * weight * weight;
   }
+  slope /= count;
+  if (!(slope > 0.05)) return false;  // residuals that no curve of the loss holds together
+  double variance = psi_sq / (count - 5) / (slope * slope);
+  const double least = kLeastResidual * scale_px;
+  if (variance < least * least) variance = least * least;
+  for (int k = 0; k < 25; ++k) {
+    uncertainty->covariance[k] = variance * inverse[k];
+    if (!(uncertainty->covariance[k] - uncertainty->covariance[k] == 0.0)) return false;
+  }
+  uncertainty->noise_px = std::sqrt(variance / kVarianceOfCauchy);
   return true;
 }
 

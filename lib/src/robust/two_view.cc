@@ -5,7 +5,9 @@
 
 #include "base/math.h"
 #include "robust/covariance.h"
+#include "robust/estimators_upright.h"
 #include "robust/loop.h"
+#include "robust/second_model.h"
 
 namespace tv {
 namespace {
@@ -15,8 +17,11 @@ namespace {
 // measurements.
 constexpr int kMinIterations = 50, kFewInliersIterations = 20000;
 
-// A sample gives a model; what is left must be enough to test it against chance.
-constexpr int kFewMatches = 8;
+// A pose that fewer matches agree on is not to be relied on (COLMAP asks for as many).
+constexpr int kFewMatches = 15;
+
+// An "ok" is for poses that are 5 degrees off only by an accident of four standard deviations.
+constexpr double kMostSigma = 1.25 * kPi / 180;
 
 RayPairs searched(const Matches& matches) {
   RayPairs pairs = matches.pairs;
@@ -36,12 +41,25 @@ LoopResult<typename Estimator::Model> run(Estimator estimator, const TwoViewProb
   return robust_loop(estimator, sampler, loop_options(problem.options));
 }
 
+// A model's degrees of freedom. An upright pose has three, but refinement frees all five.
+int least_matches(int method) {
+  if (method == TV_METHOD_EIGHT_POINT) return 8;
+  return method == TV_METHOD_SEVEN_POINT ? 7 : 5;
+}
+
+GravityPrior gravity_of(const TwoViewProblem& problem) {
+  const tv_estimate_options& options = problem.options;
+  return gravity_prior(options.gravity0, options.gravity1, options.gravity_sigma_rad);
+}
+
 }  // namespace
 
 size_t two_view_scratch_bytes(int max_matches) {
   const size_t n = static_cast<size_t>(max_matches);
-  return matches_bytes(max_matches) + verdict_bytes(max_matches) + 2 * arena_bytes<int32_t>(n) +
-         arena_bytes<uint8_t>(n) + arena_bytes<double>(n);
+  const size_t second = arena_bytes<uint8_t>(n) + second_model_bytes(max_matches);
+  const size_t lattice = arena_bytes<double>(2 * n) + lattice_bytes(max_matches);
+  return matches_bytes(max_matches) + 2 * arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) +
+         arena_bytes<double>(n) + std::max(verdict_bytes(max_matches), std::max(second, lattice));
 }
 
 void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
@@ -52,12 +70,14 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
   int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(pairs.num));
   const double threshold = problem.options.max_error_px;
   EpipolarModel& epipolar = model->epipolar;
-  const int sample_size = problem.options.method == TV_METHOD_FIVE_POINT    ? 5
-                          : problem.options.method == TV_METHOD_EIGHT_POINT ? 8
-                                                                            : 7;
+  const int sample_size = least_matches(problem.options.method);
   if (pairs.num < sample_size) return;
-  if (problem.options.method == TV_METHOD_FIVE_POINT) {
-    const LoopResult<Pose> result = run(PoseEstimator{pairs, threshold, indices}, problem);
+  if (sample_size == 5) {
+    const GravityPrior gravity = gravity_of(problem);
+    const LoopResult<Pose> result =
+        problem.options.method == TV_METHOD_UPRIGHT
+            ? run(make_upright_estimator(pairs, threshold, indices, gravity), problem)
+            : run(PoseEstimator{pairs, threshold, indices}, problem);
     model->num_iterations = result.num_iterations;
     epipolar.found = epipolar.has_pose = result.found;
     if (result.found) epipolar.pose = result.model;
@@ -93,6 +113,8 @@ struct Finish {
   double* values;    // scratch
   int32_t* support;  // the unique inliers of the epipolar model
   int num_support;
+  double noise;      // of the epipolar pose's residuals, pixels; 0: unknown
+  GravityPrior gravity;
   TwoViewOutcome* out;
 };
 
@@ -122,16 +144,56 @@ RobustLoss final_loss(const Finish& f, const Mat3& M, int count) {
                     std::max(0.02 * f.threshold, std::min(scale, f.threshold))};
 }
 
-Pose refined_pose(const Finish& f, const Pose& start) {
-  PoseModel model{start};
+// The matches that take part in a pose's final refinement, into f.indices.
+int near_pose(const Finish& f, const Pose& pose) {
+  return near_matches(f.pairs, f.pairs.num, pose, kFinalNear * f.threshold, f.threshold,
+                      f.indices);
+}
+
+// Cauchy's loss at kFinalScale deviations takes E[psi^2] / E[psi'] = 0.585 of what the same matches
+// would say in least squares: the prior is to count as much less.
+constexpr double kPriorScale = 0.7646473 / kFinalScale;  // sqrt(0.58469), per scale_px
+
+Pose refined_pose(const Finish& f, const Pose& start, const GravityPrior& gravity) {
+  GravityPoseModel model{start, &gravity};
   for (int round = 0; round < kFinalRounds; ++round) {
-    const int count = near_matches(f.pairs, f.pairs.num, model.pose, kFinalNear * f.threshold,
-                                   f.threshold, f.indices);
+    const int count = near_pose(f, model.pose);
     if (count < 5) break;
     const RobustLoss loss = final_loss(f, essential_from_pose(model.pose), count);
+    model.noise_px = kPriorScale * loss.scale_px;
     refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
   }
   return model.pose;
+}
+
+// Of the pose that the points alone gave.
+bool uncertainty_without_gravity(const Finish& f, const Pose& pose, PoseUncertainty* uncertainty) {
+  const int count = near_pose(f, pose);
+  const double scale = final_loss(f, essential_from_pose(pose), count).scale_px;
+  return pose_uncertainty(f.pairs, f.indices, count, pose, scale, uncertainty);
+}
+
+// The prior with the weight that the points leave it, where they alone would put the pose.
+GravityPrior tested_gravity(const Finish& f, const Pose& start) {
+  GravityPrior gravity = f.gravity;
+  if (!gravity.known) return gravity;
+  const Pose alone = refined_pose(f, start, GravityPrior{});
+  PoseUncertainty uncertainty;
+  if (uncertainty_without_gravity(f, alone, &uncertainty)) {
+    gravity.weight = gravity_weight(gravity, alone.R, uncertainty.covariance);
+  }
+  return gravity;
+}
+
+Pose refined_pose(const Finish& f, const Pose& start) {
+  return refined_pose(f, start, tested_gravity(f, start));
+}
+
+bool uncertainty_of(const Finish& f, const Pose& pose, PoseUncertainty* uncertainty) {
+  const GravityPrior gravity = tested_gravity(f, pose);
+  if (!uncertainty_without_gravity(f, pose, uncertainty)) return false;
+  if (gravity.known) add_gravity_information(gravity, pose.R, uncertainty->covariance);
+  return true;
 }
 
 Mat3 refined_fundamental(const Finish& f, const Mat3& start) {
@@ -220,6 +282,27 @@ void choose_planar_pose(Finish& f, const Rivals& rivals) {
   }
 }
 
+// Whether the support moves along the epipolar lines by more than noise. Under a rotation alone what
+// it leaves over has two dimensions and the epipolar residual one, and the sum S of the differences
+// over the variance follows chi-square with a degree of freedom for each match. Torr's criterion
+// (P. Torr, "An assessment of information criteria for motion model selection", CVPR 1997) pays
+// log 4 for the depth of each and log(4 n) for each of the two parameters of the direction.
+// leaves_parallax tells about the matches that the rotation does not explain, this about those that
+// it does.
+bool moves_along_lines(const Finish& f, const Mat3& R) {
+  if (!f.out->epipolar.has_pose || !(f.noise > 0)) return false;
+  const double limit = kTransferThresholdScale * f.threshold;
+  double S = 0;
+  int n = 0;
+  for (int k = 0; k < f.num_support; ++k) {
+    const double r_sq = transfer_residual(f.pairs, f.support[k], R).r_sq;
+    if (r_sq > limit * limit) continue;
+    S += r_sq - sampson_sq(f.pairs, f.support[k], f.out->epipolar.M);
+    ++n;
+  }
+  return n > 0 && S > f.noise * f.noise * (n * 1.3862943611198906 + 2 * log(4.0 * n));
+}
+
 // Whether the pair is to be called by one of the rivals, or degenerate.
 tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
   const EpipolarModel& epipolar = f.out->epipolar;
@@ -249,7 +332,8 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
   const int most = epipolar.found ? f.num_support * 7 / 10 : n / 2;
   const bool rotation_enough =
       rotation_meaningful && rivals.rotation_inliers > most &&
-      !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold);
+      !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold) &&
+      !moves_along_lines(f, rivals.R);
   const bool homography_enough =
       homography_meaningful && rivals.homography_inliers > most &&
       !leaves_parallax(f.matches, rivals.H, f.out->inlier, f.threshold);
@@ -272,7 +356,15 @@ double parallax(const Finish& f, int i) {
   return atan2(a.cross(b).norm(), a.dot(b));
 }
 
-// The evidence of a full pose: parallax, error, covariance.
+// The largest standard deviation of the rotation and of the direction, bounded from above by the
+// traces of their blocks.
+double largest_sigma(const double covariance[25]) {
+  const double rotation = covariance[0] + covariance[6] + covariance[12];
+  const double direction = covariance[18] + covariance[24];
+  return std::sqrt(std::max(rotation, direction));
+}
+
+// The evidence of a full pose: parallax, covariance.
 void measure_pose(Finish& f) {
   TwoViewOutcome& out = *f.out;
   double sum = 0;
@@ -284,9 +376,66 @@ void measure_pose(Finish& f) {
   double* middle = f.values + (f.num_support - 1) / 2;
   std::nth_element(f.values, middle, f.values + f.num_support);
   out.median_parallax_rad = *middle;
-  if (*middle < 3 * f.threshold * sum / f.num_support) out.reasons |= TV_REASON_LOW_PARALLAX;
-  out.has_covariance = pose_covariance(f.pairs, f.support, f.num_support, out.epipolar.pose,
-                                       out.covariance);
+  PoseUncertainty uncertainty;
+  out.has_covariance = uncertainty_of(f, out.epipolar.pose, &uncertainty);
+  if (out.has_covariance) {
+    std::copy(uncertainty.covariance, uncertainty.covariance + 25, out.covariance);
+    out.noise_px = uncertainty.noise_px;
+  }
+  if (out.median_parallax_rad < 3 * f.threshold * sum / f.num_support || !out.has_covariance ||
+      largest_sigma(out.covariance) > kMostSigma) {
+    out.reasons |= TV_REASON_LOW_PARALLAX;
+  }
+  if (!out.has_alternative) return;
+  out.has_alternative_covariance = uncertainty_of(f, out.alternative, &uncertainty);
+  if (out.has_alternative_covariance) {
+    std::copy(uncertainty.covariance, uncertainty.covariance + 25, out.alternative_covariance);
+  }
+}
+
+// A model of the rest that is no part of the first: matches farther from it than kClear thresholds.
+constexpr double kClear = 3;
+
+// A second consistent model, and whether the points repeat themselves as on a lattice: then it is
+// the same scene, matched one period off; where most of the support does, so may the pose be.
+constexpr double kSomeLattice = 0.15, kMostlyLattice = 0.5;
+
+void look_for_rivals_of_its_kind(Finish& f, Arena& arena) {
+  TwoViewOutcome& out = *f.out;
+  const int n = f.pairs.num;
+  bool second = false;
+  {
+    ArenaScope scope(arena);
+    uint8_t* explained = arena_alloc<uint8_t>(arena, static_cast<size_t>(n));
+    const bool by_pose = out.has_t;
+    const double limit = kClear * f.threshold;
+    int num_first = 0;
+    for (int i = 0; i < n; ++i) {
+      const double r_sq = by_pose ? sampson_sq(f.pairs, i, out.epipolar.M)
+                                  : transfer_residual(f.pairs, i, out.H).r_sq;
+      explained[i] = r_sq <= limit * limit;
+      num_first += out.inlier[i] != 0;
+    }
+    second = find_second_model(f.matches, explained, num_first, f.threshold,
+                               f.problem.options.seed, arena)
+                 .found;
+  }
+  ArenaScope scope(arena);
+  double* xy = arena_alloc<double>(arena, 2 * static_cast<size_t>(n));
+  for (int i = 0; i < n; ++i) {
+    for (int d = 0; d < 2; ++d) xy[2 * i + d] = f.problem.pixels[0][2 * f.matches.order[i] + d];
+  }
+  int count = 0;
+  for (int i = 0; i < n; ++i) {
+    if (out.inlier[i] != 0) f.indices[count++] = i;
+  }
+  const double lattice = second ? lattice_share(xy, n, nullptr, 0, arena)
+                                : lattice_share(xy, n, f.indices, count, arena);
+  if (lattice >= (second ? kSomeLattice : kMostlyLattice)) {
+    out.reasons |= TV_REASON_REPEATED_STRUCTURE;
+  } else if (second) {
+    out.reasons |= TV_REASON_SECOND_MOTION;
+  }
 }
 
 void measure_inliers(Finish& f) {
@@ -307,10 +456,14 @@ void measure_inliers(Finish& f) {
 
 void judge(Finish& f) {
   TwoViewOutcome& out = *f.out;
-  const int num_unique = f.pairs.num;
-  if (num_unique < kFewMatches) out.reasons |= TV_REASON_TOO_FEW_MATCHES;
-  if (out.config == TV_CONFIG_DEGENERATE) {
-    if (num_unique >= kFewMatches) out.reasons |= TV_REASON_LOW_INLIER_RATIO;
+  const bool degenerate = out.config == TV_CONFIG_DEGENERATE;
+  int unique_inliers = 0;
+  for (int i = 0; i < f.pairs.num; ++i) unique_inliers += out.inlier[i];
+  if ((degenerate ? f.pairs.num : unique_inliers) < kFewMatches) {
+    out.reasons |= TV_REASON_TOO_FEW_MATCHES;
+  }
+  if (degenerate) {
+    if (f.pairs.num >= kFewMatches) out.reasons |= TV_REASON_LOW_INLIER_RATIO;
     out.verdict = TV_VERDICT_REFUSED;
     return;
   }
@@ -341,11 +494,17 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
            arena_alloc<double>(arena, n),
            arena_alloc<int32_t>(arena, n),
            0,
+           0,
+           gravity_of(problem),
            outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {
     refine_epipolar(f);
+    PoseUncertainty uncertainty;
+    if (out.epipolar.has_pose && uncertainty_of(f, out.epipolar.pose, &uncertainty)) {
+      f.noise = uncertainty.noise_px;
+    }
     (problem.calibrated ? out.essential_inliers : out.fundamental_inliers) = f.num_support;
   }
   if (f.num_support < 5) {  // no epipolar model: a rival may still explain the matches
@@ -358,9 +517,7 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
   out.rotation_inliers = rivals.rotation_inliers;
   out.homography_inliers = rivals.homography_inliers;
   if (!out.epipolar.found) f.num_support = 0;
-  const int sample_size = problem.options.method == TV_METHOD_FIVE_POINT    ? 5
-                          : problem.options.method == TV_METHOD_EIGHT_POINT ? 8
-                                                                            : 7;
+  const int sample_size = least_matches(problem.options.method);
   out.config = choose_config(f, rivals, sample_size);
   out.H = rivals.H;
   out.has_H = out.config == TV_CONFIG_PLANAR || out.config == TV_CONFIG_PLANAR_OR_PANORAMIC;
@@ -396,6 +553,9 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
   }
   if (out.has_t) measure_pose(f);
   measure_inliers(f);
+  if (problem.calibrated && out.config != TV_CONFIG_DEGENERATE) {
+    look_for_rivals_of_its_kind(f, arena);
+  }
   judge(f);
 }
 

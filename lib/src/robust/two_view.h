@@ -19,13 +19,13 @@ struct TwoViewOutcome {
   uint32_t reasons = 0;
   EpipolarModel epipolar;
   bool has_R = false, has_t = false, has_H = false, has_alternative = false,
-       has_covariance = false;
+       has_covariance = false, has_alternative_covariance = false;
   Mat3 H = Mat3::Zero();
   Pose alternative;
-  double covariance[25] = {};
+  double covariance[25] = {}, alternative_covariance[25] = {};
   int num_inliers = 0, essential_inliers = -1, fundamental_inliers = -1, homography_inliers = -1,
       rotation_inliers = -1;
-  double median_parallax_rad = 0, rms_error_px = 0;
+  double median_parallax_rad = 0, rms_error_px = 0, noise_px = 0;
   uint8_t* inlier = nullptr;  // of matches.pairs
 };
 

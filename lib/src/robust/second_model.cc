@@ -1,0 +1,222 @@
+#include "robust/second_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "robust/loop.h"
+#include "robust/verdict.h"
+
+namespace tv {
+namespace {
+
+// Of matches left over, a model of a third of them is missed once in a hundred by this many samples.
+constexpr int kMostSamples = 400;
+constexpr double kConfidence = 0.99;
+constexpr int kFewestInliers = 12;
+constexpr int kMaxLeft = 512;  // of more that are left over, every n-th is searched
+
+// The listed matches alone, as arrays of their own.
+Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena& arena) {
+  Matches part = matches;
+  part.pairs = alloc_ray_pairs(arena, count, matches.pairs.on_plane);
+  part.pairs.num = part.num_unique = count;
+  for (int v = 0; v < 2; ++v) {
+    for (int k = 0; k < count; ++k) {
+      set_ray(part.pairs, v, k, ray_of(matches.pairs, v, listed[k]),
+              jacobian_of(matches.pairs, v, listed[k]));
+    }
+  }
+  finish_rays(part.pairs);
+  return part;
+}
+
+}  // namespace
+
+size_t second_model_bytes(int max_matches) {
+  const int most = max_matches < kMaxLeft ? max_matches : kMaxLeft;
+  return 2 * arena_bytes<int32_t>(static_cast<size_t>(most)) + ray_pairs_bytes(most);
+}
+
+SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,
+                              double threshold_px, uint64_t seed, Arena& arena) {
+  SecondModel second;
+  int left = 0;
+  for (int i = 0; i < matches.num_unique; ++i) left += explained[i] == 0;
+  if (left < kFewestInliers || left < kSecondShare * num_first) return second;
+  ArenaScope scope(arena);
+  const int count = left < kMaxLeft ? left : kMaxLeft;
+  int32_t* listed = arena_alloc<int32_t>(arena, static_cast<size_t>(count));
+  int taken = 0;
+  for (int i = 0, seen = 0; i < matches.num_unique; ++i) {
+    if (explained[i] != 0) continue;
+    if (static_cast<int64_t>(seen) * count / left == taken) listed[taken++] = i;
+    ++seen;
+    if (taken == count) break;
+  }
+  const Matches part = gathered(matches, listed, taken, arena);
+  int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(taken));
+  PoseEstimator estimator{part.pairs, threshold_px, indices};
+  Sampler sampler = make_sampler(seed, taken, PoseEstimator::kSampleSize, false);
+  const LoopOptions options{kConfidence, 5, kMostSamples, 0, 0};
+  const LoopResult<Pose> result = robust_loop(estimator, sampler, options);
+  if (!result.found || result.num_inliers < kFewestInliers) return second;
+  const double of_all = static_cast<double>(result.num_inliers) * left / taken;
+  if (of_all < kSecondShare * num_first) return second;
+  const double chance =
+      chance_of_agreement(part, essential_from_pose(result.model), threshold_px, seed);
+  if (!(log_false_alarms(taken, result.num_inliers, 5, 10, chance) < kLogMeaningful)) {
+    return second;
+  }
+  second.found = true;
+  second.pose = result.model;
+  second.num_inliers = static_cast<int>(of_all);
+  return second;
+}
+
+// ---- Lattice ----
+
+namespace {
+
+// Points are kept in the cells of a grid; a search looks at no more than kMostSeen of them, so that
+// points in one heap cost no more than points that are spread.
+constexpr int kGrid = 64, kNeighbours = 6, kMostSeen = 64;
+constexpr int kMostAsked = 512;
+constexpr double kOpposite = 0.12;   // how far from the opposite place, of the neighbour's distance
+constexpr double kNearestPx = 8;     // nearer neighbours are not told from noise
+constexpr double kParallelSine = 0.5;
+// What chance alone does is counted at a place where no usual lattice has a point: the neighbour
+// turned by 146 degrees instead of 180.
+constexpr double kControlCosine = -0.829, kControlSine = 0.559;
+
+struct Grid {
+  const double* xy;
+  double low[2], inverse[2];
+  int32_t* first;  // kGrid^2, -1: empty
+  int32_t* next;   // num
+
+  int cell(double value, int axis) const {
+    const double place = (value - low[axis]) * inverse[axis];
+    return place > 0 ? (place < kGrid - 1 ? static_cast<int>(place) : kGrid - 1) : 0;
+  }
+};
+
+Grid make_grid(const double* xy, int num, Arena& arena) {
+  Grid grid{xy, {0, 0}, {0, 0}, arena_alloc<int32_t>(arena, kGrid * kGrid),
+            arena_alloc<int32_t>(arena, static_cast<size_t>(num))};
+  for (int axis = 0; axis < 2; ++axis) {
+    double low = xy[axis], high = low;
+    for (int i = 1; i < num; ++i) {
+      low = std::min(low, xy[2 * i + axis]);
+      high = std::max(high, xy[2 * i + axis]);
+    }
+    grid.low[axis] = low;
+    grid.inverse[axis] = high > low ? kGrid / (high - low) : 0;
+  }
+  for (int c = 0; c < kGrid * kGrid; ++c) grid.first[c] = -1;
+  for (int i = num - 1; i >= 0; --i) {
+    int32_t& head = grid.first[kGrid * grid.cell(xy[2 * i + 1], 1) + grid.cell(xy[2 * i], 0)];
+    grid.next[i] = head;
+    head = i;
+  }
+  return grid;
+}
+
+struct Neighbour {
+  double dist_sq;
+  double dx, dy;
+};
+
+// The nearest points that are not nearer than kNearestPx, nearest first. Returns how many.
+int nearest_points(const Grid& grid, int i, Neighbour* nearest) {
+  const double x = grid.xy[2 * i], y = grid.xy[2 * i + 1];
+  const int column = grid.cell(x, 0), row = grid.cell(y, 1);
+  int found = 0, seen = 0;
+  for (int ring = 0; ring < kGrid && seen < kMostSeen; ++ring) {
+    if (ring > 1 && found == kNeighbours && seen >= 2 * kNeighbours) break;
+    for (int r = std::max(0, row - ring); r <= std::min(kGrid - 1, row + ring); ++r) {
+      const bool edge = r == row - ring || r == row + ring;
+      for (int c = column - ring; c <= column + ring; c += edge || ring == 0 ? 1 : 2 * ring) {
+        if (c < 0 || c >= kGrid) continue;
+        for (int32_t j = grid.first[kGrid * r + c]; j >= 0 && seen < kMostSeen; j = grid.next[j]) {
+          const double dx = grid.xy[2 * j] - x, dy = grid.xy[2 * j + 1] - y;
+          const double dist_sq = dx * dx + dy * dy;
+          if (dist_sq < kNearestPx * kNearestPx) continue;
+          ++seen;
+          if (found == kNeighbours && dist_sq >= nearest[found - 1].dist_sq) continue;
+          int place = found < kNeighbours ? found++ : found - 1;
+          for (; place > 0 && nearest[place - 1].dist_sq > dist_sq; --place) {
+            nearest[place] = nearest[place - 1];
+          }
+          nearest[place] = Neighbour{dist_sq, dx, dy};
+        }
+      }
+    }
+  }
+  return found;
+}
+
+bool point_near(const Grid& grid, double x, double y, double radius) {
+  const int c0 = grid.cell(x - radius, 0), c1 = grid.cell(x + radius, 0);
+  const int r0 = grid.cell(y - radius, 1), r1 = grid.cell(y + radius, 1);
+  int seen = 0;
+  for (int r = r0; r <= r1; ++r) {
+    for (int c = c0; c <= c1; ++c) {
+      for (int32_t j = grid.first[kGrid * r + c]; j >= 0; j = grid.next[j]) {
+        const double dx = grid.xy[2 * j] - x, dy = grid.xy[2 * j + 1] - y;
+        if (dx * dx + dy * dy <= radius * radius) return true;
+        if (++seen == kMostSeen) return false;
+      }
+    }
+  }
+  return false;
+}
+
+// Whether two of the neighbours, in different directions, have a point where they are turned to.
+bool has_partners(const Grid& grid, int i, const Neighbour* nearest, int count, double cosine,
+                  double sine) {
+  Neighbour opposed[kNeighbours];
+  int num_opposed = 0;
+  for (int k = 0; k < count; ++k) {
+    const Neighbour& n = nearest[k];
+    if (point_near(grid, grid.xy[2 * i] + (cosine * n.dx - sine * n.dy),
+                   grid.xy[2 * i + 1] + (sine * n.dx + cosine * n.dy),
+                   kOpposite * std::sqrt(n.dist_sq))) {
+      opposed[num_opposed++] = n;
+    }
+  }
+  for (int a = 0; a < num_opposed; ++a) {
+    for (int b = a + 1; b < num_opposed; ++b) {
+      const double cross = opposed[a].dx * opposed[b].dy - opposed[a].dy * opposed[b].dx;
+      const double limit = kParallelSine * kParallelSine * opposed[a].dist_sq * opposed[b].dist_sq;
+      if (cross * cross > limit) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+size_t lattice_bytes(int max_points) {
+  return arena_bytes<int32_t>(kGrid * kGrid) + arena_bytes<int32_t>(static_cast<size_t>(max_points));
+}
+
+double lattice_share(const double* xy, int num, const int32_t* listed, int num_listed,
+                     Arena& arena) {
+  const int asked = listed != nullptr ? num_listed : num;
+  if (asked == 0 || num < 3) return 0;
+  ArenaScope scope(arena);
+  const Grid grid = make_grid(xy, num, arena);
+  const int taken = asked < kMostAsked ? asked : kMostAsked;
+  int count = 0;
+  for (int k = 0; k < taken; ++k) {
+    const int place = static_cast<int>(static_cast<int64_t>(k) * asked / taken);
+    const int i = listed != nullptr ? listed[place] : place;
+    Neighbour nearest[kNeighbours];
+    const int found = nearest_points(grid, i, nearest);
+    count += has_partners(grid, i, nearest, found, -1, 0);
+    count -= has_partners(grid, i, nearest, found, kControlCosine, kControlSine);
+  }
+  return count > 0 ? static_cast<double>(count) / taken : 0;
+}
+
+}  // namespace tv

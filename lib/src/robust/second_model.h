@@ -1,0 +1,32 @@
+// Whether what the pair's model leaves over follows a model of its own: a second motion, or the same
+// scene matched one period off.
+#pragma once
+
+#include "robust/estimators.h"
+
+namespace tv {
+
+struct SecondModel {
+  bool found = false;
+  Pose pose;
+  int num_inliers = 0;
+};
+
+size_t second_model_bytes(int max_matches);
+
+// Searches the unique matches farther than kClearOfFirst thresholds from the first model
+// (explained[i]: match i is not) for a pose of their own. Found: the model is meaningful among them
+// (verdict.h), and counts at least kSecondShare of num_first.
+inline constexpr double kSecondShare = 0.15;
+SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,
+                              double threshold_px, uint64_t seed, Arena& arena);
+
+// How many of the points lie as on a lattice: a point counts when, of its nearest neighbours, two in
+// different directions have another point at the opposite place. As many as do so by chance, which
+// is counted at another place, are taken off. xy: num x 2; listed: null or the indices of those
+// that are asked. Returns the share of the asked points that count, [0, 1].
+double lattice_share(const double* xy, int num, const int32_t* listed, int num_listed,
+                     Arena& arena);
+size_t lattice_bytes(int max_points);
+
+}  // namespace tv
