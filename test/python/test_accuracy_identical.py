@@ -118,7 +118,7 @@ class TestRows(unittest.TestCase):
 
     def test_an_absent_peer_is_named(self):
         with mock.patch.object(system_python, "versions", return_value={}):
-            _, absent = identical.available(["opengv", "magsac"])
+            _, absent = identical.available(["opengv_refined", "magsac"])
         self.assertTrue(any("python3-opengv" in line for line in absent))
         self.assertTrue(any("python3-opencv" in line for line in absent))
 
