@@ -1,8 +1,10 @@
 #include "twoview/two_view.h"
 
 #include <cstring>
+#include <utility>
 
 #include "api/validate.h"
+#include "base/math.h"
 #include "robust/covariance.h"
 #include "robust/two_view.h"
 
@@ -15,6 +17,19 @@ constexpr tv_estimate_options kDefaults = {
     sizeof(tv_estimate_options), TV_METHOD_FIVE_POINT, 1.0, 0.9999, 10000, 0, kDefaultSeed,
     {0, 0, 0}, {0, 0, 0}, 0};
 
+// Directions that are read: finite, not zero, and a deviation of at most half a turn.
+tv_status check_gravity(const tv_estimate_options& options) {
+  if (options.gravity_sigma_rad == 0) return TV_OK;
+  const double* gravity[2] = {options.gravity0, options.gravity1};
+  bool zero = false;
+  for (const double* g : gravity) {
+    if (!is_finite(g[0]) || !is_finite(g[1]) || !is_finite(g[2])) return TV_ERR_NOT_FINITE;
+    zero = zero || (g[0] == 0 && g[1] == 0 && g[2] == 0);
+  }
+  const bool in_range = options.gravity_sigma_rad > 0 && options.gravity_sigma_rad <= kPi;
+  return in_range && !zero ? TV_OK : TV_ERR_ARGUMENT;
+}
+
 tv_status read_estimate_options(const tv_estimate_options* options, bool calibrated,
                                 tv_estimate_options* checked) {
   *checked = kDefaults;
@@ -24,17 +39,21 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
   } else if (!calibrated) {
     checked->method = TV_METHOD_EIGHT_POINT;
   }
-  if (!is_finite(checked->max_error_px) || !is_finite(checked->confidence)) {
+  if (!is_finite(checked->max_error_px) || !is_finite(checked->confidence) ||
+      !is_finite(checked->gravity_sigma_rad)) {
     return TV_ERR_NOT_FINITE;
   }
   const bool in_range = checked->max_error_px > 0 && checked->max_error_px <= 1e9 &&
                         checked->confidence >= 0 && checked->confidence < 1 &&
                         checked->max_iterations >= 1 && checked->max_iterations <= 1000000 &&
                         checked->fixed_iterations >= 0 && checked->fixed_iterations <= 1000000;
-  const bool method_known = checked->method == TV_METHOD_EIGHT_POINT ||
-                            checked->method == TV_METHOD_SEVEN_POINT ||
-                            (checked->method == TV_METHOD_FIVE_POINT && calibrated);
-  return in_range && method_known ? TV_OK : TV_ERR_ARGUMENT;
+  const bool with_gravity = checked->gravity_sigma_rad > 0;
+  const bool method_known =
+      checked->method == TV_METHOD_EIGHT_POINT || checked->method == TV_METHOD_SEVEN_POINT ||
+      (checked->method == TV_METHOD_FIVE_POINT && calibrated) ||
+      (checked->method == TV_METHOD_UPRIGHT && calibrated && with_gravity);
+  if (!in_range || !method_known) return TV_ERR_ARGUMENT;
+  return check_gravity(*checked);
 }
 
 uint64_t hash_of(const double* a, const double* b) {
@@ -257,6 +276,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     }
     problem.pixels[0] = swapped ? pixels1 : pixels0;
     problem.pixels[1] = swapped ? pixels0 : pixels1;
+    if (swapped) std::swap(problem.options.gravity0, problem.options.gravity1);
     problem.ratios = ratios;
     problem.num = num_matches;
     problem.kernels = context->kernels;
