@@ -384,6 +384,37 @@ static void case_sampson_score(trial *t) {
   REPEAT(t, *score = t->set->sampson_score(read, num_blocks, on_plane, m, inverse_sq, bound));
 }
 
+/* Rays of random points seen from two places, some samples degenerate: equal matches, zeros. */
+static void case_relpose_5pt(trial *t) {
+  const int32_t num_samples = pick(t, 1, TVK_WIDTH, TVK_WIDTH);
+  const double span = random_int(&t->seed, 0, 1) ? 1 : 1e-3;
+  double *rays = INPUT(t, double, 30 * TVK_WIDTH);
+  double *essentials = OUTPUT(t, double, 9 * TVK_RELPOSE_MODELS * TVK_WIDTH);
+  int32_t *counts = OUTPUT(t, int32_t, TVK_WIDTH), s, k, c;
+  for (s = 0; s < TVK_WIDTH; ++s) {
+    const int32_t kind = random_int(&t->seed, 0, 9);
+    double move[3];
+    for (c = 0; c < 3; ++c) move[c] = 2 * random_unit(&t->seed) - 1;
+    for (k = 0; k < 5; ++k) {
+      const double depth = 2 + 6 * random_unit(&t->seed);
+      for (c = 0; c < 3; ++c) {
+        const double x = c == 2 ? depth : depth * span * (2 * random_unit(&t->seed) - 1);
+        rays[TVK_WIDTH * (6 * k + c) + s] = kind == 0 ? 0 : kind == 1 ? 1 : x;
+        rays[TVK_WIDTH * (6 * k + 3 + c) + s] =
+            kind == 0 ? 0 : kind == 1 ? 1 : kind == 2 ? x : x + move[c];
+      }
+    }
+  }
+  REPEAT(t, t->set->relpose_5pt(rays, num_samples, essentials, counts));
+  for (s = 0; s < TVK_WIDTH; ++s) { /* the rest is scratch */
+    const int32_t count = s < num_samples ? counts[s] : 0;
+    TEST_ASSERT_TRUE(count >= 0 && count <= TVK_RELPOSE_MODELS);
+    if (s >= num_samples) counts[s] = 0;
+    memset(essentials + 9 * (TVK_RELPOSE_MODELS * s + count), PATTERN,
+           (size_t)(TVK_RELPOSE_MODELS - count) * 9 * sizeof essentials[0]);
+  }
+}
+
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {
   trial t;
   memset(&t, 0, sizeof t);

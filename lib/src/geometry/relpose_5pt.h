@@ -1,14 +1,37 @@
-// Essential matrices from five matched rays.
+// Essential matrices from five matched rays, many samples at a time: kernels/relpose_5pt.h.
 #pragma once
 
 #include "geometry/camera.h"
+#include "kernels/kernels.h"
 
 namespace tv {
 
-inline constexpr int kMaxRelpose5pt = 10;
+inline constexpr int kMaxRelpose5pt = TVK_RELPOSE_MODELS;
+inline constexpr int kSamples5 = TVK_WIDTH;  // solved at once
 
-// rays0, rays1: five each, of any positive length. essentials: room for kMaxRelpose5pt, Frobenius
-// norm 1, either sign. Returns how many there are; 0 for a degenerate sample.
+// Five pairs of rays, of any positive length, of each sample.
+struct Samples5 {
+  double rays[30][kSamples5];
+};
+void set_sample(Samples5* samples, int s, const Vec3 rays0[5], const Vec3 rays1[5]);
+
+// Of each sample: Frobenius norm 1, either sign; none for a degenerate sample.
+struct Essentials {
+  double entries[kSamples5][kMaxRelpose5pt][9];
+  int32_t count[kSamples5];
+  Mat3 matrix(int s, int k) const {
+    const double* e = entries[s][k];
+    Mat3 E;
+    E << e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8];
+    return E;
+  }
+};
+
+// All kSamples5 samples are set, with finite rays; the first num_samples are solved.
+void relpose_5pt(const tvk_table& kernels, const Samples5& samples, int num_samples,
+                 Essentials* models);
+
+// One sample. essentials: room for kMaxRelpose5pt. Returns how many there are.
 int relpose_5pt(const Vec3 rays0[5], const Vec3 rays1[5], Mat3 essentials[kMaxRelpose5pt]);
 
 }  // namespace tv

@@ -24,6 +24,7 @@ extern "C" {
 #define TVK_SCORE_BLOCK 32           /* matches */
 #define TVK_SCORE_ONE 65536          /* what a match outside the threshold costs */
 #define TVK_SAMPSON_LARGEST 16384.0  /* r^2 / scale^2 beyond which Cauchy's loss is level */
+#define TVK_RELPOSE_MODELS 10         /* most essential matrices of a sample of five */
 #define TVK_SAMPSON_SUMS 56          /* numbers that sampson_sums adds up */
 
 /* fast_score_row: rows[0..6] are the image rows y-3..y+3. Writes for each x in [0, width) the largest
@@ -59,7 +60,11 @@ extern "C" {
      truncated loss (r^2 / scale^2 or 1); the last is a product, of Cauchy's 1 + r^2 / scale^2.
    sampson_score: arrays in single precision, on the plane x0 y0 x1 y1 and the upper triangles of J J'
      (3 and 3), else all 18: the sum over num_blocks blocks of min(r^2 / T^2, 1) TVK_SCORE_ONE, each
-     truncated to an integer; ends after the block that makes it exceed `bound`. */
+     truncated to an integer; ends after the block that makes it exceed `bound`.
+   relpose_5pt: rays[TVK_WIDTH (6 k + 3 view + c) + s] is entry c of sample s's k-th ray in a view, for
+     TVK_WIDTH samples, of which the first num_samples are to be solved; the others are finite. Writes the
+     essential matrices, row-major, Frobenius norm 1, of sample s to essentials + 9 TVK_RELPOSE_MODELS s
+     and their number to counts[s], 0 for a degenerate sample. What lies behind them is scratch. */
 #define TVK_LIST(X)                                                                                \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
@@ -96,7 +101,9 @@ extern "C" {
      int32_t on_plane, const double *m, double inverse_sq, int32_t cauchy, double *sums))          \
   X(sampson_score, int64_t,                                                                        \
     (const float *const *arrays, int32_t num_blocks, int32_t on_plane, const float *m,             \
-     float inverse_sq, int64_t bound))
+     float inverse_sq, int64_t bound))                                                             \
+  X(relpose_5pt, void,                                                                             \
+    (const double *rays, int32_t num_samples, double *essentials, int32_t *counts))
 
 typedef struct tvk_table {
   int32_t set; /* a tv_kernels */

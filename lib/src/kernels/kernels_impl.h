@@ -11,6 +11,7 @@
 #include "kernels/resample.h"
 #include "kernels/describe.h"
 #include "kernels/nearest.h"
+#include "kernels/relpose_5pt.h"
 #include "kernels/sampson.h"
 /* clang-format on */
 

@@ -112,21 +112,28 @@ bool pose_from_essential(const RayPairs& pairs, const int32_t* indices, int coun
   return true;
 }
 
-int PoseEstimator::generate_models(const int32_t* sample, Pose* models) const {
-  Vec3 rays0[5], rays1[5];
-  gather<5>(pairs, sample, rays0, rays1);
-  Mat3 essentials[kMaxRelpose5pt];
-  const int count = relpose_5pt(rays0, rays1, essentials);
-  int num_models = 0;
-  for (int k = 0; k < count; ++k) {
-    num_models += pose_from_essential(pairs, sample, 5, essentials[k], threshold_px, true,
-                                      &models[num_models]);
+void PoseEstimator::generate(const int32_t samples[][5], int num_samples,
+                             Essentials* models) const {
+  Samples5 rays;
+  for (int s = 0; s < kSamples5; ++s) {
+    Vec3 rays0[5], rays1[5];
+    gather<5>(pairs, samples[s < num_samples ? s : 0], rays0, rays1);
+    set_sample(&rays, s, rays0, rays1);
   }
-  return num_models;
+  relpose_5pt(*pairs.kernels, rays, num_samples, models);
+}
+
+int64_t PoseEstimator::fast_cost(const Essentials& models, int s, int k, int64_t bound) const {
+  return msac_cost_fast(pairs, models.matrix(s, k), threshold_px, bound);
 }
 
 int64_t PoseEstimator::fast_cost(const Pose& model, int64_t bound) const {
   return msac_cost_fast(pairs, essential_from_pose(model), threshold_px, bound);
+}
+
+bool PoseEstimator::complete(const Essentials& models, int s, int k, const int32_t* sample,
+                             Pose* pose) const {
+  return pose_from_essential(pairs, sample, 5, models.matrix(s, k), threshold_px, true, pose);
 }
 
 int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {

@@ -10,13 +10,17 @@ namespace tv {
 // A pose from five rays.
 struct PoseEstimator {
   using Model = Pose;
+  using Candidates = Essentials;
   static constexpr int kSampleSize = 5;
   static constexpr int kMaxModels = kMaxRelpose5pt;
+  static constexpr int kBatch = kSamples5;
   const RayPairs& pairs;  // the matches that take part
   double threshold_px;
   int32_t* indices;  // scratch, as many as matches
-  int generate_models(const int32_t* sample, Model* models) const;
-  int64_t fast_cost(const Model& model, int64_t bound) const;
+  void generate(const int32_t samples[][5], int num_samples, Essentials* models) const;
+  int64_t fast_cost(const Essentials& models, int s, int k, int64_t bound) const;
+  int64_t fast_cost(const Pose& model, int64_t bound) const;
+  bool complete(const Essentials& models, int s, int k, const int32_t* sample, Pose* pose) const;
   int64_t full_cost(const Model& model, int* num_inliers) const;
   void refine_model(Model* model) const;
 };
@@ -27,6 +31,7 @@ struct FundamentalEstimator {
   using Model = Mat3;
   static constexpr int kSampleSize = kPoints;
   static constexpr int kMaxModels = kPoints == 7 ? 3 : 1;
+  static constexpr int kBatch = 1;
   const RayPairs& pairs;
   double threshold_px;
   int32_t* indices;
@@ -49,6 +54,7 @@ struct HomographyEstimator : TransferEstimator {
   using Model = Mat3;
   static constexpr int kSampleSize = 4;
   static constexpr int kMaxModels = 1;
+  static constexpr int kBatch = 1;
   int generate_models(const int32_t* sample, Model* models) const;
   int64_t fast_cost(const Model& model, int64_t bound) const { return cost(model, bound, nullptr); }
   int64_t full_cost(const Model& model, int* num_inliers) const {
@@ -61,6 +67,7 @@ struct RotationEstimator : TransferEstimator {
   using Model = Mat3;
   static constexpr int kSampleSize = 2;
   static constexpr int kMaxModels = 1;
+  static constexpr int kBatch = 1;
   int generate_models(const int32_t* sample, Model* models) const;
   int64_t fast_cost(const Model& model, int64_t bound) const { return cost(model, bound, nullptr); }
   int64_t full_cost(const Model& model, int* num_inliers) const {

@@ -13,6 +13,7 @@ namespace tv {
 struct UprightEstimator : PoseEstimator {
   static constexpr int kSampleSize = 3;
   static constexpr int kMaxModels = kMaxRelposeUpright3pt;
+  static constexpr int kBatch = 1;
   const GravityPrior& gravity;
   Mat3 level0, level1;  // level_from_camera of gravity.down
   double width_first;   // of local optimisation, thresholds

@@ -1,11 +1,18 @@
 // The robust loop: sample, solve, score, optimise locally, stop when a better model is unlikely.
 //
 // An estimator is a struct with
-//   Model, kSampleSize, kMaxModels
+//   Model, kSampleSize, kMaxModels, kBatch
+//   int64_t full_cost(const Model&, int* num_inliers)  with all the checks a model must pass
+//   void refine_model(Model*)                         local optimisation on the model's inliers
+// and, where kBatch is 1,
 //   int generate_models(const int32_t* sample, Model* models)
 //   int64_t fast_cost(const Model&, int64_t bound)   MSAC cost; above bound, anything above it
-//   int64_t full_cost(const Model&, int* num_inliers)  with all the checks a pose must pass
-//   void refine_model(Model*)                         local optimisation on the model's inliers
+// or, where kBatch samples are solved at once, and what they give becomes a model only when its cost
+// asks for it,
+//   Candidates, with Candidates::count[s] of each sample
+//   void generate(const int32_t samples[][kSampleSize], int num_samples, Candidates*)
+//   int64_t fast_cost(const Candidates&, int s, int k, int64_t bound)
+//   bool complete(const Candidates&, int s, int k, const int32_t* sample, Model*)
 #pragma once
 
 #include <cstdint>
@@ -75,6 +82,50 @@ void take_if_better(const Model& model, int64_t cost, int num_inliers, LoopResul
   best->num_inliers = num_inliers;
 }
 
+// Draws samples and solves them, one or kBatch at a time.
+template <typename Estimator, bool kOne = Estimator::kBatch == 1>
+struct Solver {
+  using Model = typename Estimator::Model;
+  Model models[Estimator::kMaxModels];
+
+  // Returns how many candidates the next sample has.
+  int next(Estimator& estimator, Sampler& sampler) {
+    int32_t sample[Estimator::kSampleSize];
+    draw_sample(sampler, sample);
+    return estimator.generate_models(sample, models);
+  }
+  int64_t fast_cost(const Estimator& estimator, int k, int64_t bound) const {
+    return estimator.fast_cost(models[k], bound);
+  }
+  bool complete(const Estimator&, int k, Model* model) const {
+    *model = models[k];
+    return true;
+  }
+};
+
+template <typename Estimator>
+struct Solver<Estimator, false> {
+  using Model = typename Estimator::Model;
+  int32_t samples[Estimator::kBatch][Estimator::kSampleSize];
+  typename Estimator::Candidates candidates;
+  int current = Estimator::kBatch - 1;
+
+  int next(Estimator& estimator, Sampler& sampler) {
+    if (++current == Estimator::kBatch) {
+      for (int s = 0; s < Estimator::kBatch; ++s) draw_sample(sampler, samples[s]);
+      estimator.generate(samples, Estimator::kBatch, &candidates);
+      current = 0;
+    }
+    return candidates.count[current];
+  }
+  int64_t fast_cost(const Estimator& estimator, int k, int64_t bound) const {
+    return estimator.fast_cost(candidates, current, k, bound);
+  }
+  bool complete(const Estimator& estimator, int k, Model* model) const {
+    return estimator.complete(candidates, current, k, samples[current], model);
+  }
+};
+
 // Local optimisation takes every sampled model that is the best so far (O. Chum, J. Matas, J.
 // Kittler, "Locally optimized RANSAC", 2003), and the best of each window of samples: the best
 // minimum does not always start from the best sample. A window is longer where optimising takes
@@ -90,27 +141,26 @@ LoopResult<typename Estimator::Model> robust_loop(Estimator& estimator, Sampler&
   int wanted = most;
   int window_iterations = 0;
   int64_t best_sampled = INT64_MAX, window_cost = INT64_MAX;  // before local optimisation
-  Model window_model;
-  int32_t sample[Estimator::kSampleSize];
-  Model models[Estimator::kMaxModels];
+  Model window_model, model;
+  Solver<Estimator> solver;
   while (best.num_iterations < wanted) {
-    draw_sample(sampler, sample);
     ++best.num_iterations;
     ++window_iterations;
     bool improved = false;
-    const int num_models = estimator.generate_models(sample, models);
+    const int num_models = solver.next(estimator, sampler);
     for (int k = 0; k < num_models; ++k) {
-      if (estimator.fast_cost(models[k], window_cost) >= window_cost) continue;
+      if (solver.fast_cost(estimator, k, window_cost) >= window_cost) continue;
+      if (!solver.complete(estimator, k, &model)) continue;
       int num_inliers;
-      const int64_t cost = estimator.full_cost(models[k], &num_inliers);
+      const int64_t cost = estimator.full_cost(model, &num_inliers);
       if (cost >= window_cost) continue;
       window_cost = cost;
-      window_model = models[k];
+      window_model = model;
       if (cost < best_sampled) {
         best_sampled = cost;
         improved = true;
       }
-      take_if_better(models[k], cost, num_inliers, &best);
+      take_if_better(model, cost, num_inliers, &best);
     }
     const bool window_over = window_iterations >= window && window_cost < INT64_MAX;
     if (!improved && !window_over) continue;
