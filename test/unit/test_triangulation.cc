@@ -20,8 +20,10 @@ using tv::Vec2;
 using tv::Vec3;
 
 constexpr uint64_t kSeed = 11;
-const tv_triangulation kMethods[] = {TV_TRIANGULATION_LINEAR_LS, TV_TRIANGULATION_ITERATIVE_LS,
-                                     TV_TRIANGULATION_MIDPOINT};
+const tv_triangulation kMethods[] = {
+    TV_TRIANGULATION_POLY,         TV_TRIANGULATION_POLY_ABS,        TV_TRIANGULATION_LINEAR_EIGEN,
+    TV_TRIANGULATION_LINEAR_LS,    TV_TRIANGULATION_ITERATIVE_EIGEN, TV_TRIANGULATION_ITERATIVE_LS,
+    TV_TRIANGULATION_MIDPOINT};
 const Mat3 kIdentity = Mat3::Identity();
 const Vec3 kSideways(-1, 0, 0);
 
@@ -102,6 +104,37 @@ Vec3 linear_ls_by_qr(const tv_camera& camera0, const tv_camera& camera1, const M
     }
   }
   return A.colPivHouseholderQr().solve(b);
+}
+
+// (X, 1) spans the smallest singular vector of the same equations in (X, W), R a rotation and |t| 1.
+// Held against A itself: where the two smallest values are equal, so are all vectors between.
+void expect_singular_vector(const tv_camera& camera0, const tv_camera& camera1, const Mat3& R,
+                            const Vec3& t, const Vec2& pixel0, const Vec2& pixel1, double w0,
+                            double w1, const tv_point& point) {
+  const tv_camera* cameras[2] = {&camera0, &camera1};
+  const Vec2 pixels[2] = {pixel0, pixel1};
+  const double weights[2] = {w0, w1};
+  Eigen::Matrix4d A;
+  for (int i = 0; i < 2; ++i) {
+    Eigen::Matrix<double, 3, 4> P;
+    P.setIdentity();
+    if (i == 1) P << R, t;
+    Mat3 K;
+    K << cameras[i]->fx, 0, cameras[i]->cx, 0, cameras[i]->fy, cameras[i]->cy, 0, 0, 1;
+    P = K * P;
+    for (int row = 0; row < 2; ++row) {
+      A.row(2 * i + row) = (pixels[i][row] * P.row(2) - P.row(row)) / weights[i];
+    }
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix4d> svd(A, Eigen::ComputeFullV);
+  const Eigen::Vector4d s = svd.singularValues();
+  Eigen::Vector4d ours(point.position[0], point.position[1], point.position[2], 1);
+  if (point.status == TV_POINT_INFINITE) ours[3] = 0;
+  ours.normalize();
+  const double gap = (s[2] - s[3]) / s[0];
+  TEST_ASSERT_TRUE((A * ours).norm() <= s[3] * (1 + 1e-9) + 1e-12 * s[0]);
+  const Eigen::Vector4d across = ours - svd.matrixV().col(3) * svd.matrixV().col(3).dot(ours);
+  TEST_ASSERT_TRUE(across.norm() <= 1e-12 / gap);
 }
 
 struct Scene {
@@ -236,6 +269,93 @@ void test_iterative_ls_is_the_fixed_point_of_its_weights(void) {
     moved = std::max(moved, (linear - at).norm());
   }
   TEST_ASSERT_TRUE(moved > 1e-5);  // the weights have done something
+}
+
+void test_linear_eigen_is_the_smallest_singular_vector(void) {
+  tv::Random random = tv::random_seeded(kSeed);
+  tv_camera other = pinhole();
+  other.fx = 700, other.fy = 650, other.cx = 300;
+  const Camera camera0 = tv::prepare_camera(pinhole());
+  const Camera camera1 = tv::prepare_camera(other);
+  for (int i = 0; i < 5000; ++i) {
+    const Scene scene = random_scene(&random);
+    // Up to so much noise that the two smallest singular values are often near to each other.
+    const double sigma = i % 3 == 0 ? 0.5 : i % 3 == 1 ? 5 : 100;
+    const Vec2 pixel0 =
+        seen(camera0, scene.point0) + Vec2(noise(&random, sigma), noise(&random, sigma));
+    const Vec2 pixel1 =
+        seen(camera1, scene.point1) + Vec2(noise(&random, sigma), noise(&random, sigma));
+    const tv_point point = triangulated(TV_TRIANGULATION_LINEAR_EIGEN, camera0, camera1, scene.R,
+                                        scene.t, pixel0, pixel1);
+    expect_singular_vector(pinhole(), other, scene.R, scene.t, pixel0, pixel1, 1, 1, point);
+  }
+}
+
+void test_iterative_eigen_is_the_fixed_point_of_its_weights(void) {
+  tv::Random random = tv::random_seeded(kSeed);
+  const Camera camera = tv::prepare_camera(pinhole());
+  double moved = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Scene scene = random_scene(&random);
+    const Vec2 pixel0 = seen(camera, scene.point0) + Vec2(noise(&random, 1), noise(&random, 1));
+    const Vec2 pixel1 = seen(camera, scene.point1) + Vec2(noise(&random, 1), noise(&random, 1));
+    const tv_point point = triangulated(TV_TRIANGULATION_ITERATIVE_EIGEN, camera, camera, scene.R,
+                                        scene.t, pixel0, pixel1);
+    const double w1 = (scene.R * position(point) + scene.t)[2];
+    expect_singular_vector(pinhole(), pinhole(), scene.R, scene.t, pixel0, pixel1,
+                           point.position[2], w1, point);
+    const tv_point linear = triangulated(TV_TRIANGULATION_LINEAR_EIGEN, camera, camera, scene.R,
+                                         scene.t, pixel0, pixel1);
+    moved = std::max(moved, (position(linear) - position(point)).norm());
+  }
+  TEST_ASSERT_TRUE(moved > 1e-5);
+}
+
+void test_correction_of_a_fisheye_is_least_on_its_tangent_planes(void) {
+  tv::Random random = tv::random_seeded(kSeed);
+  const Camera camera = tv::prepare_camera(fisheye());
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 point0(uniform(&random, -3, 3), uniform(&random, 1, 3), uniform(&random, -1, 2));
+    const Mat3 R = rotation(uniform(&random, -0.1, 0.1), 0.1, uniform(&random, -3, 3));
+    const Vec3 t = Vec3(0.4, -0.3, 0.2).normalized();
+    const Vec2 pixel0 = seen(camera, point0) + Vec2(noise(&random, 1), noise(&random, 1));
+    const Vec2 pixel1 = seen(camera, R * point0 + t) + Vec2(noise(&random, 1), noise(&random, 1));
+    Vec3 ray[2];
+    TEST_ASSERT_TRUE(tv::unproject(camera, pixel0, &ray[0], nullptr));
+    TEST_ASSERT_TRUE(tv::unproject(camera, pixel1, &ray[1], nullptr));
+    const tv::TriangulationPair pair = tv::prepare_triangulation(camera, camera, R, t);
+    for (const bool squared : {true, false}) {
+      // The tangent of the angle between a ray and a plane with unit normal n, in pixels.
+      const auto cost_of = [&](const Vec3& n) {
+        double sum = 0;
+        for (int k = 0; k < 2; ++k) {
+          const double sine = ray[k].dot(k == 0 ? n : Vec3(R * n));
+          const double sq = sine * sine / (1 - sine * sine) * 220 * 221;
+          sum += squared ? sq : std::sqrt(sq);
+        }
+        return sum;
+      };
+      const tv::Correction correction = tv::correct_match(
+          squared ? TV_TRIANGULATION_POLY : TV_TRIANGULATION_POLY_ABS, pair,
+          tv::frame_of(camera, ray[0]), tv::frame_of(camera, ray[1]));
+      double moved = 0;
+      for (int k = 0; k < 2; ++k) {
+        const double sq = correction.step[k][0] * correction.step[k][0] +
+                          correction.step[k][1] * correction.step[k][1];
+        moved += squared ? sq : std::sqrt(sq);
+        const Vec3 off = ray[k] - correction.ray[k];
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::sqrt(sq), off.norm() * std::sqrt(220.0 * 221.0));
+      }
+      const Vec3 center = -(R.transpose() * t);
+      const Vec3 plane = center.cross(correction.ray[0]).normalized();
+      TEST_ASSERT_TRUE(std::fabs(plane.dot(R.transpose() * correction.ray[1])) < 1e-14);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + moved), moved, cost_of(plane));
+      for (int k = 0; k < 2000; ++k) {
+        const Vec3 turned = Eigen::AngleAxisd(k * 3.14159265358979 / 2000, center) * plane;
+        TEST_ASSERT_TRUE(moved <= cost_of(turned) * (1 + 1e-9) + 1e-12);
+      }
+    }
+  }
 }
 
 void test_midpoint_equals_the_point_nearest_to_both_lines(void) {
@@ -397,6 +517,9 @@ void test_swapped_views_give_the_same_point(void) {
     const Mat3 R_back = scene.R.transpose();
     const Vec3 t_back = -(R_back * scene.t);
     for (tv_triangulation method : kMethods) {
+      // The length of (X, W) that the eigenvector methods hold at 1 counts from camera 0.
+      if (method == TV_TRIANGULATION_LINEAR_EIGEN) continue;
+      if (method == TV_TRIANGULATION_ITERATIVE_EIGEN) continue;
       const tv_point there =
           triangulated(method, camera0, camera1, scene.R, scene.t, pixel0, pixel1);
       const tv_point back = triangulated(method, camera1, camera0, R_back, t_back, pixel1, pixel0);
@@ -449,6 +572,9 @@ int main(void) {
   RUN_TEST(test_linear_ls_equals_hartley_and_sturms_equations_solved_by_qr);
   RUN_TEST(test_linear_ls_of_a_fisheye_equals_equations_on_the_viewing_sphere);
   RUN_TEST(test_iterative_ls_is_the_fixed_point_of_its_weights);
+  RUN_TEST(test_linear_eigen_is_the_smallest_singular_vector);
+  RUN_TEST(test_iterative_eigen_is_the_fixed_point_of_its_weights);
+  RUN_TEST(test_correction_of_a_fisheye_is_least_on_its_tangent_planes);
   RUN_TEST(test_midpoint_equals_the_point_nearest_to_both_lines);
   RUN_TEST(test_error_is_the_rms_reprojection_through_the_lens);
   RUN_TEST(test_iterative_ls_has_no_more_error_than_midpoint_under_noise);

@@ -8,20 +8,28 @@
 
 TV_BEGIN_DECLS
 
+/* What a method makes least, with a pixel error measured on the undistorted image (a pixel being 1/fx
+   by 1/fy there); for TV_CAMERA_KANNALA_BRANDT, which sees beyond a half space, on the plane that
+   touches the viewing sphere at the match's own ray (a pixel being 1 / sqrt(fx fy)). For a pinhole
+   these are the textbook's pixels. Distances are in units of |t|, so that a method does not depend
+   on the length of t. */
 typedef enum tv_triangulation {
-  TV_TRIANGULATION_POLY = 0,
-  TV_TRIANGULATION_POLY_ABS = 1,
-  TV_TRIANGULATION_LINEAR_EIGEN = 2,
-  TV_TRIANGULATION_LINEAR_LS = 3,
-  TV_TRIANGULATION_ITERATIVE_EIGEN = 4,
-  TV_TRIANGULATION_ITERATIVE_LS = 5, /* the paper's choice, and the default */
-  TV_TRIANGULATION_MIDPOINT = 6
+  TV_TRIANGULATION_POLY = 0,     /* the squared distances from both pixels to the point's images:
+                                    the global minimum, most likely under normal noise */
+  TV_TRIANGULATION_POLY_ABS = 1, /* the distances instead of their squares, globally */
+  TV_TRIANGULATION_LINEAR_EIGEN = 2,    /* the four linear equations over unit vectors (X, W), X / W
+                                           the point in units of |t|; counts from camera 0 */
+  TV_TRIANGULATION_LINEAR_LS = 3,       /* the same equations with W = 1 */
+  TV_TRIANGULATION_ITERATIVE_EIGEN = 4, /* each camera's equations divided by the point's depth, up to
+                                           ten times; the linear answer when that does not settle */
+  TV_TRIANGULATION_ITERATIVE_LS = 5,    /* the same with W = 1; the paper's choice, and the default */
+  TV_TRIANGULATION_MIDPOINT = 6         /* the distances from the point to both rays */
 } tv_triangulation;
 
 typedef enum tv_point_status {
   TV_POINT_OK = 0,
-  TV_POINT_INFINITE = 1, /* rays parallel within what a double can tell: position is the unit
-                            direction in camera 0 */
+  TV_POINT_INFINITE = 1, /* rays parallel within what a double can tell, or the method's answer at
+                            infinity: position is the unit direction in camera 0 */
   TV_POINT_BEHIND = 2,   /* the rays meet behind a camera: position is where */
   TV_POINT_INVALID = 3   /* no ray (pixel outside the lens model), input not finite, or opposed rays
                             along the baseline: zeros */
@@ -37,7 +45,7 @@ typedef struct tv_point {
   int32_t reserved;   /* 0 */
 } tv_point;
 
-/* Triangulates num_points matches. This release has LINEAR_LS, ITERATIVE_LS and MIDPOINT.
+/* Triangulates num_points matches.
    cam1_from_cam0: x1 = R x0 + t; R row-major 3x3, a rotation to 1e-6; t not zero.
    pixels0, pixels1: num_points x 2 (x, y), distorted pixels as the image has them.
    points: the caller's array of num_points; overlaps neither pixels0 nor pixels1.
@@ -48,6 +56,22 @@ TV_API tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera
                                 const tv_camera *camera1, const double R[9], const double t[3],
                                 const double *pixels0, const double *pixels1, int32_t num_points,
                                 tv_point *points);
+
+/* Moves the pixels of num_points matches to where their rays meet: the least sum of squared distances
+   (cost TV_TRIANGULATION_POLY) or of distances (TV_TRIANGULATION_POLY_ABS) that does it, the global
+   minimum. Pixels are distorted, in and out; the distances are those described at tv_triangulation.
+   Whether the rays then meet before the cameras is tv_triangulate's to say.
+   Cameras, R, t and pixels as for tv_triangulate.
+   corrected0, corrected1: num_points x 2; may not overlap anything else.
+   valid: num_points bytes, 1 where the match was corrected; else 0 and both pixels are zeros (a pixel
+   without a ray or not finite, or a correction that leaves the lens's valid region).
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (cost, count, R, t), TV_ERR_NOT_FINITE (R, t),
+   TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context; thread-safe. */
+TV_API tv_status tv_correct_matches(tv_triangulation cost, const tv_camera *camera0,
+                                    const tv_camera *camera1, const double R[9], const double t[3],
+                                    const double *pixels0, const double *pixels1,
+                                    int32_t num_points, double *corrected0, double *corrected1,
+                                    uint8_t *valid);
 
 TV_END_DECLS
 

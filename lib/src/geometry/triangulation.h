@@ -4,6 +4,7 @@
 #pragma once
 
 #include "geometry/camera.h"
+#include "geometry/triangulation_poly.h"
 #include "twoview/triangulate.h"
 
 namespace tv {
@@ -21,6 +22,8 @@ struct TriangulationPair {
   Vec3 direction;  // t / |t|
   Vec3 center1;    // camera 1's centre in camera 0's frame, for |t| = 1
   double baseline;  // |t|
+  EpipolarPencil pencil;
+  bool has_steps;  // of the pencil: the same for every match when both cameras have an image plane
 };
 
 // R is a rotation, t not zero.
@@ -29,6 +32,16 @@ TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& cam
 
 // Whether the number is a tv_triangulation that this release has.
 bool is_triangulation_method(int method);
+
+// The match moved to where its rays meet, at the least cost of POLY_ABS, or of POLY for any other
+// method. The frames are those of the pixels' rays.
+Correction correct_match(tv_triangulation method, const TriangulationPair& pair,
+                         const RayFrame& frame0, const RayFrame& frame1);
+
+// The same for pixels, through the lens and back. False: a pixel has no ray, or the lens does not see
+// the corrected one; corrected is untouched.
+bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
+                    const Vec2& pixel1, Vec2 corrected[2]);
 
 // Writes every field of *point; nothing in it is ever NaN or infinite.
 void triangulate_point(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,

@@ -1,0 +1,66 @@
+// What the methods of triangulation share: sums in a written order, and the plane on which a
+// camera's pixel errors are measured.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "geometry/camera.h"
+
+namespace tv {
+
+// Written out: Eigen's sums are free to change their order with its version.
+inline double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+inline Vec3 cross(const Vec3& a, const Vec3& b) {
+  return Vec3(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
+}
+
+inline Vec3 rotate(const Mat3& R, const Vec3& v) {
+  return Vec3(R(0, 0) * v[0] + R(0, 1) * v[1] + R(0, 2) * v[2],
+              R(1, 0) * v[0] + R(1, 1) * v[1] + R(1, 2) * v[2],
+              R(2, 0) * v[0] + R(2, 1) * v[1] + R(2, 2) * v[2]);
+}
+
+inline Vec3 combine(double a, const Vec3& u, double b, const Vec3& v) {
+  return Vec3(a * u[0] + b * v[0], a * u[1] + b * v[1], a * u[2] + b * v[2]);
+}
+
+inline bool is_finite(const Vec3& v) {
+  return std::fabs(v[0]) < std::numeric_limits<double>::infinity() &&
+         std::fabs(v[1]) < std::numeric_limits<double>::infinity() &&
+         std::fabs(v[2]) < std::numeric_limits<double>::infinity();
+}
+
+// Two unit vectors that make a right-handed frame with a unit axis; the coordinate axis that is
+// farthest from it starts them.
+inline void complete_basis(const Vec3& axis, Vec3* u, Vec3* v) {
+  const double size[3] = {std::fabs(axis[0]), std::fabs(axis[1]), std::fabs(axis[2])};
+  Vec3 start(1.0, 0.0, 0.0);
+  if (size[1] < size[0] && size[1] <= size[2]) start = Vec3(0.0, 1.0, 0.0);
+  if (size[2] < size[0] && size[2] < size[1]) start = Vec3(0.0, 0.0, 1.0);
+  const Vec3 side = cross(axis, start);
+  const double scale = 1.0 / std::sqrt(dot(side, side));
+  *u = Vec3(side[0] * scale, side[1] * scale, side[2] * scale);
+  *v = cross(axis, *u);
+}
+
+// The plane of a camera's undistorted image, where a pixel is 1/fx by 1/fy; or, for a camera that
+// sees beyond a half space and has no such plane, the plane that touches the viewing sphere at the
+// ray, where a pixel is 1 / sqrt(fx fy) both ways.
+struct RayFrame {
+  Vec3 ray;         // of depth 1: z = 1 on the image plane, a unit vector on the sphere
+  Vec3 rows[2];     // n, so that n . ray = 0
+  Vec3 basis[2];    // of the plane of equal depth: -rows[i] . basis[j] = (i == j)
+  Vec3 depth;       // depth of X is depth . X
+  double pixel[2];  // a pixel's length along basis[i]
+};
+
+// The ray is a unit vector.
+RayFrame frame_of(const Camera& camera, const Vec3& ray);
+
+inline bool has_image_plane(const Camera& camera) {
+  return camera.model.model != TV_CAMERA_KANNALA_BRANDT;
+}
+
+}  // namespace tv

@@ -1,0 +1,18 @@
+// The four linear methods: Linear-LS, Iterative-LS, Linear-Eigen, Iterative-Eigen. R. Hartley,
+// P. Sturm, "Triangulation", CVIU 68(2), 1997. Derivation: docs/algorithms/triangulation.md.
+#pragma once
+
+#include "geometry/triangulation_frame.h"
+
+namespace tv {
+
+struct TriangulationPair;
+
+// The point in camera 0's frame for a baseline of 1. An iterative method that does not settle falls
+// back to its linear one. A point at infinity is not finite.
+Vec3 solve_least_squares(const TriangulationPair& pair, const RayFrame& frame0,
+                         const RayFrame& frame1, bool iterative);
+Vec3 solve_eigen(const TriangulationPair& pair, const RayFrame& frame0, const RayFrame& frame1,
+                 bool iterative);
+
+}  // namespace tv

@@ -1,0 +1,39 @@
+// Optimal triangulation: the epipolar plane whose lines are nearest to two pixels, by the sum of
+// squared distances (Poly) or of distances (Poly-Abs), and the nearest points on them. R. Hartley,
+// P. Sturm, "Triangulation", CVIU 68(2), 1997. Derivation: docs/algorithms/triangulation.md.
+#pragma once
+
+#include "geometry/triangulation_frame.h"
+
+namespace tv {
+
+// The planes through the baseline, n = v[0] axis[0] + v[1] axis[1], and what a pixel's step does to
+// them. A point with ray x of an image has the coordinates alpha = (axis[0] . x, axis[1] . x); it is
+// on the plane v where alpha . v = 0, two points correspond where alpha0 x alpha1 = 0, and a step
+// d (in pixels along the frame's basis) moves alpha by step d. The line v is |alpha . v| / sqrt(v
+// step step^T v) pixels away.
+struct EpipolarPencil {
+  Vec3 axis[2][2];        // of camera i, in its own frame
+  double step[2][2][2];   // of camera i: [axis][basis]
+  double turned[2][2][2]; // the same after the turns that make step0^T [0 1; -1 0] step1 diagonal
+  double singular[2];     // that diagonal, |singular[1]| <= singular[0]
+};
+
+// The axes alone: cam0_from_cam1's centre is a unit vector in camera 0's frame.
+void set_pencil_axes(const Vec3& center1, const Mat3& cam1_from_cam0_R, EpipolarPencil* pencil);
+
+// The rest. On an image plane it is the same for all rays; on the sphere each ray has its own.
+void set_pencil_steps(const RayFrame& frame0, const RayFrame& frame1, EpipolarPencil* pencil);
+
+struct Correction {
+  Vec3 ray[2];      // on a common epipolar plane within rounding; depth 1, not unit vectors
+  double step[2][2];  // of each image's pixel, in pixels along the frame's basis
+};
+
+enum class PixelCost { kSumOfSquares, kSumOfDistances };
+
+// The global minimum. With numbers too large for doubles the result is not finite.
+Correction correct_rays(PixelCost cost, const EpipolarPencil& pencil, const RayFrame& frame0,
+                        const RayFrame& frame1);
+
+}  // namespace tv
