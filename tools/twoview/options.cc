@@ -2,8 +2,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -23,7 +25,7 @@ const Names kTriangulations = {
     "poly", "poly-abs", "linear-eigen", "linear-ls", "iterative-eigen", "iterative-ls", "midpoint"};
 
 // Values that the interface names and this version's library refuses.
-const Names kNotYet = {"upright", "poly", "poly-abs", "linear-eigen", "iterative-eigen"};
+const Names kNotYet = {"poly", "poly-abs", "linear-eigen", "iterative-eigen"};
 
 struct Choice {
   int32_t* value;
@@ -39,10 +41,15 @@ Names offered(const Choice& choice) {
   return names;
 }
 
+// Three numbers, of any length but 0.
+struct Direction {
+  double* xyz;
+};
+
 struct Option {
   const char* name;
   OptionGroup group;
-  std::variant<int32_t*, uint64_t*, float*, double*, Choice> target;
+  std::variant<int32_t*, uint64_t*, float*, double*, Choice, Direction> target;
   double low, high;
   enum Ends { kClosed, kOpenLow, kOpenHigh } ends;  // whether low, or high, is itself refused
   const char* help;
@@ -84,6 +91,11 @@ std::vector<Option> table(Options& o) {
       {"fixed-iterations", kEstimate, &e.fixed_iterations, 0, 1e6, closed,
        "exactly this many samples; 0: adaptive stop"},
       {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
+      {"gravity0", kGravity, Direction{e.gravity0}, 0, 0, closed,
+       "the direction of gravity (down) in the first camera's frame"},
+      {"gravity1", kGravity, Direction{e.gravity1}, 0, 0, closed, "the same of the second"},
+      {"gravity-sigma-deg", kGravity, &o.gravity_sigma_deg, 0, 180, closed,
+       "standard deviation of each direction about each axis across it; 0: not known"},
       {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations, false}, 0, 0, closed,
        "method"},
       {"kernels", kCommon, Choice{&o.kernels, &kKernels}, 0, 0, closed, "kernel set"},
@@ -124,6 +136,25 @@ std::string joined(const Names& names, const char* separator) {
   return text;
 }
 
+bool is_zero(const Direction& direction) {
+  return std::all_of(direction.xyz, direction.xyz + 3, [](double v) { return v == 0; });
+}
+
+void set_direction(const std::string& flag, const Direction& direction, const std::string& text) {
+  std::array<double, 3> values{};
+  std::string_view rest = text;
+  bool good = true;
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t end = k < 2 ? rest.find(',') : rest.size();
+    good = good && end != rest.npos && parse_number(std::string(rest.substr(0, end)), values[k]) &&
+           std::isfinite(values[k]);
+    if (!good) throw CLI::ValidationError(flag, "'" + text + "' is not three numbers x,y,z");
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  std::copy(values.begin(), values.end(), direction.xyz);
+  if (is_zero(direction)) throw CLI::ValidationError(flag, "'" + text + "' has no direction");
+}
+
 // Writes the option's target; throws CLI::ValidationError in words.
 void set(const Option& option, const std::string& text) {
   const std::string flag = "--" + std::string(option.name);
@@ -137,9 +168,13 @@ void set(const Option& option, const std::string& text) {
     *choice->value = static_cast<int32_t>(found - choice->names->begin());
     return;
   }
+  if (const Direction* direction = std::get_if<Direction>(&option.target)) {
+    set_direction(flag, *direction, text);
+    return;
+  }
   std::visit(
       [&](auto target) {
-        if constexpr (!std::is_same_v<decltype(target), Choice>) {
+        if constexpr (std::is_pointer_v<decltype(target)>) {
           using T = std::remove_pointer_t<decltype(target)>;
           T value{};
           if (!parse_number(text, value)) {
@@ -164,6 +199,10 @@ nlohmann::ordered_json value_json(const Option& option) {
         using T = decltype(target);
         if constexpr (std::is_same_v<T, Choice>)
           return (*target.names)[static_cast<size_t>(*target.value)];
+        else if constexpr (std::is_same_v<T, Direction>)
+          return is_zero(target) ? nlohmann::ordered_json()
+                                 : nlohmann::ordered_json{target.xyz[0], target.xyz[1],
+                                                          target.xyz[2]};
         else if constexpr (std::is_same_v<T, float*>)
           return shortest(*target);
         else
@@ -184,6 +223,7 @@ const char* group_title(OptionGroup group) {
     case kMatch:
       return "Matching";
     case kEstimate:
+    case kGravity:
       return "Geometry";
     case kTriangulate:
       return "Triangulation";
@@ -209,6 +249,13 @@ void Options::settle() {
                    " is above --threshold " + std::to_string(feature.threshold));
   if (feature.cell_px > 0 && feature.cell_px < 8)
     throw BadInput("--cell-px: " + std::to_string(feature.cell_px) + " is not 0 or in [8, 16384]");
+  const bool given[3] = {!is_zero({estimate.gravity0}), !is_zero({estimate.gravity1}),
+                         gravity_sigma_deg > 0};
+  if (given[0] != given[1] || given[1] != given[2])
+    throw BadInput("--gravity0, --gravity1 and --gravity-sigma-deg go together");
+  if (estimate.method == TV_METHOD_UPRIGHT && !given[0])
+    throw BadInput("--method upright needs --gravity0, --gravity1 and --gravity-sigma-deg");
+  estimate.gravity_sigma_rad = gravity_sigma_deg * 3.14159265358979323846 / 180;
 }
 
 void add_options(CLI::App& verb, Options& options, unsigned groups) {
@@ -223,8 +270,11 @@ void add_options(CLI::App& verb, Options& options, unsigned groups) {
         },
         option.help);
     const Choice* choice = std::get_if<Choice>(&option.target);
-    flag->type_name(choice ? joined(offered(*choice), "|") : range_text(option));
-    flag->default_str(value_text(option));
+    const bool is_direction = std::holds_alternative<Direction>(option.target);
+    flag->type_name(choice         ? joined(offered(*choice), "|")
+                    : is_direction ? "x,y,z"
+                                   : range_text(option));
+    if (!is_direction) flag->default_str(value_text(option));
     flag->group(group_title(option.group));
   }
 }

@@ -19,6 +19,7 @@ struct Options {
   int32_t kernels = TV_KERNELS_AUTO;
   int32_t resize = 0;  // longer side, pixels; 0: as it is
   bool min_threshold_given = false;
+  double gravity_sigma_deg = 0;  // settle() hands it to `estimate`
 
   Options();
   // What cannot be said option by option. Call after parsing.
@@ -32,7 +33,8 @@ enum OptionGroup : unsigned {
   kEstimate = 4,
   kTriangulate = 8,
   kCommon = 16,
-  kAllOptions = 31
+  kAllOptions = 31,
+  kGravity = 32  // of one pair
 };
 
 // Adds the flags of the groups to a verb. `options` must outlive the parsing.

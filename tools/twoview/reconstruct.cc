@@ -57,7 +57,7 @@ void load_inputs(const Arguments& a, Outcome& outcome) {
 }
 
 nlohmann::ordered_json options_of(const Arguments& a) {
-  nlohmann::ordered_json json = options_json(a.common.options, kAllOptions);
+  nlohmann::ordered_json json = options_json(a.common.options, kAllOptions | kGravity);
   const std::array<std::string, 2> files = camera_files(a);
   for (int i = 0; i < 2; ++i) {
     const std::string key = "camera" + std::to_string(i);
@@ -231,7 +231,7 @@ void add_reconstruct(CLI::App& program, Run& run) {
   a->cameras.add_to(*verb);
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
       ->type_name("FILE");
-  add_common(*verb, a->common, kAllOptions, "folder for the results");
+  add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
 }
 
