@@ -362,9 +362,7 @@ static void case_sampson_score(trial *t) {
   const int32_t num_blocks = pick(t, 0, 8, 16), on_plane = pick(t, 0, 1, 1);
   const int32_t n = num_blocks * TVK_SCORE_BLOCK, scale = random_int(&t->seed, 0, 2);
   const float inverse_sq = scale == 0 ? 1e-18f : scale == 1 ? 1.0f : 1e37f;
-  const int64_t most = (int64_t)n * TVK_SCORE_ONE, bound = random_int(&t->seed, 0, 1)
-                                                              ? most
-                                                              : (int64_t)(random_unit(&t->seed) * (double)most);
+  const int32_t first_block = pick(t, 0, num_blocks, 0);
   const float *read[18];
   float *m = INPUT(t, float, 9);
   int64_t *score = OUTPUT(t, int64_t, 1);
@@ -381,7 +379,8 @@ static void case_sampson_score(trial *t) {
     read[k] = array;
   }
   for (k = 0; k < 9; ++k) m[k] = (float)(2 * random_unit(&t->seed) - 1);
-  REPEAT(t, *score = t->set->sampson_score(read, num_blocks, on_plane, m, inverse_sq, bound));
+  REPEAT(t, *score = t->set->sampson_score(read, first_block, num_blocks - first_block, on_plane, m,
+                                          inverse_sq));
 }
 
 /* Rays of random points seen from two places, some samples degenerate: equal matches, zeros. */

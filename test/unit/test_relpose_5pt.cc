@@ -95,7 +95,7 @@ void test_every_model_satisfies_the_constraints(void) {
       TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, models[k].norm());
     }
   }
-  TEST_ASSERT_GREATER_THAN_INT(2000, models_seen);
+  TEST_ASSERT_GREATER_THAN_INT(1500, models_seen);
   TEST_ASSERT_LESS_OR_EQUAL_INT(models_seen / 200, poor);
 }
 

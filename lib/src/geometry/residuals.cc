@@ -10,6 +10,9 @@ namespace tv {
 namespace {
 
 constexpr double kInfinity = __builtin_inf();
+// A model is given up after this many blocks, or twice, four times as many, when it does badly.
+constexpr int kFirstBlocks = 2;
+
 constexpr double kLargestQ = 1e300, kLogLargestQ = 690.8;  // beyond it, no slope
 
 size_t padded(int max_matches) {
@@ -122,36 +125,59 @@ double pixel_angle(const RayPairs& pairs, int i) {
   return std::sqrt(0.5 * sum);
 }
 
-}  // namespace
+// Of n numbers, one that shares no factor with n, near n times the golden ratio: k step mod n, for
+// k = 0, 1, .., visits all, and any first few of them are spread evenly.
+int even_step(int n) {
+  int step = static_cast<int>(0.6180339887498949 * n);
+  for (;; ++step) {
+    int a = n, b = step;
+    while (b > 0) {
+      const int remainder = a % b;
+      a = b;
+      b = remainder;
+    }
+    if (a == 1) return step;
+  }
+}
 
-void finish_rays(RayPairs& pairs) {
-  const int end = static_cast<int>(padded(pairs.num));
-  for (int i = 0; i < pairs.num; ++i) {
-    pairs.pixel_angle[i] = pixel_angle(pairs, i);
-    for (int v = 0; v < 2; ++v) {
-      const Mat32 J = jacobian_of(pairs, v, i);
-      if (pairs.on_plane) {
-        for (int k = 0; k < 2; ++k) {
-          pairs.fast[2 * v + k][i] = static_cast<float>(pairs.ray[v][k][i]);
-        }
-        const double metric[3] = {J(0, 0) * J(0, 0) + J(0, 1) * J(0, 1),
-                                  J(0, 0) * J(1, 0) + J(0, 1) * J(1, 1),
-                                  J(1, 0) * J(1, 0) + J(1, 1) * J(1, 1)};
-        for (int k = 0; k < 3; ++k) {
-          pairs.fast[4 + 3 * v + k][i] = static_cast<float>(metric[k]);
-        }
-      } else {
-        for (int k = 0; k < 3; ++k) {
-          pairs.fast[3 * v + k][i] = static_cast<float>(pairs.ray[v][k][i]);
-        }
-        for (int k = 0; k < 6; ++k) {
-          pairs.fast[6 + 6 * v + k][i] = static_cast<float>(pairs.jacobian[v][k][i]);
-        }
+void set_fast(RayPairs& pairs, int slot, int i) {
+  for (int v = 0; v < 2; ++v) {
+    const Mat32 J = jacobian_of(pairs, v, i);
+    if (pairs.on_plane) {
+      for (int k = 0; k < 2; ++k) {
+        pairs.fast[2 * v + k][slot] = static_cast<float>(pairs.ray[v][k][i]);
+      }
+      const double metric[3] = {J(0, 0) * J(0, 0) + J(0, 1) * J(0, 1),
+                                J(0, 0) * J(1, 0) + J(0, 1) * J(1, 1),
+                                J(1, 0) * J(1, 0) + J(1, 1) * J(1, 1)};
+      for (int k = 0; k < 3; ++k) {
+        pairs.fast[4 + 3 * v + k][slot] = static_cast<float>(metric[k]);
+      }
+    } else {
+      for (int k = 0; k < 3; ++k) {
+        pairs.fast[3 * v + k][slot] = static_cast<float>(pairs.ray[v][k][i]);
+      }
+      for (int k = 0; k < 6; ++k) {
+        pairs.fast[6 + 6 * v + k][slot] = static_cast<float>(pairs.jacobian[v][k][i]);
       }
     }
   }
+}
+
+}  // namespace
+
+void finish_rays(RayPairs& pairs) { finish_rays(pairs, pairs.num); }
+
+void finish_rays(RayPairs& pairs, int num_scored) {
+  for (int i = 0; i < pairs.num; ++i) pairs.pixel_angle[i] = pixel_angle(pairs, i);
+  const int step = num_scored > 0 ? even_step(num_scored) : 0;
+  for (int slot = 0, i = 0; slot < num_scored; ++slot) {
+    set_fast(pairs, slot, i);
+    i = i < num_scored - step ? i + step : i - (num_scored - step);
+  }
+  const int end = static_cast<int>(padded(num_scored));
   for (int k = 0; k < (pairs.on_plane ? 10 : 18); ++k) {
-    for (int i = pairs.num; i < end; ++i) pairs.fast[k][i] = 0;
+    for (int slot = num_scored; slot < end; ++slot) pairs.fast[k][slot] = 0;
   }
 }
 
@@ -173,6 +199,21 @@ void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, c
                                  entries_of(M).m, squares);
 }
 
+namespace {
+
+// What the first `num` of all matches cost at most, 98 times in a hundred, when all cost `bound` and
+// the first are drawn at random without replacement: the mean, and two standard deviations of what
+// lies between 0 and 1 with that mean.
+int64_t bound_of_first(int64_t bound, int num, int all) {
+  const double mean = static_cast<double>(bound) / (static_cast<double>(all) * kCostOne);
+  if (mean >= 1) return INT64_MAX;
+  const double left = 1 - static_cast<double>(num) / all;
+  const double slack = 2 * std::sqrt(mean * (1 - mean) * num * left);
+  return static_cast<int64_t>((mean * num + slack) * kCostOne);
+}
+
+}  // namespace
+
 int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound) {
   float m[9];
   for (int k = 0; k < 9; ++k) m[k] = static_cast<float>(M(k / 3, k % 3));
@@ -180,10 +221,19 @@ int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px
   const float inverse_sq = static_cast<float>(inverse < 1e37 ? inverse : 1e37);
   const int num_blocks = static_cast<int>(padded(pairs.num)) / kScoreBlock;
   // The padding costs kCostOne each.
-  const int64_t padding = static_cast<int64_t>(num_blocks * kScoreBlock - pairs.num) * kCostOne;
-  const int64_t most = bound < INT64_MAX - padding ? bound + padding : INT64_MAX;
-  return pairs.kernels->sampson_score(pairs.fast, num_blocks, pairs.on_plane, m, inverse_sq, most) -
-         padding;
+  int64_t sum = -static_cast<int64_t>(num_blocks * kScoreBlock - pairs.num) * kCostOne;
+  int done = 0;
+  for (int end = kFirstBlocks; done < num_blocks; end *= 2) {
+    if (end > num_blocks) end = num_blocks;
+    sum += pairs.kernels->sampson_score(pairs.fast, done, end - done, pairs.on_plane, m,
+                                        inverse_sq);
+    done = end;
+    if (done == num_blocks) break;
+    if (bound < INT64_MAX && sum > bound_of_first(bound, done * kScoreBlock, pairs.num)) {
+      return INT64_MAX;
+    }
+  }
+  return sum;
 }
 
 namespace {
@@ -383,6 +433,8 @@ double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, 
 }
 
 template double transfer_normal_equations<3>(const RayPairs&, const int32_t*, int, const Mat3&,
+                                             const Mat3*, const RobustLoss&, double*, double*);
+template double transfer_normal_equations<8>(const RayPairs&, const int32_t*, int, const Mat3&,
                                              const Mat3*, const RobustLoss&, double*, double*);
 template double transfer_normal_equations<9>(const RayPairs&, const int32_t*, int, const Mat3&,
                                              const Mat3*, const RobustLoss&, double*, double*);

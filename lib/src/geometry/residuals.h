@@ -28,7 +28,8 @@ struct RayPairs {
   double* jacobian[2][6];  // row-major 3x2
   double* pixel_angle;  // the angle, in radians, that a pixel of noise in both images makes between
                         // the two rays
-  // For scoring only, single precision, padded with zeros to a multiple of kScoreBlock.
+  // For scoring only, single precision, padded with zeros to a multiple of kScoreBlock, in an order
+  // of their own: the first few are a fair sample of all.
   // On the plane: x0 y0 x1 y1, then J J' of view 0 and of view 1 (xx, xy, yy).
   // Else: the rays (6) and the Jacobians (12).
   float* fast[18];
@@ -47,7 +48,10 @@ inline Mat32 jacobian_of(const RayPairs& pairs, int view, int i) {
 }
 
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian);
-void finish_rays(RayPairs& pairs);  // after the last set_ray: fills what follows from the rays
+// After the last set_ray: fills what follows from the rays. Only the first num_scored matches (none
+// given: all) are for scoring.
+void finish_rays(RayPairs& pairs);
+void finish_rays(RayPairs& pairs, int num_scored);
 
 // Squared Sampson distance; +inf for a match that the model says nothing about (both rays at the
 // epipoles).
@@ -58,9 +62,10 @@ void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M,
 void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
                      double* squares);
 
-// Sum over all matches of min(r^2 / T^2, 1), each truncated to a multiple of 1/kCostOne: an
-// integer, so that neither order nor vector width matters. May stop as soon as the sum exceeds
-// `bound`.
+// Sum over the matches for scoring (pairs.num of them) of min(r^2 / T^2, 1), each truncated to a
+// multiple of 1/kCostOne: an integer, so that neither order nor vector width matters. Above `bound`
+// it may be anything above it; so it is, once in a while, for a model just below `bound`, which the
+// first few matches spoke against.
 int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound);
 
 // What a homography (or a rotation) leaves: d = the displacement in image 1, in pixels, between

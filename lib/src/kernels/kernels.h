@@ -59,11 +59,12 @@ extern "C" {
      m's entries and the loss's weight w, upper triangle of w g g' (45, row by row), w g r (9), the
      truncated loss (r^2 / scale^2 or 1); the last is a product, of Cauchy's 1 + r^2 / scale^2.
    sampson_score: arrays in single precision, on the plane x0 y0 x1 y1 and the upper triangles of J J'
-     (3 and 3), else all 18: the sum over num_blocks blocks of min(r^2 / T^2, 1) TVK_SCORE_ONE, each
-     truncated to an integer; ends after the block that makes it exceed `bound`.
+     (3 and 3), else all 18: the sum over blocks first_block .. first_block + num_blocks - 1 of
+     min(r^2 / T^2, 1) TVK_SCORE_ONE, each truncated to an integer.
    relpose_5pt: rays[TVK_WIDTH (6 k + 3 view + c) + s] is entry c of sample s's k-th ray in a view, for
      TVK_WIDTH samples, of which the first num_samples are to be solved; the others are finite. Writes the
-     essential matrices, row-major, Frobenius norm 1, of sample s to essentials + 9 TVK_RELPOSE_MODELS s
+     essential matrices, row-major, Frobenius norm 1, that have no match before one camera and behind the
+     other, of sample s to essentials + 9 TVK_RELPOSE_MODELS s
      and their number to counts[s], 0 for a degenerate sample. What lies behind them is scratch. */
 #define TVK_LIST(X)                                                                                \
   X(fast_score_row, void,                                                                          \
@@ -100,8 +101,8 @@ extern "C" {
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
      int32_t on_plane, const double *m, double inverse_sq, int32_t cauchy, double *sums))          \
   X(sampson_score, int64_t,                                                                        \
-    (const float *const *arrays, int32_t num_blocks, int32_t on_plane, const float *m,             \
-     float inverse_sq, int64_t bound))                                                             \
+    (const float *const *arrays, int32_t first_block, int32_t num_blocks, int32_t on_plane,        \
+     const float *m, float inverse_sq))                                                            \
   X(relpose_5pt, void,                                                                             \
     (const double *rays, int32_t num_samples, double *essentials, int32_t *counts))
 

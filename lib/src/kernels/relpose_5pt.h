@@ -453,6 +453,44 @@ static inline void null_vector(const z_matrix *b, lanes z, lanes best[3]) {
   }
 }
 
+/* Whether the five rays agree on which side of the epipole they lie: e x f1 and E f0 are normals of the
+   same epipolar plane, and point the same way for all matches that are in front of both cameras, or
+   for none (O. Chum, T. Werner, J. Matas, "Epipolar geometry estimation via RANSAC benefits from the
+   oriented epipolar constraint", ICPR 2004). Matches within some 0.01 rad of an epipole do not count. */
+static inline lane_mask same_side(const lanes f[10][3], const lanes E[9]) {
+  lanes e[3] = {{0}, {0}, {0}}, best_sq = {0};
+  lane_mask some_positive = {0}, some_negative = {0};
+  int k, i;
+  for (k = 0; k < 3; ++k) { /* the left null vector: the longest cross product of two columns */
+    const int a = k, c = (k + 1) % 3;
+    lanes cross[3], sq;
+    lane_mask longer;
+    cross[0] = E[3 + a] * E[6 + c] - E[6 + a] * E[3 + c];
+    cross[1] = E[6 + a] * E[c] - E[a] * E[6 + c];
+    cross[2] = E[a] * E[3 + c] - E[3 + a] * E[c];
+    sq = (cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2];
+    longer = sq > best_sq;
+    best_sq = lanes_select(longer, sq, best_sq);
+    for (i = 0; i < 3; ++i) e[i] = lanes_select(longer, cross[i], e[i]);
+  }
+  for (k = 0; k < 5; ++k) {
+    const lanes *f0 = f[2 * k], *f1 = f[2 * k + 1];
+    lanes value = {0}, sq0 = {0}, sq1 = {0};
+    lane_mask clear;
+    for (i = 0; i < 3; ++i) {
+      const int a = (i + 1) % 3, c = (i + 2) % 3;
+      const lanes normal = (E[3 * i] * f0[0] + E[3 * i + 1] * f0[1]) + E[3 * i + 2] * f0[2];
+      value += (e[a] * f1[c] - e[c] * f1[a]) * normal;
+      sq0 += f0[i] * f0[i];
+      sq1 += f1[i] * f1[i];
+    }
+    clear = value * value > (0.5e-8 * best_sq) * (sq0 * sq1);
+    some_positive |= clear & (value > 0.0);
+    some_negative |= clear & (value < 0.0);
+  }
+  return ~(some_positive & some_negative);
+}
+
 /* Lanes first .. first + TVK_LANES - 1 of the kernel. */
 static void solve_lanes(const double *rays, int first, double *essentials, int32_t *counts) {
   lanes f[10][3], constraints[5][9], basis[4][9], rows[10][20], polynomial[11];
@@ -482,6 +520,7 @@ static void solve_lanes(const double *rays, int first, double *essentials, int32
   for (r = 0; r < brackets.most; ++r) {
     const lanes z = roots_in(polynomial, brackets.low[r], brackets.high[r]);
     lanes xy1[3], entries[9], sum = {0}, scale;
+    lane_mask keep;
     null_vector(&b, z, xy1);
     for (i = 0; i < 9; ++i) {
       entries[i] = (xy1[0] * basis[0][i] + xy1[1] * basis[1][i]) +
@@ -490,9 +529,10 @@ static void solve_lanes(const double *rays, int first, double *essentials, int32
     }
     scale = 1.0 / lanes_sqrt(sum);
     for (i = 0; i < 9; ++i) entries[i] *= scale;
+    keep = (sum > 0.0) & (sum < 1e300) & same_side((const lanes(*)[3])f, entries);
     for (l = 0; l < TVK_LANES; ++l) {
       double *out = essentials + 9 * (10 * (first + l) + counts[first + l]);
-      if (r >= brackets.num[l] || !(sum[l] > 0) || !(sum[l] < 1e300)) continue;
+      if (r >= brackets.num[l] || !keep[l]) continue;
       for (i = 0; i < 9; ++i) out[i] = entries[i][l];
       ++counts[first + l];
     }

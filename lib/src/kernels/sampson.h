@@ -239,11 +239,11 @@ static inline int32_t score_general(const float *const *f, int32_t begin, const 
   return sum_of_costs(q);
 }
 
-static int64_t sampson_score(const float *const *arrays, int32_t num_blocks, int32_t on_plane,
-                             const float *m, float inverse_sq, int64_t bound) {
+static int64_t sampson_score(const float *const *arrays, int32_t first_block, int32_t num_blocks,
+                             int32_t on_plane, const float *m, float inverse_sq) {
   int64_t sum = 0;
   int32_t block;
-  for (block = 0; block < num_blocks && sum <= bound; ++block) {
+  for (block = first_block; block < first_block + num_blocks; ++block) {
     const int32_t begin = block * TVK_SCORE_BLOCK;
     sum += on_plane ? score_on_plane(arrays, begin, m, inverse_sq)
                     : score_general(arrays, begin, m, inverse_sq);

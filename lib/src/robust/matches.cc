@@ -212,7 +212,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   matches->area_px = problem.calibrated
                          ? static_cast<double>(second.width) * second.height
                          : box_area(problem.pixels[1], matches->order, matches->num_unique);
-  finish_rays(matches->pairs);
+  finish_rays(matches->pairs, matches->num_unique);
 }
 
 }  // namespace tv
