@@ -2,6 +2,7 @@
 #ifndef TWOVIEW_TWOVIEW_H
 #define TWOVIEW_TWOVIEW_H
 
+#include "twoview/bundle.h"
 #include "twoview/camera.h"
 #include "twoview/context.h"
 #include "twoview/feature.h"

@@ -4,6 +4,7 @@
 
 #include "feature/corners.h"
 #include "match/match.h"
+#include "robust/bundle.h"
 #include "robust/two_view.h"
 #include "twoview/reconstruct.h"
 
@@ -25,7 +26,8 @@ size_t reconstruct_result_bytes(const tv_limits& limits) {
 
 size_t scratch_bytes(const tv_limits& limits) {
   const size_t stage = std::max({extract_scratch_bytes(limits), match_bytes(limits.max_keypoints),
-                                 two_view_scratch_bytes(limits.max_matches)});
+                                 two_view_scratch_bytes(limits.max_matches),
+                                 bundle_scratch_bytes(limits.max_matches)});
   return reconstruct_result_bytes(limits) + stage;
 }
 

@@ -15,6 +15,7 @@ bool is_stride(int64_t stride_bytes, int32_t width) {
 
 constexpr float kMaxKeypointSize = 512.0f;
 constexpr float kMaxCoordinate = 1e5f;
+constexpr double kRotationTolerance = 1e-6;
 
 }  // namespace
 
@@ -74,6 +75,27 @@ tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {
     }
   }
   return TV_OK;
+}
+
+bool all_finite(const double* values, int num_values) {
+  for (int i = 0; i < num_values; ++i) {
+    if (!is_finite(values[i])) return false;
+  }
+  return true;
+}
+
+bool is_rotation(const double R[9]) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) {
+      const double* a = R + 3 * i;
+      const double* b = R + 3 * j;
+      const double product = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+      if (!(std::fabs(product - (i == j ? 1.0 : 0.0)) <= kRotationTolerance)) return false;
+    }
+  }
+  const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
+                     R[2] * (R[3] * R[7] - R[4] * R[6]);
+  return det > 0.0;
 }
 
 }  // namespace tv

@@ -25,6 +25,11 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
 // Finite, of a positive size.
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);
 
+bool all_finite(const double* values, int num_values);
+
+// R R' = I to 1e-6 and det R > 0.
+bool is_rotation(const double R[9]);
+
 // Whether two arrays share a byte.
 inline bool overlap(const void* a, size_t a_bytes, const void* b, size_t b_bytes) {
   const uintptr_t a0 = reinterpret_cast<uintptr_t>(a), b0 = reinterpret_cast<uintptr_t>(b);
