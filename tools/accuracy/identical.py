@@ -286,7 +286,9 @@ def compare_source(arguments, sets, library, systems, source):
                        "peer)", summaries)
     counting = {title[s.name]: chosen[s.name] for s in systems if s.counts}
     poselib = next((title[s.name] for s in systems if s.module == "poselib"), None)
-    verdicts, compared = judge(ours, counting, poselib, arguments.resamples) if counting else ([], {})
+    verdicts, compared = [], {}
+    if counting:
+        verdicts, compared = judge(ours, counting, poselib, arguments.resamples)
     if compared:
         say(f"\n{OURS} minus each peer at its best, mean over sets: AUC5, AUC10, AUC20")
         for name, c in compared.items():

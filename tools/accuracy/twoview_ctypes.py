@@ -239,6 +239,32 @@ class Context:
                           ctypes.byref(count))
         return found[:count.value]
 
+    def match_guided(self, camera0, camera1, epipolar, features0, features1, options=None):
+        """Array of dtype CORRESPONDENCE; features are (keypoints, descriptors), as extract gives
+        them, epipolar E, or F with no cameras."""
+        wanted = self.library._init_struct("tv_guided_options", options)
+        epipolar = np.ascontiguousarray(epipolar, np.float64)
+        sides = []
+        for keypoints, descriptors in (features0, features1):
+            keypoints = np.ascontiguousarray(keypoints, KEYPOINT)
+            descriptors = np.ascontiguousarray(descriptors, np.uint8)
+            sides.append((keypoints, descriptors))
+        capacity = min(len(keypoints) for keypoints, _ in sides)
+        found = np.zeros(max(capacity, 1), CORRESPONDENCE)
+        count = ctypes.c_int32()
+        self.library.call(
+            "tv_match_guided", self._pointer,
+            ctypes.byref(camera0) if camera0 is not None else None,
+            ctypes.byref(camera1) if camera1 is not None else None,
+            ctypes.c_void_p(epipolar.ctypes.data),
+            *(argument for keypoints, descriptors in sides
+              for argument in (ctypes.c_void_p(keypoints.ctypes.data),
+                               ctypes.c_void_p(descriptors.ctypes.data),
+                               ctypes.c_int32(len(keypoints)))),
+            ctypes.byref(wanted), ctypes.c_void_p(found.ctypes.data), ctypes.c_int32(capacity),
+            ctypes.byref(count))
+        return found[:count.value]
+
     def estimate_two_view(self, camera0, camera1, pixels0, pixels1, ratios=None, options=None):
         """(tv_two_view, inlier mask as bools); pixels as the images have them (distorted)."""
         wanted = self.library.estimate_options(options)

@@ -12,6 +12,7 @@ size_t scratch_bytes(const tv_limits& limits);
 
 // The parts of it that a single stage takes.
 size_t extract_scratch_bytes(const tv_limits& limits);
+size_t guided_scratch_bytes(const tv_limits& limits);
 size_t reconstruct_result_bytes(const tv_limits& limits);
 
 }  // namespace tv

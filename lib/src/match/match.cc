@@ -9,26 +9,6 @@ namespace {
 
 constexpr int32_t kFar = INT32_MAX;
 
-// One side's descriptors as the kernels want them.
-struct Side {
-  int16_t* rows;
-  int32_t* norms;
-};
-
-Side prepare(const tvk_table& kernels, const uint8_t* descriptors, int32_t count, Arena& arena) {
-  const size_t n = static_cast<size_t>(count);
-  Side side{arena_alloc<int16_t>(arena, n * TV_DESCRIPTOR_BYTES), arena_alloc<int32_t>(arena, n)};
-  for (int32_t k = 0; k < count; ++k) {
-    int16_t* row = side.rows + static_cast<int64_t>(k) * TV_DESCRIPTOR_BYTES;
-    kernels.widen(descriptors + static_cast<int64_t>(k) * TV_DESCRIPTOR_BYTES, TV_DESCRIPTOR_BYTES,
-                  row);
-    int32_t norm = 0;
-    for (int32_t i = 0; i < TV_DESCRIPTOR_BYTES; ++i) norm += row[i] * row[i];
-    side.norms[k] = norm;
-  }
-  return side;
-}
-
 struct Nearest {
   int32_t best, second, idx;
 };
@@ -60,11 +40,31 @@ float distance_ratio(int32_t best, int32_t second) {
 
 }  // namespace
 
+size_t descriptor_rows_bytes(int32_t count) {
+  const size_t n = static_cast<size_t>(count);
+  return arena_bytes<int16_t>(n * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(n);
+}
+
+DescriptorRows prepare_descriptors(const tvk_table& kernels, const uint8_t* descriptors,
+                                   int32_t count, Arena& arena) {
+  const size_t n = static_cast<size_t>(count);
+  DescriptorRows side{arena_alloc<int16_t>(arena, n * TV_DESCRIPTOR_BYTES),
+                      arena_alloc<int32_t>(arena, n)};
+  for (int32_t k = 0; k < count; ++k) {
+    int16_t* row = side.rows + static_cast<int64_t>(k) * TV_DESCRIPTOR_BYTES;
+    kernels.widen(descriptors + static_cast<int64_t>(k) * TV_DESCRIPTOR_BYTES, TV_DESCRIPTOR_BYTES,
+                  row);
+    int32_t norm = 0;
+    for (int32_t i = 0; i < TV_DESCRIPTOR_BYTES; ++i) norm += row[i] * row[i];
+    side.norms[k] = norm;
+  }
+  return side;
+}
+
 size_t match_bytes(int32_t max_keypoints) {
   const size_t n = static_cast<size_t>(max_keypoints);
-  return 2 * (arena_bytes<int16_t>(n * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(n)) +
-         3 * arena_bytes<int32_t>(n) + arena_bytes<Nearest>(n) +
-         arena_bytes<tv_correspondence>(n);
+  return 2 * descriptor_rows_bytes(max_keypoints) + 3 * arena_bytes<int32_t>(n) +
+         arena_bytes<Nearest>(n) + arena_bytes<tv_correspondence>(n);
 }
 
 int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0, int32_t num0,
@@ -72,8 +72,8 @@ int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0,
                           tv_correspondence* correspondences) {
   if (num0 == 0 || num1 == 0) return 0;
   ArenaScope scope(arena);
-  const Side side0 = prepare(kernels, descriptors0, num0, arena);
-  const Side side1 = prepare(kernels, descriptors1, num1, arena);
+  const DescriptorRows side0 = prepare_descriptors(kernels, descriptors0, num0, arena);
+  const DescriptorRows side1 = prepare_descriptors(kernels, descriptors1, num1, arena);
   const size_t columns = static_cast<size_t>(num1);
   int32_t dist[kBlock];
   int32_t* best = arena_alloc<int32_t>(arena, columns);

@@ -1,0 +1,131 @@
+// The boundary of guided matching: validate, turn keypoints into rays, call.
+#include "api/scratch.h"
+#include "api/validate.h"
+#include "geometry/camera.h"
+#include "match/guided.h"
+
+namespace tv {
+namespace {
+
+constexpr tv_guided_options kDefaults = {sizeof(tv_guided_options), 4.0f, 0.87f, 180.0f, 4.0f};
+
+bool in_range(float value, float lowest, float largest) {
+  return value >= lowest && value <= largest;
+}
+
+tv_status read_guided_options(const tv_guided_options* options, tv_guided_options* checked) {
+  *checked = kDefaults;
+  if (options == nullptr) return TV_OK;
+  if (options->struct_size != sizeof(tv_guided_options)) return TV_ERR_STRUCT_SIZE;
+  *checked = *options;
+  const bool valid = in_range(checked->max_error_px, 0.01f, 1000.0f) && checked->ratio > 0.0f &&
+                     checked->ratio <= 1.0f && checked->max_distance > 0.0f &&
+                     checked->max_distance <= 3000.0f &&
+                     in_range(checked->neighbourhood_px, 0.0f, 1000.0f);
+  return valid ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+size_t rays_bytes(int32_t max_keypoints) {
+  const size_t n = static_cast<size_t>(max_keypoints);
+  return arena_bytes<double>(3 * n) + arena_bytes<double>(6 * n) + arena_bytes<uint8_t>(n);
+}
+
+// camera may be null: the ray of a pixel is then (x, y, 1).
+GuidedView make_view(const tv_camera* camera, const tv_keypoint* keypoints,
+                     const uint8_t* descriptors, int32_t num, Arena& arena) {
+  const size_t n = static_cast<size_t>(num);
+  double* rays = arena_alloc<double>(arena, 3 * n);
+  double* slopes = arena_alloc<double>(arena, 6 * n);
+  uint8_t* valid = arena_alloc<uint8_t>(arena, n);
+  const Camera prepared = camera != nullptr ? prepare_camera(*camera) : Camera{};
+  for (size_t k = 0; k < n; ++k) {
+    const Vec2 pixel(keypoints[k].x, keypoints[k].y);
+    Vec3 ray(pixel[0], pixel[1], 1);
+    Mat32 slope;
+    slope << 1, 0, 0, 1, 0, 0;
+    valid[k] = camera == nullptr || unproject(prepared, pixel, &ray, &slope);
+    for (int i = 0; i < 3; ++i) rays[3 * k + i] = ray[i];
+    for (int i = 0; i < 6; ++i) slopes[6 * k + i] = slope(i / 2, i % 2);
+  }
+  return GuidedView{keypoints, descriptors, rays, slopes, valid, num};
+}
+
+struct KeypointSet {
+  const tv_keypoint* keypoints;
+  const uint8_t* descriptors;
+  int32_t num;
+};
+
+tv_status check_set(const tv_context& context, const KeypointSet& set, const void* out,
+                    size_t out_bytes) {
+  if (set.num < 0) return TV_ERR_ARGUMENT;
+  if (set.num > context.limits.max_keypoints) return TV_ERR_LIMITS;
+  if (set.num > 0 && (set.keypoints == nullptr || set.descriptors == nullptr)) return TV_ERR_NULL;
+  const size_t n = static_cast<size_t>(set.num);
+  if (overlap(out, out_bytes, set.keypoints, n * sizeof(tv_keypoint)) ||
+      overlap(out, out_bytes, set.descriptors, n * TV_DESCRIPTOR_BYTES)) {
+    return TV_ERR_OVERLAP;
+  }
+  return check_keypoints(set.keypoints, set.num);
+}
+
+}  // namespace
+
+size_t guided_scratch_bytes(const tv_limits& limits) {
+  return 2 * rays_bytes(limits.max_keypoints) + guided_bytes(limits.max_keypoints) +
+         arena_bytes<tv_correspondence>(static_cast<size_t>(limits.max_keypoints));
+}
+
+}  // namespace tv
+
+void tv_guided_options_init(tv_guided_options* options) {
+  if (options != nullptr) *options = tv::kDefaults;
+}
+
+tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const tv_camera* camera1,
+                          const double epipolar[9], const tv_keypoint* keypoints0,
+                          const uint8_t* descriptors0, int32_t num0, const tv_keypoint* keypoints1,
+                          const uint8_t* descriptors1, int32_t num1,
+                          const tv_guided_options* options, tv_correspondence* correspondences,
+                          int32_t cap_correspondences, int32_t* num_correspondences) {
+  if (context == nullptr || epipolar == nullptr || num_correspondences == nullptr ||
+      (correspondences == nullptr && cap_correspondences > 0)) {
+    return TV_ERR_NULL;
+  }
+  tv_guided_options checked;
+  tv_status status = tv::read_guided_options(options, &checked);
+  if (status != TV_OK) return status;
+  if (cap_correspondences < 0 || (camera0 == nullptr) != (camera1 == nullptr)) {
+    return TV_ERR_ARGUMENT;
+  }
+  for (int k = 0; k < 9; ++k) {
+    if (!tv::is_finite(epipolar[k])) return TV_ERR_NOT_FINITE;
+  }
+  if (camera0 != nullptr) {
+    status = tv_camera_check(camera0);
+    if (status == TV_OK) status = tv_camera_check(camera1);
+    if (status != TV_OK) return status;
+  }
+  const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);
+  const tv::KeypointSet sets[2] = {{keypoints0, descriptors0, num0},
+                                   {keypoints1, descriptors1, num1}};
+  for (const tv::KeypointSet& set : sets) {
+    status = tv::check_set(*context, set, correspondences, out_bytes);
+    if (status != TV_OK) return status;
+  }
+  tv::StageTimer timer(context, TV_STAGE_MATCH);
+  tv::ArenaScope scope(context->arena);
+  const int32_t most = num0 < num1 ? num0 : num1;
+  tv_correspondence* found =
+      tv::arena_alloc<tv_correspondence>(context->arena, static_cast<size_t>(most));
+  const tv::GuidedView view0 =
+      tv::make_view(camera0, keypoints0, descriptors0, num0, context->arena);
+  const tv::GuidedView view1 =
+      tv::make_view(camera1, keypoints1, descriptors1, num1, context->arena);
+  const int32_t count = tv::match_guided(*context->kernels, view0, view1, epipolar, checked,
+                                         context->arena, found);
+  *num_correspondences = count;
+  if (count > cap_correspondences) return TV_ERR_CAPACITY;
+  for (int32_t k = 0; k < count; ++k) correspondences[k] = found[k];
+  return TV_OK;
+}
