@@ -348,14 +348,28 @@ static void case_sampson_squares(trial *t) {
   REPEAT(t, t->set->sampson_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
 }
 
-static void case_sampson_sums(trial *t) {
+static void case_transfer_squares(trial *t) {
+  const match_arrays a = take_matches(t);
+  double *squares = OUTPUT(t, double, a.count);
+  REPEAT(t, t->set->transfer_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
+}
+
+typedef void sums_kernel(const double *const *, const int32_t *, int32_t, int32_t, int32_t,
+                         const double *, double, int32_t, double *);
+
+static void check_sums(trial *t, sums_kernel *kernel, int32_t num_sums) {
   const match_arrays a = take_matches(t);
   const int32_t cauchy = random_int(&t->seed, 0, 1);
-  double *sums = OUTPUT(t, double, TVK_SAMPSON_SUMS * TVK_WIDTH);
+  double *sums = OUTPUT(t, double, num_sums * TVK_WIDTH);
   int32_t k;
-  for (k = 0; k < TVK_SAMPSON_SUMS * TVK_WIDTH; ++k) sums[k] = k / TVK_WIDTH == 55;
-  REPEAT(t, t->set->sampson_sums(a.read, a.indices, a.first, a.count, a.on_plane, a.m, 1.0, cauchy,
-                                 sums));
+  for (k = 0; k < num_sums * TVK_WIDTH; ++k) sums[k] = k / TVK_WIDTH == num_sums - 1;
+  REPEAT(t, kernel(a.read, a.indices, a.first, a.count, a.on_plane, a.m, 1.0, cauchy, sums));
+}
+
+static void case_sampson_sums(trial *t) { check_sums(t, t->set->sampson_sums, TVK_SAMPSON_SUMS); }
+
+static void case_transfer_sums(trial *t) {
+  check_sums(t, t->set->transfer_sums, TVK_TRANSFER_SUMS);
 }
 
 static void case_sampson_score(trial *t) {

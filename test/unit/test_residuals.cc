@@ -163,6 +163,10 @@ void test_squares_of_many_are_those_of_each(void) {
     for (int k = 0; k < 101; ++k) {
       TEST_ASSERT_TRUE(squares[k] == tv::sampson_sq(matches.pairs, 3 + k, E));
     }
+    tv::transfer_squares(matches.pairs, 3, 101, pair.R, squares);
+    for (int k = 0; k < 101; ++k) {
+      TEST_ASSERT_TRUE(squares[k] == tv::transfer_residual(matches.pairs, 3 + k, pair.R).r_sq);
+    }
     const int32_t listed[5] = {7, 7, 150, 0, 12};
     tv::sampson_squares(matches.pairs, listed, 5, E, squares);
     for (int k = 0; k < 5; ++k) {

@@ -13,7 +13,6 @@ constexpr double kInfinity = __builtin_inf();
 // A model is given up after this many blocks, or twice, four times as many, when it does badly.
 constexpr int kFirstBlocks = 2;
 
-constexpr double kLargestQ = 1e300, kLogLargestQ = 690.8;  // beyond it, no slope
 
 size_t padded(int max_matches) {
   return (static_cast<size_t>(max_matches) + kScoreBlock - 1) / kScoreBlock * kScoreBlock;
@@ -43,16 +42,6 @@ inline void epipolar(const RayPairs& p, int i, const Mat3& M, Epipolar* e) {
                p.jacobian[1][4 + k][i] * e->line1[2];
   }
   e->n = (e->s0[0] * e->s0[0] + e->s0[1] * e->s0[1]) + (e->s1[0] * e->s1[0] + e->s1[1] * e->s1[1]);
-}
-
-// (value, weight) of the loss at q = r^2 / scale^2; weight = d value / d q.
-inline double robust(Loss kind, double q, double* weight) {
-  if (kind == Loss::kTruncated) {
-    *weight = q < 1 ? 1.0 : 0.0;
-    return q < 1 ? q : 1.0;
-  }
-  *weight = 1 / (1 + q);
-  return log(1 + q);
 }
 
 // A model's entries, row by row.
@@ -325,46 +314,55 @@ TransferResidual transfer_residual(const RayPairs& pairs, int i, const Mat3& H) 
   return {r_sq >= 0 ? r_sq : kInfinity, t.d[0] * t.d[0] + t.d[1] * t.d[1]};
 }
 
+void transfer_squares(const RayPairs& pairs, int first, int count, const Mat3& H, double* squares) {
+  pairs.kernels->transfer_squares(arrays_of(pairs).p, nullptr, first, count, pairs.on_plane,
+                                  entries_of(H).m, squares);
+}
+
+void transfer_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& H,
+                      double* squares) {
+  pairs.kernels->transfer_squares(arrays_of(pairs).p, indices, 0, count, pairs.on_plane,
+                                  entries_of(H).m, squares);
+}
+
 // The lanes of one of the kernel's sums, in a fixed order.
 inline double over_lanes(const double* x) {
   return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
 }
 
-// Sums over M's nine entries; returns the loss. The logarithms of Cauchy's loss are those of
-// products of few enough factors, each at most 1 + TVK_SAMPSON_LARGEST.
-double sampson_sums(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
-                    const RobustLoss& loss, double upper[45], double gradient[9]) {
+using SumsKernel = void (*)(const double* const*, const int32_t*, int32_t, int32_t, int32_t,
+                            const double*, double, int32_t, double*);
+
+// What the kernel adds up, lanes together; returns the loss. The logarithms of Cauchy's loss are
+// those of products of few enough factors, each at most 1 + TVK_LARGEST_LOSS.
+template <int kSums>
+double add_up(SumsKernel kernel, const RayPairs& pairs, const int32_t* indices, int count,
+              const Mat3& M, const RobustLoss& loss, double* totals) {
   constexpr int kFactors = 64;
   const Arrays arrays = arrays_of(pairs);
   const Entries entries = entries_of(M);
   const double inverse_sq = 1 / (loss.scale_px * loss.scale_px);
   const bool cauchy = loss.kind == Loss::kCauchy;
-  double sums[TVK_SAMPSON_SUMS][TVK_WIDTH] = {};
-  double* products = sums[TVK_SAMPSON_SUMS - 1];
+  double sums[kSums][TVK_WIDTH] = {};
+  double* products = sums[kSums - 1];
   double cost = 0;
   for (int first = 0; first < count; first += TVK_WIDTH * kFactors) {
     const int some = count - first < TVK_WIDTH * kFactors ? count - first : TVK_WIDTH * kFactors;
     for (int l = 0; l < TVK_WIDTH; ++l) products[l] = 1;
-    pairs.kernels->sampson_sums(arrays.p, indices ? indices + first : nullptr, first, some,
-                                pairs.on_plane, entries.m, inverse_sq, cauchy, sums[0]);
+    kernel(arrays.p, indices ? indices + first : nullptr, first, some, pairs.on_plane, entries.m,
+           inverse_sq, cauchy, sums[0]);
     for (int l = 0; l < TVK_WIDTH && cauchy; ++l) cost += log(products[l]);
   }
-  for (int k = 0; k < 45; ++k) upper[k] = over_lanes(sums[k]);
-  for (int k = 0; k < 9; ++k) gradient[k] = over_lanes(sums[45 + k]);
-  return cauchy ? cost : over_lanes(sums[54]);
+  for (int k = 0; k < kSums - 2; ++k) totals[k] = over_lanes(sums[k]);
+  return cauchy ? cost : over_lanes(sums[kSums - 2]);
 }
 
+// Normal equations of the matrix's entries, to those of parameters with d matrix / dparameter p =
+// columns[p].
 template <int P>
-double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                const Mat3& M, const Mat3 columns[P], const RobustLoss& loss,
-                                double upper[P * (P + 1) / 2], double gradient[P]) {
-  double packed[45], slope[9], full[9][9];
-  const double cost = sampson_sums(pairs, indices, count, M, loss, packed, slope);
+void project(const double full[9][9], const double slope[9], const Mat3 columns[P],
+             double upper[P * (P + 1) / 2], double gradient[P]) {
   int slot = 0;
-  for (int i = 0; i < 9; ++i) {
-    for (int j = i; j < 9; ++j) full[i][j] = full[j][i] = packed[slot++];
-  }
-  slot = 0;
   for (int p = 0; p < P; ++p) {
     double product[9];
     gradient[p] = 0;
@@ -379,6 +377,20 @@ double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, i
       upper[slot++] = sum;
     }
   }
+}
+
+template <int P>
+double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                const Mat3& M, const Mat3 columns[P], const RobustLoss& loss,
+                                double upper[P * (P + 1) / 2], double gradient[P]) {
+  double totals[TVK_SAMPSON_SUMS - 2], full[9][9];
+  const double cost = add_up<TVK_SAMPSON_SUMS>(pairs.kernels->sampson_sums, pairs, indices, count,
+                                               M, loss, totals);
+  int slot = 0;
+  for (int i = 0; i < 9; ++i) {
+    for (int j = i; j < 9; ++j) full[i][j] = full[j][i] = totals[slot++];
+  }
+  project<P>(full, totals + 45, columns, upper, gradient);
   return cost;
 }
 
@@ -391,43 +403,23 @@ template <int P>
 double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
                                  const Mat3& H, const Mat3* columns, const RobustLoss& loss,
                                  double upper[P * (P + 1) / 2], double gradient[P]) {
-  for (int k = 0; k < P * (P + 1) / 2; ++k) upper[k] = 0;
-  for (int p = 0; p < P; ++p) gradient[p] = 0;
-  const double inverse_sq = 1 / (loss.scale_px * loss.scale_px);
-  double cost = 0;
-  for (int k = 0; k < count; ++k) {
-    const int i = indices ? indices[k] : k;
-    Transfer t;
-    const bool valid = transfer(pairs, i, H, &t);
-    const double q = valid ? weighted_sq(t) * inverse_sq : kInfinity;
-    if (!(q >= 0 && q < kLargestQ)) {
-      cost += loss.kind == Loss::kTruncated ? 1.0 : kLogLargestQ;
-      continue;
+  static constexpr int kPlace[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  double totals[TVK_TRANSFER_SUMS - 2], full[9][9];
+  const double cost = add_up<TVK_TRANSFER_SUMS>(pairs.kernels->transfer_sums, pairs, indices, count,
+                                                H, loss, totals);
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j < 9; ++j) {
+      full[i][j] = totals[6 * kPlace[i / 3][j / 3] + kPlace[i % 3][j % 3]];
     }
-    double weight;
-    cost += robust(loss.kind, q, &weight);
-    if (weight == 0) continue;
-    double row[2][P];
-    for (int r = 0; r < 2; ++r) {
-      for (int p = 0; p < P; ++p) {
-        if (columns == nullptr) {
-          row[r][p] = t.slope[r][p / 3] * t.f0[p % 3];
-        } else {
-          const Vec3 moved = columns[p] * Vec3(t.f0[0], t.f0[1], t.f0[2]);
-          row[r][p] = (t.slope[r][0] * moved[0] + t.slope[r][1] * moved[1]) +
-                      t.slope[r][2] * moved[2];
-        }
-      }
-    }
-    const double w00 = weight * t.weight[0], w01 = weight * t.weight[1],
-                 w11 = weight * t.weight[2];
-    int slot = 0;
-    for (int p = 0; p < P; ++p) {
-      const double first = w00 * row[0][p] + w01 * row[1][p];
-      const double second = w01 * row[0][p] + w11 * row[1][p];
-      gradient[p] += first * t.d[0] + second * t.d[1];
-      for (int r = p; r < P; ++r) upper[slot++] += first * row[0][r] + second * row[1][r];
-    }
+  }
+  if (columns != nullptr) {
+    project<P>(full, totals + 36, columns, upper, gradient);
+    return cost;
+  }
+  int slot = 0;
+  for (int p = 0; p < P; ++p) {
+    gradient[p] = totals[36 + p];
+    for (int r = p; r < P; ++r) upper[slot++] = full[p][r];
   }
   return cost;
 }

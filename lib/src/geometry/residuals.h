@@ -78,6 +78,11 @@ struct TransferResidual {
 };
 TransferResidual transfer_residual(const RayPairs& pairs, int i, const Mat3& H);
 
+// r_sq alone of the matches first .. first + count - 1, or of those listed.
+void transfer_squares(const RayPairs& pairs, int first, int count, const Mat3& H, double* squares);
+void transfer_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& H,
+                      double* squares);
+
 enum class Loss { kTruncated, kCauchy };
 
 struct RobustLoss {

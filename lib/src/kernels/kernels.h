@@ -23,9 +23,10 @@ extern "C" {
 #define TVK_WIDTH 8                  /* lanes of the kernels on doubles */
 #define TVK_SCORE_BLOCK 32           /* matches */
 #define TVK_SCORE_ONE 65536          /* what a match outside the threshold costs */
-#define TVK_SAMPSON_LARGEST 16384.0  /* r^2 / scale^2 beyond which Cauchy's loss is level */
+#define TVK_LARGEST_LOSS 16384.0     /* r^2 / scale^2 beyond which Cauchy's loss is level */
 #define TVK_RELPOSE_MODELS 10         /* most essential matrices of a sample of five */
 #define TVK_SAMPSON_SUMS 56          /* numbers that sampson_sums adds up */
+#define TVK_TRANSFER_SUMS 47         /* of transfer_sums */
 
 /* fast_score_row: rows[0..6] are the image rows y-3..y+3. Writes for each x in [0, width) the largest
      threshold at which (x, y) is a corner with `arc` (9..12) contiguous brighter or darker circle
@@ -55,9 +56,13 @@ extern "C" {
    row-major 3x2); on_plane: the rays end in 1 and the slopes' last rows are zero, and are not read;
    m: a model matrix, row-major; matches indices[0 .. count), or first, first + 1, .. where null:
    sampson_squares: squares[k] = r^2 of Sampson's distance, infinite where that is no number.
+   transfer_squares: the same of the transfer residual of a homography.
    sampson_sums: to sums[TVK_WIDTH n + k % TVK_WIDTH] adds match k's part of sum n: with slopes g of r by
      m's entries and the loss's weight w, upper triangle of w g g' (45, row by row), w g r (9), the
-     truncated loss (r^2 / scale^2 or 1); the last is a product, of Cauchy's 1 + r^2 / scale^2.
+     truncated loss (r^2 / scale^2 or 1); the last is a product, of Cauchy's 1 + r^2 / scale^2. Of the
+     two losses the one that is asked for is added.
+   transfer_sums: the same of the transfer residual; in place of w g g' the 36 products of the upper
+     triangles of w S' W S and f0 f0', S = d d / d (H f0), W the residual's weight.
    sampson_score: arrays in single precision, on the plane x0 y0 x1 y1 and the upper triangles of J J'
      (3 and 3), else all 18: the sum over blocks first_block .. first_block + num_blocks - 1 of
      min(r^2 / T^2, 1) TVK_SCORE_ONE, each truncated to an integer.
@@ -97,7 +102,13 @@ extern "C" {
   X(sampson_squares, void,                                                                         \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
      int32_t on_plane, const double *m, double *squares))                                          \
+  X(transfer_squares, void,                                                                        \
+    (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
+     int32_t on_plane, const double *m, double *squares))                                          \
   X(sampson_sums, void,                                                                            \
+    (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
+     int32_t on_plane, const double *m, double inverse_sq, int32_t cauchy, double *sums))          \
+  X(transfer_sums, void,                                                                           \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
      int32_t on_plane, const double *m, double inverse_sq, int32_t cauchy, double *sums))          \
   X(sampson_score, int64_t,                                                                        \

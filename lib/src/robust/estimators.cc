@@ -12,7 +12,7 @@ namespace {
 
 // Local optimisation looks this many thresholds far, so that matches can come in.
 constexpr double kNear = 3;
-constexpr int kLocalIterations = 10;
+constexpr int kLocalIterations = 5;
 
 inline int64_t quantised(double q) {
   return q < 1 ? static_cast<int64_t>(q * kCostOne) : kCostOne;
@@ -202,13 +202,19 @@ template struct FundamentalEstimator<7>;
 template struct FundamentalEstimator<8>;
 
 int64_t TransferEstimator::cost(const Mat3& H, int64_t bound, int* num_inliers) const {
+  constexpr int kChunk = 64;
   const double inverse_sq = 1 / (threshold_px * threshold_px);
+  double squares[kChunk];
   int64_t sum = 0;
   int inliers = 0;
-  for (int k = 0; k < num_subset && sum <= bound; ++k) {
-    const double q = transfer_residual(pairs, subset[k], H).r_sq * inverse_sq;
-    inliers += q <= 1;
-    sum += quantised(q);
+  for (int first = 0; first < num_subset && sum <= bound; first += kChunk) {
+    const int some = num_subset - first < kChunk ? num_subset - first : kChunk;
+    transfer_squares(pairs, subset + first, some, H, squares);
+    for (int k = 0; k < some; ++k) {
+      const double q = squares[k] * inverse_sq;
+      inliers += q <= 1;
+      sum += quantised(q);
+    }
   }
   if (num_inliers != nullptr) *num_inliers = inliers;
   return sum;
