@@ -57,7 +57,11 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
   int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(taken));
   PoseEstimator estimator{part.pairs, threshold_px, indices};
   Sampler sampler = make_sampler(seed, taken, PoseEstimator::kSampleSize, false);
-  const LoopOptions options{kConfidence, 5, kMostSamples, 0, 0};
+  // A model with fewer of them than asked for below need not be found.
+  const double fewest = std::max<double>(kFewestInliers, kSecondShare * num_first * taken / left);
+  const int most = samples_needed(kConfidence, static_cast<int>(fewest), taken,
+                                  PoseEstimator::kSampleSize, kMostSamples);
+  const LoopOptions options{kConfidence, 5, most, 0, 0};
   const LoopResult<Pose> result = robust_loop(estimator, sampler, options);
   if (!result.found || result.num_inliers < kFewestInliers) return second;
   const double of_all = static_cast<double>(result.num_inliers) * left / taken;
