@@ -196,6 +196,51 @@ void test_information_of_gravity_is_added_to_that_of_the_points(void) {
   }
 }
 
+// The minimum of the sum of both squared distances, by its gradient.
+void test_a_pose_with_a_covariance_moves_to_where_both_agree_best(void) {
+  using Vector5 = Eigen::Matrix<double, 5, 1>;
+  using Matrix5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
+  tv::Random random = tv::random_seeded(27);
+  for (int trial = 0; trial < 300; ++trial) {
+    const Pose pose = any_pose(&random);
+    const Vec3 down0 = scene::direction(&random);
+    // A small disagreement: to first order all is linear.
+    const Vec3 down1 = tv::rotation_about(scene::direction(&random), 1e-4) * (pose.R * down0);
+    GravityPrior prior = tv::gravity_prior(down0.data(), down1.data(), kSigma);
+    prior.weight = uniform(&random, 0.1, 1);
+    Matrix5 C;
+    for (int k = 0; k < 25; ++k) C(k / 5, k % 5) = kSigma * uniform(&random, -1, 1);
+    C = (C * C.transpose() + 1e-2 * kSigma * kSigma * Matrix5::Identity()).eval();
+    double covariance[25], expected[25];
+    for (int k = 0; k < 25; ++k) covariance[k] = expected[k] = C(k / 5, k % 5);
+    Pose moved = pose;
+    tv::add_gravity(prior, &moved, covariance);
+    // The step taken, in the parameters of the pose it started from.
+    const Mat3 turn = moved.R * pose.R.transpose();
+    Vec3 b1, b2, c1, c2;
+    tv::tangent_basis(pose.t, &b1, &b2);
+    tv::tangent_basis(moved.t, &c1, &c2);
+    Vector5 step;
+    step << 0.5 * (turn(2, 1) - turn(1, 2)), 0.5 * (turn(0, 2) - turn(2, 0)),
+        0.5 * (turn(1, 0) - turn(0, 1)), moved.t.dot(b1), moved.t.dot(b2);
+    const Rows rows = rows_at(prior, moved.R, 1, 1);
+    Vector5 gradient = C.inverse() * step;
+    const double size = gradient.norm();
+    for (int p = 0; p < 5; ++p) gradient[p] += rows.gradient[p];
+    TEST_ASSERT_TRUE(gradient.norm() < 1e-3 * size);
+    // The covariance is that of the sum, in the new basis.
+    tv::add_gravity_information(prior, pose.R, expected);
+    Matrix5 basis = Matrix5::Identity();
+    basis.block<2, 2>(3, 3) << c1.dot(b1), c1.dot(b2), c2.dot(b1), c2.dot(b2);
+    for (int k = 0; k < 25; ++k) C(k / 5, k % 5) = expected[k];
+    const Matrix5 turned = basis * C * basis.transpose();
+    for (int k = 0; k < 25; ++k) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12 * C.trace(), turned(k / 5, k % 5), covariance[k]);
+      TEST_ASSERT_EQUAL_DOUBLE(covariance[k], covariance[5 * (k % 5) + k / 5]);
+    }
+  }
+}
+
 void test_a_prior_that_is_not_known_changes_nothing(void) {
   constexpr int kNum = 40;
   static double memory[40000];
@@ -243,6 +288,7 @@ int main(void) {
   RUN_TEST(test_gravity_that_agrees_has_its_full_weight);
   RUN_TEST(test_gravity_that_disagrees_pulls_less_the_farther_it_is);
   RUN_TEST(test_information_of_gravity_is_added_to_that_of_the_points);
+  RUN_TEST(test_a_pose_with_a_covariance_moves_to_where_both_agree_best);
   RUN_TEST(test_a_prior_that_is_not_known_changes_nothing);
   return UNITY_END();
 }

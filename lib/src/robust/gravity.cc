@@ -39,10 +39,49 @@ TangentRows tangent_rows(const Vec3& h, const double covariance[25]) {
   return rows;
 }
 
+// h - down1 in h's tangent plane, stretched to its own length.
+void tangent_residual(const GravityPrior& prior, const Mat3& R, const TangentRows& rows,
+                      double e[2]) {
+  const double chord = (R * prior.down[0] - prior.down[1]).norm();
+  for (int i = 0; i < 2; ++i) e[i] = -rows.b[i].dot(prior.down[1]);
+  const double length = std::sqrt(e[0] * e[0] + e[1] * e[1]);
+  if (length > 0) {
+    e[0] *= chord / length;
+    e[1] *= chord / length;
+  } else {
+    e[0] = chord;  // 0, or opposite
+  }
+}
+
 // (S + variance I)^-1, symmetric: a, b; b, c.
 struct Inverse2 {
   double a, b, c;
 };
+
+// The covariance in the tangent basis of another t: the basis may turn far where t moves little.
+void turn_tangent_basis(const Vec3& old_t, const Vec3& t, double covariance[25]) {
+  Vec3 from[2], to[2];
+  tangent_basis(old_t, &from[0], &from[1]);
+  tangent_basis(t, &to[0], &to[1]);
+  const double turn[2][2] = {{to[0].dot(from[0]), to[0].dot(from[1])},
+                             {to[1].dot(from[0]), to[1].dot(from[1])}};
+  for (int i = 0; i < 5; ++i) {  // C T'
+    double* row = covariance + 5 * i;
+    const double a = row[3], b = row[4];
+    row[3] = turn[0][0] * a + turn[0][1] * b;
+    row[4] = turn[1][0] * a + turn[1][1] * b;
+  }
+  for (int i = 0; i < 5; ++i) {  // T C
+    const double a = covariance[15 + i], b = covariance[20 + i];
+    covariance[15 + i] = turn[0][0] * a + turn[0][1] * b;
+    covariance[20 + i] = turn[1][0] * a + turn[1][1] * b;
+  }
+  covariance[23] = covariance[19];
+  for (int i = 0; i < 3; ++i) {
+    covariance[15 + i] = covariance[5 * i + 3];
+    covariance[20 + i] = covariance[5 * i + 4];
+  }
+}
 
 Inverse2 inverse_sum(const TangentRows& rows, double variance) {
   const double a = rows.S[0] + variance, b = rows.S[1], c = rows.S[2] + variance;
@@ -91,22 +130,16 @@ double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_
   return weight * (h - prior.down[1]).squaredNorm() / (scale_px * scale_px);
 }
 
-double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]) {
-  const Vec3 h = R * prior.down[0];
-  const TangentRows rows = tangent_rows(h, covariance);
-  // The residual in h's tangent plane, stretched to the chord's length.
-  const double chord = (h - prior.down[1]).norm();
-  double e[2] = {-rows.b[0].dot(prior.down[1]), -rows.b[1].dot(prior.down[1])};
-  const double length = std::sqrt(e[0] * e[0] + e[1] * e[1]);
-  if (length > 0) {
-    e[0] *= chord / length;
-    e[1] *= chord / length;
-  } else {
-    e[0] = chord;  // 0, or opposite
-  }
+double gravity_distance_sq(const GravityPrior& prior, const Mat3& R, const double covariance[25]) {
+  const TangentRows rows = tangent_rows(R * prior.down[0], covariance);
+  double e[2];
+  tangent_residual(prior, R, rows, e);
   const Inverse2 inverse = inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad);
-  const double z_sq = (inverse.a * e[0] * e[0] + 2 * inverse.b * e[0] * e[1]) +
-                      inverse.c * e[1] * e[1];
+  return (inverse.a * e[0] * e[0] + 2 * inverse.b * e[0] * e[1]) + inverse.c * e[1] * e[1];
+}
+
+double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]) {
+  const double z_sq = gravity_distance_sq(prior, R, covariance);
   if (!(z_sq > kAgreementSq)) return 1;
   const double ratio = kAgreementSq / z_sq;
   return ratio * ratio;
@@ -126,6 +159,20 @@ void add_gravity_information(const GravityPrior& prior, const Mat3& R, double co
       covariance[5 * c + r] = covariance[5 * r + c];
     }
   }
+}
+
+void add_gravity(const GravityPrior& prior, Pose* pose, double covariance[25]) {
+  const TangentRows rows = tangent_rows(pose->R * prior.down[0], covariance);
+  const Inverse2 inverse =
+      inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad / prior.weight);
+  double e[2], step[5];
+  tangent_residual(prior, pose->R, rows, e);
+  const double u = inverse.a * e[0] + inverse.b * e[1], v = inverse.b * e[0] + inverse.c * e[1];
+  for (int p = 0; p < 5; ++p) step[p] = -(rows.across[0][p] * u + rows.across[1][p] * v);
+  add_gravity_information(prior, pose->R, covariance);
+  const Vec3 old_t = pose->t;
+  *pose = PoseModel{*pose}.stepped(step).pose;
+  turn_tangent_basis(old_t, pose->t, covariance);
 }
 
 double GravityPoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
