@@ -33,7 +33,8 @@ typedef struct tv_bundle_result {
   uint32_t struct_size; /* set by tv_bundle_result_init */
   int32_t num_points;   /* that took part */
   int32_t num_iterations;
-  uint8_t converged;      /* 1: the last step changed the cost by less than 1e-10 of it */
+  uint8_t converged;      /* 1: the last step changed the cost by at most 1e-10 of it, or none,
+                             however short, lowers it */
   uint8_t has_covariance; /* 0: five parameters are not determined, or the pose was held */
   uint8_t reserved[2];
   double initial_cost, final_cost; /* sum of rho over the points that took part, px^2 */

@@ -311,9 +311,9 @@ void settle(const BundleProblem& problem, const BundleFrame& frame, const Vec2& 
 }
 
 // The point's direction from its pixel in image 0, its distance where that ray comes nearest to the
-// other. False where this says nothing.
-bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, const Vec2& pixel0,
-                const Vec2& pixel1, BundleMatch* match) {
+// other; or `far`, at infinity between the two rays. False where this says nothing.
+bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far,
+                const Vec2& pixel0, const Vec2& pixel1, BundleMatch* match) {
   Vec3 ray0, ray1;
   if (!unproject(problem.camera[0], pixel0, &ray0, nullptr) ||
       !unproject(problem.camera[1], pixel1, &ray1, nullptr)) {
@@ -322,7 +322,18 @@ bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, const Ve
   BundlePoint point{{ray0[0], ray0[1], ray0[2]}, 0.0};
   double turned[3];
   rotate(frame.R, point.direction, turned);
-  // |rho (turned) + ... |: with n = turned x ray1, 1 / rho = (ray1 x t).n / n.n.
+  if (far) {
+    double back[3];
+    for (int i = 0; i < 3; ++i) back[i] = turned[i] + ray1[i];
+    for (int i = 0; i < 3; ++i) {
+      point.direction[i] = (frame.R(0, i) * back[0] + frame.R(1, i) * back[1]) +
+                           frame.R(2, i) * back[2];
+    }
+    const double length = length3(point.direction);
+    for (double& x : point.direction) x /= length;
+    return length > 0.0 && linearise(problem.camera, frame, point, pixel0, pixel1, match);
+  }
+  // With u the ray in camera 1's frame and n = u x ray1: rho = n.n / ((ray1 x t).n).
   const Vec3 u(turned[0], turned[1], turned[2]);
   const Vec3 n = u.cross(ray1), m = ray1.cross(frame.t);
   const double across = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
@@ -347,10 +358,10 @@ bool try_point(const BundleProblem& problem, const BundleFrame& old_frame,
   if (seen && after <= (careful ? before : kGrowth * before + kGrowthSq)) return true;
   BundleMatch other;
   bool found = seen;
-  for (int from = 0; from < 2; ++from) {
+  for (int from = 0; from < 3; ++from) {
     const bool starts =
         from == 0 ? linearise(problem.camera, frame, match.point, pixel0, pixel1, &other)
-                  : begin_anew(problem, frame, pixel0, pixel1, &other);
+                  : begin_anew(problem, frame, from == 2, pixel0, pixel1, &other);
     if (!starts) continue;
     settle(problem, frame, pixel0, pixel1, &other);
     if (!found || error_sq(other) < error_sq(*out)) *out = other;
@@ -433,39 +444,40 @@ void minimise(Adjustment& adjustment, BundleFrame* frame, Sums* sums, BundleOutc
       careful = damping > kHonestDamping;
       newton = false;
     }
-    out->converged = small;
-    if (small || damping > kMaxDamping) break;
+    // No step lowers the cost, however short: a minimum, too, as far as doubles go.
+    out->converged = small || damping > kMaxDamping;
+    if (out->converged) break;
   }
 }
 
-// Huber, "Robust statistics" (1981), section 7.6: the covariance of an M-estimate is
-//     (sum psi^2 / (n - 5)) / (sum psi' / n)^2 (sum a a')^-1,
-// psi = rho' r; for least squares, the usual one.
-void measure_covariance(const Adjustment& adjustment, const BundleFrame& frame,
+// The covariance of the minimum (P. Huber, "Robust statistics", 1981, 7.6, his third): with psi =
+// rho' r and p = 5 parameters,
+//     K^2 (sum psi^2 / (n - p)) / (sum psi' / n) H^-1,  H = sum psi' a a',
+//     K = 1 + p / n var(psi') / mean(psi')^2;
+// the usual sigma^2 (sum a a')^-1 for least squares. With psi' inside of H, the wrong matches, for
+// which it is about 0, tell nothing, wherever they lie.
+void measure_covariance(const Adjustment& adjustment, const BundleFrame& frame, const Sums& sums,
                         BundleOutcome* out) {
   const int n = adjustment.num;
-  if (n <= 5) return;
-  double upper[15] = {}, inverse[25];
-  double psi_sq = 0.0, slope = 0.0;
+  double inverse[25];
+  if (n <= 5 || !invert_symmetric5(sums.newton, inverse)) return;
+  double psi_sq = 0.0, slope = 0.0, slope_sq = 0.0;
   for (int k = 0; k < n; ++k) {
-    const Elimination e = eliminate(frame, adjustment.now[k]);
-    const double r_sq = e.r * e.r;
-    const LossAt loss = loss_at(adjustment.problem.options, r_sq);
-    psi_sq += loss.weight * loss.weight * r_sq;
-    slope += loss.weight + 2.0 * loss.bend * r_sq;
-    int slot = 0;
-    for (int i = 0; i < 5; ++i) {
-      for (int j = i; j < 5; ++j) upper[slot++] += e.a[i] * e.a[j];
-    }
+    const double r = eliminate(frame, adjustment.now[k]).r;
+    const LossAt loss = loss_at(adjustment.problem.options, r * r);
+    const double bent = loss.weight + 2.0 * loss.bend * (r * r);
+    psi_sq += loss.weight * loss.weight * (r * r);
+    slope += bent;
+    slope_sq += bent * bent;
   }
-  if (!(slope > 0.0) || !invert_symmetric5(upper, inverse)) return;
-  const double noise = std::sqrt(psi_sq / (n - 5)) * (n / slope);
-  const double variance = noise * noise;
+  if (!(slope > 0.0)) return;
+  const double K = 1.0 + 5.0 / n * (n * slope_sq / (slope * slope) - 1.0);
+  const double variance = K * K * (psi_sq / (n - 5)) * (n / slope);
   for (int i = 0; i < 25; ++i) {
     out->covariance[i] = variance * inverse[i];
     if (!is_finite(out->covariance[i])) return;
   }
-  out->noise_px = noise;
+  out->noise_px = std::sqrt(variance * (n / slope));
   out->has_covariance = true;
 }
 
@@ -689,7 +701,7 @@ void adjust_two_view(const BundleProblem& problem, const Pose& start, double bas
   minimise(adjustment, &frame, &sums, outcome);
   outcome->final_cost = sums.cost;
   outcome->final_sum_sq = sums.sum_sq;
-  if (problem.options.hold_pose == 0) measure_covariance(adjustment, frame, outcome);
+  if (problem.options.hold_pose == 0) measure_covariance(adjustment, frame, sums, outcome);
   for (int k = 0; k < adjustment.num; ++k) {
     write_point(frame, adjustment.now[k], baseline, &points[adjustment.index[k]]);
   }

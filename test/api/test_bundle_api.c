@@ -1,0 +1,313 @@
+/* tv_adjust_two_view and tv_point_covariances: what the header promises of statuses and outputs. */
+#include <math.h>
+#include <string.h>
+
+#include "support/api.h"
+
+#define NUM_POINTS 20
+
+static tv_camera camera0, camera1;
+static double R[9], t[3], start_R[9], start_t[3];
+static double pixels0[2 * NUM_POINTS], pixels1[2 * NUM_POINTS];
+static tv_point points[NUM_POINTS + 1], start[NUM_POINTS + 1];
+static tv_bundle_options options;
+static tv_bundle_result result, start_result;
+static double covariances[9 * NUM_POINTS + 1];
+static api_context a;
+
+/* Twenty points 2 to 5 ahead, seen from 2 apart; pixels rounded to halves, which is the noise. */
+void setUp(void) {
+  uint64_t seed = 1;
+  int i, k;
+  tv_limits limits;
+  memset(&camera0, 0, sizeof camera0);
+  camera0.model = TV_CAMERA_PINHOLE;
+  camera0.width = 640, camera0.height = 480;
+  camera0.fx = camera0.fy = 500, camera0.cx = 320, camera0.cy = 240;
+  camera1 = camera0;
+  for (i = 0; i < 9; ++i) R[i] = i % 4 == 0;
+  t[0] = -2, t[1] = 0, t[2] = 0.5;
+  memset(start, 0x5a, sizeof start);
+  for (i = 0; i < NUM_POINTS; ++i) {
+    const double z = 4 + 6 * random_unit(&seed);
+    const double X[3] = {z * (random_unit(&seed) - 0.3), z * (random_unit(&seed) - 0.5) * 0.8, z};
+    const double moved[3] = {X[0] + t[0], X[1], X[2] + t[2]};
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera0, X, pixels0 + 2 * i, NULL));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera1, moved, pixels1 + 2 * i, NULL));
+    for (k = 0; k < 2; ++k) {
+      pixels0[2 * i + k] = floor(2 * pixels0[2 * i + k]) / 2;
+      pixels1[2 * i + k] = floor(2 * pixels1[2 * i + k]) / 2;
+    }
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_triangulate(TV_TRIANGULATION_MIDPOINT, &camera0, &camera1, R, t,
+                                       pixels0, pixels1, NUM_POINTS, start));
+  memcpy(start_R, R, sizeof R);
+  memcpy(start_t, t, sizeof t);
+  memcpy(points, start, sizeof points);
+  tv_bundle_options_init(&options);
+  tv_bundle_result_init(&result);
+  start_result = result;
+  tv_limits_init(&limits);
+  limits.max_matches = NUM_POINTS;
+  a = api_make(&limits);
+}
+
+void tearDown(void) { api_release(&a); }
+
+static tv_status run(void) {
+  return tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1, NUM_POINTS, &options,
+                            R, t, points, &result);
+}
+
+static void expect_untouched(void) {
+  TEST_ASSERT_EQUAL_MEMORY(start_R, R, sizeof R);
+  TEST_ASSERT_EQUAL_MEMORY(start_t, t, sizeof t);
+  TEST_ASSERT_EQUAL_MEMORY(start, points, sizeof points);
+  TEST_ASSERT_EQUAL_MEMORY(&start_result, &result, sizeof result);
+}
+
+static void expect_refusal(tv_status expected) {
+  TEST_ASSERT_EQUAL_INT(expected, run());
+  expect_untouched();
+}
+
+static void test_adjusts_pose_and_points(void) {
+  int i;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run());
+  TEST_ASSERT_EQUAL_INT(NUM_POINTS, result.num_points);
+  TEST_ASSERT_TRUE(result.converged);
+  TEST_ASSERT_TRUE(result.final_cost < result.initial_cost);
+  TEST_ASSERT_TRUE(result.rms_px < result.initial_rms_px);
+  TEST_ASSERT_TRUE(result.has_covariance);
+  TEST_ASSERT_TRUE(result.noise_px > 0.05 && result.noise_px < 0.5);
+  TEST_ASSERT_TRUE(result.num_iterations > 0 && result.num_iterations <= 50);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.25, t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+  for (i = 0; i < NUM_POINTS; ++i) TEST_ASSERT_EQUAL_INT(TV_POINT_OK, points[i].status);
+  TEST_ASSERT_EQUAL_MEMORY(&start[NUM_POINTS], &points[NUM_POINTS], sizeof(tv_point));
+}
+
+static void test_defaults_and_no_result_are_fine(void) {
+  tv_point by_default[NUM_POINTS + 1];
+  TEST_ASSERT_EQUAL_INT(TV_OK, run());
+  memcpy(by_default, points, sizeof points);
+  memcpy(R, start_R, sizeof R), memcpy(t, start_t, sizeof t);
+  memcpy(points, start, sizeof points);
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1,
+                                           NUM_POINTS, NULL, R, t, points, NULL));
+  TEST_ASSERT_EQUAL_MEMORY(by_default, points, sizeof points);
+}
+
+static void test_no_iterations_only_measure(void) {
+  int i, k;
+  options.max_iterations = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run());
+  TEST_ASSERT_EQUAL_MEMORY(start_R, R, sizeof R);
+  TEST_ASSERT_EQUAL_MEMORY(start_t, t, sizeof t);
+  TEST_ASSERT_EQUAL_INT(0, result.num_iterations);
+  TEST_ASSERT_FALSE(result.converged);
+  TEST_ASSERT_EQUAL_DOUBLE(result.initial_cost, result.final_cost);
+  for (i = 0; i < NUM_POINTS; ++i) {
+    for (k = 0; k < 3; ++k) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, start[i].position[k], points[i].position[k]);
+    }
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f, start[i].error_px, points[i].error_px);
+    TEST_ASSERT_FLOAT_WITHIN(1e-2f, start[i].angle_rad, points[i].angle_rad);
+  }
+}
+
+static void test_no_points_are_fine(void) {
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(a.context, &camera0, &camera1, NULL, NULL, 0,
+                                                  NULL, R, t, NULL, &result));
+  TEST_ASSERT_EQUAL_INT(0, result.num_points);
+  TEST_ASSERT_EQUAL_DOUBLE(0, result.rms_px);
+  TEST_ASSERT_FALSE(result.has_covariance);
+  TEST_ASSERT_EQUAL_MEMORY(start_R, R, sizeof R);
+}
+
+static void test_null_pointers_are_refused(void) {
+  tv_context *c = a.context;
+  const int n = NUM_POINTS;
+  tv_bundle_options *o = &options;
+  tv_bundle_result *r = &result;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(NULL, &camera0, &camera1, pixels0, pixels1,
+                                                        n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, NULL, &camera1, pixels0, pixels1, n, o,
+                                                        R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, NULL, pixels0, pixels1, n, o,
+                                                        R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, NULL, pixels1, n, o,
+                                                        R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, NULL, n, o,
+                                                        R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
+                                                        o, NULL, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
+                                                        o, R, NULL, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
+                                                        o, R, t, NULL, r));
+  expect_untouched();
+  tv_bundle_options_init(NULL);
+  tv_bundle_result_init(NULL);
+}
+
+static void test_options_out_of_range_are_refused(void) {
+  const tv_bundle_options good = options;
+  options.struct_size = 0, expect_refusal(TV_ERR_STRUCT_SIZE), options = good;
+  options.loss = 3, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  options.loss = -1, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  options.loss_scale_px = 0, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  options.loss_scale_px = -1, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  options.loss_scale_px = 2e9, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  options.loss_scale_px = NAN, expect_refusal(TV_ERR_NOT_FINITE), options = good;
+  options.max_iterations = -1, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  options.max_iterations = 1001, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  options.hold_pose = 2, expect_refusal(TV_ERR_ARGUMENT), options = good;
+  result.struct_size = start_result.struct_size = 1;
+  expect_refusal(TV_ERR_STRUCT_SIZE);
+}
+
+static void test_poses_cameras_and_counts_are_checked(void) {
+  const tv_camera good = camera1;
+  R[0] = start_R[0] = 1 + 1e-5, expect_refusal(TV_ERR_ARGUMENT);
+  R[0] = start_R[0] = 1;
+  R[5] = start_R[5] = NAN, expect_refusal(TV_ERR_NOT_FINITE);
+  R[5] = start_R[5] = 0;
+  t[1] = start_t[1] = INFINITY, expect_refusal(TV_ERR_NOT_FINITE);
+  memset(t, 0, sizeof t), memset(start_t, 0, sizeof t), expect_refusal(TV_ERR_ARGUMENT);
+  t[0] = t[1] = t[2] = start_t[0] = start_t[1] = start_t[2] = 1.5e308;
+  expect_refusal(TV_ERR_ARGUMENT); /* its length is not a number */
+  t[0] = start_t[0] = -1e-300, t[1] = t[2] = start_t[1] = start_t[2] = 0;
+  camera1.fx = 0, expect_refusal(TV_ERR_CAMERA), camera1 = good;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1, -1,
+                                           &options, R, t, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS,
+                        tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1,
+                                           NUM_POINTS + 1, &options, R, t, points, &result));
+  expect_untouched();
+}
+
+static void test_outputs_may_not_overlap(void) {
+  tv_context *c = a.context;
+  double *inside = (double *)points;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_adjust_two_view(c, &camera0, &camera1, inside, pixels1, NUM_POINTS,
+                                           &options, R, t, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_adjust_two_view(c, &camera0, &camera1, pixels0, inside, NUM_POINTS,
+                                           &options, R, t, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, NUM_POINTS,
+                                           &options, R, R + 6, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_adjust_two_view(c, &camera0, &camera1, pixels0, R, 2, &options, R, t,
+                                           points, &result));
+  expect_untouched();
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5, points,
+                                             NUM_POINTS, (double *)points));
+  expect_untouched();
+}
+
+static void test_covariances_are_symmetric_grow_with_the_pose_and_scale_with_t(void) {
+  double with_pose[9 * NUM_POINTS], doubled[9 * NUM_POINTS], t2[3];
+  int i, k;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run());
+  covariances[9 * NUM_POINTS] = 77;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5, points,
+                                                    NUM_POINTS, covariances));
+  TEST_ASSERT_EQUAL_DOUBLE(77, covariances[9 * NUM_POINTS]);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t, result.covariance,
+                                                    0.5, points, NUM_POINTS, with_pose));
+  for (i = 0; i < NUM_POINTS; ++i) {
+    const double *C = covariances + 9 * i, *D = with_pose + 9 * i;
+    TEST_ASSERT_TRUE(C[0] > 0 && C[4] > 0 && C[8] > 0);
+    TEST_ASSERT_EQUAL_DOUBLE(C[1], C[3]);
+    TEST_ASSERT_EQUAL_DOUBLE(C[2], C[6]);
+    TEST_ASSERT_EQUAL_DOUBLE(C[5], C[7]);
+    TEST_ASSERT_TRUE(D[0] > C[0] && D[4] > C[4] && D[8] > C[8]);
+  }
+  for (k = 0; k < 3; ++k) t2[k] = 2 * t[k];
+  for (i = 0; i < NUM_POINTS; ++i) {
+    for (k = 0; k < 3; ++k) points[i].position[k] *= 2;
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t2, NULL, 0.5, points,
+                                                    NUM_POINTS, doubled));
+  for (k = 0; k < 9 * NUM_POINTS; ++k) {
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * fabs(doubled[k]) + 1e-15, 4 * covariances[k], doubled[k]);
+  }
+}
+
+static void test_points_that_are_not_ok_have_zero_covariance(void) {
+  const double zeros[9] = {0};
+  int i;
+  points[0].status = TV_POINT_BEHIND;
+  points[1].status = TV_POINT_INFINITE;
+  points[2].status = TV_POINT_INVALID;
+  points[3].position[0] = NAN;
+  points[4].position[2] = -1; /* behind the camera */
+  for (i = 0; i < 3; ++i) points[5].position[i] = (i == 0 ? 2 : i == 2 ? -0.5 : 0) * 3;
+  for (i = 0; i < 3; ++i) points[6].position[i] = 0;
+  for (i = 0; i < 3; ++i) points[7].position[i] *= 1e200;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5, points,
+                                                    NUM_POINTS, covariances));
+  for (i = 0; i < NUM_POINTS; ++i) {
+    const double *C = covariances + 9 * i;
+    TEST_ASSERT_TRUE(i < 8 ? memcmp(zeros, C, sizeof zeros) == 0 : C[0] > 0);
+  }
+}
+
+static void test_covariances_check_their_arguments(void) {
+  double pose[25] = {0}, untouched[9 * NUM_POINTS];
+  const int n = NUM_POINTS;
+  memset(covariances, 0x5a, sizeof covariances);
+  memcpy(untouched, covariances, sizeof untouched);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(NULL, &camera1, R, t, NULL, 1, points, n,
+                                                          covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, NULL, R, t, NULL, 1, points, n,
+                                                          covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, NULL, t, NULL, 1,
+                                                          points, n, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, NULL, NULL, 1,
+                                                          points, n, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, NULL,
+                                                          n, covariances));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, points, n, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, -1,
+                                                              points, n, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
+                                                              points, -1, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
+                        tv_point_covariances(&camera0, &camera1, R, t, NULL, NAN, points, n,
+                                             covariances));
+  pose[7] = INFINITY;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
+                        tv_point_covariances(&camera0, &camera1, R, t, pose, 1, points, n,
+                                             covariances));
+  R[0] = 2;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
+                                                              points, n, covariances));
+  R[0] = 1, camera0.fy = -1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
+                                                            points, n, covariances));
+  TEST_ASSERT_EQUAL_MEMORY(untouched, covariances, sizeof untouched);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_adjusts_pose_and_points);
+  RUN_TEST(test_defaults_and_no_result_are_fine);
+  RUN_TEST(test_no_iterations_only_measure);
+  RUN_TEST(test_no_points_are_fine);
+  RUN_TEST(test_null_pointers_are_refused);
+  RUN_TEST(test_options_out_of_range_are_refused);
+  RUN_TEST(test_poses_cameras_and_counts_are_checked);
+  RUN_TEST(test_outputs_may_not_overlap);
+  RUN_TEST(test_covariances_are_symmetric_grow_with_the_pose_and_scale_with_t);
+  RUN_TEST(test_points_that_are_not_ok_have_zero_covariance);
+  RUN_TEST(test_covariances_check_their_arguments);
+  return UNITY_END();
+}
