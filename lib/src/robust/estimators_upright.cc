@@ -4,7 +4,7 @@ namespace tv {
 namespace {
 
 // As PoseEstimator's.
-constexpr int kLocalIterations = 10;
+constexpr int kLocalIterations = 5;
 constexpr double kNear = 3;
 
 // Rounds with a wider threshold only bring the pose near.
