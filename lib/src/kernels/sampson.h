@@ -7,30 +7,54 @@ typedef struct sampson_block {
   lanes f0[3], f1[3], J0[6], J1[6];
 } sampson_block;
 
+static inline lanes gather_lanes(const double *array, const int32_t index[TVK_LANES]) {
+#if defined(TVK_AVX512)
+  return (lanes)_mm512_i32gather_pd(_mm256_loadu_si256((const __m256i *)index), array, 8);
+#elif defined(TVK_AVX2)
+  return (lanes){array[index[0]], array[index[1]], array[index[2]], array[index[3]]};
+#else
+  return (lanes){array[index[0]], array[index[1]]};
+#endif
+}
+
+/* index null: from the array's element `first` on. */
+static inline lanes load_lanes(const double *array, const int32_t *index, int32_t first) {
+  return index ? gather_lanes(array, index) : lanes_load(array + first);
+}
+
+static inline void load_arrays(const double *const *arrays, const int32_t *index, int32_t first,
+                               int on_plane, sampson_block *b) {
+  const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6; /* else ones and zeros */
+  int k;
+  for (k = 0; k < rays; ++k) {
+    b->f0[k] = load_lanes(arrays[k], index, first);
+    b->f1[k] = load_lanes(arrays[3 + k], index, first);
+  }
+  for (k = 0; k < slopes; ++k) {
+    b->J0[k] = load_lanes(arrays[6 + k], index, first);
+    b->J1[k] = load_lanes(arrays[12 + k], index, first);
+  }
+}
+
 /* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the other
    lanes. */
 static inline void load_block(const double *const *arrays, const int32_t *indices, int32_t first,
                               int32_t count, int on_plane, sampson_block *b) {
   int32_t index[TVK_LANES];
-  int a, l;
+  int l;
+  if (count == TVK_LANES) {
+    if (indices) {
+      load_arrays(arrays, indices, 0, on_plane, b);
+    } else {
+      load_arrays(arrays, NULL, first, on_plane, b);
+    }
+    return;
+  }
   for (l = 0; l < TVK_LANES; ++l) {
-    index[l] = l < count ? (indices ? indices[l] : first + l) : (indices ? indices[0] : first);
+    const int32_t k = l < count ? l : 0;
+    index[l] = indices ? indices[k] : first + k;
   }
-  for (a = 0; a < 18; ++a) {
-    lanes x = {0};
-    /* On the plane rays end in 1 and slopes in zeros. */
-    if (on_plane && (a == 2 || a == 5 || a == 10 || a == 11 || a == 16 || a == 17)) continue;
-    if (!indices && count == TVK_LANES) {
-      x = lanes_load(arrays[a] + first);
-    } else {
-      for (l = 0; l < TVK_LANES; ++l) x[l] = arrays[a][index[l]];
-    }
-    if (a < 6) {
-      (a < 3 ? b->f0 : b->f1)[a % 3] = x;
-    } else {
-      (a < 12 ? b->J0 : b->J1)[a % 6] = x;
-    }
-  }
+  load_arrays(arrays, index, 0, on_plane, b);
 }
 
 typedef struct epipolar_terms {
