@@ -242,6 +242,24 @@ static void test_scale_out_of_range_is_refused(void) {
   TEST_ASSERT_EQUAL_INT(1, scaled.height);
 }
 
+static void test_results_too_large_for_a_double_are_outside(void) {
+  tv_camera camera = barrel();
+  const double pixel[2] = {320, 180}, point[3] = {0.5, 0.5, 1}, *many = point;
+  double out[6], jacobian[6], pixels[2];
+  uint8_t inside[1];
+  memcpy(out, marks, sizeof out);
+  memcpy(jacobian, marks, sizeof jacobian);
+  camera.fx = 5e-324, camera.cx = 320;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OUTSIDE, tv_camera_unproject(&camera, pixel, out, jacobian));
+  camera.fx = 1.7e308;
+  camera.cx = 1.7e308;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OUTSIDE, tv_camera_project(&camera, point, out, jacobian));
+  assert_marks(out, 6);
+  assert_marks(jacobian, 6);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project_points(&camera, many, 1, pixels, inside));
+  TEST_ASSERT_TRUE(inside[0] == 0 && pixels[0] == 0 && pixels[1] == 0);
+}
+
 static void test_many_points_have_the_pixels_of_each_one(void) {
   const tv_camera cameras[2] = {ardrone2(), barrel()};
   const double points[5][3] = {{0.1, 0.2, 1}, {0, 0, -1}, {NAN, 0, 1}, {9, 0, 1}, {-0.3, 0.1, 2}};
@@ -321,6 +339,7 @@ int main(void) {
   RUN_TEST(test_valid_angle_of_each_model);
   RUN_TEST(test_scale_keeps_pixel_centres);
   RUN_TEST(test_scale_out_of_range_is_refused);
+  RUN_TEST(test_results_too_large_for_a_double_are_outside);
   RUN_TEST(test_many_points_have_the_pixels_of_each_one);
   RUN_TEST(test_many_points_refuse_what_one_refuses);
   RUN_TEST(test_every_number_has_its_name);

@@ -175,6 +175,7 @@ class Cameras(cli.CliTest):
                            "camera_matrix", "rows is not 3")
         self.refuse_camera(camera_yaml().replace("cols: 5", "cols: 4"), "distortion_coefficients has 5",
                            "rows x cols = 1 x 4")
+        self.refuse_camera(camera_yaml().replace("   data: [ 300", "   dat: [ 300"), "camera_matrix has no data")
         self.refuse_camera(camera_yaml().replace("cols: 5", "cols: many"), "cols", "not a number")
 
     def test_a_name_given_twice_is_refused_with_its_line(self):

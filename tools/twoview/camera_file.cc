@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "error.h"
-#include "image_file.h"
 #include "output.h"
 #include "yaml_values.h"
 

@@ -131,8 +131,9 @@ std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,
   const YAML::Node node = find(map, entry, file);
   YAML::Node list = node;
   if (node.IsMap()) {
-    list.reset(node["data"]);
-    if (!list) throw BadInput(file + ": " + entry + " has no data");
+    const YAML::Node data = node["data"];
+    if (!data) throw BadInput(file + ": " + entry + " has no data");
+    list.reset(data);
   }
   if (!list.IsSequence()) throw BadInput(file + ": " + entry + " is not a list of numbers");
   std::vector<double> values;

@@ -40,8 +40,8 @@ TV_API tv_status tv_camera_valid_angle(const tv_camera *camera, double *angle_ra
 
 /* Pixel of a point (or ray) in the camera frame (x right, y down, z forward).
    jacobian: null, or 2x3 row-major d pixel / d point.
-   Returns TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_OUTSIDE (behind the camera, or beyond the valid
-   angle). */
+   Returns TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_OUTSIDE (behind the camera, beyond the valid angle,
+   or a result that is too large for a double). */
 TV_API tv_status tv_camera_project(const tv_camera *camera, const double point[3], double pixel[2],
                                    double *jacobian);
 
