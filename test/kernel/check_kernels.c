@@ -348,6 +348,19 @@ static void case_sampson_squares(trial *t) {
   REPEAT(t, t->set->sampson_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
 }
 
+static void case_pose_squares(trial *t) {
+  const match_arrays a = take_matches(t);
+  const double *read[19];
+  double *angle = INPUT(t, double, a.n), *pose = INPUT(t, double, 21);
+  double *squares = OUTPUT(t, double, a.count);
+  int32_t k;
+  for (k = 0; k < 18; ++k) read[k] = a.read[k];
+  for (k = 0; k < a.n; ++k) angle[k] = 0.01 * random_unit(&t->seed);
+  for (k = 0; k < 21; ++k) pose[k] = 2 * random_unit(&t->seed) - 1;
+  read[18] = angle;
+  REPEAT(t, t->set->pose_squares(read, a.first, a.count, a.on_plane, pose, 1.5, squares));
+}
+
 static void case_transfer_squares(trial *t) {
   const match_arrays a = take_matches(t);
   double *squares = OUTPUT(t, double, a.count);

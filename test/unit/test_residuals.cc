@@ -163,6 +163,24 @@ void test_squares_of_many_are_those_of_each(void) {
     for (int k = 0; k < 101; ++k) {
       TEST_ASSERT_TRUE(squares[k] == tv::sampson_sq(matches.pairs, 3 + k, E));
     }
+    const tv::Pose poses[2] = {{pair.R, pair.t}, {pair.R, -pair.t}};
+    int behind[2] = {};
+    for (int p = 0; p < 2; ++p) {
+      tv::pose_squares(matches.pairs, 3, 101, poses[p], 1.5, squares);
+      for (int k = 0; k < 101; ++k) {
+        const int i = 3 + k;
+        const bool in_front =
+            tv::depth_vote(tv::depth_signs(poses[p], tv::ray_of(matches.pairs, 0, i),
+                                           tv::ray_of(matches.pairs, 1, i),
+                                           1.5 * matches.pairs.pixel_angle[i])) >= 0;
+        behind[p] += !in_front;
+        TEST_ASSERT_TRUE(
+            squares[k] ==
+            (in_front ? tv::sampson_sq(matches.pairs, i, tv::essential_from_pose(poses[p]))
+                      : INFINITY));
+      }
+    }
+    TEST_ASSERT_TRUE(behind[0] < 30 && behind[1] > 60);
     tv::transfer_squares(matches.pairs, 3, 101, pair.R, squares);
     for (int k = 0; k < 101; ++k) {
       TEST_ASSERT_TRUE(squares[k] == tv::transfer_residual(matches.pairs, 3 + k, pair.R).r_sq);

@@ -188,6 +188,22 @@ void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, c
                                  entries_of(M).m, squares);
 }
 
+void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose, double scale_px,
+                  double* squares) {
+  const Arrays rays = arrays_of(pairs);
+  const double* arrays[19];
+  for (int k = 0; k < 18; ++k) arrays[k] = rays.p[k];
+  arrays[18] = pairs.pixel_angle;
+  double entries[21];
+  const Mat3 E = essential_from_pose(pose);
+  for (int k = 0; k < 9; ++k) {
+    entries[k] = E(k / 3, k % 3);
+    entries[9 + k] = pose.R(k / 3, k % 3);
+  }
+  for (int k = 0; k < 3; ++k) entries[18 + k] = pose.t[k];
+  pairs.kernels->pose_squares(arrays, first, count, pairs.on_plane, entries, scale_px, squares);
+}
+
 namespace {
 
 // What the first `num` of all matches cost at most, 98 times in a hundred, when all cost `bound` and

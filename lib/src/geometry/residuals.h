@@ -12,6 +12,7 @@
 
 #include "base/arena.h"
 #include "geometry/camera.h"
+#include "geometry/essential.h"
 #include "kernels/kernels.h"
 
 namespace tv {
@@ -61,6 +62,11 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares);
 void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
                      double* squares);
+
+// The same of a pose, which is to have the matches in front of both cameras: +inf too for one that is
+// behind by more than scale_px pixels (depth_vote). Sees the matches first .. first + count - 1.
+void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose, double scale_px,
+                  double* squares);
 
 // Sum over the matches for scoring (pairs.num of them) of min(r^2 / T^2, 1), each truncated to a
 // multiple of 1/kCostOne: an integer, so that neither order nor vector width matters. Above `bound`

@@ -56,6 +56,8 @@ extern "C" {
    row-major 3x2); on_plane: the rays end in 1 and the slopes' last rows are zero, and are not read;
    m: a model matrix, row-major; matches indices[0 .. count), or first, first + 1, .. where null:
    sampson_squares: squares[k] = r^2 of Sampson's distance, infinite where that is no number.
+   pose_squares: the same of a pose's matrix E, R and t (21 numbers), infinite too where the match is
+     behind a camera by more than arrays[18][k] times scale (an angle; essential.h's depth_vote).
    transfer_squares: the same of the transfer residual of a homography.
    sampson_sums: to sums[TVK_WIDTH n + k % TVK_WIDTH] adds match k's part of sum n: with slopes g of r by
      m's entries and the loss's weight w, upper triangle of w g g' (45, row by row), w g r (9), the
@@ -102,6 +104,9 @@ extern "C" {
   X(sampson_squares, void,                                                                         \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
      int32_t on_plane, const double *m, double *squares))                                          \
+  X(pose_squares, void,                                                                            \
+    (const double *const *arrays, int32_t first, int32_t count, int32_t on_plane,                  \
+     const double *pose, double scale, double *squares))                                           \
   X(transfer_squares, void,                                                                        \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
      int32_t on_plane, const double *m, double *squares))                                          \

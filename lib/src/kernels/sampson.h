@@ -115,6 +115,63 @@ static void sampson_squares(const double *const *arrays, const int32_t *indices,
   }
 }
 
+/* Where a match is behind a camera by more than the angle that is allowed: geometry/essential.h's
+   depth_signs and depth_vote. */
+static inline lane_mask behind_of(const sampson_block *b, lanes angle, int on_plane,
+                                  const double R[9], const double t[3]) {
+  lanes a[3], aa, ff, af, at, ft, depth0, depth1, turn;
+  int r;
+  for (r = 0; r < 3; ++r) {
+    const lanes last = on_plane ? lanes_of(R[3 * r + 2]) : R[3 * r + 2] * b->f0[2];
+    a[r] = (R[3 * r] * b->f0[0] + R[3 * r + 1] * b->f0[1]) + last;
+  }
+  aa = (a[0] * a[0] + a[1] * a[1]) + a[2] * a[2];
+  at = (a[0] * t[0] + a[1] * t[1]) + a[2] * t[2];
+  if (on_plane) {
+    ff = (b->f1[0] * b->f1[0] + b->f1[1] * b->f1[1]) + 1.0;
+    af = (a[0] * b->f1[0] + a[1] * b->f1[1]) + a[2];
+    ft = (b->f1[0] * t[0] + b->f1[1] * t[1]) + t[2];
+  } else {
+    ff = (b->f1[0] * b->f1[0] + b->f1[1] * b->f1[1]) + b->f1[2] * b->f1[2];
+    af = (a[0] * b->f1[0] + a[1] * b->f1[1]) + a[2] * b->f1[2];
+    ft = (b->f1[0] * t[0] + b->f1[1] * t[1]) + b->f1[2] * t[2];
+  }
+  depth0 = af * ft - ff * at;
+  depth1 = aa * ft - af * at;
+  turn = angle * angle * aa * ff;
+  return ((depth0 < 0.0) & (depth0 * depth0 > turn * (ff - ft * ft))) |
+         ((depth1 < 0.0) & (depth1 * depth1 > turn * (aa - at * at)));
+}
+
+static inline void pose_squares_of(const double *const *arrays, int32_t first, int32_t count,
+                                   int on_plane, const double *pose, double scale,
+                                   double *squares) {
+  int32_t done;
+  for (done = 0; done < count; done += TVK_LANES) {
+    const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
+    sampson_block b;
+    epipolar_terms e;
+    lanes q, angle = {0};
+    int l;
+    load_block(arrays, NULL, first + done, left, on_plane, &b);
+    for (l = 0; l < left; ++l) angle[l] = arrays[18][first + done + l];
+    epipolar_of(&b, pose, on_plane, &e);
+    q = e.c * e.c / e.n;
+    q = lanes_select((q >= 0.0) & ~behind_of(&b, scale * angle, on_plane, pose + 9, pose + 18), q,
+                     lanes_of((double)INFINITY));
+    for (l = 0; l < left; ++l) squares[done + l] = q[l];
+  }
+}
+
+static void pose_squares(const double *const *arrays, int32_t first, int32_t count,
+                         int32_t on_plane, const double *pose, double scale, double *squares) {
+  if (on_plane) {
+    pose_squares_of(arrays, first, count, 1, pose, scale, squares);
+  } else {
+    pose_squares_of(arrays, first, count, 0, pose, scale, squares);
+  }
+}
+
 /* With P the left inverse of J1 that sends f1 to zero, and a = e_z on the plane, f1 on the sphere, the
    displacement is d = P h / (a . h), h = H f0. */
 typedef struct transfer_terms {

@@ -42,9 +42,17 @@ void for_each_square(const RayPairs& pairs, int count, const Mat3& M, Use use) {
   }
 }
 
-bool in_front(const RayPairs& pairs, int i, const Pose& pose, double threshold_px) {
-  return depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
-                                threshold_px * pairs.pixel_angle[i])) >= 0;
+// The same of a pose, r^2 infinite for a match that is behind by more than the threshold.
+template <typename Use>
+void for_each_square(const RayPairs& pairs, int count, const Pose& pose, double threshold_px,
+                     Use use) {
+  constexpr int kChunk = 64;
+  double squares[kChunk];
+  for (int first = 0; first < count; first += kChunk) {
+    const int some = count - first < kChunk ? count - first : kChunk;
+    pose_squares(pairs, first, some, pose, threshold_px, squares);
+    for (int k = 0; k < some; ++k) use(first + k, squares[k]);
+  }
 }
 
 }  // namespace
@@ -52,7 +60,9 @@ bool in_front(const RayPairs& pairs, int i, const Pose& pose, double threshold_p
 bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
                  double limit_px, double threshold_px, double* r_sq) {
   *r_sq = sampson_sq(pairs, i, E);
-  return *r_sq <= limit_px * limit_px && in_front(pairs, i, pose, threshold_px);
+  return *r_sq <= limit_px * limit_px &&
+         depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
+                                threshold_px * pairs.pixel_angle[i])) >= 0;
 }
 
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
@@ -69,8 +79,8 @@ int near_matches(const RayPairs& pairs, int count, const Pose& pose, double limi
                  double threshold_px, int32_t* indices) {
   const double limit_sq = limit_px * limit_px;
   int near = 0;
-  for_each_square(pairs, count, essential_from_pose(pose), [&](int i, double r_sq) {
-    if (r_sq <= limit_sq && in_front(pairs, i, pose, threshold_px)) indices[near++] = i;
+  for_each_square(pairs, count, pose, threshold_px, [&](int i, double r_sq) {
+    if (r_sq <= limit_sq) indices[near++] = i;
   });
   return near;
 }
@@ -140,9 +150,8 @@ int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {
   const double inverse_sq = 1 / (threshold_px * threshold_px);
   int64_t cost = 0;
   int inliers = 0;
-  for_each_square(pairs, pairs.num, essential_from_pose(model), [&](int i, double r_sq) {
-    const bool inlier =
-        r_sq <= threshold_px * threshold_px && in_front(pairs, i, model, threshold_px);
+  for_each_square(pairs, pairs.num, model, threshold_px, [&](int, double r_sq) {
+    const bool inlier = r_sq <= threshold_px * threshold_px;
     inliers += inlier;
     cost += inlier ? quantised(r_sq * inverse_sq) : kCostOne;
   });
