@@ -153,6 +153,11 @@ static void test_what_the_stages_refuse_is_refused(void) {
   refused(TV_ERR_ARGUMENT, &o.all);
   o.all.triangulation = -1;
   refused(TV_ERR_ARGUMENT, &o.all);
+  default_stages(&o);
+  o.all.guided_matching = 2;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  o.all.guided_matching = -1;
+  refused(TV_ERR_ARGUMENT, &o.all);
   views[1].mask = &mask;
   refused(TV_ERR_ARGUMENT, NULL);
   views[1].mask = NULL;
@@ -290,6 +295,78 @@ static void test_a_real_pair_has_the_same_bytes_with_every_kernel_set(void) {
   free(pair.luma[1]);
 }
 
+/* The place of a match among those of the result, or -1. */
+static int32_t place_of(const tv_correspondence *match) {
+  int32_t k;
+  for (k = 0; k < reconstruction.num_matches; ++k) {
+    const tv_correspondence *m = &reconstruction.matches[k];
+    if (m->idx0 == match->idx0 && m->idx1 == match->idx1) return k;
+  }
+  return -1;
+}
+
+static void check_one_to_one(void) {
+  const tv_reconstruction *r = &reconstruction;
+  uint8_t used[2048] = {0};
+  int32_t k, inliers = 0;
+  for (k = 0; k < r->num_matches; ++k) {
+    TEST_ASSERT_TRUE(k == 0 || r->matches[k].idx0 > r->matches[k - 1].idx0);
+    TEST_ASSERT_TRUE(r->matches[k].idx0 < r->num_keypoints[0]);
+    TEST_ASSERT_TRUE(r->matches[k].idx1 < r->num_keypoints[1]);
+    TEST_ASSERT_EQUAL_INT(0, used[r->matches[k].idx1]++);
+    inliers += r->inlier_mask[k];
+  }
+  TEST_ASSERT_EQUAL_INT(r->num_matches, two_view.num_matches);
+  TEST_ASSERT_EQUAL_INT(inliers, two_view.num_inliers);
+}
+
+static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
+  static tv_correspondence plain[2048];
+  static tv_two_view first, guided;
+  real_pair pair;
+  tv_limits limits;
+  tv_camera real_camera;
+  tv_reconstruct_options options;
+  api_context b;
+  int32_t num_plain, num_guided, k, v;
+  if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
+  limits = limits_of(pair.width, pair.height, 2048);
+  b = api_make(&limits);
+  real_camera = camera_of(pair.width, pair.height);
+  for (v = 0; v < 2; ++v) {
+    views[v].image = api_image(pair.luma[v], pair.width, pair.height, pair.width);
+    views[v].camera = &real_camera;
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
+  first = two_view;
+  num_plain = reconstruction.num_matches;
+  memcpy(plain, reconstruction.matches, (size_t)num_plain * sizeof plain[0]);
+  TEST_ASSERT_EQUAL_INT(1, first.has_t);
+  tv_reconstruct_options_init(&options);
+  options.guided_matching = 1;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              &reconstruction));
+  guided = two_view;
+  num_guided = reconstruction.num_matches;
+  TEST_ASSERT_TRUE(num_guided > num_plain + num_plain / 50);
+  TEST_ASSERT_TRUE(guided.num_inliers > first.num_inliers);
+  TEST_ASSERT_EQUAL_INT(first.config, guided.config);
+  TEST_ASSERT_EQUAL_INT(first.verdict, guided.verdict);
+  TEST_ASSERT_EQUAL_UINT32(first.reasons, guided.reasons);
+  for (k = 0; k < num_plain; ++k) TEST_ASSERT_TRUE(place_of(&plain[k]) >= 0);
+  check_one_to_one();
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view,
+                                              &reconstruction));
+  check_one_to_one();
+  TEST_ASSERT_EQUAL_INT(num_guided, reconstruction.num_matches);
+  for (k = 0; k < 9; ++k) {
+    TEST_ASSERT_EQUAL_MEMORY(&guided.R[k], &two_view.R[k % 3 * 3 + k / 3], sizeof(double));
+  }
+  api_release(&b);
+  free(pair.luma[0]);
+  free(pair.luma[1]);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_null_pointers_are_refused);
@@ -301,5 +378,6 @@ int main(void) {
   RUN_TEST(test_the_same_call_gives_the_same_bytes);
   RUN_TEST(test_a_full_call_uses_most_of_the_memory);
   RUN_TEST(test_a_real_pair_has_the_same_bytes_with_every_kernel_set);
+  RUN_TEST(test_guided_matching_adds_matches_and_keeps_the_verdict);
   return UNITY_END();
 }

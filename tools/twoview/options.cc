@@ -24,22 +24,10 @@ const Names kKernels = {"auto", "c", "sse2", "avx2", "avx512", "neon"};
 const Names kTriangulations = {
     "poly", "poly-abs", "linear-eigen", "linear-ls", "iterative-eigen", "iterative-ls", "midpoint"};
 
-// Values that the interface names and this version's library refuses.
-const Names kNotYet = {"poly", "poly-abs", "linear-eigen", "iterative-eigen"};
-
 struct Choice {
   int32_t* value;
   const Names* names;
-  bool all = true;  // false: without those of kNotYet
 };
-
-Names offered(const Choice& choice) {
-  Names names;
-  for (const std::string& name : *choice.names)
-    if (choice.all || std::find(kNotYet.begin(), kNotYet.end(), name) == kNotYet.end())
-      names.push_back(name);
-  return names;
-}
 
 // Three numbers, of any length but 0.
 struct Direction {
@@ -82,7 +70,7 @@ std::vector<Option> table(Options& o) {
        "diameter of a corner on level 0, pixels"},
       {"ratio", kMatch, &o.match.ratio, 0, 1, open_low,
        "nearest over second nearest distance, both directions"},
-      {"method", kEstimate, Choice{&e.method, &kMethods, false}, 0, 0, closed, "minimal solver"},
+      {"method", kEstimate, Choice{&e.method, &kMethods}, 0, 0, closed, "minimal solver"},
       {"max-error-px", kEstimate, &e.max_error_px, 0, 1e9, open_low,
        "inlier threshold, Sampson distance in pixels"},
       {"confidence", kEstimate, &e.confidence, 0, 1, open_high,
@@ -91,12 +79,14 @@ std::vector<Option> table(Options& o) {
       {"fixed-iterations", kEstimate, &e.fixed_iterations, 0, 1e6, closed,
        "exactly this many samples; 0: adaptive stop"},
       {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
+      {"guided-matching", kEstimate, &o.guided_matching, 0, 1, closed,
+       "1: match again along the epipolar lines, and estimate from all matches"},
       {"gravity0", kGravity, Direction{e.gravity0}, 0, 0, closed,
        "the direction of gravity (down) in the first camera's frame"},
       {"gravity1", kGravity, Direction{e.gravity1}, 0, 0, closed, "the same of the second"},
       {"gravity-sigma-deg", kGravity, &o.gravity_sigma_deg, 0, 180, closed,
        "standard deviation of each direction about each axis across it; 0: not known"},
-      {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations, false}, 0, 0, closed,
+      {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations}, 0, 0, closed,
        "method"},
       {"kernels", kCommon, Choice{&o.kernels, &kKernels}, 0, 0, closed, "kernel set"},
       {"resize", kCommon, &o.resize, 0, 16384, closed,
@@ -159,7 +149,7 @@ void set_direction(const std::string& flag, const Direction& direction, const st
 void set(const Option& option, const std::string& text) {
   const std::string flag = "--" + std::string(option.name);
   if (const Choice* choice = std::get_if<Choice>(&option.target)) {
-    const Names names = offered(*choice);
+    const Names& names = *choice->names;
     if (std::find(names.begin(), names.end(), text) == names.end()) {
       throw CLI::ValidationError(
           flag, "'" + text + "' is none of this version's " + joined(names, ", "));
@@ -271,7 +261,7 @@ void add_options(CLI::App& verb, Options& options, unsigned groups) {
         option.help);
     const Choice* choice = std::get_if<Choice>(&option.target);
     const bool is_direction = std::holds_alternative<Direction>(option.target);
-    flag->type_name(choice         ? joined(offered(*choice), "|")
+    flag->type_name(choice         ? joined(*choice->names, "|")
                     : is_direction ? "x,y,z"
                                    : range_text(option));
     if (!is_direction) flag->default_str(value_text(option));

@@ -23,6 +23,9 @@ typedef struct tv_reconstruct_options {
   const tv_feature_options *feature;
   const tv_match_options *match;
   const tv_estimate_options *estimate;
+  int32_t guided_matching; /* 1: after a first full pose, matches along its epipolar lines join the
+                              others (tv_match_guided with its defaults) and all are estimated again;
+                              default 0 */
 } tv_reconstruct_options;
 
 TV_API void tv_reconstruct_options_init(tv_reconstruct_options *options);
@@ -44,6 +47,9 @@ typedef struct tv_reconstruction {
 TV_API void tv_reconstruction_init(tv_reconstruction *reconstruction);
 
 /* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate.
+   With guided_matching the second estimate is taken where it is of the same kind with no fewer inliers
+   and no worse a verdict, but verdict and reasons stay the first one's: matches sought along its lines
+   are no independent evidence for it.
    options: null means the defaults. two_view: initialised by tv_two_view_init.
    Statuses as the stages'. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,

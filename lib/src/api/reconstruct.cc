@@ -18,6 +18,8 @@ struct Results {
   float* ratios;
   uint8_t* inlier_mask;
   tv_point* points;
+  tv_correspondence* more_matches;  // of guided matching, with what was found before
+  uint8_t* more_inlier_mask;
 };
 
 Results alloc_results(Arena& arena, int32_t max_keypoints) {
@@ -32,12 +34,14 @@ Results alloc_results(Arena& arena, int32_t max_keypoints) {
   r.ratios = arena_alloc<float>(arena, n);
   r.inlier_mask = arena_alloc<uint8_t>(arena, n);
   r.points = arena_alloc<tv_point>(arena, n);
+  r.more_matches = arena_alloc<tv_correspondence>(arena, n);
+  r.more_inlier_mask = arena_alloc<uint8_t>(arena, n);
   return r;
 }
 
-void gather_pixels(Results& r, int32_t num_matches) {
+void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_matches) {
   for (int32_t k = 0; k < num_matches; ++k) {
-    const tv_correspondence& m = r.matches[k];
+    const tv_correspondence& m = matches[k];
     const tv_keypoint& a = r.keypoints[0][m.idx0];
     const tv_keypoint& b = r.keypoints[1][m.idx1];
     r.pixels[0][2 * k] = a.x;
@@ -48,6 +52,66 @@ void gather_pixels(Results& r, int32_t num_matches) {
   }
 }
 
+// Leaves those of num_found matches that use no keypoint of the num_matches first ones, and puts the
+// latter between them, ascending in idx0. Returns how many there are now.
+int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Arena& arena,
+                     int32_t max_keypoints, tv_correspondence* found, int32_t num_found) {
+  ArenaScope scope(arena);
+  uint8_t* used = arena_alloc<uint8_t>(arena, 2 * static_cast<size_t>(max_keypoints));
+  std::memset(used, 0, 2 * static_cast<size_t>(max_keypoints));
+  for (int32_t k = 0; k < num_matches; ++k) {
+    used[2 * matches[k].idx0] = used[2 * matches[k].idx1 + 1] = 1;
+  }
+  int32_t num_new = 0;
+  for (int32_t k = 0; k < num_found; ++k) {
+    const tv_correspondence m = found[k];
+    if (used[2 * m.idx0] == 0 && used[2 * m.idx1 + 1] == 0) found[num_new++] = m;
+  }
+  int32_t a = num_matches - 1, b = num_new - 1;
+  for (int32_t k = num_matches + num_new - 1; a >= 0; --k) {  // from the end: in place
+    found[k] = b >= 0 && found[b].idx0 > matches[a].idx0 ? found[b--] : matches[a--];
+  }
+  return num_matches + num_new;
+}
+
+bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
+
+// Matches along the epipolar lines of `estimate`, and the estimate from all of them, where that is
+// no worse: *num_matches, the estimate and r's matches, pixels and mask are then of the second pass.
+tv_status match_along_lines(tv_context* context, const tv_view& view0, const tv_view& view1,
+                            const int32_t num_keypoints[2], const tv_estimate_options* options,
+                            Results& r, int32_t* num_matches, tv_two_view* estimate) {
+  const tv_limits& limits = context->limits;
+  int32_t count = 0;
+  tv_status status = tv_match_guided(
+      context, view0.camera, view1.camera, estimate->E, r.keypoints[0], r.descriptors[0],
+      num_keypoints[0], r.keypoints[1], r.descriptors[1], num_keypoints[1], nullptr,
+      r.more_matches, limits.max_keypoints, &count);
+  if (status != TV_OK) return status;
+  count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
+                       r.more_matches, count);
+  if (count == *num_matches || count > limits.max_matches) return TV_OK;
+  gather_pixels(r, r.more_matches, count);
+  tv_two_view again = *estimate;
+  status = tv_estimate_two_view(context, view0.camera, view1.camera, r.pixels[0], r.pixels[1],
+                                r.ratios, count, options, &again, r.more_inlier_mask);
+  if (status != TV_OK) return status;
+  const bool no_worse = is_full_pose(again) && again.config == estimate->config &&
+                        again.verdict >= estimate->verdict &&
+                        again.num_inliers >= estimate->num_inliers;
+  if (!no_worse) {
+    gather_pixels(r, r.matches, *num_matches);
+    return TV_OK;
+  }
+  again.verdict = estimate->verdict;
+  again.reasons = estimate->reasons;
+  *estimate = again;
+  *num_matches = count;
+  std::copy(r.more_matches, r.more_matches + count, r.matches);
+  std::copy(r.more_inlier_mask, r.more_inlier_mask + count, r.inlier_mask);
+  return TV_OK;
+}
+
 // Triangulates the inliers of a full pose; all other points are invalid. Returns how many are good.
 tv_status triangulate_inliers(tv_context* context, tv_triangulation method, const tv_view& view0,
                               const tv_view& view1, const tv_two_view& two_view,
@@ -55,7 +119,7 @@ tv_status triangulate_inliers(tv_context* context, tv_triangulation method, cons
   StageTimer timer(context, TV_STAGE_TRIANGULATE);
   *num_points = 0;
   if (num_matches == 0) return TV_OK;
-  const bool full_pose = two_view.has_R != 0 && two_view.has_t != 0;
+  const bool full_pose = is_full_pose(two_view);
   if (full_pose) {
     const tv_status status =
         tv_triangulate(method, view0.camera, view1.camera, two_view.R, two_view.t, r.pixels[0],
@@ -74,7 +138,7 @@ tv_status triangulate_inliers(tv_context* context, tv_triangulation method, cons
 
 constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
                                               TV_TRIANGULATION_ITERATIVE_LS, nullptr, nullptr,
-                                              nullptr};
+                                              nullptr, 0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                                    tv_reconstruct_options* checked) {
@@ -82,7 +146,9 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   if (options == nullptr) return TV_OK;
   if (options->struct_size != sizeof(tv_reconstruct_options)) return TV_ERR_STRUCT_SIZE;
   *checked = *options;
-  return is_triangulation_method(checked->triangulation) ? TV_OK : TV_ERR_ARGUMENT;
+  const bool valid = is_triangulation_method(checked->triangulation) &&
+                     (checked->guided_matching == 0 || checked->guided_matching == 1);
+  return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
 }  // namespace
@@ -125,12 +191,17 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   status = tv_match(context, r.descriptors[0], num_keypoints[0], r.descriptors[1],
                     num_keypoints[1], checked.match, r.matches, capacity, &num_matches);
   if (status != TV_OK) return status;
-  tv::gather_pixels(r, num_matches);
+  tv::gather_pixels(r, r.matches, num_matches);
   tv_two_view estimate = *two_view;
   status = tv_estimate_two_view(context, view0->camera, view1->camera, r.pixels[0], r.pixels[1],
                                 r.ratios, num_matches, checked.estimate, &estimate,
                                 r.inlier_mask);
   if (status != TV_OK) return status;
+  if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
+    status = tv::match_along_lines(context, *view0, *view1, num_keypoints, checked.estimate, r,
+                                   &num_matches, &estimate);
+    if (status != TV_OK) return status;
+  }
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),
                                    *view0, *view1, estimate, num_matches, r, &num_points);
   if (status != TV_OK) return status;

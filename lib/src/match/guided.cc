@@ -17,7 +17,7 @@ constexpr double kSlack = 1.0 + 1e-6;
 // A view with what the band test needs of each keypoint.
 struct Side {
   GuidedView view;
-  DescriptorRows descriptors;
+  DescriptorRows descriptors;  // of one side only: half the memory
   double* lines;           // 3 each: M ray0, or M' ray1, the epipolar line in the other view
   double* coordinates[3];  // of the rays, an array each, for the quick test; padded to kBlock
   double* line_norms;      // squared; padded
@@ -32,7 +32,7 @@ size_t padded(int32_t count) {
 }
 
 size_t side_bytes(int32_t count) {
-  return descriptor_rows_bytes(count) + arena_bytes<double>(3 * static_cast<size_t>(count)) +
+  return arena_bytes<double>(3 * static_cast<size_t>(count)) +
          5 * arena_bytes<double>(padded(count));
 }
 
@@ -48,11 +48,11 @@ double squared_gradient(const double* slopes, const double* line) {
   return sum;
 }
 
-Side make_side(const tvk_table& kernels, const GuidedView& view, const double* M, bool transposed,
-               Arena& arena) {
+Side make_side(const GuidedView& view, const DescriptorRows& descriptors, const double* M,
+               bool transposed, Arena& arena) {
   const size_t n = static_cast<size_t>(view.num), room = padded(view.num);
   Side side{view,
-            prepare_descriptors(kernels, view.descriptors, view.num, arena),
+            descriptors,
             arena_alloc<double>(arena, 3 * n),
             {arena_alloc<double>(arena, room), arena_alloc<double>(arena, room),
              arena_alloc<double>(arena, room)},
@@ -91,11 +91,16 @@ bool in_band(const Side& a, int32_t i, const Side& b, int32_t j, double band_sq)
 
 int32_t squared_distance(const tvk_table& kernels, const Side& a, int32_t i, const Side& b,
                          int32_t j) {
-  int32_t dist;
-  kernels.squared_distances(a.descriptors.rows + static_cast<int64_t>(i) * TV_DESCRIPTOR_BYTES,
-                            a.descriptors.norms[i],
-                            b.descriptors.rows + static_cast<int64_t>(j) * TV_DESCRIPTOR_BYTES,
-                            b.descriptors.norms + j, 1, &dist);
+  const bool wide_a = a.descriptors.rows != nullptr;
+  const Side &wide = wide_a ? a : b, &narrow = wide_a ? b : a;
+  const int64_t in_wide = wide_a ? i : j, in_narrow = wide_a ? j : i;
+  int16_t query[TV_DESCRIPTOR_BYTES];
+  kernels.widen(narrow.view.descriptors + in_narrow * TV_DESCRIPTOR_BYTES, TV_DESCRIPTOR_BYTES,
+                query);
+  int32_t norm = 0, dist;
+  for (int32_t k = 0; k < TV_DESCRIPTOR_BYTES; ++k) norm += query[k] * query[k];
+  kernels.squared_distances(query, norm, wide.descriptors.rows + in_wide * TV_DESCRIPTOR_BYTES,
+                            wide.descriptors.norms + in_wide, 1, &dist);
   return dist;
 }
 
@@ -198,7 +203,8 @@ float distance_ratio(int32_t best, double rival) {
 
 size_t guided_bytes(int32_t max_keypoints) {
   const size_t n = static_cast<size_t>(max_keypoints);
-  return 2 * (side_bytes(max_keypoints) + arena_bytes<Nearest>(n)) + arena_bytes<Row>(n);
+  return descriptor_rows_bytes(max_keypoints) + 2 * side_bytes(max_keypoints) +
+         2 * arena_bytes<Nearest>(n) + arena_bytes<Row>(n);
 }
 
 int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const GuidedView& view1,
@@ -206,8 +212,9 @@ int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const Gu
                      tv_correspondence* correspondences) {
   if (view0.num == 0 || view1.num == 0) return 0;
   ArenaScope scope(arena);
-  const Side side0 = make_side(kernels, view0, M, false, arena);
-  const Side side1 = make_side(kernels, view1, M, true, arena);
+  const DescriptorRows rows1 = prepare_descriptors(kernels, view1.descriptors, view1.num, arena);
+  const Side side0 = make_side(view0, DescriptorRows{nullptr, nullptr}, M, false, arena);
+  const Side side1 = make_side(view1, rows1, M, true, arena);
   Row* rows = arena_alloc<Row>(arena, static_cast<size_t>(view0.num));
   Nearest* columns = arena_alloc<Nearest>(arena, static_cast<size_t>(view1.num));
   Candidates candidates{
