@@ -158,6 +158,11 @@ static void test_what_the_stages_refuse_is_refused(void) {
   refused(TV_ERR_ARGUMENT, &o.all);
   o.all.guided_matching = -1;
   refused(TV_ERR_ARGUMENT, &o.all);
+  default_stages(&o);
+  o.all.bundle_adjustment = 2;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  o.all.bundle_adjustment = -1;
+  refused(TV_ERR_ARGUMENT, &o.all);
   views[1].mask = &mask;
   refused(TV_ERR_ARGUMENT, NULL);
   views[1].mask = NULL;
@@ -367,6 +372,58 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   free(pair.luma[1]);
 }
 
+/* Sum of squared errors of the points that are good in both. */
+static double sum_sq(const tv_point *points, const tv_point *others, int32_t count) {
+  double sum = 0;
+  int32_t k;
+  for (k = 0; k < count; ++k) {
+    if (points[k].status != TV_POINT_OK || others[k].status != TV_POINT_OK) continue;
+    sum += points[k].error_px * points[k].error_px;
+  }
+  return sum;
+}
+
+static void test_bundle_adjustment_moves_the_pose_and_what_follows_from_it(void) {
+  static tv_point plain[2048];
+  static tv_two_view first;
+  real_pair pair;
+  tv_limits limits;
+  tv_camera real_camera;
+  tv_reconstruct_options options;
+  api_context b;
+  int32_t k, v;
+  if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
+  limits = limits_of(pair.width, pair.height, 2048);
+  b = api_make(&limits);
+  real_camera = camera_of(pair.width, pair.height);
+  for (v = 0; v < 2; ++v) {
+    views[v].image = api_image(pair.luma[v], pair.width, pair.height, pair.width);
+    views[v].camera = &real_camera;
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
+  first = two_view;
+  memcpy(plain, reconstruction.points, (size_t)reconstruction.num_matches * sizeof plain[0]);
+  TEST_ASSERT_EQUAL_INT(1, first.has_t);
+  tv_reconstruct_options_init(&options);
+  options.bundle_adjustment = 1;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
+                                              &reconstruction));
+  TEST_ASSERT_EQUAL_INT(first.num_inliers, two_view.num_inliers);
+  TEST_ASSERT_TRUE(memcmp(first.R, two_view.R, sizeof first.R) != 0);
+  TEST_ASSERT_TRUE(sum_sq(reconstruction.points, plain, first.num_matches) <
+                   sum_sq(plain, reconstruction.points, first.num_matches));
+  TEST_ASSERT_EQUAL_INT(1, two_view.has_covariance);
+  for (k = 0; k < 9; ++k) {
+    const double *t = two_view.t, *R = two_view.R;
+    const int row = k / 3, i = (row + 1) % 3, j = (row + 2) % 3, c = k % 3;
+    const double E = (t[i] * R[3 * j + c] - t[j] * R[3 * i + c]) / sqrt(2.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, E, two_view.E[k]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, first.E[k], two_view.E[k]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, first.F[k], two_view.F[k]);
+  }
+  api_release(&b);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_null_pointers_are_refused);
@@ -379,5 +436,6 @@ int main(void) {
   RUN_TEST(test_a_full_call_uses_most_of_the_memory);
   RUN_TEST(test_a_real_pair_has_the_same_bytes_with_every_kernel_set);
   RUN_TEST(test_guided_matching_adds_matches_and_keeps_the_verdict);
+  RUN_TEST(test_bundle_adjustment_moves_the_pose_and_what_follows_from_it);
   return UNITY_END();
 }

@@ -15,8 +15,8 @@ alternative evidence covariance num_points median_parallax_deg rms_reprojection_
 truth timings_ms context_bytes options seed version kernels""".split()
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
-max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching camera0 camera1
-resize""".split()
+max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
+bundle_adjustment camera0 camera1 resize""".split()
 TRUTH = "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [-1, 0, 0]\nbaseline: 0.5\ndepth0: depth.pfm\n"
 
 
@@ -147,7 +147,8 @@ class Reconstruct(cli.CliTest):
         chosen = {"max_keypoints": 300, "arc": 9, "threshold": 15, "levels": 2, "scale_factor": 1.5,
                   "orientation": "upright", "descriptor": "sift", "ratio": 0.75, "method": "eight-point",
                   "max_error_px": 1.5, "confidence": 0.99, "max_iterations": 500, "seed": 2**64 - 1,
-                  "kernels": "c", "triangulation": "midpoint", "guided_matching": 1, "resize": 300}
+                  "kernels": "c", "triangulation": "midpoint", "guided_matching": 1,
+                  "bundle_adjustment": 1, "resize": 300}
         flags = [f"--{key.replace('_', '-')}={value}" for key, value in chosen.items()]
         self.succeed(self.reconstruct(*flags))
         result = self.result()

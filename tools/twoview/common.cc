@@ -32,6 +32,7 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   tv_reconstruct_options_init(&stages);
   stages.triangulation = options.triangulation;
   stages.guided_matching = options.guided_matching;
+  stages.bundle_adjustment = options.bundle_adjustment;
   stages.feature = &options.feature;
   stages.match = &options.match;
   stages.estimate = &options.estimate;

@@ -81,6 +81,8 @@ std::vector<Option> table(Options& o) {
       {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
       {"guided-matching", kEstimate, &o.guided_matching, 0, 1, closed,
        "1: match again along the epipolar lines, and estimate from all matches"},
+      {"bundle-adjustment", kEstimate, &o.bundle_adjustment, 0, 1, closed,
+       "1: adjust pose and points together"},
       {"gravity0", kGravity, Direction{e.gravity0}, 0, 0, closed,
        "the direction of gravity (down) in the first camera's frame"},
       {"gravity1", kGravity, Direction{e.gravity1}, 0, 0, closed, "the same of the second"},

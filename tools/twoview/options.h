@@ -17,6 +17,7 @@ struct Options {
   tv_estimate_options estimate;
   int32_t triangulation = TV_TRIANGULATION_ITERATIVE_LS;
   int32_t guided_matching = 0;
+  int32_t bundle_adjustment = 0;
   int32_t kernels = TV_KERNELS_AUTO;
   int32_t resize = 0;  // longer side, pixels; 0: as it is
   bool min_threshold_given = false;

@@ -26,6 +26,10 @@ typedef struct tv_reconstruct_options {
   int32_t guided_matching; /* 1: after a first full pose, matches along its epipolar lines join the
                               others (tv_match_guided with its defaults) and all are estimated again;
                               default 0 */
+  int32_t bundle_adjustment; /* 1: a full pose and its inliers' points are adjusted together
+                                (tv_adjust_two_view with its defaults); R, t, E, F, covariance and
+                                noise_px are then its own; default 0: the estimate's refinement ends
+                                as near the truth (docs/decisions/0005-bundle.md) */
 } tv_reconstruct_options;
 
 TV_API void tv_reconstruct_options_init(tv_reconstruct_options *options);
@@ -46,7 +50,8 @@ typedef struct tv_reconstruction {
 
 TV_API void tv_reconstruction_init(tv_reconstruction *reconstruction);
 
-/* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate.
+/* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate. With bundle_adjustment
+   swapped views give the inverse to rounding only.
    With guided_matching the second estimate is taken where it is of the same kind with no fewer inliers
    and no worse a verdict, but verdict and reasons stay the first one's: matches sought along its lines
    are no independent evidence for it.

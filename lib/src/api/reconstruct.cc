@@ -4,7 +4,9 @@
 #include <cstring>
 
 #include "api/validate.h"
+#include "geometry/essential.h"
 #include "geometry/triangulation.h"
+#include "twoview/bundle.h"
 
 namespace tv {
 namespace {
@@ -136,9 +138,45 @@ tv_status triangulate_inliers(tv_context* context, tv_triangulation method, cons
   return TV_OK;
 }
 
+void store_unit(const Mat3& m, double out[9]) {
+  const Mat3 unit = m.normalized();
+  for (int k = 0; k < 9; ++k) out[k] = unit(k / 3, k % 3);
+}
+
+Mat3 inverse_intrinsics(const tv_camera& c) {
+  Mat3 inverse;
+  inverse << 1 / c.fx, 0, -c.cx / c.fx, 0, 1 / c.fy, -c.cy / c.fy, 0, 0, 1;
+  return inverse;
+}
+
+// Pose and points together; what follows from the pose follows.
+tv_status adjust(tv_context* context, const tv_view& view0, const tv_view& view1,
+                 int32_t num_matches, Results& r, tv_two_view* two_view, int32_t* num_points) {
+  tv_bundle_result bundle;
+  tv_bundle_result_init(&bundle);
+  const tv_status status =
+      tv_adjust_two_view(context, view0.camera, view1.camera, r.pixels[0], r.pixels[1],
+                         num_matches, nullptr, two_view->R, two_view->t, r.points, &bundle);
+  if (status != TV_OK) return status;
+  Pose pose;
+  for (int k = 0; k < 9; ++k) pose.R(k / 3, k % 3) = two_view->R[k];
+  for (int k = 0; k < 3; ++k) pose.t[k] = two_view->t[k];
+  const Mat3 E = essential_from_pose(pose);
+  store_unit(E, two_view->E);
+  store_unit(inverse_intrinsics(*view1.camera).transpose() * E *
+                 inverse_intrinsics(*view0.camera),
+             two_view->F);
+  two_view->has_covariance = bundle.has_covariance;
+  std::copy(bundle.covariance, bundle.covariance + 25, two_view->covariance);
+  if (bundle.has_covariance) two_view->noise_px = bundle.noise_px;
+  *num_points = 0;
+  for (int32_t k = 0; k < num_matches; ++k) *num_points += r.points[k].status == TV_POINT_OK;
+  return TV_OK;
+}
+
 constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
                                               TV_TRIANGULATION_ITERATIVE_LS, nullptr, nullptr,
-                                              nullptr, 0};
+                                              nullptr, 0, 0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                                    tv_reconstruct_options* checked) {
@@ -147,7 +185,8 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   if (options->struct_size != sizeof(tv_reconstruct_options)) return TV_ERR_STRUCT_SIZE;
   *checked = *options;
   const bool valid = is_triangulation_method(checked->triangulation) &&
-                     (checked->guided_matching == 0 || checked->guided_matching == 1);
+                     (checked->guided_matching == 0 || checked->guided_matching == 1) &&
+                     (checked->bundle_adjustment == 0 || checked->bundle_adjustment == 1);
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
@@ -205,6 +244,10 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),
                                    *view0, *view1, estimate, num_matches, r, &num_points);
   if (status != TV_OK) return status;
+  if (checked.bundle_adjustment != 0 && tv::is_full_pose(estimate)) {
+    status = tv::adjust(context, *view0, *view1, num_matches, r, &estimate, &num_points);
+    if (status != TV_OK) return status;
+  }
   *two_view = estimate;
   for (int v = 0; v < 2; ++v) {
     reconstruction->num_keypoints[v] = num_keypoints[v];
