@@ -23,6 +23,7 @@ import identical
 import metrics
 import peers
 import pipeline
+import robust500
 from tables import (MIN_PAIRS, OURS, mean_summary, print_table, progress, runs_of, say, summarise)
 
 PROGRAM = os.path.join(datasets.ROOT, "build", "release", "bin", "twoview")
@@ -217,7 +218,11 @@ def main():
                         help="with --estimators: fields of tv_estimate_options for ours")
     parser.add_argument("--thresholds", default="0.5,1,2",
                         help="with --estimators: pixels; each peer counts at its best")
+    parser.add_argument("--robust500", action="store_true",
+                        help="instead: the robust estimate beside PoseLib's on simulated matches")
     arguments = parser.parse_args(own)
+    if arguments.robust500:
+        sys.exit(0 if robust500.run(arguments.lib) else 1)
     arguments.extra = extra
     arguments.thresholds = [float(t) for t in arguments.thresholds.split(",")]
     if not arguments.resamples:
