@@ -156,6 +156,15 @@ double coverage(const TwoViewProblem& problem, const Matches& matches, const uin
   return filled / 64.0;
 }
 
+void pack_covariance(const Pose& pose, const Pose& inverse, const double covariance[25],
+                     bool swapped, double packed[25]) {
+  if (swapped) {
+    invert_covariance(pose, inverse, covariance, packed);
+  } else {
+    std::memcpy(packed, covariance, 25 * sizeof covariance[0]);
+  }
+}
+
 void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewModel& model,
           const TwoViewOutcome& outcome, bool swapped, tv_two_view* result) {
   tv_two_view packed{};
@@ -173,6 +182,7 @@ void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewMo
   packed.rotation_inliers = outcome.rotation_inliers;
   packed.median_parallax_rad = outcome.median_parallax_rad;
   packed.rms_error_px = outcome.rms_error_px;
+  packed.noise_px = outcome.noise_px;
   packed.coverage = coverage(problem, matches, outcome.inlier, swapped ? 1 : 0);
   if (packed.coverage > 0 && packed.coverage < 4.5 / 64 &&
       packed.config != TV_CONFIG_DEGENERATE) {
@@ -191,18 +201,19 @@ void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewMo
     const Mat3 E = essential_from_pose(pose).normalized();
     packed.has_E = 1;
     store(swapped ? Mat3(E.transpose()) : E, packed.E);
+    packed.has_covariance = outcome.has_covariance;
+    if (outcome.has_covariance) {
+      pack_covariance(pose, inverse, outcome.covariance, swapped, packed.covariance);
+    }
     if (outcome.has_alternative) {
       const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
       packed.has_alternative = 1;
       store(other.R, packed.alternative_R);
       for (int k = 0; k < 3; ++k) packed.alternative_t[k] = other.t[k];
-    }
-    if (outcome.has_covariance) {
-      packed.has_covariance = 1;
-      if (swapped) {
-        invert_covariance(pose, inverse, outcome.covariance, packed.covariance);
-      } else {
-        std::memcpy(packed.covariance, outcome.covariance, sizeof packed.covariance);
+      packed.has_alternative_covariance = outcome.has_alternative_covariance;
+      if (outcome.has_alternative_covariance) {
+        pack_covariance(outcome.alternative, other, outcome.alternative_covariance, swapped,
+                        packed.alternative_covariance);
       }
     }
   }

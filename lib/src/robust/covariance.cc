@@ -1,50 +1,169 @@
 #include "robust/covariance.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "base/math.h"
 
 namespace tv {
 
 namespace {
 
-// Normal residuals, cut at three deviations, under Cauchy's loss with a scale of 1.5 deviations:
-// the variance of the M-estimate over that of the residuals.
-constexpr double kVarianceOfCauchy = 1.1405946331327699;
+// Normal residuals, cut at three deviations, under Cauchy's loss: the variance of the M-estimate
+// over that of the residuals, at the loss's scale that the refinement takes (1.5 deviations for the
+// epipolar residual, kPlaneScale for the plane's).
+constexpr double kVarianceOfCauchy = 1.1405946331327699, kVarianceOnPlane = 1.0901;
 
 constexpr double kLeastResidual = 0.05;  // of the loss's scale
+
+// What the residuals say about the loss: sums over the matches.
+struct LossSums {
+  double psi_sq = 0, slope = 0, slope_sq = 0;
+};
+
+// Huber's variance for n residuals of `dimensions` each and p parameters; negative where the loss
+// has no curvature left. cut_slope: what the mean of psi' loses because matches beyond a limit take
+// no part: 2 psi(limit) times the density of the residuals there.
+double variance_of(const LossSums& sums, int n, int dimensions, int p, double scale_px,
+                   double cut_slope) {
+  const double mean = sums.slope / n - cut_slope;
+  if (!(mean > 0.05)) return -1;
+  const double of_slope = sums.slope_sq / n - mean * mean;
+  const double K = 1 + p / static_cast<double>(dimensions * n) * of_slope / (mean * mean);
+  const double variance = K * K * sums.psi_sq / (dimensions * n - p) / (mean * mean);
+  const double least = kLeastResidual * scale_px;
+  return std::max(variance, least * least);
+}
+
+bool is_finite(const double* values, int count) {
+  double sum = 0;
+  for (int k = 0; k < count; ++k) sum += values[k] - values[k];
+  return sum == 0;
+}
+
+// What a pixel of noise in each coordinate adds to the information about the direction, whose rows
+// b . (R f0 x f1) / |gradient of the residual| are as small as the parallax: the block's three
+// entries.
+void direction_noise(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
+                     double block[3]) {
+  Vec3 b[2];
+  tangent_basis(pose.t, &b[0], &b[1]);
+  block[0] = block[1] = block[2] = 0;
+  for (int k = 0; k < count; ++k) {
+    const int i = indices[k];
+    const Vec3 f0 = pose.R * ray_of(pairs, 0, i), f1 = ray_of(pairs, 1, i);
+    const Mat32 J0 = pose.R * jacobian_of(pairs, 0, i), J1 = jacobian_of(pairs, 1, i);
+    const auto gradient = [&](const Vec3& v, double g[4]) {  // of v . (f0 x f1) by the four pixels
+      const Vec3 a0 = f1.cross(v), a1 = v.cross(f0);
+      for (int c = 0; c < 2; ++c) {
+        g[c] = a0.dot(J0.col(c));
+        g[2 + c] = a1.dot(J1.col(c));
+      }
+    };
+    double g[2][4], own[4], norm_sq = 0;
+    gradient(b[0], g[0]);
+    gradient(b[1], g[1]);
+    gradient(pose.t, own);
+    for (double value : own) norm_sq += value * value;
+    if (!(norm_sq > 0)) continue;
+    for (int c = 0; c < 4; ++c) {
+      block[0] += g[0][c] * g[0][c] / norm_sq;
+      block[1] += g[0][c] * g[1][c] / norm_sq;
+      block[2] += g[1][c] * g[1][c] / norm_sq;
+    }
+  }
+}
+
+void multiply5(const double A[25], const double B[25], double C[25]) {
+  for (int r = 0; r < 5; ++r) {
+    for (int c = 0; c < 5; ++c) {
+      double sum = 0;
+      for (int k = 0; k < 5; ++k) sum += A[5 * r + k] * B[5 * k + c];
+      C[5 * r + c] = sum;
+    }
+  }
+}
+
+// A scale that no residual reaches: plain least squares.
+constexpr RobustLoss kLeastSquares{Loss::kTruncated, 1e140};
 
 }  // namespace
 
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
-                      double scale_px, PoseUncertainty* uncertainty) {
-  if (count <= 5) return false;
-  double upper[15], gradient[5];
-  // A scale that no residual reaches: plain least squares.
-  constexpr double kNoLimit = 1e140;
-  const PoseModel model{pose};
-  model.normal_equations(pairs, indices, count, RobustLoss{Loss::kTruncated, kNoLimit}, upper,
-                         gradient);
-  double inverse[25];
+                      double scale_px, double limit_px, PoseUncertainty* uncertainty) {
+  constexpr int P = PoseModel::kParameters;
+  if (count <= P) return false;
+  double upper[15], gradient[P], inverse[25];
+  PoseModel{pose}.normal_equations(pairs, indices, count, kLeastSquares, upper, gradient);
   if (!invert_symmetric5(upper, inverse)) return false;
   const Mat3 E = essential_from_pose(pose);
   const double inverse_sq = 1 / (scale_px * scale_px);
-  double psi_sq = 0, slope = 0;
+  LossSums sums;
   for (int k = 0; k < count; ++k) {
     const double r_sq = sampson_sq(pairs, indices[k], E);
     const double q = r_sq * inverse_sq, weight = 1 / (1 + q);
-    psi_sq += r_sq * weight * weight;
-    slope += (1 - q) * weight * weight;
+    const double slope = (1 - q) * weight * weight;
+    sums.psi_sq += r_sq * weight * weight;
+    sums.slope += slope;
+    sums.slope_sq += slope * slope;
   }
-  slope /= count;
-  if (!(slope > 0.05)) return false;  // residuals that no curve of the loss holds together
-  double variance = psi_sq / (count - 5) / (slope * slope);
-  const double least = kLeastResidual * scale_px;
-  if (variance < least * least) variance = least * least;
-  for (int k = 0; k < 25; ++k) {
-    uncertainty->covariance[k] = variance * inverse[k];
-    if (!(uncertainty->covariance[k] - uncertainty->covariance[k] == 0.0)) return false;
+  const double uncut = variance_of(sums, count, 1, P, scale_px, 0);
+  if (!(uncut > 0)) return false;
+  const double noise_px = std::sqrt(uncut / kVarianceOfCauchy);
+  const double density = exp(-0.5 * limit_px * limit_px / (noise_px * noise_px)) /
+                         (2.5066282746310002 * noise_px);
+  const double cut_slope = 2 * limit_px / (1 + limit_px * limit_px * inverse_sq) * density;
+  const double variance = variance_of(sums, count, 1, P, scale_px, cut_slope);
+  uncertainty->noise_px = noise_px;
+  if (!(variance > 0)) return false;
+  // A = J' J holds J at the noisy pixels. A0, without what the noise adds to it, is what the motion
+  // of the points tells: C = A0^-1 A A0^-1.
+  double noise[3];
+  direction_noise(pairs, indices, count, pose, noise);
+  double exact[15], A[25], half[25];
+  for (int k = 0; k < 15; ++k) exact[k] = upper[k];
+  const double noise_sq = noise_px * noise_px;
+  exact[12] -= noise_sq * noise[0];
+  exact[13] -= noise_sq * noise[1];
+  exact[14] -= noise_sq * noise[2];
+  if (!invert_symmetric5(exact, inverse)) return false;
+  for (int r = 0, slot = 0; r < 5; ++r) {
+    for (int c = r; c < 5; ++c) A[5 * r + c] = A[5 * c + r] = upper[slot++];
   }
-  uncertainty->noise_px = std::sqrt(variance / kVarianceOfCauchy);
-  return true;
+  multiply5(inverse, A, half);
+  multiply5(half, inverse, uncertainty->covariance);
+  for (int r = 0; r < 5; ++r) {
+    for (int c = r; c < 5; ++c) {
+      uncertainty->covariance[5 * r + c] *= variance;
+      uncertainty->covariance[5 * c + r] = uncertainty->covariance[5 * r + c];
+    }
+  }
+  return is_finite(uncertainty->covariance, 25);
+}
+
+bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
+                       const PlaneModel& model, double scale_px, PoseUncertainty* uncertainty) {
+  constexpr int P = PlaneModel::kParameters;
+  if (2 * count <= P) return false;
+  double upper[P * (P + 1) / 2], gradient[P], inverse[P * P];
+  model.normal_equations(pairs, indices, count, kLeastSquares, upper, gradient);
+  if (!invert_symmetric<P>(upper, inverse)) return false;
+  const Mat3 H = model.matrix();
+  const double inverse_sq = 1 / (scale_px * scale_px);
+  LossSums sums;
+  for (int k = 0; k < count; ++k) {
+    const double r_sq = transfer_residual(pairs, indices[k], H).r_sq;
+    const double weight = 1 / (1 + r_sq * inverse_sq), slope = weight * weight;
+    sums.psi_sq += r_sq * slope;
+    sums.slope += slope;
+    sums.slope_sq += slope * slope;
+  }
+  const double variance = variance_of(sums, count, 2, P, scale_px, 0);
+  for (int r = 0; r < 5; ++r) {
+    for (int c = 0; c < 5; ++c) uncertainty->covariance[5 * r + c] = variance * inverse[P * r + c];
+  }
+  uncertainty->noise_px = std::sqrt(std::max(variance, 0.0) / kVarianceOnPlane);
+  return variance > 0 && is_finite(uncertainty->covariance, 25);
 }
 
 void invert_covariance(const Pose& pose, const Pose& inverse, const double covariance[25],

@@ -13,12 +13,20 @@ struct PoseUncertainty {
 // The covariance of the M-estimate that minimises Cauchy's loss with scale_px over the listed
 // matches (P. Huber, "Robust Statistics", 1981, 7.6): with psi the derivative of the loss and p = 5
 // parameters,
-//     C = sum psi(r)^2 / (n - p) / (mean psi'(r))^2 (J' J)^-1.
+//     C = K^2 sum psi(r)^2 / (n - p) / (mean psi'(r))^2 (J' J)^-1,
+//     K = 1 + p / n var(psi') / (mean psi')^2.
 // It allows for what the loss loses against least squares, and for the wrong matches among the
-// listed. Residuals of a twentieth of scale_px and less count as that: exact input is no exact
-// camera. False when a parameter is not determined.
+// listed, which lie within limit_px. J is taken without what the noise of the pixels adds to it: at a
+// low parallax that is a part of it. Residuals of a twentieth of scale_px and less count as that:
+// exact input is no exact camera. False when a parameter is not determined.
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
-                      double scale_px, PoseUncertainty* uncertainty);
+                      double scale_px, double limit_px, PoseUncertainty* uncertainty);
+
+// The same for a pose that is fitted together with a plane (PlaneModel), whose residuals have two
+// dimensions: with w the loss's weight, E[psi'] is the mean of w^2.
+inline constexpr double kPlaneScale = 2;  // of the loss, in standard deviations of the noise
+bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
+                       const PlaneModel& model, double scale_px, PoseUncertainty* uncertainty);
 
 // The covariance of the inverse pose (R', -R' t) in its own parameters: to first order
 // w' = -R' w, and t' moves by -R' (a b1 + b b2) + R' (w x t).

@@ -100,6 +100,30 @@ RotationModel RotationModel::stepped(const double* step) const {
   return RotationModel{orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * R)};
 }
 
+Mat3 PlaneModel::matrix() const { return pose.R + pose.t * plane.transpose(); }
+
+double PlaneModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                    const RobustLoss& loss, double* upper,
+                                    double* gradient) const {
+  Vec3 b1, b2;
+  tangent_basis(pose.t, &b1, &b2);
+  Mat3 columns[8];
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    columns[k] = cross_matrix(axis) * pose.R;
+    columns[5 + k] = pose.t * axis.transpose();
+  }
+  columns[3] = b1 * plane.transpose();
+  columns[4] = b2 * plane.transpose();
+  return transfer_normal_equations<8>(pairs, indices, count, matrix(), columns, loss, upper,
+                                      gradient);
+}
+
+PlaneModel PlaneModel::stepped(const double* step) const {
+  return PlaneModel{PoseModel{pose}.stepped(step).pose, plane + Vec3(step[5], step[6], step[7])};
+}
+
 namespace {
 
 // A = L D L' in place of a full lower triangle; false when a pivot is not above `smallest`.
@@ -157,25 +181,29 @@ bool solve_damped(const double upper[P * (P + 1) / 2], const double gradient[P],
   return true;
 }
 
-bool invert_symmetric5(const double upper[15], double inverse[25]) {
-  double A[5][5], D[5];
-  unpack_lower<5>(upper, A);
+template <int P>
+bool invert_symmetric(const double upper[P * (P + 1) / 2], double inverse[P * P]) {
+  double A[P][P], D[P];
+  unpack_lower<P>(upper, A);
   double largest = 0;
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < P; ++i) {
     if (A[i][i] > largest) largest = A[i][i];
   }
-  if (!factorise<5>(A, D, 1e-13 * largest)) return false;
-  for (int c = 0; c < 5; ++c) {
-    double x[5] = {};
+  if (!factorise<P>(A, D, 1e-13 * largest)) return false;
+  for (int c = 0; c < P; ++c) {
+    double x[P] = {};
     x[c] = 1;
-    solve_factorised<5>(A, D, x);
-    for (int r = 0; r < 5; ++r) inverse[5 * r + c] = x[r];
+    solve_factorised<P>(A, D, x);
+    for (int r = 0; r < P; ++r) inverse[P * r + c] = x[r];
   }
-  for (int r = 0; r < 5; ++r) {  // exactly symmetric
-    for (int c = 0; c < r; ++c) inverse[5 * r + c] = inverse[5 * c + r];
+  for (int r = 0; r < P; ++r) {  // exactly symmetric
+    for (int c = 0; c < r; ++c) inverse[P * r + c] = inverse[P * c + r];
   }
   return true;
 }
+
+template bool invert_symmetric<5>(const double*, double*);
+template bool invert_symmetric<8>(const double*, double*);
 
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
@@ -220,6 +248,8 @@ template double refine<FundamentalModel>(const RayPairs&, const int32_t*, int, c
                                          int, FundamentalModel*);
 template double refine<HomographyModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
                                         int, HomographyModel*);
+template double refine<PlaneModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
+                                   PlaneModel*);
 template double refine<RotationModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
                                       RotationModel*);
 

@@ -49,6 +49,18 @@ struct RotationModel {
   RotationModel stepped(const double* step) const;
 };
 
+// A pose and the plane n . X = 1 (in units of |t|) that the points lie on, H = R + t n': eight
+// parameters, those of PoseModel and n's. Transfer residual.
+struct PlaneModel {
+  static constexpr int kParameters = 8;
+  Pose pose;
+  Vec3 plane;
+  Mat3 matrix() const;
+  double normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                          const RobustLoss& loss, double* upper, double* gradient) const;
+  PlaneModel stepped(const double* step) const;
+};
+
 // Solves (A + lambda diag(A)) step = -gradient for the packed upper triangle of a symmetric
 // non-negative A, by LDL'. False when it is singular.
 template <int P>
@@ -56,7 +68,11 @@ bool solve_damped(const double upper[P * (P + 1) / 2], const double gradient[P],
                   double step[P]);
 
 // The inverse of the packed symmetric A, full row-major. False when it is singular.
-bool invert_symmetric5(const double upper[15], double inverse[25]);
+template <int P>
+bool invert_symmetric(const double upper[P * (P + 1) / 2], double inverse[P * P]);
+inline bool invert_symmetric5(const double upper[15], double inverse[25]) {
+  return invert_symmetric<5>(upper, inverse);
+}
 
 // Lowers the robust cost over the listed matches. Returns the final cost, in units of scale^2.
 template <typename Model>

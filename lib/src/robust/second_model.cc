@@ -85,9 +85,8 @@ namespace {
 // points in one heap cost no more than points that are spread.
 constexpr int kGrid = 64, kNeighbours = 6, kMostSeen = 64;
 constexpr int kMostAsked = 512;
-constexpr double kOpposite = 0.12;   // how far from the opposite place, of the neighbour's distance
+constexpr double kOpposite = 0.14;   // how far from the opposite place, of the neighbour's distance
 constexpr double kNearestPx = 8;     // nearer neighbours are not told from noise
-constexpr double kParallelSine = 0.5;
 // What chance alone does is counted at a place where no usual lattice has a point: the neighbour
 // turned by 146 degrees instead of 180.
 constexpr double kControlCosine = -0.829, kControlSine = 0.559;
@@ -175,27 +174,17 @@ bool point_near(const Grid& grid, double x, double y, double radius) {
   return false;
 }
 
-// Whether two of the neighbours, in different directions, have a point where they are turned to.
-bool has_partners(const Grid& grid, int i, const Neighbour* nearest, int count, double cosine,
-                  double sine) {
-  Neighbour opposed[kNeighbours];
-  int num_opposed = 0;
+// How many of the neighbours have a point where they are turned to.
+int count_partners(const Grid& grid, int i, const Neighbour* nearest, int count, double cosine,
+                   double sine) {
+  int partners = 0;
   for (int k = 0; k < count; ++k) {
     const Neighbour& n = nearest[k];
-    if (point_near(grid, grid.xy[2 * i] + (cosine * n.dx - sine * n.dy),
-                   grid.xy[2 * i + 1] + (sine * n.dx + cosine * n.dy),
-                   kOpposite * std::sqrt(n.dist_sq))) {
-      opposed[num_opposed++] = n;
-    }
+    partners += point_near(grid, grid.xy[2 * i] + (cosine * n.dx - sine * n.dy),
+                           grid.xy[2 * i + 1] + (sine * n.dx + cosine * n.dy),
+                           kOpposite * std::sqrt(n.dist_sq));
   }
-  for (int a = 0; a < num_opposed; ++a) {
-    for (int b = a + 1; b < num_opposed; ++b) {
-      const double cross = opposed[a].dx * opposed[b].dy - opposed[a].dy * opposed[b].dx;
-      const double limit = kParallelSine * kParallelSine * opposed[a].dist_sq * opposed[b].dist_sq;
-      if (cross * cross > limit) return true;
-    }
-  }
-  return false;
+  return partners;
 }
 
 }  // namespace
@@ -204,23 +193,26 @@ size_t lattice_bytes(int max_points) {
   return arena_bytes<int32_t>(kGrid * kGrid) + arena_bytes<int32_t>(static_cast<size_t>(max_points));
 }
 
-double lattice_share(const double* xy, int num, const int32_t* listed, int num_listed,
+Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,
                      Arena& arena) {
   const int asked = listed != nullptr ? num_listed : num;
-  if (asked == 0 || num < 3) return 0;
+  if (asked == 0 || num < 3) return {0, 0};
   ArenaScope scope(arena);
   const Grid grid = make_grid(xy, num, arena);
   const int taken = asked < kMostAsked ? asked : kMostAsked;
-  int count = 0;
+  int opposite = 0, control = 0, num_neighbours = 0;
   for (int k = 0; k < taken; ++k) {
     const int place = static_cast<int>(static_cast<int64_t>(k) * asked / taken);
     const int i = listed != nullptr ? listed[place] : place;
     Neighbour nearest[kNeighbours];
     const int found = nearest_points(grid, i, nearest);
-    count += has_partners(grid, i, nearest, found, -1, 0);
-    count -= has_partners(grid, i, nearest, found, kControlCosine, kControlSine);
+    opposite += count_partners(grid, i, nearest, found, -1, 0);
+    control += count_partners(grid, i, nearest, found, kControlCosine, kControlSine);
+    num_neighbours += found;
   }
-  return count > 0 ? static_cast<double>(count) / taken : 0;
+  if (opposite <= control) return {0, 0};
+  const double excess = opposite - control;
+  return {excess / num_neighbours, excess / std::sqrt(1.0 + opposite + control)};
 }
 
 }  // namespace tv

@@ -21,11 +21,14 @@ inline constexpr double kSecondShare = 0.15;
 SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,
                               double threshold_px, uint64_t seed, Arena& arena);
 
-// How many of the points lie as on a lattice: a point counts when, of its nearest neighbours, two in
-// different directions have another point at the opposite place. As many as do so by chance, which
-// is counted at another place, are taken off. xy: num x 2; listed: null or the indices of those
-// that are asked. Returns the share of the asked points that count, [0, 1].
-double lattice_share(const double* xy, int num, const int32_t* listed, int num_listed,
+// Whether points lie as on a lattice: of a point's nearest neighbours, how many have another point
+// at the opposite place, less those that have one at a place where a lattice has none, which is
+// chance. xy: num x 2; listed: null or the indices of the points that are asked.
+struct Lattice {
+  double share;   // of neighbours, chance taken off; a full lattice has nearly 1
+  double sigmas;  // how many standard deviations of a count of chance that is
+};
+Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,
                      Arena& arena);
 size_t lattice_bytes(int max_points);
 

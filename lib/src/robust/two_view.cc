@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/math.h"
-#include "robust/covariance.h"
+#include "robust/final_pose.h"
 #include "robust/estimators_upright.h"
 #include "robust/loop.h"
 #include "robust/second_model.h"
@@ -107,94 +107,15 @@ namespace {
 struct Finish {
   const TwoViewProblem& problem;
   const Matches& matches;
-  RayPairs pairs;  // without repeats
+  const RayPairs& pairs;  // without repeats
   double threshold;
   int32_t* indices;  // scratch
   double* values;    // scratch
   int32_t* support;  // the unique inliers of the epipolar model
   int num_support;
-  double noise;      // of the epipolar pose's residuals, pixels; 0: unknown
-  GravityPrior gravity;
+  PoseRefiner refiner;  // of the same pairs and scratch
   TwoViewOutcome* out;
 };
-
-// The final refinement minimises Cauchy's loss over the matches within kFinalNear thresholds. Its
-// scale follows the noise, kFinalScale times the standard deviation that the inliers' median
-// residual tells, since the threshold says little about it: sub-pixel matches are far better than
-// 1 px, and their tails are heavy. docs/decisions/0002-robust-loop.md has the measurements.
-constexpr double kFinalNear = 1.5, kFinalScale = 1.5;
-constexpr int kFinalRounds = 2, kFinalIterations = 20;
-
-// 1.4826 times the median residual of the listed matches within the threshold.
-double noise_px(const Finish& f, const Mat3& M, int count) {
-  int within = 0;
-  for (int k = 0; k < count; ++k) {
-    const double r_sq = sampson_sq(f.pairs, f.indices[k], M);
-    if (r_sq <= f.threshold * f.threshold) f.values[within++] = r_sq;
-  }
-  if (within == 0) return f.threshold;
-  double* middle = f.values + within / 2;
-  std::nth_element(f.values, middle, f.values + within);
-  return 1.4826 * std::sqrt(*middle);
-}
-
-RobustLoss final_loss(const Finish& f, const Mat3& M, int count) {
-  const double scale = kFinalScale * noise_px(f, M, count);
-  return RobustLoss{Loss::kCauchy,
-                    std::max(0.02 * f.threshold, std::min(scale, f.threshold))};
-}
-
-// The matches that take part in a pose's final refinement, into f.indices.
-int near_pose(const Finish& f, const Pose& pose) {
-  return near_matches(f.pairs, f.pairs.num, pose, kFinalNear * f.threshold, f.threshold,
-                      f.indices);
-}
-
-// Cauchy's loss at kFinalScale deviations takes E[psi^2] / E[psi'] = 0.585 of what the same matches
-// would say in least squares: the prior is to count as much less.
-constexpr double kPriorScale = 0.7646473 / kFinalScale;  // sqrt(0.58469), per scale_px
-
-Pose refined_pose(const Finish& f, const Pose& start, const GravityPrior& gravity) {
-  GravityPoseModel model{start, &gravity};
-  for (int round = 0; round < kFinalRounds; ++round) {
-    const int count = near_pose(f, model.pose);
-    if (count < 5) break;
-    const RobustLoss loss = final_loss(f, essential_from_pose(model.pose), count);
-    model.noise_px = kPriorScale * loss.scale_px;
-    refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
-  }
-  return model.pose;
-}
-
-// Of the pose that the points alone gave.
-bool uncertainty_without_gravity(const Finish& f, const Pose& pose, PoseUncertainty* uncertainty) {
-  const int count = near_pose(f, pose);
-  const double scale = final_loss(f, essential_from_pose(pose), count).scale_px;
-  return pose_uncertainty(f.pairs, f.indices, count, pose, scale, uncertainty);
-}
-
-// The prior with the weight that the points leave it, where they alone would put the pose.
-GravityPrior tested_gravity(const Finish& f, const Pose& start) {
-  GravityPrior gravity = f.gravity;
-  if (!gravity.known) return gravity;
-  const Pose alone = refined_pose(f, start, GravityPrior{});
-  PoseUncertainty uncertainty;
-  if (uncertainty_without_gravity(f, alone, &uncertainty)) {
-    gravity.weight = gravity_weight(gravity, alone.R, uncertainty.covariance);
-  }
-  return gravity;
-}
-
-Pose refined_pose(const Finish& f, const Pose& start) {
-  return refined_pose(f, start, tested_gravity(f, start));
-}
-
-bool uncertainty_of(const Finish& f, const Pose& pose, PoseUncertainty* uncertainty) {
-  const GravityPrior gravity = tested_gravity(f, pose);
-  if (!uncertainty_without_gravity(f, pose, uncertainty)) return false;
-  if (gravity.known) add_gravity_information(gravity, pose.R, uncertainty->covariance);
-  return true;
-}
 
 Mat3 refined_fundamental(const Finish& f, const Mat3& start) {
   FundamentalModel model = fundamental_model(start);
@@ -202,8 +123,8 @@ Mat3 refined_fundamental(const Finish& f, const Mat3& start) {
     const int count = near_matches(f.pairs, f.pairs.num, model.matrix(),
                                    kFinalNear * f.threshold, f.indices);
     if (count < 7) break;
-    refine(f.pairs, f.indices, count, final_loss(f, model.matrix(), count), kFinalIterations,
-           &model);
+    refine(f.pairs, f.indices, count, final_loss(f.refiner, model.matrix(), count),
+           kFinalIterations, &model);
   }
   return model.matrix().normalized();
 }
@@ -226,12 +147,18 @@ void collect_support(Finish& f) {
 void refine_epipolar(Finish& f) {
   EpipolarModel& epipolar = f.out->epipolar;
   if (epipolar.has_pose) {
-    epipolar.pose = refined_pose(f, epipolar.pose);
+    epipolar.pose = refined_pose(f.refiner, epipolar.pose);
     epipolar.M = essential_from_pose(epipolar.pose);
   } else {
     epipolar.M = refined_fundamental(f, epipolar.M);
   }
   collect_support(f);
+}
+
+void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out) {
+  out->has_covariance = true;
+  out->noise_px = uncertainty.noise_px;
+  std::copy(uncertainty.covariance, uncertainty.covariance + 25, out->covariance);
 }
 
 // The matches that the named transfer explains become the inliers.
@@ -242,27 +169,36 @@ void inliers_of_transfer(Finish& f, const Mat3& H) {
   }
 }
 
-// A plane allows two motions. Each is refined as a pose; with the epipolar model's they compete for
-// the lowest cost, and a second one that is different and not clearly worse is the alternative.
+// A plane allows two motions. Where the plane explains all of the support they are fitted together
+// with it; where there is more than the plane, each is refined as a pose, and the epipolar model's
+// own competes with them. The one of lowest cost is the pose, and a second one that is different and
+// not clearly worse the alternative.
 void choose_planar_pose(Finish& f, const Rivals& rivals) {
+  TwoViewOutcome& out = *f.out;
   Vec3 mean = Vec3::Zero();
   for (int k = 0; k < f.num_support; ++k) mean += ray_of(f.pairs, 0, f.support[k]).normalized();
-  PlanarPose planar[2];
-  const int count = decompose_homography(rivals.H, mean, planar);
-  const PoseEstimator scorer{f.pairs, f.threshold, f.indices};
-  Pose poses[3] = {f.out->epipolar.pose};
-  int inliers[3];
-  int64_t cost[3] = {scorer.full_cost(poses[0], &inliers[0])};
-  int num_poses = 1;
-  for (int k = 0; k < count; ++k) {
-    poses[num_poses] = refined_pose(f, planar[k].pose);
-    cost[num_poses] = scorer.full_cost(poses[num_poses], &inliers[num_poses]);
-    ++num_poses;
+  PlaneFit fit;
+  Pose poses[3];
+  int num_poses = 0;
+  const bool plane_alone = 20 * rivals.homography_inliers >= 19 * f.num_support;
+  if (plane_alone) num_poses = refine_on_plane(f.refiner, rivals.H, mean, &fit);
+  const bool on_plane = num_poses > 0;
+  for (int k = 0; k < num_poses; ++k) poses[k] = fit.pose[k];
+  if (!on_plane) {
+    poses[num_poses++] = out.epipolar.pose;
+    PlanarPose planar[2];
+    const int count = decompose_homography(rivals.H, mean, planar);
+    for (int k = 0; k < count; ++k) poses[num_poses++] = refined_pose(f.refiner, planar[k].pose);
   }
-  int best = 0;
-  for (int k = 1; k < num_poses; ++k) best = cost[k] < cost[best] ? k : best;
-  f.out->epipolar.pose = poses[best];
-  f.out->epipolar.M = essential_from_pose(poses[best]);
+  const PoseEstimator scorer{f.pairs, f.threshold, f.indices};
+  int best = 0, inliers[3];
+  int64_t cost[3];
+  for (int k = 0; k < num_poses; ++k) {
+    cost[k] = scorer.full_cost(poses[k], &inliers[k]);
+    best = cost[k] < cost[best] ? k : best;
+  }
+  out.epipolar.pose = poses[best];
+  out.epipolar.M = essential_from_pose(poses[best]);
   collect_support(f);
   int other = -1;
   double farthest = 1e-4;  // half a degree
@@ -276,31 +212,43 @@ void choose_planar_pose(Finish& f, const Rivals& rivals) {
     }
   }
   if (other >= 0) {
-    f.out->has_alternative = true;
-    f.out->alternative = poses[other];
-    f.out->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+    out.has_alternative = true;
+    out.alternative = poses[other];
+    out.reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  }
+  PoseUncertainty uncertainty;
+  const bool certain = on_plane ? fit.certain[best]
+                                : uncertainty_of(f.refiner, poses[best], &uncertainty);
+  if (certain) store_uncertainty(on_plane ? fit.uncertainty[best] : uncertainty, &out);
+  if (other < 0) return;
+  out.has_alternative_covariance =
+      on_plane ? fit.certain[other] : uncertainty_of(f.refiner, poses[other], &uncertainty);
+  if (out.has_alternative_covariance) {
+    const PoseUncertainty& u = on_plane ? fit.uncertainty[other] : uncertainty;
+    std::copy(u.covariance, u.covariance + 25, out.alternative_covariance);
   }
 }
 
-// Whether the support moves along the epipolar lines by more than noise. Under a rotation alone what
-// it leaves over has two dimensions and the epipolar residual one, and the sum S of the differences
-// over the variance follows chi-square with a degree of freedom for each match. Torr's criterion
-// (P. Torr, "An assessment of information criteria for motion model selection", CVPR 1997) pays
-// log 4 for the depth of each and log(4 n) for each of the two parameters of the direction.
-// leaves_parallax tells about the matches that the rotation does not explain, this about those that
-// it does.
+// Whether the support moves along the epipolar lines by more than noise. What a rotation leaves over
+// has two dimensions, the epipolar residual one: under a rotation alone the sum S of the differences
+// is about as large as the sum of the squared epipolar residuals (1.3 times, since the search turns
+// the epipole to where the residuals happen to be smallest; in one of 300 pairs more than the limit), and a parallax of p deviations of
+// the noise adds p^2 / 2 times as much. leaves_parallax tells about the matches that the rotation
+// does not explain, this about those that it does.
 bool moves_along_lines(const Finish& f, const Mat3& R) {
-  if (!f.out->epipolar.has_pose || !(f.noise > 0)) return false;
+  if (!f.out->epipolar.has_pose) return false;
   const double limit = kTransferThresholdScale * f.threshold;
-  double S = 0;
+  double across = 0, along = 0;
   int n = 0;
   for (int k = 0; k < f.num_support; ++k) {
     const double r_sq = transfer_residual(f.pairs, f.support[k], R).r_sq;
     if (r_sq > limit * limit) continue;
-    S += r_sq - sampson_sq(f.pairs, f.support[k], f.out->epipolar.M);
+    const double epipolar_sq = sampson_sq(f.pairs, f.support[k], f.out->epipolar.M);
+    across += epipolar_sq;
+    along += r_sq - epipolar_sq;
     ++n;
   }
-  return n > 0 && S > f.noise * f.noise * (n * 1.3862943611198906 + 2 * log(4.0 * n));
+  return n > 0 && along > (1.8 + 40.0 / n) * across;
 }
 
 // Whether the pair is to be called by one of the rivals, or degenerate.
@@ -364,7 +312,7 @@ double largest_sigma(const double covariance[25]) {
   return std::sqrt(std::max(rotation, direction));
 }
 
-// The evidence of a full pose: parallax, covariance.
+// The parallax of a full pose, and whether it is enough.
 void measure_pose(Finish& f) {
   TwoViewOutcome& out = *f.out;
   double sum = 0;
@@ -376,20 +324,10 @@ void measure_pose(Finish& f) {
   double* middle = f.values + (f.num_support - 1) / 2;
   std::nth_element(f.values, middle, f.values + f.num_support);
   out.median_parallax_rad = *middle;
-  PoseUncertainty uncertainty;
-  out.has_covariance = uncertainty_of(f, out.epipolar.pose, &uncertainty);
-  if (out.has_covariance) {
-    std::copy(uncertainty.covariance, uncertainty.covariance + 25, out.covariance);
-    out.noise_px = uncertainty.noise_px;
-  }
-  if (out.median_parallax_rad < 3 * f.threshold * sum / f.num_support || !out.has_covariance ||
+  const double least_px = std::max(3 * f.threshold, 10 * out.noise_px);
+  if (out.median_parallax_rad < least_px * sum / f.num_support || !out.has_covariance ||
       largest_sigma(out.covariance) > kMostSigma) {
     out.reasons |= TV_REASON_LOW_PARALLAX;
-  }
-  if (!out.has_alternative) return;
-  out.has_alternative_covariance = uncertainty_of(f, out.alternative, &uncertainty);
-  if (out.has_alternative_covariance) {
-    std::copy(uncertainty.covariance, uncertainty.covariance + 25, out.alternative_covariance);
   }
 }
 
@@ -398,7 +336,7 @@ constexpr double kClear = 3;
 
 // A second consistent model, and whether the points repeat themselves as on a lattice: then it is
 // the same scene, matched one period off; where most of the support does, so may the pose be.
-constexpr double kSomeLattice = 0.15, kMostlyLattice = 0.5;
+constexpr double kLatticeSigmas = 3.6, kMostlyLattice = 0.5;
 
 void look_for_rivals_of_its_kind(Finish& f, Arena& arena) {
   TwoViewOutcome& out = *f.out;
@@ -429,9 +367,8 @@ void look_for_rivals_of_its_kind(Finish& f, Arena& arena) {
   for (int i = 0; i < n; ++i) {
     if (out.inlier[i] != 0) f.indices[count++] = i;
   }
-  const double lattice = second ? lattice_share(xy, n, nullptr, 0, arena)
-                                : lattice_share(xy, n, f.indices, count, arena);
-  if (lattice >= (second ? kSomeLattice : kMostlyLattice)) {
+  const Lattice lattice = find_lattice(xy, n, second ? nullptr : f.indices, count, arena);
+  if (lattice.sigmas > kLatticeSigmas && (second || lattice.share > kMostlyLattice)) {
     out.reasons |= TV_REASON_REPEATED_STRUCTURE;
   } else if (second) {
     out.reasons |= TV_REASON_SECOND_MOTION;
@@ -486,25 +423,17 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
   outcome->inlier = arena_alloc<uint8_t>(arena, n);
   for (size_t i = 0; i < n; ++i) outcome->inlier[i] = 0;
   ArenaScope scope(arena);
-  Finish f{problem,
-           matches,
-           searched(matches),
-           problem.options.max_error_px,
-           arena_alloc<int32_t>(arena, n),
-           arena_alloc<double>(arena, n),
-           arena_alloc<int32_t>(arena, n),
-           0,
-           0,
-           gravity_of(problem),
-           outcome};
+  const RayPairs unique = searched(matches);
+  const double threshold = problem.options.max_error_px;
+  int32_t* indices = arena_alloc<int32_t>(arena, n);
+  double* values = arena_alloc<double>(arena, n);
+  int32_t* support = arena_alloc<int32_t>(arena, n);
+  Finish f{problem, matches, unique, threshold, indices, values, support, 0,
+           PoseRefiner{unique, threshold, gravity_of(problem), indices, values}, outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {
     refine_epipolar(f);
-    PoseUncertainty uncertainty;
-    if (out.epipolar.has_pose && uncertainty_of(f, out.epipolar.pose, &uncertainty)) {
-      f.noise = uncertainty.noise_px;
-    }
     (problem.calibrated ? out.essential_inliers : out.fundamental_inliers) = f.num_support;
   }
   if (f.num_support < 5) {  // no epipolar model: a rival may still explain the matches
@@ -527,9 +456,14 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
       out.essential_inliers = f.num_support;
       out.has_R = out.has_t = true;
       break;
-    case TV_CONFIG_CALIBRATED:
+    case TV_CONFIG_CALIBRATED: {
+      PoseUncertainty uncertainty;
+      if (uncertainty_of(f.refiner, out.epipolar.pose, &uncertainty)) {
+        store_uncertainty(uncertainty, &out);
+      }
       out.has_R = out.has_t = true;
       break;
+    }
     case TV_CONFIG_PANORAMIC:
       out.epipolar.pose.R = out.H = rivals.R;
       out.has_R = true;

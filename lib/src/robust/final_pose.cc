@@ -1,0 +1,182 @@
+#include "robust/final_pose.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/homography_4pt.h"
+#include "robust/verdict.h"
+
+namespace tv {
+namespace {
+
+// The final refinement minimises Cauchy's loss. Its scale follows the noise, kFinalScale times the
+// standard deviation that the inliers' median residual tells, since the threshold says little about
+// it: sub-pixel matches are far better than 1 px, and their tails are heavy.
+// docs/decisions/0002-robust-loop.md has the measurements.
+constexpr double kFinalScale = 1.5;
+
+// A wrong match that lies near an epipolar line moves its point anywhere along it; a true one moves
+// it as far as its depth asks. Matches with this many times the parallax that nine in ten stay below
+// take no part.
+constexpr double kFarParallax = 3;
+
+// Cauchy's loss at kFinalScale deviations takes E[psi^2] / E[psi'] = 0.585 of what the same matches
+// would say in least squares: the prior is to count as much less.
+constexpr double kPriorScale = 0.7646473 / kFinalScale;  // sqrt(0.58469), per scale_px
+
+// Of the squared parallax: grows with the angle up to a right angle.
+double sine_sq(const PoseRefiner& f, const Mat3& R, int i) {
+  const Vec3 a = R * ray_of(f.pairs, 0, i), b = ray_of(f.pairs, 1, i);
+  const double along = a.dot(b);
+  if (!(along > 0)) return 2;
+  const Vec3 across = a.cross(b);
+  return across.squaredNorm() / (a.squaredNorm() * b.squaredNorm());
+}
+
+// The matches that take part in a pose's final refinement, into f.indices.
+int near_pose(const PoseRefiner& f, const Pose& pose) {
+  const int count = near_matches(f.pairs, f.pairs.num, pose, kFinalNear * f.threshold_px,
+                                 f.threshold_px, f.indices);
+  if (count < 10) return count;
+  for (int k = 0; k < count; ++k) f.values[k] = sine_sq(f, pose.R, f.indices[k]);
+  double* nine_tenths = f.values + count * 9 / 10;
+  std::nth_element(f.values, nine_tenths, f.values + count);
+  const double limit = kFarParallax * kFarParallax * *nine_tenths;
+  int kept = 0;
+  for (int k = 0; k < count; ++k) {
+    const int i = f.indices[k];
+    if (sine_sq(f, pose.R, i) <= limit) f.indices[kept++] = i;
+  }
+  return kept;
+}
+
+Pose refined_with(const PoseRefiner& f, const Pose& start, const GravityPrior& gravity) {
+  GravityPoseModel model{start, &gravity};
+  for (int round = 0; round < kFinalRounds; ++round) {
+    const int count = near_pose(f, model.pose);
+    if (count < 5) break;
+    const RobustLoss loss = final_loss(f, essential_from_pose(model.pose), count);
+    model.noise_px = kPriorScale * loss.scale_px;
+    refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
+  }
+  return model.pose;
+}
+
+// Of the pose that the points alone gave.
+bool uncertainty_without_gravity(const PoseRefiner& f, const Pose& pose,
+                                 PoseUncertainty* uncertainty) {
+  const int count = near_pose(f, pose);
+  const double scale = final_loss(f, essential_from_pose(pose), count).scale_px;
+  return pose_uncertainty(f.pairs, f.indices, count, pose, scale, kFinalNear * f.threshold_px,
+                          uncertainty);
+}
+
+// The prior with the weight that the points leave it, where they alone would put the pose.
+GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
+  GravityPrior gravity = f.gravity;
+  if (!gravity.known) return gravity;
+  const Pose alone = refined_with(f, start, GravityPrior{});
+  PoseUncertainty uncertainty;
+  if (uncertainty_without_gravity(f, alone, &uncertainty)) {
+    gravity.weight = gravity_weight(gravity, alone.R, uncertainty.covariance);
+  }
+  return gravity;
+}
+
+// ---- On a plane ----
+
+// The matches that the plane explains, into f.indices.
+int near_plane(const PoseRefiner& f, const Mat3& H) {
+  const double limit = kFinalNear * kTransferThresholdScale * f.threshold_px;
+  int near = 0;
+  for (int i = 0; i < f.pairs.num; ++i) {
+    if (transfer_residual(f.pairs, i, H).r_sq <= limit * limit) f.indices[near++] = i;
+  }
+  return near;
+}
+
+// Two-dimensional residuals: half of them lie within 1.1774 deviations.
+RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
+  for (int k = 0; k < count; ++k) f.values[k] = transfer_residual(f.pairs, f.indices[k], H).r_sq;
+  double* middle = f.values + count / 2;
+  std::nth_element(f.values, middle, f.values + count);
+  const double scale = kPlaneScale * std::sqrt(*middle) / 1.1774100225154747;
+  return RobustLoss{Loss::kCauchy,
+                    std::max(0.02 * f.threshold_px, std::min(scale, 2 * f.threshold_px))};
+}
+
+// Beyond this squared distance in deviations, gravity and a pose are a chance of one in a thousand.
+constexpr double kGravityExcludes = 13.816;
+
+}  // namespace
+
+double median_noise_px(const PoseRefiner& f, const Mat3& M, int count) {
+  int within = 0;
+  for (int k = 0; k < count; ++k) {
+    const double r_sq = sampson_sq(f.pairs, f.indices[k], M);
+    if (r_sq <= f.threshold_px * f.threshold_px) f.values[within++] = r_sq;
+  }
+  if (within == 0) return f.threshold_px;
+  double* middle = f.values + within / 2;
+  std::nth_element(f.values, middle, f.values + within);
+  return 1.4826 * std::sqrt(*middle);
+}
+
+RobustLoss final_loss(const PoseRefiner& f, const Mat3& M, int count) {
+  const double scale = kFinalScale * median_noise_px(f, M, count);
+  return RobustLoss{Loss::kCauchy,
+                    std::max(0.02 * f.threshold_px, std::min(scale, f.threshold_px))};
+}
+
+Pose refined_pose(const PoseRefiner& f, const Pose& start) {
+  return refined_with(f, start, tested_gravity(f, start));
+}
+
+bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* uncertainty) {
+  const GravityPrior gravity = tested_gravity(f, pose);
+  if (!uncertainty_without_gravity(f, pose, uncertainty)) return false;
+  if (gravity.known) add_gravity_information(gravity, pose.R, uncertainty->covariance);
+  return true;
+}
+
+int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, PlaneFit* fit) {
+  PlanarPose planar[2];
+  if (decompose_homography(H, mean_ray0, planar) == 0) return 0;
+  PlaneModel model{planar[0].pose, planar[0].baseline_over_depth * planar[0].normal};
+  RobustLoss loss{};
+  int count = 0;
+  for (int round = 0; round < kFinalRounds; ++round) {
+    count = near_plane(f, model.matrix());
+    if (count < 8) return 0;
+    loss = plane_loss(f, model.matrix(), count);
+    refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
+  }
+  const int num = decompose_homography(model.matrix(), mean_ray0, planar);
+  count = near_plane(f, model.matrix());
+  if (count < 8) return 0;
+  double from_gravity[2] = {};
+  for (int k = 0; k < num; ++k) {
+    const PlaneModel twin{planar[k].pose, planar[k].baseline_over_depth * planar[k].normal};
+    fit->pose[k] = twin.pose;
+    fit->certain[k] = plane_uncertainty(f.pairs, f.indices, count, twin, loss.scale_px,
+                                        &fit->uncertainty[k]);
+    if (!f.gravity.known || !fit->certain[k]) continue;
+    GravityPrior gravity = f.gravity;
+    double* covariance = fit->uncertainty[k].covariance;
+    from_gravity[k] = gravity_distance_sq(gravity, twin.pose.R, covariance);
+    gravity.weight = gravity_weight(gravity, twin.pose.R, covariance);
+    add_gravity(gravity, &fit->pose[k], covariance);
+  }
+  // Gravity may know which of the two it was.
+  for (int k = 0; k < num && num == 2; ++k) {
+    if (from_gravity[k] > kGravityExcludes && from_gravity[1 - k] < kGravityExcludes) {
+      fit->pose[0] = fit->pose[1 - k];
+      fit->certain[0] = fit->certain[1 - k];
+      fit->uncertainty[0] = fit->uncertainty[1 - k];
+      return 1;
+    }
+  }
+  return num;
+}
+
+}  // namespace tv
