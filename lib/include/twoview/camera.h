@@ -35,7 +35,8 @@ TV_API tv_status tv_camera_check(const tv_camera *camera);
 
 /* The model is used only where its distortion is monotonic: up to this angle (radians) off the
    optical axis, found from the derivative's first zero, and bounded by what 64-bit Newton can
-   invert. Writes *angle_rad in (0, pi/2] (pi for Kannala-Brandt). */
+   invert. Writes *angle_rad in [0, pi/2] (pi for Kannala-Brandt); 0 for a
+   distortion so strong that no ray is left. */
 TV_API tv_status tv_camera_valid_angle(const tv_camera *camera, double *angle_rad);
 
 /* Pixel of a point (or ray) in the camera frame (x right, y down, z forward).

@@ -1,0 +1,15 @@
+// Tables of matches: any text is a list of matches, or BadInput.
+#include <string>
+
+#include "error.h"
+#include "fuzz.h"
+#include "matches_file.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  try {
+    const auto matches = cli::parse_matches({reinterpret_cast<const char*>(data), size}, "f");
+    FUZZ_REQUIRE(matches.size() > 0 && matches.pixels[0].size() == matches.pixels[1].size());
+  } catch (const cli::BadInput&) {
+  }
+  return 0;
+}

@@ -1,0 +1,40 @@
+// tv_triangulate: any pose, any pixels, every method.
+#include "fuzz.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  fuzz::Bytes bytes(data, size);
+  const tv_camera plain = {TV_CAMERA_PINHOLE, 640, 480, 0, 500, 500, 320, 240, {}};
+  const bool lens = bytes.whole(0, 3) == 0;
+  const tv_camera camera0 = lens ? fuzz::camera(bytes) : plain;
+  const tv_camera camera1 = lens ? fuzz::camera(bytes) : plain;
+  // A quaternion's rotation, or nine numbers.
+  double R[9], q[4], norm = 0;
+  for (double& value : q) value = bytes.between(-1, 1), norm += value * value;
+  norm = std::sqrt(norm > 0 ? norm : 1);
+  const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
+  const double rotation[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+                              2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                              2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
+  std::memcpy(R, rotation, sizeof R);
+  if (bytes.whole(0, 15) == 0)
+    for (double& value : R) value = bytes.wild(-1, 1);
+  const double t[3] = {bytes.wild(-1, 1), bytes.wild(-1, 1), bytes.wild(-1, 1)};
+  constexpr int kNum = 6;
+  double pixels[2][2 * kNum];
+  for (auto& view : pixels)
+    for (double& value : view) value = bytes.wild(0, 640);
+  if (bytes.whole(0, 3) == 0) std::memcpy(pixels[1], pixels[0], sizeof pixels[0]);
+  for (int method = -1; method <= TV_TRIANGULATION_MIDPOINT + 1; ++method) {
+    tv_point points[kNum];
+    const tv_status status = tv_triangulate(static_cast<tv_triangulation>(method), &camera0,
+                                            &camera1, R, t, pixels[0], pixels[1], kNum, points);
+    if (status != TV_OK) continue;
+    for (const tv_point& point : points) {
+      FUZZ_REQUIRE(point.status >= TV_POINT_OK && point.status <= TV_POINT_INVALID);
+      FUZZ_REQUIRE(fuzz::all_finite(point.position, 3));
+      FUZZ_REQUIRE(std::isfinite(point.angle_rad) && point.angle_rad >= 0);
+      FUZZ_REQUIRE(std::isfinite(point.error_px) && point.error_px >= 0);
+    }
+  }
+  return 0;
+}
