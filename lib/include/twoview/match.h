@@ -18,7 +18,7 @@ typedef struct tv_correspondence {
 /* Filled by tv_match_options_init. */
 typedef struct tv_match_options {
   uint32_t struct_size; /* set by tv_match_options_init */
-  float ratio;          /* keep where ratio < this in both directions, (0, 1], default 0.87;
+  float ratio;          /* keep where ratio < this in both directions, (0, 1], default 0.92;
                            1 keeps ties out only */
 } tv_match_options;
 

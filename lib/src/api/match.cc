@@ -4,7 +4,7 @@
 
 void tv_match_options_init(tv_match_options* options) {
   if (options == nullptr) return;
-  *options = tv_match_options{sizeof(tv_match_options), 0.87f};
+  *options = tv_match_options{sizeof(tv_match_options), 0.92f};
 }
 
 tv_status tv_match(tv_context* context, const uint8_t* descriptors0, int32_t num0,
