@@ -106,8 +106,8 @@ Vec3 linear_ls_by_qr(const tv_camera& camera0, const tv_camera& camera1, const M
   return A.colPivHouseholderQr().solve(b);
 }
 
-// (X, 1) spans the smallest singular vector of the same equations in (X, W), R a rotation and |t| 1.
-// Held against A itself: where the two smallest values are equal, so are all vectors between.
+// (X, 1) spans the smallest singular vector of the same equations in (X, W), R a rotation and |t|
+// 1. Held against A itself: where the two smallest values are equal, so are all vectors between.
 void expect_singular_vector(const tv_camera& camera0, const tv_camera& camera1, const Mat3& R,
                             const Vec3& t, const Vec2& pixel0, const Vec2& pixel1, double w0,
                             double w1, const tv_point& point) {

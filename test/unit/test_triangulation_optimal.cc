@@ -4,8 +4,9 @@
 //   TWOVIEW_TRIANGULATION_CASES=1000000 unit_triangulation_optimal     the number of cases of each
 //
 // Motions: general, sideways, forward, converging, both epipoles at infinity, one there. Matches:
-// with noise from 1e-9 to 1000 pixels, unrelated, at infinity, on and near the epipoles of one image
-// and of both, at equal distances from them. All within 2000 pixels, where doubles are 2e-13 apart.
+// with noise from 1e-9 to 1000 pixels, unrelated, at infinity, on and near the epipoles of one
+// image and of both, at equal distances from them. All within 2000 pixels, where doubles are 2e-13
+// apart.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
@@ -29,6 +30,8 @@ using Real = long double;
 constexpr uint64_t kSeed = 23;
 constexpr Real kRelativeGap = 1e-9L, kAbsoluteGapPx = 1e-12L;
 constexpr Real kOffPlanePx = 3e-12L;  // a dozen roundings of a pixel
+// Poly-Abs missed this one's minimum: beside it the line in image 0 goes to infinity.
+constexpr int kOnceMissed = 696735;
 constexpr int kMaxNodes = 400000;
 
 double uniform(tv::Random* random, double low, double high) {
@@ -384,8 +387,8 @@ Answer answer_of(const Case& c, const Pencil& pencil, tv_triangulation method) {
     coordinates(pencil, c, i, corrected, alpha[i]);
   }
   if (squared) answer.moved = std::sqrt(answer.moved);
-  // The two corrected pixels agree on a plane, but for rounding, and but for a pixel on its epipole,
-  // which says nothing.
+  // The two corrected pixels agree on a plane, but for rounding, and but for a pixel on its
+  // epipole, which says nothing.
   answer.cost = INFINITY;
   answer.off_plane = INFINITY;
   for (int i = 0; i < 2; ++i) {
@@ -415,8 +418,9 @@ void check(tv_triangulation method) {
   long long nodes = 0;
   const int cases = num_cases();
   int failures = 0;
-  for (int i = 0; i < cases; ++i) {
+  for (int i = 0; i < cases || i <= kOnceMissed; ++i) {
     const Case c = random_case(&random, i);
+    if (i >= cases && i != kOnceMissed) continue;
     const Pencil pencil = pencil_of(c);
     const Answer answer = answer_of(c, pencil, method);
     const Real slack = std::fmax(kRelativeGap * answer.cost, kAbsoluteGapPx);
@@ -440,6 +444,7 @@ void check(tv_triangulation method) {
       " a case\n",
       squared ? "Poly" : "Poly-Abs", cases, failures, worst_gap, worst_relative, worst_off,
       worst_moved, static_cast<double>(nodes) / cases);
+  std::fflush(stdout);
   TEST_ASSERT_EQUAL_INT(0, failures);
   TEST_ASSERT_TRUE(worst_off <= kOffPlanePx && worst_moved <= kOffPlanePx);
 }

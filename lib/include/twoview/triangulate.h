@@ -8,21 +8,21 @@
 
 TV_BEGIN_DECLS
 
-/* What a method makes least, with a pixel error measured on the undistorted image (a pixel being 1/fx
-   by 1/fy there); for TV_CAMERA_KANNALA_BRANDT, which sees beyond a half space, on the plane that
-   touches the viewing sphere at the match's own ray (a pixel being 1 / sqrt(fx fy)). For a pinhole
-   these are the textbook's pixels. Distances are in units of |t|, so that a method does not depend
-   on the length of t. */
+/* What a method makes least. A pixel's error is measured on the undistorted image, where a pixel is
+   1/fx by 1/fy; for TV_CAMERA_KANNALA_BRANDT, which sees beyond a half space, on the plane that
+   touches the viewing sphere at the match's own ray, where a pixel is 1 / sqrt(fx fy). These are the
+   textbook's pixels for a pinhole. Lengths are in units of |t|: no method depends on it. */
 typedef enum tv_triangulation {
-  TV_TRIANGULATION_POLY = 0,     /* the squared distances from both pixels to the point's images:
-                                    the global minimum, most likely under normal noise */
-  TV_TRIANGULATION_POLY_ABS = 1, /* the distances instead of their squares, globally */
+  TV_TRIANGULATION_POLY = 0,     /* squared distances from both pixels to the point's images: the
+                                    global minimum, the most likely point under normal noise */
+  TV_TRIANGULATION_POLY_ABS = 1, /* the distances instead of their squares, the global minimum */
   TV_TRIANGULATION_LINEAR_EIGEN = 2,    /* the four linear equations over unit vectors (X, W), X / W
-                                           the point in units of |t|; counts from camera 0 */
+                                           the point; counts from camera 0 */
   TV_TRIANGULATION_LINEAR_LS = 3,       /* the same equations with W = 1 */
-  TV_TRIANGULATION_ITERATIVE_EIGEN = 4, /* each camera's equations divided by the point's depth, up to
-                                           ten times; the linear answer when that does not settle */
-  TV_TRIANGULATION_ITERATIVE_LS = 5,    /* the same with W = 1; the paper's choice, and the default */
+  TV_TRIANGULATION_ITERATIVE_EIGEN = 4, /* LINEAR_EIGEN with each camera's equations divided by the
+                                           point's depth in it, again up to ten times; the linear
+                                           answer when that does not settle */
+  TV_TRIANGULATION_ITERATIVE_LS = 5,    /* LINEAR_LS so repeated; the paper's choice, the default */
   TV_TRIANGULATION_MIDPOINT = 6         /* the distances from the point to both rays */
 } tv_triangulation;
 
@@ -57,14 +57,14 @@ TV_API tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera
                                 const double *pixels0, const double *pixels1, int32_t num_points,
                                 tv_point *points);
 
-/* Moves the pixels of num_points matches to where their rays meet: the least sum of squared distances
-   (cost TV_TRIANGULATION_POLY) or of distances (TV_TRIANGULATION_POLY_ABS) that does it, the global
-   minimum. Pixels are distorted, in and out; the distances are those described at tv_triangulation.
-   Whether the rays then meet before the cameras is tv_triangulate's to say.
+/* Moves the pixels of num_points matches to where their rays meet, by the least sum of squared
+   distances (cost TV_TRIANGULATION_POLY) or of distances (TV_TRIANGULATION_POLY_ABS) that does it.
+   Pixels are distorted, in and out; the distances are those described at tv_triangulation.
+   Whether the rays then meet in front of the cameras is tv_triangulate's to say.
    Cameras, R, t and pixels as for tv_triangulate.
    corrected0, corrected1: num_points x 2; may not overlap anything else.
-   valid: num_points bytes, 1 where the match was corrected; else 0 and both pixels are zeros (a pixel
-   without a ray or not finite, or a correction that leaves the lens's valid region).
+   valid: num_points bytes, 1 where the match was corrected; else 0 and both pixels are zeros (a
+   pixel without a ray or not finite, or a correction that leaves the lens's valid region).
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT (cost, count, R, t), TV_ERR_NOT_FINITE (R, t),
    TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context; thread-safe. */
 TV_API tv_status tv_correct_matches(tv_triangulation cost, const tv_camera *camera0,

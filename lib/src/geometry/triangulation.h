@@ -38,8 +38,8 @@ bool is_triangulation_method(int method);
 Correction correct_match(tv_triangulation method, const TriangulationPair& pair,
                          const RayFrame& frame0, const RayFrame& frame1);
 
-// The same for pixels, through the lens and back. False: a pixel has no ray, or the lens does not see
-// the corrected one; corrected is untouched.
+// The same for pixels, through the lens and back. False: a pixel has no ray, or the lens does not
+// see the corrected one; corrected is untouched.
 bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
                     const Vec2& pixel1, Vec2 corrected[2]);
 

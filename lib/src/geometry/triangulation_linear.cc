@@ -98,11 +98,12 @@ Depths scaled_depths(double depth0, double depth1) {
 
 // ---- Linear-Eigen and Iterative-Eigen ----
 //
-// The unit 4-vector (X, W) of the least |A (X, W)|^2, A the same four equations. In coordinates along
-// camera 0's ray and across it, still orthonormal, camera 0's rows are [N 0] and camera 1's [B D],
-// 2x2 blocks: N is never small, and det D is, of the order of the parallax times the distance of the
-// rays. The smallest singular vector comes by inverse iteration, (A^T A)^-1 with its division by
-// (det D)^2 left out: it counts for nothing in a direction, and for exact matches it is one by zero.
+// The unit 4-vector (X, W) of the least |A (X, W)|^2, A the same four equations. In coordinates
+// along camera 0's ray and across it, still orthonormal, camera 0's rows are [N 0] and camera 1's
+// [B D], 2x2 blocks: N is never small, and det D is, of the order of the parallax times the
+// distance of the rays. The smallest singular vector comes by inverse iteration, (A^T A)^-1 with
+// its division by (det D)^2 left out: it counts for nothing in a direction, and for exact matches
+// it is one by zero.
 struct Homogeneous {
   double n[2][2], b[2][2], d[2][2];
   Vec3 across[2], along;

@@ -131,76 +131,85 @@ double solve_near_bound(const Secular& s, const double s0) {
   return e;
 }
 
+// mu, and 1 + mu m along the two directions with a negative m.
+struct Multiplier {
+  double mu, low0, low1;
+};
+
+Multiplier solve_multiplier(const Secular& s) {
+  const double s0 = -s.m[0], s1 = -s.m[2];
+  if (!(s.c > 0.0)) return Multiplier{0.0, 1.0, 1.0};
+  double mu;
+  if (solve_small(s, &mu)) return Multiplier{mu, 1.0 - mu * s0, 1.0 - mu * s1};
+  const double e = solve_near_bound(s, s0);
+  return Multiplier{(1.0 - e) / s0, e, (1.0 - s1 / s0) + e * (s1 / s0)};
+}
+
+V2 column(const double matrix[2][2], int k) { return V2{matrix[0][k], matrix[1][k]}; }
+
+V2 moved_by(V2 alpha, const double turned[2][2], double d0, double d1) {
+  return V2{alpha.x + (turned[0][0] * d0 + turned[0][1] * d1),
+            alpha.y + (turned[1][0] * d0 + turned[1][1] * d1)};
+}
+
+double size_sq(const double step[2][2]) {
+  return (step[0][0] * step[0][0] + step[0][1] * step[0][1]) +
+         (step[1][0] * step[1][0] + step[1][1] * step[1][1]);
+}
+
 // The plane of the least sum of squares.
 V2 plane_of_least_squares(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
-  const double(&k0)[2][2] = pencil.turned[0];
-  const double(&k1)[2][2] = pencil.turned[1];
-  const V2 column0[2] = {{k0[0][0], k0[1][0]}, {k0[0][1], k0[1][1]}};
-  const V2 column1[2] = {{k1[0][0], k1[1][0]}, {k1[0][1], k1[1][1]}};
   const double c = cross(alpha0, alpha1);
-  // The multiplier's sign is the constraint's; turned positive, m changes its sign instead.
+  // The multiplier has the constraint's sign; turned positive, the eigenvalues change theirs. Along
+  // each singular direction the eigenvectors are d0 + d1 and d0 - d1 over sqrt 2; d0 + side d1 is
+  // the one whose eigenvalue is negative then.
   const double sign = c < 0.0 ? -1.0 : 1.0;
-  const double s0 = pencil.singular[0];
-  const double s1 = std::fabs(pencil.singular[1]);
-  // Of (d0 + d1) / sqrt 2 and (d0 - d1) / sqrt 2 along each singular direction, `low` is the one with
-  // the negative eigenvalue.
   const double side[2] = {-sign, pencil.singular[1] < 0.0 ? sign : -sign};
-  double low[2], high[2];
+  double low[2], high[2];  // b times sqrt 2
   for (int k = 0; k < 2; ++k) {
-    const double g0 = sign * cross(column0[k], alpha1);
-    const double g1 = sign * cross(alpha0, column1[k]);
-    low[k] = g0 + side[k] * g1;  // sqrt 2 times b
+    const double g0 = sign * cross(column(pencil.turned[0], k), alpha1);
+    const double g1 = sign * cross(alpha0, column(pencil.turned[1], k));
+    low[k] = g0 + side[k] * g1;
     high[k] = g0 - side[k] * g1;
   }
+  const double s0 = pencil.singular[0], s1 = std::fabs(pencil.singular[1]);
   Secular s{sign * c,
             {0.5 * low[0] * low[0], 0.5 * high[0] * high[0], 0.5 * low[1] * low[1],
              0.5 * high[1] * high[1]},
             {-s0, s0, -s1, s1},
             0.0};
   s.sum_sq = (s.b_sq[0] + s.b_sq[1]) + (s.b_sq[2] + s.b_sq[3]);
-  double mu = 0.0;
-  double factor_low0 = 1.0, factor_low1 = 1.0;  // 1 + mu m
-  if (s.c > 0.0) {
-    if (solve_small(s, &mu)) {
-      factor_low0 = 1.0 - mu * s0;
-      factor_low1 = 1.0 - mu * s1;
-    } else {
-      // A gradient of zero along this direction would leave its side open: two equal minima. Any
-      // step below a pixel's rounding chooses one.
-      const double least = 1e-40 * (s.sum_sq + s.c * s0);
-      if (s.b_sq[0] < least) {
-        s.b_sq[0] = least;
-        low[0] = low[0] < 0.0 ? -std::sqrt(2.0 * least) : std::sqrt(2.0 * least);
-      }
-      const double e = solve_near_bound(s, s0);
-      mu = (1.0 - e) / s0;
-      factor_low0 = e;
-      factor_low1 = (1.0 - s1 / s0) + e * (s1 / s0);
-    }
+  // A gradient of zero along the first would leave its side open: two equal minima. One that is far
+  // below a pixel's rounding chooses.
+  const double least = 1e-40 * (s.sum_sq + s.c * s0);
+  if (s.b_sq[0] < least) {
+    s.b_sq[0] = least;
+    low[0] = low[0] < 0.0 ? -std::sqrt(2.0 * least) : std::sqrt(2.0 * least);
   }
-  const double step_low[2] = {-0.5 * mu * low[0] / factor_low0, -0.5 * mu * low[1] / factor_low1};
-  const double step_high[2] = {-0.5 * mu * high[0] / (1.0 + mu * s0),
-                               -0.5 * mu * high[1] / (1.0 + mu * s1)};
-  V2 moved0 = alpha0, moved1 = alpha1;
-  double size0 = 0.0, size1 = 0.0;
+  const Multiplier by = solve_multiplier(s);
+  const double factor_low[2] = {by.low0, by.low1};
+  const double factor_high[2] = {1.0 + by.mu * s0, 1.0 + by.mu * s1};
+  double d0[2], d1[2];
   for (int k = 0; k < 2; ++k) {
-    const double d0 = step_low[k] + step_high[k];
-    const double d1 = side[k] * (step_low[k] - step_high[k]);
-    moved0 = V2{moved0.x + d0 * column0[k].x, moved0.y + d0 * column0[k].y};
-    moved1 = V2{moved1.x + d1 * column1[k].x, moved1.y + d1 * column1[k].y};
-    size0 += dot(column0[k], column0[k]);
-    size1 += dot(column1[k], column1[k]);
+    const double along_low = -0.5 * by.mu * low[k] / factor_low[k];
+    const double along_high = -0.5 * by.mu * high[k] / factor_high[k];
+    d0[k] = along_low + along_high;
+    d1[k] = side[k] * (along_low - along_high);
   }
+  const V2 moved0 = moved_by(alpha0, pencil.turned[0], d0[0], d0[1]);
+  const V2 moved1 = moved_by(alpha1, pencil.turned[1], d1[0], d1[1]);
   // The two agree; the one that is farther from its epipole, in pixels, says it better.
-  return dot(moved0, moved0) * size1 >= dot(moved1, moved1) * size0 ? normal_of(moved0)
-                                                                   : normal_of(moved1);
+  return dot(moved0, moved0) * size_sq(pencil.step[1]) >=
+                 dot(moved1, moved1) * size_sq(pencil.step[0])
+             ? normal_of(moved0)
+             : normal_of(moved1);
 }
 
 // ---- the sum of distances ----
 //
 // On an arc of planes v = r v_first + t v_last, r = 1 - t, the cost is N0 / sqrt Q0 + N1 / sqrt Q1
-// with N = |alpha . v| = a r + b t (an arc ends where it is zero) and Q = A r^2 + 2 B r t + C t^2, and
-// its derivative has the sign of L0 Q1^(3/2) + L1 Q0^(3/2), L = (A b - B a) r + (B b - C a) t.
+// with N = |alpha . v| = a r + b t (an arc ends where it is zero) and Q = A r^2 + 2 B r t + C t^2,
+// and its derivative has the sign of L0 Q1^(3/2) + L1 Q0^(3/2), L = (A b - B a) r + (B b - C a) t.
 // (Squared, that is Hartley & Sturm's polynomial of degree 8.) Between the zeros of L0, L1 and of
 // the quartic of `critical_quartic` the ratio of the two terms is monotonic: one root at most.
 struct Arc {
@@ -215,7 +224,8 @@ double linear(const Arc& arc, int i, double t) {
 
 double form(const Arc& arc, int i, double t) {
   const double r = 1.0 - t;
-  return arc.A[i] * r * r + 2.0 * arc.B[i] * r * t + arc.C[i] * t * t;
+  const double q = arc.A[i] * r * r + 2.0 * arc.B[i] * r * t + arc.C[i] * t * t;
+  return q > 0.0 ? q : 0.0;  // a line at infinity may come out below zero
 }
 
 double distance(const Arc& arc, int i, double t) {
@@ -225,7 +235,8 @@ double distance(const Arc& arc, int i, double t) {
 
 double cost(const Arc& arc, double t) { return distance(arc, 0, t) + distance(arc, 1, t); }
 
-double slope_sign(const Arc& arc, double t) {
+// The cost's derivative but for a positive factor.
+double slope(const Arc& arc, double t) {
   const double q0 = form(arc, 0, t), q1 = form(arc, 1, t);
   return linear(arc, 0, t) * (q1 * std::sqrt(q1)) + linear(arc, 1, t) * (q0 * std::sqrt(q0));
 }
@@ -272,9 +283,9 @@ void halve(const double p[5], double left[5], double right[5]) {
   }
 }
 
-// The zeros in (0, 1) of a quartic in Bernstein's basis, ascending, to 2^-kDepth. The number of sign
-// changes bounds that of the zeros, and halving brings it down to it; roots nearer to each other
-// than the rounding come out as one.
+// The zeros in (0, 1) of a quartic in Bernstein's basis, ascending, to 2^-kDepth. The number of
+// sign changes bounds that of the zeros, and halving brings it down to it; roots nearer to each
+// other than the rounding come out as one.
 int zeros_in_unit_interval(const double quartic[5], double zeros[8]) {
   constexpr int kDepth = 40;
   struct Piece {
@@ -305,21 +316,30 @@ int zeros_in_unit_interval(const double quartic[5], double zeros[8]) {
   return num_zeros;
 }
 
-// The minimum of a piece whose slope goes from negative to positive, once.
-double bracketed_minimum(const Arc& arc, double low, double high) {
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    if (slope_sign(arc, middle) < 0.0) {
-      low = middle;
+// The minimum of a piece whose slope goes from negative to positive, once: the secant's zero, with
+// the weight of an end that stays halved (the Illinois rule), or the middle.
+double bracketed_minimum(const Arc& arc, double low, double high, double at_low, double at_high) {
+  const double enough = 1e-10 * (high - low);
+  for (int i = 0; i < 100 && high - low > enough; ++i) {
+    const double secant = low + (high - low) * (at_low / (at_low - at_high));
+    const double t = i < 50 && secant > low && secant < high ? secant : 0.5 * (low + high);
+    const double at = slope(arc, t);
+    if (at == 0.0) return t;
+    if (at < 0.0) {
+      low = t;
+      at_low = at;
+      at_high *= 0.5;
     } else {
-      high = middle;
+      high = t;
+      at_high = at;
+      at_low *= 0.5;
     }
   }
   return 0.5 * (low + high);
 }
 
-// Whether the slope surely keeps its sign, by bounds of its parts over the whole arc: a polynomial in
-// Bernstein's basis lies within its coefficients.
+// Whether the slope surely keeps its sign, by bounds of its parts over the whole arc: a polynomial
+// in Bernstein's basis lies within its coefficients.
 bool is_surely_monotonic(const Arc& arc) {
   double q_min[2], q_max[2], l_min[2], l_max[2];
   for (int i = 0; i < 2; ++i) {
@@ -358,21 +378,26 @@ double search_arc(const Arc& arc, double* best) {
     }
   }
   double best_t = -1.0;
+  const auto consider = [&](double t) {
+    const double at = cost(arc, t);
+    if (!(at < *best)) return;
+    *best = at;
+    best_t = t;
+  };
+  // The slope may be zero at a split, with any sign after rounding (where L0 and Q0 vanish together,
+  // it jumps there): it is asked just inside, and the split itself is a candidate.
   double low = 0.0;
-  double sign_low = slope_sign(arc, low);
   for (int i = 0; i < num; ++i) {
     const double high = split[i];
-    const double sign_high = slope_sign(arc, high);
-    if (sign_low <= 0.0 && sign_high >= 0.0 && high > low) {
-      const double t = bracketed_minimum(arc, low, high);
-      const double at = cost(arc, t);
-      if (at < *best) {
-        *best = at;
-        best_t = t;
-      }
+    const double margin = 1e-9 * (high - low);
+    const double first = low > 0.0 ? low + margin : low;
+    const double last = high < 1.0 ? high - margin : high;
+    const double slope_first = slope(arc, first), slope_last = slope(arc, last);
+    if (slope_first < 0.0 && slope_last > 0.0) {
+      consider(bracketed_minimum(arc, first, last, slope_first, slope_last));
     }
+    if (high < 1.0) consider(high);
     low = high;
-    sign_low = sign_high;
   }
   return best_t;
 }
@@ -429,8 +454,8 @@ void improve(const Plane& first, const Plane& last, const Arc& arc, double* best
 }
 
 // The planes of the two pixels part the pencil into two arcs; the longer is halved. Along an arc of
-// which no pixel's plane is an inner point each distance rises and falls at most once, and is nowhere
-// less than at the nearer end.
+// which no pixel's plane is an inner point each distance rises and falls at most once, and is
+// nowhere less than at the nearer end.
 V2 plane_of_least_distances(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
   const V2 alpha[2] = {alpha0, alpha1};
   if (cross(alpha0, alpha1) == 0.0) {

@@ -8,10 +8,10 @@
 namespace tv {
 
 // The planes through the baseline, n = v[0] axis[0] + v[1] axis[1], and what a pixel's step does to
-// them. A point with ray x of an image has the coordinates alpha = (axis[0] . x, axis[1] . x); it is
-// on the plane v where alpha . v = 0, two points correspond where alpha0 x alpha1 = 0, and a step
-// d (in pixels along the frame's basis) moves alpha by step d. The line v is |alpha . v| / sqrt(v
-// step step^T v) pixels away.
+// them. A point with ray x of an image has the coordinates alpha = (axis[0] . x, axis[1] . x); it
+// is on the plane v where alpha . v = 0, two points correspond where alpha0 x alpha1 = 0, and a
+// step d (in pixels along the frame's basis) moves alpha by step d. The line v is |alpha . v| /
+// sqrt(v step step^T v) pixels away.
 struct EpipolarPencil {
   Vec3 axis[2][2];        // of camera i, in its own frame
   double step[2][2][2];   // of camera i: [axis][basis]
