@@ -174,6 +174,13 @@ def compare_pipelines(arguments, sets):
     if systems:
         say(f"\n*: worse by more than two standard errors (sets of {MIN_PAIRS} pairs or more, and "
             "the two last lines)")
+        say()
+        for name, comparison in comparisons.items():
+            differences = comparison["mean"].values()
+            reached = all(d["difference"] >= 0 for d in differences)
+            say(f"{'reached' if reached else 'NOT REACHED':<12}mean over sets ahead of {name}: "
+                + ", ".join(f"{d['difference']:+.1f} ± {d['standard_error']:.1f}"
+                            for d in differences))
         say("\n" + ("\n".join(sentences) if sentences else
                     "no mean lower than a peer's, no set worse by more than two standard errors"))
     return {"mode": "pipelines", "sets": summaries, "mean": mean, "comparisons": comparisons,
