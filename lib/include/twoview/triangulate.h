@@ -10,8 +10,8 @@ TV_BEGIN_DECLS
 
 /* What a method makes least. A pixel's error is measured on the undistorted image, where a pixel is
    1/fx by 1/fy; for TV_CAMERA_KANNALA_BRANDT, which sees beyond a half space, on the plane that
-   touches the viewing sphere at the match's own ray, where a pixel is 1 / sqrt(fx fy). These are the
-   textbook's pixels for a pinhole. Lengths are in units of |t|: no method depends on it. */
+   touches the viewing sphere at the match's own ray, where a pixel is 1 / sqrt(fx fy). They
+   are the textbook's pixels for a pinhole. Lengths are in units of |t|: no method depends on it. */
 typedef enum tv_triangulation {
   TV_TRIANGULATION_POLY = 0,     /* squared distances from both pixels to the point's images: the
                                     global minimum, the most likely point under normal noise */

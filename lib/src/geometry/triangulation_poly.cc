@@ -384,8 +384,8 @@ double search_arc(const Arc& arc, double* best) {
     *best = at;
     best_t = t;
   };
-  // The slope may be zero at a split, with any sign after rounding (where L0 and Q0 vanish together,
-  // it jumps there): it is asked just inside, and the split itself is a candidate.
+  // The slope may be zero at a split, with any sign after rounding (where L0 and Q0 vanish
+  // together, it jumps there): it is asked just inside, and the split itself is a candidate.
   double low = 0.0;
   for (int i = 0; i < num; ++i) {
     const double high = split[i];
