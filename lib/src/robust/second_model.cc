@@ -84,7 +84,7 @@ namespace {
 // Points are kept in the cells of a grid; a search looks at no more than kMostSeen of them, so that
 // points in one heap cost no more than points that are spread.
 constexpr int kGrid = 64, kNeighbours = 6, kMostSeen = 64;
-constexpr int kMostAsked = 512;
+constexpr int kMostAsked = 512, kMostListed = 96;  // a share is told from fewer than an excess
 constexpr double kOpposite = 0.14;   // how far from the opposite place, of the neighbour's distance
 constexpr double kNearestPx = 8;     // nearer neighbours are not told from noise
 // What chance alone does is counted at a place where no usual lattice has a point: the neighbour
@@ -199,7 +199,8 @@ Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_l
   if (asked == 0 || num < 3) return {0, 0};
   ArenaScope scope(arena);
   const Grid grid = make_grid(xy, num, arena);
-  const int taken = asked < kMostAsked ? asked : kMostAsked;
+  const int most = listed != nullptr ? kMostListed : kMostAsked;
+  const int taken = asked < most ? asked : most;
   int opposite = 0, control = 0, num_neighbours = 0;
   for (int k = 0; k < taken; ++k) {
     const int place = static_cast<int>(static_cast<int64_t>(k) * asked / taken);

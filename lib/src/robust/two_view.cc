@@ -169,8 +169,8 @@ void inliers_of_transfer(Finish& f, const Mat3& H) {
   }
 }
 
-// A plane allows two motions. Where the plane explains all of the support they are fitted together
-// with it; where there is more than the plane, each is refined as a pose, and the epipolar model's
+// A plane allows two motions. Where the plane explains nearly all of the support they are fitted
+// together with it; where there is more than the plane, each is refined as a pose, and the epipolar model's
 // own competes with them. The one of lowest cost is the pose, and a second one that is different and
 // not clearly worse the alternative.
 void choose_planar_pose(Finish& f, const Rivals& rivals) {
@@ -180,7 +180,7 @@ void choose_planar_pose(Finish& f, const Rivals& rivals) {
   PlaneFit fit;
   Pose poses[3];
   int num_poses = 0;
-  const bool plane_alone = 20 * rivals.homography_inliers >= 19 * f.num_support;
+  const bool plane_alone = 20 * rivals.homography_inliers >= 17 * f.num_support;
   if (plane_alone) num_poses = refine_on_plane(f.refiner, rivals.H, mean, &fit);
   const bool on_plane = num_poses > 0;
   for (int k = 0; k < num_poses; ++k) poses[k] = fit.pose[k];
@@ -277,7 +277,7 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
   // A rival speaks for the pair when it explains most of what the epipolar model does (half of all
   // matches where there is none: a failed search is no proof of a rotation), and the rest does not
   // agree on an epipole.
-  const int most = epipolar.found ? f.num_support * 7 / 10 : n / 2;
+  const double most = epipolar.found ? kRivalShare * f.num_support : kRivalShareAlone * n;
   const bool rotation_enough =
       rotation_meaningful && rivals.rotation_inliers > most &&
       !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold) &&
@@ -336,7 +336,7 @@ constexpr double kClear = 3;
 
 // A second consistent model, and whether the points repeat themselves as on a lattice: then it is
 // the same scene, matched one period off; where most of the support does, so may the pose be.
-constexpr double kLatticeSigmas = 3.6, kMostlyLattice = 0.5;
+constexpr double kLatticeSigmas = 3.3, kMostlyLattice = 0.5;
 
 void look_for_rivals_of_its_kind(Finish& f, Arena& arena) {
   TwoViewOutcome& out = *f.out;
@@ -391,6 +391,24 @@ void measure_inliers(Finish& f) {
   if (out.num_inliers > 0) out.rms_error_px = std::sqrt(sum / out.num_inliers);
 }
 
+// As told by the median of residuals that are spread evenly over the band: 0.74.
+constexpr double kNoiseOfChance = 0.7;
+
+// Whether the support's rays of one view lie in one plane, as those of a line of points do: their
+// distances from it have a root mean square below three thresholds.
+bool in_a_line(const Finish& f, int view) {
+  if (f.num_support == 0) return false;
+  Mat3 sum = Mat3::Zero();
+  double pixel_angle = 0;
+  for (int k = 0; k < f.num_support; ++k) {
+    const Vec3 ray = ray_of(f.pairs, view, f.support[k]).normalized();
+    sum += ray * ray.transpose();
+    pixel_angle += f.pairs.pixel_angle[f.support[k]];
+  }
+  const double limit = 3 * f.threshold * pixel_angle / f.num_support;
+  return svd3(sum).s[2] < limit * limit * f.num_support;
+}
+
 void judge(Finish& f) {
   TwoViewOutcome& out = *f.out;
   const bool degenerate = out.config == TV_CONFIG_DEGENERATE;
@@ -404,7 +422,11 @@ void judge(Finish& f) {
     out.verdict = TV_VERDICT_REFUSED;
     return;
   }
-  if (4 * out.num_inliers < f.matches.pairs.num) out.reasons |= TV_REASON_LOW_INLIER_RATIO;
+  // Residuals that fill the band as evenly as chance does are no better than few inliers.
+  if (4 * out.num_inliers < f.matches.pairs.num || out.noise_px > kNoiseOfChance * f.threshold) {
+    out.reasons |= TV_REASON_LOW_INLIER_RATIO;
+  }
+  if (out.has_t && (in_a_line(f, 0) || in_a_line(f, 1))) out.reasons |= TV_REASON_CROWDED_MATCHES;
   if (out.config == TV_CONFIG_NO_MOTION) out.reasons |= TV_REASON_NO_MOTION;
   if (out.config == TV_CONFIG_PANORAMIC) out.reasons |= TV_REASON_PURE_ROTATION;
   if (out.config == TV_CONFIG_NO_MOTION || out.config == TV_CONFIG_PANORAMIC) {
@@ -441,7 +463,8 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
     for (int i = 0; i < f.pairs.num; ++i) f.support[i] = i;
     out.epipolar.found = false;
   }
-  const Rivals rivals = find_rivals(matches, f.support, f.num_support, problem.calibrated,
+  const double least_share = out.epipolar.found ? kRivalShare : kRivalShareAlone;
+  const Rivals rivals = find_rivals(matches, f.support, f.num_support, problem.calibrated, least_share,
                                     f.threshold, problem.options.seed, arena);
   out.rotation_inliers = rivals.rotation_inliers;
   out.homography_inliers = rivals.homography_inliers;

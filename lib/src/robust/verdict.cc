@@ -12,9 +12,9 @@ namespace {
 constexpr double kInfinity = __builtin_inf();
 
 // The rivals need few samples, since only one that explains most of the support matters, and few
-// matches to be told apart: of models that explain half of it, these samples miss one in a
-// thousand.
-constexpr int kRotationSamples = 30, kHomographySamples = 100;
+// matches to be told apart. Of models that explain least_share, one in ten thousand is missed.
+constexpr double kRivalConfidence = 0.9999;
+constexpr int kMostRivalSamples = 200;
 constexpr int kMaxSubset = 128;
 
 double log_factorial(int n) {
@@ -33,10 +33,13 @@ struct Best {
 };
 
 template <typename Estimator>
-Best search(Estimator estimator, const int32_t* support, int num_support, uint64_t seed) {
+Best search(Estimator estimator, const int32_t* support, int num_support, double least_share,
+            uint64_t seed) {
   if (num_support < Estimator::kSampleSize) return {};
   Sampler sampler = make_sampler(seed, estimator.num_subset, Estimator::kSampleSize, false);
-  const int most = Estimator::kSampleSize == 2 ? kRotationSamples : kHomographySamples;
+  const int least = static_cast<int>(least_share * estimator.num_subset);
+  const int most = samples_needed(kRivalConfidence, least, estimator.num_subset,
+                                  Estimator::kSampleSize, kMostRivalSamples);
   const LoopOptions options{0.999, 5, most, 0, 0};
   const LoopResult<Mat3> result = robust_loop(estimator, sampler, options);
   if (!result.found) return {};
@@ -108,7 +111,7 @@ size_t verdict_bytes(int max_matches) {
 }
 
 Rivals find_rivals(const Matches& matches, const int32_t* support, int num_support, bool calibrated,
-                   double threshold_px, uint64_t seed, Arena& arena) {
+                   double least_share, double threshold_px, uint64_t seed, Arena& arena) {
   ArenaScope scope(arena);
   int32_t* subset = arena_alloc<int32_t>(arena, kMaxSubset);
   const int num_subset = num_support < kMaxSubset ? num_support : kMaxSubset;
@@ -121,14 +124,14 @@ Rivals find_rivals(const Matches& matches, const int32_t* support, int num_suppo
   Rivals rivals{};
   rivals.rotation_inliers = rivals.homography_inliers = -1;
   if (calibrated) {
-    const Best rotation = search(RotationEstimator{base}, support, num_support, seed);
+    const Best rotation = search(RotationEstimator{base}, support, num_support, least_share, seed);
     rivals.has_rotation = rotation.found;
     if (rotation.found) {
       rivals.R = rotation.model;
       rivals.rotation_inliers = count_inliers(matches.pairs, n, rivals.R, limit);
     }
   }
-  const Best homography = search(HomographyEstimator{base}, support, num_support, seed);
+  const Best homography = search(HomographyEstimator{base}, support, num_support, least_share, seed);
   rivals.has_homography = homography.found;
   if (homography.found) {
     rivals.H = homography.model;

@@ -42,9 +42,14 @@ inline constexpr double kLogMeaningful = -4.605170185988091;  // NFA < 0.01
 double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
                            uint64_t seed);
 
-// The rotation and the homography that explain most of the listed matches.
+// A rival speaks for the pair when it explains this share of what the epipolar model does, or of all
+// matches where there is none.
+inline constexpr double kRivalShare = 0.7, kRivalShareAlone = 0.5;
+
+// The rotation and the homography that explain most of the listed matches; one that explains less
+// than least_share of them may be missed.
 Rivals find_rivals(const Matches& matches, const int32_t* support, int num_support, bool calibrated,
-                   double threshold_px, uint64_t seed, Arena& arena);
+                   double least_share, double threshold_px, uint64_t seed, Arena& arena);
 
 // Whether the matches that a rival H leaves unexplained agree on an epipole more than chance would
 // have it. A match that H misses by a vector d falls into the epipolar band, were d's direction
