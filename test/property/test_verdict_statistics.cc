@@ -127,6 +127,8 @@ void test_the_verdict_names_the_kind_and_ok_means_ok(void) {
     solvable_pairs += c.solvable;
     ok_of_solvable += c.ok_of_solvable;
   }
+  std::printf("all: ok for %d of %d solvable; %d of %d ok wrong by 5 degrees\n", ok_of_solvable,
+              solvable_pairs, wrong, ok);
   for (const Count& c : counts) TEST_ASSERT_TRUE(at_least(c.named, c.pairs, 0.99));
   TEST_ASSERT_TRUE(at_least(ok_of_solvable, solvable_pairs, 0.95));
   TEST_ASSERT_LESS_OR_EQUAL_INT(1 + ok / 10000, wrong);
