@@ -11,8 +11,8 @@ import cli_support as cli
 from cli_support import FOCAL, HEIGHT, WIDTH
 
 RESULT_KEYS = """image0 image1 num_keypoints num_matches num_inliers config verdict reasons R t E F H
-alternative evidence covariance num_points median_parallax_deg rms_reprojection_px scale scale_sigma imu
-truth timings_ms context_bytes options seed version kernels""".split()
+alternative evidence covariance noise_px num_points median_parallax_deg rms_reprojection_px scale
+scale_sigma imu truth timings_ms context_bytes options seed version kernels""".split()
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
 max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
@@ -45,11 +45,29 @@ class Reconstruct(cli.CliTest):
         self.assertEqual(result["scale"], "unit")
         self.assertIsNone(result["truth"])
         self.assertEqual(len(result["covariance"]), 25)
+        self.assertTrue(0 < result["noise_px"] < 1)
+        self.assertIsNone(result["alternative"])
         self.assertAlmostEqual(result["t"][0], -1, delta=1e-3)
         self.assertAlmostEqual(math.hypot(*result["t"]), 1, delta=1e-12)
         self.assertAlmostEqual(math.hypot(*result["E"]), 1, delta=1e-9)
         self.assertEqual(set(result["evidence"]),
                          {"essential", "fundamental", "homography", "rotation", "coverage"})
+
+    def test_a_plane_flown_at_has_a_second_pose_with_its_covariance(self):
+        # The wall fills the image; one motion flies at it and aside, the other straight at one tilted.
+        rows = cli.texture(WIDTH, HEIGHT)
+        xs = [min(max(round(WIDTH / 2 + (x - WIDTH / 2) / 1.1 + 12), 0), WIDTH - 1) for x in range(WIDTH)]
+        ys = [round(HEIGHT / 2 + (y - HEIGHT / 2) / 1.1) for y in range(HEIGHT)]
+        a = self.write("wall0.png", cli.png(WIDTH, HEIGHT, b"".join(map(bytes, rows))))
+        nearer = b"".join(bytes(rows[y][x] for x in xs) for y in ys)
+        b = self.write("wall1.png", cli.png(WIDTH, HEIGHT, nearer))
+        self.succeed(self.reconstruct(a=a, b=b))
+        result = self.result()
+        self.assertEqual(result["config"], "planar")
+        self.assertIn("two_planar_solutions", result["reasons"])
+        self.assertEqual(set(result["alternative"]), {"R", "t", "covariance"})
+        self.assertEqual(len(result["alternative"]["covariance"]), 25)
+        self.assertNotEqual(result["alternative"]["covariance"], result["covariance"])
 
     def test_E_is_t_cross_R_with_its_sign(self):
         self.succeed(self.reconstruct())

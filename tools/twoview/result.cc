@@ -144,13 +144,16 @@ Json result_json(const Outcome& outcome) {
   json["alternative"] = nullptr;
   if (v.has_alternative)
     json["alternative"] = {{"R", numbers_or_null(v.alternative_R, 9, true)},
-                           {"t", numbers_or_null(v.alternative_t, 3, true)}};
+                           {"t", numbers_or_null(v.alternative_t, 3, true)},
+                           {"covariance", numbers_or_null(v.alternative_covariance, 25,
+                                                          v.has_alternative_covariance)}};
   json["evidence"] = {{"essential", count_or_null(v.essential_inliers)},
                       {"fundamental", count_or_null(v.fundamental_inliers)},
                       {"homography", count_or_null(v.homography_inliers)},
                       {"rotation", count_or_null(v.rotation_inliers)},
                       {"coverage", finite_or_null(v.coverage)}};
   json["covariance"] = numbers_or_null(v.covariance, 25, v.has_covariance);
+  json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
   json["num_points"] = r.num_points;
   json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)
