@@ -209,7 +209,7 @@ template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
               int max_iterations, Model* model) {
   constexpr int P = Model::kParameters;
-  constexpr double kSmallStep = 1e-10, kSmallGain = 1e-12;
+  constexpr double kSmallStep = 1e-9, kSmallGain = 1e-9;
   double upper[P * (P + 1) / 2], gradient[P], step[P];
   double cost = model->normal_equations(pairs, indices, count, loss, upper, gradient);
   double lambda = 1e-4;

@@ -20,6 +20,7 @@ Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena
   Matches part = matches;
   part.pairs = alloc_ray_pairs(arena, count, matches.pairs.on_plane);
   part.pairs.num = part.num_unique = count;
+  part.pairs.kernels = matches.pairs.kernels;
   for (int v = 0; v < 2; ++v) {
     for (int k = 0; k < count; ++k) {
       set_ray(part.pairs, v, k, ray_of(matches.pairs, v, listed[k]),
@@ -84,7 +85,7 @@ namespace {
 // Points are kept in the cells of a grid; a search looks at no more than kMostSeen of them, so that
 // points in one heap cost no more than points that are spread.
 constexpr int kGrid = 64, kNeighbours = 6, kMostSeen = 64;
-constexpr int kMostAsked = 512, kMostListed = 96;  // a share is told from fewer than an excess
+constexpr int kMostAsked = 512, kMostListed = 64;  // a share is told from fewer than an excess
 constexpr double kOpposite = 0.14;   // how far from the opposite place, of the neighbour's distance
 constexpr double kNearestPx = 8;     // nearer neighbours are not told from noise
 // What chance alone does is counted at a place where no usual lattice has a point: the neighbour
