@@ -69,7 +69,8 @@ bool draw_pair(pair_kinds::Maker& maker, Class which) {
 
 // The true pose in the covariance's coordinates around an estimate.
 Vec5 error_of(const double* R, const double* t) {
-  const Mat3 turned = pair.R * Mat3(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R)).transpose();
+  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const Mat3 turned = pair.R * Mat3(Eigen::Map<const RowMajor>(R)).transpose();
   const Vec3 twice_sine(turned(2, 1) - turned(1, 2), turned(0, 2) - turned(2, 0),
                         turned(1, 0) - turned(0, 1));
   const double sine = 0.5 * twice_sine.norm();

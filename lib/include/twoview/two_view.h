@@ -35,15 +35,21 @@ typedef enum tv_verdict {
 
 /* Why a verdict is not "ok": bits of tv_two_view.reasons. */
 typedef enum tv_reason {
-  TV_REASON_TOO_FEW_MATCHES = 1 << 0,
-  TV_REASON_LOW_INLIER_RATIO = 1 << 1,
-  TV_REASON_LOW_PARALLAX = 1 << 2,
-  TV_REASON_TWO_PLANAR_SOLUTIONS = 1 << 3,
-  TV_REASON_PURE_ROTATION = 1 << 4,
-  TV_REASON_NO_MOTION = 1 << 5,
-  TV_REASON_SECOND_MOTION = 1 << 6,
-  TV_REASON_CROWDED_MATCHES = 1 << 7,
-  TV_REASON_REPEATED_STRUCTURE = 1 << 8
+  TV_REASON_TOO_FEW_MATCHES = 1 << 0,   /* fewer than 15 different ones agree */
+  TV_REASON_LOW_INLIER_RATIO = 1 << 1,  /* fewer than a quarter agree, or what they leave is spread
+                                           over the whole threshold as chance would have it */
+  TV_REASON_LOW_PARALLAX = 1 << 2,      /* a median parallax below 3 max_error_px or 10 times the
+                                           noise, or a pose whose standard deviation is above 1.25
+                                           degrees: t is little known */
+  TV_REASON_TWO_PLANAR_SOLUTIONS = 1 << 3, /* a plane's two motions explain the matches alike */
+  TV_REASON_PURE_ROTATION = 1 << 4,     /* refused: there is no t */
+  TV_REASON_NO_MOTION = 1 << 5,         /* refused: there is no t */
+  TV_REASON_SECOND_MOTION = 1 << 6,     /* matches far from this pose agree on another, at least 15
+                                           per cent as many: something moved by itself, or which of
+                                           the two the scene was is open */
+  TV_REASON_CROWDED_MATCHES = 1 << 7,   /* the inliers lie in less than 5 of 64 cells, or on a line */
+  TV_REASON_REPEATED_STRUCTURE = 1 << 8 /* the same, or most of the inliers, and the keypoints of image
+                                           0 lie as on a lattice: matched one period off, perhaps */
 } tv_reason;
 
 /* "calibrated", "planar_or_panoramic", "ok", "low_parallax" ...; "unknown" for any other number.

@@ -9,7 +9,7 @@
 namespace tv {
 namespace {
 
-// Of matches left over, a model of a third of them is missed once in a hundred by this many samples.
+// Of matches left over, a model of a third of them is missed once in a hundred by so many samples.
 constexpr int kMostSamples = 400;
 constexpr double kConfidence = 0.99;
 constexpr int kFewestInliers = 12;

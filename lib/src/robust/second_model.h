@@ -14,8 +14,8 @@ struct SecondModel {
 
 size_t second_model_bytes(int max_matches);
 
-// Searches the unique matches farther than kClearOfFirst thresholds from the first model
-// (explained[i]: match i is not) for a pose of their own. Found: the model is meaningful among them
+// Searches the unique matches that the first model does not explain (explained[i] is 0; its inliers'
+// tail, too, is to be marked) for a pose of their own. Found: the model is meaningful among them
 // (verdict.h), and counts at least kSecondShare of num_first.
 inline constexpr double kSecondShare = 0.15;
 SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,

@@ -232,9 +232,9 @@ void choose_planar_pose(Finish& f, const Rivals& rivals) {
 // Whether the support moves along the epipolar lines by more than noise. What a rotation leaves over
 // has two dimensions, the epipolar residual one: under a rotation alone the sum S of the differences
 // is about as large as the sum of the squared epipolar residuals (1.3 times, since the search turns
-// the epipole to where the residuals happen to be smallest; in one of 300 pairs more than the limit), and a parallax of p deviations of
-// the noise adds p^2 / 2 times as much. leaves_parallax tells about the matches that the rotation
-// does not explain, this about those that it does.
+// the epipole to where the residuals happen to be smallest; in one of 300 pairs more than the limit),
+// and a parallax of p deviations of the noise adds p^2 / 2 times as much. leaves_parallax tells about
+// the matches that the rotation does not explain, this about those that it does.
 bool moves_along_lines(const Finish& f, const Mat3& R) {
   if (!f.out->epipolar.has_pose) return false;
   const double limit = kTransferThresholdScale * f.threshold;
@@ -338,7 +338,7 @@ constexpr double kClear = 3;
 // the same scene, matched one period off; where most of the support does, so may the pose be.
 constexpr double kLatticeSigmas = 3.3, kMostlyLattice = 0.5;
 
-void look_for_rivals_of_its_kind(Finish& f, Arena& arena) {
+void look_for_second_model(Finish& f, Arena& arena) {
   TwoViewOutcome& out = *f.out;
   const int n = f.pairs.num;
   bool second = false;
@@ -464,8 +464,8 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
     out.epipolar.found = false;
   }
   const double least_share = out.epipolar.found ? kRivalShare : kRivalShareAlone;
-  const Rivals rivals = find_rivals(matches, f.support, f.num_support, problem.calibrated, least_share,
-                                    f.threshold, problem.options.seed, arena);
+  const Rivals rivals = find_rivals(matches, f.support, f.num_support, problem.calibrated,
+                                    least_share, f.threshold, problem.options.seed, arena);
   out.rotation_inliers = rivals.rotation_inliers;
   out.homography_inliers = rivals.homography_inliers;
   if (!out.epipolar.found) f.num_support = 0;
@@ -511,7 +511,7 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
   if (out.has_t) measure_pose(f);
   measure_inliers(f);
   if (problem.calibrated && out.config != TV_CONFIG_DEGENERATE) {
-    look_for_rivals_of_its_kind(f, arena);
+    look_for_second_model(f, arena);
   }
   judge(f);
 }
