@@ -44,8 +44,9 @@ GuidedView make_view(const tv_camera* camera, const tv_keypoint* keypoints,
     Mat32 slope;
     slope << 1, 0, 0, 1, 0, 0;
     valid[k] = camera == nullptr || unproject(prepared, pixel, &ray, &slope);
-    for (int i = 0; i < 3; ++i) rays[3 * k + i] = ray[i];
-    for (int i = 0; i < 6; ++i) slopes[6 * k + i] = slope(i / 2, i % 2);
+    double* const to = rays + 3 * k;
+    for (int i = 0; i < 3; ++i) to[i] = ray[i];
+    for (int i = 0; i < 6; ++i) slopes[6 * k + static_cast<size_t>(i)] = slope(i / 2, i % 2);
   }
   return GuidedView{keypoints, descriptors, rays, slopes, valid, num};
 }

@@ -64,15 +64,16 @@ Side make_side(const GuidedView& view, const DescriptorRows& descriptors, const 
   }
   for (size_t k = 0; k < n; ++k) {
     double* line = side.lines + 3 * k;
+    const double *ray = view.rays + 3 * k, *slope = view.slopes + 6 * k;
     for (int r = 0; r < 3; ++r) {
       const double row[3] = {transposed ? M[r] : M[3 * r], transposed ? M[3 + r] : M[3 * r + 1],
                              transposed ? M[6 + r] : M[3 * r + 2]};
-      line[r] = dot3(row, view.rays + 3 * k);
-      side.coordinates[r][k] = view.rays[3 * k + r];
+      line[r] = dot3(row, ray);
+      side.coordinates[r][k] = ray[r];
     }
     side.line_norms[k] = dot3(line, line);
     double sum = 0;
-    for (int i = 0; i < 6; ++i) sum += view.slopes[6 * k + i] * view.slopes[6 * k + i];
+    for (int i = 0; i < 6; ++i) sum += slope[i] * slope[i];
     side.slope_norms[k] = sum;
   }
   return side;

@@ -9,10 +9,9 @@ namespace tv {
 
 namespace {
 
-// Normal residuals, cut at three deviations, under Cauchy's loss: the variance of the M-estimate
-// over that of the residuals, at the loss's scale that the refinement takes (1.5 deviations for the
+// Normal residuals under Cauchy's loss: the variance of the M-estimate over that of the residuals, at the loss's scale that the refinement takes (1.5 deviations for the
 // epipolar residual, kPlaneScale for the plane's).
-constexpr double kVarianceOfCauchy = 1.1405946331327699, kVarianceOnPlane = 1.0901;
+constexpr double kVarianceOfCauchy = 1.1484187788317, kVarianceOnPlane = 1.0919;
 
 constexpr double kLeastResidual = 0.05;  // of the loss's scale
 
@@ -30,7 +29,11 @@ double variance_of(const LossSums& sums, int n, int dimensions, int p, double sc
   if (!(mean > 0.05)) return -1;
   const double of_slope = sums.slope_sq / n - mean * mean;
   const double K = 1 + p / static_cast<double>(dimensions * n) * of_slope / (mean * mean);
-  const double variance = K * K * sums.psi_sq / (dimensions * n - p) / (mean * mean);
+  const int left = dimensions * n - p;
+  if (left <= 2) return -1;
+  // Student's: the noise is told by as many residuals only.
+  const double student = static_cast<double>(left) / (left - 2);
+  const double variance = student * K * K * sums.psi_sq / left / (mean * mean);
   const double least = kLeastResidual * scale_px;
   return std::max(variance, least * least);
 }

@@ -13,7 +13,7 @@ struct PoseUncertainty {
 // The covariance of the M-estimate that minimises Cauchy's loss with scale_px over the listed
 // matches (P. Huber, "Robust Statistics", 1981, 7.6): with psi the derivative of the loss and p = 5
 // parameters,
-//     C = K^2 sum psi(r)^2 / (n - p) / (mean psi'(r))^2 (J' J)^-1,
+//     C = K^2 sum psi(r)^2 / (n - p - 2) / (mean psi'(r))^2 (J' J)^-1,
 //     K = 1 + p / n var(psi') / (mean psi')^2.
 // It allows for what the loss loses against least squares, and for the wrong matches among the
 // listed, which lie within limit_px. J is taken without what the noise of the pixels adds to it: at a

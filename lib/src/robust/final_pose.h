@@ -37,7 +37,7 @@ double median_noise_px(const PoseRefiner& refiner, const Mat3& M, int count);
 RobustLoss final_loss(const PoseRefiner& refiner, const Mat3& M, int count);
 
 // The final refinement looks this many thresholds far, this often, each time with so many steps.
-inline constexpr double kFinalNear = 1.5;
+inline constexpr double kFinalNear = 3;
 inline constexpr int kFinalRounds = 2, kFinalIterations = 20;
 
 }  // namespace tv
