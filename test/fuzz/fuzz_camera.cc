@@ -27,7 +27,11 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (seen) FUZZ_REQUIRE(fuzz::all_finite(back, 2) && fuzz::all_finite(d_pixel, 6));
     if (good) {
       FUZZ_REQUIRE(tv_camera_project_points(&camera, point, 1, many, &inside) == TV_OK);
-      FUZZ_REQUIRE(inside == seen && (!seen || std::memcmp(many, back, sizeof back) == 0));
+      // Without a Jacobian, which may end beyond a double's range before the pixel does.
+      const bool projected = tv_camera_project(&camera, point, back, nullptr) == TV_OK;
+      FUZZ_REQUIRE(projected || !seen);
+      FUZZ_REQUIRE(inside == projected &&
+                   (!projected || std::memcmp(many, back, sizeof back) == 0));
     }
   }
   return 0;
