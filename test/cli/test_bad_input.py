@@ -195,6 +195,7 @@ class Cameras(cli.CliTest):
 
     def test_an_unknown_lens_is_refused(self):
         self.refuse_camera(camera_yaml() + "distortion_model: mirror\n", "mirror")
+        self.refuse_camera(camera_yaml() + "distortion_model: [plumb_bob]\n", "distortion_model")
 
     def test_broken_yaml_is_named_by_its_line(self):
         self.refuse_camera("image_width: 320\nimage_height: [240\n", "line")
@@ -326,6 +327,19 @@ class Surroundings(cli.CliTest):
         self.assertEqual(done.returncode, 2)
         self.one_line(done, "matches.png", "No space left")
         self.assertEqual(self.listing(), ["matches.png"])
+
+    def test_what_is_read_is_not_written_over(self):
+        for verb, name in (("detect", "keypoints.png"), ("match", "matches.png"),
+                           ("reconstruct", "matches.png")):
+            with self.subTest(verb=verb):
+                image = self.write(name, png(64, 48, [128] * (64 * 48)))
+                before = image.read_bytes(), sorted(os.listdir(self.folder))
+                more = [] if verb == "detect" else [name]
+                more += ["--method", "eight-point"] if verb == "reconstruct" else []
+                done = self.run_program(verb, name, *more, "-o", self.folder)
+                self.assertEqual(done.returncode, 2)
+                self.one_line(done, name, "read by this run")
+                self.assertEqual((image.read_bytes(), sorted(os.listdir(self.folder))), before)
 
     def test_a_folder_in_the_place_of_a_file_is_told(self):
         (self.out / "views.png").mkdir(parents=True)

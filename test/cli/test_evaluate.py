@@ -93,6 +93,11 @@ class Evaluate(cli.CliTest):
             with self.subTest(words=words):
                 self.assert_refused(self.evaluate(line), "pairs.txt", *words)
         self.assert_refused(self.evaluate("# nothing\n"), "no pair")
+        last = pair_line().split()[:-1] + ["inf"]
+        self.assert_refused(self.evaluate(" ".join(last)), "line 1", "inf")
+        last = pair_line().split()[:-4] + ["5", "0", "0", "1"]
+        self.assert_refused(self.evaluate(" ".join(last)), "line 1", "0 0 0 1")
+        self.assert_refused(self.evaluate(pair_line(), "--method", "upright"), "gravity")
 
     def test_missing_files_and_flags_are_refused(self):
         done = self.run_program("evaluate", "no.txt", "--images", ".", "-o", self.out)

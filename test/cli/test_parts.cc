@@ -65,6 +65,8 @@ void test_translation_error_forgets_the_sign_only_when_asked() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 180, translation_error_signed_deg({1, 0, 0}, {-2, 0, 0}));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, translation_error_deg({1, 0, 0}, {-2, 0, 0}));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 45, translation_error_deg({-1, 1, 0}, {3, 0, 0}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 45, translation_error_deg({-1, 0, 0}, {1e308, 1e308, 0}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 45, translation_error_deg({-1, 0, 0}, {1e-300, 1e-300, 0}));
   TEST_ASSERT_TRUE(translation_error_deg({0, 0, 0}, {1, 0, 0}) == kInfinity);
 }
 

@@ -86,7 +86,8 @@ class Triangulate(cli.CliTest):
     def test_what_misses_its_pixels_is_left_out_of_the_cloud_only(self):
         row = seen(POINTS)[0]
         matches = self.write("m.txt", f"{row[0]} {row[1]} {row[2]} {row[3] + 10}\n" + " ".join(map(str, row)))
-        self.succeed(self.triangulate(matches=matches))
+        done = self.succeed(self.triangulate(matches=matches))
+        self.assertTrue(done.stdout.startswith(b"1 points of 2 matches; 1 above 1 px,"), done.stdout)
         self.assertEqual(len(self.rows(self.out / "points.csv")), 2)
         self.assertIn(b"element vertex 1\n", (self.out / "cloud.ply").read_bytes())
         self.succeed(self.triangulate("--max-error-px", "20", matches=matches))
@@ -101,6 +102,13 @@ class Triangulate(cli.CliTest):
         self.assertEqual(self.listing(cloud.parent), ["cloud.ply"])
         points = [p for p in json.loads(done.stdout)["points"] if p["status"] == "ok" and p["error_px"] < 0.5]
         self.assertGreater(len(points), 200)
+
+    def test_what_is_read_is_not_written_over(self):
+        matches = self.write("points.csv", "10 20 5 20\n")
+        done = self.triangulate(matches=matches, out=self.folder)
+        self.assertEqual(done.returncode, 2)
+        self.one_line(done, "points.csv", "read by this run")
+        self.assertEqual(matches.read_text(), "10 20 5 20\n")
 
     def test_o_names_one_file_by_its_ending(self):
         self.succeed(self.triangulate(out=self.out / "p.csv"))

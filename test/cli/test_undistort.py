@@ -159,12 +159,21 @@ class Undistort(cli.CliTest):
         self.assert_refused(self.run_program("undistort", "d.png", "-o", self.out), "--camera")
         self.assert_refused(self.run_program("undistort", "--camera", "lens.yaml", "-o", self.out), "IMAGE")
 
-    def test_an_image_of_the_same_folder_is_replaced_whole(self):
+    def test_what_is_read_is_not_written_over(self):
         self.lens_file("brown_conrady")
+        (self.folder / "lens.yaml").rename(self.folder / "camera.yaml")
         image = self.write("d.png", png(W, H, [128] * (W * H)))
-        self.succeed(self.run_program("undistort", "d.png", "--camera", "lens.yaml", "-o", "."))
-        cli.png_size(image.read_bytes())
-        self.assertFalse([name for name in os.listdir(self.folder) if name.startswith(".")])
+        before = {name: (self.folder / name).read_bytes() for name in os.listdir(self.folder)}
+        done = self.run_program("undistort", "d.png", "--camera", "camera.yaml", "-o", self.folder)
+        self.assertEqual(done.returncode, 2)
+        self.one_line(done, "d.png", "read by this run")
+        image.rename(self.folder / "e.jpg")  # its result is e.png, but camera.yaml is still read
+        done = self.run_program("undistort", "e.jpg", "--camera", "camera.yaml", "-o", ".")
+        self.assertEqual(done.returncode, 2)
+        self.one_line(done, "camera.yaml", "read by this run")
+        (self.folder / "e.jpg").rename(image)
+        after = {name: (self.folder / name).read_bytes() for name in os.listdir(self.folder)}
+        self.assertEqual(before, after)
 
 
 if __name__ == "__main__":

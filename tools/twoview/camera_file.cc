@@ -51,6 +51,8 @@ void read_matrix(const YAML::Node& root, const std::string& file, tv_camera& cam
 
 void read_distortion(const YAML::Node& root, const std::string& file, tv_camera& camera) {
   const YAML::Node model_node = root["distortion_model"];
+  if (model_node && !model_node.IsScalar() && !model_node.IsNull())
+    throw BadInput(file + ": distortion_model is not a word");
   std::string model = model_node && model_node.IsScalar() ? model_node.Scalar() : "";
   const std::string known[] = {"", "plumb_bob", "rational_polynomial", "equidistant", "none"};
   if (std::find(std::begin(known), std::end(known), model) == std::end(known))

@@ -22,6 +22,7 @@ int detect(Arguments& a) {
   Picture picture = load_picture(a.image);
   shrink(picture, common.options.resize);
   OutputSet files(common.output);
+  files.keep(a.image);
   Session session(common.options);
   tv_context* context = session.context(picture.luma.cols, picture.luma.rows);
   const uint64_t start_ns = now_ns();

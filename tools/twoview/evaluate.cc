@@ -265,6 +265,8 @@ void split_output(const std::string& output, fs::path& folder, std::string& name
 
 int evaluate(Arguments& a) {
   Common& common = a.common;
+  if (common.options.estimate.method == TV_METHOD_UPRIGHT)
+    throw BadInput("--method upright needs gravity, which a list of pairs does not have");
   common.options.settle();
   if (!fs::is_directory(a.images)) throw BadInput("--images: " + a.images + " is not a folder");
   std::vector<Pair> pairs = load_pairs(a.pairs);
@@ -278,6 +280,7 @@ int evaluate(Arguments& a) {
   std::string name;
   split_output(common.output, folder, name);
   OutputSet files(folder);  // before the long work, so that an unwritable folder is told at once
+  files.keep(a.pairs);
   Session session(common.options);
   std::vector<PairReport> reports;
   {

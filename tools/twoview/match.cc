@@ -38,6 +38,7 @@ int match(Arguments& a) {
     shrink(picture[i], common.options.resize);
   }
   OutputSet files(common.output);
+  for (const std::string& image : a.image) files.keep(image);
   Session session(common.options);
   tv_context* context = session.context(std::max(picture[0].luma.cols, picture[1].luma.cols),
                                         std::max(picture[0].luma.rows, picture[1].luma.rows));

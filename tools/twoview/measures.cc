@@ -9,6 +9,12 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232;  // of a radian
 
+// The same direction, of a length whose square is neither infinite nor 0; zeros stay.
+Vector3 of_medium_length(const Vector3& v) {
+  const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
+  return largest > 0 ? Vector3{v[0] / largest, v[1] / largest, v[2] / largest} : v;
+}
+
 }  // namespace
 
 Matrix3 product(const Matrix3& a, const Matrix3& b) {
@@ -49,8 +55,9 @@ double rotation_error_deg(const Matrix3& R_est, const Matrix3& R_gt) {
 }
 
 double translation_error_signed_deg(const Vector3& t_est, const Vector3& t_gt) {
-  if (norm(t_est) == 0 || norm(t_gt) == 0) return std::numeric_limits<double>::infinity();
-  return std::atan2(norm(cross(t_est, t_gt)), dot(t_est, t_gt)) * kDegrees;
+  const Vector3 est = of_medium_length(t_est), gt = of_medium_length(t_gt);
+  if (norm(est) == 0 || norm(gt) == 0) return std::numeric_limits<double>::infinity();
+  return std::atan2(norm(cross(est, gt)), dot(est, gt)) * kDegrees;
 }
 
 double translation_error_deg(const Vector3& t_est, const Vector3& t_gt) {

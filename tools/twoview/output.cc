@@ -107,12 +107,25 @@ void OutputSet::make_folder() {
     throw BadInput("cannot write to folder " + folder_.string() + ": " + reason(errno));
 }
 
+void OutputSet::keep(const std::string& input) {
+  if (!input.empty()) kept_.push_back(input);
+}
+
+bool OutputSet::is_kept(const fs::path& path) const {
+  return std::any_of(kept_.begin(), kept_.end(), [&](const std::string& input) {
+    std::error_code error;  // set where one of the two is not there: then they are not the same
+    return fs::is_regular_file(path, error) && fs::equivalent(path, input, error);
+  });
+}
+
 void OutputSet::add(const std::string& name, std::string_view bytes) {
   const fs::path target = folder_ / name;
   struct stat info;
   const bool exists = ::stat(target.c_str(), &info) == 0;
   if (exists && S_ISDIR(info.st_mode))
     throw BadInput("cannot write " + target.string() + ": it is a folder");
+  if (is_kept(target))
+    throw BadInput("cannot write " + target.string() + ": it is read by this run; give another -o");
 
   const bool direct = exists && (!S_ISREG(info.st_mode) || stands_for_open_file(target));
   Entry entry{name, {}};
@@ -163,7 +176,7 @@ void OutputSet::remove_others(const std::vector<std::string>& names) const {
     for (const Entry& entry : entries_) ours = ours || entry.name == name;
     struct stat info;
     const fs::path path = folder_ / name;
-    if (!ours && ::lstat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode)) ::unlink(path.c_str());
+    if (!ours && !is_kept(path) && ::lstat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode)) ::unlink(path.c_str());
   }
 }
 

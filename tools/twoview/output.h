@@ -20,6 +20,9 @@ class OutputSet {
   OutputSet(const OutputSet&) = delete;
   OutputSet& operator=(const OutputSet&) = delete;
 
+  // A file that the run reads: add() refuses to write over it, and remove_others() leaves it.
+  void keep(const std::string& input);
+
   void add(const std::string& name, std::string_view bytes);
   void commit();
 
@@ -35,12 +38,14 @@ class OutputSet {
     std::string name;
     std::filesystem::path temporary;  // empty: written already
   };
+  bool is_kept(const std::filesystem::path& path) const;
   void discard() noexcept;
   void make_folder();
 
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> made_;  // folders made here, outermost first
   std::vector<Entry> entries_;
+  std::vector<std::string> kept_;
 };
 
 // From now on Ctrl-C, SIGTERM and SIGHUP end the program only after what the OutputSets have not

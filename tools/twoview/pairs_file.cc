@@ -79,6 +79,9 @@ Pair parse_line(const std::string& line) {
       pair.t[row] = parse_number(fields[22 + 4 * row + 3]);
     }
     check_rotation(pair.R);
+    for (size_t column = 0; column < 4; ++column)
+      if (parse_number(fields[34 + column]) != (column == 3 ? 1 : 0))
+        throw BadInput("the last row of T_0to1 is not 0 0 0 1");
   }
   return pair;
 }

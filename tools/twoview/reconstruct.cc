@@ -195,6 +195,9 @@ int reconstruct(Arguments& a) {
     check_truth(truth, outcome.picture[0]);
   }
   OutputSet files(common.output);
+  for (const std::string& image : a.image) files.keep(image);
+  for (const std::string& camera : a.cameras.files()) files.keep(camera);
+  files.keep(a.truth);
   Session session(common.options);
   const uint64_t total_ns = reconstruct_pair(session, common.options, outcome);
 

@@ -94,10 +94,12 @@ Json result(const Arguments& a, const std::vector<tv_point>& points, const Known
 std::string summary(const Json& json, const OutputSet& files) {
   char text[256];
   std::snprintf(text, sizeof text,
-                "%d points of %d matches; %d infinite, %d behind a camera, %d invalid\n",
+                "%d points of %d matches; %d above %g px, %d infinite, %d behind a camera, "
+                "%d invalid\n",
                 json["num_points"].get<int>(), json["num_matches"].get<int>(),
-                json["num_infinite"].get<int>(), json["num_behind"].get<int>(),
-                json["num_invalid"].get<int>());
+                json["num_ok"].get<int>() - json["num_points"].get<int>(),
+                json["options"]["max_error_px"].get<double>(), json["num_infinite"].get<int>(),
+                json["num_behind"].get<int>(), json["num_invalid"].get<int>());
   std::string words = text;
   if (json["num_points"].get<int>() > 0) {
     std::snprintf(text, sizeof text, "reprojection %.2f px rms, angle %.2f deg (median)\n",
@@ -135,6 +137,9 @@ int triangulate(Arguments& a) {
   const std::string kind = output.extension().string();
   const bool is_file = (kind == ".csv" || kind == ".ply") && !fs::is_directory(output);
   OutputSet files(is_file ? output.parent_path() : output);
+  files.keep(a.matches);
+  files.keep(a.pose);
+  for (const std::string& camera : camera_files) files.keep(camera);
   const Json json = result(a, points, pose, camera_files);
   add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px)), files);
   if (common.json) print(json_text(json));

@@ -92,6 +92,8 @@ int undistort(Arguments& a) {
   pinhole.fy *= a.focal_scale;
   const std::vector<std::string> names = result_names(a.images, a.mask);
   OutputSet files(common.output);
+  files.keep(a.camera);
+  for (const std::string& image : a.images) files.keep(image);
   const Map map = map_to(lens, pinhole);
   for (size_t i = 0; i < a.images.size(); ++i) {
     const cv::Mat image = load_pixels(a.images[i]);
