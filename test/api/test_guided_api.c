@@ -170,6 +170,23 @@ static void test_bad_numbers_are_refused(void) {
   refused(TV_ERR_CAMERA, &c);
 }
 
+static void test_the_scale_of_the_matrix_does_not_matter(void) {
+  static const double scales[4] = {1e-300, 1e-160, -3, 1e300};
+  call c = good_call();
+  int32_t first = 0, count;
+  size_t s, k;
+  double kept[9];
+  memcpy(kept, sideways, sizeof kept);
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(&c, &first));
+  TEST_ASSERT_TRUE(first > 0);
+  for (s = 0; s < 4; ++s) {
+    for (k = 0; k < 9; ++k) sideways[k] = kept[k] * scales[s];
+    TEST_ASSERT_EQUAL_INT(TV_OK, run(&c, &count));
+    TEST_ASSERT_EQUAL_INT(first, count);
+  }
+  memcpy(sideways, kept, sizeof kept);
+}
+
 static void test_options_out_of_range_are_refused(void) {
   static const float bad[4][6] = {{0.0f, 0.009f, 1000.1f, (float)NAN, (float)INFINITY, -1.0f},
                                   {0.0f, -0.5f, 1.0001f, (float)NAN, (float)INFINITY, 2.0f},
@@ -249,6 +266,7 @@ int main(void) {
   RUN_TEST(test_counts_out_of_range_are_refused);
   RUN_TEST(test_an_output_over_an_input_is_refused);
   RUN_TEST(test_bad_numbers_are_refused);
+  RUN_TEST(test_the_scale_of_the_matrix_does_not_matter);
   RUN_TEST(test_options_out_of_range_are_refused);
   RUN_TEST(test_huge_numbers_give_no_match_and_no_crash);
   RUN_TEST(test_a_full_context_matches_in_its_memory);

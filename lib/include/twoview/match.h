@@ -65,7 +65,8 @@ TV_API void tv_guided_options_init(tv_guided_options *options);
    pixels of the images as given), or no cameras and F of the pixels. epipolar: row-major 3x3, finite.
    Swapped views with the transposed matrix give the same pairs, swapped.
    A keypoint outside its lens's valid region is not matched.
-   keypoints, descriptors: num of each, num in [0, context's max_keypoints]. options may be null.
+   keypoints, descriptors: num of each, num in [0, context's max_keypoints]; keypoints are checked as
+   tv_describe checks them, all of their fields. options may be null.
    The result is in ascending order of idx0; capacity of min(num0, num1) is always enough.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
    TV_ERR_NOT_FINITE, TV_ERR_CAPACITY (*num_correspondences then is how many there are),

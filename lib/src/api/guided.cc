@@ -99,9 +99,14 @@ tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const t
   if (cap_correspondences < 0 || (camera0 == nullptr) != (camera1 == nullptr)) {
     return TV_ERR_ARGUMENT;
   }
+  // The matrix has no scale; with a largest entry of 1 its squares stay within a double's range.
+  double scaled[9], largest = 0;
   for (int k = 0; k < 9; ++k) {
     if (!tv::is_finite(epipolar[k])) return TV_ERR_NOT_FINITE;
+    const double size = epipolar[k] < 0 ? -epipolar[k] : epipolar[k];
+    largest = size > largest ? size : largest;
   }
+  for (int k = 0; k < 9; ++k) scaled[k] = largest > 0 ? epipolar[k] / largest : 0;
   if (camera0 != nullptr) {
     status = tv_camera_check(camera0);
     if (status == TV_OK) status = tv_camera_check(camera1);
@@ -123,7 +128,7 @@ tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const t
       tv::make_view(camera0, keypoints0, descriptors0, num0, context->arena);
   const tv::GuidedView view1 =
       tv::make_view(camera1, keypoints1, descriptors1, num1, context->arena);
-  const int32_t count = tv::match_guided(*context->kernels, view0, view1, epipolar, checked,
+  const int32_t count = tv::match_guided(*context->kernels, view0, view1, scaled, checked,
                                          context->arena, found);
   *num_correspondences = count;
   if (count > cap_correspondences) return TV_ERR_CAPACITY;
