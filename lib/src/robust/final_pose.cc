@@ -9,6 +9,8 @@
 namespace tv {
 namespace {
 
+constexpr double kInfinity = __builtin_inf();
+
 // The final refinement minimises Cauchy's loss. Its scale follows the noise, kFinalScale times the
 // standard deviation that the inliers' median residual tells, since the threshold says little about
 // it: sub-pixel matches are far better than 1 px, and their tails are heavy.
@@ -20,9 +22,11 @@ constexpr double kFinalScale = 1.5;
 // take no part.
 constexpr double kFarParallax = 3;
 
-// Cauchy's loss at kFinalScale deviations takes E[psi^2] / E[psi'] = 0.585 of what the same matches
-// would say in least squares: the prior is to count as much less.
-constexpr double kPriorScale = 0.7646473 / kFinalScale;  // sqrt(0.58469), per scale_px
+// The refinement of a pose takes the scale at which Huber's estimate of the variance,
+// sum psi^2 / (sum psi')^2, is least: residuals with heavy tails want a small one, plain noise a large
+// one. Its uncertainty is still that of kFinalScale, since the variance that was chosen for being
+// small reads low.
+constexpr double kScales[] = {1, 1.5, 2, 3}, kLargestScale = 2;  // of sigma, of the threshold
 
 // Of the squared parallax: grows with the angle up to a right angle.
 double sine_sq(const PoseRefiner& f, const Mat3& R, int i) {
@@ -50,13 +54,38 @@ int near_pose(const PoseRefiner& f, const Pose& pose) {
   return kept;
 }
 
+// The loss of least estimated variance over the listed matches. *taken: sqrt(sum psi^2 / sum psi'),
+// what it takes from the matches in deviations of a residual, for a prior to count as much less.
+RobustLoss best_loss(const PoseRefiner& f, const Mat3& M, int count, double* taken) {
+  const double sigma = median_noise_px(f, M, count);
+  for (int k = 0; k < count; ++k) f.values[k] = sampson_sq(f.pairs, f.indices[k], M);
+  double least = 0;
+  RobustLoss best{};
+  for (const double factor : kScales) {
+    const double scale = std::max(0.02 * f.threshold_px,
+                                  std::min(factor * sigma, kLargestScale * f.threshold_px));
+    const double inverse_sq = 1 / (scale * scale);
+    double psi_sq = 0, slope = 0;
+    for (int k = 0; k < count; ++k) {
+      const double q = f.values[k] * inverse_sq, weight = 1 / (1 + q);
+      psi_sq += f.values[k] * weight * weight;
+      slope += (1 - q) * weight * weight;
+    }
+    if (factor != kScales[0] && !(slope > 0 && psi_sq < least * slope * slope)) continue;
+    least = slope > 0 ? psi_sq / (slope * slope) : kInfinity;
+    best = RobustLoss{Loss::kCauchy, scale};
+    *taken = slope > 0 ? std::sqrt(psi_sq / slope) : sigma;
+  }
+  return best;
+}
+
 Pose refined_with(const PoseRefiner& f, const Pose& start, const GravityPrior& gravity) {
   GravityPoseModel model{start, &gravity};
   for (int round = 0; round < kFinalRounds; ++round) {
     const int count = near_pose(f, model.pose);
     if (count < 5) break;
-    const RobustLoss loss = final_loss(f, essential_from_pose(model.pose), count);
-    model.noise_px = kPriorScale * loss.scale_px;
+    const RobustLoss loss =
+        best_loss(f, essential_from_pose(model.pose), count, &model.noise_px);
     refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
   }
   return model.pose;
