@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "support/estimator.h"
 #include "support/pair_kinds.h"
 #include "twoview/two_view.h"
 
@@ -22,7 +23,6 @@ const char* const kNames[kNumClasses] = {"general", "sideways", "forward", "para
                                          "planar"};
 constexpr double kChiSq95[6] = {0, 3.841, 5.991, 7.815, 9.488, 11.070};
 
-alignas(TV_CONTEXT_ALIGNMENT) uint8_t memory[8 << 20];
 tv_context* context;
 pair_kinds::Pair pair;
 int num_pairs = 300;
@@ -139,26 +139,13 @@ void test_the_ellipsoid_of_95_per_cent_holds_the_truth(void) {
 }  // namespace
 
 void setUp(void) {
-  tv_limits limits;
-  tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 64;
-  limits.max_keypoints = 1;
-  limits.max_matches = pair_kinds::kMaxMatches;
-  size_t size_bytes;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size_bytes));
-  TEST_ASSERT_TRUE(size_bytes <= sizeof memory);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, memory, size_bytes));
+  context = estimator::make_context(pair_kinds::kMaxMatches);
 }
 
 void tearDown(void) {}
 
 int main(void) {
-  if (std::getenv("TWOVIEW_PAIRS") != nullptr) num_pairs = std::atoi(std::getenv("TWOVIEW_PAIRS"));
-  if (std::getenv("TWOVIEW_SEED") != nullptr) {
-    base_seed = std::strtoull(std::getenv("TWOVIEW_SEED"), nullptr, 10);
-  }
-  std::printf("TWOVIEW_SEED=%llu TWOVIEW_PAIRS=%d\n", static_cast<unsigned long long>(base_seed),
-              num_pairs);
+  estimator::read_environment(1, &num_pairs, &base_seed);
   UNITY_BEGIN();
   RUN_TEST(test_the_ellipsoid_of_95_per_cent_holds_the_truth);
   return UNITY_END();

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "support/estimator.h"
 #include "support/scene.h"
 #include "twoview/two_view.h"
 
@@ -12,7 +13,6 @@ namespace {
 using scene::Kind;
 
 constexpr int kCapMatches = 4000;
-alignas(TV_CONTEXT_ALIGNMENT) uint8_t memory[8 << 20];
 tv_context* context;
 scene::Scene pair;
 uint8_t mask[kCapMatches];
@@ -212,15 +212,7 @@ void test_covariance_covers_the_error(void) {
 }  // namespace
 
 void setUp(void) {
-  tv_limits limits;
-  tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 64;
-  limits.max_keypoints = 1;
-  limits.max_matches = kCapMatches;
-  size_t size_bytes;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size_bytes));
-  TEST_ASSERT_TRUE(size_bytes <= sizeof memory);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, memory, size_bytes));
+  context = estimator::make_context(kCapMatches);
 }
 
 void tearDown(void) {}

@@ -4,6 +4,7 @@
 // moves them. TWOVIEW_VERBOSE=1 prints each pair that is misnamed, and each wrong "ok".
 #include <cstdlib>
 
+#include "support/estimator.h"
 #include "support/pair_kinds.h"
 #include "twoview/two_view.h"
 
@@ -11,7 +12,6 @@ namespace {
 
 using pair_kinds::Kind;
 
-alignas(TV_CONTEXT_ALIGNMENT) uint8_t memory[8 << 20];
 tv_context* context;
 pair_kinds::Pair pair;
 int num_pairs = 100;
@@ -137,27 +137,14 @@ void test_the_verdict_names_the_kind_and_ok_means_ok(void) {
 }  // namespace
 
 void setUp(void) {
-  tv_limits limits;
-  tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 64;
-  limits.max_keypoints = 1;
-  limits.max_matches = pair_kinds::kMaxMatches;
-  size_t size_bytes;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size_bytes));
-  TEST_ASSERT_TRUE(size_bytes <= sizeof memory);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, memory, size_bytes));
+  context = estimator::make_context(pair_kinds::kMaxMatches);
 }
 
 void tearDown(void) {}
 
 int main(void) {
-  if (std::getenv("TWOVIEW_PAIRS") != nullptr) num_pairs = std::atoi(std::getenv("TWOVIEW_PAIRS"));
-  if (std::getenv("TWOVIEW_SEED") != nullptr) {
-    base_seed = std::strtoull(std::getenv("TWOVIEW_SEED"), nullptr, 10);
-  }
   verbose = std::getenv("TWOVIEW_VERBOSE") != nullptr;
-  std::printf("TWOVIEW_SEED=%llu TWOVIEW_PAIRS=%d\n", static_cast<unsigned long long>(base_seed),
-              num_pairs);
+  estimator::read_environment(1, &num_pairs, &base_seed);
   UNITY_BEGIN();
   RUN_TEST(test_the_verdict_names_the_kind_and_ok_means_ok);
   return UNITY_END();

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "support/estimator.h"
 #include "support/scene.h"
 #include "twoview/two_view.h"
 
@@ -26,7 +27,6 @@ constexpr int kMaxPairs = 100000;
 constexpr int kThresholdsDeg[3] = {1, 5, 10};
 const double kInfinite = HUGE_VAL;
 
-alignas(TV_CONTEXT_ALIGNMENT) uint8_t memory[1 << 20];
 tv_context* context;
 uint64_t seed = 360;
 int num_pairs = 100;
@@ -197,26 +197,15 @@ void test_a_wide_lens_is_as_good_as_a_pinhole(void) {
 }  // namespace
 
 void setUp(void) {
-  tv_limits limits;
-  tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 64;
-  limits.max_keypoints = 1;
-  limits.max_matches = kNum;
-  size_t size_bytes;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size_bytes));
-  TEST_ASSERT_TRUE(size_bytes <= sizeof memory);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, memory, size_bytes));
+  context = estimator::make_context(kNum);
   for (int c = 0; c < kNumCameras; ++c) cameras[c] = tv::prepare_camera(kCameras[c]);
 }
 
 void tearDown(void) {}
 
 int main(void) {
-  if (const char* text = std::getenv("TWOVIEW_PAIRS")) num_pairs = std::atoi(text);
-  if (num_pairs < 10 || num_pairs > kMaxPairs) num_pairs = 1000;
-  if (const char* text = std::getenv("TWOVIEW_SEED")) seed = std::strtoull(text, nullptr, 10);
-  std::printf("TWOVIEW_PAIRS=%d TWOVIEW_SEED=%llu\n", num_pairs,
-              static_cast<unsigned long long>(seed));
+  estimator::read_environment(10, &num_pairs, &seed);
+  if (num_pairs > kMaxPairs) num_pairs = kMaxPairs;
   UNITY_BEGIN();
   RUN_TEST(test_a_wide_lens_is_as_good_as_a_pinhole);
   return UNITY_END();

@@ -11,10 +11,9 @@ namespace {
 
 constexpr double kInfinity = __builtin_inf();
 
-// The final refinement minimises Cauchy's loss. Its scale follows the noise, kFinalScale times the
-// standard deviation that the inliers' median residual tells, since the threshold says little about
-// it: sub-pixel matches are far better than 1 px, and their tails are heavy.
-// docs/decisions/0002-robust-loop.md has the measurements.
+// Cauchy's loss has a scale that follows the noise, this many times the standard deviation that the
+// inliers' median residual tells, since the threshold says little about it: sub-pixel matches are far
+// better than 1 px. So for a fundamental matrix, and for the uncertainty of a pose.
 constexpr double kFinalScale = 1.5;
 
 // A wrong match that lies near an epipolar line moves its point anywhere along it; a true one moves
@@ -22,11 +21,12 @@ constexpr double kFinalScale = 1.5;
 // take no part.
 constexpr double kFarParallax = 3;
 
-// The refinement of a pose takes the scale at which Huber's estimate of the variance,
-// sum psi^2 / (sum psi')^2, is least: residuals with heavy tails want a small one, plain noise a large
-// one. Its uncertainty is still that of kFinalScale, since the variance that was chosen for being
-// small reads low.
-constexpr double kScales[] = {1, 1.5, 2, 3}, kLargestScale = 2;  // of sigma, of the threshold
+// A pose is refined at the one of these scales, in standard deviations, at which Huber's estimate of
+// the variance, sum psi^2 / (sum psi')^2, is least: heavy tails want a small one, plain noise a large
+// one. Its uncertainty is still that of kFinalScale, since a variance that was chosen for being small
+// reads low. docs/decisions/0002-robust-loop.md has the measurements.
+constexpr double kScales[] = {1, 1.5, 2, 3};
+constexpr double kLargestScale = 2;  // in thresholds
 
 // Of the squared parallax: grows with the angle up to a right angle.
 double sine_sq(const PoseRefiner& f, const Mat3& R, int i) {

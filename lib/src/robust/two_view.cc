@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/math.h"
-#include "robust/final_pose.h"
 #include "robust/estimators_upright.h"
+#include "robust/final_pose.h"
 #include "robust/loop.h"
 #include "robust/second_model.h"
 
