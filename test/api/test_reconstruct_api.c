@@ -274,19 +274,22 @@ static void test_a_full_call_uses_most_of_the_memory(void) {
   TEST_ASSERT_TRUE(high_water > a.size_bytes / 10 * 8);
 }
 
+static void view_real_pair(const real_pair *pair) {
+  int v;
+  camera = camera_of(pair->width, pair->height); /* setUp makes the drawn pair's again */
+  for (v = 0; v < 2; ++v) {
+    views[v].image = api_image(pair->luma[v], pair->width, pair->height, pair->width);
+    views[v].camera = &camera;
+  }
+}
+
 static void test_a_real_pair_has_the_same_bytes_with_every_kernel_set(void) {
   real_pair pair;
   tv_limits limits;
-  tv_camera real_camera;
   uint64_t first = 0;
-  int v;
   if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
   limits = limits_of(pair.width, pair.height, 2048);
-  real_camera = camera_of(pair.width, pair.height);
-  for (v = 0; v < 2; ++v) {
-    views[v].image = api_image(pair.luma[v], pair.width, pair.height, pair.width);
-    views[v].camera = &real_camera;
-  }
+  view_real_pair(&pair);
   for (limits.kernels = TV_KERNELS_C; limits.kernels <= TV_KERNELS_NEON; ++limits.kernels) {
     api_context b;
     if (api_try(&limits, &b) == TV_ERR_KERNELS) continue;
@@ -330,18 +333,13 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   static tv_two_view first, guided;
   real_pair pair;
   tv_limits limits;
-  tv_camera real_camera;
   tv_reconstruct_options options;
   api_context b;
-  int32_t num_plain, num_guided, k, v;
+  int32_t num_plain, num_guided, k;
   if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
   limits = limits_of(pair.width, pair.height, 2048);
   b = api_make(&limits);
-  real_camera = camera_of(pair.width, pair.height);
-  for (v = 0; v < 2; ++v) {
-    views[v].image = api_image(pair.luma[v], pair.width, pair.height, pair.width);
-    views[v].camera = &real_camera;
-  }
+  view_real_pair(&pair);
   TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
   first = two_view;
   num_plain = reconstruction.num_matches;
@@ -388,18 +386,13 @@ static void test_bundle_adjustment_moves_the_pose_and_what_follows_from_it(void)
   static tv_two_view first;
   real_pair pair;
   tv_limits limits;
-  tv_camera real_camera;
   tv_reconstruct_options options;
   api_context b;
-  int32_t k, v;
+  int32_t k;
   if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
   limits = limits_of(pair.width, pair.height, 2048);
   b = api_make(&limits);
-  real_camera = camera_of(pair.width, pair.height);
-  for (v = 0; v < 2; ++v) {
-    views[v].image = api_image(pair.luma[v], pair.width, pair.height, pair.width);
-    views[v].camera = &real_camera;
-  }
+  view_real_pair(&pair);
   TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
   first = two_view;
   memcpy(plain, reconstruction.points, (size_t)reconstruction.num_matches * sizeof plain[0]);

@@ -41,6 +41,16 @@ static inline api_context api_make(const tv_limits *limits) {
   return a;
 }
 
+/* A context of each kernel set that this machine has, into an array of room for all. How many. */
+static inline int api_make_all_kernels(tv_limits limits, api_context *contexts) {
+  int count = 0;
+  for (limits.kernels = TV_KERNELS_C; limits.kernels <= TV_KERNELS_NEON; ++limits.kernels) {
+    if (api_try(&limits, &contexts[count]) == TV_OK) ++count;
+  }
+  TEST_ASSERT_TRUE(count > 0);
+  return count;
+}
+
 static inline int api_is_pattern(const void *begin, size_t bytes) {
   const uint8_t *b = (const uint8_t *)begin;
   while (bytes > 0 && *b == API_PATTERN) ++b, --bytes;

@@ -33,10 +33,7 @@ static void make_contexts(void) {
   tv_limits_init(&limits);
   limits.max_width = limits.max_height = 16;
   limits.max_keypoints = MAX_POINTS;
-  for (limits.kernels = TV_KERNELS_C; limits.kernels <= TV_KERNELS_NEON; ++limits.kernels) {
-    if (api_try(&limits, &contexts[num_contexts]) == TV_OK) ++num_contexts;
-  }
-  TEST_ASSERT_TRUE(num_contexts > 0);
+  num_contexts = api_make_all_kernels(limits, contexts);
 }
 
 static tv_camera make_camera(int model) {

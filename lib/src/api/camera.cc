@@ -23,13 +23,6 @@ tv_status check_input(const tv_camera *camera, const double *values, int num_val
   return TV_OK;
 }
 
-bool all_finite(const double *values, int num_values) {
-  for (int i = 0; i < num_values; ++i) {
-    if (!is_finite(values[i])) return false;
-  }
-  return true;
-}
-
 int32_t scaled_size(int32_t size, double scale) {
   const double rounded = size * scale + 0.5;
   return rounded < 1.0 ? 1 : static_cast<int32_t>(rounded);
@@ -71,8 +64,8 @@ tv_status tv_camera_project(const tv_camera *camera, const double point[3], doub
     return TV_ERR_OUTSIDE;
   }
   // Overflow, where a focal length or a coordinate is near a double's end.
-  if (!all_finite(projected.data(), 2)) return TV_ERR_OUTSIDE;
-  if (jacobian && !all_finite(d_pixel.data(), 6)) return TV_ERR_OUTSIDE;
+  if (!tv::all_finite(projected.data(), 2)) return TV_ERR_OUTSIDE;
+  if (jacobian && !tv::all_finite(d_pixel.data(), 6)) return TV_ERR_OUTSIDE;
   pixel[0] = projected[0];
   pixel[1] = projected[1];
   if (jacobian) {
@@ -101,7 +94,7 @@ tv_status tv_camera_project_points(const tv_camera *camera, const double *points
     tv::Vec2 pixel(0, 0);
     const bool finite = is_finite(p[0]) && is_finite(p[1]) && is_finite(p[2]);
     inside[i] = finite && tv::project(prepared, tv::Vec3(p[0], p[1], p[2]), &pixel, nullptr) &&
-                all_finite(pixel.data(), 2);
+                tv::all_finite(pixel.data(), 2);
     if (!inside[i]) pixel.setZero();
     pixels[2 * i] = pixel[0];
     pixels[2 * i + 1] = pixel[1];
@@ -119,8 +112,8 @@ tv_status tv_camera_unproject(const tv_camera *camera, const double pixel[2], do
                      jacobian ? &d_ray : nullptr)) {
     return TV_ERR_OUTSIDE;
   }
-  if (!all_finite(unprojected.data(), 3)) return TV_ERR_OUTSIDE;
-  if (jacobian && !all_finite(d_ray.data(), 6)) return TV_ERR_OUTSIDE;
+  if (!tv::all_finite(unprojected.data(), 3)) return TV_ERR_OUTSIDE;
+  if (jacobian && !tv::all_finite(d_ray.data(), 6)) return TV_ERR_OUTSIDE;
   for (int i = 0; i < 3; ++i) ray[i] = unprojected[i];
   if (jacobian) {
     for (int i = 0; i < 6; ++i) jacobian[i] = d_ray(i / 2, i % 2);

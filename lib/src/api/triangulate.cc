@@ -1,7 +1,6 @@
 // The boundary of triangulation: validate, call.
 #include "twoview/triangulate.h"
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -11,36 +10,12 @@
 
 namespace {
 
-constexpr double kRotationTolerance = 1e-6;
-
-bool all_finite(const double *values, int num_values) {
-  for (int i = 0; i < num_values; ++i) {
-    if (!tv::is_finite(values[i])) return false;
-  }
-  return true;
-}
-
-// R R^T = I and det R > 0.
-bool is_rotation(const double R[9]) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i; j < 3; ++j) {
-      const double *a = R + 3 * i;
-      const double *b = R + 3 * j;
-      const double product = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-      if (!(std::fabs(product - (i == j ? 1.0 : 0.0)) <= kRotationTolerance)) return false;
-    }
-  }
-  const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
-                     R[2] * (R[3] * R[7] - R[4] * R[6]);
-  return det > 0.0;
-}
-
 // What both entry points ask of cameras and pose.
 tv_status check_pair(const tv_camera *camera0, const tv_camera *camera1, const double R[9],
                      const double t[3]) {
   if (tv_camera_check(camera0) != TV_OK || tv_camera_check(camera1) != TV_OK) return TV_ERR_CAMERA;
-  if (!all_finite(R, 9) || !all_finite(t, 3)) return TV_ERR_NOT_FINITE;
-  if (!is_rotation(R)) return TV_ERR_ARGUMENT;
+  if (!tv::all_finite(R, 9) || !tv::all_finite(t, 3)) return TV_ERR_NOT_FINITE;
+  if (!tv::is_rotation(R)) return TV_ERR_ARGUMENT;
   if (t[0] == 0.0 && t[1] == 0.0 && t[2] == 0.0) return TV_ERR_ARGUMENT;
   return TV_OK;
 }

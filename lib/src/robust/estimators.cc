@@ -10,10 +10,6 @@
 namespace tv {
 namespace {
 
-// Local optimisation looks this many thresholds far, so that matches can come in.
-constexpr double kNear = 3;
-constexpr int kLocalIterations = 5;
-
 inline int64_t quantised(double q) {
   return q < 1 ? static_cast<int64_t>(q * kCostOne) : kCostOne;
 }

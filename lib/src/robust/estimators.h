@@ -7,6 +7,11 @@
 
 namespace tv {
 
+// Local optimisation looks this many thresholds far, so that matches can come in, and takes this many
+// steps.
+inline constexpr double kNear = 3;
+inline constexpr int kLocalIterations = 5;
+
 // A pose from five rays.
 struct PoseEstimator {
   using Model = Pose;

@@ -3,10 +3,6 @@
 namespace tv {
 namespace {
 
-// As PoseEstimator's.
-constexpr int kLocalIterations = 5;
-constexpr double kNear = 3;
-
 // Rounds with a wider threshold only bring the pose near.
 constexpr int kWideIterations = 4;
 constexpr double kWidest = 16;
