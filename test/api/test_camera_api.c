@@ -303,6 +303,47 @@ static void test_many_points_refuse_what_one_refuses(void) {
   TEST_ASSERT_TRUE(memory[3] == -4 && memory[4] == -5 && inside[0] == 7);
 }
 
+static void test_many_pixels_have_the_rays_of_each_one(void) {
+  const tv_camera cameras[2] = {ardrone2(), barrel()};
+  const double pixels[5][2] = {{320, 180}, {12, 7.5}, {NAN, 0}, {1e9, 3}, {600.25, 300}};
+  int c, i;
+  for (c = 0; c < 2; ++c) {
+    double rays[16];
+    uint8_t inside[6];
+    memset(rays, 0x5A, sizeof rays);
+    memset(inside, 0x5A, sizeof inside);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_unproject_points(&cameras[c], pixels[0], 5, rays, inside));
+    for (i = 0; i < 5; ++i) {
+      double ray[3] = {0, 0, 0};
+      const tv_status status = tv_camera_unproject(&cameras[c], pixels[i], ray, NULL);
+      TEST_ASSERT_EQUAL_INT(status == TV_OK, inside[i]);
+      TEST_ASSERT_EQUAL_MEMORY(ray, rays + 3 * i, sizeof ray);
+    }
+    TEST_ASSERT_TRUE(inside[0] == 1 && inside[2] == 0);
+    if (c == 1) TEST_ASSERT_EQUAL_INT(0, inside[3]); /* beyond the barrel's valid angle */
+    TEST_ASSERT_EQUAL_INT(0x5A, inside[5]);
+  }
+}
+
+static void test_many_pixels_refuse_what_one_refuses(void) {
+  tv_camera camera = barrel();
+  double memory[4] = {320, 180, -4, -5};
+  uint8_t inside[1] = {7};
+  double rays[3] = {1, 2, 3};
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_unproject_points(&camera, NULL, 0, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_unproject_points(NULL, memory, 1, rays, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_unproject_points(&camera, NULL, 1, rays, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_unproject_points(&camera, memory, 1, NULL, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_camera_unproject_points(&camera, memory, 1, rays, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_camera_unproject_points(&camera, memory, -1, rays, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_camera_unproject_points(&camera, memory, 1, memory + 1, inside));
+  camera.fx = 0;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_camera_unproject_points(&camera, memory, 1, rays, inside));
+  TEST_ASSERT_TRUE(rays[0] == 1 && rays[1] == 2 && rays[2] == 3 && inside[0] == 7);
+}
+
 static void test_every_number_has_its_name(void) {
   int i, j;
   for (i = TV_OK; i <= TV_ERR_KERNELS; ++i) {
@@ -342,6 +383,8 @@ int main(void) {
   RUN_TEST(test_results_too_large_for_a_double_are_outside);
   RUN_TEST(test_many_points_have_the_pixels_of_each_one);
   RUN_TEST(test_many_points_refuse_what_one_refuses);
+  RUN_TEST(test_many_pixels_have_the_rays_of_each_one);
+  RUN_TEST(test_many_pixels_refuse_what_one_refuses);
   RUN_TEST(test_every_number_has_its_name);
   return UNITY_END();
 }

@@ -60,6 +60,12 @@ TV_API tv_status tv_camera_project_points(const tv_camera *camera, const double 
 TV_API tv_status tv_camera_unproject(const tv_camera *camera, const double pixel[2], double ray[3],
                                      double *jacobian);
 
+/* The unit rays of many pixels, the valid region found once: num_pixels x 2 in, num_pixels x 3 out.
+   inside: num_pixels bytes, 1 where the pixel has a ray; else 0 and the ray is zeros.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (num_pixels below 0), TV_ERR_CAMERA, TV_ERR_OVERLAP. */
+TV_API tv_status tv_camera_unproject_points(const tv_camera *camera, const double *pixels,
+                                            int32_t num_pixels, double *rays, uint8_t *inside);
+
 /* The pixel where a camera without distortion and with the same fx fy cx cy would see what this one
    sees at `pixel`. Returns as tv_camera_unproject; TV_ERR_OUTSIDE also for rays at 90 degrees and
    more. */

@@ -28,6 +28,22 @@ int32_t scaled_size(int32_t size, double scale) {
   return rounded < 1.0 ? 1 : static_cast<int32_t>(rounded);
 }
 
+// What the calls on many points share: `in_wide` numbers in and `out_wide` out a point.
+tv_status check_many(const tv_camera *camera, const double *in, size_t in_wide, int32_t count,
+                     const double *out, size_t out_wide, const uint8_t *inside) {
+  if (camera == nullptr) return TV_ERR_NULL;
+  if (count > 0 && (in == nullptr || out == nullptr || inside == nullptr)) return TV_ERR_NULL;
+  if (count < 0) return TV_ERR_ARGUMENT;
+  const tv_status status = tv_camera_check(camera);
+  if (status != TV_OK) return status;
+  const size_t n = static_cast<size_t>(count);
+  if (tv::overlap(out, 8 * out_wide * n, in, 8 * in_wide * n) ||
+      tv::overlap(inside, n, in, 8 * in_wide * n) || tv::overlap(inside, n, out, 8 * out_wide * n)) {
+    return TV_ERR_OVERLAP;
+  }
+  return TV_OK;
+}
+
 }  // namespace
 
 tv_status tv_camera_check(const tv_camera *camera) {
@@ -76,24 +92,15 @@ tv_status tv_camera_project(const tv_camera *camera, const double point[3], doub
 
 tv_status tv_camera_project_points(const tv_camera *camera, const double *points,
                                    int32_t num_points, double *pixels, uint8_t *inside) {
-  if (camera == nullptr) return TV_ERR_NULL;
-  if (num_points > 0 && (points == nullptr || pixels == nullptr || inside == nullptr)) {
-    return TV_ERR_NULL;
-  }
-  if (num_points < 0) return TV_ERR_ARGUMENT;
-  const tv_status status = tv_camera_check(camera);
+  const tv_status status = check_many(camera, points, 3, num_points, pixels, 2, inside);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(num_points);
-  if (tv::overlap(pixels, 16 * n, points, 24 * n) || tv::overlap(inside, n, points, 24 * n) ||
-      tv::overlap(inside, n, pixels, 16 * n)) {
-    return TV_ERR_OVERLAP;
-  }
   const tv::Camera prepared = tv::prepare_camera(*camera);
   for (size_t i = 0; i < n; ++i) {
     const double *p = points + 3 * i;
     tv::Vec2 pixel(0, 0);
-    const bool finite = is_finite(p[0]) && is_finite(p[1]) && is_finite(p[2]);
-    inside[i] = finite && tv::project(prepared, tv::Vec3(p[0], p[1], p[2]), &pixel, nullptr) &&
+    inside[i] = tv::all_finite(p, 3) &&
+                tv::project(prepared, tv::Vec3(p[0], p[1], p[2]), &pixel, nullptr) &&
                 tv::all_finite(pixel.data(), 2);
     if (!inside[i]) pixel.setZero();
     pixels[2 * i] = pixel[0];
@@ -117,6 +124,24 @@ tv_status tv_camera_unproject(const tv_camera *camera, const double pixel[2], do
   for (int i = 0; i < 3; ++i) ray[i] = unprojected[i];
   if (jacobian) {
     for (int i = 0; i < 6; ++i) jacobian[i] = d_ray(i / 2, i % 2);
+  }
+  return TV_OK;
+}
+
+tv_status tv_camera_unproject_points(const tv_camera *camera, const double *pixels,
+                                     int32_t num_pixels, double *rays, uint8_t *inside) {
+  const tv_status status = check_many(camera, pixels, 2, num_pixels, rays, 3, inside);
+  if (status != TV_OK) return status;
+  const size_t n = static_cast<size_t>(num_pixels);
+  const tv::Camera prepared = tv::prepare_camera(*camera);
+  for (size_t i = 0; i < n; ++i) {
+    const double *p = pixels + 2 * i;
+    tv::Vec3 ray(0, 0, 0);
+    inside[i] = tv::all_finite(p, 2) &&
+                tv::unproject(prepared, tv::Vec2(p[0], p[1]), &ray, nullptr) &&
+                tv::all_finite(ray.data(), 3);
+    if (!inside[i]) ray.setZero();
+    for (size_t k = 0; k < 3; ++k) rays[3 * i + k] = ray[static_cast<int>(k)];
   }
   return TV_OK;
 }
