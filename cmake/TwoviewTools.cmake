@@ -12,6 +12,7 @@ foreach(package OpenCV yaml-cpp CLI11 nlohmann_json)
 endforeach()
 
 if(NOT missing)
+  add_subdirectory(${PROJECT_SOURCE_DIR}/tools/room ${PROJECT_BINARY_DIR}/tools/room)
   add_subdirectory(${PROJECT_SOURCE_DIR}/tools/twoview ${PROJECT_BINARY_DIR}/tools/twoview)
 elseif(TWOVIEW_TOOLS STREQUAL "AUTO")
   message(STATUS "The command line is not built; not found: ${missing}")
