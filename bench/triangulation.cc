@@ -1,46 +1,43 @@
-// Table 1 of the paper again: the seven methods of triangulation, their time and their errors, over
-// noise and three geometries, with OpenCV beside them. Markdown, or with --json one object.
+// Table 1 of the paper again: the seven methods of triangulation over noise and three geometries, beside
+// OpenCV and OpenGV. Times as the other benchmarks; errors, of ours and OpenCV's, as Markdown with
 //
-//   bench_triangulation [--json] [--points N]
+//   bench_triangulation --errors [POINTS]
+//
+// Ours takes pixels through the camera model and tells angle, error and status of each point as well;
+// the peers get rays, or pixels and projection matrices, and give the point.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <opencv2/calib3d.hpp>
 #include <random>
 #include <string>
 #include <vector>
 
-#include "twoview/twoview.h"
-
-#ifdef BENCH_HAS_OPENCV
-#include <opencv2/calib3d.hpp>
+#include "bench.h"
+#ifdef BENCH_HAS_OPENGV
+#include "opengv_peer.h"
 #endif
 
 namespace {
 
 struct Method {
   const char* name;
-  double paper;  // relative time of Table 1; 0 when it is not there
-  int method;    // a tv_triangulation, or one of the peers below
+  int method;  // a tv_triangulation, or one of the peers below
 };
 
 enum Peer { kPeerLinear = 100, kPeerOptimal };
 
-const Method kMethods[] = {{"Poly", 14, TV_TRIANGULATION_POLY},
-                           {"Poly-Abs", 30, TV_TRIANGULATION_POLY_ABS},
-                           {"Linear-Eigen", 3, TV_TRIANGULATION_LINEAR_EIGEN},
-                           {"Linear-LS", 2, TV_TRIANGULATION_LINEAR_LS},
-                           {"Iterative-Eigen", 5, TV_TRIANGULATION_ITERATIVE_EIGEN},
-                           {"Iterative-LS", 3, TV_TRIANGULATION_ITERATIVE_LS},
-                           {"Midpoint", 2, TV_TRIANGULATION_MIDPOINT},
-#ifdef BENCH_HAS_OPENCV
-                           {"OpenCV triangulatePoints", 0, kPeerLinear},
-                           {"OpenCV correctMatches + triangulatePoints", 0, kPeerOptimal},
-#endif
-};
-constexpr int kNumMethods = sizeof kMethods / sizeof kMethods[0];
+const Method kMethods[] = {{"Poly", TV_TRIANGULATION_POLY},
+                           {"Poly-Abs", TV_TRIANGULATION_POLY_ABS},
+                           {"Linear-Eigen", TV_TRIANGULATION_LINEAR_EIGEN},
+                           {"Linear-LS", TV_TRIANGULATION_LINEAR_LS},
+                           {"Iterative-Eigen", TV_TRIANGULATION_ITERATIVE_EIGEN},
+                           {"Iterative-LS", TV_TRIANGULATION_ITERATIVE_LS},
+                           {"Midpoint", TV_TRIANGULATION_MIDPOINT},
+                           {"OpenCV " CV_VERSION " triangulatePoints", kPeerLinear},
+                           {"OpenCV " CV_VERSION " correctMatches + triangulatePoints", kPeerOptimal}};
 
 const double kNoisePx[] = {0.1, 0.5, 1, 2};
 const char* const kGeometries[] = {"sideways", "forward", "converging"};
@@ -95,7 +92,6 @@ Scene make_scene(int geometry, double noise_px, int num_points) {
   return scene;
 }
 
-#ifdef BENCH_HAS_OPENCV
 void triangulate_by_opencv(bool optimal, const Scene& scene, std::vector<tv_point>* points) {
   const int n = scene.size();
   const cv::Matx33d K(500, 0, scene.camera.cx, 0, 500, scene.camera.cy, 0, 0, 1);
@@ -120,18 +116,12 @@ void triangulate_by_opencv(bool optimal, const Scene& scene, std::vector<tv_poin
     for (int k = 0; k < 3; ++k) position[k] = X.at<double>(k, i) / w;
   }
 }
-#endif
 
 void triangulate(int method, const Scene& scene, std::vector<tv_point>* points) {
-#ifdef BENCH_HAS_OPENCV
   if (method >= kPeerLinear) return triangulate_by_opencv(method == kPeerOptimal, scene, points);
-#endif
-  if (tv_triangulate(static_cast<tv_triangulation>(method), &scene.camera, &scene.camera, scene.R,
-                     scene.t, scene.pixels[0].data(), scene.pixels[1].data(), scene.size(),
-                     points->data()) != TV_OK) {
-    std::fprintf(stderr, "tv_triangulate failed\n");
-    std::exit(1);
-  }
+  bench::require(tv_triangulate(static_cast<tv_triangulation>(method), &scene.camera, &scene.camera,
+                                scene.R, scene.t, scene.pixels[0].data(), scene.pixels[1].data(),
+                                scene.size(), points->data()), "tv_triangulate");
 }
 
 struct Errors {
@@ -176,136 +166,115 @@ Errors errors_of(const Scene& scene, const std::vector<tv_point>& points) {
                 100 * (n - seen) / n};
 }
 
-// Nanoseconds a point: the median of several rounds over all geometries, and its spread.
-struct Time {
-  double median, least, most;
-};
-
-std::vector<Time> measure(const std::vector<Scene>& scenes) {
-  constexpr int kRounds = 21;
-  std::vector<std::vector<double>> rounds(kNumMethods);
-  std::vector<tv_point> points(static_cast<size_t>(scenes[0].size()));
-  for (int round = 0; round < kRounds; ++round) {
-    for (int m = 0; m < kNumMethods; ++m) {  // turn by turn: all see the same machine
-      double sum = 0;
-      for (const Scene& scene : scenes) {
-        const auto start = std::chrono::steady_clock::now();
-        triangulate(kMethods[m].method, scene, &points);
-        sum += std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start)
-                   .count() /
-               scene.size();
-      }
-      rounds[static_cast<size_t>(m)].push_back(sum / static_cast<double>(scenes.size()));
-    }
-  }
-  std::vector<Time> times;
-  for (std::vector<double>& r : rounds) {
-    std::sort(r.begin(), r.end());
-    times.push_back(Time{r[kRounds / 2], r.front(), r.back()});
-  }
-  return times;
-}
-
-double peer_time(const std::vector<Time>& times, int method) {
-  const int peer = method == TV_TRIANGULATION_POLY || method == TV_TRIANGULATION_POLY_ABS
-                       ? kPeerOptimal
-                       : kPeerLinear;
-  for (int m = 0; m < kNumMethods; ++m) {
-    if (kMethods[m].method == peer) return times[static_cast<size_t>(m)].median;
-  }
-  return 0;
-}
-
-void print_times(const std::vector<Time>& times, bool json) {
-  const double midpoint = times[6].median;
-  if (!json) {
-    std::printf("| method | the paper's time | ours, Midpoint as 2 | ns a point | least to most |\n"
-                "| --- | --- | --- | --- | --- |\n");
-  }
-  for (int m = 0; m < kNumMethods; ++m) {
-    const Time& t = times[static_cast<size_t>(m)];
-    const char* end = m + 1 < kNumMethods ? "," : "";
-    if (!json) {
-      char paper[16] = "";
-      if (kMethods[m].paper > 0) std::snprintf(paper, sizeof paper, "%g", kMethods[m].paper);
-      std::printf("| %s | %s | %.1f | %.0f | %.0f to %.0f |\n", kMethods[m].name, paper,
-                  2 * t.median / midpoint, t.median, t.least, t.most);
-      continue;
-    }
-    const double peer = kMethods[m].method < kPeerLinear ? peer_time(times, kMethods[m].method) : 0;
-    std::printf("    {\"stage\": \"triangulate\", \"case\": \"%s\", \"ours\": %.1f, ",
-                kMethods[m].name, t.median);
-    if (peer > 0) {
-      std::printf("\"peer\": %.1f, \"peer_name\": \"%s\", \"ratio\": %.3f, ", peer,
-                  kMethods[m].paper >= 14 ? "OpenCV correctMatches + triangulatePoints"
-                                          : "OpenCV triangulatePoints",
-                  peer / t.median);
-    } else {
-      std::printf("\"peer\": null, \"peer_name\": null, \"ratio\": null, ");
-    }
-    std::printf("\"unit\": \"ns/point\", \"paper_relative\": %g, \"relative\": %.2f}%s\n",
-                kMethods[m].paper, 2 * t.median / midpoint, end);
-  }
-}
-
-void print_errors(int num_points, bool json) {
+// Markdown.
+void print_errors(int num_points) {
   std::vector<tv_point> points(static_cast<size_t>(num_points));
-  bool first = true;
   for (int g = 0; g < 3; ++g) {
-    if (!json) {
-      std::printf("\n**%s**: pixels to the measured / to the true pixels (rms), space 50 %% / 95 %%"
-                  " of points (per cent of the distance), points behind a camera (per cent)\n\n"
-                  "| method |",
-                  kGeometries[g]);
-      for (double noise : kNoisePx) std::printf(" %g px |", noise);
-      std::printf("\n| --- | --- | --- | --- | --- |\n");
-    }
-    std::vector<Scene> scenes;
-    for (double noise : kNoisePx) scenes.push_back(make_scene(g, noise, num_points));
+    std::printf("\n**%s**: pixels to the measured / to the true pixels (rms), space 50 %% / 95 %%"
+                " of points (per cent of the distance), points behind a camera (per cent)\n\n"
+                "| method |",
+                kGeometries[g]);
+    for (double noise : kNoisePx) std::printf(" %g px |", noise);
+    std::printf("\n| --- | --- | --- | --- | --- |\n");
     for (const Method& method : kMethods) {
-      if (!json) std::printf("| %s |", method.name);
-      for (size_t i = 0; i < scenes.size(); ++i) {
-        triangulate(method.method, scenes[i], &points);
-        const Errors e = errors_of(scenes[i], points);
-        if (json) {
-          std::printf("%s    {\"geometry\": \"%s\", \"noise_px\": %g, \"method\": \"%s\", "
-                      "\"cost_px\": %.6f, \"truth_px\": %.6f, \"space_percent_50\": %.5f, "
-                      "\"space_percent_95\": %.5f, \"behind_percent\": %.3f}",
-                      first ? "" : ",\n", kGeometries[g], kNoisePx[i], method.name, e.cost_px,
-                      e.truth_px, e.percent_50, e.percent_95, e.percent_behind);
-          first = false;
-        } else {
-          std::printf(" %.4f / %.4f, %.3f / %.2f, %.2f |", e.cost_px, e.truth_px, e.percent_50,
-                      e.percent_95, e.percent_behind);
-        }
+      std::printf("| %s |", method.name);
+      for (double noise : kNoisePx) {
+        const Scene scene = make_scene(g, noise, num_points);
+        triangulate(method.method, scene, &points);
+        const Errors e = errors_of(scene, points);
+        std::printf(" %.4f / %.4f, %.3f / %.2f, %.2f |", e.cost_px, e.truth_px, e.percent_50,
+                    e.percent_95, e.percent_behind);
       }
-      if (!json) std::printf("\n");
+      std::printf("\n");
     }
   }
+}
+
+constexpr int kTimedPoints = 1000;  // of each geometry
+
+using Scenes = std::shared_ptr<std::vector<Scene>>;
+
+// The error of the sideways scene says that a point was found.
+void add_method(const std::string& name, const Scenes& scenes, int method) {
+  const auto points = std::make_shared<std::vector<tv_point>>(kTimedPoints);
+  bench::add({name,
+              [=] {
+                for (const Scene& scene : *scenes) triangulate(method, scene, points.get());
+              },
+              [=] {
+                triangulate(method, scenes->front(), points.get());
+                const Errors errors = errors_of(scenes->front(), *points);
+                return bench::Counters{{"cost_px", errors.cost_px}};
+              }, 3.0 * kTimedPoints});
+}
+
+#ifdef BENCH_HAS_OPENGV
+std::vector<double> unit_rays(const Scene& scene, int view) {
+  std::vector<double> rays(static_cast<size_t>(3 * scene.size()));
+  for (size_t k = 0; k < static_cast<size_t>(scene.size()); ++k) {
+    bench::require(tv_camera_unproject(&scene.camera, &scene.pixels[view][2 * k], &rays[3 * k],
+                                       nullptr), "tv_camera_unproject");
+  }
+  return rays;
+}
+
+void add_opengv(const std::string& name, const Scenes& scenes, bench::OpengvTriangulation method) {
+  std::vector<std::shared_ptr<bench::OpengvMatches>> matches;
+  for (const Scene& scene : *scenes) {
+    matches.push_back(
+        std::make_shared<bench::OpengvMatches>(unit_rays(scene, 0), unit_rays(scene, 1)));
+    matches.back()->set_pose(scene.R, scene.t);
+  }
+  const auto positions = std::make_shared<std::vector<double>>(3 * kTimedPoints);
+  const auto triangulate_all = [=] {
+    for (const auto& m : matches) m->triangulate(method, positions->data());
+  };
+  const auto found = [=] {
+    matches.front()->triangulate(method, positions->data());
+    std::vector<tv_point> points(kTimedPoints);
+    for (size_t k = 0; k < positions->size(); ++k) points[k / 3].position[k % 3] = (*positions)[k];
+    return bench::Counters{{"cost_px", errors_of(scenes->front(), points).cost_px}};
+  };
+  bench::add({name, triangulate_all, found, 3.0 * kTimedPoints});
+}
+#endif
+
+void add_peers(const std::string& name, const Scenes& scenes, int method) {
+  const bool optimal = method == TV_TRIANGULATION_POLY || method == TV_TRIANGULATION_POLY_ABS;
+  const Method& opencv = kMethods[optimal ? 8 : 7];
+  if (method != TV_TRIANGULATION_MIDPOINT) {
+    add_method(name + "/" + opencv.name, scenes, opencv.method);
+  }
+  if (optimal) return;
+#ifdef BENCH_HAS_OPENGV
+  const bool midpoint = method == TV_TRIANGULATION_MIDPOINT;
+  add_opengv(name + "/" + bench::kOpengvName + (midpoint ? " triangulate2" : " triangulate"), scenes,
+             midpoint ? bench::OpengvTriangulation::kMidpoint
+                      : bench::OpengvTriangulation::kLinear);
+#else
+  bench::add_missing(name + "/OpenGV");
+#endif
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  bool json = false;
-  int num_points = 20000;
-  for (int i = 1; i < argc; ++i) {
-    if (!std::strcmp(argv[i], "--json")) {
-      json = true;
-    } else if (!std::strcmp(argv[i], "--points") && i + 1 < argc && std::atoi(argv[i + 1]) > 19) {
-      num_points = std::atoi(argv[++i]);
-    } else {
-      std::fprintf(stderr, "usage: bench_triangulation [--json] [--points N], N at least 20\n");
+  if (argc > 1 && !std::strcmp(argv[1], "--errors")) {
+    const int num_points = argc > 2 ? std::atoi(argv[2]) : 20000;
+    if (num_points < 20) {
+      std::fprintf(stderr, "usage: bench_triangulation --errors [POINTS, at least 20]\n");
       return 2;
     }
+    print_errors(num_points);
+    return 0;
   }
-  std::vector<Scene> scenes;
-  for (int g = 0; g < 3; ++g) scenes.push_back(make_scene(g, 1.0, num_points));
-  const std::vector<Time> times = measure(scenes);
-  if (json) std::printf("{\n  \"rows\": [\n");
-  print_times(times, json);
-  if (json) std::printf("  ],\n  \"errors\": [\n");
-  print_errors(num_points, json);
-  if (json) std::printf("\n  ]\n}\n");
-  return 0;
+  const auto scenes = std::make_shared<std::vector<Scene>>();
+  for (int g = 0; g < 3; ++g) scenes->push_back(make_scene(g, 1.0, kTimedPoints));
+  for (const Method& method : kMethods) {
+    if (method.method >= kPeerLinear) continue;
+    const std::string name = std::string("triangulate/") + method.name;
+    add_method(bench::ours(name), scenes, method.method);
+    add_peers(name, scenes, method.method);
+  }
+  return bench::run(argc, argv);
 }

@@ -1,0 +1,183 @@
+// A whole pair, images in memory to pose and points, ours beside OpenCV's stages as its user would chain
+// them. Also the program to profile: bench_pair --benchmark_filter=defaults/twoview.
+//
+//   same work   FAST-9 at a fixed threshold, the same corners on both sides, upright descriptors with the
+//               same window, the same ratio; for full SIFT its number of keypoints and median size
+//   defaults    the library's defaults beside OpenCV's: FAST at 20 with cv::KeyPoint's usual size 7, SIFT
+//
+// OpenCV: BFMatcher both ways with ratio 0.8, USAC_MAGSAC at 1 px, recoverPose, triangulatePoints.
+#include <ctime>
+
+#include "bench.h"
+#include "images.h"
+#include "opencv_peer.h"
+#include "problem.h"
+
+namespace {
+
+using bench::Counters;
+using bench::Pair;
+
+constexpr int kMaxKeypoints = 2048;
+constexpr float kRatio = 0.8f;  // of the peer, and of ours where the work is to be the same
+
+struct Options {
+  tv_feature_options feature;
+  tv_match_options match;
+  Options() {
+    tv_feature_options_init(&feature);
+    tv_match_options_init(&match);
+  }
+};
+
+// The process's time, as all times here.
+uint64_t now_ns(void*) {
+  timespec time;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return 1000000000u * static_cast<uint64_t>(time.tv_sec) + static_cast<uint64_t>(time.tv_nsec);
+}
+
+class Ours {
+ public:
+  Ours(const Pair& pair, const Options& options)
+      : pair_(pair), options_(options),
+        context_(bench::make_context(pair.image[0].cols, pair.image[0].rows,
+                                     options.feature.max_keypoints)) {}
+
+  void run() {
+    tv_view views[2];
+    for (int v = 0; v < 2; ++v) {
+      views[v] = tv_view{bench::view_of(pair_.image[v]), &pair_.camera[v], nullptr};
+    }
+    tv_reconstruct_options options;
+    tv_reconstruct_options_init(&options);
+    options.feature = &options_.feature;
+    options.match = &options_.match;
+    tv_two_view_init(&pose_);
+    tv_reconstruction_init(&found_);
+    bench::require(tv_reconstruct(context_.get(), &views[0], &views[1], &options, &pose_, &found_),
+                   "tv_reconstruct");
+  }
+
+  // What was found; and where the time of one more call went.
+  Counters counters() {
+    static const char* const stages[TV_NUM_STAGES] = {"pyramid_us",  "detect_us", "describe_us",
+                                                      "match_us",    "estimate_us", "refine_us",
+                                                      "triangulate_us"};
+    uint64_t stage_ns[TV_NUM_STAGES];
+    bench::require(tv_context_set_clock(context_.get(), now_ns, nullptr), "tv_context_set_clock");
+    run();
+    bench::require(tv_context_take_times(context_.get(), stage_ns), "tv_context_take_times");
+    bench::require(tv_context_set_clock(context_.get(), nullptr, nullptr), "tv_context_set_clock");
+    Counters counters = {{"keypoints", found_.num_keypoints[0]},
+                         {"matches", found_.num_matches},
+                         {"inliers", pose_.num_inliers},
+                         {"points", found_.num_points}};
+    for (int k = 0; k < TV_NUM_STAGES; ++k) counters[stages[k]] = 1e-3 * stage_ns[k];
+    if (pose_.has_R && pose_.has_t) {
+      counters["error_deg"] = bench::pose_error_deg(pose_.R, pose_.t, pair_.R, pair_.t);
+    }
+    return counters;
+  }
+
+ private:
+  const Pair& pair_;
+  Options options_;
+  bench::Context context_;
+  tv_two_view pose_;
+  tv_reconstruction found_;
+};
+
+void add_ours(const std::string& name, const Pair& pair, const Options& options) {
+  const auto ours = std::make_shared<Ours>(pair, options);
+  bench::add({bench::ours(name), [=] { ours->run(); }, [=] { return ours->counters(); }});
+}
+
+// extract: the features of an image.
+template <typename Extract>
+void add_opencv(const std::string& name, const Pair& pair, Extract extract) {
+  const auto found = std::make_shared<bench::OpencvPair>();
+  const auto run = [=, &pair] {
+    const bench::OpencvFeatures features[2] = {extract(pair.image[0]), extract(pair.image[1])};
+    *found = bench::opencv_reconstruct(features, pair.camera, kRatio);
+  };
+  const auto counters = [=, &pair] {
+    Counters c = {{"keypoints", 1.0 * found->num_keypoints[0]},
+                  {"matches", 1.0 * found->num_matches},
+                  {"inliers", 1.0 * found->num_inliers},
+                  {"points", 1.0 * found->points.cols}};
+    if (!found->pose.R.empty()) {
+      c["error_deg"] = bench::pose_error_deg(found->pose.R.ptr<double>(),
+                                             found->pose.t.ptr<double>(), pair.R, pair.t);
+    }
+    return c;
+  };
+  bench::add({name + "/OpenCV " CV_VERSION " " + extract.name, run, counters});
+}
+
+struct FastSift {
+  int threshold, max_keypoints;
+  float size;
+  const char* name = "FAST + SIFT";
+  bench::OpencvFeatures operator()(const cv::Mat& image) const {
+    return bench::opencv_fast_sift(image, threshold, max_keypoints, size);
+  }
+};
+
+struct Sift {
+  int max_keypoints;
+  const char* name = "SIFT";
+  bench::OpencvFeatures operator()(const cv::Mat& image) const {
+    return bench::opencv_sift(image, max_keypoints);
+  }
+};
+
+void add_same_work_as_fast(const Pair& pair, float size) {
+  const int threshold = 20;
+  Options options;
+  options.feature.threshold = threshold;
+  options.feature.min_threshold = 0;
+  options.feature.orientation = TV_ORIENTATION_UPRIGHT;
+  options.feature.descriptor = TV_DESCRIPTOR_SIFT;
+  options.feature.keypoint_size = size;
+  options.match.ratio = kRatio;
+  const std::string name = "pair/" + pair.name + " same corners, size " +
+                           std::to_string(static_cast<int>(size));
+  add_ours(name, pair, options);
+  add_opencv(name, pair, FastSift{threshold, kMaxKeypoints, size});
+}
+
+void add_same_work_as_sift(const Pair& pair) {
+  const std::vector<cv::KeyPoint> keypoints =
+      bench::opencv_sift(pair.image[0], kMaxKeypoints).keypoints;
+  std::vector<double> sizes;
+  for (const cv::KeyPoint& keypoint : keypoints) sizes.push_back(keypoint.size);
+  Options options;
+  options.feature.max_keypoints = static_cast<int32_t>(keypoints.size());
+  options.feature.descriptor = TV_DESCRIPTOR_SIFT;
+  options.feature.keypoint_size = static_cast<float>(bench::median(sizes));
+  options.match.ratio = kRatio;
+  const std::string name = "pair/" + pair.name + " SIFT's number and median window";
+  add_ours(name, pair, options);
+  add_opencv(name, pair, Sift{kMaxKeypoints});
+}
+
+void add_defaults(const Pair& pair) {
+  const std::string name = "pair/" + pair.name + " defaults";
+  add_ours(name, pair, Options());
+  add_opencv(name, pair, FastSift{20, kMaxKeypoints, 7});
+  add_opencv(name, pair, Sift{kMaxKeypoints});
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  for (bench::Size size : {bench::Size::kVga, bench::Size::kHd}) {
+    const Pair& pair = bench::pair_of(size);
+    add_same_work_as_fast(pair, 7);
+    add_same_work_as_fast(pair, 5);
+    add_same_work_as_sift(pair);
+    add_defaults(pair);
+  }
+  return bench::run(argc, argv);
+}
