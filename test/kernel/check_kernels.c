@@ -100,10 +100,19 @@ static void case_fast_score_row(trial *t) {
 }
 
 static void case_fast_contrasts(trial *t) {
-  const int32_t stride = pick(t, 9, 40, 640), arc = pick(t, 9, 12, 12);
-  const uint8_t *image = row_of_bytes(t, 8 * stride + 9); /* ends with the last circle's pixel */
-  int32_t *contrasts = OUTPUT(t, int32_t, 9);
-  REPEAT(t, t->set->fast_contrasts(image + 4 * stride + 4, stride, arc, contrasts));
+  const int32_t stride = pick(t, 9, 40, 640), arc = pick(t, 9, 12, 9), count = pick(t, 1, 9, 64);
+  const int32_t height = pick(t, 9, 12, 480), width = pick(t, 9, stride, stride);
+  /* Ends with the last pixel: the last circle's, now and then. */
+  const uint8_t *image = row_of_bytes(t, (height - 1) * stride + width);
+  const uint8_t *centres[64];
+  int16_t *contrasts = OUTPUT(t, int16_t, 9 * count);
+  int32_t k;
+  for (k = 0; k < count; ++k) {
+    const int32_t last = random_int(&t->seed, 0, 3) == 0;
+    const int32_t x = random_int(&t->seed, 4, width - 5), y = random_int(&t->seed, 4, height - 5);
+    centres[k] = image + (last ? height - 5 : y) * stride + (last ? width - 5 : x);
+  }
+  REPEAT(t, t->set->fast_contrasts(centres, count, stride, arc, contrasts));
 }
 
 static void case_suppress_row(trial *t) {

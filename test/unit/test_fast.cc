@@ -7,6 +7,10 @@
 #include <string.h>
 #include <unity.h>
 
+#include <algorithm>
+#include <tuple>
+#include <vector>
+
 #include "base/arena.h"
 #include "feature/corners.h"
 #include "support/random.h"
@@ -15,8 +19,8 @@
 namespace {
 
 // Clockwise from above the centre, (x, y) with y down: Rosten's figure 1.
-constexpr int kCircle[16][2] = {{0, -3}, {1, -3}, {2, -2}, {3, -1}, {3, 0},  {3, 1},
-                                {2, 2},  {1, 3},  {0, 3},  {-1, 3}, {-2, 2}, {-3, 1},
+constexpr int kCircle[16][2] = {{0, -3}, {1, -3},  {2, -2},  {3, -1}, {3, 0},  {3, 1},
+                                {2, 2},  {1, 3},   {0, 3},   {-1, 3}, {-2, 2}, {-3, 1},
                                 {-3, 0}, {-3, -1}, {-2, -2}, {-1, -3}};
 
 constexpr int kMaxWidth = 800, kMaxHeight = 600;
@@ -71,9 +75,9 @@ void check_score_map(const tvk_table& kernels, const tv_image& image, int arc, i
 void check_contrasts(const tvk_table& kernels, const tv_image& image, int arc) {
   for (int y = 4; y < image.height - 4; y += 3) {
     for (int x = 4; x < image.width - 4; x += 3) {
-      int32_t contrasts[9];
-      kernels.fast_contrasts(image.data + y * image.stride_bytes + x, image.stride_bytes, arc,
-                             contrasts);
+      const uint8_t* centre = image.data + y * image.stride_bytes + x;
+      int16_t contrasts[9];
+      kernels.fast_contrasts(&centre, 1, image.stride_bytes, arc, contrasts);
       for (int k = 0; k < 9; ++k) {
         const int c = contrasts[k], cx = x + k % 3 - 1, cy = y + k / 3 - 1;
         TEST_ASSERT_FALSE(is_corner(image, cx, cy, arc, c));
@@ -94,6 +98,25 @@ bool is_peak(int x, int y, int threshold) {
   return true;
 }
 
+struct Peak {
+  int score, y, x;
+};
+
+bool operator<(const Peak& a, const Peak& b) {
+  return std::make_tuple(-a.score, a.y, a.x) < std::make_tuple(-b.score, b.y, b.x);
+}
+
+std::vector<Peak> all_peaks(const tv_image& image, int threshold) {
+  std::vector<Peak> peaks;
+  for (int y = 3; y < image.height - 3; ++y) {
+    for (int x = 3; x < image.width - 3; ++x) {
+      if (is_peak(x, y, threshold)) peaks.push_back(Peak{expected_scores[y][x], y, x});
+    }
+  }
+  std::sort(peaks.begin(), peaks.end());
+  return peaks;
+}
+
 void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int threshold) {
   tv_feature_options options;
   memset(&options, 0, sizeof options);
@@ -104,8 +127,7 @@ void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int
   options.keypoint_size = 4.0f;
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
   const int32_t budget = image.width * image.height / 4;
-  TEST_ASSERT_LESS_OR_EQUAL(sizeof arena_memory,
-                            tv::corners_bytes(image.width, image.height));
+  TEST_ASSERT_LESS_OR_EQUAL(sizeof arena_memory, tv::corners_bytes(image.width, image.height));
   const int32_t count =
       tv::find_corners(kernels, image, nullptr, options, budget, arena, keypoints);
   int32_t expected = 0;
@@ -122,6 +144,61 @@ void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int
     const tv_keypoint& q = keypoints[k - 1];
     TEST_ASSERT_TRUE(q.score > p.score ||
                      (q.score == p.score && (q.y < p.y || (q.y == p.y && q.x < p.x))));
+  }
+}
+
+// The `budget` best peaks of at least the lowest threshold, in their order; with cells, the best
+// ones of each cell up to an even share among the peaks of the highest threshold that leaves the
+// budget, then the best of the rest.
+void check_budget(const tvk_table& kernels, const tv_image& image, int budget, int cell_px) {
+  tv_feature_options options;
+  memset(&options, 0, sizeof options);
+  options.arc = 9;
+  options.threshold = 40;
+  options.min_threshold = 2;
+  options.levels = 1;
+  options.scale_factor = 2.0f;
+  options.keypoint_size = 4.0f;
+  options.cell_px = cell_px;
+  std::vector<Peak> peaks = all_peaks(image, options.min_threshold), chosen, rest;
+  int cutoff = options.threshold;
+  const auto is_kept = [&cutoff](const Peak& p) { return p.score >= cutoff; };
+  while (cutoff > options.min_threshold &&
+         std::count_if(peaks.begin(), peaks.end(), is_kept) < budget) {
+    --cutoff;
+  }
+  peaks.erase(std::partition_point(peaks.begin(), peaks.end(), is_kept), peaks.end());
+  const int columns = cell_px > 0 ? image.width / cell_px + 1 : 1;
+  const int rows = cell_px > 0 ? image.height / cell_px + 1 : 1;
+  const int share = (budget + columns * rows - 1) / (columns * rows);
+  std::vector<int> in_cell(static_cast<size_t>(columns * rows));
+  for (const Peak& p : peaks) {
+    int& count =
+        in_cell[static_cast<size_t>(cell_px > 0 ? p.y / cell_px * columns + p.x / cell_px : 0)];
+    (count < share ? (++count, chosen) : rest).push_back(p);
+  }
+  chosen.insert(chosen.end(), rest.begin(), rest.end());
+  if (chosen.size() > static_cast<size_t>(budget)) chosen.resize(static_cast<size_t>(budget));
+  std::sort(chosen.begin(), chosen.end());
+  tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
+  const int32_t count =
+      tv::find_corners(kernels, image, nullptr, options, budget, arena, keypoints);
+  TEST_ASSERT_EQUAL_INT(chosen.size(), count);
+  for (int32_t k = 0; k < count; ++k) {
+    const Peak& p = chosen[static_cast<size_t>(k)];
+    TEST_ASSERT_EQUAL_INT(p.score, static_cast<int>(keypoints[k].score));
+    TEST_ASSERT_EQUAL_INT(p.y, static_cast<int>(keypoints[k].y));
+    TEST_ASSERT_EQUAL_INT(p.x, static_cast<int>(keypoints[k].x));
+  }
+}
+
+void check_budgets(const tv_image& image) {
+  fill_expected(image, 9);
+  for (int set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
+    if (tvk_select(set) == nullptr) continue;
+    for (int budget : {1, 7, 60, 200, 1000, 5000}) {
+      for (int cell_px : {0, 8, 33}) check_budget(*tvk_select(set), image, budget, cell_px);
+    }
   }
 }
 
@@ -170,6 +247,16 @@ void test_corners_equal_the_definition_on_a_real_image() {
   check_image(tv_image{real.luma[0], real.width, height, real.width});
 }
 
+// The scan gives up on weak corners as soon as there are enough strong ones; nobody may notice.
+void test_the_best_corners_are_kept_within_a_budget() {
+  noise_state = 3;
+  int (*const values[])(int, int) = {noise, black_and_white, faint, checkerboard, soft_squares};
+  for (auto value : values) check_budgets(filled(150, 61, value));
+  if (real.luma[0] != nullptr) {
+    check_budgets(tv_image{real.luma[0], real.width, real.height / 3, real.width});
+  }
+}
+
 void test_corners_equal_the_definition_on_synthetic_images() {
   noise_state = 1;
   int (*const values[])(int, int) = {noise,       black_and_white, faint, checkerboard,
@@ -177,11 +264,15 @@ void test_corners_equal_the_definition_on_synthetic_images() {
   for (auto value : values) check_image(filled(150, 61, value));
 }
 
-// Widths around the kernel's chunk of 64, and images that hold one candidate pixel or none.
+// Widths around the kernels' chunks of 16, 32 and 64, and images that hold one candidate pixel or
+// none.
 void test_corners_equal_the_definition_in_images_of_any_size() {
   noise_state = 2;
   for (int width = 1; width <= 12; ++width) {
     for (int height = 5; height <= 9; ++height) check_image(filled(width, height, black_and_white));
+  }
+  for (int width : {17, 18, 21, 22, 23, 34, 38, 39, 54, 55, 69, 70, 71, 102, 103}) {
+    check_image(filled(width, 9, noise));
   }
   for (int width = 66; width <= 72; ++width) check_image(filled(width, 12, black_and_white));
   for (int width = 130; width <= 138; ++width) check_image(filled(width, 9, noise));
@@ -206,6 +297,7 @@ int main() {
   RUN_TEST(test_corners_equal_the_definition_in_images_of_any_size);
   RUN_TEST(test_a_white_dot_on_black_scores_254);
   const bool has_real_image = real_pair_load(&real) != 0;
+  RUN_TEST(test_the_best_corners_are_kept_within_a_budget);
   if (has_real_image) RUN_TEST(test_corners_equal_the_definition_on_a_real_image);
   const int failures = UNITY_END();
   return failures == 0 && !has_real_image ? TWOVIEW_SKIP_CODE : failures;

@@ -78,7 +78,10 @@ bool find_corner(int arc, int* best_x, int* best_y) {
 }
 
 void refine(int arc, int x, int y, double* rx, double* ry) {
-  tv::refine_corner(*tvk_select(TV_KERNELS_AUTO), level, arc, x, y, rx, ry);
+  tv::Position position{1.0 * x, 1.0 * y};
+  tv::refine_corners(*tvk_select(TV_KERNELS_AUTO), level, arc, &position, 1);
+  *rx = position.x;
+  *ry = position.y;
 }
 
 void test_a_blobs_middle_is_found_below_a_pixel() {

@@ -46,12 +46,34 @@ bool is_masked_out(const tv_image* mask, const Level& level, int32_t x, int32_t 
   return mask->data[full_y * mask->stride_bytes + full_x] == 0;
 }
 
-// All corners of a level in raster order.
+// How many candidates there are of each score.
+struct Histogram {
+  int32_t counts[256];
+};
+
+// Adds the candidates of row y that the kernel found; returns how many there are now.
+int32_t add_row(const Level& level, const tv_image* mask, int32_t threshold, const uint16_t* xs,
+                int32_t found, int32_t y, const uint8_t* scores, Corner* candidates, int32_t count,
+                Histogram& histogram) {
+  for (int32_t k = 0; k < found; ++k) {
+    const int32_t x = xs[k];
+    if (scores[x] < threshold || is_masked_out(mask, level, x, y)) continue;
+    candidates[count++] = Corner{static_cast<uint16_t>(x), static_cast<uint16_t>(y), scores[x]};
+    ++histogram.counts[scores[x]];
+  }
+  return count;
+}
+
+// The corners of a level in raster order, those that can be among the `wanted` best at least. As
+// soon as there are enough at a higher threshold, the rest of the image is scanned at that, up to
+// `highest`.
 int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image* mask, int32_t arc,
-                   int32_t threshold, Workspace& work) {
+                   int32_t threshold, int32_t highest, int32_t wanted, Workspace& work,
+                   Histogram& histogram) {
   const int32_t rim = TVK_CIRCLE_RADIUS;
+  histogram = Histogram{};
   if (level.width <= 2 * rim || level.height <= 2 * rim) return 0;
-  int32_t count = 0;
+  int32_t count = 0, below = 0;  // candidates, and how many of them are below the threshold
   memset(work.scores[(rim - 1) % 3], 0, static_cast<size_t>(level.width));
   for (int32_t y = rim; y <= level.height - rim; ++y) {
     uint8_t* row = work.scores[y % 3];
@@ -66,35 +88,27 @@ int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image*
     const uint8_t* middle = work.scores[(y - 1) % 3];
     const int32_t found =
         kernels.suppress_row(work.scores[(y - 2) % 3], middle, row, level.width, work.xs);
-    for (int32_t k = 0; k < found; ++k) {
-      const int32_t x = work.xs[k];
-      if (is_masked_out(mask, level, x, y - 1)) continue;
-      work.candidates[count++] =
-          Corner{static_cast<uint16_t>(x), static_cast<uint16_t>(y - 1), middle[x]};
+    count = add_row(level, mask, threshold, work.xs, found, y - 1, middle, work.candidates, count,
+                    histogram);
+    while (threshold < highest && count - below - histogram.counts[threshold] >= wanted) {
+      below += histogram.counts[threshold++];
     }
   }
   return count;
 }
 
-// Counting sort to descending scores, raster order among equals. Corners below the adapted threshold
-// are left out; returns how many remain.
-int32_t sort_by_score(const Corner* corners, int32_t count, int32_t threshold,
-                      int32_t min_threshold, int32_t wanted, Corner* sorted) {
-  int32_t starts[257] = {0};  // starts[s]: how many have a score above s, in the end
-  for (int32_t k = 0; k < count; ++k) ++starts[corners[k].score];
-  int32_t above = 0;
-  for (int32_t s = 255; s >= 0; --s) {
-    const int32_t here = starts[s];
-    starts[s] = above;
-    above += here;
+// Counting sort to descending scores, raster order among equals. The corners below the highest
+// threshold that leaves `wanted`, at most `highest`, are left out; returns how many remain.
+int32_t sort_by_score(const Corner* corners, int32_t count, const Histogram& histogram,
+                      int32_t lowest, int32_t highest, int32_t wanted, Corner* sorted) {
+  int32_t starts[256];  // how many have a higher score
+  int32_t cutoff = 255, kept = 0;
+  while (cutoff > lowest && (cutoff > highest || kept < wanted)) {
+    starts[--cutoff] = kept;
+    kept += histogram.counts[cutoff];
   }
-  int32_t cutoff = threshold;
-  while (cutoff > min_threshold && starts[cutoff - 1] < wanted) --cutoff;
-  int32_t kept = 0;
   for (int32_t k = 0; k < count; ++k) {
-    if (corners[k].score < cutoff) continue;
-    sorted[starts[corners[k].score]++] = corners[k];
-    ++kept;
+    if (corners[k].score >= cutoff) sorted[starts[corners[k].score]++] = corners[k];
   }
   return kept;
 }
@@ -128,20 +142,27 @@ bool is_better(const tv_keypoint& a, const tv_keypoint& b) {
   return a.x < b.x;
 }
 
-tv_keypoint make_keypoint(const tvk_table& kernels, const Corner& corner, const Level& level,
-                          int32_t index, const tv_feature_options& options) {
-  double x = corner.x, y = corner.y;
-  if (options.subpixel != 0) {
-    refine_corner(kernels, level, options.arc, corner.x, corner.y, &x, &y);
+// Keypoints of a level's corners, one for one.
+void make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
+                    const Level& level, int32_t index, const tv_feature_options& options,
+                    tv_keypoint* keypoints) {
+  for (int32_t begin = 0; begin < count; begin += kRefineBlock) {
+    const int32_t here = std::min(count - begin, kRefineBlock);
+    Position positions[kRefineBlock];
+    for (int32_t k = 0; k < here; ++k) {
+      positions[k] = Position{1.0 * corners[begin + k].x, 1.0 * corners[begin + k].y};
+    }
+    if (options.subpixel != 0) refine_corners(kernels, level, options.arc, positions, here);
+    for (int32_t k = 0; k < here; ++k) {
+      tv_keypoint& keypoint = keypoints[begin + k];
+      keypoint.x = static_cast<float>(to_full(level, positions[k].x));
+      keypoint.y = static_cast<float>(to_full(level, positions[k].y));
+      keypoint.size = static_cast<float>(options.keypoint_size * level.scale);
+      keypoint.angle_rad = 0.0f;
+      keypoint.score = corners[begin + k].score;
+      keypoint.level = index;
+    }
   }
-  tv_keypoint keypoint;
-  keypoint.x = static_cast<float>(to_full(level, x));
-  keypoint.y = static_cast<float>(to_full(level, y));
-  keypoint.size = static_cast<float>(options.keypoint_size * level.scale);
-  keypoint.angle_rad = 0.0f;
-  keypoint.score = corner.score;
-  keypoint.level = index;
-  return keypoint;
 }
 
 // The share of the budget that level `index` of `count` starts with: areas fall by factor squared.
@@ -181,14 +202,16 @@ int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_ima
                       const tv_feature_options& options, int32_t index, int32_t share,
                       Workspace& work, tv_keypoint* keypoints) {
   const int32_t lowest = options.min_threshold > 0 ? options.min_threshold : options.threshold;
-  const int32_t found = scan_level(kernels, level, mask, options.arc, lowest, work);
+  // Without a grid the best are taken, wherever they are; with one, all above the threshold count.
+  const int32_t highest = options.cell_px == 0 ? 254 : options.threshold;
+  Histogram histogram;
+  const int32_t found =
+      scan_level(kernels, level, mask, options.arc, lowest, highest, share, work, histogram);
   const int32_t sorted =
-      sort_by_score(work.candidates, found, options.threshold, lowest, share, work.sorted);
+      sort_by_score(work.candidates, found, histogram, lowest, highest, share, work.sorted);
   const int32_t kept = spread_over_grid(work.sorted, sorted, share, level, options.cell_px,
                                         work.cell_counts, work.candidates);
-  for (int32_t k = 0; k < kept; ++k) {
-    keypoints[k] = make_keypoint(kernels, work.sorted[k], level, index, options);
-  }
+  make_keypoints(kernels, work.sorted, kept, level, index, options, keypoints);
   return kept;
 }
 

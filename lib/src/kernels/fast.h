@@ -1,134 +1,178 @@
 /* FAST's segment test and its score, and non-maximum suppression.
    E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006. */
-
-static inline uint8_t fast_min(uint8_t a, uint8_t b) { return a < b ? a : b; }
-static inline uint8_t fast_max(uint8_t a, uint8_t b) { return a > b ? a : b; }
+#include "kernels/bytes.h"
 
 /* The circle of radius 3, clockwise from below the centre: row of rows[], column offset. */
 static const int8_t fast_circle_row[16] = {6, 6, 5, 4, 3, 2, 1, 0, 0, 0, 1, 2, 3, 4, 5, 6};
-static const int8_t fast_circle_column[16] = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
+static const int8_t fast_circle_column[16] = {0, 1,  2,  3,  3,  3,  2,  1,
+                                              0, -1, -2, -3, -3, -3, -2, -1};
 
-enum { FAST_CHUNK = 64 };
+/* The greatest, over the arcs of the circle p, of the least pixel of the arc; the other way round
+   for darker ones. The arcs from 2i and 2i + 1 share the pixels 2i + 1 .. 2i + arc - 1; each has
+   one end more. A macro, for compilers make no vectors of a condition on which of the two it is. */
+#define BEST_OF_ARCS(name, lesser, greater, worst)                                     \
+  static inline byte_lanes name(const byte_lanes p[16], int32_t arc) {                 \
+    byte_lanes run2[8], run4[8], best = bytes_of(worst); /* run[i] starts at 2i + 1 */ \
+    int32_t i;                                                                         \
+    for (i = 0; i < 8; ++i) run2[i] = lesser(p[2 * i + 1], p[(2 * i + 2) & 15]);       \
+    for (i = 0; i < 8; ++i) run4[i] = lesser(run2[i], run2[(i + 1) & 7]);              \
+    for (i = 0; i < 8; ++i) {                                                          \
+      const byte_lanes ends = greater(p[2 * i], p[(2 * i + arc) & 15]);                \
+      byte_lanes least = lesser(lesser(run4[i], run4[(i + 2) & 7]), ends);             \
+      if (arc > 10) least = lesser(least, run2[(i + 4) & 7]);                          \
+      if (arc % 2 == 0) least = lesser(least, p[(2 * i + arc - 1) & 15]);              \
+      best = greater(best, least);                                                     \
+    }                                                                                  \
+    return best;                                                                       \
+  }
+BEST_OF_ARCS(brightest_of_arcs, bytes_min, bytes_max, 0)
+BEST_OF_ARCS(darkest_of_arcs, bytes_max, bytes_min, 255)
+#undef BEST_OF_ARCS
 
-/* The score of a pixel c is the larger of
-     max over arcs of min over the arc of p_i - c   (brighter) and
-     c - min over arcs of max over the arc of p_i   (darker), less 1.
-   The minimum over n = 9..12 contiguous pixels is that of three runs of 4, which start at i, i + 4 and
-   i + n - 4; a run of 4 is two runs of 2. Nothing here depends on the data, so neither does the time. */
-static void fast_score_chunk(const uint8_t *const circle[16], const uint8_t *centre, int32_t arc,
-                             int32_t threshold, uint8_t *scores) {
-  uint8_t low[16][FAST_CHUNK], high[16][FAST_CHUNK];
-  uint8_t low4[16][FAST_CHUNK], high4[16][FAST_CHUNK];
-  uint8_t brighter[FAST_CHUNK], darker[FAST_CHUNK];
-  int32_t i, x;
-  for (i = 0; i < 16; ++i) {
-    const uint8_t *a = circle[i], *b = circle[(i + 1) & 15];
-    for (x = 0; x < FAST_CHUNK; ++x) {
-      low[i][x] = fast_min(a[x], b[x]);
-      high[i][x] = fast_max(a[x], b[x]);
-    }
+/* Not inlined: they are long, and called from two places. */
+static __attribute__((noinline)) byte_lanes brightest_arc(const byte_lanes p[16], int32_t arc) {
+  return arc == 9 ? brightest_of_arcs(p, 9) : brightest_of_arcs(p, arc);
+}
+static __attribute__((noinline)) byte_lanes darkest_arc(const byte_lanes p[16], int32_t arc) {
+  return arc == 9 ? darkest_of_arcs(p, 9) : darkest_of_arcs(p, arc);
+}
+
+/* Bounds that four pixels, evenly on the circle, set to every arc: an arc of 9 holds two neighbours
+   of them, one of 12 holds three. */
+typedef struct arc_bounds {
+  byte_lanes brightest, darkest;
+} arc_bounds;
+
+static inline arc_bounds bounds_of_arcs(const byte_lanes p[16], int32_t first, int32_t arc) {
+  const byte_lanes a = p[first], b = p[first + 4], c = p[first + 8], d = p[first + 12];
+  arc_bounds bounds;
+  bounds.brightest = bytes_min(bytes_max(a, c), bytes_max(b, d));
+  bounds.darkest = bytes_max(bytes_min(a, c), bytes_min(b, d));
+  if (arc == 12) { /* second of four from below, and from above */
+    const byte_lanes brightest = bounds.brightest;
+    bounds.brightest = bytes_min(brightest, bounds.darkest);
+    bounds.darkest = bytes_max(brightest, bounds.darkest);
   }
-  for (i = 0; i < 16; ++i) {
-    const int32_t j = (i + 2) & 15;
-    for (x = 0; x < FAST_CHUNK; ++x) {
-      low4[i][x] = fast_min(low[i][x], low[j][x]);
-      high4[i][x] = fast_max(high[i][x], high[j][x]);
-    }
+  return bounds;
+}
+
+static inline byte_lanes circle_pixel(const uint8_t *const rows[7], int32_t x, int32_t i) {
+  return bytes_load(rows[fast_circle_row[i]] + x + fast_circle_column[i]);
+}
+
+/* Scores of TVK_BYTES pixels from x on. Given up early where four or eight of the circle's pixels
+   let none of them be a corner. */
+static inline byte_lanes fast_scores(const uint8_t *const rows[7], int32_t x, int32_t arc,
+                                     int32_t threshold) {
+  const byte_lanes t = bytes_of((uint8_t)threshold), c = bytes_load(rows[3] + x);
+  const byte_lanes high = bytes_add(c, t), low = bytes_sub(c, t);
+  byte_lanes p[16], contrast = bytes_of(0);
+  arc_bounds bounds, more;
+  int has_brighter, has_darker;
+  int32_t i;
+  for (i = 0; i < 16; i += 4) p[i] = circle_pixel(rows, x, i);
+  bounds = bounds_of_arcs(p, 0, arc);
+  if (!bytes_any(bytes_max(bytes_sub(bounds.brightest, high), bytes_sub(low, bounds.darkest)))) {
+    return contrast;
   }
-  for (x = 0; x < FAST_CHUNK; ++x) {
-    brighter[x] = 0;
-    darker[x] = 255;
-  }
-  for (i = 0; i < 16; ++i) {
-    const int32_t j = (i + 4) & 15, k = (i + arc - 4) & 15;
-    for (x = 0; x < FAST_CHUNK; ++x) {
-      const uint8_t l = fast_min(fast_min(low4[i][x], low4[j][x]), low4[k][x]);
-      const uint8_t h = fast_max(fast_max(high4[i][x], high4[j][x]), high4[k][x]);
-      brighter[x] = fast_max(brighter[x], l);
-      darker[x] = fast_min(darker[x], h);
-    }
-  }
-  for (x = 0; x < FAST_CHUNK; ++x) {
-    const uint8_t c = centre[x];
-    const uint8_t above = (uint8_t)(fast_max(brighter[x], c) - c);
-    const uint8_t below = (uint8_t)(c - fast_min(darker[x], c));
-    const uint8_t contrast = fast_max(above, below);
-    scores[x] = contrast > threshold ? (uint8_t)(contrast - 1) : 0;
-  }
+  for (i = 2; i < 16; i += 4) p[i] = circle_pixel(rows, x, i);
+  more = bounds_of_arcs(p, 2, arc);
+  has_brighter = bytes_any(bytes_sub(bytes_min(bounds.brightest, more.brightest), high));
+  has_darker = bytes_any(bytes_sub(low, bytes_max(bounds.darkest, more.darkest)));
+  if (!has_brighter && !has_darker) return contrast;
+  for (i = 1; i < 16; i += 2) p[i] = circle_pixel(rows, x, i);
+  if (has_brighter) contrast = bytes_sub(brightest_arc(p, arc), c);
+  if (has_darker) contrast = bytes_max(contrast, bytes_sub(c, darkest_arc(p, arc)));
+  return bytes_where_above(contrast, t, bytes_sub(contrast, bytes_of(1)));
 }
 
 static void fast_score_row(const uint8_t *const rows[7], int32_t width, int32_t arc,
                            int32_t threshold, uint8_t *scores) {
-  const int32_t end = width - TVK_CIRCLE_RADIUS;
-  const uint8_t *circle[16];
-  uint8_t copy[7][FAST_CHUNK + 2 * TVK_CIRCLE_RADIUS];
-  uint8_t chunk_scores[FAST_CHUNK];
-  int32_t x = TVK_CIRCLE_RADIUS, i;
-  memset(scores, 0, (size_t)width);
-  for (; x + FAST_CHUNK <= end; x += FAST_CHUNK) {
-    for (i = 0; i < 16; ++i) circle[i] = rows[fast_circle_row[i]] + x + fast_circle_column[i];
-    fast_score_chunk(circle, rows[3] + x, arc, threshold, scores + x);
+  enum { RIM = TVK_CIRCLE_RADIUS };
+  const int32_t end = width - RIM, last = end - TVK_BYTES;
+  int32_t x, i;
+  if (last < RIM) { /* a narrow image: on a copy, so that nothing beyond the rows is read */
+    uint8_t copy[7][TVK_BYTES + 2 * RIM], chunk[TVK_BYTES];
+    const uint8_t *copies[7];
+    memset(scores, 0, (size_t)width);
+    if (end <= RIM) return;
+    memset(copy, 0, sizeof copy);
+    for (i = 0; i < 7; ++i) {
+      memcpy(copy[i], rows[i], (size_t)width);
+      copies[i] = copy[i];
+    }
+    bytes_store(chunk, fast_scores(copies, RIM, arc, threshold));
+    memcpy(scores + RIM, chunk, (size_t)(end - RIM));
+    return;
   }
-  if (x >= end) return;
-  /* The last chunk is cut short: it works on a copy, so that nothing beyond the rows is read. */
-  memset(copy, 0, sizeof copy);
-  for (i = 0; i < 7; ++i) {
-    memcpy(copy[i], rows[i] + x - TVK_CIRCLE_RADIUS, (size_t)(width - x + TVK_CIRCLE_RADIUS));
+  memset(scores, 0, RIM);
+  memset(scores + end, 0, RIM);
+  for (x = RIM; x < end; x += TVK_BYTES) { /* the last chunk may overlap the one before it */
+    const int32_t at = x < last ? x : last;
+    bytes_store(scores + at, fast_scores(rows, at, arc, threshold));
   }
-  for (i = 0; i < 16; ++i) {
-    circle[i] = copy[fast_circle_row[i]] + TVK_CIRCLE_RADIUS + fast_circle_column[i];
-  }
-  fast_score_chunk(circle, copy[3] + TVK_CIRCLE_RADIUS, arc, threshold, chunk_scores);
-  memcpy(scores + x, chunk_scores, (size_t)(end - x));
 }
 
-/* By how much the best arc around one pixel is brighter or darker than it; below 0 where none is. The
-   circle is laid out twice, so that runs need not wrap. */
-static int32_t fast_contrast(const uint8_t *centre, int64_t stride, int32_t arc) {
-  int16_t circle[32], low[32], high[32], low4[28], high4[28];
-  int32_t brighter = -255, darker = 255, i;
-  for (i = 0; i < 16; ++i) {
-    circle[i] = centre[(fast_circle_row[i] - 3) * stride + fast_circle_column[i]];
+/* A group of 16 lanes holds a corner: three rows of three pixels and one that is not used. */
+static void fast_contrasts(const uint8_t *const *centres, int32_t count, int64_t stride,
+                           int32_t arc, int16_t *contrasts) {
+  enum { GROUPS = TVK_BYTES / 16 };
+  int32_t done, g, i, k;
+  for (done = 0; done < count; done += GROUPS) {
+    const uint8_t *at[GROUPS], *shifted[GROUPS];
+    uint8_t above[TVK_BYTES], below[TVK_BYTES];
+    byte_lanes p[16], c, brightest, darkest;
+    for (g = 0; g < GROUPS; ++g) at[g] = centres[done + g < count ? done + g : count - 1] - 1;
+    c = bytes_of_rows(at, stride);
+    for (i = 0; i < 16; ++i) {
+      const int64_t offset = (fast_circle_row[i] - 3) * stride + fast_circle_column[i];
+      for (g = 0; g < GROUPS; ++g) shifted[g] = at[g] + offset;
+      p[i] = bytes_of_rows(shifted, stride);
+    }
+    brightest = brightest_arc(p, arc);
+    darkest = darkest_arc(p, arc);
+    /* Of the two contrasts at most one is above 0, for two arcs have pixels in common. */
+    bytes_store(above, bytes_max(bytes_sub(brightest, c), bytes_sub(c, darkest)));
+    bytes_store(below, bytes_min(bytes_sub(c, brightest), bytes_sub(darkest, c)));
+    for (g = 0; g < GROUPS && done + g < count; ++g) {
+      for (k = 0; k < 9; ++k) {
+        const int32_t lane = 16 * g + k / 3 * 4 + k % 3;
+        contrasts[9 * (done + g) + k] = (int16_t)(above[lane] - below[lane]);
+      }
+    }
   }
-  for (i = 0; i < 16; ++i) circle[i + 16] = circle[i];
-  for (i = 0; i < 31; ++i) {
-    low[i] = circle[i] < circle[i + 1] ? circle[i] : circle[i + 1];
-    high[i] = circle[i] > circle[i + 1] ? circle[i] : circle[i + 1];
-  }
-  for (i = 0; i < 28; ++i) {
-    low4[i] = low[i] < low[i + 2] ? low[i] : low[i + 2];
-    high4[i] = high[i] > high[i + 2] ? high[i] : high[i + 2];
-  }
-  for (i = 0; i < 16; ++i) {
-    const int16_t *l = low4 + i, *h = high4 + i;
-    int32_t lowest = l[0] < l[4] ? l[0] : l[4], highest = h[0] > h[4] ? h[0] : h[4];
-    lowest = lowest < l[arc - 4] ? lowest : l[arc - 4];
-    highest = highest > h[arc - 4] ? highest : h[arc - 4];
-    brighter = brighter > lowest ? brighter : lowest;
-    darker = darker < highest ? darker : highest;
-  }
-  brighter -= *centre;
-  darker = *centre - darker;
-  return brighter > darker ? brighter : darker;
 }
 
-static void fast_contrasts(const uint8_t *centre, int64_t stride, int32_t arc,
-                           int32_t *contrasts) {
-  int32_t i;
-  for (i = 0; i < 9; ++i) {
-    contrasts[i] = fast_contrast(centre + (i / 3 - 1) * stride + i % 3 - 1, stride, arc);
+/* The scores of TVK_BYTES pixels at x that are above those of all eight neighbours: a bit each. */
+static inline uint64_t suppress(const uint8_t *prev, const uint8_t *cur, const uint8_t *next,
+                                int32_t x) {
+  byte_lanes most = bytes_max(bytes_load(cur + x - 1), bytes_load(cur + x + 1));
+  int32_t k;
+  for (k = -1; k <= 1; ++k) {
+    most = bytes_max(most, bytes_max(bytes_load(prev + x + k), bytes_load(next + x + k)));
   }
+  return bytes_above(bytes_load(cur + x), most);
 }
 
 static int32_t suppress_row(const uint8_t *prev, const uint8_t *cur, const uint8_t *next,
                             int32_t width, uint16_t *xs) {
+  const int32_t end = width - 1, last = end - TVK_BYTES;
   int32_t count = 0, x;
-  for (x = 1; x + 1 < width; ++x) {
-    const uint8_t s = cur[x];
-    if (s == 0) continue;
-    if (s > cur[x - 1] && s > cur[x + 1] && s > prev[x - 1] && s > prev[x] && s > prev[x + 1] &&
-        s > next[x - 1] && s > next[x] && s > next[x + 1]) {
-      xs[count++] = (uint16_t)x;
+  if (last < 1) {
+    for (x = 1; x < end; ++x) {
+      const uint8_t s = cur[x];
+      if (s > cur[x - 1] && s > cur[x + 1] && s > prev[x - 1] && s > prev[x] && s > prev[x + 1] &&
+          s > next[x - 1] && s > next[x] && s > next[x + 1]) {
+        xs[count++] = (uint16_t)x;
+      }
+    }
+    return count;
+  }
+  for (x = 1; x < end; x += TVK_BYTES) { /* the last chunk may overlap the one before it */
+    const int32_t at = x < last ? x : last;
+    uint64_t kept = suppress(prev, cur, next, at) & ~(uint64_t)0 << (x - at) * TVK_BYTES_BITS;
+    for (; kept != 0; kept &= kept - 1) {
+      xs[count++] = (uint16_t)(at + __builtin_ctzll(kept) / TVK_BYTES_BITS);
     }
   }
   return count;

@@ -31,8 +31,9 @@ extern "C" {
 /* fast_score_row: rows[0..6] are the image rows y-3..y+3. Writes for each x in [0, width) the largest
      threshold at which (x, y) is a corner with `arc` (9..12) contiguous brighter or darker circle
      pixels, where that is at least `threshold` (>= 1), else 0. 0 in the 3-pixel rim.
-   fast_contrasts: the score before the threshold of a pixel and its eight neighbours, in raster order:
-     by how much the best arc is brighter or darker, below 0 where none is.
+   fast_contrasts: the score before the threshold of each of `count` pixels and its eight neighbours, in
+     raster order: by how much the best arc is brighter or darker, below 0 where none is. Each circle
+     lies in the image; of the last row of the nine nothing behind the circle is read.
    suppress_row: x of the scores in `cur` that are above 0 and above all eight neighbours; returns how
      many. xs has room for (width + 1) / 2. The first and last x are never kept.
    average_rows: columns of up to three rows, weights (of 256) in row_weights, to sums in [0, 65280].
@@ -77,7 +78,7 @@ extern "C" {
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
   X(fast_contrasts, void,                                                                          \
-    (const uint8_t *centre, int64_t stride, int32_t arc, int32_t *contrasts))                      \
+    (const uint8_t *const *centres, int32_t count, int64_t stride, int32_t arc, int16_t *contrasts)) \
   X(suppress_row, int32_t,                                                                         \
     (const uint8_t *prev, const uint8_t *cur, const uint8_t *next, int32_t width, uint16_t *xs))   \
   X(average_rows, void,                                                                            \
