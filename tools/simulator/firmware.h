@@ -1,0 +1,99 @@
+// What runs on the simulated drone: it obeys AT commands, keeps a configuration and says how it is in
+// navdata. It knows bytes and a clock, no sockets.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "simulator/flight.h"
+
+struct ardrone_navdata;
+
+namespace simulator {
+
+// How far the sensors are off: factors on the truth, and one standard deviation of noise.
+struct Sensors {
+  double altitude_factor = 1.0;
+  double velocity_factor = 1.0;
+  double attitude_noise_rad = 0.002;
+  double velocity_noise_m_s = 0.01;
+  double altitude_noise_m = 0.003;
+  uint64_t seed = 1;
+};
+
+class Firmware {
+ public:
+  Firmware(const room::Room& room, const Vec3& start, double yaw_rad, const Sensors& sensors,
+           int64_t now_ns);
+
+  // A datagram on the AT port, and one on the navdata port (it wakes the stream).
+  void receive_commands(std::string_view datagram, int64_t now_ns);
+  void receive_hello(int64_t now_ns);
+
+  // Flies on and watches over the link; call it often.
+  void advance(int64_t now_ns);
+
+  // The navdata packet that is due, or nothing: 15 a second in demo mode, 200 in full.
+  std::optional<std::vector<uint8_t>> next_navdata(int64_t now_ns);
+
+  // What the control channel is to send (configuration or id list, with its zero byte), once.
+  std::optional<std::string> take_control_text();
+
+  // As when its battery was changed: bootstrap, sequence numbers from 1, on the ground where it is.
+  void reboot(int64_t now_ns);
+  // The next packet's sequence number, to try the wrap.
+  void set_sequence(uint32_t sequence) { sequence_ = sequence; }
+
+  // Time since boot: what navdata's and the video's stamps count.
+  int64_t uptime_ns(int64_t now_ns) const { return now_ns - boot_ns_; }
+  const FlightState& truth() const { return flight_.state(); }
+  bool wants_720p() const;
+  bool navdata_runs() const { return hello_; }
+  int num_refused() const { return num_refused_; }
+  int num_obeyed() const { return num_obeyed_; }
+  // The highest sequence number obeyed since the link began, and whether one fell without starting at 1.
+  int32_t last_command() const { return last_command_; }
+  int num_take_offs() const { return num_take_offs_; }
+
+ private:
+  struct Ids {
+    std::string session = "00000000", user = "00000000", application = "00000000";
+    bool operator==(const Ids& other) const {
+      return session == other.session && user == other.user && application == other.application;
+    }
+  };
+  void obey(std::string_view line, int64_t now_ns);
+  void obey_ref(const std::vector<std::string>& arguments);
+  void obey_move(const std::vector<std::string>& arguments);
+  void obey_config(const std::vector<std::string>& arguments);
+  void obey_control(const std::vector<std::string>& arguments);
+  bool is_writable(const std::string& key) const;
+  void apply_limits();
+  double number(const std::string& key) const;
+  uint32_t state_word() const;
+  uint32_t option_mask() const;
+  void fill(int64_t now_ns, ardrone_navdata* navdata);
+  std::string configuration_text() const;
+  std::string ids_text() const;
+  void watch_link(int64_t now_ns);
+
+  Flight flight_;
+  Sensors sensors_;
+  std::map<std::string, std::string> configuration_;
+  std::map<std::string, std::string> sessions_, users_, applications_;  // id to description
+  Ids ids_, addressed_;
+  std::vector<std::string> control_texts_;
+  bool bootstrap_ = true, acknowledge_ = false, hello_ = false, watchdog_ = false, lost_ = false;
+  bool emergency_level_ = false;
+  int64_t boot_ns_, advanced_ns_, next_navdata_ns_ = 0, command_ns_;
+  uint32_t sequence_ = 1;
+  int32_t last_command_ = 0;
+  int num_refused_ = 0, num_obeyed_ = 0, num_take_offs_ = 0;
+  uint64_t noise_state_;
+};
+
+}  // namespace simulator
