@@ -34,6 +34,9 @@ int run_program(int argc, char** argv) {
   cli::add_triangulate(program, run);
   cli::add_undistort(program, run);
   cli::add_evaluate(program, run);
+#ifdef TWOVIEW_HAS_DRONE
+  cli::add_drone(program, run);
+#endif
   const auto verbs = program.get_subcommands([](const CLI::App*) { return true; });
   const auto is_named_first = [&](const CLI::App* verb) {
     return argc > 1 && verb->get_name() == argv[1];
@@ -46,8 +49,14 @@ int run_program(int argc, char** argv) {
     cli::print(std::string(e.what()) + "\n");
     return 0;
   } catch (const CLI::Success&) {  // --help
-    const auto chosen = program.get_subcommands();
-    cli::print(chosen.empty() ? program.help() : chosen[0]->help("twoview"));
+    const CLI::App* chosen = &program;
+    std::string path;
+    while (!chosen->get_subcommands().empty()) {
+      if (!path.empty()) path += ' ';
+      path += chosen->get_name();
+      chosen = chosen->get_subcommands()[0];
+    }
+    cli::print(chosen->help(path));
     return 0;
   } catch (const CLI::ParseError& e) {
     const auto chosen = std::find_if(verbs.begin(), verbs.end(), is_named_first);

@@ -186,6 +186,22 @@ std::vector<std::string> OutputSet::names() const {
   return names;
 }
 
+// Whether a signal is to set the flag before it ends the program.
+std::atomic<bool>& asks_first() {
+  static std::atomic<bool> asks{false};
+  return asks;
+}
+
+std::atomic<bool>& stop_flag() {
+  static std::atomic<bool> stop{false};
+  return stop;
+}
+
+const std::atomic<bool>& stop_flag_for_signals() {
+  asks_first() = true;
+  return stop_flag();
+}
+
 void clean_up_on_signals() {
   sigset_t awaited;
   sigemptyset(&awaited);
@@ -198,7 +214,9 @@ void clean_up_on_signals() {
   ::pthread_sigmask(SIG_BLOCK, &awaited, nullptr);
   std::thread([awaited] {
     int signal = 0;
-    if (::sigwait(&awaited, &signal) != 0) return;
+    do {
+      if (::sigwait(&awaited, &signal) != 0) return;
+    } while (asks_first() && !stop_flag().exchange(true));
     living().mutex.lock();  // for good
     for (OutputSet* set : living().sets) set->discard();
     ::signal(signal, SIG_DFL);

@@ -1,6 +1,7 @@
 // Files that appear whole or not at all.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -51,6 +52,10 @@ class OutputSet {
 // From now on Ctrl-C, SIGTERM and SIGHUP end the program only after what the OutputSets have not
 // committed is gone. Call once, before any other thread starts.
 void clean_up_on_signals();
+
+// For work that ends well when it is told to (a recording, a simulation): after this call the first
+// such signal sets the flag and does no more; a second one ends the program as before.
+const std::atomic<bool>& stop_flag_for_signals();
 
 // The whole of a text or image file; refuses what is missing, no file, empty, or above max_bytes.
 std::string read_file(const std::string& path, size_t max_bytes);

@@ -31,6 +31,7 @@ void add_match(CLI::App& program, Run& run);
 void add_triangulate(CLI::App& program, Run& run);
 void add_undistort(CLI::App& program, Run& run);
 void add_evaluate(CLI::App& program, Run& run);
+void add_drone(CLI::App& program, Run& run);  // its own verbs: drone/
 
 // The main job on outcome.picture and outcome.camera: fills two_view and reconstruction; the wall
 // time in nanoseconds. Throws BadInput when the library refuses.

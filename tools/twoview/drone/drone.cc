@@ -1,0 +1,37 @@
+// twoview drone: talks to an AR.Drone 2.0, or is one.
+
+#include "drone/drone.h"
+
+namespace cli {
+
+void add_address(CLI::App& verb, DroneAddress& address, const std::string& host) {
+  address.host = host;
+  verb.add_option("--host", address.host, "the drone's address")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  const auto port = [&](const char* name, int& value, const char* help) {
+    verb.add_option(name, value, help)
+        ->check(CLI::Range(0, 65535))
+        ->type_name("PORT")
+        ->capture_default_str();
+  };
+  port("--at-port", address.at_port, "commands, UDP");
+  port("--navdata-port", address.navdata_port, "navdata, UDP");
+  port("--video-port", address.video_port, "video, TCP");
+  port("--control-port", address.control_port, "configuration, TCP");
+}
+
+void add_duration(CLI::App& verb, double& seconds) {
+  verb.add_option("--duration", seconds, "end after so many seconds; 0: with Ctrl-C")
+      ->check(CLI::Range(0.0, 1e7))
+      ->type_name("S")
+      ->capture_default_str();
+}
+
+void add_drone(CLI::App& program, Run& run) {
+  CLI::App* drone = program.add_subcommand("drone", "an AR.Drone 2.0: simulate one");
+  drone->require_subcommand(1);
+  add_drone_simulate(*drone, run);
+}
+
+}  // namespace cli

@@ -1,0 +1,24 @@
+// twoview drone: what its verbs share.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <cstdint>
+#include <string>
+
+#include "verbs.h"
+
+namespace cli {
+
+// Where a drone is: --host and a port option for each channel.
+struct DroneAddress {
+  std::string host;
+  int at_port = 5556, navdata_port = 5554, video_port = 5555, control_port = 5559;
+};
+void add_address(CLI::App& verb, DroneAddress& address, const std::string& host);
+
+// --duration: seconds until the verb ends by itself, 0 for no end.
+void add_duration(CLI::App& verb, double& seconds);
+
+void add_drone_simulate(CLI::App& drone, Run& run);
+
+}  // namespace cli
