@@ -135,11 +135,24 @@ int32_t spread_over_grid(Corner* corners, int32_t count, int32_t wanted, const L
   return taken;
 }
 
-bool is_better(const tv_keypoint& a, const tv_keypoint& b) {
-  if (a.score != b.score) return a.score > b.score;
-  if (a.level != b.level) return a.level < b.level;
-  if (a.y != b.y) return a.y < b.y;
-  return a.x < b.x;
+// A total order: best first.
+struct IsBetter {
+  bool operator()(const tv_keypoint& a, const tv_keypoint& b) const {
+    if (a.score != b.score) return a.score > b.score;
+    if (a.level != b.level) return a.level < b.level;
+    if (a.y != b.y) return a.y < b.y;
+    return a.x < b.x;
+  }
+};
+
+// By IsBetter, keypoints whose scores fall already: runs of equal scores are short.
+void sort_within_scores(tv_keypoint* keypoints, int32_t count) {
+  int32_t begin = 0;
+  for (int32_t k = 1; k <= count; ++k) {
+    if (k < count && keypoints[k].score == keypoints[begin].score) continue;
+    std::sort(keypoints + begin, keypoints + k, IsBetter());
+    begin = k;
+  }
 }
 
 // Keypoints of a level's corners, one for one.
@@ -245,7 +258,11 @@ int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_i
     count += collect_level(kernels, level, mask, options, k, share, work, keypoints + count);
     if (k + 1 < levels) next_level(kernels, level, factor, k, buffers, &level);
   }
-  std::sort(keypoints, keypoints + count, is_better);
+  if (levels == 1 && options.cell_px == 0) {
+    sort_within_scores(keypoints, count);
+  } else {
+    std::sort(keypoints, keypoints + count, IsBetter());
+  }
   return count;
 }
 

@@ -9,33 +9,29 @@ static const int8_t fast_circle_column[16] = {0, 1,  2,  3,  3,  3,  2,  1,
 
 /* The greatest, over the arcs of the circle p, of the least pixel of the arc; the other way round
    for darker ones. The arcs from 2i and 2i + 1 share the pixels 2i + 1 .. 2i + arc - 1; each has
-   one end more. A macro, for compilers make no vectors of a condition on which of the two it is. */
-#define BEST_OF_ARCS(name, lesser, greater, worst)                                     \
-  static inline byte_lanes name(const byte_lanes p[16], int32_t arc) {                 \
-    byte_lanes run2[8], run4[8], best = bytes_of(worst); /* run[i] starts at 2i + 1 */ \
-    int32_t i;                                                                         \
-    for (i = 0; i < 8; ++i) run2[i] = lesser(p[2 * i + 1], p[(2 * i + 2) & 15]);       \
-    for (i = 0; i < 8; ++i) run4[i] = lesser(run2[i], run2[(i + 1) & 7]);              \
-    for (i = 0; i < 8; ++i) {                                                          \
-      const byte_lanes ends = greater(p[2 * i], p[(2 * i + arc) & 15]);                \
-      byte_lanes least = lesser(lesser(run4[i], run4[(i + 2) & 7]), ends);             \
-      if (arc > 10) least = lesser(least, run2[(i + 4) & 7]);                          \
-      if (arc % 2 == 0) least = lesser(least, p[(2 * i + arc - 1) & 15]);              \
-      best = greater(best, least);                                                     \
-    }                                                                                  \
-    return best;                                                                       \
+   one end more. A macro, for compilers make no vectors of a condition on which of the two it is;
+   not inlined, for it is long and called from two places. */
+#define BEST_ARC(name, lesser, greater)                                                            \
+  static __attribute__((noinline)) byte_lanes name(const byte_lanes p[16], int32_t arc) {          \
+    byte_lanes run2[8], run4[8], least[8], best; /* run[i] starts at 2i + 1 */                     \
+    int32_t i;                                                                                     \
+    for (i = 0; i < 8; ++i) run2[i] = lesser(p[2 * i + 1], p[(2 * i + 2) & 15]);                   \
+    for (i = 0; i < 8; ++i) run4[i] = lesser(run2[i], run2[(i + 1) & 7]);                          \
+    for (i = 0; i < 8; ++i) least[i] = lesser(run4[i], run4[(i + 2) & 7]);                         \
+    if (arc > 10) {                                                                                \
+      for (i = 0; i < 8; ++i) least[i] = lesser(least[i], run2[(i + 4) & 7]);                      \
+    }                                                                                              \
+    if (arc % 2 == 0) {                                                                            \
+      for (i = 0; i < 8; ++i) least[i] = lesser(least[i], p[(2 * i + arc - 1) & 15]);              \
+    }                                                                                              \
+    for (i = 0; i < 8; ++i) least[i] = lesser(least[i], greater(p[2 * i], p[(2 * i + arc) & 15])); \
+    best = least[0];                                                                               \
+    for (i = 1; i < 8; ++i) best = greater(best, least[i]);                                        \
+    return best;                                                                                   \
   }
-BEST_OF_ARCS(brightest_of_arcs, bytes_min, bytes_max, 0)
-BEST_OF_ARCS(darkest_of_arcs, bytes_max, bytes_min, 255)
-#undef BEST_OF_ARCS
-
-/* Not inlined: they are long, and called from two places. */
-static __attribute__((noinline)) byte_lanes brightest_arc(const byte_lanes p[16], int32_t arc) {
-  return arc == 9 ? brightest_of_arcs(p, 9) : brightest_of_arcs(p, arc);
-}
-static __attribute__((noinline)) byte_lanes darkest_arc(const byte_lanes p[16], int32_t arc) {
-  return arc == 9 ? darkest_of_arcs(p, 9) : darkest_of_arcs(p, arc);
-}
+BEST_ARC(brightest_arc, bytes_min, bytes_max)
+BEST_ARC(darkest_arc, bytes_max, bytes_min)
+#undef BEST_ARC
 
 /* Bounds that four pixels, evenly on the circle, set to every arc: an arc of 9 holds two neighbours
    of them, one of 12 holds three. */
@@ -88,28 +84,28 @@ static inline byte_lanes fast_scores(const uint8_t *const rows[7], int32_t x, in
 
 static void fast_score_row(const uint8_t *const rows[7], int32_t width, int32_t arc,
                            int32_t threshold, uint8_t *scores) {
-  enum { RIM = TVK_CIRCLE_RADIUS };
-  const int32_t end = width - RIM, last = end - TVK_BYTES;
+  enum { RIM = TVK_CIRCLE_RADIUS, NARROW = TVK_BYTES + 2 * RIM };
+  const int32_t end = width - RIM, last = end > NARROW - RIM ? end - TVK_BYTES : RIM;
+  uint8_t copy[7][NARROW], narrow_scores[NARROW], *out = scores;
+  const uint8_t *copies[7];
   int32_t x, i;
-  if (last < RIM) { /* a narrow image: on a copy, so that nothing beyond the rows is read */
-    uint8_t copy[7][TVK_BYTES + 2 * RIM], chunk[TVK_BYTES];
-    const uint8_t *copies[7];
-    memset(scores, 0, (size_t)width);
-    if (end <= RIM) return;
+  if (width < NARROW) { /* on a copy, so that nothing is read or written beyond the rows */
     memset(copy, 0, sizeof copy);
-    for (i = 0; i < 7; ++i) {
-      memcpy(copy[i], rows[i], (size_t)width);
-      copies[i] = copy[i];
-    }
-    bytes_store(chunk, fast_scores(copies, RIM, arc, threshold));
-    memcpy(scores + RIM, chunk, (size_t)(end - RIM));
-    return;
+    for (i = 0; i < 7; ++i) copies[i] = (uint8_t *)memcpy(copy[i], rows[i], (size_t)width);
+    memset(scores, 0, (size_t)width);
+    rows = copies;
+    out = narrow_scores;
   }
-  memset(scores, 0, RIM);
-  memset(scores + end, 0, RIM);
   for (x = RIM; x < end; x += TVK_BYTES) { /* the last chunk may overlap the one before it */
     const int32_t at = x < last ? x : last;
-    bytes_store(scores + at, fast_scores(rows, at, arc, threshold));
+    bytes_store(out + at, fast_scores(rows, at, arc, threshold));
+  }
+  if (end <= RIM) return;
+  if (out != scores) {
+    memcpy(scores + RIM, out + RIM, (size_t)(end - RIM));
+  } else {
+    memset(scores, 0, RIM);
+    memset(scores + end, 0, RIM);
   }
 }
 
