@@ -17,7 +17,7 @@ using bench::Counters;
 
 constexpr int kNumMatches = 500;
 constexpr double kNoisePx = 0.5, kMaxErrorPx = 1, kConfidence = 0.9999;
-constexpr int kNumProblems = 20;
+constexpr int kNumProblems = 10;
 
 using Problems = std::shared_ptr<std::vector<bench::Problem>>;
 using Errors = std::shared_ptr<std::vector<double>>;  // of each problem, degrees; 180 for no pose
