@@ -55,24 +55,34 @@ def _count(build, program, stage, kernels):
 
 
 def measure(build, stages, programs):
-    """Rows as dictionaries: stage, case, system, kernels, instructions, unit."""
+    """Rows as dictionaries: stage, case, ours by kernel set, peer, peer_name, ratio, unit."""
     found = []
     for stage in (s for s in stages if programs[s]):
+        by_set = {kernels: _count(build, programs[stage], stage, kernels) for kernels in SETS}
+        first = by_set[SETS[0]]
         unit = table.UNITS[stage][0].partition("/")[2] or "call"
-        for kernels in SETS:
-            for name, instructions in _count(build, programs[stage], stage, kernels).items():
-                case, system = name.split("/")[1:]
-                if system != table.OURS and kernels != SETS[0]:
-                    continue  # a peer does not know our sets
-                found.append({"stage": stage, "case": case, "system": system,
-                              "kernels": kernels if system == table.OURS else None,
-                              "instructions": instructions, "unit": f"instructions/{unit}"})
+        for name in first:
+            case, system = name.split("/")[1:]
+            own = f"{stage}/{case}/{table.OURS}"
+            alone = all(not n.startswith(f"{stage}/{case}/") or n == own for n in first)
+            if system == table.OURS and not alone:
+                continue  # stands in its peers' rows
+            peer = None if alone else first[name]
+            found.append({"stage": stage, "case": case,
+                          "ours": {kernels: by_set[kernels][own] for kernels in SETS},
+                          "peer": peer, "peer_name": None if alone else system,
+                          "ratio": None if alone else peer / first[own],
+                          "unit": f"instructions/{unit}"})
     return found
 
 
 def print_table(found, out):
-    print("| stage | case | system | instructions | a |\n| --- | --- | --- | --- | --- |", file=out)
+    sets = " | ".join(f"ours, {kernels}" for kernels in SETS)
+    print(f"| stage | case | {sets} | peer | peer / {SETS[0]} | peer's name | a |", file=out)
+    print("| --- | --- |" + " --- |" * (len(SETS) + 4), file=out)
     for row in found:
-        system = f"twoview, {row['kernels']}" if row["kernels"] else row["system"]
-        print(f"| {row['stage']} | {row['case']} | {system} | {row['instructions']:,.0f} | "
-              f"{row['unit'].partition('/')[2]} |", file=out)
+        numbers = [f"{row['ours'][kernels]:,.0f}" for kernels in SETS]
+        numbers += ["-", "-"] if row["peer"] is None else [f"{row['peer']:,.0f}",
+                                                           f"{row['ratio']:.3g}"]
+        print(f"| {row['stage']} | {row['case']} | " + " | ".join(numbers) +
+              f" | {row['peer_name'] or '-'} | {row['unit'].partition('/')[2]} |", file=out)

@@ -44,13 +44,15 @@ struct Detector {
   }
 };
 
-// The highest threshold with at least this many corners.
+// The highest threshold with at least this many corners, of which there are fewer at higher ones.
 int threshold_for(Detector* detector, int arc, int corners) {
-  for (int threshold = 100; threshold > 1; --threshold) {
-    detector->detect(options_of(arc, threshold));
-    if (detector->count >= corners) return threshold;
+  int enough = 1, too_few = 128;
+  while (too_few - enough > 1) {
+    const int middle = (enough + too_few) / 2;
+    detector->detect(options_of(arc, middle));
+    (detector->count >= corners ? enough : too_few) = middle;
   }
-  return 1;
+  return enough;
 }
 
 void add_opencv(const std::string& name, const cv::Mat& image, int threshold) {

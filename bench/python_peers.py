@@ -187,11 +187,14 @@ class Ours:
 # ---- stages ------------------------------------------------------------------------------------
 
 def _threshold_for(ours, corners):
-    for threshold in range(100, 1, -1):
-        if ours.detect({"threshold": threshold, "min_threshold": 0, "subpixel": 0,
-                        "max_keypoints": len(ours.keypoints)})() >= corners:
-            return threshold
-    return 1
+    """The highest with at least that many."""
+    enough, too_few = 1, 128
+    while too_few - enough > 1:
+        middle = (enough + too_few) // 2
+        count = ours.detect({"threshold": middle, "min_threshold": 0, "subpixel": 0,
+                             "max_keypoints": len(ours.keypoints)})()
+        enough, too_few = (middle, too_few) if count >= corners else (enough, middle)
+    return enough
 
 
 def fast_cases(library, pairs):
