@@ -255,55 +255,64 @@ static void case_quantize_descriptor(trial *t) {
   REPEAT(t, t->set->quantize_descriptor(histogram, root, descriptor));
 }
 
-static void case_widen(trial *t) {
-  const int32_t count = pick(t, 0, 300, TVK_DESCRIPTOR_SIZE);
-  const uint8_t *bytes = row_of_bytes(t, count);
-  int16_t *out = OUTPUT(t, int16_t, count);
-  REPEAT(t, t->set->widen(bytes, count, out));
+static int is_pattern(const uint8_t *begin, const uint8_t *end) {
+  for (; begin < end; ++begin) {
+    if (*begin != PATTERN) return 0;
+  }
+  return 1;
 }
 
-static int32_t random_row(trial *t, int16_t *row) {
-  const int32_t extreme = random_int(&t->seed, 0, 3);
-  int32_t norm = 0, k;
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-    const int32_t noise = random_int(&t->seed, 0, 255);
-    row[k] = (int16_t)(extreme == 0 ? 255 : extreme == 1 ? 0 : noise);
-    norm += row[k] * row[k];
+/* Descriptors with ties, near copies of each other and extremes. */
+static uint8_t *random_descriptors(trial *t, int32_t count, const uint8_t *similar, int32_t num) {
+  const int32_t kind = random_int(&t->seed, 0, 4);
+  uint8_t *rows = INPUT(t, uint8_t, count * TVK_DESCRIPTOR_SIZE);
+  int32_t i, k;
+  for (i = 0; i < count; ++i) {
+    uint8_t *const row = rows + i * TVK_DESCRIPTOR_SIZE;
+    const int32_t copy = num > 0 ? random_int(&t->seed, 0, num - 1) : -1;
+    for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
+      const int32_t noise = random_int(&t->seed, 0, 255);
+      row[k] = (uint8_t)(kind == 0   ? noise
+                         : kind == 1 ? (noise & 1) * 255
+                         : kind == 2 ? (k < 3 ? noise & 1 : 0)
+                                     : noise * noise / 400);
+      if (kind == 4 && copy >= 0) {
+        row[k] = similar[copy * TVK_DESCRIPTOR_SIZE + k];
+        if (noise == 0) row[k] = (uint8_t)(row[k] ^ 1);
+      }
+    }
+    if (random_int(&t->seed, 0, 40) == 0) memset(row, i % 2 * 255, TVK_DESCRIPTOR_SIZE);
   }
-  return norm;
+  return rows;
+}
+
+static void case_mutual_nearest(trial *t) {
+  /* Now and then more rows or columns than are met at once. */
+  const int32_t many = random_int(&t->seed, 0, 59);
+  const int32_t num_rows = pick(t, 0, many == 0 ? 2000 : 40, 1000);
+  const int32_t num_columns = pick(t, 0, many == 1 ? TVK_NEAREST_PANEL + 300 : 150, 1000);
+  const uint8_t *rows = random_descriptors(t, num_rows, NULL, 0);
+  const uint8_t *columns = random_descriptors(t, num_columns, rows, num_rows);
+  const size_t scratch_bytes = TVK_NEAREST_SCRATCH(num_columns);
+  uint8_t *scratch = OUTPUT(t, uint8_t, scratch_bytes + 64), *aligned = scratch;
+  tvk_nearest *of_columns = OUTPUT(t, tvk_nearest, num_columns);
+  tvk_nearest *of_rows = OUTPUT(t, tvk_nearest, num_rows);
+  while ((uintptr_t)aligned % 64 != 0) ++aligned;
+  REPEAT(t, t->set->mutual_nearest(rows, num_rows, columns, num_columns, aligned, of_columns,
+                                   of_rows));
+  TEST_ASSERT_TRUE(is_pattern(scratch, aligned));
+  TEST_ASSERT_TRUE(is_pattern(aligned + scratch_bytes, scratch + scratch_bytes + 64));
+  memset(scratch, PATTERN, scratch_bytes + 64);
+  if (num_columns > 0) memset(of_columns, PATTERN, (size_t)num_columns * sizeof of_columns[0]);
 }
 
 static void case_squared_distances(trial *t) {
-  const int32_t num_rows = pick(t, 0, 40, 1000);
-  int16_t *query = INPUT(t, int16_t, TVK_DESCRIPTOR_SIZE);
-  int16_t *rows = INPUT(t, int16_t, num_rows * TVK_DESCRIPTOR_SIZE);
-  int32_t *norms = INPUT(t, int32_t, num_rows), *out = OUTPUT(t, int32_t, num_rows);
-  const int32_t query_norm = random_row(t, query);
-  int32_t k;
-  for (k = 0; k < num_rows; ++k) norms[k] = random_row(t, rows + k * TVK_DESCRIPTOR_SIZE);
-  REPEAT(t, t->set->squared_distances(query, query_norm, rows, norms, num_rows, out));
-}
-
-static void case_update_columns(trial *t) {
-  const int32_t num_columns = pick(t, 0, 200, 1000);
-  const int32_t highest = random_int(&t->seed, 0, 1) ? 8323200 : 3; /* 128 * 255^2; ties */
-  const int32_t row = random_int(&t->seed, 0, 65534);
-  int32_t *dist = INPUT(t, int32_t, num_columns), *best = OUTPUT(t, int32_t, num_columns);
-  int32_t *second = OUTPUT(t, int32_t, num_columns), *best_row = OUTPUT(t, int32_t, num_columns);
-  int32_t *smallest = OUTPUT(t, int32_t, 1), k;
-  for (k = 0; k < num_columns; ++k) {
-    const int32_t seen = random_int(&t->seed, 0, 2);
-    dist[k] = random_int(&t->seed, 0, highest);
-    best[k] = random_int(&t->seed, 0, highest);
-    second[k] = random_int(&t->seed, best[k], highest);
-    best_row[k] = random_int(&t->seed, 0, 65534);
-    if (seen < 2) second[k] = INT32_MAX;
-    if (seen == 0) {
-      best[k] = INT32_MAX;
-      best_row[k] = -1;
-    }
-  }
-  REPEAT(t, *smallest = t->set->update_columns(dist, num_columns, row, best, second, best_row));
+  const int32_t num_rows = pick(t, 1, 40, 1000), count = pick(t, 0, 60, 20);
+  const uint8_t *query = random_descriptors(t, 1, NULL, 0);
+  const uint8_t *rows = random_descriptors(t, num_rows, query, 1);
+  int32_t *indices = INPUT(t, int32_t, count), *out = OUTPUT(t, int32_t, count), k;
+  for (k = 0; k < count; ++k) indices[k] = random_int(&t->seed, 0, num_rows - 1);
+  REPEAT(t, t->set->squared_distances(query, rows, indices, count, out));
 }
 
 /* Rays near the axis and slopes of a lens of some 500 pixels; now and then an extreme match. */
@@ -458,13 +467,6 @@ static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_
   t.typical = typical;
   t.calls = calls;
   return t;
-}
-
-static int is_pattern(const uint8_t *begin, const uint8_t *end) {
-  for (; begin < end; ++begin) {
-    if (*begin != PATTERN) return 0;
-  }
-  return 1;
 }
 
 /* What differs, or null. */

@@ -8,11 +8,10 @@
 
 #include "support/api.h"
 
-enum { MAX_DESCRIPTORS = 120, SIZE = TV_DESCRIPTOR_BYTES };
+enum { MANY = 2200, MAX_DESCRIPTORS = 120, SIZE = TV_DESCRIPTOR_BYTES };
 
-static uint8_t descriptors0[MAX_DESCRIPTORS * SIZE], descriptors1[MAX_DESCRIPTORS * SIZE];
-static tv_correspondence found[MAX_DESCRIPTORS], swapped[MAX_DESCRIPTORS];
-static tv_correspondence expected[MAX_DESCRIPTORS];
+static uint8_t descriptors0[MANY * SIZE], descriptors1[MANY * SIZE];
+static tv_correspondence found[MANY], swapped[MANY], expected[MANY];
 static api_context contexts[8];
 static int num_contexts;
 
@@ -24,7 +23,7 @@ static void make_contexts(void) {
   tv_limits limits;
   tv_limits_init(&limits);
   limits.max_width = limits.max_height = 16;
-  limits.max_keypoints = MAX_DESCRIPTORS;
+  limits.max_keypoints = MANY;
   num_contexts = api_make_all_kernels(limits, contexts);
 }
 
@@ -81,8 +80,7 @@ static int32_t run(const api_context *a, const uint8_t *rows0, int32_t num0,
   tv_match_options_init(&options);
   options.ratio = ratio;
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_match(a->context, rows0, num0, rows1, num1, &options, out, MAX_DESCRIPTORS,
-                      &count));
+      TV_OK, tv_match(a->context, rows0, num0, rows1, num1, &options, out, MANY, &count));
   return count;
 }
 
@@ -138,6 +136,17 @@ static void test_matches_equal_the_definition_and_swap_with_the_images(void) {
       fill(&state, kind);
       for (r = 0; r < 4; ++r) check(num0, num1, ratios[r]);
     }
+  }
+}
+
+/* More rows, then more columns, than any kernel set takes at once. */
+static void test_many_descriptors_match_by_the_definition(void) {
+  uint64_t state = 15;
+  int kind;
+  for (kind = 0; kind < 4; ++kind) {
+    fill(&state, kind);
+    check(MANY - 7, 43, 1.0f);
+    check(43, MANY - 7, 1.0f);
   }
 }
 
@@ -209,6 +218,7 @@ int main(void) {
   UNITY_BEGIN();
   make_contexts();
   RUN_TEST(test_matches_equal_the_definition_and_swap_with_the_images);
+  RUN_TEST(test_many_descriptors_match_by_the_definition);
   RUN_TEST(test_noisy_copies_are_found);
   RUN_TEST(test_an_empty_side_gives_no_matches);
   RUN_TEST(test_one_descriptor_never_passes_the_ratio_test);

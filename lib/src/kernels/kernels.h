@@ -7,11 +7,16 @@
 #ifndef TWOVIEW_KERNELS_H
 #define TWOVIEW_KERNELS_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+typedef struct tvk_nearest {
+  int32_t best, second, idx;
+} tvk_nearest;
 
 #define TVK_CIRCLE_RADIUS 3 /* of the segment test */
 
@@ -19,6 +24,15 @@ extern "C" {
 #define TVK_ORIENT_SIDE 15     /* the same for the orientation's patch: 13 and a rim */
 #define TVK_ORIENT_BINS 36
 #define TVK_DESCRIPTOR_SIZE 128
+
+#define TVK_NEAREST_PANEL 2048       /* columns that mutual_nearest prepares at once */
+#define TVK_NEAREST_COLUMN_BYTES 288 /* of one */
+#define TVK_NEAREST_CHUNK_BYTES 65536
+#define TVK_NEAREST_SCRATCH(num_columns)                                                         \
+  (TVK_NEAREST_CHUNK_BYTES + (size_t)((num_columns) < TVK_NEAREST_PANEL                           \
+                                          ? ((num_columns) + 63) / 64 * 64                        \
+                                          : TVK_NEAREST_PANEL) *                                  \
+                                 TVK_NEAREST_COLUMN_BYTES)
 
 #define TVK_WIDTH 8                  /* lanes of the kernels on doubles */
 #define TVK_SCORE_BLOCK 32           /* matches */
@@ -49,10 +63,11 @@ extern "C" {
    gradient_histogram: SIFT's 4x4x8 histogram of a TVK_PATCH_SIDE patch (feature/describe.h), with
      trilinear sharing and Gaussian window.
    quantize_descriptor: SIFT's normalisation, clipping at 0.2, and 128 bytes; root: RootSIFT.
-   widen: bytes to int16.
-   squared_distances: out[j] = |query|^2 + |row j|^2 - 2 query . row j, for 128-element rows.
-   update_columns: per column j: the two smallest of dist so far and the row index of the smallest;
-     returns the smallest of dist.
+   mutual_nearest: of_rows[i].idx is the column whose nearest is row i and that is i's nearest, each
+     strictly, else -1 (and 0 for the rest); best their squared distance, second the smallest other
+     distance of either, INT32_MAX where there is none. of_columns (num_columns) and scratch
+     (TVK_NEAREST_SCRATCH(num_columns) bytes, aligned to 64) are left with anything in them.
+   squared_distances: of the query to rows[indices[k]].
    Of matches (geometry/residuals.h), arrays: rays (3 and 3) and slopes d ray / d pixel (6 and 6,
    row-major 3x2); on_plane: the rays end in 1 and the slopes' last rows are zero, and are not read;
    m: a model matrix, row-major; matches indices[0 .. count), or first, first + 1, .. where null:
@@ -95,13 +110,12 @@ extern "C" {
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
   X(gradient_histogram, void, (const int16_t *patch, int32_t *histogram))                          \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
-  X(widen, void, (const uint8_t *bytes, int32_t count, int16_t *out))                              \
+  X(mutual_nearest, void,                                                                          \
+    (const uint8_t *rows, int32_t num_rows, const uint8_t *columns, int32_t num_columns,           \
+     void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows))                                \
   X(squared_distances, void,                                                                       \
-    (const int16_t *query, int32_t query_norm, const int16_t *rows, const int32_t *norms,          \
-     int32_t num_rows, int32_t *out))                                                              \
-  X(update_columns, int32_t,                                                                       \
-    (const int32_t *dist, int32_t num_columns, int32_t row, int32_t *best, int32_t *second,        \
-     int32_t *best_row))                                                                           \
+    (const uint8_t *query, const uint8_t *rows, const int32_t *indices, int32_t count,             \
+     int32_t *out))                                                                                \
   X(sampson_squares, void,                                                                         \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
      int32_t on_plane, const double *m, double *squares))                                          \

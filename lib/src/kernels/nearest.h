@@ -1,13 +1,40 @@
-/* Two nearest neighbours among 128-byte descriptors, widened to int16. */
+/* Strictly nearest neighbours, both ways, among 128-byte descriptors, all pairs compared.
 
-static void widen(const uint8_t *bytes, int32_t count, int16_t *out) {
-  int32_t k;
-  for (k = 0; k < count; ++k) out[k] = bytes[k];
+   Rows (of image 0) meet columns (of image 1) in tiles of NEAREST_QUERIES x NEAREST_COLUMNS. Of a pair
+   a, b a tile makes two keys, |a|^2 - 2 a . b for b's list and |b|^2 - 2 a . b for a's, what is missing
+   being the same for the whole list; a key is that number (24 bits with its sign) << 8, and below it
+   where it comes from: the tile's place among 256 of rows, or of columns. A tile
+   keeps the smallest key of its rows for each column, and of its columns that share a lane for each row:
+   a group; the two smallest keys of groups are kept per column, and per row and lane.
+
+   So the two nearest groups are known in the end, by their nearest members. The second nearest neighbour
+   may hide in the nearest's own group: that group's distances are computed once more, of the few
+   descriptors that can be each other's nearest. Ties need no order: equals are not strictly nearest.
+
+   A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), the structs
+   nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte where these
+   need it, and tile_products, -a . b
+   of a tile's pairs, a row of NEAREST_COLUMNS after another. */
+
+#define NEAREST_FAR INT32_MAX
+#define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
+#define NEAREST_PLACES 256
+
+/* A key's missing part, shifted, and its place; beyond the last descriptor, what no key may beat. */
+static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
+
+static inline int32_t squared_norm(const uint8_t *a) {
+  int32_t sum = 0, k;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * a[k];
+  return sum;
 }
 
-static inline int32_t dot_128(const int16_t *a, const int16_t *b) {
+static inline int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
   int32_t sum = 0, k;
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * b[k];
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
+    const int16_t difference = (int16_t)(a[k] - b[k]);
+    sum += difference * difference;
+  }
   return sum;
 }
 
@@ -16,25 +43,272 @@ static inline int32_t dot_128(const int16_t *a, const int16_t *b) {
 #elif defined(TVK_AVX2)
 #include "kernels/nearest_avx2.h"
 #else
-static void squared_distances(const int16_t *query, int32_t query_norm, const int16_t *rows,
-                              const int32_t *norms, int32_t num_rows, int32_t *out) {
-  int32_t j;
-  for (j = 0; j < num_rows; ++j) {
-    out[j] = query_norm + norms[j] - 2 * dot_128(query, rows + (int64_t)j * TVK_DESCRIPTOR_SIZE);
-  }
-}
+#include "kernels/nearest_c.h"
 #endif
 
-static int32_t update_columns(const int32_t *dist, int32_t num_columns, int32_t row, int32_t *best,
-                              int32_t *second, int32_t *best_row) {
-  int32_t smallest = INT32_MAX, j;
-  for (j = 0; j < num_columns; ++j) {
-    const int32_t d = dist[j], b = best[j], s = second[j];
-    const int32_t larger = d > b ? d : b;
-    second[j] = larger < s ? larger : s;
-    best_row[j] = d < b ? row : best_row[j];
-    best[j] = d < b ? d : b;
-    smallest = d < smallest ? d : smallest;
+#define NEAREST_ASSERT(name, condition) typedef char name[(condition) ? 1 : -1]
+NEAREST_ASSERT(nearest_chunk_fits, sizeof(nearest_rows) * (NEAREST_ROWS / NEAREST_QUERIES) <=
+                                       TVK_NEAREST_CHUNK_BYTES);
+NEAREST_ASSERT(nearest_panel_fits,
+               sizeof(nearest_block) <= NEAREST_COLUMNS * TVK_NEAREST_COLUMN_BYTES);
+NEAREST_ASSERT(nearest_chunks_are_whole, NEAREST_ROWS % NEAREST_QUERIES == 0 &&
+                                             NEAREST_PLACES * NEAREST_QUERIES % NEAREST_ROWS == 0);
+NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
+                                             TVK_NEAREST_PANEL % NEAREST_COLUMNS == 0 &&
+                                             TVK_NEAREST_PANEL / NEAREST_COLUMNS <= NEAREST_PLACES);
+#undef NEAREST_ASSERT
+
+static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
+
+/* The smallest and the second smallest distance of groups so far, and where the smallest group starts. */
+static inline void nearest_merge(tvk_nearest *nearest, int32_t best_key, int32_t second_key,
+                                 int32_t norm, int32_t group) {
+  const int32_t best = (best_key >> 8) + norm;
+  if (best_key == NEAREST_FAR || best >= nearest->second) return;
+  if (best < nearest->best) {
+    nearest->second = nearest->best;
+    nearest->best = best;
+    nearest->idx = group;
+  } else {
+    nearest->second = best;
   }
-  return smallest;
+  if (second_key != NEAREST_FAR) {
+    nearest->second = nearest_min(nearest->second, (second_key >> 8) + norm);
+  }
+}
+
+static inline void merge_columns(const nearest_block *block, int32_t first_row, int32_t num_columns,
+                                 tvk_nearest *of_columns) {
+  int32_t j;
+  for (j = 0; j < num_columns; ++j) {
+    const int32_t key = block->best[j];
+    nearest_merge(&of_columns[j], key, block->second[j], block->norms[j],
+                  first_row + (key & (NEAREST_PLACES - 1)) * NEAREST_QUERIES);
+  }
+}
+
+/* The lanes of a row to one nearest group. */
+static inline void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
+                               int32_t first_column, tvk_nearest *of_row) {
+  int32_t smallest = NEAREST_FAR, next = NEAREST_FAR, equals = 0, lane;
+  for (lane = 0; lane < NEAREST_LANES; ++lane) smallest = nearest_min(smallest, best[lane]);
+  for (lane = 0; lane < NEAREST_LANES; ++lane) {
+    const int32_t other = best[lane] == smallest ? second[lane] : best[lane];
+    equals += best[lane] == smallest;
+    next = nearest_min(next, other);
+  }
+  if (equals > 1) next = smallest;
+  for (lane = 0; best[lane] != smallest;) ++lane;
+  nearest_merge(of_row, smallest, next, norm,
+                first_column + (smallest & (NEAREST_PLACES - 1)) * NEAREST_COLUMNS + lane);
+}
+
+/* Whether `best` is the distance of one member of a group alone: which, and the next distance. */
+static inline int32_t resolve_group(const uint8_t *query, const uint8_t *others, int32_t num_others,
+                                    int32_t stride, int32_t count, tvk_nearest *nearest) {
+  int32_t found = -1, equals = 0, k, member = nearest->idx;
+  for (k = 0; k < count && member < num_others; ++k, member += stride) {
+    const int32_t dist =
+        squared_distance(query, others + (int64_t)member * TVK_DESCRIPTOR_SIZE);
+    if (dist == nearest->best) {
+      found = member;
+      ++equals;
+    } else {
+      nearest->second = nearest_min(nearest->second, dist);
+    }
+  }
+  return equals == 1 && nearest->best < nearest->second ? found : -1;
+}
+
+/* Whether a column of row i's nearest group has i in its own, at the same distance. */
+static inline int32_t may_be_mutual(int32_t i, const tvk_nearest *of_row,
+                                    const tvk_nearest *of_columns, int32_t num_columns) {
+  int32_t k, j = of_row->idx;
+  for (k = 0; k < NEAREST_VECTORS && j < num_columns; ++k, j += NEAREST_LANES) {
+    const int32_t before = i - of_columns[j].idx;
+    if (of_columns[j].best == of_row->best && before >= 0 && before < NEAREST_QUERIES) return 1;
+  }
+  return 0;
+}
+
+static inline void resolve_row(const uint8_t *rows, int32_t num_rows, int32_t i,
+                               const uint8_t *columns, int32_t num_columns,
+                               const tvk_nearest *of_columns, tvk_nearest *of_row) {
+  const tvk_nearest none = {0, 0, -1};
+  tvk_nearest row = *of_row, column;
+  int32_t j;
+  *of_row = none;
+  if (!may_be_mutual(i, &row, of_columns, num_columns)) return;
+  j = resolve_group(rows + (int64_t)i * TVK_DESCRIPTOR_SIZE, columns, num_columns, NEAREST_LANES,
+                    NEAREST_VECTORS, &row);
+  if (j < 0 || of_columns[j].best != row.best) return;
+  column = of_columns[j];
+  if (resolve_group(columns + (int64_t)j * TVK_DESCRIPTOR_SIZE, rows, num_rows, 1, NEAREST_QUERIES,
+                    &column) != i) {
+    return;
+  }
+  of_row->best = row.best;
+  of_row->second = nearest_min(row.second, column.second);
+  of_row->idx = j;
+}
+
+/* NEAREST_LANES numbers. */
+typedef int32_t int_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
+typedef uint32_t key_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
+typedef int32_t unaligned_int_lanes
+    __attribute__((vector_size(4 * NEAREST_LANES), aligned(4), may_alias));
+
+static inline int_lanes load_ints(const int32_t *p) { return *(const unaligned_int_lanes *)p; }
+static inline void store_ints(int32_t *p, int_lanes x) { *(unaligned_int_lanes *)p = x; }
+
+static inline int_lanes min_lanes(int_lanes a, int_lanes b) {
+#if defined(TVK_AVX512)
+  return (int_lanes)_mm512_min_epi32((__m512i)a, (__m512i)b);
+#elif defined(TVK_AVX2)
+  return (int_lanes)_mm256_min_epi32((__m256i)a, (__m256i)b);
+#else
+  const int_lanes less = a < b;
+  return (a & less) | (b & ~less);
+#endif
+}
+
+static inline int_lanes max_lanes(int_lanes a, int_lanes b) {
+#if defined(TVK_AVX512)
+  return (int_lanes)_mm512_max_epi32((__m512i)a, (__m512i)b);
+#elif defined(TVK_AVX2)
+  return (int_lanes)_mm256_max_epi32((__m256i)a, (__m256i)b);
+#else
+  const int_lanes less = a < b;
+  return (b & less) | (a & ~less);
+#endif
+}
+
+static inline int_lanes make_keys(int_lanes terms, const int32_t *products) {
+  return (int_lanes)((key_lanes)terms + ((key_lanes)load_ints(products) << 9));
+}
+
+/* The two smallest of each lane, with one more. */
+static inline void update_two(int_lanes keys, int32_t *best, int32_t *second) {
+  const int_lanes old = load_ints(best);
+  store_ints(second, min_lanes(load_ints(second), max_lanes(keys, old)));
+  store_ints(best, min_lanes(keys, old));
+}
+
+/* A row's keys, the smallest of each lane, into its list. */
+static inline void update_row(const int32_t *products, const int32_t *terms, int32_t *best,
+                              int32_t *second) {
+  int_lanes keys = make_keys(load_ints(terms), products);
+  int32_t v;
+  for (v = NEAREST_LANES; v < NEAREST_COLUMNS; v += NEAREST_LANES) {
+    keys = min_lanes(keys, make_keys(load_ints(terms + v), products + v));
+  }
+  update_two(keys, best, second);
+}
+
+/* The columns' keys, the smallest of the rows, into their lists. */
+static inline void update_columns(const int32_t *products, const int32_t *terms, int32_t *best,
+                                  int32_t *second) {
+  const int_lanes zero = {0};
+  int32_t v, i;
+  for (v = 0; v < NEAREST_COLUMNS; v += NEAREST_LANES) {
+    int_lanes keys = make_keys(zero + terms[0], products + v);
+    for (i = 1; i < NEAREST_QUERIES; ++i) {
+      keys = min_lanes(keys, make_keys(zero + terms[i], products + NEAREST_COLUMNS * i + v));
+    }
+    update_two(keys, best + v, second + v);
+  }
+}
+
+static void meet_tile(nearest_rows *rows, nearest_block *block) {
+  int32_t products[NEAREST_QUERIES * NEAREST_COLUMNS], i;
+  tile_products(rows, block, products);
+  for (i = 0; i < NEAREST_QUERIES; ++i) {
+    update_row(products + NEAREST_COLUMNS * i, block->terms, rows->best + NEAREST_LANES * i,
+               rows->second + NEAREST_LANES * i);
+  }
+  update_columns(products, rows->terms, block->best, block->second);
+}
+
+static void forget_columns(nearest_block *blocks, int32_t num_columns) {
+  int32_t first, k;
+  for (first = 0; first < num_columns; first += NEAREST_COLUMNS, ++blocks) {
+    for (k = 0; k < NEAREST_COLUMNS; ++k) blocks->best[k] = blocks->second[k] = NEAREST_FAR;
+  }
+}
+
+/* The tiles of a chunk, from row `first` on; returns how many. */
+static int32_t make_chunk(const uint8_t *rows, int32_t num_rows, int32_t first, int32_t largest,
+                          nearest_rows *tiles) {
+  int32_t t, k, row = first;
+  for (t = 0; t < NEAREST_ROWS / NEAREST_QUERIES && row < num_rows; ++t, row += NEAREST_QUERIES) {
+    make_rows(rows + (int64_t)row * TVK_DESCRIPTOR_SIZE,
+              nearest_min(NEAREST_QUERIES, num_rows - row),
+              row / NEAREST_QUERIES % NEAREST_PLACES, largest, &tiles[t]);
+    for (k = 0; k < NEAREST_QUERIES * NEAREST_LANES; ++k) {
+      tiles[t].best[k] = tiles[t].second[k] = NEAREST_FAR;
+    }
+  }
+  return t;
+}
+
+/* All rows meet a panel: a chunk of them at a time, which stays in the first-level cache. */
+static void meet_panel(const uint8_t *rows, int32_t num_rows, nearest_block *blocks,
+                       int32_t first_column, int32_t num_columns, int32_t largest,
+                       nearest_rows *tiles, tvk_nearest *of_rows, tvk_nearest *of_columns) {
+  int32_t first, start = 0, i, j, t;
+  forget_columns(blocks, num_columns);
+  for (first = 0; first < num_rows; first += NEAREST_ROWS) {
+    const int32_t num_tiles = make_chunk(rows, num_rows, first, largest, tiles);
+    const int32_t count = nearest_min(NEAREST_ROWS, num_rows - first);
+    for (j = 0; j < num_columns; j += NEAREST_COLUMNS) {
+      for (t = 0; t < num_tiles; ++t) meet_tile(&tiles[t], blocks + j / NEAREST_COLUMNS);
+    }
+    for (i = 0; i < count; ++i) {
+      const nearest_rows *const tile = &tiles[i / NEAREST_QUERIES];
+      const int32_t q = i % NEAREST_QUERIES;
+      merge_lanes(tile->best + q * NEAREST_LANES, tile->second + q * NEAREST_LANES, tile->norms[q],
+                  first_column, &of_rows[first + i]);
+    }
+    if (first + count == num_rows || first + count - start == NEAREST_PLACES * NEAREST_QUERIES) {
+      for (j = 0; j < num_columns; j += NEAREST_COLUMNS) {
+        merge_columns(blocks + j / NEAREST_COLUMNS, start,
+                      nearest_min(NEAREST_COLUMNS, num_columns - j), of_columns + j);
+      }
+      forget_columns(blocks, num_columns); /* no place is left in a key for further tiles */
+      start = first + count;
+    }
+  }
+}
+
+static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t *columns,
+                           int32_t num_columns, void *scratch, tvk_nearest *of_columns,
+                           tvk_nearest *of_rows) {
+  const tvk_nearest none = {NEAREST_FAR, NEAREST_FAR, 0};
+  nearest_rows *const tiles = (nearest_rows *)scratch;
+  nearest_block *const blocks =
+      (nearest_block *)(void *)((uint8_t *)scratch + TVK_NEAREST_CHUNK_BYTES);
+  const int32_t largest = largest_byte(columns, (int64_t)num_columns * TVK_DESCRIPTOR_SIZE);
+  int32_t first, b, k;
+  for (k = 0; k < num_rows; ++k) of_rows[k] = none;
+  for (k = 0; k < num_columns; ++k) of_columns[k] = none;
+  for (first = 0; first < num_columns; first += TVK_NEAREST_PANEL) {
+    const int32_t count = nearest_min(TVK_NEAREST_PANEL, num_columns - first);
+    for (b = 0; b * NEAREST_COLUMNS < count; ++b) {
+      const int32_t column = first + b * NEAREST_COLUMNS;
+      make_block(columns + (int64_t)column * TVK_DESCRIPTOR_SIZE,
+                 nearest_min(NEAREST_COLUMNS, num_columns - column), b, largest, &blocks[b]);
+    }
+    meet_panel(rows, num_rows, blocks, first, count, largest, tiles, of_rows, of_columns + first);
+  }
+  for (k = 0; k < num_rows; ++k) {
+    resolve_row(rows, num_rows, k, columns, num_columns, of_columns, &of_rows[k]);
+  }
+}
+
+static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
+                              int32_t count, int32_t *out) {
+  int32_t k;
+  for (k = 0; k < count; ++k) {
+    out[k] = squared_distance(query, rows + (int64_t)indices[k] * TVK_DESCRIPTOR_SIZE);
+  }
 }

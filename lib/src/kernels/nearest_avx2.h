@@ -1,36 +1,165 @@
-/* squared_distances of nearest.h by AVX2: four rows at a time share the query's registers and one
-   reduction. */
+/* The tile of nearest.h by AVX2: a lane a column, four bytes of eight columns a register.
+
+   vpmaddubsw multiplies unsigned by signed bytes and adds pairs in 16 bits. Columns are c - b, c half
+   the largest byte, so that |c - b| <= h = largest - c; two products of pairs are added in 16 bits before
+   they are widened, which is exact where four bytes of the row add up to 32767 / h at most: 255 at
+   worst, 370 for descriptors as they are, whose mean is 35. Where they add up to more, the row is split
+   into a sum of rows that do not: further steps, almost never needed. */
 #include <immintrin.h>
 
-static inline __m256i dot_avx2(const __m256i query[8], const int16_t *row) {
-  __m256i sum = _mm256_madd_epi16(query[0], _mm256_loadu_si256((const __m256i *)row));
-  int k;
-  for (k = 1; k < 8; ++k) {
-    const __m256i part = _mm256_loadu_si256((const __m256i *)(row + 16 * k));
-    sum = _mm256_add_epi32(sum, _mm256_madd_epi16(query[k], part));
-  }
-  return sum;
+enum { NEAREST_LANES = 8, NEAREST_VECTORS = 4, NEAREST_QUERIES = 2, NEAREST_ROWS = 64 };
+enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4, NEAREST_MOST_STEPS = 2 * NEAREST_GROUPS };
+
+/* A step: eight bytes of each row, and which eight of the 128. */
+typedef struct nearest_rows {
+  uint8_t bytes[NEAREST_MOST_STEPS][NEAREST_QUERIES][8];
+  int32_t places[NEAREST_MOST_STEPS], num_steps;
+  int32_t starts[NEAREST_QUERIES]; /* -c sum a */
+  int32_t norms[NEAREST_QUERIES], terms[NEAREST_QUERIES];
+  int32_t best[NEAREST_QUERIES * NEAREST_LANES], second[NEAREST_QUERIES * NEAREST_LANES];
+} nearest_rows;
+
+typedef struct nearest_block {
+  int8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
+  int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
+  int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
+} nearest_block;
+
+static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
+  uint8_t largest = 0;
+  int64_t k;
+  for (k = 0; k < count; ++k) largest = bytes[k] > largest ? bytes[k] : largest;
+  return largest;
 }
 
-static void squared_distances(const int16_t *query, int32_t query_norm, const int16_t *rows,
-                              const int32_t *norms, int32_t num_rows, int32_t *out) {
-  __m256i q[8];
-  int32_t j, k;
-  for (k = 0; k < 8; ++k) q[k] = _mm256_loadu_si256((const __m256i *)(query + 16 * k));
-  for (j = 0; j + 4 <= num_rows; j += 4) {
-    const int16_t *row = rows + (int64_t)j * TVK_DESCRIPTOR_SIZE;
-    const __m256i ab =
-        _mm256_hadd_epi32(dot_avx2(q, row), dot_avx2(q, row + TVK_DESCRIPTOR_SIZE));
-    const __m256i cd = _mm256_hadd_epi32(dot_avx2(q, row + 2 * TVK_DESCRIPTOR_SIZE),
-                                         dot_avx2(q, row + 3 * TVK_DESCRIPTOR_SIZE));
-    const __m256i halves = _mm256_hadd_epi32(ab, cd);
-    const __m128i dots = _mm_add_epi32(_mm256_castsi256_si128(halves),
-                                       _mm256_extracti128_si256(halves, 1));
-    const __m128i sums = _mm_add_epi32(_mm_set1_epi32(query_norm),
-                                       _mm_loadu_si128((const __m128i *)(norms + j)));
-    _mm_storeu_si128((__m128i *)(out + j), _mm_sub_epi32(sums, _mm_slli_epi32(dots, 1)));
+static inline int32_t nearest_centre(int32_t largest) { return largest / 2; }
+
+/* Moves to `step` what may be added in 16 bits of the eight bytes in `left`: those four that meet in a
+   sum are 0 1 4 5 and 2 3 6 7. Returns whether something stays. */
+static inline int32_t take_step(uint8_t *left, int32_t most, uint8_t *step) {
+  static const uint8_t meet[2][4] = {{0, 1, 4, 5}, {2, 3, 6, 7}};
+  int32_t half, k, stays = 0;
+  if (left[0] + left[1] + left[4] + left[5] <= most &&
+      left[2] + left[3] + left[6] + left[7] <= most) {
+    memcpy(step, left, 8);
+    memset(left, 0, 8);
+    return 0;
   }
-  for (; j < num_rows; ++j) {
-    out[j] = query_norm + norms[j] - 2 * dot_128(query, rows + (int64_t)j * TVK_DESCRIPTOR_SIZE);
+  for (half = 0; half < 2; ++half) {
+    int32_t room = most;
+    for (k = 0; k < 4; ++k) {
+      uint8_t *const from = left + meet[half][k];
+      const int32_t part = *from < room ? *from : room;
+      step[meet[half][k]] = (uint8_t)part;
+      *from = (uint8_t)(*from - part);
+      room -= part;
+      stays |= *from;
+    }
+  }
+  return stays;
+}
+
+static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t largest,
+                      nearest_rows *tile) {
+  const int32_t centre = nearest_centre(largest), farthest = largest - centre;
+  const int32_t most = farthest > 0 ? 32767 / farthest : 32767;
+  int32_t i, k, p;
+  uint8_t left[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE];
+  memset(left, 0, sizeof left);
+  for (i = 0; i < NEAREST_QUERIES; ++i) {
+    int32_t sum = 0;
+    if (i < count) memcpy(left[i], rows + i * TVK_DESCRIPTOR_SIZE, TVK_DESCRIPTOR_SIZE);
+    for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += left[i][k];
+    tile->norms[i] = squared_norm(left[i]);
+    tile->terms[i] = i < count ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
+    tile->starts[i] = -centre * sum;
+  }
+  tile->num_steps = 0;
+  for (p = 0; p < TVK_DESCRIPTOR_SIZE / 8; ++p) {
+    int32_t stays;
+    do {
+      const int32_t step = tile->num_steps++;
+      tile->places[step] = 2 * p;
+      stays = 0;
+      for (i = 0; i < NEAREST_QUERIES; ++i) {
+        stays |= take_step(left[i] + 8 * p, most, tile->bytes[step][i]);
+      }
+    } while (stays);
   }
 }
+
+static void make_block(const uint8_t *columns, int32_t count, int32_t place, int32_t largest,
+                       nearest_block *block) {
+  const int32_t centre = nearest_centre(largest);
+  int32_t j, k;
+  if (count < NEAREST_COLUMNS) memset(block->bytes, centre, sizeof block->bytes);
+  for (j = 0; j < NEAREST_COLUMNS; ++j, columns += TVK_DESCRIPTOR_SIZE) {
+    if (j < count) {
+      int8_t centred[TVK_DESCRIPTOR_SIZE];
+      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) centred[k] = (int8_t)(centre - columns[k]);
+      for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], centred + 4 * k, 4);
+    }
+    block->norms[j] = j < count ? squared_norm(columns) : 0;
+    block->terms[j] = j < count ? nearest_term(block->norms[j], place) : NEAREST_FAR;
+  }
+}
+
+static inline __m256i load_avx2(const void *from) {
+  return _mm256_loadu_si256((const __m256i *)from);
+}
+
+static inline __m256i four_avx2(const uint8_t *row) {
+  int32_t four;
+  memcpy(&four, row, 4);
+  return _mm256_set1_epi32(four);
+}
+
+/* Eight bytes of the row, four and four, with those of eight columns. */
+static inline __m256i products_avx2(__m256i row, __m256i next, const int8_t *columns) {
+  const __m256i pairs = _mm256_add_epi16(
+      _mm256_maddubs_epi16(row, load_avx2(columns)),
+      _mm256_maddubs_epi16(next, load_avx2(columns + 4 * NEAREST_COLUMNS)));
+  return _mm256_madd_epi16(pairs, _mm256_set1_epi16(1));
+}
+
+static inline void store_avx2(int32_t *to, __m256i x) { _mm256_storeu_si256((__m256i *)to, x); }
+
+/* Each sum is a variable by name, s12 of row 1 and the third eight columns: gcc 12 keeps arrays of them in
+   memory. */
+#define START(i)                                                           \
+  __m256i s##i##0 = _mm256_set1_epi32(rows->starts[i]), s##i##1 = s##i##0; \
+  __m256i s##i##2 = s##i##0, s##i##3 = s##i##0;
+
+#define ADD(i)                                                                 \
+  row = four_avx2(rows->bytes[step][i]);                                       \
+  next = four_avx2(rows->bytes[step][i] + 4);                                  \
+  s##i##0 = _mm256_add_epi32(s##i##0, products_avx2(row, next, columns));      \
+  s##i##1 = _mm256_add_epi32(s##i##1, products_avx2(row, next, columns + 32)); \
+  s##i##2 = _mm256_add_epi32(s##i##2, products_avx2(row, next, columns + 64)); \
+  s##i##3 = _mm256_add_epi32(s##i##3, products_avx2(row, next, columns + 96));
+
+#define STORE(i)                              \
+  store_avx2(products + 32 * i, s##i##0);     \
+  store_avx2(products + 32 * i + 8, s##i##1); \
+  store_avx2(products + 32 * i + 16, s##i##2); \
+  store_avx2(products + 32 * i + 24, s##i##3);
+
+static void tile_products(const nearest_rows *rows, const nearest_block *block, int32_t *products) {
+  __m256i row, next;
+  int32_t step;
+  START(0)
+  START(1)
+  for (step = 0; step < rows->num_steps; ++step) {
+    const int8_t *const columns = block->bytes[rows->places[step]][0];
+    ADD(0)
+    /* Not to hold all columns in registers until the second row: there are too few. */
+    __asm__ volatile("" ::: "memory");
+    ADD(1)
+  }
+  STORE(0)
+  STORE(1)
+}
+
+#undef START
+#undef ADD
+#undef STORE

@@ -1,42 +1,112 @@
-/* squared_distances of nearest.h by AVX-512 VNNI: a dot product of 128 is four instructions. */
+/* The tile of nearest.h by AVX-512 VNNI: a lane a column, four bytes of 16 columns a register, 24 sums
+   in registers. vpdpbusd multiplies unsigned by signed bytes: sum of b (127 - a) = 127 sum b - a . b. */
 #include <immintrin.h>
 
-static inline __m512i dot_avx512(const __m512i query[4], const int16_t *row) {
-  __m512i sum = _mm512_setzero_si512();
-  int k;
-  for (k = 0; k < 4; ++k) {
-    sum = _mm512_dpwssd_epi32(sum, query[k], _mm512_loadu_si512(row + 32 * k));
+enum { NEAREST_LANES = 16, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
+enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4 };
+
+typedef struct nearest_rows {
+  int8_t bytes[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE]; /* 127 - a */
+  int32_t best[NEAREST_QUERIES * NEAREST_LANES], second[NEAREST_QUERIES * NEAREST_LANES];
+  int32_t norms[8], terms[8];
+} nearest_rows;
+
+typedef struct nearest_block {
+  uint8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
+  int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
+  int32_t starts[NEAREST_COLUMNS]; /* -127 sum b */
+  int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
+} nearest_block;
+
+static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
+  (void)bytes;
+  (void)count;
+  return 0; /* no use for it */
+}
+
+static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t largest,
+                      nearest_rows *tile) {
+  int32_t i, k;
+  (void)largest;
+  for (i = 0; i < NEAREST_QUERIES; ++i, rows += TVK_DESCRIPTOR_SIZE) {
+    tile->norms[i] = i < count ? squared_norm(rows) : 0;
+    tile->terms[i] = i < count ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
+    for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = 127;
+    if (i < count) {
+      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = (int8_t)(127 - rows[k]);
+    }
   }
-  return sum;
 }
 
-/* Neighbours added, interleaved: (a0+a1', b0+b1', ..) within each 128-bit lane. */
-static inline __m512i add_pairs_avx512(__m512i a, __m512i b) {
-  return _mm512_add_epi32(_mm512_unpacklo_epi32(a, b), _mm512_unpackhi_epi32(a, b));
-}
-
-static void squared_distances(const int16_t *query, int32_t query_norm, const int16_t *rows,
-                              const int32_t *norms, int32_t num_rows, int32_t *out) {
-  __m512i q[4];
+static void make_block(const uint8_t *columns, int32_t count, int32_t place, int32_t largest,
+                       nearest_block *block) {
   int32_t j, k;
-  for (k = 0; k < 4; ++k) q[k] = _mm512_loadu_si512(query + 32 * k);
-  for (j = 0; j + 4 <= num_rows; j += 4) {
-    const int16_t *row = rows + (int64_t)j * TVK_DESCRIPTOR_SIZE;
-    const __m512i ab =
-        add_pairs_avx512(dot_avx512(q, row), dot_avx512(q, row + TVK_DESCRIPTOR_SIZE));
-    const __m512i cd = add_pairs_avx512(dot_avx512(q, row + 2 * TVK_DESCRIPTOR_SIZE),
-                                        dot_avx512(q, row + 3 * TVK_DESCRIPTOR_SIZE));
-    const __m512i lanes =
-        _mm512_add_epi32(_mm512_unpacklo_epi64(ab, cd), _mm512_unpackhi_epi64(ab, cd));
-    const __m256i halves = _mm256_add_epi32(_mm512_castsi512_si256(lanes),
-                                            _mm512_extracti64x4_epi64(lanes, 1));
-    const __m128i dots = _mm_add_epi32(_mm256_castsi256_si128(halves),
-                                       _mm256_extracti128_si256(halves, 1));
-    const __m128i sums = _mm_add_epi32(_mm_set1_epi32(query_norm),
-                                       _mm_loadu_si128((const __m128i *)(norms + j)));
-    _mm_storeu_si128((__m128i *)(out + j), _mm_sub_epi32(sums, _mm_slli_epi32(dots, 1)));
-  }
-  for (; j < num_rows; ++j) {
-    out[j] = query_norm + norms[j] - 2 * dot_128(query, rows + (int64_t)j * TVK_DESCRIPTOR_SIZE);
+  (void)largest;
+  if (count < NEAREST_COLUMNS) memset(block->bytes, 0, sizeof block->bytes);
+  for (j = 0; j < NEAREST_COLUMNS; ++j, columns += TVK_DESCRIPTOR_SIZE) {
+    int32_t sum = 0;
+    if (j < count) {
+      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += columns[k];
+      for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], columns + 4 * k, 4);
+    }
+    block->norms[j] = j < count ? squared_norm(columns) : 0;
+    block->terms[j] = j < count ? nearest_term(block->norms[j], place) : NEAREST_FAR;
+    block->starts[j] = -127 * sum;
   }
 }
+
+/* Sums keep this type: as __m512i, which is of 64-bit numbers, gcc 12 holds each of them twice. */
+typedef int32_t int32x16 __attribute__((vector_size(64)));
+
+static inline int32x16 load_avx512(const void *from) { return (int32x16)_mm512_loadu_si512(from); }
+
+static inline int32x16 four_avx512(const int8_t *row) {
+  int32_t four;
+  memcpy(&four, row, 4);
+  return (int32x16)_mm512_set1_epi32(four);
+}
+
+static inline int32x16 add_avx512(int32x16 sum, int32x16 columns, int32x16 row) {
+  return (int32x16)_mm512_dpbusd_epi32((__m512i)sum, (__m512i)columns, (__m512i)row);
+}
+
+/* Each sum is a variable by name, s20 of row 2 and the first 16 columns: gcc 12 keeps arrays of them in
+   memory, at half the speed. */
+#define EACH_ROW(do) do(0) do(1) do(2) do(3) do(4) do(5)
+
+#define START(i) \
+  int32x16 s##i##0 = columns0, s##i##1 = columns1, s##i##2 = columns2, s##i##3 = columns3;
+
+#define ADD(i)                                  \
+  row = four_avx512(rows->bytes[i] + 4 * g);    \
+  s##i##0 = add_avx512(s##i##0, columns0, row); \
+  s##i##1 = add_avx512(s##i##1, columns1, row); \
+  s##i##2 = add_avx512(s##i##2, columns2, row); \
+  s##i##3 = add_avx512(s##i##3, columns3, row);
+
+#define STORE(i)                                                    \
+  _mm512_storeu_si512(products + 64 * i, (__m512i)s##i##0);         \
+  _mm512_storeu_si512(products + 64 * i + 16, (__m512i)s##i##1);    \
+  _mm512_storeu_si512(products + 64 * i + 32, (__m512i)s##i##2);    \
+  _mm512_storeu_si512(products + 64 * i + 48, (__m512i)s##i##3);
+
+static void tile_products(const nearest_rows *rows, const nearest_block *block, int32_t *products) {
+  int32x16 columns0 = load_avx512(block->starts), columns1 = load_avx512(block->starts + 16);
+  int32x16 columns2 = load_avx512(block->starts + 32), columns3 = load_avx512(block->starts + 48);
+  int32x16 row;
+  int32_t g;
+  EACH_ROW(START)
+  for (g = 0; g < NEAREST_GROUPS; ++g) {
+    columns0 = load_avx512(block->bytes[g]);
+    columns1 = load_avx512(block->bytes[g] + 16);
+    columns2 = load_avx512(block->bytes[g] + 32);
+    columns3 = load_avx512(block->bytes[g] + 48);
+    EACH_ROW(ADD)
+  }
+  EACH_ROW(STORE)
+}
+
+#undef EACH_ROW
+#undef START
+#undef ADD
+#undef STORE

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include "match/match.h"
-
 namespace tv {
 namespace {
 
@@ -17,7 +15,6 @@ constexpr double kSlack = 1.0 + 1e-6;
 // A view with what the band test needs of each keypoint.
 struct Side {
   GuidedView view;
-  DescriptorRows descriptors;  // of one side only: half the memory
   double* lines;           // 3 each: M ray0, or M' ray1, the epipolar line in the other view
   double* coordinates[3];  // of the rays, an array each, for the quick test; padded to kBlock
   double* line_norms;      // squared; padded
@@ -48,11 +45,9 @@ double squared_gradient(const double* slopes, const double* line) {
   return sum;
 }
 
-Side make_side(const GuidedView& view, const DescriptorRows& descriptors, const double* M,
-               bool transposed, Arena& arena) {
+Side make_side(const GuidedView& view, const double* M, bool transposed, Arena& arena) {
   const size_t n = static_cast<size_t>(view.num), room = padded(view.num);
   Side side{view,
-            descriptors,
             arena_alloc<double>(arena, 3 * n),
             {arena_alloc<double>(arena, room), arena_alloc<double>(arena, room),
              arena_alloc<double>(arena, room)},
@@ -90,21 +85,6 @@ bool in_band(const Side& a, int32_t i, const Side& b, int32_t j, double band_sq)
   return residual * residual < band_sq * gradient;
 }
 
-int32_t squared_distance(const tvk_table& kernels, const Side& a, int32_t i, const Side& b,
-                         int32_t j) {
-  const bool wide_a = a.descriptors.rows != nullptr;
-  const Side &wide = wide_a ? a : b, &narrow = wide_a ? b : a;
-  const int64_t in_wide = wide_a ? i : j, in_narrow = wide_a ? j : i;
-  int16_t query[TV_DESCRIPTOR_BYTES];
-  kernels.widen(narrow.view.descriptors + in_narrow * TV_DESCRIPTOR_BYTES, TV_DESCRIPTOR_BYTES,
-                query);
-  int32_t norm = 0, dist;
-  for (int32_t k = 0; k < TV_DESCRIPTOR_BYTES; ++k) norm += query[k] * query[k];
-  kernels.squared_distances(query, norm, wide.descriptors.rows + in_wide * TV_DESCRIPTOR_BYTES,
-                            wide.descriptors.norms + in_wide, 1, &dist);
-  return dist;
-}
-
 // Not above 0 for those of a block's keypoints that may be in the band: |J' l| <= |J| |l|, and most
 // are far outside.
 void quick_test(const double* line, double of_line, double of_slope, const Side& b, int32_t first,
@@ -118,10 +98,24 @@ void quick_test(const double* line, double of_line, double of_slope, const Side&
   }
 }
 
-// Calls visit(j, squared distance) for each keypoint of b in the band of keypoint i of a.
-template <typename Visit>
-void for_candidates(const tvk_table& kernels, const Side& a, int32_t i, const Side& b,
-                    double band_sq, const Visit& visit) {
+bool neighbours(const tv_keypoint& a, const tv_keypoint& b, double radius) {
+  const double dx = static_cast<double>(a.x) - b.x, dy = static_cast<double>(a.y) - b.y;
+  return dx * dx + dy * dy <= radius * radius;
+}
+
+struct Nearest {
+  int32_t dist, idx;
+};
+
+// The keypoints of the other view in one keypoint's band, in ascending order.
+struct Candidates {
+  int32_t *indices, *dists;
+  int32_t count;
+};
+
+void find_candidates(const tvk_table& kernels, const Side& a, int32_t i, const Side& b,
+                     double band_sq, Candidates* candidates) {
+  candidates->count = 0;
   if (a.view.valid[i] == 0) return;
   const double* line = a.lines + 3 * i;
   const double of_line = band_sq * a.line_norms[i] * kSlack;
@@ -132,32 +126,12 @@ void for_candidates(const tvk_table& kernels, const Side& a, int32_t i, const Si
     const int32_t last = std::min(first + kBlock, b.view.num);
     for (int32_t j = first; j < last; ++j) {
       if (!(excess[j - first] <= 0) || b.view.valid[j] == 0) continue;
-      if (in_band(a, i, b, j, band_sq)) visit(j, squared_distance(kernels, a, i, b, j));
+      if (in_band(a, i, b, j, band_sq)) candidates->indices[candidates->count++] = j;
     }
   }
-}
-
-bool neighbours(const tv_keypoint& a, const tv_keypoint& b, double radius) {
-  const double dx = static_cast<double>(a.x) - b.x, dy = static_cast<double>(a.y) - b.y;
-  return dx * dx + dy * dy <= radius * radius;
-}
-
-struct Nearest {
-  int32_t dist, idx;
-};
-
-// The keypoints of the other view in one keypoint's band.
-struct Candidates {
-  Nearest* found;
-  int32_t count;
-};
-
-void find_candidates(const tvk_table& kernels, const Side& a, int32_t i, const Side& b,
-                     double band_sq, Candidates* candidates) {
-  candidates->count = 0;
-  for_candidates(kernels, a, i, b, band_sq, [&](int32_t j, int32_t dist) {
-    candidates->found[candidates->count++] = Nearest{dist, j};
-  });
+  kernels.squared_distances(a.view.descriptors + static_cast<int64_t>(i) * TV_DESCRIPTOR_BYTES,
+                            b.view.descriptors, candidates->indices, candidates->count,
+                            candidates->dists);
 }
 
 // The smallest distance among candidates that do not lie beside keypoint `best`.
@@ -165,8 +139,9 @@ int32_t rival_distance(const Candidates& candidates, const tv_keypoint* keypoint
                        double radius) {
   int32_t rival = kFar;
   for (int32_t k = 0; k < candidates.count; ++k) {
-    const Nearest& c = candidates.found[k];
-    if (c.dist < rival && !neighbours(keypoints[c.idx], keypoints[best], radius)) rival = c.dist;
+    const int32_t dist = candidates.dists[k];
+    const tv_keypoint& candidate = keypoints[candidates.indices[k]];
+    if (dist < rival && !neighbours(candidate, keypoints[best], radius)) rival = dist;
   }
   return rival;
 }
@@ -184,9 +159,9 @@ void find_nearest(const tvk_table& kernels, const Side& side0, const Side& side1
     find_candidates(kernels, side0, i, side1, band_sq, candidates);
     Row row{kFar, -1, kFar};
     for (int32_t k = 0; k < candidates->count; ++k) {
-      const Nearest& c = candidates->found[k];
-      if (c.dist < row.dist) row.dist = c.dist, row.idx = c.idx;
-      if (c.dist < columns[c.idx].dist) columns[c.idx] = Nearest{c.dist, i};
+      const int32_t dist = candidates->dists[k], j = candidates->indices[k];
+      if (dist < row.dist) row.dist = dist, row.idx = j;
+      if (dist < columns[j].dist) columns[j] = Nearest{dist, i};
     }
     if (row.idx >= 0) {
       row.rival = rival_distance(*candidates, side1.view.keypoints, row.idx, radius);
@@ -204,8 +179,8 @@ float distance_ratio(int32_t best, double rival) {
 
 size_t guided_bytes(int32_t max_keypoints) {
   const size_t n = static_cast<size_t>(max_keypoints);
-  return descriptor_rows_bytes(max_keypoints) + 2 * side_bytes(max_keypoints) +
-         2 * arena_bytes<Nearest>(n) + arena_bytes<Row>(n);
+  return 2 * side_bytes(max_keypoints) + 2 * arena_bytes<int32_t>(n) + arena_bytes<Nearest>(n) +
+         arena_bytes<Row>(n);
 }
 
 int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const GuidedView& view1,
@@ -213,13 +188,12 @@ int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const Gu
                      tv_correspondence* correspondences) {
   if (view0.num == 0 || view1.num == 0) return 0;
   ArenaScope scope(arena);
-  const DescriptorRows rows1 = prepare_descriptors(kernels, view1.descriptors, view1.num, arena);
-  const Side side0 = make_side(view0, DescriptorRows{nullptr, nullptr}, M, false, arena);
-  const Side side1 = make_side(view1, rows1, M, true, arena);
+  const Side side0 = make_side(view0, M, false, arena);
+  const Side side1 = make_side(view1, M, true, arena);
   Row* rows = arena_alloc<Row>(arena, static_cast<size_t>(view0.num));
   Nearest* columns = arena_alloc<Nearest>(arena, static_cast<size_t>(view1.num));
-  Candidates candidates{
-      arena_alloc<Nearest>(arena, static_cast<size_t>(std::max(view0.num, view1.num))), 0};
+  const size_t most = static_cast<size_t>(std::max(view0.num, view1.num));
+  Candidates candidates{arena_alloc<int32_t>(arena, most), arena_alloc<int32_t>(arena, most), 0};
   const double band_sq = static_cast<double>(options.max_error_px) * options.max_error_px;
   const double radius = options.neighbourhood_px;
   const double largest = static_cast<double>(options.max_distance) * options.max_distance;

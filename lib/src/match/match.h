@@ -7,16 +7,6 @@
 
 namespace tv {
 
-// One side's descriptors as the kernels want them.
-struct DescriptorRows {
-  int16_t* rows;   // TV_DESCRIPTOR_BYTES each
-  int32_t* norms;  // squared
-};
-
-size_t descriptor_rows_bytes(int32_t count);
-DescriptorRows prepare_descriptors(const tvk_table& kernels, const uint8_t* descriptors,
-                                   int32_t count, Arena& arena);
-
 // Scratch of match_descriptors and of an array for its result.
 size_t match_bytes(int32_t max_keypoints);
 
