@@ -182,7 +182,7 @@ static void case_halve_row(trial *t) {
 }
 
 static void case_blur_row(trial *t) {
-  const int32_t width = pick(t, 1, 300, 640);
+  const int32_t width = pick(t, 1, 700, 640);
   const uint8_t *above = row_of_bytes(t, width), *row = row_of_bytes(t, width);
   const uint8_t *below = random_int(&t->seed, 0, 3) == 0 ? row : row_of_bytes(t, width);
   uint8_t *out = OUTPUT(t, uint8_t, width);

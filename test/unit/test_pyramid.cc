@@ -194,7 +194,7 @@ int blurred(const tv::Level& image, int x, int y) {
 void test_octaves_are_halved_then_blurred() {
   uint64_t seed = 23;
   uint8_t halved[kMaxSide * kMaxSide], smaller[kMaxSide * kMaxSide];
-  for (int width : {1, 2, 23, 47, 48, 97, 200}) {
+  for (int width : {1, 2, 23, 47, 48, 97, 200, 322, 323, 500}) {
     for (int height : {1, 30, 49, 131}) {
       const tv::Level full = noise_image(&seed, width, height, width + 5);
       const tv_image image{full.data, width, height, full.stride};
