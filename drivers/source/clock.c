@@ -49,8 +49,13 @@ static int64_t drift_over(const tvs_clock *clock, int64_t elapsed_ns) {
 }
 
 static int64_t uncertainty_at(const tvs_clock *clock, int64_t host_ns) {
-  return clock->options.least_delay_ns + 4 * clock->options.jitter_ns / clock->num_observed +
+  return clock->options.least_delay_ns / 2 + 4 * clock->options.jitter_ns / clock->num_observed +
          drift_over(clock, host_ns - clock->offset_host_ns);
+}
+
+/* host - device: the least delay is somewhere between 0 and what the options say, so half of that is taken off. */
+static int64_t shift_of(const tvs_clock *clock) {
+  return clock->offset_ns - clock->options.least_delay_ns / 2;
 }
 
 /* The time of this stamp nearest to the one expected. */
@@ -122,7 +127,7 @@ tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t receive
     }
   }
   time->received_ns = received_ns;
-  time->host_ns = device_ns + clock->offset_ns;
+  time->host_ns = device_ns + shift_of(clock);
   time->uncertainty_ns = uncertainty_at(clock, received_ns);
   time->device_ns = device_ns;
   time->clock_id = clock->clock_id;
@@ -135,7 +140,7 @@ tvs_status tvs_clock_to_host(const tvs_clock *clock, uint32_t clock_id, int64_t 
   if (!clock || !host_ns || !uncertainty_ns) return TVS_ERR_NULL;
   if (device_ns < -FARTHEST_NS || device_ns > FARTHEST_NS) return TVS_ERR_ARGUMENT;
   if (clock->num_observed == 0 || clock_id != clock->clock_id) return TVS_NONE;
-  *host_ns = device_ns + clock->offset_ns;
+  *host_ns = device_ns + shift_of(clock);
   *uncertainty_ns = uncertainty_at(clock, *host_ns);
   return TVS_OK;
 }
@@ -146,7 +151,7 @@ tvs_status tvs_clock_to_device(const tvs_clock *clock, int64_t host_ns, uint32_t
   if (host_ns < -FARTHEST_NS || host_ns > FARTHEST_NS) return TVS_ERR_ARGUMENT;
   if (clock->num_observed == 0) return TVS_NONE;
   *clock_id = clock->clock_id;
-  *device_ns = host_ns - clock->offset_ns;
+  *device_ns = host_ns - shift_of(clock);
   *uncertainty_ns = uncertainty_at(clock, host_ns);
   return TVS_OK;
 }

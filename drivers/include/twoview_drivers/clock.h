@@ -15,8 +15,8 @@ TV_BEGIN_DECLS
 
 typedef struct tvs_clock_options {
   int64_t period_ns;      /* after this long the counter starts again, at least 60 s; 0: never */
-  int64_t least_delay_ns; /* how late even the quickest packet may be: it cannot be observed, so it
-                             stays in the uncertainty. Default 2 ms */
+  int64_t least_delay_ns; /* how late even the quickest packet may be. It cannot be observed: half of it
+                             is taken off, and the other half is uncertainty. Default 2 ms */
   int64_t jitter_ns;      /* mean extra delay of a packet: the quickest of n is late by less than
                              4 jitter / n (98 per cent, were it exponential). Default 20 ms */
   int32_t drift_ppm;      /* how fast the two clocks may part, [0, 10000], default 100 */
