@@ -87,7 +87,7 @@ static void read_option(const uint8_t *option, ardrone_navdata *navdata) {
   const navdata_layout *layout = ardrone_navdata_layout(tag, bytes);
   const uint8_t *from = option + NAVDATA_OPTION_BYTES;
   int k;
-  if (!layout) {
+  if (!layout || (navdata->present >> tag & 1)) {
     ++navdata->num_unknown;
     return;
   }

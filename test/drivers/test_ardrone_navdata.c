@@ -116,6 +116,21 @@ static void test_tag_27_goes_by_its_size(void) {
   }
 }
 
+/* Found by fuzzing: two forms of tag 27 in one packet filled both. */
+static void test_of_a_tag_that_comes_twice_the_first_counts(void) {
+  begin(0x55667788);
+  add_option(27, 12, 1);
+  add_option(27, 216, 2);
+  add_option(1, 8, 1);
+  add_option(1, 8, 2);
+  end_packet();
+  TEST_ASSERT_EQUAL_INT(TVS_OK, decode());
+  TEST_ASSERT_EQUAL_INT(ARDRONE_GPS_ZIMMU, navdata.gps_form);
+  TEST_ASSERT_EQUAL_UINT32(0, navdata.gps.firmware);
+  TEST_ASSERT_EQUAL_HEX32(0x01010101, navdata.time.stamp);
+  TEST_ASSERT_EQUAL_UINT32(2, navdata.num_unknown);
+}
+
 static void test_a_wrong_checksum_is_refused_and_nothing_used(void) {
   begin(0x55667788);
   add_option(1, 8, 1);
@@ -264,6 +279,7 @@ int main(void) {
   RUN_TEST(test_option_sizes_below_4_are_refused);
   RUN_TEST(test_longer_options_give_what_is_known_shorter_ones_nothing);
   RUN_TEST(test_tag_27_goes_by_its_size);
+  RUN_TEST(test_of_a_tag_that_comes_twice_the_first_counts);
   RUN_TEST(test_a_wrong_checksum_is_refused_and_nothing_used);
   RUN_TEST(test_bytes_after_the_checksum_are_refused);
   RUN_TEST(test_a_short_packet_after_a_long_one_holds_nothing_of_it);

@@ -227,7 +227,7 @@ typedef enum ardrone_gps_form {
 typedef struct ardrone_navdata {
   uint32_t magic, state, sequence, vision_defined, checksum;
   uint32_t present;     /* bit per ardrone_tag that was there, whole */
-  uint32_t num_unknown; /* options of a tag or a size that nobody knows: passed over */
+  uint32_t num_unknown; /* options of a tag or a size that nobody knows, or there twice: passed over */
   uint32_t num_short;   /* options shorter than this firmware's: passed over */
   ardrone_gps_form gps_form;
   ardrone_demo demo;
