@@ -117,6 +117,7 @@ static void fast_contrasts(const uint8_t *const *centres, int32_t count, int64_t
   for (done = 0; done < count; done += GROUPS) {
     const uint8_t *at[GROUPS], *shifted[GROUPS];
     uint8_t above[TVK_BYTES], below[TVK_BYTES];
+    int16_t wide[TVK_BYTES];
     byte_lanes p[16], c, brightest, darkest;
     for (g = 0; g < GROUPS; ++g) at[g] = centres[done + g < count ? done + g : count - 1] - 1;
     c = bytes_of_rows(at, stride);
@@ -130,10 +131,10 @@ static void fast_contrasts(const uint8_t *const *centres, int32_t count, int64_t
     /* Of the two contrasts at most one is above 0, for two arcs have pixels in common. */
     bytes_store(above, bytes_max(bytes_sub(brightest, c), bytes_sub(c, darkest)));
     bytes_store(below, bytes_min(bytes_sub(c, brightest), bytes_sub(darkest, c)));
+    for (k = 0; k < TVK_BYTES; ++k) wide[k] = (int16_t)(above[k] - below[k]);
     for (g = 0; g < GROUPS && done + g < count; ++g) {
-      for (k = 0; k < 9; ++k) {
-        const int32_t lane = 16 * g + k / 3 * 4 + k % 3;
-        contrasts[9 * (done + g) + k] = (int16_t)(above[lane] - below[lane]);
+      for (k = 0; k < 3; ++k) {
+        memcpy(contrasts + 9 * (done + g) + 3 * k, wide + 16 * g + 4 * k, 3 * sizeof wide[0]);
       }
     }
   }
