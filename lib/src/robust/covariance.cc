@@ -14,6 +14,7 @@ namespace {
 constexpr double kVarianceOfCauchy = 1.1484187788317, kVarianceOnPlane = 1.0919;
 
 constexpr double kLeastResidual = 0.05;  // of the loss's scale
+constexpr int kChunk = 64;               // matches at a time, on the stack
 
 // What the residuals say about the loss: sums over the matches.
 struct LossSums {
@@ -96,19 +97,22 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
                       double scale_px, double limit_px, PoseUncertainty* uncertainty) {
   constexpr int P = PoseModel::kParameters;
   if (count <= P) return false;
-  double upper[15], gradient[P], inverse[25];
+  double upper[15], gradient[P], inverse[25], squares[kChunk];
   PoseModel{pose}.normal_equations(pairs, indices, count, kLeastSquares, upper, gradient);
   if (!invert_symmetric5(upper, inverse)) return false;
   const Mat3 E = essential_from_pose(pose);
   const double inverse_sq = 1 / (scale_px * scale_px);
   LossSums sums;
-  for (int k = 0; k < count; ++k) {
-    const double r_sq = sampson_sq(pairs, indices[k], E);
-    const double q = r_sq * inverse_sq, weight = 1 / (1 + q);
-    const double slope = (1 - q) * weight * weight;
-    sums.psi_sq += r_sq * weight * weight;
-    sums.slope += slope;
-    sums.slope_sq += slope * slope;
+  for (int first = 0; first < count; first += kChunk) {
+    const int some = std::min(kChunk, count - first);
+    sampson_squares(pairs, indices + first, some, E, squares);
+    for (int k = 0; k < some; ++k) {
+      const double q = squares[k] * inverse_sq, weight = 1 / (1 + q);
+      const double slope = (1 - q) * weight * weight;
+      sums.psi_sq += squares[k] * weight * weight;
+      sums.slope += slope;
+      sums.slope_sq += slope * slope;
+    }
   }
   const double uncut = variance_of(sums, count, 1, P, scale_px, 0);
   if (!(uncut > 0)) return false;

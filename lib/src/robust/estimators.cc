@@ -53,14 +53,6 @@ void for_each_square(const RayPairs& pairs, int count, const Pose& pose, double 
 
 }  // namespace
 
-bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
-                 double limit_px, double threshold_px, double* r_sq) {
-  *r_sq = sampson_sq(pairs, i, E);
-  return *r_sq <= limit_px * limit_px &&
-         depth_vote(depth_signs(pose, ray_of(pairs, 0, i), ray_of(pairs, 1, i),
-                                threshold_px * pairs.pixel_angle[i])) >= 0;
-}
-
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
                  int32_t* indices) {
   const double limit_sq = limit_px * limit_px;

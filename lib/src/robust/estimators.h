@@ -81,11 +81,6 @@ struct RotationEstimator : TransferEstimator {
   void refine_model(Model* model) const;
 };
 
-// Whether match i is within limit_px of a pose's epipolar line, and not behind a camera by more
-// than the threshold's parallax. Writes the squared distance.
-bool pose_inlier(const RayPairs& pairs, int i, const Mat3& E, const Pose& pose,
-                 double limit_px, double threshold_px, double* r_sq);
-
 // Matches among the first `count` whose Sampson distance is below limit_px. Returns how many.
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
                  int32_t* indices);

@@ -58,7 +58,7 @@ int near_pose(const PoseRefiner& f, const Pose& pose) {
 // what it takes from the matches in deviations of a residual, for a prior to count as much less.
 RobustLoss best_loss(const PoseRefiner& f, const Mat3& M, int count, double* taken) {
   const double sigma = median_noise_px(f, M, count);
-  for (int k = 0; k < count; ++k) f.values[k] = sampson_sq(f.pairs, f.indices[k], M);
+  sampson_squares(f.pairs, f.indices, count, M, f.values);
   double least = 0;
   RobustLoss best{};
   for (const double factor : kScales) {
@@ -118,15 +118,16 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
 int near_plane(const PoseRefiner& f, const Mat3& H) {
   const double limit = kFinalNear * kTransferThresholdScale * f.threshold_px;
   int near = 0;
+  transfer_squares(f.pairs, 0, f.pairs.num, H, f.values);
   for (int i = 0; i < f.pairs.num; ++i) {
-    if (transfer_residual(f.pairs, i, H).r_sq <= limit * limit) f.indices[near++] = i;
+    if (f.values[i] <= limit * limit) f.indices[near++] = i;
   }
   return near;
 }
 
 // Two-dimensional residuals: half of them lie within 1.1774 deviations.
 RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
-  for (int k = 0; k < count; ++k) f.values[k] = transfer_residual(f.pairs, f.indices[k], H).r_sq;
+  transfer_squares(f.pairs, f.indices, count, H, f.values);
   double* middle = f.values + count / 2;
   std::nth_element(f.values, middle, f.values + count);
   const double scale = kPlaneScale * std::sqrt(*middle) / 1.1774100225154747;
@@ -141,8 +142,9 @@ constexpr double kGravityExcludes = 13.816;
 
 double median_noise_px(const PoseRefiner& f, const Mat3& M, int count) {
   int within = 0;
+  sampson_squares(f.pairs, f.indices, count, M, f.values);
   for (int k = 0; k < count; ++k) {
-    const double r_sq = sampson_sq(f.pairs, f.indices[k], M);
+    const double r_sq = f.values[k];
     if (r_sq <= f.threshold_px * f.threshold_px) f.values[within++] = r_sq;
   }
   if (within == 0) return f.threshold_px;

@@ -132,13 +132,14 @@ Mat3 refined_fundamental(const Finish& f, const Mat3& start) {
 void collect_support(Finish& f) {
   const EpipolarModel& epipolar = f.out->epipolar;
   f.num_support = 0;
-  for (int i = 0; i < f.matches.pairs.num; ++i) {
-    double r_sq;
-    const bool inlier =
-        epipolar.has_pose
-            ? pose_inlier(f.matches.pairs, i, epipolar.M, epipolar.pose, f.threshold,
-                          f.threshold, &r_sq)
-            : sampson_sq(f.matches.pairs, i, epipolar.M) <= f.threshold * f.threshold;
+  const RayPairs& pairs = f.matches.pairs;
+  if (epipolar.has_pose) {
+    pose_squares(pairs, 0, pairs.num, epipolar.pose, f.threshold, f.values);
+  } else {
+    sampson_squares(pairs, 0, pairs.num, epipolar.M, f.values);
+  }
+  for (int i = 0; i < pairs.num; ++i) {
+    const bool inlier = f.values[i] <= f.threshold * f.threshold;
     f.out->inlier[i] = inlier;
     if (inlier && i < f.pairs.num) f.support[f.num_support++] = i;
   }
@@ -164,9 +165,8 @@ void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out) 
 // The matches that the named transfer explains become the inliers.
 void inliers_of_transfer(Finish& f, const Mat3& H) {
   const double limit = kTransferThresholdScale * f.threshold;
-  for (int i = 0; i < f.matches.pairs.num; ++i) {
-    f.out->inlier[i] = transfer_residual(f.matches.pairs, i, H).r_sq <= limit * limit;
-  }
+  transfer_squares(f.matches.pairs, 0, f.matches.pairs.num, H, f.values);
+  for (int i = 0; i < f.matches.pairs.num; ++i) f.out->inlier[i] = f.values[i] <= limit * limit;
 }
 
 // A plane allows two motions. Where the plane explains nearly all of the support they are fitted
@@ -240,8 +240,9 @@ bool moves_along_lines(const Finish& f, const Mat3& R) {
   const double limit = kTransferThresholdScale * f.threshold;
   double across = 0, along = 0;
   int n = 0;
+  transfer_squares(f.pairs, f.support, f.num_support, R, f.values);
   for (int k = 0; k < f.num_support; ++k) {
-    const double r_sq = transfer_residual(f.pairs, f.support[k], R).r_sq;
+    const double r_sq = f.values[k];
     if (r_sq > limit * limit) continue;
     const double epipolar_sq = sampson_sq(f.pairs, f.support[k], f.out->epipolar.M);
     across += epipolar_sq;
@@ -348,10 +349,13 @@ void look_for_second_model(Finish& f, Arena& arena) {
     const bool by_pose = out.has_t;
     const double limit = kClear * f.threshold;
     int num_first = 0;
+    if (by_pose) {
+      sampson_squares(f.pairs, 0, n, out.epipolar.M, f.values);
+    } else {
+      transfer_squares(f.pairs, 0, n, out.H, f.values);
+    }
     for (int i = 0; i < n; ++i) {
-      const double r_sq = by_pose ? sampson_sq(f.pairs, i, out.epipolar.M)
-                                  : transfer_residual(f.pairs, i, out.H).r_sq;
-      explained[i] = r_sq <= limit * limit;
+      explained[i] = f.values[i] <= limit * limit;
       num_first += out.inlier[i] != 0;
     }
     second = find_second_model(f.matches, explained, num_first, f.threshold,
@@ -382,11 +386,15 @@ void measure_inliers(Finish& f) {
                            out.config == TV_CONFIG_PLANAR_OR_PANORAMIC;
   const RayPairs& pairs = f.matches.pairs;
   double sum = 0;
+  if (by_transfer) {
+    transfer_squares(pairs, 0, pairs.num, out.H, f.values);
+  } else {
+    sampson_squares(pairs, 0, pairs.num, out.epipolar.M, f.values);
+  }
   for (int i = 0; i < pairs.num; ++i) {
     if (out.inlier[i] == 0) continue;
     ++out.num_inliers;
-    sum += by_transfer ? transfer_residual(pairs, i, out.H).r_sq
-                       : sampson_sq(pairs, i, out.epipolar.M);
+    sum += f.values[i];
   }
   if (out.num_inliers > 0) out.rms_error_px = std::sqrt(sum / out.num_inliers);
 }

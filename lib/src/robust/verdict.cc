@@ -10,6 +10,7 @@ namespace tv {
 namespace {
 
 constexpr double kInfinity = __builtin_inf();
+constexpr int kChunk = 64;  // matches at a time, on the stack
 
 // The rivals need few samples, since only one that explains most of the support matters, and few
 // matches to be told apart. Of models that explain least_share, one in ten thousand is missed.
@@ -51,12 +52,46 @@ Best search(Estimator estimator, const int32_t* support, int num_support, double
 }
 
 int count_inliers(const RayPairs& pairs, int count, const Mat3& H, double threshold_px) {
+  double squares[kChunk];
   int inliers = 0;
-  for (int i = 0; i < count; ++i) {
-    inliers += transfer_residual(pairs, i, H).r_sq <= threshold_px * threshold_px;
+  for (int first = 0; first < count; first += kChunk) {
+    const int some = std::min(kChunk, count - first);
+    transfer_squares(pairs, first, some, H, squares);
+    for (int k = 0; k < some; ++k) inliers += squares[k] <= threshold_px * threshold_px;
   }
   return inliers;
 }
+
+// Points of view 0 with others of view 1, in the arrays' own form.
+struct WrongPairs {
+  double storage[18][kChunk];
+  RayPairs arrays;
+
+  explicit WrongPairs(const RayPairs& pairs) : arrays(pairs) {
+    for (int k = 0; k < 18; ++k) array(k) = storage[k];
+  }
+  double*& array(int k) {  // the rays' entries, then the Jacobians'
+    return k < 6 ? arrays.ray[k / 3][k % 3] : arrays.jacobian[k / 6 - 1][k % 6];
+  }
+  int count_agreeing(const RayPairs& pairs, const int listed[2][kChunk], const Mat3& M,
+                     double threshold_px) {
+    for (int v = 0; v < 2; ++v) {
+      for (int k = 0; k < (pairs.on_plane ? 2 : 3); ++k) {
+        for (int l = 0; l < kChunk; ++l) arrays.ray[v][k][l] = pairs.ray[v][k][listed[v][l]];
+      }
+      for (int k = 0; k < (pairs.on_plane ? 4 : 6); ++k) {
+        for (int l = 0; l < kChunk; ++l) {
+          arrays.jacobian[v][k][l] = pairs.jacobian[v][k][listed[v][l]];
+        }
+      }
+    }
+    double squares[kChunk];
+    sampson_squares(arrays, 0, kChunk, M, squares);
+    int agreeing = 0;
+    for (double r_sq : squares) agreeing += r_sq <= threshold_px * threshold_px;
+    return agreeing;
+  }
+};
 
 }  // namespace
 
@@ -82,23 +117,17 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   const int n = matches.num_unique;
   if (n < 2) return 1;
   Random random = random_seeded(seed);
-  // One wrong match at a time, in the arrays' own form.
-  double storage[18];
-  RayPairs one = pairs;
-  one.num = 1;
-  for (int k = 0; k < 3; ++k) one.ray[0][k] = &storage[k], one.ray[1][k] = &storage[3 + k];
-  for (int k = 0; k < 6; ++k) {
-    one.jacobian[0][k] = &storage[6 + k];
-    one.jacobian[1][k] = &storage[12 + k];
-  }
+  WrongPairs wrong(pairs);
   int agreeing = 0;
-  for (int pairing = 0; pairing < kPairings; ++pairing) {
-    const int i = static_cast<int>(random_below(random, static_cast<uint32_t>(n)));
-    int j = static_cast<int>(random_below(random, static_cast<uint32_t>(n - 1)));
-    j += j >= i;
-    set_ray(one, 0, 0, ray_of(pairs, 0, i), jacobian_of(pairs, 0, i));
-    set_ray(one, 1, 0, ray_of(pairs, 1, j), jacobian_of(pairs, 1, j));
-    agreeing += sampson_sq(one, 0, M) <= threshold_px * threshold_px;
+  for (int first = 0; first < kPairings; first += kChunk) {
+    int listed[2][kChunk];
+    for (int k = 0; k < kChunk; ++k) {
+      const int i = static_cast<int>(random_below(random, static_cast<uint32_t>(n)));
+      const int j = static_cast<int>(random_below(random, static_cast<uint32_t>(n - 1)));
+      listed[0][k] = i;
+      listed[1][k] = j + (j >= i);
+    }
+    agreeing += wrong.count_agreeing(pairs, listed, M, threshold_px);
   }
   // Of few matches there are fewer different pairings than were drawn.
   const double different = 0.5 * n * (n - 1.0);
