@@ -102,13 +102,13 @@ namespace {
 double pixel_angle(const RayPairs& pairs, int i) {
   double sum = 0;
   for (int v = 0; v < 2; ++v) {
-    const Vec3 ray = ray_of(pairs, v, i);
-    const Mat32 J = jacobian_of(pairs, v, i);
-    const double inverse_sq = 1 / ray.squaredNorm();
+    const double x = pairs.ray[v][0][i], y = pairs.ray[v][1][i], z = pairs.ray[v][2][i];
+    const double inverse_sq = 1 / (x * x + (y * y + z * z));
     for (int k = 0; k < 2; ++k) {
-      const Vec3 column = J.col(k);
-      const double along = column.dot(ray);
-      sum += (column.squaredNorm() - along * along * inverse_sq) * inverse_sq;
+      const double a = pairs.jacobian[v][k][i], b = pairs.jacobian[v][2 + k][i],
+                   c = pairs.jacobian[v][4 + k][i];
+      const double along = a * x + (b * y + c * z);
+      sum += ((a * a + (b * b + c * c)) - along * along * inverse_sq) * inverse_sq;
     }
   }
   return std::sqrt(0.5 * sum);
@@ -131,14 +131,13 @@ int even_step(int n) {
 
 void set_fast(RayPairs& pairs, int slot, int i) {
   for (int v = 0; v < 2; ++v) {
-    const Mat32 J = jacobian_of(pairs, v, i);
     if (pairs.on_plane) {
       for (int k = 0; k < 2; ++k) {
         pairs.fast[2 * v + k][slot] = static_cast<float>(pairs.ray[v][k][i]);
       }
-      const double metric[3] = {J(0, 0) * J(0, 0) + J(0, 1) * J(0, 1),
-                                J(0, 0) * J(1, 0) + J(0, 1) * J(1, 1),
-                                J(1, 0) * J(1, 0) + J(1, 1) * J(1, 1)};
+      double* const* J = pairs.jacobian[v];
+      const double a = J[0][i], b = J[1][i], c = J[2][i], d = J[3][i];
+      const double metric[3] = {a * a + b * b, a * c + b * d, c * c + d * d};
       for (int k = 0; k < 3; ++k) {
         pairs.fast[4 + 3 * v + k][slot] = static_cast<float>(metric[k]);
       }

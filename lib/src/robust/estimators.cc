@@ -152,7 +152,7 @@ void PoseEstimator::refine_model(Pose* model) const {
                                  indices);
   PoseModel refined{*model};
   refine(pairs, indices, count, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
-         &refined);
+         &refined, kLocalGain);
   *model = refined.pose;
 }
 
@@ -191,7 +191,7 @@ void FundamentalEstimator<kPoints>::refine_model(Mat3* model) const {
   const int count = near_matches(pairs, pairs.num, *model, kNear * threshold_px, indices);
   FundamentalModel refined = fundamental_model(*model);
   refine(pairs, indices, count, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
-         &refined);
+         &refined, kLocalGain);
   *model = refined.matrix().normalized();
 }
 
@@ -228,7 +228,7 @@ int HomographyEstimator::generate_models(const int32_t* sample, Mat3* models) co
 void HomographyEstimator::refine_model(Mat3* model) const {
   HomographyModel refined{*model};
   refine(pairs, subset, num_subset, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
-         &refined);
+         &refined, kLocalGain);
   *model = refined.H;
 }
 
@@ -242,7 +242,7 @@ int RotationEstimator::generate_models(const int32_t* sample, Mat3* models) cons
 void RotationEstimator::refine_model(Mat3* model) const {
   RotationModel refined{*model};
   refine(pairs, subset, num_subset, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
-         &refined);
+         &refined, kLocalGain);
   *model = refined.R;
 }
 

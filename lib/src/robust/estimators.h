@@ -11,6 +11,7 @@ namespace tv {
 // steps.
 inline constexpr double kNear = 3;
 inline constexpr int kLocalIterations = 5;
+inline constexpr double kLocalGain = 1e-3;
 
 // A pose from five rays.
 struct PoseEstimator {

@@ -18,6 +18,7 @@
 #include <cstdint>
 
 #include "base/math.h"
+#include "geometry/residuals.h"
 #include "robust/sampler.h"
 
 namespace tv {
@@ -33,6 +34,7 @@ struct LoopOptions {
   int min_iterations, max_iterations;
   int fixed_iterations;        // 0: adaptive stop
   int few_inliers_iterations;  // at least this many / inliers, up to kMostForFewInliers
+  int least_inliers = 0;       // what costs more than so many exact inliers is not locally optimised
 };
 
 template <typename Model>
@@ -140,6 +142,7 @@ LoopResult<typename Estimator::Model> robust_loop(Estimator& estimator, Sampler&
   const int window = kWindow + sampler.num / kWindowShare;
   int wanted = most;
   int window_iterations = 0;
+  const int64_t worth_optimising = int64_t{kCostOne} * (sampler.num - options.least_inliers);
   int64_t best_sampled = INT64_MAX, window_cost = INT64_MAX;  // before local optimisation
   Model window_model, model;
   Solver<Estimator> solver;
@@ -149,25 +152,25 @@ LoopResult<typename Estimator::Model> robust_loop(Estimator& estimator, Sampler&
     bool improved = false;
     const int num_models = solver.next(estimator, sampler);
     for (int k = 0; k < num_models; ++k) {
-      if (solver.fast_cost(estimator, k, window_cost) >= window_cost) continue;
-      if (!solver.complete(estimator, k, &model)) continue;
-      int num_inliers;
-      const int64_t cost = estimator.full_cost(model, &num_inliers);
+      const int64_t cost = solver.fast_cost(estimator, k, window_cost);
       if (cost >= window_cost) continue;
+      if (!solver.complete(estimator, k, &model)) continue;
       window_cost = cost;
       window_model = model;
       if (cost < best_sampled) {
         best_sampled = cost;
         improved = true;
       }
-      take_if_better(model, cost, num_inliers, &best);
     }
     const bool window_over = window_iterations >= window && window_cost < INT64_MAX;
     if (!improved && !window_over) continue;
-    estimator.refine_model(&window_model);
+    const bool worth = window_cost <= worth_optimising;
+    if (!worth && !improved) continue;
+    if (worth) estimator.refine_model(&window_model);
     int num_inliers;
     const int64_t cost = estimator.full_cost(window_model, &num_inliers);
     take_if_better(window_model, cost, num_inliers, &best);
+    if (!worth) continue;
     window_iterations = 0;
     window_cost = INT64_MAX;
     if (fixed || !best.found) continue;

@@ -41,6 +41,7 @@ bool same_place(const TwoViewProblem& p, int32_t i, int32_t j) {
 struct SortKey {
   float ratio;
   int32_t index;
+  double x0;  // the first coordinate, which settles nearly every tie of ratios
 };
 
 // A ratio that is not a number counts as the worst.
@@ -52,6 +53,7 @@ float sort_ratio(const TwoViewProblem& p, int32_t i) {
 
 bool sorts_before(const TwoViewProblem& p, const SortKey& a, const SortKey& b) {
   if (a.ratio != b.ratio) return a.ratio < b.ratio;
+  if (a.x0 != b.x0) return a.x0 < b.x0;
   const Coordinates ca = coordinates(p, a.index), cb = coordinates(p, b.index);
   for (int k = 0; k < 4; ++k) {
     if (ca.v[k] != cb.v[k]) return ca.v[k] < cb.v[k];
@@ -186,7 +188,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
       usable = ray_of_pixel(problem.camera[v], &c.v[2 * v], on_plane, &ray, &jacobian) &&
                sane(ray, jacobian);
     }
-    if (usable) keys[count++] = SortKey{sort_ratio(problem, i), i};
+    if (usable) keys[count++] = SortKey{sort_ratio(problem, i), i, c.v[0]};
   }
   std::sort(keys, keys + count, [&problem](const SortKey& a, const SortKey& b) {
     return sorts_before(problem, a, b);

@@ -207,9 +207,9 @@ template bool invert_symmetric<8>(const double*, double*);
 
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
-              int max_iterations, Model* model) {
+              int max_iterations, Model* model, double small_gain) {
   constexpr int P = Model::kParameters;
-  constexpr double kSmallStep = 1e-9, kSmallGain = 1e-9;
+  constexpr double kSmallStep = 1e-9;
   double upper[P * (P + 1) / 2], gradient[P], step[P];
   double cost = model->normal_equations(pairs, indices, count, loss, upper, gradient);
   double lambda = 1e-4;
@@ -234,23 +234,23 @@ double refine(const RayPairs& pairs, const int32_t* indices, int count, const Ro
     if (lambda < 1e-10) lambda = 1e-10;
     for (int k = 0; k < P * (P + 1) / 2; ++k) upper[k] = new_upper[k];
     for (int p = 0; p < P; ++p) gradient[p] = new_gradient[p];
-    if (gain < kSmallGain * cost) break;
+    if (gain < small_gain * cost) break;
   }
   return cost;
 }
 
 template bool solve_damped<5>(const double*, const double*, double, double*);
 template double refine<PoseModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
-                                  PoseModel*);
+                                  PoseModel*, double);
 template double refine<GravityPoseModel>(const RayPairs&, const int32_t*, int,
-                                         const RobustLoss&, int, GravityPoseModel*);
+                                         const RobustLoss&, int, GravityPoseModel*, double);
 template double refine<FundamentalModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
-                                         int, FundamentalModel*);
+                                         int, FundamentalModel*, double);
 template double refine<HomographyModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
-                                        int, HomographyModel*);
+                                        int, HomographyModel*, double);
 template double refine<PlaneModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
-                                   PlaneModel*);
+                                   PlaneModel*, double);
 template double refine<RotationModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
-                                      RotationModel*);
+                                      RotationModel*, double);
 
 }  // namespace tv

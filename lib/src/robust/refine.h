@@ -74,9 +74,11 @@ inline bool invert_symmetric5(const double upper[15], double inverse[25]) {
   return invert_symmetric<5>(upper, inverse);
 }
 
-// Lowers the robust cost over the listed matches. Returns the final cost, in units of scale^2.
+// Lowers the robust cost over the listed matches, until a step gains less than small_gain of it.
+// Returns the final cost, in units of scale^2.
+inline constexpr double kSmallGain = 1e-9;
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
-              int max_iterations, Model* model);
+              int max_iterations, Model* model, double small_gain = kSmallGain);
 
 }  // namespace tv

@@ -62,7 +62,7 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
   const double fewest = std::max<double>(kFewestInliers, kSecondShare * num_first * taken / left);
   const int most = samples_needed(kConfidence, static_cast<int>(fewest), taken,
                                   PoseEstimator::kSampleSize, kMostSamples);
-  const LoopOptions options{kConfidence, 5, most, 0, 0};
+  const LoopOptions options{kConfidence, 5, most, 0, 0, static_cast<int>(fewest / 2)};
   const LoopResult<Pose> result = robust_loop(estimator, sampler, options);
   if (!result.found || result.num_inliers < kFewestInliers) return second;
   const double of_all = static_cast<double>(result.num_inliers) * left / taken;
@@ -82,9 +82,9 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
 
 namespace {
 
-// Points are kept in the cells of a grid; a search looks at no more than kMostSeen of them, so that
+// Points are kept in the cells of a grid, about as many as there are points; a search looks at no more than kMostSeen of them, so that
 // points in one heap cost no more than points that are spread.
-constexpr int kGrid = 64, kNeighbours = 6, kMostSeen = 64;
+constexpr int kMostSide = 64, kNeighbours = 6, kMostSeen = 64;
 constexpr int kMostAsked = 512, kMostListed = 64;  // a share is told from fewer than an excess
 constexpr double kOpposite = 0.14;   // how far from the opposite place, of the neighbour's distance
 constexpr double kNearestPx = 8;     // nearer neighbours are not told from noise
@@ -95,17 +95,20 @@ constexpr double kControlCosine = -0.829, kControlSine = 0.559;
 struct Grid {
   const double* xy;
   double low[2], inverse[2];
-  int32_t* first;  // kGrid^2, -1: empty
+  int side;
+  int32_t* first;  // side^2, -1: empty
   int32_t* next;   // num
 
   int cell(double value, int axis) const {
     const double place = (value - low[axis]) * inverse[axis];
-    return place > 0 ? (place < kGrid - 1 ? static_cast<int>(place) : kGrid - 1) : 0;
+    return place > 0 ? (place < side - 1 ? static_cast<int>(place) : side - 1) : 0;
   }
 };
 
 Grid make_grid(const double* xy, int num, Arena& arena) {
-  Grid grid{xy, {0, 0}, {0, 0}, arena_alloc<int32_t>(arena, kGrid * kGrid),
+  int side = 1;
+  while (side < kMostSide && side * side < num) ++side;
+  Grid grid{xy, {0, 0}, {0, 0}, side, arena_alloc<int32_t>(arena, kMostSide * kMostSide),
             arena_alloc<int32_t>(arena, static_cast<size_t>(num))};
   for (int axis = 0; axis < 2; ++axis) {
     double low = xy[axis], high = low;
@@ -114,11 +117,11 @@ Grid make_grid(const double* xy, int num, Arena& arena) {
       high = std::max(high, xy[2 * i + axis]);
     }
     grid.low[axis] = low;
-    grid.inverse[axis] = high > low ? kGrid / (high - low) : 0;
+    grid.inverse[axis] = high > low ? side / (high - low) : 0;
   }
-  for (int c = 0; c < kGrid * kGrid; ++c) grid.first[c] = -1;
+  for (int c = 0; c < side * side; ++c) grid.first[c] = -1;
   for (int i = num - 1; i >= 0; --i) {
-    int32_t& head = grid.first[kGrid * grid.cell(xy[2 * i + 1], 1) + grid.cell(xy[2 * i], 0)];
+    int32_t& head = grid.first[side * grid.cell(xy[2 * i + 1], 1) + grid.cell(xy[2 * i], 0)];
     grid.next[i] = head;
     head = i;
   }
@@ -135,13 +138,13 @@ int nearest_points(const Grid& grid, int i, Neighbour* nearest) {
   const double x = grid.xy[2 * i], y = grid.xy[2 * i + 1];
   const int column = grid.cell(x, 0), row = grid.cell(y, 1);
   int found = 0, seen = 0;
-  for (int ring = 0; ring < kGrid && seen < kMostSeen; ++ring) {
+  for (int ring = 0; ring < grid.side && seen < kMostSeen; ++ring) {
     if (ring > 1 && found == kNeighbours && seen >= 2 * kNeighbours) break;
-    for (int r = std::max(0, row - ring); r <= std::min(kGrid - 1, row + ring); ++r) {
+    for (int r = std::max(0, row - ring); r <= std::min(grid.side - 1, row + ring); ++r) {
       const bool edge = r == row - ring || r == row + ring;
       for (int c = column - ring; c <= column + ring; c += edge || ring == 0 ? 1 : 2 * ring) {
-        if (c < 0 || c >= kGrid) continue;
-        for (int32_t j = grid.first[kGrid * r + c]; j >= 0 && seen < kMostSeen; j = grid.next[j]) {
+        if (c < 0 || c >= grid.side) continue;
+        for (int32_t j = grid.first[grid.side * r + c]; j >= 0 && seen < kMostSeen; j = grid.next[j]) {
           const double dx = grid.xy[2 * j] - x, dy = grid.xy[2 * j + 1] - y;
           const double dist_sq = dx * dx + dy * dy;
           if (dist_sq < kNearestPx * kNearestPx) continue;
@@ -165,7 +168,7 @@ bool point_near(const Grid& grid, double x, double y, double radius) {
   int seen = 0;
   for (int r = r0; r <= r1; ++r) {
     for (int c = c0; c <= c1; ++c) {
-      for (int32_t j = grid.first[kGrid * r + c]; j >= 0; j = grid.next[j]) {
+      for (int32_t j = grid.first[grid.side * r + c]; j >= 0; j = grid.next[j]) {
         const double dx = grid.xy[2 * j] - x, dy = grid.xy[2 * j + 1] - y;
         if (dx * dx + dy * dy <= radius * radius) return true;
         if (++seen == kMostSeen) return false;
@@ -191,7 +194,7 @@ int count_partners(const Grid& grid, int i, const Neighbour* nearest, int count,
 }  // namespace
 
 size_t lattice_bytes(int max_points) {
-  return arena_bytes<int32_t>(kGrid * kGrid) + arena_bytes<int32_t>(static_cast<size_t>(max_points));
+  return arena_bytes<int32_t>(kMostSide * kMostSide) + arena_bytes<int32_t>(static_cast<size_t>(max_points));
 }
 
 Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,

@@ -299,11 +299,15 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
   return homography_enough ? TV_CONFIG_PLANAR : TV_CONFIG_CALIBRATED;
 }
 
-double parallax(const Finish& f, int i) {
+// Grows with the angle between a match's rays, R taken off: 0 to 2 for 0 to 180 degrees.
+double pseudo_angle(const Finish& f, int i) {
   const Vec3 a = f.out->epipolar.pose.R * ray_of(f.matches.pairs, 0, i);
   const Vec3 b = ray_of(f.matches.pairs, 1, i);
-  return atan2(a.cross(b).norm(), a.dot(b));
+  const double sine = a.cross(b).norm(), cosine = a.dot(b);
+  return cosine > 0 ? sine / (sine + cosine) : 1 - cosine / (sine - cosine);
 }
+
+double angle_of_pseudo(double p) { return p < 1 ? atan2(p, 1 - p) : atan2(2 - p, 1 - p); }
 
 // The largest standard deviation of the rotation and of the direction, bounded from above by the
 // traces of their blocks.
@@ -319,12 +323,12 @@ void measure_pose(Finish& f) {
   double sum = 0;
   if (f.num_support == 0) return;
   for (int k = 0; k < f.num_support; ++k) {
-    f.values[k] = parallax(f, f.support[k]);
+    f.values[k] = pseudo_angle(f, f.support[k]);
     sum += f.pairs.pixel_angle[f.support[k]];
   }
   double* middle = f.values + (f.num_support - 1) / 2;
   std::nth_element(f.values, middle, f.values + f.num_support);
-  out.median_parallax_rad = *middle;
+  out.median_parallax_rad = angle_of_pseudo(*middle);
   const double least_px = std::max(3 * f.threshold, 10 * out.noise_px);
   if (out.median_parallax_rad < least_px * sum / f.num_support || !out.has_covariance ||
       largest_sigma(out.covariance) > kMostSigma) {

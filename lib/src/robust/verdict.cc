@@ -41,10 +41,11 @@ Best search(Estimator estimator, const int32_t* support, int num_support, double
   const int least = static_cast<int>(least_share * estimator.num_subset);
   const int most = samples_needed(kRivalConfidence, least, estimator.num_subset,
                                   Estimator::kSampleSize, kMostRivalSamples);
-  const LoopOptions options{0.999, 5, most, 0, 0};
+  const LoopOptions options{0.999, 5, most, 0, 0, least / 2};
   const LoopResult<Mat3> result = robust_loop(estimator, sampler, options);
   if (!result.found) return {};
   Best best{true, result.model};
+  if (result.num_inliers < least / 2) return best;
   estimator.subset = support;
   estimator.num_subset = num_support;
   estimator.refine_model(&best.model);
