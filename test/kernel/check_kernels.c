@@ -7,6 +7,7 @@
    check_kernels --time   prints nanoseconds per call of typical size, a column per set */
 #define _POSIX_C_SOURCE 199309L /* clock_gettime */
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +17,7 @@
 #include "kernels/kernels.h"
 #include "support/random.h"
 #include "twoview/context.h"
+#include "twoview/triangulate.h"
 
 enum { MAX_BLOCKS = 32, GUARD_BYTES = 64, PATTERN = 0xA5, ROUNDS = 600 };
 
@@ -457,6 +459,49 @@ static void case_relpose_5pt(trial *t) {
     memset(essentials + 9 * (TVK_RELPOSE_MODELS * s + count), PATTERN,
            (size_t)(TVK_RELPOSE_MODELS - count) * 9 * sizeof essentials[0]);
   }
+}
+
+/* Points before and behind two cameras, far ones, pixels that belong to none, and some that are no
+   numbers. */
+static void case_triangulate(trial *t) {
+  const int32_t num = pick(t, 0, 100, 500), method = random_int(&t->seed, 0, 2);
+  const double angle = random_unit(&t->seed) - 0.5, sine = sin(angle), cosine = cos(angle);
+  const double R[9] = {cosine, 0, sine, 0, 1, 0, -sine, 0, cosine};
+  double *pixels0 = INPUT(t, double, 2 * num), *pixels1 = INPUT(t, double, 2 * num);
+  tvk_triangulate_pair *pair = INPUT(t, tvk_triangulate_pair, 1);
+  tv_point *points = OUTPUT(t, tv_point, num);
+  int32_t k, c;
+  for (k = 0; k < 4; ++k) {
+    pair->focal[k] = 500 + k;
+    pair->inverse_focal[k] = 1 / pair->focal[k];
+    pair->principal[k] = 320 - 40 * k;
+  }
+  memcpy(pair->R, R, sizeof R);
+  for (c = 0; c < 3; ++c) pair->direction[c] = c == 0 ? -0.8 : c == 1 ? 0 : 0.6;
+  for (c = 0; c < 3; ++c) pair->center1[c] = 0.8 * R[c] - 0.6 * R[6 + c];
+  pair->baseline = 0.1;
+  pair->parallel_sine_sq = 1e-29;
+  for (k = 0; k < num; ++k) {
+    const int32_t kind = random_int(&t->seed, 0, 9);
+    const double depth = kind == 0 ? -4 : kind == 1 ? 1e9 : 1 + 9 * random_unit(&t->seed);
+    double X[3], Y[3];
+    for (c = 0; c < 3; ++c) X[c] = c == 2 ? depth : depth * (2 * random_unit(&t->seed) - 1);
+    for (c = 0; c < 3; ++c) {
+      Y[c] = R[3 * c] * X[0] + R[3 * c + 1] * X[1] + R[3 * c + 2] * X[2] + pair->direction[c];
+    }
+    for (c = 0; c < 2; ++c) {
+      const double noise = kind == 2 ? 100 : 1;
+      pixels0[2 * k + c] = pair->focal[c] * X[c] / X[2] + pair->principal[c] + random_unit(&t->seed);
+      pixels1[2 * k + c] = pair->focal[2 + c] * Y[c] / Y[2] + pair->principal[2 + c] +
+                           noise * random_unit(&t->seed);
+    }
+    if (kind == 3) pixels0[2 * k] = random_int(&t->seed, 0, 1) ? 1e200 : NAN;
+  }
+  REPEAT(t, t->set->triangulate(pair,
+                                method == 0   ? TV_TRIANGULATION_MIDPOINT
+                                : method == 1 ? TV_TRIANGULATION_LINEAR_LS
+                                              : TV_TRIANGULATION_ITERATIVE_LS,
+                                pixels0, pixels1, num, points));
 }
 
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {

@@ -62,9 +62,7 @@ tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
   const tv::Camera prepared0 = tv::prepare_camera(*camera0);
   const tv::Camera prepared1 = tv::prepare_camera(*camera1);
   const tv::TriangulationPair pair = prepare_pair(prepared0, prepared1, R, t);
-  for (size_t i = 0; i < n; ++i) {
-    tv::triangulate_point(method, pair, pixel_at(pixels0, i), pixel_at(pixels1, i), &points[i]);
-  }
+  tv::triangulate_points(method, pair, pixels0, pixels1, n, points);
   return TV_OK;
 }
 

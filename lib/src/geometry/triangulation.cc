@@ -4,6 +4,8 @@
 
 #include "base/math.h"
 #include "geometry/triangulation_linear.h"
+#include "kernels/kernels.h"
+#include "twoview/context.h"
 
 namespace tv {
 namespace {
@@ -118,6 +120,35 @@ Vec3 solve(tv_triangulation method, const TriangulationPair& pair, const Match& 
   }
 }
 
+// What the kernel asks of a method and of the cameras.
+bool in_lanes(tv_triangulation method, const TriangulationPair& pair) {
+  return (method == TV_TRIANGULATION_MIDPOINT || method == TV_TRIANGULATION_LINEAR_LS ||
+          method == TV_TRIANGULATION_ITERATIVE_LS) &&
+         pair.cameras[0]->model.model == TV_CAMERA_PINHOLE &&
+         pair.cameras[1]->model.model == TV_CAMERA_PINHOLE;
+}
+
+tvk_triangulate_pair kernel_pair(const TriangulationPair& pair) {
+  tvk_triangulate_pair p;
+  for (int v = 0; v < 2; ++v) {
+    const tv_camera& camera = pair.cameras[v]->model;
+    const double focal[2] = {camera.fx, camera.fy}, principal[2] = {camera.cx, camera.cy};
+    for (int k = 0; k < 2; ++k) {
+      p.focal[2 * v + k] = focal[k];
+      p.inverse_focal[2 * v + k] = 1.0 / focal[k];
+      p.principal[2 * v + k] = principal[k];
+    }
+  }
+  for (int k = 0; k < 9; ++k) p.R[k] = pair.cam1_from_cam0_R(k / 3, k % 3);
+  for (int k = 0; k < 3; ++k) {
+    p.direction[k] = pair.direction[k];
+    p.center1[k] = pair.center1[k];
+  }
+  p.baseline = pair.baseline;
+  p.parallel_sine_sq = kParallelSine * kParallelSine;
+  return p;
+}
+
 }  // namespace
 
 bool is_triangulation_method(int method) {
@@ -220,6 +251,25 @@ void triangulate_point(tv_triangulation method, const TriangulationPair& pair, c
     return write_invalid(point);
   }
   triangulate_rays(method, pair, ray0, ray1, pixel0, pixel1, point);
+}
+
+void triangulate_points(tv_triangulation method, const TriangulationPair& pair,
+                        const double* pixels0, const double* pixels1, size_t num,
+                        tv_point* points) {
+  constexpr size_t kAtOnce = size_t{1} << 30;  // the kernel counts in 32 bits
+  const bool lanes = in_lanes(method, pair);
+  const tvk_table* kernels = tvk_select(TV_KERNELS_AUTO);
+  for (size_t first = 0; first < num && lanes; first += kAtOnce) {
+    const size_t some = num - first < kAtOnce ? num - first : kAtOnce;
+    const tvk_triangulate_pair p = kernel_pair(pair);
+    kernels->triangulate(&p, method, pixels0 + 2 * first, pixels1 + 2 * first,
+                         static_cast<int32_t>(some), points + first);
+  }
+  for (size_t i = 0; i < num; ++i) {
+    if (lanes && points[i].status >= 0) continue;
+    triangulate_point(method, pair, Vec2(pixels0[2 * i], pixels0[2 * i + 1]),
+                      Vec2(pixels1[2 * i], pixels1[2 * i + 1]), &points[i]);
+  }
 }
 
 void triangulate_point(tv_triangulation method, const Camera& camera0, const Camera& camera1,

@@ -47,6 +47,12 @@ bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, cons
 void triangulate_point(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
                        const Vec2& pixel1, tv_point* point);
 
+// Many matches at once, pixels num x 2: the same points but for rounding, in lanes where both lenses
+// are pinholes and the method has a closed form.
+void triangulate_points(tv_triangulation method, const TriangulationPair& pair,
+                        const double* pixels0, const double* pixels1, size_t num,
+                        tv_point* points);
+
 // The same for unit rays that the caller has already (ray i in camera i's frame, through pixel i).
 void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, const Vec3& ray0,
                       const Vec3& ray1, const Vec2& pixel0, const Vec2& pixel1, tv_point* point);

@@ -42,6 +42,16 @@ typedef struct tvk_nearest {
 #define TVK_SAMPSON_SUMS 56          /* numbers that sampson_sums adds up */
 #define TVK_TRANSFER_SUMS 47         /* of transfer_sums */
 
+struct tv_point;
+
+/* Two pinholes: x, y of camera 0, then of camera 1; x1 = R x0 + baseline direction, direction of
+   length 1, and camera 1's centre at baseline center1. */
+typedef struct tvk_triangulate_pair {
+  double focal[4], inverse_focal[4], principal[4];
+  double R[9], direction[3], center1[3], baseline;
+  double parallel_sine_sq; /* rays with a smaller sine, squared, between them are parallel */
+} tvk_triangulate_pair;
+
 /* fast_score_row: rows[0..6] are the image rows y-3..y+3. Writes for each x in [0, width) the largest
      threshold at which (x, y) is a corner with `arc` (9..12) contiguous brighter or darker circle
      pixels, where that is at least `threshold` (>= 1), else 0. 0 in the 3-pixel rim.
@@ -88,7 +98,10 @@ typedef struct tvk_nearest {
      TVK_WIDTH samples, of which the first num_samples are to be solved; the others are finite. Writes the
      essential matrices, row-major, Frobenius norm 1, that have no match before one camera and behind the
      other, of sample s to essentials + 9 TVK_RELPOSE_MODELS s
-     and their number to counts[s], 0 for a degenerate sample. What lies behind them is scratch. */
+     and their number to counts[s], 0 for a degenerate sample. What lies behind them is scratch.
+   triangulate: count matches of two pinholes (pixels: x and y each) by Midpoint, Linear-LS or
+     Iterative-LS (method, a tv_triangulation). status -1, and zeros, for a match that is none of
+     "ok" and "behind", or needs more care. */
 #define TVK_LIST(X)                                                                                \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
@@ -135,7 +148,10 @@ typedef struct tvk_nearest {
     (const float *const *arrays, int32_t first_block, int32_t num_blocks, int32_t on_plane,        \
      const float *m, float inverse_sq))                                                            \
   X(relpose_5pt, void,                                                                             \
-    (const double *rays, int32_t num_samples, double *essentials, int32_t *counts))
+    (const double *rays, int32_t num_samples, double *essentials, int32_t *counts))                \
+  X(triangulate, void,                                                                             \
+    (const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,                      \
+     const double *pixels1, int32_t count, struct tv_point *points))
 
 typedef struct tvk_table {
   int32_t set; /* a tv_kernels */

@@ -14,6 +14,7 @@
 #include "kernels/nearest.h"
 #include "kernels/relpose_5pt.h"
 #include "kernels/sampson.h"
+#include "kernels/triangulate.h"
 /* clang-format on */
 
 extern const tvk_table TVK_TABLE;

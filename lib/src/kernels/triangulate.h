@@ -1,0 +1,180 @@
+/* Points from two pinholes' pixels by the closed methods, TVK_LANES matches at a time: what
+   geometry/triangulation.cc does for one match of any lens, in coordinates of the image planes z = 1.
+   R. Hartley, P. Sturm, "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md. */
+
+#include "kernels/lanes.h"
+#include "twoview/triangulate.h"
+
+enum { TRIANGULATE_CHUNK = 32 }; /* matches whose numbers lie in arrays of their own */
+
+typedef struct triangulate_arrays {
+  double pixel[4][TRIANGULATE_CHUNK]; /* x0 y0 x1 y1, from the principal points */
+  double position[3][TRIANGULATE_CHUNK], angle[TRIANGULATE_CHUNK], error[TRIANGULATE_CHUNK];
+  double front[TRIANGULATE_CHUNK]; /* a tv_point_status, or -1 */
+} triangulate_arrays;
+
+/* x, y: of the rays (x, y, 1). */
+typedef struct ray_lanes {
+  lanes x, y;
+} ray_lanes;
+
+/* atan2(sine, cosine) for sine >= 0, to 1e-9: what goes into a float. */
+static inline lanes lanes_angle(lanes sine, lanes cosine) {
+  static const double c[6] = {0.9999999993921005,   -0.33333307493431985, 0.1999821079763211,
+                              -0.14239982919498284, 0.10572814479386781,  -0.06033241707997648};
+  const lanes size = lanes_abs(cosine);
+  const lane_mask steep = sine > size;
+  const lanes small = lanes_select(steep, size, sine), large = lanes_select(steep, sine, size);
+  const lane_mask turned = small > 0.41421356237309503 * large; /* beyond tan of 22.5 degrees */
+  const lanes t = lanes_select(turned, small - large, small) /
+                  lanes_select(turned, small + large, large);
+  const lanes s = t * t;
+  lanes angle = t * (((((c[5] * s + c[4]) * s + c[3]) * s + c[2]) * s + c[1]) * s + c[0]);
+  angle += lanes_keep(turned, lanes_of(0.78539816339744828));
+  angle = lanes_select(steep, 1.5707963267948966 - angle, angle);
+  return lanes_select(cosine < 0.0, 3.1415926535897931 - angle, angle);
+}
+
+/* Linear-LS and Iterative-LS: geometry/triangulation_linear.cc's equations for two image planes.
+   Clears the mask of lanes that do not settle. */
+static inline void least_squares_point(const tvk_triangulate_pair *p, const ray_lanes *ray0,
+                                       const ray_lanes *ray1, int iterative, lanes point[3],
+                                       lane_mask *settled) {
+  const double *R = p->R, *d = p->direction;
+  const double step0[2] = {p->inverse_focal[0] * p->inverse_focal[0],
+                           p->inverse_focal[1] * p->inverse_focal[1]};
+  const double step1[2] = {p->inverse_focal[2] * p->inverse_focal[2],
+                           p->inverse_focal[3] * p->inverse_focal[3]};
+  lanes A[2][2], m[2], b[2], cov[3], square0 = lanes_of(1), square1 = lanes_of(1);
+  lanes depth0 = {0}, depth1 = {0};
+  lane_mask active;
+  int row, i;
+  for (row = 0; row < 2; ++row) {
+    const lanes along = row ? ray1->y : ray1->x;
+    for (i = 0; i < 2; ++i) A[row][i] = along * R[6 + i] - R[3 * row + i];
+    m[row] = (A[row][0] * ray0->x + A[row][1] * ray0->y) + (along * R[8] - R[3 * row + 2]);
+    b[row] = along * d[2] - d[row];
+  }
+  cov[0] = A[0][0] * A[0][0] * step0[0] + A[0][1] * A[0][1] * step0[1];
+  cov[1] = A[0][0] * A[1][0] * step0[0] + A[0][1] * A[1][1] * step0[1];
+  cov[2] = A[1][0] * A[1][0] * step0[0] + A[1][1] * A[1][1] * step0[1];
+  active = square0 > 0.0;
+  for (i = 0; i <= 10; ++i) { /* Hartley and Sturm's bound */
+    const lanes xx = square0 * cov[0] + square1 * step1[0], xy = square0 * cov[1];
+    const lanes yy = square0 * cov[2] + square1 * step1[1];
+    const lanes m0 = yy * m[0] - xy * m[1], m1 = xx * m[1] - xy * m[0];
+    const lanes size = m0 * m[0] + m1 * m[1], det = xx * yy - xy * xy;
+    const lanes inverse = 1.0 / (size * det);
+    const lanes before0 = depth0, before1 = depth1;
+    const lanes depth = -(m0 * b[0] + m1 * b[1]) * (det * inverse);
+    const lanes e0 = m[0] * depth + b[0], e1 = m[1] * depth + b[1];
+    const lanes factor = -square0 * (size * inverse);
+    const lanes r0 = factor * (yy * e0 - xy * e1), r1 = factor * (xx * e1 - xy * e0);
+    const lanes x = depth * ray0->x + step0[0] * (A[0][0] * r0 + A[1][0] * r1);
+    const lanes y = depth * ray0->y + step0[1] * (A[0][1] * r0 + A[1][1] * r1);
+    point[0] = lanes_select(active, x, point[0]);
+    point[1] = lanes_select(active, y, point[1]);
+    point[2] = lanes_select(active, depth, point[2]);
+    if (!iterative) return;
+    depth0 = depth;
+    depth1 = (R[6] * x + R[7] * y) + (R[8] * depth + d[2]);
+    active &= ~((lanes_abs(depth0 - before0) <= 1e-10 * lanes_abs(depth0)) &
+                (lanes_abs(depth1 - before1) <= 1e-10 * lanes_abs(depth1)));
+    if (!lanes_any(active)) return;
+    square0 = depth0 * depth0;
+    square1 = depth1 * depth1;
+  }
+  *settled &= ~active;
+}
+
+/* The match's lanes first .. first + TVK_LANES - 1 of the arrays. */
+static inline void triangulate_block(const tvk_triangulate_pair *p, int method, int first,
+                                     triangulate_arrays *a) {
+  const double *R = p->R, *d = p->direction, *c = p->center1;
+  const lanes u0 = lanes_load(a->pixel[0] + first), v0 = lanes_load(a->pixel[1] + first);
+  const lanes u1 = lanes_load(a->pixel[2] + first), v1 = lanes_load(a->pixel[3] + first);
+  const ray_lanes r0 = {u0 * p->inverse_focal[0], v0 * p->inverse_focal[1]};
+  const ray_lanes r1 = {u1 * p->inverse_focal[2], v1 * p->inverse_focal[3]};
+  lanes f[3], n[3], point[3] = {{0}, {0}, {0}}, moved[3]; /* f: ray 1 in camera 0; n = ray 0 x f */
+  lanes n_sq, size_sq, cosine, along0, along1, inverse, error_sq, front;
+  lane_mask good;
+  int i;
+  for (i = 0; i < 3; ++i) f[i] = (R[i] * r1.x + R[3 + i] * r1.y) + R[6 + i];
+  n[0] = r0.y * f[2] - f[1];
+  n[1] = f[0] - r0.x * f[2];
+  n[2] = r0.x * f[1] - r0.y * f[0];
+  n_sq = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
+  size_sq = ((r0.x * r0.x + r0.y * r0.y) + 1.0) * ((f[0] * f[0] + f[1] * f[1]) + f[2] * f[2]);
+  cosine = (r0.x * f[0] + r0.y * f[1]) + f[2];
+  good = n_sq > p->parallel_sine_sq * size_sq;
+  along0 = ((c[1] * f[2] - c[2] * f[1]) * n[0] + (c[2] * f[0] - c[0] * f[2]) * n[1]) +
+           (c[0] * f[1] - c[1] * f[0]) * n[2];
+  along1 = ((c[1] - c[2] * r0.y) * n[0] + (c[2] * r0.x - c[0]) * n[1]) +
+           (c[0] * r0.y - c[1] * r0.x) * n[2];
+  if (method == TV_TRIANGULATION_MIDPOINT) {
+    const lanes half = 0.5 / n_sq;
+    const lanes t0 = along0 * half, t1 = along1 * half;
+    point[0] = (t0 * r0.x + t1 * f[0]) + 0.5 * c[0];
+    point[1] = (t0 * r0.y + t1 * f[1]) + 0.5 * c[1];
+    point[2] = (t0 + t1 * f[2]) + 0.5 * c[2];
+  } else {
+    least_squares_point(p, &r0, &r1, method == TV_TRIANGULATION_ITERATIVE_LS, point, &good);
+  }
+  for (i = 0; i < 3; ++i) {
+    moved[i] = ((R[3 * i] * point[0] + R[3 * i + 1] * point[1]) + R[3 * i + 2] * point[2]) + d[i];
+  }
+  /* Projected through the centre where it lies behind. */
+  inverse = 1.0 / (point[2] * moved[2]);
+  {
+    const lanes inverse0 = moved[2] * inverse, inverse1 = point[2] * inverse;
+    const lanes ex0 = p->focal[0] * (point[0] * inverse0) - u0;
+    const lanes ey0 = p->focal[1] * (point[1] * inverse0) - v0;
+    const lanes ex1 = p->focal[2] * (moved[0] * inverse1) - u1;
+    const lanes ey1 = p->focal[3] * (moved[1] * inverse1) - v1;
+    error_sq = 0.5 * ((ex0 * ex0 + ey0 * ey0) + (ex1 * ex1 + ey1 * ey1));
+  }
+  {
+    const lanes ahead0 = (r0.x * point[0] + r0.y * point[1]) + point[2];
+    const lanes ahead1 = (r1.x * moved[0] + r1.y * moved[1]) + moved[2];
+    const lane_mask in_front = (along0 > 0.0) & (along1 > 0.0) & (ahead0 > 0.0) & (ahead1 > 0.0);
+    /* Where the rays' and the axes' sides differ no pixel sees the point. */
+    good &= (ahead0 * point[2] > 0.0) & (ahead1 * moved[2] > 0.0) & (error_sq < 1e60);
+    front = lanes_select(in_front, lanes_of(TV_POINT_OK), lanes_of(TV_POINT_BEHIND));
+  }
+  for (i = 0; i < 3; ++i) {
+    point[i] *= p->baseline;
+    good &= lanes_abs(point[i]) < 1e300;
+  }
+  for (i = 0; i < 3; ++i) lanes_store(a->position[i] + first, lanes_keep(good, point[i]));
+  lanes_store(a->angle + first, lanes_keep(good, lanes_angle(lanes_sqrt(n_sq), cosine)));
+  lanes_store(a->error + first, lanes_keep(good, lanes_sqrt(error_sq)));
+  lanes_store(a->front + first, lanes_select(good, front, lanes_of(-1)));
+}
+
+static void triangulate(const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,
+                        const double *pixels1, int32_t count, tv_point *points) {
+  triangulate_arrays a;
+  int32_t done, k;
+  for (done = 0; done < count; done += TRIANGULATE_CHUNK) {
+    const int32_t some = count - done < TRIANGULATE_CHUNK ? count - done : TRIANGULATE_CHUNK;
+    for (k = 0; k < some; ++k) {
+      const double *p0 = pixels0 + 2 * (done + k), *p1 = pixels1 + 2 * (done + k);
+      a.pixel[0][k] = p0[0] - pair->principal[0];
+      a.pixel[1][k] = p0[1] - pair->principal[1];
+      a.pixel[2][k] = p1[0] - pair->principal[2];
+      a.pixel[3][k] = p1[1] - pair->principal[3];
+    }
+    for (; k % TVK_LANES; ++k) a.pixel[0][k] = a.pixel[1][k] = a.pixel[2][k] = a.pixel[3][k] = 0;
+    for (k = 0; k < some; k += TVK_LANES) triangulate_block(pair, method, k, &a);
+    for (k = 0; k < some; ++k) {
+      tv_point *point = points + done + k;
+      point->position[0] = a.position[0][k];
+      point->position[1] = a.position[1][k];
+      point->position[2] = a.position[2][k];
+      point->angle_rad = (float)a.angle[k];
+      point->error_px = (float)a.error[k];
+      point->status = (int32_t)a.front[k];
+      point->reserved = 0;
+    }
+  }
+}
