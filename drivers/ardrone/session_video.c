@@ -241,7 +241,6 @@ static void take_live(ardrone_session *session, const ardrone_pave_packet *packe
 
 static void step_live(ardrone_session *session) {
   size_t total = 0, size;
-  supervise_stream(session, &session->video);
   do {
     ardrone_pave_packet packet;
     size = receive_stream(session, &session->video);
@@ -255,13 +254,13 @@ static void step_live(ardrone_session *session) {
       take_live(session, &packet);
     }
   } while (size > 0 && total < MAX_BYTES_A_STEP);
+  supervise_stream(session, &session->video); /* after receiving: a caller's pause is no silence */
   session->counters.bytes_skipped = session->video.parser.bytes_skipped;
 }
 
 /* Every packet counts here: no gate, no latency rule. */
 static void step_recording(ardrone_session *session) {
   size_t total = 0, size;
-  supervise_stream(session, &session->recording);
   do {
     ardrone_pave_packet packet;
     size = receive_stream(session, &session->recording);
@@ -271,6 +270,7 @@ static void step_recording(ardrone_session *session) {
       session->options.on_recording(session->options.user, &packet, session->now_ns);
     }
   } while (size > 0 && total < MAX_BYTES_A_STEP);
+  supervise_stream(session, &session->recording);
 }
 
 void ardrone_video_step(ardrone_session *session) {

@@ -215,12 +215,11 @@ static void test_video_returns_after_a_cut_and_after_silence(void) {
     TEST_ASSERT_TRUE(wait_for_picture(2000) < 1000);
     run_ms(700 + 37 * k);
   }
-  for (k = 0; k < 5; ++k) {
-    drone.video_off = 1; /* half-open: the connection stands, nothing comes */
-    run_ms(1001 + STEP_MS);
-    drone.video_off = 0;
-    TEST_ASSERT_TRUE(wait_for_picture(2000) < 1000); /* silent 1 s, then back: within 2 s of its start */
-    run_ms(1000 + 41 * k);
+  for (k = 0; k < 20; ++k) {
+    drone.video_half_open = 1; /* the connection stands, and nothing comes through it any more */
+    run_ms(40);
+    TEST_ASSERT_TRUE(wait_for_picture(3000) < 2000 - 40);
+    run_ms(700 + 41 * k);
   }
   TEST_ASSERT_EQUAL_INT(0, own_decoder.num_refused);
 }
@@ -241,6 +240,28 @@ static void test_reading_too_slowly_drops_the_oldest_and_says_so(void) {
   frames.release(frames.user, &frame);
   ardrone_session_counters(session, &counters);
   TEST_ASSERT_TRUE(counters.frames_dropped >= 10);
+}
+
+/* Nobody steps for two seconds; the pictures that have piled up are worth nothing but for the last group. */
+static void test_the_latency_rule_drops_what_piled_up(void) {
+  ardrone_session_options options = default_options();
+  ardrone_counters counters;
+  tvs_frame frame;
+  options.skip_to_latest = 1;
+  start(&options);
+  run_ms(3000);
+  own_decoder.num_decoded = 0;
+  now += 2000 * MOCK_MS;
+  mock_advance(&drone, now);
+  step();
+  TEST_ASSERT_TRUE(own_decoder.num_decoded <= MOCK_GOP + 1);
+  ardrone_session_counters(session, &counters);
+  TEST_ASSERT_TRUE(counters.packets_skipped >= 40);
+  frame.struct_size = sizeof frame;
+  TEST_ASSERT_EQUAL_INT(TVS_OK, frames.next(frames.user, &frame));
+  TEST_ASSERT_TRUE(frame.flags & TVS_FRAME_GAP);
+  frames.release(frames.user, &frame);
+  TEST_ASSERT_EQUAL_INT(0, own_decoder.num_refused);
 }
 
 /* ---- the long run ---- */
@@ -379,6 +400,7 @@ int main(void) {
   RUN_TEST(test_a_session_without_steps_sends_nothing);
   RUN_TEST(test_video_returns_after_a_cut_and_after_silence);
   RUN_TEST(test_reading_too_slowly_drops_the_oldest_and_says_so);
+  RUN_TEST(test_the_latency_rule_drops_what_piled_up);
   RUN_TEST(test_ten_minutes_of_a_bad_link);
   RUN_TEST(test_unrelated_clocks_are_mapped_with_an_honest_sigma);
   RUN_TEST(test_bad_arguments);

@@ -36,7 +36,7 @@ typedef struct mock_drone {
   int64_t next_navdata_ns, next_frame_ns;
   mock_datagram queue[MOCK_DATAGRAMS];
 
-  int video_open, video_ended;
+  int video_open, video_ended, video_half_open; /* half-open: nothing comes through this connection */
   uint32_t frame_number;
   uint8_t stream[MOCK_STREAM];
   size_t stream_begin, stream_end;
@@ -125,7 +125,7 @@ static inline void mock_send_frame(mock_drone *d) {
   uint8_t payload[MOCK_PAYLOAD] = {0};
   size_t size;
   const uint32_t number = ++d->frame_number;
-  if (!d->video_open || d->video_ended) return;
+  if (!d->video_open || d->video_ended || d->video_half_open) return;
   memset(&h, 0, sizeof h);
   h.version = 2;
   h.codec = ARDRONE_PAVE_H264;
@@ -206,7 +206,7 @@ static inline tvs_status mock_open(void *user, ardrone_channel channel, int64_t 
   if (channel == ARDRONE_CHANNEL_VIDEO) {
     if (d->video_refused) return TVS_ERR_IO;
     d->video_open = 1;
-    d->video_ended = 0;
+    d->video_ended = d->video_half_open = 0;
     d->stream_begin = d->stream_end = 0;
   }
   if (channel == ARDRONE_CHANNEL_CONTROL) {
