@@ -29,8 +29,12 @@ void add_duration(CLI::App& verb, double& seconds) {
 }
 
 void add_drone(CLI::App& program, Run& run) {
-  CLI::App* drone = program.add_subcommand("drone", "an AR.Drone 2.0: simulate one");
+  CLI::App* drone = program.add_subcommand("drone", "talk to an AR.Drone 2.0, or be one");
   drone->require_subcommand(1);
+  add_drone_info(*drone, run);
+  add_drone_record(*drone, run);
+  add_drone_replay(*drone, run);
+  add_drone_fly(*drone, run);
   add_drone_simulate(*drone, run);
 }
 

@@ -19,6 +19,10 @@ void add_address(CLI::App& verb, DroneAddress& address, const std::string& host)
 // --duration: seconds until the verb ends by itself, 0 for no end.
 void add_duration(CLI::App& verb, double& seconds);
 
+void add_drone_info(CLI::App& drone, Run& run);
+void add_drone_record(CLI::App& drone, Run& run);
+void add_drone_replay(CLI::App& drone, Run& run);
+void add_drone_fly(CLI::App& drone, Run& run);
 void add_drone_simulate(CLI::App& drone, Run& run);
 
 }  // namespace cli

@@ -1,0 +1,43 @@
+#include "drone/keyboard.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+namespace cli {
+
+Keyboard::Keyboard() : is_terminal_(::isatty(STDIN_FILENO) != 0) {
+  if (!is_terminal_) return;
+  ::tcgetattr(STDIN_FILENO, &before_);
+  termios raw = before_;
+  raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C stays a signal
+  raw.c_cc[VMIN] = 0;
+  raw.c_cc[VTIME] = 0;
+  ::tcsetattr(STDIN_FILENO, TCSANOW, &raw);
+}
+
+Keyboard::~Keyboard() {
+  if (is_terminal_) ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+}
+
+std::optional<int> Keyboard::read_byte() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  if (has_ended_ || ::poll(&input, 1, 0) <= 0) return {};
+  unsigned char byte = 0;
+  const ssize_t count = ::read(STDIN_FILENO, &byte, 1);
+  if (count == 0) has_ended_ = true;
+  if (count != 1) return {};
+  return byte;
+}
+
+std::optional<int> Keyboard::next() {
+  const std::optional<int> first = read_byte();
+  if (first != 27) return first;
+  // Arrows are ESC [ A..D; a lonely ESC is itself.
+  const std::optional<int> second = read_byte();
+  if (second != '[') return 27;
+  const std::optional<int> third = read_byte();
+  if (third && *third >= 'A' && *third <= 'D') return kKeyUp + (*third - 'A');
+  return {};
+}
+
+}  // namespace cli

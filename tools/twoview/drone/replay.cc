@@ -1,0 +1,79 @@
+// twoview drone replay: a recording once more, through the same driver.
+
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+
+#include "drone/link.h"
+#include "drone/recording.h"
+#include "error.h"
+#include "output.h"
+
+namespace cli {
+namespace {
+
+struct Arguments {
+  std::string recording, frames;
+  double speed = 0;
+  bool json = false, quiet = false;
+};
+
+int replay(const Arguments& a) {
+  LinkListener listener;
+  int64_t first_ns = INT64_MAX, last_ns = 0;
+  listener.on_navdata = [&](const uint8_t*, size_t, const ardrone_navdata&, const tvs_imu& imu) {
+    first_ns = std::min(first_ns, imu.time.received_ns);
+    last_ns = std::max(last_ns, imu.time.received_ns);
+  };
+  listener.on_packet = [&](const ardrone_pave_packet&, const tvs_time& time, int) {
+    first_ns = std::min(first_ns, time.received_ns);
+    last_ns = std::max(last_ns, time.received_ns);
+  };
+  std::string failure;  // exceptions do not cross the driver's C
+  if (!a.frames.empty()) {
+    listener.on_frame = [&](const tvs_frame& frame) {
+      if (!failure.empty()) return;
+      try {
+        write_frame(a.frames, frame);
+      } catch (const std::exception& e) {
+        failure = e.what();
+      }
+    };
+    make_folder(a.frames);
+  }
+  const ardrone_counters counters = play(a.recording, listener, stop_flag_for_signals(), a.speed);
+  if (!failure.empty()) throw BadInput(failure);
+  const double seconds =
+      last_ns > first_ns ? static_cast<double>(last_ns - first_ns) * 1e-9 : 0.0;
+  const nlohmann::ordered_json summary = summary_json(counters, seconds);
+  if (a.json) print(summary.dump(2) + "\n");
+  if (!a.json && !a.quiet) {
+    char line[240];
+    std::snprintf(line, sizeof line,
+                  "recording    %.1f s: %llu navdata, %llu frames, %llu decoded, %llu gaps\n", seconds,
+                  static_cast<unsigned long long>(counters.navdata_received),
+                  static_cast<unsigned long long>(counters.packets),
+                  static_cast<unsigned long long>(counters.frames_decoded),
+                  static_cast<unsigned long long>(counters.gaps));
+    print(line);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_drone_replay(CLI::App& drone, Run& run) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* verb = drone.add_subcommand("replay", "play a recording through the driver again");
+  verb->add_option("DIR", a->recording, "folder of drone record")->required()->type_name("DIR");
+  verb->add_option("--frames", a->frames, "write the decoded pictures to this folder")
+      ->type_name("DIR");
+  verb->add_option("--speed", a->speed, "times as fast as it was; 0: as fast as it can")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->type_name("FACTOR")
+      ->capture_default_str();
+  verb->add_flag("--json", a->json, "print the summary alone, as JSON");
+  verb->add_flag("--quiet", a->quiet, "print nothing on stdout");
+  verb->final_callback([a, &run] { run = [a] { return replay(*a); }; });
+}
+
+}  // namespace cli
