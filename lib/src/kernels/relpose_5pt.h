@@ -103,16 +103,12 @@ static __attribute__((noinline)) void add_cubic_product(const lanes q[10], const
 }
 
 /* The ten cubic constraints, a row each. */
-static inline void cubic_constraints(const lanes basis[4][9], lanes rows[10][20]) {
+static __attribute__((noinline)) void cubic_constraints(const lanes e[9][4], lanes rows[10][20]) {
   static const int place[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-  lanes e[9][4]; /* E's entries as linear polynomials */
   lanes gram[6][10]; /* E E' - tr(E E') / 2: entries 00 01 02 11 12 22 */
   int i, j, k, m;
   memset(gram, 0, sizeof gram);
   memset(rows, 0, 10 * sizeof rows[0]);
-  for (i = 0; i < 9; ++i) {
-    for (k = 0; k < 4; ++k) e[i][k] = basis[k][i];
-  }
   for (i = 0; i < 3; ++i) {
     for (j = i; j < 3; ++j) {
       for (k = 0; k < 3; ++k) add_product(e[3 * i + k], e[3 * j + k], gram[place[i][j]]);
@@ -143,7 +139,7 @@ static inline void cubic_constraints(const lanes basis[4][9], lanes rows[10][20]
 
 /* Makes the left ten columns the identity, in the last six rows only: the first four are never used.
    Clears the mask of lanes where they are singular. */
-static inline void eliminate(lanes rows[10][20], lane_mask *ok) {
+static __attribute__((noinline)) void eliminate(lanes rows[10][20], lane_mask *ok) {
   lanes diagonal[10];
   int k, r, c;
   for (k = 0; k < 10; ++k) {
@@ -201,6 +197,16 @@ static inline void z_matrix_of(const lanes rows[10][20], z_matrix *b) {
   }
 }
 
+/* A function of its own, as are those above: their arrays are the most of the stack, and are gone when
+   the roots are looked for. */
+static __attribute__((noinline)) void reduce_constraints(const lanes e[9][4], z_matrix *b,
+                                                         lane_mask *ok) {
+  lanes rows[10][20];
+  cubic_constraints(e, rows);
+  eliminate(rows, ok);
+  z_matrix_of(rows, b);
+}
+
 static inline void determinant_of(const z_matrix *b, lanes polynomial[11]) {
   int k, p, q;
   memset(polynomial, 0, 11 * sizeof polynomial[0]);
@@ -227,7 +233,7 @@ typedef struct sturm_chain {
   lanes last; /* the sign of the chain's end */
 } sturm_chain;
 
-static inline void make_sturm_chain(const lanes p[11], sturm_chain *chain) {
+static __attribute__((noinline)) void make_sturm_chain(const lanes p[11], sturm_chain *chain) {
   lanes previous[11], current[11];
   const lanes one = lanes_of(1), sign = lanes_select(p[10] < 0.0, -one, one);
   const lanes inverse_lead = sign / (10.0 * p[10]);
@@ -491,40 +497,52 @@ static inline lane_mask same_side(const lanes f[10][3], const lanes E[9]) {
   return ~(some_positive & some_negative);
 }
 
-/* Lanes first .. first + TVK_LANES - 1 of the kernel. */
-static void solve_lanes(const double *rays, int first, double *essentials, int32_t *counts) {
-  lanes f[10][3], constraints[5][9], basis[4][9], rows[10][20], polynomial[11];
-  lane_mask ok = lanes_of(1) > 0.0;
-  z_matrix b;
-  sturm_chain chain;
-  root_brackets brackets;
-  int k, i, j, r, l;
+static inline void load_rays(const double *rays, int first, lanes f[10][3]) {
+  int k, i;
   for (k = 0; k < 10; ++k) {
     for (i = 0; i < 3; ++i) f[k][i] = lanes_load(rays + TVK_WIDTH * (3 * k + i) + first);
   }
+}
+
+/* E's entries as linear polynomials. */
+static __attribute__((noinline)) void null_space_of(const double *rays, int first, lanes e[9][4],
+                                                    lane_mask *ok) {
+  lanes f[10][3], constraints[5][9], basis[4][9];
+  int k, i, j;
+  load_rays(rays, first, f);
   for (k = 0; k < 5; ++k) {
     for (i = 0; i < 3; ++i) {
       for (j = 0; j < 3; ++j) constraints[k][3 * i + j] = f[2 * k + 1][i] * f[2 * k][j];
     }
   }
-  null_space_5x9(constraints, basis, &ok);
+  null_space_5x9(constraints, basis, ok);
   mix_basis(basis);
-  cubic_constraints(basis, rows);
-  eliminate(rows, &ok);
-  z_matrix_of(rows, &b);
-  determinant_of(&b, polynomial);
+  for (i = 0; i < 9; ++i) {
+    for (k = 0; k < 4; ++k) e[i][k] = basis[k][i];
+  }
+}
+
+/* The models of the polynomial's roots. */
+static __attribute__((noinline)) void write_models(const double *rays, int first, const lanes e[9][4],
+                                                   const z_matrix *b, lane_mask ok,
+                                                   double *essentials, int32_t *counts) {
+  lanes f[10][3], polynomial[11];
+  sturm_chain chain;
+  root_brackets brackets;
+  int i, r, l;
+  determinant_of(b, polynomial);
   ok &= (lanes_abs(polynomial[10]) > 1e-300) & (lanes_abs(polynomial[10]) < 1e300);
   make_sturm_chain(polynomial, &chain);
   find_brackets(&chain, ok, &brackets);
+  load_rays(rays, first, f);
   for (l = 0; l < TVK_LANES; ++l) counts[first + l] = 0;
   for (r = 0; r < brackets.most; ++r) {
     const lanes z = roots_in(polynomial, brackets.low[r], brackets.high[r]);
     lanes xy1[3], entries[9], sum = {0}, scale;
     lane_mask keep;
-    null_vector(&b, z, xy1);
+    null_vector(b, z, xy1);
     for (i = 0; i < 9; ++i) {
-      entries[i] = (xy1[0] * basis[0][i] + xy1[1] * basis[1][i]) +
-                   xy1[2] * (z * basis[2][i] + basis[3][i]);
+      entries[i] = (xy1[0] * e[i][0] + xy1[1] * e[i][1]) + xy1[2] * (z * e[i][2] + e[i][3]);
       sum += entries[i] * entries[i];
     }
     scale = 1.0 / lanes_sqrt(sum);
@@ -537,6 +555,16 @@ static void solve_lanes(const double *rays, int first, double *essentials, int32
       ++counts[first + l];
     }
   }
+}
+
+/* Lanes first .. first + TVK_LANES - 1 of the kernel. */
+static void solve_lanes(const double *rays, int first, double *essentials, int32_t *counts) {
+  lanes e[9][4];
+  lane_mask ok = lanes_of(1) > 0.0;
+  z_matrix b;
+  null_space_of(rays, first, e, &ok);
+  reduce_constraints((const lanes(*)[4])e, &b, &ok);
+  write_models(rays, first, (const lanes(*)[4])e, &b, ok, essentials, counts);
 }
 
 static void relpose_5pt(const double *rays, int32_t num_samples, double *essentials,
