@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """What the built library needs and gives: no heap, no printing, no libstdc++; libc and libm alone
 at run time; and nothing exported but tv_*.
+And what its objects hold: no static constructor, nothing that may be written to.
 usage: check_symbols.py --nm NM --readelf READELF SO ARCHIVE"""
 import argparse
 import re
@@ -20,6 +21,10 @@ ALLOWED = {
 # Weak references that every shared object has, from the compiler's start files.
 STARTUP = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable",
            "_ITM_registerTMCloneTable", "__deregister_frame_info", "__register_frame_info"}
+# Of the objects, not of the .so: there the compiler's start files and libgcc's cpu model have theirs.
+CONSTRUCTORS = re.compile(r"\.(init_array|fini_array|ctors|dtors)\b")
+WRITABLE = re.compile(r"\.(data|bss|tdata|tbss)\b(?!\.rel\.ro)")  # .data.rel.ro is made read-only at load
+SECTION = re.compile(r"^\s*\[\s*\d+\]\s+(\.\S+)\s+\S+\s+[0-9a-f]+\s+[0-9a-f]+\s+([0-9a-f]+)\s", re.M)
 NEEDED = re.compile(r"^(libc|libm|ld-linux[\w-]*)\.so\.\d+$")
 
 
@@ -31,6 +36,16 @@ def names(nm_output):
     """Symbol names of `nm --format=posix`, without version suffixes."""
     return {line.split()[0].split("@")[0] for line in nm_output.splitlines()
             if line.strip() and not line.endswith(":")}
+
+
+def sections_that_run_or_change(readelf, archive):
+    """Names of the constructors' and the writable sections that are not empty, of all members."""
+    text = run(readelf, "--section-headers", "--wide", archive)
+    sections = SECTION.findall(text)
+    if len(sections) < 100:
+        sys.exit(f"{archive}: {len(sections)} sections read: readelf's output is not understood")
+    return sorted({name for name, size in sections if int(size, 16) > 0 and
+                   (CONSTRUCTORS.match(name) or WRITABLE.match(name))})
 
 
 def main():
@@ -56,6 +71,9 @@ def main():
     wanted = names(run(*nm, "--undefined-only", args.archive))
     own = names(run(*nm, "--defined-only", "--extern-only", args.archive))
     found += [f"{args.archive} needs {name}" for name in sorted(wanted - own - ALLOWED)]
+
+    found += [f"{args.archive} has a section {name}"
+              for name in sections_that_run_or_change(args.readelf, args.archive)]
 
     for line in found:
         print(line)

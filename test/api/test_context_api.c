@@ -66,7 +66,11 @@ static void test_a_struct_of_another_size_is_refused(void) {
   tv_limits limits = small_limits();
   limits.struct_size = 0;
   check_size_status(TV_ERR_STRUCT_SIZE, &limits);
+  limits.struct_size = sizeof limits - 4; /* of a header before the last field */
+  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
   limits.struct_size = sizeof limits + 4;
+  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
+  limits.struct_size = UINT32_MAX;
   check_size_status(TV_ERR_STRUCT_SIZE, &limits);
 }
 
@@ -86,6 +90,34 @@ static void test_the_extreme_limits_have_a_size(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &large));
   TEST_ASSERT_TRUE(small < 65536);
   TEST_ASSERT_TRUE(large > (size_t)16384 * 16384);
+}
+
+static void test_a_vga_context_is_within_8_mib(void) {
+  tv_limits limits;
+  size_t size = 0;
+  tv_limits_init(&limits); /* 640 x 480, 2048 keypoints */
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size));
+  TEST_ASSERT_TRUE(size <= (size_t)8 << 20);
+}
+
+static void test_several_mistakes_at_once_write_nothing(void) {
+  tv_limits limits = small_limits();
+  size_t size = 77;
+  limits.struct_size = 0;
+  limits.max_width = -1;
+  TEST_ASSERT_TRUE(tv_context_size(&limits, &size) != TV_OK);
+  TEST_ASSERT_TRUE(tv_context_init(NULL, &limits, NULL, 0) != TV_OK);
+  TEST_ASSERT_EQUAL_UINT64(77, size);
+}
+
+static void test_memory_larger_than_needed_is_left_alone(void) {
+  const tv_limits limits = small_limits();
+  api_context a = api_make(&limits);
+  tv_context *context = NULL;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, a.memory, SIZE_MAX));
+  TEST_ASSERT_EQUAL_PTR(a.memory, context);
+  a.context = context;
+  api_release(&a); /* the guard behind the size that was asked for is whole */
 }
 
 static void test_the_size_never_falls_when_a_limit_rises(void) {
@@ -217,6 +249,9 @@ int main(void) {
   RUN_TEST(test_a_struct_of_another_size_is_refused);
   RUN_TEST(test_the_size_query_needs_somewhere_to_write);
   RUN_TEST(test_the_extreme_limits_have_a_size);
+  RUN_TEST(test_a_vga_context_is_within_8_mib);
+  RUN_TEST(test_several_mistakes_at_once_write_nothing);
+  RUN_TEST(test_memory_larger_than_needed_is_left_alone);
   RUN_TEST(test_the_size_never_falls_when_a_limit_rises);
   RUN_TEST(test_memory_that_is_null_misaligned_or_a_byte_short_is_refused);
   RUN_TEST(test_a_kernel_set_is_what_was_asked_for_or_refused);

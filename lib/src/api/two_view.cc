@@ -165,6 +165,8 @@ void pack_covariance(const Pose& pose, const Pose& inverse, const double covaria
   }
 }
 
+// Not inlined: what it needs of the stack is not to lie under the search.
+__attribute__((noinline))
 void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewModel& model,
           const TwoViewOutcome& outcome, bool swapped, tv_two_view* result) {
   tv_two_view packed{};
