@@ -5,8 +5,8 @@
 set(TWOVIEW_UNITY_DIR "" CACHE PATH "Folder with unity.c, unity.h and unity_internals.h")
 
 add_library(twoview_unity INTERFACE)
-# Defined as nothing, as the copy in cjson does itself.
-target_compile_definitions(twoview_unity INTERFACE UNITY_INCLUDE_DOUBLE=)
+# Defined as nothing, as the copy in cjson does itself. 64-bit numbers are off by default on a 32-bit CPU.
+target_compile_definitions(twoview_unity INTERFACE UNITY_INCLUDE_DOUBLE= UNITY_SUPPORT_64=)
 
 function(tv_build_unity folder)
   if(NOT EXISTS ${folder}/unity.c)
@@ -17,7 +17,7 @@ function(tv_build_unity folder)
   target_include_directories(twoview_unity_source SYSTEM PUBLIC ${folder})
   # setUp and tearDown of a test that defines none are empty.
   target_compile_definitions(twoview_unity_source PRIVATE
-    UNITY_INCLUDE_SETUP_STUBS= UNITY_INCLUDE_DOUBLE=)
+    UNITY_INCLUDE_SETUP_STUBS= UNITY_INCLUDE_DOUBLE= UNITY_SUPPORT_64=)
   target_link_libraries(twoview_unity INTERFACE twoview_unity_source)
 endfunction()
 

@@ -13,6 +13,7 @@ ALLOWED = {
     "memcpy", "memmove", "memset", "memcmp",  # the compiler writes these calls itself
     "sqrt", "sqrtf",  # exact by IEEE 754, so the same everywhere; the only libm functions
     "__cpu_model", "__cpu_features2", "__cpu_indicator_init",  # libgcc's, for the choice of kernels on x86
+    "getauxval",  # libc's, for the same on ARM: the CPU's features as the kernel hands them over
     "__stack_chk_fail", "__stack_chk_guard",  # where the compiler guards the stack by default
     "_GLOBAL_OFFSET_TABLE_",
     "__popcountdi2",  # libgcc's, linked into the program or the .so: integers only

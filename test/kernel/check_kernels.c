@@ -532,16 +532,21 @@ static const char *difference(const trial *expected, const trial *actual) {
   return NULL;
 }
 
+/* "neon", and "neon+" for the table above it with more instructions. */
+static const char *name_of(int32_t n) {
+  static char name[16];
+  const tvk_table *table = tvk_nth(n), *below = tvk_nth(n - 1);
+  snprintf(name, sizeof name, "%s%s", tv_kernels_string((tv_kernels)table->set),
+           below != NULL && below->set == table->set ? "+" : "");
+  return name;
+}
+
 static void check(const char *name, void (*run)(trial *)) {
-  const tvk_table *reference = tvk_select(TV_KERNELS_C);
-  int32_t set;
+  int32_t n;
   uint64_t seed;
-  for (set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
-    const tvk_table *table = tvk_select(set);
-    if (table == NULL) continue;
-    TEST_ASSERT_EQUAL_INT(set, table->set);
+  for (n = 0; tvk_nth(n) != NULL; ++n) {
     for (seed = 0; seed < ROUNDS; ++seed) {
-      trial expected = make_trial(reference, seed, 0, 1), actual = make_trial(table, seed, 0, 1);
+      trial expected = make_trial(tvk_nth(0), seed, 0, 1), actual = make_trial(tvk_nth(n), seed, 0, 1);
       const char *what;
       run(&expected);
       run(&actual);
@@ -550,7 +555,7 @@ static void check(const char *name, void (*run)(trial *)) {
       release(&actual);
       if (what != NULL) {
         char message[160];
-        snprintf(message, sizeof message, "%s of set %d, seed %d: %s", name, (int)set, (int)seed,
+        snprintf(message, sizeof message, "%s of set %s, seed %d: %s", name, name_of(n), (int)seed,
                  what);
         TEST_FAIL_MESSAGE(message);
       }
@@ -597,26 +602,50 @@ static double time_per_call(const tvk_table *set, void (*run)(trial *)) {
 }
 
 static void print_times(const char *name, void (*run)(trial *)) {
-  int32_t set;
+  int32_t n;
   printf("%-24s", name);
-  for (set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
-    if (tvk_select(set) != NULL) printf(" %10.1f", time_per_call(tvk_select(set), run));
-  }
+  for (n = 0; tvk_nth(n) != NULL; ++n) printf(" %10.1f", time_per_call(tvk_nth(n), run));
   printf("\n");
 }
 
 static int print_all_times(void) {
-  static const char *const names[] = {"c", "sse2", "avx2", "avx512", "neon"};
-  int32_t set;
+  int32_t n;
   printf("%-24s", "ns per call");
-  for (set = TV_KERNELS_C; set <= TV_KERNELS_NEON; ++set) {
-    if (tvk_select(set) != NULL) printf(" %10s", names[set - TV_KERNELS_C]);
-  }
+  for (n = 0; tvk_nth(n) != NULL; ++n) printf(" %10s", name_of(n));
   printf("\n");
 #define TIME(name, result, parameters) print_times(#name, case_##name);
   TVK_LIST(TIME)
 #undef TIME
   return 0;
+}
+
+/* The sets that this machine runs, from C upwards, and what tvk_select makes of each number. */
+static void test_the_sets_are_those_of_this_cpu(void) {
+  int32_t n, set;
+  const tvk_table *fastest = NULL;
+  TEST_ASSERT_EQUAL_INT(TV_KERNELS_C, tvk_nth(0)->set);
+  for (n = 0; tvk_nth(n) != NULL; ++n) {
+    fastest = tvk_nth(n);
+    TEST_ASSERT_TRUE(n == 0 || fastest->set >= tvk_nth(n - 1)->set);
+    TEST_ASSERT_EQUAL_INT(fastest->set, tvk_select(fastest->set)->set);
+    printf("kernel set: %s\n", name_of(n));
+  }
+  TEST_ASSERT_NULL(tvk_nth(-1));
+  TEST_ASSERT_NULL(tvk_nth(n + 1));
+  TEST_ASSERT_EQUAL_PTR(fastest, tvk_select(TV_KERNELS_AUTO));
+  for (set = -1; set <= TV_KERNELS_NEON + 1; ++set) {
+    const tvk_table *table = tvk_select(set);
+    TEST_ASSERT_TRUE(table == NULL || set == TV_KERNELS_AUTO || table->set == set);
+  }
+#if defined(__x86_64__)
+  TEST_ASSERT_NOT_NULL(tvk_select(TV_KERNELS_SSE2));
+  TEST_ASSERT_NULL(tvk_select(TV_KERNELS_NEON));
+#elif defined(__aarch64__)
+  TEST_ASSERT_NOT_NULL(tvk_select(TV_KERNELS_NEON));
+#endif
+#if !defined(__x86_64__)
+  TEST_ASSERT_NULL(tvk_select(TV_KERNELS_SSE2));
+#endif
 }
 
 void setUp(void) {}
@@ -625,6 +654,7 @@ void tearDown(void) {}
 int main(int argc, char **argv) {
   if (argc == 2 && strcmp(argv[1], "--time") == 0) return print_all_times();
   UNITY_BEGIN();
+  RUN_TEST(test_the_sets_are_those_of_this_cpu);
 #define RUN(name, result, parameters) RUN_TEST(test_##name##_equals_the_c_set);
   TVK_LIST(RUN)
 #undef RUN

@@ -160,8 +160,11 @@ typedef struct tvk_table {
 #undef TVK_MEMBER
 } tvk_table;
 
-/* The set of a tv_kernels number that this CPU can run, the fastest for 0 (auto); null if this CPU or
-   this build lacks it. */
+/* All tables that this CPU and this build have, n = 0, 1, .. from the C set's to the fastest, then null.
+   The NEON set has two where the CPU has ARMv8.2's dot product: without it and with it. */
+const tvk_table *tvk_nth(int32_t n);
+
+/* The fastest of them of a tv_kernels number, of all for 0 (auto); null if there is none. */
 const tvk_table *tvk_select(int32_t set);
 
 #ifdef __cplusplus

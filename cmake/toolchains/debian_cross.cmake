@@ -1,0 +1,18 @@
+# What Debian's cross compilers share; `tv_triplet` names one.
+if(NOT CMAKE_C_COMPILER)
+  set(CMAKE_C_COMPILER ${tv_triplet}-gcc)
+endif()
+if(NOT CMAKE_CXX_COMPILER)
+  set(CMAKE_CXX_COMPILER ${tv_triplet}-g++)
+endif()
+# gcc is made for one target, clang has to be told.
+set(CMAKE_C_COMPILER_TARGET ${tv_triplet})
+set(CMAKE_CXX_COMPILER_TARGET ${tv_triplet})
+
+# No library of the host is taken for one of the target's; Eigen is headers only, the host's serve.
+set(CMAKE_FIND_ROOT_PATH /usr/${tv_triplet})
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
+set(Eigen3_DIR /usr/share/eigen3/cmake CACHE PATH "Eigen's CMake files")

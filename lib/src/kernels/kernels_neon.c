@@ -1,0 +1,19 @@
+/* The same source compiled for NEON, and by hand what pays. On 32-bit ARM, NEON flushes denormals and
+   has no IEEE division: integers there, and the compilers leave the rest to scalar VFP. */
+#define TVK_SET TV_KERNELS_NEON
+#define TVK_TABLE tvk_table_neon
+#define TVK_NEON
+#include "kernels/kernels_impl.h"
+
+#if defined(__aarch64__)
+/* The same with what gains by the dot product of ARMv8.2. */
+#include "kernels/neon_dot.h"
+#define squared_distances tvk_squared_distances_neon_dot
+extern const tvk_table tvk_table_neon_dot;
+const tvk_table tvk_table_neon_dot = {
+    TV_KERNELS_NEON,
+#define TVK_ENTRY(name, result, parameters) name,
+    TVK_LIST(TVK_ENTRY)
+#undef TVK_ENTRY
+};
+#endif
