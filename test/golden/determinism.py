@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+"""Every CPU, the same bits: builds the digest program (digest.c) for x86-64, aarch64 and armv7 with gcc
+and clang at -O0 and -O2, runs each build with every kernel set on real pairs, ARM under qemu-user, and
+compares all digests. Exit status 0 if they are equal, 1 on any difference, 2 where a build or a run
+fails.
+
+A digest covers keypoints, descriptors, matches, poses with covariance and evidence, E F H, verdicts,
+points of all seven triangulations with angles and errors, their covariances, guided matching, bundle
+adjustment, cameras. No number is stored: builds are compared with each other."""
+import argparse
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+LONGER_SIDE = 320  # pixels: an -O0 build under qemu takes its time
+# (architecture, what runs its programs, what this run's "neon" is). A Cortex-A72 has no dot product.
+RUNNERS = {
+    "x86-64": [([], "")],
+    "aarch64": [(["qemu-aarch64", "-cpu", "cortex-a72", "-L", "/usr/aarch64-linux-gnu"], ""),
+                (["qemu-aarch64", "-cpu", "max", "-L", "/usr/aarch64-linux-gnu"], "+dot")],
+    "armv7": [(["qemu-arm", "-cpu", "cortex-a8", "-L", "/usr/arm-linux-gnueabihf"], "")],
+}
+SETS = {"x86-64": {"c", "sse2"}, "aarch64": {"c", "neon", "neon+dot"}, "armv7": {"c", "neon"}}
+BUILDS = [(architecture, compiler, level) for level in ("O2", "O0")
+          for compiler in ("gcc", "clang") for architecture in RUNNERS]
+# One of each architecture, each compiler and each level: what the test suite has time for.
+QUICK = [("x86-64", "gcc", "O2"), ("x86-64", "clang", "O0"), ("aarch64", "gcc", "O2"),
+         ("armv7", "gcc", "O2")]
+
+
+class Failure(Exception):
+    """A build or a run that did not come to its end."""
+
+
+def run(*command):
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise Failure(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def write_pairs(folder, data):
+    """The pairs as digest.c reads them: luma, decoded and scaled down once, here."""
+    import cv2
+
+    motorcycle = ROOT / ".cache/motorcycle"
+    pairs = [("motorcycle", [motorcycle / f"motorcycle_{side}.png" for side in ("left", "right")],
+              [[994.978, 994.978, 311.193, 254.877], [994.978, 994.978, 342.279, 254.877]],
+              [[0.0] * 5] * 2)]
+    for name in ("euroc_v101_start", "tum_fr3_office"):
+        if data and (data / name / "pairs.txt").exists():
+            pairs.append(read_set(data / name))
+    for name, images, cameras, distortion in pairs:
+        luma = [cv2.imread(str(image), cv2.IMREAD_GRAYSCALE) for image in images]
+        height, width = luma[0].shape
+        scale = LONGER_SIDE / max(height, width)
+        size = (round(width * scale), round(height * scale))
+        with open(folder / name, "wb") as file:
+            file.write(b"%d %d\n" % size)
+            for (fx, fy, cx, cy), k in zip(cameras, distortion):
+                scaled = [scale * fx, scale * fy, scale * (cx + 0.5) - 0.5, scale * (cy + 0.5) - 0.5]
+                file.write(" ".join(map(repr, scaled + k)).encode() + b"\n")
+            for image in luma:
+                file.write(cv2.resize(image, size, interpolation=cv2.INTER_AREA).tobytes())
+    return [folder / name for name, *_ in pairs]
+
+
+def read_set(folder):
+    """The first pair of a data set."""
+    import yaml
+
+    words = next(line for line in (folder / "pairs.txt").read_text().splitlines()
+                 if line.strip() and not line.startswith("#")).split()
+    known = yaml.safe_load((folder / "cameras.yaml").read_text())
+    entries = [next((known[key] for key in known if name.startswith(key)), next(iter(known.values())))
+               for name in words[:2]]
+    return (folder.name, [folder / "images" / name for name in words[:2]],
+            [[entry[key] for key in ("fx", "fy", "cx", "cy")] for entry in entries],
+            [[float(entry[key]) for key in ("k1", "k2", "p1", "p2", "k3")] for entry in entries])
+
+
+def build(folder, architecture, compiler, level):
+    """The digest program of this architecture, compiler and level."""
+    there = folder / f"{architecture}-{compiler}-{level}"
+    options = [f"-DCMAKE_BUILD_TYPE={'Release' if level == 'O2' else 'Debug'}",
+               "-DCMAKE_C_FLAGS_DEBUG=-O0", "-DCMAKE_CXX_FLAGS_DEBUG=-O0",
+               "-DTWOVIEW_TOOLS=OFF", "-DBUILD_TESTING=ON"]
+    if architecture != "x86-64":
+        options.append(f"--toolchain={ROOT}/cmake/toolchains/{architecture}.cmake")
+    if compiler == "clang":
+        options += ["-DCMAKE_C_COMPILER=clang", "-DCMAKE_CXX_COMPILER=clang++"]
+    elif architecture == "x86-64":
+        options += ["-DCMAKE_C_COMPILER=gcc", "-DCMAKE_CXX_COMPILER=g++"]
+    if not (there / "build.ninja").exists():
+        run("cmake", "-S", ROOT, "-B", there, "-G", "Ninja", *options)
+    run("cmake", "--build", there, "--target", "golden_digest", "-j", "1", "--", "--quiet")
+    return there / "test/bin/golden_digest"
+
+
+def digests(program, architecture, pairs):
+    """{kernel set: [(pair and part, digest)]} of one build."""
+    found = {}
+    for command, suffix in RUNNERS[architecture]:
+        for line in run(*command, program, *pairs).splitlines():
+            pair, kernels, part, digest = line.split()
+            if suffix and kernels == "c":
+                continue  # the first runner's
+            found.setdefault(kernels + (suffix if kernels == "neon" else ""), []).append(
+                (f"{pair}/{part}", digest))
+    missing = SETS[architecture] - set(found)
+    if missing:
+        raise Failure(f"{program} does not run the sets {', '.join(sorted(missing))}")
+    return found
+
+
+def summary(lines):
+    """One number out of the digests of all pairs and parts."""
+    total = 14695981039346656037
+    for _, digest in lines:
+        for byte in bytes.fromhex(digest):
+            total = (total ^ byte) * 1099511628211 % 2**64
+    return f"{total:016x}"
+
+
+def compare(expected, actual):
+    """The pairs' parts that differ."""
+    parts, other = dict(expected), dict(actual)
+    return [part for part in {**parts, **other} if parts.get(part) != other.get(part)]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="four builds instead of twelve")
+    parser.add_argument("--build-dir", type=Path, default=ROOT / "build/determinism")
+    parser.add_argument("--data", type=Path, default=os.environ.get("TWOVIEW_DATA"),
+                        help="folder of data sets; default TWOVIEW_DATA, else ../shared/data")
+    parser.add_argument("--jobs", type=int,
+                        default=int(os.environ.get("TWOVIEW_JOBS", os.cpu_count() or 1)))
+    args = parser.parse_args()
+    data = args.data or ROOT.parent / "shared/data"
+    args.build_dir.mkdir(parents=True, exist_ok=True)
+    pair_folder = args.build_dir / "pairs"
+    pair_folder.mkdir(exist_ok=True)
+    pairs = write_pairs(pair_folder, data)
+    wanted = QUICK if args.quick else BUILDS
+
+    def job(one):
+        return digests(build(args.build_dir, *one), one[0], pairs)
+
+    print(f"{'architecture':<13}{'compiler':<9}{'level':<6}{'kernels':<9} digest of "
+          f"{', '.join(p.name for p in pairs)}", flush=True)
+    first, differences = None, 0
+    with ThreadPoolExecutor(args.jobs) as pool:
+        for (architecture, compiler, level), sets in zip(wanted, pool.map(job, wanted)):
+            for kernels, lines in sets.items():
+                first = first or lines
+                parts = compare(first, lines)
+                differences += bool(parts)
+                print(f"{architecture:<13}{compiler:<9}-{level:<5}{kernels:<9} {summary(lines)}"
+                      + (f"  DIFFERS in {len(parts)}: {' '.join(parts)}" if parts else ""),
+                      flush=True)
+    print(f"{differences} differ" if differences else "all equal")
+    return 1 if differences else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except Failure as failure:
+        print(f"determinism: {failure}", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,480 @@
+/* A digest of every output of the library over pairs of images, for scripts/determinism: two builds
+   that agree in these lines gave the same bits.
+
+   digest PAIR...   for each pair and each kernel set of this CPU: `pair set part digest`, a part
+                    being the outputs of a few calls
+   PAIR is what determinism.py writes: a line of text, `width height`, a line of numbers for each camera
+   (fx fy cx cy k1 k2 p1 p2 k3), and the bytes of both images.
+
+   Values are digested field by field (padding is nobody's), floating point as its bits. */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "twoview/alloc.h"
+#include "twoview/twoview.h"
+
+enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
+
+typedef struct pair {
+  const char *name;
+  tv_camera camera[2];
+  tv_image image[2];
+} pair;
+
+static void fail(const char *what, tv_status status) {
+  fprintf(stderr, "digest: %s: %s\n", what, tv_status_string(status));
+  exit(2);
+}
+
+static void must(const char *what, tv_status status) {
+  if (status != TV_OK) fail(what, status);
+}
+
+/* FNV-1a, 64 bits. */
+static uint64_t digest;
+
+static void start(void) { digest = 14695981039346656037u; }
+
+static void add_bytes(const void *bytes, size_t count) {
+  const uint8_t *b = (const uint8_t *)bytes;
+  size_t k;
+  for (k = 0; k < count; ++k) digest = (digest ^ b[k]) * 1099511628211u;
+}
+
+static void add_int(int64_t value) { add_bytes(&value, sizeof value); }
+static void add_float(float value) { add_bytes(&value, sizeof value); }
+static void add_doubles(const double *values, size_t count) {
+  add_bytes(values, count * sizeof values[0]);
+}
+static void add_double(double value) { add_doubles(&value, 1); }
+
+static void print(const pair *p, tv_context *context, const char *part) {
+  printf("%s %s %s %016llx\n", p->name, tv_kernels_string(tv_context_kernels(context)), part,
+         (unsigned long long)digest);
+}
+
+static void add_keypoints(const tv_keypoint *keypoints, const uint8_t *descriptors, int32_t count) {
+  int32_t k;
+  add_int(count);
+  for (k = 0; k < count; ++k) {
+    add_float(keypoints[k].x);
+    add_float(keypoints[k].y);
+    add_float(keypoints[k].size);
+    add_float(keypoints[k].angle_rad);
+    add_float(keypoints[k].score);
+    add_int(keypoints[k].level);
+  }
+  if (descriptors) add_bytes(descriptors, (size_t)count * TV_DESCRIPTOR_BYTES);
+}
+
+static void add_matches(const tv_correspondence *matches, int32_t count) {
+  int32_t k;
+  add_int(count);
+  for (k = 0; k < count; ++k) {
+    add_int(matches[k].idx0);
+    add_int(matches[k].idx1);
+    add_int(matches[k].dist_sq);
+    add_float(matches[k].ratio);
+  }
+}
+
+static void add_two_view(const tv_two_view *r) {
+  add_int(r->config);
+  add_int(r->verdict);
+  add_int(r->reasons);
+  add_int(r->num_matches);
+  add_int(r->num_inliers);
+  add_bytes(&r->has_R, 8); /* the eight flags */
+  add_int(r->num_iterations);
+  add_doubles(r->R, 9);
+  add_doubles(r->t, 3);
+  add_doubles(r->E, 9);
+  add_doubles(r->F, 9);
+  add_doubles(r->H, 9);
+  add_doubles(r->alternative_R, 9);
+  add_doubles(r->alternative_t, 3);
+  add_doubles(r->covariance, 25);
+  add_doubles(r->alternative_covariance, 25);
+  add_int(r->essential_inliers);
+  add_int(r->fundamental_inliers);
+  add_int(r->homography_inliers);
+  add_int(r->rotation_inliers);
+  add_double(r->coverage);
+  add_double(r->median_parallax_rad);
+  add_double(r->rms_error_px);
+  add_double(r->noise_px);
+  add_int((int64_t)r->seed);
+}
+
+static void add_points(const tv_point *points, int32_t count) {
+  int32_t k;
+  for (k = 0; k < count; ++k) {
+    add_doubles(points[k].position, 3);
+    add_float(points[k].angle_rad);
+    add_float(points[k].error_px);
+    add_int(points[k].status);
+  }
+}
+
+static void add_bundle(const tv_bundle_result *r) {
+  add_int(r->num_points);
+  add_int(r->num_iterations);
+  add_int(r->converged);
+  add_int(r->has_covariance);
+  add_double(r->initial_cost);
+  add_double(r->final_cost);
+  add_double(r->initial_rms_px);
+  add_double(r->rms_px);
+  add_doubles(r->covariance, 25);
+  add_double(r->noise_px);
+}
+
+static void add_camera(const tv_camera *camera) {
+  double pixels[64][2], rays[64][3];
+  uint8_t inside[64];
+  tv_camera scaled;
+  double angle;
+  int k;
+  for (k = 0; k < 64; ++k) { /* from beyond one corner to beyond the other */
+    pixels[k][0] = camera->width * (0.16 * (k % 8) - 0.05);
+    pixels[k][1] = camera->height * (0.16 * (k / 8) - 0.05);
+  }
+  must("valid_angle", tv_camera_valid_angle(camera, &angle));
+  add_double(angle);
+  must("unproject_points",
+       tv_camera_unproject_points(camera, pixels[0], 64, rays[0], inside));
+  add_doubles(rays[0], sizeof rays / sizeof(double));
+  add_bytes(inside, sizeof inside);
+  for (k = 0; k < 64; ++k) {
+    double back[2] = {0, 0}, flat[2] = {0, 0}, jacobian[6] = {0};
+    add_int(tv_camera_project(camera, rays[k], back, jacobian));
+    add_doubles(back, 2);
+    add_doubles(jacobian, 6);
+    add_int(tv_camera_unproject(camera, pixels[k], rays[k], jacobian));
+    add_doubles(jacobian, 6);
+    add_int(tv_camera_undistort(camera, pixels[k], flat));
+    add_doubles(flat, 2);
+  }
+  must("project_points", tv_camera_project_points(camera, rays[0], 64, pixels[0], inside));
+  add_doubles(pixels[0], sizeof pixels / sizeof(double));
+  add_bytes(inside, sizeof inside);
+  must("scale", tv_camera_scale(camera, 0.37, &scaled));
+  add_int(scaled.width);
+  add_int(scaled.height);
+  add_doubles(&scaled.fx, 4);
+}
+
+/* The pair's own cameras, and both models of distortion with strong lenses. */
+static void digest_cameras(const pair *p, tv_context *context) {
+  static const double brown[8] = {-0.32, 0.12, 0.001, -0.0007, 0.01, 0.02, -0.01, 0.001};
+  static const double fisheye[8] = {-0.02, 0.01, -0.004, 0.0006, 0, 0, 0, 0};
+  tv_camera lens = p->camera[0];
+  start();
+  add_camera(&p->camera[0]);
+  add_camera(&p->camera[1]);
+  lens.model = TV_CAMERA_BROWN_CONRADY;
+  memcpy(lens.k, brown, sizeof lens.k);
+  add_camera(&lens);
+  lens.model = TV_CAMERA_KANNALA_BRANDT;
+  memcpy(lens.k, fisheye, sizeof lens.k);
+  add_camera(&lens);
+  print(p, context, "camera");
+}
+
+typedef struct features {
+  tv_keypoint keypoints[2][MAX_KEYPOINTS];
+  uint8_t descriptors[2][MAX_KEYPOINTS * TV_DESCRIPTOR_BYTES];
+  int32_t count[2];
+} features;
+
+static void extract(const pair *p, tv_context *context, const tv_feature_options *options,
+                    features *f) {
+  int v;
+  for (v = 0; v < 2; ++v) {
+    must("extract", tv_extract(context, &p->image[v], NULL, options, f->keypoints[v],
+                               f->descriptors[v], MAX_KEYPOINTS, &f->count[v]));
+    add_keypoints(f->keypoints[v], f->descriptors[v], f->count[v]);
+  }
+}
+
+/* Every option of a feature is met with two values at least. Ends with the defaults' in `f`. */
+static void digest_features(const pair *p, tv_context *context, features *f) {
+  tv_feature_options options;
+  tv_feature_options_init(&options);
+  options.max_keypoints = MAX_KEYPOINTS;
+  start();
+  for (options.arc = 10; options.arc <= 12; ++options.arc) {
+    options.levels = options.arc - 8;
+    options.scale_factor = options.arc == 11 ? 1.37f : 2.0f;
+    options.cell_px = options.arc == 12 ? 40 : 0;
+    options.threshold = 2 * options.arc;
+    options.min_threshold = options.arc == 10 ? 0 : 3;
+    options.subpixel = options.arc != 11;
+    options.orientation = options.arc == 12 ? TV_ORIENTATION_UPRIGHT : TV_ORIENTATION_GRADIENT;
+    options.descriptor = options.arc == 12 ? TV_DESCRIPTOR_ROOTSIFT : TV_DESCRIPTOR_SIFT;
+    options.keypoint_size = (float)options.arc - 6.5f;
+    extract(p, context, &options, f);
+  }
+  print(p, context, "features_options");
+  tv_feature_options_init(&options);
+  options.max_keypoints = MAX_KEYPOINTS;
+  start();
+  extract(p, context, &options, f);
+  print(p, context, "features");
+}
+
+typedef struct matched {
+  tv_correspondence matches[MAX_KEYPOINTS];
+  double pixels[2][2 * MAX_KEYPOINTS];
+  float ratios[MAX_KEYPOINTS];
+  int32_t count;
+} matched;
+
+static void digest_matches(const pair *p, tv_context *context, const features *f, matched *m) {
+  int32_t k, v;
+  start();
+  must("match", tv_match(context, f->descriptors[0], f->count[0], f->descriptors[1], f->count[1],
+                         NULL, m->matches, MAX_KEYPOINTS, &m->count));
+  add_matches(m->matches, m->count);
+  print(p, context, "matches");
+  for (k = 0; k < m->count; ++k) {
+    const int32_t index[2] = {m->matches[k].idx0, m->matches[k].idx1};
+    for (v = 0; v < 2; ++v) {
+      m->pixels[v][2 * k] = f->keypoints[v][index[v]].x;
+      m->pixels[v][2 * k + 1] = f->keypoints[v][index[v]].y;
+    }
+    m->ratios[k] = m->matches[k].ratio;
+  }
+}
+
+static void estimate(const pair *p, tv_context *context, const matched *m, int calibrated,
+                     const tv_estimate_options *options, tv_two_view *result) {
+  uint8_t inliers[MAX_KEYPOINTS];
+  tv_two_view_init(result);
+  must("estimate_two_view",
+       tv_estimate_two_view(context, calibrated ? &p->camera[0] : NULL,
+                            calibrated ? &p->camera[1] : NULL, m->pixels[0], m->pixels[1],
+                            m->ratios, m->count, options, result, inliers));
+  add_two_view(result);
+  add_bytes(inliers, (size_t)m->count);
+}
+
+static void digest_estimates(const pair *p, tv_context *context, const matched *m,
+                             tv_two_view *pose) {
+  static const char *const names[] = {"five_point", "eight_point", "seven_point", "upright"};
+  tv_estimate_options options;
+  tv_two_view with_gravity;
+  int32_t method;
+  for (method = TV_METHOD_UPRIGHT; method >= 0; --method) { /* the five-point pose is the last */
+    tv_estimate_options_init(&options);
+    options.method = method;
+    options.max_iterations = 2000;
+    if (method == TV_METHOD_UPRIGHT) {
+      options.gravity0[1] = options.gravity1[1] = 1;
+      options.gravity_sigma_rad = 0.02;
+    }
+    start();
+    if (method == TV_METHOD_EIGHT_POINT || method == TV_METHOD_SEVEN_POINT) {
+      estimate(p, context, m, 0, &options, pose);
+    }
+    estimate(p, context, m, 1, &options, pose);
+    print(p, context, names[method]);
+  }
+  tv_estimate_options_init(&options);
+  options.fixed_iterations = 40;
+  options.gravity0[1] = options.gravity1[1] = 1; /* a prior, and a wrong one at that */
+  options.gravity0[0] = 0.1;
+  options.gravity_sigma_rad = 0.05;
+  start();
+  estimate(p, context, m, 1, &options, &with_gravity);
+  print(p, context, "gravity");
+}
+
+static void digest_guided(const pair *p, tv_context *context, const features *f,
+                          const tv_two_view *pose) {
+  static tv_correspondence found[MAX_KEYPOINTS];
+  int32_t count;
+  start();
+  must("match_guided",
+       tv_match_guided(context, &p->camera[0], &p->camera[1], pose->E, f->keypoints[0],
+                       f->descriptors[0], f->count[0], f->keypoints[1], f->descriptors[1],
+                       f->count[1], NULL, found, MAX_KEYPOINTS, &count));
+  add_matches(found, count);
+  must("match_guided",
+       tv_match_guided(context, NULL, NULL, pose->F, f->keypoints[0], f->descriptors[0],
+                       f->count[0], f->keypoints[1], f->descriptors[1], f->count[1], NULL, found,
+                       MAX_KEYPOINTS, &count));
+  add_matches(found, count);
+  print(p, context, "guided");
+}
+
+static void digest_points(const pair *p, tv_context *context, const matched *m,
+                          const tv_two_view *pose, tv_point *points) {
+  static const char *const names[NUM_METHODS] = {
+      "poly",       "poly_abs", "linear_eigen", "linear_ls", "iterative_eigen", "iterative_ls",
+      "midpoint"};
+  static double corrected[2][2 * MAX_KEYPOINTS], covariances[9 * MAX_KEYPOINTS];
+  uint8_t valid[MAX_KEYPOINTS];
+  int32_t method;
+  for (method = 0; method < NUM_METHODS; ++method) {
+    start();
+    must("triangulate", tv_triangulate((tv_triangulation)method, &p->camera[0], &p->camera[1],
+                                       pose->R, pose->t, m->pixels[0], m->pixels[1], m->count,
+                                       points));
+    add_points(points, m->count);
+    if (method <= TV_TRIANGULATION_POLY_ABS) {
+      must("correct_matches",
+           tv_correct_matches((tv_triangulation)method, &p->camera[0], &p->camera[1], pose->R,
+                              pose->t, m->pixels[0], m->pixels[1], m->count, corrected[0],
+                              corrected[1], valid));
+      add_doubles(corrected[0], 2 * (size_t)m->count);
+      add_doubles(corrected[1], 2 * (size_t)m->count);
+      add_bytes(valid, (size_t)m->count);
+    }
+    print(p, context, names[method]);
+  }
+  start();
+  must("point_covariances",
+       tv_point_covariances(&p->camera[0], &p->camera[1], pose->R, pose->t,
+                            pose->has_covariance ? pose->covariance : NULL, 0.5, points, m->count,
+                            covariances));
+  add_doubles(covariances, 9 * (size_t)m->count);
+  print(p, context, "point_covariances");
+}
+
+static void digest_bundle(const pair *p, tv_context *context, const matched *m,
+                          const tv_two_view *pose, const tv_point *points) {
+  static tv_point adjusted[MAX_KEYPOINTS];
+  tv_bundle_options options;
+  tv_bundle_result result;
+  double R[9], t[3];
+  start();
+  tv_bundle_options_init(&options);
+  options.max_iterations = 12;
+  for (options.loss = TV_LOSS_NONE; options.loss <= TV_LOSS_CAUCHY; ++options.loss) {
+    memcpy(R, pose->R, sizeof R);
+    memcpy(t, pose->t, sizeof t);
+    memcpy(adjusted, points, sizeof adjusted);
+    tv_bundle_result_init(&result);
+    must("adjust_two_view",
+         tv_adjust_two_view(context, &p->camera[0], &p->camera[1], m->pixels[0], m->pixels[1],
+                            m->count, &options, R, t, adjusted, &result));
+    add_bundle(&result);
+    add_doubles(R, 9);
+    add_doubles(t, 3);
+    add_points(adjusted, m->count);
+  }
+  print(p, context, "bundle");
+}
+
+/* The main job in one call, with what is off by default. */
+static void digest_reconstruct(const pair *p, tv_context *context) {
+  tv_reconstruct_options options;
+  tv_feature_options feature;
+  tv_view view[2];
+  tv_two_view pose;
+  tv_reconstruction cloud;
+  int v;
+  tv_feature_options_init(&feature);
+  feature.max_keypoints = MAX_KEYPOINTS;
+  tv_reconstruct_options_init(&options);
+  options.feature = &feature;
+  options.guided_matching = options.bundle_adjustment = 1;
+  for (v = 0; v < 2; ++v) {
+    view[v].image = p->image[v];
+    view[v].camera = &p->camera[v];
+    view[v].mask = NULL;
+  }
+  tv_two_view_init(&pose);
+  tv_reconstruction_init(&cloud);
+  start();
+  must("reconstruct", tv_reconstruct(context, &view[0], &view[1], &options, &pose, &cloud));
+  add_two_view(&pose);
+  for (v = 0; v < 2; ++v) {
+    add_keypoints(cloud.keypoints[v], cloud.descriptors[v], cloud.num_keypoints[v]);
+  }
+  add_matches(cloud.matches, cloud.num_matches);
+  add_bytes(cloud.inlier_mask, (size_t)cloud.num_matches);
+  add_points(cloud.points, cloud.num_matches);
+  add_int(cloud.num_points);
+  print(p, context, "reconstruct");
+}
+
+static void digest_pair(const pair *p, int32_t kernels) {
+  static features f;
+  static matched m;
+  static tv_point points[MAX_KEYPOINTS];
+  tv_two_view pose;
+  tv_limits limits;
+  tv_context *context;
+  tv_status status;
+  tv_limits_init(&limits);
+  limits.max_width = p->image[0].width;
+  limits.max_height = p->image[0].height;
+  limits.max_keypoints = MAX_KEYPOINTS;
+  limits.kernels = kernels;
+  status = tv_context_new(&context, &limits);
+  if (status == TV_ERR_KERNELS) return;
+  must("context", status);
+  digest_cameras(p, context);
+  digest_features(p, context, &f);
+  digest_matches(p, context, &f, &m);
+  digest_estimates(p, context, &m, &pose);
+  if (!pose.has_R || !pose.has_t) fail("this pair has no pose", TV_OK);
+  digest_guided(p, context, &f, &pose);
+  digest_points(p, context, &m, &pose, points);
+  digest_bundle(p, context, &m, &pose, points);
+  digest_reconstruct(p, context);
+  tv_context_free(context);
+}
+
+static void read_camera(FILE *file, tv_camera *camera, int32_t width, int32_t height) {
+  int k;
+  memset(camera, 0, sizeof *camera);
+  camera->width = width;
+  camera->height = height;
+  if (fscanf(file, "%lf %lf %lf %lf", &camera->fx, &camera->fy, &camera->cx, &camera->cy) != 4) {
+    fail("no camera in the file", TV_OK);
+  }
+  for (k = 0; k < 5; ++k) {
+    if (fscanf(file, "%lf", &camera->k[k]) != 1) fail("no distortion in the file", TV_OK);
+    if (camera->k[k] != 0) camera->model = TV_CAMERA_BROWN_CONRADY;
+  }
+}
+
+static pair read_pair(const char *path) {
+  FILE *file = fopen(path, "rb");
+  const char *name = strrchr(path, '/');
+  int width, height, v;
+  pair p;
+  p.name = name ? name + 1 : path;
+  if (!file || fscanf(file, "%d %d", &width, &height) != 2) fail(path, TV_OK);
+  for (v = 0; v < 2; ++v) read_camera(file, &p.camera[v], width, height);
+  if (fgetc(file) != '\n') fail(path, TV_OK);
+  for (v = 0; v < 2; ++v) {
+    const size_t bytes = (size_t)width * (size_t)height;
+    uint8_t *data = (uint8_t *)malloc(bytes);
+    if (!data || fread(data, 1, bytes, file) != bytes) fail(path, TV_OK);
+    p.image[v].data = data;
+    p.image[v].width = width;
+    p.image[v].height = height;
+    p.image[v].stride_bytes = width;
+  }
+  fclose(file);
+  return p;
+}
+
+int main(int argc, char **argv) {
+  int a;
+  for (a = 1; a < argc; ++a) {
+    const pair p = read_pair(argv[a]);
+    int32_t kernels;
+    for (kernels = TV_KERNELS_C; kernels <= TV_KERNELS_NEON; ++kernels) digest_pair(&p, kernels);
+    free((void *)(uintptr_t)p.image[0].data);
+    free((void *)(uintptr_t)p.image[1].data);
+  }
+  return 0;
+}
