@@ -16,6 +16,23 @@
 #include "twoview/alloc.h"
 #include "twoview/twoview.h"
 
+/* What programs exchange, and ctypes declares, has one layout on every CPU: all structs without
+   pointers. */
+#define LAYOUT(type, bytes, last, offset) \
+  _Static_assert(sizeof(type) == bytes && offsetof(type, last) == offset, #type)
+LAYOUT(tv_limits, 24, kernels, 20);
+LAYOUT(tv_keypoint, 24, level, 20);
+LAYOUT(tv_feature_options, 48, keypoint_size, 44);
+LAYOUT(tv_correspondence, 16, ratio, 12);
+LAYOUT(tv_match_options, 8, ratio, 4);
+LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
+LAYOUT(tv_camera, 112, k, 48);
+LAYOUT(tv_estimate_options, 96, gravity_sigma_rad, 88);
+LAYOUT(tv_two_view, 904, seed, 896);
+LAYOUT(tv_point, 40, reserved, 36);
+LAYOUT(tv_bundle_options, 24, hold_pose, 20);
+LAYOUT(tv_bundle_result, 256, noise_px, 248);
+
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 
 typedef struct pair {
@@ -403,6 +420,16 @@ static void digest_reconstruct(const pair *p, tv_context *context) {
   print(p, context, "reconstruct");
 }
 
+/* The context's size is the limits' alone, and so is how much of it was used the data's. */
+static void digest_memory(const pair *p, tv_context *context, const tv_limits *limits) {
+  size_t bytes = 0;
+  start();
+  must("size", tv_context_size(limits, &bytes));
+  add_int((int64_t)bytes);
+  add_int((int64_t)tv_context_high_water(context));
+  print(p, context, "memory");
+}
+
 static void digest_pair(const pair *p, int32_t kernels) {
   static features f;
   static matched m;
@@ -428,6 +455,7 @@ static void digest_pair(const pair *p, int32_t kernels) {
   digest_points(p, context, &m, &pose, points);
   digest_bundle(p, context, &m, &pose, points);
   digest_reconstruct(p, context);
+  digest_memory(p, context, &limits);
   tv_context_free(context);
 }
 
