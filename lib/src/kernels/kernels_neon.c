@@ -8,7 +8,7 @@
 #if defined(__aarch64__)
 /* The same with what gains by the dot product of ARMv8.2. */
 #include "kernels/neon_dot.h"
-#define squared_distances tvk_squared_distances_neon_dot
+#define mutual_nearest tvk_mutual_nearest_neon_dot
 extern const tvk_table tvk_table_neon_dot;
 const tvk_table tvk_table_neon_dot = {
     TV_KERNELS_NEON,

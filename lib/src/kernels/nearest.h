@@ -42,6 +42,8 @@ static inline int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
 #include "kernels/nearest_avx512.h"
 #elif defined(TVK_AVX2)
 #include "kernels/nearest_avx2.h"
+#elif defined(TVK_NEON_DOT)
+#include "kernels/nearest_neon_dot.h"
 #else
 #include "kernels/nearest_c.h"
 #endif
@@ -305,6 +307,7 @@ static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t 
   }
 }
 
+#if !defined(TVK_NEON_DOT) /* which takes the other kernels of the NEON set */
 static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
                               int32_t count, int32_t *out) {
   int32_t k;
@@ -312,3 +315,4 @@ static void squared_distances(const uint8_t *query, const uint8_t *rows, const i
     out[k] = squared_distance(query, rows + (int64_t)indices[k] * TVK_DESCRIPTOR_SIZE);
   }
 }
+#endif

@@ -2,9 +2,10 @@
 #ifndef TWOVIEW_KERNELS_NEON_DOT_H
 #define TWOVIEW_KERNELS_NEON_DOT_H
 
-#include <stdint.h>
+#include "kernels/kernels.h"
 
-void tvk_squared_distances_neon_dot(const int16_t *query, int32_t query_norm, const int16_t *rows,
-                                    const int32_t *norms, int32_t num_rows, int32_t *out);
+void tvk_mutual_nearest_neon_dot(const uint8_t *rows, int32_t num_rows, const uint8_t *columns,
+                                 int32_t num_columns, void *scratch, tvk_nearest *of_columns,
+                                 tvk_nearest *of_rows);
 
 #endif
