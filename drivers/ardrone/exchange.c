@@ -130,9 +130,9 @@ tvs_status ardrone_exchange_tick(ardrone_exchange *exchange, ardrone_at *at, int
       exchange->state == ARDRONE_EXCHANGE_RELEASING) {
     return send_acknowledge(exchange, at, now_ns);
   }
-  if (exchange->state == ARDRONE_EXCHANGE_WAITING) {
-    if (now_ns - exchange->step_ns < ARDRONE_EXCHANGE_STEP_NS) return TVS_OK;
-    enter(exchange, ARDRONE_EXCHANGE_SENDING, now_ns);
+  if (exchange->state == ARDRONE_EXCHANGE_WAITING &&
+      now_ns - exchange->step_ns < ARDRONE_EXCHANGE_STEP_NS) {
+    return TVS_OK;
   }
   status = write_command(exchange, at);
   if (status != TVS_OK) return status; /* no room in this datagram: the next one */

@@ -46,14 +46,6 @@ static int load_header(ardrone_replay *replay, ardrone_pave_header *header) {
   return status == TVS_OK;
 }
 
-static int is_whole(FILE *file, size_t payload_size) {
-  const long at = ftell(file);
-  long end;
-  if (at < 0 || fseek(file, 0, SEEK_END) != 0) return 0;
-  end = ftell(file);
-  return fseek(file, at, SEEK_SET) == 0 && end >= at && (size_t)(end - at) >= payload_size;
-}
-
 static int read_frame_line(FILE *file, uint32_t number, int64_t *host_ns) {
   long long host, device;
   unsigned long long found;
@@ -64,8 +56,7 @@ static int read_frame_line(FILE *file, uint32_t number, int64_t *host_ns) {
 
 static void load_packet(ardrone_replay *replay) {
   ardrone_pave_header header;
-  replay->has_packet = replay->video && load_header(replay, &header) &&
-                       is_whole(replay->video, header.payload_size);
+  replay->has_packet = replay->video && load_header(replay, &header);
   if (!replay->has_packet) return;
   replay->header_sent = 0;
   replay->payload_left = header.payload_size;
@@ -124,7 +115,7 @@ static tvs_status receive_video(ardrone_replay *replay, void *bytes, size_t capa
     *size = replay->payload_left < capacity ? replay->payload_left : capacity;
     *size = fread(bytes, 1, *size, replay->video);
     replay->payload_left -= *size;
-    if (*size == 0) replay->payload_left = 0; /* the file shrank while it was read */
+    if (*size == 0) replay->payload_left = 0; /* cut off: the parser throws away what came of it */
   }
   if (replay->header_sent == replay->header_size && replay->payload_left == 0) {
     load_packet(replay);

@@ -180,6 +180,19 @@ static void test_the_handshake_completes_whatever_single_message_is_lost(void) {
   }
 }
 
+/* Nothing is sent that is not needed: value, release; and a release before, where an old bit stands. */
+static void test_a_good_link_takes_two_messages(void) {
+  int old_bit;
+  for (old_bit = 0; old_bit < 2; ++old_bit) {
+    mock drone = {0};
+    ardrone_exchange exchange;
+    drone.acknowledged = old_bit;
+    begin_set(&exchange);
+    TEST_ASSERT_EQUAL_INT(ARDRONE_EXCHANGE_DONE, run_exchange(&exchange, &drone));
+    TEST_ASSERT_EQUAL_INT(2 + old_bit, drone.num_messages);
+  }
+}
+
 static void test_a_deaf_drone_fails_in_time(void) {
   mock drone = {0};
   ardrone_exchange exchange;
@@ -227,6 +240,7 @@ int main(void) {
   RUN_TEST(test_numbers_have_a_dot_whatever_the_locale);
   RUN_TEST(test_ids_are_crc_32);
   RUN_TEST(test_the_handshake_completes_whatever_single_message_is_lost);
+  RUN_TEST(test_a_good_link_takes_two_messages);
   RUN_TEST(test_a_deaf_drone_fails_in_time);
   RUN_TEST(test_ids_and_command_share_a_datagram);
   RUN_TEST(test_one_exchange_at_a_time_and_no_bad_value);

@@ -140,6 +140,15 @@ static void test_a_wrong_checksum_is_refused_and_nothing_used(void) {
   TEST_ASSERT_EQUAL_UINT32(0, navdata.sequence);
 }
 
+/* More than a 16-bit lane of the sum holds. */
+static void test_a_packet_of_ones_has_its_sum(void) {
+  begin(0x55667788);
+  add_option(200, 4000, 0xff);
+  end_packet();
+  TEST_ASSERT_EQUAL_INT(TVS_OK, decode());
+  TEST_ASSERT_TRUE(navdata.checksum > 3996 * 255);
+}
+
 static void test_bytes_after_the_checksum_are_refused(void) {
   begin(0x55667788);
   add_option(1, 8, 1);
@@ -281,6 +290,7 @@ int main(void) {
   RUN_TEST(test_tag_27_goes_by_its_size);
   RUN_TEST(test_of_a_tag_that_comes_twice_the_first_counts);
   RUN_TEST(test_a_wrong_checksum_is_refused_and_nothing_used);
+  RUN_TEST(test_a_packet_of_ones_has_its_sum);
   RUN_TEST(test_bytes_after_the_checksum_are_refused);
   RUN_TEST(test_a_short_packet_after_a_long_one_holds_nothing_of_it);
   RUN_TEST(test_order_gap_late_wrap_and_reboot);
