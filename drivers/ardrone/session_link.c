@@ -85,7 +85,6 @@ static void begin_anew(ardrone_session *session) {
   session->sequence.has_last = 1; /* it is this packet's already */
   session->has_psi0 = 0;
   tvs_clock_restart(&session->navdata_clock);
-  tvs_attitudes_init(&session->attitudes);
   ardrone_video_reboot(session);
   ardrone_tell(session, ARDRONE_EVENT_REBOOT, NULL);
 }

@@ -22,7 +22,6 @@ static void begin_connection(ardrone_session *session, stream *s) {
   ++s->num_connections;
   if (s != &session->video) return;
   ++session->counters.video_connections;
-  session->gap |= s->num_connections > 1;
   session->new_stream = 1;
   memset(&session->gate, 0, sizeof session->gate);
   ardrone_tell(session, ARDRONE_EVENT_VIDEO_OPEN, NULL);

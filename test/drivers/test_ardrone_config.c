@@ -186,8 +186,12 @@ static void test_a_good_link_takes_two_messages(void) {
   for (old_bit = 0; old_bit < 2; ++old_bit) {
     mock drone = {0};
     ardrone_exchange exchange;
+    ardrone_at at;
     drone.acknowledged = old_bit;
+    memset(&at, 0, sizeof at);
     begin_set(&exchange);
+    TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_exchange_tick(&exchange, &at, 0));
+    TEST_ASSERT_EQUAL_UINT64(0, at.size); /* before the drone has said whether the bit is set */
     TEST_ASSERT_EQUAL_INT(ARDRONE_EXCHANGE_DONE, run_exchange(&exchange, &drone));
     TEST_ASSERT_EQUAL_INT(2 + old_bit, drone.num_messages);
   }
