@@ -1,0 +1,193 @@
+"""What each function returns, on images and on points whose truth is known."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import twoview as tv
+
+
+def angle_deg(R):
+    return np.degrees(np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1)))
+
+
+def test_extract_is_detect_orient_describe(context, image):
+    corners = tv.detect(context, image, max_keypoints=400)
+    oriented = tv.orient(context, image, corners, max_keypoints=500)
+    keypoints, descriptors = tv.extract(context, image, max_keypoints=500)
+    assert corners.dtype == tv.KEYPOINT and 50 < len(corners) <= 400
+    assert (np.diff(corners["score"]) <= 0).all()
+    assert len(oriented) >= len(corners)
+    assert descriptors.shape == (len(keypoints), tv.DESCRIPTOR_BYTES)
+    again = tv.describe(context, image, keypoints, max_keypoints=500)
+    assert np.array_equal(again, descriptors)
+
+
+def test_a_mask_keeps_corners_out(context, image):
+    mask = np.zeros_like(image)
+    mask[:, 160:] = 255
+    keypoints = tv.detect(context, image, mask, max_keypoints=500)
+    assert len(keypoints) > 20 and keypoints["x"].min() > 155
+
+
+def test_rows_may_lie_apart_and_are_not_copied(context, image):
+    wide = np.zeros((240, 400), np.uint8)
+    wide[:, 40:360] = image
+    crop = wide[:, 40:360]
+    assert not crop.flags.c_contiguous
+    expected = tv.extract(context, image, max_keypoints=500)
+    actual = tv.extract(context, crop, max_keypoints=500)
+    assert all(np.array_equal(a, b) for a, b in zip(expected, actual))
+    assert tv._abi.check_image("image", crop).data == crop.ctypes.data
+
+
+def test_results_outlive_the_context(image):
+    with tv.Context(max_width=320, max_height=240, max_keypoints=100) as context:
+        keypoints, _ = tv.extract(context, image, max_keypoints=100)
+        kept = keypoints.tobytes()
+    assert keypoints.tobytes() == kept
+
+
+def test_match_is_the_definition(context):
+    random = np.random.default_rng(1)
+    a = random.integers(0, 60, (90, 128), dtype=np.uint8)
+    b = random.integers(0, 60, (70, 128), dtype=np.uint8)
+    b[:50] = a[10:60] ^ random.integers(0, 4, (50, 128), dtype=np.uint8)
+    squares = ((a[:, None].astype(int) - b[None]) ** 2).sum(2)
+    found = tv.match(context, a, b, ratio=0.9)
+    expected = []
+    for i in range(len(a)):
+        j = int(squares[i].argmin())
+        row, column = np.sort(squares[i]), np.sort(squares[:, j])
+        if squares[:, j].argmin() == i and np.sqrt(row[0] / min(row[1], column[1])) < 0.9:
+            expected.append((i, j, row[0]))
+    assert len(expected) >= 50
+    assert [(m["idx0"], m["idx1"], m["dist_sq"]) for m in found] == expected
+
+
+def test_estimate_finds_the_pose(context, scene):
+    result, inliers = tv.estimate_two_view(context, scene.camera, scene.camera, scene.pixels0,
+                                           scene.pixels1)
+    assert result.config == tv.Config.CALIBRATED and result.verdict == tv.Verdict.OK
+    assert result.reasons == tv.Reason(0) and inliers.dtype == bool and inliers.all()
+    assert angle_deg(result.R @ scene.R.T) < 1e-3 and result.t @ scene.t > 1 - 1e-8
+    assert result.covariance.shape == (5, 5) and result.H is None
+    uncalibrated, _ = tv.estimate_two_view(context, None, None, scene.pixels0, scene.pixels1,
+                                           method=tv.Method.EIGHT_POINT)
+    assert uncalibrated.R is None and uncalibrated.F.shape == (3, 3)
+
+
+def test_pixels_that_are_not_finite_are_no_inliers(context, scene):
+    pixels = scene.pixels0.copy()
+    pixels[7] = np.nan
+    result, inliers = tv.estimate_two_view(context, scene.camera, scene.camera, pixels,
+                                           scene.pixels1)
+    assert result.verdict == tv.Verdict.OK and not inliers[7] and inliers.sum() == 199
+
+
+def test_triangulate_adjust_and_covariances(context, scene):
+    points = tv.triangulate(scene.camera, scene.camera, scene.R, scene.t, scene.pixels0,
+                            scene.pixels1)
+    assert (points["status"] == tv.PointStatus.OK).all()
+    assert np.allclose(points["position"], scene.points, atol=1e-6)
+    start = points.tobytes()
+    noise = np.random.default_rng(2).normal(0, 0.3, scene.pixels0.shape)
+    adjusted = tv.adjust_two_view(context, scene.camera, scene.camera, scene.pixels0 + noise,
+                                  scene.pixels1 - noise, scene.R, scene.t, points)
+    assert points.tobytes() == start and adjusted.converged
+    assert adjusted.final_cost < adjusted.initial_cost and angle_deg(adjusted.R @ scene.R.T) < 1
+    covariances = tv.point_covariances(scene.camera, scene.camera, adjusted.R, adjusted.t,
+                                       adjusted.points, adjusted.noise_px, adjusted.covariance)
+    assert covariances.shape == (200, 3, 3) and (covariances[:, 2, 2] > 0).all()
+    corrected0, corrected1, valid = tv.correct_matches(scene.camera, scene.camera, scene.R, scene.t,
+                                                       scene.pixels0 + noise, scene.pixels1)
+    assert valid.all() and np.abs(corrected0 - scene.pixels0).max() < 5
+    assert corrected1.shape == (200, 2)
+
+
+def test_guided_matching_finds_what_the_epipolar_lines_allow(context, scene):
+    random = np.random.default_rng(4)
+    keypoints = [np.zeros(200, tv.KEYPOINT) for _ in range(2)]
+    for rows, pixels in zip(keypoints, (scene.pixels0, scene.pixels1)):
+        rows["x"], rows["y"], rows["size"] = pixels[:, 0], pixels[:, 1], 4
+    descriptors = random.integers(0, 60, (200, 128), dtype=np.uint8)
+    found, _ = tv.estimate_two_view(context, scene.camera, scene.camera, scene.pixels0,
+                                    scene.pixels1)
+    links = tv.match_guided(context, scene.camera, scene.camera, found.E, keypoints[0],
+                            descriptors, keypoints[1], descriptors)
+    assert len(links) == 200 and (links["idx0"] == links["idx1"]).all()
+
+
+def test_cameras_go_there_and_back():
+    camera = tv.Camera(640, 480, 500, 510, 320, 240, tv.CameraModel.BROWN_CONRADY, (-0.2, 0.05))
+    pixels = np.array([[10.0, 20.0], [320.0, 240.0], [600.0, 400.0]])
+    rays, inside = tv.camera_unproject_points(camera, pixels)
+    back, seen = tv.camera_project_points(camera, rays)
+    assert inside.all() and seen.all() and np.allclose(back, pixels, atol=1e-9)
+    assert tv.camera_undistort(camera, pixels[1]) == pytest.approx((320, 240))
+    half = tv.camera_scale(camera, 0.5)
+    assert (half.width, half.fx, half.cx) == (320, 250, 0.5 * 320.5 - 0.5)
+    assert 0 < tv.camera_valid_angle(camera) <= np.pi / 2
+    tv.camera_check(camera)
+
+
+def test_reconstruct_is_the_stages(context, image):
+    camera = tv.Camera(320, 240, 300, 300, 159.5, 119.5)
+    options = tv.FeatureOptions(max_keypoints=500)
+    result, cloud = tv.reconstruct(context, image, camera, image, camera, feature=options)
+    assert result.config == tv.Config.NO_MOTION and result.verdict == tv.Verdict.REFUSED
+    keypoints, descriptors = tv.extract(context, image, options=options)
+    assert np.array_equal(cloud.keypoints[0], keypoints)
+    assert np.array_equal(cloud.descriptors[1], descriptors)
+    assert np.array_equal(cloud.matches, tv.match(context, descriptors, descriptors))
+    assert cloud.inlier_mask.dtype == bool and len(cloud.points) == len(cloud.matches)
+
+
+def test_other_threads_run_during_a_call():
+    """ctypes gives the interpreter's lock away: Python goes on counting while C matches."""
+    random = np.random.default_rng(6)
+    descriptors = random.integers(0, 60, (6000, 128), dtype=np.uint8)
+    context = tv.Context(max_keypoints=6000, kernels=tv.Kernels.C)
+    done, longest = threading.Event(), 0.0
+
+    def work():
+        tv.match(context, descriptors, descriptors)
+        done.set()
+
+    thread = threading.Thread(target=work)
+    start = time.perf_counter()
+    thread.start()
+    turns = 0
+    while not done.is_set():
+        time.sleep(0.0005)
+        turns += 1
+    longest = time.perf_counter() - start
+    thread.join()
+    assert turns > 5, f"{turns} turns in {longest:.3f} s"
+
+
+def test_a_context_may_be_shared_by_threads(context, image):
+    expected = tv.extract(context, image, max_keypoints=500)[1]
+    wrong = []
+
+    def work():
+        for _ in range(5):
+            if not np.array_equal(tv.extract(context, image, max_keypoints=500)[1], expected):
+                wrong.append(1)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_gravity_and_seed_reach_the_library(context, scene):
+    down = (0.0, 1.0, 0.0)
+    result, _ = tv.estimate_two_view(
+        context, scene.camera, scene.camera, scene.pixels0, scene.pixels1,
+        method=tv.Method.UPRIGHT, gravity0=down, gravity1=down, gravity_sigma_rad=0.01, seed=77)
+    assert result.seed == 77 and result.verdict == tv.Verdict.OK
+    assert angle_deg(result.R @ scene.R.T) < 0.01

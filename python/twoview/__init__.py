@@ -1,0 +1,27 @@
+"""FAST-SIFT matching and two-view geometry: poses with a verdict and a covariance.
+
+The functions have the names of the C API without tv_. Images are read where they lie; calls release
+the interpreter's lock. docs/python.md has an example."""
+
+from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, KEYPOINT, POINT, TV_ERR_ALIGNMENT,
+                   TV_ERR_ARGUMENT, TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS,
+                   TV_ERR_MEMORY, TV_ERR_NOT_FINITE, TV_ERR_NULL, TV_ERR_OUTSIDE, TV_ERR_OVERLAP,
+                   TV_ERR_STRUCT_SIZE, Library, StatusError, default_library)
+from .camera import (Camera, camera_check, camera_project_points, camera_scale,
+                     camera_undistort, camera_unproject_points, camera_valid_angle)
+from .context import Context
+from .enums import (CameraModel, Config, Descriptor, Kernels, Loss, Method, Orientation,
+                    PointStatus, Reason, Stage, Status, Triangulation, Verdict)
+from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOptions,
+                      MatchOptions)
+from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,
+                     describe, detect, estimate_two_view, extract, match, match_guided, orient,
+                     point_covariances, reconstruct, triangulate)
+
+
+def version_string() -> str:
+    """tv_version_string of the library."""
+    return default_library().version()
+
+
+__all__ = [name for name in dir() if not name.startswith("_")]

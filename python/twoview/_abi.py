@@ -1,0 +1,313 @@
+"""The C ABI: struct layouts and the library. python/tests compiles the headers and compares.
+
+ctypes releases the interpreter's lock around every call.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import operator
+import os
+from ctypes import (POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_size_t,
+                    c_uint8, c_uint32, c_uint64, c_void_p)
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from .enums import Status
+
+DESCRIPTOR_BYTES = 128
+CONTEXT_ALIGNMENT = 64
+
+
+class tv_limits(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_width", c_int32), ("max_height", c_int32),
+                ("max_keypoints", c_int32), ("max_matches", c_int32), ("kernels", c_int32)]
+
+
+class tv_image(Structure):
+    _fields_ = [("data", c_void_p), ("width", c_int32), ("height", c_int32),
+                ("stride_bytes", c_int64)]
+
+
+class tv_camera(Structure):
+    _fields_ = [("model", c_int32), ("width", c_int32), ("height", c_int32), ("reserved", c_int32),
+                ("fx", c_double), ("fy", c_double), ("cx", c_double), ("cy", c_double),
+                ("k", c_double * 8)]
+
+
+class tv_keypoint(Structure):
+    _fields_ = [("x", c_float), ("y", c_float), ("size", c_float), ("angle_rad", c_float),
+                ("score", c_float), ("level", c_int32)]
+
+
+class tv_feature_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_keypoints", c_int32), ("arc", c_int32),
+                ("threshold", c_int32), ("min_threshold", c_int32), ("levels", c_int32),
+                ("scale_factor", c_float), ("cell_px", c_int32), ("subpixel", c_int32),
+                ("orientation", c_int32), ("descriptor", c_int32), ("keypoint_size", c_float)]
+
+
+class tv_correspondence(Structure):
+    _fields_ = [("idx0", c_int32), ("idx1", c_int32), ("dist_sq", c_uint32), ("ratio", c_float)]
+
+
+class tv_match_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("ratio", c_float)]
+
+
+class tv_guided_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_error_px", c_float), ("ratio", c_float),
+                ("max_distance", c_float), ("neighbourhood_px", c_float)]
+
+
+class tv_estimate_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("method", c_int32), ("max_error_px", c_double),
+                ("confidence", c_double), ("max_iterations", c_int32),
+                ("fixed_iterations", c_int32), ("seed", c_uint64), ("gravity0", c_double * 3),
+                ("gravity1", c_double * 3), ("gravity_sigma_rad", c_double)]
+
+
+class tv_two_view(Structure):
+    _fields_ = [("struct_size", c_uint32), ("config", c_int32), ("verdict", c_int32),
+                ("reasons", c_uint32), ("num_matches", c_int32), ("num_inliers", c_int32),
+                ("has_R", c_uint8), ("has_t", c_uint8), ("has_E", c_uint8), ("has_F", c_uint8),
+                ("has_H", c_uint8), ("has_alternative", c_uint8), ("has_covariance", c_uint8),
+                ("has_alternative_covariance", c_uint8), ("num_iterations", c_int32),
+                ("R", c_double * 9), ("t", c_double * 3), ("E", c_double * 9), ("F", c_double * 9),
+                ("H", c_double * 9), ("alternative_R", c_double * 9),
+                ("alternative_t", c_double * 3), ("covariance", c_double * 25),
+                ("alternative_covariance", c_double * 25), ("essential_inliers", c_int32),
+                ("fundamental_inliers", c_int32), ("homography_inliers", c_int32),
+                ("rotation_inliers", c_int32), ("coverage", c_double),
+                ("median_parallax_rad", c_double), ("rms_error_px", c_double),
+                ("noise_px", c_double), ("seed", c_uint64)]
+
+
+class tv_point(Structure):
+    _fields_ = [("position", c_double * 3), ("angle_rad", c_float), ("error_px", c_float),
+                ("status", c_int32), ("reserved", c_int32)]
+
+
+class tv_view(Structure):
+    _fields_ = [("image", tv_image), ("camera", POINTER(tv_camera)), ("mask", POINTER(tv_image))]
+
+
+class tv_reconstruct_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("triangulation", c_int32),
+                ("feature", POINTER(tv_feature_options)), ("match", POINTER(tv_match_options)),
+                ("estimate", POINTER(tv_estimate_options)), ("guided_matching", c_int32),
+                ("bundle_adjustment", c_int32)]
+
+
+class tv_reconstruction(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num_keypoints", c_int32 * 2),
+                ("keypoints", c_void_p * 2), ("descriptors", c_void_p * 2),
+                ("num_matches", c_int32), ("num_points", c_int32), ("matches", c_void_p),
+                ("inlier_mask", c_void_p), ("points", c_void_p)]
+
+
+class tv_bundle_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("loss", c_int32), ("loss_scale_px", c_double),
+                ("max_iterations", c_int32), ("hold_pose", c_int32)]
+
+
+class tv_bundle_result(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num_points", c_int32), ("num_iterations", c_int32),
+                ("converged", c_uint8), ("has_covariance", c_uint8), ("reserved", c_uint8 * 2),
+                ("initial_cost", c_double), ("final_cost", c_double),
+                ("initial_rms_px", c_double), ("rms_px", c_double), ("covariance", c_double * 25),
+                ("noise_px", c_double)]
+
+
+STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_feature_options, tv_correspondence,
+           tv_match_options, tv_guided_options, tv_estimate_options, tv_two_view, tv_point,
+           tv_view, tv_reconstruct_options, tv_reconstruction, tv_bundle_options,
+           tv_bundle_result]
+
+KEYPOINT = np.dtype(tv_keypoint)
+CORRESPONDENCE = np.dtype(tv_correspondence)
+POINT = np.dtype(tv_point)
+
+
+class StatusError(RuntimeError):
+    """A C status other than TV_OK. `status` is the Status, `function` the C function's name; each
+    status has a subclass of its C name: `except twoview.TV_ERR_LIMITS`."""
+
+    status: Status = Status.OK
+    function: str = ""
+
+
+class TV_ERR_NULL(StatusError):
+    status = Status.ERR_NULL
+
+
+class TV_ERR_ARGUMENT(StatusError, ValueError):
+    status = Status.ERR_ARGUMENT
+
+
+class TV_ERR_NOT_FINITE(StatusError, ValueError):
+    status = Status.ERR_NOT_FINITE
+
+
+class TV_ERR_STRUCT_SIZE(StatusError):
+    status = Status.ERR_STRUCT_SIZE
+
+
+class TV_ERR_ALIGNMENT(StatusError):
+    status = Status.ERR_ALIGNMENT
+
+
+class TV_ERR_MEMORY(StatusError, MemoryError):
+    status = Status.ERR_MEMORY
+
+
+class TV_ERR_LIMITS(StatusError, ValueError):
+    status = Status.ERR_LIMITS
+
+
+class TV_ERR_CAPACITY(StatusError):
+    status = Status.ERR_CAPACITY
+
+
+class TV_ERR_OVERLAP(StatusError, ValueError):
+    status = Status.ERR_OVERLAP
+
+
+class TV_ERR_CAMERA(StatusError, ValueError):
+    status = Status.ERR_CAMERA
+
+
+class TV_ERR_OUTSIDE(StatusError, ValueError):
+    status = Status.ERR_OUTSIDE
+
+
+class TV_ERR_KERNELS(StatusError):
+    status = Status.ERR_KERNELS
+
+
+ERRORS = {int(kind.status): kind for kind in StatusError.__subclasses__()}
+
+
+class Library:
+    """A loaded libtwoview.so. Programs need none: the functions use the package's own."""
+
+    def __init__(self, path: Union[str, os.PathLike[str]]):
+        self.path = os.path.abspath(path)
+        self.lib = ctypes.CDLL(self.path)
+        for name in ("tv_version_string", "tv_status_string"):
+            getattr(self.lib, name).restype = c_char_p
+        self.lib.tv_context_high_water.restype = c_size_t
+        for struct in (tv_limits, tv_feature_options, tv_match_options, tv_guided_options,
+                       tv_estimate_options, tv_two_view, tv_reconstruct_options,
+                       tv_reconstruction, tv_bundle_options, tv_bundle_result):
+            self.make(struct)
+
+    def make(self, struct: Any, fields: Optional[dict[str, Any]] = None) -> Any:
+        """A struct filled by its tv_..._init; `fields` then replace the defaults."""
+        made = struct()
+        init = getattr(self.lib, struct.__name__ + "_init")
+        init.restype = None
+        init(ctypes.byref(made))
+        if made.struct_size != ctypes.sizeof(struct):
+            raise ImportError(f"{struct.__name__}: {made.struct_size} bytes in {self.path}, "
+                              f"{ctypes.sizeof(struct)} in this package: not the same version")
+        for name, value in (fields or {}).items():
+            set_field(made, name, value)
+        return made
+
+    def call(self, function: str, *arguments: Any) -> None:
+        status = getattr(self.lib, function)(*arguments)
+        if status != 0:
+            kind = ERRORS.get(status, StatusError)
+            text = self.lib.tv_status_string(status).decode()
+            error = kind(f"{function}: {kind.__name__}: {text}")
+            error.function = function
+            raise error
+
+    def version(self) -> str:
+        return self.lib.tv_version_string().decode()
+
+
+def set_field(struct: Any, name: str, value: Any) -> None:
+    """A number, or three of them, into a field; a wrong name or type is named."""
+    kinds = dict(struct._fields_)
+    if name not in kinds or name == "struct_size":
+        known = ", ".join(k for k in kinds if k != "struct_size")
+        raise TypeError(f"{type(struct).__name__} has no option {name!r}; it has {known}")
+    kind = kinds[name]
+    try:
+        if issubclass(kind, ctypes.Array):
+            value = kind(*small_array(name, value, kind._length_))
+        elif kind in (c_float, c_double):
+            value = float(value + 0.0)  # a string is no number
+        else:
+            value = operator.index(value)
+    except TypeError:
+        raise TypeError(f"option {name}: {value!r} is not what it takes") from None
+    if kind in (c_int32, c_uint64) and kind(value).value != value:
+        raise ValueError(f"option {name}: {value} is out of range")
+    setattr(struct, name, value)
+
+
+_default: Optional[Library] = None
+
+
+def default_library() -> Library:
+    """The one that TWOVIEW_LIBRARY names, else the one in the package."""
+    global _default
+    if _default is None:
+        beside = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libtwoview.so")
+        path = os.environ.get("TWOVIEW_LIBRARY") or beside
+        if not os.path.isfile(path):
+            raise ImportError(f"no library at {path}: install the package (pip install ./python), "
+                              "or name a libtwoview.so by TWOVIEW_LIBRARY")
+        _default = Library(path)
+    return _default
+
+
+def pointer(array: Optional[np.ndarray]) -> Optional[c_void_p]:
+    return None if array is None else c_void_p(array.ctypes.data)
+
+
+def check_array(name: str, array: Any, dtype: Any, *columns: int) -> np.ndarray:
+    """The caller's array as it is, never a copy; TypeError or ValueError where C could not read it."""
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"{name}: a numpy array is expected, not {type(array).__name__}")
+    if array.dtype != dtype:
+        raise TypeError(f"{name}: dtype {np.dtype(dtype)} is expected, not {array.dtype}")
+    if array.ndim != 1 + len(columns) or array.shape[1:] != columns:
+        shape = "(n" + "".join(f", {c}" for c in columns) + ("," if not columns else "") + ")"
+        raise ValueError(f"{name}: shape {shape} is expected, not {array.shape}")
+    if not array.flags.c_contiguous:
+        raise ValueError(f"{name}: not contiguous; numpy.ascontiguousarray makes a copy that is")
+    if not array.flags.aligned:
+        raise ValueError(f"{name}: not aligned")
+    if len(array) > 2**31 - 1:
+        raise ValueError(f"{name}: too long")
+    return array
+
+
+def small_array(name: str, values: Any, *shape: int) -> np.ndarray:
+    """Few numbers, given in any form: a contiguous copy as float64."""
+    array = np.ascontiguousarray(values, np.float64)
+    if array.shape != shape:
+        raise ValueError(f"{name}: shape {shape} is expected, not {array.shape}")
+    return array
+
+
+def check_image(name: str, pixels: Any) -> tv_image:
+    """A view on the caller's pixels, whose rows may lie apart."""
+    if not isinstance(pixels, np.ndarray):
+        raise TypeError(f"{name}: a numpy array is expected, not {type(pixels).__name__}")
+    if pixels.dtype != np.uint8:
+        raise TypeError(f"{name}: dtype uint8 is expected, not {pixels.dtype}")
+    if pixels.ndim != 2 or 0 in pixels.shape or max(pixels.shape) > 2**31 - 1:
+        raise ValueError(f"{name}: shape (height, width) is expected, not {pixels.shape}")
+    if pixels.strides[1] != 1 and pixels.shape[1] > 1:
+        raise ValueError(f"{name}: the pixels of a row must lie side by side (a grey image, not a "
+                         "channel of a colour one; numpy.ascontiguousarray makes a copy)")
+    if pixels.strides[0] < pixels.shape[1] and pixels.shape[0] > 1:
+        raise ValueError(f"{name}: rows that overlap or run upwards")
+    return tv_image(pixels.ctypes.data, pixels.shape[1], pixels.shape[0],
+                    max(pixels.strides[0], pixels.shape[1]))

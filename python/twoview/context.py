@@ -1,0 +1,75 @@
+"""The context: all memory that the library's calls use."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from typing import Any, Optional
+
+import numpy as np
+
+from . import _abi
+from .enums import Kernels
+
+
+class Context:
+    """tv_context in memory that Python owns.
+
+    max_width, max_height: of an image, pixels; max_keypoints: descriptors an image; max_matches: an
+    estimate, 0 for max_keypoints; kernels: a Kernels. Calls from several threads wait for each other;
+    use a context a thread to have them run at once. close(), or a with statement, gives the memory
+    back; later calls raise ValueError."""
+
+    def __init__(self, *, max_width: int = 640, max_height: int = 480, max_keypoints: int = 2048,
+                 max_matches: int = 0, kernels: int = Kernels.AUTO,
+                 library: Optional[_abi.Library] = None):
+        self.library = library or _abi.default_library()
+        limits = self.library.make(_abi.tv_limits, {
+            "max_width": max_width, "max_height": max_height, "max_keypoints": max_keypoints,
+            "max_matches": max_matches, "kernels": kernels})
+        size = ctypes.c_size_t()
+        self.library.call("tv_context_size", ctypes.byref(limits), ctypes.byref(size))
+        self._memory: Optional[np.ndarray] = np.empty(size.value + _abi.CONTEXT_ALIGNMENT, np.uint8)
+        start = -self._memory.ctypes.data % _abi.CONTEXT_ALIGNMENT
+        self._pointer = ctypes.c_void_p()
+        self.library.call("tv_context_init", ctypes.byref(self._pointer), ctypes.byref(limits),
+                          ctypes.c_void_p(self._memory.ctypes.data + start), size)
+        self.lock = threading.RLock()
+        self.size_bytes = size.value
+        self.max_keypoints = int(limits.max_keypoints)
+
+    def __enter__(self) -> Context:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def close(self) -> None:
+        with self.lock:
+            self._memory = None
+            self._pointer = ctypes.c_void_p()
+
+    def call(self, function: str, *arguments: Any) -> None:
+        """A C function whose first argument is the context."""
+        with self.lock:
+            if self._memory is None:
+                raise ValueError(f"{function}: the context is closed")
+            self.library.call(function, self._pointer, *arguments)
+
+    @property
+    def kernels(self) -> Kernels:
+        """The kernel set that runs (tv_context_kernels)."""
+        with self.lock:
+            return Kernels(self.library.lib.tv_context_kernels(self._pointer))
+
+    @property
+    def high_water(self) -> int:
+        """Bytes that any call so far has used (tv_context_high_water)."""
+        with self.lock:
+            return int(self.library.lib.tv_context_high_water(self._pointer))
+
+
+def check_context(context: Any) -> Context:
+    if not isinstance(context, Context):
+        raise TypeError(f"context: a twoview.Context is expected, not {type(context).__name__}")
+    return context

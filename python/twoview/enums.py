@@ -1,0 +1,123 @@
+"""The C API's enums and statuses; lib/include/twoview/ says what each value means."""
+
+from enum import IntEnum, IntFlag
+
+
+class Status(IntEnum):
+    """tv_status; names as in C without TV_."""
+
+    OK = 0
+    ERR_NULL = 1
+    ERR_ARGUMENT = 2
+    ERR_NOT_FINITE = 3
+    ERR_STRUCT_SIZE = 4
+    ERR_ALIGNMENT = 5
+    ERR_MEMORY = 6
+    ERR_LIMITS = 7
+    ERR_CAPACITY = 8
+    ERR_OVERLAP = 9
+    ERR_CAMERA = 10
+    ERR_OUTSIDE = 11
+    ERR_KERNELS = 12
+
+
+class Kernels(IntEnum):
+    AUTO = 0
+    C = 1
+    SSE2 = 2
+    AVX2 = 3
+    AVX512 = 4
+    NEON = 5
+
+
+class Stage(IntEnum):
+    PYRAMID = 0
+    DETECT = 1
+    DESCRIBE = 2
+    MATCH = 3
+    ESTIMATE = 4
+    REFINE = 5
+    TRIANGULATE = 6
+
+
+class Orientation(IntEnum):
+    UPRIGHT = 0
+    GRADIENT = 1
+
+
+class Descriptor(IntEnum):
+    SIFT = 0
+    ROOTSIFT = 1
+
+
+class CameraModel(IntEnum):
+    PINHOLE = 0
+    BROWN_CONRADY = 1
+    KANNALA_BRANDT = 2
+
+
+class Method(IntEnum):
+    FIVE_POINT = 0
+    EIGHT_POINT = 1
+    SEVEN_POINT = 2
+    UPRIGHT = 3
+
+
+class Config(IntEnum):
+    DEGENERATE = 0
+    CALIBRATED = 1
+    UNCALIBRATED = 2
+    PLANAR = 3
+    PANORAMIC = 4
+    PLANAR_OR_PANORAMIC = 5
+    NO_MOTION = 6
+
+
+class Verdict(IntEnum):
+    REFUSED = 0
+    DOUBTFUL = 1
+    OK = 2
+
+
+class Reason(IntFlag):
+    TOO_FEW_MATCHES = 1 << 0
+    LOW_INLIER_RATIO = 1 << 1
+    LOW_PARALLAX = 1 << 2
+    TWO_PLANAR_SOLUTIONS = 1 << 3
+    PURE_ROTATION = 1 << 4
+    NO_MOTION = 1 << 5
+    SECOND_MOTION = 1 << 6
+    CROWDED_MATCHES = 1 << 7
+    REPEATED_STRUCTURE = 1 << 8
+
+
+class Triangulation(IntEnum):
+    POLY = 0
+    POLY_ABS = 1
+    LINEAR_EIGEN = 2
+    LINEAR_LS = 3
+    ITERATIVE_EIGEN = 4
+    ITERATIVE_LS = 5
+    MIDPOINT = 6
+
+
+class PointStatus(IntEnum):
+    OK = 0
+    INFINITE = 1
+    BEHIND = 2
+    INVALID = 3
+
+
+class Loss(IntEnum):
+    NONE = 0
+    HUBER = 1
+    CAUCHY = 2
+
+
+# The C prefix of each.
+C_PREFIXES = {
+    Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Orientation: "TV_ORIENTATION_",
+    Descriptor: "TV_DESCRIPTOR_", CameraModel: "TV_CAMERA_", Method: "TV_METHOD_",
+    Config: "TV_CONFIG_", Verdict: "TV_VERDICT_", Reason: "TV_REASON_",
+    Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",
+}

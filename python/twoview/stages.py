@@ -1,0 +1,353 @@
+"""The stages, by their names in C. Arrays are numpy's and the caller's images are read in place."""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import byref, c_int32
+from dataclasses import dataclass
+from typing import Any, Optional, Sequence
+
+import numpy as np
+
+from . import _abi
+from .camera import Camera, camera_struct
+from .context import Context, check_context
+from .enums import Config, Reason, Triangulation, Verdict
+from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOptions, MatchOptions,
+                      to_struct)
+
+
+def _images(image: np.ndarray, mask: Optional[np.ndarray]) -> list[Any]:
+    views = [byref(_abi.check_image("image", image)), None]
+    if mask is not None:
+        views[1] = byref(_abi.check_image("mask", mask))
+        if mask.shape != image.shape:
+            raise ValueError(f"mask: the image's shape {image.shape} is expected, not {mask.shape}")
+    return views
+
+
+def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = None,
+           options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
+    """tv_detect: FAST corners, strongest first.
+
+    image: (height, width) uint8, rows may lie apart; mask: the same shape, 0 where no corner is wanted.
+    Returns (n,) of twoview.KEYPOINT: x, y (pixels), size, angle_rad, score, level."""
+    wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
+    keypoints = np.empty(max(wanted.max_keypoints, 0), _abi.KEYPOINT)
+    count = c_int32()
+    context.call("tv_detect", *_images(image, mask), byref(wanted), _abi.pointer(keypoints),
+                 c_int32(len(keypoints)), byref(count))
+    return keypoints[: count.value].copy()
+
+
+def orient(context: Context, image: np.ndarray, keypoints: np.ndarray,
+           options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
+    """tv_orient: keypoints with their angles; those with a second one appear twice."""
+    wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
+    keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
+    oriented = np.empty(2 * len(keypoints), _abi.KEYPOINT)
+    count = c_int32()
+    context.call("tv_orient", _images(image, None)[0], byref(wanted), _abi.pointer(keypoints),
+                 c_int32(len(keypoints)), _abi.pointer(oriented), c_int32(len(oriented)),
+                 byref(count))
+    return oriented[: count.value].copy()
+
+
+def describe(context: Context, image: np.ndarray, keypoints: np.ndarray,
+             options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
+    """tv_describe: (n, 128) uint8, UBC order, a row a keypoint."""
+    wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
+    keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
+    descriptors = np.empty((len(keypoints), _abi.DESCRIPTOR_BYTES), np.uint8)
+    context.call("tv_describe", _images(image, None)[0], byref(wanted), _abi.pointer(keypoints),
+                 c_int32(len(keypoints)), _abi.pointer(descriptors))
+    return descriptors
+
+
+def extract(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = None,
+            options: Optional[FeatureOptions] = None,
+            **keywords: Any) -> tuple[np.ndarray, np.ndarray]:
+    """tv_extract: keypoints (n,) and descriptors (n, 128), as detect, orient and describe give them."""
+    wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
+    capacity = max(wanted.max_keypoints, 0)
+    keypoints = np.empty(capacity, _abi.KEYPOINT)
+    descriptors = np.empty((capacity, _abi.DESCRIPTOR_BYTES), np.uint8)
+    count = c_int32()
+    context.call("tv_extract", *_images(image, mask), byref(wanted), _abi.pointer(keypoints),
+                 _abi.pointer(descriptors), c_int32(capacity), byref(count))
+    return keypoints[: count.value].copy(), descriptors[: count.value].copy()
+
+
+def _descriptors(name: str, array: np.ndarray) -> np.ndarray:
+    return _abi.check_array(name, array, np.uint8, _abi.DESCRIPTOR_BYTES)
+
+
+def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
+          options: Optional[MatchOptions] = None, **keywords: Any) -> np.ndarray:
+    """tv_match: mutual nearest neighbours that pass the ratio test both ways.
+
+    descriptors: (n, 128) uint8. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq, ratio."""
+    wanted = to_struct(check_context(context).library, MatchOptions, options, keywords)
+    descriptors0 = _descriptors("descriptors0", descriptors0)
+    descriptors1 = _descriptors("descriptors1", descriptors1)
+    found = np.empty(min(len(descriptors0), len(descriptors1)), _abi.CORRESPONDENCE)
+    count = c_int32()
+    context.call("tv_match", _abi.pointer(descriptors0), c_int32(len(descriptors0)),
+                 _abi.pointer(descriptors1), c_int32(len(descriptors1)), byref(wanted),
+                 _abi.pointer(found), c_int32(len(found)), byref(count))
+    return found[: count.value].copy()
+
+
+def _two_cameras(camera0: Optional[Camera], camera1: Optional[Camera]) -> list[Any]:
+    if camera0 is None and camera1 is None:
+        return [None, None]
+    return [byref(camera_struct("camera0", camera0)), byref(camera_struct("camera1", camera1))]
+
+
+def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
+                 epipolar: Sequence[Sequence[float]], keypoints0: np.ndarray,
+                 descriptors0: np.ndarray, keypoints1: np.ndarray, descriptors1: np.ndarray,
+                 options: Optional[GuidedOptions] = None, **keywords: Any) -> np.ndarray:
+    """tv_match_guided: matches along epipolar lines. epipolar: 3x3, E with cameras, F without."""
+    wanted = to_struct(check_context(context).library, GuidedOptions, options, keywords)
+    matrix = _abi.small_array("epipolar", epipolar, 3, 3)
+    arguments: list[Any] = []
+    for view, (keypoints, descriptors) in enumerate(((keypoints0, descriptors0),
+                                                     (keypoints1, descriptors1))):
+        keypoints = _abi.check_array(f"keypoints{view}", keypoints, _abi.KEYPOINT)
+        descriptors = _descriptors(f"descriptors{view}", descriptors)
+        if len(keypoints) != len(descriptors):
+            raise ValueError(f"{len(keypoints)} keypoints{view} and {len(descriptors)} descriptors")
+        arguments += [_abi.pointer(keypoints), _abi.pointer(descriptors), c_int32(len(keypoints))]
+    found = np.empty(min(len(keypoints0), len(keypoints1)), _abi.CORRESPONDENCE)
+    count = c_int32()
+    context.call("tv_match_guided", *_two_cameras(camera0, camera1), _abi.pointer(matrix),
+                 *arguments, byref(wanted), _abi.pointer(found), c_int32(len(found)), byref(count))
+    return found[: count.value].copy()
+
+
+@dataclass(frozen=True)
+class TwoView:
+    """tv_two_view. cam1_from_cam0: x1 = R x0 + t, |t| = 1; what was not estimated is None."""
+
+    config: Config
+    verdict: Verdict
+    reasons: Reason
+    num_matches: int
+    num_inliers: int
+    num_iterations: int
+    R: Optional[np.ndarray]  #: (3, 3)
+    t: Optional[np.ndarray]  #: (3,)
+    E: Optional[np.ndarray]  #: (3, 3), Frobenius norm 1
+    F: Optional[np.ndarray]  #: (3, 3), of undistorted pixels
+    H: Optional[np.ndarray]  #: (3, 3), undistorted pixels of image 0 to image 1
+    alternative_R: Optional[np.ndarray]  #: the second pose of a plane
+    alternative_t: Optional[np.ndarray]
+    covariance: Optional[np.ndarray]  #: (5, 5), radians squared, order w0 w1 w2 a b
+    alternative_covariance: Optional[np.ndarray]
+    essential_inliers: Optional[int]  #: evidence: inliers of each model
+    fundamental_inliers: Optional[int]
+    homography_inliers: Optional[int]
+    rotation_inliers: Optional[int]
+    coverage: float  #: share of an 8x8 grid that holds an inlier
+    median_parallax_rad: float
+    rms_error_px: float
+    noise_px: float
+    seed: int
+
+
+def _two_view(found: Any) -> TwoView:
+    def matrix(field: str, has: int, *shape: int) -> Optional[np.ndarray]:
+        return np.array(getattr(found, field)).reshape(shape) if has else None
+
+    def inliers(count: int) -> Optional[int]:
+        return count if count >= 0 else None
+
+    return TwoView(
+        Config(found.config), Verdict(found.verdict), Reason(found.reasons), found.num_matches,
+        found.num_inliers, found.num_iterations, matrix("R", found.has_R, 3, 3),
+        matrix("t", found.has_t, 3), matrix("E", found.has_E, 3, 3),
+        matrix("F", found.has_F, 3, 3), matrix("H", found.has_H, 3, 3),
+        matrix("alternative_R", found.has_alternative, 3, 3),
+        matrix("alternative_t", found.has_alternative, 3),
+        matrix("covariance", found.has_covariance, 5, 5),
+        matrix("alternative_covariance", found.has_alternative_covariance, 5, 5),
+        inliers(found.essential_inliers), inliers(found.fundamental_inliers),
+        inliers(found.homography_inliers), inliers(found.rotation_inliers), found.coverage,
+        found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed)
+
+
+def _pixels(pixels0: np.ndarray, pixels1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    pixels0 = _abi.check_array("pixels0", pixels0, np.float64, 2)
+    pixels1 = _abi.check_array("pixels1", pixels1, np.float64, 2)
+    if len(pixels0) != len(pixels1):
+        raise ValueError(f"{len(pixels0)} pixels0 and {len(pixels1)} pixels1")
+    return pixels0, pixels1
+
+
+def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
+                      pixels0: np.ndarray, pixels1: np.ndarray,
+                      ratios: Optional[np.ndarray] = None,
+                      options: Optional[EstimateOptions] = None,
+                      **keywords: Any) -> tuple[TwoView, np.ndarray]:
+    """tv_estimate_two_view: the geometry, and which matches agree, (n,) bool.
+
+    pixels: (n, 2) float64, as the images have them (distorted); ratios: (n,) float32, lower surer.
+    A pixel that is not finite is never an inlier. Without cameras: F and H only, and method
+    EIGHT_POINT or SEVEN_POINT."""
+    wanted = to_struct(check_context(context).library, EstimateOptions, options, keywords)
+    pixels0, pixels1 = _pixels(pixels0, pixels1)
+    if ratios is not None:
+        ratios = _abi.check_array("ratios", ratios, np.float32)
+        if len(ratios) != len(pixels0):
+            raise ValueError(f"{len(ratios)} ratios and {len(pixels0)} matches")
+    found = context.library.make(_abi.tv_two_view)
+    inliers = np.zeros(len(pixels0), np.uint8)
+    context.call("tv_estimate_two_view", *_two_cameras(camera0, camera1), _abi.pointer(pixels0),
+                 _abi.pointer(pixels1), _abi.pointer(ratios), c_int32(len(pixels0)),
+                 byref(wanted), byref(found), _abi.pointer(inliers))
+    return _two_view(found), inliers.view(bool)
+
+
+def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
+                t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
+                method: int = Triangulation.ITERATIVE_LS) -> np.ndarray:
+    """tv_triangulate: (n,) of twoview.POINT: position (camera 0 frame, units of |t|), angle_rad,
+    error_px, status (a PointStatus). R 3x3, t 3, pixels (n, 2) float64."""
+    pixels0, pixels1 = _pixels(pixels0, pixels1)
+    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    points = np.zeros(len(pixels0), _abi.POINT)
+    _abi.default_library().call(
+        "tv_triangulate", c_int32(int(method)), *_two_cameras(camera0, camera1),
+        _abi.pointer(rotation), _abi.pointer(translation), _abi.pointer(pixels0),
+        _abi.pointer(pixels1), c_int32(len(pixels0)), _abi.pointer(points))
+    return points
+
+
+def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
+                    t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
+                    cost: int = Triangulation.POLY) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """tv_correct_matches: both pixels (n, 2) moved to where their rays meet, and which were, (n,) bool."""
+    pixels0, pixels1 = _pixels(pixels0, pixels1)
+    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    corrected0, corrected1 = np.empty_like(pixels0), np.empty_like(pixels1)
+    valid = np.empty(len(pixels0), np.uint8)
+    _abi.default_library().call(
+        "tv_correct_matches", c_int32(int(cost)), *_two_cameras(camera0, camera1),
+        _abi.pointer(rotation), _abi.pointer(translation), _abi.pointer(pixels0),
+        _abi.pointer(pixels1), c_int32(len(pixels0)), _abi.pointer(corrected0),
+        _abi.pointer(corrected1), _abi.pointer(valid))
+    return corrected0, corrected1, valid.view(bool)
+
+
+@dataclass(frozen=True)
+class BundleResult:
+    """tv_bundle_result, with the pose and points that it is about."""
+
+    R: np.ndarray
+    t: np.ndarray
+    points: np.ndarray
+    num_points: int
+    num_iterations: int
+    converged: bool
+    initial_cost: float
+    final_cost: float
+    initial_rms_px: float
+    rms_px: float
+    covariance: Optional[np.ndarray]  #: (5, 5), radians squared
+    noise_px: float
+
+
+def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0: np.ndarray,
+                    pixels1: np.ndarray, R: Sequence[Sequence[float]], t: Sequence[float],
+                    points: np.ndarray, options: Optional[BundleOptions] = None,
+                    **keywords: Any) -> BundleResult:
+    """tv_adjust_two_view: bundle adjustment from a start, which stays as it is. points: of triangulate."""
+    wanted = to_struct(check_context(context).library, BundleOptions, options, keywords)
+    pixels0, pixels1 = _pixels(pixels0, pixels1)
+    rotation, translation = _abi.small_array("R", R, 3, 3).copy(), _abi.small_array("t", t, 3).copy()
+    points = _abi.check_array("points", points, _abi.POINT).copy()
+    if len(points) != len(pixels0):
+        raise ValueError(f"{len(points)} points and {len(pixels0)} matches")
+    result = context.library.make(_abi.tv_bundle_result)
+    context.call("tv_adjust_two_view", *_two_cameras(camera0, camera1), _abi.pointer(pixels0),
+                 _abi.pointer(pixels1), c_int32(len(pixels0)), byref(wanted),
+                 _abi.pointer(rotation), _abi.pointer(translation), _abi.pointer(points),
+                 byref(result))
+    covariance = np.array(result.covariance).reshape(5, 5) if result.has_covariance else None
+    return BundleResult(rotation, translation, points, result.num_points, result.num_iterations,
+                        bool(result.converged), result.initial_cost, result.final_cost,
+                        result.initial_rms_px, result.rms_px, covariance, result.noise_px)
+
+
+def point_covariances(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
+                      t: Sequence[float], points: np.ndarray, noise_px: float,
+                      pose_covariance: Optional[Sequence[Sequence[float]]] = None) -> np.ndarray:
+    """tv_point_covariances: (n, 3, 3), camera 0 frame, the unit of t squared; zeros where unknown."""
+    rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
+    points = _abi.check_array("points", points, _abi.POINT)
+    given = pose_covariance
+    pose = None if given is None else _abi.small_array("pose_covariance", given, 5, 5)
+    covariances = np.zeros((len(points), 3, 3))
+    _abi.default_library().call(
+        "tv_point_covariances", *_two_cameras(camera0, camera1), _abi.pointer(rotation),
+        _abi.pointer(translation), _abi.pointer(pose), ctypes.c_double(noise_px),
+        _abi.pointer(points), c_int32(len(points)), _abi.pointer(covariances))
+    return covariances
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """tv_reconstruction: both views' features, matches, and a point a match."""
+
+    keypoints: tuple[np.ndarray, np.ndarray]
+    descriptors: tuple[np.ndarray, np.ndarray]
+    matches: np.ndarray  #: (m,) of CORRESPONDENCE
+    inlier_mask: np.ndarray  #: (m,) bool
+    points: np.ndarray  #: (m,) of POINT, INVALID where the match is no inlier
+    num_points: int
+
+
+def _copied(address: Optional[int], count: int, dtype: Any) -> np.ndarray:
+    if not count or not address:
+        return np.empty(0, dtype)
+    size = count * np.dtype(dtype).itemsize
+    return np.frombuffer(ctypes.string_at(address, size), dtype).copy()
+
+
+def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: np.ndarray,
+                camera1: Camera, *, mask0: Optional[np.ndarray] = None,
+                mask1: Optional[np.ndarray] = None, feature: Optional[FeatureOptions] = None,
+                match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
+                triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
+                bundle_adjustment: bool = False) -> tuple[TwoView, Reconstruction]:
+    """tv_reconstruct: two images to a pose and points. Images are (height, width) uint8, read in place;
+    feature, match and estimate are the stages' options."""
+    library = check_context(context).library
+    kept = [to_struct(library, kind, options, {}) for kind, options in
+            ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
+    wanted = library.make(_abi.tv_reconstruct_options, {
+        "triangulation": triangulation, "guided_matching": guided_matching,
+        "bundle_adjustment": bundle_adjustment})
+    wanted.feature, wanted.match, wanted.estimate = (ctypes.pointer(k) for k in kept)
+    views = []
+    for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
+        view = _abi.tv_view(_abi.check_image("image" + name, image),
+                            ctypes.pointer(camera_struct("camera" + name, camera)))
+        if mask is not None:
+            view.mask = ctypes.pointer(_abi.check_image("mask" + name, mask))
+        views.append(view)
+    found = library.make(_abi.tv_two_view)
+    cloud = library.make(_abi.tv_reconstruction)
+    with context.lock:  # the arrays hold until the context's next call
+        context.call("tv_reconstruct", byref(views[0]), byref(views[1]), byref(wanted),
+                     byref(found), byref(cloud))
+        n, m = tuple(cloud.num_keypoints), cloud.num_matches
+        first, second = (_copied(cloud.keypoints[v], n[v], _abi.KEYPOINT) for v in range(2))
+        bytes0, bytes1 = (_copied(cloud.descriptors[v], n[v] * _abi.DESCRIPTOR_BYTES, np.uint8)
+                          .reshape(-1, _abi.DESCRIPTOR_BYTES) for v in range(2))
+        result = Reconstruction((first, second), (bytes0, bytes1),
+                                _copied(cloud.matches, m, _abi.CORRESPONDENCE),
+                                _copied(cloud.inlier_mask, m, np.uint8).view(bool),
+                                _copied(cloud.points, m, _abi.POINT), cloud.num_points)
+    return _two_view(found), result
