@@ -8,8 +8,8 @@ from __future__ import annotations
 import ctypes
 import operator
 import os
-from ctypes import (POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_size_t,
-                    c_uint8, c_uint32, c_uint64, c_void_p)
+from ctypes import (Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_size_t, c_uint8,
+                    c_uint32, c_uint64, c_void_p)
 from typing import Any, Optional, Union
 
 import numpy as np
@@ -90,13 +90,12 @@ class tv_point(Structure):
 
 
 class tv_view(Structure):
-    _fields_ = [("image", tv_image), ("camera", POINTER(tv_camera)), ("mask", POINTER(tv_image))]
+    _fields_ = [("image", tv_image), ("camera", c_void_p), ("mask", c_void_p)]
 
 
 class tv_reconstruct_options(Structure):
-    _fields_ = [("struct_size", c_uint32), ("triangulation", c_int32),
-                ("feature", POINTER(tv_feature_options)), ("match", POINTER(tv_match_options)),
-                ("estimate", POINTER(tv_estimate_options)), ("guided_matching", c_int32),
+    _fields_ = [("struct_size", c_uint32), ("triangulation", c_int32), ("feature", c_void_p),
+                ("match", c_void_p), ("estimate", c_void_p), ("guided_matching", c_int32),
                 ("bundle_adjustment", c_int32)]
 
 

@@ -40,6 +40,8 @@ class Camera:
 
 
 def camera_struct(name: str, camera: Any) -> Any:
+    if isinstance(camera, _abi.tv_camera):
+        return camera
     if not isinstance(camera, Camera):
         raise TypeError(f"{name}: a twoview.Camera is expected, not {type(camera).__name__}")
     return camera._struct()

@@ -185,17 +185,9 @@ def _pixels(pixels0: np.ndarray, pixels1: np.ndarray) -> tuple[np.ndarray, np.nd
     return pixels0, pixels1
 
 
-def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
-                      pixels0: np.ndarray, pixels1: np.ndarray,
-                      ratios: Optional[np.ndarray] = None,
-                      options: Optional[EstimateOptions] = None,
-                      **keywords: Any) -> tuple[TwoView, np.ndarray]:
-    """tv_estimate_two_view: the geometry, and which matches agree, (n,) bool.
-
-    pixels: (n, 2) float64, as the images have them (distorted); ratios: (n,) float32, lower surer.
-    A pixel that is not finite is never an inlier. Without cameras: F and H only, and method
-    EIGHT_POINT or SEVEN_POINT."""
-    wanted = to_struct(check_context(context).library, EstimateOptions, options, keywords)
+def _estimate(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
+              pixels0: np.ndarray, pixels1: np.ndarray, ratios: Optional[np.ndarray],
+              wanted: Any) -> tuple[Any, np.ndarray]:
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     if ratios is not None:
         ratios = _abi.check_array("ratios", ratios, np.float32)
@@ -206,7 +198,23 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
     context.call("tv_estimate_two_view", *_two_cameras(camera0, camera1), _abi.pointer(pixels0),
                  _abi.pointer(pixels1), _abi.pointer(ratios), c_int32(len(pixels0)),
                  byref(wanted), byref(found), _abi.pointer(inliers))
-    return _two_view(found), inliers.view(bool)
+    return found, inliers.view(bool)
+
+
+def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
+                      pixels0: np.ndarray, pixels1: np.ndarray,
+                      ratios: Optional[np.ndarray] = None,
+                      options: Optional[EstimateOptions] = None,
+                      **keywords: Any) -> tuple[TwoView, np.ndarray]:
+    """tv_estimate_two_view: the geometry, and which matches agree, (n,) bool.
+
+    pixels: (n, 2) float64, as the images have them (distorted); ratios: (n,) float32, lower surer.
+    A pixel that is not finite is never an inlier. Without cameras: F and H only, and method
+    EIGHT_POINT or SEVEN_POINT."""
+    found, inliers = _estimate(context, camera0, camera1, pixels0, pixels1, ratios,
+                               to_struct(check_context(context).library, EstimateOptions, options,
+                                         keywords))
+    return _two_view(found), inliers
 
 
 def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
@@ -329,19 +337,21 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
     wanted = library.make(_abi.tv_reconstruct_options, {
         "triangulation": triangulation, "guided_matching": guided_matching,
         "bundle_adjustment": bundle_adjustment})
-    wanted.feature, wanted.match, wanted.estimate = (ctypes.pointer(k) for k in kept)
+    wanted.feature, wanted.match, wanted.estimate = map(ctypes.addressof, kept)
     views = []
     for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
-        view = _abi.tv_view(_abi.check_image("image" + name, image),
-                            ctypes.pointer(camera_struct("camera" + name, camera)))
+        kept.append(camera_struct("camera" + name, camera))
+        view = _abi.tv_view(_abi.check_image("image" + name, image), ctypes.addressof(kept[-1]))
         if mask is not None:
-            view.mask = ctypes.pointer(_abi.check_image("mask" + name, mask))
+            kept.append(_abi.check_image("mask" + name, mask))
+            view.mask = ctypes.addressof(kept[-1])
         views.append(view)
     found = library.make(_abi.tv_two_view)
     cloud = library.make(_abi.tv_reconstruction)
     with context.lock:  # the arrays hold until the context's next call
         context.call("tv_reconstruct", byref(views[0]), byref(views[1]), byref(wanted),
                      byref(found), byref(cloud))
+        del kept  # the structs that the call pointed to
         n, m = tuple(cloud.num_keypoints), cloud.num_matches
         first, second = (_copied(cloud.keypoints[v], n[v], _abi.KEYPOINT) for v in range(2))
         bytes0, bytes1 = (_copied(cloud.descriptors[v], n[v] * _abi.DESCRIPTOR_BYTES, np.uint8)
