@@ -191,12 +191,19 @@ static void case_blur_row(trial *t) {
   REPEAT(t, t->set->blur_row(above, row, below, width, out));
 }
 
+static void case_pair_rows(trial *t) {
+  const int32_t width = pick(t, 1, 300, 640);
+  const uint8_t *row = row_of_bytes(t, width);
+  const uint8_t *below = random_int(&t->seed, 0, 3) == 0 ? row : row_of_bytes(t, width);
+  uint16_t *pairs = OUTPUT(t, uint16_t, width + 1);
+  REPEAT(t, t->set->pair_rows(row, below, width, pairs));
+}
+
 static void case_sample_patch(trial *t) {
-  static const int32_t sides[4] = {TVK_PATCH_SIDE, TVK_ORIENT_SIDE, 1, 7};
+  static const int32_t heights[4] = {TVK_PATCH_SIDE, TVK_ORIENT_SIDE, 1, 7};
   const int32_t width = pick(t, 1, 90, 640), height = pick(t, 1, 90, 480);
-  const int32_t stride = width + random_int(&t->seed, 0, 9);
-  const int32_t side = t->typical ? TVK_PATCH_SIDE : sides[random_int(&t->seed, 0, 3)];
-  const int32_t bytes = (height - 1) * stride + width; /* none behind the last row's last pixel */
+  const int32_t num_rows = t->typical ? TVK_PATCH_SIDE : heights[random_int(&t->seed, 0, 3)];
+  const int32_t num_pairs = height * (width + 1); /* nothing behind the last */
   /* Steps from none to far beyond the image; a step of whole pixels from a whole position ends on
      the last column or row exactly. */
   const int32_t whole = random_int(&t->seed, 0, 3) == 0;
@@ -205,48 +212,55 @@ static void case_sample_patch(trial *t) {
   int32_t du_x = pick(t, -farthest, farthest, 80000), du_y = pick(t, -farthest, farthest, 40000);
   int32_t x = pick(t, -margin, (width << 16) + margin, 300 << 16);
   int32_t y = pick(t, -margin, (height << 16) + margin, 200 << 16);
-  const uint8_t *image = row_of_bytes(t, bytes);
-  int16_t *patch = OUTPUT(t, int16_t, side * side);
+  uint16_t *pairs = INPUT(t, uint16_t, num_pairs);
+  int16_t *patch = OUTPUT(t, int16_t, num_rows * TVK_PATCH_SIDE + 1);
+  fill_bytes(t, (uint8_t *)pairs, 2 * num_pairs);
   if (whole) {
     x = random_int(&t->seed, 0, width) << 16;
     y = random_int(&t->seed, 0, height) << 16;
     du_x = 1 << 16;
     du_y = 0;
   }
-  REPEAT(t, t->set->sample_patch(image, stride, width, height, x, y, du_x, du_y, side, patch));
+  REPEAT(t, t->set->sample_patch(pairs, width, height, x, y, du_x, du_y, num_rows, patch));
 }
 
-/* Samples as sample_patch makes them: 1/16 grey level. */
-static const int16_t *random_patch(trial *t, int32_t side) {
-  const int32_t kind = random_int(&t->seed, 0, 3), base = random_int(&t->seed, 0, 4000);
-  int16_t *patch = INPUT(t, int16_t, side * side);
+/* Samples as sample_patch makes them, from -LOWEST_SAMPLE to LARGEST_SAMPLE. */
+enum { LOWEST_SAMPLE = 8065, LARGEST_SAMPLE = 8001, SAMPLE_RANGE = LOWEST_SAMPLE + LARGEST_SAMPLE + 1 };
+
+static const int16_t *random_patch(trial *t, int32_t num_rows) {
+  const int32_t kind = random_int(&t->seed, 0, 4), base = random_int(&t->seed, 0, 8000);
+  const int32_t size = num_rows * TVK_PATCH_SIDE;
+  int16_t *patch = INPUT(t, int16_t, size + 1);
   int32_t k;
-  for (k = 0; k < side * side; ++k) {
-    const int32_t noise = random_int(&t->seed, 0, 4080);
-    patch[k] = (int16_t)(kind == 0   ? noise
-                         : kind == 1 ? (noise & 1) * 4080
-                         : kind == 2 ? base + noise % 3
-                                     : (k / side * 131 + k % side * 57) % 4081);
+  for (k = 0; k < size; ++k) {
+    const int32_t noise = random_int(&t->seed, 0, SAMPLE_RANGE - 1);
+    const int32_t x = k % TVK_PATCH_SIDE, y = k / TVK_PATCH_SIDE;
+    patch[k] = (int16_t)((kind == 0   ? noise
+                          : kind == 1 ? (noise & 1) * (SAMPLE_RANGE - 1)
+                          : kind == 2 ? base + noise % 3
+                          : kind == 3 ? ((x + y) & 1) * (SAMPLE_RANGE - 1)
+                                      : (y * 531 + x * 257) % SAMPLE_RANGE) - LOWEST_SAMPLE);
   }
+  patch[size] = 0;
   return patch;
 }
 
 static void case_orientation_histogram(trial *t) {
   const int16_t *patch = random_patch(t, TVK_ORIENT_SIDE);
-  int32_t *histogram = OUTPUT(t, int32_t, TVK_ORIENT_BINS);
-  REPEAT(t, t->set->orientation_histogram(patch, histogram));
+  int32_t *smooth = OUTPUT(t, int32_t, TVK_ORIENT_BINS);
+  REPEAT(t, t->set->orientation_histogram(patch, smooth));
 }
 
 static void case_gradient_histogram(trial *t) {
   const int16_t *patch = random_patch(t, TVK_PATCH_SIDE);
-  int32_t *histogram = OUTPUT(t, int32_t, TVK_DESCRIPTOR_SIZE);
+  int32_t *histogram = OUTPUT(t, int32_t, TVK_DESCRIPTOR_SIZE), k;
   REPEAT(t, t->set->gradient_histogram(patch, histogram));
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) TEST_ASSERT_TRUE(histogram[k] >= 0);
 }
 
 static void case_quantize_descriptor(trial *t) {
-  /* gradient_histogram's sums stay below 972^2 / 256 * 5770. */
-  static const int32_t highest[5] = {0, 1, 300, 1 << 18, 21300000};
-  const int32_t high = t->typical ? 1 << 18 : highest[random_int(&t->seed, 0, 4)];
+  static const int32_t highest[6] = {0, 1, 300, 4096, 1 << 18, INT32_MAX};
+  const int32_t high = t->typical ? 1 << 18 : highest[random_int(&t->seed, 0, 5)];
   const int32_t spikes = random_int(&t->seed, 0, 2) == 0, root = pick(t, 0, 1, 1);
   int32_t *histogram = INPUT(t, int32_t, TVK_DESCRIPTOR_SIZE), k;
   uint8_t *descriptor = OUTPUT(t, uint8_t, TVK_DESCRIPTOR_SIZE);

@@ -117,21 +117,30 @@ void test_a_constant_image_stays_constant() {
   }
 }
 
-// Bilinear at positions clamped to the image, in 1/16 grey level. Fractions are cut to 1/256 pixel along
-// each axis, which two black and white neighbours turn into 16 * 255 / 256 each; rounding adds 0.5.
+// Bilinear at positions clamped to the image, less 128, times 127^2 / 256. Fractions are known to 1/128
+// pixel along each axis, which two black and white neighbours turn into 255 / 128 each; the last shift
+// leaves out up to 1.
 void test_patches_are_bilinear_samples() {
-  constexpr double kMaxError = 2 * 16 * 255 / 256.0 + 0.5;
-  constexpr int kPatch = 12, kWidth = 37, kHeight = 29, kStride = 41;
+  constexpr double kUnit = 127.0 * 127.0 / 256.0;
+  constexpr double kMaxError = 2 * 255 / 128.0 * kUnit + 1;
+  constexpr int kRows = 12, kPatch = TVK_PATCH_SIDE, kWidth = 37, kHeight = 29, kStride = 41;
   uint64_t seed = 24;
   const tv::Level image = noise_image(&seed, kWidth, kHeight, kStride);
+  uint16_t pairs[kHeight * (kWidth + 1)];
+  for (int y = 0; y < kHeight; ++y) {
+    const uint8_t* row = image.data + y * kStride;
+    tvk_select(TV_KERNELS_AUTO)
+        ->pair_rows(row, y + 1 < kHeight ? row + kStride : row, kWidth, pairs + y * (kWidth + 1));
+  }
+  double sum = 0;
   for (int trial = 0; trial < 4000; ++trial) {
     const int x = random_int(&seed, -10 * 65536, 45 * 65536);
     const int y = random_int(&seed, -10 * 65536, 37 * 65536);
     const int du_x = random_int(&seed, -70000, 70000), du_y = random_int(&seed, -70000, 70000);
-    int16_t patch[kPatch * kPatch];
+    int16_t patch[kRows * kPatch + 1];
     tvk_select(trial % 2 ? TV_KERNELS_AUTO : TV_KERNELS_C)
-        ->sample_patch(image.data, kStride, kWidth, kHeight, x, y, du_x, du_y, kPatch, patch);
-    for (int k = 0; k < kPatch * kPatch; ++k) {
+        ->sample_patch(pairs, kWidth, kHeight, x, y, du_x, du_y, kRows, patch);
+    for (int k = 0; k < kRows * kPatch; ++k) {
       const int i = k % kPatch, j = k / kPatch;
       const double sx = std::fmin(kWidth - 1, std::fmax(0, (x + i * du_x - j * du_y) / 65536.0));
       const double sy = std::fmin(kHeight - 1, std::fmax(0, (y + i * du_y + j * du_x) / 65536.0));
@@ -141,9 +150,12 @@ void test_patches_are_bilinear_samples() {
       const double fx = sx - ix, fy = sy - iy;
       const double grey = (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) +
                           fy * ((1 - fx) * p[kStride] + fx * p[kStride + 1]);
-      TEST_ASSERT_DOUBLE_WITHIN(kMaxError, 16 * grey, patch[k]);
+      TEST_ASSERT_DOUBLE_WITHIN(kMaxError, kUnit * (grey - 128), patch[k]);
+      sum += patch[k] - kUnit * (grey - 128);
     }
+    TEST_ASSERT_EQUAL_INT(0, patch[kRows * kPatch]);
   }
+  TEST_ASSERT_DOUBLE_WITHIN(1, -0.5, sum / (4000.0 * kRows * kPatch));
 }
 
 void test_coordinates_go_to_a_level_and_back() {
@@ -206,14 +218,18 @@ void test_octaves_are_halved_then_blurred() {
         TEST_ASSERT_TRUE(octaves.count >= 1 && octaves.count <= 4);
         tv::Level level = full;
         for (int o = 0; o < octaves.count; ++o) {
-          const tv::Level& octave = octaves.levels[o];
-          if (octave.data != nullptr) {
+          const tv::Octave& octave = octaves.octaves[o];
+          if (octave.pairs != nullptr) {
             TEST_ASSERT_EQUAL_INT(level.width, octave.width);
             TEST_ASSERT_EQUAL_INT(level.height, octave.height);
             TEST_ASSERT_EQUAL_DOUBLE(std::ldexp(1.0, o), octave.scale);
             for (int y = 0; y < level.height; ++y) {
-              for (int x = 0; x < level.width; ++x) {
-                TEST_ASSERT_EQUAL_INT(blurred(level, x, y), octave.data[y * octave.stride + x]);
+              const int below = y + 1 < level.height ? y + 1 : y;
+              for (int x = 0; x <= level.width; ++x) {
+                const int column = x < level.width ? x : x - 1;
+                const int pair = octave.pairs[y * (level.width + 1) + x];
+                TEST_ASSERT_EQUAL_INT(blurred(level, column, y) ^ 128, pair & 255);
+                TEST_ASSERT_EQUAL_INT(blurred(level, column, below) ^ 128, pair >> 8);
               }
             }
           } else {

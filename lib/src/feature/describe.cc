@@ -5,18 +5,21 @@
 namespace tv {
 namespace {
 
-// A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma) and holds four samples.
-constexpr double kStepPerSize = 1.5 / 4.0;
+// A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma) and holds three samples.
+constexpr double kStepPerSize = 1.5 * 0.28;
 
-// Samples lie one to two pixels apart: closer would blur, wider would alias (docs/decisions/0003).
-constexpr double kMaxStep = 2.0;
+// Four of the orientation's: found to half a degree, where three leave a degree.
+constexpr double kOrientStep = 1.5 / 4.0;
+
+// Samples lie 4/3 to 8/3 pixels apart: closer would blur, wider would alias (docs/decisions/0009).
+constexpr double kMaxStep = 2.24;
 
 // A second direction counts above this share of the highest peak (Lowe, section 5).
 constexpr double kSecondPeak = 0.8;
 
-const Level& level_of(const Octaves& octaves, const tv_keypoint& keypoint) {
+const Octave& octave_for(const Octaves& octaves, const tv_keypoint& keypoint) {
   const int32_t octave = octave_of(keypoint.size);
-  return octaves.levels[octave < octaves.count ? octave : octaves.count - 1];
+  return octaves.octaves[octave < octaves.count ? octave : octaves.count - 1];
 }
 
 // A keypoint further outside than this sees the border's pixels only, wherever it is. Keeps every
@@ -34,34 +37,23 @@ double near_image(double x, int32_t side) {
 
 // Samples a square patch of `side` samples whose middle is the keypoint and whose x axis points
 // along angle_rad.
-void sample_around(const tvk_table& kernels, const Level& level, const tv_keypoint& keypoint,
-                   double angle_rad, int32_t side, int16_t* patch) {
-  const double step = keypoint.size * kStepPerSize / level.scale;
+void sample_around(const tvk_table& kernels, const Octave& octave, const tv_keypoint& keypoint,
+                   double angle_rad, double step_per_size, int32_t side, int16_t* patch) {
+  const double step = keypoint.size * step_per_size / octave.scale;
   double sine = 0.0, cosine = 1.0;
   if (angle_rad != 0.0) sincos(angle_rad, &sine, &cosine);
   const int32_t du_x = to_q16(step * cosine), du_y = to_q16(step * sine);
   // The first sample, half a patch before the middle along both axes.
   const double half = 0.5 * (side - 1);
-  const int32_t x = to_q16(near_image(to_level(level, keypoint.x), level.width)) -
+  const int32_t x = to_q16(near_image(to_level(octave.scale, keypoint.x), octave.width)) -
                     static_cast<int32_t>(half * (du_x - du_y));
-  const int32_t y = to_q16(near_image(to_level(level, keypoint.y), level.height)) -
+  const int32_t y = to_q16(near_image(to_level(octave.scale, keypoint.y), octave.height)) -
                     static_cast<int32_t>(half * (du_y + du_x));
-  kernels.sample_patch(level.data, level.stride, level.width, level.height, x, y, du_x, du_y, side,
-                       patch);
-}
-
-// (1 4 6 4 1) / 16 around the circle, left at 16 times the value.
-void smooth_circle(const int32_t* histogram, int64_t* smooth) {
-  constexpr int32_t n = TVK_ORIENT_BINS;
-  for (int32_t k = 0; k < n; ++k) {
-    smooth[k] = static_cast<int64_t>(histogram[(k + n - 2) % n]) + histogram[(k + 2) % n] +
-                4 * (static_cast<int64_t>(histogram[(k + n - 1) % n]) + histogram[(k + 1) % n]) +
-                6 * static_cast<int64_t>(histogram[k]);
-  }
+  kernels.sample_patch(octave.pairs, octave.width, octave.height, x, y, du_x, du_y, side, patch);
 }
 
 // Peak of the parabola through a bin and its neighbours.
-float peak_angle(const int64_t* smooth, int32_t bin) {
+float peak_angle(const int32_t* smooth, int32_t bin) {
   constexpr int32_t n = TVK_ORIENT_BINS;
   const double left = static_cast<double>(smooth[(bin + n - 1) % n]);
   const double middle = static_cast<double>(smooth[bin]);
@@ -98,20 +90,19 @@ OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count) {
 
 int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint& keypoint, float angles_rad[2]) {
-  int16_t patch[TVK_ORIENT_SIDE * TVK_ORIENT_SIDE];
-  int32_t histogram[TVK_ORIENT_BINS];
-  int64_t smooth[TVK_ORIENT_BINS];
-  sample_around(kernels, level_of(octaves, keypoint), keypoint, 0.0, TVK_ORIENT_SIDE, patch);
-  kernels.orientation_histogram(patch, histogram);
-  smooth_circle(histogram, smooth);
+  int16_t patch[TVK_ORIENT_SIDE * TVK_PATCH_SIDE + 1];
+  int32_t smooth[TVK_ORIENT_BINS];
+  sample_around(kernels, octave_for(octaves, keypoint), keypoint, 0.0, kOrientStep, TVK_ORIENT_SIDE,
+                patch);
+  kernels.orientation_histogram(patch, smooth);
   // The two highest local maxima; the lower bin wins a tie.
   int32_t best = 0, second = -1;
   for (int32_t k = 1; k < TVK_ORIENT_BINS; ++k) {
     if (smooth[k] > smooth[best]) best = k;
   }
   for (int32_t k = 0; k < TVK_ORIENT_BINS; ++k) {
-    const int64_t left = smooth[(k + TVK_ORIENT_BINS - 1) % TVK_ORIENT_BINS];
-    const int64_t right = smooth[(k + 1) % TVK_ORIENT_BINS];
+    const int32_t left = smooth[(k + TVK_ORIENT_BINS - 1) % TVK_ORIENT_BINS];
+    const int32_t right = smooth[(k + 1) % TVK_ORIENT_BINS];
     if (k == best || smooth[k] <= left || smooth[k] <= right) continue;
     if (second < 0 || smooth[k] > smooth[second]) second = k;
   }
@@ -126,10 +117,10 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
 
 void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
                        const tv_keypoint& keypoint, int32_t kind, uint8_t* descriptor) {
-  int16_t patch[TVK_PATCH_SIDE * TVK_PATCH_SIDE];
+  int16_t patch[TVK_PATCH_SIDE * TVK_PATCH_SIDE + 1];
   int32_t histogram[TVK_DESCRIPTOR_SIZE];
-  sample_around(kernels, level_of(octaves, keypoint), keypoint, keypoint.angle_rad, TVK_PATCH_SIDE,
-                patch);
+  sample_around(kernels, octave_for(octaves, keypoint), keypoint, keypoint.angle_rad, kStepPerSize,
+                TVK_PATCH_SIDE, patch);
   kernels.gradient_histogram(patch, histogram);
   kernels.quantize_descriptor(histogram, kind == TV_DESCRIPTOR_ROOTSIFT, descriptor);
 }

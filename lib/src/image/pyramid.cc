@@ -53,13 +53,18 @@ void average(const tvk_table& kernels, const Level& source, double factor, Level
   }
 }
 
-void blur(const tvk_table& kernels, const Level& source, uint8_t* pixels) {
+// Blurs the level, two rows at a time in `rows`, and stores the pairs.
+void make_octave(const tvk_table& kernels, const Level& source, uint8_t* rows[2], uint16_t* pairs) {
   const int32_t last = source.height - 1;
   for (int32_t y = 0; y <= last; ++y) {
     const uint8_t* row = source.data + y * source.stride;
     kernels.blur_row(y > 0 ? row - source.stride : row, row, y < last ? row + source.stride : row,
-                     source.width, pixels + static_cast<int64_t>(y) * source.width);
+                     source.width, rows[y & 1]);
+    const int64_t above = static_cast<int64_t>(y - 1) * (source.width + 1);
+    if (y > 0) kernels.pair_rows(rows[(y - 1) & 1], rows[y & 1], source.width, pairs + above);
   }
+  kernels.pair_rows(rows[last & 1], rows[last & 1], source.width,
+                    pairs + static_cast<int64_t>(last) * (source.width + 1));
 }
 
 size_t area(int32_t width, int32_t height) {
@@ -102,10 +107,12 @@ bool next_level(const tvk_table& kernels, const Level& level, double factor, int
 }
 
 size_t octaves_bytes(int32_t max_width, int32_t max_height) {
-  // Each octave but the first is a halved image and its blur; the areas fall by four.
-  size_t bytes = arena_bytes<uint8_t>(area(max_width, max_height));
-  for (int32_t o = 1; o < kMaxOctaves; ++o) {
-    bytes += 2 * arena_bytes<uint8_t>(area(max_width >> o, max_height >> o));
+  // Each octave is a halved image, but for the first, and its pairs; the areas fall by four.
+  size_t bytes = 2 * arena_bytes<uint8_t>(static_cast<size_t>(max_width));
+  for (int32_t o = 0; o < kMaxOctaves; ++o) {
+    const int32_t width = max_width >> o, height = max_height >> o;
+    bytes += arena_bytes<uint16_t>(area(width + 1, height));
+    if (o > 0) bytes += arena_bytes<uint8_t>(area(width, height));
   }
   return bytes;
 }
@@ -114,25 +121,21 @@ Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t fi
                      Arena& arena) {
   Octaves octaves{};
   Level level = full_level(image);
+  uint8_t* rows[2];
+  for (uint8_t*& row : rows) row = arena_alloc<uint8_t>(arena, static_cast<size_t>(level.width));
   for (int32_t o = 0; o < kMaxOctaves; ++o) {
-    if (o >= first || o == last) {
-      uint8_t* blurred = arena_alloc<uint8_t>(arena, area(level.width, level.height));
-      blur(kernels, level, blurred);
-      octaves.levels[o] = Level{blurred, level.width, level.height, level.width, level.scale};
+    const int32_t width = level.width / 2, height = level.height / 2;
+    const bool is_coarsest = o >= last || width < kMinLevelSide || height < kMinLevelSide;
+    if (o >= first || is_coarsest) {
+      uint16_t* pairs = arena_alloc<uint16_t>(arena, area(level.width + 1, level.height));
+      make_octave(kernels, level, rows, pairs);
+      octaves.octaves[o] = Octave{pairs, level.width, level.height, level.scale};
     }
     octaves.count = o + 1;
-    const int32_t width = level.width / 2, height = level.height / 2;
-    if (o >= last || width < kMinLevelSide || height < kMinLevelSide) break;
+    if (is_coarsest) break;
     uint8_t* halved = arena_alloc<uint8_t>(arena, area(width, height));
     halve(kernels, level, halved, width, height);
     level = Level{halved, width, height, width, level.scale * 2};
-  }
-  const int32_t coarsest = octaves.count - 1;
-  if (octaves.levels[coarsest].data == nullptr) {  // the image ended before `first`
-    uint8_t* blurred = arena_alloc<uint8_t>(arena, area(level.width, level.height));
-    blur(kernels, level, blurred);
-    octaves.levels[coarsest] =
-        Level{blurred, level.width, level.height, level.width, level.scale};
   }
   return octaves;
 }

@@ -26,8 +26,9 @@ inline Level full_level(const tv_image& image) {
   return Level{image.data, image.width, image.height, image.stride_bytes, 1.0};
 }
 
+inline double to_level(double scale, double x) { return (x + 0.5) / scale - 0.5; }
 inline double to_full(const Level& level, double x) { return (x + 0.5) * level.scale - 0.5; }
-inline double to_level(const Level& level, double x) { return (x + 0.5) / level.scale - 0.5; }
+inline double to_level(const Level& level, double x) { return to_level(level.scale, x); }
 
 // Two buffers that take turns: a level is made from the one before it, which then is free again.
 struct LevelBuffers {
@@ -45,9 +46,16 @@ LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_he
 bool next_level(const tvk_table& kernels, const Level& level, double factor, int32_t index,
                 LevelBuffers& buffers, Level* next);
 
-// Octave o: the image halved o times and blurred by the 3x3 binomial.
+// The image halved some times and blurred by the 3x3 binomial, its rows stored in pairs:
+// pairs[y (width + 1) + x] holds pixel (x, y) and the one below it, each less 128 (tvk pair_rows).
+struct Octave {
+  const uint16_t* pairs;
+  int32_t width, height;
+  double scale;  // full-image pixels in one of its pixels
+};
+
 struct Octaves {
-  Level levels[kMaxOctaves];
+  Octave octaves[kMaxOctaves];
   int32_t count;
 };
 

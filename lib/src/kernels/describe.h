@@ -1,180 +1,270 @@
 /* Orientation and SIFT histograms of a sampled patch, and the 128 bytes.
    D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, sections 5, 6.
-   All sums are of integers, so their order does not matter; the float steps are single IEEE
-   operations on one element each. */
+   No arctangent: a gradient that lies between two directions of the histogram is the sum of a vector
+   along each, and the lengths of these are what it gives to the two. All of it in integers, 16 bits
+   where they suffice (docs/decisions/0009). */
 
-/* atan(a) / (2 pi) * 65536 for a in [0, 1]: odd minimax polynomial, error below 0.13 units. */
-#define ATAN_C1 10428.9841f
-#define ATAN_C3 -3445.2039f
-#define ATAN_C5 1879.1296f
-#define ATAN_C7 -888.2130f
-#define ATAN_C9 217.4224f
+#include "kernels/words.h"
 
-/* Direction of (dx, dy) in 1/65536 turn, clockwise as seen (y down), error below 2 units. */
-static inline int32_t gradient_direction(int32_t dx, int32_t dy) {
-  const int32_t ax = dx < 0 ? -dx : dx, ay = dy < 0 ? -dy : dy;
-  const int32_t small = ax < ay ? ax : ay, large = ax < ay ? ay : ax;
-  const float a = (float)small / (float)(large + (large == 0));
-  const float s = a * a;
-  const float octant = a * (ATAN_C1 + s * (ATAN_C3 + s * (ATAN_C5 + s * (ATAN_C7 + s * ATAN_C9))));
-  int32_t turn = (int32_t)(octant + 0.5f);
-  turn = ay > ax ? 16384 - turn : turn;
-  turn = dx < 0 ? 32768 - turn : turn;
-  turn = dy < 0 ? 65536 - turn : turn;
-  return turn & 65535;
+/* A gradient along the diagonals of four samples, in samples' units: u to the lower right, v to the
+   upper right. Sums and differences of u and v fit 16 bits. */
+static inline words gradient_u(const int16_t *at) {
+  return words_load(at + TVK_PATCH_SIDE + 1) - words_load(at);
+}
+static inline words gradient_v(const int16_t *at) {
+  return words_load(at + 1) - words_load(at + TVK_PATCH_SIDE);
 }
 
-static inline int32_t gradient_magnitude(int32_t dx, int32_t dy) {
-  return (int32_t)(sqrtf((float)(dx * dx + dy * dy)) + 0.5f);
-}
+enum { ORIENT_GRADIENTS = TVK_ORIENT_SIDE - 1 };
 
-enum { ORIENT_INNER = TVK_ORIENT_SIDE - 2 };
-
-/* 256 exp(-(x^2 + y^2) / (2 * 2^2)) for x^2 + y^2 <= 6^2, else 0. */
-static const int16_t orientation_weights[ORIENT_INNER][ORIENT_INNER] = {
-  {0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0},
-  {0, 0, 0, 4, 7, 10, 11, 10, 7, 4, 0, 0, 0},
-  {0, 0, 5, 11, 21, 31, 35, 31, 21, 11, 5, 0, 0},
-  {0, 4, 11, 27, 50, 73, 83, 73, 50, 27, 11, 4, 0},
-  {0, 7, 21, 50, 94, 137, 155, 137, 94, 50, 21, 7, 0},
-  {0, 10, 31, 73, 137, 199, 226, 199, 137, 73, 31, 10, 0},
-  {3, 11, 35, 83, 155, 226, 256, 226, 155, 83, 35, 11, 3},
-  {0, 10, 31, 73, 137, 199, 226, 199, 137, 73, 31, 10, 0},
-  {0, 7, 21, 50, 94, 137, 155, 137, 94, 50, 21, 7, 0},
-  {0, 4, 11, 27, 50, 73, 83, 73, 50, 27, 11, 4, 0},
-  {0, 0, 5, 11, 21, 31, 35, 31, 21, 11, 5, 0, 0},
-  {0, 0, 0, 4, 7, 10, 11, 10, 7, 4, 0, 0, 0},
-  {0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0},
+/* 65536 * 0.11 exp(-(x^2 + y^2) / (2 * 2^2)) for x^2 + y^2 < 6^2: all together give a bin less than
+   65536. */
+static const uint16_t orientation_weights[ORIENT_GRADIENTS][TVK_PATCH_SIDE] = {
+    {0, 0, 103, 192, 280, 317, 280, 192, 103, 0, 0},
+    {0, 132, 317, 592, 861, 976, 861, 592, 317, 132, 0},
+    {103, 317, 760, 1420, 2065, 2340, 2065, 1420, 760, 317, 103},
+    {192, 592, 1420, 2652, 3859, 4372, 3859, 2652, 1420, 592, 192},
+    {280, 861, 2065, 3859, 5614, 6362, 5614, 3859, 2065, 861, 280},
+    {317, 976, 2340, 4372, 6362, 7209, 6362, 4372, 2340, 976, 317},
+    {280, 861, 2065, 3859, 5614, 6362, 5614, 3859, 2065, 861, 280},
+    {192, 592, 1420, 2652, 3859, 4372, 3859, 2652, 1420, 592, 192},
+    {103, 317, 760, 1420, 2065, 2340, 2065, 1420, 760, 317, 103},
+    {0, 132, 317, 592, 861, 976, 861, 592, 317, 132, 0},
+    {0, 0, 103, 192, 280, 317, 280, 192, 103, 0, 0},
 };
 
-/* Each gradient is shared between the two directions, 10 degrees apart, that it lies between. */
-static void orientation_histogram(const int16_t *patch, int32_t *histogram) {
-  int32_t x, y, magnitude[ORIENT_INNER], direction[ORIENT_INNER];
-  memset(histogram, 0, TVK_ORIENT_BINS * sizeof histogram[0]);
-  for (y = 0; y < ORIENT_INNER; ++y) {
-    const int16_t *row = patch + (y + 1) * TVK_ORIENT_SIDE + 1;
-    for (x = 0; x < ORIENT_INNER; ++x) {
-      const int32_t dx = row[x + 1] - row[x - 1];
-      const int32_t dy = row[x + TVK_ORIENT_SIDE] - row[x - TVK_ORIENT_SIDE];
-      magnitude[x] = (gradient_magnitude(dx, dy) * orientation_weights[y][x] + 128) >> 8;
-      direction[x] = (gradient_direction(dx, dy) * TVK_ORIENT_BINS) >> 8; /* 1/256 of a bin */
-    }
-    for (x = 0; x < ORIENT_INNER; ++x) {
-      const int32_t bin = direction[x] >> 8, share = direction[x] & 255;
-      const int32_t next = bin + 1 == TVK_ORIENT_BINS ? 0 : bin + 1;
-      histogram[bin] += magnitude[x] * (256 - share);
-      histogram[next] += magnitude[x] * share;
-    }
+/* Lanes of `x` turned around within `span` where the mask is set: span - x. */
+static inline words reflect(words x, words mask, int16_t span) {
+  return (x ^ mask) - mask + (words_of(span) & mask);
+}
+
+typedef struct direction_shares {
+  words bin;       /* of 32, clockwise as seen from x */
+  words low, high; /* what it and the next one get */
+} direction_shares;
+
+/* The direction is folded at 0, 90, 45, 22.5 and 11.25 degrees, and unfolded as a number of bins. */
+static direction_shares share_directions(words u, words v, words weights) {
+  const words au = words_max(u, -u), av = words_max(v, -v);
+  const words left = u < words_of(0), up = v > words_of(0), steep = av > au;
+  words big = words_max(au, av), small = words_min(au, av), bin, is_odd, a, b;
+  const words root_half = words_of((int16_t)46341);
+  const words cosine = words_of((int16_t)60547), sine = words_of(25080); /* of 22.5 degrees */
+  const words big45 = words_scale(big + small, root_half);
+  const words small45 = words_scale(big - small, root_half);
+  const words over22 = small45 < small;
+  words big22, small22, over11;
+  direction_shares shares;
+  big = words_max(big, big45);
+  small = words_min(small, small45);
+  big22 = words_scale(big, cosine) + words_scale(small, sine);
+  small22 = words_positive(words_scale(big, sine) - words_scale(small, cosine));
+  over11 = small22 < small;
+  big = words_max(big, big22);
+  small = words_min(small, small22);
+  bin = words_of(2) & over11;
+  bin = reflect(bin, over22, 4);
+  bin = reflect(bin, steep, 8);
+  bin = reflect(bin, left, 16);
+  bin = reflect(bin, up, 0);
+  is_odd = over11 ^ over22 ^ steep ^ left ^ up; /* it lies before `bin`, not behind it */
+  /* big - small cot(11.25 deg) and small / sin(11.25 deg). */
+  b = words_of(5) * small;
+  a = words_positive(big - b - words_scale(small, words_of(1796)));
+  b = b + words_scale(small, words_of(8258));
+  a = words_scale(a, weights);
+  b = words_scale(b, weights);
+  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1); /* u points to bin 4 */
+  shares.low = (a & ~is_odd) | (b & is_odd);
+  shares.high = (b & ~is_odd) | (a & is_odd);
+  return shares;
+}
+
+/* (1 4 6 4 1) / 16 around the circle, left at 16 times the value. */
+static void smooth_circle(const int32_t *histogram, int32_t *smooth) {
+  int32_t around[TVK_ORIENT_BINS + 4], k;
+  memcpy(around, histogram + TVK_ORIENT_BINS - 2, 2 * sizeof around[0]);
+  memcpy(around + 2, histogram, TVK_ORIENT_BINS * sizeof around[0]);
+  memcpy(around + 2 + TVK_ORIENT_BINS, histogram, 2 * sizeof around[0]);
+  for (k = 0; k < TVK_ORIENT_BINS; ++k) {
+    smooth[k] = around[k] + around[k + 4] + 4 * (around[k + 1] + around[k + 3]) + 6 * around[k + 2];
   }
 }
 
-enum { PATCH_INNER = TVK_PATCH_SIDE - 2, CELL_SAMPLES = 8 };
+static void orientation_histogram(const int16_t *patch, int32_t *smooth) {
+  /* A gradient adds both its shares at once, 16 bits each; neighbours add to different tables, so that
+     none waits for the one before it. */
+  uint32_t tables[4][TVK_ORIENT_BINS] TVK_ALIGNED;
+  int32_t histogram[TVK_ORIENT_BINS];
+  int32_t x, y;
+  memset(tables, 0, sizeof tables);
+  for (y = 0; y < ORIENT_GRADIENTS; ++y) {
+    uint16_t bin[TVK_PATCH_SIDE] TVK_ALIGNED;
+    uint32_t both[TVK_PATCH_SIDE] TVK_ALIGNED;
+    for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
+      const int16_t *at = patch + y * TVK_PATCH_SIDE + x;
+      const direction_shares shares =
+          share_directions(gradient_u(at), gradient_v(at), words_load(orientation_weights[y] + x));
+      words_store(bin + x, shares.bin);
+      words_zip(shares.low, shares.high, both + x);
+    }
+    for (x = 0; x < ORIENT_GRADIENTS; ++x) {
+      tables[x & 3][bin[x]] += both[x];
+    }
+  }
+  for (x = 0; x < TVK_ORIENT_BINS; ++x) {
+    tables[0][x] += tables[1][x] + tables[2][x] + tables[3][x];
+    histogram[x] = (int32_t)(tables[0][x] & 65535);
+  }
+  histogram[0] += (int32_t)(tables[0][TVK_ORIENT_BINS - 1] >> 16);
+  for (x = 1; x < TVK_ORIENT_BINS; ++x) histogram[x] += (int32_t)(tables[0][x - 1] >> 16);
+  smooth_circle(histogram, smooth);
+}
 
-/* Along an axis cell c = 0..3 is fed by samples u = 4 c + i, i = 0..7 of the twenty, with the share
-   256 exp(-p^2 / 8) max(0, 1 - |p + 1.5 - c|), where p = (u - 9.5) / 4 cells from the middle. */
-static const int16_t cell_weights[4][CELL_SAMPLES] = {
-    {16, 55, 103, 161, 177, 137, 87, 30},
-    {25, 82, 145, 213, 220, 160, 96, 31},
-    {31, 96, 160, 220, 213, 145, 82, 25},
-    {30, 87, 137, 177, 161, 103, 55, 16},
+enum { PATCH_GRADIENTS = TVK_PATCH_SIDE - 1, CELL_SAMPLES = 6 };
+
+/* Along an axis cell c = 0..3 is fed by gradients k = 3 c + i, i = 0..5 of the fifteen, with the share
+   exp(-p^2 / 8) max(0, 1 - |p + 1.5 - c|), where p = 0.28 (k - 7) cells from the middle. Along y times
+   0.56 * 65536, and another sqrt(1/2) for the odd directions, so that sums fit 16 bits; along x times
+   16384. */
+static const uint16_t row_weights[2][4][CELL_SAMPLES] = {{
+    {12261, 21148, 25853, 19452, 11425, 2117},
+    {11922, 22177, 33172, 28347, 18350, 7995},
+    {7995, 18350, 28347, 33172, 22177, 11922},
+    {2117, 11425, 19452, 25853, 21148, 12261},
+}, {
+    {8670, 14954, 18281, 13755, 8078, 1497},
+    {8430, 15682, 23456, 20044, 12975, 5654},
+    {5654, 12975, 20044, 23456, 15682, 8430},
+    {1497, 8078, 13755, 18281, 14954, 8670},
+}};
+static const int16_t column_weights[4][8] = {
+    {5474, 9441, 11541, 8684, 5100, 945, 0, 0},
+    {5322, 9901, 14809, 12655, 8192, 3569, 0, 0},
+    {3569, 8192, 12655, 14809, 9901, 5322, 0, 0},
+    {945, 5100, 8684, 11541, 9441, 5474, 0, 0},
 };
 
-/* The gradients lie flat, TVK_PATCH_SIDE to a row, so that one long loop runs over all of them; the
-   two at the end of each row straddle its border and are never read. */
-enum { PATCH_FLAT = PATCH_INNER * TVK_PATCH_SIDE };
-
-static void patch_gradients(const int16_t *patch, int16_t *magnitude, int16_t *direction) {
-  int32_t k;
-  for (k = 0; k < PATCH_FLAT - 2; ++k) {
-    const int16_t *at = patch + TVK_PATCH_SIDE + 1 + k;
-    const int32_t dx = at[1] - at[-1];
-    const int32_t dy = at[-TVK_PATCH_SIDE] - at[TVK_PATCH_SIDE]; /* UBC order: counter-clockwise */
-    magnitude[k] = (int16_t)gradient_magnitude(dx, dy);
-    direction[k] = (int16_t)(gradient_direction(dx, dy) >> 5);
+/* What each gradient of a row gives to the eight directions, counter-clockwise as seen from x: the
+   part along an axis (times sqrt(1/2)) and along a diagonal. A row's shares lie one direction after
+   the other. */
+static void share_row(const int16_t *row, int16_t shares[8][TVK_PATCH_SIDE]) {
+  int32_t x;
+  for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
+    const words u = gradient_u(row + x), v = gradient_v(row + x);
+    const words pu = words_positive(u), nu = words_positive(-u);
+    const words pv = words_positive(v), nv = words_positive(-v);
+    const words au = pu + nu, av = pv + nv;
+    words_store(shares[0] + x, words_min(pu, pv));
+    words_store(shares[1] + x, words_positive(v - au));
+    words_store(shares[2] + x, words_min(nu, pv));
+    words_store(shares[3] + x, words_positive(-u - av));
+    words_store(shares[4] + x, words_min(nu, nv));
+    words_store(shares[5] + x, words_positive(-v - au));
+    words_store(shares[6] + x, words_min(pu, nv));
+    words_store(shares[7] + x, words_positive(u - av));
   }
 }
 
-/* What each gradient gives to direction `bin` of eight: a tent, 256 units wide to each side. */
-static void share_of_direction(const int16_t *magnitude, const int16_t *direction, int32_t bin,
-                               int16_t *share) {
-  int32_t k;
-  for (k = 0; k < PATCH_FLAT - 2; ++k) {
-    const int16_t turned = (int16_t)(((direction[k] - 256 * bin + 1024) & 2047) - 1024);
-    const int16_t away = (int16_t)(turned < 0 ? -turned : turned);
-    const int16_t tent = (int16_t)(away < 256 ? 256 - away : 0);
-    share[k] = (int16_t)((magnitude[k] * (tent < 255 ? tent : 255)) >> 8);
-  }
-}
-
-/* Sums over the rows of each cell; columns[x][cell_y * 8 + bin]. */
-static void pool_rows(const int16_t *share, int32_t bin, int16_t columns[PATCH_INNER][32]) {
-  int32_t cell, i, x;
-  for (cell = 0; cell < 4; ++cell) {
-    const int16_t *rows = share + 4 * cell * TVK_PATCH_SIDE;
-    int32_t sums[PATCH_INNER];
-    for (x = 0; x < PATCH_INNER; ++x) sums[x] = 128;
+/* Over the rows of a cell. */
+static void pool_rows(int16_t (*rows)[8][TVK_PATCH_SIDE], int32_t cell, int16_t *pooled) {
+  int32_t bin, x, i;
+  for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
+    words sums[8];
+    for (bin = 0; bin < 8; ++bin) sums[bin] = words_of(0);
     for (i = 0; i < CELL_SAMPLES; ++i) {
-      for (x = 0; x < PATCH_INNER; ++x) {
-        sums[x] += cell_weights[cell][i] * rows[i * TVK_PATCH_SIDE + x];
+      const words even = words_of((int16_t)row_weights[0][cell][i]);
+      const words odd = words_of((int16_t)row_weights[1][cell][i]);
+      for (bin = 0; bin < 8; bin += 2) {
+        sums[bin] += words_scale(words_load(rows[i][bin] + x), even);
+        sums[bin + 1] += words_scale(words_load(rows[i][bin + 1] + x), odd);
       }
     }
-    for (x = 0; x < PATCH_INNER; ++x) columns[x][cell * 8 + bin] = (int16_t)(sums[x] >> 8);
+    for (bin = 0; bin < 8; ++bin) words_store(pooled + bin * TVK_PATCH_SIDE + x, sums[bin]);
   }
+}
+
+/* Over the columns of a cell, for the eight directions; two samples more are read, and weigh nothing. */
+static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t *sums) {
+#if defined(TVK_AVX2) || defined(TVK_AVX512)
+  const __m256i w = _mm256_broadcastsi128_si256(_mm_loadu_si128((const __m128i *)weights));
+  __m256i product[4], low, high;
+  int32_t bin;
+  for (bin = 0; bin < 4; ++bin) {
+    const int16_t *near_row = columns + bin * TVK_PATCH_SIDE, *far_row = near_row + 4 * TVK_PATCH_SIDE;
+    const __m256i both = _mm256_inserti128_si256(
+        _mm256_castsi128_si256(_mm_loadu_si128((const __m128i *)near_row)),
+        _mm_loadu_si128((const __m128i *)far_row), 1);
+    product[bin] = _mm256_madd_epi16(both, w);
+  }
+  low = _mm256_hadd_epi32(product[0], product[1]);
+  high = _mm256_hadd_epi32(product[2], product[3]);
+  _mm256_storeu_si256((__m256i *)sums, _mm256_hadd_epi32(low, high));
+#else
+  int32_t bin, i;
+  for (bin = 0; bin < 8; ++bin) {
+    int32_t sum = 0;
+    for (i = 0; i < CELL_SAMPLES; ++i) sum += columns[bin * TVK_PATCH_SIDE + i] * weights[i];
+    sums[bin] = sum;
+  }
+#endif
 }
 
 static void gradient_histogram(const int16_t *patch, int32_t *histogram) {
-  int16_t magnitude[PATCH_FLAT], direction[PATCH_FLAT], share[PATCH_FLAT];
-  int16_t columns[PATCH_INNER][32];
-  int32_t bin, cell, i, k;
-  patch_gradients(patch, magnitude, direction);
-  for (bin = 0; bin < 8; ++bin) {
-    share_of_direction(magnitude, direction, bin, share);
-    pool_rows(share, bin, columns);
-  }
-  for (cell = 0; cell < 4; ++cell) {
-    int32_t sums[32] = {0};
-    for (i = 0; i < CELL_SAMPLES; ++i) {
-      for (k = 0; k < 32; ++k) sums[k] += cell_weights[cell][i] * columns[4 * cell + i][k];
-    }
-    for (k = 0; k < 32; ++k) histogram[((k / 8) * 4 + cell) * 8 + k % 8] = sums[k];
+  int16_t rows[PATCH_GRADIENTS][8][TVK_PATCH_SIDE] TVK_ALIGNED;
+  int16_t pooled[4 * 8 * TVK_PATCH_SIDE + 2] TVK_ALIGNED; /* the last column's cells read two beyond */
+  int32_t x, y;
+  for (y = 0; y < PATCH_GRADIENTS; ++y) share_row(patch + y * TVK_PATCH_SIDE, rows[y]);
+  for (y = 0; y < 4; ++y) pool_rows(rows + 3 * y, y, pooled + y * 8 * TVK_PATCH_SIDE);
+  memset(pooled + 4 * 8 * TVK_PATCH_SIDE, 0, 2 * sizeof pooled[0]);
+  for (y = 0; y < 4; ++y) {
+    const int16_t *columns = pooled + y * 8 * TVK_PATCH_SIDE;
+    for (x = 0; x < 4; ++x) pool_columns(columns + 3 * x, column_weights[x], histogram + (4 * y + x) * 8);
   }
 }
 
-static inline uint8_t descriptor_byte(float value) {
-  const int32_t rounded = (int32_t)(value + 0.5f);
-  return (uint8_t)(rounded < 255 ? rounded : 255);
+/* Scaled to 12 bits: their squares' sum fits 31. */
+static void normalise_histogram(const int32_t *histogram, int16_t *values) {
+  int32_t any = 0, shift, k;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) any |= histogram[k];
+  shift = any > 4095 ? 20 - __builtin_clz((uint32_t)any) : 0;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) values[k] = (int16_t)(histogram[k] >> shift);
 }
 
-static float descriptor_norm(const int32_t *values) {
-  int64_t sum = 0;
-  int32_t k;
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += (int64_t)values[k] * values[k];
-  return sqrtf((float)sum);
+static int32_t sum_of_squares(const int16_t *values) {
+  int32_t sum = 0, k;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += values[k] * values[k];
+  return sum;
 }
 
 static void quantize_descriptor(const int32_t *histogram, int32_t root, uint8_t *descriptor) {
-  int32_t clipped[TVK_DESCRIPTOR_SIZE];
-  const int32_t limit = (int32_t)(0.2f * descriptor_norm(histogram));
-  int64_t l1 = 0;
-  float scale;
-  int32_t k;
+  int16_t values[TVK_DESCRIPTOR_SIZE];
+  int32_t l1 = 0, limit, k;
+  uint32_t scale;
+  normalise_histogram(histogram, values);
+  limit = (int32_t)(0.2f * sqrtf((float)sum_of_squares(values)));
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-    clipped[k] = histogram[k] < limit ? histogram[k] : limit;
-    l1 += clipped[k];
+    values[k] = (int16_t)(values[k] < limit ? values[k] : limit);
+    l1 += values[k];
   }
   if (l1 == 0) {
     memset(descriptor, 0, TVK_DESCRIPTOR_SIZE);
     return;
   }
   if (root) {
-    scale = 1.0f / (float)l1;
+    /* 512^2 times the share as an integer: its root is never so near to a half that rounding could
+       go either way. */
+    scale = (1u << 31) / (uint32_t)l1;
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-      descriptor[k] = descriptor_byte(512.0f * sqrtf((float)clipped[k] * scale));
+      const int32_t square = (int32_t)(((uint32_t)values[k] * scale) >> 13);
+      const int32_t byte = (int32_t)(sqrtf((float)square) + 0.5f);
+      descriptor[k] = (uint8_t)(byte < 255 ? byte : 255);
     }
   } else {
-    scale = 512.0f / descriptor_norm(clipped);
+    scale = (uint32_t)(512.0f * 65536.0f / sqrtf((float)sum_of_squares(values)));
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-      descriptor[k] = descriptor_byte((float)clipped[k] * scale);
+      const uint32_t byte = ((uint32_t)values[k] * scale + 32768) >> 16;
+      descriptor[k] = (uint8_t)(byte < 255 ? byte : 255);
     }
   }
 }

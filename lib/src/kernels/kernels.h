@@ -20,9 +20,9 @@ typedef struct tvk_nearest {
 
 #define TVK_CIRCLE_RADIUS 3 /* of the segment test */
 
-#define TVK_PATCH_SIDE 22      /* samples a side of a descriptor's patch: 20 gradients and a rim */
-#define TVK_ORIENT_SIDE 15     /* the same for the orientation's patch: 13 and a rim */
-#define TVK_ORIENT_BINS 36
+#define TVK_PATCH_SIDE 16      /* samples a side of a descriptor's patch, 15 gradients between them */
+#define TVK_ORIENT_SIDE 12     /* the same for the orientation's patch */
+#define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
 
 #define TVK_NEAREST_PANEL 2048       /* columns that mutual_nearest prepares at once */
@@ -65,12 +65,16 @@ typedef struct tvk_triangulate_pair {
      >> 16; where a weight is 0 the sum is not read.
    halve_row: out[x] = (a[2x] + a[2x+1] + b[2x] + b[2x+1] + 2) / 4.
    blur_row: 3x3 binomial (1 2 1)/4 in both directions, edges repeated, rounded once at the end.
-   sample_patch: side x side bilinear samples; sample (i, j) lies at (x + i du_x - j du_y,
-     y + i du_y + j du_x), all in 1/65536 pixel; positions are clamped to the image. Values in 1/16
-     grey level.
-   orientation_histogram: 36 directions, clockwise as seen, of the gradients within 6 samples of the
-     middle of an upright TVK_ORIENT_SIDE patch, Gaussian weight of sigma 2 samples.
-   gradient_histogram: SIFT's 4x4x8 histogram of a TVK_PATCH_SIDE patch (feature/describe.h), with
+   pair_rows: pairs[x] = the pixel and the one below it, in the low and the high byte, each less 128 in
+     two's complement; pairs[width] = pairs[width - 1].
+   sample_patch: num_rows rows of TVK_PATCH_SIDE bilinear samples of an image of pairs, width + 1 to a
+     row, the last row paired with itself, and a 0 behind them; sample (i, j) lies at (x + i du_x - j du_y,
+     y + i du_y + j du_x), all in 1/65536 pixel; positions are clamped to the image. In 256 / 127^2 grey
+     level, less 128 levels.
+   orientation_histogram: of the gradients within 6 samples of the middle of TVK_ORIENT_SIDE upright rows of
+     TVK_ORIENT_SIDE samples, Gaussian weight of sigma 2 samples: TVK_ORIENT_BINS directions, clockwise
+     as seen, smoothed around the circle.
+   gradient_histogram: SIFT's 4x4x8 histogram of TVK_PATCH_SIDE rows (feature/describe.h), with
      trilinear sharing and Gaussian window.
    quantize_descriptor: SIFT's normalisation, clipping at 0.2, and 128 bytes; root: RootSIFT.
    mutual_nearest: of_rows[i].idx is the column whose nearest is row i and that is i's nearest, each
@@ -117,9 +121,11 @@ typedef struct tvk_triangulate_pair {
   X(halve_row, void, (const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out))        \
   X(blur_row, void,                                                                                \
     (const uint8_t *above, const uint8_t *row, const uint8_t *below, int32_t width, uint8_t *out)) \
+  X(pair_rows, void,                                                                               \
+    (const uint8_t *row, const uint8_t *below, int32_t width, uint16_t *pairs))                    \
   X(sample_patch, void,                                                                            \
-    (const uint8_t *image, int64_t stride, int32_t width, int32_t height, int32_t x, int32_t y,    \
-     int32_t du_x, int32_t du_y, int32_t side, int16_t *patch))                                    \
+    (const uint16_t *pairs, int32_t width, int32_t height, int32_t x, int32_t y, int32_t du_x,     \
+     int32_t du_y, int32_t num_rows, int16_t *patch))                                              \
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
   X(gradient_histogram, void, (const int16_t *patch, int32_t *histogram))                          \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \

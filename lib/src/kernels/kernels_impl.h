@@ -9,6 +9,7 @@
 /* clang-format off */
 #include "kernels/fast.h"
 #include "kernels/resample.h"
+#include "kernels/words.h"
 #include "kernels/patch.h"
 #include "kernels/describe.h"
 #include "kernels/nearest.h"

@@ -1,76 +1,131 @@
-/* Bilinear samples of a turned square. */
+/* Bilinear samples of a turned square, out of an image whose rows are stored in pairs: one 32-bit load
+   fetches all four neighbours, and no position needs a rule of its own at the border.
+   Shares are of 127, not of 128: they make up for the fraction's truncation, and a share times a pixel
+   (less 128) fits 16 bits. */
+
+static void pair_rows(const uint8_t *row, const uint8_t *below, int32_t width, uint16_t *pairs) {
+  int32_t x;
+  for (x = 0; x < width; ++x) pairs[x] = (uint16_t)((row[x] | below[x] << 8) ^ 0x8080);
+  pairs[width] = pairs[width - 1];
+}
+
+typedef struct sampled_image {
+  const uint16_t *pairs;
+  int32_t pitch, right, bottom; /* the last positions, in 1/65536 pixel */
+} sampled_image;
+
+#if defined(TVK_AVX512)
+
+/* Bytes [127 - f, f] of a position's fraction f, twice; and the same as words. */
+static inline __m512i byte_shares(__m512i position) {
+  const __m512i spread = _mm512_shuffle_epi8(_mm512_srli_epi32(position, 1),
+                                             _mm512_set4_epi32(0x0d0d0d0d, 0x09090909, 0x05050505, 0x01010101));
+  return _mm512_xor_si512(_mm512_and_si512(spread, _mm512_set1_epi8(127)), _mm512_set1_epi16(127));
+}
+static inline __m512i word_shares(__m512i position) {
+  const __m512i spread = _mm512_shuffle_epi8(
+      _mm512_srli_epi32(position, 1),
+      _mm512_set4_epi32((int)0x800d800du, (int)0x80098009u, (int)0x80058005u, (int)0x80018001u));
+  return _mm512_xor_si512(_mm512_and_si512(spread, _mm512_set1_epi8(127)), _mm512_set1_epi32(127));
+}
+
+static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t du_x, int32_t du_y,
+                       int16_t *out) {
+  const __m512i i = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
+  const __m512i zero = _mm512_setzero_si512();
+  const __m512i all_x = _mm512_add_epi32(_mm512_set1_epi32(x), _mm512_mullo_epi32(i, _mm512_set1_epi32(du_x)));
+  const __m512i all_y = _mm512_add_epi32(_mm512_set1_epi32(y), _mm512_mullo_epi32(i, _mm512_set1_epi32(du_y)));
+  const __m512i sx = _mm512_min_epi32(_mm512_max_epi32(all_x, zero), _mm512_set1_epi32(image->right));
+  const __m512i sy = _mm512_min_epi32(_mm512_max_epi32(all_y, zero), _mm512_set1_epi32(image->bottom));
+  const __m512i yx = _mm512_mask_mov_epi16(sy, 0x55555555, _mm512_srli_epi32(sx, 16));
+  const __m512i offset = _mm512_madd_epi16(yx, _mm512_set1_epi32(image->pitch << 16 | 1));
+  const __m512i quads = _mm512_i32gather_epi32(offset, image->pairs, 2);
+  const __m512i columns = _mm512_maddubs_epi16(byte_shares(sy), quads);
+  const __m512i sums = _mm512_madd_epi16(columns, word_shares(sx));
+  _mm256_storeu_si256((__m256i *)out, _mm512_cvtepi32_epi16(_mm512_srai_epi32(sums, 8)));
+}
+
+#elif defined(TVK_AVX2)
+
+static inline __m256i byte_shares(__m256i position) {
+  const __m256i spread = _mm256_shuffle_epi8(
+      _mm256_srli_epi32(position, 1),
+      _mm256_setr_epi32(0x01010101, 0x05050505, 0x09090909, 0x0d0d0d0d, 0x01010101, 0x05050505,
+                        0x09090909, 0x0d0d0d0d));
+  return _mm256_xor_si256(_mm256_and_si256(spread, _mm256_set1_epi8(127)), _mm256_set1_epi16(127));
+}
+static inline __m256i word_shares(__m256i position) {
+  const __m256i fraction = _mm256_and_si256(_mm256_srli_epi32(position, 9), _mm256_set1_epi32(127));
+  const __m256i spread = _mm256_or_si256(fraction, _mm256_slli_epi32(fraction, 16));
+  return _mm256_xor_si256(spread, _mm256_set1_epi32(127));
+}
+
+/* Eight samples, the first one `first` along the row, 32 bits each. */
+static inline __m256i sample_eight(const sampled_image *image, __m256i x, __m256i y) {
+  const __m256i zero = _mm256_setzero_si256();
+  const __m256i sx = _mm256_min_epi32(_mm256_max_epi32(x, zero), _mm256_set1_epi32(image->right));
+  const __m256i sy = _mm256_min_epi32(_mm256_max_epi32(y, zero), _mm256_set1_epi32(image->bottom));
+  const __m256i yx = _mm256_blend_epi16(sy, _mm256_srli_epi32(sx, 16), 0x55);
+  const __m256i offset = _mm256_madd_epi16(yx, _mm256_set1_epi32(image->pitch << 16 | 1));
+  const __m256i quads = _mm256_i32gather_epi32((const int *)image->pairs, offset, 2);
+  const __m256i columns = _mm256_maddubs_epi16(byte_shares(sy), quads);
+  return _mm256_srai_epi32(_mm256_madd_epi16(columns, word_shares(sx)), 8);
+}
+
+static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t du_x, int32_t du_y,
+                       int16_t *out) {
+  const __m256i i = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+  const __m256i near_x = _mm256_add_epi32(_mm256_set1_epi32(x), _mm256_mullo_epi32(i, _mm256_set1_epi32(du_x)));
+  const __m256i near_y = _mm256_add_epi32(_mm256_set1_epi32(y), _mm256_mullo_epi32(i, _mm256_set1_epi32(du_y)));
+  const __m256i far_x = _mm256_add_epi32(near_x, _mm256_set1_epi32(8 * du_x));
+  const __m256i far_y = _mm256_add_epi32(near_y, _mm256_set1_epi32(8 * du_y));
+  const __m256i packed = _mm256_packs_epi32(sample_eight(image, near_x, near_y),
+                                            sample_eight(image, far_x, far_y));
+  _mm256_storeu_si256((__m256i *)out, _mm256_permute4x64_epi64(packed, 0xd8));
+}
+
+#else
 
 static inline int32_t clamp_i32(int32_t value, int32_t low, int32_t high) {
-  return value < low ? low : value > high ? high : value;
+  const int32_t raised = value < low ? low : value;
+  return raised < high ? raised : high;
 }
 
-/* Bilinear value, in 1/16 grey level, between four pixels; fx, fy in 1/256. */
-static inline int16_t bilinear(int32_t a, int32_t b, int32_t c, int32_t d, int32_t fx, int32_t fy) {
-  const int32_t upper = 256 * a + fx * (b - a);
-  const int32_t lower = 256 * c + fx * (d - c);
-  return (int16_t)((256 * upper + fy * (lower - upper) + 2048) >> 12);
-}
-
-/* Position clamped to the image; the neighbours of the last column and row are themselves. */
-static int16_t sample_clamped(const uint8_t *image, int64_t stride, int32_t width, int32_t height,
-                              int32_t x, int32_t y) {
-  const int32_t sx = clamp_i32(x, 0, (width - 1) << 16), sy = clamp_i32(y, 0, (height - 1) << 16);
-  const int32_t ix = sx >> 16, iy = sy >> 16;
-  const uint8_t *top = image + (int64_t)iy * stride + ix;
-  const uint8_t *bottom = top + (iy + 1 < height ? stride : 0);
-  const int32_t right = ix + 1 < width ? 1 : 0;
-  return bilinear(top[0], top[right], bottom[0], bottom[right], (sx >> 8) & 255, (sy >> 8) & 255);
-}
-
-static int is_inside(int32_t x, int32_t y, int32_t width, int32_t height) {
-  return x >= 0 && y >= 0 && x < (width - 1) << 16 && y < (height - 1) << 16;
-}
-
-enum { SAMPLE_CHUNK = 24 }; /* at least a patch's side, and whole vectors */
-
-/* A row of samples in three steps, so that all but the loads can run in vectors. */
-static void sample_row(const uint8_t *image, int64_t stride, int32_t x, int32_t y, int32_t du_x,
-                       int32_t du_y, int32_t side, int16_t *out) {
-  int32_t offset[SAMPLE_CHUNK];
-  int16_t fx[SAMPLE_CHUNK], fy[SAMPLE_CHUNK], value[SAMPLE_CHUNK];
-  uint8_t a[SAMPLE_CHUNK] = {0}, b[SAMPLE_CHUNK] = {0}, c[SAMPLE_CHUNK] = {0}, d[SAMPLE_CHUNK] = {0};
-  const int32_t pitch = (int32_t)stride;
+/* In three steps, so that all but the loads can run in vectors. */
+static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t du_x, int32_t du_y,
+                       int16_t *out) {
+  int32_t offset[TVK_PATCH_SIDE];
+  int16_t fx[TVK_PATCH_SIDE], fy[TVK_PATCH_SIDE];
+  uint16_t left[TVK_PATCH_SIDE], right[TVK_PATCH_SIDE];
   int32_t i;
-  for (i = 0; i < SAMPLE_CHUNK; ++i) {
-    const int32_t sx = x + i * du_x, sy = y + i * du_y;
-    offset[i] = (sy >> 16) * pitch + (sx >> 16);
-    fx[i] = (int16_t)((sx >> 8) & 255);
-    fy[i] = (int16_t)((sy >> 8) & 255);
+  for (i = 0; i < TVK_PATCH_SIDE; ++i) {
+    const int32_t sx = clamp_i32(x + i * du_x, 0, image->right);
+    const int32_t sy = clamp_i32(y + i * du_y, 0, image->bottom);
+    offset[i] = (sy >> 16) * image->pitch + (sx >> 16);
+    fx[i] = (int16_t)((sx >> 9) & 127);
+    fy[i] = (int16_t)((sy >> 9) & 127);
   }
-  for (i = 0; i < side; ++i) {
-    const uint8_t *top = image + offset[i], *bottom = top + stride;
-    a[i] = top[0];
-    b[i] = top[1];
-    c[i] = bottom[0];
-    d[i] = bottom[1];
+  for (i = 0; i < TVK_PATCH_SIDE; ++i) {
+    left[i] = image->pairs[offset[i]];
+    right[i] = image->pairs[offset[i] + 1];
   }
-  for (i = 0; i < SAMPLE_CHUNK; ++i) value[i] = bilinear(a[i], b[i], c[i], d[i], fx[i], fy[i]);
-  memcpy(out, value, (size_t)side * sizeof out[0]);
+  for (i = 0; i < TVK_PATCH_SIDE; ++i) {
+    const int16_t a = (int16_t)((int16_t)(left[i] << 8) >> 8), c = (int16_t)((int16_t)left[i] >> 8);
+    const int16_t b = (int16_t)((int16_t)(right[i] << 8) >> 8), d = (int16_t)((int16_t)right[i] >> 8);
+    const int16_t gx = (int16_t)(127 - fx[i]), gy = (int16_t)(127 - fy[i]);
+    const int16_t at_left = (int16_t)(gy * a + fy[i] * c), at_right = (int16_t)(gy * b + fy[i] * d);
+    out[i] = (int16_t)((gx * at_left + fx[i] * at_right) >> 8);
+  }
 }
 
-static void sample_patch(const uint8_t *image, int64_t stride, int32_t width, int32_t height,
-                         int32_t x, int32_t y, int32_t du_x, int32_t du_y, int32_t side,
-                         int16_t *patch) {
-  const int32_t end = side - 1;
-  const int inside = is_inside(x, y, width, height) &&
-                     is_inside(x + end * du_x, y + end * du_y, width, height) &&
-                     is_inside(x - end * du_y, y + end * du_x, width, height) &&
-                     is_inside(x + end * (du_x - du_y), y + end * (du_y + du_x), width, height);
-  int32_t i, j;
-  for (j = 0; j < side; ++j) {
-    const int32_t row_x = x - j * du_y, row_y = y + j * du_x;
-    int16_t *row = patch + j * side;
-    if (inside) {
-      sample_row(image, stride, row_x, row_y, du_x, du_y, side, row);
-      continue;
-    }
-    for (i = 0; i < side; ++i) {
-      row[i] = sample_clamped(image, stride, width, height, row_x + i * du_x, row_y + i * du_y);
-    }
+#endif
+
+static void sample_patch(const uint16_t *pairs, int32_t width, int32_t height, int32_t x, int32_t y,
+                         int32_t du_x, int32_t du_y, int32_t num_rows, int16_t *patch) {
+  const sampled_image image = {pairs, width + 1, (width - 1) << 16, (height - 1) << 16};
+  int32_t j;
+  for (j = 0; j < num_rows; ++j) {
+    sample_row(&image, x - j * du_y, y + j * du_x, du_x, du_y, patch + j * TVK_PATCH_SIDE);
   }
+  patch[num_rows * TVK_PATCH_SIDE] = 0;
 }
