@@ -106,7 +106,7 @@ typedef struct tvk_triangulate_pair {
    triangulate: count matches of two pinholes (pixels: x and y each) by Midpoint, Linear-LS or
      Iterative-LS (method, a tv_triangulation). status -1, and zeros, for a match that is none of
      "ok" and "behind", or needs more care. */
-#define TVK_LIST(X)                                                                                \
+#define TVK_PIXEL_LIST(X)                                                                          \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
   X(fast_contrasts, void,                                                                          \
@@ -134,7 +134,10 @@ typedef struct tvk_triangulate_pair {
      void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows))                                \
   X(squared_distances, void,                                                                       \
     (const uint8_t *query, const uint8_t *rows, const int32_t *indices, int32_t count,             \
-     int32_t *out))                                                                                \
+     int32_t *out))
+
+/* Those on matches, in files of their own (lanes_*.c): a set may take another set's. */
+#define TVK_MATCH_LIST(X)                                                                          \
   X(sampson_squares, void,                                                                         \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,            \
      int32_t on_plane, const double *m, double *squares))                                          \
@@ -158,6 +161,8 @@ typedef struct tvk_triangulate_pair {
   X(triangulate, void,                                                                             \
     (const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,                      \
      const double *pixels1, int32_t count, struct tv_point *points))
+
+#define TVK_LIST(X) TVK_PIXEL_LIST(X) TVK_MATCH_LIST(X)
 
 typedef struct tvk_table {
   int32_t set; /* a tv_kernels */

@@ -1,4 +1,5 @@
-/* One kernel set: include with TVK_SET (a tv_kernels) and TVK_TABLE (the table's name) defined. */
+/* One kernel set: include with TVK_SET (a tv_kernels) and TVK_TABLE (the table's name) defined, and
+   TVK_MATCH(name), its kernels on matches, where they are not the portable ones. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -13,15 +14,22 @@
 #include "kernels/patch.h"
 #include "kernels/describe.h"
 #include "kernels/nearest.h"
-#include "kernels/relpose_5pt.h"
-#include "kernels/sampson.h"
-#include "kernels/triangulate.h"
 /* clang-format on */
+
+#if !defined(TVK_MATCH)
+#define TVK_MATCH(name) tvk_##name##_c
+#endif
+#define TVK_DECLARE(name, result, parameters) result TVK_MATCH(name) parameters;
+TVK_MATCH_LIST(TVK_DECLARE)
+#undef TVK_DECLARE
 
 extern const tvk_table TVK_TABLE;
 const tvk_table TVK_TABLE = {
     TVK_SET,
 #define TVK_ENTRY(name, result, parameters) name,
-    TVK_LIST(TVK_ENTRY)
+    TVK_PIXEL_LIST(TVK_ENTRY)
+#undef TVK_ENTRY
+#define TVK_ENTRY(name, result, parameters) TVK_MATCH(name),
+    TVK_MATCH_LIST(TVK_ENTRY)
 #undef TVK_ENTRY
 };

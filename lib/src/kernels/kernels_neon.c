@@ -13,7 +13,10 @@ extern const tvk_table tvk_table_neon_dot;
 const tvk_table tvk_table_neon_dot = {
     TV_KERNELS_NEON,
 #define TVK_ENTRY(name, result, parameters) name,
-    TVK_LIST(TVK_ENTRY)
+    TVK_PIXEL_LIST(TVK_ENTRY)
+#undef TVK_ENTRY
+#define TVK_ENTRY(name, result, parameters) TVK_MATCH(name),
+    TVK_MATCH_LIST(TVK_ENTRY)
 #undef TVK_ENTRY
 };
 #endif

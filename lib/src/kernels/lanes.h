@@ -20,6 +20,17 @@
 #include <immintrin.h>
 #endif
 
+/* Before a loop whose number of turns is a constant, at most 10. */
+#if defined(__clang__)
+#define TVK_UNROLL _Pragma("unroll")
+#else
+#define TVK_UNROLL _Pragma("GCC unroll 10")
+#endif
+
+#define TVK_NOINLINE __attribute__((noinline))
+/* For what is compiled once for the image plane and once for the sphere. */
+#define TVK_INLINE inline __attribute__((always_inline))
+
 typedef double lanes __attribute__((vector_size(8 * TVK_LANES)));
 typedef int64_t lane_mask __attribute__((vector_size(8 * TVK_LANES))); /* all ones or all zeros */
 typedef double unaligned_lanes

@@ -65,7 +65,7 @@ static inline void mix_basis(lanes basis[4][9]) {
 
 /* Linear polynomials over (x, y, z, 1); quadratic ones over (xx xy xz x yy yz y zz z 1); cubic ones
    over Nister's order (xxx yyy xxy xyy xxz xx yyz yy xyz xy | xzz xz x yzz yz y zzz zz z 1). */
-static inline void add_product(const lanes a[4], const lanes b[4], lanes out[10]) {
+static TVK_NOINLINE void add_product(const lanes a[4], const lanes b[4], lanes out[10]) {
   out[0] += a[0] * b[0];
   out[1] += a[0] * b[1] + a[1] * b[0];
   out[2] += a[0] * b[2] + a[2] * b[0];
@@ -78,8 +78,7 @@ static inline void add_product(const lanes a[4], const lanes b[4], lanes out[10]
   out[9] += a[3] * b[3];
 }
 
-static __attribute__((noinline)) void add_cubic_product(const lanes q[10], const lanes l[4],
-                                                        lanes out[20]) {
+static TVK_NOINLINE void add_cubic_product(const lanes q[10], const lanes l[4], lanes out[20]) {
   out[0] += q[0] * l[0];
   out[1] += q[4] * l[1];
   out[2] += q[0] * l[1] + q[1] * l[0];
@@ -163,6 +162,7 @@ static __attribute__((noinline)) void eliminate(lanes rows[10][20], lane_mask *o
       for (r = first_used; r < 10; ++r) rows[r][c] -= dot * v[r];
     }
   }
+  TVK_UNROLL
   for (k = 9; k >= 4; --k) {
     const lanes inverse = 1.0 / diagonal[k];
     for (c = 10; c < 20; ++c) {
@@ -214,10 +214,14 @@ static inline void determinant_of(const z_matrix *b, lanes polynomial[11]) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
     lanes minor[7];
     memset(minor, 0, sizeof minor);
+    TVK_UNROLL
     for (p = 0; p < 4; ++p) {
+      TVK_UNROLL
       for (q = 0; q < 4; ++q) minor[p + q] += b->x[i][p] * b->y[j][q] - b->x[j][p] * b->y[i][q];
     }
+    TVK_UNROLL
     for (p = 0; p < 5; ++p) {
+      TVK_UNROLL
       for (q = 0; q < 7; ++q) polynomial[p + q] += b->one[k][p] * minor[q];
     }
   }
@@ -273,6 +277,7 @@ static inline lane_mask sign_changes(const sturm_chain *chain, double z) {
   lanes next = {0}, current = chain->last;
   lane_mask changes = {0}; /* counts down: a set mask is -1 */
   int k;
+  TVK_UNROLL
   for (k = 9; k >= 0; --k) {
     const lanes previous =
         (chain->slope[k] * z + chain->offset[k]) * current - chain->scale[k] * next;
@@ -314,9 +319,8 @@ static inline void add_bracket(root_brackets *b, int lane, double low, double hi
 }
 
 /* Halves an interval with several roots, in z or, beyond +-1, in 1 / z. */
-static __attribute__((noinline)) void split_bracket(const sturm_chain *chain, int lane, double low,
-                                                    double high, int changes_low,
-                                                    int changes_high, root_brackets *brackets) {
+static TVK_NOINLINE void split_bracket(const sturm_chain *chain, int lane, double low, double high,
+                                       int changes_low, int changes_high, root_brackets *brackets) {
   struct {
     double low, high;
     int changes_low, changes_high;
@@ -386,6 +390,7 @@ static inline void find_brackets(const sturm_chain *chain, lane_mask ok, root_br
 static inline lanes polynomial_at(const lanes p[11], lanes z, lanes *derivative) {
   lanes value = p[10], slope = {0};
   int i;
+  TVK_UNROLL
   for (i = 9; i >= 0; --i) {
     slope = slope * z + value;
     value = value * z + p[i];
@@ -567,8 +572,8 @@ static void solve_lanes(const double *rays, int first, double *essentials, int32
   write_models(rays, first, (const lanes(*)[4])e, &b, ok, essentials, counts);
 }
 
-static void relpose_5pt(const double *rays, int32_t num_samples, double *essentials,
-                        int32_t *counts) {
+void TVK_MATCH(relpose_5pt)(const double *rays, int32_t num_samples, double *essentials,
+                            int32_t *counts) {
   int first;
   for (first = 0; first < num_samples; first += TVK_LANES) {
     solve_lanes(rays, first, essentials, counts);

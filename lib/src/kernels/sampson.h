@@ -22,8 +22,8 @@ static inline lanes load_lanes(const double *array, const int32_t *index, int32_
   return index ? gather_lanes(array, index) : lanes_load(array + first);
 }
 
-static inline void load_arrays(const double *const *arrays, const int32_t *index, int32_t first,
-                               int on_plane, sampson_block *b) {
+static TVK_INLINE void load_arrays(const double *const *arrays, const int32_t *index, int32_t first,
+                                   int on_plane, sampson_block *b) {
   const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6; /* else ones and zeros */
   int k;
   for (k = 0; k < rays; ++k) {
@@ -38,8 +38,8 @@ static inline void load_arrays(const double *const *arrays, const int32_t *index
 
 /* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the other
    lanes. */
-static inline void load_block(const double *const *arrays, const int32_t *indices, int32_t first,
-                              int32_t count, int on_plane, sampson_block *b) {
+static TVK_INLINE void load_block(const double *const *arrays, const int32_t *indices,
+                                  int32_t first, int32_t count, int on_plane, sampson_block *b) {
   int32_t index[TVK_LANES];
   int l;
   if (count == TVK_LANES) {
@@ -62,8 +62,8 @@ typedef struct epipolar_terms {
   lanes s0[2], s1[2];
 } epipolar_terms;
 
-static inline void epipolar_of(const sampson_block *b, const double m[9], int on_plane,
-                               epipolar_terms *e) {
+static TVK_INLINE void epipolar_of(const sampson_block *b, const double m[9], int on_plane,
+                                   epipolar_terms *e) {
   lanes line0[3], line1[3];
   int r, k;
   for (r = 0; r < 3; ++r) {
@@ -85,8 +85,9 @@ static inline void epipolar_of(const sampson_block *b, const double m[9], int on
   e->n = (e->s0[0] * e->s0[0] + e->s0[1] * e->s0[1]) + (e->s1[0] * e->s1[0] + e->s1[1] * e->s1[1]);
 }
 
-static inline void squares_of(const double *const *arrays, const int32_t *indices, int32_t first,
-                              int32_t count, int on_plane, const double m[9], double *squares) {
+static TVK_INLINE void squares_of(const double *const *arrays, const int32_t *indices,
+                                  int32_t first, int32_t count, int on_plane, const double m[9],
+                                  double *squares) {
   int32_t done;
   for (done = 0; done < count; done += TVK_LANES) {
     const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
@@ -106,8 +107,8 @@ static inline void squares_of(const double *const *arrays, const int32_t *indice
   }
 }
 
-static void sampson_squares(const double *const *arrays, const int32_t *indices, int32_t first,
-                            int32_t count, int32_t on_plane, const double *m, double *squares) {
+void TVK_MATCH(sampson_squares)(const double *const *arrays, const int32_t *indices, int32_t first,
+                                int32_t count, int32_t on_plane, const double *m, double *squares) {
   if (on_plane) {
     squares_of(arrays, indices, first, count, 1, m, squares);
   } else {
@@ -117,8 +118,8 @@ static void sampson_squares(const double *const *arrays, const int32_t *indices,
 
 /* Where a match is behind a camera by more than the angle that is allowed: geometry/essential.h's
    depth_signs and depth_vote. */
-static inline lane_mask behind_of(const sampson_block *b, lanes angle, int on_plane,
-                                  const double R[9], const double t[3]) {
+static TVK_INLINE lane_mask behind_of(const sampson_block *b, lanes angle, int on_plane,
+                                      const double R[9], const double t[3]) {
   lanes a[3], aa, ff, af, at, ft, depth0, depth1, turn;
   int r;
   for (r = 0; r < 3; ++r) {
@@ -143,9 +144,9 @@ static inline lane_mask behind_of(const sampson_block *b, lanes angle, int on_pl
          ((depth1 < 0.0) & (depth1 * depth1 > turn * (aa - at * at)));
 }
 
-static inline void pose_squares_of(const double *const *arrays, int32_t first, int32_t count,
-                                   int on_plane, const double *pose, double scale,
-                                   double *squares) {
+static TVK_INLINE void pose_squares_of(const double *const *arrays, int32_t first, int32_t count,
+                                       int on_plane, const double *pose, double scale,
+                                       double *squares) {
   int32_t done;
   for (done = 0; done < count; done += TVK_LANES) {
     const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
@@ -163,8 +164,8 @@ static inline void pose_squares_of(const double *const *arrays, int32_t first, i
   }
 }
 
-static void pose_squares(const double *const *arrays, int32_t first, int32_t count,
-                         int32_t on_plane, const double *pose, double scale, double *squares) {
+void TVK_MATCH(pose_squares)(const double *const *arrays, int32_t first, int32_t count,
+                             int32_t on_plane, const double *pose, double scale, double *squares) {
   if (on_plane) {
     pose_squares_of(arrays, first, count, 1, pose, scale, squares);
   } else {
@@ -253,19 +254,16 @@ static inline void transfer_squares_of(const double *const *arrays, const int32_
   }
 }
 
-static void transfer_squares(const double *const *arrays, const int32_t *indices, int32_t first,
-                             int32_t count, int32_t on_plane, const double *h, double *squares) {
-  if (on_plane) {
-    transfer_squares_of(arrays, indices, first, count, 1, h, squares);
-  } else {
-    transfer_squares_of(arrays, indices, first, count, 0, h, squares);
-  }
+void TVK_MATCH(transfer_squares)(const double *const *arrays, const int32_t *indices, int32_t first,
+                                 int32_t count, int32_t on_plane, const double *h,
+                                 double *squares) {
+  transfer_squares_of(arrays, indices, first, count, on_plane, h, squares);
 }
 
 /* The slopes of r by M's entries: dr/dM_ij = (f1_i (f0_j - s g0_j) - s g1_i f0_j) / sqrt(n), with
    s = c / n, g0 = J0 J0' M' f1, g1 = J1 J1' M f0. */
-static inline void slopes_of(const sampson_block *b, const epipolar_terms *e, lanes s, lanes root,
-                             int on_plane, lanes slopes[9]) {
+static TVK_INLINE void slopes_of(const sampson_block *b, const epipolar_terms *e, lanes s,
+                                 lanes root, int on_plane, lanes slopes[9]) {
   lanes u0[3], u1[3];
   int i, j;
   for (i = 0; i < 3; ++i) {
@@ -308,13 +306,29 @@ static inline lane_mask add_loss(lanes q, int32_t count, int cauchy, double *sum
   return ok;
 }
 
-/* One block's part of the sums; `sums` points to the block's first lane. */
-static inline void add_block(const sampson_block *b, int32_t count, int on_plane, const double m[9],
-                             double inverse_sq, int cauchy, double *sums) {
-  epipolar_terms e;
-  lanes slopes[9], weight, inverse_n, c, root, s, residual;
-  lane_mask ok;
+/* To the sums the upper triangle of weight g g', row by row, and weight g r. */
+static TVK_NOINLINE void add_products(const lanes g[9], lanes weight, lanes residual,
+                                      double *sums) {
   int i, j, slot = 0;
+  TVK_UNROLL
+  for (i = 0; i < 9; ++i) {
+    const lanes weighted = weight * g[i];
+    TVK_UNROLL
+    for (j = i; j < 9; ++j, ++slot) {
+      double *sum = sums + TVK_WIDTH * slot;
+      lanes_store(sum, lanes_load(sum) + weighted * g[j]);
+    }
+    lanes_store(sums + TVK_WIDTH * (45 + i),
+                lanes_load(sums + TVK_WIDTH * (45 + i)) + weighted * residual);
+  }
+}
+
+/* One block's part of the sums; `sums` points to the block's first lane. */
+static TVK_INLINE void add_block(const sampson_block *b, int32_t count, int on_plane,
+                                 const double m[9], double inverse_sq, int cauchy, double *sums) {
+  epipolar_terms e;
+  lanes slopes[9], weight, inverse_n, c, root, s;
+  lane_mask ok;
   epipolar_of(b, m, on_plane, &e);
   inverse_n = 1.0 / e.n;
   ok = add_loss(e.c * e.c * inverse_n * inverse_sq, count, cauchy, sums + TVK_WIDTH * 54, &weight);
@@ -323,21 +337,12 @@ static inline void add_block(const sampson_block *b, int32_t count, int on_plane
   root = lanes_sqrt(inverse_n);
   s = c * inverse_n;
   slopes_of(b, &e, s, root, on_plane, slopes);
-  residual = c * root;
-  for (i = 0; i < 9; ++i) {
-    const lanes weighted = weight * slopes[i];
-    for (j = i; j < 9; ++j, ++slot) {
-      double *sum = sums + TVK_WIDTH * slot;
-      lanes_store(sum, lanes_load(sum) + weighted * slopes[j]);
-    }
-    lanes_store(sums + TVK_WIDTH * (45 + i),
-                lanes_load(sums + TVK_WIDTH * (45 + i)) + weighted * residual);
-  }
+  add_products(slopes, weight, c * root, sums);
 }
 
-static inline void sums_of(const double *const *arrays, const int32_t *indices, int32_t first,
-                           int32_t count, int on_plane, const double m[9], double inverse_sq,
-                           int cauchy, double *sums) {
+static TVK_INLINE void sums_of(const double *const *arrays, const int32_t *indices, int32_t first,
+                               int32_t count, int on_plane, const double m[9], double inverse_sq,
+                               int cauchy, double *sums) {
   int32_t done;
   for (done = 0; done < count; done += TVK_LANES) {
     const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
@@ -347,9 +352,9 @@ static inline void sums_of(const double *const *arrays, const int32_t *indices, 
   }
 }
 
-static void sampson_sums(const double *const *arrays, const int32_t *indices, int32_t first,
-                         int32_t count, int32_t on_plane, const double *m, double inverse_sq,
-                         int32_t cauchy, double *sums) {
+void TVK_MATCH(sampson_sums)(const double *const *arrays, const int32_t *indices, int32_t first,
+                             int32_t count, int32_t on_plane, const double *m, double inverse_sq,
+                             int32_t cauchy, double *sums) {
   if (on_plane) {
     sums_of(arrays, indices, first, count, 1, m, inverse_sq, cauchy, sums);
   } else {
@@ -410,14 +415,10 @@ static inline void transfer_sums_of(const double *const *arrays, const int32_t *
   }
 }
 
-static void transfer_sums(const double *const *arrays, const int32_t *indices, int32_t first,
-                          int32_t count, int32_t on_plane, const double *h, double inverse_sq,
-                          int32_t cauchy, double *sums) {
-  if (on_plane) {
-    transfer_sums_of(arrays, indices, first, count, 1, h, inverse_sq, cauchy, sums);
-  } else {
-    transfer_sums_of(arrays, indices, first, count, 0, h, inverse_sq, cauchy, sums);
-  }
+void TVK_MATCH(transfer_sums)(const double *const *arrays, const int32_t *indices, int32_t first,
+                              int32_t count, int32_t on_plane, const double *h, double inverse_sq,
+                              int32_t cauchy, double *sums) {
+  transfer_sums_of(arrays, indices, first, count, on_plane, h, inverse_sq, cauchy, sums);
 }
 
 /* The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is
@@ -478,8 +479,9 @@ static inline int32_t score_general(const float *const *f, int32_t begin, const 
   return sum_of_costs(q);
 }
 
-static int64_t sampson_score(const float *const *arrays, int32_t first_block, int32_t num_blocks,
-                             int32_t on_plane, const float *m, float inverse_sq) {
+int64_t TVK_MATCH(sampson_score)(const float *const *arrays, int32_t first_block,
+                                 int32_t num_blocks, int32_t on_plane, const float *m,
+                                 float inverse_sq) {
   int64_t sum = 0;
   int32_t block;
   for (block = first_block; block < first_block + num_blocks; ++block) {

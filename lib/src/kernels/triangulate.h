@@ -151,8 +151,8 @@ static inline void triangulate_block(const tvk_triangulate_pair *p, int method, 
   lanes_store(a->front + first, lanes_select(good, front, lanes_of(-1)));
 }
 
-static void triangulate(const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,
-                        const double *pixels1, int32_t count, tv_point *points) {
+void TVK_MATCH(triangulate)(const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,
+                            const double *pixels1, int32_t count, tv_point *points) {
   triangulate_arrays a;
   int32_t done, k;
   for (done = 0; done < count; done += TRIANGULATE_CHUNK) {
