@@ -1,21 +1,30 @@
-"""Instructions a call under valgrind --tool=callgrind, which no mood of the machine changes.
+"""Instructions a call, which no mood of the machine changes.
 
-Each row of the benchmark programs is called once more after a first call; what happens inside
-bench_measured (bench.cc) is counted. Once with the avx2 and once with the c kernel set; valgrind 3.19
-hides AVX-512, so OpenCV too runs its AVX2 code.
+x86-64, under valgrind --tool=callgrind: each row of the benchmark programs is called once more after a
+first call; what happens inside bench_measured (bench.cc) is counted. Once with the avx2 and once with
+the c kernel set; valgrind 3.19 hides AVX-512, so OpenCV too runs its AVX2 code.
+
+ARM, under qemu-user with the plugin qemu_count.c: stages.c, built by the cross compiler with the library
+of the presets aarch64 and armv7; a call is the difference between one call and none.
 """
 
 import glob
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 
 import rows as table
 
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SETS = ("avx2", "c")
+ARM = (("aarch64", "aarch64-linux-gnu-gcc", "qemu-aarch64"),
+       ("armv7", "arm-linux-gnueabihf-gcc", "qemu-arm"))
+ARM_STAGES = ("detect", "describe", "match", "estimate", "pair")
+ARM_SETS = ("auto", "c")
 # Where the other rows' calls would be minutes each.
 FILTERS = {"robust": "^robust/.*/twoview$", "match": "^match/1000x1000"}
 
@@ -76,12 +85,60 @@ def measure(build, stages, programs):
     return found
 
 
+def _run(*command):
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def _arm_program(preset, compiler, folder):
+    """stages.c for that processor, linked statically."""
+    _run("cmake", "--preset", preset, "-S", ROOT, "-DTWOVIEW_TOOLS=OFF", "-DBUILD_TESTING=OFF",
+         "-B", os.path.join(folder, preset))
+    _run("cmake", "--build", os.path.join(folder, preset), "--target", "twoview_static")
+    program = os.path.join(folder, "stages-" + preset)
+    _run(compiler, "-std=c99", "-O2", "-static", os.path.join(ROOT, "bench", "stages.c"), "-I",
+         os.path.join(ROOT, "lib", "include"), os.path.join(folder, preset, "lib", "libtwoview.a"),
+         "-lm", "-o", program)
+    return program
+
+
+def arm(build):
+    """Rows as measure() gives them, without peers; what is missing here is told and left out."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        plugin = os.path.join(folder, "count.so")
+        _run("gcc", "-O2", "-shared", "-fPIC", os.path.join(ROOT, "bench", "qemu_count.c"), "-o",
+             plugin)
+        _run(os.path.join(build, "bin", "bench_export_images"), folder)
+        with open(os.path.join(folder, "640x480.json"), encoding="utf-8") as f:
+            camera = [str(k) for k in json.load(f)["K0"]["data"]]
+        images = [os.path.join(folder, f"640x480_{v}.pgm") for v in (0, 1)]
+        for preset, compiler, qemu in ARM:
+            missing = [tool for tool in (compiler, qemu) if not shutil.which(tool)]
+            if missing:
+                print(f"bench: no {' and no '.join(missing)}: {preset} is left out", file=sys.stderr)
+                continue
+            print(f"bench: counting {preset} under qemu", file=sys.stderr, flush=True)
+            program = _arm_program(preset, compiler, folder)
+
+            def count(stage, calls, kernels, qemu=qemu, program=program):
+                done = subprocess.run([qemu, "-plugin", plugin, program, *images, *camera, stage,
+                                       str(calls), kernels], check=True, capture_output=True,
+                                      text=True)
+                return int(re.search(r"instructions: (\d+)", done.stderr)[1])
+            for stage in ARM_STAGES:
+                ours = {kernels: count(stage, 1, kernels) - count(stage, 0, kernels)
+                        for kernels in ARM_SETS}
+                found.append({"stage": stage, "case": f"640x480 defaults, {preset}", "ours": ours,
+                              "peer": None, "peer_name": None, "ratio": None,
+                              "unit": "instructions/call"})
+    return found
+
+
 def print_table(found, out):
-    sets = " | ".join(f"ours, {kernels}" for kernels in SETS)
-    print(f"| stage | case | {sets} | peer | peer / {SETS[0]} | peer's name | a |", file=out)
-    print("| --- | --- |" + " --- |" * (len(SETS) + 4), file=out)
+    print("| stage | case | ours, fastest set | ours, c | peer | peer / ours | peer's name | a |\n"
+          "| --- | --- | --- | --- | --- | --- | --- | --- |", file=out)
     for row in found:
-        numbers = [f"{row['ours'][kernels]:,.0f}" for kernels in SETS]
+        numbers = [f"{n:,.0f}" for n in row["ours"].values()]
         numbers += ["-", "-"] if row["peer"] is None else [f"{row['peer']:,.0f}",
                                                            f"{row['ratio']:.3g}"]
         print(f"| {row['stage']} | {row['case']} | " + " | ".join(numbers) +

@@ -14,7 +14,7 @@ void write(const std::string& folder, const bench::Pair& pair) {
     const std::string number = std::to_string(v);
     const tv_camera& c = pair.camera[v];
     file << "K" + number << cv::Mat(cv::Matx<double, 1, 4>(c.fx, c.fy, c.cx, c.cy));
-    cv::imwrite(folder + "/" + pair.name + "_" + number + ".png", pair.image[v]);
+    cv::imwrite(folder + "/" + pair.name + "_" + number + ".pgm", pair.image[v]);
   }
 }
 

@@ -114,7 +114,7 @@ class Pair:
         self.t = np.array(text["t"]["data"])
         self.images, self.K = [], []
         for v in (0, 1):
-            path = os.path.join(folder, f"{name}_{v}.png")
+            path = os.path.join(folder, f"{name}_{v}.pgm")
             self.images.append(cv2.imread(path, cv2.IMREAD_GRAYSCALE))
             fx, fy, cx, cy = text[f"K{v}"]["data"]
             self.K.append(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))

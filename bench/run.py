@@ -79,7 +79,10 @@ def main():
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
     if arguments.counts:
-        report = {"machine": cpu_name(), "rows": counts.measure(arguments.build, stages, PROGRAMS)}
+        found = counts.measure(arguments.build, stages, PROGRAMS)
+        if not arguments.only:
+            found += counts.arm(arguments.build)
+        report = {"machine": cpu_name(), "rows": found}
         counts.print_table(report["rows"], sys.stdout)
     else:
         measures, context = [], {}
