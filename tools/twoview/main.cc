@@ -11,6 +11,7 @@
 
 #include "error.h"
 #include "output.h"
+#include "python_verbs.h"
 #include "verbs.h"
 
 namespace {
@@ -37,6 +38,7 @@ int run_program(int argc, char** argv) {
 #ifdef TWOVIEW_HAS_DRONE
   cli::add_drone(program, run);
 #endif
+  cli::add_python_verbs(program);
   const auto verbs = program.get_subcommands([](const CLI::App*) { return true; });
   const auto is_named_first = [&](const CLI::App* verb) {
     return argc > 1 && verb->get_name() == argv[1];
@@ -69,6 +71,11 @@ int run_program(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  try {
+    cli::hand_over_python_verb(argc, argv);
+  } catch (const cli::BadInput& e) {
+    return refuse(e.what());
+  }
   // A full disk and a reader that went away come back as errors of write().
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);

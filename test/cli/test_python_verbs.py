@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""twoview compare and twoview colmap: the hand-over to the Python programs of the source tree."""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import unittest
+
+import cli_support as cli
+
+# Stands for either program: says what it was started with.
+SCRIPT = """import json, os, signal, sys
+json.dump({"argv": sys.argv[1:], "python": sys.executable, "library": os.environ.get("TWOVIEW_LIBRARY"),
+           "blocked": [int(s) for s in signal.pthread_sigmask(signal.SIG_BLOCK, [])]}, sys.stdout)
+sys.exit(3)
+"""
+
+
+class HandOver(cli.CliTest):
+    def setUp(self):
+        super().setUp()
+        self.tree = self.folder / "a tree"
+        tools = self.tree / "tools" / "compare_colmap"
+        tools.mkdir(parents=True)
+        for script in ("compare_colmap", "twoview_colmap"):
+            (tools / script).write_text(SCRIPT)
+        bin_dir, lib_dir = self.tree / "build" / "x" / "bin", self.tree / "build" / "x" / "lib"
+        bin_dir.mkdir(parents=True)
+        lib_dir.mkdir()
+        (lib_dir / "libtwoview.so").touch()
+        self.library = str(lib_dir / "libtwoview.so")
+        self.program = shutil.copy(cli.program(), bin_dir / "twoview")
+
+    def start(self, *arguments, **environment):
+        kept = {k: v for k, v in os.environ.items() if k not in ("TWOVIEW_PYTHON", "TWOVIEW_LIBRARY")}
+        return subprocess.run([self.program, *arguments], env={**kept, **environment},
+                              capture_output=True, timeout=60)
+
+    def report(self, done):
+        self.assertEqual((done.returncode, done.stderr), (3, b""))
+        return json.loads(done.stdout)
+
+    def test_both_get_the_arguments_and_this_library_and_their_status_comes_back(self):
+        for verb in ("compare", "colmap"):
+            got = self.report(self.start(verb, "--help", "a b", "", TWOVIEW_PYTHON=sys.executable))
+            self.assertEqual(got["argv"], ["--help", "a b", ""])
+            self.assertEqual((got["library"], got["blocked"]), (self.library, []))
+
+    def test_a_library_that_is_named_stays(self):
+        got = self.report(self.start("colmap", TWOVIEW_PYTHON=sys.executable, TWOVIEW_LIBRARY="/x.so"))
+        self.assertEqual(got["library"], "/x.so")
+
+    def test_the_python_of_bootstrap_comes_before_that_of_the_path(self):
+        on_path = self.folder / "path"
+        venv = self.tree / ".cache" / "venv" / "bin"
+        for folder, name in ((on_path, "python3"), (venv, "python")):
+            folder.mkdir(parents=True)
+            (folder / name).write_text(f"#!/bin/sh\necho {folder}\n")
+            (folder / name).chmod(0o755)
+        path = f"{on_path}:{os.environ['PATH']}"
+        self.assertEqual(self.start("colmap", PATH=path).stdout, f"{venv}\n".encode())
+        (venv / "python").unlink()
+        self.assertEqual(self.start("colmap", PATH=path).stdout, f"{on_path}\n".encode())
+
+    def test_what_is_missing_is_one_line(self):
+        self.assert_refused(self.start("colmap", TWOVIEW_PYTHON="/no/python"), "/no/python")
+        shutil.rmtree(self.tree / "tools")
+        self.assert_refused(self.start("compare", TWOVIEW_PYTHON=sys.executable),
+                            "tools/compare_colmap/compare_colmap")
+
+    def test_help_lists_them(self):
+        listed = self.start("--help").stdout.decode()
+        self.assertRegex(listed, r"\n  compare  .*\n  colmap  ")
+
+
+if __name__ == "__main__":
+    cli.main()

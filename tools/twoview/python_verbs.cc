@@ -1,0 +1,78 @@
+#include "python_verbs.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "error.h"
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PythonVerb {
+  const char *name, *script, *help;
+};
+constexpr PythonVerb kVerbs[] = {
+    {"compare", "compare_colmap", "the same pairs beside COLMAP, OpenGV, OpenCV and PoseLib"},
+    {"colmap", "twoview_colmap", "COLMAP databases and models, in and out"},
+};
+
+// The folder above this program that holds tools/compare_colmap; empty where there is none.
+fs::path source_tree(const fs::path& program) {
+  for (fs::path folder = program.parent_path(); folder != folder.root_path();
+       folder = folder.parent_path())
+    if (std::error_code none; fs::is_directory(folder / "tools" / "compare_colmap", none))
+      return folder;
+  return {};
+}
+
+// TWOVIEW_PYTHON, else the Python that scripts/bootstrap made, else the one in the PATH.
+std::string python_of(const fs::path& tree) {
+  const char* const named = std::getenv("TWOVIEW_PYTHON");
+  if (named && *named) return named;
+  const fs::path bootstrapped = tree / ".cache" / "venv" / "bin" / "python";
+  return access(bootstrapped.c_str(), X_OK) == 0 ? bootstrapped.string() : "python3";
+}
+
+[[noreturn]] void become(const PythonVerb& verb, int argc, char** argv) {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path tree = source_tree(program);
+  const fs::path script = tree / "tools" / "compare_colmap" / verb.script;
+  if (tree.empty() || !fs::is_regular_file(script, error))
+    throw BadInput(std::string(verb.name) +
+                   " is a Python program of the source tree, tools/compare_colmap/" + verb.script +
+                   ", and there is none above " + program.string());
+
+  // The package twoview runs on this program's library unless the caller named another.
+  const fs::path library = program.parent_path().parent_path() / "lib" / "libtwoview.so";
+  if (fs::is_regular_file(library, error)) setenv("TWOVIEW_LIBRARY", library.c_str(), 0);
+
+  std::string python = python_of(tree), path = script.string();
+  std::vector<char*> arguments{python.data(), path.data()};
+  arguments.insert(arguments.end(), argv + 2, argv + argc);
+  arguments.push_back(nullptr);
+  execvp(python.c_str(), arguments.data());
+  throw BadInput("cannot run " + python + ": " + std::strerror(errno) +
+                 " (scripts/bootstrap bench installs one, TWOVIEW_PYTHON names another)");
+}
+
+}  // namespace
+
+void add_python_verbs(CLI::App& program) {
+  for (const PythonVerb& verb : kVerbs) program.add_subcommand(verb.name, verb.help);
+}
+
+void hand_over_python_verb(int argc, char** argv) {
+  for (const PythonVerb& verb : kVerbs)
+    if (argc > 1 && std::strcmp(argv[1], verb.name) == 0) become(verb, argc, argv);
+}
+
+}  // namespace cli
