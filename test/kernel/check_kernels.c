@@ -309,7 +309,7 @@ static void case_mutual_nearest(trial *t) {
   const int32_t num_columns = pick(t, 0, many == 1 ? TVK_NEAREST_PANEL + 300 : 150, 1000);
   const uint8_t *rows = random_descriptors(t, num_rows, NULL, 0);
   const uint8_t *columns = random_descriptors(t, num_columns, rows, num_rows);
-  const size_t scratch_bytes = TVK_NEAREST_SCRATCH(num_columns);
+  const size_t scratch_bytes = TVK_NEAREST_SCRATCH(num_rows, num_columns);
   uint8_t *scratch = OUTPUT(t, uint8_t, scratch_bytes + 64), *aligned = scratch;
   tvk_nearest *of_columns = OUTPUT(t, tvk_nearest, num_columns);
   tvk_nearest *of_rows = OUTPUT(t, tvk_nearest, num_rows);

@@ -27,12 +27,14 @@ typedef struct tvk_nearest {
 
 #define TVK_NEAREST_PANEL 2048       /* columns that mutual_nearest prepares at once */
 #define TVK_NEAREST_COLUMN_BYTES 288 /* of one */
-#define TVK_NEAREST_CHUNK_BYTES 65536
-#define TVK_NEAREST_SCRATCH(num_columns)                                                         \
-  (TVK_NEAREST_CHUNK_BYTES + (size_t)((num_columns) < TVK_NEAREST_PANEL                           \
-                                          ? ((num_columns) + 63) / 64 * 64                        \
-                                          : TVK_NEAREST_PANEL) *                                  \
-                                 TVK_NEAREST_COLUMN_BYTES)
+#define TVK_NEAREST_ROW_BYTES 1024   /* of one of the rows that meet them at once, and of one more */
+#define TVK_NEAREST_CHUNK_BYTES(num_rows) \
+  ((size_t)((num_rows) < 63 ? (num_rows) + 1 : 64) * TVK_NEAREST_ROW_BYTES)
+#define TVK_NEAREST_PANEL_BYTES(num_columns)                                                      \
+  ((size_t)((num_columns) < TVK_NEAREST_PANEL ? ((num_columns) + 63) / 64 * 64 : TVK_NEAREST_PANEL) * \
+   TVK_NEAREST_COLUMN_BYTES)
+#define TVK_NEAREST_SCRATCH(num_rows, num_columns) \
+  (TVK_NEAREST_CHUNK_BYTES(num_rows) + TVK_NEAREST_PANEL_BYTES(num_columns))
 
 #define TVK_WIDTH 8                  /* lanes of the kernels on doubles */
 #define TVK_SCORE_BLOCK 32           /* matches */
@@ -80,7 +82,7 @@ typedef struct tvk_triangulate_pair {
    mutual_nearest: of_rows[i].idx is the column whose nearest is row i and that is i's nearest, each
      strictly, else -1 (and 0 for the rest); best their squared distance, second the smallest other
      distance of either, INT32_MAX where there is none. of_columns (num_columns) and scratch
-     (TVK_NEAREST_SCRATCH(num_columns) bytes, aligned to 64) are left with anything in them.
+     (TVK_NEAREST_SCRATCH(num_rows, num_columns) bytes, aligned to 64) are left with anything in them.
    squared_distances: of the query to rows[indices[k]].
    Of matches (geometry/residuals.h), arrays: rays (3 and 3) and slopes d ray / d pixel (6 and 6,
    row-major 3x2); on_plane: the rays end in 1 and the slopes' last rows are zero, and are not read;

@@ -50,7 +50,10 @@ static inline int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
 
 #define NEAREST_ASSERT(name, condition) typedef char name[(condition) ? 1 : -1]
 NEAREST_ASSERT(nearest_chunk_fits, sizeof(nearest_rows) * (NEAREST_ROWS / NEAREST_QUERIES) <=
-                                       TVK_NEAREST_CHUNK_BYTES);
+                                       TVK_NEAREST_CHUNK_BYTES(NEAREST_ROWS));
+NEAREST_ASSERT(nearest_few_rows_fit, sizeof(nearest_rows) <= 2 * TVK_NEAREST_ROW_BYTES &&
+                                         sizeof(nearest_rows) <=
+                                             NEAREST_QUERIES * TVK_NEAREST_ROW_BYTES);
 NEAREST_ASSERT(nearest_panel_fits,
                sizeof(nearest_block) <= NEAREST_COLUMNS * TVK_NEAREST_COLUMN_BYTES);
 NEAREST_ASSERT(nearest_chunks_are_whole, NEAREST_ROWS % NEAREST_QUERIES == 0 &&
@@ -288,7 +291,7 @@ static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t 
   const tvk_nearest none = {NEAREST_FAR, NEAREST_FAR, 0};
   nearest_rows *const tiles = (nearest_rows *)scratch;
   nearest_block *const blocks =
-      (nearest_block *)(void *)((uint8_t *)scratch + TVK_NEAREST_CHUNK_BYTES);
+      (nearest_block *)(void *)((uint8_t *)scratch + TVK_NEAREST_CHUNK_BYTES(num_rows));
   const int32_t largest = largest_byte(columns, (int64_t)num_columns * TVK_DESCRIPTOR_SIZE);
   int32_t first, b, k;
   for (k = 0; k < num_rows; ++k) of_rows[k] = none;

@@ -8,7 +8,7 @@ namespace tv {
 size_t match_bytes(int32_t max_keypoints) {
   const size_t n = static_cast<size_t>(max_keypoints);
   return 2 * arena_bytes<tvk_nearest>(n) +
-         arena_bytes<uint8_t>(TVK_NEAREST_SCRATCH(max_keypoints)) +
+         arena_bytes<uint8_t>(TVK_NEAREST_SCRATCH(max_keypoints, max_keypoints)) +
          arena_bytes<tv_correspondence>(n);
 }
 
@@ -19,7 +19,7 @@ int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0,
   ArenaScope scope(arena);
   tvk_nearest* rows = arena_alloc<tvk_nearest>(arena, static_cast<size_t>(num0));
   tvk_nearest* columns = arena_alloc<tvk_nearest>(arena, static_cast<size_t>(num1));
-  void* scratch = arena_alloc<uint8_t>(arena, TVK_NEAREST_SCRATCH(num1));
+  void* scratch = arena_alloc<uint8_t>(arena, TVK_NEAREST_SCRATCH(num0, num1));
   kernels.mutual_nearest(descriptors0, num0, descriptors1, num1, scratch, columns, rows);
   int32_t count = 0;
   for (int32_t i = 0; i < num0; ++i) {

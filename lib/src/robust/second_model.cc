@@ -105,10 +105,15 @@ struct Grid {
   }
 };
 
-Grid make_grid(const double* xy, int num, Arena& arena) {
+int grid_side(int num) {
   int side = 1;
   while (side < kMostSide && side * side < num) ++side;
-  Grid grid{xy, {0, 0}, {0, 0}, side, arena_alloc<int32_t>(arena, kMostSide * kMostSide),
+  return side;
+}
+
+Grid make_grid(const double* xy, int num, Arena& arena) {
+  const int side = grid_side(num);
+  Grid grid{xy, {0, 0}, {0, 0}, side, arena_alloc<int32_t>(arena, static_cast<size_t>(side * side)),
             arena_alloc<int32_t>(arena, static_cast<size_t>(num))};
   for (int axis = 0; axis < 2; ++axis) {
     double low = xy[axis], high = low;
@@ -194,7 +199,8 @@ int count_partners(const Grid& grid, int i, const Neighbour* nearest, int count,
 }  // namespace
 
 size_t lattice_bytes(int max_points) {
-  return arena_bytes<int32_t>(kMostSide * kMostSide) + arena_bytes<int32_t>(static_cast<size_t>(max_points));
+  const size_t side = static_cast<size_t>(grid_side(max_points));
+  return arena_bytes<int32_t>(side * side) + arena_bytes<int32_t>(static_cast<size_t>(max_points));
 }
 
 Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,
