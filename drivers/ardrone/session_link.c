@@ -65,11 +65,10 @@ static void take_imu(ardrone_session *session, tvs_imu *imu) {
 }
 
 static void lose_link(ardrone_session *session) {
-  const int was_up = session->is_up;
   session->has_link = session->is_up = 0;
   session->sequence.has_last = 0;
   ardrone_pilot_new_link(&session->pilot);
-  if (was_up) ardrone_tell(session, ARDRONE_EVENT_LINK_LOST, NULL);
+  ardrone_tell(session, ARDRONE_EVENT_LINK_LOST, NULL);
 }
 
 static void make_link(ardrone_session *session) {

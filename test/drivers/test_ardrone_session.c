@@ -188,6 +188,21 @@ static void test_take_off_is_dropped_when_the_link_is_lost(void) {
   TEST_ASSERT_EQUAL_INT(0, drone.num_falls);
 }
 
+/* Its commands count from 1 again, so whoever watches them must hear of it. */
+static void test_a_link_lost_before_it_was_up_is_told(void) {
+  start_default();
+  while (drone.num_commands == 0) step();
+  drone.navdata_off = 1;
+  run_ms(2500);
+  TEST_ASSERT_EQUAL_INT(0, num_events[ARDRONE_EVENT_LINK_UP]);
+  TEST_ASSERT_EQUAL_INT(1, num_events[ARDRONE_EVENT_LINK_LOST]);
+  drone.navdata_off = 0;
+  run_ms(3000);
+  TEST_ASSERT_EQUAL_INT(1, num_events[ARDRONE_EVENT_LINK_UP]);
+  TEST_ASSERT_EQUAL_INT(1, drone.num_restarts);
+  TEST_ASSERT_EQUAL_INT(0, drone.num_falls);
+}
+
 static void test_a_session_without_steps_sends_nothing(void) {
   int before;
   start_default();
@@ -397,6 +412,7 @@ int main(void) {
   RUN_TEST(test_gps_keys_are_set);
   RUN_TEST(test_a_host_that_does_not_answer);
   RUN_TEST(test_take_off_is_dropped_when_the_link_is_lost);
+  RUN_TEST(test_a_link_lost_before_it_was_up_is_told);
   RUN_TEST(test_a_session_without_steps_sends_nothing);
   RUN_TEST(test_video_returns_after_a_cut_and_after_silence);
   RUN_TEST(test_reading_too_slowly_drops_the_oldest_and_says_so);

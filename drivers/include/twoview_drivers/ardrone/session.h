@@ -24,7 +24,7 @@ typedef struct ardrone_session ardrone_session;
 
 typedef enum ardrone_event {
   ARDRONE_EVENT_LINK_UP,      /* navdata flows, and the drone is set up */
-  ARDRONE_EVENT_LINK_LOST,    /* 2 s without navdata, or the drone went back to bootstrap */
+  ARDRONE_EVENT_LINK_LOST,    /* 2 s without navdata, or a reboot; of a link that was not up yet, too */
   ARDRONE_EVENT_REBOOT,       /* the drone counts anew: times and attitudes begin anew, too */
   ARDRONE_EVENT_VIDEO_OPEN,   /* the first bytes of a connection */
   ARDRONE_EVENT_VIDEO_CLOSED, /* closed, broken or silent; it is being opened again */
