@@ -22,8 +22,8 @@ cv::Mat matches_picture(const Picture& picture0, const Picture& picture1,
 cv::Mat epipolar_picture(const Outcome& outcome);
 bool has_epipolar_geometry(const Outcome& outcome);
 
-// The cloud from the front, as camera 0 sees it, and from the side; axes in units of the distance
-// between the cameras. The cloud is not empty.
+// The cloud from the front, as camera 0 sees it, and from the side; axes in metres or
+// in units of the distance between the cameras. The cloud is not empty.
 cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& cloud);
 
 }  // namespace cli

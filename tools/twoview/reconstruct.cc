@@ -1,4 +1,4 @@
-// twoview reconstruct A B: two images to a pose, a cloud, pictures and a report.
+// twoview reconstruct A B, or --recording DIR: two views to a pose, a cloud, pictures and a report.
 
 #include <cmath>
 #include <cstdio>
@@ -7,6 +7,7 @@
 #include "camera_file.h"
 #include "camera_options.h"
 #include "canvas.h"
+#include "drone/recording_input.h"
 #include "error.h"
 #include "output.h"
 #include "pictures.h"
@@ -25,7 +26,22 @@ struct Arguments {
   Common common;
   std::string image[2], truth;
   CameraOptions cameras;
+  RecordingOptions recording;
 };
+
+// Two images or a recording, not both, not half of either.
+void check_inputs(const Arguments& a) {
+  if (!a.recording.given()) {
+    for (int i = 0; i < 2; ++i)
+      if (a.image[i].empty()) throw BadInput(std::string(i == 0 ? "A" : "B") + " is required");
+    if (!a.recording.frames.empty() || !a.recording.body_from_camera.empty() ||
+        !a.recording.camera_in_body.empty())
+      throw BadInput("--frames, --body-from-camera and --camera-in-body go with --recording");
+    return;
+  }
+  if (!a.image[0].empty()) throw BadInput("give A and B or --recording, not both");
+  if (a.cameras.both.empty()) throw BadInput("--recording needs --camera");
+}
 
 // The camera file of each image; both empty without cameras, which some methods can do without.
 std::array<std::string, 2> camera_files(const Arguments& a) {
@@ -38,14 +54,16 @@ std::array<std::string, 2> camera_files(const Arguments& a) {
   return files;
 }
 
-void load_inputs(const Arguments& a, Outcome& outcome) {
+void load_inputs(const Arguments& a, RecordingInput* recording, Session& session,
+                 Outcome& outcome) {
   const std::array<std::string, 2> files = camera_files(a);
   outcome.has_cameras = !files[0].empty();
   std::array<tv_camera, 2> camera{};
   if (outcome.has_cameras) camera = CameraOptions::load(files);
+  if (recording) recording->load(camera[0], session, a.common.options, outcome);
   for (int i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
-    picture = load_picture(a.image[i]);
+    if (!recording) picture = load_picture(a.image[i]);
     if (outcome.has_cameras) {
       outcome.camera[i] = camera[i];
       require_size(outcome.camera[i], files[i], picture.luma.cols, picture.luma.rows, picture.path);
@@ -78,7 +96,9 @@ void make_files(const Outcome& outcome, OutputSet& files) {
   if (has_cloud) {
     figures.push_back(
         {"The cloud from the front and from the side",
-         "Each point in its colour in image 0. One baseline is the distance between the cameras.",
+         outcome.scale
+             ? "Each point in its colour in image 0."
+             : "Each point in its colour in image 0. One baseline is the distance between the cameras.",
          views_picture(outcome, cloud), false});
     files.add("cloud.ply", cloud_ply(cloud));
     files.add("views.png", png_bytes(figures.back().picture));
@@ -119,7 +139,8 @@ std::string uncertainty_line(const tv_two_view& v) {
               std::sqrt(c[0] + c[6] + c[12]) * 180 / M_PI, std::sqrt(c[18] + c[24]) * 180 / M_PI);
 }
 
-std::string pose_lines(const tv_two_view& v) {
+std::string pose_lines(const Outcome& outcome) {
+  const tv_two_view& v = outcome.two_view;
   std::string text;
   if (v.has_R)
     text += line("rotation", "%.3f deg between the views",
@@ -127,9 +148,12 @@ std::string pose_lines(const tv_two_view& v) {
   if (has_full_pose(v)) {
     // Where camera 1 stands as camera 0 sees it, which is easier to picture than t.
     const Vector3 c = applied(transposed(rotation_of(v)), translation_of(v));
+    const double unit = unit_of(outcome);
+    char far[48] = "one baseline";
+    if (outcome.scale) std::snprintf(far, sizeof far, "%.3f m", unit);
     text += line("direction",
-                 "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), one baseline away",
-                 -c[0], -c[1], -c[2]);
+                 "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), %s away",
+                 -unit * c[0], -unit * c[1], -unit * c[2], far);
   }
   if (v.has_covariance) text += uncertainty_line(v);
   return text;
@@ -151,7 +175,8 @@ std::string truth_line(const nlohmann::ordered_json& truth) {
   return line("truth", "%s", text.c_str());
 }
 
-std::string summary(const Outcome& outcome, const OutputSet& files, size_t context_bytes) {
+std::string summary(const Outcome& outcome, const RecordingInput* recording,
+                    const OutputSet& files, size_t context_bytes) {
   const Style style = stdout_style();
   const tv_two_view& v = outcome.two_view;
   const tv_reconstruction& r = outcome.reconstruction;
@@ -167,7 +192,8 @@ std::string summary(const Outcome& outcome, const OutputSet& files, size_t conte
   text += line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
   text += line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
                v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
-  text += pose_lines(v);
+  text += pose_lines(outcome);
+  if (recording) text += recording->words(outcome);
   const auto& j = outcome.json;
   if (j["median_parallax_deg"].is_number())
     text += line("parallax", "%.2f deg (median)", j["median_parallax_deg"].get<double>());
@@ -186,8 +212,14 @@ std::string summary(const Outcome& outcome, const OutputSet& files, size_t conte
 int reconstruct(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
+  check_inputs(a);
+  std::unique_ptr<RecordingInput> recording;
+  if (a.recording.given())
+    recording = std::make_unique<RecordingInput>(a.recording, a.cameras.both);
+  Session session(common.options);
   Outcome outcome;
-  load_inputs(a, outcome);
+  load_inputs(a, recording.get(), session, outcome);
+  if (recording) recording->add_gravity(common.options.estimate);
   const bool has_truth = !a.truth.empty();
   Truth truth;
   if (has_truth) {
@@ -198,10 +230,11 @@ int reconstruct(Arguments& a) {
   for (const std::string& image : a.image) files.keep(image);
   for (const std::string& camera : a.cameras.files()) files.keep(camera);
   files.keep(a.truth);
-  Session session(common.options);
   const uint64_t total_ns = reconstruct_pair(session, common.options, outcome);
+  if (recording) recording->add_scale(outcome);
 
   outcome.json = result_json(outcome);
+  if (recording) recording->add_json(outcome);
   if (has_truth)
     outcome.json["truth"] =
         truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
@@ -212,7 +245,7 @@ int reconstruct(Arguments& a) {
   make_files(outcome, files);
 
   if (common.json) print(json_text(outcome.json));
-  if (common.speaks()) print(summary(outcome, files, session.context_bytes()));
+  if (common.speaks()) print(summary(outcome, recording.get(), files, session.context_bytes()));
   files.commit();
   files.remove_others(kFiles);
   if (has_full_pose(outcome.two_view)) return kExitPose;
@@ -229,8 +262,9 @@ void add_reconstruct(CLI::App& program, Run& run) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb =
       program.add_subcommand("reconstruct", "two images to a pose, a point cloud and a report");
-  verb->add_option("A", a->image[0], "image 0")->required()->type_name("IMAGE");
-  verb->add_option("B", a->image[1], "image 1")->required()->type_name("IMAGE");
+  verb->add_option("A", a->image[0], "image 0")->type_name("IMAGE");
+  verb->add_option("B", a->image[1], "image 1")->type_name("IMAGE");
+  a->recording.add_to(*verb);
   a->cameras.add_to(*verb);
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
       ->type_name("FILE");

@@ -81,6 +81,13 @@ std::string cards(const Outcome& outcome) {
       text +=
           card(number_of(truth["depth_error_median_percent"], "%.2f"), "%", "depth error, median");
   }
+  if (j["imu"].is_object())
+    text += card(number_of(j["imu"]["rotation_difference_deg"], "%.2f"), "deg",
+                 "between the IMU's rotation and the cameras'");
+  if (outcome.scale)
+    text += card(formatted("%.3f", outcome.scale->baseline_m),
+                 "&plusmn; " + formatted("%.3f", outcome.scale->sigma_m) + " m",
+                 "between the cameras, by " + outcome.scale->source);
   text += card(number_of(j["timings_ms"]["total"], "%.1f"), "ms", "computing time");
   return text;
 }
@@ -145,10 +152,12 @@ std::string tables(const Json& j) {
   std::string found;
   for (const char* key :
        {"num_keypoints", "num_matches", "num_inliers", "config", "verdict", "reasons", "num_points",
-        "median_parallax_deg", "rms_reprojection_px", "scale", "num_iterations"})
+        "median_parallax_deg", "rms_reprojection_px", "scale", "scale_sigma", "num_iterations"})
     found += row(key, j[key]);
   std::string text = table("What was found", found);
   if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);
+  if (j["imu"].is_object()) text += object_table("Against the IMU", j["imu"]);
+  if (j.contains("recording")) text += object_table("Out of the recording", j["recording"]);
   text += object_table("Inliers of each model", j["evidence"]);
   text += object_table("Time, ms", j["timings_ms"]);
   text += object_table("Options as used", j["options"]);
@@ -160,16 +169,17 @@ Json camera_json(const Outcome& outcome, int camera, double size) {
   return {{"centre", frustum.centre}, {"corners", frustum.corners}};
 }
 
-std::string cloud_section(const std::vector<CloudPoint>& cloud) {
+std::string cloud_section(const Outcome& outcome, const std::vector<CloudPoint>& cloud) {
   if (cloud.empty()) return "";
+  const std::string unit = outcome.scale ? "metres" : "baselines, the distance between the cameras";
   return "<section>\n<h2>The cloud</h2>\n<div class=\"stage\"><canvas id=\"cloud\"></canvas>\n"
          "<div class=\"buttons\"><button id=\"view-front\">front</button>"
          "<button id=\"view-side\">side</button><button id=\"view-top\">top</button></div></div>\n"
          "<p class=\"hint\">Drag to turn, wheel or pinch to zoom, shift and drag to move, double "
          "click "
          "to start again. Camera 0 is white, camera 1 orange; x right, y down, z forward. Lengths "
-         "are in "
-         "baselines, the distance between the cameras.</p>\n</section>\n";
+         "are in " +
+         unit + ".</p>\n</section>\n";
 }
 
 std::string cloud_script(const Outcome& outcome, const std::vector<CloudPoint>& cloud) {
@@ -229,7 +239,7 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
                               {"verdict_words", escaped(config_in_words(v.config) +
                                                         (reasons.empty() ? "" : ": " + reasons))},
                               {"cards", cards(outcome)},
-                              {"cloud", cloud_section(cloud)},
+                              {"cloud", cloud_section(outcome, cloud)},
                               {"figures", sections},
                               {"matrices", matrices(outcome.json)},
                               {"tables", tables(outcome.json)},

@@ -82,10 +82,13 @@ void append_json(std::string& text, const Json& json, size_t depth) {
 
 }  // namespace
 
+double unit_of(const Outcome& outcome) { return outcome.scale ? outcome.scale->baseline_m : 1; }
+
 std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
   std::vector<CloudPoint> cloud;
   const tv_reconstruction& r = outcome.reconstruction;
   const cv::Mat& colour = outcome.picture[0].colour;
+  const double unit = unit_of(outcome);
   for (int32_t i = 0; i < r.num_matches; ++i) {
     const tv_point& point = r.points[i];
     if (point.status != TV_POINT_OK) continue;
@@ -93,8 +96,9 @@ std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
     const int x = std::min(std::max(static_cast<int>(std::lround(keypoint.x)), 0), colour.cols - 1);
     const int y = std::min(std::max(static_cast<int>(std::lround(keypoint.y)), 0), colour.rows - 1);
     const cv::Vec3b bgr = colour.at<cv::Vec3b>(y, x);
-    cloud.push_back({point.position[0], point.position[1], point.position[2], bgr[2], bgr[1],
-                     bgr[0], static_cast<float>(static_cast<double>(point.angle_rad) * kDegrees),
+    cloud.push_back({unit * point.position[0], unit * point.position[1], unit * point.position[2],
+                     bgr[2], bgr[1], bgr[0],
+                     static_cast<float>(static_cast<double>(point.angle_rad) * kDegrees),
                      point.error_px});
   }
   return cloud;
@@ -106,6 +110,7 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size) {
   if (camera == 1) {
     R = rotation_of(outcome.two_view);
     t = translation_of(outcome.two_view);
+    for (double& part : t) part *= unit_of(outcome);
   }
   // A point x of the camera's frame lies at R^T (x - t).
   const auto placed = [&](const Vector3& x) {
@@ -137,14 +142,18 @@ Json result_json(const Outcome& outcome) {
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
   json["reasons"] = reasons_json(v.reasons);
   json["R"] = numbers_or_null(v.R, 9, v.has_R);
-  json["t"] = numbers_or_null(v.t, 3, v.has_t);
+  const double unit = unit_of(outcome);
+  const double t[3] = {unit * v.t[0], unit * v.t[1], unit * v.t[2]};
+  json["t"] = numbers_or_null(t, 3, v.has_t);
   json["E"] = numbers_or_null(v.E, 9, v.has_E);
   json["F"] = numbers_or_null(v.F, 9, v.has_F);
   json["H"] = numbers_or_null(v.H, 9, v.has_H);
   json["alternative"] = nullptr;
+  const double other_t[3] = {unit * v.alternative_t[0], unit * v.alternative_t[1],
+                             unit * v.alternative_t[2]};
   if (v.has_alternative)
     json["alternative"] = {{"R", numbers_or_null(v.alternative_R, 9, true)},
-                           {"t", numbers_or_null(v.alternative_t, 3, true)},
+                           {"t", numbers_or_null(other_t, 3, true)},
                            {"covariance", numbers_or_null(v.alternative_covariance, 25,
                                                           v.has_alternative_covariance)}};
   json["evidence"] = {{"essential", count_or_null(v.essential_inliers)},
@@ -159,8 +168,8 @@ Json result_json(const Outcome& outcome) {
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)
                                     : Json(nullptr);
   json["rms_reprojection_px"] = finite_or_null(rms_reprojection_px(r));
-  json["scale"] = "unit";
-  json["scale_sigma"] = nullptr;
+  json["scale"] = outcome.scale ? "metric" : "unit";
+  json["scale_sigma"] = outcome.scale ? Json(outcome.scale->sigma_m) : Json(nullptr);
   json["imu"] = nullptr;
   json["truth"] = nullptr;
   json["num_iterations"] = v.num_iterations;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,12 @@
 
 namespace cli {
 
+// The distance between the two camera positions, and where that is known from.
+struct MetricScale {
+  std::string source;  // "velocity", "altitude", "floor"
+  double baseline_m = 0, sigma_m = 0;
+};
+
 // All that the outputs of `reconstruct` are made from.
 struct Outcome {
   Picture picture[2];
@@ -19,12 +26,16 @@ struct Outcome {
   tv_camera camera[2]{};  // of the images as they were used, so resized ones
   tv_two_view two_view{};
   tv_reconstruction reconstruction{};  // its arrays lie in the context
+  std::optional<MetricScale> scale;    // then outputs are in metres, else in baselines
   nlohmann::ordered_json json;         // result.json
 };
 
+// What one unit of the two-view pose and of its points is in the outputs: 1, or the baseline in metres.
+double unit_of(const Outcome& outcome);
+
 // A point of the cloud with its colour in image 0.
 struct CloudPoint {
-  double x, y, z;  // camera 0 frame, units of |t|
+  double x, y, z;  // camera 0 frame, metres or baselines
   uint8_t red, green, blue;
   float angle_deg, error_px;
 };

@@ -158,10 +158,11 @@ cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& clo
       std::min(std::max(std::sqrt(0.12 * width * height / double(cloud.size())) / 2, 1.8), 5.0);
 
   Plot front(sheet, {left, top, width, height}, x, y);
-  front.axes("From the front, as camera 0 sees it", "x, right [baselines]", "y, down [baselines]");
+  const std::string unit = outcome.scale ? " [m]" : " [baselines]";
+  front.axes("From the front, as camera 0 sees it", "x, right" + unit, "y, down" + unit);
   const int outside_front = draw_cloud(front, cloud, &CloudPoint::x, &CloudPoint::z, radius);
   Plot side(sheet, {2 * left + width, top, width, height}, z, y);
-  side.axes("From the side", "z, forward [baselines]", "y, down [baselines]");
+  side.axes("From the side", "z, forward" + unit, "y, down" + unit);
   const int outside_side = draw_cloud(side, cloud, &CloudPoint::z, &CloudPoint::x, radius);
   if (show_cameras) {
     const double size = 0.06 * with_cameras.length();
@@ -171,10 +172,9 @@ cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& clo
 
   char caption[256];
   const double parallax = v.median_parallax_rad * 57.29577951308232;
-  std::snprintf(
-      caption, sizeof caption,
-      "%zu points; one baseline is the distance between the cameras; median parallax %.2f deg%s",
-      cloud.size(), parallax, show_cameras ? "; cameras: 0 white, 1 orange" : "");
+  std::snprintf(caption, sizeof caption, "%zu points; %smedian parallax %.2f deg%s", cloud.size(),
+                outcome.scale ? "" : "one baseline is the distance between the cameras; ", parallax,
+                show_cameras ? "; cameras: 0 white, 1 orange" : "");
   std::string text = caption;
   if (outside_front + outside_side > 0)
     text += "; beyond the frame: " + std::to_string(outside_front) + " and " +
