@@ -1,0 +1,1 @@
+"""COLMAP databases and models, in and out: `twoview colmap` (docs/colmap.md)."""

@@ -1,0 +1,151 @@
+"""Between twoview's conventions and COLMAP's.
+
+Pixels: twoview's (0, 0) is the centre of the top-left pixel, COLMAP's its corner, so that centre is (0.5, 0.5).
+Poses are the same: x1 = R x0 + t, quaternions w x y z in databases and text models.
+Keypoints: COLMAP's scale is SIFT's sigma, half of twoview's diameter; the angle turns x towards y in both."""
+
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+import twoview as tv
+
+HALF_PIXEL = 0.5
+_TO_COLMAP = np.array([[1, 0, HALF_PIXEL], [0, 1, HALF_PIXEL], [0, 0, 1]])
+_FROM_COLMAP = np.array([[1, 0, -HALF_PIXEL], [0, 1, -HALF_PIXEL], [0, 0, 1]])
+
+# COLMAP's TwoViewGeometry::ConfigurationType.
+DEGENERATE, CALIBRATED, UNCALIBRATED, PLANAR, PANORAMIC, PLANAR_OR_PANORAMIC = 1, 2, 3, 4, 5, 6
+# No motion is a panorama whose rotation is none: its matches still join tracks.
+CONFIGURATIONS = {
+    tv.Config.DEGENERATE: DEGENERATE, tv.Config.CALIBRATED: CALIBRATED,
+    tv.Config.UNCALIBRATED: UNCALIBRATED, tv.Config.PLANAR: PLANAR, tv.Config.PANORAMIC: PANORAMIC,
+    tv.Config.PLANAR_OR_PANORAMIC: PLANAR_OR_PANORAMIC, tv.Config.NO_MOTION: PANORAMIC}
+
+
+@dataclass(frozen=True)
+class ColmapCamera:
+    """A row of the table cameras."""
+
+    model: str
+    width: int
+    height: int
+    params: tuple
+
+
+MODEL_IDS = {"PINHOLE": 1, "OPENCV": 4, "OPENCV_FISHEYE": 5, "FULL_OPENCV": 6}
+
+
+def camera_to_colmap(camera):
+    k = [float(c) for c in camera.k] + [0.0] * (8 - len(camera.k))
+    params = [camera.fx, camera.fy, camera.cx + HALF_PIXEL, camera.cy + HALF_PIXEL]
+    if camera.model == tv.CameraModel.KANNALA_BRANDT:
+        model, lens = "OPENCV_FISHEYE", k[:4]
+    elif camera.model == tv.CameraModel.PINHOLE or not any(k):
+        model, lens = "PINHOLE", []
+    elif any(k[4:]):
+        model, lens = "FULL_OPENCV", k
+    else:
+        model, lens = "OPENCV", k[:4]
+    return ColmapCamera(model, int(camera.width), int(camera.height), tuple(map(float, params + lens)))
+
+
+# Where each of COLMAP's models has fx fy cx cy, and which of twoview's k its other parameters are.
+_PINHOLE, _BROWN, _FISHEYE = (tv.CameraModel.PINHOLE, tv.CameraModel.BROWN_CONRADY,
+                              tv.CameraModel.KANNALA_BRANDT)
+_MODELS = {
+    "SIMPLE_PINHOLE": (_PINHOLE, (0, 0, 1, 2), ()), "PINHOLE": (_PINHOLE, (0, 1, 2, 3), ()),
+    "SIMPLE_RADIAL": (_BROWN, (0, 0, 1, 2), (0,)), "RADIAL": (_BROWN, (0, 0, 1, 2), (0, 1)),
+    "OPENCV": (_BROWN, (0, 1, 2, 3), (0, 1, 2, 3)),
+    "FULL_OPENCV": (_BROWN, (0, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6, 7)),
+    "SIMPLE_RADIAL_FISHEYE": (_FISHEYE, (0, 0, 1, 2), (0,)),
+    "RADIAL_FISHEYE": (_FISHEYE, (0, 0, 1, 2), (0, 1)),
+    "OPENCV_FISHEYE": (_FISHEYE, (0, 1, 2, 3), (0, 1, 2, 3)),
+}
+
+
+def camera_from_colmap(camera, name):
+    """ColmapCamera to twoview.Camera; ValueError for a lens that twoview has no model of."""
+    if camera.model not in _MODELS:
+        raise ValueError(f"{name}: COLMAP's {camera.model} is not one of {', '.join(_MODELS)}")
+    model, places, lens = _MODELS[camera.model]
+    count = max(places) + 1 + len(lens)
+    if len(camera.params) != count:
+        raise ValueError(f"{name}: {camera.model} has {count} parameters, not {len(camera.params)}")
+    fx, fy, cx, cy = (float(camera.params[i]) for i in places)
+    k = [0.0] * 8
+    for place, value in zip(lens, camera.params[max(places) + 1:]):
+        k[place] = float(value)
+    if model == _BROWN and not any(k):
+        model = _PINHOLE
+    return tv.Camera(camera.width, camera.height, fx, fy, cx - HALF_PIXEL, cy - HALF_PIXEL, model,
+                     () if model == _PINHOLE else tuple(k))
+
+
+def keypoints_to_colmap(keypoints):
+    """(n, 6) float32: x y a11 a12 a21 a22, the form that COLMAP's own extractor writes."""
+    x, y, angle = (keypoints[name].astype(np.float64) for name in ("x", "y", "angle_rad"))
+    scale = keypoints["size"].astype(np.float64) / 2
+    cos, sin = scale * np.cos(angle), scale * np.sin(angle)
+    columns = [x + HALF_PIXEL, y + HALF_PIXEL, cos, -sin, sin, cos]
+    return np.column_stack(columns).astype(np.float32).reshape(-1, 6)
+
+
+def pixels_from_colmap(keypoints):
+    """(n, 2) float64 of COLMAP's (n, 2), (n, 4) or (n, 6)."""
+    return np.ascontiguousarray(np.asarray(keypoints, np.float64)[:, :2] - HALF_PIXEL)
+
+
+def quaternion(R):
+    """w x y z with w >= 0."""
+    from scipy.spatial.transform import Rotation
+    x, y, z, w = Rotation.from_matrix(R).as_quat(canonical=True)
+    return np.array([w, x, y, z])
+
+
+def rotation(qvec):
+    """3x3 of w x y z."""
+    from scipy.spatial.transform import Rotation
+    w, x, y, z = qvec
+    return Rotation.from_quat([x, y, z, w]).as_matrix()
+
+
+@dataclass(frozen=True)
+class PairGeometry:
+    """A row of two_view_geometries, in COLMAP's pixels; what is unknown is None."""
+
+    config: int
+    inlier_matches: np.ndarray  #: (n, 2) uint32
+    F: Optional[np.ndarray] = None
+    E: Optional[np.ndarray] = None
+    H: Optional[np.ndarray] = None
+    R: Optional[np.ndarray] = None
+    t: Optional[np.ndarray] = None
+
+    def swapped(self):
+        """The same pair named the other way round."""
+        H = R = t = None
+        if self.H is not None:
+            H = np.linalg.inv(self.H)
+            H = H / H[2, 2] if H[2, 2] else H
+        if self.R is not None:
+            R, t = self.R.T, -self.R.T @ self.t
+        return PairGeometry(self.config, np.ascontiguousarray(self.inlier_matches[:, ::-1]),
+                            None if self.F is None else self.F.T.copy(),
+                            None if self.E is None else self.E.T.copy(), H, R, t)
+
+
+def geometry_to_colmap(found, matches):
+    """A twoview.TwoView and its inlier matches (n, 2) to a row. A degenerate pair keeps no match."""
+    config = CONFIGURATIONS[found.config]
+    if config == DEGENERATE:
+        return PairGeometry(DEGENERATE, np.zeros((0, 2), np.uint32))
+    F, H = found.F, found.H
+    if F is not None:
+        F = _FROM_COLMAP.T @ F @ _FROM_COLMAP
+    if H is not None:
+        H = _TO_COLMAP @ H @ _FROM_COLMAP
+    t = found.t
+    if found.R is not None and t is None:
+        t = np.zeros(3)  # COLMAP's pose of a panorama
+    return PairGeometry(config, np.ascontiguousarray(matches, np.uint32), F, found.E, H, found.R, t)

@@ -1,0 +1,187 @@
+"""A database file that appears, or grows, whole or not at all; and what is in one, by SQL that every COLMAP shares."""
+
+import contextlib
+import os
+import sqlite3
+import tempfile
+
+import numpy as np
+
+from . import schema4, schema38
+from .conventions import MODEL_IDS, ColmapCamera
+from .errors import BadInput
+
+SCHEMAS = {schema.NAME: schema for schema in (schema4, schema38)}
+_LEFT_BEHIND = ("-wal", "-journal", "-shm")
+
+
+def _columns(database):
+    """{table: columns} of all that is no SQLite's own."""
+    tables = [row[0] for row in database.execute(
+        "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'")]
+    return {table: [row[1] for row in database.execute(f"PRAGMA table_info('{table}')")] for table in tables}
+
+
+def maker_of(database):
+    """Which COLMAP a database is of, in words."""
+    version = database.execute("PRAGMA user_version").fetchone()[0]
+    if not {"cameras", "images", "two_view_geometries"} <= set(_columns(database)):
+        return "no COLMAP"
+    if version >= 1000000:
+        return f"COLMAP {version // 1000000}.{version // 10000 % 100}.{version // 100 % 100}"
+    return f"COLMAP {version // 1000}.{version // 100 % 10}" if version else "a COLMAP that gives no version"
+
+
+def _explain(path, error):
+    words = str(error)
+    if "locked" in words or "busy" in words:
+        return BadInput(f"{path}: locked by another program")
+    if "not a database" in words or "malformed" in words:
+        return BadInput(f"{path}: not a database")
+    return BadInput(f"{path}: {words}")
+
+
+@contextlib.contextmanager
+def reading(path):
+    """An sqlite3 connection that only reads; errors in words."""
+    if not os.path.isfile(path):
+        raise BadInput(f"{path}: no such file")
+    try:
+        uri = "file:" + os.path.abspath(path).replace("%", "%25").replace("?", "%3f").replace("#", "%23")
+        with contextlib.closing(sqlite3.connect(uri + "?mode=ro", uri=True, timeout=1)) as database:
+            database.execute("SELECT count(*) FROM sqlite_master")
+            yield database
+    except sqlite3.Error as error:
+        raise _explain(path, error) from None
+
+
+def _require_schema(database, path, schema, folder):
+    """Refuses a database of another COLMAP: its tables are not those that this schema makes."""
+    fresh = os.path.join(folder, "fresh.db")
+    schema.create(fresh)
+    with contextlib.closing(sqlite3.connect(fresh)) as expected:
+        wanted, maker = _columns(expected), maker_of(expected)
+    if _columns(database) != wanted:
+        raise BadInput(f"{path}: made by {maker_of(database)}, and --schema {schema.NAME} is for {maker}")
+
+
+def _settle(path):
+    """One file: what COLMAP 4 keeps in path-wal is moved in."""
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA journal_mode = DELETE")
+
+
+@contextlib.contextmanager
+def new_database(path, schema):
+    """A Writer of a database that is at `path` when the block ends well; there must be none before."""
+    if os.path.lexists(path):
+        raise BadInput(f"{path}: there already (--append adds to it)")
+    for suffix in _LEFT_BEHIND:  # SQLite would roll it into the new file
+        if os.path.lexists(path + suffix):
+            raise BadInput(f"{path}{suffix}: left there by another database; remove it first")
+    with _scratch_folder(path) as scratch:
+        made = os.path.join(scratch, "made.db")
+        schema.create(made)
+        with schema.Writer(made) as writer:
+            yield writer
+            writer.commit()
+        _settle(made)
+        try:
+            os.link(made, path)  # never over a file that came meanwhile
+        except FileExistsError:
+            raise BadInput(f"{path}: there already (--append adds to it)") from None
+        except OSError:  # a file system without links
+            os.rename(made, path)
+
+
+@contextlib.contextmanager
+def appended_database(path, schema):
+    """A Writer of a copy, which replaces the content of `path` in one transaction when the block ends well."""
+    if not os.path.isfile(path):
+        raise BadInput(f"{path}: no such file, nothing to append to")
+    try:
+        with _scratch_folder(path) as scratch, contextlib.closing(sqlite3.connect(path, timeout=1)) as target:
+            made = os.path.join(scratch, "made.db")
+            target.execute("BEGIN IMMEDIATE")  # says whether it can be written to
+            target.rollback()
+            _require_schema(target, path, schema, scratch)
+            before = target.execute("PRAGMA data_version").fetchone()
+            with contextlib.closing(sqlite3.connect(made)) as copy:
+                target.backup(copy)
+            with schema.Writer(made) as writer:
+                yield writer
+                writer.commit()
+            _settle(made)
+            if target.execute("PRAGMA data_version").fetchone() != before:
+                raise BadInput(f"{path}: changed by another program meanwhile; nothing was written")
+            with contextlib.closing(sqlite3.connect(made)) as copy:
+                copy.backup(target)
+    except sqlite3.Error as error:
+        raise _explain(path, error) from None
+
+
+@contextlib.contextmanager
+def _scratch_folder(path):
+    """A hidden folder beside `path`, gone at the end whatever happens."""
+    folder = os.path.dirname(os.path.abspath(path))
+    if not os.path.isdir(folder):
+        raise BadInput(f"{folder}: no such folder")
+    try:
+        scratch = tempfile.TemporaryDirectory(prefix=f".{os.path.basename(path)}.", dir=folder)
+    except OSError as error:
+        raise BadInput(f"{folder}: {error.strerror}") from None
+    with scratch as name:
+        yield name
+
+
+def read_cameras(database):
+    """{camera_id: ColmapCamera}."""
+    names = {number: name for name, number in MODEL_IDS.items()}
+    names.update({0: "SIMPLE_PINHOLE", 2: "SIMPLE_RADIAL", 3: "RADIAL", 8: "SIMPLE_RADIAL_FISHEYE",
+                  9: "RADIAL_FISHEYE"})
+    rows = database.execute("SELECT camera_id, model, width, height, params FROM cameras")
+    return {camera_id: ColmapCamera(names.get(model, f"model {model}"), width, height,
+                                    tuple(np.frombuffer(params, np.float64).tolist()))
+            for camera_id, model, width, height, params in rows}
+
+
+def read_images(database):
+    """{name: (image_id, camera_id)}."""
+    return {name: (image_id, camera_id) for image_id, name, camera_id in
+            database.execute("SELECT image_id, name, camera_id FROM images ORDER BY image_id")}
+
+
+def _table(row, dtype, path, what):
+    if row is None or row[0] == 0:
+        return np.zeros((0, row[1] if row else 2), dtype)
+    rows, columns, data = row
+    if len(data or b"") != rows * columns * np.dtype(dtype).itemsize:
+        raise BadInput(f"{path}: {what}: not {rows} x {columns} values")
+    return np.frombuffer(data, dtype).reshape(rows, columns)
+
+
+def read_keypoints(database, path, image_id):
+    """(n, 2), (n, 4) or (n, 6) float32, in COLMAP's pixels."""
+    row = database.execute("SELECT rows, cols, data FROM keypoints WHERE image_id = ?", (image_id,)).fetchone()
+    return _table(row, np.float32, path, f"keypoints of image {image_id}")
+
+
+def read_descriptors(database, path, image_id):
+    """(n, 128) uint8."""
+    row = database.execute("SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)).fetchone()
+    return _table(row, np.uint8, path, f"descriptors of image {image_id}")
+
+
+def read_matches(database, path):
+    """[(image_id0, image_id1, (n, 2) uint32)], image_id0 < image_id1."""
+    found = []
+    for pair, *row in database.execute("SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id"):
+        id0, id1 = divmod(pair, schema38.MAX_IMAGES)
+        found.append((id0, id1, _table(row, np.uint32, path, f"matches of images {id0} and {id1}")))
+    return found
+
+
+def read_pair_ids(database):
+    """Pairs of image ids, smaller first, that have matches or a geometry."""
+    rows = database.execute("SELECT pair_id FROM matches UNION SELECT pair_id FROM two_view_geometries")
+    return {divmod(row[0], schema38.MAX_IMAGES) for row in rows}

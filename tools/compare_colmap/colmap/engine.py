@@ -1,0 +1,44 @@
+"""The library's stages on images of any size, with one set of options."""
+
+import numpy as np
+import twoview as tv
+
+from .errors import BadInput
+
+
+class Engine:
+    def __init__(self, feature=None, match=None, estimate=None, max_matches=0):
+        self.feature, self.match_options = feature or tv.FeatureOptions(), match or tv.MatchOptions()
+        self.estimate_options = estimate or tv.EstimateOptions()
+        self.max_matches = max_matches
+        self.width = self.height = 0
+        self.context = None
+
+    def _context(self, width, height):
+        if self.context is None or width > self.width or height > self.height:
+            self.width, self.height = max(width, self.width), max(height, self.height)
+            self.context = tv.Context(max_width=self.width, max_height=self.height,
+                                      max_keypoints=max(self.feature.max_keypoints, 1),
+                                      max_matches=self.max_matches)
+        return self.context
+
+    def extract(self, luma, name):
+        try:
+            return tv.extract(self._context(luma.shape[1], luma.shape[0]), luma, options=self.feature)
+        except tv.StatusError as error:
+            raise BadInput(f"image {name}: {error}") from None
+
+    def match(self, descriptors0, descriptors1):
+        return tv.match(self._context(1, 1), descriptors0, descriptors1, self.match_options)
+
+    def estimate(self, camera0, camera1, pixels0, pixels1, ratios=None):
+        try:
+            return tv.estimate_two_view(self._context(1, 1), camera0, camera1, pixels0, pixels1, ratios,
+                                        self.estimate_options)
+        except tv.StatusError as error:
+            raise BadInput(str(error)) from None
+
+
+def pixels_of(keypoints):
+    """(n, 2) float64."""
+    return np.column_stack([keypoints["x"], keypoints["y"]]).astype(np.float64)

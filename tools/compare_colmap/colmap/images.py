@@ -1,0 +1,43 @@
+"""Image files as `twoview` reads them."""
+
+import os
+
+import numpy as np
+
+from .errors import BadInput
+
+EXTENSIONS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp")
+
+
+def list_images(folder):
+    """Names below a folder, sorted, with / between folders as COLMAP has them."""
+    if not os.path.isdir(folder):
+        raise BadInput(f"{folder}: no such folder")
+    names = [os.path.relpath(os.path.join(root, file), folder)
+             for root, _, files in os.walk(folder) for file in files
+             if file.lower().endswith(EXTENSIONS) and not file.startswith(".")]
+    return sorted(name.replace(os.sep, "/") for name in names)
+
+
+def read_luma(path):
+    """(height, width) uint8: 0.299 R + 0.587 G + 0.114 B of the pixels as they are stored."""
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")  # read when it is imported: the line is ours
+    import cv2
+    if not os.path.isfile(path):
+        raise BadInput(f"image {path}: no such file")
+    try:
+        image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        image = None
+    if image is None:
+        raise BadInput(f"image {path}: not an image that OpenCV reads")
+    if image.dtype == np.uint16:  # to 8 bits, rounded
+        image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
+    if image.dtype != np.uint8:
+        raise BadInput(f"image {path}: samples of {image.dtype}, not of 8 or 16 bits")
+    if image.ndim == 3:
+        codes = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
+        if image.shape[2] not in codes:
+            raise BadInput(f"image {path}: {image.shape[2]} channels, not 1, 3 or 4")
+        image = cv2.cvtColor(image, codes[image.shape[2]])
+    return np.ascontiguousarray(image)

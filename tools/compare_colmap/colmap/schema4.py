@@ -1,0 +1,74 @@
+"""COLMAP 4's database, written by pycolmap's own Database class."""
+
+from .errors import need_pycolmap
+
+NAME = "4"
+
+
+def create(path):
+    need_pycolmap("--schema 4").Database.open(path).close()
+
+
+class Writer:
+    """Adds rows; commit() makes them stay. A camera has a rig, and an image a frame, of its own."""
+
+    def __init__(self, path):
+        self.colmap = need_pycolmap("--schema 4")
+        self.database = self.colmap.Database.open(path)
+        self.transaction = self.colmap.DatabaseTransaction(self.database)
+        self.transaction.__enter__()
+        self.rigs = {rig.ref_sensor_id.id: rig.rig_id for rig in self.database.read_all_rigs()
+                     if rig.ref_sensor_id.type == self.colmap.SensorType.CAMERA}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.commit()  # COLMAP's class knows no way back; the file is one that can be thrown away
+        self.database.close()
+
+    def commit(self):
+        if self.transaction:
+            self.transaction.__exit__(None, None, None)
+            self.transaction = None
+
+    def add_camera(self, camera):
+        made = self.colmap.Camera(model=camera.model, width=camera.width, height=camera.height,
+                                  params=list(camera.params))
+        made.has_prior_focal_length = True
+        made.camera_id = self.database.write_camera(made)
+        self._add_rig(made.sensor_id)
+        return made.camera_id
+
+    def _add_rig(self, sensor_id):
+        rig = self.colmap.Rig()
+        rig.add_ref_sensor(sensor_id)
+        self.rigs[sensor_id.id] = self.database.write_rig(rig)
+
+    def add_image(self, name, camera_id):
+        image = self.colmap.Image(name=name, camera_id=camera_id)
+        image.image_id = self.database.write_image(image)
+        if camera_id not in self.rigs:
+            self._add_rig(self.database.read_camera(camera_id).sensor_id)
+        frame = self.colmap.Frame()
+        frame.rig_id = self.rigs[camera_id]
+        frame.add_data_id(image.data_id)
+        self.database.write_frame(frame)
+        return image.image_id
+
+    def add_features(self, image_id, keypoints, descriptors):
+        self.database.write_keypoints(image_id, keypoints)
+        self.database.write_descriptors(image_id, self.colmap.FeatureDescriptors(
+            type=self.colmap.FeatureExtractorType.SIFT, data=descriptors))
+
+    def add_pair(self, id0, id1, matches, geometry):
+        if id0 > id1:
+            id0, id1, matches, geometry = id1, id0, matches[:, ::-1], geometry.swapped()
+        self.database.write_matches(id0, id1, matches.astype("uint32"))
+        row = self.colmap.TwoViewGeometry()
+        row.config = geometry.config
+        row.inlier_matches = geometry.inlier_matches
+        row.F, row.E, row.H = geometry.F, geometry.E, geometry.H
+        if geometry.R is not None:
+            row.cam2_from_cam1 = self.colmap.Rigid3d(self.colmap.Rotation3d(geometry.R), geometry.t)
+        self.database.write_two_view_geometry(id0, id1, row)

@@ -1,0 +1,48 @@
+"""The stages' options as flags, by INTERFACES' names, and the stages run with them."""
+
+import dataclasses
+
+import twoview as tv
+
+_CHOICES = {"orientation": tv.Orientation, "descriptor": tv.Descriptor, "method": tv.Method}
+_KINDS = (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)
+_NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
+
+
+def _spelt(value):
+    return value.name.lower().replace("_", "-")
+
+
+def _choice(enum):
+    def convert(text):
+        for value in enum:
+            if _spelt(value) == text:
+                return value
+        raise ValueError
+    convert.__name__ = " or ".join(map(_spelt, enum))
+    return convert
+
+
+def add_options(parser, kinds=_KINDS):
+    """A flag for each field of the options."""
+    group = parser.add_argument_group("options of the stages (docs/cli.md)")
+    for kind in kinds:
+        for field in dataclasses.fields(kind):
+            if field.name in _NOT_HERE:
+                continue
+            flag = "--" + field.name.replace("_", "-")
+            if field.name in _CHOICES:
+                enum = _CHOICES[field.name]
+                group.add_argument(flag, type=_choice(enum), default=enum(field.default),
+                                   metavar="|".join(map(_spelt, enum)), help=_spelt(enum(field.default)))
+            else:
+                number = int if field.default is None else type(field.default)
+                group.add_argument(flag, type=number, default=field.default,
+                                   metavar="N" if number is int else "X",
+                                   help="the library's" if field.default is None else f"{field.default:g}")
+
+
+def options_of(arguments, kind):
+    """The options object that the flags name."""
+    return kind(**{field.name: getattr(arguments, field.name) for field in dataclasses.fields(kind)
+                   if hasattr(arguments, field.name)})

@@ -1,0 +1,48 @@
+"""A model's poses beside the truth: aligned by the similarity that fits the camera centres best."""
+
+import os
+
+import numpy as np
+
+from .conventions import rotation
+
+
+def read_truth(folder):
+    """{image: (R, centre)} of a data set, camera from world: groundtruth.txt (TUM, world from camera), frames.txt."""
+    with open(os.path.join(folder, "groundtruth.txt"), encoding="utf-8") as file:
+        rows = [line.split() for line in file if line.strip() and not line.startswith("#")]
+    poses = {row[0]: np.array(row[1:], float) for row in rows}
+    with open(os.path.join(folder, "frames.txt"), encoding="utf-8") as file:
+        frames = [line.split() for line in file if line.strip() and not line.startswith("#")]
+    truth = {}
+    for stamp, name, *_ in frames:
+        if stamp in poses:
+            x, y, z, w = poses[stamp][3:]
+            truth[os.path.basename(name)] = rotation([w, x, y, z]).T, poses[stamp][:3]
+    return truth
+
+
+def align(source, target):
+    """(scale, R, t) with target = scale R source + t in the least squares' sense; S. Umeyama, PAMI 1991."""
+    mean0, mean1 = source.mean(axis=0), target.mean(axis=0)
+    a, b = source - mean0, target - mean1
+    U, S, Vt = np.linalg.svd(b.T @ a)
+    sign = np.diag([1, 1, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
+    R = U @ sign @ Vt
+    scale = np.trace(np.diag(S) @ sign) / (a ** 2).sum()
+    return scale, R, mean1 - scale * R @ mean0
+
+
+def pose_errors(model, truth):
+    """(names, position errors in the truth's unit, rotation errors in degrees) of {image: (R, centre)}, for the
+    images that both have; at least three."""
+    names = sorted(set(model) & set(truth))
+    if len(names) < 3:
+        return names, np.full(len(names), np.inf), np.full(len(names), np.inf)
+    source, target = (np.array([poses[name][1] for name in names]) for poses in (model, truth))
+    scale, R, t = align(source, target)
+    positions = np.linalg.norm(scale * source @ R.T + t - target, axis=1)
+    # The model's world turned by R; what is left between the two orientations of each camera.
+    left = [model[name][0] @ R.T @ truth[name][0].T for name in names]
+    cosines = [np.clip((np.trace(rest) - 1) / 2, -1, 1) for rest in left]
+    return names, positions, np.degrees(np.arccos(cosines))
