@@ -7,8 +7,11 @@ import signal
 import sqlite3
 import sys
 
+import numpy as np
+import twoview as tv
+
 from . import settings
-from .errors import EXIT_BAD_INPUT, EXIT_DONE, EXIT_NO_POSE, BadInput
+from .errors import ENDING_SIGNALS, EXIT_BAD_INPUT, EXIT_DONE, EXIT_NO_POSE, BadInput
 
 
 class Parser(argparse.ArgumentParser):
@@ -48,8 +51,6 @@ def _add_export(verbs):
 
 
 def _export(arguments):
-    import twoview as tv
-
     from .exporter import Job, export
     job = Job(arguments.database, arguments.images, arguments.pairs, arguments.sequential,
               tuple(arguments.camera), arguments.schema, arguments.append, arguments.quiet or arguments.json)
@@ -64,6 +65,78 @@ def _export(arguments):
     return EXIT_DONE
 
 
+def _add_import(verbs):
+    parser = verbs.add_parser("import", help="a COLMAP model as reference poses, a database's matches as input")
+    parser.add_argument("--model", default="", metavar="DIR", help="cameras, images and points3D, .bin or .txt")
+    parser.add_argument("--database", default="", metavar="FILE",
+                        help="estimate from its features and matches, of COLMAP 3.8 or 4; with --model against its poses")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR",
+                        help="of pairs.txt, cameras.yaml and trajectory.tum; with --database of report.json")
+    _choice_of_pairs(parser)
+    parser.add_argument("--min-common-points", type=int, default=30, metavar="N",
+                        help="pairs.txt has the pairs that see as many points of the model (default: 30)")
+    parser.add_argument("--camera", action="append", default=[], metavar="YAML",
+                        help="for all images, instead of the database's")
+    settings.add_options(parser, (tv.MatchOptions, tv.EstimateOptions))
+    parser.set_defaults(run=_import)
+
+
+def _import(arguments):
+    from .importer import import_database, import_model
+    from .model import read_model
+    a = arguments
+    if not a.model and not a.database:
+        raise BadInput("import needs --model or --database (see twoview colmap import --help)")
+    model = read_model(a.model) if a.model else None
+    if not a.database:
+        count = import_model(model, a.output, a.pairs, a.sequential, a.min_common_points)
+        _say(a, {"images": len(model.images), "pairs": count},
+             f"{a.output}: {len(model.images)} images, {count} pairs")
+        return EXIT_DONE
+    report = import_database(a.database, a.output, a.pairs, a.sequential, model, a.camera,
+                             settings.options_of(a, tv.MatchOptions), settings.options_of(a, tv.EstimateOptions),
+                             a.quiet or a.json)
+    posed = sum(row["R"] is not None and row["t"] is not None for row in report["pairs"])
+    areas = ", ".join(f"{area:.1f}" for area in report["auc"].values() if area is not None)
+    _say(a, report, f"{a.output}/report.json: {report['num_pairs']} pairs, {posed} with a pose"
+                    + (f"; AUC at 5, 10, 20 degrees {areas}" if areas else ""))
+    return EXIT_DONE if posed else EXIT_NO_POSE
+
+
+def _add_model(verbs):
+    parser = verbs.add_parser("model", help="two images to a COLMAP text model and a TUM trajectory")
+    parser.add_argument("images", nargs=2, metavar="IMAGE")
+    parser.add_argument("--camera", required=True, metavar="YAML", help="of both images, or of the first")
+    parser.add_argument("--camera1", default="", metavar="YAML", help="of the second, where it is another")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR",
+                        help="of cameras.txt, images.txt, points3D.txt and trajectory.tum")
+    settings.add_options(parser)
+    parser.set_defaults(run=_model)
+
+
+def _model(arguments):
+    from .cameras import read_camera
+    from .model import text_model
+    from .output import write_files
+    from .trajectory import write_trajectory
+    from .two_view_model import reconstruct
+    a = arguments
+    cameras = [read_camera(path) for path in (a.camera, a.camera1 or a.camera)]
+    names = [os.path.basename(path) for path in a.images]
+    if names[0] == names[1]:
+        raise BadInput(f"both images are called {names[0]}, and a COLMAP model tells images apart by their names")
+    pose, model = reconstruct(a.images, names, cameras, *(settings.options_of(a, kind) for kind in (
+        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))
+    if model is None:
+        print(f"twoview: no full pose: {pose.config.name.lower()}", file=sys.stderr)
+        return EXIT_NO_POSE
+    poses = {names[0]: (np.eye(3), np.zeros(3)), names[1]: (model.R, -model.R.T @ model.t)}
+    write_files(a.output, {**text_model(model), "trajectory.tum": write_trajectory(poses)})
+    _say(a, {"points": len(model.points), "verdict": pose.verdict.name.lower()},
+         f"{a.output}: 2 images, {len(model.points)} points, verdict {pose.verdict.name.lower()}")
+    return EXIT_DONE
+
+
 def _say(arguments, result, words):
     if arguments.json:
         print(json.dumps(result))
@@ -75,6 +148,8 @@ def _parser():
     parser = Parser(prog="twoview colmap", description="COLMAP databases and models, in and out")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=Parser)
     _add_export(verbs)
+    _add_import(verbs)
+    _add_model(verbs)
     for verb in verbs.choices.values():
         verb.add_argument("--json", action="store_true", help="print the result alone, as JSON, on stdout")
         verb.add_argument("--quiet", action="store_true", help="print nothing on stdout")
@@ -94,12 +169,12 @@ def _end(number, _frame):
 
 
 def main(arguments=None):
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in ENDING_SIGNALS:
         signal.signal(number, _end)
     try:
         parsed = _parser().parse_args(arguments)
         return parsed.run(parsed)
-    except (BadInput, OSError, sqlite3.Error, MemoryError) as error:
+    except (BadInput, ImportError, OSError, sqlite3.Error, MemoryError) as error:
         print("twoview: " + " ".join(str(error).split()), file=sys.stderr)
         return EXIT_BAD_INPUT
     except _Ended as ended:  # ends as the signal would have

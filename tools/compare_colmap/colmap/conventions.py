@@ -110,6 +110,10 @@ def rotation(qvec):
     return Rotation.from_quat([x, y, z, w]).as_matrix()
 
 
+def _scaled(H):
+    return H / H[2, 2] if H[2, 2] else H
+
+
 @dataclass(frozen=True)
 class PairGeometry:
     """A row of two_view_geometries, in COLMAP's pixels; what is unknown is None."""
@@ -126,8 +130,7 @@ class PairGeometry:
         """The same pair named the other way round."""
         H = R = t = None
         if self.H is not None:
-            H = np.linalg.inv(self.H)
-            H = H / H[2, 2] if H[2, 2] else H
+            H = _scaled(np.linalg.inv(self.H))
         if self.R is not None:
             R, t = self.R.T, -self.R.T @ self.t
         return PairGeometry(self.config, np.ascontiguousarray(self.inlier_matches[:, ::-1]),
@@ -144,7 +147,7 @@ def geometry_to_colmap(found, matches):
     if F is not None:
         F = _FROM_COLMAP.T @ F @ _FROM_COLMAP
     if H is not None:
-        H = _TO_COLMAP @ H @ _FROM_COLMAP
+        H = _scaled(_TO_COLMAP @ H @ _FROM_COLMAP)
     t = found.t
     if found.R is not None and t is None:
         t = np.zeros(3)  # COLMAP's pose of a panorama

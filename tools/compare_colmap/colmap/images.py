@@ -19,8 +19,8 @@ def list_images(folder):
     return sorted(name.replace(os.sep, "/") for name in names)
 
 
-def read_luma(path):
-    """(height, width) uint8: 0.299 R + 0.587 G + 0.114 B of the pixels as they are stored."""
+def _decode(path):
+    """8 bits, 1, 3 (BGR) or 4 (BGRA) channels, the pixels as they are stored."""
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")  # read when it is imported: the line is ours
     import cv2
     if not os.path.isfile(path):
@@ -31,13 +31,25 @@ def read_luma(path):
         image = None
     if image is None:
         raise BadInput(f"image {path}: not an image that OpenCV reads")
-    if image.dtype == np.uint16:  # to 8 bits, rounded
+    if image.dtype == np.uint16:  # rounded
         image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
     if image.dtype != np.uint8:
         raise BadInput(f"image {path}: samples of {image.dtype}, not of 8 or 16 bits")
+    if image.ndim == 3 and image.shape[2] not in (3, 4):
+        raise BadInput(f"image {path}: {image.shape[2]} channels, not 1, 3 or 4")
+    return image
+
+
+def read_luma(path):
+    """(height, width) uint8: 0.299 R + 0.587 G + 0.114 B."""
+    image = _decode(path)
     if image.ndim == 3:
-        codes = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
-        if image.shape[2] not in codes:
-            raise BadInput(f"image {path}: {image.shape[2]} channels, not 1, 3 or 4")
-        image = cv2.cvtColor(image, codes[image.shape[2]])
+        import cv2
+        image = cv2.cvtColor(image, {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}[image.shape[2]])
     return np.ascontiguousarray(image)
+
+
+def read_rgb(path):
+    """(height, width, 3) uint8."""
+    image = _decode(path)
+    return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image[..., 2::-1]

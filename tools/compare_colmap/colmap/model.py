@@ -14,6 +14,7 @@ class ModelImage:
     camera_id: int
     R: np.ndarray  #: (3, 3), camera from world
     t: np.ndarray
+    point_ids: frozenset = frozenset()  #: 3D points that it sees
 
     @property
     def centre(self):
@@ -50,7 +51,8 @@ def read_model(folder):
     for image in sorted(found.images.values(), key=lambda image: image.name):
         if image.has_pose:
             pose = image.cam_from_world().matrix()
-            images[image.name] = ModelImage(image.camera_id, pose[:, :3].copy(), pose[:, 3].copy())
+            seen = frozenset(point.point3D_id for point in image.get_observation_points2D())
+            images[image.name] = ModelImage(image.camera_id, pose[:, :3].copy(), pose[:, 3].copy(), seen)
     error = found.compute_mean_reprojection_error() if found.num_points3D() else 0.0
     return Model(cameras, images, found.num_points3D(), error)
 

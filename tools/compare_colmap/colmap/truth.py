@@ -35,14 +35,17 @@ def align(source, target):
 
 def pose_errors(model, truth):
     """(names, position errors in the truth's unit, rotation errors in degrees) of {image: (R, centre)}, for the
-    images that both have; at least three."""
+    images that both have; at least three.
+
+    Centres on a line leave the turn about it open, so the rotations have an alignment of their own: the world's
+    turn that makes them fit best."""
     names = sorted(set(model) & set(truth))
     if len(names) < 3:
         return names, np.full(len(names), np.inf), np.full(len(names), np.inf)
     source, target = (np.array([poses[name][1] for name in names]) for poses in (model, truth))
     scale, R, t = align(source, target)
     positions = np.linalg.norm(scale * source @ R.T + t - target, axis=1)
-    # The model's world turned by R; what is left between the two orientations of each camera.
-    left = [model[name][0] @ R.T @ truth[name][0].T for name in names]
-    cosines = [np.clip((np.trace(rest) - 1) / 2, -1, 1) for rest in left]
-    return names, positions, np.degrees(np.arccos(cosines))
+    U, _, Vt = np.linalg.svd(sum(truth[name][0].T @ model[name][0] for name in names))
+    turn = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+    chords = [np.linalg.norm(model[name][0] - truth[name][0] @ turn) for name in names]
+    return names, positions, np.degrees(2 * np.arcsin(np.minimum(np.array(chords) / np.sqrt(8), 1)))

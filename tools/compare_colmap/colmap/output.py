@@ -1,0 +1,24 @@
+"""Files of a folder that appear whole or not at all."""
+
+import os
+
+from .errors import BadInput
+
+
+def write_files(folder, texts):
+    """{name: text} into `folder`, made where it is missing. Each is written under another name first."""
+    temporary = {}
+    try:
+        os.makedirs(folder, exist_ok=True)
+        for name, text in texts.items():
+            temporary[name] = os.path.join(folder, f".{name}.{os.getpid()}")
+            with open(temporary[name], "w", encoding="utf-8") as file:
+                file.write(text)
+        for name in texts:
+            os.replace(temporary.pop(name), os.path.join(folder, name))
+    except OSError as error:
+        raise BadInput(f"{folder}: {error.strerror}") from None
+    finally:
+        for path in temporary.values():
+            if os.path.exists(path):
+                os.remove(path)

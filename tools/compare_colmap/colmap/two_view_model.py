@@ -1,0 +1,36 @@
+"""Two images to a COLMAP text model and a trajectory, by `tv_reconstruct`."""
+
+import numpy as np
+import twoview as tv
+
+from .engine import pixels_of
+from .errors import BadInput
+from .images import read_luma, read_rgb
+from .model import TwoViewModel
+
+
+def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
+    """(TwoView, TwoViewModel), the model None without a full pose."""
+    lumas = [read_luma(path) for path in paths]
+    for path, luma, camera in zip(paths, lumas, cameras):
+        if (camera.height, camera.width) != luma.shape:
+            raise BadInput(f"image {path} is {luma.shape[1]}x{luma.shape[0]}, but its camera is for "
+                           f"{camera.width}x{camera.height}")
+    feature = feature or tv.FeatureOptions()
+    try:
+        with tv.Context(max_width=max(luma.shape[1] for luma in lumas), max_height=max(luma.shape[0] for luma in lumas),
+                        max_keypoints=feature.max_keypoints) as context:
+            pose, cloud = tv.reconstruct(context, lumas[0], cameras[0], lumas[1], cameras[1], feature=feature,
+                                         match=match, estimate=estimate)
+    except tv.StatusError as error:
+        raise BadInput(f"cannot reconstruct {paths[0]} and {paths[1]}: {error}") from None
+    if pose.R is None or pose.t is None:
+        return pose, None
+    good = cloud.inlier_mask & (cloud.points["status"] == tv.PointStatus.OK)
+    pixels = tuple(pixels_of(cloud.keypoints[i])[cloud.matches[f"idx{i}"][good]] for i in range(2))
+    rgb = read_rgb(paths[0])
+    x, y = np.floor(pixels[0].T + 0.5).astype(int)  # the pixel whose square holds the point
+    colours = rgb[np.clip(y, 0, rgb.shape[0] - 1), np.clip(x, 0, rgb.shape[1] - 1)]
+    points = cloud.points[good]
+    return pose, TwoViewModel(tuple(names), tuple(cameras), pose.R, pose.t, pixels,
+                              points["position"].astype(np.float64), colours, points["error_px"].astype(np.float64))
