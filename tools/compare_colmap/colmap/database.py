@@ -79,6 +79,7 @@ def new_database(path, schema):
     for suffix in _LEFT_BEHIND:  # SQLite would roll it into the new file
         if os.path.lexists(path + suffix):
             raise BadInput(f"{path}{suffix}: left there by another database; remove it first")
+    schema.prepare()
     with _scratch_folder(path) as scratch:
         made = os.path.join(scratch, "made.db")
         schema.create(made)
@@ -99,6 +100,7 @@ def appended_database(path, schema):
     """A Writer of a copy, which replaces the content of `path` in one transaction when the block ends well."""
     if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file, nothing to append to")
+    schema.prepare()
     try:
         with _scratch_folder(path) as scratch, contextlib.closing(sqlite3.connect(path, timeout=1)) as target:
             made = os.path.join(scratch, "made.db")

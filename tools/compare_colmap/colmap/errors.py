@@ -1,6 +1,7 @@
 """How the program says no: one line on stderr, exit status 2."""
 
 import signal
+import sys
 import threading
 
 EXIT_DONE = 0
@@ -16,15 +17,17 @@ ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def need_pycolmap(what):
-    """pycolmap, or the line that says how to get it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING_SIGNALS)  # its import takes them for failures of its own
+    """pycolmap, or the line that says how to get it. The first call comes before there is anything to clean up: a
+    signal during the import ends the program."""
+    if "pycolmap" in sys.modules:
+        return sys.modules["pycolmap"]
+    in_main = threading.current_thread() is threading.main_thread()
+    before = {number: signal.signal(number, signal.SIG_DFL) for number in ENDING_SIGNALS if in_main}
     try:
         import pycolmap
     except ImportError as error:
         raise BadInput(f"{what} needs pycolmap (scripts/bootstrap bench installs it): {error}") from error
     finally:
-        if threading.current_thread() is threading.main_thread():
-            for number in ENDING_SIGNALS:  # its log library has put a crash's report in place of ours
-                signal.signal(number, signal.getsignal(number))
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in before.items():  # its log library has put a crash's report in their place
+            signal.signal(number, handler)
     return pycolmap

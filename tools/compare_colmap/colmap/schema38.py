@@ -36,6 +36,10 @@ CREATE TABLE two_view_geometries (
 """
 
 
+def prepare():
+    """SQLite is all that it takes."""
+
+
 def create(path):
     with contextlib.closing(sqlite3.connect(path)) as database, database:
         database.executescript(_TABLES)

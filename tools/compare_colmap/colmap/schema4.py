@@ -5,6 +5,11 @@ from .errors import need_pycolmap
 NAME = "4"
 
 
+def prepare():
+    """Whether databases can be written at all."""
+    need_pycolmap("--schema 4")
+
+
 def create(path):
     need_pycolmap("--schema 4").Database.open(path).close()
 
