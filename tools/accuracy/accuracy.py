@@ -9,7 +9,6 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one t
 
 import argparse
 import json
-import platform
 import shutil
 import subprocess
 import sys
@@ -24,7 +23,8 @@ import metrics
 import peers
 import pipeline
 import robust500
-from tables import (MIN_PAIRS, OURS, mean_summary, print_table, progress, runs_of, say, summarise)
+from tables import (MIN_PAIRS, OURS, machine, mean_summary, print_table, progress, runs_of, say,
+                    summarise)
 
 PROGRAM = os.path.join(datasets.ROOT, "build", "release", "bin", "twoview")
 QUICK_PAIRS = 8
@@ -114,18 +114,6 @@ def verdicts(peer, compared, sizes):
             found.append(f"mean over sets: AUC{t} lower by {-d['difference']:.1f} "
                          f"(standard error {d['standard_error']:.1f}) than {peer}")
     return found
-
-
-def machine():
-    model = platform.processor() or platform.machine()
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as f:
-            model = next(line.split(":", 1)[1].strip() for line in f
-                         if line.startswith("model name"))
-    except (OSError, StopIteration):
-        pass
-    return {"cpu": model, "cpus": os.cpu_count(), "system": platform.platform(),
-            "python": platform.python_version()}
 
 
 # ---- whole pipelines ---------------------------------------------------------------------------

@@ -28,25 +28,55 @@ def all_sets(folder=None):
 
 
 class Pair:
-    """One line of pairs.txt."""
+    """One line of pairs.txt. R and t are None where the line ends with the two K."""
 
     def __init__(self, line):
         fields = line.split()
-        if len(fields) != 38:
-            raise ValueError(f"a pair has 38 fields, not {len(fields)}: {line[:60]}")
+        if len(fields) not in (22, 38):
+            raise ValueError(f"{len(fields)} fields, not 38 (name0 name1 rot0 rot1 K0 K1 T_0to1), or "
+                             "22 without the truth")
         self.line = " ".join(fields)
         self.name0, self.name1 = fields[:2]
         if fields[2:4] != ["0", "0"]:
-            raise ValueError(f"{self.name0} {self.name1}: no set measured here has turned images")
-        numbers = np.array([float(f) for f in fields[4:]])
+            raise ValueError(f"{self.name0} {self.name1}: turned images are not measured here")
+        numbers = np.array([_number(f) for f in fields[4:]])
         self.K0, self.K1 = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3)
-        T = numbers[18:].reshape(4, 4)
-        self.R, self.t = T[:3, :3], T[:3, 3]
+        for name, K in (("K0", self.K0), ("K1", self.K1)):
+            if K[0, 0] <= 0 or K[1, 1] <= 0 or np.any(K[[0, 1, 2, 2], [1, 0, 0, 1]]) or K[2, 2] != 1:
+                raise ValueError(f"{name} is not [fx 0 cx 0 fy cy 0 0 1]")
+        self.R = self.t = None
+        if len(numbers) > 18:
+            T = numbers[18:].reshape(4, 4)
+            self.R, self.t = T[:3, :3], T[:3, 3]
+            if (np.abs(self.R @ self.R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(self.R) < 0
+                    or T[3].tolist() != [0, 0, 0, 1]):
+                raise ValueError("T_0to1 holds no rotation and translation")
 
 
-def read_pairs(path):
-    with open(path, encoding="utf-8") as f:
-        return [Pair(line) for line in f if line.strip() and not line.startswith("#")]
+def _number(text):
+    try:
+        number = float(text)
+    except ValueError:
+        number = np.nan
+    if not np.isfinite(number):
+        raise ValueError(f"{text!r} is no finite number")
+    return number
+
+
+def read_pairs(path, needs_truth=True):
+    """The pairs of a file. A line that is none is a ValueError that tells its number."""
+    pairs = []
+    with open(path, encoding="utf-8", errors="replace") as f:
+        for number, line in enumerate(f, 1):
+            if not line.strip() or line.lstrip().startswith("#"):
+                continue
+            try:
+                pairs.append(Pair(line))
+                if needs_truth and pairs[-1].R is None:
+                    raise ValueError("no true pose")
+            except ValueError as error:
+                raise ValueError(f"{path}: line {number}: {error}") from error
+    return pairs
 
 
 def read_cameras(set_dir):
@@ -128,6 +158,30 @@ def undistort(points, K, distortion):
     return np.column_stack([x, y])
 
 
+def read_luma(path):
+    """The luma of an image file, by the program's way: colours first, so that it is the same
+    whatever the format (asked for grey, OpenCV takes a JPEG's own luma instead)."""
+    import cv2
+    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    if image is None or image.dtype != np.uint8:
+        raise ValueError(f"{path}: no image, or not of 8 bits")
+    if image.ndim == 3:
+        codes = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
+        image = cv2.cvtColor(image, codes[image.shape[2]])
+    return image
+
+
+def resized_luma(path, resize):
+    """(8-bit luma with the long side brought down to `resize`, scale in x, scale in y)"""
+    import cv2
+    image = read_luma(path)
+    height, width = image.shape
+    size = resized_shape(width, height, resize)
+    if size != (width, height):
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(image), size[0] / width, size[1] / height
+
+
 class Set:
     """A data set with its images in memory once they were read."""
 
@@ -153,32 +207,14 @@ class Set:
     def path(self, name):
         return os.path.join(self.dir, "images", name)
 
-    def _read(self, name):
-        """The luma of an image file, by the program's way: colours first, so that it is the same
-        whatever the format (asked for grey, OpenCV takes a JPEG's own luma instead)."""
-        import cv2
-        image = cv2.imread(self.path(name), cv2.IMREAD_UNCHANGED)
-        if image is None or image.dtype != np.uint8:
-            raise ValueError(f"{self.path(name)}: no image, or not of 8 bits")
-        if image.ndim == 3:
-            codes = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
-            image = cv2.cvtColor(image, codes[image.shape[2]])
-        return image
-
     def _native_size(self, name):
-        image = self._read(name)
+        image = read_luma(self.path(name))
         return image.shape[1], image.shape[0]
 
     @functools.lru_cache(maxsize=None)
     def gray(self, name):
         """(8-bit luma, scale in x, scale in y)"""
-        import cv2
-        image = self._read(name)
-        height, width = image.shape
-        size = resized_shape(width, height, self.resize)
-        if size != (width, height):
-            image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-        return np.ascontiguousarray(image), size[0] / width, size[1] / height
+        return resized_luma(self.path(name), self.resize)
 
     @functools.lru_cache(maxsize=None)
     def pixel_hash(self, name):

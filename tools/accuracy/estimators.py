@@ -119,12 +119,12 @@ def _pycolmap_calibrated(matches, order, threshold_px, seed):
     return pose.rotation.matrix(), t, len(geometry.inlier_matches)
 
 
-def _unit_rays(rays):
+def unit_rays(rays):
     rays = np.column_stack([rays, np.ones(len(rays))])
     return np.ascontiguousarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
-def _sampson_squared(rays0, rays1, R, t):
+def sampson_squared(rays0, rays1, R, t):
     """Squared Sampson distance of normalised points."""
     tx, ty, tz = t
     E = np.array([[0, -tz, ty], [tz, 0, -tx], [-ty, tx, 0]]) @ R
@@ -134,33 +134,35 @@ def _sampson_squared(rays0, rays1, R, t):
     return np.sum(p1 * line1, axis=1) ** 2 / np.maximum(norm, 1e-300)
 
 
-def _opengv_refined(matches, order, threshold_px, seed):
-    """RANSAC, then OpenGV's nonlinear optimisation over the inliers, twice."""
-    import pyopengv  # seeds itself; the order of the matches is what `seed` changes
-    del seed
-    rays0, rays1 = matches.rays0[order], matches.rays1[order]
-    unit0, unit1 = _unit_rays(rays0), _unit_rays(rays1)
-    K0, K1 = (K for K, _ in matches.cameras)
-    focal = (K0[0, 0] + K0[1, 1] + K1[0, 0] + K1[1, 1]) / 4
-    # the sum of 1 - cos of both reprojection errors, as OpenGV's own programs have it
-    threshold = 2 * (1 - np.cos(np.arctan(threshold_px / focal)))
-    try:
-        T = pyopengv.relative_pose_ransac(unit0, unit1, "NISTER", threshold,
-                                          OPENGV_MAX_ITERATIONS, CONFIDENCE)
-    except RuntimeError:
-        return None
-    T = np.asarray(T, float)
-    for steps_left in (2, 1, 0):  # T: camera 1 in camera 0
-        if T.shape != (3, 4) or not np.isfinite(T).all() or not np.any(T[:, 3]):
+def _opengv(algorithm, nonlinear):
+    """OpenGV's RANSAC; `nonlinear`: then its optimisation over the inliers, twice."""
+    def run(matches, order, threshold_px, seed):
+        import pyopengv  # seeds itself; the order of the matches is what `seed` changes
+        del seed
+        rays0, rays1 = matches.rays0[order], matches.rays1[order]
+        unit0, unit1 = unit_rays(rays0), unit_rays(rays1)
+        K0, K1 = (K for K, _ in matches.cameras)
+        focal = (K0[0, 0] + K0[1, 1] + K1[0, 0] + K1[1, 1]) / 4
+        # the sum of 1 - cos of both reprojection errors, as OpenGV's own programs have it
+        threshold = 2 * (1 - np.cos(np.arctan(threshold_px / focal)))
+        try:
+            T = pyopengv.relative_pose_ransac(unit0, unit1, algorithm, threshold,
+                                              OPENGV_MAX_ITERATIONS, CONFIDENCE)
+        except RuntimeError:
             return None
-        R, t = T[:, :3].T, -T[:, :3].T @ T[:, 3]
-        t = t / np.linalg.norm(t)
-        inliers = _sampson_squared(rays0, rays1, R, t) < (threshold_px / focal) ** 2
-        if steps_left == 0 or np.count_nonzero(inliers) < 6:
-            return R, t, int(np.count_nonzero(inliers))
-        T = np.asarray(pyopengv.relative_pose_optimize_nonlinear(
-            unit0[inliers], unit1[inliers], T[:, 3].copy(), T[:, :3].copy()), float)
-    return None
+        T = np.asarray(T, float)
+        for steps_left in (2, 1, 0) if nonlinear else (0,):  # T: camera 1 in camera 0
+            if T.shape != (3, 4) or not np.isfinite(T).all() or not np.any(T[:, 3]):
+                return None
+            R, t = T[:, :3].T, -T[:, :3].T @ T[:, 3]
+            t = t / np.linalg.norm(t)
+            inliers = sampson_squared(rays0, rays1, R, t) < (threshold_px / focal) ** 2
+            if steps_left == 0 or np.count_nonzero(inliers) < 6:
+                return R, t, int(np.count_nonzero(inliers))
+            T = np.asarray(pyopengv.relative_pose_optimize_nonlinear(
+                unit0[inliers], unit1[inliers], T[:, 3].copy(), T[:, :3].copy()), float)
+        return None
+    return run
 
 
 PEERS = {
@@ -170,8 +172,14 @@ PEERS = {
     "poselib": ("PoseLib E", "poselib", _poselib),
     "pycolmap": ("COLMAP E", "pycolmap", _pycolmap_essential),
     "pycolmap_tvg": ("COLMAP calibrated two-view geometry", "pycolmap", _pycolmap_calibrated),
-    "opengv_refined": ("OpenGV NISTER + nonlinear", "pyopengv", _opengv_refined),
+    "opengv_refined": ("OpenGV NISTER + nonlinear", "pyopengv", _opengv("NISTER", True)),
 }
+# All that OpenGV has, for tools/compare_colmap; the tables take its best, which is above.
+OPENGV = {f"opengv_{algorithm.lower()}{'_nonlinear' if nonlinear else ''}":
+          (f"OpenGV {algorithm}{' + nonlinear' if nonlinear else ''}", "pyopengv",
+           _opengv(algorithm, nonlinear))
+          for algorithm in ("NISTER", "STEWENIUS", "SEVENPT", "EIGHTPT")
+          for nonlinear in (False, True)}
 
 
 def module_version(module):
@@ -198,8 +206,8 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
     order = matches.shuffled(seed)
     if len(order) < 5:
         return None
-    function = PEERS[kind][2]
-    if PEERS[kind][1] != "cv2":
+    _, module, function = {**PEERS, **OPENGV}[kind]
+    if module != "cv2":
         return function(matches, order, threshold_px, seed)
     import cv2
     try:

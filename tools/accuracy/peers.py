@@ -129,7 +129,7 @@ def _root(descriptors):
 def extract(gray, config):
     """(points n x 2, descriptors n x 128 float32), at most CAP."""
     if config["front"] == "pycolmap":
-        return _extract_pycolmap(gray)
+        return _extract_pycolmap(gray, config.get("cap", CAP))
     import cv2
     cv2.setNumThreads(1)
     if config["front"] == "sift":
@@ -159,13 +159,13 @@ def extract(gray, config):
     return np.array([k.pt for k in keypoints], float), descriptors
 
 
-def _extract_pycolmap(gray):
+def _extract_pycolmap(gray, cap):
     """COLMAP's own SIFT (RootSIFT by default); its origin is the pixel's corner. The descriptors
     stay COLMAP's objects, for its matcher."""
     pycolmap = estimators.pycolmap_module()
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads, options.use_gpu = 1, False
-    options.sift.max_num_features = CAP
+    options.sift.max_num_features = cap
     extractor = pycolmap.FeatureExtractor.create(options, pycolmap.Device.cpu)
     keypoints, descriptors = extractor.extract_from_uint8_array(gray)
     points = np.array([(k.x, k.y) for k in keypoints], float).reshape(-1, 2) - 0.5
@@ -189,7 +189,7 @@ def match(descriptors0, descriptors1, ratio=RATIO):
             np.sqrt(first[keep] / np.maximum(second[keep], 1e-30)))
 
 
-def _match_pycolmap(features0, features1):
+def match_pycolmap(features0, features1):
     """COLMAP's matcher with its defaults (ratio 0.8, distance 0.7, mutual)."""
     pycolmap = estimators.pycolmap_module()
     options = pycolmap.FeatureMatchingOptions()
@@ -260,7 +260,7 @@ class Peer:
                 features[name] = found, 1e3 * (time.perf_counter() - start)
         ((points0, d0), ms0), ((points1, d1), ms1) = features[pair.name0], features[pair.name1]
         start = time.perf_counter()
-        find = _match_pycolmap if self.config["front"] == "pycolmap" else match
+        find = match_pycolmap if self.config["front"] == "pycolmap" else match
         index0, index1, ratios = find(d0, d1)
         match_ms = 1e3 * (time.perf_counter() - start)
         sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]

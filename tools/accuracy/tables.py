@@ -1,5 +1,7 @@
 """Numbers of rows, and how they are printed."""
 
+import os
+import platform
 import sys
 
 import numpy as np
@@ -66,3 +68,15 @@ def print_table(title, summaries):
         f"{'matches':>8} {'prec%':>6} {'ms':>8}")
     for name, summary in summaries.items():
         say(table_line(name, summary, width))
+
+
+def machine():
+    model = platform.processor() or platform.machine()
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as f:
+            model = next(line.split(":", 1)[1].strip() for line in f
+                         if line.startswith("model name"))
+    except (OSError, StopIteration):
+        pass
+    return {"cpu": model, "cpus": os.cpu_count(), "system": platform.platform(),
+            "python": platform.python_version()}
