@@ -7,6 +7,7 @@
 
 #define MS INT64_C(1000000)
 enum { RECORD_BYTES = 12, MAX_FOLDER_BYTES = 4000 };
+static const int64_t TAKEN_LATER_NS = 10 * MS;
 
 /* ---- files ---- */
 
@@ -190,7 +191,8 @@ int64_t ardrone_replay_next_ns(const ardrone_replay *replay) {
   if (replay->has_packet && due(replay, replay->packet_ns) < next_ns) {
     next_ns = due(replay, replay->packet_ns);
   }
-  return next_ns;
+  /* Due and not taken: the session has closed that channel, and time alone opens it again. */
+  return next_ns > replay->now_ns ? next_ns : replay->now_ns + TAKEN_LATER_NS;
 }
 
 int64_t ardrone_replay_host_ns(const ardrone_replay *replay, int64_t now_ns) {

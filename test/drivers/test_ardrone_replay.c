@@ -51,7 +51,8 @@ static void record_packet(void *user, const ardrone_pave_packet *packet, const t
   ++num_recorded_packets;
 }
 
-static void make_recording(void) {
+/* Four seconds; `silent_ms` of them, from the second on, without video, the last 250 ms without navdata. */
+static void make_recording(int64_t silent_ms) {
   ardrone_session_options options;
   const ardrone_transport transport = mock_transport(&drone);
   ardrone_session *session;
@@ -71,7 +72,10 @@ static void make_recording(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_size(&options, &size));
   memory = malloc(size);
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_init(&session, &options, &transport, memory, size));
+  num_recorded_packets = num_recorded_navdata = num_undecodable = 0;
   for (; now < 9000 * MOCK_MS; now += 4 * MOCK_MS) {
+    drone.video_off = now >= 6000 * MOCK_MS && now < (6000 + silent_ms) * MOCK_MS;
+    drone.navdata_off = drone.video_off && now >= (6000 + silent_ms - 250) * MOCK_MS;
     mock_advance(&drone, now);
     ardrone_session_step(session, now);
   }
@@ -125,7 +129,8 @@ static int64_t play(void) {
     ardrone_replay_advance(&replay, t);
     TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_step(session, t));
     if (ardrone_replay_next_ns(&replay) == INT64_MAX) break;
-    if (ardrone_replay_next_ns(&replay) > t) t = ardrone_replay_next_ns(&replay);
+    TEST_ASSERT_TRUE(ardrone_replay_next_ns(&replay) > t);
+    t = ardrone_replay_next_ns(&replay);
     TEST_ASSERT_TRUE(t < begin + 60000 * MOCK_MS);
   }
   ardrone_session_close(session);
@@ -140,6 +145,15 @@ static void test_a_recording_plays_back_whole(void) {
   TEST_ASSERT_EQUAL_INT(num_recorded_navdata, num_navdata);
   TEST_ASSERT_EQUAL_INT(num_recorded_packets - num_undecodable, num_frames);
   TEST_ASSERT_EQUAL_INT(0, num_gaps);
+}
+
+/* The session takes the video for dead, and opens it again a moment after the next packet is due. */
+static void test_a_silence_is_played_over(void) {
+  make_recording(1300);
+  TEST_ASSERT_TRUE(play() > 3500);
+  TEST_ASSERT_EQUAL_INT(num_recorded_navdata, num_navdata);
+  TEST_ASSERT_TRUE(num_frames > 40 && num_gaps > 0);
+  make_recording(0);
 }
 
 static void cut(const char *name, long bytes) {
@@ -229,8 +243,9 @@ int main(void) {
   int result;
   UNITY_BEGIN();
   if (!mkdtemp(folder)) return 1;
-  make_recording();
+  make_recording(0);
   RUN_TEST(test_a_recording_plays_back_whole);
+  RUN_TEST(test_a_silence_is_played_over);
   RUN_TEST(test_a_log_is_an_imu_source);
   RUN_TEST(test_a_recording_cut_at_any_byte);
   RUN_TEST(test_a_folder_that_is_no_recording);

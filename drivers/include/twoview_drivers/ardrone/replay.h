@@ -39,7 +39,8 @@ TV_API void ardrone_replay_close(ardrone_replay *replay);
    jumps from ardrone_replay_next_ns to the next plays as fast as it can. */
 TV_API void ardrone_replay_advance(ardrone_replay *replay, int64_t now_ns);
 
-/* When the next bytes are due by that clock; INT64_MAX when all has been played. */
+/* When the next bytes are due by that clock, always after its last time: what is due and was not taken waits for
+   10 ms. INT64_MAX when all has been played. */
 TV_API int64_t ardrone_replay_next_ns(const ardrone_replay *replay);
 
 /* The recorded host time that an instant of the caller's clock plays. */
