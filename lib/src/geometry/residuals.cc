@@ -92,8 +92,14 @@ RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane) {
 }
 
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian) {
+  double entries[6];
+  for (int k = 0; k < 6; ++k) entries[k] = jacobian(k / 2, k % 2);
+  set_ray(pairs, view, i, ray.data(), entries);
+}
+
+void set_ray(RayPairs& pairs, int view, int i, const double ray[3], const double jacobian[6]) {
   for (int k = 0; k < 3; ++k) pairs.ray[view][k][i] = ray[k];
-  for (int k = 0; k < 6; ++k) pairs.jacobian[view][k][i] = jacobian(k / 2, k % 2);
+  for (int k = 0; k < 6; ++k) pairs.jacobian[view][k][i] = jacobian[k];
 }
 
 namespace {
@@ -377,18 +383,22 @@ double add_up(SumsKernel kernel, const RayPairs& pairs, const int32_t* indices, 
 template <int P>
 void project(const double full[9][9], const double slope[9], const Mat3 columns[P],
              double upper[P * (P + 1) / 2], double gradient[P]) {
+  double flat[P][9];
+  for (int p = 0; p < P; ++p) {
+    for (int i = 0; i < 9; ++i) flat[p][i] = columns[p](i / 3, i % 3);
+  }
   int slot = 0;
   for (int p = 0; p < P; ++p) {
     double product[9];
     gradient[p] = 0;
     for (int i = 0; i < 9; ++i) {
-      gradient[p] += columns[p](i / 3, i % 3) * slope[i];
+      gradient[p] += flat[p][i] * slope[i];
       product[i] = 0;
-      for (int j = 0; j < 9; ++j) product[i] += full[i][j] * columns[p](j / 3, j % 3);
+      for (int j = 0; j < 9; ++j) product[i] += full[i][j] * flat[p][j];
     }
     for (int r = p; r < P; ++r) {
       double sum = 0;
-      for (int i = 0; i < 9; ++i) sum += columns[r](i / 3, i % 3) * product[i];
+      for (int i = 0; i < 9; ++i) sum += flat[r][i] * product[i];
       upper[slot++] = sum;
     }
   }

@@ -42,6 +42,19 @@ RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane);
 inline Vec3 ray_of(const RayPairs& pairs, int view, int i) {
   return Vec3(pairs.ray[view][0][i], pairs.ray[view][1][i], pairs.ray[view][2][i]);
 }
+// For loops over matches, which without Eigen's types are short at -Os, too. R times view 0's ray:
+inline void turn_ray0(const RayPairs& pairs, int i, const Mat3& R, double turned[3]) {
+  const double x = pairs.ray[0][0][i], y = pairs.ray[0][1][i], z = pairs.ray[0][2][i];
+  for (int r = 0; r < 3; ++r) turned[r] = (R(r, 0) * x + R(r, 1) * y) + R(r, 2) * z;
+}
+inline void cross(const double a[3], const double b[3], double product[3]) {
+  product[0] = a[1] * b[2] - a[2] * b[1];
+  product[1] = a[2] * b[0] - a[0] * b[2];
+  product[2] = a[0] * b[1] - a[1] * b[0];
+}
+inline double dot(const double a[3], const double b[3]) {
+  return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
 inline Mat32 jacobian_of(const RayPairs& pairs, int view, int i) {
   Mat32 jacobian;
   for (int k = 0; k < 6; ++k) jacobian(k / 2, k % 2) = pairs.jacobian[view][k][i];
@@ -49,6 +62,7 @@ inline Mat32 jacobian_of(const RayPairs& pairs, int view, int i) {
 }
 
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian);
+void set_ray(RayPairs& pairs, int view, int i, const double ray[3], const double jacobian[6]);
 // After the last set_ray: fills what follows from the rays. Only the first num_scored matches (none
 // given: all) are for scoring.
 void finish_rays(RayPairs& pairs);

@@ -59,10 +59,16 @@ static inline lanes lanes_sqrt(lanes a) {
 #endif
 }
 static inline int lanes_any(lane_mask mask) {
+#if defined(TVK_AVX512)
+  return _mm512_test_epi64_mask((__m512i)mask, (__m512i)mask) != 0;
+#elif defined(TVK_AVX2)
+  return !_mm256_testz_si256((__m256i)mask, (__m256i)mask);
+#else
   int64_t any = 0;
   int k;
   for (k = 0; k < TVK_LANES; ++k) any |= mask[k];
   return any != 0;
+#endif
 }
 
 #endif

@@ -85,6 +85,15 @@ static TVK_INLINE void epipolar_of(const sampson_block *b, const double m[9], in
   e->n = (e->s0[0] * e->s0[0] + e->s0[1] * e->s0[1]) + (e->s1[0] * e->s1[0] + e->s1[1] * e->s1[1]);
 }
 
+static TVK_INLINE void store_first(double *to, lanes x, int32_t count) {
+  int32_t l;
+  if (count == TVK_LANES) {
+    lanes_store(to, x);
+  } else {
+    for (l = 0; l < count; ++l) to[l] = x[l];
+  }
+}
+
 static TVK_INLINE void squares_of(const double *const *arrays, const int32_t *indices,
                                   int32_t first, int32_t count, int on_plane, const double m[9],
                                   double *squares) {
@@ -94,16 +103,10 @@ static TVK_INLINE void squares_of(const double *const *arrays, const int32_t *in
     sampson_block b;
     epipolar_terms e;
     lanes q;
-    int l;
     load_block(arrays, indices ? indices + done : indices, first + done, left, on_plane, &b);
     epipolar_of(&b, m, on_plane, &e);
     q = e.c * e.c / e.n;
-    q = lanes_select(q >= 0.0, q, lanes_of((double)INFINITY));
-    if (left == TVK_LANES) {
-      lanes_store(squares + done, q);
-    } else {
-      for (l = 0; l < left; ++l) squares[done + l] = q[l];
-    }
+    store_first(squares + done, lanes_select(q >= 0.0, q, lanes_of((double)INFINITY)), left);
   }
 }
 
@@ -155,12 +158,16 @@ static TVK_INLINE void pose_squares_of(const double *const *arrays, int32_t firs
     lanes q, angle = {0};
     int l;
     load_block(arrays, NULL, first + done, left, on_plane, &b);
-    for (l = 0; l < left; ++l) angle[l] = arrays[18][first + done + l];
+    if (left == TVK_LANES) {
+      angle = lanes_load(arrays[18] + first + done);
+    } else {
+      for (l = 0; l < left; ++l) angle[l] = arrays[18][first + done + l];
+    }
     epipolar_of(&b, pose, on_plane, &e);
     q = e.c * e.c / e.n;
     q = lanes_select((q >= 0.0) & ~behind_of(&b, scale * angle, on_plane, pose + 9, pose + 18), q,
                      lanes_of((double)INFINITY));
-    for (l = 0; l < left; ++l) squares[done + l] = q[l];
+    store_first(squares + done, q, left);
   }
 }
 
@@ -247,10 +254,9 @@ static inline void transfer_squares_of(const double *const *arrays, const int32_
     const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
     sampson_block b;
     transfer_terms t;
-    int l;
     load_block(arrays, indices ? indices + done : indices, first + done, left, on_plane, &b);
     transfer_of(&b, h, on_plane, &t);
-    for (l = 0; l < left; ++l) squares[done + l] = t.r_sq[l];
+    store_first(squares + done, t.r_sq, left);
   }
 }
 

@@ -52,28 +52,40 @@ void direction_noise(const RayPairs& pairs, const int32_t* indices, int count, c
                      double block[3]) {
   Vec3 b[2];
   tangent_basis(pose.t, &b[0], &b[1]);
+  double along[3][3];  // b[0], b[1] and t
+  for (int i = 0; i < 3; ++i) {
+    along[0][i] = b[0][i];
+    along[1][i] = b[1][i];
+    along[2][i] = pose.t[i];
+  }
   block[0] = block[1] = block[2] = 0;
   for (int k = 0; k < count; ++k) {
     const int i = indices[k];
-    const Vec3 f0 = pose.R * ray_of(pairs, 0, i), f1 = ray_of(pairs, 1, i);
-    const Mat32 J0 = pose.R * jacobian_of(pairs, 0, i), J1 = jacobian_of(pairs, 1, i);
-    const auto gradient = [&](const Vec3& v, double g[4]) {  // of v . (f0 x f1) by the four pixels
-      const Vec3 a0 = f1.cross(v), a1 = v.cross(f0);
-      for (int c = 0; c < 2; ++c) {
-        g[c] = a0.dot(J0.col(c));
-        g[2 + c] = a1.dot(J1.col(c));
-      }
-    };
-    double g[2][4], own[4], norm_sq = 0;
-    gradient(b[0], g[0]);
-    gradient(b[1], g[1]);
-    gradient(pose.t, own);
-    for (double value : own) norm_sq += value * value;
-    if (!(norm_sq > 0)) continue;
+    const double f1[3] = {pairs.ray[1][0][i], pairs.ray[1][1][i], pairs.ray[1][2][i]};
+    double f0[3], g[3][4];  // g: gradients of along . (f0 x f1) by the four pixels
+    turn_ray0(pairs, i, pose.R, f0);
     for (int c = 0; c < 4; ++c) {
-      block[0] += g[0][c] * g[0][c] / norm_sq;
-      block[1] += g[0][c] * g[1][c] / norm_sq;
-      block[2] += g[1][c] * g[1][c] / norm_sq;
+      double* const* J = pairs.jacobian[c / 2];
+      const double slope[3] = {J[c % 2][i], J[2 + c % 2][i], J[4 + c % 2][i]};
+      double turned[3], moved[3];
+      if (c < 2) {
+        for (int r = 0; r < 3; ++r) {
+          turned[r] = (pose.R(r, 0) * slope[0] + pose.R(r, 1) * slope[1]) + pose.R(r, 2) * slope[2];
+        }
+        cross(turned, f1, moved);
+      } else {
+        cross(f0, slope, moved);
+      }
+      for (int a = 0; a < 3; ++a) g[a][c] = dot(along[a], moved);
+    }
+    const double norm_sq = (g[2][0] * g[2][0] + g[2][1] * g[2][1]) +
+                           (g[2][2] * g[2][2] + g[2][3] * g[2][3]);
+    if (!(norm_sq > 0)) continue;
+    const double inverse = 1 / norm_sq;
+    for (int c = 0; c < 4; ++c) {
+      block[0] += g[0][c] * g[0][c] * inverse;
+      block[1] += g[0][c] * g[1][c] * inverse;
+      block[2] += g[1][c] * g[1][c] * inverse;
     }
   }
 }

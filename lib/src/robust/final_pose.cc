@@ -30,11 +30,12 @@ constexpr double kLargestScale = 2;  // in thresholds
 
 // Of the squared parallax: grows with the angle up to a right angle.
 double sine_sq(const PoseRefiner& f, const Mat3& R, int i) {
-  const Vec3 a = R * ray_of(f.pairs, 0, i), b = ray_of(f.pairs, 1, i);
-  const double along = a.dot(b);
-  if (!(along > 0)) return 2;
-  const Vec3 across = a.cross(b);
-  return across.squaredNorm() / (a.squaredNorm() * b.squaredNorm());
+  const double b[3] = {f.pairs.ray[1][0][i], f.pairs.ray[1][1][i], f.pairs.ray[1][2][i]};
+  double a[3], across[3];
+  turn_ray0(f.pairs, i, R, a);
+  if (!(dot(a, b) > 0)) return 2;
+  cross(a, b, across);
+  return dot(across, across) / (dot(a, a) * dot(b, b));
 }
 
 // The matches that take part in a pose's final refinement, into f.indices.

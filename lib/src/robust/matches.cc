@@ -89,36 +89,49 @@ uint32_t table_size_for(int max_matches) {
   return size;
 }
 
-// The ray of a pixel and d ray / d pixel, on the plane z = 1 or of unit length.
-bool ray_of_pixel(const Camera& camera, const double* pixel, bool on_plane, Vec3* ray,
-                  Mat32* jacobian) {
+struct PixelRay {
+  double ray[3], jacobian[6];  // d ray / d pixel, row-major 3x2
+};
+
+// The ray of a pixel, on the plane z = 1 or of unit length.
+bool ray_of_pixel(const Camera& camera, const double* pixel, bool on_plane, PixelRay* out) {
   const tv_camera& model = camera.model;
+  double *ray = out->ray, *jacobian = out->jacobian;
   if (model.model == TV_CAMERA_PINHOLE && on_plane) {
-    *ray = Vec3((pixel[0] - model.cx) / model.fx, (pixel[1] - model.cy) / model.fy, 1);
-    *jacobian << 1 / model.fx, 0, 0, 1 / model.fy, 0, 0;
+    ray[0] = (pixel[0] - model.cx) / model.fx;
+    ray[1] = (pixel[1] - model.cy) / model.fy;
+    ray[2] = 1;
+    jacobian[0] = 1 / model.fx;
+    jacobian[3] = 1 / model.fy;
+    jacobian[1] = jacobian[2] = jacobian[4] = jacobian[5] = 0;
     return true;
   }
   Vec3 unit;
   Mat32 slope;
   if (!unproject(camera, Vec2(pixel[0], pixel[1]), &unit, &slope)) return false;
   if (!on_plane) {
-    *ray = unit;
-    *jacobian = slope;
+    for (int r = 0; r < 3; ++r) {
+      ray[r] = unit[r];
+      for (int c = 0; c < 2; ++c) jacobian[2 * r + c] = slope(r, c);
+    }
     return true;
   }
   if (!(unit[2] > 1e-3)) return false;  // Brown-Conrady's valid angle ends before 90 degrees
-  *ray = Vec3(unit[0] / unit[2], unit[1] / unit[2], 1);
   for (int r = 0; r < 2; ++r) {
+    ray[r] = unit[r] / unit[2];
     for (int c = 0; c < 2; ++c) {
-      (*jacobian)(r, c) = (slope(r, c) - (*ray)[r] * slope(2, c)) / unit[2];
+      jacobian[2 * r + c] = (slope(r, c) - ray[r] * slope(2, c)) / unit[2];
     }
   }
-  (*jacobian)(2, 0) = (*jacobian)(2, 1) = 0;
+  ray[2] = 1;
+  jacobian[4] = jacobian[5] = 0;
   return true;
 }
 
-bool sane(const Vec3& ray, const Mat32& jacobian) {
-  double sum = ray.squaredNorm() + jacobian.squaredNorm();
+bool sane(const PixelRay& p) {
+  double sum = 0;
+  for (double x : p.ray) sum += x * x;
+  for (double x : p.jacobian) sum += x * x;
   return is_finite(sum) && sum < 1e200;
 }
 
@@ -181,12 +194,10 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
     const double sum = (std::fabs(c.v[0]) + std::fabs(c.v[1])) +
                        (std::fabs(c.v[2]) + std::fabs(c.v[3]));
     if (!(sum < kMaxCoordinates)) continue;  // NaN, infinite, or no pixel of any image
-    Vec3 ray;
-    Mat32 jacobian;
+    PixelRay ray;
     bool usable = true;
     for (int v = 0; v < 2 && usable && problem.calibrated; ++v) {
-      usable = ray_of_pixel(problem.camera[v], &c.v[2 * v], on_plane, &ray, &jacobian) &&
-               sane(ray, jacobian);
+      usable = ray_of_pixel(problem.camera[v], &c.v[2 * v], on_plane, &ray) && sane(ray);
     }
     if (usable) keys[count++] = SortKey{sort_ratio(problem, i), i, c.v[0]};
   }
@@ -202,10 +213,9 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
             ? problem.camera[v]
             : normalising_camera(problem.pixels[v], matches->order, matches->num_unique);
     for (int k = 0; k < count; ++k) {
-      Vec3 ray;
-      Mat32 jacobian;
-      ray_of_pixel(camera, problem.pixels[v] + 2 * matches->order[k], on_plane, &ray, &jacobian);
-      set_ray(matches->pairs, v, k, ray, jacobian);
+      PixelRay p;
+      ray_of_pixel(camera, problem.pixels[v] + 2 * matches->order[k], on_plane, &p);
+      set_ray(matches->pairs, v, k, p.ray, p.jacobian);
     }
     const tv_camera& m = camera.model;
     matches->intrinsics[v] << m.fx, 0, m.cx, 0, m.fy, m.cy, 0, 0, 1;

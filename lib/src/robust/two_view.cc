@@ -301,9 +301,12 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
 
 // Grows with the angle between a match's rays, R taken off: 0 to 2 for 0 to 180 degrees.
 double pseudo_angle(const Finish& f, int i) {
-  const Vec3 a = f.out->epipolar.pose.R * ray_of(f.matches.pairs, 0, i);
-  const Vec3 b = ray_of(f.matches.pairs, 1, i);
-  const double sine = a.cross(b).norm(), cosine = a.dot(b);
+  const RayPairs& pairs = f.matches.pairs;
+  const double b[3] = {pairs.ray[1][0][i], pairs.ray[1][1][i], pairs.ray[1][2][i]};
+  double a[3], across[3];
+  turn_ray0(pairs, i, f.out->epipolar.pose.R, a);
+  cross(a, b, across);
+  const double sine = std::sqrt(dot(across, across)), cosine = dot(a, b);
   return cosine > 0 ? sine / (sine + cosine) : 1 - cosine / (sine - cosine);
 }
 
@@ -410,13 +413,22 @@ constexpr double kNoiseOfChance = 0.7;
 // distances from it have a root mean square below three thresholds.
 bool in_a_line(const Finish& f, int view) {
   if (f.num_support == 0) return false;
-  Mat3 sum = Mat3::Zero();
-  double pixel_angle = 0;
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0, pixel_angle = 0;
   for (int k = 0; k < f.num_support; ++k) {
-    const Vec3 ray = ray_of(f.pairs, view, f.support[k]).normalized();
-    sum += ray * ray.transpose();
-    pixel_angle += f.pairs.pixel_angle[f.support[k]];
+    const int i = f.support[k];
+    double* const* ray = f.pairs.ray[view];
+    const double x = ray[0][i], y = ray[1][i], z = ray[2][i];
+    const double weight = 1 / ((x * x + y * y) + z * z);
+    xx += weight * x * x;
+    xy += weight * x * y;
+    xz += weight * x * z;
+    yy += weight * y * y;
+    yz += weight * y * z;
+    zz += weight * z * z;
+    pixel_angle += f.pairs.pixel_angle[i];
   }
+  Mat3 sum;
+  sum << xx, xy, xz, xy, yy, yz, xz, yz, zz;
   const double limit = 3 * f.threshold * pixel_angle / f.num_support;
   return svd3(sum).s[2] < limit * limit * f.num_support;
 }
