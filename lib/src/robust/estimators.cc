@@ -110,28 +110,26 @@ bool pose_from_essential(const RayPairs& pairs, const int32_t* indices, int coun
   return true;
 }
 
-void PoseEstimator::generate(const int32_t samples[][5], int num_samples,
-                             Essentials* models) const {
-  Samples5 rays;
+void PoseEstimator::generate(const int32_t samples[][5], int num_samples) const {
   for (int s = 0; s < kSamples5; ++s) {
     Vec3 rays0[5], rays1[5];
     gather<5>(pairs, samples[s < num_samples ? s : 0], rays0, rays1);
-    set_sample(&rays, s, rays0, rays1);
+    set_sample(&batch->rays, s, rays0, rays1);
   }
-  relpose_5pt(*pairs.kernels, rays, num_samples, models);
+  relpose_5pt(*pairs.kernels, batch->rays, num_samples, &batch->models);
 }
 
-int64_t PoseEstimator::fast_cost(const Essentials& models, int s, int k, int64_t bound) const {
-  return msac_cost_fast(pairs, models.matrix(s, k), threshold_px, bound);
+int64_t PoseEstimator::fast_cost(int s, int k, int64_t bound) const {
+  return msac_cost_fast(pairs, batch->models.matrix(s, k), threshold_px, bound);
 }
 
 int64_t PoseEstimator::fast_cost(const Pose& model, int64_t bound) const {
   return msac_cost_fast(pairs, essential_from_pose(model), threshold_px, bound);
 }
 
-bool PoseEstimator::complete(const Essentials& models, int s, int k, const int32_t* sample,
-                             Pose* pose) const {
-  return pose_from_essential(pairs, sample, 5, models.matrix(s, k), threshold_px, true, pose);
+bool PoseEstimator::complete(int s, int k, const int32_t* sample, Pose* pose) const {
+  const Mat3 E = batch->models.matrix(s, k);
+  return pose_from_essential(pairs, sample, 5, E, threshold_px, true, pose);
 }
 
 int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {
@@ -148,8 +146,13 @@ int64_t PoseEstimator::full_cost(const Pose& model, int* num_inliers) const {
 }
 
 void PoseEstimator::refine_model(Pose* model) const {
-  const int count = near_matches(pairs, pairs.num, *model, kNear * threshold_px, threshold_px,
-                                 indices);
+  int count = near_matches(pairs, pairs.num, *model, kNear * threshold_px, threshold_px, indices);
+  if (count > kMostLocal) {
+    for (int k = 0; k < kMostLocal; ++k) {
+      indices[k] = indices[static_cast<int64_t>(k) * count / kMostLocal];
+    }
+    count = kMostLocal;
+  }
   PoseModel refined{*model};
   refine(pairs, indices, count, RobustLoss{Loss::kTruncated, threshold_px}, kLocalIterations,
          &refined, kLocalGain);

@@ -8,25 +8,33 @@
 namespace tv {
 
 // Local optimisation looks this many thresholds far, so that matches can come in, and takes this many
-// steps.
+// steps. A pose's takes into account no more than kMostLocal matches: the final refinement sees all.
+inline constexpr int kMostLocal = 128;
 inline constexpr double kNear = 3;
 inline constexpr int kLocalIterations = 5;
 inline constexpr double kLocalGain = 1e-3;
 
+// What PoseEstimator solves and finds at once: 7.7 KB, in the arena for the stack's sake.
+struct PoseBatch {
+  Samples5 rays;
+  Essentials models;
+};
+
 // A pose from five rays.
 struct PoseEstimator {
   using Model = Pose;
-  using Candidates = Essentials;
   static constexpr int kSampleSize = 5;
   static constexpr int kMaxModels = kMaxRelpose5pt;
   static constexpr int kBatch = kSamples5;
   const RayPairs& pairs;  // the matches that take part
   double threshold_px;
   int32_t* indices;  // scratch, as many as matches
-  void generate(const int32_t samples[][5], int num_samples, Essentials* models) const;
-  int64_t fast_cost(const Essentials& models, int s, int k, int64_t bound) const;
+  PoseBatch* batch;  // scratch, null where no samples are solved
+  void generate(const int32_t samples[][5], int num_samples) const;
+  int count(int s) const { return batch->models.count[s]; }
+  int64_t fast_cost(int s, int k, int64_t bound) const;
   int64_t fast_cost(const Pose& model, int64_t bound) const;
-  bool complete(const Essentials& models, int s, int k, const int32_t* sample, Pose* pose) const;
+  bool complete(int s, int k, const int32_t* sample, Pose* pose) const;
   int64_t full_cost(const Model& model, int* num_inliers) const;
   void refine_model(Model* model) const;
 };

@@ -42,7 +42,7 @@ bool face_forward(const RayPairs& pairs, const int32_t* sample, double threshold
 
 UprightEstimator make_upright_estimator(const RayPairs& pairs, double threshold_px,
                                         int32_t* indices, const GravityPrior& gravity) {
-  return UprightEstimator{{pairs, threshold_px, indices},
+  return UprightEstimator{{pairs, threshold_px, indices, nullptr},
                           gravity,
                           level_from_camera(gravity.down[0]),
                           level_from_camera(gravity.down[1]),

@@ -20,6 +20,7 @@ constexpr double kFinalScale = 1.5;
 // it as far as its depth asks. Matches with this many times the parallax that nine in ten stay below
 // take no part.
 constexpr double kFarParallax = 3;
+constexpr int kParallaxSample = 128;  // matches that tell it
 
 // A pose is refined at the one of these scales, in standard deviations, at which Huber's estimate of
 // the variance, sum psi^2 / (sum psi')^2, is least: heavy tails want a small one, plain noise a large
@@ -27,6 +28,12 @@ constexpr double kFarParallax = 3;
 // reads low. docs/decisions/0002-robust-loop.md has the measurements.
 constexpr double kScales[] = {1, 1.5, 2, 3};
 constexpr double kLargestScale = 2;  // in thresholds
+constexpr double kMostStretch = 1.5;
+
+// The first round's pose only says which matches are near, and how large the noise is. A step that
+// gains less than a millionth of the cost is a fiftieth of a standard deviation long, and the next one
+// a tenth of that.
+constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
 
 // Of the squared parallax: grows with the angle up to a right angle.
 double sine_sq(const PoseRefiner& f, const Mat3& R, int i) {
@@ -43,9 +50,12 @@ int near_pose(const PoseRefiner& f, const Pose& pose) {
   const int count = near_matches(f.pairs, f.pairs.num, pose, kFinalNear * f.threshold_px,
                                  f.threshold_px, f.indices);
   if (count < 10) return count;
-  for (int k = 0; k < count; ++k) f.values[k] = sine_sq(f, pose.R, f.indices[k]);
-  double* nine_tenths = f.values + count * 9 / 10;
-  std::nth_element(f.values, nine_tenths, f.values + count);
+  const int sampled = std::min(count, kParallaxSample);
+  for (int k = 0; k < sampled; ++k) {
+    f.values[k] = sine_sq(f, pose.R, f.indices[static_cast<int64_t>(k) * count / sampled]);
+  }
+  double* nine_tenths = f.values + sampled * 9 / 10;
+  std::nth_element(f.values, nine_tenths, f.values + sampled);
   const double limit = kFarParallax * kFarParallax * *nine_tenths;
   int kept = 0;
   for (int k = 0; k < count; ++k) {
@@ -55,27 +65,35 @@ int near_pose(const PoseRefiner& f, const Pose& pose) {
   return kept;
 }
 
-// The loss of least estimated variance over the listed matches. *taken: sqrt(sum psi^2 / sum psi'),
-// what it takes from the matches in deviations of a residual, for a prior to count as much less.
-RobustLoss best_loss(const PoseRefiner& f, const Mat3& M, int count, double* taken) {
+// The loss of least estimated variance over the listed matches.
+struct BestLoss {
+  RobustLoss loss;
+  double taken;    // sqrt(sum psi^2 / sum psi'), what it takes from the matches in deviations of a
+                   // residual, for a prior to count as much less
+  double stretch;  // of steps of refine
+};
+
+BestLoss best_loss(const PoseRefiner& f, const Mat3& M, int count) {
   const double sigma = median_noise_px(f, M, count);
   sampson_squares(f.pairs, f.indices, count, M, f.values);
   double least = 0;
-  RobustLoss best{};
+  BestLoss best{};
   for (const double factor : kScales) {
     const double scale = std::max(0.02 * f.threshold_px,
                                   std::min(factor * sigma, kLargestScale * f.threshold_px));
     const double inverse_sq = 1 / (scale * scale);
-    double psi_sq = 0, slope = 0;
+    double psi_sq = 0, slope = 0, weights = 0;
     for (int k = 0; k < count; ++k) {
       const double q = f.values[k] * inverse_sq, weight = 1 / (1 + q);
       psi_sq += f.values[k] * weight * weight;
       slope += (1 - q) * weight * weight;
+      weights += weight;
     }
     if (factor != kScales[0] && !(slope > 0 && psi_sq < least * slope * slope)) continue;
     least = slope > 0 ? psi_sq / (slope * slope) : kInfinity;
-    best = RobustLoss{Loss::kCauchy, scale};
-    *taken = slope > 0 ? std::sqrt(psi_sq / slope) : sigma;
+    best.loss = RobustLoss{Loss::kCauchy, scale};
+    best.taken = slope > 0 ? std::sqrt(psi_sq / slope) : sigma;
+    best.stretch = weights < kMostStretch * slope ? weights / slope : kMostStretch;
   }
   return best;
 }
@@ -85,9 +103,10 @@ Pose refined_with(const PoseRefiner& f, const Pose& start, const GravityPrior& g
   for (int round = 0; round < kFinalRounds; ++round) {
     const int count = near_pose(f, model.pose);
     if (count < 5) break;
-    const RobustLoss loss =
-        best_loss(f, essential_from_pose(model.pose), count, &model.noise_px);
-    refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
+    const BestLoss best = best_loss(f, essential_from_pose(model.pose), count);
+    model.noise_px = best.taken;
+    refine(f.pairs, f.indices, count, best.loss, kFinalIterations, &model, kFinalGains[round],
+           best.stretch);
   }
   return model.pose;
 }

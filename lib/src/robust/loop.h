@@ -9,10 +9,10 @@
 //   int64_t fast_cost(const Model&, int64_t bound)   MSAC cost; above bound, anything above it
 // or, where kBatch samples are solved at once, and what they give becomes a model only when its cost
 // asks for it,
-//   Candidates, with Candidates::count[s] of each sample
-//   void generate(const int32_t samples[][kSampleSize], int num_samples, Candidates*)
-//   int64_t fast_cost(const Candidates&, int s, int k, int64_t bound)
-//   bool complete(const Candidates&, int s, int k, const int32_t* sample, Model*)
+//   void generate(const int32_t samples[][kSampleSize], int num_samples)   keeps what it finds
+//   int count(int s)                                                       of sample s
+//   int64_t fast_cost(int s, int k, int64_t bound)
+//   bool complete(int s, int k, const int32_t* sample, Model*)
 #pragma once
 
 #include <cstdint>
@@ -109,22 +109,21 @@ template <typename Estimator>
 struct Solver<Estimator, false> {
   using Model = typename Estimator::Model;
   int32_t samples[Estimator::kBatch][Estimator::kSampleSize];
-  typename Estimator::Candidates candidates;
   int current = Estimator::kBatch - 1;
 
   int next(Estimator& estimator, Sampler& sampler) {
     if (++current == Estimator::kBatch) {
       for (int s = 0; s < Estimator::kBatch; ++s) draw_sample(sampler, samples[s]);
-      estimator.generate(samples, Estimator::kBatch, &candidates);
+      estimator.generate(samples, Estimator::kBatch);
       current = 0;
     }
-    return candidates.count[current];
+    return estimator.count(current);
   }
   int64_t fast_cost(const Estimator& estimator, int k, int64_t bound) const {
-    return estimator.fast_cost(candidates, current, k, bound);
+    return estimator.fast_cost(current, k, bound);
   }
   bool complete(const Estimator& estimator, int k, Model* model) const {
-    return estimator.complete(candidates, current, k, samples[current], model);
+    return estimator.complete(current, k, samples[current], model);
   }
 };
 

@@ -207,7 +207,7 @@ template bool invert_symmetric<8>(const double*, double*);
 
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
-              int max_iterations, Model* model, double small_gain) {
+              int max_iterations, Model* model, double small_gain, double stretch) {
   constexpr int P = Model::kParameters;
   constexpr double kSmallStep = 1e-9;
   double upper[P * (P + 1) / 2], gradient[P], step[P];
@@ -216,7 +216,10 @@ double refine(const RayPairs& pairs, const int32_t* indices, int count, const Ro
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!solve_damped<P>(upper, gradient, lambda, step)) break;
     double step_sq = 0;
-    for (int p = 0; p < P; ++p) step_sq += step[p] * step[p];
+    for (int p = 0; p < P; ++p) {
+      step[p] *= stretch;
+      step_sq += step[p] * step[p];
+    }
     if (!(step_sq > kSmallStep * kSmallStep)) break;
     double new_upper[P * (P + 1) / 2], new_gradient[P];
     const Model moved = model->stepped(step);
@@ -241,16 +244,16 @@ double refine(const RayPairs& pairs, const int32_t* indices, int count, const Ro
 
 template bool solve_damped<5>(const double*, const double*, double, double*);
 template double refine<PoseModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
-                                  PoseModel*, double);
+                                  PoseModel*, double, double);
 template double refine<GravityPoseModel>(const RayPairs&, const int32_t*, int,
-                                         const RobustLoss&, int, GravityPoseModel*, double);
+                                         const RobustLoss&, int, GravityPoseModel*, double, double);
 template double refine<FundamentalModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
-                                         int, FundamentalModel*, double);
+                                         int, FundamentalModel*, double, double);
 template double refine<HomographyModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
-                                        int, HomographyModel*, double);
+                                        int, HomographyModel*, double, double);
 template double refine<PlaneModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
-                                   PlaneModel*, double);
+                                   PlaneModel*, double, double);
 template double refine<RotationModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
-                                      RotationModel*, double);
+                                      RotationModel*, double, double);
 
 }  // namespace tv

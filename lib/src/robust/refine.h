@@ -75,10 +75,13 @@ inline bool invert_symmetric5(const double upper[15], double inverse[25]) {
 }
 
 // Lowers the robust cost over the listed matches, until a step gains less than small_gain of it.
-// Returns the final cost, in units of scale^2.
+// stretch: of each step. Reweighted least squares divide by the weights' mean where the loss itself
+// curves by the mean of psi': their ratio is what the steps are too short by. Returns the final cost, in
+// units of scale^2.
 inline constexpr double kSmallGain = 1e-9;
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
-              int max_iterations, Model* model, double small_gain = kSmallGain);
+              int max_iterations, Model* model, double small_gain = kSmallGain,
+              double stretch = 1);
 
 }  // namespace tv

@@ -35,7 +35,8 @@ Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena
 
 size_t second_model_bytes(int max_matches) {
   const int most = max_matches < kMaxLeft ? max_matches : kMaxLeft;
-  return 2 * arena_bytes<int32_t>(static_cast<size_t>(most)) + ray_pairs_bytes(most);
+  return 2 * arena_bytes<int32_t>(static_cast<size_t>(most)) + ray_pairs_bytes(most) +
+         arena_bytes<PoseBatch>(1);
 }
 
 SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,
@@ -56,7 +57,7 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
   }
   const Matches part = gathered(matches, listed, taken, arena);
   int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(taken));
-  PoseEstimator estimator{part.pairs, threshold_px, indices};
+  PoseEstimator estimator{part.pairs, threshold_px, indices, arena_alloc<PoseBatch>(arena, 1)};
   Sampler sampler = make_sampler(seed, taken, PoseEstimator::kSampleSize, false);
   // A model with fewer of them than asked for below need not be found.
   const double fewest = std::max<double>(kFewestInliers, kSecondShare * num_first * taken / left);
@@ -67,11 +68,9 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
   if (!result.found || result.num_inliers < kFewestInliers) return second;
   const double of_all = static_cast<double>(result.num_inliers) * left / taken;
   if (of_all < kSecondShare * num_first) return second;
-  const double chance =
-      chance_of_agreement(part, essential_from_pose(result.model), threshold_px, seed);
-  if (!(log_false_alarms(taken, result.num_inliers, 5, 10, chance) < kLogMeaningful)) {
-    return second;
-  }
+  const double limit = meaningful_chance(taken, result.num_inliers, 5, 10);
+  const Mat3 M = essential_from_pose(result.model);
+  if (!(chance_of_agreement(part, M, threshold_px, seed, limit) < limit)) return second;
   second.found = true;
   second.pose = result.model;
   second.num_inliers = static_cast<int>(of_all);

@@ -58,8 +58,11 @@ size_t two_view_scratch_bytes(int max_matches) {
   const size_t n = static_cast<size_t>(max_matches);
   const size_t second = arena_bytes<uint8_t>(n) + second_model_bytes(max_matches);
   const size_t lattice = arena_bytes<double>(2 * n) + lattice_bytes(max_matches);
-  return matches_bytes(max_matches) + 2 * arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) +
-         arena_bytes<double>(n) + std::max(verdict_bytes(max_matches), std::max(second, lattice));
+  const size_t search = arena_bytes<int32_t>(n) + arena_bytes<PoseBatch>(1);
+  const size_t finish = 2 * arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) +
+                        arena_bytes<double>(n) +
+                        std::max(verdict_bytes(max_matches), std::max(second, lattice));
+  return matches_bytes(max_matches) + std::max(search, finish);
 }
 
 void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
@@ -77,7 +80,8 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
     const LoopResult<Pose> result =
         problem.options.method == TV_METHOD_UPRIGHT
             ? run(make_upright_estimator(pairs, threshold, indices, gravity), problem)
-            : run(PoseEstimator{pairs, threshold, indices}, problem);
+            : run(PoseEstimator{pairs, threshold, indices, arena_alloc<PoseBatch>(arena, 1)},
+                  problem);
     model->num_iterations = result.num_iterations;
     epipolar.found = epipolar.has_pose = result.found;
     if (result.found) epipolar.pose = result.model;
@@ -190,7 +194,7 @@ void choose_planar_pose(Finish& f, const Rivals& rivals) {
     const int count = decompose_homography(rivals.H, mean, planar);
     for (int k = 0; k < count; ++k) poses[num_poses++] = refined_pose(f.refiner, planar[k].pose);
   }
-  const PoseEstimator scorer{f.pairs, f.threshold, f.indices};
+  const PoseEstimator scorer{f.pairs, f.threshold, f.indices, nullptr};
   int best = 0, inliers[3];
   int64_t cost[3];
   for (int k = 0; k < num_poses; ++k) {
@@ -270,10 +274,10 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
       log_false_alarms(n, rivals.homography_inliers, 4, 1, disc) < kLogMeaningful;
   bool epipolar_meaningful = false;
   if (epipolar.found && f.num_support > sample_size) {
-    const double p =
-        chance_of_agreement(f.matches, epipolar.M, f.threshold, f.problem.options.seed);
-    epipolar_meaningful = log_false_alarms(n, f.num_support, sample_size,
-                                           sample_size == 5 ? 10 : 3, p) < kLogMeaningful;
+    const double limit =
+        meaningful_chance(n, f.num_support, sample_size, sample_size == 5 ? 10 : 3);
+    epipolar_meaningful = chance_of_agreement(f.matches, epipolar.M, f.threshold,
+                                              f.problem.options.seed, limit) < limit;
   }
   // A rival speaks for the pair when it explains most of what the epipolar model does (half of all
   // matches where there is none: a failed search is no proof of a rotation), and the rest does not

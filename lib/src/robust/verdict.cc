@@ -16,7 +16,7 @@ constexpr int kChunk = 64;  // matches at a time, on the stack
 // matches to be told apart. Of models that explain least_share, one in ten thousand is missed.
 constexpr double kRivalConfidence = 0.9999;
 constexpr int kMostRivalSamples = 200;
-constexpr int kMaxSubset = 128;
+constexpr int kMaxSubset = 64;
 
 double log_factorial(int n) {
   if (n < 16) {
@@ -63,6 +63,18 @@ int count_inliers(const RayPairs& pairs, int count, const Mat3& H, double thresh
   return inliers;
 }
 
+// Whether a share of `agreeing` of `drawn` tells a probability from the limit: were it the limit's, the
+// share would be as far away with probability exp(-kClear) at most (Chernoff's bound).
+bool is_clear(int agreeing, int drawn, double limit) {
+  constexpr double kClear = 25;
+  if (drawn == 0 || !(limit > 0 && limit < 1)) return false;
+  const double n = drawn, share = agreeing / n;
+  double divergence = 0;
+  if (agreeing > 0) divergence += share * log(share / limit);
+  if (agreeing < drawn) divergence += (1 - share) * log((1 - share) / (1 - limit));
+  return n * divergence > kClear;
+}
+
 // Points of view 0 with others of view 1, in the arrays' own form.
 struct WrongPairs {
   double storage[18][kChunk];
@@ -106,8 +118,14 @@ double log_false_alarms(int n, int k, int m, int models, double p) {
          (k - m) * log(p);
 }
 
+double meaningful_chance(int n, int k, int m, int models) {
+  return exp((kLogMeaningful - log(static_cast<double>(models) * (n - m)) - log_binomial(n, k) -
+              log_binomial(k, m)) /
+             (k - m));
+}
+
 double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
-                           uint64_t seed) {
+                           uint64_t seed, double limit) {
   constexpr int kPairings = 1024;
   constexpr double kPriorWeight = 100;
   const RayPairs& pairs = matches.pairs;
@@ -119,8 +137,8 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   if (n < 2) return 1;
   Random random = random_seeded(seed);
   WrongPairs wrong(pairs);
-  int agreeing = 0;
-  for (int first = 0; first < kPairings; first += kChunk) {
+  int agreeing = 0, drawn = 0;
+  while (drawn < kPairings && !is_clear(agreeing, drawn, limit)) {
     int listed[2][kChunk];
     for (int k = 0; k < kChunk; ++k) {
       const int i = static_cast<int>(random_below(random, static_cast<uint32_t>(n)));
@@ -129,11 +147,12 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
       listed[1][k] = j + (j >= i);
     }
     agreeing += wrong.count_agreeing(pairs, listed, M, threshold_px);
+    drawn += kChunk;
   }
   // Of few matches there are fewer different pairings than were drawn.
   const double different = 0.5 * n * (n - 1.0);
   const double weight = different < kPairings ? different : kPairings;
-  return (weight * agreeing / kPairings + kPriorWeight * prior) / (weight + kPriorWeight);
+  return (weight * agreeing / drawn + kPriorWeight * prior) / (weight + kPriorWeight);
 }
 
 size_t verdict_bytes(int max_matches) {

@@ -36,11 +36,15 @@ double log_false_alarms(int n, int k, int m, int models, double p);
 
 inline constexpr double kLogMeaningful = -4.605170185988091;  // NFA < 0.01
 
+// The probability p at which log_false_alarms is kLogMeaningful; k > m.
+double meaningful_chance(int n, int k, int m, int models);
+
 // The probability that a match of view 0's point with a wrong point of view 1 agrees with M:
 // counted over wrong pairings of these very points, so that crowded points are allowed for; weighed
-// with the share of the image that a band of the threshold's width covers.
+// with the share of the image that a band of the threshold's width covers. Counting ends when it is
+// clear on which side of `limit` the count will lie.
 double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
-                           uint64_t seed);
+                           uint64_t seed, double limit = 0);
 
 // A rival speaks for the pair when it explains this share of what the epipolar model does, or of all
 // matches where there is none.
