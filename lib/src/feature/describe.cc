@@ -5,13 +5,14 @@
 namespace tv {
 namespace {
 
-// A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma) and holds three samples.
+// A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma); a sample every 0.28 of it.
 constexpr double kStepPerSize = 1.5 * 0.28;
 
-// Four of the orientation's: found to half a degree, where three leave a degree.
+// A sample every quarter of that: the angle is found to half a degree, where every third leaves a degree.
 constexpr double kOrientStep = 1.5 / 4.0;
 
-// Samples lie 4/3 to 8/3 pixels apart: closer would blur, wider would alias (docs/decisions/0009).
+// Samples lie 1.12 to 2.24 pixels of their octave apart: closer would blur, wider would alias
+// (docs/decisions/0009).
 constexpr double kMaxStep = 2.24;
 
 // A second direction counts above this share of the highest peak (Lowe, section 5).

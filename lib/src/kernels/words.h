@@ -27,10 +27,10 @@ static inline words words_of(int16_t a) { return (words){0} + a; }
 static inline words words_load(const void *p) { return *(const unaligned_words *)p; }
 static inline void words_store(void *p, words a) { *(unaligned_words *)p = a; }
 
+/* words_zip: out[k] = low[k] + 65536 high[k], both taken as unsigned; words_scale: a b / 65536, too. */
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
 static inline words words_min(words a, words b) { return (words)_mm256_min_epi16((__m256i)a, (__m256i)b); }
 static inline words words_max(words a, words b) { return (words)_mm256_max_epi16((__m256i)a, (__m256i)b); }
-/* words_zip: out[k] = low[k] + 65536 high[k]. words_scale: a b / 65536, both taken as unsigned. */
 static inline words words_scale(words a, words b) { return (words)_mm256_mulhi_epu16((__m256i)a, (__m256i)b); }
 static inline void words_zip(words low, words high, uint32_t *out) {
   const __m256i a = _mm256_unpacklo_epi16((__m256i)low, (__m256i)high);
