@@ -1,0 +1,9 @@
+#!/bin/bash
+# Our features, matches and poses for COLMAP's mapper: no feature_extractor, no matcher, no verification.
+# usage: 12_colmap.sh IMAGE_DIR CAMERA.yaml OUT_DIR     (twoview and Debian's colmap in the PATH)
+set -euo pipefail
+images=$1 camera=$2 out=$3
+mkdir -p "$out/model"
+twoview colmap export --database "$out/database.db" --images "$images" --camera "$camera" \
+  --exhaustive --schema 3.8
+colmap mapper --database_path "$out/database.db" --image_path "$images" --output_path "$out/model"

@@ -1,0 +1,189 @@
+"""The examples: built against an installed library by CMake and by pkg-config alone, and run as their README says.
+
+Arguments: the project's folder, its build folder, cmake, the C compiler.
+"""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE, BUILD, CMAKE, CC = sys.argv[1:5]
+EXAMPLES = pathlib.Path(SOURCE, "examples")
+PROGRAM = pathlib.Path(BUILD, "bin", "twoview")
+SKIP_CODE = 77
+CAMERA = ["994.978", "994.978", "311.193", "342.279", "254.877"]  # of the cache's Motorcycle pair
+
+try:
+    import cv2
+    import numpy as np
+except ImportError as missing:
+    print(f"skipped: {missing}")
+    sys.exit(SKIP_CODE)
+
+
+def run(*command, status=0, **options):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300, **options)
+    assert done.returncode == status, (command, done.returncode, done.stdout, done.stderr)
+    return done.stdout + done.stderr
+
+
+def number(pattern, text):
+    found = re.search(pattern, text)
+    assert found, (pattern, text)
+    return float(found.group(1))
+
+
+class Examples(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.temporary.name)
+        prefix = cls.folder / "prefix"
+        run(CMAKE, "--install", BUILD, "--prefix", prefix)
+        cls.prefix = prefix
+        cls.bin = cls.folder / "build"
+        run(CMAKE, "-S", EXAMPLES, "-B", cls.bin, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_COMPILER={CC}",
+            "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror")
+        run(CMAKE, "--build", cls.bin)
+        cls.image = []
+        for side in ("left", "right"):
+            colour = cv2.imread(os.path.join(SOURCE, ".cache", "motorcycle", f"motorcycle_{side}.png"))
+            if colour is None:
+                print("skipped: the Motorcycle pair is not in .cache (scripts/bootstrap)")
+                sys.exit(SKIP_CODE)
+            cls.image.append(cls.folder / f"{side}.pgm")
+            cv2.imwrite(str(cls.image[-1]), cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY))
+        cls.matches = cls.folder / "matches.txt"
+        cls.matches.write_text(subprocess.run([cls.bin / "04_match", *cls.image], capture_output=True, text=True,
+                                              check=True).stdout)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def example(self, name, *arguments, **options):
+        return run(self.bin / name, *arguments, **options)
+
+    def test_calibrate(self):
+        if not (self.bin / "01_calibrate").exists():
+            self.skipTest("OpenCV is not installed")
+        boards = []
+        K = np.array([[500.0, 0, 319.5], [0, 500, 239.5], [0, 0, 1]])
+        sheet = np.kron((np.indices((8, 9)).sum(0) % 2) * 225 + 15, np.ones((40, 40))).astype(np.uint8)
+        sheet = cv2.copyMakeBorder(sheet, 40, 40, 40, 40, cv2.BORDER_CONSTANT, value=240)
+        for k in range(8):
+            tilt = np.array([0.35 * np.cos(k), 0.35 * np.sin(k), 0.1 * k])
+            R = cv2.Rodrigues(tilt)[0]
+            M = np.diag([1 / 40, 1 / 40, 1]) @ np.array([[1, 0, -220], [0, 1, -200], [0, 0, 1.0]])
+            H = K @ np.column_stack([R[:, 0], R[:, 1], [0.6 * np.sin(2 * k), 0.4 * np.cos(3 * k), 12]]) @ M
+            boards.append(self.folder / f"board{k}.png")
+            cv2.imwrite(str(boards[-1]), cv2.warpPerspective(sheet, H, (640, 480), borderValue=128,
+                                                             flags=cv2.INTER_AREA))
+        text = self.example("01_calibrate", self.folder / "camera.yaml", 8, 7, *boards)
+        self.assertAlmostEqual(number(r"fx ([\d.]+)", text), 500, delta=5)
+        self.assertIn("camera_matrix", (self.folder / "camera.yaml").read_text())
+
+    def test_undistort(self):
+        out = self.folder / "undistorted.pgm"
+        text = self.example("02_undistort", self.image[0], out, 600, 600, 370, 250, -0.3, 0.1, 0, 0, 0)
+        self.assertIn("good to", text)
+        self.assertEqual(cv2.imread(str(out), 0).shape, cv2.imread(str(self.image[0]), 0).shape)
+
+    def test_detect(self):
+        out = self.folder / "corners.ppm"
+        twelve = number(r": (\d+) corners", self.example("03_detect", self.image[0], out))
+        nine = number(r": (\d+) corners", self.example("03_detect", self.image[0], out, 9))
+        self.assertTrue(100 < twelve < nine)
+        self.assertEqual(cv2.imread(str(out)).shape[2], 3)
+
+    def test_match(self):
+        rows = [line.split() for line in self.matches.read_text().splitlines()]
+        self.assertGreater(len(rows), 400)
+        # The pair is rectified: nearly all true matches lie in one row.
+        level = sum(abs(float(r[1]) - float(r[3])) < 2 for r in rows)
+        self.assertGreater(level, 0.7 * len(rows))
+
+    def test_fundamental(self):
+        text = self.example("05_fundamental", self.matches)
+        self.assertGreater(number(r": (\d+) of", text), 300)
+
+    def test_epipolar(self):
+        text = self.example("06_epipolar", self.matches, 741, 500)
+        self.assertEqual(text.count("outside"), 2, text)  # the camera moved sideways
+        self.assertEqual(text.count("-> line"), 5)
+
+    def test_imu(self):
+        level = ["1", "0", "0", "0"]
+        text = self.example("07_imu", self.matches, *CAMERA[:3], CAMERA[4], *level, *level, "1")
+        self.assertIn("of the estimated rotation", text)
+
+    def test_triangulate(self):
+        rows = [line.split() for line in self.example("08_triangulate", self.matches, *CAMERA).splitlines()[1:]]
+        self.assertEqual(len(rows), 7)
+        for row in rows:
+            self.assertGreater(int(row[1]), 300)
+            self.assertLess(float(row[2]), 1)
+
+    def test_reconstruct(self):
+        out = self.folder / "cloud.ply"
+        text = self.example("09_reconstruct", *self.image, out, *CAMERA)
+        points = int(number(r", (\d+) points", text))
+        self.assertGreater(points, 300)
+        self.assertEqual(len(out.read_text().split("end_header\n")[1].splitlines()), points)
+
+    def test_static_memory(self):
+        text = self.example("10_static_memory")
+        self.assertIn("none of the heap", text)
+        self.assertAlmostEqual(number(r"t = \((-?[\d.]+)", text), -1, delta=0.02)
+        symbols = run("nm", "--undefined-only", self.bin / "10_static_memory")
+        self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
+
+    def test_ardrone_against_the_simulator(self):
+        if not (self.bin / "11_ardrone").exists() or "drone" not in run(PROGRAM, "--help"):
+            self.skipTest("built without the drivers")
+        command = [PROGRAM, "drone", "simulate", "--duration", "30"]
+        for channel in ("at", "navdata", "video", "control", "recording"):
+            command += [f"--{channel}-port", "0"]
+        drone = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        try:
+            words = drone.stdout.readline().replace(",", "").split()
+            ports = [words[words.index(name) + 1] for name in ("commands", "navdata", "video", "control")]
+            text = self.example("11_ardrone", "127.0.0.1", "5", *ports)
+            self.assertGreater(number(r"(\d+) pictures", text), 20)
+            self.assertIn("heading", text)
+        finally:
+            drone.kill()
+            drone.communicate()
+
+    def test_each_builds_by_pkg_config_alone(self):
+        if not shutil.which("pkg-config"):
+            self.skipTest("no pkg-config")
+        paths = [str(p.parent) for p in self.prefix.rglob("*.pc")]
+        environment = dict(os.environ, PKG_CONFIG_PATH=":".join(sorted(set(paths))))
+        for source in sorted(EXAMPLES.glob("*.c")):
+            packages = ["twoview"]
+            if source.stem == "11_ardrone":
+                if not (self.bin / "11_ardrone").exists():
+                    continue
+                packages += ["twoview_ardrone", "twoview_h264"]
+            flags = run("pkg-config", "--cflags", "--libs", *packages, env=environment).split()
+            run(CC, "-std=c11", source, "-o", self.folder / "alone", *flags, "-lm")
+
+    def test_wrong_arguments_are_told(self):
+        for source in sorted(EXAMPLES.glob("0[2-9]*.c")):
+            self.assertIn("usage", self.example(source.stem, status=2))
+        self.assertIn("cannot read", self.example("03_detect", "/nowhere.pgm", "/dev/null", status=2))
+
+    def test_each_has_a_row_in_the_readme_and_is_short(self):
+        readme = (EXAMPLES / "README.md").read_text()
+        for source in sorted(EXAMPLES.glob("[0-9]*")):
+            self.assertIn(f"`{source.name}`", readme)
+            self.assertLess(len(source.read_text().splitlines()), 100, source.name)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
