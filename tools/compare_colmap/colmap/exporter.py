@@ -122,14 +122,37 @@ def _write_images(writer, known, views):
     return ids
 
 
+def one_keypoint_a_place(keypoints):
+    """(n,): for each keypoint the first that lies at its place. A corner with two orientations is two keypoints; the
+    mapper would make two tracks of it, each with half of the corner's matches."""
+    places = np.column_stack([keypoints["x"], keypoints["y"]])
+    _, first, inverse = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    return first[inverse.reshape(-1)]
+
+
+def one_to_one(matches, order):
+    """Indices of the matches, best of `order` first, that share no keypoint with a better one."""
+    used, kept = (set(), set()), []
+    for k in order:
+        idx0, idx1 = matches[k]
+        if idx0 not in used[0] and idx1 not in used[1]:
+            used[0].add(idx0)
+            used[1].add(idx1)
+            kept.append(k)
+    return np.array(sorted(kept), np.int64)
+
+
 def two_view(engine, view0, view1):
-    """(matches (n, 2), TwoView, inliers (n,) bool)."""
+    """(matches (n, 2), TwoView, inliers (n,) bool), with one keypoint a corner."""
     found = engine.match(view0.descriptors, view1.descriptors)
     matches = np.column_stack([found["idx0"], found["idx1"]]).astype(np.uint32)
     result, inliers = engine.estimate(
         view0.camera, view1.camera, pixels_of(view0.keypoints)[matches[:, 0]],
         pixels_of(view1.keypoints)[matches[:, 1]], found["ratio"].copy())
-    return matches, result, inliers
+    matches = np.column_stack([one_keypoint_a_place(view.keypoints)[matches[:, i]]
+                               for i, view in enumerate((view0, view1))])
+    kept = one_to_one(matches, np.lexsort((found["ratio"], ~inliers)))
+    return matches[kept], result, inliers[kept]
 
 
 def export(job, feature=None, match=None, estimate=None):

@@ -8,9 +8,6 @@ import subprocess
 from .conventions import camera_to_colmap
 from .errors import BadInput, need_pycolmap
 
-SEED = 1
-
-
 def _run_colmap(verb, *arguments):
     program = shutil.which("colmap")
     if not program:
@@ -39,32 +36,32 @@ def own_features_4(database, images, camera):
     extraction, matching = colmap.FeatureExtractionOptions(), colmap.FeatureMatchingOptions()
     extraction.num_threads = matching.num_threads = 1
     extraction.use_gpu = matching.use_gpu = False
-    colmap.set_random_seed(SEED)
+    colmap.set_random_seed(1)
     colmap.extract_features(database, images, camera_mode=colmap.CameraMode.SINGLE, reader_options=reader,
                             extraction_options=extraction, device=colmap.Device.cpu)
     colmap.match_exhaustive(database, matching_options=matching, device=colmap.Device.cpu)
 
 
-def map_38(database, images, folder, fix_intrinsics):
+def map_38(database, images, folder, fix_intrinsics, seed=1):
     """The folders of the models."""
     os.makedirs(folder, exist_ok=True)
     refine = 0 if fix_intrinsics else 1
     _run_colmap("mapper", "--database_path", database, "--image_path", images, "--output_path", folder,
-                "--random_seed", SEED, "--Mapper.num_threads", 1, "--Mapper.ba_refine_focal_length", refine,
+                "--random_seed", seed, "--Mapper.num_threads", 1, "--Mapper.ba_refine_focal_length", refine,
                 "--Mapper.ba_refine_extra_params", refine, "--Mapper.extract_colors", 0)
     return sorted(str(path) for path in pathlib.Path(folder).iterdir() if path.is_dir())
 
 
-def map_4(database, images, folder, fix_intrinsics):
+def map_4(database, images, folder, fix_intrinsics, seed=1):
     """The same of COLMAP 4."""
     colmap = need_pycolmap("COLMAP 4's mapper")
     os.makedirs(folder, exist_ok=True)
     options = colmap.IncrementalPipelineOptions()
     options.num_threads = options.mapper.num_threads = 1
-    options.random_seed = options.mapper.random_seed = options.triangulation.random_seed = SEED
+    options.random_seed = options.mapper.random_seed = options.triangulation.random_seed = seed
     options.ba_refine_focal_length = options.ba_refine_extra_params = not fix_intrinsics
     options.extract_colors = False
-    colmap.set_random_seed(SEED)
+    colmap.set_random_seed(seed)
     colmap.incremental_mapping(database, images, folder, options)
     return sorted(str(path) for path in pathlib.Path(folder).iterdir() if path.is_dir())
 

@@ -12,7 +12,7 @@ import time
 import numpy as np
 import pytest
 import twoview as tv
-from colmap import schema38
+from colmap import exporter, schema38
 from conftest import CAMERA, HEIGHT, NAMES, WIDTH, run, start
 
 pycolmap = pytest.importorskip("pycolmap")
@@ -288,3 +288,26 @@ def test_json_is_alone_on_stdout(photographs, tmp_path):
     import json
     out = run("export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--json")
     assert sum(json.loads(out)["configurations"].values()) == json.loads(out)["pairs_verified"] == 6
+
+
+# ---- one keypoint a corner ---------------------------------------------------------------------
+
+def test_a_corner_with_two_orientations_is_one_keypoint_to_the_mapper():
+    keypoints = np.zeros(5, tv.KEYPOINT)
+    keypoints["x"], keypoints["y"] = (4, 7, 4, 4, 7), (1, 2, 1, 2, 2)
+    keypoints["angle_rad"] = range(5)
+    assert exporter.one_keypoint_a_place(keypoints).tolist() == [0, 1, 0, 3, 1]
+    matches = np.array([[0, 5], [0, 6], [1, 5], [2, 7], [0, 5]])
+    assert exporter.one_to_one(matches, [1, 0, 2, 3, 4]).tolist() == [1, 2, 3]
+    assert exporter.one_to_one(matches, [0, 1, 2, 3, 4]).tolist() == [0, 3]
+    assert exporter.one_to_one(matches[:0], []).tolist() == []
+
+
+def test_no_keypoint_is_in_two_matches_of_a_pair(exported):
+    with pycolmap.Database.open(exported["4"]) as database:
+        for pair, row in zip(*database.read_two_view_geometries()):
+            ids = pycolmap.pair_id_to_image_pair(pair)
+            for matches in (row.inlier_matches, database.read_matches(*ids)):
+                for k, image_id in enumerate(ids):
+                    places = database.read_keypoints(image_id)[matches[:, k], :2]
+                    assert len(np.unique(places, axis=0)) == len(places)

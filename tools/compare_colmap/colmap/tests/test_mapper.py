@@ -36,3 +36,17 @@ def test_alignment_undoes_a_similarity():
     moved = {i: (pose @ R.T, 2.5 * R @ centre + [1, 2, 3]) for i, (pose, centre) in poses.items()}
     names, positions, angles = truth.pose_errors(poses, moved)
     assert len(names) == 6 and positions.max() < 1e-12 and angles.max() < 1e-5
+
+
+@pytest.mark.parametrize("schema", ["4", "3.8"])
+def test_an_image_without_keypoints_is_left_out(photographs, tmp_path, schema, call):
+    """The mappers read the keypoints of every image, and refuse a table of none whose columns are not 2, 4 or 6."""
+    if schema == "3.8" and not shutil.which("colmap"):
+        pytest.skip("no colmap: scripts/bootstrap test installs it")
+    import cv2
+    shutil.copytree(photographs / "images", tmp_path / "images")
+    cv2.imwrite(str(tmp_path / "images" / "blank.png"), np.full((480, 640), 90, np.uint8))
+    shutil.copy(photographs / "cameras.yaml", tmp_path)
+    assert call("export", "--database", tmp_path / "x.db", "--images", tmp_path / "images", "--schema", schema)[0] == 0
+    [folder] = mapping.MAPPERS[schema](str(tmp_path / "x.db"), str(tmp_path / "images"), str(tmp_path / "model"), True)
+    assert set(read_model(folder).images) == set(NAMES)
