@@ -5,16 +5,22 @@ A worker of a cluster has this tree and the images under the same paths."""
 import concurrent.futures
 import contextlib
 import os
-import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
 
-def _work(here, task):
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    import pair_run
-    return pair_run.work(task)
+def _worker():
+    """The function that does a task. It is an inner one, which dask sends as it stands: the other
+    side has no path to this module yet."""
+    here = HERE
+
+    def work(task):
+        import sys
+        if here not in sys.path:
+            sys.path.insert(0, here)
+        import pair_run
+        return pair_run.work(task)
+    return work
 
 
 class Local:
@@ -24,7 +30,8 @@ class Local:
 
     def run(self, tasks):
         """(index, result) as they are done."""
-        futures = {self.pool.submit(_work, HERE, task): i for i, task in enumerate(tasks)}
+        work = _worker()
+        futures = {self.pool.submit(work, task): i for i, task in enumerate(tasks)}
         for future in concurrent.futures.as_completed(futures):
             yield futures[future], future.result()
 
@@ -36,17 +43,15 @@ class Local:
 
 class Dask:
     def __init__(self, address):
-        import cloudpickle
         import distributed
-        cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers have no path to it
         self.client = distributed.Client(address, timeout="10s")
         workers = len(self.client.scheduler_info(n_workers=-1)["workers"])
         self.description = f"dask.distributed, {workers} workers at the start"
 
     def run(self, tasks):
         import distributed
-        futures = {self.client.submit(_work, HERE, task, pure=False): i
-                   for i, task in enumerate(tasks)}
+        work = _worker()
+        futures = {self.client.submit(work, task, pure=False): i for i, task in enumerate(tasks)}
         for future in distributed.as_completed(futures):
             yield futures[future], future.result()
 

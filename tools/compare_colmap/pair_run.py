@@ -29,7 +29,8 @@ def probe(task):
     for python in dict.fromkeys(s.python for s in systems.SYSTEMS):
         modules = sorted({s.module for s in systems.SYSTEMS if s.python == python})
         try:
-            found.update(children.call(python, {"call": "versions", "task": {"modules": modules}},
+            found.update(children.call(python, {
+                "call": "versions", "task": {"modules": modules, "library": task["library"]}},
                                        task["timeout_s"])[0])
         except children.ChildError as error:
             found.update({module: {"missing": str(error)} for module in modules})

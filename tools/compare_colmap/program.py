@@ -123,7 +123,13 @@ def make_task(arguments, name, folder, pair, cameras):
     return {"what": "pair", "set": name, "views": views, "truth": truth,
             "resize": arguments.resize, "systems": arguments.systems,
             "matches_of": arguments.matches, "max_error_px": arguments.max_error_px,
-            "seed": arguments.seed, "timeout_s": arguments.timeout}
+            "seed": arguments.seed, "timeout_s": arguments.timeout, "library": library_path()}
+
+
+def library_path():
+    """libtwoview.so for every worker, wherever it runs."""
+    import twoview_ctypes
+    return os.path.abspath(os.environ.get("TWOVIEW_LIBRARY") or twoview_ctypes.DEFAULT_LIBRARY)
 
 
 def thin_out(tasks, most):
@@ -289,8 +295,11 @@ def compare(arguments):
     start = time.time()
     try:
         with cluster.workers(arguments.jobs, arguments.scheduler) as workers:
-            (_, versions), = workers.run([{"what": "versions", "timeout_s": 120}])
+            (_, versions), = workers.run([{"what": "versions", "library": library_path(),
+                                           "timeout_s": 120}])
             missing = {m: v["missing"] for m, v in versions.items() if "missing" in v}
+            for module, why in missing.items():
+                print(f"compare_colmap: {module} is missing: {why}", file=sys.stderr)
             told = set_references(arguments, tasks, workers, store, hashes)
             for task in tasks:
                 task["missing"] = missing

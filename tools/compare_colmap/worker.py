@@ -10,6 +10,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one t
     os.environ.setdefault(_name, "1")
 
 import functools
+import hashlib
 import json
 import resource
 import sys
@@ -68,7 +69,7 @@ class Views:
 @functools.lru_cache(maxsize=2)
 def twoview_context(width, height, max_matches):
     import twoview_ctypes
-    library = twoview_ctypes.Library(os.environ.get("TWOVIEW_LIBRARY"))
+    library = twoview_ctypes.Library(os.environ["TWOVIEW_LIBRARY"])
     return twoview_ctypes.Context(library, max_width=width, max_height=height,
                                   max_matches=max_matches)
 
@@ -281,7 +282,10 @@ def versions(modules):
 def _version(module):
     try:
         if module == "twoview":
-            return {"version": twoview_context(64, 64, 8192).library.version()}
+            library = twoview_context(64, 64, 8192).library
+            with open(library.path, "rb") as f:  # a development version has many builds
+                return {"version": library.version(),
+                        "sha256": hashlib.sha256(f.read()).hexdigest()}
         if module == "colmap":
             import colmap_program
             return {"version": colmap_program.version()}
@@ -292,6 +296,8 @@ def _version(module):
 
 def answer(request, matches):
     call, task = request["call"], request["task"]
+    if "library" in task:
+        os.environ["TWOVIEW_LIBRARY"] = task["library"]
     if call == "versions":
         return versions(task["modules"])
     if call == "images":  # so that reading them is nobody's time
