@@ -1,4 +1,4 @@
-"""Who does the work: threads of this process, each with its own worker processes, or a dask cluster.
+"""Who does the work: threads of this process, each with worker processes, or a dask cluster.
 
 A worker of a cluster has this tree and the images under the same paths."""
 

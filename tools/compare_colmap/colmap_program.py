@@ -1,4 +1,4 @@
-"""Debian's `colmap` program on one pair: features and matches by its commands, the database read."""
+"""Debian's `colmap` on one pair: features and matches by its commands, the database read."""
 
 import os
 import re

@@ -91,7 +91,8 @@ def table_groups(report):
     """[(title, kind, [(name of the set, pairs, [(system, its cells)])])]"""
     groups = []
     for kind, title in (("pipeline", "Whole pipelines, each from its own features"),
-                        ("solver", f"Solvers on identical matches, those of {report['matches_of']}")):
+                        ("solver",
+                         f"Solvers on identical matches, those of {report['matches_of']}")):
         listed = [s for s in report["systems"] if s["kind"] == kind]
         if not listed:
             continue
@@ -130,7 +131,8 @@ def render(report, pairs, tasks):
     environment.filters["number"] = number
     from plotly.offline import get_plotlyjs
     return environment.from_string(read(PARTS, "page.html")).render(
-        report=report, groups=table_groups(report), style=read(PROGRAM_STYLE) + read(PARTS, "page.css"),
+        report=report, groups=table_groups(report),
+        style=read(PROGRAM_STYLE) + read(PARTS, "page.css"),
         script=read(PARTS, "page.js"), plotly=get_plotlyjs(), data=script_text(data),
         plots=[{**plot, "json": script_text(plot["figure"])}
                for plot in plots.all_plots(report, pairs)],

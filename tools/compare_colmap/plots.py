@@ -28,10 +28,10 @@ def _dash(system, listed):
 def _figure(traces, x, y, **layout):
     figure = graph.Figure(traces)
     figure.update_layout(
-        template="none", margin={"l": 62, "r": 16, "t": 12, "b": 48}, hovermode="closest",
+        template="none", margin={"l": 62, "r": 16, "t": 12, "b": 52}, hovermode="closest",
         xaxis={"title": {"text": x}, **layout.pop("xaxis", {})},
         yaxis={"title": {"text": y}, **layout.pop("yaxis", {})},
-        legend={"font": {"size": 11}}, **layout)
+        legend={"font": {"size": 10}}, **layout)
     return json.loads(figure.to_json())
 
 
@@ -72,8 +72,7 @@ def time_against_accuracy(report):
                 continue
             traces.append(graph.Scatter(
                 x=[round(entry["time_ms"], 3)], y=[round(entry["auc"]["10"], 2)], mode="markers",
-                name=system.name, legendgroup=kind,
-                legendgrouptitle={"text": {"pipeline": "pipelines", "solver": "solvers"}[kind]},
+                name=system.name,
                 marker={"color": colour(system), "symbol": symbol, "size": 11}))
     return _figure(traces, "median time of a pair [ms], one thread", "AUC at 10 degrees [%]",
                    xaxis={"type": "log"})
@@ -132,7 +131,8 @@ def inlier_histogram(report, pairs):
                   if r["num_matches"] and r["num_inliers"] is not None]
         count = np.histogram(np.clip(shares, 0, 1), edges)[0]
         traces.append(graph.Scatter(
-            x=(100 * edges[:-1]).tolist(), y=count.tolist(), mode="lines", name=system.name,
+            x=(100 * edges).tolist(), y=[*count.tolist(), int(count[-1])], mode="lines",
+            name=system.name,
             line={"shape": "hv", "color": colour(system),
                   "width": 3 if system.module == "twoview" else 1.6,
                   "dash": _dash(system, _listed(report, "pipeline"))}))
@@ -177,9 +177,9 @@ def all_plots(report, pairs):
         add("Recall of the solvers", f"All on the matches of {report['matches_of']}.",
             recall(report, pairs, "solver"), True)
     if is_known:
-        add("Time against accuracy", "Up and to the left is better. A pipeline's time is from two "
-            "images to a pose, a solver's from matches to a pose.", time_against_accuracy(report),
-            True)
+        add("Time against accuracy", "Up and to the left is better. Discs are pipelines, from two "
+            "images to a pose; diamonds solvers, from matches to a pose.",
+            time_against_accuracy(report), True)
         add("Error of each pair beside twoview's", "Above the line twoview is nearer. Failures "
             "stand at 180 degrees. A click on a point opens the pair.", scatter(report, pairs),
             True)
@@ -193,6 +193,6 @@ def all_plots(report, pairs):
             "Sampson's distance of a pipeline's own matches under its own pose, pairs together.",
             epipolar_histogram(report, pairs, "pipeline"), False)
     if has["solver"]:
-        add("The same for the solvers", "All have the same matches: higher is better.",
+        add("The same distances, solvers", "All have the same matches: higher is better.",
             epipolar_histogram(report, pairs, "solver"), False)
     return found

@@ -52,8 +52,8 @@ def _solvers():
     for method, note in (("five-point", "its default"), ("eight-point", "the paper's method"),
                          ("upright", "gravity is the reference pose's: two of the three angles "
                                      "are given")):
-        yield System("twoview_" + method.replace("-", "_"), f"twoview {method}", "solver", "twoview",
-                     {"method": method}, note)
+        yield System("twoview_" + method.replace("-", "_"), f"twoview {method}", "solver",
+                     "twoview", {"method": method}, note)
     for kind, (name, module, _) in estimators.PEERS.items():
         if module != "pyopengv":
             yield System(kind + "_solver", name, "solver", module, {"estimator": kind})
@@ -70,8 +70,8 @@ def _triangulations():
     yield System("opencv_triangulate", "OpenCV triangulatePoints", "triangulation", "cv2", {})
     yield System("opencv_correct", "OpenCV correctMatches + triangulatePoints", "triangulation",
                  "cv2", {"correct": True})
-    yield System("pycolmap_triangulate", "COLMAP triangulate_point", "triangulation", "pycolmap", {},
-                 "a call a point from Python")
+    yield System("pycolmap_triangulate", "COLMAP triangulate_point", "triangulation", "pycolmap",
+                 {}, "a call a point from Python")
     for name in ("triangulate", "triangulate2"):
         yield System("opengv_" + name, f"OpenGV {name}", "triangulation", "pyopengv",
                      {"function": "triangulation_" + name})

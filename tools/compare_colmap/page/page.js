@@ -17,15 +17,17 @@ function shown(value, unit = "") {
 
 // ---- tables and plots -------------------------------------------------------------------------
 
-function markBest() { // of each table, the largest of AUC and precision, the least of errors
+function markBest() { // of each table, the largest of AUC and precision, the least of errors; who is given more does not count
   const LESS = new Set([4, 5, 6]), MORE = new Set([1, 2, 3, 10]);
   for (const table of document.querySelectorAll(".systems")) {
     if (table.rows[0].cells.length !== 12) continue;
     for (const column of [...LESS, ...MORE]) {
-      const cells = [...table.tBodies[0].rows].map(r => r.cells[column]).filter(Boolean);
-      const values = cells.map(c => parseFloat(c.textContent));
-      const best = (LESS.has(column) ? Math.min : Math.max)(...values.filter(Number.isFinite));
-      cells.forEach((c, i) => c.classList.toggle("best", values[i] === best));
+      const rows = [...table.tBodies[0].rows].filter(r => !("given" in r.dataset));
+      const cells = rows.map(r => r.cells[column]).filter(Boolean);
+      const values = cells.map(c => parseFloat(c.textContent)), known = values.filter(Number.isFinite);
+      const best = (LESS.has(column) ? Math.min : Math.max)(...known);
+      if (known.some(v => v !== best))
+        cells.forEach((c, i) => c.classList.toggle("best", values[i] === best));
     }
   }
 }
@@ -43,10 +45,13 @@ function drawPlot(box) {
   const layout = { ...figure.layout, ...rest };
   layout.xaxis = { ...axis, ...layout.xaxis };
   layout.yaxis = { ...axis, ...layout.yaxis };
-  const isNarrow = box.clientWidth < 600;
-  layout.legend = { ...layout.legend, ...(isNarrow ? { orientation: "h", y: -0.16, yanchor: "top" } : {}) };
-  box.style.height = isNarrow ? 340 + 13 * figure.data.length + "px" : "";
-  Plotly.newPlot(box, figure.data, layout, { displaylogo: false, responsive: true });
+  // The legend below, its room counted: plotly would lay it over the axis's title.
+  const columns = Math.max(1, Math.floor((box.clientWidth - 30) / 260));
+  const legend = 18 * Math.ceil(figure.data.filter(d => d.showlegend !== false).length / columns) + 8;
+  layout.legend = { ...layout.legend, orientation: "h", entrywidth: 1 / columns - 0.01, entrywidthmode: "fraction", x: 0, yref: "container", y: 0.01, yanchor: "bottom" };
+  layout.margin = { ...layout.margin, b: layout.margin.b + legend };
+  box.style.height = 360 + legend + "px";
+  Plotly.newPlot(box, figure.data, layout, { displayModeBar: false, responsive: true });
   box.on("plotly_click", event => {
     const index = event.points[0].customdata;
     if (Number.isInteger(index)) openPair(index);
@@ -319,7 +324,7 @@ function openPair(index) {
   chooseSet();
   while (isShown <= listed.indexOf(pair)) showMore(100);
   pair.box.open = true;
-  pair.box.scrollIntoView({ behavior: "smooth" });
+  pair.box.scrollIntoView();
 }
 function chooseSet() {
   const set = setChoice ? setChoice.value : "all";
@@ -341,3 +346,5 @@ filter.addEventListener("input", showPairs);
 more.addEventListener("click", () => showMore(100));
 document.querySelector("noscript")?.remove();
 showPairs();
+const linked = /^#pair-(\d+)$/.exec(location.hash); // index.html#pair-1 opens the first of pairs.csv
+if (linked && data.pairs[linked[1] - 1]) openPair(linked[1] - 1);
