@@ -176,13 +176,23 @@ def compare_pipelines(arguments, sets):
             "peers": {peer.name: peer.key for peer in systems}}
 
 
+def write_report(arguments, names, extra):
+    """compare_colmap's exit status."""
+    program = os.path.join(datasets.ROOT, "tools", "compare_colmap", "compare_colmap")
+    lists = [os.path.join(datasets.data_dir(), name, "pairs.txt") for name in names]
+    some = ["--max-pairs", str(QUICK_PAIRS)] if arguments.quick else []
+    jobs = ["--jobs", str(len(os.sched_getaffinity(0)))]
+    return subprocess.run([sys.executable, program, *lists, "-o", arguments.report, *some, *jobs,
+                           *extra], check=False).returncode
+
+
 def main():
     own, extra = sys.argv[1:], []
     if "--" in own:
         own, extra = own[:own.index("--")], own[own.index("--") + 1:]
     parser = argparse.ArgumentParser(
         prog="scripts/accuracy", description=__doc__,
-        epilog="Options after -- go to `twoview evaluate`.")
+        epilog="Options after -- go to `twoview evaluate`, with --report to compare_colmap.")
     parser.add_argument("--json", metavar="F", help="write everything, every pair included")
     parser.add_argument("--sets", help="names, separated by commas (default: all with pairs)")
     parser.add_argument("--quick", action="store_true",
@@ -215,6 +225,9 @@ def main():
                         help="with --estimators: pixels; each peer counts at its best")
     parser.add_argument("--robust500", action="store_true",
                         help="instead: the robust estimate beside PoseLib's on simulated matches")
+    parser.add_argument("--report", metavar="DIR",
+                        help="instead: every pair through every system, as one page "
+                             "(docs/compare.md)")
     arguments = parser.parse_args(own)
     if arguments.robust500:
         sys.exit(0 if robust500.run(arguments.lib) else 1)
@@ -230,6 +243,8 @@ def main():
     if missing:
         sys.exit(f"accuracy: no pairs.txt in {', '.join(sorted(missing))}; there are "
                  f"{', '.join(datasets.all_sets())}")
+    if arguments.report:
+        sys.exit(write_report(arguments, names, extra))
     if not arguments.estimators and arguments.ours == "program":
         if not os.access(arguments.program, os.X_OK):
             sys.exit(f"accuracy: {arguments.program} is not built: scripts/test builds it")

@@ -317,7 +317,9 @@ def compare(arguments):
     results.write(folder, report, pairs, tasks)
     store.remove()
     if not arguments.quiet:
-        results.print_summary(report, folder)
+        with contextlib.suppress(BrokenPipeError):  # the report is there, whoever reads this
+            results.print_summary(report, folder)
+            sys.stdout.flush()
 
 
 def main(words=None):

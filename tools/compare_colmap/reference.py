@@ -28,8 +28,8 @@ def reconstruct(task):
             os.makedirs(images, exist_ok=True)
             cv2.imwrite(os.path.join(images, files[name]), gray)
             K = datasets.scale_K(np.array(image["K"]), scale_x, scale_y)
-            model, parameters = colmap_program.camera_arguments(K, image["distortion"])
-            camera = model, ",".join(map(repr, map(float, parameters))), gray.shape
+            size = gray.shape[::-1]
+            camera = (*colmap_program.camera_arguments(size, K, image["distortion"]), size)
             by_camera.setdefault(camera, []).append(files[name])
         for (model, parameters, _), names in by_camera.items():
             _extract(pycolmap, database, images, names, model, parameters, task["threads"])
