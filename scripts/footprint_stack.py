@@ -83,7 +83,7 @@ def main():
     if not files:
         sys.exit(f"{args.folder}: no .ci files; build with -fcallgraph-info=su")
     for path in files:
-        is_kernel_file = path.name.startswith("kernels_")
+        is_kernel_file = path.parent.name == "kernels" and not path.name.startswith("select.")
         (kernels if is_kernel_file else graph).read(path)
     found = graph.unbounded + kernels.unbounded
     # A call through a pointer inside a kernel would be one more kernel; there is none.

@@ -4,3 +4,15 @@
 #define TVK_AVX512
 #define TVK_MATCH(name) tvk_##name##_avx512
 #include "kernels/kernels_impl.h"
+
+/* Another set's are as fast, or a pair's time does not show the difference. */
+#define average_columns tvk_average_columns_c
+#define fast_contrasts tvk_fast_contrasts_avx2
+#define average_rows tvk_average_rows_avx2
+#define halve_row tvk_halve_row_avx2
+#define blur_row tvk_blur_row_avx2
+#define pair_rows tvk_pair_rows_avx2
+#define orientation_histogram tvk_orientation_histogram_avx2
+#define gradient_histogram tvk_gradient_histogram_avx2
+#define quantize_descriptor tvk_quantize_descriptor_avx2
+#include "kernels/kernels_table.h"

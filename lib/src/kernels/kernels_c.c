@@ -2,3 +2,12 @@
 #define TVK_SET TV_KERNELS_C
 #define TVK_TABLE tvk_table_c
 #include "kernels/kernels_impl.h"
+
+#if defined(__x86_64__)
+TVK_LEND(average_columns, c);
+TVK_LEND(sample_patch, c);
+TVK_LEND(quantize_descriptor, c);
+TVK_LEND(mutual_nearest, c);
+TVK_LEND(squared_distances, c);
+#endif
+#include "kernels/kernels_table.h"

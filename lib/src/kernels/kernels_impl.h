@@ -1,11 +1,15 @@
-/* One kernel set: include with TVK_SET (a tv_kernels) and TVK_TABLE (the table's name) defined, and
-   TVK_MATCH(name), its kernels on matches, where they are not the portable ones. */
+/* One kernel set's own kernels: include with TVK_SET (a tv_kernels) and TVK_TABLE (the table's name)
+   defined, and TVK_MATCH(name), its kernels on matches, where they are not the portable ones; then
+   kernels/kernels_table.h. In between a set may put another's kernel in the place of its own, which then
+   is not compiled: the same speed, and a kernel less. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
 #include "kernels/kernels.h"
 #include "twoview/context.h"
+
+#pragma GCC diagnostic ignored "-Wunused-function" /* those of them that another set lends */
 
 /* clang-format off */
 #include "kernels/fast.h"
@@ -16,20 +20,6 @@
 #include "kernels/nearest.h"
 /* clang-format on */
 
-#if !defined(TVK_MATCH)
-#define TVK_MATCH(name) tvk_##name##_c
-#endif
-#define TVK_DECLARE(name, result, parameters) result TVK_MATCH(name) parameters;
-TVK_MATCH_LIST(TVK_DECLARE)
-#undef TVK_DECLARE
-
-extern const tvk_table TVK_TABLE;
-const tvk_table TVK_TABLE = {
-    TVK_SET,
-#define TVK_ENTRY(name, result, parameters) name,
-    TVK_PIXEL_LIST(TVK_ENTRY)
-#undef TVK_ENTRY
-#define TVK_ENTRY(name, result, parameters) TVK_MATCH(name),
-    TVK_MATCH_LIST(TVK_ENTRY)
-#undef TVK_ENTRY
-};
+/* Gives a kernel of this file a name for other sets' tables. */
+#define TVK_LEND(name, set) \
+  extern __typeof__(name) tvk_##name##_##set __attribute__((alias(#name)))

@@ -4,6 +4,7 @@
 #define TVK_TABLE tvk_table_neon
 #define TVK_NEON
 #include "kernels/kernels_impl.h"
+#include "kernels/kernels_table.h"
 
 #if defined(__aarch64__)
 /* The same with what gains by the dot product of ARMv8.2. */

@@ -3,3 +3,11 @@
 #define TVK_TABLE tvk_table_sse2
 #define TVK_SSE2
 #include "kernels/kernels_impl.h"
+
+/* The C set's are as fast. */
+#define average_columns tvk_average_columns_c
+#define sample_patch tvk_sample_patch_c
+#define quantize_descriptor tvk_quantize_descriptor_c
+#define mutual_nearest tvk_mutual_nearest_c
+#define squared_distances tvk_squared_distances_c
+#include "kernels/kernels_table.h"
