@@ -27,6 +27,13 @@
 #define TVK_UNROLL _Pragma("GCC unroll 10")
 #endif
 
+/* A kernel's way for wide lenses: AVX-512 takes AVX2's, for its size. */
+#if defined(TVK_AVX512)
+#define TVK_ON_SPHERE(kernel, own) tvk_##kernel##_avx2
+#else
+#define TVK_ON_SPHERE(kernel, own) own
+#endif
+
 #define TVK_NOINLINE __attribute__((noinline))
 /* For what is compiled once for the image plane and once for the sphere. */
 #define TVK_INLINE inline __attribute__((always_inline))

@@ -9,9 +9,17 @@
 #define TVK_DECLARE(name, result, parameters) result TVK_MATCH(name) parameters;
 TVK_MATCH_LIST(TVK_DECLARE)
 #undef TVK_DECLARE
+#if defined(TVK_AVX512)
+#define TVK_DECLARE(name, result, parameters) result tvk_##name##_avx2 parameters;
+TVK_MATCH_LIST(TVK_DECLARE)
+#undef TVK_DECLARE
+#endif
 
 /* clang-format off */
 #include "kernels/relpose_5pt.h"
 #include "kernels/sampson.h"
+#if !defined(TVK_AVX512) /* it takes AVX2's */
+#include "kernels/transfer.h"
+#endif
 #include "kernels/triangulate.h"
 /* clang-format on */

@@ -273,7 +273,7 @@ static __attribute__((noinline)) void make_sturm_chain(const lanes p[11], sturm_
 }
 
 /* How often each lane's chain changes sign at z. */
-static inline lane_mask sign_changes(const sturm_chain *chain, double z) {
+static TVK_NOINLINE lane_mask sign_changes(const sturm_chain *chain, double z) {
   lanes next = {0}, current = chain->last;
   lane_mask changes = {0}; /* counts down: a set mask is -1 */
   int k;
@@ -387,7 +387,7 @@ static inline void find_brackets(const sturm_chain *chain, lane_mask ok, root_br
   }
 }
 
-static inline lanes polynomial_at(const lanes p[11], lanes z, lanes *derivative) {
+static TVK_NOINLINE lanes polynomial_at(const lanes p[11], lanes z, lanes *derivative) {
   lanes value = p[10], slope = {0};
   int i;
   TVK_UNROLL

@@ -1,61 +1,7 @@
 /* Sampson's distance over arrays of matches (geometry/residuals.h). */
 
 #include "kernels/lanes.h"
-
-/* What follows takes the matches of a block in TVK_LANES lanes: rays, and slopes d ray / d pixel. */
-typedef struct sampson_block {
-  lanes f0[3], f1[3], J0[6], J1[6];
-} sampson_block;
-
-static inline lanes gather_lanes(const double *array, const int32_t index[TVK_LANES]) {
-#if defined(TVK_AVX512)
-  return (lanes)_mm512_i32gather_pd(_mm256_loadu_si256((const __m256i *)index), array, 8);
-#elif defined(TVK_AVX2)
-  return (lanes){array[index[0]], array[index[1]], array[index[2]], array[index[3]]};
-#else
-  return (lanes){array[index[0]], array[index[1]]};
-#endif
-}
-
-/* index null: from the array's element `first` on. */
-static inline lanes load_lanes(const double *array, const int32_t *index, int32_t first) {
-  return index ? gather_lanes(array, index) : lanes_load(array + first);
-}
-
-static TVK_INLINE void load_arrays(const double *const *arrays, const int32_t *index, int32_t first,
-                                   int on_plane, sampson_block *b) {
-  const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6; /* else ones and zeros */
-  int k;
-  for (k = 0; k < rays; ++k) {
-    b->f0[k] = load_lanes(arrays[k], index, first);
-    b->f1[k] = load_lanes(arrays[3 + k], index, first);
-  }
-  for (k = 0; k < slopes; ++k) {
-    b->J0[k] = load_lanes(arrays[6 + k], index, first);
-    b->J1[k] = load_lanes(arrays[12 + k], index, first);
-  }
-}
-
-/* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the other
-   lanes. */
-static TVK_INLINE void load_block(const double *const *arrays, const int32_t *indices,
-                                  int32_t first, int32_t count, int on_plane, sampson_block *b) {
-  int32_t index[TVK_LANES];
-  int l;
-  if (count == TVK_LANES) {
-    if (indices) {
-      load_arrays(arrays, indices, 0, on_plane, b);
-    } else {
-      load_arrays(arrays, NULL, first, on_plane, b);
-    }
-    return;
-  }
-  for (l = 0; l < TVK_LANES; ++l) {
-    const int32_t k = l < count ? l : 0;
-    index[l] = indices ? indices[k] : first + k;
-  }
-  load_arrays(arrays, index, 0, on_plane, b);
-}
+#include "kernels/match_block.h"
 
 typedef struct epipolar_terms {
   lanes c, n; /* f1' M f0; |J0' M' f1|^2 + |J1' M f0|^2 */
@@ -85,15 +31,6 @@ static TVK_INLINE void epipolar_of(const sampson_block *b, const double m[9], in
   e->n = (e->s0[0] * e->s0[0] + e->s0[1] * e->s0[1]) + (e->s1[0] * e->s1[0] + e->s1[1] * e->s1[1]);
 }
 
-static TVK_INLINE void store_first(double *to, lanes x, int32_t count) {
-  int32_t l;
-  if (count == TVK_LANES) {
-    lanes_store(to, x);
-  } else {
-    for (l = 0; l < count; ++l) to[l] = x[l];
-  }
-}
-
 static TVK_INLINE void squares_of(const double *const *arrays, const int32_t *indices,
                                   int32_t first, int32_t count, int on_plane, const double m[9],
                                   double *squares) {
@@ -115,7 +52,7 @@ void TVK_MATCH(sampson_squares)(const double *const *arrays, const int32_t *indi
   if (on_plane) {
     squares_of(arrays, indices, first, count, 1, m, squares);
   } else {
-    squares_of(arrays, indices, first, count, 0, m, squares);
+    TVK_ON_SPHERE(sampson_squares, squares_of)(arrays, indices, first, count, 0, m, squares);
   }
 }
 
@@ -176,94 +113,8 @@ void TVK_MATCH(pose_squares)(const double *const *arrays, int32_t first, int32_t
   if (on_plane) {
     pose_squares_of(arrays, first, count, 1, pose, scale, squares);
   } else {
-    pose_squares_of(arrays, first, count, 0, pose, scale, squares);
+    TVK_ON_SPHERE(pose_squares, pose_squares_of)(arrays, first, count, 0, pose, scale, squares);
   }
-}
-
-/* With P the left inverse of J1 that sends f1 to zero, and a = e_z on the plane, f1 on the sphere, the
-   displacement is d = P h / (a . h), h = H f0. */
-typedef struct transfer_terms {
-  lanes d[2], slope[2][3]; /* slope: d d / d h */
-  lanes w00, w01, w11;     /* (I + D D')^-1, D = d d / d pixel0 */
-  lanes r_sq;              /* infinite where H sends the ray behind */
-} transfer_terms;
-
-static inline void transfer_of(const sampson_block *b, const double h[9], int on_plane,
-                               transfer_terms *t) {
-  lanes P[2][3], moved[3], swung[3][2], D[2][2]; /* moved: H f0; swung: H J0 */
-  lanes depth, inverse, g00, g01, g11, r_sq;
-  int r, k;
-  if (on_plane) {
-    const lanes over = 1.0 / (b->J1[0] * b->J1[3] - b->J1[1] * b->J1[2]);
-    P[0][0] = b->J1[3] * over;
-    P[0][1] = -b->J1[1] * over;
-    P[1][0] = -b->J1[2] * over;
-    P[1][1] = b->J1[0] * over;
-    for (r = 0; r < 2; ++r) P[r][2] = -(P[r][0] * b->f1[0] + P[r][1] * b->f1[1]);
-  } else {
-    lanes aa = {0}, ab = {0}, bb = {0}, over;
-    for (k = 0; k < 3; ++k) {
-      aa += b->J1[2 * k] * b->J1[2 * k];
-      ab += b->J1[2 * k] * b->J1[2 * k + 1];
-      bb += b->J1[2 * k + 1] * b->J1[2 * k + 1];
-    }
-    over = 1.0 / (aa * bb - ab * ab);
-    for (k = 0; k < 3; ++k) {
-      P[0][k] = (bb * b->J1[2 * k] - ab * b->J1[2 * k + 1]) * over;
-      P[1][k] = (aa * b->J1[2 * k + 1] - ab * b->J1[2 * k]) * over;
-    }
-  }
-  for (r = 0; r < 3; ++r) {
-    const lanes last = on_plane ? lanes_of(h[3 * r + 2]) : h[3 * r + 2] * b->f0[2];
-    moved[r] = (h[3 * r] * b->f0[0] + h[3 * r + 1] * b->f0[1]) + last;
-    for (k = 0; k < 2; ++k) {
-      swung[r][k] = h[3 * r] * b->J0[k] + h[3 * r + 1] * b->J0[2 + k];
-      if (!on_plane) swung[r][k] += h[3 * r + 2] * b->J0[4 + k];
-    }
-  }
-  depth = on_plane ? moved[2]
-                   : (b->f1[0] * moved[0] + b->f1[1] * moved[1]) + b->f1[2] * moved[2];
-  inverse = 1.0 / depth;
-  for (r = 0; r < 2; ++r) {
-    t->d[r] = ((P[r][0] * moved[0] + P[r][1] * moved[1]) + P[r][2] * moved[2]) * inverse;
-    for (k = 0; k < 3; ++k) {
-      const lanes turned = on_plane ? (k == 2 ? t->d[r] : lanes_of(0)) : t->d[r] * b->f1[k];
-      t->slope[r][k] = (P[r][k] - turned) * inverse;
-    }
-    for (k = 0; k < 2; ++k) {
-      D[r][k] = (t->slope[r][0] * swung[0][k] + t->slope[r][1] * swung[1][k]) +
-                t->slope[r][2] * swung[2][k];
-    }
-  }
-  g00 = 1.0 + (D[0][0] * D[0][0] + D[0][1] * D[0][1]);
-  g11 = 1.0 + (D[1][0] * D[1][0] + D[1][1] * D[1][1]);
-  g01 = D[0][0] * D[1][0] + D[0][1] * D[1][1];
-  inverse = 1.0 / (g00 * g11 - g01 * g01);
-  t->w00 = g11 * inverse;
-  t->w01 = -g01 * inverse;
-  t->w11 = g00 * inverse;
-  r_sq = t->d[0] * (t->w00 * t->d[0] + t->w01 * t->d[1]) + t->d[1] * (t->w01 * t->d[0] + t->w11 * t->d[1]);
-  t->r_sq = lanes_select((depth > 0.0) & (r_sq >= 0.0), r_sq, lanes_of((double)INFINITY));
-}
-
-static inline void transfer_squares_of(const double *const *arrays, const int32_t *indices,
-                                       int32_t first, int32_t count, int on_plane,
-                                       const double h[9], double *squares) {
-  int32_t done;
-  for (done = 0; done < count; done += TVK_LANES) {
-    const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
-    sampson_block b;
-    transfer_terms t;
-    load_block(arrays, indices ? indices + done : indices, first + done, left, on_plane, &b);
-    transfer_of(&b, h, on_plane, &t);
-    store_first(squares + done, t.r_sq, left);
-  }
-}
-
-void TVK_MATCH(transfer_squares)(const double *const *arrays, const int32_t *indices, int32_t first,
-                                 int32_t count, int32_t on_plane, const double *h,
-                                 double *squares) {
-  transfer_squares_of(arrays, indices, first, count, on_plane, h, squares);
 }
 
 /* The slopes of r by M's entries: dr/dM_ij = (f1_i (f0_j - s g0_j) - s g1_i f0_j) / sqrt(n), with
@@ -288,28 +139,6 @@ static TVK_INLINE void slopes_of(const sampson_block *b, const epipolar_terms *e
       slopes[3 * i + j] = f1 * u0[j] - u1[i] * f0;
     }
   }
-}
-
-/* Adds the first `count` lanes' loss at q = r^2 / scale^2: sums points to the truncated loss, and
-   Cauchy's product follows. Writes the weight, and returns the lanes where there is a slope. */
-static inline lane_mask add_loss(lanes q, int32_t count, int cauchy, double *sums, lanes *weight) {
-  lanes number = {0};
-  lane_mask used, ok;
-  int l;
-  for (l = 0; l < TVK_LANES; ++l) number[l] = l;
-  used = number < (double)count;
-  if (cauchy) {
-    double *product = sums + TVK_WIDTH;
-    const lanes beyond = lanes_select(used, lanes_of(TVK_LARGEST_LOSS), lanes_of(1));
-    ok = used & (q < TVK_LARGEST_LOSS);
-    *weight = lanes_keep(ok, 1.0 / (1.0 + q));
-    lanes_store(product, lanes_load(product) * lanes_select(ok, 1.0 + q, beyond));
-  } else {
-    ok = used & (q < 1.0);
-    *weight = lanes_keep(ok, lanes_of(1));
-    lanes_store(sums, lanes_load(sums) + lanes_select(ok, q, lanes_keep(used, lanes_of(1))));
-  }
-  return ok;
 }
 
 /* To the sums the upper triangle of weight g g', row by row, and weight g r. */
@@ -364,67 +193,9 @@ void TVK_MATCH(sampson_sums)(const double *const *arrays, const int32_t *indices
   if (on_plane) {
     sums_of(arrays, indices, first, count, 1, m, inverse_sq, cauchy, sums);
   } else {
-    sums_of(arrays, indices, first, count, 0, m, inverse_sq, cauchy, sums);
+    TVK_ON_SPHERE(sampson_sums, sums_of)(arrays, indices, first, count, 0, m, inverse_sq, cauchy,
+                                         sums);
   }
-}
-
-/* One block's part: with A = S' W S and S = d d / d h, d d / d H_ab = S_a f0_b, so that the normal
-   equations of H's entries are products of A's six entries and f0 f0's. */
-static inline void add_transfer_block(const sampson_block *b, int32_t count, int on_plane,
-                                      const double h[9], double inverse_sq, int cauchy,
-                                      double *sums) {
-  transfer_terms t;
-  lanes weight, f0[3], pairs[6];
-  lane_mask ok;
-  int i, j, k, slot = 0;
-  transfer_of(b, h, on_plane, &t);
-  ok = add_loss(t.r_sq * inverse_sq, count, cauchy, sums + TVK_WIDTH * 45, &weight);
-  for (i = 0; i < 3; ++i) f0[i] = on_plane && i == 2 ? lanes_of(1) : b->f0[i];
-  for (i = 0; i < 3; ++i) {
-    for (j = i; j < 3; ++j) pairs[slot++] = f0[i] * f0[j];
-  }
-  t.w00 = lanes_keep(ok, t.w00) * weight;
-  t.w01 = lanes_keep(ok, t.w01) * weight;
-  t.w11 = lanes_keep(ok, t.w11) * weight;
-  for (k = 0; k < 2; ++k) {
-    t.d[k] = lanes_keep(ok, t.d[k]);
-    for (i = 0; i < 3; ++i) t.slope[k][i] = lanes_keep(ok, t.slope[k][i]);
-  }
-  slot = 0;
-  for (i = 0; i < 3; ++i) {
-    const lanes u = t.w00 * t.slope[0][i] + t.w01 * t.slope[1][i];
-    const lanes v = t.w01 * t.slope[0][i] + t.w11 * t.slope[1][i];
-    const lanes along = u * t.d[0] + v * t.d[1];
-    for (j = i; j < 3; ++j) {
-      const lanes a = u * t.slope[0][j] + v * t.slope[1][j];
-      for (k = 0; k < 6; ++k, ++slot) {
-        double *sum = sums + TVK_WIDTH * slot;
-        lanes_store(sum, lanes_load(sum) + a * pairs[k]);
-      }
-    }
-    for (k = 0; k < 3; ++k) {
-      double *sum = sums + TVK_WIDTH * (36 + 3 * i + k);
-      lanes_store(sum, lanes_load(sum) + along * f0[k]);
-    }
-  }
-}
-
-static inline void transfer_sums_of(const double *const *arrays, const int32_t *indices,
-                                    int32_t first, int32_t count, int on_plane, const double h[9],
-                                    double inverse_sq, int cauchy, double *sums) {
-  int32_t done;
-  for (done = 0; done < count; done += TVK_LANES) {
-    const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
-    sampson_block b;
-    load_block(arrays, indices ? indices + done : indices, first + done, left, on_plane, &b);
-    add_transfer_block(&b, left, on_plane, h, inverse_sq, cauchy, sums + done % TVK_WIDTH);
-  }
-}
-
-void TVK_MATCH(transfer_sums)(const double *const *arrays, const int32_t *indices, int32_t first,
-                              int32_t count, int32_t on_plane, const double *h, double inverse_sq,
-                              int32_t cauchy, double *sums) {
-  transfer_sums_of(arrays, indices, first, count, on_plane, h, inverse_sq, cauchy, sums);
 }
 
 /* The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is
@@ -485,15 +256,29 @@ static inline int32_t score_general(const float *const *f, int32_t begin, const 
   return sum_of_costs(q);
 }
 
+static inline int64_t score_on_sphere(const float *const *arrays, int32_t first_block,
+                                      int32_t num_blocks, int32_t on_plane, const float *m,
+                                      float inverse_sq) {
+  int64_t sum = 0;
+  int32_t k;
+  (void)on_plane;
+  for (k = first_block; k < first_block + num_blocks; ++k) {
+    sum += score_general(arrays, k * TVK_SCORE_BLOCK, m, inverse_sq);
+  }
+  return sum;
+}
+
 int64_t TVK_MATCH(sampson_score)(const float *const *arrays, int32_t first_block,
                                  int32_t num_blocks, int32_t on_plane, const float *m,
                                  float inverse_sq) {
   int64_t sum = 0;
-  int32_t block;
-  for (block = first_block; block < first_block + num_blocks; ++block) {
-    const int32_t begin = block * TVK_SCORE_BLOCK;
-    sum += on_plane ? score_on_plane(arrays, begin, m, inverse_sq)
-                    : score_general(arrays, begin, m, inverse_sq);
+  int32_t k;
+  if (!on_plane) {
+    return TVK_ON_SPHERE(sampson_score, score_on_sphere)(arrays, first_block, num_blocks, 0, m,
+                                                         inverse_sq);
+  }
+  for (k = first_block; k < first_block + num_blocks; ++k) {
+    sum += score_on_plane(arrays, k * TVK_SCORE_BLOCK, m, inverse_sq);
   }
   return sum;
 }

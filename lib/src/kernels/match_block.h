@@ -1,0 +1,92 @@
+/* TVK_LANES matches at a time: loading them, and adding up their loss. */
+#ifndef TWOVIEW_KERNELS_MATCH_BLOCK_H
+#define TWOVIEW_KERNELS_MATCH_BLOCK_H
+
+#include "kernels/lanes.h"
+
+/* Rays, and slopes d ray / d pixel. */
+typedef struct sampson_block {
+  lanes f0[3], f1[3], J0[6], J1[6];
+} sampson_block;
+
+static inline lanes gather_lanes(const double *array, const int32_t index[TVK_LANES]) {
+#if defined(TVK_AVX512)
+  return (lanes)_mm512_i32gather_pd(_mm256_loadu_si256((const __m256i *)index), array, 8);
+#elif defined(TVK_AVX2)
+  return (lanes){array[index[0]], array[index[1]], array[index[2]], array[index[3]]};
+#else
+  return (lanes){array[index[0]], array[index[1]]};
+#endif
+}
+
+/* index null: from the array's element `first` on. */
+static inline lanes load_lanes(const double *array, const int32_t *index, int32_t first) {
+  return index ? gather_lanes(array, index) : lanes_load(array + first);
+}
+
+static TVK_INLINE void load_arrays(const double *const *arrays, const int32_t *index, int32_t first,
+                                   int on_plane, sampson_block *b) {
+  const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6; /* else ones and zeros */
+  int k;
+  for (k = 0; k < rays; ++k) {
+    b->f0[k] = load_lanes(arrays[k], index, first);
+    b->f1[k] = load_lanes(arrays[3 + k], index, first);
+  }
+  for (k = 0; k < slopes; ++k) {
+    b->J0[k] = load_lanes(arrays[6 + k], index, first);
+    b->J1[k] = load_lanes(arrays[12 + k], index, first);
+  }
+}
+
+/* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the other
+   lanes. */
+static TVK_INLINE void load_block(const double *const *arrays, const int32_t *indices,
+                                  int32_t first, int32_t count, int on_plane, sampson_block *b) {
+  int32_t some[TVK_LANES];
+  int l;
+  if (count == TVK_LANES && !indices) {
+    load_arrays(arrays, NULL, first, on_plane, b);
+    return;
+  }
+  if (count < TVK_LANES) {
+    for (l = 0; l < TVK_LANES; ++l) {
+      const int32_t k = l < count ? l : 0;
+      some[l] = indices ? indices[k] : first + k;
+    }
+    indices = some;
+  }
+  load_arrays(arrays, indices, 0, on_plane, b);
+}
+
+static TVK_INLINE void store_first(double *to, lanes x, int32_t count) {
+  int32_t l;
+  if (count == TVK_LANES) {
+    lanes_store(to, x);
+  } else {
+    for (l = 0; l < count; ++l) to[l] = x[l];
+  }
+}
+
+/* Adds the first `count` lanes' loss at q = r^2 / scale^2: sums points to the truncated loss, and
+   Cauchy's product follows. Writes the weight, and returns the lanes where there is a slope. */
+static inline lane_mask add_loss(lanes q, int32_t count, int cauchy, double *sums, lanes *weight) {
+  lanes number = {0};
+  lane_mask used, ok;
+  int l;
+  for (l = 0; l < TVK_LANES; ++l) number[l] = l;
+  used = number < (double)count;
+  if (cauchy) {
+    double *product = sums + TVK_WIDTH;
+    const lanes beyond = lanes_select(used, lanes_of(TVK_LARGEST_LOSS), lanes_of(1));
+    ok = used & (q < TVK_LARGEST_LOSS);
+    *weight = lanes_keep(ok, 1.0 / (1.0 + q));
+    lanes_store(product, lanes_load(product) * lanes_select(ok, 1.0 + q, beyond));
+  } else {
+    ok = used & (q < 1.0);
+    *weight = lanes_keep(ok, lanes_of(1));
+    lanes_store(sums, lanes_load(sums) + lanes_select(ok, q, lanes_keep(used, lanes_of(1))));
+  }
+  return ok;
+}
+
+#endif
