@@ -1,10 +1,14 @@
-// The AR.Drone's codecs: packets of navdata and frames of PaVE a second. Built by the project's own encoder.
+// The AR.Drone's codecs: packets of navdata, frames of PaVE and command datagrams a second; and what a session adds of
+// its own to a picture. Built by the project's own encoder.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <vector>
 
 #include "encode.h"
+#include "twoview_drivers/ardrone/session.h"
 
 namespace {
 
@@ -62,6 +66,109 @@ void pave_parse(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations());
 }
 BENCHMARK(pave_parse);
+
+// What goes out every 30 ms in flight.
+void at_write(benchmark::State& state) {
+  static ardrone_at at;
+  const ardrone_move move = {0.1f, -0.2f, 0.3f, -0.4f};
+  for (auto _ : state) {
+    at.size = 0;
+    ardrone_at_ref(&at, 1, 0);
+    benchmark::DoNotOptimize(ardrone_at_pcmd(&at, &move, 0));
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+BENCHMARK(at_write);
+
+// A drone that has a full navdata packet and a picture of 10 kB ready at each step, and a decoder that
+// costs nothing: what is left is the driver's own.
+struct Feed {
+  std::vector<uint8_t> navdata = make_navdata(0xfffffff), picture;
+  size_t navdata_left = 0, picture_at = 0;
+  uint32_t number = 0;
+
+  void refill() {
+    ardrone_pave_header header{};
+    static const std::vector<uint8_t> payload(10000);
+    size_t size = 0;
+    header.version = 2;
+    header.codec = ARDRONE_PAVE_H264;
+    header.header_size = 68;
+    header.payload_size = 10000;
+    header.encoded_width = 640;
+    header.encoded_height = 368;
+    header.frame_number = ++number;
+    header.timestamp_ms = number * 33;
+    header.frame_type = number % 15 == 1 ? ARDRONE_PAVE_IDR : ARDRONE_PAVE_P;
+    picture.resize(10068);
+    ardrone_encode_pave(&header, payload.data(), picture.data(), picture.size(), &size);
+    picture_at = 0;
+    navdata_left = navdata.size();
+  }
+};
+
+tvs_status feed_open(void*, ardrone_channel, int64_t) { return TVS_OK; }
+tvs_status feed_send(void*, ardrone_channel, const void*, size_t) { return TVS_OK; }
+void feed_close(void*, ardrone_channel) {}
+tvs_status feed_receive(void* user, ardrone_channel channel, void* to, size_t capacity,
+                        size_t* size) {
+  Feed& feed = *static_cast<Feed*>(user);
+  if (channel == ARDRONE_CHANNEL_NAVDATA && feed.navdata_left > 0) {
+    *size = feed.navdata_left;
+    std::memcpy(to, feed.navdata.data(), *size);
+    feed.navdata_left = 0;
+    return TVS_OK;
+  }
+  if (channel != ARDRONE_CHANNEL_VIDEO || feed.picture_at == feed.picture.size()) return TVS_NONE;
+  *size = std::min({capacity, size_t{1448}, feed.picture.size() - feed.picture_at});
+  std::memcpy(to, feed.picture.data() + feed.picture_at, *size);
+  feed.picture_at += *size;
+  return TVS_OK;
+}
+
+tvs_status no_decode(void*, const uint8_t*, size_t, tvs_picture* picture) {
+  static const uint8_t pixel = 0;
+  picture->image = {&pixel, 1, 1, 1};
+  return TVS_OK;
+}
+void no_release(void*, tvs_picture*) {}
+void no_reset(void*) {}
+
+void session_picture(benchmark::State& state) {
+  Feed feed;
+  const tvs_decoder decoder = {sizeof decoder, nullptr, no_decode, no_release, no_reset};
+  const ardrone_transport transport = {sizeof transport, &feed,      feed_open, feed_send,
+                                       feed_receive,     feed_close, nullptr};
+  ardrone_session_options options;
+  ardrone_session_options_init(&options);
+  options.decoder = &decoder;
+  options.listen_only = 1;
+  size_t size = 0;
+  ardrone_session_size(&options, &size);
+  std::vector<std::max_align_t> memory(size / sizeof(std::max_align_t) + 1);
+  ardrone_session* session = nullptr;
+  ardrone_session_init(&session, &options, &transport, memory.data(), size);
+  tvs_frame_source frames;
+  ardrone_session_frames(session, &frames);
+  tvs_frame frame;
+  frame.struct_size = sizeof frame;
+  int64_t now = 0, pictures = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    feed.refill();
+    state.ResumeTiming();
+    ardrone_session_step(session, now += 33000000);
+    while (frames.next(frames.user, &frame) == TVS_OK) {
+      ++pictures;
+      frames.release(frames.user, &frame);
+    }
+  }
+  ardrone_session_close(session);
+  if (pictures + 15 < state.iterations()) state.SkipWithError("pictures are missing");
+  state.SetItemsProcessed(pictures);
+}
+BENCHMARK(session_picture);
 
 }  // namespace
 
