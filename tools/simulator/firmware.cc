@@ -15,13 +15,13 @@ constexpr int64_t kSecond = 1000000000;
 constexpr int64_t kWatchdogNs = 50000000;
 constexpr int64_t kDemoPeriodNs = kSecond / 15, kFullPeriodNs = kSecond / 200;
 constexpr double kDegrees = 180 / 3.14159265358979323846;
-const char kDefaultId[] = "00000000";
+const char kDefaultId[] = "00000000", kVersionKey[] = "general:num_version_soft";
 
 // The answer of a drone out of its box, about; keys that a driver asks for.
 std::map<std::string, std::string> factory_configuration() {
   return {{"general:num_version_config", "1"},
           {"general:num_version_mb", "33"},
-          {"general:num_version_soft", "2.4.8"},
+          {kVersionKey, "2.4.8"},
           {"general:drone_serial", "XXXXXXXXXX"},
           {"general:soft_build_date", "2013-07-05 16:18"},
           {"general:ardrone_name", "twoview simulator"},
@@ -97,6 +97,15 @@ std::optional<double> to_stick(const std::string& text) {
   return value;
 }
 
+// Puts options with tags that no known firmware has before the checksum, which is the last.
+void add_unknown_options(std::vector<uint8_t>& packet) {
+  const std::vector<uint8_t> options = {40, 0, 12, 0, 1, 2, 3, 4, 5, 6, 7, 8, 0x32, 0x88, 4, 0};
+  packet.insert(packet.end() - 8, options.begin(), options.end());
+  uint32_t sum = 0;
+  for (size_t k = 0; k + 8 < packet.size(); ++k) sum += packet[k];
+  for (size_t k = 0; k < 4; ++k) packet[packet.size() - 4 + k] = static_cast<uint8_t>(sum >> 8 * k);
+}
+
 bool is_id(const std::string& text) {
   return text.size() == 8 && text.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
 }
@@ -130,11 +139,17 @@ Firmware::Firmware(const room::Room& room, const Vec3& start, double yaw_rad,
   apply_limits();
 }
 
+void Firmware::set_version(const std::string& version) {
+  version_ = version;
+  configuration_[kVersionKey] = version;
+}
+
 void Firmware::reboot(int64_t now_ns) {
   flight_.cut_motors();
   flight_.advance(3);  // down from anywhere in the room
   flight_.rearm();
   configuration_ = factory_configuration();
+  if (!version_.empty()) configuration_[kVersionKey] = version_;
   ids_ = addressed_ = Ids();
   control_texts_.clear();
   bootstrap_ = true;
@@ -386,6 +401,7 @@ std::optional<std::vector<uint8_t>> Firmware::next_navdata(int64_t now_ns) {
   size_t size = 0;
   if (ardrone_encode_navdata(&navdata, bytes.data(), bytes.size(), &size) != TVS_OK) return {};
   bytes.resize(size);
+  if (!version_.empty()) add_unknown_options(bytes);
   ++sequence_;
   return bytes;
 }

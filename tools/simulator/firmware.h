@@ -45,6 +45,8 @@ class Firmware {
 
   // As when its battery was changed: bootstrap, sequence numbers from 1, on the ground where it is.
   void reboot(int64_t now_ns);
+  // As that version: it tells it, and an unknown one's navdata has options that nobody knows.
+  void set_version(const std::string& version);
   // The next packet's sequence number, to try the wrap.
   void set_sequence(uint32_t sequence) { sequence_ = sequence; }
 
@@ -83,6 +85,7 @@ class Firmware {
 
   Flight flight_;
   Sensors sensors_;
+  std::string version_;  // empty: the factory's
   std::map<std::string, std::string> configuration_;
   std::map<std::string, std::string> sessions_, users_, applications_;  // id to description
   Ids ids_, addressed_;

@@ -119,6 +119,7 @@ struct Server::State {
         random(given.seed + 13),
         camera(options, room) {
     if (given.first_sequence) firmware.set_sequence(*given.first_sequence);
+    if (!given.firmware.empty()) firmware.set_version(given.firmware);
     if (!given.truth_file.empty()) {
       truth_file.reset(std::fopen(given.truth_file.c_str(), "w"));
       if (!truth_file) throw std::runtime_error(given.truth_file + ": " + std::strerror(errno));

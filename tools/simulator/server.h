@@ -43,6 +43,7 @@ struct ServerOptions {
   double stall_video_every_s = 0; // open, and silent for 3 s
   double reboot_every_s = 0;
   std::optional<uint32_t> first_sequence;  // of navdata, to see the wrap
+  std::string firmware;           // empty: 2.4.8; else a version that nobody knows, see Firmware
 };
 
 // What happened, for the one who tests a driver.

@@ -2,6 +2,8 @@
 
 #include "drone/drone.h"
 
+#include <cstdio>
+
 namespace cli {
 
 void add_address(CLI::App& verb, DroneAddress& address, const std::string& host) {
@@ -21,9 +23,22 @@ void add_address(CLI::App& verb, DroneAddress& address, const std::string& host)
   port("--control-port", address.control_port, "configuration, TCP");
 }
 
+CLI::Validator number_in(double low, double high) {
+  return CLI::Validator(
+      [low, high](std::string& text) {
+        double value = 0;
+        const bool is_number = CLI::detail::lexical_cast(text, value);
+        if (is_number && value >= low && value <= high) return std::string();
+        char words[120];
+        std::snprintf(words, sizeof words, " is not a number from %g to %g", low, high);
+        return text + words;
+      },
+      "");
+}
+
 void add_duration(CLI::App& verb, double& seconds) {
   verb.add_option("--duration", seconds, "end after so many seconds; 0: with Ctrl-C")
-      ->check(CLI::Range(0.0, 1e7))
+      ->check(number_in(0.0, 1e7))
       ->type_name("S")
       ->capture_default_str();
 }

@@ -16,6 +16,9 @@ struct DroneAddress {
 };
 void add_address(CLI::App& verb, DroneAddress& address, const std::string& host);
 
+// What CLI::Range is, but "nan" is no number in any range.
+CLI::Validator number_in(double low, double high);
+
 // --duration: seconds until the verb ends by itself, 0 for no end.
 void add_duration(CLI::App& verb, double& seconds);
 

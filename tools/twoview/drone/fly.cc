@@ -153,7 +153,7 @@ void add_drone_fly(CLI::App& drone, Run& run) {
   add_address(*verb, a->address, ARDRONE_DEFAULT_HOST);
   add_duration(*verb, a->duration);
   verb->add_option("--speed", a->speed, "share of the drone's limits that a key asks for")
-      ->check(CLI::Range(0.05, 1.0))
+      ->check(number_in(0.05, 1.0))
       ->type_name("[0.05, 1]")
       ->capture_default_str();
   verb->add_flag("--live,!--dry-run", a->live, "really fly; --dry-run, the default, sends nothing");

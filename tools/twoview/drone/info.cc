@@ -107,7 +107,7 @@ void add_drone_info(CLI::App& drone, Run& run) {
   CLI::App* verb = drone.add_subcommand("info", "state, battery, firmware and configuration");
   add_address(*verb, a->address, ARDRONE_DEFAULT_HOST);
   verb->add_option("--duration", a->duration, "wait so long for an answer")
-      ->check(CLI::Range(0.1, 3600.0))
+      ->check(number_in(0.1, 3600.0))
       ->type_name("S")
       ->capture_default_str();
   verb->add_flag("--json", a->json, "print the result alone, as JSON");

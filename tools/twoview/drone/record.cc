@@ -1,6 +1,7 @@
 // twoview drone record: all that the drone sends, as it came.
 
 #include <memory>
+#include <optional>
 
 #include "drone/link.h"
 #include "drone/recording.h"
@@ -33,7 +34,7 @@ int record(const Arguments& a) {
   options.queue_frames = 0;
   const Decoder decoder;
   options.decoder = decoder.get();
-  Recording recording(a.output, a.frames);
+  std::optional<Recording> recording;
   LinkListener listener;
   std::string failure;  // exceptions do not cross the driver's C
   const auto keeping = [&failure](const auto& write) {
@@ -46,13 +47,13 @@ int record(const Arguments& a) {
   };
   listener.on_navdata = [&](const uint8_t* bytes, size_t size, const ardrone_navdata&,
                             const tvs_imu& imu) {
-    keeping([&] { recording.add_navdata(bytes, size, imu); });
+    keeping([&] { recording->add_navdata(bytes, size, imu); });
   };
   listener.on_packet = [&](const ardrone_pave_packet& packet, const tvs_time& time, int) {
-    keeping([&] { recording.add_packet(packet, time); });
+    keeping([&] { recording->add_packet(packet, time); });
   };
   listener.on_frame = [&](const tvs_frame& frame) {
-    keeping([&] { recording.add_frame(frame); });
+    keeping([&] { recording->add_frame(frame); });
   };
   const bool speaks = !a.json && !a.quiet;
   const bool is_terminal = speaks && stdout_style().bold[0] != '\0';
@@ -60,6 +61,7 @@ int record(const Arguments& a) {
   const auto seconds = [start] { return static_cast<double>(ardrone_now_ns() - start) * 1e-9; };
   double next_word = 0;
   Link link(a.address, options, listener);
+  recording.emplace(a.output, a.frames);  // not before the host is known to exist
   link.run(
       [&] {
         if (is_terminal && seconds() >= next_word) {
@@ -73,7 +75,7 @@ int record(const Arguments& a) {
   const ardrone_counters counters = link.counters();
   const std::string summary = summary_json(counters, seconds()).dump(2) + "\n";
   if (!failure.empty()) throw BadInput(failure);
-  recording.add_summary(summary);
+  recording->add_summary(summary);
   if (a.json) print(summary);
   if (speaks) {
     print("recorded     " + std::to_string(counters.navdata_received) + " navdata, " +
@@ -81,8 +83,11 @@ int record(const Arguments& a) {
           " gaps\nfiles        " + a.output + ": video.pave navdata.log attitude.tum frames.txt "
           "summary.json" + (a.frames ? " frames/" : "") + "\n");
   }
-  if (counters.navdata_received == 0 && counters.packets == 0)
-    throw BadInput("nothing came from " + a.address.host);
+  if (counters.navdata_received == counters.navdata_rejected && counters.packets == 0) {
+    throw BadInput(counters.navdata_rejected == 0 && counters.bytes_skipped == 0
+                       ? "nothing came from " + a.address.host
+                       : "what came from " + a.address.host + " is not an AR.Drone's");
+  }
   return 0;
 }
 

@@ -68,7 +68,7 @@ void add_drone_replay(CLI::App& drone, Run& run) {
   verb->add_option("--frames", a->frames, "write the decoded pictures to this folder")
       ->type_name("DIR");
   verb->add_option("--speed", a->speed, "times as fast as it was; 0: as fast as it can")
-      ->check(CLI::Range(0.0, 1000.0))
+      ->check(number_in(0.0, 1000.0))
       ->type_name("FACTOR")
       ->capture_default_str();
   verb->add_flag("--json", a->json, "print the summary alone, as JSON");

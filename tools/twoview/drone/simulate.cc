@@ -31,6 +31,7 @@ struct Arguments {
   simulator::FaultChances faults;
   double garbage = 0, cut_every = 0, stall_every = 0, reboot_every = 0;
   int64_t first_sequence = -1;
+  std::string firmware;
   bool json = false, quiet = false;
 };
 
@@ -81,6 +82,7 @@ simulator::ServerOptions server_options(const Arguments& a) {
   o.cut_video_every_s = a.cut_every;
   o.stall_video_every_s = a.stall_every;
   o.reboot_every_s = a.reboot_every;
+  o.firmware = a.firmware;
   if (a.first_sequence >= 0) o.first_sequence = static_cast<uint32_t>(a.first_sequence);
   return o;
 }
@@ -125,7 +127,7 @@ int simulate(const Arguments& a) {
 void add_faults(CLI::App& verb, Arguments& a) {
   const auto chance = [&](const char* name, double& value, const char* help) {
     verb.add_option(name, value, help)
-        ->check(CLI::Range(0.0, 1.0))
+        ->check(number_in(0.0, 1.0))
         ->type_name("[0, 1]")
         ->group("Faults")
         ->capture_default_str();
@@ -138,7 +140,7 @@ void add_faults(CLI::App& verb, Arguments& a) {
   chance("--garbage", a.garbage, "that random bytes come before a video packet");
   const auto period = [&](const char* name, double& value, const char* help) {
     verb.add_option(name, value, help)
-        ->check(CLI::Range(0.0, 1e6))
+        ->check(number_in(0.0, 1e6))
         ->type_name("S")
         ->group("Faults")
         ->capture_default_str();
@@ -149,6 +151,9 @@ void add_faults(CLI::App& verb, Arguments& a) {
   verb.add_option("--first-sequence", a.first_sequence, "navdata's first number, to see it wrap")
       ->check(CLI::Range(int64_t{0}, int64_t{UINT32_MAX}))
       ->type_name("N")
+      ->group("Faults");
+  verb.add_option("--firmware", a.firmware, "a version that nobody knows, with navdata options to match")
+      ->type_name("VERSION")
       ->group("Faults");
 }
 
@@ -163,9 +168,10 @@ void add_world(CLI::App& verb, Arguments& a) {
   verb.add_option("--start", a.start, "x and y in the room, metres; x in [-2, 7], y in [-3.5, 3.5]")
       ->delimiter(',')
       ->expected(2)
+      ->check(number_in(-10, 10))
       ->type_name("X,Y");
   verb.add_option("--yaw-deg", a.yaw_deg, "heading at start, clockwise from above")
-      ->check(CLI::Range(-360.0, 360.0))
+      ->check(number_in(-360.0, 360.0))
       ->type_name("DEG")
       ->capture_default_str();
   verb.add_option("--seed", a.seed, "of textures and noise")->type_name("N")->capture_default_str();
@@ -178,15 +184,15 @@ void add_world(CLI::App& verb, Arguments& a) {
       ->type_name("64|68")
       ->capture_default_str();
   verb.add_option("--pixel-noise", a.pixel_noise, "of the camera, grey levels")
-      ->check(CLI::Range(0.0, 40.0))
+      ->check(number_in(0.0, 40.0))
       ->type_name("SIGMA")
       ->capture_default_str();
   verb.add_option("--altitude-factor", a.sensors.altitude_factor, "altimeter over truth")
-      ->check(CLI::Range(0.5, 2.0))
+      ->check(number_in(0.5, 2.0))
       ->type_name("FACTOR")
       ->capture_default_str();
   verb.add_option("--velocity-factor", a.sensors.velocity_factor, "velocity told over truth")
-      ->check(CLI::Range(0.5, 2.0))
+      ->check(number_in(0.5, 2.0))
       ->type_name("FACTOR")
       ->capture_default_str();
 }
