@@ -60,6 +60,12 @@ class TestLists(BadInputTest):
     def test_missing_images_are_named_and_counted(self):
         pairs = self.list_of(support.LINE.replace("left", "lost").replace("right", "gone"))
         self.refused(self.compare(pairs), "motorcycle_lost.png", "and 1 more")
+
+    def test_a_file_that_is_no_image_is_named(self):
+        support.write(self.folder.name, "a.png", "not a picture")
+        pairs = self.list_of(support.LINE.replace(support.IMAGES[0], "a.png")
+                             .replace(support.IMAGES[1], "a.png"))
+        self.refused(support.run(pairs, "--images", self.folder.name, "-o", self.out), "a.png")
         self.assertFalse(os.path.exists(self.out))
 
     def test_no_folder_of_images(self):

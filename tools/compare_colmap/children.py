@@ -85,10 +85,13 @@ class Child:
 
 
 _children = {}  # (thread, interpreter): Child
+_closed = threading.Event()  # threads in the middle of a pair start no other child then
 
 
 def call(python, request, timeout_s, matches=None):
     """(the worker's answer, its seconds of CPU), in this thread's child of that interpreter."""
+    if _closed.is_set():
+        raise ChildError("failed", "interrupted")
     key = threading.get_ident(), python
     child = _children.get(key)
     if child is None or not child.is_usable:
@@ -100,6 +103,7 @@ def call(python, request, timeout_s, matches=None):
 
 
 def close_all():
+    _closed.set()
     for key in list(_children):
         _children.pop(key).close()
 

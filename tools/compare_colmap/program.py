@@ -155,10 +155,11 @@ def check_images(tasks, default_resize):
                 continue
             try:
                 with open(path, "rb") as f:
-                    hashes[path] = hashlib.sha256(f.read()).hexdigest()
+                    content = hashlib.sha256(f.read()).hexdigest()
+                width = datasets.read_luma(path).shape[1]
                 if default_resize and task["set"] not in resize:
-                    width = datasets.read_luma(path).shape[1]
                     resize[task["set"]] = datasets.default_resize(width)
+                hashes[path] = content
             except (OSError, ValueError):
                 bad.append(path)
         task["resize"] = resize.get(task["set"], 0) if default_resize else task["resize"]
