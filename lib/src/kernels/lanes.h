@@ -51,6 +51,22 @@ static inline lanes lanes_select(lane_mask mask, lanes a, lanes b) {
 }
 /* a where the mask is set, else 0. */
 static inline lanes lanes_keep(lane_mask mask, lanes a) { return (lanes)(mask & (lane_mask)a); }
+/* Lanes of a, from 0 on, and of b, from TVK_LANES on, by their numbers. */
+#if defined(__clang__)
+#define lanes_shuffle(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+#define lanes_shuffle(a, b, ...) __builtin_shuffle(a, b, (lane_mask){__VA_ARGS__})
+#endif
+#if TVK_LANES == 8
+#define LANES_EVEN 0, 2, 4, 6, 8, 10, 12, 14
+#define LANES_ODD 1, 3, 5, 7, 9, 11, 13, 15
+#elif TVK_LANES == 4
+#define LANES_EVEN 0, 2, 4, 6
+#define LANES_ODD 1, 3, 5, 7
+#else
+#define LANES_EVEN 0, 2
+#define LANES_ODD 1, 3
+#endif
 static inline lanes lanes_abs(lanes a) { return (lanes)((lane_mask)a & INT64_MAX); }
 static inline lanes lanes_sqrt(lanes a) {
 #if defined(TVK_AVX512)

@@ -5,18 +5,34 @@
 #include "kernels/lanes.h"
 #include "twoview/triangulate.h"
 
-enum { TRIANGULATE_CHUNK = 32 }; /* matches whose numbers lie in arrays of their own */
-
-typedef struct triangulate_arrays {
-  double pixel[4][TRIANGULATE_CHUNK]; /* x0 y0 x1 y1, from the principal points */
-  double position[3][TRIANGULATE_CHUNK], angle[TRIANGULATE_CHUNK], error[TRIANGULATE_CHUNK];
-  double front[TRIANGULATE_CHUNK]; /* a tv_point_status, or -1 */
-} triangulate_arrays;
+/* tv_point in words of eight bytes: the position; the angle and the error; the status. */
+enum { POINT_WORDS = 5 };
+typedef char triangulate_words_fit[sizeof(tv_point) == 8 * POINT_WORDS ? 1 : -1];
+typedef double __attribute__((may_alias)) point_word;
 
 /* x, y: of the rays (x, y, 1). */
 typedef struct ray_lanes {
   lanes x, y;
 } ray_lanes;
+
+typedef float float_lanes __attribute__((vector_size(4 * TVK_LANES)));
+typedef uint32_t half_lanes __attribute__((vector_size(4 * TVK_LANES)));
+typedef uint64_t word_lanes __attribute__((vector_size(8 * TVK_LANES)));
+
+/* Two doubles as floats in a word, the first in its lower half. */
+static inline lanes pack_floats(lanes lower, lanes upper) {
+  const half_lanes first = (half_lanes)__builtin_convertvector(lower, float_lanes);
+  const half_lanes second = (half_lanes)__builtin_convertvector(upper, float_lanes);
+  return (lanes)(__builtin_convertvector(first, word_lanes) |
+                 __builtin_convertvector(second, word_lanes) << 32);
+}
+
+/* x y x y .. to x x .. and y y .. */
+static inline void load_pairs(const double *xy, lanes *x, lanes *y) {
+  const lanes a = lanes_load(xy), b = lanes_load(xy + TVK_LANES);
+  *x = lanes_shuffle(a, b, LANES_EVEN);
+  *y = lanes_shuffle(a, b, LANES_ODD);
+}
 
 /* atan2(sine, cosine) for sine >= 0, to 1e-9: what goes into a float. */
 static inline lanes lanes_angle(lanes sine, lanes cosine) {
@@ -87,18 +103,17 @@ static inline void least_squares_point(const tvk_triangulate_pair *p, const ray_
   *settled &= ~active;
 }
 
-/* The match's lanes first .. first + TVK_LANES - 1 of the arrays. */
-static inline void triangulate_block(const tvk_triangulate_pair *p, int method, int first,
-                                     triangulate_arrays *a) {
+/* One block, from pixels less the principal points to what points hold. */
+static inline void triangulate_lanes(const tvk_triangulate_pair *p, int method, lanes u0, lanes v0,
+                                     lanes u1, lanes v1, double words[POINT_WORDS][TVK_LANES]) {
   const double *R = p->R, *d = p->direction, *c = p->center1;
-  const lanes u0 = lanes_load(a->pixel[0] + first), v0 = lanes_load(a->pixel[1] + first);
-  const lanes u1 = lanes_load(a->pixel[2] + first), v1 = lanes_load(a->pixel[3] + first);
   const ray_lanes r0 = {u0 * p->inverse_focal[0], v0 * p->inverse_focal[1]};
   const ray_lanes r1 = {u1 * p->inverse_focal[2], v1 * p->inverse_focal[3]};
   lanes f[3], n[3], point[3] = {{0}, {0}, {0}}, moved[3]; /* f: ray 1 in camera 0; n = ray 0 x f */
-  lanes n_sq, size_sq, cosine, along0, along1, inverse, error_sq, front;
-  lane_mask good;
+  lanes n_sq, size_sq, cosine, along0, along1, inverse, error_sq;
+  lane_mask good, status;
   int i;
+  TVK_UNROLL
   for (i = 0; i < 3; ++i) f[i] = (R[i] * r1.x + R[3 + i] * r1.y) + R[6 + i];
   n[0] = r0.y * f[2] - f[1];
   n[1] = f[0] - r0.x * f[2];
@@ -120,6 +135,7 @@ static inline void triangulate_block(const tvk_triangulate_pair *p, int method, 
   } else {
     least_squares_point(p, &r0, &r1, method == TV_TRIANGULATION_ITERATIVE_LS, point, &good);
   }
+  TVK_UNROLL
   for (i = 0; i < 3; ++i) {
     moved[i] = ((R[3 * i] * point[0] + R[3 * i + 1] * point[1]) + R[3 * i + 2] * point[2]) + d[i];
   }
@@ -139,42 +155,52 @@ static inline void triangulate_block(const tvk_triangulate_pair *p, int method, 
     const lane_mask in_front = (along0 > 0.0) & (along1 > 0.0) & (ahead0 > 0.0) & (ahead1 > 0.0);
     /* Where the rays' and the axes' sides differ no pixel sees the point. */
     good &= (ahead0 * point[2] > 0.0) & (ahead1 * moved[2] > 0.0) & (error_sq < 1e60);
-    front = lanes_select(in_front, lanes_of(TV_POINT_OK), lanes_of(TV_POINT_BEHIND));
+    status = (in_front & TV_POINT_OK) | (~in_front & TV_POINT_BEHIND);
   }
+  TVK_UNROLL
   for (i = 0; i < 3; ++i) {
     point[i] *= p->baseline;
     good &= lanes_abs(point[i]) < 1e300;
   }
-  for (i = 0; i < 3; ++i) lanes_store(a->position[i] + first, lanes_keep(good, point[i]));
-  lanes_store(a->angle + first, lanes_keep(good, lanes_angle(lanes_sqrt(n_sq), cosine)));
-  lanes_store(a->error + first, lanes_keep(good, lanes_sqrt(error_sq)));
-  lanes_store(a->front + first, lanes_select(good, front, lanes_of(-1)));
+  TVK_UNROLL
+  for (i = 0; i < 3; ++i) lanes_store(words[i], lanes_keep(good, point[i]));
+  lanes_store(words[3], lanes_keep(good, pack_floats(lanes_angle(lanes_sqrt(n_sq), cosine),
+                                                     lanes_sqrt(error_sq))));
+  lanes_store(words[4], (lanes)((status | ~good) & UINT32_MAX)); /* -1 where it is not good */
+}
+
+/* TVK_LANES matches, their pixels in pixels0 and pixels1, the first `count` to points. */
+static inline void triangulate_block(const tvk_triangulate_pair *p, int method,
+                                     const double *pixels0, const double *pixels1, int count,
+                                     tv_point *points) {
+  double words[POINT_WORDS][TVK_LANES];
+  lanes u0, v0, u1, v1;
+  int k, i;
+  load_pairs(pixels0, &u0, &v0);
+  load_pairs(pixels1, &u1, &v1);
+  u0 -= p->principal[0];
+  v0 -= p->principal[1];
+  u1 -= p->principal[2];
+  v1 -= p->principal[3];
+  triangulate_lanes(p, method, u0, v0, u1, v1, words);
+  for (k = 0; k < count; ++k) {
+    point_word *const point = (point_word *)(void *)(points + k);
+    TVK_UNROLL
+    for (i = 0; i < POINT_WORDS; ++i) point[i] = words[i][k];
+  }
 }
 
 void TVK_MATCH(triangulate)(const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,
                             const double *pixels1, int32_t count, tv_point *points) {
-  triangulate_arrays a;
-  int32_t done, k;
-  for (done = 0; done < count; done += TRIANGULATE_CHUNK) {
-    const int32_t some = count - done < TRIANGULATE_CHUNK ? count - done : TRIANGULATE_CHUNK;
-    for (k = 0; k < some; ++k) {
-      const double *p0 = pixels0 + 2 * (done + k), *p1 = pixels1 + 2 * (done + k);
-      a.pixel[0][k] = p0[0] - pair->principal[0];
-      a.pixel[1][k] = p0[1] - pair->principal[1];
-      a.pixel[2][k] = p1[0] - pair->principal[2];
-      a.pixel[3][k] = p1[1] - pair->principal[3];
-    }
-    for (; k % TVK_LANES; ++k) a.pixel[0][k] = a.pixel[1][k] = a.pixel[2][k] = a.pixel[3][k] = 0;
-    for (k = 0; k < some; k += TVK_LANES) triangulate_block(pair, method, k, &a);
-    for (k = 0; k < some; ++k) {
-      tv_point *point = points + done + k;
-      point->position[0] = a.position[0][k];
-      point->position[1] = a.position[1][k];
-      point->position[2] = a.position[2][k];
-      point->angle_rad = (float)a.angle[k];
-      point->error_px = (float)a.error[k];
-      point->status = (int32_t)a.front[k];
-      point->reserved = 0;
-    }
+  const int32_t whole = count - count % TVK_LANES, left = count - whole;
+  int32_t k;
+  for (k = 0; k < whole; k += TVK_LANES) {
+    triangulate_block(pair, method, pixels0 + 2 * k, pixels1 + 2 * k, TVK_LANES, points + k);
+  }
+  if (left > 0) {
+    double last0[2 * TVK_LANES] = {0}, last1[2 * TVK_LANES] = {0};
+    memcpy(last0, pixels0 + 2 * whole, (size_t)left * 2 * sizeof last0[0]);
+    memcpy(last1, pixels1 + 2 * whole, (size_t)left * 2 * sizeof last1[0]);
+    triangulate_block(pair, method, last0, last1, left, points + whole);
   }
 }
