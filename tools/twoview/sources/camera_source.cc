@@ -1,0 +1,158 @@
+#include "sources/camera_source.h"
+
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <mutex>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <thread>
+
+#include "error.h"
+
+namespace cli {
+namespace {
+
+bool is_number(const std::string& name) {
+  return !name.empty() && name.size() < 4 && name.find_first_not_of("0123456789") == std::string::npos;
+}
+
+CameraSource::Kind kind_of(const std::string& name) {
+  const bool is_live = is_number(name) || name.rfind("/dev/", 0) == 0 || name.find("://") != std::string::npos;
+  return is_live ? CameraSource::Kind::kLive : CameraSource::Kind::kFile;
+}
+
+int64_t steady_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+// OpenCV prints what each of its backends thinks of a name; the user gets one line.
+struct Silence {
+  Silence() : before(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
+  ~Silence() { cv::utils::logging::setLogLevel(before); }
+  const cv::utils::logging::LogLevel before;
+};
+
+// A picture and when it came; number counts from 0.
+struct Shot {
+  cv::Mat luma;
+  uint64_t number = 0;
+  tvs_time time{};
+};
+
+}  // namespace
+
+struct CameraSource::State {
+  explicit State(Kind given) : kind(given) {}
+
+  bool take(Shot& shot);
+  void film();
+  tvs_status next(tvs_frame* frame);
+
+  const Kind kind;
+  cv::VideoCapture capture;
+  cv::Mat colour;
+  uint64_t num_taken = 0, next_number = 0;
+  // Live: what the thread has for the reader.
+  std::mutex mutex;
+  Shot latest;
+  bool has_latest = false, has_ended = false;
+  std::atomic<bool> stop{false};
+  std::thread thread;
+};
+
+// The next picture of the film or the camera, which is waited for. False at its end.
+bool CameraSource::State::take(Shot& shot) {
+  try {
+    if (!capture.read(colour) || colour.empty()) return false;
+    shot.luma = cv::Mat();
+    if (colour.channels() == 1) shot.luma = colour.clone();
+    else cv::cvtColor(colour, shot.luma, cv::COLOR_BGR2GRAY);
+  } catch (const cv::Exception&) {
+    return false;  // a device that was pulled out
+  }
+  if (shot.luma.depth() != CV_8U) return false;
+  shot.number = num_taken++;
+  shot.time = tvs_time{};
+  if (kind == Kind::kLive) {
+    shot.time.received_ns = shot.time.host_ns = steady_ns();
+    shot.time.uncertainty_ns = INT64_MAX;
+  } else {
+    // OpenCV's position is this picture's in one backend and the next one's in another; the rate is the same.
+    const double fps = capture.get(cv::CAP_PROP_FPS);
+    const double seconds = fps > 0 ? static_cast<double>(shot.number) / fps
+                                   : capture.get(cv::CAP_PROP_POS_MSEC) * 1e-3;
+    shot.time.received_ns = shot.time.host_ns = shot.time.device_ns = static_cast<int64_t>(seconds * 1e9);
+    shot.time.clock_id = 1;
+  }
+  return true;
+}
+
+void CameraSource::State::film() {
+  Shot shot;
+  while (!stop && take(shot)) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    latest = shot;
+    has_latest = true;
+  }
+  const std::lock_guard<std::mutex> lock(mutex);
+  has_ended = true;
+}
+
+tvs_status CameraSource::State::next(tvs_frame* frame) {
+  if (frame == nullptr) return TVS_ERR_NULL;
+  if (frame->struct_size != sizeof *frame) return TVS_ERR_STRUCT_SIZE;
+  auto shot = std::make_unique<Shot>();
+  if (kind == Kind::kFile) {
+    if (!take(*shot)) return TVS_END;
+  } else {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (!has_latest) return has_ended ? TVS_END : TVS_NONE;
+    *shot = std::move(latest);
+    has_latest = false;
+  }
+  frame->flags = TVS_FRAME_KEY | (shot->number != next_number ? TVS_FRAME_GAP : 0) |
+                 (next_number == 0 ? TVS_FRAME_NEW_STREAM : 0);
+  next_number = shot->number + 1;
+  frame->image = {shot->luma.data, shot->luma.cols, shot->luma.rows,
+                  static_cast<int64_t>(shot->luma.step)};
+  frame->number = shot->number;
+  frame->time = shot->time;
+  std::memset(&frame->attitude, 0, sizeof frame->attitude);
+  frame->handle = shot.release();
+  return TVS_OK;
+}
+
+CameraSource::CameraSource(const std::string& name) : CameraSource(name, kind_of(name)) {}
+
+CameraSource::CameraSource(const std::string& name, Kind kind) : state_(std::make_unique<State>(kind)) {
+  bool is_open = false;
+  const Silence silence;
+  try {
+    is_open = is_number(name) ? state_->capture.open(std::stoi(name)) : state_->capture.open(name);
+  } catch (const cv::Exception&) {
+  }
+  if (!is_open) throw BadInput("no camera or film opens as '" + name + "'");
+  if (kind == Kind::kLive) state_->thread = std::thread([this] { state_->film(); });
+}
+
+CameraSource::~CameraSource() {
+  state_->stop = true;
+  if (state_->thread.joinable()) state_->thread.join();
+}
+
+tvs_frame_source CameraSource::frames() {
+  tvs_frame_source source{};
+  source.struct_size = sizeof source;
+  source.user = state_.get();
+  source.next = [](void* user, tvs_frame* frame) { return static_cast<State*>(user)->next(frame); };
+  source.release = [](void*, tvs_frame* frame) {
+    if (frame != nullptr) delete static_cast<Shot*>(frame->handle);
+  };
+  return source;
+}
+
+}  // namespace cli
