@@ -13,6 +13,7 @@ from .errors import BadInput
 
 SCHEMAS = {schema.NAME: schema for schema in (schema4, schema38)}
 _LEFT_BEHIND = ("-wal", "-journal", "-shm")
+_BUSY, _LOCKED = 5, 6  # SQLite's codes; Python's module names them from 3.11 on
 
 
 def _columns(database):
@@ -95,6 +96,11 @@ def new_database(path, schema):
             os.rename(made, path)
 
 
+def _give_up_when_locked(status, _remaining, _total):
+    if status in (_BUSY, _LOCKED):
+        raise sqlite3.OperationalError("database is locked")
+
+
 @contextlib.contextmanager
 def appended_database(path, schema):
     """A Writer of a copy, which replaces the content of `path` in one transaction when the block ends well."""
@@ -117,7 +123,7 @@ def appended_database(path, schema):
             if target.execute("PRAGMA data_version").fetchone() != before:
                 raise BadInput(f"{path}: changed by another program meanwhile; nothing was written")
             with contextlib.closing(sqlite3.connect(made)) as copy:
-                copy.backup(target)
+                copy.backup(target, progress=_give_up_when_locked)  # by itself it would try for ever
     except sqlite3.Error as error:
         raise _explain(path, error) from None
 

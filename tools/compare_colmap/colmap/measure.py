@@ -115,6 +115,10 @@ def measure(output, data_dir, sets, schemas, hold, seeds):
                        "registered": min(run["registered"] for run in runs)}
 
 
+def _seconds(value):
+    return "-" if value is None else f"{value:.1f}"
+
+
 def table(rows):
     text = ("| set | mapper | features | registered | points | position, mm | rotation, deg | CPU s: features and pairs, "
             "mapper |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n")
@@ -122,7 +126,7 @@ def table(rows):
         text += (f"| {row['set']} | {row['colmap']} | {row['features']} | {row['registered']} of {row['images']} "
                  f"| {row.get('points', 0):.0f} | {row.get('position_rms_mm', float('nan')):.2f} "
                  f"| {row.get('rotation_rms_deg', float('nan')):.4f} "
-                 f"| {row['feature_seconds'] or float('nan'):.1f}, {row['seconds']:.1f} |\n")
+                 f"| {_seconds(row['feature_seconds'])}, {_seconds(row['seconds'])} |\n")
     return text
 
 

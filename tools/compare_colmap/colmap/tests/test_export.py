@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 import twoview as tv
 from colmap import exporter, schema38
+from colmap.database import appended_database
+from colmap.errors import BadInput
 from conftest import CAMERA, HEIGHT, NAMES, WIDTH, run, start
 
 pycolmap = pytest.importorskip("pycolmap")
@@ -197,6 +199,15 @@ def test_a_locked_database_is_refused(exported, photographs, tmp_path, schema, r
         other.execute("BEGIN IMMEDIATE")
         refuse("x.db: locked", "export", "--database", path, "--images", photographs / "images", "--schema", schema,
                "--append")
+    assert_nothing_else(tmp_path, "x.db")
+
+
+def test_a_lock_that_comes_during_the_work_is_told(exported, tmp_path):
+    path = shutil.copy(exported["3.8"], tmp_path / "x.db")
+    with contextlib.closing(sqlite3.connect(path)) as other:
+        with pytest.raises(BadInput, match="x.db: locked"):
+            with appended_database(str(path), schema38):
+                other.execute("BEGIN IMMEDIATE")
     assert_nothing_else(tmp_path, "x.db")
 
 
