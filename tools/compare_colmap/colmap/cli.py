@@ -174,7 +174,10 @@ def main(arguments=None):
     try:
         parsed = _parser().parse_args(arguments)
         return parsed.run(parsed)
-    except (BadInput, ImportError, OSError, sqlite3.Error, MemoryError) as error:
+    except ImportError as error:
+        print(f"twoview: {error} (scripts/bootstrap bench installs what colmap needs)", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except (BadInput, OSError, sqlite3.Error, MemoryError) as error:
         print("twoview: " + " ".join(str(error).split()), file=sys.stderr)
         return EXIT_BAD_INPUT
     except _Ended as ended:  # ends as the signal would have

@@ -19,7 +19,7 @@ ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def need_pycolmap(what):
     """pycolmap, or the line that says how to get it. The first call comes before there is anything to clean up: a
     signal during the import ends the program."""
-    if "pycolmap" in sys.modules:
+    if sys.modules.get("pycolmap"):
         return sys.modules["pycolmap"]
     in_main = threading.current_thread() is threading.main_thread()
     before = {number: signal.signal(number, signal.SIG_DFL) for number in ENDING_SIGNALS if in_main}

@@ -7,6 +7,7 @@ import shutil
 import signal
 import sqlite3
 import subprocess
+import sys
 import time
 
 import numpy as np
@@ -268,6 +269,14 @@ def test_bad_arguments_are_one_line(tmp_path, refuse):
     refuse("not allowed with", *base, "--exhaustive", "--sequential", "2")
     refuse("--schema", *base, "--schema", "3.9")
     refuse("--images", "export", "--database", tmp_path / "x.db")
+
+
+def test_a_package_that_is_missing_is_told(photographs, tmp_path, refuse, monkeypatch):
+    arguments = ("export", "--database", tmp_path / "x.db", "--images", photographs / "images")
+    for package, schema, words in (("pycolmap", "4", "needs pycolmap (scripts/bootstrap"), ("cv2", "3.8", "cv2")):
+        monkeypatch.setitem(sys.modules, package, None)
+        refuse(words, *arguments, "--schema", schema)
+    assert_nothing_else(tmp_path)
 
 
 @pytest.mark.parametrize("append", [False, True])
