@@ -103,6 +103,17 @@ void transfer_squares(const RayPairs& pairs, int first, int count, const Mat3& H
 void transfer_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& H,
                       double* squares);
 
+// Of the listed matches: the square of the sine of the angle between the rays, R taken off, and 2 beyond
+// a right angle.
+void squared_sines(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& R,
+                   double* sines_sq);
+
+// What a pixel of noise in each coordinate adds to the information about the direction, whose rows
+// b . (R f0 x f1) / |gradient of the residual| are as small as the parallax: the block's three
+// entries.
+void direction_noise(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
+                     double block[3]);
+
 enum class Loss { kTruncated, kCauchy };
 
 struct RobustLoss {

@@ -35,32 +35,23 @@ constexpr double kMostStretch = 1.5;
 // a tenth of that.
 constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
 
-// Of the squared parallax: grows with the angle up to a right angle.
-double sine_sq(const PoseRefiner& f, const Mat3& R, int i) {
-  const double b[3] = {f.pairs.ray[1][0][i], f.pairs.ray[1][1][i], f.pairs.ray[1][2][i]};
-  double a[3], across[3];
-  turn_ray0(f.pairs, i, R, a);
-  if (!(dot(a, b) > 0)) return 2;
-  cross(a, b, across);
-  return dot(across, across) / (dot(a, a) * dot(b, b));
-}
-
 // The matches that take part in a pose's final refinement, into f.indices.
 int near_pose(const PoseRefiner& f, const Pose& pose) {
   const int count = near_matches(f.pairs, f.pairs.num, pose, kFinalNear * f.threshold_px,
                                  f.threshold_px, f.indices);
   if (count < 10) return count;
   const int sampled = std::min(count, kParallaxSample);
+  double sample[kParallaxSample], *nine_tenths = sample + sampled * 9 / 10;
+  squared_sines(f.pairs, f.indices, count, pose.R, f.values);
   for (int k = 0; k < sampled; ++k) {
-    f.values[k] = sine_sq(f, pose.R, f.indices[static_cast<int64_t>(k) * count / sampled]);
+    sample[k] = f.values[static_cast<int64_t>(k) * count / sampled];
   }
-  double* nine_tenths = f.values + sampled * 9 / 10;
-  std::nth_element(f.values, nine_tenths, f.values + sampled);
+  std::nth_element(sample, nine_tenths, sample + sampled);
   const double limit = kFarParallax * kFarParallax * *nine_tenths;
   int kept = 0;
   for (int k = 0; k < count; ++k) {
     const int i = f.indices[k];
-    if (sine_sq(f, pose.R, i) <= limit) f.indices[kept++] = i;
+    if (f.values[k] <= limit) f.indices[kept++] = i;
   }
   return kept;
 }
