@@ -260,7 +260,8 @@ class Store:
 
 
 def run_pairs(tasks, keys, workers, store, quiet):
-    """The pairs' results in the tasks' order; those that the store has are not run again."""
+    """(the pairs' results in the tasks' order, how many were run now); those that the store has are
+    not run again."""
     from tqdm import tqdm
     found = [store.get(key) for key in keys]
     todo = [i for i, result in enumerate(found) if result is None]
@@ -275,7 +276,7 @@ def run_pairs(tasks, keys, workers, store, quiet):
             found[index] = result
             bar.set_postfix_str(f"{result['name0']} {result['name1']}", refresh=False)
             bar.update()
-    return found
+    return found, len(todo)
 
 
 def compare(arguments):
@@ -306,14 +307,14 @@ def compare(arguments):
                 task["missing"] = missing
             keys = [digest(task, versions, [hashes[v["path"]] for v in task["views"]])
                     for task in tasks]
-            pairs = run_pairs(tasks, keys, workers, store, arguments.quiet)
+            pairs, num_run = run_pairs(tasks, keys, workers, store, arguments.quiet)
             where = workers.description
     except OSError as error:
         if not arguments.scheduler:
             raise
         raise BadInput(f"--scheduler: {arguments.scheduler}: {error}") from error
     run = {"versions": versions, "missing": missing, "reference_of_sets": told, "where": where,
-           "wall_seconds": time.time() - start, "resize": {t["set"]: t["resize"] for t in tasks}}
+           "wall_seconds": time.time() - start, "pairs_run_now": num_run, "resize": {t["set"]: t["resize"] for t in tasks}}
     report = results.make_report(arguments, run, pairs)
     results.write(folder, report, pairs, tasks)
     store.remove()

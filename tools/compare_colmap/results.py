@@ -131,7 +131,7 @@ def make_report(arguments, run, pairs):
                     "jobs": arguments.jobs, "systems": arguments.systems},
         "versions": run["versions"], "machine": tables.machine(), "where": run["where"],
         "made": time.strftime("%Y-%m-%d %H:%M:%S %Z"),
-        "wall_seconds": run["wall_seconds"],
+        "wall_seconds": run["wall_seconds"], "pairs_run_now": run["pairs_run_now"],
         "seconds": {"all": sum(seconds.values()), "by_module": seconds,
                     "twoview_share": seconds.get("twoview", 0) / max(1e-9, sum(seconds.values()))},
         "histogram_edges_px": page.HISTOGRAM_EDGES_PX,
@@ -206,6 +206,7 @@ def print_summary(report, folder):
             front = "-" if s["in_front"] is None else f"{100 * s['in_front']:.2f} %"
             print(f"  {s['name']:<{width}} {front:>8} {_cell(s['median_error_px'], '.4f'):>10} "
                   f"{_cell(s['time_us_per_point'], '.3f'):>11}")
-    print(f"\n{report['reference_words']}\n{report['wall_seconds']:.0f} s; twoview's share of the "
-          f"CPU time {100 * report['seconds']['twoview_share']:.2f} %\n"
+    print(f"\n{report['reference_words']}\n{report['wall_seconds']:.0f} s for "
+          f"{report['pairs_run_now']} pairs; {report['seconds']['all']:.0f} s of CPU for all, "
+          f"{100 * report['seconds']['twoview_share']:.2f} % of it twoview's\n"
           f"{os.path.join(folder, 'index.html')}")
