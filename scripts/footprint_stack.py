@@ -13,6 +13,8 @@ NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "([^"]*)"')
 EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 FRAME = re.compile(r"(\d+) bytes \((\S+)\)")
 INDIRECT = "__indirect_call"
+SOURCES = pathlib.Path(__file__).resolve().parent.parent / "lib/src"
+KERNEL = re.compile(r"(?:tvk_)?(\w+?)(?:_(?:c|sse2|avx2|avx512|neon|neon_dot))?(?:\.\w+)*")
 # Of other libraries: memcpy and its like, sqrt, getauxval. Their frames are small and not ours.
 FOREIGN_BYTES = 256
 # std::sort calls itself at most twice the logarithm of the number, of at most 2^20 elements.
@@ -26,7 +28,7 @@ class Graph:
     def __init__(self):
         self.frame, self.calls, self.unbounded = {}, {}, []
 
-    def read(self, path):
+    def read(self, path, indirect=INDIRECT):
         for line in path.read_text().splitlines():
             node = NODE.match(line)
             if node:
@@ -38,18 +40,30 @@ class Graph:
                 continue
             edge = EDGE.match(line)
             if edge:
-                self.calls.setdefault(edge[1], set()).add(edge[2])
+                target = indirect if edge[2] == INDIRECT else edge[2]
+                self.calls.setdefault(edge[1], set()).add(target)
 
 
-def deepest_of(graph, indirect_bytes):
-    """Bytes and chain by function; a circle is a SystemExit."""
+def kernels_of(source):
+    """The kernels that a source file may call: those it names as members of the table. Of a file that
+    names none, and of one outside the library, nothing is known."""
+    if not source.exists():
+        return frozenset()
+    list_of_all = (SOURCES / "kernels/kernels.h").read_text()
+    names = set(re.findall(r"X\((\w+), ", list_of_all))
+    return frozenset(names & set(re.findall(r"(?:->|\.)(\w+)", source.read_text())))
+
+
+def deepest_of(graph, kernel_bytes):
+    """Bytes and chain by function; a circle is a SystemExit. kernel_bytes: of an indirect call's title."""
     known, open_names = {}, []
 
     def visit(name):
         if name in known:
             return known[name]
-        if name == INDIRECT:
-            return indirect_bytes, ["(a kernel)"]
+        if name.startswith(INDIRECT):
+            bytes_ = kernel_bytes(name)
+            return bytes_, [f"(a kernel of those that {name.split()[1]} names: {bytes_})"]
         if name not in graph.frame:
             return FOREIGN_BYTES, [name]
         if name in open_names:
@@ -84,11 +98,22 @@ def main():
         sys.exit(f"{args.folder}: no .ci files; build with -fcallgraph-info=su")
     for path in files:
         is_kernel_file = path.parent.name == "kernels" and not path.name.startswith("select.")
-        (kernels if is_kernel_file else graph).read(path)
+        if is_kernel_file:
+            kernels.read(path)
+        else:
+            graph.read(path, f"{INDIRECT} {path.parent.name}/{path.name.removesuffix('.ci')}")
     found = graph.unbounded + kernels.unbounded
     # A call through a pointer inside a kernel would be one more kernel; there is none.
-    kernel = max(deepest_of(kernels, 0).values())
-    deepest = deepest_of(graph, kernel[0])
+    of_kernels = {name: deepest for name, (deepest, _) in deepest_of(kernels, lambda _: 0).items()}
+
+    def kernel_bytes(call):
+        """The deepest kernel of any set that the file of an indirect call names; of all, if it names none."""
+        names = kernels_of(SOURCES / call.split()[1])
+        found = [bytes_ for title, bytes_ in of_kernels.items()
+                 if not names or KERNEL.fullmatch(title.rsplit(":", 1)[-1])[1] in names]
+        return max(found)
+
+    deepest = deepest_of(graph, kernel_bytes)
     public = {name: deepest[name] for name in deepest if re.fullmatch(r"tv_\w+", name)}
     if "tv_reconstruct" not in public:
         found.append("tv_reconstruct is not there")
@@ -98,9 +123,10 @@ def main():
         if bytes_ > args.limit:
             found.append(f"{name}: {bytes_} bytes of stack are more than {args.limit}")
     name, (bytes_, chain) = max(public.items(), key=lambda item: item[1][0])
-    print(f"{bytes_} bytes of stack at most, {kernel[0]} of them a kernel's: {name}")
+    print(f"{bytes_} bytes of stack at most: {name}")
     for link in chain:
-        print(f"  {graph.frame.get(link, kernel[0] if link.startswith('(') else FOREIGN_BYTES):6d} {link}")
+        is_kernel = link.startswith("(")
+        print("        " + link if is_kernel else f"  {graph.frame.get(link, FOREIGN_BYTES):6d} {link}")
     for line in found:
         print(line)
     sys.exit(1 if found else 0)
