@@ -171,7 +171,7 @@ class VirtualDrone {
     if (channel == ARDRONE_CHANNEL_NAVDATA) {
       if (d.navdata_.empty()) return TVS_NONE;
       *size = std::min(capacity, d.navdata_.front().size());
-      std::memcpy(to, d.navdata_.front().data(), *size);
+      if (*size > 0) std::memcpy(to, d.navdata_.front().data(), *size);  // all of it may be cut off
       d.navdata_.pop_front();
       return TVS_OK;
     }
