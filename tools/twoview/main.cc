@@ -34,6 +34,7 @@ int run_program(int argc, char** argv) {
   cli::add_match(program, run);
   cli::add_triangulate(program, run);
   cli::add_undistort(program, run);
+  cli::add_calibrate(program, run);
   cli::add_evaluate(program, run);
 #ifdef TWOVIEW_HAS_DRONE
   cli::add_drone(program, run);

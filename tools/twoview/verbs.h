@@ -30,6 +30,7 @@ void add_detect(CLI::App& program, Run& run);
 void add_match(CLI::App& program, Run& run);
 void add_triangulate(CLI::App& program, Run& run);
 void add_undistort(CLI::App& program, Run& run);
+void add_calibrate(CLI::App& program, Run& run);
 void add_evaluate(CLI::App& program, Run& run);
 void add_drone(CLI::App& program, Run& run);  // its own verbs: drone/
 

@@ -1,0 +1,130 @@
+"""Chessboards rendered through lenses that are known exactly: what `calibrate` must find again."""
+import cv2
+import numpy as np
+
+INNER = (9, 6)
+SQUARE = 0.03
+SIZE = (640, 480)
+OVER = 3  # samples a pixel and axis
+
+MILD = ("brown-conrady", (620.0, 617.0, 327.3, 234.6), (-0.28, 0.09, 0.001, -0.0005, 0.0))
+WIDE = ("brown-conrady", (380.0, 381.0, 315.2, 243.9), (-0.25, 0.06, 0.0008, -0.0004, -0.006))
+FISHEYE = ("kannala-brandt", (300.0, 299.0, 322.8, 238.1), (0.02, -0.01, 0.003, -0.001))
+
+
+def board_points():
+    x, y = np.meshgrid(np.arange(INNER[0]), np.arange(INNER[1]))
+    return np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1) * SQUARE
+
+
+def matrix(numbers):
+    fx, fy, cx, cy = numbers
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+
+
+def distorted(model, k, rays):
+    """The models' formulas, from points before the camera to the plane that K maps to pixels."""
+    x, y = rays[:, 0] / rays[:, 2], rays[:, 1] / rays[:, 2]
+    if model == "kannala-brandt":
+        r = np.maximum(np.hypot(x, y), 1e-12)
+        t = np.arctan(r)
+        s = t * (1 + k[0] * t**2 + k[1] * t**4 + k[2] * t**6 + k[3] * t**8) / r
+        return np.stack([x * s, y * s], 1)
+    k1, k2, p1, p2, k3, *more = k
+    k4, k5, k6 = more or (0, 0, 0)
+    r2 = x * x + y * y
+    s = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    return np.stack([x * s + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                     y * s + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], 1)
+
+
+def project(lens, R, t, points):
+    model, (fx, fy, cx, cy), k = lens
+    return distorted(model, k, points @ R.T + t) * (fx, fy) + (cx, cy)
+
+
+def ray_table(lens):
+    """Where each sample of the image looks, on the plane z = 1, by Newton's method along the radius
+    and then in both axes."""
+    model, (fx, fy, cx, cy), k = lens
+    u = (np.arange(SIZE[0] * OVER) + 0.5) / OVER - 0.5
+    v = (np.arange(SIZE[1] * OVER) + 0.5) / OVER - 0.5
+    # The lens is smooth: solved on every eighth sample and interpolated by cubic splines' kin.
+    gu, gv = np.linspace(u[0], u[-1], 241), np.linspace(v[0], v[-1], 181)
+    grid = np.stack(np.meshgrid((gu - cx) / fx, (gv - cy) / fy), -1).reshape(-1, 2)
+    flat = grid.copy()
+    for _ in range(60):
+        at = distorted(model, k, np.c_[flat, np.ones(len(flat))])
+        h = 1e-6
+        dx = (distorted(model, k, np.c_[flat + (h, 0), np.ones(len(flat))]) - at) / h
+        dy = (distorted(model, k, np.c_[flat + (0, h), np.ones(len(flat))]) - at) / h
+        e = grid - at
+        det = dx[:, 0] * dy[:, 1] - dy[:, 0] * dx[:, 1]
+        step = np.stack([(dy[:, 1] * e[:, 0] - dy[:, 0] * e[:, 1]) / det,
+                         (dx[:, 0] * e[:, 1] - dx[:, 1] * e[:, 0]) / det], 1)
+        length = np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
+        flat += step * np.minimum(1, 0.2 / length)
+    assert np.abs(e).max() < 1e-9, "the lens turns back within the image"
+    coarse = flat.reshape(181, 241, 2)
+    size = (SIZE[0] * OVER, SIZE[1] * OVER)
+    mx = np.tile(np.linspace(0, 240, size[0], dtype=np.float32), (size[1], 1))
+    my = np.tile(np.linspace(0, 180, size[1], dtype=np.float32)[:, None], (1, size[0]))
+    return smooth_lookup(coarse, mx, my)
+
+
+def smooth_lookup(coarse, mx, my):
+    """Catmull-Rom in both axes, in doubles: cv2.remap's table has steps of 1/32."""
+    def along(values, place, axis):
+        n = values.shape[axis]
+        i = np.clip(place.astype(int), 1, n - 3)
+        f = (place - i).reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+        a, b, c, d = (np.take(values, i + o, axis) for o in (-1, 0, 1, 2))
+        return b + f / 2 * (c - a + f * (2 * a - 5 * b + 4 * c - d + f * (3 * (b - c) + d - a)))
+    return along(along(coarse, mx[0].astype(float), 1), my[:, 0].astype(float), 0)
+
+
+def render(rays, R, t, rng, blur=0.8, noise=3.0):
+    """A board with a white margin of one square on grey, seen through the lens."""
+    H = np.linalg.inv(np.stack([R[:, 0], R[:, 1], t], 1))
+    x, y = rays[..., 0], rays[..., 1]
+    w = H[2, 0] * x + H[2, 1] * y + H[2, 2]
+    X = (H[0, 0] * x + H[0, 1] * y + H[0, 2]) / w / SQUARE
+    Y = (H[1, 0] * x + H[1, 1] * y + H[1, 2]) / w / SQUARE
+    before = w > 0
+    board = before & (X > -1) & (X < INNER[0]) & (Y > -1) & (Y < INNER[1])
+    margin = before & (X > -2) & (X < INNER[0] + 1) & (Y > -2) & (Y < INNER[1] + 1)
+    dark = board & ((np.floor(X).astype(np.int32) + np.floor(Y).astype(np.int32)) % 2 == 0)
+    samples = np.full(x.shape, 110, np.float32)
+    samples[margin] = 205
+    samples[dark] = 45
+    image = samples.reshape(SIZE[1], OVER, SIZE[0], OVER).mean((1, 3))
+    image = cv2.GaussianBlur(image, (0, 0), blur)
+    return np.clip(np.rint(image + rng.normal(0, noise, image.shape)), 0, 255).astype(np.uint8)
+
+
+def poses(lens, count, rng, max_tilt_deg=42):
+    """Boards that lie in the image with their margin, anywhere, tilted and rolled."""
+    outline = np.array([[-2, -2], [9.0, -2], [10, 2], [10, 7], [3, 7], [-2, 7], [-2, 2], [4, -2]])
+    outline = np.c_[outline, np.zeros(len(outline))] * SQUARE
+    middle = np.array([4, 2.5, 0]) * SQUARE
+    found = []
+    while len(found) < count:
+        direction, tilt = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(5, max_tilt_deg))
+        axis = np.array([np.cos(direction), np.sin(direction), 0]) * tilt
+        R = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0, 0, rng.normal(0, 0.5)]))[0]
+        depth = rng.uniform(0.12, 0.6)
+        way = np.r_[rng.uniform(-1.2, 1.2, 2), 1]
+        # Turned to face the camera from the side: the tilt is against the line of sight.
+        z = way / np.linalg.norm(way)
+        x = np.cross([0, 1.0, 0], z)
+        x /= np.linalg.norm(x)
+        R = np.stack([x, np.cross(z, x), z], 1) @ R
+        t = z * depth - R @ middle
+        if (outline @ R.T + t)[:, 2].min() < 0.02:
+            continue
+        pixels = project(lens, R, t, outline)
+        extent = np.ptp(pixels[:, 0]) / SIZE[0]
+        if pixels.min() < 6 or (pixels > np.array(SIZE) - 7).any() or extent < 0.33:
+            continue
+        found.append((R, t))
+    return found

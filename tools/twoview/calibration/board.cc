@@ -1,0 +1,417 @@
+#include "calibration/board.h"
+
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "error.h"
+
+namespace cli {
+namespace {
+
+constexpr int kSearchSide = 1280;    // longer side of the image that is searched
+constexpr int kThumbnailSide = 400;  // of what the contact sheet shows
+constexpr int kDarkLevel = 40;       // the brightest hundredth of a dark image is below this
+// A part of a board, as small as is worth a word.
+const cv::Size kSmallestBoard(3, 3);
+// A board's edges rise within 2 to 4 px in a good picture of any size.
+constexpr double kMaxRisePx = 5, kMaxRiseOfMedian = 1.8;
+constexpr double kMinMoveShare = 0.015;    // of the image's diagonal
+constexpr double kLargerBoardShare = 0.4;  // of the contrast within the board
+constexpr int kWallPerCpu = 8;             // a machine so busy is waited for
+
+double longer_side(cv::Size size) { return std::max(size.width, size.height); }
+
+cv::Mat shrunk(const cv::Mat& image, int longer, double& scale) {
+  scale = std::min(1.0, longer / longer_side(image.size()));
+  if (scale == 1) return image;
+  cv::Mat small;
+  const cv::Size size(std::max(1L, std::lround(image.cols * scale)),
+                      std::max(1L, std::lround(image.rows * scale)));
+  cv::resize(image, small, size, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
+// Corners at a row and column, whatever the storage.
+struct Grid {
+  const Corners& corners;
+  cv::Size inner;
+  cv::Point2f at(int row, int column) const {
+    return corners[static_cast<size_t>(row * inner.width + column)];
+  }
+};
+
+double mean_around(const cv::Mat& luma, cv::Point2f place) {
+  const cv::Rect box(cvRound(place.x) - 1, cvRound(place.y) - 1, 3, 3);
+  const cv::Rect whole(0, 0, luma.cols, luma.rows);
+  return (box & whole) == box ? cv::mean(luma(box))[0] : -1;
+}
+
+// The least step from a square to the next along a side of the grid, `squares_out` squares beyond
+// it
+// (-0.5: the first ones within). `line` gives the corners of the side, `next` those one further in.
+// Positive where they alternate with the first one darker, negative where with it brighter, 0 where
+// they do not.
+double alternation(const cv::Mat& luma, const Corners& line, const Corners& next,
+                   float squares_out) {
+  std::vector<double> greys;
+  for (size_t i = 0; i + 1 < line.size(); ++i) {
+    const cv::Point2f middle = 0.5F * (line[i] + line[i + 1]);
+    const cv::Point2f inward = 0.5F * (next[i] + next[i + 1]) - middle;
+    const double grey = mean_around(luma, middle - squares_out * inward);
+    if (grey < 0) return 0;  // beyond the image
+    greys.push_back(grey);
+  }
+  double least = 255, most = -255;
+  for (size_t i = 0; i + 1 < greys.size(); ++i) {
+    const double step = (i % 2 ? -1 : 1) * (greys[i + 1] - greys[i]);
+    least = std::min(least, step);
+    most = std::max(most, step);
+  }
+  return least > 0 ? least : most < 0 ? most : 0;
+}
+
+// Whether the squares between the corners are a chessboard's. In a larger board OpenCV finds grids
+// that run askew through it, too.
+bool squares_alternate(const cv::Mat& luma, const Grid& grid) {
+  const auto square = [&](int r, int c) {
+    return mean_around(luma, 0.25F * (grid.at(r, c) + grid.at(r, c + 1) + grid.at(r + 1, c) +
+                                      grid.at(r + 1, c + 1)));
+  };
+  const bool first_is_dark = square(0, 0) < square(0, 1);
+  for (int r = 0; r + 1 < grid.inner.height; ++r)
+    for (int c = 0; c + 1 < grid.inner.width; ++c) {
+      const bool is_dark = ((r + c) % 2 == 0) == first_is_dark;
+      const double own = square(r, c);
+      if (c + 2 < grid.inner.width && (own < square(r, c + 1)) != is_dark) return false;
+      if (r + 2 < grid.inner.height && (own < square(r + 1, c)) != is_dark) return false;
+    }
+  return true;
+}
+
+// OpenCV finds a board within a larger one. Beyond the last inner corners a board has one more row
+// of squares; a larger one has a second.
+bool is_part_of_a_larger_board(const cv::Mat& luma, const Grid& grid) {
+  const auto line = [&](bool row, int index) {
+    Corners corners;
+    for (int i = 0; i < (row ? grid.inner.width : grid.inner.height); ++i)
+      corners.push_back(row ? grid.at(index, i) : grid.at(i, index));
+    return corners;
+  };
+  for (const bool row : {true, false}) {
+    const int last = (row ? grid.inner.height : grid.inner.width) - 1;
+    for (const auto& [outer, next] : {std::pair(0, 1), std::pair(last, last - 1)}) {
+      const Corners side = line(row, outer), inside = line(row, next);
+      // Two squares further out the colours are the same ones.
+      const double own = alternation(luma, side, inside, -0.5F);
+      const double beyond = alternation(luma, side, inside, 1.5F);
+      if (own != 0 && beyond / own > kLargerBoardShare) return true;
+    }
+  }
+  return false;
+}
+
+// Half the side of cornerSubPix's window. With 0.4 of a square, corners at the border of OpenCV's
+// boards, whose outermost squares are half as wide, moved by several pixels; 0.3 is safe.
+int refinement_reach(const Grid& grid) {
+  double least = 1e9;
+  for (int r = 0; r < grid.inner.height; ++r)
+    for (int c = 0; c < grid.inner.width; ++c) {
+      if (c > 0) least = std::min(least, cv::norm(grid.at(r, c) - grid.at(r, c - 1)));
+      if (r > 0) least = std::min(least, cv::norm(grid.at(r, c) - grid.at(r - 1, c)));
+    }
+  return std::clamp(static_cast<int>(0.3 * least), 2, 11);
+}
+
+// Turned by half where that makes the first square dark; boards that look the same then stay.
+void begin_with_a_dark_square(const cv::Mat& luma, cv::Size inner, Corners& corners) {
+  const Grid grid{corners, inner};
+  const auto square = [&](int r, int c) {
+    const cv::Point2f middle =
+        0.25F * (grid.at(r, c) + grid.at(r, c + 1) + grid.at(r + 1, c) + grid.at(r + 1, c + 1));
+    return mean_around(luma, middle);
+  };
+  if (square(0, 0) > square(inner.height - 2, inner.width - 2) && (inner.width + inner.height) % 2)
+    std::reverse(corners.begin(), corners.end());
+}
+
+double edge_rise_px(const cv::Mat& luma, cv::Size inner, const Corners& corners) {
+  double rise = 0;  // the slower of both directions: a moving camera blurs one
+  for (const bool vertical : {false, true})
+    rise = std::max(
+        rise, double(cv::estimateChessboardSharpness(luma, inner, corners, 0.8F, vertical)[0]));
+  return rise;
+}
+
+// What the search found, as it goes through the pipe, followed by the corners.
+struct Found {
+  Reason reason = Reason::kNoBoard;
+  int32_t seen_width = 0, seen_height = 0;
+  double edge_rise_px = 0;
+  uint32_t num_corners = 0;
+};
+
+bool is_dark(const cv::Mat& image) {
+  const cv::Mat bright = image > kDarkLevel;
+  return cv::countNonZero(bright) < static_cast<int>(image.total() / 100);
+}
+
+// Which chessboard is there when it is not the one that was asked for.
+void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
+  Corners corners;
+  cv::Mat meta;  // of the board's shape, a byte a corner
+  if (!cv::findChessboardCornersSB(small, kSmallestBoard, corners,
+                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER, meta))
+    return;
+  cv::Size seen = meta.size();
+  if ((seen.width < seen.height) != (inner.width < inner.height))
+    std::swap(seen.width, seen.height);
+  found.seen_width = seen.width;
+  found.seen_height = seen.height;
+  const bool holds_ours = seen.width >= inner.width && seen.height >= inner.height;
+  found.reason = holds_ours ? Reason::kOtherBoard : Reason::kPartialBoard;
+}
+
+Found search(const cv::Mat& luma, cv::Size inner, Corners& corners) {
+  Found found;
+  double scale = 1;
+  const cv::Mat small = shrunk(luma, kSearchSide, scale);
+  // The quick search first: its own check turns away most images without a board. The second one
+  // stands more noise and blur.
+  const bool is_whole =
+      cv::findChessboardCorners(
+          small, inner, corners,
+          cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK) ||
+      cv::findChessboardCornersSB(small, inner, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
+  if (!is_whole || corners.size() != static_cast<size_t>(inner.area())) {
+    corners.clear();
+    if (is_dark(small)) found.reason = Reason::kTooDark;
+    look_for_any_board(small, inner, found);
+    return found;
+  }
+  const auto to_full = static_cast<float>(1 / scale);
+  for (cv::Point2f& corner : corners)
+    corner = (corner + cv::Point2f(0.5F, 0.5F)) * to_full - cv::Point2f(0.5F, 0.5F);
+  const int reach = refinement_reach({corners, inner});
+  cv::cornerSubPix(luma, corners, cv::Size(reach, reach), cv::Size(-1, -1),
+                   cv::TermCriteria(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 0.0005));
+  const Grid grid{corners, inner};
+  if (!squares_alternate(luma, grid) || is_part_of_a_larger_board(luma, grid)) {
+    corners.clear();
+    look_for_any_board(small, inner, found);
+    found.reason = Reason::kOtherBoard;
+    return found;
+  }
+  begin_with_a_dark_square(luma, inner, corners);
+  found.reason = Reason::kUsed;
+  found.edge_rise_px = edge_rise_px(luma, inner, corners);
+  return found;
+}
+
+bool write_all(int file, const void* data, size_t size) {
+  const char* at = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t done = ::write(file, at, size);
+    if (done <= 0) return false;
+    at += done;
+    size -= static_cast<size_t>(done);
+  }
+  return true;
+}
+
+[[noreturn]] void search_as_child(int to_parent, const cv::Mat& luma, cv::Size inner,
+                                  int limit_seconds) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // Ctrl-C ends the parent
+  const rlim_t seconds = static_cast<rlim_t>(limit_seconds);
+  const rlimit limit{seconds, seconds + 1}, no_core{0, 0};
+  ::setrlimit(RLIMIT_CPU, &limit);
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  ::signal(SIGXCPU, SIG_DFL);
+  Corners corners;
+  Found found;
+  try {
+    found = search(luma, inner, corners);
+  } catch (const std::exception&) {  // OpenCV on an image of a few pixels
+    found = Found{};
+    corners.clear();
+  }
+  found.num_corners = static_cast<uint32_t>(corners.size());
+  const bool is_sent = write_all(to_parent, &found, sizeof found) &&
+                       write_all(to_parent, corners.data(), corners.size() * sizeof corners[0]);
+  ::_exit(is_sent ? 0 : 1);
+}
+
+// All that comes through the pipe until its other end closes or the time is over.
+std::string read_until(int from_child, std::chrono::steady_clock::time_point end) {
+  std::string bytes;
+  char part[4096];
+  for (;;) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        end - std::chrono::steady_clock::now());
+    pollfd wait{from_child, POLLIN, 0};
+    const int ready = left.count() > 0 ? ::poll(&wait, 1, static_cast<int>(left.count())) : 0;
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return bytes;
+    const ssize_t count = ::read(from_child, part, sizeof part);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return bytes;
+    bytes.append(part, static_cast<size_t>(count));
+  }
+}
+
+// False when the search did not end by itself.
+bool search_in_child(const cv::Mat& luma, cv::Size inner, int limit_seconds, Found& found,
+                     Corners& corners) {
+  int pipe_ends[2];
+  if (::pipe(pipe_ends) != 0) throw BadInput("no pipe: " + std::string(std::strerror(errno)));
+  const pid_t child = ::fork();
+  if (child < 0) throw BadInput("no process: " + std::string(std::strerror(errno)));
+  if (child == 0) {
+    ::close(pipe_ends[0]);
+    search_as_child(pipe_ends[1], luma, inner, limit_seconds);
+  }
+  ::close(pipe_ends[1]);
+  const std::string bytes =
+      read_until(pipe_ends[0], std::chrono::steady_clock::now() +
+                                   std::chrono::seconds(kWallPerCpu * limit_seconds));
+  ::close(pipe_ends[0]);
+  ::kill(child, SIGKILL);
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (bytes.size() < sizeof found) return false;
+  std::memcpy(&found, bytes.data(), sizeof found);
+  if (bytes.size() != sizeof found + found.num_corners * sizeof corners[0]) return false;
+  corners.resize(found.num_corners);
+  if (!corners.empty())
+    std::memcpy(corners.data(), bytes.data() + sizeof found, bytes.size() - sizeof found);
+  return true;
+}
+
+std::string number(double value, const char* unit) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.1f %s", value, unit);
+  return text;
+}
+
+}  // namespace
+
+const char* reason_name(Reason reason) {
+  constexpr const char* names[] = {"used",        "too_dark",   "no_board", "partial_board",
+                                   "other_board", "time_limit", "blurred",  "duplicate",
+                                   "surplus",     "outlier"};
+  return names[static_cast<int>(reason)];
+}
+
+const char* reason_words(Reason reason) {
+  constexpr const char* words[] = {"used",
+                                   "too dark",
+                                   "no chessboard",
+                                   "a part of the board",
+                                   "a larger board",
+                                   "search ended, too slow",
+                                   "blurred",
+                                   "as an earlier view",
+                                   "more than --max-views",
+                                   "error too large"};
+  return words[static_cast<int>(reason)];
+}
+
+BoardView find_board(const cv::Mat& luma, const std::string& name, cv::Size inner,
+                     int limit_seconds) {
+  BoardView view;
+  view.name = name;
+  view.thumbnail = shrunk(luma, kThumbnailSide, view.thumbnail_scale).clone();
+  Found found;
+  if (!search_in_child(luma, inner, limit_seconds, found, view.corners)) {
+    view.corners.clear();
+    view.reason = Reason::kTimeLimit;
+    view.detail = std::to_string(limit_seconds) + " s";
+    return view;
+  }
+  view.reason = found.reason;
+  view.seen = cv::Size(found.seen_width, found.seen_height);
+  view.edge_rise_px = found.edge_rise_px;
+  if (view.seen.area() > 0)
+    view.detail =
+        std::to_string(view.seen.width) + "x" + std::to_string(view.seen.height) + " seen";
+  return view;
+}
+
+void reject_blurred(std::vector<BoardView>& views) {
+  std::vector<double> rises;
+  for (const BoardView& view : views)
+    if (view.is_used()) rises.push_back(view.edge_rise_px);
+  if (rises.empty()) return;
+  std::nth_element(rises.begin(), rises.begin() + rises.size() / 2, rises.end());
+  // Where all are soft the median is no measure, and a sharp set may spread.
+  const double limit = std::max(kMaxRisePx, kMaxRiseOfMedian * rises[rises.size() / 2]);
+  for (BoardView& view : views) {
+    if (!view.is_used() || view.edge_rise_px <= std::min(limit, 2 * kMaxRisePx)) continue;
+    view.reason = Reason::kBlurred;
+    view.detail = "edges over " + number(view.edge_rise_px, "px");
+  }
+}
+
+double distance_px(const Corners& a, const Corners& b) {
+  double same = 0, turned = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    const cv::Point2f along = a[i] - b[i], back = a[i] - b[b.size() - 1 - i];
+    same += along.dot(along);
+    turned += back.dot(back);
+  }
+  return std::sqrt(std::min(same, turned) / static_cast<double>(a.size()));
+}
+
+void reject_duplicates(std::vector<BoardView>& views, cv::Size image) {
+  const double least = kMinMoveShare * std::hypot(image.width, image.height);
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (!views[i].is_used()) continue;
+    for (size_t j = 0; j < i; ++j) {
+      if (!views[j].is_used()) continue;
+      const double moved = distance_px(views[i].corners, views[j].corners);
+      if (moved >= least) continue;
+      views[i].reason = Reason::kDuplicate;
+      views[i].detail = number(moved, "px from ") + views[j].name;
+      break;
+    }
+  }
+}
+
+void reject_surplus(std::vector<BoardView>& views, int max_views) {
+  std::vector<BoardView*> left;
+  for (BoardView& view : views)
+    if (view.is_used()) left.push_back(&view);
+  if (static_cast<int>(left.size()) <= max_views) return;
+  // The most different ones: each next is the one farthest from all that were taken.
+  std::vector<double> nearest(left.size(), HUGE_VAL);
+  std::vector<bool> taken(left.size(), false);
+  size_t next = 0;
+  for (int n = 0; n < max_views; ++n) {
+    taken[next] = true;
+    size_t farthest = 0;
+    double best = -1;
+    for (size_t i = 0; i < left.size(); ++i) {
+      nearest[i] = std::min(nearest[i], distance_px(left[i]->corners, left[next]->corners));
+      if (taken[i] || nearest[i] <= best) continue;
+      best = nearest[i];
+      farthest = i;
+    }
+    next = farthest;
+  }
+  for (size_t i = 0; i < left.size(); ++i)
+    if (!taken[i]) left[i]->reason = Reason::kSurplus;
+}
+
+}  // namespace cli
