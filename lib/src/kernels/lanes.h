@@ -21,7 +21,9 @@
 #endif
 
 /* Before a loop whose number of turns is a constant, at most 10. */
-#if defined(__clang__)
+#if defined(__OPTIMIZE_SIZE__)
+#define TVK_UNROLL
+#elif defined(__clang__)
 #define TVK_UNROLL _Pragma("unroll")
 #else
 #define TVK_UNROLL _Pragma("GCC unroll 10")
