@@ -46,7 +46,7 @@ def _add_export(verbs):
     parser.add_argument("--schema", choices=("4", "3.8"), default="4",
                         help="COLMAP 4, or 3.8 as Debian has it (default: 4)")
     parser.add_argument("--append", action="store_true", help="add to a database that is there")
-    settings.add_options(parser)
+    settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS)
     parser.set_defaults(run=_export)
 
 

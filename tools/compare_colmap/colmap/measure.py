@@ -19,12 +19,12 @@ if __package__ in (None, ""):
     sys.path[:0] = [str(HERE.parent), str(ROOT / "python")]
     os.environ.setdefault("TWOVIEW_LIBRARY", str(ROOT / "build" / "release" / "lib" / "libtwoview.so"))
 
-from colmap import mapping, truth  # noqa: E402
+from colmap import mapping, settings, truth  # noqa: E402
 from colmap.errors import BadInput  # noqa: E402
 from colmap.model import read_model  # noqa: E402
 
 SETS = ("strecha_fountain_P11", "strecha_Herz_Jesus_P8", "tum_fr3_office")
-EXPORTS = {"twoview": {}, "twoview, 4096 keypoints": {"max_keypoints": 4096}}
+EXPORTS = {"twoview": {"max_keypoints": settings.MAPPING_KEYPOINTS}, "twoview, 2048 keypoints": {}}
 OWN = "COLMAP's own"
 
 

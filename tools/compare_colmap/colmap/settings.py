@@ -6,6 +6,8 @@ import twoview as tv
 
 _CHOICES = {"orientation": tv.Orientation, "descriptor": tv.Descriptor, "method": tv.Method}
 _KINDS = (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)
+# For a mapper, which has time and gains by long tracks: as many as COLMAP's own extractor (docs/colmap.md).
+MAPPING_KEYPOINTS = 8192
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
 
 
@@ -23,23 +25,24 @@ def _choice(enum):
     return convert
 
 
-def add_options(parser, kinds=_KINDS):
-    """A flag for each field of the options."""
+def add_options(parser, kinds=_KINDS, **defaults):
+    """A flag for each field of the options; defaults: those that are not the library's."""
     group = parser.add_argument_group("options of the stages (docs/cli.md)")
     for kind in kinds:
         for field in dataclasses.fields(kind):
             if field.name in _NOT_HERE:
                 continue
             flag = "--" + field.name.replace("_", "-")
+            default = defaults.get(field.name, field.default)
             if field.name in _CHOICES:
                 enum = _CHOICES[field.name]
-                group.add_argument(flag, type=_choice(enum), default=enum(field.default),
-                                   metavar="|".join(map(_spelt, enum)), help=_spelt(enum(field.default)))
+                group.add_argument(flag, type=_choice(enum), default=enum(default),
+                                   metavar="|".join(map(_spelt, enum)), help=_spelt(enum(default)))
             else:
-                number = int if field.default is None else type(field.default)
-                group.add_argument(flag, type=number, default=field.default,
+                number = int if default is None else type(default)
+                group.add_argument(flag, type=number, default=default,
                                    metavar="N" if number is int else "X",
-                                   help="the library's" if field.default is None else f"{field.default:g}")
+                                   help="the library's" if default is None else f"{default:g}")
 
 
 def options_of(arguments, kind):

@@ -13,7 +13,7 @@ import time
 import numpy as np
 import pytest
 import twoview as tv
-from colmap import exporter, schema38
+from colmap import exporter, schema38, settings
 from colmap.database import appended_database
 from colmap.errors import BadInput
 from conftest import CAMERA, HEIGHT, NAMES, WIDTH, run, start
@@ -85,8 +85,9 @@ def test_features_are_the_librarys(exported, photographs):
         for name in NAMES:
             image = database.read_image_with_name(name)
             luma = cv2.imread(str(photographs / "images" / name), cv2.IMREAD_GRAYSCALE)
-            with tv.Context(max_width=WIDTH, max_height=HEIGHT) as context:
-                keypoints, descriptors = tv.extract(context, luma)
+            most = settings.MAPPING_KEYPOINTS
+            with tv.Context(max_width=WIDTH, max_height=HEIGHT, max_keypoints=most) as context:
+                keypoints, descriptors = tv.extract(context, luma, max_keypoints=most)
             found = database.read_keypoints(image.image_id)
             np.testing.assert_array_equal(found[:, :2], np.column_stack([keypoints["x"], keypoints["y"]]) + 0.5)
             np.testing.assert_array_equal(database.read_descriptors(image.image_id).data, descriptors)
