@@ -19,6 +19,7 @@ typedef struct tvs_attitudes {
   } entries[TVS_ATTITUDES_CAPACITY];
 } tvs_attitudes;
 
+/* None known; null is allowed. */
 TV_API void tvs_attitudes_init(tvs_attitudes *attitudes);
 
 /* Adds an attitude measured at device_ns of the clock that attitude->clock_id names; the oldest goes
@@ -35,11 +36,12 @@ TV_API tvs_status tvs_attitudes_add(tvs_attitudes *attitudes, int64_t device_ns,
 TV_API tvs_status tvs_attitudes_at(const tvs_attitudes *attitudes, uint32_t clock_id,
                                    int64_t device_ns, int64_t max_gap_ns, tvs_attitude *attitude);
 
-/* The unit quaternion world_from_body of yaw, pitch, roll (radians), applied in this order about z, y,
+/* q: the unit quaternion world_from_body (w x y z) of yaw, pitch, roll (radians), applied in this order about z, y,
    x: pitch up, roll to the right and yaw clockwise from above are positive. */
 TV_API void tvs_quaternion_from_euler(double yaw, double pitch, double roll, double q[4]);
 
-/* Between two unit quaternions, s in [0, 1]. */
+/* q: on the shorter great circle between the unit quaternions a (s = 0) and b (s = 1), s in [0, 1]. It may be
+   a or b. */
 TV_API void tvs_slerp(const double a[4], const double b[4], double s, double q[4]);
 
 TV_END_DECLS

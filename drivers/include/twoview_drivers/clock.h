@@ -13,6 +13,7 @@
 
 TV_BEGIN_DECLS
 
+/* What is known of a device's clock beforehand. Filled by tvs_clock_options_init. */
 typedef struct tvs_clock_options {
   int64_t period_ns;      /* after this long the counter starts again, at least 60 s; 0: never */
   int64_t least_delay_ns; /* how late even the quickest packet may be. It cannot be observed: half of it
@@ -22,6 +23,7 @@ typedef struct tvs_clock_options {
   int32_t drift_ppm;      /* how fast the two clocks may part, [0, 10000], default 100 */
 } tvs_clock_options;
 
+/* Writes the defaults; period_ns is 0. Null is allowed. */
 TV_API void tvs_clock_options_init(tvs_clock_options *options);
 
 /* Private; a caller holds it and reads nothing. */
@@ -54,9 +56,12 @@ TV_API tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t 
 /* The device is known to have started again: the next stamp begins a new run. */
 TV_API void tvs_clock_restart(tvs_clock *clock);
 
-/* From one clock to the other, now. TVS_NONE when clock_id is not the current run. */
+/* An instant of the device's clock on the host's: *host_ns, off by at most *uncertainty_ns. TVS_NONE when clock_id
+   is not the current run. TVS_ERR_NULL, TVS_ERR_ARGUMENT (an instant out of range). */
 TV_API tvs_status tvs_clock_to_host(const tvs_clock *clock, uint32_t clock_id, int64_t device_ns,
                                     int64_t *host_ns, int64_t *uncertainty_ns);
+/* An instant of the host's clock on the device's: *device_ns of the run *clock_id, off by at most *uncertainty_ns.
+   TVS_NONE before the first observation. TVS_ERR_NULL, TVS_ERR_ARGUMENT (an instant out of range). */
 TV_API tvs_status tvs_clock_to_device(const tvs_clock *clock, int64_t host_ns, uint32_t *clock_id,
                                       int64_t *device_ns, int64_t *uncertainty_ns);
 

@@ -9,7 +9,7 @@ TV_BEGIN_DECLS
 /* Reads pictures in order; the caller knows the format. Times are those of the files. */
 typedef struct tvs_file_options {
   uint32_t struct_size; /* set by tvs_file_options_init */
-  void *user;
+  void *user;           /* first argument of the functions */
   /* Opens or decodes picture `index` (0, 1, ...): fills *picture and, where the file knows it,
      *device_ns (as it stands: index / frames_per_second). TVS_END after the last one; TVS_ERR_DATA for
      a picture that cannot be read, which is left out and makes the next one's gap flag. */
@@ -23,6 +23,7 @@ typedef struct tvs_file_options {
   int64_t max_gap_ns; /* between an attitude's neighbours (attitude.h), default 100 ms */
 } tvs_file_options;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tvs_file_options_init(tvs_file_options *options);
 
 /* About 75 kB: the attitudes. The caller's struct. Private. */

@@ -13,6 +13,7 @@ TV_BEGIN_DECLS
    Returns TVS_ERR_NULL, TVS_ERR_STATE (this libavcodec has no H.264 decoder), TVS_ERR_CAPACITY (no
    memory). */
 TV_API tvs_status tvs_h264_open(tvs_decoder *decoder);
+/* Closes what tvs_h264_open opened; null is allowed. */
 TV_API void tvs_h264_close(tvs_decoder *decoder);
 
 TV_END_DECLS

@@ -33,8 +33,8 @@ typedef struct tvs_time {
 
 /* An attitude, and how far it may be off: one standard deviation, radians, about any axis. */
 typedef struct tvs_attitude {
-  double world_from_body[4];
-  double sigma_rad;
+  double world_from_body[4]; /* unit quaternion, w x y z */
+  double sigma_rad;          /* above 0 */
   uint32_t clock_id; /* the run of the world frame that it belongs to */
   uint32_t reserved; /* 0 */
 } tvs_attitude;
@@ -57,6 +57,7 @@ typedef struct tvs_frame {
   void *handle;         /* the source's own */
 } tvs_frame;
 
+/* Where frames come from. Filled by a driver; the pointers live as long as its session. */
 typedef struct tvs_frame_source {
   uint32_t struct_size; /* sizeof(tvs_frame_source) */
   void *user;           /* first argument of the functions */
@@ -64,52 +65,54 @@ typedef struct tvs_frame_source {
      TVS_NONE: none yet (a live source does not wait). TVS_END: no more will come. Errors: frame as
      it was. Sources state how many frames may be held at once; at least 1. */
   tvs_status (*next)(void *user, tvs_frame *frame);
-  void (*release)(void *user, tvs_frame *frame);
+  void (*release)(void *user, tvs_frame *frame); /* the caller is done with the frame's pixels */
 } tvs_frame_source;
 
 /* Which fields of a sample were measured. A field without its bit is 0. */
 enum {
-  TVS_IMU_ATTITUDE = 1,
-  TVS_IMU_RATE = 2,
-  TVS_IMU_ACCELERATION = 4,
-  TVS_IMU_VELOCITY_XY = 8,
-  TVS_IMU_VELOCITY_Z = 16,
-  TVS_IMU_ALTITUDE = 32,
-  TVS_IMU_PRESSURE = 64
+  TVS_IMU_ATTITUDE = 1,     /* attitude */
+  TVS_IMU_RATE = 2,         /* rate_rad_s */
+  TVS_IMU_ACCELERATION = 4, /* acceleration_m_s2 */
+  TVS_IMU_VELOCITY_XY = 8,  /* velocity_m_s[0], [1] */
+  TVS_IMU_VELOCITY_Z = 16,  /* velocity_m_s[2] */
+  TVS_IMU_ALTITUDE = 32,    /* altitude_m */
+  TVS_IMU_PRESSURE = 64     /* pressure_pa */
 };
 
 /* One sample. Sigmas are one standard deviation of each component, as the source states them. */
 typedef struct tvs_imu {
   uint32_t struct_size; /* set by the caller: sizeof(tvs_imu) */
   uint32_t valid;       /* TVS_IMU_ bits */
-  tvs_time time;
-  tvs_attitude attitude;
+  tvs_time time;         /* of the measurement */
+  tvs_attitude attitude; /* with its own sigma */
   double rate_rad_s[3], rate_sigma;             /* body axes */
   double acceleration_m_s2[3], acceleration_sigma; /* body axes, specific force: (0, 0, -9.8) at rest */
   double velocity_m_s[3], velocity_sigma;       /* body axes */
   double altitude_m, altitude_sigma;            /* height above the ground below, up is positive */
-  double pressure_pa, pressure_sigma;
+  double pressure_pa, pressure_sigma;           /* of the air, not reduced to sea level */
 } tvs_imu;
 
+/* Where IMU samples come from. Filled as a tvs_frame_source. */
 typedef struct tvs_imu_source {
   uint32_t struct_size; /* sizeof(tvs_imu_source) */
-  void *user;
+  void *user;           /* first argument of the function */
   tvs_status (*next)(void *user, tvs_imu *sample); /* as tvs_frame_source's, with nothing to release */
 } tvs_imu_source;
 
-/* Turns one compressed picture into luma. h264.h makes one from libavcodec. */
+/* A decoded picture. */
 typedef struct tvs_picture {
   tv_image image; /* the decoder's memory, until release */
   void *handle;   /* the decoder's own */
 } tvs_picture;
 
+/* Turns one compressed picture into luma. h264.h makes one from libavcodec. */
 typedef struct tvs_decoder {
   uint32_t struct_size; /* sizeof(tvs_decoder) */
-  void *user;
+  void *user;           /* first argument of the functions */
   /* TVS_OK: *picture is filled, release it later. TVS_NONE: no picture from these bytes.
      TVS_ERR_DATA: they do not decode. Pictures that were not released stay valid. */
   tvs_status (*decode)(void *user, const uint8_t *bytes, size_t size, tvs_picture *picture);
-  void (*release)(void *user, tvs_picture *picture);
+  void (*release)(void *user, tvs_picture *picture); /* its pixels are no longer needed */
   void (*reset)(void *user); /* forget all earlier bytes: another stream begins */
 } tvs_decoder;
 

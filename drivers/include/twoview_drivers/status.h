@@ -9,7 +9,7 @@ TV_BEGIN_DECLS
 /* "Nothing now" and "over" are answers, not errors. On an error the outputs are as they were, but
    for a size that the function says it writes. */
 typedef enum tvs_status {
-  TVS_OK = 0,
+  TVS_OK = 0,               /* done */
   TVS_NONE = 1,             /* nothing now, or not known; ask again later */
   TVS_END = 2,              /* over: closed by the other side, or the end of a recording */
   TVS_ERR_NULL = 16,        /* a required pointer is null */

@@ -27,16 +27,18 @@ typedef struct tv_bundle_options {
   int32_t hold_pose;      /* 1: R and t stay, each point goes to its least error; default 0 */
 } tv_bundle_options;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tv_bundle_options_init(tv_bundle_options *options);
 
+/* What tv_adjust_two_view did, and how sure the pose is. */
 typedef struct tv_bundle_result {
   uint32_t struct_size; /* set by tv_bundle_result_init */
   int32_t num_points;   /* that took part */
-  int32_t num_iterations;
+  int32_t num_iterations; /* steps tried */
   uint8_t converged;      /* 1: the last step changed the cost by at most 1e-10 of it, or none,
                              however short, lowers it */
   uint8_t has_covariance; /* 0: five parameters are not determined, or the pose was held */
-  uint8_t reserved[2];
+  uint8_t reserved[2];    /* 0 */
   double initial_cost, final_cost; /* sum of rho over the points that took part, px^2 */
   double initial_rms_px, rms_px;   /* root mean square of |e0| and |e1| over them, without rho */
   double covariance[25]; /* of the pose, radians^2, order (w0 w1 w2 a b): R_true = exp([w]x) R,
@@ -48,6 +50,7 @@ typedef struct tv_bundle_result {
                             `covariance` is the loss's own asymptotic covariance (Huber 1981) */
 } tv_bundle_result;
 
+/* Writes zeros, and struct_size; null is allowed. */
 TV_API void tv_bundle_result_init(tv_bundle_result *result);
 
 /* Minimises the sum over matches of rho over the pose (R, and the direction of t; |t| stays) and

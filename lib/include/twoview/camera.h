@@ -36,7 +36,7 @@ TV_API tv_status tv_camera_check(const tv_camera *camera);
 /* The model is used only where its distortion is monotonic: up to this angle (radians) off the
    optical axis, found from the derivative's first zero, and bounded by what 64-bit Newton can
    invert. Writes *angle_rad in [0, pi/2] (pi for Kannala-Brandt); 0 for a
-   distortion so strong that no ray is left. */
+   distortion so strong that no ray is left. Returns TV_ERR_NULL, TV_ERR_CAMERA. */
 TV_API tv_status tv_camera_valid_angle(const tv_camera *camera, double *angle_rad);
 
 /* Pixel of a point (or ray) in the camera frame (x right, y down, z forward).
@@ -66,14 +66,15 @@ TV_API tv_status tv_camera_unproject(const tv_camera *camera, const double pixel
 TV_API tv_status tv_camera_unproject_points(const tv_camera *camera, const double *pixels,
                                             int32_t num_pixels, double *rays, uint8_t *inside);
 
-/* The pixel where a camera without distortion and with the same fx fy cx cy would see what this one
-   sees at `pixel`. Returns as tv_camera_unproject; TV_ERR_OUTSIDE also for rays at 90 degrees and
+/* undistorted: the pixel where a camera without distortion and with the same fx fy cx cy would see what
+   this one sees at `pixel`. Returns as tv_camera_unproject; TV_ERR_OUTSIDE also for rays at 90 degrees and
    more. */
 TV_API tv_status tv_camera_undistort(const tv_camera *camera, const double pixel[2],
                                      double undistorted[2]);
 
 /* The camera of an image that was scaled by `scale` in (0, 16]: f' = s f, c' = s (c + 0.5) - 0.5,
-   width and height rounded to the nearest, at least 1. */
+   width and height rounded to the nearest, at least 1.
+   Returns TV_ERR_NULL, TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_ARGUMENT (scale, or a result that no camera has). */
 TV_API tv_status tv_camera_scale(const tv_camera *camera, double scale, tv_camera *scaled);
 
 TV_END_DECLS

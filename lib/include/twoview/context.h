@@ -13,6 +13,7 @@
 
 TV_BEGIN_DECLS
 
+/* All that the library keeps between calls and needs within them. One thread at a time. */
 typedef struct tv_context tv_context;
 
 /* The memory of a context starts at a multiple of this many bytes. */
@@ -23,10 +24,10 @@ typedef struct tv_context tv_context;
 typedef enum tv_kernels {
   TV_KERNELS_AUTO = 0, /* the fastest that this CPU and this build have */
   TV_KERNELS_C = 1,    /* portable C, the definition of the others */
-  TV_KERNELS_SSE2 = 2,
-  TV_KERNELS_AVX2 = 3,
-  TV_KERNELS_AVX512 = 4,
-  TV_KERNELS_NEON = 5
+  TV_KERNELS_SSE2 = 2,   /* every x86-64 */
+  TV_KERNELS_AVX2 = 3,   /* x86-64 from Haswell and Excavator on */
+  TV_KERNELS_AVX512 = 4, /* x86-64 with F, BW, VL and VNNI */
+  TV_KERNELS_NEON = 5    /* aarch64, and armv7 with NEON */
 } tv_kernels;
 
 /* What a context is made for. Filled by tv_limits_init; change a field before tv_context_size. */
@@ -39,9 +40,10 @@ typedef struct tv_limits {
   int32_t kernels;       /* a tv_kernels, default TV_KERNELS_AUTO */
 } tv_limits;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tv_limits_init(tv_limits *limits);
 
-/* Writes the bytes of memory that a context with these limits needs. The figure depends on nothing
+/* Writes to *size_bytes what a context with these limits needs. The figure depends on nothing
    but the limits and the library's version.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (a limit out of range). */
 TV_API tv_status tv_context_size(const tv_limits *limits, size_t *size_bytes);
@@ -63,23 +65,28 @@ TV_API const char *tv_kernels_string(tv_kernels kernels);
 TV_API size_t tv_context_high_water(const tv_context *context);
 
 /* Where the time goes. The library reads no clock; a caller who wants stage times lends it one that
-   returns nanoseconds from any fixed origin. Null takes it away again. */
+   returns nanoseconds from any fixed origin. */
 typedef uint64_t (*tv_clock)(void *user);
+
+/* Lends the context a clock, called from within its calls with `user`; both are the caller's and live as
+   long as the context. A null clock takes it away again. Returns TV_ERR_NULL. */
 TV_API tv_status tv_context_set_clock(tv_context *context, tv_clock now_ns, void *user);
 
+/* Where the time of a call goes; indices of tv_context_take_times. */
 typedef enum tv_stage {
-  TV_STAGE_PYRAMID = 0,
-  TV_STAGE_DETECT = 1,
+  TV_STAGE_PYRAMID = 0,  /* levels and octaves of the image */
+  TV_STAGE_DETECT = 1,   /* corners */
   TV_STAGE_DESCRIBE = 2, /* orientation and descriptor */
-  TV_STAGE_MATCH = 3,
+  TV_STAGE_MATCH = 3,    /* both directions, and guided matching */
   TV_STAGE_ESTIMATE = 4, /* the robust loop */
-  TV_STAGE_REFINE = 5,   /* refinement on all inliers, rival models, verdict, covariance */
-  TV_STAGE_TRIANGULATE = 6,
-  TV_NUM_STAGES = 7
+  TV_STAGE_REFINE = 5,   /* refinement on all inliers, rival models, verdict, covariance;
+                            bundle adjustment */
+  TV_STAGE_TRIANGULATE = 6, /* tv_reconstruct's points */
+  TV_NUM_STAGES = 7      /* how many there are */
 } tv_stage;
 
 /* Writes the nanoseconds spent in each stage since the last call of this function (or init), all 0
-   without a clock, and starts again from 0. stage_ns holds TV_NUM_STAGES values. */
+   without a clock, and starts again from 0. stage_ns holds TV_NUM_STAGES values. Returns TV_ERR_NULL. */
 TV_API tv_status tv_context_take_times(tv_context *context, uint64_t *stage_ns);
 
 TV_END_DECLS

@@ -11,8 +11,10 @@
 
 TV_BEGIN_DECLS
 
+/* Bytes of a descriptor: 4 x 4 cells of 8 directions. */
 #define TV_DESCRIPTOR_BYTES 128
 
+/* A corner, and where and how wide its surroundings are described. */
 typedef struct tv_keypoint {
   float x, y;      /* pixels of the full image; (0,0) is the centre of its top-left pixel */
   float size;      /* diameter in pixels of the full image; a descriptor's spatial bin is 1.5 size */
@@ -21,11 +23,13 @@ typedef struct tv_keypoint {
   int32_t level;   /* pyramid level it was found on, 0 the full image */
 } tv_keypoint;
 
+/* Which way a descriptor's frame is turned. */
 typedef enum tv_orientation {
   TV_ORIENTATION_UPRIGHT = 0, /* angle 0: for cameras that do not roll; cheaper, more distinctive */
   TV_ORIENTATION_GRADIENT = 1 /* Lowe's histogram; a second peak above 80 per cent is a second keypoint */
 } tv_orientation;
 
+/* How a descriptor is normalised; both are bytes, and compared by L2 distance. */
 typedef enum tv_descriptor {
   TV_DESCRIPTOR_SIFT = 0,    /* unit L2 norm x 512, saturated at 255 */
   TV_DESCRIPTOR_ROOTSIFT = 1 /* square root of the unit-L1 descriptor x 512, saturated */
@@ -57,6 +61,7 @@ typedef struct tv_feature_options {
                             larger sees more of the surroundings: more distinctive, less local */
 } tv_feature_options;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tv_feature_options_init(tv_feature_options *options);
 
 /* Finds corners. The result is in descending order of (score, then level, y, x).
@@ -74,23 +79,27 @@ TV_API tv_status tv_detect(tv_context *context, const tv_image *image, const tv_
 
 /* Gives each of the keypoints its dominant orientation, by options->orientation; those with a second
    one appear twice, one after the other, angle apart. The order is the input's. Reads x, y, size.
-   keypoints and oriented may not overlap. Statuses as tv_detect, and TV_ERR_NOT_FINITE. */
+   oriented: the caller's array of cap_oriented; overlaps no other argument. *num_oriented: how many were
+   written; on TV_ERR_CAPACITY how many there are. Statuses as tv_detect, and TV_ERR_NOT_FINITE. */
 TV_API tv_status tv_orient(tv_context *context, const tv_image *image,
                            const tv_feature_options *options, const tv_keypoint *keypoints,
                            int32_t num_keypoints, tv_keypoint *oriented, int32_t cap_oriented,
                            int32_t *num_oriented);
 
-/* Describes the image at the points that the caller gives (x, y, size, angle_rad are read).
+/* Describes the image at the keypoints that the caller gives (x, y, size, angle_rad are read).
    descriptors: num_keypoints x TV_DESCRIPTOR_BYTES, row i for keypoint i: 4x4 cells of 8 directions,
    index (cell_y * 4 + cell_x) * 8 + direction in the frame turned by angle_rad, direction counter-
    clockwise from x as seen in the image (UBC order, as OpenCV's and COLMAP's). A point beyond the image's
-   border is described from what the image's nearest pixels show; a flat patch gives zeros. */
+   border is described from what the image's nearest pixels show; a flat patch gives zeros.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS (the image), TV_ERR_NOT_FINITE,
+   TV_ERR_OVERLAP. */
 TV_API tv_status tv_describe(tv_context *context, const tv_image *image,
                              const tv_feature_options *options, const tv_keypoint *keypoints,
                              int32_t num_keypoints, uint8_t *descriptors);
 
 /* tv_detect, tv_orient and tv_describe over one pyramid: what a program usually wants.
-   descriptors: cap_keypoints x TV_DESCRIPTOR_BYTES. */
+   mask, keypoints, *num_keypoints and statuses as tv_detect; angle_rad is that of tv_orient.
+   descriptors: cap_keypoints x TV_DESCRIPTOR_BYTES, rows as tv_describe. */
 TV_API tv_status tv_extract(tv_context *context, const tv_image *image, const tv_image *mask,
                             const tv_feature_options *options, tv_keypoint *keypoints,
                             uint8_t *descriptors, int32_t cap_keypoints, int32_t *num_keypoints);

@@ -8,6 +8,7 @@
 
 TV_BEGIN_DECLS
 
+/* A row of one image's descriptors and the row of the other's that it belongs to. */
 typedef struct tv_correspondence {
   int32_t idx0, idx1; /* rows of descriptors0 and descriptors1 */
   uint32_t dist_sq;   /* squared L2 distance of the two */
@@ -22,6 +23,7 @@ typedef struct tv_match_options {
                            1 keeps ties out only */
 } tv_match_options;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tv_match_options_init(tv_match_options *options);
 
 /* Exact two nearest neighbours in both directions; a pair is kept when each is the other's nearest
@@ -54,6 +56,7 @@ typedef struct tv_guided_options {
                              default 4 */
 } tv_guided_options;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tv_guided_options_init(tv_guided_options *options);
 
 /* A second matching pass: the nearest neighbour among the keypoints within a band along the epipolar
@@ -67,7 +70,8 @@ TV_API void tv_guided_options_init(tv_guided_options *options);
    A keypoint outside its lens's valid region is not matched.
    keypoints, descriptors: num of each, num in [0, context's max_keypoints]; keypoints are checked as
    tv_describe checks them, all of their fields. options may be null.
-   The result is in ascending order of idx0; capacity of min(num0, num1) is always enough.
+   correspondences: the caller's array, in ascending order of idx0; capacity of min(num0, num1) is always
+   enough.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
    TV_ERR_NOT_FINITE, TV_ERR_CAPACITY (*num_correspondences then is how many there are),
    TV_ERR_OVERLAP.

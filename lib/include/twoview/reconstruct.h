@@ -9,20 +9,20 @@
 
 TV_BEGIN_DECLS
 
-/* One view of the pair. mask: null, or an image of the same size, 0 where no corner is wanted. */
+/* One view of the pair. All of it is the caller's and lives as long as the call. */
 typedef struct tv_view {
-  tv_image image;
-  const tv_camera *camera;
-  const tv_image *mask;
+  tv_image image;          /* 8-bit luma */
+  const tv_camera *camera; /* of this image; null in both views: uncalibrated, no pose */
+  const tv_image *mask;    /* null, or an image of the same size, 0 where no corner is wanted */
 } tv_view;
 
-/* Filled by tv_reconstruct_options_init. Null stage options mean that stage's defaults. */
+/* Filled by tv_reconstruct_options_init. */
 typedef struct tv_reconstruct_options {
   uint32_t struct_size;  /* set by tv_reconstruct_options_init */
   int32_t triangulation; /* a tv_triangulation; default TV_TRIANGULATION_ITERATIVE_LS */
-  const tv_feature_options *feature;
-  const tv_match_options *match;
-  const tv_estimate_options *estimate;
+  const tv_feature_options *feature;   /* null (default): the stage's defaults; else the caller's */
+  const tv_match_options *match;       /* the same */
+  const tv_estimate_options *estimate; /* the same */
   int32_t guided_matching; /* 1: after a first full pose, matches along its epipolar lines join the
                               others (tv_match_guided with its defaults) and all are estimated again;
                               default 0 */
@@ -32,22 +32,24 @@ typedef struct tv_reconstruct_options {
                                 as near the truth (docs/decisions/0005-bundle.md) */
 } tv_reconstruct_options;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tv_reconstruct_options_init(tv_reconstruct_options *options);
 
 /* What tv_reconstruct found. The arrays lie in the context and hold until the next call with it. */
 typedef struct tv_reconstruction {
   uint32_t struct_size; /* set by tv_reconstruction_init */
-  int32_t num_keypoints[2];
-  const tv_keypoint *keypoints[2];
+  int32_t num_keypoints[2];        /* of view 0 and 1, second orientations included */
+  const tv_keypoint *keypoints[2]; /* num_keypoints */
   const uint8_t *descriptors[2]; /* num_keypoints x TV_DESCRIPTOR_BYTES */
-  int32_t num_matches;
+  int32_t num_matches; /* those of tv_match, and of guided matching where that was taken */
   int32_t num_points; /* inliers whose point is TV_POINT_OK */
-  const tv_correspondence *matches;
-  const uint8_t *inlier_mask; /* num_matches */
+  const tv_correspondence *matches; /* num_matches, rows of keypoints */
+  const uint8_t *inlier_mask; /* num_matches, 1 for an inlier of the model that the result's config names */
   const tv_point *points;     /* num_matches; TV_POINT_INVALID where the match is no inlier, or where
                                  there is no full pose */
 } tv_reconstruction;
 
+/* Writes zeros, and struct_size; null is allowed. */
 TV_API void tv_reconstruction_init(tv_reconstruction *reconstruction);
 
 /* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate. With bundle_adjustment

@@ -5,13 +5,16 @@
 #include "twoview/version.h"
 
 #if defined(__GNUC__)
+/* Marks what the shared library exports; everything else in it is hidden. */
 #define TV_API __attribute__((visibility("default")))
 #else
 #define TV_API
 #endif
 
 #ifdef __cplusplus
+/* From here on names are C's, in C++ too. */
 #define TV_BEGIN_DECLS extern "C" {
+/* Up to here. */
 #define TV_END_DECLS }
 #else
 #define TV_BEGIN_DECLS
@@ -24,7 +27,7 @@ TV_BEGIN_DECLS
    result (see two_view.h). On any error the outputs are as they were, but for a size or count that
    the function says it writes. Values are stable across releases of one major version. */
 typedef enum tv_status {
-  TV_OK = 0,
+  TV_OK = 0,              /* done; also when the answer is that there is no geometry */
   TV_ERR_NULL = 1,        /* a required pointer is null */
   TV_ERR_ARGUMENT = 2,    /* a value is out of its documented range */
   TV_ERR_NOT_FINITE = 3,  /* NaN or infinity where a finite number is required */

@@ -26,8 +26,9 @@ typedef enum tv_triangulation {
   TV_TRIANGULATION_MIDPOINT = 6         /* the distances from the point to both rays */
 } tv_triangulation;
 
+/* What a point's position is. */
 typedef enum tv_point_status {
-  TV_POINT_OK = 0,
+  TV_POINT_OK = 0,       /* in front of both cameras: position is the point */
   TV_POINT_INFINITE = 1, /* rays parallel within what a double can tell, or the method's answer at
                             infinity: position is the unit direction in camera 0 */
   TV_POINT_BEHIND = 2,   /* the rays meet behind a camera: position is where */
@@ -35,6 +36,7 @@ typedef enum tv_point_status {
                             along the baseline: zeros */
 } tv_point_status;
 
+/* What is known of the point that one match sees. */
 typedef struct tv_point {
   double position[3]; /* camera 0 frame, in units of |t|; never NaN */
   float angle_rad;    /* between the two rays; 0 if invalid */

@@ -7,12 +7,14 @@
 
 TV_BEGIN_DECLS
 
+/* The minimal solver that the robust loop samples with. */
 typedef enum tv_method {
   TV_METHOD_FIVE_POINT = 0,  /* Nister, "An efficient solution to the five-point relative pose
                                 problem", PAMI 2004; the default, cameras needed */
   TV_METHOD_EIGHT_POINT = 1, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
                                 paper's path */
-  TV_METHOD_SEVEN_POINT = 2,
+  TV_METHOD_SEVEN_POINT = 2, /* Hartley, Zisserman, "Multiple View Geometry", 11.1.2: smaller samples,
+                                where many matches are wrong */
   TV_METHOD_UPRIGHT = 3      /* three points and gravity; cameras and gravity needed */
 } tv_method;
 
@@ -27,10 +29,11 @@ typedef enum tv_config {
   TV_CONFIG_NO_MOTION = 6           /* the camera did not move: R = I */
 } tv_config;
 
+/* Whether to believe the pose. docs/algorithms/two_view.md has the rules. */
 typedef enum tv_verdict {
-  TV_VERDICT_REFUSED = 0,
-  TV_VERDICT_DOUBTFUL = 1,
-  TV_VERDICT_OK = 2
+  TV_VERDICT_REFUSED = 0,  /* there is no full pose */
+  TV_VERDICT_DOUBTFUL = 1, /* there is one, and a reason against it */
+  TV_VERDICT_OK = 2        /* no reason against it */
 } tv_verdict;
 
 /* Why a verdict is not "ok": bits of tv_two_view.reasons. */
@@ -52,10 +55,11 @@ typedef enum tv_reason {
                                            0 lie as on a lattice: matched one period off, perhaps */
 } tv_reason;
 
-/* "calibrated", "planar_or_panoramic", "ok", "low_parallax" ...; "unknown" for any other number.
-   Static storage. */
+/* "calibrated", "planar_or_panoramic" ...; "unknown" for any other number. Static storage. */
 TV_API const char *tv_config_string(tv_config config);
+/* "ok", "doubtful", "refused"; "unknown" for any other number. Static storage. */
 TV_API const char *tv_verdict_string(tv_verdict verdict);
+/* "low_parallax" ...; "unknown" for anything but one of the bits. Static storage. */
 TV_API const char *tv_reason_string(tv_reason reason);
 
 /* Filled by tv_estimate_options_init. */
@@ -75,6 +79,7 @@ typedef struct tv_estimate_options {
                                [0, pi]; 0 (default): gravity is not known */
 } tv_estimate_options;
 
+/* Writes the defaults, and struct_size; null is allowed. */
 TV_API void tv_estimate_options_init(tv_estimate_options *options);
 
 /* Everything that was found. Matrices are row-major; those whose has_ flag is 0 hold zeros. */
@@ -83,20 +88,20 @@ typedef struct tv_two_view {
   int32_t config;       /* a tv_config */
   int32_t verdict;      /* a tv_verdict */
   uint32_t reasons;     /* tv_reason bits */
-  int32_t num_matches;
-  int32_t num_inliers; /* of the model that config names */
+  int32_t num_matches;  /* as given */
+  int32_t num_inliers;  /* of the model that config names */
   uint8_t has_R, has_t, has_E, has_F, has_H, has_alternative, has_covariance,
-      has_alternative_covariance;
+      has_alternative_covariance; /* 1: the member of that name was estimated */
   int32_t num_iterations; /* samples drawn */
   double R[9], t[3];      /* cam1_from_cam0: x1 = R x0 + t, |t| = 1 */
   double E[9];            /* [t]x R, Frobenius norm 1, the sign that this gives */
   double F[9];            /* K1^-T E K0^-1, Frobenius norm 1; of undistorted pixels */
   double H[9];            /* undistorted pixels of image 0 to image 1; H[8] = 1 where finite */
-  double alternative_R[9], alternative_t[3]; /* the second pose of a plane */
+  double alternative_R[9], alternative_t[3]; /* the second pose of a plane, |t| = 1 */
   double covariance[25]; /* radians^2, order (w0 w1 w2 a b): R_true = exp([w]x) R,
                             t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), k the index
                             of the smallest |t_k| (the lowest on a tie), b2 = t x b1 */
-  double alternative_covariance[25]; /* the same around the alternative pose */
+  double alternative_covariance[25]; /* radians^2, the same around the alternative pose */
   int32_t essential_inliers, fundamental_inliers, homography_inliers,
       rotation_inliers;       /* evidence: inliers of each model, -1 where it was not estimated */
   double coverage;            /* share of an 8x8 grid on image 0 that holds an inlier, [0, 1] */
@@ -107,6 +112,7 @@ typedef struct tv_two_view {
   uint64_t seed;              /* as used */
 } tv_two_view;
 
+/* Writes zeros, and struct_size; null is allowed. */
 TV_API void tv_two_view_init(tv_two_view *result);
 
 /* Estimates the two-view geometry of num_matches matched pixels.

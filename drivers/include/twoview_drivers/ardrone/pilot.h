@@ -36,6 +36,7 @@ typedef struct ardrone_pilot {
   int trims_left;
 } ardrone_pilot;
 
+/* No link, no wish; null is allowed. */
 TV_API void ardrone_pilot_init(ardrone_pilot *pilot);
 
 /* The link is new, or was lost: sequence numbers start again at 1, the drone's state is unknown, the
@@ -45,14 +46,24 @@ TV_API void ardrone_pilot_new_link(ardrone_pilot *pilot);
 /* The state word of every accepted navdata packet. */
 TV_API void ardrone_pilot_state(ardrone_pilot *pilot, uint32_t state, int64_t now_ns);
 
-/* Wishes. TVS_ERR_STATE: the drone's state is not known, or forbids it (take-off in an emergency,
-   trim while flying); TVS_ERR_ARGUMENT: a component outside [-1, 1]. */
+/* The wish to fly, until something ends it (above). Returns TVS_ERR_NULL; TVS_ERR_STATE: the drone's state is
+   not known, or it is in an emergency. */
 TV_API tvs_status ardrone_pilot_take_off(ardrone_pilot *pilot, int64_t now_ns);
+/* Ends the wish to fly: the drone is told to land. Returns TVS_ERR_NULL. */
 TV_API tvs_status ardrone_pilot_land(ardrone_pilot *pilot);
+/* Ends a movement. Returns TVS_ERR_NULL. */
 TV_API tvs_status ardrone_pilot_hover(ardrone_pilot *pilot);
+/* A movement, for ARDRONE_MOVE_HOLD_NS. Returns TVS_ERR_NULL; TVS_ERR_ARGUMENT: a component outside [-1, 1];
+   TVS_ERR_STATE: there is no wish to fly. */
 TV_API tvs_status ardrone_pilot_move(ardrone_pilot *pilot, const ardrone_move *move, int64_t now_ns);
+/* Emergency: the motors stop and the drone falls. Nothing to do where it is in an emergency already.
+   Returns TVS_ERR_NULL, TVS_ERR_STATE (re-arming is under way). */
 TV_API tvs_status ardrone_pilot_cut_motors(ardrone_pilot *pilot, int64_t now_ns);
+/* Out of an emergency. Nothing to do where there is none. Returns TVS_ERR_NULL; TVS_ERR_STATE: the drone's state
+   is not known. */
 TV_API tvs_status ardrone_pilot_rearm(ardrone_pilot *pilot, int64_t now_ns);
+/* The drone stands level, on the ground. Returns TVS_ERR_NULL; TVS_ERR_STATE: its state is not known, it flies,
+   or is to fly. */
 TV_API tvs_status ardrone_pilot_flat_trim(ardrone_pilot *pilot);
 
 /* When a tick is due, begins a datagram in pilot->at, writes what it is to hold, and returns 1: the

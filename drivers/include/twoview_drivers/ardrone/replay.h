@@ -33,6 +33,7 @@ typedef struct ardrone_replay {
    Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (a path of 4000 bytes and more), TVS_ERR_IO (neither file). */
 TV_API tvs_status ardrone_replay_open(ardrone_replay *replay, const char *folder,
                                       ardrone_transport *transport);
+/* Closes the files; null is allowed. */
 TV_API void ardrone_replay_close(ardrone_replay *replay);
 
 /* The time of the caller's clock, before each step: the first call starts the playing. Any clock will do; one that
@@ -46,9 +47,7 @@ TV_API int64_t ardrone_replay_next_ns(const ardrone_replay *replay);
 /* The recorded host time that an instant of the caller's clock plays. */
 TV_API int64_t ardrone_replay_host_ns(const ardrone_replay *replay, int64_t now_ns);
 
-/* A navdata.log alone, as an IMU source: for file_source.h. The samples' device times are the recording's host
-   times, freed of the network's jitter by the drone's own stamps; clock_id 1 throughout, or another
-   one after a reboot. The caller's struct. Private. */
+/* A navdata.log alone, read as an IMU source. The caller's struct. Private. */
 typedef struct ardrone_log {
   void *file; /* FILE */
   tvs_clock clock;
@@ -57,7 +56,12 @@ typedef struct ardrone_log {
   uint32_t psi0_clock_id;
   double psi0_rad;
 } ardrone_log;
+
+/* Opens the file at `path` and fills *source, for file_source.h. The samples' device times are the recording's
+   host times, freed of the network's jitter by the drone's own stamps; clock_id 1 throughout, or another one
+   after a reboot. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not open). */
 TV_API tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *source);
+/* Closes the file; null is allowed. */
 TV_API void ardrone_log_close(ardrone_log *log);
 
 TV_END_DECLS

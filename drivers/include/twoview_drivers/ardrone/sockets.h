@@ -6,6 +6,7 @@
 
 TV_BEGIN_DECLS
 
+/* The drone's address in its own network. */
 #define ARDRONE_DEFAULT_HOST "192.168.1.1"
 
 /* The caller's struct. Private but for `port`. */
@@ -29,8 +30,8 @@ TV_API int64_t ardrone_now_ns(void);
 /* Waits until something arrives or the next step is due, but not longer than until_ns; a signal ends the wait. */
 TV_API void ardrone_session_wait(const ardrone_session *session, int64_t until_ns);
 
-/* Steps until until_ns (INT64_MAX: no end), or until keep_going, asked after each step, says 0. Returns
-   the last step's status. */
+/* Steps until until_ns (INT64_MAX: no end), or until keep_going, asked after each step with `user`, says 0; a null
+   keep_going always goes on. Returns as ardrone_session_step, for the last step. */
 TV_API tvs_status ardrone_session_run(ardrone_session *session, int64_t until_ns,
                                       int (*keep_going)(void *user), void *user);
 

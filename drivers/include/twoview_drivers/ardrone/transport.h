@@ -12,15 +12,17 @@
 
 TV_BEGIN_DECLS
 
+/* The five ways between a session and its drone. */
 typedef enum ardrone_channel {
   ARDRONE_CHANNEL_AT,        /* UDP 5556, to the drone */
   ARDRONE_CHANNEL_NAVDATA,   /* UDP 5554, both ways */
   ARDRONE_CHANNEL_VIDEO,     /* TCP 5555, from the drone */
   ARDRONE_CHANNEL_CONTROL,   /* TCP 5559, from the drone */
   ARDRONE_CHANNEL_RECORDING, /* TCP 5553, from the drone */
-  ARDRONE_NUM_CHANNELS
+  ARDRONE_NUM_CHANNELS       /* how many there are */
 } ardrone_channel;
 
+/* Filled by whoever transports; the session calls. */
 typedef struct ardrone_transport {
   uint32_t struct_size; /* sizeof(ardrone_transport) */
   void *user;           /* first argument of the functions */
