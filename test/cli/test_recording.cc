@@ -42,6 +42,7 @@ struct Plan {
   simulator::Vec3 start;
   float roll, pitch, climb, turn;
   simulator::Sensors sensors;
+  int picture_delay_ms = 40;
 };
 
 simulator::Sensors sensors(double altitude_factor, double velocity_factor) {
@@ -55,6 +56,8 @@ simulator::Sensors sensors(double altitude_factor, double velocity_factor) {
 const Plan kSideways{"sideways", {0, -2, 0}, 0.25F, 0, 0, 0, sensors(1, 1.02)};
 const Plan kForward{"forward", {-1.5, 0, 0}, 0, -0.25F, 0, 0.1F, sensors(1.01, 1.02)};
 const Plan kClimbing{"climbing", {0, 1, 0}, 0, 0, 0.6F, 0, sensors(1.01, 1)};
+// As over the loopback: a picture comes before the attitude that follows its instant.
+const Plan kPrompt{"prompt", {0, -2, 0}, 0.25F, 0, 0, 0, sensors(1, 1), 0};
 
 int32_t bits(float value) {
   int32_t word;
@@ -138,7 +141,7 @@ class Flyer {
                                                       bytes.data(), bytes.size(), &packet.size));
     packet.bytes = bytes.data();
     tvs_time time{};
-    time.host_ns = time.received_ns = now_ + 40 * kMs;
+    time.host_ns = time.received_ns = now_ + plan_.picture_delay_ms * kMs;
     recording_.add_packet(packet, time);
     truth_.push_back(state);
   }
@@ -312,6 +315,13 @@ void test_the_best_pair_is_found_and_believed() {
   TEST_ASSERT_TRUE(r.outcome.two_view.median_parallax_rad * kDegrees > 1.5);
 }
 
+void test_a_picture_that_comes_before_its_attitude_has_one() {
+  const RecordedFlight read = read_flight(flown(kPrompt).folder);
+  TEST_ASSERT_TRUE(read.frames.size() > 30);
+  for (const RecordedFrame& frame : read.frames) TEST_ASSERT_TRUE(frame.timed);
+  check_rotations(all_pairs(kPrompt));
+}
+
 void test_a_frame_that_is_not_there_is_refused() {
   const Flown& flight = flown(kSideways);
   const RecordedFlight read = read_flight(flight.folder);
@@ -416,6 +426,7 @@ int main(void) {
   RUN_TEST(test_a_climbing_flight);
   RUN_TEST(test_a_pair_that_hardly_moved_has_no_scale_by_velocity);
   RUN_TEST(test_the_best_pair_is_found_and_believed);
+  RUN_TEST(test_a_picture_that_comes_before_its_attitude_has_one);
   RUN_TEST(test_a_frame_that_is_not_there_is_refused);
   RUN_TEST(test_the_program_tells_metres);
   RUN_TEST(test_what_does_not_fit_together_is_refused_in_a_line);

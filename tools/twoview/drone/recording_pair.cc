@@ -115,9 +115,12 @@ RecordedFlight read_flight(const std::string& folder) {
     if ((imu.valid & TVS_IMU_ATTITUDE) != 0) flight.log.push_back(sample_of(imu));
   };
   listener.on_frame = [&](const tvs_frame& frame) {
-    flight.frames.push_back({static_cast<int>(flight.frames.size()), frame.number,
-                             static_cast<double>(frame.time.host_ns) * 1e-9,
-                             (frame.flags & TVS_FRAME_HAS_ATTITUDE) != 0});
+    const double time_s = static_cast<double>(frame.time.host_ns) * 1e-9;
+    // A picture can come before the attitude that follows its instant; the whole log has that one, too.
+    const bool follows_log =
+        !flight.log.empty() && time_s - flight.log.back().time_s < kAttitudeGapS;
+    flight.frames.push_back({static_cast<int>(flight.frames.size()), frame.number, time_s,
+                             follows_log || (frame.flags & TVS_FRAME_HAS_ATTITUDE) != 0});
   };
   static const std::atomic<bool> never{false};
   play(folder, listener, never, 0);
