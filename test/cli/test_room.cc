@@ -96,6 +96,11 @@ double angle_deg(double cosine) {
   return std::acos(std::fmin(1.0, cosine)) * 180 / 3.14159265358979323846;
 }
 
+void test_a_ray_along_an_axis_hits_something() {
+  const Film level = film(pose(0, 0, 0, {0, 0, -1.2}));  // its middle column and row have such rays
+  for (const float depth : level.depth) TEST_ASSERT_TRUE(depth > 0 && depth < 20);
+}
+
 void test_a_reconstruction_finds_the_true_motion() {
   const CameraPose pose0 = pose(0, 0, 0, {0, -0.3, -1.2}), pose1 = pose(0.03, 0.02, 0, {0, 0.2, -1.2});
   Film films[2] = {film(pose0), film(pose1)};
@@ -182,6 +187,7 @@ extern "C" void tearDown() {}
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_a_view_is_the_other_one_carried_by_depth_and_pose);
+  RUN_TEST(test_a_ray_along_an_axis_hits_something);
   RUN_TEST(test_a_reconstruction_finds_the_true_motion);
   RUN_TEST(test_axes_are_forward_right_down);
   RUN_TEST(test_ground_and_free_space_know_the_furniture);

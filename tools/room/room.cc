@@ -94,6 +94,7 @@ Room::Hit Room::first_hit(const Vec3& from, const Vec3& ray) const {
   const Vec3 inverse = {1 / ray[0], 1 / ray[1], 1 / ray[2]};
   Hit hit{HUGE_VAL, &walls_, 0, 0};
   for (size_t k = 0; k < 3; ++k) {
+    if (ray[k] == 0) continue;  // along these two walls
     const int side = ray[k] > 0 ? 1 : 0;
     const double exit = ((side == 1 ? walls_.high[k] : walls_.low[k]) - from[k]) * inverse[k];
     if (exit < hit.distance) hit = {exit, &walls_, k, side};
