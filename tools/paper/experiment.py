@@ -1,0 +1,41 @@
+"""An experiment of the paper: what it shows there, what comes of it here."""
+
+from dataclasses import dataclass, field
+from typing import Callable, Optional
+
+
+class Missing(Exception):
+    """Data or a program that an experiment needs and that is not here."""
+
+
+@dataclass
+class Table:
+    caption: str
+    head: list
+    rows: list  # of cells, text; the first cell of a row is its heading
+    marked: Optional[int] = None  # the row that is the default, or the paper's choice
+
+
+@dataclass
+class Picture:
+    png: bytes
+    alt: str
+    width: int  # pixels at which it is drawn at most
+
+
+@dataclass
+class Result:
+    numbers: dict  # goes into paper.json as it is
+    found: str  # sentences with the numbers
+    pictures: list = field(default_factory=list)
+    tables: list = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    id: str  # "figure8"; of the page's anchors, the pictures' names and paper.json's keys
+    section: str
+    title: str
+    paper: str  # what the paper's figure shows
+    differs: str  # where ours is another, and why; may be empty
+    run: Callable  # Inputs -> Result
