@@ -80,7 +80,7 @@ def straightness(corners, size):
     off = []
     for line in (*grid, *grid.transpose(1, 0, 2)):
         centred = line - line.mean(axis=0)
-        off.append(centred @ np.linalg.svd(centred)[2][-1])
+        off.append(centred @ np.linalg.svd(centred, full_matrices=False)[2][-1])
     return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
 
 

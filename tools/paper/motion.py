@@ -193,18 +193,15 @@ def draw_cameras(axis, study):
     axis.legend(loc="lower right")
 
 
-def draw_studies(studies, alt):
-    heights = [s.pair.colour[0].shape[0] / s.pair.colour[0].shape[1] for s in studies]
-    sheet = drawing.pyplot.figure(figsize=(12, 0.5 + sum(max(4.3 * h, 2.3) for h in heights)))
-    rows = sheet.subfigures(len(studies), 1, height_ratios=[max(4.3 * h, 2.3) for h in heights], squeeze=False)
-    for part, study in zip(rows[:, 0], studies):
-        axes = part.subplots(1, 3, width_ratios=(1.25, 1.25, 1))
-        part.suptitle(study.pair.name, x=0.01, ha="left", fontsize=10, fontweight="bold")
-        chosen = spread(study.pixels[0], NUM_LINES)
-        draw_view(axes[0], study, 0, chosen)
-        draw_view(axes[1], study, 1, chosen)
-        draw_cameras(axes[2], study)
-    return drawing.finish(sheet, alt)
+def draw_study(study, alt):
+    height = max(4.3 * study.pair.colour[0].shape[0] / study.pair.colour[0].shape[1], 2.3)
+    sheet, axes = drawing.sheet(12, height + 0.4, 1, 3, width_ratios=(1.25, 1.25, 1))
+    sheet.suptitle(study.pair.name, x=0.01, ha="left", fontsize=10, fontweight="bold")
+    chosen = spread(study.pixels[0], NUM_LINES)
+    draw_view(axes[0], study, 0, chosen)
+    draw_view(axes[1], study, 1, chosen)
+    draw_cameras(axes[2], study)
+    return drawing.finish(sheet, f"{study.pair.name}: {alt}")
 
 
 # ---- the figures ----
@@ -258,14 +255,14 @@ def figure(real, flown, lead, alt):
     found = lead + " " + ". ".join(parts) + "."
     if problems:
         found += " Missing: " + "; ".join(problems) + "."
-    return Result(numbers, found, [draw_studies(studies, alt)], [table_of(studies)])
+    return Result(numbers, found, [draw_study(study, alt) for study in studies], [table_of(studies)])
 
 
 def figure14(inputs):
     return figure(lambda: (inputs.motorcycle, None), lambda: flown_pair(inputs, flight.SIDEWAYS, 0.6),
                   "The lines run along the motion and the epipoles lie far outside the images, to the side; the drone "
                   "leans while it flies, so that its lines are tilted.",
-                  "Sideways motion: parallel epipolar lines, and both cameras from above")
+                  "parallel epipolar lines, and both cameras from above")
 
 
 def figure15(inputs):
@@ -273,7 +270,7 @@ def figure15(inputs):
                                               "KITTI, 0.43 m forward"), None),
                   lambda: flown_pair(inputs, flight.FORWARD, 0.8),
                   "The lines meet in the epipole, which lies inside both images: there the camera flies to.",
-                  "Forward motion: epipolar lines that meet in the epipole, and both cameras from above")
+                  "epipolar lines that meet in the epipole, and both cameras from above")
 
 
 DIFFERS = ("The paper compares with the real drone's IMU. No flight with pictures and an IMU log of an AR.Drone 2 "

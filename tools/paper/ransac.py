@@ -34,7 +34,7 @@ def line_points(random):
 def line_through(points):
     """(normal, offset) of the line of least squared distances: normal . x = offset."""
     middle = points.mean(axis=0)
-    normal = np.linalg.svd(points - middle)[2][-1]
+    normal = np.linalg.svd(points - middle, full_matrices=False)[2][-1]
     return normal, float(normal @ middle)
 
 
