@@ -298,6 +298,7 @@ class Page(Case):
         os.environ["TWOVIEW_DATA"] = "/nowhere"
         try:
             status, text, told, _ = self.run_paper("--only", "figure5,figure13")
+            partly = self.run_paper("--only", "figure9")
         finally:
             os.environ.pop("TWOVIEW_DATA")
             if data is not None:
@@ -306,6 +307,18 @@ class Page(Case):
         self.assertIn("kitti00_turn", told["experiments"]["figure13"]["problem"])
         self.assertIn("Not made", text)
         self.assertEqual(text.count('src="data:image/png;base64,'), 1)
+        self.assertEqual(partly[0], 1)
+        self.assertIn("Without", partly[1])
+        self.assertIn("tum_fr3_office", partly[2]["experiments"]["figure9"]["missing"][0])
+
+    def test_an_experiment_that_fails_leaves_the_others_alone(self):
+        def failing(_inputs):
+            raise RuntimeError("broken on purpose")
+        broken = experiment.Experiment("broken", "Section", "Title", "", "", failing)
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            outcome = paper.run(broken, self.given)
+        self.assertIn("broken on purpose", outcome["problem"])
+        self.assertFalse(paper.is_whole(outcome))
 
     def test_an_unknown_name_is_refused_in_a_line(self):
         with self.assertRaises(SystemExit) as refused:

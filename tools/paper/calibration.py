@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 import drawing
-from experiment import Experiment, Missing, Result, Table
+from experiment import Experiment, Missing, Result, Table, available
 from inputs import library, read_colour, read_json
 
 PAPER_RANGE_PX = (0.1, 0.5)  # the paper's usual error
@@ -115,29 +115,21 @@ def straightened(inputs, boards, axes):
                                          for v in used(calibration)]))) for name, move in moves.items()}
 
 
-def available(inputs, *wanted):
-    """Those whose pictures are here."""
-    found = []
-    for boards in wanted:
-        try:
-            boards.folder(inputs)
-            found.append(boards)
-        except Missing as missing:
-            problem = missing
-    if not found:
-        raise problem
-    return found
+def pictured(inputs, boards):
+    """The same, when its pictures are here."""
+    boards.folder(inputs)
+    return boards
 
 
 def figure1b(inputs):
-    listed = available(inputs, ARDRONE, OPENCV)
+    listed, missing = available(*(lambda b=b: pictured(inputs, b) for b in (ARDRONE, OPENCV)))
     sheet, axes = drawing.sheet(9.5, 3.85 * len(listed), len(listed), 2, squeeze=False)
     off = {boards.title: straightened(inputs, boards, row) for boards, row in zip(listed, axes)}
     found = "Rows and columns of the chessboards' corners off straight lines, rms over all views: " + "; ".join(
         f"{title} {e['raw']:.2f} px before and {e['undistorted']:.2f} px after" for title, e in off.items()) + "."
     return Result({"off_straight_px": off}, found,
                   [drawing.finish(sheet, "Raw and undistorted views of chessboards, with straight lines through "
-                                         "the corners")])
+                                         "the corners")], missing=missing)
 
 
 def draw_residuals(axis, found):
@@ -175,28 +167,25 @@ def figure4(inputs):
     numbers = {"rms_px": overall, "program_rms_px": calibration["rms_px"], "views": per_view,
                "intrinsics": calibration["intrinsics"], "sigma": calibration["sigma"],
                "published_rms_px": published, "paper_range_px": list(PAPER_RANGE_PX),
-               "opencv_board_rms_px": other_error(inputs)}
+               "opencv_board_rms_px": None}
     text = (f"twoview calibrate on {len(found)} pictures of an AR.Drone 1 (320 x 240): {overall:.3f} px rms, "
             f"within the paper's {PAPER_RANGE_PX[0]} to {PAPER_RANGE_PX[1]} px. The authors of the pictures "
             f"published {published:.2f} px for the same ones.")
-    if numbers["opencv_board_rms_px"] is not None:
-        text += f" OpenCV's own sample pictures give {numbers['opencv_board_rms_px']:.3f} px."
+    missing = []
+    try:
+        other = read_json(OPENCV.calibrated(inputs) / "calibration.json")["rms_px"]
+        numbers["opencv_board_rms_px"] = other
+        text += f" OpenCV's own sample pictures give {other:.3f} px."
+    except Missing as told:
+        missing.append(str(told))
     return Result(numbers, text, [drawing.finish(sheet, "Detected corners, residuals and the error of each "
-                                                        "view")], [intrinsics_table(calibration)])
+                                                        "view")], [intrinsics_table(calibration)], missing)
 
 
 def published_error(inputs):
     """avg_reprojection_error of the file beside the pictures."""
     text = inputs.of_fixtures("chessboard_ardrone1", "ardrone_camera.yml").read_text(encoding="utf-8")
     return float(text.split("avg_reprojection_error:")[1].split()[0])
-
-
-def other_error(inputs):
-    """The same of OpenCV's sample pictures, None where they are not here."""
-    try:
-        return read_json(OPENCV.calibrated(inputs) / "calibration.json")["rms_px"]
-    except Missing:
-        return None
 
 
 def intrinsics_table(calibration):
@@ -213,8 +202,7 @@ EXPERIMENTS = [
                "model holds. Estimation needs no undistorted image: matches become rays, and thresholds stay "
                "pixels of the image as it is.", figure1b),
     Experiment("figure4", "Camera calibration", "Figure 4: chessboards and the calibration's error",
-               "Pictures of a chessboard with its corners, from which Zhang's method finds the camera; the "
-               "error is usually 0.1 to 0.5 px.",
+               "The chessboard calibration, by Zhang's method; its error is usually 0.1 to 0.5 px.",
                "The mathematics is the paper's (Zhang, by OpenCV). twoview calibrate leaves out blurred, "
                "partial and duplicate views, tells standard deviations, and warns when the answer is not to be "
                "trusted (docs/calibrate.md).", figure4),

@@ -8,6 +8,19 @@ class Missing(Exception):
     """Data or a program that an experiment needs and that is not here."""
 
 
+def available(*makers):
+    """(what the makers give, why some give nothing, in words); Missing where none does."""
+    found, missing = [], []
+    for make in makers:
+        try:
+            found.append(make())
+        except Missing as told:
+            missing.append(str(told))
+    if not found:
+        raise Missing("; ".join(missing))
+    return found, missing
+
+
 @dataclass
 class Table:
     caption: str
@@ -29,6 +42,7 @@ class Result:
     found: str  # sentences with the numbers
     pictures: list = field(default_factory=list)
     tables: list = field(default_factory=list)
+    missing: list = field(default_factory=list)  # in words, what it had to do without
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 import drawing
 import flight
-from experiment import Experiment, Missing, Result, Table
+from experiment import Experiment, Missing, Result, Table, available
 from inputs import Pair, grey, library, read_colour
 
 NUM_LINES = 14
@@ -206,21 +206,11 @@ def draw_study(study, alt):
 
 # ---- the figures ----
 
-def studies_of(real, flown):
-    """Studies of a real pair and of a flight, whichever are here."""
-    studies, problems = [], []
-    for make in (real, flown):
-        try:
-            pair, told = make()
-            study = reconstructed(pair)
-            if told is not None:
-                study.numbers.update(imu_numbers(pair, told))
-            studies.append(study)
-        except Missing as missing:
-            problems.append(str(missing))
-    if not studies:
-        raise Missing("; ".join(problems))
-    return studies, problems
+def study_of(pair, told=None):
+    study = reconstructed(pair)
+    if told is not None:
+        study.numbers.update(imu_numbers(pair, told))
+    return study
 
 
 def table_of(studies):
@@ -239,35 +229,30 @@ def table_of(studies):
 
 
 def figure(real, flown, lead, alt):
-    studies, problems = studies_of(real, flown)
+    studies, missing = available(lambda: study_of(real()), lambda: study_of(*flown()))
     numbers = {s.pair.name: s.numbers for s in studies}
-    if problems:
-        numbers["problems"] = problems
     parts = []
-    for study in studies:
-        n = study.numbers
-        text = (f"{study.pair.name}: rotation off by {n['rotation_error_deg']:.3f} degrees, direction by "
+    for name, n in numbers.items():
+        text = (f"{name}: rotation off by {n['rotation_error_deg']:.3f} degrees, direction by "
                 f"{n['translation_error_deg']:.2f}")
         if "imu_difference_deg" in n:
             text += (f"; the IMU's rotation differs by {n['imu_difference_deg']:.2f} degrees, its sigma is "
                      f"{n['imu_sigma_deg']:.2f}")
         parts.append(text)
     found = lead + " " + ". ".join(parts) + "."
-    if problems:
-        found += " Missing: " + "; ".join(problems) + "."
-    return Result(numbers, found, [draw_study(study, alt) for study in studies], [table_of(studies)])
+    return Result(numbers, found, [draw_study(study, alt) for study in studies], [table_of(studies)], missing)
 
 
 def figure14(inputs):
-    return figure(lambda: (inputs.motorcycle, None), lambda: flown_pair(inputs, flight.SIDEWAYS, 0.6),
+    return figure(lambda: inputs.motorcycle, lambda: flown_pair(inputs, flight.SIDEWAYS, 0.6),
                   "The lines run along the motion and the epipoles lie far outside the images, to the side; the drone "
                   "leans while it flies, so that its lines are tilted.",
                   "parallel epipolar lines, and both cameras from above")
 
 
 def figure15(inputs):
-    return figure(lambda: (inputs.listed_pair("kitti00_turn", "000100.png", "000101.png",
-                                              "KITTI, 0.43 m forward"), None),
+    return figure(lambda: inputs.listed_pair("kitti00_turn", "000100.png", "000101.png",
+                                             "KITTI, 0.43 m forward"),
                   lambda: flown_pair(inputs, flight.FORWARD, 0.8),
                   "The lines meet in the epipole, which lies inside both images: there the camera flies to.",
                   "epipolar lines that meet in the epipole, and both cameras from above")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The paper's figures and tables, remade from real data into one page.
 
-DIR/paper.html is self-contained; DIR/paper.json has the numbers. An experiment whose data is missing
+DIR/paper.html is self-contained; DIR/paper.json has the numbers. An experiment that lacks data or fails
 says so on the page, the others go on, and the exit status is 1."""
 
 import os
@@ -14,6 +14,7 @@ import json
 import sys
 import tempfile
 import time
+import traceback
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,6 +40,9 @@ def run(experiment, inputs):
         outcome["result"] = experiment.run(inputs)
     except Missing as missing:
         outcome["problem"] = f"missing: {missing}"
+    except Exception as error:  # one that fails shall not take the others with it
+        traceback.print_exc()
+        outcome["problem"] = f"failed: {type(error).__name__}: {error}"
     outcome["seconds"] = time.monotonic() - begin
     print(f"{experiment.id}: {outcome['problem'] or outcome['result'].found} "
           f"[{outcome['seconds']:.1f} s]", flush=True)
@@ -48,7 +52,12 @@ def run(experiment, inputs):
 def numbers_of(outcome):
     if outcome["problem"]:
         return {"problem": outcome["problem"]}
-    return {**outcome["result"].numbers, "seconds": round(outcome["seconds"], 2)}
+    result = outcome["result"]
+    return {**result.numbers, "missing": result.missing, "seconds": round(outcome["seconds"], 2)}
+
+
+def is_whole(outcome):
+    return not outcome["problem"] and not outcome["result"].missing
 
 
 def write(path, data):
@@ -108,7 +117,7 @@ def main(command=None):
     write_results(arguments.folder, outcomes, inputs.library().version_string(),
                   time.monotonic() - begin, arguments.pictures)
     print(f"Open {arguments.folder / 'paper.html'}; the numbers are in paper.json")
-    return 1 if any(o["problem"] for o in outcomes) else 0
+    return 0 if all(map(is_whole, outcomes)) else 1
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 import drawing
-from experiment import Experiment, Missing, Result, Table
+from experiment import Experiment, Result, Table, available
 from inputs import library
 
 NUM_POINTS, NUM_INLIERS = 500, 300  # the paper's figure 8
@@ -170,13 +170,11 @@ def draw_matches(axis, pair, pixels0, pixels1, inliers):
 
 
 def pairs_of_figure9(inputs):
-    found = [inputs.motorcycle]
-    try:
-        found.append(inputs.listed_pair("tum_fr3_office", *first_pair(inputs, "tum_fr3_office", 20),
-                                        truth_px=5.0))
-    except Missing:
-        pass
-    return found
+    """(pairs, what is missing)"""
+    def office():
+        return inputs.listed_pair("tum_fr3_office", *first_pair(inputs, "tum_fr3_office", 20), "TUM office",
+                                  truth_px=5.0)
+    return available(lambda: inputs.motorcycle, office)
 
 
 def first_pair(inputs, folder, index):
@@ -186,7 +184,7 @@ def first_pair(inputs, folder, index):
 
 
 def figure9(inputs):
-    pairs = pairs_of_figure9(inputs)
+    pairs, missing = pairs_of_figure9(inputs)
     sheet, axes = drawing.sheet(11, 4.1 * len(pairs), len(pairs), 1, squeeze=False)
     numbers, rows = {}, []
     for axis, pair in zip(axes[:, 0], pairs):
@@ -214,7 +212,8 @@ def figure9(inputs):
                   ["pair: method", "matches", "inliers", "right ones kept", "of the inliers right",
                    "samples"], rows)
     return Result(numbers, found, [drawing.finish(sheet, "Matches of two views: about a hundred of the "
-                                                         "inliers in green, all outliers in red")], [table])
+                                                         "inliers in green, all outliers in red")], [table],
+                  missing)
 
 
 EXPERIMENTS = [
@@ -226,8 +225,7 @@ EXPERIMENTS = [
                "matches first (PROSAC), the score is MSAC's and not a count, and each new best is optimised "
                "locally (docs/algorithms/two_view.md).", figure8),
     Experiment("figure9", "Matching and RANSAC", "Figure 9: inliers by RANSAC and eight-point",
-               "The matches of two views of a room that RANSAC over the eight-point fundamental matrix "
-               "keeps.",
+               "The matches of two views that RANSAC over the eight-point fundamental matrix keeps.",
                "The paper samples eight matches without cameras; so does --method eight-point. Our default "
                "samples five and uses the cameras that are known anyway: with a share w of right matches a "
                "sample is clean with w^5 in place of w^8, and a plane is no degenerate case.", figure9),
