@@ -287,7 +287,7 @@ class Page(Case):
     def test_it_holds_its_pictures_and_needs_no_network(self):
         status, text, told, files = self.run_paper("--only", "figure5,figure8,table1")
         self.assertEqual(status, 0)
-        self.assertEqual(text.count('src="data:image/png;base64,'), 3)
+        self.assertEqual(text.count('src="data:image/'), 3)
         self.assertNotIn("http", text.replace("http-equiv", ""))
         self.assertEqual(set(told["experiments"]), {"figure5", "figure8", "table1"})
         self.assertEqual(told["experiments"]["figure8"]["inliers"], 300)
@@ -306,7 +306,7 @@ class Page(Case):
         self.assertEqual(status, 1)
         self.assertIn("kitti00_turn", told["experiments"]["figure13"]["problem"])
         self.assertIn("Not made", text)
-        self.assertEqual(text.count('src="data:image/png;base64,'), 1)
+        self.assertEqual(text.count('src="data:image/'), 1)
         self.assertEqual(partly[0], 1)
         self.assertIn("Without", partly[1])
         self.assertIn("tum_fr3_office", partly[2]["experiments"]["figure9"]["missing"][0])

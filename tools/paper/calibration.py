@@ -148,7 +148,7 @@ def figure4(inputs):
     per_view = {name: rms(vectors) for name, vectors in found.items()}
     overall = rms(np.concatenate(list(found.values())))
     published = published_error(inputs)
-    sheet = drawing.pyplot.figure(figsize=(11, 3.6))
+    sheet = drawing.pyplot.figure(figsize=(11, 3.1))
     grid = sheet.add_gridspec(1, 4, width_ratios=(1.35, 1.35, 1, 1.1))
     for place, view in enumerate(used(calibration)[:4:3]):
         axis = sheet.add_subplot(grid[place])

@@ -4,13 +4,14 @@ import io
 
 import cv2
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402  (after the backend)
 
 from experiment import Picture  # noqa: E402
 
-DPI = 130
+DPI, MOST_PNG_BYTES = 130, 100000
 GOOD, BAD, BLUE, ORANGE, GREY = "#11794a", "#c3323a", "#1667c1", "#d98a1f", "#8a949e"
 pyplot.rcParams.update({
     "font.size": 9, "axes.titlesize": 9.5, "axes.titlelocation": "left", "axes.grid": True,
@@ -37,16 +38,12 @@ def show(axis, image, title=""):
 
 
 def finish(figure, alt):
+    """A PNG, or WebP where photographs make that too large."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
     pyplot.close(figure)
-    return Picture(smaller(buffer.getvalue()), alt, round(figure.get_figwidth() * DPI))
-
-
-def smaller(png):
-    """The same picture in 256 colours where that saves bytes."""
-    from PIL import Image
-    image = Image.open(io.BytesIO(png)).convert("RGB")
-    buffer = io.BytesIO()
-    image.quantize(256, dither=Image.Dither.FLOYDSTEINBERG).save(buffer, "PNG", optimize=True)
-    return min(png, buffer.getvalue(), key=len)
+    width = round(figure.get_figwidth() * DPI)
+    if len(buffer.getvalue()) <= MOST_PNG_BYTES:
+        return Picture(buffer.getvalue(), "png", alt, width)
+    image = cv2.imdecode(np.frombuffer(buffer.getvalue(), np.uint8), cv2.IMREAD_COLOR)
+    return Picture(cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, 88])[1].tobytes(), "webp", alt, width)

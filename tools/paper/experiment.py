@@ -31,7 +31,8 @@ class Table:
 
 @dataclass
 class Picture:
-    png: bytes
+    data: bytes
+    kind: str  # "png" or "webp"
     alt: str
     width: int  # pixels at which it is drawn at most
 

@@ -86,12 +86,12 @@ def stop(process):
         process.wait()
 
 
-def fly(inputs, plan):
-    """Flown once a run."""
-    folder = Path(inputs.scratch) / plan.name
+def fly(inputs, plan, attempt=0):
+    folder = Path(inputs.scratch) / f"{plan.name}{attempt}"
     camera, truth = folder / "camera.yaml", folder / "truth.txt"
-    if not truth.exists():
-        fly_anew(inputs, plan, folder, camera, truth)
+    fly_anew(inputs, plan, folder, camera, truth)
+    if not truth.exists() or truth.stat().st_size == 0:
+        raise Missing("a picture from the simulated drone")
     return Recorded(folder / "recording", camera, np.loadtxt(truth, ndmin=2))
 
 

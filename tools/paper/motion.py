@@ -11,7 +11,7 @@ import flight
 from experiment import Experiment, Missing, Result, Table, available
 from inputs import Pair, grey, library, read_colour
 
-NUM_LINES = 14
+NUM_LINES, FLIGHTS = 14, 3
 # A camera that looks forward: its axes in the body's (forward, right, down).
 BODY_FROM_CAMERA = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
 
@@ -97,30 +97,35 @@ def true_motion(rows):
     return turns[1].T @ turns[0], turns[1].T @ (rows[0][2:5] - rows[1][2:5])
 
 
-def frames_apart(recorded, metres):
-    """Indices of two pictures as far apart as asked, late in the flight."""
-    numbers = np.loadtxt(recorded.folder / "frames.txt", dtype=int, ndmin=2)[:, 2]
+def frames_apart(recorded, numbers, metres):
+    """Of the decoded pictures, by the drone's numbers: the indices of two as far apart as asked, late in the
+    flight, and their rows of the truth."""
     rows = {int(row[0]): row for row in recorded.truth}
-    known = [k for k, number in enumerate(numbers) if int(number) in rows]
-    places = np.array([rows[int(numbers[k])][2:5] for k in known])
+    known = [k for k, number in enumerate(numbers) if number in rows]
     last = len(known) - 5
+    if last < 1:
+        raise Missing("enough pictures of the flight")
+    places = np.array([rows[numbers[k]][2:5] for k in known])
     off = np.linalg.norm(places - places[last], axis=1)
     first = int(np.argmin(np.abs(off[:last] - metres)))
     if abs(off[first] - metres) > 0.2 * metres:
         raise Missing(f"two pictures of the flight {metres} m apart")
-    return [known[first], known[last]], [rows[int(numbers[known[k]])] for k in (first, last)]
+    return [known[first], known[last]], [rows[numbers[known[k]]] for k in (first, last)]
 
 
-def flown_pair(inputs, plan, metres):
+def pair_of_flight(inputs, recorded, plan, metres):
     """(pair with truth, result.json of the same two frames beside the IMU)"""
-    recorded = flight.fly(inputs, plan)
-    indices, rows = frames_apart(recorded, metres)
-    out = recorded.folder.parent / "out"
-    told = json.loads(inputs.program("reconstruct", "--recording", recorded.folder, "--frames", *indices,
-                                     "--camera", recorded.camera, "--json", "-o", out))
     pictures = recorded.folder.parent / "frames"
     inputs.program("drone", "replay", recorded.folder, "--frames", pictures, "--quiet")
-    files = sorted(pictures.glob("*.png"))
+    files = sorted(pictures.glob("*.png"))  # named by the drone's numbers
+    indices, rows = frames_apart(recorded, [int(f.stem) for f in files], metres)
+    told = json.loads(inputs.program("reconstruct", "--recording", recorded.folder, "--frames", *indices,
+                                     "--camera", recorded.camera, "--json", "-o",
+                                     recorded.folder.parent / "out"))
+    if told["recording"]["frame_numbers"] != [int(row[0]) for row in rows]:
+        raise RuntimeError("reconstruct took other frames than those asked for")
+    if told["imu"] is None or told["imu"]["rotation_difference_deg"] is None:
+        raise Missing("the IMU's attitude at the two pictures")
     colour = tuple(read_colour(files[k]) for k in indices)
     tv = library()
     height, width = colour[0].shape[:2]
@@ -130,10 +135,18 @@ def flown_pair(inputs, plan, metres):
     return Pair(f"Simulated drone, {plan.name}", colour, (camera, camera), R, t / baseline, baseline), told
 
 
+def flown_pair(inputs, plan, metres):
+    """The same; on a machine too busy for real time the drone flies again."""
+    for attempt in range(FLIGHTS):
+        try:
+            return pair_of_flight(inputs, flight.fly(inputs, plan, attempt), plan, metres)
+        except (Missing, RuntimeError) as told:
+            problem = told
+    raise Missing(f"a flight: {problem}")
+
+
 def imu_numbers(pair, told):
     imu = told["imu"]
-    if imu is None or imu["rotation_difference_deg"] is None:
-        raise Missing("the IMU's attitude at the two pictures")
     metric = told["scale"] == "metric"
     return {"imu_difference_deg": imu["rotation_difference_deg"], "imu_sigma_deg": imu["sigma_deg"],
             "true_baseline_m": pair.baseline_m,
@@ -258,9 +271,9 @@ def figure15(inputs):
                   "epipolar lines that meet in the epipole, and both cameras from above")
 
 
-DIFFERS = ("The paper compares with the real drone's IMU. No flight with pictures and an IMU log of an AR.Drone 2 "
-           "is published, so the flight here is the simulator's, recorded and read as a real one; its IMU has "
-           "noise and its truth is known. The sigma of the attitude, a degree or so, is the driver's "
+DIFFERS = ("The paper compares with the real drone's IMU. We found no recording of a real flight with pictures and "
+           "IMU that may be used, so the flight here is the simulator's, recorded and read as a real one; its IMU "
+           "has noise and its truth is known. The sigma of the attitude, a degree or so, is the driver's "
            "assumption for the real sensor.")
 EXPERIMENTS = [
     Experiment("figure14", "Camera motion", "Figure 14: sideways motion",

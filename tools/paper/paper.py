@@ -76,7 +76,7 @@ def write_results(folder, outcomes, version, seconds, with_pictures):
     for outcome in outcomes if with_pictures else ():
         for number, picture in enumerate(outcome["result"].pictures if outcome["result"] else ()):
             suffix = f"_{number + 1}" if number else ""
-            write(folder / f"{outcome['experiment'].id}{suffix}.png", picture.png)
+            write(folder / f"{outcome['experiment'].id}{suffix}.{picture.kind}", picture.data)
 
 
 def arguments_of(command):
@@ -85,7 +85,7 @@ def arguments_of(command):
     parser.add_argument("-o", dest="folder", metavar="DIR", type=Path, default=ROOT / "out" / "paper",
                         help="folder for paper.html and paper.json (default: out/paper)")
     parser.add_argument("--only", metavar="ID,..", help="figure8,table1 ..: these experiments alone")
-    parser.add_argument("--pictures", action="store_true", help="also write each picture as a PNG")
+    parser.add_argument("--pictures", action="store_true", help="also write each picture as a file")
     parser.add_argument("--build", metavar="DIR", type=Path, default=ROOT / "build" / "release",
                         help="build folder (default: build/release)")
     return parser.parse_args(command)

@@ -228,5 +228,5 @@ EXPERIMENTS = [
                "The matches of two views that RANSAC over the eight-point fundamental matrix keeps.",
                "The paper samples eight matches without cameras; so does --method eight-point. Our default "
                "samples five and uses the cameras that are known anyway: with a share w of right matches a "
-               "sample is clean with w^5 in place of w^8, and a plane is no degenerate case.", figure9),
+               "sample is clean with probability w^5 in place of w^8, and a plane does not defeat it.", figure9),
 ]
