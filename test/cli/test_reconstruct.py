@@ -16,7 +16,7 @@ scale_sigma imu truth timings_ms context_bytes options seed version kernels""".s
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
 max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
-bundle_adjustment camera0 camera1 resize""".split()
+bundle_adjustment camera0 camera1 focal_35mm resize""".split()
 TRUTH = "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [-1, 0, 0]\nbaseline: 0.5\ndepth0: depth.pfm\n"
 
 
@@ -210,6 +210,21 @@ class Reconstruct(cli.CliTest):
         self.assertIsNone(result["median_parallax_deg"])
         self.assertIsNone(result["options"]["camera0"])
         self.assertIn("matches.png", self.listing())
+
+    def test_a_focal_length_of_35mm_film_is_a_pinhole_with_the_same_diagonal(self):
+        focal_35mm = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)
+        self.succeed(self.reconstruct())
+        known = self.result()
+        self.succeed(self.reconstruct("--focal-35mm", repr(focal_35mm), camera=False))
+        result = self.result()
+        self.assertEqual(result["options"]["focal_35mm"], focal_35mm)
+        self.assertIsNone(result["options"]["camera0"])
+        self.assertEqual(result["num_inliers"], known["num_inliers"])
+        for a, b in zip(result["R"] + result["t"], known["R"] + known["t"]):
+            self.assertAlmostEqual(a, b, delta=1e-9)
+        other = self.folder / "other"
+        self.assert_refused(self.reconstruct("--focal-35mm", "26", out=other), "--focal-35mm",
+                            "without a camera file", out=other)
 
     def test_files_of_an_earlier_pair_do_not_stay_beside_new_ones(self):
         self.succeed(self.reconstruct())

@@ -99,6 +99,17 @@ tv_camera load_camera(const std::string& path) {
   return parse_camera(read_file(path, kMaxFileBytes), path);
 }
 
+tv_camera film_camera(double focal_35mm, int width, int height) {
+  tv_camera camera{};
+  camera.model = TV_CAMERA_PINHOLE;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = camera.fy = focal_35mm * std::hypot(width, height) / std::hypot(36.0, 24.0);
+  camera.cx = (width - 1) / 2.0;
+  camera.cy = (height - 1) / 2.0;
+  return camera;
+}
+
 std::string camera_yaml(const tv_camera& camera) {
   const auto matrix = [](const char* name, const char* shape, const std::vector<double>& values) {
     std::string text = name + std::string(": !!opencv-matrix\n") + shape + "   dt: d\n   data: [ ";

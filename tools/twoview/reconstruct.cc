@@ -26,6 +26,7 @@ struct Arguments {
   Common common;
   std::string image[2], truth;
   CameraOptions cameras;
+  double focal_35mm = 0;
   RecordingOptions recording;
 };
 
@@ -46,25 +47,32 @@ void check_inputs(const Arguments& a) {
 // The camera file of each image; both empty without cameras, which some methods can do without.
 std::array<std::string, 2> camera_files(const Arguments& a) {
   const std::array<std::string, 2> files = a.cameras.files();
+  const bool has_focal = a.focal_35mm > 0;
+  if (has_focal && (!files[0].empty() || a.recording.given()))
+    throw BadInput("--focal-35mm is for photographs without a camera file");
   const int32_t method = a.common.options.estimate.method;
   const bool can_do_without = method == TV_METHOD_EIGHT_POINT || method == TV_METHOD_SEVEN_POINT;
-  if (files[0].empty() && !can_do_without)
+  if (files[0].empty() && !has_focal && !can_do_without)
     throw BadInput("--method " + method_name(method) +
-                   " needs cameras: give --camera, or --camera0 and --camera1");
+                   " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate,"
+                   " or --focal-35mm, from the photographs' EXIF");
   return files;
 }
 
 void load_inputs(const Arguments& a, RecordingInput* recording, Session& session,
                  Outcome& outcome) {
   const std::array<std::string, 2> files = camera_files(a);
-  outcome.has_cameras = !files[0].empty();
+  const bool has_files = !files[0].empty();
+  outcome.has_cameras = has_files || a.focal_35mm > 0;
   std::array<tv_camera, 2> camera{};
-  if (outcome.has_cameras) camera = CameraOptions::load(files);
+  if (has_files) camera = CameraOptions::load(files);
   if (recording) recording->load(camera[0], session, a.common.options, outcome);
   for (int i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
     if (!recording) picture = load_picture(a.image[i]);
-    if (outcome.has_cameras) {
+    if (!has_files && outcome.has_cameras) {
+      outcome.camera[i] = film_camera(a.focal_35mm, picture.luma.cols, picture.luma.rows);
+    } else if (has_files) {
       outcome.camera[i] = camera[i];
       require_size(outcome.camera[i], files[i], picture.luma.cols, picture.luma.rows, picture.path);
     }
@@ -82,6 +90,8 @@ nlohmann::ordered_json options_of(const Arguments& a) {
     json[key] =
         files[i].empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(files[i]);
   }
+  json["focal_35mm"] =
+      a.focal_35mm > 0 ? nlohmann::ordered_json(a.focal_35mm) : nlohmann::ordered_json(nullptr);
   return json;
 }
 
@@ -266,6 +276,10 @@ void add_reconstruct(CLI::App& program, Run& run) {
   verb->add_option("B", a->image[1], "image 1")->type_name("IMAGE");
   a->recording.add_to(*verb);
   a->cameras.add_to(*verb);
+  verb->add_option("--focal-35mm", a->focal_35mm,
+                   "in place of a camera file: the focal length as for 35 mm film, from EXIF; no lens distortion")
+      ->type_name("MM")
+      ->check(CLI::Range(1.0, 10000.0));
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
       ->type_name("FILE");
   add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
