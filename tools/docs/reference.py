@@ -72,8 +72,8 @@ class Reference:
             lines += ["", "| field | |", "| --- | --- |"]
             lines += [f"| `{title}` | {said} |" for title, _, said in rows if said]
         elif rows:
-            lines += ["", "| constant | value | |", "| --- | --- | --- |"]
-            lines += [f"| `{title}` | {value.replace('|', chr(92) + '|')} | {said} |" for title, value, said in rows]
+            lines += ["", "| constant | |", "| --- | --- |"]
+            lines += [f"| `{title}` {f'= {value}' if value else ''} | {said} |" for title, value, said in rows]
         return lines
 
     def parameters(self, symbol):
@@ -144,6 +144,8 @@ def declaration(symbol):
         return f"#define {name}{f'({parameters})' if parameters else ''} {value}".rstrip()
     if kind == "typedef":
         arguments = symbol.findtext("argsstring") or ""
+        if "(*" not in symbol.findtext("definition"):
+            return f"{symbol.findtext('definition')};"
         return f"typedef {symbol.findtext('definition').split('(*')[0].replace('typedef ', '')} (*{name}{arguments};"
     return f"typedef {kind} {name} {{ .. }} {name};" if symbol.find(".//memberdef") is not None or kind == "enum" else \
         f"typedef {kind} {name} {name};"

@@ -1,0 +1,144 @@
+"""What README.md, CHANGELOG.md, examples/README.md and docs/ say is there, is there.
+
+- A relative link leads to a file, and its anchor to a heading.
+- A path that begins with a folder of the project names a file, exactly or without its extension, or a test. `{a,b}`
+  names several; a path with a star or in capitals is a pattern.
+- A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function stands in some source.
+- An option that stands behind a verb of `twoview` is one of that verb's, and a verb is a verb.
+- A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test.
+"""
+
+import itertools
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools" / "docs"))
+import markdown_pages
+from markdown_pages import ROOT
+
+FOLDERS = "lib|drivers|examples|tools|python|bench|test|docs|scripts|cmake"
+PROGRAM = os.environ.get("TWOVIEW_PROGRAM", "")
+
+
+def braces(path):
+    """a/{b,c}.{h,cc} -> each of its paths."""
+    pieces = re.split(r"\{([^}]*)\}", path)
+    choices = [piece.split(",") if k % 2 else [piece] for k, piece in enumerate(pieces)]
+    return ["".join(choice) for choice in itertools.product(*choices)]
+
+
+def exists(path):
+    path = ROOT / path.rstrip("/")
+    return path.exists() or any(path.parent.glob(path.name + ".*")) or any(path.parent.glob(f"test_{path.name}.*"))
+
+
+class TestPages(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.pages = {path: markdown_pages.Page(path) for path in markdown_pages.pages()}
+        cls.helps = {}
+        build = pathlib.Path(PROGRAM).parents[1] if PROGRAM else ROOT / "build" / "release"
+        listed = subprocess.run(["ctest", "--test-dir", str(build), "-N"], capture_output=True, text=True).stdout
+        cls.tests = set(re.findall(r"Test +#\d+: (\S+)", listed))
+
+    def report(self, lines, what):
+        if lines:
+            self.fail(f"{len(lines)} {what}:\n" + "\n".join(lines))
+
+    def test_every_link_leads_somewhere(self):
+        wrong, count = [], 0
+        for page in self.pages.values():
+            for line, target, anchor in page.links():
+                count += 1
+                path = (page.path.parent / target).resolve() if target else page.path
+                if not path.exists():
+                    wrong.append(f"{page}:{line}: no file {target}")
+                elif anchor and path in self.pages and anchor not in self.pages[path].anchors():
+                    wrong.append(f"{page}:{line}: no heading #{anchor} in {target or page}")
+        self.assertGreater(count, 50)
+        self.report(wrong, "links that lead nowhere")
+
+    def test_every_path_names_a_file(self):
+        wrong = []
+        for page in self.pages.values():
+            texts = itertools.chain(page.code(), ((line, text) for _, line, text in page.blocks))
+            for line, text in itertools.chain(texts, page.prose):
+                for path in re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./{{}},*-]*[\w}}*/])", text):
+                    if "*" in path or re.search(r"/[A-Z]{3,}\b(?!\.md)", path) or path.startswith("test/bin"):
+                        continue
+                    wrong += [f"{page}:{line}: {one}" for one in braces(path)
+                              if one not in self.tests and not exists(one)]
+        self.report(sorted(set(wrong)), "paths that name no file")
+
+    def test_every_test_of_the_contract_is_known(self):
+        if not self.tests:
+            self.skipTest("no build: TWOVIEW_PROGRAM names none")
+        page = self.pages[ROOT / "docs" / "contract.md"]
+        labels = {name.split("/")[0] for name in self.tests}
+        wrong = []
+        for line, text in page.code():
+            label, _, name = text.partition("/")
+            if label in labels and name and re.fullmatch(r"\w+", name) and text not in self.tests:
+                wrong.append(f"{page}:{line}: {text}")
+            if label == "fuzz" and re.fullmatch(r"\w+", name) and not (ROOT / f"test/fuzz/fuzz_{name}.cc").exists():
+                wrong.append(f"{page}:{line}: {text}")
+        self.report(wrong, "tests that ctest does not know")
+
+    def test_every_test_function_of_the_contract_exists(self):
+        sources = "\n".join(path.read_text() for path in ROOT.glob("test/*/test_*.*"))
+        page = self.pages[ROOT / "docs" / "contract.md"]
+        self.report([f"{page}:{line}: {text}" for line, text in page.code()
+                     if re.fullmatch(r"test_\w+", text) and not re.search(rf"\b{text}\b", sources)],
+                    "test functions that are in no source")
+
+    def help(self, *verb):
+        if verb not in self.helps:
+            run = subprocess.run([PROGRAM, *verb, "--help"], capture_output=True, text=True)
+            self.helps[verb] = run.stdout if run.returncode == 0 else ""
+        return self.helps[verb]
+
+    def test_every_verb_and_option_is_the_programs(self):
+        if not PROGRAM or not os.path.exists(PROGRAM):
+            self.skipTest("TWOVIEW_PROGRAM names no program")
+        verbs = set(re.findall(r"^  (\w+) ", self.help(), re.M))
+        self.assertIn("reconstruct", verbs)
+        wrong, count = [], 0
+        for page in self.pages.values():
+            shell = [(line, text.replace("\\\n", " ")) for language, line, text in page.blocks if language in ("sh", "bash")]
+            for first, text in itertools.chain(shell, page.code()):
+                for line in text.split("\n"):
+                    words = line.split("#")[0].split("|")[0].split()
+                    starts = [k for k, word in enumerate(words) if re.fullmatch(r"(.*/bin/)?twoview", word)]
+                    if not starts or starts[0] != 0 or len(words) < 2:
+                        continue
+                    verb, *rest = words[1:]
+                    if not re.fullmatch("[a-z]+", verb):
+                        continue
+                    count += 1
+                    if verb not in verbs:
+                        wrong.append(f"{page}:{first}: twoview {verb}")
+                        continue
+                    if verb in ("compare", "colmap"):
+                        continue  # Python's: python/compare_*, python/colmap_* run what their pages say
+                    path = [verb] + ([rest[0]] if verb == "drone" and rest and re.fullmatch("[a-z]+", rest[0]) else [])
+                    for option in re.findall(r"(?<!\S)(--?[a-z][\w-]*)", " ".join(rest)):
+                        if not re.search(rf"(?<![\w-]){option}\b(?!-)", self.help(*path)):
+                            wrong.append(f"{page}:{first}: twoview {' '.join(path)} {option}")
+        self.assertGreater(count, 20)
+        self.report(wrong, "verbs or options that the program does not have")
+
+    def test_an_algorithm_has_its_six_parts(self):
+        parts = {"problem": r"\*\*Problem", "where it is valid": r"\*\*(Where it is valid|Valid)", "paper": r"\*\*Papers?\b",
+                 "file": r"\*\*Files?\b", "test": r"\*\*Tests?\b", "formula": r"(?m)^    \S|\*\*Formula"}
+        pages = sorted((ROOT / "docs" / "algorithms").glob("*.md"))
+        self.assertGreaterEqual(len(pages), 9)
+        self.report([f"{path.name}: no {part}" for path in pages for part, pattern in parts.items()
+                     if not re.search(pattern, path.read_text())], "parts that are missing")
+
+
+if __name__ == "__main__":
+    unittest.main()
