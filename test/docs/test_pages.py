@@ -65,6 +65,8 @@ class TestPages(unittest.TestCase):
     def test_every_path_names_a_file(self):
         wrong = []
         for page in self.pages.values():
+            if page.path.name == "CHANGELOG.md":
+                continue  # it tells what was
             texts = itertools.chain(page.code(), ((line, text) for _, line, text in page.blocks))
             for line, text in itertools.chain(texts, page.prose):
                 for path in re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./{{}},*-]*[\w}}*/])", text):
