@@ -328,7 +328,7 @@ class Page(Case):
     def test_every_experiment_of_the_paper_is_there(self):
         self.assertEqual([e.id for e in paper.experiments()],
                          ["figure1b", "figure4", "figure5", "figure6", "figure7", "figure8", "figure9",
-                          "figure14", "figure15", "figure13", "table1", "figure16"])
+                          "figure13", "table1", "figure14", "figure15", "figure16"])
 
 
 if __name__ == "__main__":

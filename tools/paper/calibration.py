@@ -125,8 +125,8 @@ def figure1b(inputs):
     listed, missing = available(*(lambda b=b: pictured(inputs, b) for b in (ARDRONE, OPENCV)))
     sheet, axes = drawing.sheet(9.5, 3.85 * len(listed), len(listed), 2, squeeze=False)
     off = {boards.title: straightened(inputs, boards, row) for boards, row in zip(listed, axes)}
-    found = "Rows and columns of the chessboards' corners off straight lines, rms over all views: " + "; ".join(
-        f"{title} {e['raw']:.2f} px before and {e['undistorted']:.2f} px after" for title, e in off.items()) + "."
+    words = [f"{title} {e['raw']:.2f} px before and {e['undistorted']:.2f} px after" for title, e in off.items()]
+    found = f"Rows and columns of the boards' corners off straight lines, rms over all views: {'; '.join(words)}."
     return Result({"off_straight_px": off}, found,
                   [drawing.finish(sheet, "Raw and undistorted views of chessboards, with straight lines through "
                                          "the corners")], missing=missing)
@@ -142,21 +142,7 @@ def draw_residuals(axis, found):
     axis.set_title("Corner minus reprojection [px]")
 
 
-def figure4(inputs):
-    calibration = read_json(ARDRONE.calibrated(inputs) / "calibration.json")
-    found = residuals(ARDRONE, calibration)
-    per_view = {name: rms(vectors) for name, vectors in found.items()}
-    overall = rms(np.concatenate(list(found.values())))
-    published = published_error(inputs)
-    sheet = drawing.pyplot.figure(figsize=(11, 3.1))
-    grid = sheet.add_gridspec(1, 4, width_ratios=(1.35, 1.35, 1, 1.1))
-    for place, view in enumerate(used(calibration)[:4:3]):
-        axis = sheet.add_subplot(grid[place])
-        image = read_colour(inputs.of_fixtures("chessboard_ardrone1", view["name"]))
-        cv2.drawChessboardCorners(image, ARDRONE.size, np.array(view["corners"], np.float32).reshape(-1, 1, 2), True)
-        drawing.show(axis, image, view["name"])
-    draw_residuals(sheet.add_subplot(grid[2]), found)
-    axis = sheet.add_subplot(grid[3])
+def draw_error_by_view(axis, per_view):
     axis.bar(range(len(per_view)), list(per_view.values()), color=drawing.BLUE)
     axis.axhspan(*PAPER_RANGE_PX, color=drawing.GOOD, alpha=0.12, label="the paper's usual error")
     axis.set_xticks(range(len(per_view)), [name[-6:-4] for name in per_view])
@@ -164,13 +150,35 @@ def figure4(inputs):
     axis.set_ylim(0, 0.6)
     axis.set_title("Error by view [px rms]")
     axis.legend(loc="upper right")
+
+
+def draw_calibration(inputs, views, found, per_view):
+    """Two of the views with their corners, the residuals, the error of each view."""
+    sheet = drawing.pyplot.figure(figsize=(11, 3.1))
+    grid = sheet.add_gridspec(1, 4, width_ratios=(1.35, 1.35, 1, 1.1))
+    for place, view in enumerate(views[:4:3]):
+        image = read_colour(ARDRONE.folder(inputs) / view["name"])
+        corners = np.array(view["corners"], np.float32).reshape(-1, 1, 2)
+        cv2.drawChessboardCorners(image, ARDRONE.size, corners, True)
+        drawing.show(sheet.add_subplot(grid[place]), image, view["name"])
+    draw_residuals(sheet.add_subplot(grid[2]), found)
+    draw_error_by_view(sheet.add_subplot(grid[3]), per_view)
+    return drawing.finish(sheet, "Detected corners, residuals and the error of each view")
+
+
+def figure4(inputs):
+    calibration = read_json(ARDRONE.calibrated(inputs) / "calibration.json")
+    found = residuals(ARDRONE, calibration)
+    per_view = {name: rms(vectors) for name, vectors in found.items()}
+    overall = rms(np.concatenate(list(found.values())))
+    published = published_error(inputs)
     numbers = {"rms_px": overall, "program_rms_px": calibration["rms_px"], "views": per_view,
                "intrinsics": calibration["intrinsics"], "sigma": calibration["sigma"],
                "published_rms_px": published, "paper_range_px": list(PAPER_RANGE_PX),
                "opencv_board_rms_px": None}
-    text = (f"twoview calibrate on {len(found)} pictures of an AR.Drone 1 (320 x 240): {overall:.3f} px rms, "
-            f"within the paper's {PAPER_RANGE_PX[0]} to {PAPER_RANGE_PX[1]} px. The authors of the pictures "
-            f"published {published:.2f} px for the same ones.")
+    text = (f"twoview calibrate on {len(found)} pictures of an AR.Drone 1 (320 x 240): {overall:.3f} px "
+            f"rms; the paper's range is {PAPER_RANGE_PX[0]} to {PAPER_RANGE_PX[1]} px. Those who took the "
+            f"pictures published {published:.2f} px for the same ones.")
     missing = []
     try:
         other = read_json(OPENCV.calibrated(inputs) / "calibration.json")["rms_px"]
@@ -178,8 +186,8 @@ def figure4(inputs):
         text += f" OpenCV's own sample pictures give {other:.3f} px."
     except Missing as told:
         missing.append(str(told))
-    return Result(numbers, text, [drawing.finish(sheet, "Detected corners, residuals and the error of each "
-                                                        "view")], [intrinsics_table(calibration)], missing)
+    picture = draw_calibration(inputs, used(calibration), found, per_view)
+    return Result(numbers, text, [picture], [intrinsics_table(calibration)], missing)
 
 
 def published_error(inputs):

@@ -230,8 +230,9 @@ def table_of(studies):
     rows = []
     for study in studies:
         n = study.numbers
-        imu = (f"{n['imu_difference_deg']:.2f} ± {n['imu_sigma_deg']:.2f}" if "imu_difference_deg" in n else "–")
-        metres = "–"
+        imu = metres = "–"
+        if "imu_difference_deg" in n:
+            imu = f"{n['imu_difference_deg']:.2f} (sigma {n['imu_sigma_deg']:.2f})"
         if n.get("baseline_m"):
             metres = f"{n['baseline_m']:.3f} by {n['baseline_source']}, true {n['true_baseline_m']:.3f}"
         rows.append([study.pair.name, f"{n['inliers']} of {n['matches']}", f"{n['rotation_error_deg']:.3f}",
@@ -258,8 +259,8 @@ def figure(real, flown, lead, alt):
 
 def figure14(inputs):
     return figure(lambda: inputs.motorcycle, lambda: flown_pair(inputs, flight.SIDEWAYS, 0.6),
-                  "The lines run along the motion and the epipoles lie far outside the images, to the side; the drone "
-                  "leans while it flies, so that its lines are tilted.",
+                  "The lines run along the motion and the epipoles lie far outside the images, to the side; the "
+                  "drone leans while it flies, so that its lines are tilted.",
                   "parallel epipolar lines, and both cameras from above")
 
 
@@ -271,9 +272,9 @@ def figure15(inputs):
                   "epipolar lines that meet in the epipole, and both cameras from above")
 
 
-DIFFERS = ("The paper compares with the real drone's IMU. We found no recording of a real flight with pictures and "
-           "IMU that may be used, so the flight here is the simulator's, recorded and read as a real one; its IMU "
-           "has noise and its truth is known. The sigma of the attitude, a degree or so, is the driver's "
+DIFFERS = ("The paper compares with the real drone's IMU. We found no recording of a real flight with pictures "
+           "and IMU that may be used, so the flight here is the simulator's, recorded and read as a real one; "
+           "its IMU has noise and its truth is known. The sigma of the attitude, a degree or so, is the driver's "
            "assumption for the real sensor.")
 EXPERIMENTS = [
     Experiment("figure14", "Camera motion", "Figure 14: sideways motion",

@@ -28,7 +28,7 @@ def experiments():
     import motion
     import ransac
     import triangulation
-    modules = (calibration, corners, descriptor, ransac, motion, triangulation, cloud)
+    modules = (calibration, corners, descriptor, ransac, triangulation, motion, cloud)  # the paper's order
     return [e for module in modules for e in module.EXPERIMENTS]
 
 

@@ -183,37 +183,39 @@ def first_pair(inputs, folder, index):
         return [line.split()[:2] for line in f if line.strip() and not line.startswith("#")][index]
 
 
+def studied(axis, pair):
+    """(numbers, rows of the table) of a pair, drawn."""
+    pixels0, pixels1, ratios = matches_of(pair)
+    right = true_matches(pair, pixels0, pixels1)
+    numbers, rows = {"matches": len(pixels0), "right": int(right.sum()), "methods": {}}, []
+    for name, (inliers, samples) in estimates(pair, pixels0, pixels1, ratios).items():
+        kept, both = int(inliers.sum()), int((inliers & right).sum())
+        numbers["methods"][name] = {"inliers": kept, "right": both, "samples": samples}
+        rows.append([f"{pair.name}: {name}", str(len(pixels0)), str(kept), f"{both} of {numbers['right']}",
+                     f"{100 * both / max(1, kept):.1f} %", "–" if samples is None else str(samples)])
+        if name.startswith("eight"):
+            draw_matches(axis, pair, pixels0, pixels1, inliers)
+            axis.set_title(f"{pair.name}: {kept} inliers of {len(pixels0)} matches")
+    return numbers, rows
+
+
 def figure9(inputs):
     pairs, missing = pairs_of_figure9(inputs)
     sheet, axes = drawing.sheet(11, 4.1 * len(pairs), len(pairs), 1, squeeze=False)
-    numbers, rows = {}, []
-    for axis, pair in zip(axes[:, 0], pairs):
-        pixels0, pixels1, ratios = matches_of(pair)
-        right = true_matches(pair, pixels0, pixels1)
-        entry = {"matches": len(pixels0), "right": int(right.sum()), "methods": {}}
-        for name, (inliers, samples) in estimates(pair, pixels0, pixels1, ratios).items():
-            entry["methods"][name] = {"inliers": int(inliers.sum()), "right": int((inliers & right).sum()),
-                                      "samples": samples}
-            rows.append([f"{pair.name}: {name}", str(len(pixels0)), str(int(inliers.sum())),
-                         f"{int((inliers & right).sum())} of {int(right.sum())}",
-                         f"{100 * (inliers & right).sum() / max(1, inliers.sum()):.1f} %",
-                         "–" if samples is None else str(samples)])
-            if name.startswith("eight"):
-                draw_matches(axis, pair, pixels0, pixels1, inliers)
-                axis.set_title(f"{pair.name}: {int(inliers.sum())} inliers of {len(pixels0)} matches")
-        numbers[pair.name] = entry
-    entry = numbers[pairs[0].name]
-    eight = entry["methods"]["eight-point, no camera"]
+    studies = {pair.name: studied(axis, pair) for axis, pair in zip(axes[:, 0], pairs)}
+    numbers = {name: entry for name, (entry, _) in studies.items()}
+    first = numbers[pairs[0].name]
+    eight = first["methods"]["eight-point, no camera"]
     found = (f"On {pairs[0].name} RANSAC with the eight-point algorithm keeps {eight['inliers']} of "
-             f"{entry['matches']} matches, of which {eight['right']} are right by the true depth. Drawn: about a "
-             "hundred of the inliers, green, and all outliers, red.")
+             f"{first['matches']} matches, of which {eight['right']} are right by the true depth. Drawn: about "
+             "a hundred of the inliers, green, and all outliers, red.")
     table = Table("Inliers at 1 px. Right: within 2 px of the true epipolar line (the office, whose truth is "
                   "good to half a degree: 5 px), and within 4 px of the true place where depth is known",
                   ["pair: method", "matches", "inliers", "right ones kept", "of the inliers right",
-                   "samples"], rows)
-    return Result(numbers, found, [drawing.finish(sheet, "Matches of two views: about a hundred of the "
-                                                         "inliers in green, all outliers in red")], [table],
-                  missing)
+                   "samples"], [row for _, rows in studies.values() for row in rows])
+    picture = drawing.finish(sheet, "Matches of two views: about a hundred of the inliers in green, all "
+                                    "outliers in red")
+    return Result(numbers, found, [picture], [table], missing)
 
 
 EXPERIMENTS = [

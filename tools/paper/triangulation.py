@@ -124,14 +124,7 @@ def excess_percent(numbers):
     return 100 * (rms / rms[-1] - 1)
 
 
-def figure13(inputs):
-    numbers, _, weights, errors, ok = weights_study(*forward_pair(inputs))
-    pair, _truth, *pixels = scene("forward")
-    drawn = weights_study(pair, *pixels)[0]
-    gain = np.where(ok, errors[0] - errors[-1], -1)
-    shown = np.argsort(-gain)[:3]
-    numbers["shown"] = [{"weights": weights[:, k].tolist(), "error_px": errors[:, k].tolist()}
-                        for k in shown]
+def draw_rounds(weights, shown, numbers, drawn):
     sheet, axes = drawing.sheet(11, 3.5, 1, 3)
     rounds = np.arange(ROUNDS)
     for k, colour in zip(shown, (drawing.BLUE, drawing.ORANGE, drawing.GOOD)):
@@ -139,11 +132,10 @@ def figure13(inputs):
             axes[0].plot(rounds, weights[:, k, view], style, color=colour, markersize=4)
         change = np.abs(np.diff(weights[:, k], axis=0) / weights[1:, k]).max(axis=1)
         axes[1].plot(rounds[1:], np.maximum(change, 1e-16), "o-", color=colour, markersize=4)
-    axes[0].plot([], [], "ko-", label="camera 0", markersize=4)
-    axes[0].plot([], [], "ks--", label="camera 1", markersize=4)
+    for view, style in ((0, "ko-"), (1, "ks--")):
+        axes[0].plot([], [], style, label=f"camera {view}", markersize=4)
     axes[0].set_ylim(0, 1.05)
     axes[0].set_title("Weights 1 / (p3 · X) of three matches")
-    axes[0].legend()
     axes[1].set_yscale("log")
     axes[1].set_title("Their relative change in a round")
     axes[2].plot(rounds, excess_percent(numbers), "o-", color=drawing.BLUE, markersize=4,
@@ -151,11 +143,21 @@ def figure13(inputs):
     axes[2].plot(rounds, excess_percent(drawn), "s-", color=drawing.ORANGE, markersize=4,
                  label=f"table 1's forward scene, {NOISE_PX:g} px of noise")
     axes[2].set_title("Root mean square above its last value [%]")
-    axes[2].legend()
     for axis in axes:
         axis.set_xlabel("round (0: Linear-LS)")
         axis.set_xticks(rounds)
-    numbers = {**numbers, "forward_scene": drawn}
+    axes[0].legend()
+    axes[2].legend()
+    return drawing.finish(sheet, "Weights and errors of Iterative-LS by round")
+
+
+def figure13(inputs):
+    numbers, _, weights, errors, ok = weights_study(*forward_pair(inputs))
+    pair, _truth, *pixels = scene("forward")
+    drawn = weights_study(pair, *pixels)[0]
+    shown = np.argsort(-np.where(ok, errors[0] - errors[-1], -1))[:3]
+    numbers["shown"] = [{"weights": weights[:, k].tolist(), "error_px": errors[:, k].tolist()}
+                        for k in shown]
     rms = numbers["rms_px"]
     found = (f"{numbers['pair']}, {numbers['matches']} matches: the root mean square error falls from "
              f"{rms[0]:.4f} px (Linear-LS) to {rms[1]:.4f} px after one round and {rms[-1]:.4f} px at the "
@@ -163,7 +165,7 @@ def figure13(inputs):
              f"to within {numbers['library_difference_p99']:.0e} of their distance (99 %). With table 1's noise "
              f"and nearer points, {drawn['rms_px'][0]:.3f} falls to {drawn['rms_px'][-1]:.3f} px. On the left "
              "are the three matches that gain most.")
-    return Result(numbers, found, [drawing.finish(sheet, "Weights and errors of Iterative-LS by round")],
+    return Result({**numbers, "forward_scene": drawn}, found, [draw_rounds(weights, shown, numbers, drawn)],
                   [rounds_table(weights[:, shown[0]], errors[:, shown[0]])])
 
 
