@@ -113,7 +113,8 @@ class RealBoards(CalibrateTest):
 
 
 class KnownCameras(CalibrateTest):
-    def check_lens(self, lens, seed):
+    def check_lens(self, lens, seed, model=None):
+        model = model or lens[0]
         rng = np.random.default_rng(seed)
         rays = boards.ray_table(lens)
         truth = boards.poses(lens, 25, rng)
@@ -121,8 +122,8 @@ class KnownCameras(CalibrateTest):
         for i, (R, t) in enumerate(truth):
             images.append(self.folder / f"board{i:02}.png")
             cv2.imwrite(str(images[-1]), boards.render(rays, R, t, rng))
-        result = self.calibrated(*images[:20], "--model", lens[0], "--square", boards.SQUARE)
-        held = self.calibrated(*images[20:], "--model", lens[0], out=self.folder / "held")
+        result = self.calibrated(*images[:20], "--model", model, "--square", boards.SQUARE)
+        held = self.calibrated(*images[20:], "--model", model, out=self.folder / "held")
         print({n: (round(result["intrinsics"][n], 2), round(s, 3)) for n, s in result["sigma"].items()},
               f"rms {result['rms_px']:.3f} coverage {result['coverage']:.2f}",
               [w["name"] for w in result["warnings"]], file=sys.stderr)
@@ -145,6 +146,7 @@ class KnownCameras(CalibrateTest):
         print(f"held out: {np.sqrt(left / noise):.3f} of the noise, "
               f"{np.sqrt(noise / 5 / 54):.3f} px", file=sys.stderr)
         self.assertLess(np.sqrt(left / noise), 1.1)
+        return result
 
     def refitted(self, lens, R, t, seen, exact):
         """The board through the estimated camera, its pose fitted by Gauss-Newton from the truth."""
@@ -164,6 +166,11 @@ class KnownCameras(CalibrateTest):
 
     def test_a_wide_brown_conrady_lens(self):
         self.check_lens(boards.WIDE, 2)
+
+    def test_a_wide_lens_with_eight_coefficients(self):
+        result = self.check_lens(boards.RATIONAL, 5, "rational")
+        self.assertTrue(all(f"k{n}" in result["intrinsics"] for n in range(1, 7)))
+        self.assertIn("cols: 8", (self.out / "camera.yaml").read_text())
 
     def test_a_kannala_brandt_lens(self):
         self.check_lens(boards.FISHEYE, 3)
