@@ -12,7 +12,6 @@ import sys
 ALLOWED = {
     "memcpy", "memmove", "memset", "memcmp",  # the compiler writes these calls itself
     "sqrt", "sqrtf",  # exact by IEEE 754, so the same everywhere; the only libm functions
-    "__cpu_model", "__cpu_features2", "__cpu_indicator_init",  # libgcc's, for the choice of kernels on x86
     "getauxval",  # libc's, for the same on ARM: the CPU's features as the kernel hands them over
     "__stack_chk_fail", "__stack_chk_guard",  # where the compiler guards the stack by default
     "_GLOBAL_OFFSET_TABLE_",
@@ -22,7 +21,7 @@ ALLOWED = {
 # Weak references that every shared object has, from the compiler's start files.
 STARTUP = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable",
            "_ITM_registerTMCloneTable", "__deregister_frame_info", "__register_frame_info"}
-# Of the objects, not of the .so: there the compiler's start files and libgcc's cpu model have theirs.
+# Of the objects, not of the .so: there the compiler's start files have theirs.
 CONSTRUCTORS = re.compile(r"\.(init_array|fini_array|ctors|dtors)\b")
 WRITABLE = re.compile(r"\.(data|bss|tdata|tbss)\b(?!\.rel\.ro)")  # .data.rel.ro is made read-only at load
 SECTION = re.compile(r"^\s*\[\s*\d+\]\s+(\.\S+)\s+\S+\s+[0-9a-f]+\s+[0-9a-f]+\s+([0-9a-f]+)\s", re.M)

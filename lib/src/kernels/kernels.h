@@ -10,6 +10,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#define TVK_NOINLINE __attribute__((noinline))
+/* Before a loop that need not be fast. */
+#if defined(__clang__)
+#define TVK_ROLLED _Pragma("nounroll")
+#else
+#define TVK_ROLLED _Pragma("GCC unroll 1")
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif

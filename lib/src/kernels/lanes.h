@@ -36,7 +36,6 @@
 #define TVK_ON_SPHERE(kernel, own) own
 #endif
 
-#define TVK_NOINLINE __attribute__((noinline))
 /* For what is compiled once for the image plane and once for the sphere. */
 #define TVK_INLINE inline __attribute__((always_inline))
 

@@ -23,13 +23,13 @@
 /* A key's missing part, shifted, and its place; beyond the last descriptor, what no key may beat. */
 static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
 
-static inline int32_t squared_norm(const uint8_t *a) {
+static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * a[k];
   return sum;
 }
 
-static inline int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
+static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
     const int16_t difference = (int16_t)(a[k] - b[k]);
@@ -66,7 +66,7 @@ NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
 static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
 
 /* The smallest and the second smallest distance of groups so far, and where the smallest group starts. */
-static inline void nearest_merge(tvk_nearest *nearest, int32_t best_key, int32_t second_key,
+static TVK_NOINLINE void nearest_merge(tvk_nearest *nearest, int32_t best_key, int32_t second_key,
                                  int32_t norm, int32_t group) {
   const int32_t best = (best_key >> 8) + norm;
   if (best_key == NEAREST_FAR || best >= nearest->second) return;
@@ -109,7 +109,7 @@ static inline void merge_lanes(const int32_t *best, const int32_t *second, int32
 }
 
 /* Whether `best` is the distance of one member of a group alone: which, and the next distance. */
-static inline int32_t resolve_group(const uint8_t *query, const uint8_t *others, int32_t num_others,
+static TVK_NOINLINE int32_t resolve_group(const uint8_t *query, const uint8_t *others, int32_t num_others,
                                     int32_t stride, int32_t count, tvk_nearest *nearest) {
   int32_t found = -1, equals = 0, k, member = nearest->idx;
   for (k = 0; k < count && member < num_others; ++k, member += stride) {
@@ -285,17 +285,23 @@ static void meet_panel(const uint8_t *rows, int32_t num_rows, nearest_block *blo
   }
 }
 
+static TVK_NOINLINE void forget_nearest(tvk_nearest *nearest, int32_t count) {
+  const tvk_nearest none = {NEAREST_FAR, NEAREST_FAR, 0};
+  int32_t k;
+  TVK_ROLLED
+  for (k = 0; k < count; ++k) nearest[k] = none;
+}
+
 static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t *columns,
                            int32_t num_columns, void *scratch, tvk_nearest *of_columns,
                            tvk_nearest *of_rows) {
-  const tvk_nearest none = {NEAREST_FAR, NEAREST_FAR, 0};
   nearest_rows *const tiles = (nearest_rows *)scratch;
   nearest_block *const blocks =
       (nearest_block *)(void *)((uint8_t *)scratch + TVK_NEAREST_CHUNK_BYTES(num_rows));
   const int32_t largest = largest_byte(columns, (int64_t)num_columns * TVK_DESCRIPTOR_SIZE);
   int32_t first, b, k;
-  for (k = 0; k < num_rows; ++k) of_rows[k] = none;
-  for (k = 0; k < num_columns; ++k) of_columns[k] = none;
+  forget_nearest(of_rows, num_rows);
+  forget_nearest(of_columns, num_columns);
   for (first = 0; first < num_columns; first += TVK_NEAREST_PANEL) {
     const int32_t count = nearest_min(TVK_NEAREST_PANEL, num_columns - first);
     for (b = 0; b * NEAREST_COLUMNS < count; ++b) {

@@ -97,6 +97,7 @@ static void make_block(const uint8_t *columns, int32_t count, int32_t place, int
     if (j < count) {
       int8_t centred[TVK_DESCRIPTOR_SIZE];
       for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) centred[k] = (int8_t)(centre - columns[k]);
+      TVK_ROLLED
       for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], centred + 4 * k, 4);
     }
     block->norms[j] = j < count ? squared_norm(columns) : 0;

@@ -47,6 +47,7 @@ static void make_block(const uint8_t *columns, int32_t count, int32_t place, int
     int32_t sum = 0;
     if (j < count) {
       for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += columns[k];
+      TVK_ROLLED
       for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], columns + 4 * k, 4);
     }
     block->norms[j] = j < count ? squared_norm(columns) : 0;

@@ -162,7 +162,7 @@ static __attribute__((noinline)) void eliminate(lanes rows[10][20], lane_mask *o
       for (r = first_used; r < 10; ++r) rows[r][c] -= dot * v[r];
     }
   }
-  TVK_UNROLL
+  TVK_ROLLED
   for (k = 9; k >= 4; --k) {
     const lanes inverse = 1.0 / diagonal[k];
     for (c = 10; c < 20; ++c) {
@@ -214,12 +214,12 @@ static inline void determinant_of(const z_matrix *b, lanes polynomial[11]) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
     lanes minor[7];
     memset(minor, 0, sizeof minor);
-    TVK_UNROLL
+    TVK_ROLLED
     for (p = 0; p < 4; ++p) {
       TVK_UNROLL
       for (q = 0; q < 4; ++q) minor[p + q] += b->x[i][p] * b->y[j][q] - b->x[j][p] * b->y[i][q];
     }
-    TVK_UNROLL
+    TVK_ROLLED
     for (p = 0; p < 5; ++p) {
       TVK_UNROLL
       for (q = 0; q < 7; ++q) polynomial[p + q] += b->one[k][p] * minor[q];
@@ -504,6 +504,7 @@ static inline lane_mask same_side(const lanes f[10][3], const lanes E[9]) {
 
 static inline void load_rays(const double *rays, int first, lanes f[10][3]) {
   int k, i;
+  TVK_ROLLED
   for (k = 0; k < 10; ++k) {
     for (i = 0; i < 3; ++i) f[k][i] = lanes_load(rays + TVK_WIDTH * (3 * k + i) + first);
   }

@@ -4,6 +4,9 @@
 #include "kernels/kernels.h"
 #include "twoview/context.h"
 
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
 #if defined(__linux__) && (defined(__arm__) || defined(__aarch64__))
 #include <asm/hwcap.h>
 #include <sys/auxv.h>
@@ -15,15 +18,45 @@ extern const tvk_table tvk_table_neon, tvk_table_neon_dot;
 enum { MAX_TABLES = 4 };
 
 #if defined(__x86_64__)
+enum { LEVEL_SSE2, LEVEL_AVX2, LEVEL_AVX512 };
+
+/* Of registers that the system saves (XCR0's bits 1 and 2: AVX, 5 to 7: AVX-512) and of instructions.
+   __builtin_cpu_supports knows every CPU there is, in 4.4 kB and a mutable variable. */
+static inline __attribute__((always_inline)) int32_t ask_cpu(void) {
+  const unsigned avx512 = bit_AVX512F | bit_AVX512BW | bit_AVX512VL;
+  unsigned a, b, c, d, saved, high;
+  if (__get_cpuid_max(0, NULL) < 7) return LEVEL_SSE2;
+  __cpuid(1, a, b, c, d);
+  if (!(c & bit_OSXSAVE)) return LEVEL_SSE2;
+  __asm__("xgetbv" : "=a"(saved), "=d"(high) : "c"(0));
+  __cpuid_count(7, 0, a, b, c, d);
+  if ((saved & 0x06) != 0x06 || !(b & bit_AVX2)) return LEVEL_SSE2;
+  return (saved & 0xe0) == 0xe0 && (b & avx512) == avx512 && (c & bit_AVX512VNNI) ? LEVEL_AVX512
+                                                                                 : LEVEL_AVX2;
+}
+
+#if defined(__GLIBC__)
+/* Asked once, by the loader, which keeps the answer as the address of a function: a virtual machine
+   takes a tenth of a millisecond for it. */
+static int32_t level_sse2(void) { return LEVEL_SSE2; }
+static int32_t level_avx2(void) { return LEVEL_AVX2; }
+static int32_t level_avx512(void) { return LEVEL_AVX512; }
+typedef int32_t (*level_of)(void);
+__attribute__((no_sanitize("address", "undefined"))) static level_of resolve_level(void) {
+  const int32_t level = ask_cpu();
+  return level == LEVEL_AVX512 ? level_avx512 : level == LEVEL_AVX2 ? level_avx2 : level_sse2;
+}
+static int32_t cpu_level(void) __attribute__((ifunc("resolve_level")));
+#else
+static int32_t cpu_level(void) { return ask_cpu(); }
+#endif
+
 static int32_t tables_above_c(const tvk_table *tables[]) {
+  const int32_t level = cpu_level();
   int32_t n = 0;
-  __builtin_cpu_init();
   tables[n++] = &tvk_table_sse2;
-  if (__builtin_cpu_supports("avx2")) tables[n++] = &tvk_table_avx2;
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni")) {
-    tables[n++] = &tvk_table_avx512;
-  }
+  if (level >= LEVEL_AVX2) tables[n++] = &tvk_table_avx2;
+  if (level >= LEVEL_AVX512) tables[n++] = &tvk_table_avx512;
   return n;
 }
 #elif defined(__linux__) && defined(__aarch64__)
