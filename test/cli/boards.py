@@ -63,6 +63,8 @@ def ray_table(lens):
         dx = (distorted(model, k, np.c_[flat + (h, 0), np.ones(len(flat))]) - at) / h
         dy = (distorted(model, k, np.c_[flat + (0, h), np.ones(len(flat))]) - at) / h
         e = grid - at
+        if np.abs(e).max() < 1e-13:
+            break
         det = dx[:, 0] * dy[:, 1] - dy[:, 0] * dx[:, 1]
         step = np.stack([(dy[:, 1] * e[:, 0] - dy[:, 0] * e[:, 1]) / det,
                          (dx[:, 0] * e[:, 1] - dx[:, 1] * e[:, 0]) / det], 1)
