@@ -248,6 +248,13 @@ class Table1(Case):
         percent = [100 * np.sqrt(((p - x) ** 2).sum() / (x ** 2).sum()) for p, x in zip(positions, truth)]
         self.assertAlmostEqual(told["percent_median"], np.median(percent), delta=1e-9)
 
+    def test_the_lens_of_the_times_distorts_nothing(self):
+        scene, _, *pixels = triangulation.scene("forward", num=100)
+        lensed = triangulation.through_a_lens(scene)
+        for method in triangulation.METHODS:
+            plain, seen = (triangulation.ours(method, s, *pixels)["error_px"] for s in (scene, lensed))
+            self.assertLess(np.abs(plain - seen).max(), 1e-4, method)
+
     def test_poly_has_the_least_pixel_error(self):
         errors = triangulation.errors_table({k: triangulation.scene(k, num=300)
                                              for k in ("sideways", "forward", "converging")})
