@@ -10,10 +10,9 @@ import compare_support as support
 
 FOUNTAIN = os.path.join(support.DATA, "strecha_fountain_P11")
 EASY = ("0000.jpg 0002.jpg ", "0003.jpg 0005.jpg ")
-# OpenGV draws its samples by the clock, and the pose of one sample is 0.1 to 4 degrees off on real
-# images. That none is off by its convention this bound shows here, and test_compare_solvers to a
-# degree on simulated matches.
-OPENGV_DEG = 8.0
+# OpenGV draws its samples by the clock, and the pose of one sample is 0.1 to 5 degrees off on these
+# pairs, within a degree in every third run. A wrong convention never is: so OpenGV may try again.
+OPENGV_RUNS = 10
 TRIANGULATIONS_AGREE_PX = 0.1
 
 
@@ -30,12 +29,16 @@ class TestReport(unittest.TestCase):
         cls.out = os.path.join(cls.folder.name, "report")
         with open(os.path.join(FOUNTAIN, "pairs.txt"), encoding="utf-8") as f:
             lines = [line for line in f if line.startswith(EASY)]
-        pairs = support.write(cls.folder.name, "pairs.txt", "".join(lines))
-        cls.done = support.run(pairs, "--images", os.path.join(FOUNTAIN, "images"), "-o", cls.out,
-                               "--jobs", 2, "--timeout", 200)
+        cls.pairs = support.write(cls.folder.name, "pairs.txt", "".join(lines))
+        cls.done = cls.compare(cls.out)
         if cls.done.returncode == 0:
             with open(os.path.join(cls.out, "report.json"), encoding="utf-8") as f:
                 cls.report = json.load(f)
+
+    @classmethod
+    def compare(cls, out, *words):
+        return support.run(cls.pairs, "--images", os.path.join(FOUNTAIN, "images"), "-o", out,
+                           "--jobs", 2, "--timeout", 200, *words)
 
     @classmethod
     def tearDownClass(cls):
@@ -57,14 +60,32 @@ class TestReport(unittest.TestCase):
                 told = [(r["status"], r["message"], r["pose_error_deg"]) for r in rows]
                 errors = [r["pose_error_deg"] for r in rows if r["pose_error_deg"] is not None]
                 self.assertTrue(errors, told)
-                # A wrong convention is wrong on both pairs; COLMAP's program and OpenGV draw anew in
-                # each run (1.04 degrees was seen of COLMAP 3.8 on one of the two).
+                # A wrong convention is wrong on both pairs; COLMAP's program draws anew in each run
+                # (1.04 degrees was seen of COLMAP 3.8 on one of the two).
                 if system.module == "pyopengv":
-                    self.assertLess(min(errors), OPENGV_DEG, told)
-                elif system.id == "twoview":
+                    continue  # a test of its own
+                if system.id == "twoview":
                     self.assertLess(max(errors), 1.0, told)
                 else:
                     self.assertLess(min(errors), 1.0, told)
+
+    def test_opengv_comes_within_a_degree_on_an_easy_pair(self):
+        import systems
+        left = {s.id for s in systems.of_kind("solver") if s.module == "pyopengv"}
+        report = self.report
+        for run in range(OPENGV_RUNS):
+            for pair in report["pairs"]:
+                rows = pair["rows"]["solver"]
+                left = {i for i in left
+                        if rows[i]["pose_error_deg"] is None or rows[i]["pose_error_deg"] > 1.0}
+            if not left:
+                return
+            out = os.path.join(self.folder.name, f"again{run}")
+            again = self.compare(out, "--systems", ",".join(["twoview", *left]))
+            self.assertEqual(again.returncode, 0, again.stderr)
+            with open(os.path.join(out, "report.json"), encoding="utf-8") as f:
+                report = json.load(f)
+        self.fail(f"{sorted(left)}: never within a degree in {OPENGV_RUNS} runs")
 
     def test_triangulations_agree(self):
         rows = [p["rows"]["triangulation"] for p in self.report["pairs"]]
