@@ -42,7 +42,8 @@ static int32_t level_sse2(void) { return LEVEL_SSE2; }
 static int32_t level_avx2(void) { return LEVEL_AVX2; }
 static int32_t level_avx512(void) { return LEVEL_AVX512; }
 typedef int32_t (*level_of)(void);
-__attribute__((no_sanitize("address", "undefined"))) static level_of resolve_level(void) {
+/* The loader calls it before a sanitizer is ready; clang does not see that it is used. */
+__attribute__((no_sanitize("address", "undefined"), unused)) static level_of resolve_level(void) {
   const int32_t level = ask_cpu();
   return level == LEVEL_AVX512 ? level_avx512 : level == LEVEL_AVX2 ? level_avx2 : level_sse2;
 }
