@@ -6,7 +6,8 @@
   *camera0`), or it is the object that the function is of (its first parameter).
 - A function that returns a status says which ones.
 - What is said of another function ("as tv_detect") counts as said here.
-- A floating-point field, and a number in nanoseconds or bytes, has its unit in its name or comment.
+- A floating-point field has its unit in its name or comment.
+- A header of an algorithm or of a protocol names its source: the page under docs/ that has papers, formulas and tests.
 """
 
 import pathlib
@@ -100,6 +101,17 @@ class TestHeaders(unittest.TestCase):
     def test_every_status_is_said(self):
         self.report([(path, function, function.name) for path, function in self.each("function")
                      if without_statuses(function, self.functions)], "functions that do not say their statuses")
+
+    def test_every_source_is_named(self):
+        named = set()
+        for path, header in self.each("file"):
+            pages = re.findall(r"docs/[\w/]+\.md", header.comment)
+            self.assertTrue(all((headers.ROOT / page).exists() for page in pages), pages)
+            named |= {pathlib.Path(page).stem for page in pages}
+            if path.name in ("at.h", "navdata.h", "pave.h", "config.h"):
+                self.assertIn("docs/drivers.md", pages, path)
+        algorithms = {path.stem for path in (headers.ROOT / "docs" / "algorithms").glob("*.md")} - {"math"}  # internal
+        self.assertEqual(algorithms - named, set())
 
     def test_every_quantity_has_a_unit(self):
         self.report([(path, symbol, str(symbol)) for path, symbol in self.each("field") if without_unit(symbol)],

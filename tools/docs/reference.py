@@ -104,12 +104,15 @@ class Reference:
             pieces.append(child.tail or "")
         words = html.escape(" ".join("".join(pieces).split()), quote=False)
         words = re.sub(r"([*|\[\]{}])", lambda found: f"&#{ord(found.group())};", words)
-        pieces = words.split("`")  # code, and what may hold the names of symbols, in turn
-        pieces[0::2] = [re.sub(r"\w+", lambda found: self.link(found.group()), piece) for piece in pieces[0::2]]
+        pieces = words.split("`")  # code, and what may hold the names of symbols and pages, in turn
+        pieces[0::2] = [re.sub(r"docs/([\w/-]+)\.md|\w+", self.link, piece) for piece in pieces[0::2]]
         pieces[1::2] = [f"<code>{piece}</code>" for piece in pieces[1::2]]
         return "".join(pieces)
 
-    def link(self, word):
+    def link(self, found):
+        word, page = found.group(), found.group(1)
+        if page:
+            return f"[{pathlib.PurePosixPath(page).name.replace('_', ' ')}]({{{{root}}}}{page}.md)"
         if word in self.place_of:
             return f"[`{word}`]({{{{root}}}}{self.place_of[word]})"
         return word.replace("_", "&#95;")

@@ -1,4 +1,7 @@
-/* twoview: bundle adjustment of two views, and how sure its points are. */
+/* twoview: bundle adjustment of two views, and how sure its points are.
+
+   N. Demmel et al., "Square root bundle adjustment", CVPR 2021; P. J. Huber, "Robust Statistics", 1981. Formulas
+   and tests: docs/algorithms/bundle.md. */
 #ifndef TWOVIEW_BUNDLE_H
 #define TWOVIEW_BUNDLE_H
 

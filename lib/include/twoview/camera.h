@@ -1,4 +1,7 @@
-/* twoview: camera models, from pixels to rays and back. */
+/* twoview: camera models, from pixels to rays and back.
+
+   D. C. Brown, "Close-range camera calibration", 1971; J. Kannala, S. Brandt, "A generic camera model and
+   calibration method", PAMI 2006. Formulas and tests: docs/algorithms/camera.md. */
 #ifndef TWOVIEW_CAMERA_H
 #define TWOVIEW_CAMERA_H
 

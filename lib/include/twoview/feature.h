@@ -2,7 +2,8 @@
 
    Corners: E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006,
    on an image pyramid. Descriptors: D. G. Lowe, "Distinctive image features from scale-invariant
-   keypoints", IJCV 2004; RootSIFT: R. Arandjelovic, A. Zisserman, CVPR 2012. */
+   keypoints", IJCV 2004; RootSIFT: R. Arandjelovic, A. Zisserman, CVPR 2012.
+   Formulas and tests: docs/algorithms/fast.md, docs/algorithms/sift.md. */
 #ifndef TWOVIEW_FEATURE_H
 #define TWOVIEW_FEATURE_H
 

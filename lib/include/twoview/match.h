@@ -1,4 +1,7 @@
-/* twoview: which descriptors belong together. */
+/* twoview: which descriptors belong together.
+
+   Ratio test: D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, 7.1. Formulas
+   and tests: docs/algorithms/match.md. */
 #ifndef TWOVIEW_MATCH_H
 #define TWOVIEW_MATCH_H
 

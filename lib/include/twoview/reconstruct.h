@@ -1,4 +1,6 @@
-/* twoview: the main job, two images in memory to a pose and points. */
+/* twoview: the main job, two images in memory to a pose and points.
+
+   The stages in a row; each one's header names its sources. Signs and frames: docs/conventions.md. */
 #ifndef TWOVIEW_RECONSTRUCT_H
 #define TWOVIEW_RECONSTRUCT_H
 

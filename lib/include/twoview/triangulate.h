@@ -1,6 +1,7 @@
 /* twoview: points from two rays.
 
-   The methods of R. Hartley, P. Sturm, "Triangulation", CVIU 1997, which the paper chose among. */
+   The methods of R. Hartley, P. Sturm, "Triangulation", CVIU 1997, which the paper chose among.
+   Formulas and tests: docs/algorithms/triangulation.md. */
 #ifndef TWOVIEW_TRIANGULATE_H
 #define TWOVIEW_TRIANGULATE_H
 

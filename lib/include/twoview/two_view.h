@@ -1,4 +1,6 @@
-/* twoview: the geometry of two views from matched pixels. */
+/* twoview: the geometry of two views from matched pixels.
+
+   Formulas, papers, rules of the verdict, tests: docs/algorithms/two_view.md, docs/algorithms/gravity.md. */
 #ifndef TWOVIEW_TWO_VIEW_H
 #define TWOVIEW_TWO_VIEW_H
 

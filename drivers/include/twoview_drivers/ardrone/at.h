@@ -3,7 +3,8 @@
 
    A command is `AT*NAME=<sequence>[,argument...]` and a carriage return. Several share a datagram, none
    is split. The drone obeys only numbers greater than the last it obeyed; 1 begins anew. The raw
-   motor command is left out on purpose. */
+   motor command is left out on purpose.
+   Layouts from Parrot's SDK, open drivers and captured bytes: docs/drivers.md. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_AT_H
 #define TWOVIEW_DRIVERS_ARDRONE_AT_H
 

@@ -1,5 +1,6 @@
 /* AR.Drone 2.0: its configuration: the text it sends (TCP 5559), the keys one can set, and the
-   handshake that makes sure that a value arrived. Pure: no socket, no heap, no locale. */
+   handshake that makes sure that a value arrived. Pure: no socket, no heap, no locale.
+   Layouts from Parrot's SDK, open drivers and captured bytes: docs/drivers.md. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_CONFIG_H
 #define TWOVIEW_DRIVERS_ARDRONE_CONFIG_H
 

@@ -3,7 +3,8 @@
 
    A datagram is a header, options (tag, size, data) and a checksum. "Bootstrap" packets have no
    option; "demo" ones come at about 15 Hz, full ones at 200 Hz. Body axes are x forward, y right, z
-   down; theta nose up, phi right side down, psi clockwise from above are positive. */
+   down; theta nose up, phi right side down, psi clockwise from above are positive.
+   Layouts from Parrot's SDK, open drivers and captured bytes: docs/drivers.md. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_NAVDATA_H
 #define TWOVIEW_DRIVERS_ARDRONE_NAVDATA_H
 

@@ -1,7 +1,8 @@
 /* AR.Drone 2.0: PaVE, the packets of its video streams (TCP 5555 live, 5553 recording). Pure: bytes in,
    frames out, no socket, no heap.
 
-   A packet is a header of 64 or 68 bytes and one H.264 picture. A connection may begin in the midst of one. */
+   A packet is a header of 64 or 68 bytes and one H.264 picture. A connection may begin in the midst of one.
+   Layouts from Parrot's SDK, open drivers and captured bytes: docs/drivers.md. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_PAVE_H
 #define TWOVIEW_DRIVERS_ARDRONE_PAVE_H
 
