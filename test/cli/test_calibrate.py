@@ -287,6 +287,7 @@ class Views(CalibrateTest):
         for board in ("8x5", "10x7", "6x5"):
             with self.subTest(board=board):
                 self.refuse(self.names[0], board=board, words=[board, "--board 9x6"])
+        self.refuse(*self.names, board="6x5", words=["first 4 images", "--board 9x6"])
         self.calibrated(*self.names, board="6x9")
 
     def test_images_of_different_sizes(self):

@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kMinSide = 3, kMaxBoardSide = 100;     // inner corners; OpenCV's least
 constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // of CPU time, for one search
+constexpr size_t kTellingViews = 4;
 
 struct Arguments {
   Common common;
@@ -109,6 +110,18 @@ void require_views(const std::vector<BoardView>& views, const Arguments& a) {
                  ": at least 3 are needed, 15 are better, each tilted another way");
 }
 
+// A search for a board that is not there takes seconds. When none of the first images has it and all but one
+// show one and the same other board, the rest would only be waited for.
+void stop_at_another_board(const std::vector<BoardView>& views, cv::Size inner) {
+  if (views.size() != kTellingViews || count_of(views, Reason::kUsed) > 0) return;
+  const auto [seen, times] = other_board(views);
+  if (times + 1 >= static_cast<int>(kTellingViews))
+    throw BadInput("no whole " + board_name(inner) + " board in the first " +
+                   std::to_string(kTellingViews) + " images, but " + board_name(seen) +
+                   " inner corners in " + std::to_string(times) + " of them: is it --board " +
+                   board_name(seen) + ", or is a part always hidden?");
+}
+
 std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
   std::vector<BoardView> views;
   int num_found = 0;
@@ -119,6 +132,7 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
       throw BadInput("video " + a.video + " changes its frames' size at " + name);
     image = luma.size();
     views.push_back(find_board(luma, name, a.board.inner, seconds));
+    if (!live) stop_at_another_board(views, a.board.inner);
     if (!views.back().is_used() || !live) return true;
     reject_duplicates(views, image);  // a live source goes on until there are enough
     num_found += views.back().is_used();
