@@ -56,11 +56,12 @@ int main(int argc, char **argv) {
   if (argc != 15) return fail("usage: 07_imu MATCHES.txt fx fy cx cy w0 x0 y0 z0 w1 x1 y1 z1 sigma_deg");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   camera.model = TV_CAMERA_PINHOLE;
-  camera.width = camera.height = 1; /* no image is looked at */
   camera.fx = atof(argv[2]);
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
   camera.cy = atof(argv[5]);
+  camera.width = (int)(2 * camera.cx); /* nearly; the verdict asks how many would agree by chance */
+  camera.height = (int)(2 * camera.cy);
   rotation_of(argv + 6, world[0]);
   rotation_of(argv + 10, world[1]);
   tv_limits_init(&limits);

@@ -119,6 +119,7 @@ class Examples(unittest.TestCase):
     def test_imu(self):
         level = ["1", "0", "0", "0"]
         text = self.example("07_imu", self.matches, *CAMERA[:3], CAMERA[4], *level, *level, "1")
+        self.assertIn("(ok)", text)
         self.assertIn("of the estimated rotation", text)
 
     def test_triangulate(self):

@@ -23,7 +23,7 @@ typedef enum tv_camera_model {
    pixel up and left: its cx, cy are ours + 0.5). */
 typedef struct tv_camera {
   int32_t model;         /* a tv_camera_model */
-  int32_t width, height; /* of the image, pixels, at least 1 */
+  int32_t width, height; /* of the image, pixels, >= 1; the verdict needs them, too */
   int32_t reserved;      /* 0 */
   double fx, fy;         /* focal lengths, pixels, > 0 */
   double cx, cy;         /* principal point, pixels */
