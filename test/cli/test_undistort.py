@@ -159,6 +159,11 @@ class Undistort(cli.CliTest):
         self.assert_refused(self.run_program("undistort", "d.png", "-o", self.out), "--camera")
         self.assert_refused(self.run_program("undistort", "--camera", "lens.yaml", "-o", self.out), "IMAGE")
 
+    def test_a_lens_that_sees_nothing_of_the_result_is_refused(self):
+        self.write("lens.yaml", camera_yaml(W, H, F, F, 100 * W, CY, (-0.5, 0, 0, 0, 0)))
+        self.write("d.png", png(W, H, [128] * (W * H)))
+        self.assert_refused(self.undistort(), "lens.yaml", "principal point")
+
     def test_what_is_read_is_not_written_over(self):
         self.lens_file("brown_conrady")
         (self.folder / "lens.yaml").rename(self.folder / "camera.yaml")

@@ -95,6 +95,10 @@ int undistort(Arguments& a) {
   files.keep(a.camera);
   for (const std::string& image : a.images) files.keep(image);
   const Map map = map_to(lens, pinhole);
+  const double share = cv::countNonZero(map.seen) / static_cast<double>(map.seen.total());
+  if (share == 0)
+    throw BadInput("camera " + a.camera + " sees no pixel of the result: check its principal point and "
+                   "distortion, or --focal-scale");
   for (size_t i = 0; i < a.images.size(); ++i) {
     const cv::Mat image = load_pixels(a.images[i]);
     require_size(lens, a.camera, image.cols, image.rows, a.images[i]);
@@ -102,7 +106,6 @@ int undistort(Arguments& a) {
   }
   if (a.mask) files.add("mask.png", png_bytes(map.seen));
   files.add("camera.yaml", camera_yaml(pinhole));
-  const double share = cv::countNonZero(map.seen) / static_cast<double>(map.seen.total());
 
   if (common.json) {
     nlohmann::ordered_json json;
