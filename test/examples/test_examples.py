@@ -46,7 +46,7 @@ class Examples(unittest.TestCase):
         run(CMAKE, "--install", BUILD, "--prefix", prefix)
         cls.prefix = prefix
         cls.bin = cls.folder / "build"
-        run(CMAKE, "-S", EXAMPLES, "-B", cls.bin, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_COMPILER={CC}",
+        run(CMAKE, "-G", "Ninja", "-S", EXAMPLES, "-B", cls.bin, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_COMPILER={CC}",
             "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror")
         run(CMAKE, "--build", cls.bin)
         cls.image = []
