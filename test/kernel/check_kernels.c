@@ -484,7 +484,7 @@ static void case_triangulate(trial *t) {
   double *pixels0 = INPUT(t, double, 2 * num), *pixels1 = INPUT(t, double, 2 * num);
   tvk_triangulate_pair *pair = INPUT(t, tvk_triangulate_pair, 1);
   tv_point *points = OUTPUT(t, tv_point, num);
-  int32_t k, c;
+  int32_t *any = OUTPUT(t, int32_t, 1), expected = 0, k, c;
   for (k = 0; k < 4; ++k) {
     pair->focal[k] = 500 + k;
     pair->inverse_focal[k] = 1 / pair->focal[k];
@@ -511,11 +511,13 @@ static void case_triangulate(trial *t) {
     }
     if (kind == 3) pixels0[2 * k] = random_int(&t->seed, 0, 1) ? 1e200 : NAN;
   }
-  REPEAT(t, t->set->triangulate(pair,
-                                method == 0   ? TV_TRIANGULATION_MIDPOINT
-                                : method == 1 ? TV_TRIANGULATION_LINEAR_LS
-                                              : TV_TRIANGULATION_ITERATIVE_LS,
-                                pixels0, pixels1, num, points));
+  REPEAT(t, *any = t->set->triangulate(pair,
+                                       method == 0   ? TV_TRIANGULATION_MIDPOINT
+                                       : method == 1 ? TV_TRIANGULATION_LINEAR_LS
+                                                     : TV_TRIANGULATION_ITERATIVE_LS,
+                                       pixels0, pixels1, num, points));
+  for (k = 0; k < num; ++k) expected |= points[k].status < 0;
+  TEST_ASSERT_EQUAL_INT(expected, *any);
 }
 
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {

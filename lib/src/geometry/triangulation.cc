@@ -149,6 +149,22 @@ tvk_triangulate_pair kernel_pair(const TriangulationPair& pair) {
   return p;
 }
 
+// The kernel's points; returns whether one of them, with status -1, is left to triangulate_point.
+bool kernel_leaves_some(tv_triangulation method, const TriangulationPair& pair,
+                        const double* pixels0, const double* pixels1, size_t num,
+                        tv_point* points) {
+  constexpr size_t kAtOnce = size_t{1} << 30;  // the kernel counts in 32 bits
+  const tvk_table* kernels = tvk_select(TV_KERNELS_AUTO);
+  const tvk_triangulate_pair p = kernel_pair(pair);
+  bool leaves = false;
+  for (size_t first = 0; first < num; first += kAtOnce) {
+    const size_t some = num - first < kAtOnce ? num - first : kAtOnce;
+    leaves |= kernels->triangulate(&p, method, pixels0 + 2 * first, pixels1 + 2 * first,
+                                   static_cast<int32_t>(some), points + first) != 0;
+  }
+  return leaves;
+}
+
 }  // namespace
 
 bool is_triangulation_method(int method) {
@@ -256,15 +272,8 @@ void triangulate_point(tv_triangulation method, const TriangulationPair& pair, c
 void triangulate_points(tv_triangulation method, const TriangulationPair& pair,
                         const double* pixels0, const double* pixels1, size_t num,
                         tv_point* points) {
-  constexpr size_t kAtOnce = size_t{1} << 30;  // the kernel counts in 32 bits
   const bool lanes = in_lanes(method, pair);
-  const tvk_table* kernels = tvk_select(TV_KERNELS_AUTO);
-  for (size_t first = 0; first < num && lanes; first += kAtOnce) {
-    const size_t some = num - first < kAtOnce ? num - first : kAtOnce;
-    const tvk_triangulate_pair p = kernel_pair(pair);
-    kernels->triangulate(&p, method, pixels0 + 2 * first, pixels1 + 2 * first,
-                         static_cast<int32_t>(some), points + first);
-  }
+  if (lanes && !kernel_leaves_some(method, pair, pixels0, pixels1, num, points)) return;
   for (size_t i = 0; i < num; ++i) {
     if (lanes && points[i].status >= 0) continue;
     triangulate_point(method, pair, Vec2(pixels0[2 * i], pixels0[2 * i + 1]),

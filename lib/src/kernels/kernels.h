@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define TVK_NOINLINE __attribute__((noinline))
-/* Before a loop that need not be fast. */
+/* Before a loop that -O2 and -O3 would unroll, where its size is worth more than its time. */
 #if defined(__clang__)
 #define TVK_ROLLED _Pragma("nounroll")
 #else
@@ -115,7 +115,7 @@ typedef struct tvk_triangulate_pair {
      and their number to counts[s], 0 for a degenerate sample. What lies behind them is scratch.
    triangulate: count matches of two pinholes (pixels: x and y each) by Midpoint, Linear-LS or
      Iterative-LS (method, a tv_triangulation). status -1, and zeros, for a match that is none of
-     "ok" and "behind", or needs more care. */
+     "ok" and "behind", or needs more care; returns whether there is one. */
 #define TVK_PIXEL_LIST(X)                                                                          \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold, uint8_t *scores)) \
@@ -168,7 +168,7 @@ typedef struct tvk_triangulate_pair {
      const float *m, float inverse_sq))                                                            \
   X(relpose_5pt, void,                                                                             \
     (const double *rays, int32_t num_samples, double *essentials, int32_t *counts))                \
-  X(triangulate, void,                                                                             \
+  X(triangulate, int32_t,                                                                          \
     (const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,                      \
      const double *pixels1, int32_t count, struct tv_point *points))
 

@@ -61,12 +61,18 @@ static inline lanes lanes_keep(lane_mask mask, lanes a) { return (lanes)(mask & 
 #if TVK_LANES == 8
 #define LANES_EVEN 0, 2, 4, 6, 8, 10, 12, 14
 #define LANES_ODD 1, 3, 5, 7, 9, 11, 13, 15
+#define LANES_EVEN_PAIRS 0, 8, 2, 10, 4, 12, 6, 14
+#define LANES_ODD_PAIRS 1, 9, 3, 11, 5, 13, 7, 15
 #elif TVK_LANES == 4
 #define LANES_EVEN 0, 2, 4, 6
 #define LANES_ODD 1, 3, 5, 7
+#define LANES_EVEN_PAIRS 0, 4, 2, 6
+#define LANES_ODD_PAIRS 1, 5, 3, 7
 #else
 #define LANES_EVEN 0, 2
 #define LANES_ODD 1, 3
+#define LANES_EVEN_PAIRS 0, 2
+#define LANES_ODD_PAIRS 1, 3
 #endif
 static inline lanes lanes_abs(lanes a) { return (lanes)((lane_mask)a & INT64_MAX); }
 static inline lanes lanes_sqrt(lanes a) {

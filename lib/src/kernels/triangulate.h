@@ -8,7 +8,6 @@
 /* tv_point in words of eight bytes: the position; the angle and the error; the status. */
 enum { POINT_WORDS = 5 };
 typedef char triangulate_words_fit[sizeof(tv_point) == 8 * POINT_WORDS ? 1 : -1];
-typedef double __attribute__((may_alias)) point_word;
 
 /* x, y: of the rays (x, y, 1). */
 typedef struct ray_lanes {
@@ -48,6 +47,13 @@ static inline void load_pairs(const double *xy, lanes *x, lanes *y) {
   const lanes a = lanes_load(xy), b = lanes_load(xy + TVK_LANES);
   *x = lanes_shuffle(a, b, LANES_EVEN);
   *y = lanes_shuffle(a, b, LANES_ODD);
+}
+
+/* Lane k's a and b side by side, two words to a store: for even k in words[0] from k on, for odd k in
+   words[1] from k - 1 on. */
+static inline void store_pairs(double words[2][TVK_LANES], lanes a, lanes b) {
+  lanes_store(words[0], lanes_shuffle(a, b, LANES_EVEN_PAIRS));
+  lanes_store(words[1], lanes_shuffle(a, b, LANES_ODD_PAIRS));
 }
 
 /* atan2(sine, cosine) for sine >= 0, to a float's rounding: the polynomial to 2e-8. */
@@ -119,14 +125,16 @@ static inline void least_squares_point(const tvk_triangulate_pair *p, const ray_
   *settled &= ~active;
 }
 
-/* One block, from pixels less the principal points to what points hold. */
-static inline void triangulate_lanes(const tvk_triangulate_pair *p, int method, lanes u0, lanes v0,
-                                     lanes u1, lanes v1, double words[POINT_WORDS][TVK_LANES]) {
+/* One block, from pixels less the principal points to what points hold: words by store_pairs, the
+   last one alone. Returns the lanes that it leaves without a point. */
+static inline lane_mask triangulate_lanes(const tvk_triangulate_pair *p, int method, lanes u0,
+                                          lanes v0, lanes u1, lanes v1,
+                                          double words[POINT_WORDS][TVK_LANES]) {
   const double *R = p->R, *d = p->direction, *c = p->center1;
   const ray_lanes r0 = {u0 * p->inverse_focal[0], v0 * p->inverse_focal[1]};
   const ray_lanes r1 = {u1 * p->inverse_focal[2], v1 * p->inverse_focal[3]};
   lanes f[3], n[3], point[3] = {{0}, {0}, {0}}, moved[3]; /* f: ray 1 in camera 0; n = ray 0 x f */
-  lanes n_sq, size_sq, cosine, along0, along1, inverse, error_sq;
+  lanes n_sq, size_sq, cosine, along0, along1, inverse, error_sq, floats;
   lane_mask good, status;
   int i;
   TVK_UNROLL
@@ -179,45 +187,57 @@ static inline void triangulate_lanes(const tvk_triangulate_pair *p, int method, 
     good &= lanes_abs(point[i]) < 1e300;
   }
   TVK_UNROLL
-  for (i = 0; i < 3; ++i) lanes_store(words[i], lanes_keep(good, point[i]));
-  lanes_store(words[3], lanes_keep(good, pack_floats(angle_of(floats_sqrt(floats_of(n_sq)),
-                                                              floats_of(cosine)),
-                                                     floats_sqrt(floats_of(error_sq)))));
+  for (i = 0; i < 3; ++i) point[i] = lanes_keep(good, point[i]);
+  floats = pack_floats(angle_of(floats_sqrt(floats_of(n_sq)), floats_of(cosine)),
+                       floats_sqrt(floats_of(error_sq)));
+  store_pairs(words, point[0], point[1]);
+  store_pairs(words + 2, point[2], lanes_keep(good, floats));
   lanes_store(words[4], (lanes)((status | ~good) & UINT32_MAX)); /* -1 where it is not good */
+  return ~good;
 }
 
-/* TVK_LANES matches, their pixels in pixels0 and pixels1, the first `count` to points. */
-static inline void triangulate_block(const tvk_triangulate_pair *p, int method,
-                                     const double *pixels0, const double *pixels1, int count,
-                                     tv_point *points) {
+/* TVK_LANES matches, their pixels in pixels0 and pixels1, the first `count` to points. Returns those
+   of all lanes that it leaves without a point. */
+static inline lane_mask triangulate_block(const tvk_triangulate_pair *p, int method,
+                                          const double *pixels0, const double *pixels1, int count,
+                                          tv_point *points) {
   double words[POINT_WORDS][TVK_LANES];
   lanes u0, v0, u1, v1;
-  int k, i;
+  lane_mask left;
+  int k;
   load_pairs(pixels0, &u0, &v0);
   load_pairs(pixels1, &u1, &v1);
   u0 -= p->principal[0];
   v0 -= p->principal[1];
   u1 -= p->principal[2];
   v1 -= p->principal[3];
-  triangulate_lanes(p, method, u0, v0, u1, v1, words);
+  left = triangulate_lanes(p, method, u0, v0, u1, v1, words);
   for (k = 0; k < count; ++k) {
-    point_word *const point = (point_word *)(void *)(points + k);
-    TVK_UNROLL
-    for (i = 0; i < POINT_WORDS; ++i) point[i] = words[i][k];
+    char *const point = (char *)(points + k);
+    memcpy(point, words[k & 1] + (k & ~1), 16);
+    memcpy(point + 16, words[2 + (k & 1)] + (k & ~1), 16);
+    memcpy(point + 32, words[4] + k, 8);
   }
+  return left;
 }
 
-void TVK_MATCH(triangulate)(const tvk_triangulate_pair *pair, int32_t method, const double *pixels0,
-                            const double *pixels1, int32_t count, tv_point *points) {
-  const int32_t whole = count - count % TVK_LANES, left = count - whole;
-  int32_t k;
+int32_t TVK_MATCH(triangulate)(const tvk_triangulate_pair *pair, int32_t method,
+                               const double *pixels0, const double *pixels1, int32_t count,
+                               tv_point *points) {
+  const int32_t whole = count - count % TVK_LANES, rest = count - whole;
+  lane_mask left = {0};
+  int32_t k, any;
   for (k = 0; k < whole; k += TVK_LANES) {
-    triangulate_block(pair, method, pixels0 + 2 * k, pixels1 + 2 * k, TVK_LANES, points + k);
+    left |=
+        triangulate_block(pair, method, pixels0 + 2 * k, pixels1 + 2 * k, TVK_LANES, points + k);
   }
-  if (left > 0) {
+  any = lanes_any(left);
+  if (rest > 0) {
     double last0[2 * TVK_LANES] = {0}, last1[2 * TVK_LANES] = {0};
-    memcpy(last0, pixels0 + 2 * whole, (size_t)left * 2 * sizeof last0[0]);
-    memcpy(last1, pixels1 + 2 * whole, (size_t)left * 2 * sizeof last1[0]);
-    triangulate_block(pair, method, last0, last1, left, points + whole);
+    memcpy(last0, pixels0 + 2 * whole, (size_t)rest * 2 * sizeof last0[0]);
+    memcpy(last1, pixels1 + 2 * whole, (size_t)rest * 2 * sizeof last1[0]);
+    left = triangulate_block(pair, method, last0, last1, rest, points + whole);
+    for (k = 0; k < rest; ++k) any |= left[k] != 0;
   }
+  return any;
 }
