@@ -221,6 +221,16 @@ class Views(CalibrateTest):
         self.assertEqual({n: found[n] for n in odd}, {n: reason for n, (_, reason) in odd.items()})
         self.assertEqual({found[n] for n in self.names}, {"used"})
 
+    def test_a_good_set_may_begin_with_parts_of_the_board(self):
+        half = self.images[0].copy()
+        half[:, int(self.outline(0)[:, 0].mean()):] = 110
+        parts = [self.save(f"part{i}.png", half) for i in range(4)]
+        result = self.calibrated(*parts, *self.names)
+        self.assertEqual(status_of(result), dict.fromkeys(parts, "partial_board") | dict.fromkeys(self.names, "used"))
+        plain = self.calibrated(*self.names, out=self.folder / "plain")
+        for name, value in plain["intrinsics"].items():
+            self.assertAlmostEqual(result["intrinsics"][name], value, delta=0.05 * plain["sigma"][name])
+
     def test_a_view_far_above_the_others_is_left_out_and_named(self):
         plain = self.calibrated(*self.names)
         x, y = np.meshgrid(np.arange(640, dtype=np.float32), np.arange(480, dtype=np.float32))
@@ -287,7 +297,7 @@ class Views(CalibrateTest):
         for board in ("8x5", "10x7", "6x5"):
             with self.subTest(board=board):
                 self.refuse(self.names[0], board=board, words=[board, "--board 9x6"])
-        self.refuse(*self.names, board="6x5", words=["first 4 images", "--board 9x6"])
+        self.refuse(*self.names, board="8x5", words=["in 8 images", "--board 9x6"])
         self.calibrated(*self.names, board="6x9")
 
     def test_images_of_different_sizes(self):

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kMinSide = 3, kMaxBoardSide = 100;     // inner corners; OpenCV's least
 constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // of CPU time, for one search
-constexpr size_t kTellingViews = 4;
+constexpr int kTellingViews = 2;                     // of another board
 
 struct Arguments {
   Common common;
@@ -93,33 +93,28 @@ void require_views(const std::vector<BoardView>& views, const Arguments& a) {
   if (views.empty()) throw BadInput("video " + a.video + " has no frames");
   if (num_used >= kMinViews) return;
   const auto [seen, times] = other_board(views);
-  if (num_used == 0 && 2 * times > static_cast<int>(views.size()) / 2)
-    throw BadInput("no whole " + board + " board in " + all + ", but " + board_name(seen) +
-                   " inner corners in " + std::to_string(times) + " of them: is it --board " +
-                   board_name(seen) + ", or is a part hidden?");
+  const std::string only = "only " + std::to_string(num_used) + " different view" +
+                           (num_used == 1 ? "" : "s") + " of the " + board + " board in " + all;
+  if (times > static_cast<int>(num_used) && 4 * times > static_cast<int>(views.size()))
+    throw BadInput((num_used == 0 ? "no whole " + board + " board in " + all : only) + ", but " +
+                   board_name(seen) + " inner corners in " + std::to_string(times) +
+                   " of them: is it --board " + board_name(seen) + ", or is a part hidden?");
   if (num_used == 0)
     throw BadInput("no " + board + " board that can be used in " + all + reasons_text(views) +
                    ": --board counts inner corners; show the whole board, sharp and evenly lit");
   if (num_used == 1 && num_alike > 0)
     throw BadInput("all " + std::to_string(1 + num_alike) + " views of the board are alike, of " +
                    all + reasons_text(views) + ": move and tilt the board between pictures");
-  throw BadInput("only " + std::to_string(num_used) + " different view" +
-                 (num_used == 1 ? "" : "s") + " of the " + board + " board in " + all +
-                 reasons_text(views) +
+  throw BadInput(only + reasons_text(views) +
                  (a.video.empty() ? "" : " of the video, which ended too soon") +
                  ": at least 3 are needed, 15 are better, each tilted another way");
 }
 
-// A search for a board that is not there takes seconds. When none of the first images has it and all but one
-// show one and the same other board, the rest would only be waited for.
-void stop_at_another_board(const std::vector<BoardView>& views, cv::Size inner) {
-  if (views.size() != kTellingViews || count_of(views, Reason::kUsed) > 0) return;
+// The board that some views so far show while none shows ours; an empty size for none. It may be
+// ours with a part hidden, so that the views to come are still searched.
+cv::Size likely_other_board(const std::vector<BoardView>& views) {
   const auto [seen, times] = other_board(views);
-  if (times + 1 >= static_cast<int>(kTellingViews))
-    throw BadInput("no whole " + board_name(inner) + " board in the first " +
-                   std::to_string(kTellingViews) + " images, but " + board_name(seen) +
-                   " inner corners in " + std::to_string(times) + " of them: is it --board " +
-                   board_name(seen) + ", or is a part always hidden?");
+  return count_of(views, Reason::kUsed) == 0 && times >= kTellingViews ? seen : cv::Size();
 }
 
 std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
@@ -131,8 +126,7 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
     if (image.area() > 0 && luma.size() != image)
       throw BadInput("video " + a.video + " changes its frames' size at " + name);
     image = luma.size();
-    views.push_back(find_board(luma, name, a.board.inner, seconds));
-    if (!live) stop_at_another_board(views, a.board.inner);
+    views.push_back(find_board(luma, name, a.board.inner, likely_other_board(views), seconds));
     if (!views.back().is_used() || !live) return true;
     reject_duplicates(views, image);  // a live source goes on until there are enough
     num_found += views.back().is_used();

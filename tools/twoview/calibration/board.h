@@ -40,10 +40,12 @@ struct BoardView {
 
 // Searches an 8-bit image for the whole board in a process of its own, which ends after
 // `limit_seconds` of CPU time: OpenCV has been seen to take minutes on a dark image.
-// The first row and column are such that the square between the first four corners is dark, where
-// the board's shape lets that be chosen.
+// `likely_other`: a board that may well be there instead, looked for before the searches that take
+// seconds to be sure that ours is not; an empty size for none. The first row and column are such
+// that the square between the first four corners is dark, where the board's shape lets that be
+// chosen.
 BoardView find_board(const cv::Mat& luma, const std::string& name, cv::Size inner,
-                     int limit_seconds);
+                     cv::Size likely_other, int limit_seconds);
 
 // Marks views as blurred, duplicates and surplus, in the views' order.
 void reject_blurred(std::vector<BoardView>& views);
