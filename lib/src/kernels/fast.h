@@ -12,7 +12,7 @@ static const int8_t fast_circle_column[16] = {0, 1,  2,  3,  3,  3,  2,  1,
    one end more. A macro, for compilers make no vectors of a condition on which of the two it is;
    not inlined, for it is long and called from two places. */
 #define BEST_ARC(name, lesser, greater)                                                            \
-  static __attribute__((noinline)) byte_lanes name(const byte_lanes p[16], int32_t arc) {          \
+  static TVK_NOINLINE byte_lanes name(const byte_lanes p[16], int32_t arc) {                       \
     byte_lanes run2[8], run4[8], least[8], best; /* run[i] starts at 2i + 1 */                     \
     int32_t i;                                                                                     \
     for (i = 0; i < 8; ++i) run2[i] = lesser(p[2 * i + 1], p[(2 * i + 2) & 15]);                   \

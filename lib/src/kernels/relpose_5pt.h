@@ -102,7 +102,7 @@ static TVK_NOINLINE void add_cubic_product(const lanes q[10], const lanes l[4], 
 }
 
 /* The ten cubic constraints, a row each. */
-static __attribute__((noinline)) void cubic_constraints(const lanes e[9][4], lanes rows[10][20]) {
+static TVK_NOINLINE void cubic_constraints(const lanes e[9][4], lanes rows[10][20]) {
   static const int place[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   lanes gram[6][10]; /* E E' - tr(E E') / 2: entries 00 01 02 11 12 22 */
   int i, j, k, m;
@@ -138,7 +138,7 @@ static __attribute__((noinline)) void cubic_constraints(const lanes e[9][4], lan
 
 /* Makes the left ten columns the identity, in the last six rows only: the first four are never used.
    Clears the mask of lanes where they are singular. */
-static __attribute__((noinline)) void eliminate(lanes rows[10][20], lane_mask *ok) {
+static TVK_NOINLINE void eliminate(lanes rows[10][20], lane_mask *ok) {
   lanes diagonal[10];
   int k, r, c;
   for (k = 0; k < 10; ++k) {
@@ -199,8 +199,7 @@ static inline void z_matrix_of(const lanes rows[10][20], z_matrix *b) {
 
 /* A function of its own, as are those above: their arrays are the most of the stack, and are gone when
    the roots are looked for. */
-static __attribute__((noinline)) void reduce_constraints(const lanes e[9][4], z_matrix *b,
-                                                         lane_mask *ok) {
+static TVK_NOINLINE void reduce_constraints(const lanes e[9][4], z_matrix *b, lane_mask *ok) {
   lanes rows[10][20];
   cubic_constraints(e, rows);
   eliminate(rows, ok);
@@ -237,7 +236,7 @@ typedef struct sturm_chain {
   lanes last; /* the sign of the chain's end */
 } sturm_chain;
 
-static __attribute__((noinline)) void make_sturm_chain(const lanes p[11], sturm_chain *chain) {
+static TVK_NOINLINE void make_sturm_chain(const lanes p[11], sturm_chain *chain) {
   lanes previous[11], current[11];
   const lanes one = lanes_of(1), sign = lanes_select(p[10] < 0.0, -one, one);
   const lanes inverse_lead = sign / (10.0 * p[10]);
@@ -511,8 +510,8 @@ static inline void load_rays(const double *rays, int first, lanes f[10][3]) {
 }
 
 /* E's entries as linear polynomials. */
-static __attribute__((noinline)) void null_space_of(const double *rays, int first, lanes e[9][4],
-                                                    lane_mask *ok) {
+static TVK_NOINLINE void null_space_of(const double *rays, int first, lanes e[9][4],
+                                       lane_mask *ok) {
   lanes f[10][3], constraints[5][9], basis[4][9];
   int k, i, j;
   load_rays(rays, first, f);
@@ -529,9 +528,9 @@ static __attribute__((noinline)) void null_space_of(const double *rays, int firs
 }
 
 /* The models of the polynomial's roots. */
-static __attribute__((noinline)) void write_models(const double *rays, int first, const lanes e[9][4],
-                                                   const z_matrix *b, lane_mask ok,
-                                                   double *essentials, int32_t *counts) {
+static TVK_NOINLINE void write_models(const double *rays, int first, const lanes e[9][4],
+                                      const z_matrix *b, lane_mask ok, double *essentials,
+                                      int32_t *counts) {
   lanes f[10][3], polynomial[11];
   sturm_chain chain;
   root_brackets brackets;
