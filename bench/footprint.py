@@ -17,10 +17,12 @@ def _run(*command):
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
-def text_and_data(path):
-    """KiB of text and data, as `size` counts them."""
-    text, data = _run("size", path).splitlines()[1].split()[:2]
-    return (int(text) + int(data)) / 1024
+def text_and_data(root, library):
+    """KiB of text and data, as `size` counts them, and their limit."""
+    told = subprocess.run([os.path.join(root, "scripts", "footprint"), "--built", library],
+                          capture_output=True, text=True).stdout  # its status: whether above it
+    text, data, limit = re.search(r"text (\d+)  data (\d+) .* (\d+) KiB", told).groups()
+    return (int(text) + int(data)) / 1024, int(limit)
 
 
 def closure(path):
@@ -70,8 +72,8 @@ def _at_most(case, value, most):
 def rows(build, root):
     sys.path.insert(0, os.path.join(root, "tools", "accuracy"))
     library = os.path.join(build, "lib", "libtwoview.so")
-    found = [_at_most(f"text + data of libtwoview.so, {os.uname().machine}", text_and_data(library),
-                      300 if os.uname().machine == "x86_64" else 200)]
+    found = [_at_most(f"text + data of libtwoview.so, {os.uname().machine}",
+                      *text_and_data(root, library))]
     for width, height in CONTEXT_SIZES:
         most = 8 * 1024 if (width, height) == (640, 480) else None
         found.append(_at_most(f"context {width}x{height}, 2048 keypoints",
