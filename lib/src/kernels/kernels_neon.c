@@ -9,15 +9,8 @@
 #if defined(__aarch64__)
 /* The same with what gains by the dot product of ARMv8.2. */
 #include "kernels/neon_dot.h"
+#undef TVK_TABLE
+#define TVK_TABLE tvk_table_neon_dot
 #define mutual_nearest tvk_mutual_nearest_neon_dot
-extern const tvk_table tvk_table_neon_dot;
-const tvk_table tvk_table_neon_dot = {
-    TV_KERNELS_NEON,
-#define TVK_ENTRY(name, result, parameters) name,
-    TVK_PIXEL_LIST(TVK_ENTRY)
-#undef TVK_ENTRY
-#define TVK_ENTRY(name, result, parameters) TVK_MATCH(name),
-    TVK_MATCH_LIST(TVK_ENTRY)
-#undef TVK_ENTRY
-};
+#include "kernels/kernels_table.h"
 #endif

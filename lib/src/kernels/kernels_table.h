@@ -1,4 +1,5 @@
-/* The table of a set: kernels/kernels_impl.h says how it is included. */
+/* The table of a set: kernels/kernels_impl.h says how it is included. Again, with another TVK_TABLE, for a
+   table that differs in some kernels. */
 #define TVK_DECLARE(name, result, parameters) \
   result tvk_##name##_c parameters;           \
   result tvk_##name##_avx2 parameters;

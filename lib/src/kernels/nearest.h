@@ -13,7 +13,7 @@
 
    A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), the structs
    nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte where these
-   need it, and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS after another. */
+   need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS after another. */
 
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
@@ -22,6 +22,8 @@
 /* A key's missing part, shifted, and its place; beyond the last descriptor, what no key may beat. */
 static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
 
+/* Out of line, as what else runs once a descriptor or a tile and not once a pair: -O3 would write it out at
+   each call. */
 static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * a[k];
@@ -45,6 +47,14 @@ static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b)
 #include "kernels/nearest_neon_dot.h"
 #else
 #include "kernels/nearest_c.h"
+#endif
+
+#if !defined(TVK_AVX2) /* the others have no use for it */
+static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
+  (void)bytes;
+  (void)count;
+  return 0;
+}
 #endif
 
 #define NEAREST_ASSERT(name, condition) typedef char name[(condition) ? 1 : -1]
@@ -285,8 +295,7 @@ static void meet_panel(const uint8_t *rows, int32_t num_rows, nearest_block *blo
   }
 }
 
-/* Out of line and rolled up for its size, 570 bytes less with AVX-512: it runs once a descriptor, beside
-   as many products as there are others. */
+/* Rolled up, too: together 570 bytes less of AVX-512's set. */
 static TVK_NOINLINE void forget_nearest(tvk_nearest *nearest, int32_t count) {
   const tvk_nearest none = {NEAREST_FAR, NEAREST_FAR, 0};
   int32_t k;

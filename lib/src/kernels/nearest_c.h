@@ -15,12 +15,6 @@ typedef struct nearest_block {
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 
-static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
-  (void)bytes;
-  (void)count;
-  return 0; /* no use for it */
-}
-
 static inline void widen_rows(const uint8_t *bytes, int32_t count, int32_t room, int32_t place,
                               int16_t (*values)[TVK_DESCRIPTOR_SIZE], int32_t *norms,
                               int32_t *terms) {

@@ -17,12 +17,6 @@ typedef struct nearest_block {
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 
-static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
-  (void)bytes;
-  (void)count;
-  return 0; /* no use for it */
-}
-
 static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t largest,
                       nearest_rows *tile) {
   int32_t i;
