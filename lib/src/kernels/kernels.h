@@ -28,8 +28,8 @@ typedef struct tvk_nearest {
 
 #define TVK_CIRCLE_RADIUS 3 /* of the segment test */
 
-#define TVK_PATCH_SIDE 16      /* samples a side of a descriptor's patch, 15 gradients between them */
-#define TVK_ORIENT_SIDE 12     /* the same for the orientation's patch */
+#define TVK_PATCH_SIDE 16  /* samples a side of a descriptor's patch, 15 gradients between them */
+#define TVK_ORIENT_SIDE 12 /* the same for the orientation's patch */
 #define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
 
@@ -44,13 +44,13 @@ typedef struct tvk_nearest {
 #define TVK_NEAREST_SCRATCH(num_rows, num_columns) \
   (TVK_NEAREST_CHUNK_BYTES(num_rows) + TVK_NEAREST_PANEL_BYTES(num_columns))
 
-#define TVK_WIDTH 8                  /* lanes of the kernels on doubles */
-#define TVK_SCORE_BLOCK 32           /* matches */
-#define TVK_SCORE_ONE 65536          /* what a match outside the threshold costs */
-#define TVK_LARGEST_LOSS 16384.0     /* r^2 / scale^2 beyond which Cauchy's loss is level */
-#define TVK_RELPOSE_MODELS 10         /* most essential matrices of a sample of five */
-#define TVK_SAMPSON_SUMS 56          /* numbers that sampson_sums adds up */
-#define TVK_TRANSFER_SUMS 47         /* of transfer_sums */
+#define TVK_WIDTH 8              /* lanes of the kernels on doubles */
+#define TVK_SCORE_BLOCK 32       /* matches */
+#define TVK_SCORE_ONE 65536      /* what a match outside the threshold costs */
+#define TVK_LARGEST_LOSS 16384.0 /* r^2 / scale^2 beyond which Cauchy's loss is level */
+#define TVK_RELPOSE_MODELS 10    /* most essential matrices of a sample of five */
+#define TVK_SAMPSON_SUMS 56      /* numbers that sampson_sums adds up */
+#define TVK_TRANSFER_SUMS 47     /* of transfer_sums */
 
 struct tv_point;
 
@@ -109,10 +109,10 @@ typedef struct tvk_triangulate_pair {
      (3 and 3), else all 18: the sum over blocks first_block .. first_block + num_blocks - 1 of
      min(r^2 / T^2, 1) TVK_SCORE_ONE, each truncated to an integer.
    relpose_5pt: rays[TVK_WIDTH (6 k + 3 view + c) + s] is entry c of sample s's k-th ray in a view, for
-     TVK_WIDTH samples, of which the first num_samples are to be solved; the others are finite. Writes the
-     essential matrices, row-major, Frobenius norm 1, that have no match before one camera and behind the
-     other, of sample s to essentials + 9 TVK_RELPOSE_MODELS s
-     and their number to counts[s], 0 for a degenerate sample. What lies behind them is scratch.
+     TVK_WIDTH samples, of which the first num_samples are to be solved; the others are finite. Writes
+     sample s's essential matrices, row-major, Frobenius norm 1, that have no match before one camera and
+     behind the other, to essentials + 9 TVK_RELPOSE_MODELS s, and their number to counts[s], 0 for a
+     degenerate sample. What lies behind them is scratch.
    triangulate: count matches of two pinholes (pixels: x and y each) by Midpoint, Linear-LS or
      Iterative-LS (method, a tv_triangulation). status -1, and zeros, for a match that is none of
      "ok" and "behind", or needs more care; returns whether there is one. */

@@ -58,6 +58,15 @@ static TVK_INLINE void load_block(const double *const *arrays, const int32_t *in
   load_arrays(arrays, indices, 0, on_plane, b);
 }
 
+/* `count` numbers, and zeros in the other lanes. */
+static TVK_INLINE lanes load_first(const double *from, int32_t count) {
+  lanes x = {0};
+  int32_t l;
+  if (count == TVK_LANES) return lanes_load(from);
+  for (l = 0; l < count; ++l) x[l] = from[l];
+  return x;
+}
+
 static TVK_INLINE void store_first(double *to, lanes x, int32_t count) {
   int32_t l;
   if (count == TVK_LANES) {

@@ -92,14 +92,9 @@ static TVK_INLINE void pose_squares_of(const double *const *arrays, int32_t firs
     const int32_t left = count - done < TVK_LANES ? count - done : TVK_LANES;
     sampson_block b;
     epipolar_terms e;
-    lanes q, angle = {0};
-    int l;
+    lanes q, angle;
     load_block(arrays, NULL, first + done, left, on_plane, &b);
-    if (left == TVK_LANES) {
-      angle = lanes_load(arrays[18] + first + done);
-    } else {
-      for (l = 0; l < left; ++l) angle[l] = arrays[18][first + done + l];
-    }
+    angle = load_first(arrays[18] + first + done, left);
     epipolar_of(&b, pose, on_plane, &e);
     q = e.c * e.c / e.n;
     q = lanes_select((q >= 0.0) & ~behind_of(&b, scale * angle, on_plane, pose + 9, pose + 18), q,
