@@ -84,6 +84,35 @@ def deepest_of(graph, kernel_bytes):
     return known
 
 
+def read_graphs(folder):
+    """Of the library outside the kernels, whose indirect calls name their file, and of the kernels."""
+    graph, kernels = Graph(), Graph()
+    files = sorted(folder.rglob("*.ci"))
+    if not files:
+        sys.exit(f"{folder}: no .ci files; build with -fcallgraph-info=su")
+    for path in files:
+        is_kernel_file = path.parent.name == "kernels" and not path.name.startswith("select.")
+        if is_kernel_file:
+            kernels.read(path)
+        else:
+            graph.read(path, f"{INDIRECT} {path.parent.name}/{path.name.removesuffix('.ci')}")
+    return graph, kernels
+
+
+def kernel_bytes_by(kernels):
+    """Of an indirect call's title: the deepest kernel of any set that the call's file names; of all, if
+    it names none."""
+    # A call through a pointer inside a kernel would be one more kernel; there is none.
+    deepest = {name: bytes_ for name, (bytes_, _) in deepest_of(kernels, lambda _: 0).items()}
+
+    def kernel_bytes(call):
+        names = kernels_of(SOURCES / call.split()[1])
+        return max(bytes_ for title, bytes_ in deepest.items()
+                   if not names or KERNEL.fullmatch(title.rsplit(":", 1)[-1])[1] in names)
+
+    return kernel_bytes
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=pathlib.Path)
@@ -92,44 +121,25 @@ def main():
     args = parser.parse_args()
     sys.setrecursionlimit(10000)
 
-    graph, kernels = Graph(), Graph()
-    files = sorted(args.folder.rglob("*.ci"))
-    if not files:
-        sys.exit(f"{args.folder}: no .ci files; build with -fcallgraph-info=su")
-    for path in files:
-        is_kernel_file = path.parent.name == "kernels" and not path.name.startswith("select.")
-        if is_kernel_file:
-            kernels.read(path)
-        else:
-            graph.read(path, f"{INDIRECT} {path.parent.name}/{path.name.removesuffix('.ci')}")
-    found = graph.unbounded + kernels.unbounded
-    # A call through a pointer inside a kernel would be one more kernel; there is none.
-    of_kernels = {name: deepest for name, (deepest, _) in deepest_of(kernels, lambda _: 0).items()}
-
-    def kernel_bytes(call):
-        """The deepest kernel of any set that the file of an indirect call names; of all, if it names none."""
-        names = kernels_of(SOURCES / call.split()[1])
-        found = [bytes_ for title, bytes_ in of_kernels.items()
-                 if not names or KERNEL.fullmatch(title.rsplit(":", 1)[-1])[1] in names]
-        return max(found)
-
-    deepest = deepest_of(graph, kernel_bytes)
+    graph, kernels = read_graphs(args.folder)
+    wrong = graph.unbounded + kernels.unbounded
+    deepest = deepest_of(graph, kernel_bytes_by(kernels))
     public = {name: deepest[name] for name in deepest if re.fullmatch(r"tv_\w+", name)}
     if "tv_reconstruct" not in public:
-        found.append("tv_reconstruct is not there")
+        wrong.append("tv_reconstruct is not there")
     for name, (bytes_, _) in sorted(public.items(), key=lambda item: -item[1][0]):
         if args.all:
             print(f"{bytes_:7d} {name}")
         if bytes_ > args.limit:
-            found.append(f"{name}: {bytes_} bytes of stack are more than {args.limit}")
+            wrong.append(f"{name}: {bytes_} bytes of stack are more than {args.limit}")
     name, (bytes_, chain) = max(public.items(), key=lambda item: item[1][0])
     print(f"{bytes_} bytes of stack at most: {name}")
     for link in chain:
         is_kernel = link.startswith("(")
         print("        " + link if is_kernel else f"  {graph.frame.get(link, FOREIGN_BYTES):6d} {link}")
-    for line in found:
+    for line in wrong:
         print(line)
-    sys.exit(1 if found else 0)
+    sys.exit(1 if wrong else 0)
 
 
 main()
