@@ -1,7 +1,8 @@
-// Files that appear whole or not at all.
+// Files that appear whole or not at all, and what is printed.
 #pragma once
 
 #include <atomic>
+#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -62,5 +63,14 @@ std::string read_file(const std::string& path, size_t max_bytes);
 
 // Writes to stdout and flushes. A reader that has gone away is no failure; a full disk is.
 void print(std::string_view text);
+
+// A line of a summary, its name in a column of its own.
+template <class... T>
+std::string summary_line(const char* name, const char* format, T... values) {
+  char head[32], text[512];
+  std::snprintf(head, sizeof head, "%-13s", name);
+  std::snprintf(text, sizeof text, format, values...);
+  return head + std::string(text) + "\n";
+}
 
 }  // namespace cli

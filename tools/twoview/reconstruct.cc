@@ -133,37 +133,30 @@ void make_files(const Outcome& outcome, OutputSet& files) {
   files.add("report.html", report_html(outcome, cloud, figures));
 }
 
-template <class... T>
-std::string line(const char* name, const char* format, T... values) {
-  char head[32], text[512];
-  std::snprintf(head, sizeof head, "%-13s", name);
-  std::snprintf(text, sizeof text, format, values...);
-  return head + std::string(text) + "\n";
-}
-
 // Standard deviations of a pose: the root of half the trace of each block would be per axis; a
 // reader wants the whole angle, so the root of the trace.
 std::string uncertainty_line(const tv_two_view& v) {
   const double* c = v.covariance;
-  return line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
-              std::sqrt(c[0] + c[6] + c[12]) * 180 / M_PI, std::sqrt(c[18] + c[24]) * 180 / M_PI);
+  return summary_line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
+                      std::sqrt(c[0] + c[6] + c[12]) * 180 / M_PI,
+                      std::sqrt(c[18] + c[24]) * 180 / M_PI);
 }
 
 std::string pose_lines(const Outcome& outcome) {
   const tv_two_view& v = outcome.two_view;
   std::string text;
   if (v.has_R)
-    text += line("rotation", "%.3f deg between the views",
-                 rotation_error_deg(rotation_of(v), {1, 0, 0, 0, 1, 0, 0, 0, 1}));
+    text += summary_line("rotation", "%.3f deg between the views",
+                         rotation_error_deg(rotation_of(v), {1, 0, 0, 0, 1, 0, 0, 0, 1}));
   if (has_full_pose(v)) {
     // Where camera 1 stands as camera 0 sees it, which is easier to picture than t.
     const Vector3 c = applied(transposed(rotation_of(v)), translation_of(v));
     const double unit = unit_of(outcome);
     char far[48] = "one baseline";
     if (outcome.scale) std::snprintf(far, sizeof far, "%.3f m", unit);
-    text += line("direction",
-                 "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), %s away",
-                 -unit * c[0], -unit * c[1], -unit * c[2], far);
+    text += summary_line("direction",
+                         "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), %s away",
+                         -unit * c[0], -unit * c[1], -unit * c[2], far);
   }
   if (v.has_covariance) text += uncertainty_line(v);
   return text;
@@ -182,7 +175,7 @@ std::string truth_line(const nlohmann::ordered_json& truth) {
   part("translation_error_deg", ", direction by %.3f deg");
   part("depth_error_median_percent", ", depth by %.2f %% (median)");
   part("depth_error_p95_percent", ", %.2f %% (95th percentile)");
-  return line("truth", "%s", text.c_str());
+  return summary_line("truth", "%s", text.c_str());
 }
 
 std::string summary(const Outcome& outcome, const RecordingInput* recording,
@@ -192,31 +185,32 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording,
   const tv_reconstruction& r = outcome.reconstruction;
   const Picture &a = outcome.picture[0], &b = outcome.picture[1];
   std::string text;
-  text += line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows,
-               b.name.c_str(), b.luma.cols, b.luma.rows);
+  text += summary_line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows,
+                       b.name.c_str(), b.luma.cols, b.luma.rows);
   const char* const colours[] = {style.poor, style.fair, style.good};
   const std::string reasons = reasons_in_words(v.reasons);
-  text += line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
-               tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
-               config_in_words(v.config).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
-  text += line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
-  text += line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
-               v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
+  text +=
+      summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
+                   tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
+                   config_in_words(v.config).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
+  text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
+  text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
+                       v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
   text += pose_lines(outcome);
   if (recording) text += recording->words(outcome);
   const auto& j = outcome.json;
   if (j["median_parallax_deg"].is_number())
-    text += line("parallax", "%.2f deg (median)", j["median_parallax_deg"].get<double>());
+    text += summary_line("parallax", "%.2f deg (median)", j["median_parallax_deg"].get<double>());
   if (r.num_points > 0)
-    text += line("cloud", "%d points, reprojection %.2f px rms", r.num_points,
-                 j["rms_reprojection_px"].get<double>());
+    text += summary_line("cloud", "%d points, reprojection %.2f px rms", r.num_points,
+                         j["rms_reprojection_px"].get<double>());
   if (j["truth"].is_object()) text += truth_line(j["truth"]);
-  text +=
-      line("work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
-           j["kernels"].get<std::string>().c_str(), static_cast<double>(context_bytes) / (1 << 20));
+  text += summary_line(
+      "work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
+      j["kernels"].get<std::string>().c_str(), static_cast<double>(context_bytes) / (1 << 20));
   std::string names;
   for (const std::string& name : files.names()) names += " " + name;
-  return text + line("files", "%s:%s", files.folder().c_str(), names.c_str());
+  return text + summary_line("files", "%s:%s", files.folder().c_str(), names.c_str());
 }
 
 int reconstruct(Arguments& a) {

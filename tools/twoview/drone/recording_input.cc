@@ -58,14 +58,6 @@ CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
   return mount;
 }
 
-template <class... T>
-std::string line(const char* name, const char* format, T... values) {
-  char head[32], text[512];
-  std::snprintf(head, sizeof head, "%-13s", name);
-  std::snprintf(text, sizeof text, format, values...);
-  return head + std::string(text) + "\n";
-}
-
 }  // namespace
 
 struct RecordingInput::State {
@@ -143,21 +135,24 @@ void RecordingInput::add_json(Outcome& outcome) const {
 
 std::string RecordingInput::words(const Outcome& outcome) const {
   const State& s = *state_;
-  std::string text = line("frames", "%d and %d of %zu, %.2f s apart: %s", s.pair.frame[0].index,
-                          s.pair.frame[1].index, s.flight.frames.size(),
-                          s.pair.frame[1].time_s - s.pair.frame[0].time_s, s.pair.why.c_str());
+  std::string text = summary_line(
+      "frames", "%d and %d of %zu, %.2f s apart: %s", s.pair.frame[0].index, s.pair.frame[1].index,
+      s.flight.frames.size(), s.pair.frame[1].time_s - s.pair.frame[0].time_s, s.pair.why.c_str());
   const nlohmann::ordered_json& imu = outcome.json["imu"];
   if (imu.is_object() && imu["sigma_deg"].is_number())
-    text += line("imu", "turned by %.2f deg otherwise than the cameras (sigma %.2f)%s",
-                 imu["rotation_difference_deg"].get<double>(), imu["sigma_deg"].get<double>(),
-                 s.gravity_used ? "; its gravity was a prior" : "");
+    text +=
+        summary_line("imu", "turned by %.2f deg otherwise than the cameras (sigma %.2f)%s",
+                     imu["rotation_difference_deg"].get<double>(), imu["sigma_deg"].get<double>(),
+                     s.gravity_used ? "; its gravity was a prior" : "");
   else
-    text += line("imu", "%s", "its attitudes at the two instants are not known");
+    text += summary_line("imu", "%s", "its attitudes at the two instants are not known");
   if (outcome.scale)
-    text += line("scale", "one baseline is %.3f m (sigma %.3f), by %s", outcome.scale->baseline_m,
-                 outcome.scale->sigma_m, outcome.scale->source.c_str());
+    text += summary_line("scale", "one baseline is %.3f m (sigma %.3f), by %s",
+                         outcome.scale->baseline_m, outcome.scale->sigma_m,
+                         outcome.scale->source.c_str());
   else
-    text += line("scale", "%s", "unknown: neither velocity, altitude nor a floor tells it here");
+    text += summary_line("scale", "%s",
+                         "unknown: neither velocity, altitude nor a floor tells it here");
   return text;
 }
 
