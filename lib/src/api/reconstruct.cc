@@ -80,6 +80,7 @@ bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
 // Matches along the epipolar lines of `estimate`, and the estimate from all of them, where that is
 // no worse: *num_matches, the estimate and r's matches, pixels and mask are then of the second pass.
+// Not inlined, as the two stages below: what they need of the stack is not to lie under the search.
 __attribute__((noinline))
 tv_status match_along_lines(tv_context* context, const tv_view& view0, const tv_view& view1,
                             const int32_t num_keypoints[2], const tv_estimate_options* options,
@@ -151,8 +152,7 @@ Mat3 inverse_intrinsics(const tv_camera& c) {
   return inverse;
 }
 
-// Pose and points together; what follows from the pose follows. Not inlined, as the two stages above:
-// what they need of the stack is not to lie under the search.
+// Pose and points together; what follows from the pose follows.
 __attribute__((noinline))
 tv_status adjust(tv_context* context, const tv_view& view0, const tv_view& view1,
                  int32_t num_matches, Results& r, tv_two_view* two_view, int32_t* num_points) {

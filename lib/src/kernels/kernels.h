@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define TVK_NOINLINE __attribute__((noinline))
-/* Before a loop that -O2 and -O3 would unroll, where its size is worth more than its time. */
+/* Before a loop that is smaller when the compiler does not unroll it, and as fast, or seldom run. */
 #if defined(__clang__)
 #define TVK_ROLLED _Pragma("nounroll")
 #else
