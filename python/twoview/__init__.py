@@ -15,8 +15,8 @@ from .enums import (CameraModel, Config, Descriptor, Kernels, Loss, Method, Orie
 from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOptions,
                       MatchOptions)
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,
-                     describe, detect, estimate_two_view, extract, match, match_guided, orient,
-                     point_covariances, reconstruct, triangulate)
+                     corrected_camera, describe, detect, estimate_two_view, extract, match,
+                     match_guided, orient, point_covariances, reconstruct, triangulate)
 
 
 def version_string() -> str:

@@ -65,7 +65,8 @@ class tv_estimate_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("method", c_int32), ("max_error_px", c_double),
                 ("confidence", c_double), ("max_iterations", c_int32),
                 ("fixed_iterations", c_int32), ("seed", c_uint64), ("gravity0", c_double * 3),
-                ("gravity1", c_double * 3), ("gravity_sigma_rad", c_double)]
+                ("gravity1", c_double * 3), ("gravity_sigma_rad", c_double),
+                ("principal_point_sigma", c_double)]
 
 
 class tv_two_view(Structure):
@@ -81,7 +82,8 @@ class tv_two_view(Structure):
                 ("fundamental_inliers", c_int32), ("homography_inliers", c_int32),
                 ("rotation_inliers", c_int32), ("coverage", c_double),
                 ("median_parallax_rad", c_double), ("rms_error_px", c_double),
-                ("noise_px", c_double), ("seed", c_uint64)]
+                ("noise_px", c_double), ("seed", c_uint64),
+                ("principal_point_shift", c_double * 2)]
 
 
 class tv_point(Structure):

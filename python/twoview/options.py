@@ -57,6 +57,7 @@ class EstimateOptions:
     gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: "down" in camera 0
     gravity1: Sequence[float] = (0.0, 0.0, 0.0)
     gravity_sigma_rad: float = 0.0  #: 0: gravity is not known
+    principal_point_sigma: float = 0.01  #: in focal lengths; 0: exactly where the cameras say
 
 
 @dataclass(frozen=True)

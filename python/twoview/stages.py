@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import byref, c_int32
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Optional, Sequence
 
 import numpy as np
@@ -154,6 +154,7 @@ class TwoView:
     rms_error_px: float
     noise_px: float
     seed: int
+    principal_point_shift: np.ndarray  #: (2,), pixels; all above is of cameras with cx, cy plus this
 
 
 def _two_view(found: Any) -> TwoView:
@@ -174,7 +175,14 @@ def _two_view(found: Any) -> TwoView:
         matrix("alternative_covariance", found.has_alternative_covariance, 5, 5),
         inliers(found.essential_inliers), inliers(found.fundamental_inliers),
         inliers(found.homography_inliers), inliers(found.rotation_inliers), found.coverage,
-        found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed)
+        found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed,
+        np.array(found.principal_point_shift))
+
+
+def corrected_camera(found: TwoView, camera: Camera) -> Camera:
+    """tv_corrected_camera: the camera that `found` is of, for what follows the estimate."""
+    shift = found.principal_point_shift
+    return replace(camera, cx=camera.cx + float(shift[0]), cy=camera.cy + float(shift[1]))
 
 
 def _pixels(pixels0: np.ndarray, pixels1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

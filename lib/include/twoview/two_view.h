@@ -79,6 +79,10 @@ typedef struct tv_estimate_options {
                                       length above 0; read when gravity_sigma_rad > 0 */
   double gravity_sigma_rad; /* standard deviation of each direction about each axis across it,
                                [0, pi]; 0 (default): gravity is not known */
+  double principal_point_sigma; /* how far from cx, cy the principal point may be: a standard deviation in
+                               focal lengths, [0, 0.1], default 0.01; 0: exactly there. Read where
+                               camera0 and camera1 are equal; it then stays where it is unless the
+                               matches speak against that at one in a thousand */
 } tv_estimate_options;
 
 /* Writes the defaults, and struct_size; null is allowed. */
@@ -112,10 +116,19 @@ typedef struct tv_two_view {
   double noise_px;            /* standard deviation of a matched pixel along one axis, as the
                                  residuals of a full pose tell it; 0 without one */
   uint64_t seed;              /* as used */
+  double principal_point_shift[2]; /* pixels: what the matches want added to cx and cy of both cameras
+                                 (tv_estimate_options.principal_point_sigma); all above is of the
+                                 cameras with it (tv_corrected_camera); nearly always 0, 0 */
 } tv_two_view;
 
 /* Writes zeros, and struct_size; null is allowed. */
 TV_API void tv_two_view_init(tv_two_view *result);
+
+/* Writes to `corrected` the camera that the result is of: cx and cy plus principal_point_shift. For what
+   follows the estimate: triangulation, guided matching, bundle adjustment. It may be the camera itself.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. */
+TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera *camera,
+                                     tv_camera *corrected);
 
 /* Estimates the two-view geometry of num_matches matched pixels.
    camera0, camera1: both given, or both null (uncalibrated: F and H only, methods eight-point and

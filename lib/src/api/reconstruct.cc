@@ -78,6 +78,20 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
 
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
+// tv_match_guided with the cameras that the estimate is of. Not inlined, for the stack below its caller.
+__attribute__((noinline))
+tv_status match_guided(tv_context* context, const tv_view& view0, const tv_view& view1,
+                       const int32_t num_keypoints[2], const tv_two_view& estimate, Results& r,
+                       int32_t* count) {
+  tv_camera cameras[2];
+  tv_corrected_camera(&estimate, view0.camera, &cameras[0]);
+  tv_corrected_camera(&estimate, view1.camera, &cameras[1]);
+  return tv_match_guided(context, &cameras[0], &cameras[1], estimate.E, r.keypoints[0],
+                         r.descriptors[0], num_keypoints[0], r.keypoints[1], r.descriptors[1],
+                         num_keypoints[1], nullptr, r.more_matches,
+                         context->limits.max_keypoints, count);
+}
+
 // Matches along the epipolar lines of `estimate`, and the estimate from all of them, where that is
 // no worse: *num_matches, the estimate and r's matches, pixels and mask are then of the second pass.
 // Not inlined, as the two stages below: what they need of the stack is not to lie under the search.
@@ -87,10 +101,8 @@ tv_status match_along_lines(tv_context* context, const tv_view& view0, const tv_
                             Results& r, int32_t* num_matches, tv_two_view* estimate) {
   const tv_limits& limits = context->limits;
   int32_t count = 0;
-  tv_status status = tv_match_guided(
-      context, view0.camera, view1.camera, estimate->E, r.keypoints[0], r.descriptors[0],
-      num_keypoints[0], r.keypoints[1], r.descriptors[1], num_keypoints[1], nullptr,
-      r.more_matches, limits.max_keypoints, &count);
+  tv_status status =
+      match_guided(context, view0, view1, num_keypoints, *estimate, r, &count);
   if (status != TV_OK) return status;
   count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
                        r.more_matches, count);
@@ -126,8 +138,11 @@ tv_status triangulate_inliers(tv_context* context, tv_triangulation method, cons
   if (num_matches == 0) return TV_OK;
   const bool full_pose = is_full_pose(two_view);
   if (full_pose) {
+    tv_camera cameras[2];
+    tv_corrected_camera(&two_view, view0.camera, &cameras[0]);
+    tv_corrected_camera(&two_view, view1.camera, &cameras[1]);
     const tv_status status =
-        tv_triangulate(method, view0.camera, view1.camera, two_view.R, two_view.t, r.pixels[0],
+        tv_triangulate(method, &cameras[0], &cameras[1], two_view.R, two_view.t, r.pixels[0],
                        r.pixels[1], num_matches, r.points);
     if (status != TV_OK) return status;
   }
@@ -156,10 +171,13 @@ Mat3 inverse_intrinsics(const tv_camera& c) {
 __attribute__((noinline))
 tv_status adjust(tv_context* context, const tv_view& view0, const tv_view& view1,
                  int32_t num_matches, Results& r, tv_two_view* two_view, int32_t* num_points) {
+  tv_camera cameras[2];
+  tv_corrected_camera(two_view, view0.camera, &cameras[0]);
+  tv_corrected_camera(two_view, view1.camera, &cameras[1]);
   tv_bundle_result bundle;
   tv_bundle_result_init(&bundle);
   const tv_status status =
-      tv_adjust_two_view(context, view0.camera, view1.camera, r.pixels[0], r.pixels[1],
+      tv_adjust_two_view(context, &cameras[0], &cameras[1], r.pixels[0], r.pixels[1],
                          num_matches, nullptr, two_view->R, two_view->t, r.points, &bundle);
   if (status != TV_OK) return status;
   Pose pose;
@@ -167,8 +185,7 @@ tv_status adjust(tv_context* context, const tv_view& view0, const tv_view& view1
   for (int k = 0; k < 3; ++k) pose.t[k] = two_view->t[k];
   const Mat3 E = essential_from_pose(pose);
   store_unit(E, two_view->E);
-  store_unit(inverse_intrinsics(*view1.camera).transpose() * E *
-                 inverse_intrinsics(*view0.camera),
+  store_unit(inverse_intrinsics(cameras[1]).transpose() * E * inverse_intrinsics(cameras[0]),
              two_view->F);
   two_view->has_covariance = bundle.has_covariance;
   std::copy(bundle.covariance, bundle.covariance + 25, two_view->covariance);

@@ -15,7 +15,7 @@ constexpr uint64_t kDefaultSeed = 20130814;  // any constant would do
 
 constexpr tv_estimate_options kDefaults = {
     sizeof(tv_estimate_options), TV_METHOD_FIVE_POINT, 1.0, 0.9999, 10000, 0, kDefaultSeed,
-    {0, 0, 0}, {0, 0, 0}, 0};
+    {0, 0, 0}, {0, 0, 0}, 0, 0.01};
 
 // Directions that are read: finite, not zero, and a deviation of at most half a turn.
 tv_status check_gravity(const tv_estimate_options& options) {
@@ -40,13 +40,14 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
     checked->method = TV_METHOD_EIGHT_POINT;
   }
   if (!is_finite(checked->max_error_px) || !is_finite(checked->confidence) ||
-      !is_finite(checked->gravity_sigma_rad)) {
+      !is_finite(checked->gravity_sigma_rad) || !is_finite(checked->principal_point_sigma)) {
     return TV_ERR_NOT_FINITE;
   }
   const bool in_range = checked->max_error_px > 0 && checked->max_error_px <= 1e9 &&
                         checked->confidence >= 0 && checked->confidence < 1 &&
                         checked->max_iterations >= 1 && checked->max_iterations <= 1000000 &&
-                        checked->fixed_iterations >= 0 && checked->fixed_iterations <= 1000000;
+                        checked->fixed_iterations >= 0 && checked->fixed_iterations <= 1000000 &&
+                        checked->principal_point_sigma >= 0 && checked->principal_point_sigma <= 0.1;
   const bool with_gravity = checked->gravity_sigma_rad > 0;
   const bool method_known =
       checked->method == TV_METHOD_EIGHT_POINT || checked->method == TV_METHOD_SEVEN_POINT ||
@@ -185,6 +186,9 @@ void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewMo
   packed.median_parallax_rad = outcome.median_parallax_rad;
   packed.rms_error_px = outcome.rms_error_px;
   packed.noise_px = outcome.noise_px;
+  for (int k = 0; k < 2; ++k) {
+    packed.principal_point_shift[k] = outcome.principal_point_shift_px[k];
+  }
   packed.coverage = coverage(problem, matches, outcome.inlier, swapped ? 1 : 0);
   if (packed.coverage > 0 && packed.coverage < 4.5 / 64 &&
       packed.config != TV_CONFIG_DEGENERATE) {
@@ -246,6 +250,16 @@ void tv_two_view_init(tv_two_view* result) {
   result->struct_size = sizeof(tv_two_view);
 }
 
+tv_status tv_corrected_camera(const tv_two_view* result, const tv_camera* camera,
+                              tv_camera* corrected) {
+  if (result == nullptr || camera == nullptr || corrected == nullptr) return TV_ERR_NULL;
+  if (result->struct_size != sizeof(tv_two_view)) return TV_ERR_STRUCT_SIZE;
+  *corrected = *camera;
+  corrected->cx += result->principal_point_shift[0];
+  corrected->cy += result->principal_point_shift[1];
+  return TV_OK;
+}
+
 tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
                                const tv_camera* camera1, const double* pixels0,
                                const double* pixels1, const float* ratios, int32_t num_matches,
@@ -283,6 +297,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     tv::StageTimer timer(context, TV_STAGE_ESTIMATE);
     swapped = tv::exchanged(camera0, camera1, pixels0, pixels1, num_matches);
     problem.calibrated = calibrated;
+    problem.one_camera = calibrated && std::memcmp(camera0, camera1, sizeof *camera0) == 0;
     if (calibrated) {
       problem.camera[0] = tv::prepare_camera(swapped ? *camera1 : *camera0);
       problem.camera[1] = tv::prepare_camera(swapped ? *camera0 : *camera1);
@@ -298,7 +313,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   }
   tv::StageTimer timer(context, TV_STAGE_REFINE);
   tv::TwoViewOutcome outcome;
-  tv::finish_two_view(problem, matches, model, context->arena, &outcome);
+  tv::finish_two_view(problem, model, context->arena, &matches, &outcome);
   tv::pack(problem, matches, model, outcome, swapped, result);
   if (inlier_mask != nullptr) {
     std::memset(inlier_mask, 0, n);

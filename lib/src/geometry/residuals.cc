@@ -13,7 +13,6 @@ constexpr double kInfinity = __builtin_inf();
 // A model is given up after this many blocks, or twice, four times as many, when it does badly.
 constexpr int kFirstBlocks = 2;
 
-
 size_t padded(int max_matches) {
   return (static_cast<size_t>(max_matches) + kScoreBlock - 1) / kScoreBlock * kScoreBlock;
 }
@@ -180,6 +179,45 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M) {
   epipolar(pairs, i, M, &e);
   const double q = e.c * e.c / e.n;
   return q >= 0 ? q : kInfinity;
+}
+
+bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
+                    SampsonSlopes* slopes) {
+  Epipolar e;
+  epipolar(pairs, i, M, &e);
+  if (!(e.n > 0)) return false;
+  const double inverse = 1 / std::sqrt(e.n), share = e.c / e.n;
+  slopes->residual = e.c * inverse;
+  // c / sqrt(n) has the slopes (d c - c / n (s0' d s0 + s1' d s1)) / sqrt(n), s0 = J0' M' f1 and s1 = J1' M f0:
+  // by M those of f1' M q0 + (q1 - f1)' M f0.
+  double q0[3], q1[3];
+  for (int r = 0; r < 3; ++r) {
+    double* const* J = pairs.jacobian[0] + 2 * r;
+    q0[r] = e.f0[r] - share * (J[0][i] * e.s0[0] + J[1][i] * e.s0[1]);
+    J = pairs.jacobian[1] + 2 * r;
+    q1[r] = e.f1[r] - share * (J[0][i] * e.s1[0] + J[1][i] * e.s1[1]);
+  }
+  double along[2][3];  // M' q1, M q0: what a ray that moves changes
+  for (int r = 0; r < 3; ++r) {
+    along[0][r] = (M(0, r) * q1[0] + M(1, r) * q1[1]) + M(2, r) * q1[2];
+    along[1][r] = (M(r, 0) * q0[0] + M(r, 1) * q0[1]) + M(r, 2) * q0[2];
+    for (int c = 0; c < 3; ++c) {
+      slopes->by_entry[3 * r + c] = inverse * (e.f1[r] * q0[c] + (q1[r] - e.f1[r]) * e.f0[c]);
+    }
+  }
+  for (int k = 0; k < 2; ++k) {
+    double slope = 0;
+    for (int r = 0; r < 3; ++r) {
+      slope -= pairs.jacobian[0][2 * r + k][i] * along[0][r] +
+               pairs.jacobian[1][2 * r + k][i] * along[1][r];
+      if (curvature == nullptr) continue;
+      const double *bend0 = curvature[0] + 3 * r + k, *bend1 = curvature[1] + 3 * r + k;
+      slope += share * ((bend0[0] * e.s0[0] + bend0[1] * e.s0[1]) * e.line0[r] +
+                        (bend1[0] * e.s1[0] + bend1[1] * e.s1[1]) * e.line1[r]);
+    }
+    slopes->by_point[k] = inverse * slope;
+  }
+  return true;
 }
 
 void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares) {
@@ -410,16 +448,15 @@ using SumsKernel = void (*)(const double* const*, const int32_t*, int32_t, int32
 
 // What the kernel adds up, lanes together; returns the loss. The logarithms of Cauchy's loss are
 // those of products of few enough factors, each at most 1 + TVK_LARGEST_LOSS.
-template <int kSums>
-double add_up(SumsKernel kernel, const RayPairs& pairs, const int32_t* indices, int count,
-              const Mat3& M, const RobustLoss& loss, double* totals) {
+double add_up(SumsKernel kernel, int num_sums, const RayPairs& pairs, const int32_t* indices,
+              int count, const Mat3& M, const RobustLoss& loss, double* totals) {
   constexpr int kFactors = 64;
   const Arrays arrays = arrays_of(pairs);
   const Entries entries = entries_of(M);
   const double inverse_sq = 1 / (loss.scale_px * loss.scale_px);
   const bool cauchy = loss.kind == Loss::kCauchy;
-  double sums[kSums][TVK_WIDTH] = {};
-  double* products = sums[kSums - 1];
+  double sums[TVK_SAMPSON_SUMS][TVK_WIDTH] = {};
+  double* products = sums[num_sums - 1];
   double cost = 0;
   for (int first = 0; first < count; first += TVK_WIDTH * kFactors) {
     const int some = count - first < TVK_WIDTH * kFactors ? count - first : TVK_WIDTH * kFactors;
@@ -428,21 +465,20 @@ double add_up(SumsKernel kernel, const RayPairs& pairs, const int32_t* indices, 
            inverse_sq, cauchy, sums[0]);
     for (int l = 0; l < TVK_WIDTH && cauchy; ++l) cost += log(products[l]);
   }
-  for (int k = 0; k < kSums - 2; ++k) totals[k] = over_lanes(sums[k]);
-  return cauchy ? cost : over_lanes(sums[kSums - 2]);
+  for (int k = 0; k < num_sums - 2; ++k) totals[k] = over_lanes(sums[k]);
+  return cauchy ? cost : over_lanes(sums[num_sums - 2]);
 }
 
 // Normal equations of the matrix's entries, to those of parameters with d matrix / dparameter p =
 // columns[p].
-template <int P>
-void project(const double full[9][9], const double slope[9], const Mat3 columns[P],
-             double upper[P * (P + 1) / 2], double gradient[P]) {
-  double flat[P][9];
-  for (int p = 0; p < P; ++p) {
+void project(const double full[9][9], const double slope[9], const Mat3* columns, int num,
+             double* upper, double* gradient) {
+  double flat[9][9];
+  for (int p = 0; p < num; ++p) {
     for (int i = 0; i < 9; ++i) flat[p][i] = columns[p](i / 3, i % 3);
   }
   int slot = 0;
-  for (int p = 0; p < P; ++p) {
+  for (int p = 0; p < num; ++p) {
     double product[9];
     gradient[p] = 0;
     for (int i = 0; i < 9; ++i) {
@@ -450,7 +486,7 @@ void project(const double full[9][9], const double slope[9], const Mat3 columns[
       product[i] = 0;
       for (int j = 0; j < 9; ++j) product[i] += full[i][j] * flat[p][j];
     }
-    for (int r = p; r < P; ++r) {
+    for (int r = p; r < num; ++r) {
       double sum = 0;
       for (int i = 0; i < 9; ++i) sum += flat[r][i] * product[i];
       upper[slot++] = sum;
@@ -458,56 +494,42 @@ void project(const double full[9][9], const double slope[9], const Mat3 columns[
   }
 }
 
-template <int P>
 double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                const Mat3& M, const Mat3 columns[P], const RobustLoss& loss,
-                                double upper[P * (P + 1) / 2], double gradient[P]) {
+                                const Mat3& M, const Mat3* columns, int num_parameters,
+                                const RobustLoss& loss, double* upper, double* gradient) {
   double totals[TVK_SAMPSON_SUMS - 2], full[9][9];
-  const double cost = add_up<TVK_SAMPSON_SUMS>(pairs.kernels->sampson_sums, pairs, indices, count,
-                                               M, loss, totals);
+  const double cost = add_up(pairs.kernels->sampson_sums, TVK_SAMPSON_SUMS, pairs, indices, count, M,
+                             loss, totals);
   int slot = 0;
   for (int i = 0; i < 9; ++i) {
     for (int j = i; j < 9; ++j) full[i][j] = full[j][i] = totals[slot++];
   }
-  project<P>(full, totals + 45, columns, upper, gradient);
+  project(full, totals + 45, columns, num_parameters, upper, gradient);
   return cost;
 }
 
-template double sampson_normal_equations<5>(const RayPairs&, const int32_t*, int, const Mat3&,
-                                            const Mat3*, const RobustLoss&, double*, double*);
-template double sampson_normal_equations<7>(const RayPairs&, const int32_t*, int, const Mat3&,
-                                            const Mat3*, const RobustLoss&, double*, double*);
-
-template <int P>
 double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                 const Mat3& H, const Mat3* columns, const RobustLoss& loss,
-                                 double upper[P * (P + 1) / 2], double gradient[P]) {
+                                 const Mat3& H, const Mat3* columns, int num_parameters,
+                                 const RobustLoss& loss, double* upper, double* gradient) {
   static constexpr int kPlace[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   double totals[TVK_TRANSFER_SUMS - 2], full[9][9];
-  const double cost = add_up<TVK_TRANSFER_SUMS>(pairs.kernels->transfer_sums, pairs, indices, count,
-                                                H, loss, totals);
+  const double cost = add_up(pairs.kernels->transfer_sums, TVK_TRANSFER_SUMS, pairs, indices, count, H,
+                             loss, totals);
   for (int i = 0; i < 9; ++i) {
     for (int j = 0; j < 9; ++j) {
       full[i][j] = totals[6 * kPlace[i / 3][j / 3] + kPlace[i % 3][j % 3]];
     }
   }
   if (columns != nullptr) {
-    project<P>(full, totals + 36, columns, upper, gradient);
+    project(full, totals + 36, columns, num_parameters, upper, gradient);
     return cost;
   }
   int slot = 0;
-  for (int p = 0; p < P; ++p) {
+  for (int p = 0; p < 9; ++p) {
     gradient[p] = totals[36 + p];
-    for (int r = p; r < P; ++r) upper[slot++] = full[p][r];
+    for (int r = p; r < 9; ++r) upper[slot++] = full[p][r];
   }
   return cost;
 }
-
-template double transfer_normal_equations<3>(const RayPairs&, const int32_t*, int, const Mat3&,
-                                             const Mat3*, const RobustLoss&, double*, double*);
-template double transfer_normal_equations<8>(const RayPairs&, const int32_t*, int, const Mat3&,
-                                             const Mat3*, const RobustLoss&, double*, double*);
-template double transfer_normal_equations<9>(const RayPairs&, const int32_t*, int, const Mat3&,
-                                             const Mat3*, const RobustLoss&, double*, double*);
 
 }  // namespace tv

@@ -72,6 +72,16 @@ void finish_rays(RayPairs& pairs, int num_scored);
 // epipoles).
 double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 
+// Sampson's distance with its sign; its slopes by the entries of M, row by row; and by the coordinates of
+// a point that all pixels of both views move away from, as a principal point is: rays move by -J, Jacobians
+// by -d J. curvature: null, or d^2 ray / d pixel^2 of each view, 3 x (xx, xy, yy), row by row.
+struct SampsonSlopes {
+  double residual, by_entry[9], by_point[2];
+};
+// False where the model says nothing about the match.
+bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
+                    SampsonSlopes* slopes);
+
 // sampson_sq of the matches first .. first + count - 1, or of those listed.
 void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares);
 void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
@@ -121,19 +131,19 @@ struct RobustLoss {
   double scale_px;
 };
 
+// A scale that no residual reaches.
+inline constexpr RobustLoss kLeastSquares{Loss::kTruncated, 1e140};
 
-// Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with P
-// parameters, columns[p] = dM / dparameter p. upper: P (P + 1) / 2, row by row. Returns the sum of
-// rho, in units of scale^2. indices null: matches 0 .. count - 1.
-template <int P>
+// Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with at most nine
+// parameters, columns[p] = dM / dparameter p. upper: the packed upper triangle, row by row. Returns the
+// sum of rho, in units of scale^2. indices null: matches 0 .. count - 1.
 double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                const Mat3& M, const Mat3 columns[P], const RobustLoss& loss,
-                                double upper[P * (P + 1) / 2], double gradient[P]);
+                                const Mat3& M, const Mat3* columns, int num_parameters,
+                                const RobustLoss& loss, double* upper, double* gradient);
 
-// The same for the transfer residual of a matrix H; columns null: P = 9, H's entries themselves.
-template <int P>
+// The same for the transfer residual of a matrix H; columns null: H's nine entries themselves.
 double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                 const Mat3& H, const Mat3* columns, const RobustLoss& loss,
-                                 double upper[P * (P + 1) / 2], double gradient[P]);
+                                 const Mat3& H, const Mat3* columns, int num_parameters,
+                                 const RobustLoss& loss, double* upper, double* gradient);
 
 }  // namespace tv

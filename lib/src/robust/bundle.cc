@@ -117,7 +117,7 @@ bool solve_step(const Sums& sums, double damping, bool newton, double step[5]) {
     for (int i = 0, slot = 0; i < 5; slot += 5 - i, ++i) {
       damped[slot] += damping * (sums.upper[slot] + 1e-9 * largest);
     }
-    if (solve_damped<5>(damped, sums.gradient, 0.0, step)) return true;
+    if (solve_damped(5, damped, sums.gradient, 0.0, step)) return true;
   }
   return false;
 }
@@ -460,7 +460,7 @@ void measure_covariance(const Adjustment& adjustment, const BundleFrame& frame, 
                         BundleOutcome* out) {
   const int n = adjustment.num;
   double inverse[25];
-  if (n <= 5 || !invert_symmetric5(sums.newton, inverse)) return;
+  if (n <= 5 || !invert_symmetric(5, sums.newton, inverse)) return;
   double psi_sq = 0.0, slope = 0.0, slope_sq = 0.0;
   for (int k = 0; k < n; ++k) {
     const double r = eliminate(frame, adjustment.now[k]).r;

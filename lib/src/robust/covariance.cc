@@ -55,9 +55,6 @@ void multiply5(const double A[25], const double B[25], double C[25]) {
   }
 }
 
-// A scale that no residual reaches: plain least squares.
-constexpr RobustLoss kLeastSquares{Loss::kTruncated, 1e140};
-
 }  // namespace
 
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
@@ -66,7 +63,7 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   if (count <= P) return false;
   double upper[15], gradient[P], inverse[25], squares[kChunk];
   PoseModel{pose}.normal_equations(pairs, indices, count, kLeastSquares, upper, gradient);
-  if (!invert_symmetric5(upper, inverse)) return false;
+  if (!invert_symmetric(P, upper, inverse)) return false;
   const Mat3 E = essential_from_pose(pose);
   const double inverse_sq = 1 / (scale_px * scale_px);
   LossSums sums;
@@ -89,6 +86,7 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   const double cut_slope = 2 * limit_px / (1 + limit_px * limit_px * inverse_sq) * density;
   const double variance = variance_of(sums, count, 1, P, scale_px, cut_slope);
   uncertainty->noise_px = noise_px;
+  uncertainty->variance_px = variance;
   if (!(variance > 0)) return false;
   // A = J' J holds J at the noisy pixels. A0, without what the noise adds to it, is what the motion
   // of the points tells: C = A0^-1 A A0^-1.
@@ -100,7 +98,7 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   exact[12] -= noise_sq * noise[0];
   exact[13] -= noise_sq * noise[1];
   exact[14] -= noise_sq * noise[2];
-  if (!invert_symmetric5(exact, inverse)) return false;
+  if (!invert_symmetric(P, exact, inverse)) return false;
   for (int r = 0, slot = 0; r < 5; ++r) {
     for (int c = r; c < 5; ++c) A[5 * r + c] = A[5 * c + r] = upper[slot++];
   }
@@ -121,7 +119,7 @@ bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
   if (2 * count <= P) return false;
   double upper[P * (P + 1) / 2], gradient[P], inverse[P * P];
   model.normal_equations(pairs, indices, count, kLeastSquares, upper, gradient);
-  if (!invert_symmetric<P>(upper, inverse)) return false;
+  if (!invert_symmetric(P, upper, inverse)) return false;
   const Mat3 H = model.matrix();
   const double inverse_sq = 1 / (scale_px * scale_px);
   LossSums sums;
@@ -136,6 +134,7 @@ bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
   for (int r = 0; r < 5; ++r) {
     for (int c = 0; c < 5; ++c) uncertainty->covariance[5 * r + c] = variance * inverse[P * r + c];
   }
+  uncertainty->variance_px = variance;
   uncertainty->noise_px = std::sqrt(std::max(variance, 0.0) / kVarianceOnPlane);
   return variance > 0 && is_finite(uncertainty->covariance, 25);
 }

@@ -8,6 +8,7 @@ namespace tv {
 struct PoseUncertainty {
   double covariance[25];  // in the parameters (w, a, b) of PoseModel
   double noise_px;        // standard deviation of a pixel's coordinate
+  double variance_px;     // of the M-estimate, for a residual: C = variance_px (J' J)^-1, px^2
 };
 
 // The covariance of the M-estimate that minimises Cauchy's loss with scale_px over the listed

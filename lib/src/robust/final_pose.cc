@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/math.h"
 #include "geometry/homography_4pt.h"
 #include "robust/verdict.h"
 
@@ -107,8 +108,13 @@ bool uncertainty_without_gravity(const PoseRefiner& f, const Pose& pose,
                                  PoseUncertainty* uncertainty) {
   const int count = near_pose(f, pose);
   const double scale = final_loss(f, essential_from_pose(pose), count).scale_px;
-  return pose_uncertainty(f.pairs, f.indices, count, pose, scale, kFinalNear * f.threshold_px,
-                          uncertainty);
+  if (!pose_uncertainty(f.pairs, f.indices, count, pose, scale, kFinalNear * f.threshold_px,
+                        uncertainty)) {
+    return false;
+  }
+  if (!f.principal_point.is_free) return true;
+  return add_shift_variance(f.problem, f.matches, f.indices, count, GravityPoseModel{pose}, f.principal_point,
+                            uncertainty->variance_px, uncertainty->covariance);
 }
 
 // The prior with the weight that the points leave it, where they alone would put the pose.
@@ -121,6 +127,16 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
     gravity.weight = gravity_weight(gravity, alone.R, uncertainty.covariance);
   }
   return gravity;
+}
+
+// Twice the logarithm of a thousand: of pairs whose principal point is where it is said to be, one in
+// a thousand is told otherwise.
+constexpr double kShiftEvidence = 13.815510557964274;
+
+// What the loss takes from a residual is at least this much of the threshold: what exact input leaves is
+// rounding, and speaks for nothing.
+double taken_px(const PoseRefiner& f, const BestLoss& best) {
+  return std::max(best.taken, 0.02 * f.threshold_px);
 }
 
 // ---- On a plane ----
@@ -172,6 +188,40 @@ RobustLoss final_loss(const PoseRefiner& f, const Mat3& M, int count) {
 
 Pose refined_pose(const PoseRefiner& f, const Pose& start) {
   return refined_with(f, start, tested_gravity(f, start));
+}
+
+bool principal_point_is_off(const PoseRefiner& f, const Pose& pose) {
+  const int count = near_pose(f, pose), left = count - kShiftedParameters;
+  if (left < 1) return false;
+  const BestLoss best = best_loss(f, essential_from_pose(pose), count);
+  const double noise_px = taken_px(f, best);
+  ShiftedEquations equations;
+  shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{pose}, f.principal_point, best.loss,
+                    noise_px, &equations);
+  double step[kShiftedParameters], gain = 0;
+  if (!solve_damped(kShiftedParameters, equations.upper, equations.gradient, 0, step)) return false;
+  for (int k = 0; k < kShiftedParameters; ++k) gain -= equations.gradient[k] * step[k];
+  // In units of what the loss takes from a residual (best_loss) twice the gain in likelihood:
+  // chi-square of two degrees of freedom where nothing is wrong (C. R. Rao's score test, 1948), less by the
+  // prior. As F(2, left), for few matches: its tail is (1 + evidence / left)^(-left / 2).
+  const double evidence = gain * best.stretch / (noise_px * noise_px);
+  return left * log(1 + evidence / left) > kShiftEvidence;
+}
+
+bool move_together(const PoseRefiner& f, Pose* pose, double shift_px[2]) {
+  const GravityPrior gravity = tested_gravity(f, *pose);
+  const int count = near_pose(f, *pose);
+  if (count < kShiftedParameters) return false;
+  const BestLoss best = best_loss(f, essential_from_pose(*pose), count);
+  const double noise_px = taken_px(f, best);
+  ShiftedEquations equations;
+  shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{*pose, &gravity}, f.principal_point,
+                    best.loss, noise_px, &equations);
+  double step[kShiftedParameters];
+  if (!solve_damped(kShiftedParameters, equations.upper, equations.gradient, 0, step)) return false;
+  *pose = PoseModel{*pose}.stepped(step).pose;
+  for (int k = 0; k < 2; ++k) shift_px[k] = step[PoseModel::kParameters + k];
+  return true;
 }
 
 bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* uncertainty) {

@@ -156,6 +156,18 @@ Camera normalising_camera(const double* pixels, const int32_t* order, int count)
   return camera;
 }
 
+void set_rays(const TwoViewProblem& problem, int view, const Camera& camera, Matches* matches) {
+  for (int k = 0; k < matches->pairs.num; ++k) {
+    PixelRay p;
+    const double* pixel = problem.pixels[view] + 2 * matches->order[k];
+    if (ray_of_pixel(camera, pixel, matches->pairs.on_plane, &p) && sane(p)) {
+      set_ray(matches->pairs, view, k, p.ray, p.jacobian);
+    }
+  }
+  const tv_camera& m = camera.model;
+  matches->intrinsics[view] << m.fx, 0, m.cx, 0, m.fy, m.cy, 0, 0, 1;
+}
+
 double box_area(const double* pixels, const int32_t* order, int count) {
   double low[2] = {0, 0}, high[2] = {0, 0};
   for (int k = 0; k < count; ++k) {
@@ -208,22 +220,48 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
       move_repeats_last(problem, keys, count, table, table_size, matches->order);
   matches->pairs.num = count;
   for (int v = 0; v < 2; ++v) {
-    const Camera camera =
-        problem.calibrated
-            ? problem.camera[v]
-            : normalising_camera(problem.pixels[v], matches->order, matches->num_unique);
-    for (int k = 0; k < count; ++k) {
-      PixelRay p;
-      ray_of_pixel(camera, problem.pixels[v] + 2 * matches->order[k], on_plane, &p);
-      set_ray(matches->pairs, v, k, p.ray, p.jacobian);
-    }
-    const tv_camera& m = camera.model;
-    matches->intrinsics[v] << m.fx, 0, m.cx, 0, m.fy, m.cy, 0, 0, 1;
+    set_rays(problem, v,
+             problem.calibrated
+                 ? problem.camera[v]
+                 : normalising_camera(problem.pixels[v], matches->order, matches->num_unique),
+             matches);
   }
   const tv_camera& second = problem.camera[1].model;
   matches->area_px = problem.calibrated
                          ? static_cast<double>(second.width) * second.height
                          : box_area(problem.pixels[1], matches->order, matches->num_unique);
+  finish_rays(matches->pairs, matches->num_unique);
+}
+
+bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
+                   int view, int k, double curvature[9]) {
+  if (camera.model.model == TV_CAMERA_PINHOLE && matches.pairs.on_plane) return false;
+  const double* pixel = problem.pixels[view] + 2 * matches.order[k];
+  for (int along = 0; along < 2; ++along) {  // by differences over a pixel
+    const double beside[2] = {pixel[0] + (along == 0), pixel[1] + (along == 1)};
+    PixelRay p;
+    const bool known = ray_of_pixel(camera, beside, matches.pairs.on_plane, &p) && sane(p);
+    for (int r = 0; r < 3; ++r) {
+      for (int c = along; c < 2; ++c) {
+        const int at = 2 * r + c;
+        curvature[3 * r + along + c] =
+            known ? p.jacobian[at] - matches.pairs.jacobian[view][at][k] : 0;
+      }
+    }
+  }
+  return true;
+}
+
+Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_px[2]) {
+  Camera camera = problem.camera[view];
+  camera.model.cx += shift_px[0];
+  camera.model.cy += shift_px[1];
+  return camera;
+}
+
+void move_principal_points(const TwoViewProblem& problem, const double shift_px[2],
+                           Matches* matches) {
+  for (int v = 0; v < 2; ++v) set_rays(problem, v, moved_camera(problem, v, shift_px), matches);
   finish_rays(matches->pairs, matches->num_unique);
 }
 

@@ -9,6 +9,7 @@ namespace tv {
 
 struct TwoViewProblem {
   bool calibrated;
+  bool one_camera;          // both views are of the same
   Camera camera[2];         // calibrated only
   const double* pixels[2];  // num x 2
   const float* ratios;      // or null
@@ -31,5 +32,18 @@ size_t matches_bytes(int max_matches);
 // Drops what is not finite or outside the lens model, sorts by (ratio, coordinates), puts repeated
 // matches last: five times the same match is one witness, not five.
 void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches);
+
+// d^2 ray / d pixel^2 of the k-th match in a view of that camera, 3 x (xx, xy, yy). False, and nothing written,
+// for rays that do not bend.
+bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
+                   int view, int k, double curvature[9]);
+
+// A camera of the problem with its principal point moved.
+Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_px[2]);
+
+// The rays anew, of cameras whose principal points lie shift_px beside those of the problem. A match
+// that such a lens has no ray for keeps its own.
+void move_principal_points(const TwoViewProblem& problem, const double shift_px[2],
+                           Matches* matches);
 
 }  // namespace tv

@@ -8,13 +8,10 @@
 
 namespace tv {
 
-double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                   const RobustLoss& loss, double* upper,
-                                   double* gradient) const {
+void pose_columns(const Pose& pose, Mat3 columns[5]) {
   const Mat3 translation = cross_matrix(pose.t);
   Vec3 b1, b2;
   tangent_basis(pose.t, &b1, &b2);
-  Mat3 columns[5];
   for (int k = 0; k < 3; ++k) {
     Vec3 axis = Vec3::Zero();
     axis[k] = 1;
@@ -22,8 +19,15 @@ double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices
   }
   columns[3] = cross_matrix(b1) * pose.R;
   columns[4] = cross_matrix(b2) * pose.R;
-  return sampson_normal_equations<5>(pairs, indices, count, translation * pose.R, columns, loss,
-                                     upper, gradient);
+}
+
+double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                   const RobustLoss& loss, double* upper,
+                                   double* gradient) const {
+  Mat3 columns[5];
+  pose_columns(pose, columns);
+  return sampson_normal_equations(pairs, indices, count, essential_from_pose(pose), columns,
+                                  kParameters, loss, upper, gradient);
 }
 
 PoseModel PoseModel::stepped(const double* step) const {
@@ -59,8 +63,8 @@ double FundamentalModel::normal_equations(const RayPairs& pairs, const int32_t* 
     columns[3 + k] = -(U * S * turn * V.transpose());
   }
   columns[6] = U.col(1) * V.col(1).transpose();
-  return sampson_normal_equations<7>(pairs, indices, count, matrix(), columns, loss, upper,
-                                     gradient);
+  return sampson_normal_equations(pairs, indices, count, matrix(), columns, kParameters, loss,
+                                  upper, gradient);
 }
 
 FundamentalModel FundamentalModel::stepped(const double* step) const {
@@ -74,7 +78,8 @@ FundamentalModel FundamentalModel::stepped(const double* step) const {
 double HomographyModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
                                          const RobustLoss& loss, double* upper,
                                          double* gradient) const {
-  return transfer_normal_equations<9>(pairs, indices, count, H, nullptr, loss, upper, gradient);
+  return transfer_normal_equations(pairs, indices, count, H, nullptr, kParameters, loss, upper,
+                                   gradient);
 }
 
 HomographyModel HomographyModel::stepped(const double* step) const {
@@ -93,7 +98,8 @@ double RotationModel::normal_equations(const RayPairs& pairs, const int32_t* ind
     axis[k] = 1;
     columns[k] = cross_matrix(axis) * R;
   }
-  return transfer_normal_equations<3>(pairs, indices, count, R, columns, loss, upper, gradient);
+  return transfer_normal_equations(pairs, indices, count, R, columns, kParameters, loss, upper,
+                                   gradient);
 }
 
 RotationModel RotationModel::stepped(const double* step) const {
@@ -116,8 +122,8 @@ double PlaneModel::normal_equations(const RayPairs& pairs, const int32_t* indice
   }
   columns[3] = b1 * plane.transpose();
   columns[4] = b2 * plane.transpose();
-  return transfer_normal_equations<8>(pairs, indices, count, matrix(), columns, loss, upper,
-                                      gradient);
+  return transfer_normal_equations(pairs, indices, count, matrix(), columns, kParameters, loss,
+                                   upper, gradient);
 }
 
 PlaneModel PlaneModel::stepped(const double* step) const {
@@ -126,15 +132,16 @@ PlaneModel PlaneModel::stepped(const double* step) const {
 
 namespace {
 
+constexpr int kMost = 9;  // parameters
+
 // A = L D L' in place of a full lower triangle; false when a pivot is not above `smallest`.
-template <int P>
-bool factorise(double A[P][P], double D[P], double smallest) {
-  for (int j = 0; j < P; ++j) {
+bool factorise(int num, double A[kMost][kMost], double* D, double smallest) {
+  for (int j = 0; j < num; ++j) {
     double pivot = A[j][j];
     for (int k = 0; k < j; ++k) pivot -= A[j][k] * A[j][k] * D[k];
     if (!(pivot > smallest)) return false;
     D[j] = pivot;
-    for (int i = j + 1; i < P; ++i) {
+    for (int i = j + 1; i < num; ++i) {
       double value = A[i][j];
       for (int k = 0; k < j; ++k) value -= A[i][k] * A[j][k] * D[k];
       A[i][j] = value / pivot;
@@ -143,67 +150,55 @@ bool factorise(double A[P][P], double D[P], double smallest) {
   return true;
 }
 
-template <int P>
-void solve_factorised(const double A[P][P], const double D[P], double x[P]) {
-  for (int i = 0; i < P; ++i) {
+void solve_factorised(int num, const double A[kMost][kMost], const double* D, double* x) {
+  for (int i = 0; i < num; ++i) {
     for (int k = 0; k < i; ++k) x[i] -= A[i][k] * x[k];
   }
-  for (int i = 0; i < P; ++i) x[i] /= D[i];
-  for (int i = P - 1; i >= 0; --i) {
-    for (int k = i + 1; k < P; ++k) x[i] -= A[k][i] * x[k];
+  for (int i = 0; i < num; ++i) x[i] /= D[i];
+  for (int i = num - 1; i >= 0; --i) {
+    for (int k = i + 1; k < num; ++k) x[i] -= A[k][i] * x[k];
   }
 }
 
-template <int P>
-void unpack_lower(const double upper[P * (P + 1) / 2], double A[P][P]) {
-  int slot = 0;
-  for (int i = 0; i < P; ++i) {
-    for (int j = i; j < P; ++j) A[j][i] = upper[slot++];
+// Returns the largest entry of the diagonal, at least 0.
+double unpack_lower(int num, const double* upper, double A[kMost][kMost]) {
+  double largest = 0;
+  for (int i = 0, slot = 0; i < num; ++i) {
+    for (int j = i; j < num; ++j) A[j][i] = upper[slot++];
+    if (A[i][i] > largest) largest = A[i][i];
   }
+  return largest;
 }
 
 }  // namespace
 
-template <int P>
-bool solve_damped(const double upper[P * (P + 1) / 2], const double gradient[P], double lambda,
-                  double step[P]) {
-  double A[P][P], D[P];
-  unpack_lower<P>(upper, A);
-  double largest = 0;
-  for (int i = 0; i < P; ++i) {
-    if (A[i][i] > largest) largest = A[i][i];
-  }
+bool solve_damped(int num, const double* upper, const double* gradient, double lambda,
+                  double* step) {
+  double A[kMost][kMost], D[kMost];
+  const double largest = unpack_lower(num, upper, A);
   if (!(largest > 0)) return false;
-  for (int i = 0; i < P; ++i) A[i][i] += lambda * (A[i][i] + 1e-9 * largest);
-  if (!factorise<P>(A, D, 0.0)) return false;
-  for (int i = 0; i < P; ++i) step[i] = -gradient[i];
-  solve_factorised<P>(A, D, step);
+  for (int i = 0; i < num; ++i) A[i][i] += lambda * (A[i][i] + 1e-9 * largest);
+  if (!factorise(num, A, D, 0.0)) return false;
+  for (int i = 0; i < num; ++i) step[i] = -gradient[i];
+  solve_factorised(num, A, D, step);
   return true;
 }
 
-template <int P>
-bool invert_symmetric(const double upper[P * (P + 1) / 2], double inverse[P * P]) {
-  double A[P][P], D[P];
-  unpack_lower<P>(upper, A);
-  double largest = 0;
-  for (int i = 0; i < P; ++i) {
-    if (A[i][i] > largest) largest = A[i][i];
-  }
-  if (!factorise<P>(A, D, 1e-13 * largest)) return false;
-  for (int c = 0; c < P; ++c) {
-    double x[P] = {};
+bool invert_symmetric(int num, const double* upper, double* inverse) {
+  double A[kMost][kMost], D[kMost];
+  const double largest = unpack_lower(num, upper, A);
+  if (!factorise(num, A, D, 1e-13 * largest)) return false;
+  for (int c = 0; c < num; ++c) {
+    double x[kMost] = {};
     x[c] = 1;
-    solve_factorised<P>(A, D, x);
-    for (int r = 0; r < P; ++r) inverse[P * r + c] = x[r];
+    solve_factorised(num, A, D, x);
+    for (int r = 0; r < num; ++r) inverse[num * r + c] = x[r];
   }
-  for (int r = 0; r < P; ++r) {  // exactly symmetric
-    for (int c = 0; c < r; ++c) inverse[P * r + c] = inverse[P * c + r];
+  for (int r = 0; r < num; ++r) {  // exactly symmetric
+    for (int c = 0; c < r; ++c) inverse[num * r + c] = inverse[num * c + r];
   }
   return true;
 }
-
-template bool invert_symmetric<5>(const double*, double*);
-template bool invert_symmetric<8>(const double*, double*);
 
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
@@ -214,7 +209,7 @@ double refine(const RayPairs& pairs, const int32_t* indices, int count, const Ro
   double cost = model->normal_equations(pairs, indices, count, loss, upper, gradient);
   double lambda = 1e-4;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!solve_damped<P>(upper, gradient, lambda, step)) break;
+    if (!solve_damped(P, upper, gradient, lambda, step)) break;
     double step_sq = 0;
     for (int p = 0; p < P; ++p) {
       step[p] *= stretch;
@@ -242,7 +237,6 @@ double refine(const RayPairs& pairs, const int32_t* indices, int count, const Ro
   return cost;
 }
 
-template bool solve_damped<5>(const double*, const double*, double, double*);
 template double refine<PoseModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
                                   PoseModel*, double, double);
 template double refine<GravityPoseModel>(const RayPairs&, const int32_t*, int,

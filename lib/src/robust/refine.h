@@ -17,6 +17,9 @@ struct PoseModel {
   PoseModel stepped(const double* step) const;
 };
 
+// d ([t]x R) / d each of the five.
+void pose_columns(const Pose& pose, Mat3 columns[5]);
+
 // A fundamental matrix U diag(1, s, 0) V' with rotations U, V: seven parameters (A. Bartoli, P.
 // Sturm, "Nonlinear estimation of the fundamental matrix with minimal parameters", PAMI 2004).
 struct FundamentalModel {
@@ -62,17 +65,12 @@ struct PlaneModel {
 };
 
 // Solves (A + lambda diag(A)) step = -gradient for the packed upper triangle of a symmetric
-// non-negative A, by LDL'. False when it is singular.
-template <int P>
-bool solve_damped(const double upper[P * (P + 1) / 2], const double gradient[P], double lambda,
-                  double step[P]);
+// non-negative A of at most nine rows, by LDL'. False when it is singular.
+bool solve_damped(int num, const double* upper, const double* gradient, double lambda,
+                  double* step);
 
 // The inverse of the packed symmetric A, full row-major. False when it is singular.
-template <int P>
-bool invert_symmetric(const double upper[P * (P + 1) / 2], double inverse[P * P]);
-inline bool invert_symmetric5(const double upper[15], double inverse[25]) {
-  return invert_symmetric<5>(upper, inverse);
-}
+bool invert_symmetric(int num, const double* upper, double* inverse);
 
 // Lowers the robust cost over the listed matches, until a step gains less than small_gain of it.
 // stretch: of each step. Reweighted least squares divide by the weights' mean where the loss itself

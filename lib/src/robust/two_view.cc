@@ -110,7 +110,7 @@ namespace {
 
 struct Finish {
   const TwoViewProblem& problem;
-  const Matches& matches;
+  Matches& matches;
   const RayPairs& pairs;  // without repeats
   double threshold;
   int32_t* indices;  // scratch
@@ -149,10 +149,36 @@ void collect_support(Finish& f) {
   }
 }
 
+// Where one camera saw both views and the matches say that its principal point is not where it is said
+// to be, pose and principal point are refined together, and the rays follow.
+TVK_NOINLINE void place_principal_point(Finish& f) {
+  constexpr int kSteps = 6;
+  constexpr double kSmallStepPx = 0.01;
+  Pose& pose = f.out->epipolar.pose;
+  PrincipalPoint& point = f.refiner.principal_point;
+  const tv_camera& camera = f.problem.camera[0].model;
+  const double sigma = f.problem.options.principal_point_sigma;
+  if (!f.problem.one_camera || !(sigma > 0)) return;
+  point.sigma_px[0] = sigma * camera.fx;
+  point.sigma_px[1] = sigma * camera.fy;
+  point.is_free = principal_point_is_off(f.refiner, pose);
+  double step[2] = {1, 1};
+  for (int k = 0; k < kSteps && point.is_free; ++k) {
+    if (std::fabs(step[0]) + std::fabs(step[1]) < kSmallStepPx) break;
+    if (!move_together(f.refiner, &pose, step)) break;
+    for (int i = 0; i < 2; ++i) point.shift_px[i] += step[i];
+    move_principal_points(f.problem, point.shift_px, &f.matches);
+  }
+  if (!point.is_free) return;
+  pose = refined_pose(f.refiner, pose);
+  std::copy(point.shift_px, point.shift_px + 2, f.out->principal_point_shift_px);
+}
+
 void refine_epipolar(Finish& f) {
   EpipolarModel& epipolar = f.out->epipolar;
   if (epipolar.has_pose) {
     epipolar.pose = refined_pose(f.refiner, epipolar.pose);
+    place_principal_point(f);
     epipolar.M = essential_from_pose(epipolar.pose);
   } else {
     epipolar.M = refined_fundamental(f, epipolar.M);
@@ -466,8 +492,9 @@ void judge(Finish& f) {
 
 }  // namespace
 
-void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
-                     const TwoViewModel& model, Arena& arena, TwoViewOutcome* outcome) {
+void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
+                     Matches* all_matches, TwoViewOutcome* outcome) {
+  Matches& matches = *all_matches;
   *outcome = TwoViewOutcome{};
   const size_t n = static_cast<size_t>(matches.pairs.num);
   outcome->inlier = arena_alloc<uint8_t>(arena, n);
@@ -479,7 +506,7 @@ void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
   double* values = arena_alloc<double>(arena, n);
   int32_t* support = arena_alloc<int32_t>(arena, n);
   Finish f{problem, matches, unique, threshold, indices, values, support, 0,
-           PoseRefiner{unique, threshold, gravity_of(problem), indices, values}, outcome};
+           PoseRefiner{problem, matches, unique, threshold, gravity_of(problem), {}, indices, values}, outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {

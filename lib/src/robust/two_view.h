@@ -25,6 +25,7 @@ struct TwoViewOutcome {
   double covariance[25] = {}, alternative_covariance[25] = {};
   int num_inliers = 0, essential_inliers = -1, fundamental_inliers = -1, homography_inliers = -1,
       rotation_inliers = -1;
+  double principal_point_shift_px[2] = {0, 0};  // taken into account in all that is here
   double median_parallax_rad = 0, rms_error_px = 0, noise_px = 0;
   uint8_t* inlier = nullptr;  // of matches.pairs
 };
@@ -37,8 +38,8 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
                      TwoViewModel* model);
 
 // Refinement on all inliers, rivals, verdict, covariance (TV_STAGE_REFINE). outcome->inlier lies in
-// the arena.
-void finish_two_view(const TwoViewProblem& problem, const Matches& matches,
-                     const TwoViewModel& model, Arena& arena, TwoViewOutcome* outcome);
+// the arena. The rays of the matches move with the principal point.
+void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
+                     Matches* matches, TwoViewOutcome* outcome);
 
 }  // namespace tv
