@@ -19,6 +19,7 @@ tv_estimate_options options_of(fuzz::Bytes& bytes) {
     for (double& g : options.gravity0) g = bytes.wild(-1, 1);
     for (double& g : options.gravity1) g = bytes.wild(-1, 1);
   }
+  if (bytes.whole(0, 3) == 0) options.principal_point_sigma = bytes.wild(0, 0.1);
   return options;
 }
 
@@ -46,6 +47,7 @@ void require_sound(const tv_two_view& r, const uint8_t* mask, int count) {
   FUZZ_REQUIRE(fuzz::all_finite(r.F, 9) && fuzz::all_finite(r.H, 9));
   FUZZ_REQUIRE(fuzz::all_finite(r.alternative_R, 9) && fuzz::all_finite(r.alternative_t, 3));
   FUZZ_REQUIRE(fuzz::all_finite(r.covariance, 25));
+  FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_shift, 2));
   for (int i = 0; i < 5; ++i) FUZZ_REQUIRE(r.covariance[6 * i] >= 0);
   FUZZ_REQUIRE(std::isfinite(r.median_parallax_rad) && std::isfinite(r.rms_error_px));
   FUZZ_REQUIRE(r.coverage >= 0 && r.coverage <= 1);

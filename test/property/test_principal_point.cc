@@ -148,6 +148,16 @@ void test_two_cameras_are_taken_as_they_are(void) {
   }
 }
 
+// A hundred pixels are no calibration's error: whatever the matches ask for, six sigmas are the most.
+void test_a_camera_that_is_not_this_one_stays(void) {
+  const tv_camera right = scene::pinhole(), told = moved(right, 100, 60);
+  for (int k = 0; k < 20; ++k) {
+    make_pair(k, 400, right, right);
+    const tv_two_view r = estimated(told);
+    for (double shift : r.principal_point_shift) TEST_ASSERT_TRUE(std::fabs(shift) <= 6 * 0.01 * 505);
+  }
+}
+
 void test_swapped_views_give_the_same_shift(void) {
   const tv_camera right = scene::pinhole(), told = moved(right, 12, -12);
   for (int k = 0; k < 20; ++k) {
@@ -280,6 +290,7 @@ int main(void) {
   RUN_TEST(test_a_principal_point_as_told_stays);
   RUN_TEST(test_a_principal_point_off_is_found_and_the_pose_gains);
   RUN_TEST(test_two_cameras_are_taken_as_they_are);
+  RUN_TEST(test_a_camera_that_is_not_this_one_stays);
   RUN_TEST(test_swapped_views_give_the_same_shift);
   RUN_TEST(test_matrices_are_of_the_corrected_camera);
   RUN_TEST(test_options_out_of_range_are_refused);

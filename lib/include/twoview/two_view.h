@@ -1,6 +1,7 @@
 /* twoview: the geometry of two views from matched pixels.
 
-   Formulas, papers, rules of the verdict, tests: docs/algorithms/two_view.md, docs/algorithms/gravity.md. */
+   Formulas, papers, rules of the verdict, tests: docs/algorithms/two_view.md, docs/algorithms/gravity.md,
+   docs/algorithms/principal_point.md. */
 #ifndef TWOVIEW_TWO_VIEW_H
 #define TWOVIEW_TWO_VIEW_H
 
