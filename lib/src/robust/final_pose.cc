@@ -133,12 +133,6 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
 // a thousand is told otherwise.
 constexpr double kShiftEvidence = 13.815510557964274;
 
-// What the loss takes from a residual is at least this much of the threshold: what exact input leaves is
-// rounding, and speaks for nothing.
-double taken_px(const PoseRefiner& f, const BestLoss& best) {
-  return std::max(best.taken, 0.02 * f.threshold_px);
-}
-
 // ---- On a plane ----
 
 // The matches that the plane explains, into f.indices.
@@ -190,35 +184,42 @@ Pose refined_pose(const PoseRefiner& f, const Pose& start) {
   return refined_with(f, start, tested_gravity(f, start));
 }
 
-bool principal_point_is_off(const PoseRefiner& f, const Pose& pose) {
-  const int count = near_pose(f, pose), left = count - kShiftedParameters;
-  if (left < 1) return false;
+namespace {
+
+// A step of pose and principal point together over the matches near the pose. evidence: twice the
+// logarithm of how much likelier it makes them, to first order; from a pose at its best that is
+// chi-square of two degrees of freedom where nothing is wrong (C. R. Rao's score test, 1948), or less,
+// by the prior. Returns how many matches took part, 0 when they do not tell.
+int joint_step(const PoseRefiner& f, const Pose& pose, const GravityPrior& gravity,
+               double step[kShiftedParameters], double* evidence) {
+  const int count = near_pose(f, pose);
+  if (count <= kShiftedParameters) return 0;
   const BestLoss best = best_loss(f, essential_from_pose(pose), count);
-  const double noise_px = taken_px(f, best);
+  // What exact input leaves is rounding, and speaks for nothing.
+  const double noise_px = std::max(best.taken, 0.02 * f.threshold_px);
   ShiftedEquations equations;
-  shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{pose}, f.principal_point, best.loss,
-                    noise_px, &equations);
-  double step[kShiftedParameters], gain = 0;
-  if (!solve_damped(kShiftedParameters, equations.upper, equations.gradient, 0, step)) return false;
-  for (int k = 0; k < kShiftedParameters; ++k) gain -= equations.gradient[k] * step[k];
-  // In units of what the loss takes from a residual (best_loss) twice the gain in likelihood:
-  // chi-square of two degrees of freedom where nothing is wrong (C. R. Rao's score test, 1948), less by the
-  // prior. As F(2, left), for few matches: its tail is (1 + evidence / left)^(-left / 2).
-  const double evidence = gain * best.stretch / (noise_px * noise_px);
-  return left * log(1 + evidence / left) > kShiftEvidence;
+  shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{pose, &gravity},
+                    f.principal_point, best.loss, noise_px, &equations);
+  if (!solve_damped(kShiftedParameters, equations.upper, equations.gradient, 0, step)) return 0;
+  *evidence = 0;
+  for (int k = 0; k < kShiftedParameters; ++k) *evidence -= equations.gradient[k] * step[k];
+  *evidence *= best.stretch / (noise_px * noise_px);
+  return count;
+}
+
+}  // namespace
+
+bool principal_point_is_off(const PoseRefiner& f, const Pose& pose) {
+  double step[kShiftedParameters], evidence;
+  const int count = joint_step(f, pose, GravityPrior{}, step, &evidence);
+  // Over 2 it follows F(2, left), whose tail is (1 + evidence / left)^(-left / 2).
+  const int left = count - kShiftedParameters;
+  return count > 0 && left * log(1 + evidence / left) > kShiftEvidence;
 }
 
 bool move_together(const PoseRefiner& f, Pose* pose, double shift_px[2]) {
-  const GravityPrior gravity = tested_gravity(f, *pose);
-  const int count = near_pose(f, *pose);
-  if (count < kShiftedParameters) return false;
-  const BestLoss best = best_loss(f, essential_from_pose(*pose), count);
-  const double noise_px = taken_px(f, best);
-  ShiftedEquations equations;
-  shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{*pose, &gravity}, f.principal_point,
-                    best.loss, noise_px, &equations);
-  double step[kShiftedParameters];
-  if (!solve_damped(kShiftedParameters, equations.upper, equations.gradient, 0, step)) return false;
+  double step[kShiftedParameters], evidence;
+  if (joint_step(f, *pose, tested_gravity(f, *pose), step, &evidence) == 0) return false;
   *pose = PoseModel{*pose}.stepped(step).pose;
   for (int k = 0; k < 2; ++k) shift_px[k] = step[PoseModel::kParameters + k];
   return true;

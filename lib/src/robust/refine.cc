@@ -2,7 +2,9 @@
 // a robust loss the weights are those of the current residuals (iteratively reweighted).
 #include "robust/refine.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "robust/gravity.h"
 
@@ -200,40 +202,70 @@ bool invert_symmetric(int num, const double* upper, double* inverse) {
   return true;
 }
 
-template <typename Model>
-double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
-              int max_iterations, Model* model, double small_gain, double stretch) {
-  constexpr int P = Model::kParameters;
+namespace {
+
+// A model without its type: one loop for all of them.
+struct AnyModel {
+  int num_parameters;
+  double (*normal_equations)(const void* model, const RayPairs& pairs, const int32_t* indices,
+                             int count, const RobustLoss& loss, double* upper, double* gradient);
+  void (*make_step)(const void* model, const double* step, void* moved);
+};
+
+// Refines *model with `moved` as scratch, another of its kind; *model ends as one of the two, the better.
+double refine_any(const AnyModel& any, const RayPairs& pairs, const int32_t* indices, int count,
+                  const RobustLoss& loss, int max_iterations, void** model, void* moved,
+                  double small_gain, double stretch) {
   constexpr double kSmallStep = 1e-9;
-  double upper[P * (P + 1) / 2], gradient[P], step[P];
-  double cost = model->normal_equations(pairs, indices, count, loss, upper, gradient);
+  const int num = any.num_parameters, packed = num * (num + 1) / 2;
+  double upper[2][kMost * (kMost + 1) / 2], gradient[2][kMost], step[kMost];
+  double cost = any.normal_equations(*model, pairs, indices, count, loss, upper[0], gradient[0]);
   double lambda = 1e-4;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!solve_damped(P, upper, gradient, lambda, step)) break;
+    if (!solve_damped(num, upper[0], gradient[0], lambda, step)) break;
     double step_sq = 0;
-    for (int p = 0; p < P; ++p) {
+    for (int p = 0; p < num; ++p) {
       step[p] *= stretch;
       step_sq += step[p] * step[p];
     }
     if (!(step_sq > kSmallStep * kSmallStep)) break;
-    double new_upper[P * (P + 1) / 2], new_gradient[P];
-    const Model moved = model->stepped(step);
+    any.make_step(*model, step, moved);
     const double new_cost =
-        moved.normal_equations(pairs, indices, count, loss, new_upper, new_gradient);
+        any.normal_equations(moved, pairs, indices, count, loss, upper[1], gradient[1]);
     if (!(new_cost < cost)) {
       lambda *= 10;
       if (lambda > 1e6) break;
       continue;
     }
     const double gain = cost - new_cost;
-    *model = moved;
+    std::swap(*model, moved);
     cost = new_cost;
     lambda *= 0.1;
     if (lambda < 1e-10) lambda = 1e-10;
-    for (int k = 0; k < P * (P + 1) / 2; ++k) upper[k] = new_upper[k];
-    for (int p = 0; p < P; ++p) gradient[p] = new_gradient[p];
+    std::copy(upper[1], upper[1] + packed, upper[0]);
+    std::copy(gradient[1], gradient[1] + num, gradient[0]);
     if (gain < small_gain * cost) break;
   }
+  return cost;
+}
+
+}  // namespace
+
+template <typename Model>
+double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
+              int max_iterations, Model* model, double small_gain, double stretch) {
+  const AnyModel any = {
+      Model::kParameters,
+      [](const void* of, const RayPairs& p, const int32_t* i, int n, const RobustLoss& l, double* u,
+         double* g) { return static_cast<const Model*>(of)->normal_equations(p, i, n, l, u, g); },
+      [](const void* of, const double* step, void* moved) {
+        *static_cast<Model*>(moved) = static_cast<const Model*>(of)->stepped(step);
+      }};
+  Model scratch = *model;
+  void* best = model;
+  const double cost = refine_any(any, pairs, indices, count, loss, max_iterations, &best, &scratch,
+                                 small_gain, stretch);
+  if (best != model) *model = scratch;
   return cost;
 }
 
