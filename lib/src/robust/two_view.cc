@@ -211,7 +211,8 @@ void inliers_of_transfer(Finish& f, const Mat3& H) {
 // together with it; where there is more than the plane, each is refined as a pose, and the epipolar model's
 // own competes with them. The one of lowest cost is the pose, and a second one that is different and
 // not clearly worse the alternative.
-void choose_planar_pose(Finish& f, const Rivals& rivals) {
+// Not inlined, for the stack below finish_two_view.
+TVK_NOINLINE void choose_planar_pose(Finish& f, const Rivals& rivals) {
   TwoViewOutcome& out = *f.out;
   Vec3 mean = Vec3::Zero();
   for (int k = 0; k < f.num_support; ++k) mean += ray_of(f.pairs, 0, f.support[k]).normalized();
