@@ -24,6 +24,7 @@ class Epipolar {
     const tv_two_view& v = outcome.two_view;
     by_rays_ = has_full_pose(v) && outcome.has_cameras;
     if (by_rays_) {
+      for (int image = 0; image < 2; ++image) camera_[image] = corrected_camera(outcome, image);
       const Matrix3 R = rotation_of(v);
       const Vector3 t = translation_of(v);
       matrix_ = product(Matrix3{0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0}, R);
@@ -42,9 +43,9 @@ class Epipolar {
     if (!by_rays_) return {straight(to, applied(m, Vector3{other.x, other.y, 1}))};
     const double pixel[2] = {other.x, other.y};
     Vector3 ray;
-    if (tv_camera_unproject(&outcome_.camera[1 - to], pixel, ray.data(), nullptr) != TV_OK)
+    if (tv_camera_unproject(&camera_[1 - to], pixel, ray.data(), nullptr) != TV_OK)
       return {};
-    return bent(outcome_.camera[to], applied(m, ray));
+    return bent(camera_[to], applied(m, ray));
   }
 
   // The epipole's pixel; where the lens cannot see it, the pixel of a lens without distortion, far
@@ -54,7 +55,7 @@ class Epipolar {
     exact = true;
     if (!by_rays_) return finite_pixel(e);
     if (e[2] < 0) e = {-e[0], -e[1], -e[2]};
-    const tv_camera& camera = outcome_.camera[image];
+    const tv_camera& camera = camera_[image];
     double pixel[2];
     if (tv_camera_project(&camera, e.data(), pixel, nullptr) == TV_OK &&
         std::hypot(pixel[0], pixel[1]) < 1e7)
@@ -112,6 +113,7 @@ class Epipolar {
 
   const Outcome& outcome_;
   bool by_rays_ = false;
+  tv_camera camera_[2]{};
   Matrix3 matrix_{};  // E or F
   Vector3 epipole_[2]{};
 };

@@ -101,6 +101,7 @@ void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
     report.errors.translation = translation_error_deg(t, t_true);
     report.errors.translation_signed = translation_error_signed_deg(t, t_true);
   }
+  // Of the cameras as given: it is about the matches, and the truth's pose goes with those.
   report.json["precision"] =
       match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
 }
@@ -114,7 +115,8 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
   json["name1"] = pair.name1;
   for (const char* key : {"rotation_error_deg", "translation_error_deg",
                           "translation_error_signed_deg", "pose_error_deg", "num_matches",
-                          "num_inliers", "precision", "config", "verdict", "time_ms"})
+                          "num_inliers", "precision", "config", "verdict",
+                          "principal_point_shift_px", "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;
@@ -125,6 +127,7 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
     json["num_inliers"] = v.num_inliers;
     json["config"] = tv_config_string(static_cast<tv_config>(v.config));
     json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
+    json["principal_point_shift_px"] = v.principal_point_shift;
     json["time_ms"] = static_cast<double>(total_ns) * 1e-6;
     if (pair.has_truth) compare(pair, outcome, report);
   } catch (const BadInput& e) {

@@ -142,6 +142,16 @@ std::string uncertainty_line(const tv_two_view& v) {
                       std::sqrt(c[18] + c[24]) * 180 / M_PI);
 }
 
+// Empty where the camera is as its file says.
+std::string camera_line(const tv_two_view& v) {
+  const double *shift = v.principal_point_shift;
+  if (shift[0] == 0 && shift[1] == 0) return "";
+  return summary_line("camera",
+                      "its principal point seems to be (%+.1f, %+.1f) px off; pose and points are of the "
+                      "corrected camera",
+                      shift[0], shift[1]);
+}
+
 std::string pose_lines(const Outcome& outcome) {
   const tv_two_view& v = outcome.two_view;
   std::string text;
@@ -159,7 +169,7 @@ std::string pose_lines(const Outcome& outcome) {
                          -unit * c[0], -unit * c[1], -unit * c[2], far);
   }
   if (v.has_covariance) text += uncertainty_line(v);
-  return text;
+  return text + camera_line(v);
 }
 
 std::string truth_line(const nlohmann::ordered_json& truth) {

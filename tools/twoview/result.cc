@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "error.h"
+
 namespace cli {
 namespace {
 
@@ -82,6 +84,12 @@ void append_json(std::string& text, const Json& json, size_t depth) {
 
 }  // namespace
 
+tv_camera corrected_camera(const Outcome& outcome, int camera) {
+  tv_camera corrected = outcome.camera[camera];
+  check(tv_corrected_camera(&outcome.two_view, &corrected, &corrected), "cannot correct the camera");
+  return corrected;
+}
+
 double unit_of(const Outcome& outcome) { return outcome.scale ? outcome.scale->baseline_m : 1; }
 
 std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
@@ -116,7 +124,7 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size) {
   const auto placed = [&](const Vector3& x) {
     return applied(transposed(R), {x[0] - t[0], x[1] - t[1], x[2] - t[2]});
   };
-  const tv_camera& lens = outcome.camera[camera];
+  const tv_camera& lens = outcome.camera[camera];  // drawn about its axis, wherever that meets the image
   Frustum frustum;
   frustum.centre = placed({0, 0, 0});
   for (size_t i = 0; i < 4; ++i) {
@@ -163,6 +171,8 @@ Json result_json(const Outcome& outcome) {
                       {"coverage", finite_or_null(v.coverage)}};
   json["covariance"] = numbers_or_null(v.covariance, 25, v.has_covariance);
   json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
+  json["principal_point_shift_px"] =
+      numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
   json["num_points"] = r.num_points;
   json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)

@@ -30,7 +30,8 @@ struct Arguments {
 std::vector<tv_point> triangulated(const Arguments& a, const MatchList& matches,
                                    const KnownPose& pose,
                                    const std::array<std::string, 2>& camera_files) {
-  const std::array<tv_camera, 2> camera = CameraOptions::load(camera_files);
+  std::array<tv_camera, 2> camera = CameraOptions::load(camera_files);
+  for (tv_camera& c : camera) c = pose.corrected(c);
   std::vector<tv_point> points(matches.size());
   const auto method = static_cast<tv_triangulation>(a.common.options.triangulation);
   check(tv_triangulate(method, &camera[0], &camera[1], pose.R.data(), pose.t.data(),
@@ -158,7 +159,7 @@ void add_triangulate(CLI::App& program, Run& run) {
       ->required()
       ->type_name("FILE");
   a->cameras.add_to(*verb);
-  verb->add_option("--pose", a->pose, "R and t of cam1_from_cam0: result.json, or YAML")
+  verb->add_option("--pose", a->pose, "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px is used too, or YAML")
       ->required()
       ->type_name("FILE");
   verb->add_option("--max-error-px", a->max_error_px, "leave points of a larger error out of the cloud")

@@ -20,7 +20,7 @@ std::array<double, N> fixed(const YAML::Node& root, const std::string& entry,
   if (values.size() != N)
     throw BadInput(file + ": " + entry + " has " + std::to_string(values.size()) +
                    " numbers, not " + std::to_string(N));
-  std::array<double, N> result;
+  std::array<double, N> result{};
   std::copy(values.begin(), values.end(), result.begin());
   return result;
 }
@@ -35,6 +35,17 @@ KnownPose read_pose(const YAML::Node& root, const std::string& path) {
   if (determinant(pose.R) < 0) throw BadInput(path + ": R is no rotation but a reflection");
   if (norm(pose.t) == 0) throw BadInput(path + ": t is 0");
   return pose;
+}
+
+// What `reconstruct` says of the camera in its result.json; other files need not.
+void read_shift(const YAML::Node& root, const std::string& path, KnownPose& pose) {
+  const YAML::Node shift = root["principal_point_shift_px"];
+  if (!shift || shift.IsNull()) return;
+  const auto pixels = fixed<2>(root, "principal_point_shift_px", path);
+  std::copy(pixels.begin(), pixels.end(), pose.principal_point_shift_px);
+  if (!root["image_size0"]) return;
+  pose.image_width = fixed<2>(root, "image_size0", path)[0];
+  if (!(pose.image_width > 0)) throw BadInput(path + ": image_size0 is not above 0");
 }
 
 // The depth errors of the cloud's points in per cent, each against the nearest pixel of the map.
@@ -58,8 +69,18 @@ std::vector<double> depth_errors_percent(const Truth& truth, const Picture& pict
 
 }  // namespace
 
+tv_camera KnownPose::corrected(const tv_camera& camera) const {
+  tv_camera corrected = camera;
+  const double scale = image_width > 0 ? camera.width / image_width : 1;
+  corrected.cx += scale * principal_point_shift_px[0];
+  corrected.cy += scale * principal_point_shift_px[1];
+  return corrected;
+}
+
 KnownPose load_pose(const std::string& path) {
-  KnownPose pose = read_pose(parse_yaml(read_file(path, kMaxFileBytes), path), path);
+  const YAML::Node root = parse_yaml(read_file(path, kMaxFileBytes), path);
+  KnownPose pose = read_pose(root, path);
+  read_shift(root, path, pose);
   const cv::SVD svd(cv::Mat(3, 3, CV_64F, pose.R.data()));
   const cv::Mat nearest = svd.u * svd.vt;
   std::copy(nearest.begin<double>(), nearest.end<double>(), pose.R.begin());

@@ -10,11 +10,18 @@
 
 namespace cli {
 
-// R and t of cam1_from_cam0 out of a YAML or JSON file, such as result.json. R is the rotation nearest
+// R and t of cam1_from_cam0 out of a YAML or JSON file, such as result.json, which also tells which
+// camera they are of. R is the rotation nearest
 // to the file's nine numbers, which may be rounded. Throws BadInput.
 struct KnownPose {
   Matrix3 R{};
   Vector3 t{};
+  // What the pose wants added to cx and cy of cameras for images so wide; 0: of any width.
+  double principal_point_shift_px[2] = {0, 0};
+  double image_width = 0;
+
+  // The camera, at whatever size its file is for, that the pose is of.
+  tv_camera corrected(const tv_camera& camera) const;
 };
 KnownPose load_pose(const std::string& path);
 
