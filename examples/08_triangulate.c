@@ -57,6 +57,7 @@ int main(int argc, char **argv) {
                                 &pose, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R || !pose.has_t) return fail("no full pose");
+  for (v = 0; v < 2; ++v) tv_corrected_camera(&pose, &camera[v], &camera[v]); /* those that it is of */
   for (k = 0; k < n; ++k) { /* those that agree, in place */
     if (!inlier[k]) continue;
     for (v = 0; v < 2; ++v) {
