@@ -66,6 +66,7 @@ def pair_data(pair, index, names):
             short(v, 7) for v in row["t"]]
         pictures[names["pipeline", name]] = {
             "in": flat(overlay["inliers"]), "out": flat(overlay["outliers"]), "pose": pose,
+            "shift": [short(v, 4) for v in row.get("principal_point_shift_px", (0, 0))],
             "within": overlay["num_within"]}
     reference = pair["reference"]
     return {"set": pair["set"], "names": [pair["name0"], pair["name1"]],

@@ -81,7 +81,7 @@ def run_pair(task):
         if answer:
             matches = _matches(answer)
             answers[system.id] = answer, matches
-            overlays[system.id] = overlay(matches, answer, task)
+            overlays[system.id] = overlay(_of_pose(matches, answer), answer, task)
         if system.id in wanted:
             rows["pipeline"][system.id] = _row(task, answer, status, message,
                                                answers.get(system.id, (0, None))[1])
@@ -103,6 +103,21 @@ def _matches(answer):
 
 def _given(answer):
     return {key: answer[key] for key in ("pixels0", "pixels1", "ratios", "cameras", "sizes")}
+
+
+def _shift(answer):
+    """What a pose's own cameras have added to cx and cy, [0, 0] for all but ours."""
+    return answer.get("principal_point_shift_px", [0.0, 0.0])
+
+
+def _of_pose(matches, answer):
+    """The matches with the cameras that a system's pose is of: lines and points must be of those."""
+    shift = _shift(answer)
+    if not any(shift):
+        return matches
+    moved = np.array([[0, 0, shift[0]], [0, 0, shift[1]], [0, 0, 0]])
+    cameras = [(K + moved, distortion) for K, distortion in matches.cameras]
+    return estimators.Matches(matches.pixels0, matches.pixels1, cameras, matches.sizes, matches.ratios)
 
 
 def _coded(given):
@@ -131,7 +146,8 @@ def _row(task, answer, status, message, matches):
            "rotation_error_deg": None, "translation_error_deg": None,
            "translation_error_signed_deg": None, "pose_error_deg": None}
     if answer:
-        row.update({key: answer[key] for key in ("num_keypoints", "config", "verdict")
+        row.update({key: answer[key]
+                    for key in ("num_keypoints", "config", "verdict", "principal_point_shift_px")
                     if key in answer})
         row["num_inliers"], row["ms"] = answer["num_inliers"], _rounded(answer["ms"])
         row["time_ms"] = round(sum(answer["ms"].values()), 3)
@@ -144,7 +160,7 @@ def _row(task, answer, status, message, matches):
         if matches is not None:
             row["precision"] = metrics.precision(matches.rays0, matches.rays1, R_true, t_true)
     if R is not None and matches is not None and len(matches):
-        error = epipolar_error_px(matches, R, t)
+        error = epipolar_error_px(_of_pose(matches, answer), R, t)
         row["error_px_histogram"] = np.histogram(error, HISTOGRAM_EDGES_PX)[0].tolist()
     return row
 
@@ -194,6 +210,8 @@ def _triangulate(run, rows, source, wanted):
             rows[system.id] = _points_row("failed", "no pose to triangulate with")
         return None
     answer, matches = source
+    if whose != "reference":
+        matches = _of_pose(matches, answer)
     t = np.array(pose["t"], float)
     if not np.linalg.norm(t) > 0:
         for system in chosen:
@@ -201,7 +219,7 @@ def _triangulate(run, rows, source, wanted):
         return None
     pose = {"R": pose["R"], "t": (t / np.linalg.norm(t)).tolist()}
     keep = epipolar_error_px(matches, pose["R"], pose["t"]) < 2 * task["max_error_px"]
-    given = _given(answer)
+    given = {**_given(answer), "cameras": [[K.tolist(), list(d)] for K, d in matches.cameras]}
     for key in ("pixels0", "pixels1"):
         given[key] = np.array(given[key]).reshape(-1, 2)[keep].tolist()
     given["ratios"] = None

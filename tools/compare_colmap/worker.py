@@ -92,7 +92,7 @@ def run_twoview(views, options, task):
     import twoview_ctypes
     R, t, inliers, found = estimators.run_twoview(context, matches, None, task["seed"])
     watch.lap("estimate")
-    return {"num_keypoints": [len(k) for k, _ in features], **pose_answer(R, t, inliers),
+    return {"num_keypoints": [len(k) for k, _ in features], **pose_answer(R, t, inliers, found),
             "config": twoview_ctypes.enum_name("config", found.config),
             "verdict": twoview_ctypes.enum_name("verdict", found.verdict),
             **matches_answer(matches)}, watch.ms
@@ -146,10 +146,14 @@ def run_colmap_program(views, options, task):
             **matches_answer(matches)}, watch.ms
 
 
-def pose_answer(R, t, inliers):
+def pose_answer(R, t, inliers, found=None):
+    """found: our library's tv_two_view, whose pose may be of cameras with another principal point."""
     if R is None or t is None:
         return {"R": None, "t": None, "num_inliers": int(inliers or 0)}
-    return {"R": np.asarray(R).tolist(), "t": np.ravel(t).tolist(), "num_inliers": int(inliers)}
+    answer = {"R": np.asarray(R).tolist(), "t": np.ravel(t).tolist(), "num_inliers": int(inliers)}
+    if found is not None:
+        answer["principal_point_shift_px"] = list(found.principal_point_shift)
+    return answer
 
 
 def matches_answer(matches):
@@ -193,9 +197,9 @@ def solver(system, task, matches):
         options["gravity_sigma_rad"] = GRAVITY_SIGMA_RAD
     context = twoview_context(64, 64, 8192)
     watch = Stopwatch()
-    R, t, inliers, _ = estimators.run_twoview(context, matches, options, task["seed"])
+    R, t, inliers, found = estimators.run_twoview(context, matches, options, task["seed"])
     watch.lap("estimate")
-    return {**pose_answer(R, t, inliers), "ms": watch.ms}
+    return {**pose_answer(R, t, inliers, found), "ms": watch.ms}
 
 
 # ---- triangulations on an identical pose -------------------------------------------------------

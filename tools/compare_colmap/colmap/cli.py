@@ -46,7 +46,8 @@ def _add_export(verbs):
     parser.add_argument("--schema", choices=("4", "3.8"), default="4",
                         help="COLMAP 4, or 3.8 as Debian has it (default: 4)")
     parser.add_argument("--append", action="store_true", help="add to a database that is there")
-    settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS)
+    # A pair's geometry is of the database's own cameras, which all images share: none is moved for one pair.
+    settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS, principal_point_sigma=0.0)
     parser.set_defaults(run=_export)
 
 
@@ -132,8 +133,11 @@ def _model(arguments):
         return EXIT_NO_POSE
     poses = {names[0]: (np.eye(3), np.zeros(3)), names[1]: (model.R, -model.R.T @ model.t)}
     write_files(a.output, {**text_model(model), "trajectory.tum": write_trajectory(poses)})
-    _say(a, {"points": len(model.points), "verdict": pose.verdict.name.lower()},
-         f"{a.output}: 2 images, {len(model.points)} points, verdict {pose.verdict.name.lower()}")
+    shift = pose.principal_point_shift
+    moved = f"; principal point moved by ({shift[0]:+.1f}, {shift[1]:+.1f}) px" if shift.any() else ""
+    _say(a, {"points": len(model.points), "verdict": pose.verdict.name.lower(),
+             "principal_point_shift_px": shift.tolist()},
+         f"{a.output}: 2 images, {len(model.points)} points, verdict {pose.verdict.name.lower()}{moved}")
     return EXIT_DONE
 
 

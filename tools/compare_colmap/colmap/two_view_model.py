@@ -10,7 +10,8 @@ from .model import TwoViewModel
 
 
 def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
-    """(TwoView, TwoViewModel), the model None without a full pose."""
+    """(TwoView, TwoViewModel), the model None without a full pose. Its cameras are those that pose and points
+    are of: the given ones, the principal point moved where the matches want it (twoview.corrected_camera)."""
     lumas = [read_luma(path) for path in paths]
     for path, luma, camera in zip(paths, lumas, cameras):
         if (camera.height, camera.width) != luma.shape:
@@ -32,5 +33,6 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
     x, y = np.floor(pixels[0].T + 0.5).astype(int)  # the pixel whose square holds the point
     colours = rgb[np.clip(y, 0, rgb.shape[0] - 1), np.clip(x, 0, rgb.shape[1] - 1)]
     points = cloud.points[good]
-    return pose, TwoViewModel(tuple(names), tuple(cameras), pose.R, pose.t, pixels,
+    cameras = tuple(tv.corrected_camera(pose, camera) for camera in cameras)
+    return pose, TwoViewModel(tuple(names), cameras, pose.R, pose.t, pixels,
                               points["position"].astype(np.float64), colours, points["error_px"].astype(np.float64))

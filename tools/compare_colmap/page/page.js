@@ -152,18 +152,22 @@ async function drawMatches(canvas, pair, picture) {
   }
 }
 
-async function drawLines(canvas, pair, pose, points) {
+function moved([fx, fy, cx, cy, ...lens], [dx, dy]) { // the camera that a pose is of
+  return [fx, fy, cx + dx, cy + dy, ...lens];
+}
+
+async function drawLines(canvas, pair, picture, points) {
   const { context, place, clip, sizes } = await sideBySide(canvas, pair);
-  const poses = [[pose, [], 2], [pair.reference, [6, 5], 1.3]].filter(([p]) => p);
+  const poses = [[picture.pose, picture.shift, [], 2], [pair.reference, [0, 0], [6, 5], 1.3]].filter(([p]) => p);
   points.forEach((pixels, number) => {
     const colour = LINE_COLOURS[number % LINE_COLOURS.length];
     for (const view of [0, 1]) {
       const here = pixels.slice(2 * view, 2 * view + 2), other = pixels.slice(2 - 2 * view, 4 - 2 * view);
       context.save();
       clip(view);
-      for (const [p, dash, width] of poses) {
-        const ray = undistort(pair.cameras[1 - view], ...other);
-        const curve = epipolarCurve(essential(p), view === 1, ray, pair.cameras[view], sizes[view]);
+      for (const [p, shift, dash, width] of poses) {
+        const ray = undistort(moved(pair.cameras[1 - view], shift), ...other);
+        const curve = epipolarCurve(essential(p), view === 1, ray, moved(pair.cameras[view], shift), sizes[view]);
         context.setLineDash(dash);
         context.lineWidth = width;
         context.strokeStyle = colour;
@@ -278,7 +282,7 @@ async function fillPair(box, pair) {
     const matches = element("canvas"), lines = element("canvas");
     figure.append(matches, lines);
     await drawMatches(matches, pair, picture);
-    await drawLines(lines, pair, picture.pose, points);
+    await drawLines(lines, pair, picture, points);
   }
 }
 

@@ -83,6 +83,22 @@ def photographs(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="session")
+def bend(tmp_path_factory):
+    """A folder with images/ and cam.yaml: a car in a bend, its camera's principal point off by about ten pixels."""
+    data = pathlib.Path(os.environ.get("TWOVIEW_DATA") or ROOT.parent / "shared" / "data") / "kitti00_turn" / "images"
+    if not data.is_dir():
+        pytest.skip(f"no {data}")
+    folder = tmp_path_factory.mktemp("bend")
+    (folder / "images").mkdir()
+    for name in ("000106.png", "000110.png"):
+        (folder / "images" / name).write_bytes((data / name).read_bytes())
+    (folder / "cam.yaml").write_text("image_width: 1241\nimage_height: 376\n"
+                                     "camera_matrix: {rows: 3, cols: 3, data: [718.856, 0, 607.1928, 0, 718.856, "
+                                     "185.2157, 0, 0, 1]}\ndistortion_coefficients: [0, 0, 0, 0, 0]\n")
+    return folder
+
+
 def relative_pose(i, j):
     (R0, t0), (R1, t1) = camera_pose(i), camera_pose(j)
     R = R1 @ R0.T

@@ -113,6 +113,17 @@ def test_geometries_are_there_and_agree_with_their_matches(exported):
             assert len(distance) >= 25 and np.median(distance) < 0.5
 
 
+def test_a_geometry_is_of_the_databases_camera(bend, tmp_path, call):
+    """Even where the matches would have its principal point elsewhere: all pairs share the camera."""
+    assert call("export", "--database", tmp_path / "x.db", "--images", bend / "images", "--camera",
+                bend / "cam.yaml")[0] == 0
+    with pycolmap.Database.open(tmp_path / "x.db") as database:
+        [camera], (_, [row]) = database.read_all_cameras(), database.read_two_view_geometries()
+        inverse = np.linalg.inv(camera.calibration_matrix())
+        F = inverse.T @ row.E @ inverse
+        np.testing.assert_allclose(row.F / np.linalg.norm(row.F), F / np.linalg.norm(F), atol=1e-9)
+
+
 @pytest.mark.parametrize("schema", SCHEMAS)
 def test_a_pair_that_is_named_the_other_way_round_is_the_same_row(exported, photographs, tmp_path, schema, call):
     (tmp_path / "pairs.txt").write_text("c.png a.png\nd.png b.png\na.png c.png\n")

@@ -227,6 +227,19 @@ def test_pycolmap_reads_a_result_and_reprojects_it(result):
     assert np.linalg.norm(pose.R - R) < 3e-3 and np.linalg.norm(pose.t - t / np.linalg.norm(t)) < 1e-2
 
 
+def test_a_model_has_the_camera_that_its_points_are_of(bend, tmp_path, call):
+    images = bend / "images"
+    status, out, _ = call("model", images / "000106.png", images / "000110.png", "--camera", bend / "cam.yaml", "-o",
+                          tmp_path, "--json")
+    shift = np.array(json.loads(out)["principal_point_shift_px"])
+    assert status == 0 and -18 < shift[0] < -5 and abs(shift[1]) < 9
+    found = pycolmap.Reconstruction(tmp_path)
+    assert found.num_cameras() == 1
+    np.testing.assert_allclose(found.cameras[1].params[2:], np.array([607.6928, 185.7157]) + shift, atol=1e-9)
+    found.update_point_3d_errors()
+    assert np.mean([point.error for point in found.points3D.values()]) < 0.5
+
+
 def test_a_model_comes_back_with_half_a_pixel_more(tmp_path):
     pixels = views_of(scene_points(5))
     R, t = relative_pose(0, 1)
