@@ -25,12 +25,14 @@ def matches_of(pair, path):
 
 
 def estimated(context, pair, path, pixels0, pixels1, ratios):
-    """(R, t, inliers, covariance or None) by the library, or by OpenCV without any refinement."""
+    """(R, t, inliers, covariance or None, the cameras that these are of) by the library, or by OpenCV without any
+    refinement."""
     tv = library()
     if path != "unrefined":
         method = tv.Method.EIGHT_POINT if path == "paper" else tv.Method.FIVE_POINT
         found, inliers = tv.estimate_two_view(context, *pair.cameras, pixels0, pixels1, ratios, method=method)
-        return found.R, found.t, inliers, found.covariance
+        cameras = [tv.corrected_camera(found, camera) for camera in pair.cameras]
+        return found.R, found.t, inliers, found.covariance, cameras
     cv2.setRNGSeed(1)
     F, mask = cv2.findFundamentalMat(pixels0, pixels1, cv2.FM_RANSAC, 1.0, 0.9999, 10000)
     inliers = mask.ravel().astype(bool)
@@ -38,7 +40,7 @@ def estimated(context, pair, path, pixels0, pixels1, ratios):
     rays = [cv2.undistortPoints(pixels[inliers][:, None], K, None)[:, 0]
             for pixels, K in ((pixels0, K0), (pixels1, K1))]
     _, R, t, _ = cv2.recoverPose(K1.T @ F @ K0, *rays, np.eye(3))
-    return R, t.ravel(), inliers, None
+    return R, t.ravel(), inliers, None, pair.cameras
 
 
 def sigmas_deg(covariance):
@@ -52,13 +54,13 @@ def reconstructed(pair, path):
     tv = library()
     pixels0, pixels1, ratios = matches_of(pair, path)
     with tv.Context(max_matches=len(pixels0)) as context:
-        R, t, inliers, covariance = estimated(context, pair, path, pixels0, pixels1, ratios)
+        R, t, inliers, covariance, cameras = estimated(context, pair, path, pixels0, pixels1, ratios)
         pixels = pixels0[inliers].copy(), pixels1[inliers].copy()
-        points = tv.triangulate(*pair.cameras, R, t, *pixels)
+        points = tv.triangulate(*cameras, R, t, *pixels)
         stages = {"before": (R, t, points)}
         for stage, scale_px in STAGES.items():
             if scale_px is not None:
-                a = tv.adjust_two_view(context, *pair.cameras, *pixels, R, t, points, loss_scale_px=scale_px)
+                a = tv.adjust_two_view(context, *cameras, *pixels, R, t, points, loss_scale_px=scale_px)
                 stages[stage] = a.R, a.t, a.points
     return stages, pixels, None if covariance is None else sigmas_deg(covariance)
 

@@ -1,7 +1,7 @@
 """Figures 14 and 15: epipolar lines, epipoles and camera poses of sideways and of forward motion."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -66,6 +66,8 @@ def reconstructed(pair):
         pose, cloud = tv.reconstruct(context, pair.grey[0], pair.cameras[0], pair.grey[1], pair.cameras[1])
     if pose.R is None or pose.t is None:
         raise Missing(f"a pose of {pair.name}")
+    # Pixels, epipoles and F's lines are all of the cameras that the pose is of.
+    pair = replace(pair, cameras=tuple(tv.corrected_camera(pose, camera) for camera in pair.cameras))
     chosen = cloud.matches[cloud.inlier_mask]
     pixels = tuple(to_pinhole(camera, np.column_stack([keys["x"], keys["y"]])[chosen[index]])
                    for camera, keys, index in zip(pair.cameras, cloud.keypoints, ("idx0", "idx1")))

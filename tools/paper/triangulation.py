@@ -88,7 +88,8 @@ def iterative_ls(pair, pixels0, pixels1, rounds=ROUNDS):
 
 
 def forward_pair(inputs):
-    """(pair, pixels0, pixels1): a camera that drives forward, with its inliers."""
+    """(pair, pixels0, pixels1): a camera that drives forward, with its inliers; the pose is the estimate's, and the
+    cameras are those that it is of."""
     pair = inputs.listed_pair("kitti00_turn", "000100.png", "000104.png", "KITTI, 1.65 m forward")
     tv = library()
     pixels0, pixels1, ratios = ransac.matches_of(pair)
@@ -96,10 +97,10 @@ def forward_pair(inputs):
         found, inliers = tv.estimate_two_view(context, *pair.cameras, pixels0, pixels1, ratios)
     if found.R is None or found.t is None:
         raise Missing("a pose of the KITTI pair")
-    points = tv.triangulate(*pair.cameras, found.R, found.t, pixels0[inliers].copy(),
-                            pixels1[inliers].copy())
+    cameras = tuple(tv.corrected_camera(found, camera) for camera in pair.cameras)
+    points = tv.triangulate(*cameras, found.R, found.t, pixels0[inliers].copy(), pixels1[inliers].copy())
     good = points["status"] == tv.PointStatus.OK
-    estimated = Pair(pair.name, pair.colour, pair.cameras, found.R, found.t, 1.0)
+    estimated = Pair(pair.name, pair.colour, cameras, found.R, found.t, 1.0)
     return estimated, pixels0[inliers][good].copy(), pixels1[inliers][good].copy()
 
 
