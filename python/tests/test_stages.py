@@ -78,6 +78,36 @@ def test_estimate_finds_the_pose(context, scene):
     assert uncalibrated.R is None and uncalibrated.F.shape == (3, 3)
 
 
+def test_a_result_is_of_the_corrected_camera(context):
+    right = tv.Camera(640, 480, 500.0, 500.0, 325.0, 236.0)
+    wrong = tv.Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
+    random = np.random.default_rng(9)
+    points = np.column_stack([random.uniform(-2, 2, 400), random.uniform(-1.5, 1.5, 400),
+                              random.uniform(4, 9, 400)])
+    yaw, roll = (np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in (0.3, 0.4))
+    R = np.eye(3)
+    R[::2, ::2] = yaw
+    R[:2] = roll @ R[:2]
+    t = np.array([1.2, 0.3, 0.6])
+    pixels = [tv.camera_project_points(right, np.ascontiguousarray(part))[0]
+              + random.normal(0, 0.1, (400, 2)) for part in (points, points @ R.T + t)]
+    found, inliers = tv.estimate_two_view(context, wrong, wrong, *pixels)
+    assert np.abs(found.principal_point_shift - (5.5, -3.5)).max() < 1.5
+    corrected = tv.corrected_camera(found, wrong)
+    dx, dy = found.principal_point_shift
+    assert corrected == tv.Camera(640, 480, 500.0, 500.0, 319.5 + dx, 239.5 + dy)
+    errors = [np.median(tv.triangulate(camera, camera, found.R, found.t, pixels[0][inliers],
+                                       pixels[1][inliers])["error_px"])
+              for camera in (corrected, wrong)]
+    assert errors[0] < 0.15 and errors[1] > 2 * errors[0]
+    as_told, _ = tv.estimate_two_view(context, wrong, wrong, *pixels, principal_point_sigma=0)
+    assert not as_told.principal_point_shift.any()
+    assert tv.corrected_camera(as_told, wrong) == wrong
+    assert angle_deg(found.R @ R.T) < angle_deg(as_told.R @ R.T)
+    with pytest.raises(tv.TV_ERR_ARGUMENT):
+        tv.estimate_two_view(context, wrong, wrong, *pixels, principal_point_sigma=0.2)
+
+
 def test_pixels_that_are_not_finite_are_no_inliers(context, scene):
     pixels = scene.pixels0.copy()
     pixels[7] = np.nan
