@@ -53,7 +53,9 @@ class PrincipalPoint(cli.CliTest):
         self.assertTrue(-18 < shift[0] < -5 and -3 < shift[1] < 9, shift)
         line = f"({shift[0]:+.1f}, {shift[1]:+.1f}) px"
         self.assertIn(line.encode(), [x for x in done.stdout.splitlines() if x.startswith(b"camera ")][0])
-        self.assertIn("principal_point_shift_px", (self.out / "report.html").read_text())
+        report = (self.out / "report.html").read_text()
+        self.assertIn("principal_point_shift_px", report)
+        self.assertIn(f"<b>{shift[0]:+.1f}, {shift[1]:+.1f}<i>px</i></b><span>the principal point", report)
         self.assertEqual(result["options"]["principal_point_sigma"], 0.01)
 
     def test_F_is_of_the_corrected_camera(self):
@@ -75,6 +77,7 @@ class PrincipalPoint(cli.CliTest):
         self.assertEqual(self.result()["principal_point_shift_px"], [0, 0])
         self.assertEqual(self.result()["options"]["principal_point_sigma"], 0)
         self.assertNotIn(b"\ncamera ", done.stdout)
+        self.assertNotIn("<span>the principal point", (self.out / "report.html").read_text())
 
     def test_what_is_no_such_deviation_is_refused(self):
         for text in ("-0.01", "0.11", "nan", "inf", "some", ""):

@@ -73,6 +73,10 @@ std::string cards(const Outcome& outcome) {
                "of " + std::to_string(outcome.two_view.num_matches), "matches that agree");
   text += card(number_of(j["median_parallax_deg"], "%.2f"), "deg", "median parallax");
   text += card(number_of(j["rms_reprojection_px"], "%.2f"), "px", "reprojection, rms");
+  const double* shift = outcome.two_view.principal_point_shift;
+  if (shift[0] != 0 || shift[1] != 0)
+    text += card(formatted("%+.1f, ", shift[0]) + formatted("%+.1f", shift[1]), "px",
+                 "the principal point is off; pose and points are of the corrected camera");
   const Json& truth = j["truth"];
   if (truth.is_object()) {
     text += card(number_of(truth["rotation_error_deg"], "%.3f"), "deg", "rotation error");
