@@ -46,8 +46,8 @@ def _add_export(verbs):
     parser.add_argument("--schema", choices=("4", "3.8"), default="4",
                         help="COLMAP 4, or 3.8 as Debian has it (default: 4)")
     parser.add_argument("--append", action="store_true", help="add to a database that is there")
-    # A pair's geometry is of the database's own cameras, which all images share: none is moved for one pair.
-    settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS, principal_point_sigma=0.0)
+    settings.add_options(parser, max_keypoints=settings.MAPPING_KEYPOINTS,
+                         principal_point_sigma=settings.PRINCIPAL_POINT_SIGMA_OF_A_DATABASE)
     parser.set_defaults(run=_export)
 
 

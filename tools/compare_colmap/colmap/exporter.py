@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import twoview as tv
 
 from . import conventions
 from .cameras import CameraChoice
@@ -15,6 +16,7 @@ from .errors import BadInput
 from .images import list_images, read_luma
 from .pairs import exhaustive, read_pairs, sequential
 from .progress import progress
+from .settings import PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,8 @@ def two_view(engine, view0, view1):
 def export(job, feature=None, match=None, estimate=None):
     """{what: how many}; the database is whole, or as it was before."""
     schema = SCHEMAS[job.schema]
-    engine = Engine(feature, match, estimate)
+    engine = Engine(feature, match, estimate or
+                    tv.EstimateOptions(principal_point_sigma=PRINCIPAL_POINT_SIGMA_OF_A_DATABASE))
     with (appended_database if job.append else new_database)(job.database, schema) as writer:
         pairs = choose_pairs(job)
         views = _describe_images(job, pairs, engine)

@@ -8,6 +8,8 @@ _CHOICES = {"orientation": tv.Orientation, "descriptor": tv.Descriptor, "method"
 _KINDS = (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)
 # For a mapper, which has time and gains by long tracks: as many as COLMAP's own extractor (docs/colmap.md).
 MAPPING_KEYPOINTS = 8192
+# For a database, whose pairs share its cameras: a pair's geometry is of those, none is moved for one pair.
+PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
 
 

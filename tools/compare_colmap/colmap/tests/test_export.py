@@ -113,10 +113,15 @@ def test_geometries_are_there_and_agree_with_their_matches(exported):
             assert len(distance) >= 25 and np.median(distance) < 0.5
 
 
-def test_a_geometry_is_of_the_databases_camera(bend, tmp_path, call):
+@pytest.mark.parametrize("by", ["program", "function"])
+def test_a_geometry_is_of_the_databases_camera(bend, tmp_path, call, by):
     """Even where the matches would have its principal point elsewhere: all pairs share the camera."""
-    assert call("export", "--database", tmp_path / "x.db", "--images", bend / "images", "--camera",
-                bend / "cam.yaml")[0] == 0
+    if by == "program":
+        assert call("export", "--database", tmp_path / "x.db", "--images", bend / "images", "--camera",
+                    bend / "cam.yaml")[0] == 0
+    else:
+        exporter.export(exporter.Job(str(tmp_path / "x.db"), str(bend / "images"), cameras=(str(bend / "cam.yaml"),),
+                                     quiet=True))
     with pycolmap.Database.open(tmp_path / "x.db") as database:
         [camera], (_, [row]) = database.read_all_cameras(), database.read_two_view_geometries()
         inverse = np.linalg.inv(camera.calibration_matrix())
