@@ -11,12 +11,13 @@ import cli_support as cli
 from cli_support import FOCAL, HEIGHT, WIDTH
 
 RESULT_KEYS = """image0 image1 num_keypoints num_matches num_inliers config verdict reasons R t E F H
-alternative evidence covariance noise_px num_points median_parallax_deg rms_reprojection_px scale
+alternative evidence covariance noise_px principal_point_shift_px num_points median_parallax_deg
+rms_reprojection_px scale
 scale_sigma imu truth timings_ms context_bytes options seed version kernels""".split()
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
 max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
-bundle_adjustment camera0 camera1 focal_35mm resize""".split()
+bundle_adjustment principal_point_sigma camera0 camera1 focal_35mm resize""".split()
 TRUTH = "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [-1, 0, 0]\nbaseline: 0.5\ndepth0: depth.pfm\n"
 
 
@@ -166,7 +167,7 @@ class Reconstruct(cli.CliTest):
                   "orientation": "upright", "descriptor": "sift", "ratio": 0.75, "method": "eight-point",
                   "max_error_px": 1.5, "confidence": 0.99, "max_iterations": 500, "seed": 2**64 - 1,
                   "kernels": "c", "triangulation": "midpoint", "guided_matching": 1,
-                  "bundle_adjustment": 1, "resize": 300}
+                  "bundle_adjustment": 1, "principal_point_sigma": 0.02, "resize": 300}
         flags = [f"--{key.replace('_', '-')}={value}" for key, value in chosen.items()]
         self.succeed(self.reconstruct(*flags))
         result = self.result()
