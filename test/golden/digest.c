@@ -124,6 +124,7 @@ static void add_two_view(const tv_two_view *r) {
   add_double(r->rms_error_px);
   add_double(r->noise_px);
   add_int((int64_t)r->seed);
+  add_doubles(r->principal_point_shift, 2);
 }
 
 static void add_points(const tv_point *points, int32_t count) {
@@ -267,16 +268,63 @@ static void digest_matches(const pair *p, tv_context *context, const features *f
   }
 }
 
-static void estimate(const pair *p, tv_context *context, const matched *m, int calibrated,
-                     const tv_estimate_options *options, tv_two_view *result) {
+static void estimate_with(const tv_camera *camera0, const tv_camera *camera1, tv_context *context,
+                          const matched *m, const tv_estimate_options *options,
+                          tv_two_view *result) {
   uint8_t inliers[MAX_KEYPOINTS];
   tv_two_view_init(result);
   must("estimate_two_view",
-       tv_estimate_two_view(context, calibrated ? &p->camera[0] : NULL,
-                            calibrated ? &p->camera[1] : NULL, m->pixels[0], m->pixels[1],
-                            m->ratios, m->count, options, result, inliers));
+       tv_estimate_two_view(context, camera0, camera1, m->pixels[0], m->pixels[1], m->ratios,
+                            m->count, options, result, inliers));
   add_two_view(result);
   add_bytes(inliers, (size_t)m->count);
+}
+
+static void estimate(const pair *p, tv_context *context, const matched *m, int calibrated,
+                     const tv_estimate_options *options, tv_two_view *result) {
+  estimate_with(calibrated ? &p->camera[0] : NULL, calibrated ? &p->camera[1] : NULL, context, m,
+                options, result);
+}
+
+static double uniform(uint64_t *seed, double low, double high) {
+  *seed = *seed * 6364136223846793005u + 1442695040888963407u;
+  return low + (high - low) * (double)(*seed >> 33) / 2147483648.0;
+}
+
+/* Simulated matches of one camera that turns by 23 degrees and moves, its principal point told wrongly, which
+   the matches must find: few real pairs turn enough. A pinhole, then a lens. */
+static void digest_principal_point(const pair *p, tv_context *context) {
+  static matched m;
+  const double cosine = 0.96 / 1.04, sine = 0.4 / 1.04; /* t = 0.2 in (1 - t^2, 2 t) / (1 + t^2) */
+  tv_camera camera = p->camera[0];
+  tv_two_view moved;
+  uint64_t seed = 1;
+  int lens, k, v;
+  start();
+  for (lens = 0; lens < 2; ++lens) {
+    camera.model = lens ? TV_CAMERA_BROWN_CONRADY : TV_CAMERA_PINHOLE;
+    memset(camera.k, 0, sizeof camera.k);
+    camera.k[0] = lens ? -0.3 : 0;
+    for (m.count = k = 0; k < 400; ++k) {
+      const double z = uniform(&seed, 2, 8), x = z * uniform(&seed, -0.4, 0.4),
+                   y = z * uniform(&seed, -0.3, 0.3);
+      const double points[2][3] = {
+          {x, y, z}, {cosine * x + sine * z - 0.7, y + 0.1, cosine * z - sine * x + 0.7}};
+      for (v = 0; v < 2; ++v) {
+        double pixel[2];
+        must("project", tv_camera_project(&camera, points[v], pixel, NULL));
+        m.pixels[v][2 * m.count] = pixel[0] + uniform(&seed, -0.1, 0.1);
+        m.pixels[v][2 * m.count + 1] = pixel[1] + uniform(&seed, -0.1, 0.1);
+      }
+      m.ratios[m.count++] = 0.5f;
+    }
+    camera.cx += 0.03 * camera.fx;
+    camera.cy -= 0.02 * camera.fy;
+    estimate_with(&camera, &camera, context, &m, NULL, &moved);
+    if (moved.principal_point_shift[0] == 0) fail("the principal point stayed", TV_OK);
+    camera = p->camera[0];
+  }
+  print(p, context, "principal_point");
 }
 
 static void digest_estimates(const pair *p, tv_context *context, const matched *m,
@@ -308,6 +356,7 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   start();
   estimate(p, context, m, 1, &options, &with_gravity);
   print(p, context, "gravity");
+  digest_principal_point(p, context);
 }
 
 static void digest_guided(const pair *p, tv_context *context, const features *f,
