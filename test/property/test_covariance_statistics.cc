@@ -15,7 +15,7 @@ namespace {
 
 using tv::Mat3;
 using tv::Vec3;
-using Vec5 = Eigen::Matrix<double, 5, 1>;
+using scene::Vec5;
 using Mat5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
 
 enum Class { kGeneral, kSideways, kForward, kLowParallax, kPlanar, kNumClasses };
@@ -67,24 +67,6 @@ bool draw_pair(pair_kinds::Maker& maker, Class which) {
   return made;
 }
 
-// The true pose in the covariance's coordinates around an estimate.
-Vec5 error_of(const double* R, const double* t) {
-  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const Mat3 turned = pair.R * Mat3(Eigen::Map<const RowMajor>(R)).transpose();
-  const Vec3 twice_sine(turned(2, 1) - turned(1, 2), turned(0, 2) - turned(2, 0),
-                        turned(1, 0) - turned(0, 1));
-  const double sine = 0.5 * twice_sine.norm();
-  const double angle = std::atan2(sine, 0.5 * (turned.trace() - 1));
-  const Vec3 direction(t[0], t[1], t[2]);
-  Vec3 b1, b2;
-  tv::tangent_basis(direction, &b1, &b2);
-  const double along = direction.dot(pair.t);
-  Vec5 e;
-  e << (sine > 0 ? Vec3(0.5 * angle / sine * twice_sine) : Vec3(0, 0, 0)), b1.dot(pair.t) / along,
-      b2.dot(pair.t) / along;
-  return along > 0 ? e : Vec5(Vec5::Constant(1e3));
-}
-
 void test_the_ellipsoid_of_95_per_cent_holds_the_truth(void) {
   int share_wrong = 0;
   const char* only = std::getenv("TWOVIEW_KIND");
@@ -107,10 +89,10 @@ void test_the_ellipsoid_of_95_per_cent_holds_the_truth(void) {
         ++absent;
         continue;
       }
-      Vec5 e = error_of(r.R, r.t);
+      Vec5 e = scene::pose_error(r.R, r.t, pair.R, pair.t);
       const double* covariance = r.covariance;
       if (which == kPlanar && r.has_alternative != 0) {
-        const Vec5 other = error_of(r.alternative_R, r.alternative_t);
+        const Vec5 other = scene::pose_error(r.alternative_R, r.alternative_t, pair.R, pair.t);
         if (other.norm() < e.norm()) {
           e = other;
           covariance = r.alternative_covariance;

@@ -1,6 +1,5 @@
 // Gravity in two-view estimation, on synthetic pairs with 30 to 60 per cent of true matches: what
 // it gives where it is true to its sigma, what it costs where it is wrong, and what is refused.
-#include <Eigen/LU>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -89,26 +88,6 @@ double pose_error_deg(const tv_two_view& result) {
   return std::fmin(std::fmax(rotation_error_deg(result), moved), kMostDeg);
 }
 
-// Whether the truth lies in the 95 per cent ellipsoid (chi-square of 5 degrees of freedom).
-bool covered(const tv_two_view& result) {
-  if (!result.has_covariance) return false;
-  Mat3 R;
-  for (int k = 0; k < 9; ++k) R(k / 3, k % 3) = result.R[k];
-  const Vec3 t(result.t[0], result.t[1], result.t[2]);
-  const Mat3 turn = pair.R * R.transpose();
-  Vec3 w(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1));
-  const double sine = w.norm();
-  if (sine > 0) w *= tv::atan2(sine, turn.trace() - 1) / sine;
-  Vec3 b1, b2;
-  tv::tangent_basis(t, &b1, &b2);
-  const Vec3 along = pair.t / pair.t.dot(t);
-  Eigen::Matrix<double, 5, 1> e;
-  e << w, along.dot(b1), along.dot(b2);
-  Eigen::Matrix<double, 5, 5> C;
-  for (int k = 0; k < 25; ++k) C(k / 5, k % 5) = result.covariance[k];
-  return e.dot(C.inverse() * e) < 11.0705;
-}
-
 struct Sum {
   double sum = 0, squares = 0;
   void add(double x) {
@@ -140,7 +119,7 @@ void gather_statistics() {
     const tv_two_view base = estimated(TV_METHOD_FIVE_POINT, truth);
     statistics.base_pose.add(pose_error_deg(base));
     statistics.base_rotation.add(rotation_error_deg(base));
-    statistics.base_covered += covered(base);
+    statistics.base_covered += scene::within_ellipsoid_95(base, pair.R, pair.t);
     statistics.base_samples += base.num_iterations;
     for (int s = 0; s < kSigmas; ++s) {
       const Gravity gravity = noisy(truth, kSigmasDeg[s], static_cast<uint64_t>(10 * k + s));
@@ -148,7 +127,7 @@ void gather_statistics() {
         const tv_two_view result = estimated(kMethods[m], gravity);
         statistics.pose_gain[s][m].add(pose_error_deg(base) - pose_error_deg(result));
         statistics.rotation_gain[s][m].add(rotation_error_deg(base) - rotation_error_deg(result));
-        statistics.covered[s][m] += covered(result);
+        statistics.covered[s][m] += scene::within_ellipsoid_95(result, pair.R, pair.t);
         statistics.samples[s][m] += result.num_iterations;
       }
     }

@@ -3,6 +3,7 @@
 #ifndef TEST_SUPPORT_SCENE_H
 #define TEST_SUPPORT_SCENE_H
 
+#include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -154,6 +155,35 @@ inline double rotation_error_deg(const double R[9], const Mat3& truth) {
 inline double translation_error_deg(const double t[3], const Vec3& truth) {
   const Vec3 estimate(t[0], t[1], t[2]);
   return degrees(tv::atan2(estimate.cross(truth).norm(), estimate.dot(truth)));
+}
+
+using Vec5 = Eigen::Matrix<double, 5, 1>;
+
+// The true pose in the parameters of a covariance around an estimate (two_view.h); far away where the
+// directions are opposite.
+inline Vec5 pose_error(const double R[9], const double t[3], const Mat3& true_R, const Vec3& true_t) {
+  Mat3 estimate;
+  for (int k = 0; k < 9; ++k) estimate(k / 3, k % 3) = R[k];
+  const Mat3 turn = true_R * estimate.transpose();
+  Vec3 w(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1));
+  const double twice_sine = w.norm();
+  if (twice_sine > 0) w *= tv::atan2(twice_sine, turn.trace() - 1) / twice_sine;
+  const Vec3 direction(t[0], t[1], t[2]);
+  Vec3 b1, b2;
+  tv::tangent_basis(direction, &b1, &b2);
+  const double along = direction.dot(true_t);
+  Vec5 e;
+  e << w, b1.dot(true_t) / along, b2.dot(true_t) / along;
+  return along > 0 ? e : Vec5(Vec5::Constant(1e3));
+}
+
+// Whether the truth lies in the 95 per cent ellipsoid (chi-square of 5 degrees of freedom).
+inline bool within_ellipsoid_95(const tv_two_view& r, const Mat3& true_R, const Vec3& true_t) {
+  if (!r.has_covariance) return false;
+  const Vec5 e = pose_error(r.R, r.t, true_R, true_t);
+  Eigen::Matrix<double, 5, 5> C;
+  for (int k = 0; k < 25; ++k) C(k / 5, k % 5) = r.covariance[k];
+  return e.dot(C.inverse() * e) < 11.0705;
 }
 
 }  // namespace scene

@@ -159,7 +159,9 @@ void add_triangulate(CLI::App& program, Run& run) {
       ->required()
       ->type_name("FILE");
   a->cameras.add_to(*verb);
-  verb->add_option("--pose", a->pose, "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px is used too, or YAML")
+  verb->add_option("--pose", a->pose,
+                   "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px is used "
+                   "too, or YAML")
       ->required()
       ->type_name("FILE");
   verb->add_option("--max-error-px", a->max_error_px, "leave points of a larger error out of the cloud")

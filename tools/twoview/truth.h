@@ -11,8 +11,8 @@
 namespace cli {
 
 // R and t of cam1_from_cam0 out of a YAML or JSON file, such as result.json, which also tells which
-// camera they are of. R is the rotation nearest
-// to the file's nine numbers, which may be rounded. Throws BadInput.
+// camera they are of. R is the rotation nearest to the file's nine numbers, which may be rounded.
+// Throws BadInput.
 struct KnownPose {
   Matrix3 R{};
   Vector3 t{};

@@ -113,8 +113,8 @@ bool uncertainty_without_gravity(const PoseRefiner& f, const Pose& pose,
     return false;
   }
   if (!f.principal_point.is_free) return true;
-  return add_shift_variance(f.problem, f.matches, f.indices, count, GravityPoseModel{pose}, f.principal_point,
-                            uncertainty->variance_px, uncertainty->covariance);
+  return add_shift_variance(f.problem, f.matches, f.indices, count, GravityPoseModel{pose},
+                            f.principal_point, uncertainty->variance_px, uncertainty->covariance);
 }
 
 // The prior with the weight that the points leave it, where they alone would put the pose.

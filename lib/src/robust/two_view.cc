@@ -515,7 +515,8 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
   double* values = arena_alloc<double>(arena, n);
   int32_t* support = arena_alloc<int32_t>(arena, n);
   Finish f{problem, matches, unique, threshold, indices, values, support, 0,
-           PoseRefiner{problem, matches, unique, threshold, gravity_of(problem), {}, indices, values}, outcome};
+           PoseRefiner{problem, matches, unique, threshold, gravity_of(problem), {}, indices, values},
+           outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {
