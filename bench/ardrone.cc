@@ -1,5 +1,5 @@
-// The AR.Drone's codecs: packets of navdata, frames of PaVE and command datagrams a second; and what a session adds of
-// its own to a picture. Built by the project's own encoder.
+// The AR.Drone's codecs: packets of navdata, frames of PaVE and command datagrams a second; and
+// what a session adds of its own to a picture. Built by the project's own encoder.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -81,8 +81,8 @@ void at_write(benchmark::State& state) {
 }
 BENCHMARK(at_write);
 
-// A drone that has a full navdata packet and a picture of 10 kB ready at each step, and a decoder that
-// costs nothing: what is left is the driver's own.
+// A drone that has a full navdata packet and a picture of 10 kB ready at each step, and a decoder
+// that costs nothing: what is left is the driver's own.
 struct Feed {
   std::vector<uint8_t> navdata = make_navdata(0xfffffff), picture;
   size_t navdata_left = 0, picture_at = 0;

@@ -76,9 +76,10 @@ void add(Row row) {
 }
 
 void add_missing(const std::string& name) {
-  benchmark::RegisterBenchmark(name.c_str(), [](benchmark::State& state) {
-    state.SkipWithError("peer missing");
-  })->Iterations(1)->Repetitions(1);
+  benchmark::RegisterBenchmark(name.c_str(),
+                               [](benchmark::State& state) { state.SkipWithError("peer missing"); })
+      ->Iterations(1)
+      ->Repetitions(1);
 }
 
 int run(int argc, char** argv) {

@@ -1,9 +1,9 @@
 // What the benchmark programs share: rows with a name, one timed call each, and main.
 //
-// A row's name is stage/case/system; the system is "twoview", or the peer with its version. The rows of
-// a case are to do the same work, and their counters say how much of it each has found. All rows of a
-// program run in random turn, so that a change of the machine's mood meets all systems alike.
-// scripts/bench reads the JSON and divides.
+// A row's name is stage/case/system; the system is "twoview", or the peer with its version. The
+// rows of a case are to do the same work, and their counters say how much of it each has found. All
+// rows of a program run in random turn, so that a change of the machine's mood meets all systems
+// alike. scripts/bench reads the JSON and divides.
 #pragma once
 
 #include <functional>
@@ -43,7 +43,8 @@ Context make_context(int width, int height, int max_keypoints, int max_matches =
 // Ends the program where a call that cannot fail has failed.
 void require(tv_status status, const char* what);
 
-// Runs all rows. Arguments are Google Benchmark's; its defaults here are 15 repetitions in random turn.
+// Runs all rows. Arguments are Google Benchmark's; its defaults here are 15 repetitions in random
+// turn.
 int run(int argc, char** argv);
 
 }  // namespace bench

@@ -136,8 +136,8 @@ int main(int argc, char **argv) {
   }
   qsort(natural, (size_t)num, sizeof natural[0], ascending);
   median = natural[num / 2];
-  printf("worst %.2f ms, median of %d natural pairs %.2f ms: %.2f (at most 1.5)\n", worst, num, median,
-         worst / median);
+  printf("worst %.2f ms, median of %d natural pairs %.2f ms: %.2f (at most 1.5)\n", worst, num,
+         median, worst / median);
   tv_context_free(context);
   return worst > 1.5 * median;
 }

@@ -1,9 +1,9 @@
 // SIFT descriptors at our own corners, and all of SIFT, beside OpenCV's.
 //
-// At given points both describe the same keypoints and angles, with the same window: a spatial bin is 1.5
-// keypoint sizes on both sides. The rows of many and of few keypoints differ by the descriptors alone;
-// scripts/bench takes the pyramid apart by that. The agreement is the median cosine of the two
-// descriptors: ours is smoothed a little less than OpenCV's.
+// At given points both describe the same keypoints and angles, with the same window: a spatial bin
+// is 1.5 keypoint sizes on both sides. The rows of many and of few keypoints differ by the
+// descriptors alone; scripts/bench takes the pyramid apart by that. The agreement is the median
+// cosine of the two descriptors: ours is smoothed a little less than OpenCV's.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/features2d.hpp>
@@ -26,8 +26,8 @@ tv_feature_options options_of(float size) {
   return options;
 }
 
-// Keypoints with their angles, spread over the image: every n-th of the best corners that lie so far
-// from the border that OpenCV describes them whole.
+// Keypoints with their angles, spread over the image: every n-th of the best corners that lie so
+// far from the border that OpenCV describes them whole.
 std::vector<tv_keypoint> keypoints_of(const cv::Mat& pixels, float size, int count) {
   const bench::Context context = bench::make_context(pixels.cols, pixels.rows, kMaxKeypoints);
   const tv_feature_options options = options_of(size);
@@ -36,7 +36,8 @@ std::vector<tv_keypoint> keypoints_of(const cv::Mat& pixels, float size, int cou
   std::vector<uint8_t> descriptors(kMaxKeypoints * TV_DESCRIPTOR_BYTES);
   int32_t found = 0;
   bench::require(tv_extract(context.get(), &image, nullptr, &options, all.data(),
-                            descriptors.data(), kMaxKeypoints, &found), "tv_extract");
+                            descriptors.data(), kMaxKeypoints, &found),
+                 "tv_extract");
   const float rim = 6 * size;
   for (int k = 0; k < found; ++k) {
     const tv_keypoint& p = all[static_cast<size_t>(k)];
@@ -86,21 +87,25 @@ void add_describe(const bench::Pair& pair, float size, int count) {
               [=] {
                 const tv_image image = bench::view_of(pixels);
                 bench::require(tv_describe(context.get(), &image, &options, d->keypoints.data(),
-                                           num, d->ours.data()), "tv_describe");
+                                           num, d->ours.data()),
+                               "tv_describe");
               },
-              [=] { return Counters{{"keypoints", 1.0 * num}}; }, 1.0 * num});
+              [=] {
+                return Counters{{"keypoints", 1.0 * num}};
+              },
+              1.0 * num});
   std::vector<cv::KeyPoint> points = bench::opencv_keypoints(d->keypoints.data(), num);
   const cv::Ptr<cv::SIFT> sift = cv::SIFT::create();
-  bench::add({name + "/OpenCV " CV_VERSION,
-              [=]() mutable { sift->compute(pixels, points, d->opencvs); },
-              [=] {
-                return Counters{{"keypoints", 1.0 * d->opencvs.rows},
-                                {"cosine", median_cosine(*d)}};
-              }, 1.0 * num});
+  bench::add(
+      {name + "/OpenCV " CV_VERSION, [=]() mutable { sift->compute(pixels, points, d->opencvs); },
+       [=] {
+         return Counters{{"keypoints", 1.0 * d->opencvs.rows}, {"cosine", median_cosine(*d)}};
+       },
+       1.0 * num});
 }
 
-// All of SIFT: OpenCV's detector and descriptor beside ours, at OpenCV's number of keypoints and at our
-// defaults.
+// All of SIFT: OpenCV's detector and descriptor beside ours, at OpenCV's number of keypoints and at
+// our defaults.
 void add_extract(const bench::Pair& pair) {
   const cv::Mat pixels = pair.image[0];
   const auto opencvs = std::make_shared<bench::OpencvFeatures>();
@@ -108,8 +113,8 @@ void add_extract(const bench::Pair& pair) {
   const int opencvs_count = static_cast<int>(opencvs->keypoints.size());
   for (int count : {opencvs_count, kMaxKeypoints}) {
     if (count != opencvs_count) *opencvs = {};
-    const std::string name = "extract/" + pair.name + (count == kMaxKeypoints ? " defaults"
-                                                       : " at SIFT's count");
+    const std::string name =
+        "extract/" + pair.name + (count == kMaxKeypoints ? " defaults" : " at SIFT's count");
     const std::shared_ptr<tv_context> context =
         bench::make_context(pixels.cols, pixels.rows, count);
     const auto keypoints = std::make_shared<std::vector<tv_keypoint>>(count);
@@ -125,10 +130,14 @@ void add_extract(const bench::Pair& pair) {
                                             keypoints->data(), bytes->data(), count, found.get()),
                                  "tv_extract");
                 },
-                [=] { return Counters{{"keypoints", 1.0 * *found}}; }});
+                [=] {
+                  return Counters{{"keypoints", 1.0 * *found}};
+                }});
     bench::add({name + "/OpenCV " CV_VERSION " SIFT",
                 [=] { *opencvs = bench::opencv_sift(pixels, kMaxKeypoints); },
-                [=] { return Counters{{"keypoints", 1.0 * opencvs->descriptors.rows}}; }});
+                [=] {
+                  return Counters{{"keypoints", 1.0 * opencvs->descriptors.rows}};
+                }});
     if (opencvs_count == kMaxKeypoints) break;
   }
 }

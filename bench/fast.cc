@@ -1,5 +1,6 @@
-// FAST corners with suppression, at the thresholds that give about 1000 and 4000: ours beside OpenCV's
-// FAST-9 and libcvd's FAST-12. No budget and no sub-pixel position on either side; ours also sorts.
+// FAST corners with suppression, at the thresholds that give about 1000 and 4000: ours beside
+// OpenCV's FAST-9 and libcvd's FAST-12. No budget and no sub-pixel position on either side; ours
+// also sorts.
 #include <opencv2/features2d.hpp>
 
 #ifdef BENCH_HAS_CVD
@@ -39,8 +40,9 @@ struct Detector {
       : context(bench::make_context(pixels.cols, pixels.rows, kMaxCorners)),
         image(bench::view_of(pixels)) {}
   void detect(const tv_feature_options& options) {
-    bench::require(tv_detect(context.get(), &image, nullptr, &options, keypoints.data(),
-                             kMaxCorners, &count), "tv_detect");
+    bench::require(
+        tv_detect(context.get(), &image, nullptr, &options, keypoints.data(), kMaxCorners, &count),
+        "tv_detect");
   }
 };
 
@@ -57,9 +59,10 @@ int threshold_for(Detector* detector, int arc, int corners) {
 
 void add_opencv(const std::string& name, const cv::Mat& image, int threshold) {
   const auto found = std::make_shared<std::vector<cv::KeyPoint>>();
-  bench::add({name + "/OpenCV " CV_VERSION,
-              [=] { cv::FAST(image, *found, threshold, true); },
-              [=] { return Counters{{"corners", static_cast<double>(found->size())}}; }});
+  bench::add({name + "/OpenCV " CV_VERSION, [=] { cv::FAST(image, *found, threshold, true); },
+              [=] {
+                return Counters{{"corners", static_cast<double>(found->size())}};
+              }});
 }
 
 void add_libcvd(const std::string& name, const cv::Mat& image, int threshold) {
@@ -72,8 +75,9 @@ void add_libcvd(const std::string& name, const cv::Mat& image, int threshold) {
     found->clear();
     CVD::fast_nonmax(view, corners, threshold, *found);
   };
-  bench::add({name + "/" BENCH_CVD_NAME, detect,
-              [=] { return Counters{{"corners", static_cast<double>(found->size())}}; }});
+  bench::add({name + "/" BENCH_CVD_NAME, detect, [=] {
+                return Counters{{"corners", static_cast<double>(found->size())}};
+              }});
 #else
   bench::add_missing(name + "/libcvd");
 #endif
@@ -83,8 +87,8 @@ void add_case(const bench::Pair& pair, int arc, int corners) {
   const cv::Mat image = pair.image[0];
   const auto detector = std::make_shared<Detector>(image);
   const int threshold = threshold_for(detector.get(), arc, corners);
-  const std::string name = "fast/FAST-" + std::to_string(arc) + " " + pair.name + " about " +
-                           std::to_string(corners);
+  const std::string name =
+      "fast/FAST-" + std::to_string(arc) + " " + pair.name + " about " + std::to_string(corners);
   bench::add({bench::ours(name), [=] { detector->detect(options_of(arc, threshold)); },
               [=] {
                 return Counters{{"corners", static_cast<double>(detector->count)},

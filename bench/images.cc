@@ -112,8 +112,10 @@ Pair load(Size size) {
   const int width = vga ? 640 : 1280, height = vga ? 480 : 720;
   Pair pair;
   if (!read_from_data(source, &pair) && !read_motorcycle(&pair)) {
-    std::fprintf(stderr, "no images: neither %s/%s (TWOVIEW_DATA) nor .cache/motorcycle "
-                 "(scripts/bootstrap)\n", data_folder().c_str(), source.folder);
+    std::fprintf(stderr,
+                 "no images: neither %s/%s (TWOVIEW_DATA) nor .cache/motorcycle "
+                 "(scripts/bootstrap)\n",
+                 data_folder().c_str(), source.folder);
     std::exit(1);
   }
   fit(&pair, width, height);

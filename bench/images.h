@@ -1,8 +1,8 @@
 // Pairs of real images in memory, with what is known about their cameras.
 //
-// From TWOVIEW_DATA (else ../shared/data beside the project): 640x480 is a pair of TUM's fr3 office as it
-// is; 1280x720 the middle of Strecha's fountain, 1536x1024 averaged down to 1280x853. Without that data
-// both are cut out of Middlebury's Motorcycle pair, the larger one after enlarging.
+// From TWOVIEW_DATA (else ../shared/data beside the project): 640x480 is a pair of TUM's fr3 office
+// as it is; 1280x720 the middle of Strecha's fountain, 1536x1024 averaged down to 1280x853. Without
+// that data both are cut out of Middlebury's Motorcycle pair, the larger one after enlarging.
 #pragma once
 
 #include <opencv2/core.hpp>

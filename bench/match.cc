@@ -1,6 +1,6 @@
-// Two nearest neighbours with ratio and one-to-one, over descriptors of real images, beside OpenCV's
-// BFMatcher: both directions, which gives the same matches, and its one knnMatch alone, which is half
-// of the work.
+// Two nearest neighbours with ratio and one-to-one, over descriptors of real images, beside
+// OpenCV's BFMatcher: both directions, which gives the same matches, and its one knnMatch alone,
+// which is half of the work.
 #include <opencv2/features2d.hpp>
 #include <set>
 
@@ -30,9 +30,9 @@ Side describe(const cv::Mat& pixels, int count) {
   Side side;
   side.bytes.resize(static_cast<size_t>(count) * TV_DESCRIPTOR_BYTES);
   bench::require(tv_extract(context.get(), &image, nullptr, &options, keypoints.data(),
-                            side.bytes.data(), count, &side.count), "tv_extract");
-  cv::Mat(side.count, TV_DESCRIPTOR_BYTES, CV_8U, side.bytes.data())
-      .convertTo(side.floats, CV_32F);
+                            side.bytes.data(), count, &side.count),
+                 "tv_extract");
+  cv::Mat(side.count, TV_DESCRIPTOR_BYTES, CV_8U, side.bytes.data()).convertTo(side.floats, CV_32F);
   return side;
 }
 
@@ -60,30 +60,34 @@ void add_case(const bench::Pair& pair, int count) {
   for (int v = 0; v < 2; ++v) m->side[v] = describe(pair.image[v], count);
   m->context = bench::make_context(64, 64, count);
   m->ours.resize(static_cast<size_t>(count));
-  const std::string name = "match/" + std::to_string(m->side[0].count) + "x" +
-                           std::to_string(m->side[1].count);
+  const std::string name =
+      "match/" + std::to_string(m->side[0].count) + "x" + std::to_string(m->side[1].count);
   const auto match = [=] {
     tv_match_options options;
     tv_match_options_init(&options);
     options.ratio = kRatio;
     bench::require(tv_match(m->context.get(), m->side[0].bytes.data(), m->side[0].count,
                             m->side[1].bytes.data(), m->side[1].count, &options, m->ours.data(),
-                            count, &m->num_ours), "tv_match");
+                            count, &m->num_ours),
+                   "tv_match");
   };
   bench::add({bench::ours(name), match, [=] { return Counters{{"matches", 1.0 * m->num_ours}}; }});
-  bench::add({name + "/OpenCV " CV_VERSION " both ways",
-              [=] { m->opencvs = bench::opencv_match(m->side[0].floats, m->side[1].floats, kRatio); },
-              [=] {
-                match();
-                return Counters{{"matches", 1.0 * m->opencvs.size()}, {"common", num_common(*m)}};
-              }});
-  bench::add({name + "/OpenCV " CV_VERSION " one way, 2-NN only",
-              [=] {
-                m->one_way.clear();
-                cv::BFMatcher(cv::NORM_L2)
-                    .knnMatch(m->side[0].floats, m->side[1].floats, m->one_way, 2);
-              },
-              [=] { return Counters{{"nearest", 1.0 * m->one_way.size()}}; }});
+  bench::add(
+      {name + "/OpenCV " CV_VERSION " both ways",
+       [=] { m->opencvs = bench::opencv_match(m->side[0].floats, m->side[1].floats, kRatio); },
+       [=] {
+         match();
+         return Counters{{"matches", 1.0 * m->opencvs.size()}, {"common", num_common(*m)}};
+       }});
+  bench::add(
+      {name + "/OpenCV " CV_VERSION " one way, 2-NN only",
+       [=] {
+         m->one_way.clear();
+         cv::BFMatcher(cv::NORM_L2).knnMatch(m->side[0].floats, m->side[1].floats, m->one_way, 2);
+       },
+       [=] {
+         return Counters{{"nearest", 1.0 * m->one_way.size()}};
+       }});
 }
 
 }  // namespace

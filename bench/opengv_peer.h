@@ -1,5 +1,5 @@
-// OpenGV's part of the work, behind plain doubles: a shared library of its own, for OpenGV's Eigen is
-// compiled with vectors and ours without, and neither may run the other's inline functions.
+// OpenGV's part of the work, behind plain doubles: a shared library of its own, for OpenGV's Eigen
+// is compiled with vectors and ours without, and neither may run the other's inline functions.
 //
 // Rays are unit, 3 numbers each; R and t are ours (x1 = R x0 + t).
 #pragma once
@@ -24,9 +24,10 @@ class [[gnu::visibility("default")]] OpengvMatches {
   // Of five consecutive matches from `first`: 9 numbers a solution, appended.
   void solve_five_point(OpengvSolver solver, int first, std::vector<double>* solutions) const;
 
-  // RANSAC with Nister's solver, then OpenGV's refinement on the inliers where asked for. false: no pose.
-  bool estimate(double max_error_rad, double confidence, int max_iterations, bool refine, double R[9],
-                double t[3]);
+  // RANSAC with Nister's solver, then OpenGV's refinement on the inliers where asked for. false: no
+  // pose.
+  bool estimate(double max_error_rad, double confidence, int max_iterations, bool refine,
+                double R[9], double t[3]);
 
   void triangulate(OpengvTriangulation method, double* points) const;
 

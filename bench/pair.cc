@@ -1,9 +1,11 @@
-// A whole pair, images in memory to pose and points, ours beside OpenCV's stages as its user would chain
-// them. Also the program to profile: bench_pair --benchmark_filter=defaults/twoview.
+// A whole pair, images in memory to pose and points, ours beside OpenCV's stages as its user would
+// chain them. Also the program to profile: bench_pair --benchmark_filter=defaults/twoview.
 //
-//   same work   FAST-9 at a fixed threshold, the same corners on both sides, upright descriptors with the
+//   same work   FAST-9 at a fixed threshold, the same corners on both sides, upright descriptors
+//   with the
 //               same window, the same ratio; for full SIFT its number of keypoints and median size
-//   defaults    the library's defaults beside OpenCV's: FAST at 20 with cv::KeyPoint's usual size 7, SIFT
+//   defaults    the library's defaults beside OpenCV's: FAST at 20 with cv::KeyPoint's usual size
+//   7, SIFT
 //
 // OpenCV: BFMatcher both ways with ratio 0.8, USAC_MAGSAC at 1 px, recoverPose, triangulatePoints.
 #include <ctime>
@@ -40,7 +42,8 @@ uint64_t now_ns(void*) {
 class Ours {
  public:
   Ours(const Pair& pair, const Options& options)
-      : pair_(pair), options_(options),
+      : pair_(pair),
+        options_(options),
         context_(bench::make_context(pair.image[0].cols, pair.image[0].rows,
                                      options.feature.max_keypoints)) {}
 
@@ -61,8 +64,8 @@ class Ours {
 
   // What was found; and where the time of one more call went.
   Counters counters() {
-    static const char* const stages[TV_NUM_STAGES] = {"pyramid_us",  "detect_us", "describe_us",
-                                                      "match_us",    "estimate_us", "refine_us",
+    static const char* const stages[TV_NUM_STAGES] = {"pyramid_us",    "detect_us",   "describe_us",
+                                                      "match_us",      "estimate_us", "refine_us",
                                                       "triangulate_us"};
     uint64_t stage_ns[TV_NUM_STAGES];
     bench::require(tv_context_set_clock(context_.get(), now_ns, nullptr), "tv_context_set_clock");
@@ -141,8 +144,8 @@ void add_same_work_as_fast(const Pair& pair, float size) {
   options.feature.descriptor = TV_DESCRIPTOR_SIFT;
   options.feature.keypoint_size = size;
   options.match.ratio = kRatio;
-  const std::string name = "pair/" + pair.name + " same corners, size " +
-                           std::to_string(static_cast<int>(size));
+  const std::string name =
+      "pair/" + pair.name + " same corners, size " + std::to_string(static_cast<int>(size));
   add_ours(name, pair, options);
   add_opencv(name, pair, FastSift{threshold, kMaxKeypoints, size});
 }

@@ -1,7 +1,8 @@
-// Five-point solvers on exact samples: essential matrices of five matched rays, ours beside OpenGV's
-// three and OpenCV's. The error is the median over samples of the distance from the true matrix to the
-// nearest solution. Ours solves eight samples a call, as the robust loop asks for; one a call stands
-// beside it. OpenGV's and OpenCV's copies of the matches are made outside of the timed work.
+// Five-point solvers on exact samples: essential matrices of five matched rays, ours beside
+// OpenGV's three and OpenCV's. The error is the median over samples of the distance from the true
+// matrix to the nearest solution. Ours solves eight samples a call, as the robust loop asks for;
+// one a call stands beside it. OpenGV's and OpenCV's copies of the matches are made outside of the
+// timed work.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
@@ -73,14 +74,13 @@ Counters errors_of(const Samples& samples) {
   }
   return {{"solutions", count / kNumSamples},
           {"error", bench::median(nearest)},
-          {"lost", 1.0 * std::count_if(nearest.begin(), nearest.end(),
-                                       [](double e) { return e > 1e-3; })}};
+          {"lost",
+           1.0 * std::count_if(nearest.begin(), nearest.end(), [](double e) { return e > 1e-3; })}};
 }
 
 void add_ours(const std::string& name, const std::shared_ptr<Samples>& samples, int at_once) {
   const tvk_table* kernels = tvk_select(bench::kernels_in_use());
-  const auto essentials =
-      std::make_shared<std::vector<double>>(9 * TVK_RELPOSE_MODELS * TVK_WIDTH);
+  const auto essentials = std::make_shared<std::vector<double>>(9 * TVK_RELPOSE_MODELS * TVK_WIDTH);
   const auto solve = [=](int first, bool keep) {
     double rays[30 * TVK_WIDTH];
     int32_t counts[TVK_WIDTH];
@@ -104,7 +104,8 @@ void add_ours(const std::string& name, const std::shared_ptr<Samples>& samples, 
               [=] {
                 solve_all(true);
                 return errors_of(*samples);
-              }, 1.0 * kNumSamples});
+              },
+              1.0 * kNumSamples});
 }
 
 void add_opencv(const std::string& name, const std::shared_ptr<Samples>& samples) {
@@ -119,22 +120,24 @@ void add_opencv(const std::string& name, const std::shared_ptr<Samples>& samples
     for (size_t s = 0; s < kNumSamples; ++s) {
       const cv::Mat found = cv::findEssentialMat((*points)[2 * s], (*points)[2 * s + 1],
                                                  cv::Matx33d::eye(), cv::RANSAC);
-      if (found.empty()) samples->solutions[s].clear();
-      else samples->solutions[s].assign(found.begin<double>(), found.end<double>());
+      if (found.empty())
+        samples->solutions[s].clear();
+      else
+        samples->solutions[s].assign(found.begin<double>(), found.end<double>());
     }
   };
   bench::add({name + "/OpenCV " CV_VERSION " findEssentialMat", solve_all,
               [=] {
                 solve_all();
                 return errors_of(*samples);
-              }, 1.0 * kNumSamples});
+              },
+              1.0 * kNumSamples});
 }
 
 #ifdef BENCH_HAS_OPENGV
 void add_opengv(const std::string& name, const std::shared_ptr<Samples>& samples,
                 bench::OpengvSolver solver, const char* solver_name) {
-  const auto matches =
-      std::make_shared<bench::OpengvMatches>(samples->rays[0], samples->rays[1]);
+  const auto matches = std::make_shared<bench::OpengvMatches>(samples->rays[0], samples->rays[1]);
   const auto solve_all = [=] {
     for (int s = 0; s < kNumSamples; ++s) {
       std::vector<double>& found = samples->solutions[static_cast<size_t>(s)];
@@ -147,7 +150,8 @@ void add_opengv(const std::string& name, const std::shared_ptr<Samples>& samples
               [=] {
                 solve_all();
                 return rotations ? Counters() : errors_of(*samples);
-              }, 1.0 * kNumSamples});
+              },
+              1.0 * kNumSamples});
 }
 #endif
 

@@ -1,7 +1,7 @@
-// The robust essential estimate on simulated matches (problem.h), 500 of them without ratios, 30, 50 and
-// 80 per cent true, 0.5 px of noise: ours at its defaults beside OpenCV's USAC and OpenGV's RANSAC, all
-// at 1 px. A call works through all problems, so that the time is the mean of a problem; the errors
-// stand beside it. PoseLib is compared through Python (bench/python_peers.py).
+// The robust essential estimate on simulated matches (problem.h), 500 of them without ratios, 30,
+// 50 and 80 per cent true, 0.5 px of noise: ours at its defaults beside OpenCV's USAC and OpenGV's
+// RANSAC, all at 1 px. A call works through all problems, so that the time is the mean of a
+// problem; the errors stand beside it. PoseLib is compared through Python (bench/python_peers.py).
 #include <opencv2/calib3d.hpp>
 
 #include "bench.h"
@@ -54,9 +54,10 @@ void add_ours(const std::string& name, const Problems& problems) {
     const bench::Problem& p = (*problems)[k];
     tv_two_view pose;
     tv_two_view_init(&pose);
-    bench::require(tv_estimate_two_view(context.get(), &p.camera, &p.camera, p.pixels[0].data(),
-                                        p.pixels[1].data(), nullptr, p.size(), nullptr, &pose,
-                                        nullptr), "tv_estimate_two_view");
+    bench::require(
+        tv_estimate_two_view(context.get(), &p.camera, &p.camera, p.pixels[0].data(),
+                             p.pixels[1].data(), nullptr, p.size(), nullptr, &pose, nullptr),
+        "tv_estimate_two_view");
     return pose.has_R && pose.has_t ? bench::pose_error_deg(pose.R, pose.t, p.R, p.t) : 180;
   });
 }
@@ -92,8 +93,8 @@ void add_opengv(const std::string& name, const Problems& problems, bool refine) 
   add(name, problems, [=](size_t k) {
     const bench::Problem& p = (*problems)[k];
     double R[9], t[3];
-    const bool found = matches[k]->estimate(std::atan(kMaxErrorPx / p.camera.fx), kConfidence, 1000,
-                                            refine, R, t);
+    const bool found =
+        matches[k]->estimate(std::atan(kMaxErrorPx / p.camera.fx), kConfidence, 1000, refine, R, t);
     return found ? bench::pose_error_deg(R, t, p.R, p.t) : 180;
   });
 }

@@ -1,5 +1,6 @@
-/* One stage, called so many times, with nothing but the library and libc: for counting instructions on
-   processors that have no OpenCV at hand (counts.py, with qemu). Options are the library's defaults.
+/* One stage, called so many times, with nothing but the library and libc: for counting instructions
+   on processors that have no OpenCV at hand (counts.py, with qemu). Options are the library's
+   defaults.
 
      stages A.pgm B.pgm fx fy cx cy STAGE CALLS [KERNELS]
 
@@ -52,26 +53,29 @@ static tv_image read_pgm(const char *path) {
 
 static void detect(stages *s) {
   require(tv_detect(s->context, &s->image[0], NULL, NULL, s->keypoints[0], MAX_KEYPOINTS,
-                    &s->num_keypoints[0]) == TV_OK, "tv_detect");
+                    &s->num_keypoints[0]) == TV_OK,
+          "tv_detect");
 }
 
 static void describe(stages *s) {
   require(tv_describe(s->context, &s->image[0], NULL, s->keypoints[0], s->num_keypoints[0],
-                      s->descriptors[0]) == TV_OK, "tv_describe");
+                      s->descriptors[0]) == TV_OK,
+          "tv_describe");
 }
 
 static void extract_both(stages *s) {
   int v;
   for (v = 0; v < 2; ++v) {
     require(tv_extract(s->context, &s->image[v], NULL, NULL, s->keypoints[v], s->descriptors[v],
-                       MAX_KEYPOINTS, &s->num_keypoints[v]) == TV_OK, "tv_extract");
+                       MAX_KEYPOINTS, &s->num_keypoints[v]) == TV_OK,
+            "tv_extract");
   }
 }
 
 static void match(stages *s) {
   require(tv_match(s->context, s->descriptors[0], s->num_keypoints[0], s->descriptors[1],
-                   s->num_keypoints[1], NULL, s->matches, MAX_KEYPOINTS,
-                   &s->num_matches) == TV_OK, "tv_match");
+                   s->num_keypoints[1], NULL, s->matches, MAX_KEYPOINTS, &s->num_matches) == TV_OK,
+          "tv_match");
 }
 
 static void gather(stages *s) {
@@ -126,12 +130,16 @@ int main(int argc, char **argv) {
   static const struct {
     const char *name;
     void (*call)(stages *);
-  } list[] = {{"detect", detect}, {"describe", describe}, {"match", match},
-              {"estimate", estimate}, {"pair", pair}};
+  } list[] = {{"detect", detect},
+              {"describe", describe},
+              {"match", match},
+              {"estimate", estimate},
+              {"pair", pair}};
   static stages s;
   int k, calls;
-  require(argc == 9 || argc == 10,
-          "usage: stages A.pgm B.pgm fx fy cx cy detect|describe|match|estimate|pair CALLS [KERNELS]");
+  require(
+      argc == 9 || argc == 10,
+      "usage: stages A.pgm B.pgm fx fy cx cy detect|describe|match|estimate|pair CALLS [KERNELS]");
   for (k = 0; k < 2; ++k) s.image[k] = read_pgm(argv[1 + k]);
   s.camera.width = s.image[0].width;
   s.camera.height = s.image[0].height;

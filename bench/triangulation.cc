@@ -1,10 +1,11 @@
-// Table 1 of the paper again: the seven methods of triangulation over noise and three geometries, beside
-// OpenCV and OpenGV. Times as the other benchmarks; errors, of ours and OpenCV's, as Markdown with
+// Table 1 of the paper again: the seven methods of triangulation over noise and three geometries,
+// beside OpenCV and OpenGV. Times as the other benchmarks; errors, of ours and OpenCV's, as
+// Markdown with
 //
 //   bench_triangulation --errors [POINTS]
 //
-// Ours takes pixels through the camera model and tells angle, error and status of each point as well;
-// the peers get rays, or pixels and projection matrices, and give the point.
+// Ours takes pixels through the camera model and tells angle, error and status of each point as
+// well; the peers get rays, or pixels and projection matrices, and give the point.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -29,15 +30,16 @@ struct Method {
 
 enum Peer { kPeerLinear = 100, kPeerOptimal };
 
-const Method kMethods[] = {{"Poly", TV_TRIANGULATION_POLY},
-                           {"Poly-Abs", TV_TRIANGULATION_POLY_ABS},
-                           {"Linear-Eigen", TV_TRIANGULATION_LINEAR_EIGEN},
-                           {"Linear-LS", TV_TRIANGULATION_LINEAR_LS},
-                           {"Iterative-Eigen", TV_TRIANGULATION_ITERATIVE_EIGEN},
-                           {"Iterative-LS", TV_TRIANGULATION_ITERATIVE_LS},
-                           {"Midpoint", TV_TRIANGULATION_MIDPOINT},
-                           {"OpenCV " CV_VERSION " triangulatePoints", kPeerLinear},
-                           {"OpenCV " CV_VERSION " correctMatches + triangulatePoints", kPeerOptimal}};
+const Method kMethods[] = {
+    {"Poly", TV_TRIANGULATION_POLY},
+    {"Poly-Abs", TV_TRIANGULATION_POLY_ABS},
+    {"Linear-Eigen", TV_TRIANGULATION_LINEAR_EIGEN},
+    {"Linear-LS", TV_TRIANGULATION_LINEAR_LS},
+    {"Iterative-Eigen", TV_TRIANGULATION_ITERATIVE_EIGEN},
+    {"Iterative-LS", TV_TRIANGULATION_ITERATIVE_LS},
+    {"Midpoint", TV_TRIANGULATION_MIDPOINT},
+    {"OpenCV " CV_VERSION " triangulatePoints", kPeerLinear},
+    {"OpenCV " CV_VERSION " correctMatches + triangulatePoints", kPeerOptimal}};
 
 const double kNoisePx[] = {0.1, 0.5, 1, 2};
 const char* const kGeometries[] = {"sideways", "forward", "converging"};
@@ -45,8 +47,8 @@ const char* const kGeometries[] = {"sideways", "forward", "converging"};
 struct Scene {
   tv_camera camera;
   double R[9], t[3];
-  std::vector<double> points;     // truth, in camera 0
-  std::vector<double> exact[2];   // pixels without noise
+  std::vector<double> points;    // truth, in camera 0
+  std::vector<double> exact[2];  // pixels without noise
   std::vector<double> pixels[2];
   int size() const { return static_cast<int>(points.size() / 3); }
 };
@@ -97,8 +99,8 @@ void triangulate_by_opencv(bool optimal, const Scene& scene, std::vector<tv_poin
   const cv::Matx33d K(500, 0, scene.camera.cx, 0, 500, scene.camera.cy, 0, 0, 1);
   const double *R = scene.R, *t = scene.t;
   const cv::Matx34d P0 = K * cv::Matx34d::eye();
-  const cv::Matx34d P1 = K * cv::Matx34d(R[0], R[1], R[2], t[0], R[3], R[4], R[5], t[1], R[6],
-                                         R[7], R[8], t[2]);
+  const cv::Matx34d P1 =
+      K * cv::Matx34d(R[0], R[1], R[2], t[0], R[3], R[4], R[5], t[1], R[6], R[7], R[8], t[2]);
   cv::Mat x0(1, n, CV_64FC2, const_cast<double*>(scene.pixels[0].data()));
   cv::Mat x1(1, n, CV_64FC2, const_cast<double*>(scene.pixels[1].data()));
   if (optimal) {
@@ -121,7 +123,8 @@ void triangulate(int method, const Scene& scene, std::vector<tv_point>* points) 
   if (method >= kPeerLinear) return triangulate_by_opencv(method == kPeerOptimal, scene, points);
   bench::require(tv_triangulate(static_cast<tv_triangulation>(method), &scene.camera, &scene.camera,
                                 scene.R, scene.t, scene.pixels[0].data(), scene.pixels[1].data(),
-                                scene.size(), points->data()), "tv_triangulate");
+                                scene.size(), points->data()),
+                 "tv_triangulate");
 }
 
 struct Errors {
@@ -170,10 +173,11 @@ Errors errors_of(const Scene& scene, const std::vector<tv_point>& points) {
 void print_errors(int num_points) {
   std::vector<tv_point> points(static_cast<size_t>(num_points));
   for (int g = 0; g < 3; ++g) {
-    std::printf("\n**%s**: pixels to the measured / to the true pixels (rms), space 50 %% / 95 %%"
-                " of points (per cent of the distance), points behind a camera (per cent)\n\n"
-                "| method |",
-                kGeometries[g]);
+    std::printf(
+        "\n**%s**: pixels to the measured / to the true pixels (rms), space 50 %% / 95 %%"
+        " of points (per cent of the distance), points behind a camera (per cent)\n\n"
+        "| method |",
+        kGeometries[g]);
     for (double noise : kNoisePx) std::printf(" %g px |", noise);
     std::printf("\n| --- | --- | --- | --- | --- |\n");
     for (const Method& method : kMethods) {
@@ -205,15 +209,17 @@ void add_method(const std::string& name, const Scenes& scenes, int method) {
                 triangulate(method, scenes->front(), points.get());
                 const Errors errors = errors_of(scenes->front(), *points);
                 return bench::Counters{{"cost_px", errors.cost_px}};
-              }, 3.0 * kTimedPoints});
+              },
+              3.0 * kTimedPoints});
 }
 
 #ifdef BENCH_HAS_OPENGV
 std::vector<double> unit_rays(const Scene& scene, int view) {
   std::vector<double> rays(static_cast<size_t>(3 * scene.size()));
   for (size_t k = 0; k < static_cast<size_t>(scene.size()); ++k) {
-    bench::require(tv_camera_unproject(&scene.camera, &scene.pixels[view][2 * k], &rays[3 * k],
-                                       nullptr), "tv_camera_unproject");
+    bench::require(
+        tv_camera_unproject(&scene.camera, &scene.pixels[view][2 * k], &rays[3 * k], nullptr),
+        "tv_camera_unproject");
   }
   return rays;
 }
@@ -248,9 +254,9 @@ void add_peers(const std::string& name, const Scenes& scenes, int method) {
   if (optimal) return;
 #ifdef BENCH_HAS_OPENGV
   const bool midpoint = method == TV_TRIANGULATION_MIDPOINT;
-  add_opengv(name + "/" + bench::kOpengvName + (midpoint ? " triangulate2" : " triangulate"), scenes,
-             midpoint ? bench::OpengvTriangulation::kMidpoint
-                      : bench::OpengvTriangulation::kLinear);
+  add_opengv(
+      name + "/" + bench::kOpengvName + (midpoint ? " triangulate2" : " triangulate"), scenes,
+      midpoint ? bench::OpengvTriangulation::kMidpoint : bench::OpengvTriangulation::kLinear);
 #else
   bench::add_missing(name + "/OpenGV");
 #endif

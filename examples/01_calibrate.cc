@@ -25,7 +25,8 @@ int main(int argc, char** argv) {
     }
     size = image.size();
     std::vector<cv::Point2f> corners;
-    const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
+    const int flags =
+        cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
     if (!cv::findChessboardCorners(image, inner, corners, flags)) {
       std::printf("%s: no whole board\n", argv[k]);
       continue;
@@ -40,10 +41,10 @@ int main(int argc, char** argv) {
   }
   cv::Mat K, distortion;
   std::vector<cv::Mat> rotations, translations;
-  const double rms = cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(seen.size(), board), seen, size, K,
-                                         distortion, rotations, translations);
-  std::printf("%zu boards, %.3f px rms: fx %.2f fy %.2f cx %.2f cy %.2f\n", seen.size(), rms, K.at<double>(0, 0),
-              K.at<double>(1, 1), K.at<double>(0, 2), K.at<double>(1, 2));
+  const double rms = cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(seen.size(), board),
+                                         seen, size, K, distortion, rotations, translations);
+  std::printf("%zu boards, %.3f px rms: fx %.2f fy %.2f cx %.2f cy %.2f\n", seen.size(), rms,
+              K.at<double>(0, 0), K.at<double>(1, 1), K.at<double>(0, 2), K.at<double>(1, 2));
   cv::FileStorage out(argv[1], cv::FileStorage::WRITE);
   out << "image_width" << size.width << "image_height" << size.height << "camera_matrix" << K
       << "distortion_coefficients" << distortion;

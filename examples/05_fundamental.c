@@ -12,8 +12,9 @@ enum { MOST = 20000 };
 static int read_matches(const char *path, double *pixels0, double *pixels1, float *ratios) {
   FILE *file = fopen(path, "r");
   int n = 0;
-  while (file && n < MOST && fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1],
-                                    &pixels1[2 * n], &pixels1[2 * n + 1], &ratios[n]) == 5)
+  while (file && n < MOST &&
+         fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1], &pixels1[2 * n],
+                &pixels1[2 * n + 1], &ratios[n]) == 5)
     ++n;
   if (file) fclose(file);
   return n;

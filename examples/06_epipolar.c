@@ -1,6 +1,6 @@
-/* Epipolar lines in image 1 of some points of image 0, and both epipoles: outside the images when the
-   camera moved sideways, inside when it moved forward (the paper's figures 14 and 15).
-   usage: 06_epipolar MATCHES.txt WIDTH HEIGHT */
+/* Epipolar lines in image 1 of some points of image 0, and both epipoles: outside the images when
+   the camera moved sideways, inside when it moved forward (the paper's figures 14 and 15). usage:
+   06_epipolar MATCHES.txt WIDTH HEIGHT */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,8 +13,9 @@ enum { MOST = 20000 };
 static int read_matches(const char *path, double *pixels0, double *pixels1, float *ratios) {
   FILE *file = fopen(path, "r");
   int n = 0;
-  while (file && n < MOST && fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1],
-                                    &pixels1[2 * n], &pixels1[2 * n + 1], &ratios[n]) == 5)
+  while (file && n < MOST &&
+         fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1], &pixels1[2 * n],
+                &pixels1[2 * n + 1], &ratios[n]) == 5)
     ++n;
   if (file) fclose(file);
   return n;
@@ -36,7 +37,8 @@ static void epipole_of(const double F[9], int transposed, double e[3]) {
       a[c] = transposed ? F[3 * c + r0] : F[3 * r0 + c];
       b[c] = transposed ? F[3 * c + r1] : F[3 * r1 + c];
     }
-    for (j = 0; j < 3; ++j) x[j] = a[(j + 1) % 3] * b[(j + 2) % 3] - a[(j + 2) % 3] * b[(j + 1) % 3];
+    for (j = 0; j < 3; ++j)
+      x[j] = a[(j + 1) % 3] * b[(j + 2) % 3] - a[(j + 2) % 3] * b[(j + 1) % 3];
     size = x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
     if (size <= largest) continue;
     largest = size;
@@ -63,7 +65,8 @@ int main(int argc, char **argv) {
   options.method = TV_METHOD_SEVEN_POINT;
   tv_two_view_init(&found);
   if (tv_estimate_two_view(context, NULL, NULL, pixels[0], pixels[1], ratios, n, &options, &found,
-                           inlier) != TV_OK || !found.has_F)
+                           inlier) != TV_OK ||
+      !found.has_F)
     return fail("no fundamental matrix");
   for (v = 0; v < 2; ++v) {
     double e[3], x, y;
@@ -71,7 +74,8 @@ int main(int argc, char **argv) {
     x = e[0] / e[2];
     y = e[1] / e[2];
     printf("epipole in image %d: (%.1f, %.1f), %s\n", v, x, y,
-           x > -0.5 && y > -0.5 && x < atof(argv[2]) - 0.5 && y < atof(argv[3]) - 0.5 ? "inside" : "outside");
+           x > -0.5 && y > -0.5 && x < atof(argv[2]) - 0.5 && y < atof(argv[3]) - 0.5 ? "inside"
+                                                                                      : "outside");
   }
   for (k = 0; k < n && shown < 5; ++k) {
     const double *a = pixels[0] + 2 * k, *b = pixels[1] + 2 * k, *F = found.F;

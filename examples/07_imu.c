@@ -1,7 +1,7 @@
 /* The rotation between two views against an IMU's, with its gravity as a prior: the paper's check.
-   Attitudes are w x y z, world from body; the body's x is forward, y right, z down, and so is the world's z.
-   The camera looks forward.
-   usage: 07_imu MATCHES.txt fx fy cx cy  w0 x0 y0 z0  w1 x1 y1 z1  sigma_deg */
+   Attitudes are w x y z, world from body; the body's x is forward, y right, z down, and so is the
+   world's z. The camera looks forward. usage: 07_imu MATCHES.txt fx fy cx cy  w0 x0 y0 z0  w1 x1 y1
+   z1  sigma_deg */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,8 +14,9 @@ enum { MOST = 20000 };
 static int read_matches(const char *path, double *pixels0, double *pixels1, float *ratios) {
   FILE *file = fopen(path, "r");
   int n = 0;
-  while (file && n < MOST && fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1],
-                                    &pixels1[2 * n], &pixels1[2 * n + 1], &ratios[n]) == 5)
+  while (file && n < MOST &&
+         fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1], &pixels1[2 * n],
+                &pixels1[2 * n + 1], &ratios[n]) == 5)
     ++n;
   if (file) fclose(file);
   return n;
@@ -28,12 +29,14 @@ static int fail(const char *what) {
 
 #define DEGREES 57.29577951308232
 
-/* world_from_camera, row-major: the body's rotation, with camera axes (right, down, forward) in columns. */
+/* world_from_camera, row-major: the body's rotation, with camera axes (right, down, forward) in
+ * columns. */
 static void rotation_of(char **q, double R[9]) {
   const double w = atof(q[0]), x = atof(q[1]), y = atof(q[2]), z = atof(q[3]);
-  const double body[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+  const double body[9] = {
+      1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
   int r;
   for (r = 0; r < 3; ++r) { /* right is the body's y, down its z, forward its x */
     R[3 * r] = body[3 * r + 1];
@@ -53,7 +56,8 @@ int main(int argc, char **argv) {
   tv_status status;
   double trace = 0;
   int n, i, j, k;
-  if (argc != 15) return fail("usage: 07_imu MATCHES.txt fx fy cx cy w0 x0 y0 z0 w1 x1 y1 z1 sigma_deg");
+  if (argc != 15)
+    return fail("usage: 07_imu MATCHES.txt fx fy cx cy w0 x0 y0 z0 w1 x1 y1 z1 sigma_deg");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   camera.model = TV_CAMERA_PINHOLE;
   camera.fx = atof(argv[2]);
@@ -76,14 +80,16 @@ int main(int argc, char **argv) {
   }
   options.gravity_sigma_rad = atof(argv[14]) / DEGREES;
   tv_two_view_init(&pose);
-  status = tv_estimate_two_view(context, &camera, &camera, pixels[0], pixels[1], ratios, n, &options, &pose, NULL);
+  status = tv_estimate_two_view(context, &camera, &camera, pixels[0], pixels[1], ratios, n,
+                                &options, &pose, NULL);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R) return fail("no rotation");
   for (i = 0; i < 3; ++i) /* trace of R_imu^T R, with R_imu = world1^T world0 */
     for (j = 0; j < 3; ++j)
-      for (k = 0; k < 3; ++k) trace += world[1][3 * k + i] * world[0][3 * k + j] * pose.R[3 * i + j];
-  printf("%s (%s), %d of %d matches agree\n", tv_config_string(pose.config), tv_verdict_string(pose.verdict),
-         pose.num_inliers, n);
+      for (k = 0; k < 3; ++k)
+        trace += world[1][3 * k + i] * world[0][3 * k + j] * pose.R[3 * i + j];
+  printf("%s (%s), %d of %d matches agree\n", tv_config_string(pose.config),
+         tv_verdict_string(pose.verdict), pose.num_inliers, n);
   printf("the cameras turned by %.3f deg, the IMU differs from that by %.3f deg\n",
          DEGREES * acos(fmax(-1, fmin(1, (pose.R[0] + pose.R[4] + pose.R[8] - 1) / 2))),
          DEGREES * acos(fmax(-1, fmin(1, (trace - 1) / 2))));

@@ -12,8 +12,9 @@ enum { MOST = 20000 };
 static int read_matches(const char *path, double *pixels0, double *pixels1, float *ratios) {
   FILE *file = fopen(path, "r");
   int n = 0;
-  while (file && n < MOST && fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1],
-                                    &pixels1[2 * n], &pixels1[2 * n + 1], &ratios[n]) == 5)
+  while (file && n < MOST &&
+         fscanf(file, "%lf %lf %lf %lf %f", &pixels0[2 * n], &pixels0[2 * n + 1], &pixels1[2 * n],
+                &pixels1[2 * n + 1], &ratios[n]) == 5)
     ++n;
   if (file) fclose(file);
   return n;
@@ -25,8 +26,9 @@ static int fail(const char *what) {
 }
 
 int main(int argc, char **argv) {
-  static const char *const name[] = {"Poly",         "Poly-Abs",       "Linear-Eigen", "Linear-LS",
-                                     "Iterative-Eigen", "Iterative-LS", "Midpoint"};
+  static const char *const name[] = {"Poly",      "Poly-Abs",        "Linear-Eigen",
+                                     "Linear-LS", "Iterative-Eigen", "Iterative-LS",
+                                     "Midpoint"};
   static double pixels[2][2 * MOST];
   static float ratios[MOST];
   static uint8_t inlier[MOST];
@@ -53,12 +55,13 @@ int main(int argc, char **argv) {
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
   tv_two_view_init(&pose);
-  status = tv_estimate_two_view(context, &camera[0], &camera[1], pixels[0], pixels[1], ratios, n, NULL,
-                                &pose, inlier);
+  status = tv_estimate_two_view(context, &camera[0], &camera[1], pixels[0], pixels[1], ratios, n,
+                                NULL, &pose, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R || !pose.has_t) return fail("no full pose");
-  for (v = 0; v < 2; ++v) tv_corrected_camera(&pose, &camera[v], &camera[v]); /* those that it is of */
-  for (k = 0; k < n; ++k) { /* those that agree, in place */
+  for (v = 0; v < 2; ++v)
+    tv_corrected_camera(&pose, &camera[v], &camera[v]); /* those that it is of */
+  for (k = 0; k < n; ++k) {                             /* those that agree, in place */
     if (!inlier[k]) continue;
     for (v = 0; v < 2; ++v) {
       pixels[v][2 * kept] = pixels[v][2 * k];
@@ -70,7 +73,8 @@ int main(int argc, char **argv) {
   for (method = TV_TRIANGULATION_POLY; method <= TV_TRIANGULATION_MIDPOINT; ++method) {
     double sum = 0;
     int good = 0;
-    status = tv_triangulate(method, &camera[0], &camera[1], pose.R, pose.t, pixels[0], pixels[1], kept, point);
+    status = tv_triangulate(method, &camera[0], &camera[1], pose.R, pose.t, pixels[0], pixels[1],
+                            kept, point);
     if (status != TV_OK) return fail(tv_status_string(status));
     for (k = 0; k < kept; ++k) {
       if (point[k].status != TV_POINT_OK) continue;

@@ -64,14 +64,18 @@ int main(int argc, char **argv) {
          tv_verdict_string(pose.verdict), pose.num_inliers, pose.num_matches, cloud.num_points);
   if (!pose.has_R || !pose.has_t) return 3;
   for (k = 0; k < 3; ++k)
-    printf("  R % .6f % .6f % .6f   t % .6f\n", pose.R[3 * k], pose.R[3 * k + 1], pose.R[3 * k + 2], pose.t[k]);
+    printf("  R % .6f % .6f % .6f   t % .6f\n", pose.R[3 * k], pose.R[3 * k + 1], pose.R[3 * k + 2],
+           pose.t[k]);
   out = fopen(argv[3], "w");
   if (!out) return fail("cannot write");
-  fprintf(out, "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
-               "property float z\nend_header\n", cloud.num_points);
+  fprintf(out,
+          "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
+          "property float z\nend_header\n",
+          cloud.num_points);
   for (k = 0; k < cloud.num_matches; ++k) {
     const tv_point *p = &cloud.points[k];
-    if (p->status == TV_POINT_OK) fprintf(out, "%.6g %.6g %.6g\n", p->position[0], p->position[1], p->position[2]);
+    if (p->status == TV_POINT_OK)
+      fprintf(out, "%.6g %.6g %.6g\n", p->position[0], p->position[1], p->position[2]);
   }
   if (fclose(out) != 0) return fail("cannot write");
   for (v = 0; v < 2; ++v) free((void *)view[v].image.data);

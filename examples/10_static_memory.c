@@ -1,6 +1,5 @@
-/* No malloc at all: the context lies in a static array, as on a flight computer. The pair is made here:
-   a textured wall in two depths, seen from two places.
-   usage: 10_static_memory */
+/* No malloc at all: the context lies in a static array, as on a flight computer. The pair is made
+   here: a textured wall in two depths, seen from two places. usage: 10_static_memory */
 #include <stdio.h>
 #include <stdlib.h>
 #include <twoview/twoview.h>
@@ -16,12 +15,15 @@ static unsigned next_random(void) {
   return state >> 8;
 }
 
-/* Blocks of random grey; those of the lower half are nearer, so that they move three times as far. */
+/* Blocks of random grey; those of the lower half are nearer, so that they move three times as far.
+ */
 static void paint(void) {
   int k, x, y;
   for (k = 0; k < 6000; ++k) {
-    const int left = (int)(next_random() % (WIDTH - 60)) + 40, top = (int)(next_random() % (HEIGHT - 8));
-    const int side = 4 + (int)(next_random() % 5), shift = top < HEIGHT / 2 ? 6 + k % 5 : 24 + k % 5;
+    const int left = (int)(next_random() % (WIDTH - 60)) + 40,
+              top = (int)(next_random() % (HEIGHT - 8));
+    const int side = 4 + (int)(next_random() % 5),
+              shift = top < HEIGHT / 2 ? 6 + k % 5 : 24 + k % 5;
     const uint8_t grey = (uint8_t)next_random();
     for (y = top; y < top + side && y < HEIGHT; ++y) {
       for (x = left; x < left + side; ++x) {
@@ -46,7 +48,8 @@ int main(void) {
   status = tv_context_size(&limits, &needed);
   if (status == TV_OK) status = tv_context_init(&context, &limits, memory, sizeof memory);
   if (status != TV_OK) {
-    fprintf(stderr, "%s: %lu bytes are needed, %d are there\n", tv_status_string(status), (unsigned long)needed, MEMORY);
+    fprintf(stderr, "%s: %lu bytes are needed, %d are there\n", tv_status_string(status),
+            (unsigned long)needed, MEMORY);
     return 2;
   }
   paint();
@@ -55,7 +58,9 @@ int main(void) {
   status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, &cloud);
   if (status != TV_OK) return 2;
   printf("%s (%s): %d of %d matches agree, t = (%.3f, %.3f, %.3f)\n", tv_config_string(pose.config),
-         tv_verdict_string(pose.verdict), pose.num_inliers, pose.num_matches, pose.t[0], pose.t[1], pose.t[2]);
-  printf("%lu of %lu bytes used, none of the heap\n", (unsigned long)tv_context_high_water(context), (unsigned long)needed);
+         tv_verdict_string(pose.verdict), pose.num_inliers, pose.num_matches, pose.t[0], pose.t[1],
+         pose.t[2]);
+  printf("%lu of %lu bytes used, none of the heap\n", (unsigned long)tv_context_high_water(context),
+         (unsigned long)needed);
   return pose.has_t ? 0 : 3;
 }

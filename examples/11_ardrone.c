@@ -20,18 +20,22 @@ static void use(tv_context *context, const tvs_frame *frame) {
   const double *q = frame->attitude.world_from_body;
   int32_t count = 0;
   if (frame->number % 10 != 0) return;
-  if (tv_extract(context, &frame->image, NULL, NULL, keypoint, descriptor, 2048, &count) != TV_OK) return;
-  printf("picture %llu, %d x %d: %d keypoints%s", (unsigned long long)frame->number, frame->image.width,
-         frame->image.height, count, frame->flags & TVS_FRAME_GAP ? ", after a gap" : "");
+  if (tv_extract(context, &frame->image, NULL, NULL, keypoint, descriptor, 2048, &count) != TV_OK)
+    return;
+  printf("picture %llu, %d x %d: %d keypoints%s", (unsigned long long)frame->number,
+         frame->image.width, frame->image.height, count,
+         frame->flags & TVS_FRAME_GAP ? ", after a gap" : "");
   if (frame->flags & TVS_FRAME_HAS_ATTITUDE)
-    printf(", heading %.1f deg", 57.29577951308232 * atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3])));
+    printf(", heading %.1f deg", 57.29577951308232 * atan2(2 * (q[0] * q[3] + q[1] * q[2]),
+                                                           1 - 2 * (q[2] * q[2] + q[3] * q[3])));
   printf("\n");
 }
 
 int main(int argc, char **argv) {
   const char *host = argc > 1 ? argv[1] : ARDRONE_DEFAULT_HOST;
   const int64_t end = ardrone_now_ns() + (int64_t)(1e9 * (argc > 2 ? atof(argv[2]) : 10));
-  const int channel[4] = {ARDRONE_CHANNEL_AT, ARDRONE_CHANNEL_NAVDATA, ARDRONE_CHANNEL_VIDEO, ARDRONE_CHANNEL_CONTROL};
+  const int channel[4] = {ARDRONE_CHANNEL_AT, ARDRONE_CHANNEL_NAVDATA, ARDRONE_CHANNEL_VIDEO,
+                          ARDRONE_CHANNEL_CONTROL};
   ardrone_sockets sockets;
   ardrone_transport transport;
   ardrone_session_options options;
@@ -56,7 +60,8 @@ int main(int argc, char **argv) {
   options.decoder = &decoder;
   ardrone_session_size(&options, &size);
   memory = malloc(size);
-  if (!memory || ardrone_session_init(&session, &options, &transport, memory, size) != TVS_OK) return fail("no session");
+  if (!memory || ardrone_session_init(&session, &options, &transport, memory, size) != TVS_OK)
+    return fail("no session");
   ardrone_session_frames(session, &frames);
   frame.struct_size = sizeof frame;
   while (ardrone_now_ns() < end) {

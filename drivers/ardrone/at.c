@@ -153,7 +153,8 @@ tvs_status ardrone_at_calib(ardrone_at *at, int device) {
   return finish(&w);
 }
 
-/* Text that a quoted argument can carry: what a quote or a control character would begin is not ours. */
+/* Text that a quoted argument can carry: what a quote or a control character would begin is not
+ * ours. */
 static int is_quotable(const char *text, size_t max_bytes) {
   size_t k = 0;
   for (; text[k]; ++k) {
@@ -240,9 +241,9 @@ tvs_status ardrone_at_legacy(ardrone_at *at, ardrone_legacy command, const int32
   static const struct {
     const char *name;
     int num_arguments;
-  } commands[ARDRONE_NUM_LEGACY] = {{"PMODE", 1}, {"MISC", 4},  {"GAIN", 13}, {"VISP", 9},
-                                    {"VISO", 1},  {"CAP", 2},   {"ZAP", 1},   {"CAD", 2},
-                                    {"MTRIM", 3}, {"POL", 5},   {"AFLIGHT", 1}, {"VICON", 22}};
+  } commands[ARDRONE_NUM_LEGACY] = {{"PMODE", 1}, {"MISC", 4}, {"GAIN", 13},   {"VISP", 9},
+                                    {"VISO", 1},  {"CAP", 2},  {"ZAP", 1},     {"CAD", 2},
+                                    {"MTRIM", 3}, {"POL", 5},  {"AFLIGHT", 1}, {"VICON", 22}};
   writer w;
   int k;
   if (!at || !arguments) return TVS_ERR_NULL;

@@ -91,7 +91,15 @@ tvs_status ardrone_ids_next(const char *text, size_t size, size_t *offset, ardro
 
 /* ---- keys ---- */
 
-typedef enum key_kind { KEY_BOOL, KEY_INT, KEY_REAL, KEY_GPS, KEY_TEXT, KEY_ID, KEY_READ_ONLY } key_kind;
+typedef enum key_kind {
+  KEY_BOOL,
+  KEY_INT,
+  KEY_REAL,
+  KEY_GPS,
+  KEY_TEXT,
+  KEY_ID,
+  KEY_READ_ONLY
+} key_kind;
 
 typedef struct key_rule {
   const char *key;
@@ -200,8 +208,7 @@ static int is_id_value(const char *value) {
 static int obeys(const key_rule *rule, const char *value) {
   double number;
   switch (rule->kind) {
-    case KEY_BOOL:
-      return strcmp(value, "TRUE") == 0 || strcmp(value, "FALSE") == 0;
+    case KEY_BOOL: return strcmp(value, "TRUE") == 0 || strcmp(value, "FALSE") == 0;
     case KEY_INT:
     case KEY_REAL:
       return parse_number(value, rule->kind == KEY_REAL, &number) && number >= rule->low &&
@@ -209,12 +216,9 @@ static int obeys(const key_rule *rule, const char *value) {
     case KEY_GPS: /* 500 says "not valid" */
       return parse_number(value, 1, &number) &&
              ((number >= rule->low && number <= rule->high) || number == 500);
-    case KEY_TEXT:
-      return 1;
-    case KEY_ID:
-      return is_id_value(value);
-    case KEY_READ_ONLY:
-      break;
+    case KEY_TEXT: return 1;
+    case KEY_ID: return is_id_value(value);
+    case KEY_READ_ONLY: break;
   }
   return 0;
 }

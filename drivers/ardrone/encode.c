@@ -14,8 +14,14 @@ static uint8_t *write_run(const uint8_t *from, const navdata_run *run, uint8_t *
     uint64_t two_words;
     switch (run->width) {
       case 1: *to = *from; break;
-      case 2: memcpy(&half, from, 2); ardrone_put16(to, half); break;
-      case 4: memcpy(&word, from, 4); ardrone_put32(to, word); break;
+      case 2:
+        memcpy(&half, from, 2);
+        ardrone_put16(to, half);
+        break;
+      case 4:
+        memcpy(&word, from, 4);
+        ardrone_put32(to, word);
+        break;
       default: memcpy(&two_words, from, 8); ardrone_put64(to, two_words);
     }
   }

@@ -7,9 +7,10 @@
 
 TV_BEGIN_DECLS
 
-/* The packet of navdata's magic (0: the usual one), state, sequence, vision_defined and those options that
-   `present` and `gps_form` name, in the order of their tags, with its checksum. The part of a
-   480-byte GPS that nobody knows is zeros. Writes *size; TVS_ERR_CAPACITY when it does not fit. */
+/* The packet of navdata's magic (0: the usual one), state, sequence, vision_defined and those
+   options that `present` and `gps_form` name, in the order of their tags, with its checksum. The
+   part of a 480-byte GPS that nobody knows is zeros. Writes *size; TVS_ERR_CAPACITY when it does
+   not fit. */
 tvs_status ardrone_encode_navdata(const ardrone_navdata *navdata, uint8_t *bytes, size_t capacity,
                                   size_t *size);
 

@@ -1,5 +1,6 @@
-/* The acknowledge handshake of ardrone/config.h. The drone raises its acknowledge bit when it has taken a value and keeps it
-   until it is told to clear it; over UDP each of the four messages may be lost, so each step repeats. */
+/* The acknowledge handshake of ardrone/config.h. The drone raises its acknowledge bit when it has
+   taken a value and keeps it until it is told to clear it; over UDP each of the four messages may
+   be lost, so each step repeats. */
 #include <string.h>
 
 #include "twoview_drivers/ardrone/config.h"
@@ -73,8 +74,7 @@ void ardrone_exchange_navdata(ardrone_exchange *exchange, uint32_t state, int64_
     case ARDRONE_EXCHANGE_RELEASING:
       if (!acknowledged) enter(exchange, ARDRONE_EXCHANGE_DONE, now_ns);
       break;
-    default:
-      break;
+    default: break;
   }
 }
 

@@ -52,9 +52,7 @@ static const uint8_t *read_run(const uint8_t *from, const navdata_run *run, uint
   int k;
   to += run->offset;
   switch (run->width) {
-    case 1:
-      memcpy(to, from, run->count);
-      break;
+    case 1: memcpy(to, from, run->count); break;
     case 2:
       for (k = 0; k < run->count; ++k) {
         const uint16_t value = ardrone_get16(from + 2 * k);
@@ -77,8 +75,9 @@ static const uint8_t *read_run(const uint8_t *from, const navdata_run *run, uint
 }
 
 static ardrone_gps_form gps_form(size_t option_bytes) {
-  return option_bytes == 12 ? ARDRONE_GPS_ZIMMU
-                            : option_bytes == 480 ? ARDRONE_GPS_247 : ARDRONE_GPS_248;
+  return option_bytes == 12    ? ARDRONE_GPS_ZIMMU
+         : option_bytes == 480 ? ARDRONE_GPS_247
+                               : ARDRONE_GPS_248;
 }
 
 static void read_option(const uint8_t *option, ardrone_navdata *navdata) {
@@ -147,7 +146,8 @@ ardrone_order ardrone_sequence_check(ardrone_sequence *sequence, const ardrone_n
     sequence->num_late = 0;
   }
   sequence->late_last = navdata->sequence;
-  if (++sequence->num_late >= LATE_IN_A_ROW) return accept(sequence, navdata, ARDRONE_ORDER_RESTART);
+  if (++sequence->num_late >= LATE_IN_A_ROW)
+    return accept(sequence, navdata, ARDRONE_ORDER_RESTART);
   return ARDRONE_ORDER_LATE;
 }
 
@@ -197,13 +197,15 @@ static void take_motion(const ardrone_navdata *navdata, tvs_imu *sample) {
   sample->valid |= TVS_IMU_VELOCITY_XY;
   if (ARDRONE_HAS(navdata, ARDRONE_TAG_ALTITUDE) && is_within(navdata->altitude.vz_mm_s, 20e3) &&
       (sample->valid & TVS_IMU_ATTITUDE)) {
-    /* World's down velocity is the third row of the rotation times the body velocity; solved for z. */
+    /* World's down velocity is the third row of the rotation times the body velocity; solved for z.
+     */
     const double theta = demo->theta_mdeg * 1e-3 * DEGREE, phi = demo->phi_mdeg * 1e-3 * DEGREE;
     const double down = cos(theta) * cos(phi);
     if (down > 0.5) {
       sample->velocity_m_s[2] =
           (-navdata->altitude.vz_mm_s * 1e-3 + sin(theta) * sample->velocity_m_s[0] -
-           cos(theta) * sin(phi) * sample->velocity_m_s[1]) / down;
+           cos(theta) * sin(phi) * sample->velocity_m_s[1]) /
+          down;
       sample->valid |= TVS_IMU_VELOCITY_Z;
     }
   }

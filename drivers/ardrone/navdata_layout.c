@@ -2,8 +2,9 @@
 
 #include "twoview_drivers/ardrone/navdata.h"
 
-#define AT(field) (uint16_t)offsetof(ardrone_navdata, field)
-#define LAYOUT(runs, bytes) {runs, (int)(sizeof runs / sizeof runs[0]), bytes}
+#define AT(field) (uint16_t) offsetof(ardrone_navdata, field)
+#define LAYOUT(runs, bytes) \
+  { runs, (int)(sizeof runs / sizeof runs[0]), bytes }
 
 static const navdata_run demo[] = {{AT(demo), 4, 36}};
 static const navdata_run time[] = {{AT(time), 4, 1}};
@@ -36,9 +37,8 @@ static const navdata_run adc_data[] = {{AT(adc_data), 4, 1}, {AT(adc_data.data),
 static const navdata_run video_stream[] = {{AT(video_stream), 1, 1},
                                            {AT(video_stream.frame_size), 4, 15}};
 static const navdata_run games[] = {{AT(games), 4, 2}};
-static const navdata_run pressure[] = {{AT(pressure), 4, 1},
-                                       {AT(pressure.ut), 2, 1},
-                                       {AT(pressure.temperature_dc), 4, 2}};
+static const navdata_run pressure[] = {
+    {AT(pressure), 4, 1}, {AT(pressure.ut), 2, 1}, {AT(pressure.temperature_dc), 4, 2}};
 static const navdata_run magneto[] = {{AT(magneto), 2, 3},
                                       {AT(magneto.field_mg), 4, 12},
                                       {AT(magneto.calibrated), 1, 1},
@@ -49,25 +49,38 @@ static const navdata_run hd_video[] = {{AT(hd_video), 4, 7}};
 static const navdata_run wifi[] = {{AT(wifi), 4, 1}};
 static const navdata_run zimmu[] = {{AT(zimmu), 4, 2}};
 static const navdata_run gps_247[] = {{AT(gps), 8, 4}};
-static const navdata_run gps_248[] = {{AT(gps), 8, 4},
-                                      {AT(gps.data_available), 4, 3},
-                                      {AT(gps.latitude0), 8, 4},
-                                      {AT(gps.state), 4, 11},
-                                      {AT(gps.vdop), 8, 2},
-                                      {AT(gps.speed), 4, 8},
-                                      {AT(gps.channels), 1, 24},
-                                      {AT(gps.plugged), 4, 5}};
+static const navdata_run gps_248[] = {{AT(gps), 8, 4},           {AT(gps.data_available), 4, 3},
+                                      {AT(gps.latitude0), 8, 4}, {AT(gps.state), 4, 11},
+                                      {AT(gps.vdop), 8, 2},      {AT(gps.speed), 4, 8},
+                                      {AT(gps.channels), 1, 24}, {AT(gps.plugged), 4, 5}};
 
-static const navdata_layout layouts[ARDRONE_TAG_GPS] = {
-    LAYOUT(demo, 148),          LAYOUT(time, 8),           LAYOUT(raw_measures, 52),
-    LAYOUT(phys_measures, 46),  LAYOUT(gyros_offsets, 16), LAYOUT(euler_angles, 12),
-    LAYOUT(references, 88),     LAYOUT(trims, 16),         LAYOUT(rc_references, 24),
-    LAYOUT(pwm, 76),            LAYOUT(altitude, 56),      LAYOUT(vision_raw, 16),
-    LAYOUT(vision_flow, 44),    LAYOUT(vision, 92),        LAYOUT(vision_perf, 108),
-    LAYOUT(trackers, 364),      LAYOUT(vision_detect, 328), LAYOUT(watchdog, 8),
-    LAYOUT(adc_data, 40),       LAYOUT(video_stream, 65),  LAYOUT(games, 12),
-    LAYOUT(pressure, 18),       LAYOUT(magneto, 75),       LAYOUT(wind, 56),
-    LAYOUT(kalman_pressure, 72), LAYOUT(hd_video, 32),     LAYOUT(wifi, 8)};
+static const navdata_layout layouts[ARDRONE_TAG_GPS] = {LAYOUT(demo, 148),
+                                                        LAYOUT(time, 8),
+                                                        LAYOUT(raw_measures, 52),
+                                                        LAYOUT(phys_measures, 46),
+                                                        LAYOUT(gyros_offsets, 16),
+                                                        LAYOUT(euler_angles, 12),
+                                                        LAYOUT(references, 88),
+                                                        LAYOUT(trims, 16),
+                                                        LAYOUT(rc_references, 24),
+                                                        LAYOUT(pwm, 76),
+                                                        LAYOUT(altitude, 56),
+                                                        LAYOUT(vision_raw, 16),
+                                                        LAYOUT(vision_flow, 44),
+                                                        LAYOUT(vision, 92),
+                                                        LAYOUT(vision_perf, 108),
+                                                        LAYOUT(trackers, 364),
+                                                        LAYOUT(vision_detect, 328),
+                                                        LAYOUT(watchdog, 8),
+                                                        LAYOUT(adc_data, 40),
+                                                        LAYOUT(video_stream, 65),
+                                                        LAYOUT(games, 12),
+                                                        LAYOUT(pressure, 18),
+                                                        LAYOUT(magneto, 75),
+                                                        LAYOUT(wind, 56),
+                                                        LAYOUT(kalman_pressure, 72),
+                                                        LAYOUT(hd_video, 32),
+                                                        LAYOUT(wifi, 8)};
 static const navdata_layout layout_zimmu = LAYOUT(zimmu, 12);
 static const navdata_layout layout_gps_247 = LAYOUT(gps_247, 480);
 static const navdata_layout layout_gps_248 = LAYOUT(gps_248, 216);

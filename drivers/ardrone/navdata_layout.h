@@ -1,6 +1,6 @@
-/* The wire layout of every navdata option, once, for the decoder and the encoder. An option's fields
-   lie on the wire without gaps, in the order of its struct; so a layout is a list of runs of equal
-   width. */
+/* The wire layout of every navdata option, once, for the decoder and the encoder. An option's
+   fields lie on the wire without gaps, in the order of its struct; so a layout is a list of runs of
+   equal width. */
 #ifndef ARDRONE_NAVDATA_LAYOUT_H
 #define ARDRONE_NAVDATA_LAYOUT_H
 

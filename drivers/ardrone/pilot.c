@@ -6,8 +6,8 @@
 
 #define MS INT64_C(1000000)
 static const int64_t TAKE_OFF_TIMEOUT_NS = 20000 * MS;
-/* A pulse holds the bit long enough that some of its datagrams arrive; the pause after it, which is the falling edge,
-   is longer than the drone needs to say what became of it. */
+/* A pulse holds the bit long enough that some of its datagrams arrive; the pause after it, which is
+   the falling edge, is longer than the drone needs to say what became of it. */
 static const int64_t PULSE_NS = 150 * MS, PULSE_PERIOD_NS = 600 * MS, EMERGENCY_NS = 3000 * MS;
 static const int64_t FRESH_NS = 200 * MS;
 enum { NUM_TRIMS = 10 }; /* the drone does not acknowledge it */
@@ -107,7 +107,8 @@ static tvs_status begin_emergency(ardrone_pilot *pilot, int kind, int64_t now_ns
   return TVS_OK;
 }
 
-/* Without a state there is no telling whether the bit cuts or re-arms; one who asks for the cut means it. */
+/* Without a state there is no telling whether the bit cuts or re-arms; one who asks for the cut
+ * means it. */
 tvs_status ardrone_pilot_cut_motors(ardrone_pilot *pilot, int64_t now_ns) {
   if (!pilot) return TVS_ERR_NULL;
   if (pilot->has_state && is_in_emergency(pilot)) return TVS_OK;
@@ -136,7 +137,8 @@ static int emergency_bit(ardrone_pilot *pilot, int64_t now_ns) {
     return 0;
   }
   since_ns = now_ns - pilot->pulse_start_ns;
-  /* The bit is a toggle: another pulse only if the drone has just said that the last one did nothing. */
+  /* The bit is a toggle: another pulse only if the drone has just said that the last one did
+   * nothing. */
   if (since_ns >= PULSE_PERIOD_NS && (!pilot->has_state || now_ns - pilot->state_ns > FRESH_NS)) {
     return 0;
   }

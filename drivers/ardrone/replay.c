@@ -212,8 +212,7 @@ static void read_packet(ardrone_log *log, const ardrone_navdata *navdata, int64_
   }
   time.device_ns = time.host_ns;
   if (ARDRONE_HAS(navdata, ARDRONE_TAG_DEMO) && navdata->demo.psi_mdeg >= -360e3f &&
-      navdata->demo.psi_mdeg <= 360e3f &&
-      (!log->has_psi0 || log->psi0_clock_id != time.clock_id)) {
+      navdata->demo.psi_mdeg <= 360e3f && (!log->has_psi0 || log->psi0_clock_id != time.clock_id)) {
     log->has_psi0 = 1;
     log->psi0_clock_id = time.clock_id;
     log->psi0_rad = navdata->demo.psi_mdeg * radian_per_mdeg;

@@ -61,7 +61,7 @@ static void init_clocks(ardrone_session *session) {
   options.period_ns = ARDRONE_TIME_PERIOD_NS;
   tvs_clock_init(&session->navdata_clock, &options, 1, 2);
   options.period_ns = INT64_C(4294967296) * MS; /* 32 bits of milliseconds */
-  options.least_delay_ns = 300 * MS;            /* exposure, encoder, queues: nobody sees them from here */
+  options.least_delay_ns = 300 * MS; /* exposure, encoder, queues: nobody sees them from here */
   tvs_clock_init(&session->video_clock, &options, 2, 2);
 }
 

@@ -61,9 +61,9 @@ static void tell_result(ardrone_session *session, const request *r, int done) {
       session->transport.close(session->transport.user, ARDRONE_CHANNEL_CONTROL);
       session->has_text = done;
       ardrone_tell(session,
-                   !done ? ARDRONE_EVENT_READ_FAILED
-                         : r->kind == ARDRONE_EXCHANGE_READ_CONFIG ? ARDRONE_EVENT_CONFIG
-                                                                   : ARDRONE_EVENT_IDS,
+                   !done                                     ? ARDRONE_EVENT_READ_FAILED
+                   : r->kind == ARDRONE_EXCHANGE_READ_CONFIG ? ARDRONE_EVENT_CONFIG
+                                                             : ARDRONE_EVENT_IDS,
                    NULL);
       break;
   }

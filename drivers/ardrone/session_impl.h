@@ -1,5 +1,6 @@
-/* What the parts of a session share. session.c: life, step, queries. session_link.c: navdata, link, commands.
-   session_exchange.c: set-up and the queue of exchanges. session_video.c: streams, pictures. */
+/* What the parts of a session share. session.c: life, step, queries. session_link.c: navdata, link,
+   commands. session_exchange.c: set-up and the queue of exchanges. session_video.c: streams,
+   pictures. */
 #ifndef ARDRONE_SESSION_IMPL_H
 #define ARDRONE_SESSION_IMPL_H
 

@@ -51,7 +51,8 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
     status = t->receive(t->user, s->channel, to, room, &size);
     if (status == TVS_NONE) return total;
     if (status != TVS_OK || size == 0) {
-      /* What came before the end is still good: it is cut up before the next receive sees the end. */
+      /* What came before the end is still good: it is cut up before the next receive sees the end.
+       */
       if (total == 0) close_stream(session, s);
       return total;
     }
@@ -65,15 +66,15 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
 
 /* ---- time of a picture ---- */
 
-
-
 /* Where both stamps count from the drone's start, the picture's own stamp names an instant of the
-   navdata clock. It shows: by its arrival, less what is taken off for the least delay, the picture then
-   is up to a second and a half late, where two unrelated clocks would agree so well once in 1200 times. */
+   navdata clock. It shows: by its arrival, less what is taken off for the least delay, the picture
+   then is up to a second and a half late, where two unrelated clocks would agree so well once in
+   1200 times. */
 typedef enum clock_relation { UNRELATED, BY_ARRIVAL, BY_STAMP } clock_relation;
 
 static clock_relation to_navdata_clock(const ardrone_session *session, const tvs_time *time,
-                            uint32_t *clock_id, int64_t *device_ns, int64_t *uncertainty_ns) {
+                                       uint32_t *clock_id, int64_t *device_ns,
+                                       int64_t *uncertainty_ns) {
   int64_t by_host, late;
   if (tvs_clock_to_device(&session->navdata_clock, time->host_ns, clock_id, &by_host,
                           uncertainty_ns) != TVS_OK) {
@@ -128,13 +129,13 @@ tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs
     clock_id = time->clock_id;
     device_ns = time->device_ns;
   } else if (time->clock_id != session->video_clock.clock_id ||
-             to_navdata_clock(session, time, &clock_id, &device_ns, &uncertainty_ns) ==
-                 UNRELATED) {
+             to_navdata_clock(session, time, &clock_id, &device_ns, &uncertainty_ns) == UNRELATED) {
     return TVS_NONE;
   }
   status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns, gap_ns, &found);
   if (status != TVS_OK) return status;
-  /* Not knowing the instant is not knowing the attitude: what it turned in that time goes to sigma. */
+  /* Not knowing the instant is not knowing the attitude: what it turned in that time goes to sigma.
+   */
   if (uncertainty_ns > 0) {
     status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns - uncertainty_ns, gap_ns,
                               &earlier);
@@ -193,8 +194,10 @@ static void queue_picture(ardrone_session *session, const ardrone_pave_header *h
   if (session->num_frames == session->options.queue_frames) {
     drop_oldest(session);
     ++session->counters.frames_dropped;
-    if (session->num_frames > 0) frame_at(session, 0)->flags |= TVS_FRAME_GAP;
-    else frame.flags |= TVS_FRAME_GAP;
+    if (session->num_frames > 0)
+      frame_at(session, 0)->flags |= TVS_FRAME_GAP;
+    else
+      frame.flags |= TVS_FRAME_GAP;
   }
   *frame_at(session, session->num_frames++) = frame;
 }

@@ -68,7 +68,7 @@ static tvs_status send_bytes(void *user, ardrone_channel channel, const void *by
     return TVS_OK;
   }
   return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS ? TVS_NONE
-                                                                                        : TVS_ERR_IO;
+                                                                                       : TVS_ERR_IO;
 }
 
 static tvs_status why_nothing(void) {
@@ -155,8 +155,7 @@ void ardrone_session_wait(const ardrone_session *session, int64_t until_ns) {
   due_ns -= ardrone_now_ns();
   if (due_ns <= 0) return;
   for (channel = 0; session->transport.descriptor && channel < ARDRONE_NUM_CHANNELS; ++channel) {
-    const int fd =
-        session->transport.descriptor(session->transport.user, (ardrone_channel)channel);
+    const int fd = session->transport.descriptor(session->transport.user, (ardrone_channel)channel);
     if (fd < 0 || channel == ARDRONE_CHANNEL_AT) continue;
     fds[num].fd = fd;
     fds[num++].events = POLLIN;

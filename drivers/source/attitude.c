@@ -102,8 +102,7 @@ tvs_status tvs_attitudes_at(const tvs_attitudes *attitudes, uint32_t clock_id, i
   if (gap_ns > 0) {
     const tvs_attitude *a = &attitudes->entries[before].attitude;
     const tvs_attitude *b = &attitudes->entries[after].attitude;
-    const double s =
-        (double)(device_ns - attitudes->entries[before].device_ns) / (double)gap_ns;
+    const double s = (double)(device_ns - attitudes->entries[before].device_ns) / (double)gap_ns;
     tvs_slerp(a->world_from_body, b->world_from_body, s, attitude->world_from_body);
     if (b->sigma_rad > attitude->sigma_rad) attitude->sigma_rad = b->sigma_rad;
   }

@@ -1,14 +1,17 @@
-/* The least delay: received - device is the offset plus a delay that is never negative, so the least
-   of it over many packets is the offset plus the least delay. The clocks drift, so an old least may
-   have become too small or too large; it is let grow with the drift until a packet confirms it. */
+/* The least delay: received - device is the offset plus a delay that is never negative, so the
+   least of it over many packets is the offset plus the least delay. The clocks drift, so an old
+   least may have become too small or too large; it is let grow with the drift until a packet
+   confirms it. */
 #include "twoview_drivers/clock.h"
 
 #include <stddef.h>
 
 enum { SECOND = 1000000000 };
-static const int64_t LATEST_DELAY_NS = 30LL * SECOND; /* more than TCP holds back and still delivers */
+static const int64_t LATEST_DELAY_NS =
+    30LL * SECOND; /* more than TCP holds back and still delivers */
 static const int64_t JUMP_NS = SECOND;
-static const int64_t FARTHEST_NS = (int64_t)1 << 61; /* about 73 years: sums and differences are safe */
+static const int64_t FARTHEST_NS = (int64_t)1
+                                   << 61; /* about 73 years: sums and differences are safe */
 
 void tvs_clock_options_init(tvs_clock_options *options) {
   if (!options) return;
@@ -26,8 +29,8 @@ tvs_status tvs_clock_init(tvs_clock *clock, const tvs_clock_options *options, ui
   if (options) used = *options;
   if ((used.period_ns != 0 && (used.period_ns < 60LL * SECOND || used.period_ns > FARTHEST_NS)) ||
       used.least_delay_ns < 0 || used.least_delay_ns > FARTHEST_NS || used.jitter_ns < 0 ||
-      used.jitter_ns > FARTHEST_NS / 4 || used.drift_ppm < 0 || used.drift_ppm > 10000 || first_id == 0 ||
-      id_step == 0) {
+      used.jitter_ns > FARTHEST_NS / 4 || used.drift_ppm < 0 || used.drift_ppm > 10000 ||
+      first_id == 0 || id_step == 0) {
     return TVS_ERR_ARGUMENT;
   }
   clock->options = used;
@@ -53,7 +56,8 @@ static int64_t uncertainty_at(const tvs_clock *clock, int64_t host_ns) {
          drift_over(clock, host_ns - clock->offset_host_ns);
 }
 
-/* host - device: the least delay is somewhere between 0 and what the options say, so half of that is taken off. */
+/* host - device: the least delay is somewhere between 0 and what the options say, so half of that
+ * is taken off. */
 static int64_t shift_of(const tvs_clock *clock) {
   return clock->offset_ns - clock->options.least_delay_ns / 2;
 }
@@ -93,8 +97,7 @@ static int continues_run(const tvs_clock *clock, int64_t stamp_ns, int64_t recei
 
 static void improve_offset(tvs_clock *clock, int64_t device_ns, int64_t received_ns) {
   const int64_t sample = received_ns - device_ns;
-  const int64_t allowed =
-      clock->offset_ns + drift_over(clock, received_ns - clock->offset_host_ns);
+  const int64_t allowed = clock->offset_ns + drift_over(clock, received_ns - clock->offset_host_ns);
   if (sample <= allowed) {
     clock->offset_ns = sample;
     clock->offset_host_ns = received_ns;
@@ -114,8 +117,8 @@ tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t receive
     device_ns = stamp_ns;
     begin_run(clock, stamp_ns, received_ns);
   } else {
-    /* After a silence in which the clocks parted by more than a packet's jitter, old packets say no more
-       than a new one. */
+    /* After a silence in which the clocks parted by more than a packet's jitter, old packets say no
+       more than a new one. */
     ++clock->num_observed;
     if (drift_over(clock, received_ns - clock->last_host_ns) > clock->options.jitter_ns) {
       clock->num_observed = 1;

@@ -6,8 +6,8 @@
 
 struct tvs_file_source {
   tvs_file_options options;
-  uint64_t index;   /* of the next picture */
-  int gap;          /* one was left out since the last frame */
+  uint64_t index; /* of the next picture */
+  int gap;        /* one was left out since the last frame */
   int imu_ended;
   int64_t imu_device_ns; /* of the newest attitude read */
   tvs_attitudes attitudes;
@@ -24,8 +24,8 @@ void tvs_file_options_init(tvs_file_options *options) {
 
 size_t tvs_file_source_size(void) { return sizeof(tvs_file_source); }
 
-/* Reads samples until one is not older than device_ns. A log may hold many samples without an attitude
-   (a drone that is starting): all are read, the file is finite. */
+/* Reads samples until one is not older than device_ns. A log may hold many samples without an
+   attitude (a drone that is starting): all are read, the file is finite. */
 static void read_attitudes_until(tvs_file_source *source, int64_t device_ns) {
   const tvs_imu_source *imu = source->options.imu;
   while (!source->imu_ended && source->imu_device_ns < device_ns) {
@@ -36,7 +36,8 @@ static void read_attitudes_until(tvs_file_source *source, int64_t device_ns) {
       source->imu_ended = 1;
       return;
     }
-    if ((sample.valid & TVS_IMU_ATTITUDE) == 0 || sample.time.clock_id != source->options.clock_id) {
+    if ((sample.valid & TVS_IMU_ATTITUDE) == 0 ||
+        sample.time.clock_id != source->options.clock_id) {
       continue;
     }
     source->imu_device_ns = sample.time.device_ns;
@@ -61,8 +62,8 @@ static tvs_status next_frame(void *user, tvs_frame *frame) {
     ++source->index;
     if (status == TVS_ERR_DATA) source->gap = 1;
   } while (status != TVS_OK);
-  frame->flags = TVS_FRAME_KEY | (source->gap ? TVS_FRAME_GAP : 0) |
-                 (index == 0 ? TVS_FRAME_NEW_STREAM : 0);
+  frame->flags =
+      TVS_FRAME_KEY | (source->gap ? TVS_FRAME_GAP : 0) | (index == 0 ? TVS_FRAME_NEW_STREAM : 0);
   source->gap = 0;
   frame->image = picture.image;
   frame->handle = picture.handle;

@@ -39,9 +39,8 @@ void setUp(void) {
       pixels1[2 * i + k] = floor(2 * pixels1[2 * i + k]) / 2;
     }
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_triangulate(TV_TRIANGULATION_MIDPOINT, &camera0, &camera1, R, t,
-                                       pixels0, pixels1, NUM_POINTS, start));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(TV_TRIANGULATION_MIDPOINT, &camera0, &camera1, R, t,
+                                              pixels0, pixels1, NUM_POINTS, start));
   memcpy(start_R, R, sizeof R);
   memcpy(start_t, t, sizeof t);
   memcpy(points, start, sizeof points);
@@ -93,9 +92,8 @@ static void test_defaults_and_no_result_are_fine(void) {
   memcpy(by_default, points, sizeof points);
   memcpy(R, start_R, sizeof R), memcpy(t, start_t, sizeof t);
   memcpy(points, start, sizeof points);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1,
-                                           NUM_POINTS, NULL, R, t, points, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1,
+                                                  NUM_POINTS, NULL, R, t, points, NULL));
   TEST_ASSERT_EQUAL_MEMORY(by_default, points, sizeof points);
 }
 
@@ -133,14 +131,14 @@ static void test_null_pointers_are_refused(void) {
   tv_bundle_result *r = &result;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(NULL, &camera0, &camera1, pixels0, pixels1,
                                                         n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, NULL, &camera1, pixels0, pixels1, n, o,
-                                                        R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, NULL, pixels0, pixels1, n, o,
-                                                        R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, NULL, pixels1, n, o,
-                                                        R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, NULL, n, o,
-                                                        R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_adjust_two_view(c, NULL, &camera1, pixels0, pixels1, n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_adjust_two_view(c, &camera0, NULL, pixels0, pixels1, n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, NULL, pixels1, n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, NULL, n, o, R, t, points, r));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
                                                         o, NULL, t, points, r));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
@@ -201,13 +199,11 @@ static void test_outputs_may_not_overlap(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, NUM_POINTS,
                                            &options, R, R + 6, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_adjust_two_view(c, &camera0, &camera1, pixels0, R, 2, &options, R, t,
-                                           points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_adjust_two_view(c, &camera0, &camera1, pixels0, R, 2,
+                                                           &options, R, t, points, &result));
   expect_untouched();
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5, points,
-                                             NUM_POINTS, (double *)points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5,
+                                                             points, NUM_POINTS, (double *)points));
   expect_untouched();
 }
 
@@ -264,29 +260,27 @@ static void test_covariances_check_their_arguments(void) {
   const int n = NUM_POINTS;
   memset(covariances, 0x5a, sizeof covariances);
   memcpy(untouched, covariances, sizeof untouched);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(NULL, &camera1, R, t, NULL, 1, points, n,
-                                                          covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, NULL, R, t, NULL, 1, points, n,
-                                                          covariances));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_point_covariances(NULL, &camera1, R, t, NULL, 1, points, n, covariances));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_point_covariances(&camera0, NULL, R, t, NULL, 1, points, n, covariances));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, NULL, t, NULL, 1,
                                                           points, n, covariances));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, NULL, NULL, 1,
                                                           points, n, covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, NULL,
-                                                          n, covariances));
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, points, n, NULL));
+      TV_ERR_NULL, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, NULL, n, covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        tv_point_covariances(&camera0, &camera1, R, t, NULL, 1, points, n, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, -1,
                                                               points, n, covariances));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
                                                               points, -1, covariances));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
-                        tv_point_covariances(&camera0, &camera1, R, t, NULL, NAN, points, n,
-                                             covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, tv_point_covariances(&camera0, &camera1, R, t, NULL, NAN,
+                                                                points, n, covariances));
   pose[7] = INFINITY;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
-                        tv_point_covariances(&camera0, &camera1, R, t, pose, 1, points, n,
-                                             covariances));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, tv_point_covariances(&camera0, &camera1, R, t, pose, 1,
+                                                                points, n, covariances));
   R[0] = 2;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_point_covariances(&camera0, &camera1, R, t, NULL, 1,
                                                               points, n, covariances));

@@ -269,7 +269,8 @@ static void test_many_points_have_the_pixels_of_each_one(void) {
     uint8_t inside[6];
     memset(pixels, 0x5A, sizeof pixels);
     memset(inside, 0x5A, sizeof inside);
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project_points(&cameras[c], points[0], 5, pixels, inside));
+    TEST_ASSERT_EQUAL_INT(TV_OK,
+                          tv_camera_project_points(&cameras[c], points[0], 5, pixels, inside));
     for (i = 0; i < 5; ++i) {
       double pixel[2] = {0, 0};
       const tv_status status = tv_camera_project(&cameras[c], points[i], pixel, NULL);
@@ -296,8 +297,8 @@ static void test_many_points_refuse_what_one_refuses(void) {
                         tv_camera_project_points(&camera, point, -1, pixels, inside));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_camera_project_points(&camera, memory, 1, memory + 2, inside));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP, tv_camera_project_points(&camera, point, 1, pixels, (uint8_t *)pixels + 9));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_camera_project_points(&camera, point, 1, pixels, (uint8_t *)pixels + 9));
   camera.fx = 0;
   TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_camera_project_points(&camera, point, 1, pixels, inside));
   TEST_ASSERT_TRUE(memory[3] == -4 && memory[4] == -5 && inside[0] == 7);
@@ -312,7 +313,8 @@ static void test_many_pixels_have_the_rays_of_each_one(void) {
     uint8_t inside[6];
     memset(rays, 0x5A, sizeof rays);
     memset(inside, 0x5A, sizeof inside);
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_unproject_points(&cameras[c], pixels[0], 5, rays, inside));
+    TEST_ASSERT_EQUAL_INT(TV_OK,
+                          tv_camera_unproject_points(&cameras[c], pixels[0], 5, rays, inside));
     for (i = 0; i < 5; ++i) {
       double ray[3] = {0, 0, 0};
       const tv_status status = tv_camera_unproject(&cameras[c], pixels[i], ray, NULL);
@@ -340,7 +342,8 @@ static void test_many_pixels_refuse_what_one_refuses(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_camera_unproject_points(&camera, memory, 1, memory + 1, inside));
   camera.fx = 0;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_camera_unproject_points(&camera, memory, 1, rays, inside));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA,
+                        tv_camera_unproject_points(&camera, memory, 1, rays, inside));
   TEST_ASSERT_TRUE(rays[0] == 1 && rays[1] == 2 && rays[2] == 3 && inside[0] == 7);
 }
 

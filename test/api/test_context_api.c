@@ -48,7 +48,7 @@ static void test_limits_out_of_range_are_refused(void) {
   tv_limits limits;
   size_t k;
   check_size_status(TV_ERR_NULL, NULL);
-#define REFUSED(field, values)                              \
+#define REFUSED(field, values)                             \
   for (k = 0; k < sizeof values / sizeof values[0]; ++k) { \
     limits = small_limits();                               \
     limits.field = values[k];                              \
@@ -147,8 +147,8 @@ static void test_memory_that_is_null_misaligned_or_a_byte_short_is_refused(void)
   TEST_ASSERT_EQUAL_INT(TV_ERR_MEMORY, tv_context_init(&context, &limits, memory, 0));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT,
                         tv_context_init(&context, &limits, memory + 1, a.size_bytes));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT, tv_context_init(&context, &limits, memory + 32,
-                                                          a.size_bytes));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT,
+                        tv_context_init(&context, &limits, memory + 32, a.size_bytes));
   TEST_ASSERT_NULL(context);
   TEST_ASSERT_TRUE(api_is_pattern(memory, a.size_bytes));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, memory, a.size_bytes));

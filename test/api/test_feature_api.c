@@ -79,9 +79,9 @@ static void test_images_that_are_none_are_refused(void) {
   tv_image bad = image;
   refused(TV_ERR_NULL, NULL, &image, NULL, NULL);
   refused(TV_ERR_NULL, a.context, NULL, NULL, NULL);
-#define REFUSED(status, field, value)        \
-  bad = image;                               \
-  bad.field = value;                         \
+#define REFUSED(status, field, value) \
+  bad = image;                        \
+  bad.field = value;                  \
   refused(status, a.context, &bad, NULL, NULL)
   REFUSED(TV_ERR_NULL, data, NULL);
   REFUSED(TV_ERR_ARGUMENT, width, 0);
@@ -103,9 +103,9 @@ static void test_images_that_are_none_are_refused(void) {
 
 static void test_masks_of_another_shape_are_refused(void) {
   tv_image bad;
-#define REFUSED(status, field, value)                            \
-  bad = api_image(mask_pixels, WIDTH, HEIGHT, WIDTH);            \
-  bad.field = value;                                             \
+#define REFUSED(status, field, value)                 \
+  bad = api_image(mask_pixels, WIDTH, HEIGHT, WIDTH); \
+  bad.field = value;                                  \
   refused(status, a.context, &image, &bad, NULL)
   REFUSED(TV_ERR_NULL, data, NULL);
   REFUSED(TV_ERR_ARGUMENT, width, WIDTH - 1);
@@ -119,9 +119,9 @@ static void test_masks_of_another_shape_are_refused(void) {
 static void test_options_out_of_range_are_refused(void) {
   tv_feature_options bad;
   tv_feature_options_init(NULL);
-#define REFUSED(status, field, value)                 \
-  bad = options;                                      \
-  bad.field = value;                                  \
+#define REFUSED(status, field, value) \
+  bad = options;                      \
+  bad.field = value;                  \
   refused(status, a.context, &image, NULL, &bad)
   REFUSED(TV_ERR_STRUCT_SIZE, struct_size, 0);
   REFUSED(TV_ERR_STRUCT_SIZE, struct_size, sizeof bad + 4);
@@ -164,7 +164,8 @@ static void test_output_pointers_are_checked(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_detect(c, v, NULL, NULL, keypoints, CAP, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_detect(c, v, NULL, NULL, NULL, CAP, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_detect(c, v, NULL, NULL, keypoints, -1, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_detect(c, v, NULL, NULL, (tv_keypoint *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_detect(c, v, NULL, NULL, (tv_keypoint *)v->data, 1, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_extract(c, v, NULL, NULL, keypoints, NULL, CAP, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_extract(c, v, NULL, NULL, NULL, descriptors, CAP, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
@@ -178,8 +179,8 @@ static void test_output_pointers_are_checked(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_orient(c, v, NULL, &point, 1, keypoints, CAP, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_orient(c, v, NULL, &point, -1, keypoints, CAP, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_orient(c, v, NULL, &point, 1, keypoints, -1, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_orient(c, v, NULL, keypoints, 2, keypoints + 1, CAP - 1,
-                                                  &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_orient(c, v, NULL, keypoints, 2, keypoints + 1, CAP - 1, &count));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_describe(c, v, NULL, NULL, 1, descriptors));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_describe(c, v, NULL, &point, 1, NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_describe(c, v, NULL, &point, -1, descriptors));
@@ -221,12 +222,13 @@ static void test_points_that_are_none_are_refused(void) {
 }
 
 static void test_capacity_is_told_and_nothing_is_written(void) {
-  const int32_t all = detect(a.context, others), described = extract(a.context, others, descriptors);
+  const int32_t all = detect(a.context, others),
+                described = extract(a.context, others, descriptors);
   int32_t count = 0;
   clear_outputs();
   TEST_ASSERT_TRUE(all > 50 && described >= all);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_detect(a.context, &image, NULL, &options, keypoints,
-                                                   all - 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY,
+                        tv_detect(a.context, &image, NULL, &options, keypoints, all - 1, &count));
   TEST_ASSERT_EQUAL_INT(all, count);
   TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_extract(a.context, &image, NULL, &options, keypoints,
                                                     descriptors, described - 1, &count));
@@ -235,14 +237,15 @@ static void test_capacity_is_told_and_nothing_is_written(void) {
                         tv_detect(a.context, &image, NULL, &options, NULL, 0, &count));
   TEST_ASSERT_TRUE(api_is_pattern(keypoints, sizeof keypoints));
   TEST_ASSERT_TRUE(api_is_pattern(descriptors, sizeof descriptors));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_detect(a.context, &image, NULL, &options, keypoints, all, &count));
-  TEST_ASSERT_TRUE(api_is_pattern(keypoints + all, sizeof keypoints - (size_t)all *
-                                                                          sizeof keypoints[0]));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_detect(a.context, &image, NULL, &options, keypoints, all, &count));
+  TEST_ASSERT_TRUE(
+      api_is_pattern(keypoints + all, sizeof keypoints - (size_t)all * sizeof keypoints[0]));
   clear_outputs();
   options.orientation = TV_ORIENTATION_GRADIENT;
   detect(a.context, others);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_orient(a.context, &image, &options, others, 20,
-                                                   keypoints, 19, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY,
+                        tv_orient(a.context, &image, &options, others, 20, keypoints, 19, &count));
   TEST_ASSERT_TRUE(count >= 20 && api_is_pattern(keypoints, sizeof keypoints));
 }
 
@@ -275,8 +278,8 @@ static void test_extract_is_detect_orient_describe(void) {
     options.orientation = kinds[k];
     options.max_keypoints = 120;
     corners = detect(a.context, keypoints);
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others,
-                                           CAP, &oriented));
+    TEST_ASSERT_EQUAL_INT(
+        TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others, CAP, &oriented));
     TEST_ASSERT_EQUAL_INT(
         TV_OK, tv_describe(a.context, &image, &options, others, oriented, other_descriptors));
     options.max_keypoints = CAP; /* room for all second orientations */
@@ -284,8 +287,8 @@ static void test_extract_is_detect_orient_describe(void) {
     options.min_threshold = 0;
     corners = detect(a.context, keypoints);
     if (corners > CAP / 2) corners = CAP / 2;
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others,
-                                           CAP, &oriented));
+    TEST_ASSERT_EQUAL_INT(
+        TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others, CAP, &oriented));
     TEST_ASSERT_EQUAL_INT(
         TV_OK, tv_describe(a.context, &image, &options, others, oriented, other_descriptors));
     TEST_ASSERT_TRUE(k == 0 ? oriented == corners : oriented > corners);
@@ -336,8 +339,8 @@ static void test_the_mask_keeps_corners_where_it_is_not_zero(void) {
   for (y = 0; y < HEIGHT; ++y) {
     for (x = 0; x < WIDTH; ++x) mask_pixels[y * WIDTH + x] = (x / 16 + y / 16) % 2 ? 1 : 0;
   }
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_detect(a.context, &image, &mask, &options, keypoints, CAP, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_detect(a.context, &image, &mask, &options, keypoints, CAP, &count));
   for (k = 0; k < all; ++k) {
     if (mask_pixels[(int)others[k].y * WIDTH + (int)others[k].x] == 0) continue;
     TEST_ASSERT_EQUAL_MEMORY(&others[k], &keypoints[kept++], sizeof keypoints[0]);
@@ -345,8 +348,8 @@ static void test_the_mask_keeps_corners_where_it_is_not_zero(void) {
   TEST_ASSERT_EQUAL_INT(kept, count);
   TEST_ASSERT_TRUE(kept > 5 && kept < all);
   memset(mask_pixels, 0, sizeof mask_pixels);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_detect(a.context, &image, &mask, &options, keypoints, CAP, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_detect(a.context, &image, &mask, &options, keypoints, CAP, &count));
   TEST_ASSERT_EQUAL_INT(0, count);
 }
 
@@ -499,13 +502,13 @@ static void test_every_kernel_set_gives_the_same_bytes(void) {
       if (api_try(&limits, &b) == TV_ERR_KERNELS) continue;
       for (view = 0; view < 2; ++view) {
         const tv_image luma = api_image(pair.luma[view], pair.width, pair.height, pair.width);
-        TEST_ASSERT_EQUAL_INT(
-            TV_OK, tv_extract(b.context, &luma, NULL, &options, points[slot][view],
-                              rows[slot][view], MANY, &counts[slot][view]));
+        TEST_ASSERT_EQUAL_INT(TV_OK,
+                              tv_extract(b.context, &luma, NULL, &options, points[slot][view],
+                                         rows[slot][view], MANY, &counts[slot][view]));
       }
-      TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(b.context, rows[slot][0], counts[slot][0],
-                                            rows[slot][1], counts[slot][1], NULL, found[slot], MANY,
-                                            &num_found[slot]));
+      TEST_ASSERT_EQUAL_INT(
+          TV_OK, tv_match(b.context, rows[slot][0], counts[slot][0], rows[slot][1], counts[slot][1],
+                          NULL, found[slot], MANY, &num_found[slot]));
       api_release(&b);
       if (slot == 0) {
         TEST_ASSERT_TRUE(num_found[0] > 100);

@@ -1,5 +1,6 @@
 /* Input that is known to hang, crash or fool libraries of this kind, this one's limits among it: a
-   status or a verdict in bounded time, and never a NaN. Issue numbers name the reports of others. */
+   status or a verdict in bounded time, and never a NaN. Issue numbers name the reports of others.
+ */
 #include <math.h>
 #include <string.h>
 #include <time.h>
@@ -205,7 +206,8 @@ static void test_opencv_24967_a_still_camera_ends_with_a_verdict(void) {
 }
 
 /* OpenCV 24482: None for valid input. There: points about the principal point, half of them equal
-   in both views, the others a tenth of a pixel apart this way or that; a camera that hardly moves. */
+   in both views, the others a tenth of a pixel apart this way or that; a camera that hardly moves.
+ */
 static void test_opencv_24482_points_a_tenth_of_a_pixel_apart_have_an_answer(void) {
   tv_camera camera = lenses[0];
   int i;
@@ -235,7 +237,8 @@ static void test_opencv_24482_valid_input_always_has_an_answer(void) {
   }
 }
 
-/* OpenCV 19639: findFundamentalMat crashed on these seven matches; three of them end in one point. */
+/* OpenCV 19639: findFundamentalMat crashed on these seven matches; three of them end in one point.
+ */
 static void test_opencv_19639_repeated_points_are_survived(void) {
   static const double x[14] = {941, 890, 596, 940, 898, 941, 894,
                                933, 586, 938, 902, 933, 887, 935};

@@ -97,8 +97,8 @@ static void test_capacity_is_told_and_the_least_of_both_is_enough(void) {
                                                   NULL, found, 19, &count));
   TEST_ASSERT_EQUAL_INT(20, count);
   TEST_ASSERT_TRUE(api_is_pattern(found, sizeof found));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(a.context, descriptors0, COUNT, descriptors1, 20, NULL,
-                                        found, 20, &count));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_match(a.context, descriptors0, COUNT, descriptors1, 20, NULL, found, 20, &count));
   TEST_ASSERT_TRUE(api_is_pattern(found + 20, sizeof found - 20 * sizeof found[0]));
 }
 

@@ -1,4 +1,5 @@
-/* No call after tv_context_init takes heap: malloc and its like are this program's own, and count. */
+/* No call after tv_context_init takes heap: malloc and its like are this program's own, and count.
+ */
 
 #include <unity.h>
 
@@ -106,8 +107,8 @@ static void call_stages(void) {
   tv_two_view_init(&pose);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context.context, NULL, NULL, at[0], at[1], NULL,
                                                     num, NULL, &pose, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(TV_TRIANGULATION_POLY, &c, &c, R, t, at[0], at[1], num,
-                                              points));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_triangulate(TV_TRIANGULATION_POLY, &c, &c, R, t, at[0], at[1], num, points));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(context.context, &c, &c, at[0], at[1], num, NULL,
                                                   R, t, points, NULL));
   TEST_ASSERT_EQUAL_INT(TV_OK,
@@ -127,8 +128,8 @@ static void call_reconstruct(void) {
   }
   tv_two_view_init(&pose);
   tv_reconstruction_init(&cloud);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(context.context, &views[0], &views[1], NULL, &pose,
-                                              &cloud));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_reconstruct(context.context, &views[0], &views[1], NULL, &pose, &cloud));
 }
 
 static void test_the_counters_see_an_allocation(void) {

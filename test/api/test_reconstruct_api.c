@@ -1,5 +1,5 @@
-/* tv_reconstruct: every status of reconstruct.h, what it leaves untouched, where its arrays lie, and
-   equal bytes. How good the poses are is checked elsewhere. */
+/* tv_reconstruct: every status of reconstruct.h, what it leaves untouched, where its arrays lie,
+   and equal bytes. How good the poses are is checked elsewhere. */
 
 #include <math.h>
 #include <stdio.h>
@@ -347,8 +347,8 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   TEST_ASSERT_EQUAL_INT(1, first.has_t);
   tv_reconstruct_options_init(&options);
   options.guided_matching = 1;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
-                                              &reconstruction));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
   guided = two_view;
   num_guided = reconstruction.num_matches;
   TEST_ASSERT_TRUE(num_guided > num_plain + num_plain / 50);
@@ -358,8 +358,8 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   TEST_ASSERT_EQUAL_UINT32(first.reasons, guided.reasons);
   for (k = 0; k < num_plain; ++k) TEST_ASSERT_TRUE(place_of(&plain[k]) >= 0);
   check_one_to_one();
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view,
-                                              &reconstruction));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view, &reconstruction));
   check_one_to_one();
   TEST_ASSERT_EQUAL_INT(num_guided, reconstruction.num_matches);
   for (k = 0; k < 9; ++k) {
@@ -399,8 +399,8 @@ static void test_bundle_adjustment_moves_the_pose_and_what_follows_from_it(void)
   TEST_ASSERT_EQUAL_INT(1, first.has_t);
   tv_reconstruct_options_init(&options);
   options.bundle_adjustment = 1;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view,
-                                              &reconstruction));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
   TEST_ASSERT_EQUAL_INT(first.num_inliers, two_view.num_inliers);
   TEST_ASSERT_TRUE(memcmp(first.R, two_view.R, sizeof first.R) != 0);
   TEST_ASSERT_TRUE(sum_sq(reconstruction.points, plain, first.num_matches) <

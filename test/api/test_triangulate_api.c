@@ -93,8 +93,8 @@ static void test_null_pointers_are_refused(void) {
 static void test_no_points_are_fine_and_fewer_are_not(void) {
   const tv_triangulation m = TV_TRIANGULATION_MIDPOINT;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_triangulate(m, &camera0, &camera1, R, t, NULL, NULL, 0, NULL));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_ARGUMENT, tv_triangulate(m, &camera0, &camera1, R, t, pixels0, pixels1, -1, points));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_triangulate(m, &camera0, &camera1, R, t, pixels0, pixels1, -1, points));
   TEST_ASSERT_EQUAL_MEMORY(untouched, points, sizeof points);
 }
 
@@ -211,18 +211,18 @@ static void test_bad_arguments_of_a_correction_are_refused(void) {
   }
 #define CORRECT(c0, c1, r, tr, p0, p1, n, q0, q1, v) \
   tv_correct_matches(poly, c0, c1, r, tr, p0, p1, n, q0, q1, v)
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(NULL, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, NULL, R, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        CORRECT(NULL, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        CORRECT(&camera0, NULL, R, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
   TEST_ASSERT_EQUAL_INT(
       TV_ERR_NULL, CORRECT(&camera0, &camera1, NULL, t, pixels0, pixels1, NUM_POINTS, a, b, valid));
   TEST_ASSERT_EQUAL_INT(
       TV_ERR_NULL, CORRECT(&camera0, &camera1, R, NULL, pixels0, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, &camera1, R, t, NULL, pixels1, NUM_POINTS, a, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, CORRECT(&camera0, &camera1, R, t, pixels0, NULL, NUM_POINTS, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        CORRECT(&camera0, &camera1, R, t, NULL, pixels1, NUM_POINTS, a, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        CORRECT(&camera0, &camera1, R, t, pixels0, NULL, NUM_POINTS, a, b, valid));
   TEST_ASSERT_EQUAL_INT(
       TV_ERR_NULL, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, NULL, b, valid));
   TEST_ASSERT_EQUAL_INT(
@@ -232,18 +232,14 @@ static void test_bad_arguments_of_a_correction_are_refused(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
                         CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, -1, a, b, valid));
   TEST_ASSERT_EQUAL_INT(TV_OK, CORRECT(&camera0, &camera1, R, t, NULL, NULL, 0, NULL, NULL, NULL));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP,
-      CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, pixels0, b, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP,
-      CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, pixels0, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP,
-      CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, a + 2, valid));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP,
-      CORRECT(&camera0, &camera1, R, t, pixels0, pixels1, NUM_POINTS, a, b, (uint8_t *)b + 9));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
+                                                NUM_POINTS, pixels0, b, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
+                                                NUM_POINTS, a, pixels0, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
+                                                NUM_POINTS, a, a + 2, valid));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, CORRECT(&camera0, &camera1, R, t, pixels0, pixels1,
+                                                NUM_POINTS, a, b, (uint8_t *)b + 9));
 #undef CORRECT
   R[0] = NAN;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, correct(poly));

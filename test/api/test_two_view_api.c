@@ -49,8 +49,8 @@ static void make_scene(int count, double flatness, double baseline) {
     double point[3], depth;
     do {
       point[0] = uniform(-0.55, 0.55), point[1] = uniform(-0.4, 0.4), point[2] = 1;
-      depth = flatness / (0.12 + 0.05 * point[0] - 0.04 * point[1]) +
-              (1 - flatness) * uniform(4, 12);
+      depth =
+          flatness / (0.12 + 0.05 * point[0] - 0.04 * point[1]) + (1 - flatness) * uniform(4, 12);
       point[0] *= depth, point[1] *= depth, point[2] = depth;
     } while (!see(point, baseline, i));
   }
@@ -120,8 +120,9 @@ static void expect_rotation(const double R[9]) {
       TEST_ASSERT_DOUBLE_WITHIN(1e-14, i == j, dot3(R + 3 * i, R + 3 * j));
     }
   }
-  TEST_ASSERT_DOUBLE_WITHIN(1e-14, R[0] * R[4] * R[8] + R[1] * R[5] * R[6] + R[2] * R[3] * R[7] -
-                                       R[2] * R[4] * R[6] - R[1] * R[3] * R[8] - R[0] * R[5] * R[7],
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14,
+                            R[0] * R[4] * R[8] + R[1] * R[5] * R[6] + R[2] * R[3] * R[7] -
+                                R[2] * R[4] * R[6] - R[1] * R[3] * R[8] - R[0] * R[5] * R[7],
                             1);
 }
 
@@ -161,8 +162,8 @@ static void expect_covariance(void) {
     for (j = 0; j < 5; ++j) {
       const double entry = result.covariance[5 * i + j];
       TEST_ASSERT_TRUE(fabs(entry - result.covariance[5 * j + i]) <= 1e-12 * fabs(entry));
-      TEST_ASSERT_TRUE(entry * entry <= (1 + 1e-9) * result.covariance[6 * i] *
-                                            result.covariance[6 * j]);
+      TEST_ASSERT_TRUE(entry * entry <=
+                       (1 + 1e-9) * result.covariance[6 * i] * result.covariance[6 * j]);
     }
   }
 }
@@ -230,17 +231,16 @@ static void expect_sound(int count, int cameras_given) {
 
 static void estimate(int count) {
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1,
-                                             NULL, count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0,
+                                                    pixels1, NULL, count, &options, &result, mask));
   expect_sound(count, 1);
 }
 
 static void estimate_uncalibrated(int count, int method) {
   options.method = method;
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, NULL, NULL, pixels0, pixels1,
-                                                    NULL, count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, NULL, NULL, pixels0, pixels1, NULL,
+                                                    count, &options, &result, mask));
   expect_sound(count, 0);
 }
 
@@ -251,9 +251,8 @@ static void expect_refusal(tv_status expected, const tv_camera *c0, const tv_cam
   before.struct_size = sizeof before;
   result = before;
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(expected,
-                        tv_estimate_two_view(api.context, c0, c1, pixels0, pixels1, NULL, count,
-                                             &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(expected, tv_estimate_two_view(api.context, c0, c1, pixels0, pixels1, NULL,
+                                                       count, &options, &result, mask));
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
   TEST_ASSERT_TRUE(api_is_pattern(mask, sizeof mask));
 }
@@ -301,9 +300,9 @@ static void test_null_is_fine_where_the_header_says_so(void) {
   tv_two_view with_mask;
   estimate(MAX_MATCHES);
   with_mask = result;
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1,
-                                             NULL, MAX_MATCHES, NULL, &result, NULL));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1, NULL,
+                                  MAX_MATCHES, NULL, &result, NULL));
   TEST_ASSERT_EQUAL_MEMORY(&with_mask, &result, sizeof result);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, NULL, NULL,
                                                     NULL, 0, &options, &result, NULL));
@@ -367,15 +366,15 @@ static void test_cameras_are_checked(void) {
 
 static void test_the_mask_may_not_lie_over_an_input(void) {
   const tv_two_view before = result;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1,
-                                             NULL, 10, &options, &result, (uint8_t *)pixels0));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1, NULL,
+                                           10, &options, &result, (uint8_t *)pixels0));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1,
                                              ratios, 10, &options, &result, (uint8_t *)ratios));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1,
-                                             NULL, 10, &options, &result, (uint8_t *)&result + 8));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1, NULL,
+                                           10, &options, &result, (uint8_t *)&result + 8));
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
 }
 
@@ -602,9 +601,8 @@ static void test_a_hundred_thousand_matches_fit_a_context_of_that_size(void) {
     memcpy(many0 + 2 * MAX_MATCHES * i, pixels0, sizeof pixels0);
     memcpy(many1 + 2 * MAX_MATCHES * i, pixels1, sizeof pixels1);
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_estimate_two_view(large.context, &camera0, &camera1, many0, many1, NULL,
-                                             MANY, &options, &result, many_mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(large.context, &camera0, &camera1, many0, many1,
+                                                    NULL, MANY, &options, &result, many_mask));
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_OK, result.verdict);
   TEST_ASSERT_TRUE(distance(true_R, result.R, 9) < 1e-4);
   for (i = 0; i < MANY; ++i) inliers += many_mask[i];

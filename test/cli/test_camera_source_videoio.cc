@@ -1,5 +1,5 @@
-// A film written and read through OpenCV comes out of the frame source as it went in, as a file and as if
-// it were a live camera.
+// A film written and read through OpenCV comes out of the frame source as it went in, as a file and
+// as if it were a live camera.
 #include <unistd.h>
 #include <unity.h>
 
@@ -23,14 +23,15 @@ std::string film;
 int grey_of(uint64_t number) { return 30 + 10 * static_cast<int>(number); }
 
 void write_film() {
-  cv::VideoWriter writer(film, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), kFps,
-                         cv::Size(kWidth, kHeight));
+  cv::VideoWriter writer(film, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'),
+                         kFps, cv::Size(kWidth, kHeight));
   if (!writer.isOpened()) {
     std::printf("skipped: this OpenCV writes no film\n");
     std::exit(TWOVIEW_SKIP_CODE);
   }
   for (int k = 0; k < kFrames; ++k) {
-    writer.write(cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar::all(grey_of(static_cast<uint64_t>(k)))));
+    writer.write(
+        cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar::all(grey_of(static_cast<uint64_t>(k)))));
   }
 }
 

@@ -1,9 +1,9 @@
 // Metres from velocity, altitude and floor: flights whose truth is known in closed form.
+#include <unity.h>  // last: its macros take isnan and isinf
+
 #include <cmath>
 
 #include "drone/metric_scale.h"
-
-#include <unity.h>  // last: its macros take isnan and isinf
 
 using namespace cli;
 
@@ -42,11 +42,17 @@ FlightLog flight(Attitude attitude, Velocity velocity, Altitude altitude) {
 // A quarter circle of radius 1 m, flown forward while it turns.
 FlightLog circle() {
   return flight([](double t) { return yaw_of(t * kPi / 4); },
-                [](double) { return Vector3{kPi / 4, 0, 0}; }, [](double) { return 1.0; });
+                [](double) {
+                  return Vector3{kPi / 4, 0, 0};
+                },
+                [](double) { return 1.0; });
 }
 
 FlightLog climb() {
-  return flight([](double) { return yaw_of(0.3); }, [](double) { return Vector3{0, 0, -0.3}; },
+  return flight([](double) { return yaw_of(0.3); },
+                [](double) {
+                  return Vector3{0, 0, -0.3};
+                },
                 [](double t) { return 1.0 + 0.3 * t; });
 }
 
@@ -84,7 +90,9 @@ void test_velocity_gives_nothing_over_a_gap_outside_or_at_rest() {
   unknown[100].velocity_m_s.reset();
   TEST_ASSERT_FALSE(scale_by_velocity(unknown, 10.2, 11.8, CameraMount()).has_value());
   const FlightLog rest = flight([](double) { return yaw_of(0); },
-                                [](double) { return Vector3{0.01, 0, 0}; },
+                                [](double) {
+                                  return Vector3{0.01, 0, 0};
+                                },
                                 [](double) { return 1.0; });
   TEST_ASSERT_FALSE(scale_by_velocity(rest, 10, 12, CameraMount()).has_value());
 }
@@ -95,9 +103,10 @@ void test_altitude_divides_by_the_vertical_part_of_the_way() {
   const auto scale = scale_by_altitude(climb(), 10.2, 11.7, {half, 0, -half}, 0.02, CameraMount());
   TEST_ASSERT_TRUE(scale.has_value());
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.45 / half, scale->baseline_m);
-  // sigma: altitudes 0.01 each over the part, direction 0.02 and attitude 0.01 times the level part.
-  const double expected = std::hypot(0.01 * std::sqrt(2.0) / half,
-                                     0.45 / half * std::hypot(0.02, 0.01) * 1.0);
+  // sigma: altitudes 0.01 each over the part, direction 0.02 and attitude 0.01 times the level
+  // part.
+  const double expected =
+      std::hypot(0.01 * std::sqrt(2.0) / half, 0.45 / half * std::hypot(0.02, 0.01) * 1.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, scale->sigma_m);
 }
 
@@ -124,7 +133,10 @@ std::vector<Vector3> floor_points(double pitch, const CameraMount& mount) {
 void test_a_seen_floor_gives_the_scale() {
   const CameraMount mount;
   const FlightLog log = flight([](double) { return pitch_of(-0.15); },
-                               [](double) { return Vector3{0, 0, 0}; }, [](double) { return 1.5; });
+                               [](double) {
+                                 return Vector3{0, 0, 0};
+                               },
+                               [](double) { return 1.5; });
   std::vector<Vector3> points = floor_points(-0.15, mount);
   points.push_back({0, 40, 40});  // wrong ones far below
   points.push_back({1, 44, 40});
@@ -137,7 +149,10 @@ void test_a_seen_floor_gives_the_scale() {
 void test_no_floor_gives_no_scale() {
   const CameraMount mount;
   const FlightLog log = flight([](double) { return pitch_of(0); },
-                               [](double) { return Vector3{0, 0, 0}; }, [](double) { return 1.5; });
+                               [](double) {
+                                 return Vector3{0, 0, 0};
+                               },
+                               [](double) { return 1.5; });
   std::vector<Vector3> slope;
   for (int k = 0; k < 200; ++k) slope.push_back({0.1 * k, 0.5 + 0.1 * k, 10});
   TEST_ASSERT_FALSE(scale_by_floor(log, 11, slope, mount).has_value());

@@ -1,5 +1,5 @@
-// The pictures of a pair whose camera the estimate corrected. Owning objects live in functions that give plain
-// values: Unity leaves a failing test by longjmp.
+// The pictures of a pair whose camera the estimate corrected. Owning objects live in functions that
+// give plain values: Unity leaves a failing test by longjmp.
 
 #include <array>
 #include <cmath>

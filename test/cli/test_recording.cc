@@ -1,5 +1,6 @@
 // reconstruct --recording: flights of the simulated drone through the room, held against its truth.
 #include <unistd.h>
+#include <unity.h>  // last: its macros take isnan and isinf
 
 #include <algorithm>
 #include <cmath>
@@ -19,8 +20,6 @@
 #include "simulator/film.h"
 #include "simulator/firmware.h"
 #include "verbs.h"
-
-#include <unity.h>  // last: its macros take isnan and isinf
 
 using namespace cli;
 using simulator::FlightState;
@@ -79,7 +78,9 @@ const room::Room& the_room() {
 class Flyer {
  public:
   explicit Flyer(const Plan& plan, const fs::path& folder)
-      : plan_(plan), recording_(folder, false), drone_(the_room(), plan.start, 0, plan.sensors, now_) {
+      : plan_(plan),
+        recording_(folder, false),
+        drone_(the_room(), plan.start, 0, plan.sensors, now_) {
     drone_.receive_hello(now_);
     send("CONFIG", "\"general:navdata_demo\",\"FALSE\"");
     send("CTRL", "5,0");
@@ -100,8 +101,8 @@ class Flyer {
 
  private:
   void send(const std::string& name, const std::string& arguments) {
-    drone_.receive_commands("AT*" + name + "=" + std::to_string(++sequence_) + "," + arguments + "\r",
-                            now_);
+    drone_.receive_commands(
+        "AT*" + name + "=" + std::to_string(++sequence_) + "," + arguments + "\r", now_);
   }
   void steer() {
     std::string arguments = "1";
@@ -117,10 +118,10 @@ class Flyer {
   void record_picture() {
     const FlightState& state = drone_.truth();
     std::vector<uint8_t> luma(kWidth * kHeight);
-    the_room().render(eye_,
-                      room::camera_pose(simulator::world_from_body(state), room::kForwardCamera,
-                                        state.position),
-                      luma.data(), kWidth);
+    the_room().render(
+        eye_,
+        room::camera_pose(simulator::world_from_body(state), room::kForwardCamera, state.position),
+        luma.data(), kWidth);
     room::add_sensor_noise(luma.data(), kWidth, kHeight, kWidth, 1.5, truth_.size() + 1);
     const simulator::FilmPacket coded = film_.encode(luma.data(), kWidth);
     ardrone_pave_packet packet{};
@@ -161,9 +162,9 @@ const Flown& flown(const Plan& plan) {
   static std::vector<std::pair<const Plan*, Flown>> all;
   for (const auto& [known, flight] : all)
     if (known == &plan) return flight;
-  const fs::path folder = fs::temp_directory_path() /
-                          ("twoview_test_recording_" + std::string(plan.name) + "_" +
-                           std::to_string(::getpid()));
+  const fs::path folder =
+      fs::temp_directory_path() /
+      ("twoview_test_recording_" + std::string(plan.name) + "_" + std::to_string(::getpid()));
   fs::remove_all(folder);
   Flown flight{folder, {}};
   flight.truth = Flyer(plan, folder).fly();
@@ -194,16 +195,16 @@ Result reconstructed(const Flown& flight, const RecordedFlight& read, RecordingP
   room::CameraPose pose[2];
   for (int k = 0; k < 2; ++k) {
     const FlightState& truth = flight.truth[pair.frame[k].number - 1];
-    pose[k] = room::camera_pose(simulator::world_from_body(truth), room::kForwardCamera,
-                                truth.position);
+    pose[k] =
+        room::camera_pose(simulator::world_from_body(truth), room::kForwardCamera, truth.position);
   }
   Matrix3 R;
   Vector3 t;
   room::relative_pose(pose[0], pose[1], R, t);
   result.rotation_error_deg = rotation_error_deg(rotation_of(result.outcome.two_view), R);
   result.true_baseline_m = norm(t);
-  const auto imu = imu_json(read, pair.frame, mount, result.outcome.two_view, true,
-                            best_scale(result.scales));
+  const auto imu =
+      imu_json(read, pair.frame, mount, result.outcome.two_view, true, best_scale(result.scales));
   result.imu_difference_deg = imu["rotation_difference_deg"].get<double>();
   result.imu_sigma_deg = imu["sigma_deg"].get<double>();
   return result;
@@ -224,8 +225,8 @@ std::vector<Result> all_pairs(const Plan& plan) {
   std::vector<Result> results;
   for (int apart : {8, 14})
     for (int first = 4; first + apart < static_cast<int>(read.frames.size()); first += 3)
-      results.push_back(reconstructed(flight, read, pair_of(flight.folder, read, first, first + apart),
-                                      session, options));
+      results.push_back(reconstructed(
+          flight, read, pair_of(flight.folder, read, first, first + apart), session, options));
   return results;
 }
 
@@ -238,14 +239,17 @@ void check_rotations(const std::vector<Result>& results) {
     differences.push_back(r.imu_difference_deg);
     within += r.imu_difference_deg < 2 * r.imu_sigma_deg;
   }
-  std::printf("    %zu pairs: rotation error %.3f deg, difference to the IMU %.3f deg (medians; %zu within 2 sigma)\n",
-              results.size(), median(errors), median(differences), within);
+  std::printf(
+      "    %zu pairs: rotation error %.3f deg, difference to the IMU %.3f deg (medians; %zu within "
+      "2 sigma)\n",
+      results.size(), median(errors), median(differences), within);
   TEST_ASSERT_TRUE(results.size() >= 10);
   TEST_ASSERT_TRUE(median(errors) < 0.3);
   TEST_ASSERT_TRUE(10 * within >= 9 * results.size());
 }
 
-// A source by itself, or the surest of them (source empty), over the truth; most pairs must have it.
+// A source by itself, or the surest of them (source empty), over the truth; most pairs must have
+// it.
 void check_scales(const std::vector<Result>& results, const std::string& source) {
   std::vector<double> errors;
   size_t covered = 0;
@@ -262,9 +266,11 @@ void check_scales(const std::vector<Result>& results, const std::string& source)
     covered += error <= 2 * scale->sigma_m;
   }
   TEST_ASSERT_TRUE_MESSAGE(4 * errors.size() > 3 * results.size(), "few pairs have this scale");
-  std::printf("    scale by %s, %zu of %zu pairs: off by %.2f %% (median), %.2f %% at most, %zu within 2 sigma\n",
-              source.empty() ? "the surest" : source.c_str(), errors.size(), results.size(),
-              100 * median(errors), 100 * *std::max_element(errors.begin(), errors.end()), covered);
+  std::printf(
+      "    scale by %s, %zu of %zu pairs: off by %.2f %% (median), %.2f %% at most, %zu within 2 "
+      "sigma\n",
+      source.empty() ? "the surest" : source.c_str(), errors.size(), results.size(),
+      100 * median(errors), 100 * *std::max_element(errors.begin(), errors.end()), covered);
   TEST_ASSERT_TRUE(median(errors) < 0.03);
   TEST_ASSERT_TRUE(10 * covered >= 9 * errors.size());
 }
@@ -298,7 +304,8 @@ void test_a_pair_that_hardly_moved_has_no_scale_by_velocity() {
   const RecordedFlight read = read_flight(flight.folder);
   const Options options;
   Session session(options);
-  const Result r = reconstructed(flight, read, pair_of(flight.folder, read, 0, 1), session, options);
+  const Result r =
+      reconstructed(flight, read, pair_of(flight.folder, read, 0, 1), session, options);
   for (const auto& scale : r.scales) TEST_ASSERT_TRUE(!scale || scale->source != "velocity");
 }
 
@@ -307,8 +314,10 @@ void test_the_best_pair_is_found_and_believed() {
   const RecordedFlight read = read_flight(flight.folder);
   const Options options;
   Session session(options);
-  const RecordingPair pair = choose_pair(flight.folder, read, kCamera, CameraMount(), session, options);
-  std::printf("    frames %d and %d: %s\n", pair.frame[0].index, pair.frame[1].index, pair.why.c_str());
+  const RecordingPair pair =
+      choose_pair(flight.folder, read, kCamera, CameraMount(), session, options);
+  std::printf("    frames %d and %d: %s\n", pair.frame[0].index, pair.frame[1].index,
+              pair.why.c_str());
   const Result r = reconstructed(flight, read, pair, session, options);
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_OK, r.outcome.two_view.verdict);
   TEST_ASSERT_TRUE(r.rotation_error_deg < 0.3);
@@ -340,7 +349,8 @@ struct Ran {
 
 // The program itself.
 Ran run(const std::string& arguments) {
-  const std::string command = std::string(std::getenv("TWOVIEW_PROGRAM")) + " reconstruct " + arguments + " 2>&1";
+  const std::string command =
+      std::string(std::getenv("TWOVIEW_PROGRAM")) + " reconstruct " + arguments + " 2>&1";
   FILE* pipe = ::popen(command.c_str(), "r");
   TEST_ASSERT_NOT_NULL(pipe);
   Ran ran;
@@ -365,8 +375,8 @@ void test_the_program_tells_metres() {
   const Flown& flight = flown(kSideways);
   const std::string camera = write_camera(flight, "camera_in_body: [0, 0, 0]\n");
   const fs::path out = flight.folder / "out";
-  const Ran ran = run("--recording " + flight.folder.string() + " --frames 10 24 --camera " + camera +
-                      " --json -o " + out.string());
+  const Ran ran = run("--recording " + flight.folder.string() + " --frames 10 24 --camera " +
+                      camera + " --json -o " + out.string());
   TEST_ASSERT_EQUAL_INT_MESSAGE(0, ran.status, ran.text.c_str());
   const auto json = nlohmann::json::parse(ran.text);
   TEST_ASSERT_EQUAL_STRING("metric", json["scale"].get<std::string>().c_str());
@@ -383,8 +393,9 @@ void test_the_program_tells_metres() {
   TEST_ASSERT_TRUE(report.find("Against the IMU") != std::string::npos);
   TEST_ASSERT_TRUE(report.find("are in metres") != std::string::npos);
   // The command line's mount goes before the file's.
-  const Ran turned = run("--recording " + flight.folder.string() + " --frames 10 24 --camera " + camera +
-                         " --body-from-camera 1,0,0,0,1,0,0,0,1 --json -o " + out.string());
+  const Ran turned =
+      run("--recording " + flight.folder.string() + " --frames 10 24 --camera " + camera +
+          " --body-from-camera 1,0,0,0,1,0,0,0,1 --json -o " + out.string());
   const auto other = nlohmann::json::parse(turned.text.substr(turned.text.find('{')));
   TEST_ASSERT_EQUAL_DOUBLE(1, other["recording"]["body_from_camera"][0].get<double>());
 }
@@ -393,13 +404,14 @@ void check_refused(const std::string& arguments, const char* word) {
   const Ran ran = run(arguments + " -o " + (fs::temp_directory_path() / "twoview_never").string());
   TEST_ASSERT_EQUAL_INT_MESSAGE(2, ran.status, ran.text.c_str());
   TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(ran.text.c_str(), word), ran.text.c_str());
-  TEST_ASSERT_EQUAL_INT_MESSAGE(1, static_cast<int>(std::count(ran.text.begin(), ran.text.end(), '\n')),
-                                ran.text.c_str());
+  TEST_ASSERT_EQUAL_INT_MESSAGE(
+      1, static_cast<int>(std::count(ran.text.begin(), ran.text.end(), '\n')), ran.text.c_str());
 }
 
 void test_what_does_not_fit_together_is_refused_in_a_line() {
   const Flown& flight = flown(kSideways);
-  const std::string folder = flight.folder.string(), camera = " --camera " + write_camera(flight, "");
+  const std::string folder = flight.folder.string(),
+                    camera = " --camera " + write_camera(flight, "");
   check_refused("--recording " + folder, "--camera");
   check_refused("a.png b.png --recording " + folder + camera, "not both");
   check_refused("a.png b.png --frames 1 2" + camera, "--recording");

@@ -102,7 +102,8 @@ void test_a_ray_along_an_axis_hits_something() {
 }
 
 void test_a_reconstruction_finds_the_true_motion() {
-  const CameraPose pose0 = pose(0, 0, 0, {0, -0.3, -1.2}), pose1 = pose(0.03, 0.02, 0, {0, 0.2, -1.2});
+  const CameraPose pose0 = pose(0, 0, 0, {0, -0.3, -1.2}),
+                   pose1 = pose(0.03, 0.02, 0, {0, 0.2, -1.2});
   Film films[2] = {film(pose0), film(pose1)};
   tv_limits limits;
   tv_limits_init(&limits);
@@ -122,8 +123,8 @@ void test_a_reconstruction_finds_the_true_motion() {
   tv_two_view_init(&two_view);
   tv_reconstruction result;
   tv_reconstruction_init(&result);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_reconstruct(context, &views[0], &views[1], nullptr, &two_view, &result));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_reconstruct(context, &views[0], &views[1], nullptr, &two_view, &result));
   tv_context_free(context);
   TEST_ASSERT_EQUAL_INT(TV_CONFIG_CALIBRATED, two_view.config);
   room::Mat3 R;

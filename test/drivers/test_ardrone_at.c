@@ -18,11 +18,11 @@ static void check_text(const ardrone_at *written, const char *expected) {
   TEST_ASSERT_EQUAL_MEMORY(expected, written->text, written->size);
 }
 
-#define CHECK(call, expected)                  \
-  do {                                         \
-    memset(&at, 0, sizeof at);                 \
-    TEST_ASSERT_EQUAL_INT(TVS_OK, call);       \
-    check_text(&at, expected);                 \
+#define CHECK(call, expected)            \
+  do {                                   \
+    memset(&at, 0, sizeof at);           \
+    TEST_ASSERT_EQUAL_INT(TVS_OK, call); \
+    check_text(&at, expected);           \
   } while (0)
 
 static void test_each_command_has_its_text(void) {
@@ -290,7 +290,8 @@ static void test_a_lost_pulse_is_repeated_while_the_drone_says_so(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
   TEST_ASSERT_EQUAL_INT(5, count_edges(200, READY | ARDRONE_STATE_FLYING)); /* within 3 s */
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
-  for (k = 0; k < 200; ++k) { /* the drone says nothing: one pulse, for a second might undo the first */
+  for (k = 0; k < 200;
+       ++k) { /* the drone says nothing: one pulse, for a second might undo the first */
     int bit;
     now += ARDRONE_TICK_NS;
     TEST_ASSERT_EQUAL_INT(1, ardrone_pilot_tick(&pilot, now));

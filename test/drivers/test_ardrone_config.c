@@ -1,5 +1,5 @@
-/* Configuration text, keys and values, and the acknowledge handshake against a drone that loses any of
-   its messages. */
+/* Configuration text, keys and values, and the acknowledge handshake against a drone that loses any
+   of its messages. */
 #include <locale.h>
 #include <math.h>
 #include <string.h>
@@ -37,10 +37,11 @@ static void test_configuration_text(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, FIND("general:empty"));
   TEST_ASSERT_EQUAL_STRING("", value);
   TEST_ASSERT_EQUAL_INT(TVS_NONE, FIND("after:the"));
-  TEST_ASSERT_EQUAL_INT(TVS_ERR_CAPACITY,
-                        ardrone_config_find(text, sizeof text, "general:num_version_soft", value, 5));
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        ardrone_config_find(text, sizeof text, "general:num_version_soft", value, 6));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_ERR_CAPACITY,
+      ardrone_config_find(text, sizeof text, "general:num_version_soft", value, 5));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_OK, ardrone_config_find(text, sizeof text, "general:num_version_soft", value, 6));
 }
 
 static void test_configuration_text_cut_anywhere(void) {
@@ -180,7 +181,8 @@ static void test_the_handshake_completes_whatever_single_message_is_lost(void) {
   }
 }
 
-/* Nothing is sent that is not needed: value, release; and a release before, where an old bit stands. */
+/* Nothing is sent that is not needed: value, release; and a release before, where an old bit
+ * stands. */
 static void test_a_good_link_takes_two_messages(void) {
   int old_bit;
   for (old_bit = 0; old_bit < 2; ++old_bit) {
@@ -219,8 +221,10 @@ static void test_ids_and_command_share_a_datagram(void) {
   at.size = 0;
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_exchange_tick(&exchange, &at, 0));
   at.text[at.size] = '\0';
-  TEST_ASSERT_EQUAL_STRING("AT*CONFIG_IDS=1,\"00000001\",\"00000002\",\"00000003\"\r"
-                           "AT*CONFIG=2,\"video:video_codec\",\"131\"\r", at.text);
+  TEST_ASSERT_EQUAL_STRING(
+      "AT*CONFIG_IDS=1,\"00000001\",\"00000002\",\"00000003\"\r"
+      "AT*CONFIG=2,\"video:video_codec\",\"131\"\r",
+      at.text);
 }
 
 static void test_one_exchange_at_a_time_and_no_bad_value(void) {
@@ -229,9 +233,9 @@ static void test_one_exchange_at_a_time_and_no_bad_value(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_exchange_begin(&exchange, ARDRONE_EXCHANGE_READ_IDS,
                                                               NULL, NULL, NULL, 0));
   memset(&exchange, 0, sizeof exchange);
-  TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT,
-                        ardrone_exchange_begin(&exchange, ARDRONE_EXCHANGE_SET, "video:codec_fps",
-                                               "100", NULL, 0));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_ERR_ARGUMENT,
+      ardrone_exchange_begin(&exchange, ARDRONE_EXCHANGE_SET, "video:codec_fps", "100", NULL, 0));
 }
 
 int main(void) {

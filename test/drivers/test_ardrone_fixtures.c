@@ -22,8 +22,7 @@ static void check_every_byte_survives(const char *name) {
   static uint8_t again[ARDRONE_NAVDATA_MAX_BYTES];
   size_t size, size_again;
   uint8_t *bytes = decode_fixture(name, &size);
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        ardrone_encode_navdata(&navdata, again, sizeof again, &size_again));
+  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_navdata(&navdata, again, sizeof again, &size_again));
   TEST_ASSERT_EQUAL_UINT64(size, size_again);
   TEST_ASSERT_EQUAL_MEMORY(bytes, again, size);
   free(bytes);
@@ -75,8 +74,8 @@ static void test_the_landed_packet_has_the_values_of_the_sheet(void) {
   TEST_ASSERT_EQUAL_INT(ARDRONE_GPS_ZIMMU, navdata.gps_form);
 }
 
-/* Gravity alone, so the accelerometer's own angles must be those that the drone made of it: a sign or
-   an axis that is wrong would show. */
+/* Gravity alone, so the accelerometer's own angles must be those that the drone made of it: a sign
+   or an axis that is wrong would show. */
 static void test_the_accelerometer_agrees_with_the_angles_in_the_packet(void) {
   size_t size;
   tvs_imu imu;
@@ -84,8 +83,8 @@ static void test_the_accelerometer_agrees_with_the_angles_in_the_packet(void) {
   free(decode_fixture("navdata/navdata_full_landed_1916.bin", &size));
   imu.struct_size = sizeof imu;
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_navdata_to_imu(&navdata, 0, &imu));
-  TEST_ASSERT_EQUAL_UINT32(TVS_IMU_ATTITUDE | TVS_IMU_ACCELERATION | TVS_IMU_RATE | TVS_IMU_PRESSURE,
-                           imu.valid);
+  TEST_ASSERT_EQUAL_UINT32(
+      TVS_IMU_ATTITUDE | TVS_IMU_ACCELERATION | TVS_IMU_RATE | TVS_IMU_PRESSURE, imu.valid);
   {
     const double *a = imu.acceleration_m_s2;
     TEST_ASSERT_DOUBLE_WITHIN(6e-4, 4.8664, atan2(a[0], hypot(a[1], a[2])) / degree);
@@ -94,7 +93,8 @@ static void test_the_accelerometer_agrees_with_the_angles_in_the_packet(void) {
   {
     /* Where the body's x points, and its y: nose up is -z, right side down is +z. */
     const double *q = imu.attitude.world_from_body;
-    const double nose_z = 2 * (q[1] * q[3] - q[0] * q[2]), right_z = 2 * (q[2] * q[3] + q[0] * q[1]);
+    const double nose_z = 2 * (q[1] * q[3] - q[0] * q[2]),
+                 right_z = 2 * (q[2] * q[3] + q[0] * q[1]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, -sin(2.974 * degree), nose_z);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, sin(0.550 * degree) * cos(2.974 * degree), right_z);
   }
@@ -128,7 +128,8 @@ static void test_the_bootstrap_packet(void) {
   TEST_ASSERT_EQUAL_HEX32(0, navdata.present);
 }
 
-/* A copy that ends where the prefix ends, so that the address sanitizer sees a byte read too far. */
+/* A copy that ends where the prefix ends, so that the address sanitizer sees a byte read too far.
+ */
 static tvs_status decode_copy(const uint8_t *bytes, size_t size) {
   uint8_t *copy = malloc(size ? size : 1);
   tvs_status status;
@@ -205,8 +206,7 @@ static stream_facts parse(const uint8_t *bytes, size_t size, size_t first, size_
   ardrone_pave_gate gate = {0};
   stream_facts facts = {0};
   size_t piece = first;
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        ardrone_pave_init(&parser, video_buffer, sizeof video_buffer));
+  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pave_init(&parser, video_buffer, sizeof video_buffer));
   while (size > 0) {
     size_t room, take;
     uint8_t *to = ardrone_pave_space(&parser, &room);
@@ -289,7 +289,8 @@ static void test_a_stream_split_at_every_byte_gives_the_same_packets(void) {
   free(bytes);
 }
 
-/* A connection that begins in the midst of a packet: from any byte, the parser finds the next one. */
+/* A connection that begins in the midst of a packet: from any byte, the parser finds the next one.
+ */
 static void test_a_stream_joined_at_any_byte_loses_one_packet(void) {
   size_t size, at;
   uint8_t *bytes = fixture_read("video/pave68_h264_360p_5frames.pave", &size);

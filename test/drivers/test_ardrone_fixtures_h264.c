@@ -1,5 +1,5 @@
-/* Every picture of the captures decodes: 517 of 517, 17 of 20 (three come before the first that decoding
-   can begin with), 5 of 5. */
+/* Every picture of the captures decodes: 517 of 517, 17 of 20 (three come before the first that
+   decoding can begin with), 5 of 5. */
 #include <string.h>
 
 #include "support/ardrone_fixtures.h"
@@ -36,8 +36,7 @@ static int decode_all(const char *name) {
   uint8_t *bytes = fixture_read(name, &size);
   int pictures = 0;
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_h264_open(&decoder));
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        ardrone_pave_init(&parser, video_buffer, sizeof video_buffer));
+  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pave_init(&parser, video_buffer, sizeof video_buffer));
   while (at < size) {
     size_t room, take = 1000;
     uint8_t *to = ardrone_pave_space(&parser, &room);

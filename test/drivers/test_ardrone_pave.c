@@ -37,8 +37,8 @@ static void add(uint32_t number, int type, uint32_t payload_size) {
   const ardrone_pave_header h = header_of(number, type, payload_size);
   size_t written;
   memset(payload, (int)number, sizeof payload);
-  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, payload, stream + size,
-                                                    sizeof stream - size, &written));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_OK, ardrone_encode_pave(&h, payload, stream + size, sizeof stream - size, &written));
   size += written;
 }
 
@@ -133,8 +133,7 @@ static void test_absurd_sizes_are_refused(void) {
 static void test_an_advertisement_carries_no_payload(void) {
   ardrone_pave_header h = header_of(1, ARDRONE_PAVE_P, 0);
   size_t written;
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        ardrone_encode_pave(&h, NULL, stream, sizeof stream, &written));
+  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, NULL, stream, sizeof stream, &written));
   stream[31] = ARDRONE_PAVE_ADVERTISEMENT;
   stream[8] = 77; /* the size of what is to come */
   size = written;
@@ -193,12 +192,14 @@ static void test_the_gate_opens_on_idr_and_shuts_on_a_gap(void) {
   ardrone_pave_gate g = {0};
   ardrone_pave_header h;
   TEST_ASSERT_EQUAL_INT(0, gate(&g, 1, ARDRONE_PAVE_P, 100));
-  TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_DECODE | ARDRONE_PAVE_RESET, gate(&g, 2, ARDRONE_PAVE_IDR, 100));
+  TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_DECODE | ARDRONE_PAVE_RESET,
+                        gate(&g, 2, ARDRONE_PAVE_IDR, 100));
   TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_DECODE, gate(&g, 3, ARDRONE_PAVE_P, 100));
   TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_REPEAT, gate(&g, 4, ARDRONE_PAVE_P, 7));
   TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_GAP, gate(&g, 6, ARDRONE_PAVE_P, 100));
   TEST_ASSERT_EQUAL_INT(0, gate(&g, 7, ARDRONE_PAVE_P, 100));
-  TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_DECODE | ARDRONE_PAVE_RESET, gate(&g, 8, ARDRONE_PAVE_IDR, 100));
+  TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_DECODE | ARDRONE_PAVE_RESET,
+                        gate(&g, 8, ARDRONE_PAVE_IDR, 100));
   TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_GAP, gate(&g, 8, ARDRONE_PAVE_P, 100)); /* the same again */
   g.is_open = 1;
   h = header_of(9, ARDRONE_PAVE_P, 100);

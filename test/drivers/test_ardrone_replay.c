@@ -51,7 +51,8 @@ static void record_packet(void *user, const ardrone_pave_packet *packet, const t
   ++num_recorded_packets;
 }
 
-/* Four seconds; `silent_ms` of them, from the second on, without video, the last 250 ms without navdata. */
+/* Four seconds; `silent_ms` of them, from the second on, without video, the last 250 ms without
+ * navdata. */
 static void make_recording(int64_t silent_ms) {
   ardrone_session_options options;
   const ardrone_transport transport = mock_transport(&drone);
@@ -147,7 +148,8 @@ static void test_a_recording_plays_back_whole(void) {
   TEST_ASSERT_EQUAL_INT(0, num_gaps);
 }
 
-/* The session takes the video for dead, and opens it again a moment after the next packet is due. */
+/* The session takes the video for dead, and opens it again a moment after the next packet is due.
+ */
 static void test_a_silence_is_played_over(void) {
   make_recording(1300);
   TEST_ASSERT_TRUE(play() > 3500);

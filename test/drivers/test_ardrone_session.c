@@ -50,8 +50,7 @@ static void start(const ardrone_session_options *options) {
   memory = malloc(size);
   TEST_ASSERT_EQUAL_INT(TVS_ERR_CAPACITY,
                         ardrone_session_init(&session, options, &transport, memory, size - 1));
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        ardrone_session_init(&session, options, &transport, memory, size));
+  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_init(&session, options, &transport, memory, size));
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_frames(session, &frames));
 }
 
@@ -108,7 +107,7 @@ static void test_it_ends_the_bootstrap_and_asks_for_nothing_else(void) {
   TEST_ASSERT_EQUAL_INT(2, drone.num_configs);
   TEST_ASSERT_EQUAL_STRING("general:navdata_options", drone.last_key);
   TEST_ASSERT_EQUAL_INT(0, drone.num_refs + drone.num_pcmds); /* nobody asked to fly */
-  TEST_ASSERT_TRUE(drone.num_commands > 30); /* and yet the watchdog is content */
+  TEST_ASSERT_TRUE(drone.num_commands > 30);                  /* and yet the watchdog is content */
   TEST_ASSERT_NOT_NULL(ardrone_session_navdata(session));
   TEST_ASSERT_EQUAL_UINT32(77, ardrone_session_navdata(session)->demo.battery_percent);
 }
@@ -140,8 +139,8 @@ static void test_the_configuration_is_read(void) {
   run_ms(1500);
   TEST_ASSERT_EQUAL_INT(1, num_events[ARDRONE_EVENT_CONFIG]);
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_text(session, &text, &size));
-  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_config_find(text, size, "general:num_version_soft", value,
-                                                    sizeof value));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_OK, ardrone_config_find(text, size, "general:num_version_soft", value, sizeof value));
   TEST_ASSERT_EQUAL_STRING("2.4.8", value);
   TEST_ASSERT_EQUAL_INT(0, drone.control_open);
 }
@@ -257,7 +256,8 @@ static void test_reading_too_slowly_drops_the_oldest_and_says_so(void) {
   TEST_ASSERT_TRUE(counters.frames_dropped >= 10);
 }
 
-/* Nobody steps for two seconds; the pictures that have piled up are worth nothing but for the last group. */
+/* Nobody steps for two seconds; the pictures that have piled up are worth nothing but for the last
+ * group. */
 static void test_the_latency_rule_drops_what_piled_up(void) {
   ardrone_session_options options = default_options();
   ardrone_counters counters;
@@ -290,17 +290,18 @@ typedef struct frame_check {
 } frame_check;
 
 static void check_frame(frame_check *c, const tvs_frame *frame) {
-  const int follows = c->num > 0 && frame->number == c->last_number + 1 &&
-                      frame->time.clock_id == c->last_clock;
+  const int follows =
+      c->num > 0 && frame->number == c->last_number + 1 && frame->time.clock_id == c->last_clock;
   ++c->num;
   TEST_ASSERT_TRUE(c->num == 1 || follows || (frame->flags & TVS_FRAME_GAP) != 0);
   c->num_gaps += (frame->flags & TVS_FRAME_GAP) != 0;
   c->last_number = frame->number;
   c->last_clock = frame->time.clock_id;
   if (frame->flags & TVS_FRAME_HAS_ATTITUDE) {
-    const double device_s = (double)frame->time.device_ns * 1e-9 - (drone.clocks_differ ? 987.654 : 0);
-    const double yaw = 2 * atan2(frame->attitude.world_from_body[3],
-                                 frame->attitude.world_from_body[0]);
+    const double device_s =
+        (double)frame->time.device_ns * 1e-9 - (drone.clocks_differ ? 987.654 : 0);
+    const double yaw =
+        2 * atan2(frame->attitude.world_from_body[3], frame->attitude.world_from_body[0]);
     const double error =
         fabs(remainder(yaw + psi0 - mock_yaw(&drone, device_s), 6.283185307179586));
     ++c->with_attitude;
@@ -340,12 +341,12 @@ static void test_ten_minutes_of_a_bad_link(void) {
     }
   }
   ardrone_session_counters(session, &counters);
-  printf("pictures %d, with attitude %d, gaps %d, worst attitude error %.5f rad; commands %llu, "
-         "links %llu, reboots %llu, late %llu, missing %llu\n",
-         c.num, c.with_attitude, c.num_gaps, c.worst_error,
-         (unsigned long long)counters.commands_sent, (unsigned long long)counters.links,
-         (unsigned long long)counters.reboots, (unsigned long long)counters.navdata_late,
-         (unsigned long long)counters.navdata_missing);
+  printf(
+      "pictures %d, with attitude %d, gaps %d, worst attitude error %.5f rad; commands %llu, "
+      "links %llu, reboots %llu, late %llu, missing %llu\n",
+      c.num, c.with_attitude, c.num_gaps, c.worst_error, (unsigned long long)counters.commands_sent,
+      (unsigned long long)counters.links, (unsigned long long)counters.reboots,
+      (unsigned long long)counters.navdata_late, (unsigned long long)counters.navdata_missing);
   TEST_ASSERT_TRUE(c.num > 17500);
   TEST_ASSERT_TRUE(c.with_attitude > 0.98 * c.num);
   TEST_ASSERT_TRUE(c.worst_error < 0.005); /* 1 ms stamps at 1 rad/s, and samples 5 ms apart */
@@ -387,8 +388,8 @@ static void test_bad_arguments(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_NULL,
                         ardrone_session_init(&session, &options, NULL, buffer, sizeof buffer));
   transport.send = NULL;
-  TEST_ASSERT_EQUAL_INT(TVS_ERR_NULL,
-                        ardrone_session_init(&session, &options, &transport, buffer, sizeof buffer));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_ERR_NULL, ardrone_session_init(&session, &options, &transport, buffer, sizeof buffer));
   start_default();
   step();
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, ardrone_session_step(session, now - 1));

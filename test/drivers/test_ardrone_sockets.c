@@ -57,13 +57,14 @@ static void test_datagrams_go_out_and_only_the_host_is_heard(void) {
   const int host = bound(SOCK_DGRAM, "127.0.0.1", &port);
   const int stranger = bound(SOCK_DGRAM, "127.0.0.2", &stranger_port);
   sockets.port[ARDRONE_CHANNEL_NAVDATA] = port;
-  TEST_ASSERT_EQUAL_INT(TVS_ERR_IO, transport.send(transport.user, ARDRONE_CHANNEL_NAVDATA, "x", 1));
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_IO,
+                        transport.send(transport.user, ARDRONE_CHANNEL_NAVDATA, "x", 1));
   TEST_ASSERT_EQUAL_INT(TVS_OK, transport.open(transport.user, ARDRONE_CHANNEL_NAVDATA, 0));
   TEST_ASSERT_EQUAL_INT(TVS_NONE, transport.receive(transport.user, ARDRONE_CHANNEL_NAVDATA, bytes,
                                                     sizeof bytes, &size));
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        transport.send(transport.user, ARDRONE_CHANNEL_NAVDATA, "wake", 4));
-  TEST_ASSERT_EQUAL_INT(4, recvfrom(host, bytes, sizeof bytes, 0, (struct sockaddr *)&client, &length));
+  TEST_ASSERT_EQUAL_INT(TVS_OK, transport.send(transport.user, ARDRONE_CHANNEL_NAVDATA, "wake", 4));
+  TEST_ASSERT_EQUAL_INT(
+      4, recvfrom(host, bytes, sizeof bytes, 0, (struct sockaddr *)&client, &length));
   TEST_ASSERT_EQUAL_INT(5, sendto(stranger, "false", 5, 0, (struct sockaddr *)&client, length));
   TEST_ASSERT_EQUAL_INT(4, sendto(host, "true", 4, 0, (struct sockaddr *)&client, length));
   TEST_ASSERT_EQUAL_INT(TVS_OK, receive_soon(ARDRONE_CHANNEL_NAVDATA, bytes, sizeof bytes, &size));
@@ -110,8 +111,8 @@ static void test_the_loop_ends_in_time(void) {
   int64_t begin, took;
   int asked = 0;
   ardrone_session_options_init(&options);
-  TEST_ASSERT_EQUAL_INT(TVS_OK,
-                        ardrone_session_init(&session, &options, &transport, memory, sizeof memory));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_OK, ardrone_session_init(&session, &options, &transport, memory, sizeof memory));
   begin = ardrone_now_ns();
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_run(session, begin + 200000000, NULL, NULL));
   took = (ardrone_now_ns() - begin) / 1000000;
@@ -122,8 +123,7 @@ static void test_the_loop_ends_in_time(void) {
 }
 
 static void test_hosts_that_do_not_exist(void) {
-  TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT,
-                        ardrone_sockets_init(&sockets, "256.1.1.1.", &transport));
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, ardrone_sockets_init(&sockets, "256.1.1.1.", &transport));
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, ardrone_sockets_init(&sockets, "", &transport));
   TEST_ASSERT_EQUAL_INT(TVS_ERR_NULL, ardrone_sockets_init(&sockets, NULL, &transport));
 }

@@ -30,8 +30,8 @@ static tvs_time observe(tvs_clock *clock, int64_t device, int64_t host) {
   return time;
 }
 
-/* Two hours of packets with random delays and a drift of 50 ppm: across three wraps and a silence of 50
-   minutes, the host time is right within the stated uncertainty. */
+/* Two hours of packets with random delays and a drift of 50 ppm: across three wraps and a silence
+   of 50 minutes, the host time is right within the stated uncertainty. */
 static void test_unwrapped_and_mapped_within_its_uncertainty(void) {
   tvs_clock clock = mapper();
   uint32_t seed = 12345;
@@ -73,7 +73,7 @@ static void test_a_reboot_or_jump_is_another_clock(void) {
   uint32_t id;
   int64_t uncertainty;
   observe(&clock, 500 * S, 100 * S);
-  TEST_ASSERT_EQUAL_UINT32(3, observe(&clock, 2 * S, 101 * S).clock_id); /* back to its start */
+  TEST_ASSERT_EQUAL_UINT32(3, observe(&clock, 2 * S, 101 * S).clock_id);  /* back to its start */
   TEST_ASSERT_EQUAL_UINT32(5, observe(&clock, 60 * S, 102 * S).clock_id); /* ahead of what can be */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_clock_to_host(&clock, 3, 2 * S, &host, &uncertainty));
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_clock_to_host(&clock, 5, 61 * S, &host, &uncertainty));
@@ -163,7 +163,8 @@ static void test_bad_attitudes_are_refused(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, tvs_attitudes_add(&history, 0, &a));
 }
 
-/* Slerp takes the short way and halves the angle, also between nearly equal and nearly opposite ones. */
+/* Slerp takes the short way and halves the angle, also between nearly equal and nearly opposite
+ * ones. */
 static void test_slerp(void) {
   const double angles[] = {1e-9, 1e-5, 0.1, 1.0, 3.0};
   size_t k;
@@ -178,7 +179,8 @@ static void test_slerp(void) {
 
 static void test_euler_angles_turn_as_documented(void) {
   double q[4];
-  tvs_quaternion_from_euler(0, 0.3, 0, q); /* nose up: the body's x points against z, which is down */
+  tvs_quaternion_from_euler(0, 0.3, 0,
+                            q); /* nose up: the body's x points against z, which is down */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -sin(0.3), 2 * (q[1] * q[3] - q[0] * q[2]));
   tvs_quaternion_from_euler(0, 0, 0.3, q); /* right side down: the body's y points along z */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, sin(0.3), 2 * (q[2] * q[3] + q[0] * q[1]));
@@ -235,8 +237,8 @@ static void test_the_file_source(void) {
   options.release = release_picture;
   options.frames_per_second = 10;
   options.imu = &imu;
-  TEST_ASSERT_EQUAL_INT(TVS_ERR_CAPACITY,
-                        tvs_file_source_init(memory, tvs_file_source_size() - 1, &options, &source));
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_CAPACITY, tvs_file_source_init(memory, tvs_file_source_size() - 1,
+                                                               &options, &source));
   TEST_ASSERT_EQUAL_INT(TVS_OK,
                         tvs_file_source_init(memory, tvs_file_source_size(), &options, &source));
   frame.struct_size = sizeof frame;

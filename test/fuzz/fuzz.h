@@ -15,12 +15,12 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 // In every build: the fuzzer keeps the input that ends here.
-#define FUZZ_REQUIRE(condition)                                             \
-  do {                                                                      \
-    if (!(condition)) {                                                     \
+#define FUZZ_REQUIRE(condition)                                            \
+  do {                                                                     \
+    if (!(condition)) {                                                    \
       std::fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
-      std::abort();                                                         \
-    }                                                                       \
+      std::abort();                                                        \
+    }                                                                      \
   } while (0)
 
 namespace fuzz {

@@ -1,5 +1,5 @@
-// Commands with any arguments: each is written whole, as the protocol has it, or refused; a refused one
-// leaves the datagram and its number as they were.
+// Commands with any arguments: each is written whole, as the protocol has it, or refused; a refused
+// one leaves the datagram and its number as they were.
 #include <string>
 
 #include "fuzz.h"
@@ -8,12 +8,13 @@
 namespace {
 
 tvs_status write_one(ardrone_at* at, fuzz::Bytes& bytes) {
-  const ardrone_move move = {bytes.raw<float>(), static_cast<float>(bytes.wild(-1.2, 1.2)), bytes.raw<float>(),
-                             static_cast<float>(bytes.wild(-1.2, 1.2))};
+  const ardrone_move move = {bytes.raw<float>(), static_cast<float>(bytes.wild(-1.2, 1.2)),
+                             bytes.raw<float>(), static_cast<float>(bytes.wild(-1.2, 1.2))};
   const int a = bytes.raw<int32_t>(), b = bytes.raw<int32_t>();
   std::string text[3];
   for (std::string& t : text) {
-    for (int k = bytes.raw<uint8_t>() % 12; k > 0; --k) t += static_cast<char>(bytes.raw<uint8_t>());
+    for (int k = bytes.raw<uint8_t>() % 12; k > 0; --k)
+      t += static_cast<char>(bytes.raw<uint8_t>());
   }
   int32_t numbers[24];
   for (int32_t& number : numbers) number = a ^ b;
@@ -38,7 +39,8 @@ void check_line(const std::string& line, int32_t number) {
   FUZZ_REQUIRE(line.compare(0, 3, "AT*") == 0 && line.back() == '\r');
   const size_t equals = line.find('=');
   FUZZ_REQUIRE(equals != std::string::npos);
-  FUZZ_REQUIRE(line.compare(equals + 1, std::to_string(number).size(), std::to_string(number)) == 0);
+  FUZZ_REQUIRE(line.compare(equals + 1, std::to_string(number).size(), std::to_string(number)) ==
+               0);
   int quotes = 0;
   for (size_t k = 0; k + 1 < line.size(); ++k) {
     FUZZ_REQUIRE(static_cast<unsigned char>(line[k]) >= 32);

@@ -1,5 +1,5 @@
-// Configuration and id texts of any bytes; keys and values of any bytes, which become a command or are
-// refused, but never two commands.
+// Configuration and id texts of any bytes; keys and values of any bytes, which become a command or
+// are refused, but never two commands.
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -48,7 +48,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   char number[40];
   const double value = bytes.wild(-1e9, 1e9);
   if (ardrone_format_number(value, bytes.whole(0, 9), number, sizeof number) == TVS_OK) {
-    FUZZ_REQUIRE(std::strtod(number, nullptr) - value < 1 && value - std::strtod(number, nullptr) < 1);
+    FUZZ_REQUIRE(std::strtod(number, nullptr) - value < 1 &&
+                 value - std::strtod(number, nullptr) < 1);
   }
   return 0;
 }

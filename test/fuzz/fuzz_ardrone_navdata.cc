@@ -1,5 +1,6 @@
-// Navdata: any bytes are a packet, or refused; what is read survives encoding, and nothing that is not a
-// number comes out in SI units. The checksum is put right most times, else nothing would get past it.
+// Navdata: any bytes are a packet, or refused; what is read survives encoding, and nothing that is
+// not a number comes out in SI units. The checksum is put right most times, else nothing would get
+// past it.
 #include <vector>
 
 #include "encode.h"
@@ -12,8 +13,14 @@ void mend_checksum(std::vector<uint8_t>& bytes) {
   const size_t at = bytes.size() - 8;
   uint32_t sum = 0;
   for (size_t k = 0; k < at; ++k) sum += bytes[k];
-  const uint8_t option[8] = {0xff, 0xff, 8, 0, static_cast<uint8_t>(sum),
-                             static_cast<uint8_t>(sum >> 8), static_cast<uint8_t>(sum >> 16), 0};
+  const uint8_t option[8] = {0xff,
+                             0xff,
+                             8,
+                             0,
+                             static_cast<uint8_t>(sum),
+                             static_cast<uint8_t>(sum >> 8),
+                             static_cast<uint8_t>(sum >> 16),
+                             0};
   std::memcpy(bytes.data() + at, option, sizeof option);
 }
 
@@ -34,7 +41,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static ardrone_navdata navdata, again;
   static ardrone_sequence sequence;
   if (size == 0) return 0;
-  std::vector<uint8_t> bytes(data + 1, data + size); // ends where it ends: the sanitizer watches
+  std::vector<uint8_t> bytes(data + 1, data + size);  // ends where it ends: the sanitizer watches
   if (data[0] < 240) mend_checksum(bytes);
   if (ardrone_navdata_decode(bytes.data(), bytes.size(), &navdata) != TVS_OK) return 0;
   ardrone_sequence_check(&sequence, &navdata);

@@ -1,5 +1,5 @@
-// PaVE: any stream, split as the input says, gives the packets of the stream in one piece; none lies
-// outside the bytes that were fed.
+// PaVE: any stream, split as the input says, gives the packets of the stream in one piece; none
+// lies outside the bytes that were fed.
 #include <vector>
 
 #include "fuzz.h"
@@ -59,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   for (size_t at = 0; at < size;) at += whole.feed(data + at, size - at);
   for (size_t at = 0; at < size;) {
-    if (skips) ardrone_pave_skip_to_latest(&split.parser); // nothing whole is left after a drain
+    if (skips) ardrone_pave_skip_to_latest(&split.parser);  // nothing whole is left after a drain
     at += split.feed(data + at, size - at < piece ? size - at : piece);
   }
   FUZZ_REQUIRE(whole.seen == split.seen);

@@ -1,5 +1,5 @@
-// A session against a drone that sends anything at any time: no take-off that was not asked for, no command
-// number falling within a link, every datagram whole, every picture given back.
+// A session against a drone that sends anything at any time: no take-off that was not asked for, no
+// command number falling within a link, every datagram whole, every picture given back.
 #include <cstdlib>
 #include <string>
 
@@ -127,9 +127,15 @@ void act(ardrone_session* session, Drone* drone, fuzz::Bytes* bytes) {
   const ardrone_move move = {bytes->raw<float>(), bytes->raw<float>(), 0, 0};
   switch (bytes->raw<uint8_t>() % 24) {
     case 0: drone->may_fly |= ardrone_session_take_off(session) == TVS_OK; break;
-    case 1: ardrone_session_land(session); drone->may_fly = false; break;
+    case 1:
+      ardrone_session_land(session);
+      drone->may_fly = false;
+      break;
     case 2: ardrone_session_move(session, &move); break;
-    case 3: ardrone_session_cut_motors(session); drone->may_fly = false; break;
+    case 3:
+      ardrone_session_cut_motors(session);
+      drone->may_fly = false;
+      break;
     case 4: ardrone_session_rearm(session); break;
     case 5: ardrone_session_flat_trim(session); break;
     case 6: ardrone_session_read_config(session); break;
@@ -147,7 +153,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   Drone drone;
   drone.bytes = &bytes;
   const tvs_decoder decoder = {sizeof decoder, &drone, decode, release, reset};
-  const ardrone_transport transport = {sizeof transport, &drone, open, send, receive, close, nullptr};
+  const ardrone_transport transport = {sizeof transport, &drone, open,   send,
+                                       receive,          close,  nullptr};
   ardrone_session_options options;
   ardrone_session_options_init(&options);
   options.user = &drone;
@@ -159,7 +166,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   options.skip_to_latest = choice >> 2 & 1;
   options.queue_frames = choice >> 3 & 3;
   ardrone_session* session;
-  FUZZ_REQUIRE(ardrone_session_init(&session, &options, &transport, memory, sizeof memory) == TVS_OK);
+  FUZZ_REQUIRE(ardrone_session_init(&session, &options, &transport, memory, sizeof memory) ==
+               TVS_OK);
   int64_t now = 0;
   while (bytes.left() > 0) {
     act(session, &drone, &bytes);

@@ -12,9 +12,10 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   for (double& value : q) value = bytes.between(-1, 1), norm += value * value;
   norm = std::sqrt(norm > 0 ? norm : 1);
   const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
-  const double rotation[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-                              2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                              2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
+  const double rotation[9] = {
+      1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
   std::memcpy(R, rotation, sizeof R);
   if (bytes.whole(0, 15) == 0)
     for (double& value : R) value = bytes.wild(-1, 1);

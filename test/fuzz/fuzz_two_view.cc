@@ -78,9 +78,9 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   tv_status status[2];
   for (int swap = 0; swap < 2; ++swap) {
     tv_two_view_init(&result[swap]);
-    status[swap] = tv_estimate_two_view(context, given[swap], given[1 - swap], pixels[swap],
-                                        pixels[1 - swap], ratios, count, &options, &result[swap],
-                                        mask[swap]);
+    status[swap] =
+        tv_estimate_two_view(context, given[swap], given[1 - swap], pixels[swap], pixels[1 - swap],
+                             ratios, count, &options, &result[swap], mask[swap]);
     if (status[swap] == TV_OK) require_sound(result[swap], mask[swap], count);
     if (options.gravity_sigma_rad != 0) return 0;  // gravity belongs to its view
   }

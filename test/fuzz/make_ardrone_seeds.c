@@ -52,8 +52,9 @@ static size_t make_stream(uint8_t *to, size_t capacity) {
 
 int main(int argc, char **argv) {
   static uint8_t bytes[ARDRONE_NAVDATA_MAX_BYTES];
-  static const char text[] = "general:navdata_demo = TRUE\nvideo:codec_fps = 30\n[applis]\r"
-                             "0a1b2c3d,name\r";
+  static const char text[] =
+      "general:navdata_demo = TRUE\nvideo:codec_fps = 30\n[applis]\r"
+      "0a1b2c3d,name\r";
   if (argc != 2) return 2;
   return !(write_seed(argv[1], "ardrone_navdata/full_zimmu", bytes,
                       make_navdata(ARDRONE_GPS_ZIMMU, bytes, sizeof bytes)) &&

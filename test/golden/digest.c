@@ -3,8 +3,8 @@
 
    digest PAIR...   for each pair and each kernel set of this CPU: `pair set part digest`, a part
                     being the outputs of a few calls
-   PAIR is what determinism.py writes: a line of text, `width height`, a line of numbers for each camera
-   (fx fy cx cy k1 k2 p1 p2 k3), and the bytes of both images.
+   PAIR is what determinism.py writes: a line of text, `width height`, a line of numbers for each
+   camera (fx fy cx cy k1 k2 p1 p2 k3), and the bytes of both images.
 
    Values are digested field by field (padding is nobody's), floating point as its bits. */
 #include <math.h>
@@ -162,8 +162,7 @@ static void add_camera(const tv_camera *camera) {
   }
   must("valid_angle", tv_camera_valid_angle(camera, &angle));
   add_double(angle);
-  must("unproject_points",
-       tv_camera_unproject_points(camera, pixels[0], 64, rays[0], inside));
+  must("unproject_points", tv_camera_unproject_points(camera, pixels[0], 64, rays[0], inside));
   add_doubles(rays[0], sizeof rays / sizeof(double));
   add_bytes(inside, sizeof inside);
   for (k = 0; k < 64; ++k) {
@@ -291,8 +290,8 @@ static double uniform(uint64_t *seed, double low, double high) {
   return low + (high - low) * (double)(*seed >> 33) / 2147483648.0;
 }
 
-/* Simulated matches of one camera that turns by 23 degrees and moves, its principal point told wrongly, which
-   the matches must find: few real pairs turn enough. A pinhole, then a lens. */
+/* Simulated matches of one camera that turns by 23 degrees and moves, its principal point told
+   wrongly, which the matches must find: few real pairs turn enough. A pinhole, then a lens. */
 static void digest_principal_point(const pair *p, tv_context *context) {
   static matched m;
   const double cosine = 0.96 / 1.04, sine = 0.4 / 1.04; /* t = 0.2 in (1 - t^2, 2 t) / (1 + t^2) */
@@ -379,17 +378,17 @@ static void digest_guided(const pair *p, tv_context *context, const features *f,
 
 static void digest_points(const pair *p, tv_context *context, const matched *m,
                           const tv_two_view *pose, tv_point *points) {
-  static const char *const names[NUM_METHODS] = {
-      "poly",       "poly_abs", "linear_eigen", "linear_ls", "iterative_eigen", "iterative_ls",
-      "midpoint"};
+  static const char *const names[NUM_METHODS] = {"poly",      "poly_abs",        "linear_eigen",
+                                                 "linear_ls", "iterative_eigen", "iterative_ls",
+                                                 "midpoint"};
   static double corrected[2][2 * MAX_KEYPOINTS], covariances[9 * MAX_KEYPOINTS];
   uint8_t valid[MAX_KEYPOINTS];
   int32_t method;
   for (method = 0; method < NUM_METHODS; ++method) {
     start();
-    must("triangulate", tv_triangulate((tv_triangulation)method, &p->camera[0], &p->camera[1],
-                                       pose->R, pose->t, m->pixels[0], m->pixels[1], m->count,
-                                       points));
+    must("triangulate",
+         tv_triangulate((tv_triangulation)method, &p->camera[0], &p->camera[1], pose->R, pose->t,
+                        m->pixels[0], m->pixels[1], m->count, points));
     add_points(points, m->count);
     if (method <= TV_TRIANGULATION_POLY_ABS) {
       must("correct_matches",
@@ -403,10 +402,9 @@ static void digest_points(const pair *p, tv_context *context, const matched *m,
     print(p, context, names[method]);
   }
   start();
-  must("point_covariances",
-       tv_point_covariances(&p->camera[0], &p->camera[1], pose->R, pose->t,
-                            pose->has_covariance ? pose->covariance : NULL, 0.5, points, m->count,
-                            covariances));
+  must("point_covariances", tv_point_covariances(&p->camera[0], &p->camera[1], pose->R, pose->t,
+                                                 pose->has_covariance ? pose->covariance : NULL,
+                                                 0.5, points, m->count, covariances));
   add_doubles(covariances, 9 * (size_t)m->count);
   print(p, context, "point_covariances");
 }

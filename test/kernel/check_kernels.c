@@ -56,9 +56,9 @@ static void release(trial *t) {
 
 #define INPUT(t, type, count) ((type *)take(t, (size_t)(count) * sizeof(type), sizeof(type), 0))
 #define OUTPUT(t, type, count) ((type *)take(t, (size_t)(count) * sizeof(type), sizeof(type), 1))
-#define REPEAT(t, call)                          \
-  do {                                           \
-    int64_t left_;                               \
+#define REPEAT(t, call)                                \
+  do {                                                 \
+    int64_t left_;                                     \
     for (left_ = (t)->calls; left_ > 0; --left_) call; \
   } while (0)
 
@@ -74,7 +74,7 @@ static void fill_bytes(trial *t, uint8_t *bytes, int32_t count) {
   int32_t k;
   for (k = 0; k < count; ++k) {
     const int32_t noise = random_int(&t->seed, 0, 255);
-    bytes[k] = (uint8_t)(kind == 0 ? noise
+    bytes[k] = (uint8_t)(kind == 0   ? noise
                          : kind == 1 ? (noise & 1) * 255
                          : kind == 2 ? base
                                      : base + k / 4 + (noise & 3));
@@ -225,7 +225,11 @@ static void case_sample_patch(trial *t) {
 }
 
 /* Samples as sample_patch makes them, from -LOWEST_SAMPLE to LARGEST_SAMPLE. */
-enum { LOWEST_SAMPLE = 8065, LARGEST_SAMPLE = 8001, SAMPLE_RANGE = LOWEST_SAMPLE + LARGEST_SAMPLE + 1 };
+enum {
+  LOWEST_SAMPLE = 8065,
+  LARGEST_SAMPLE = 8001,
+  SAMPLE_RANGE = LOWEST_SAMPLE + LARGEST_SAMPLE + 1
+};
 
 static const int16_t *random_patch(trial *t, int32_t num_rows) {
   const int32_t kind = random_int(&t->seed, 0, 4), base = random_int(&t->seed, 0, 8000);
@@ -239,7 +243,8 @@ static const int16_t *random_patch(trial *t, int32_t num_rows) {
                           : kind == 1 ? (noise & 1) * (SAMPLE_RANGE - 1)
                           : kind == 2 ? base + noise % 3
                           : kind == 3 ? ((x + y) & 1) * (SAMPLE_RANGE - 1)
-                                      : (y * 531 + x * 257) % SAMPLE_RANGE) - LOWEST_SAMPLE);
+                                      : (y * 531 + x * 257) % SAMPLE_RANGE) -
+                         LOWEST_SAMPLE);
   }
   patch[size] = 0;
   return patch;
@@ -398,7 +403,8 @@ static void case_pose_squares(trial *t) {
 static void case_transfer_squares(trial *t) {
   const match_arrays a = take_matches(t);
   double *squares = OUTPUT(t, double, a.count);
-  REPEAT(t, t->set->transfer_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
+  REPEAT(t,
+         t->set->transfer_squares(a.read, a.indices, a.first, a.count, a.on_plane, a.m, squares));
 }
 
 typedef void sums_kernel(const double *const *, const int32_t *, int32_t, int32_t, int32_t,
@@ -407,7 +413,7 @@ typedef void sums_kernel(const double *const *, const int32_t *, int32_t, int32_
 static void check_sums(trial *t, sums_kernel *kernel, int32_t num_sums) {
   const match_arrays a = take_matches(t);
   const int32_t cauchy = random_int(&t->seed, 0, 1);
-  double *sums = OUTPUT(t, double, num_sums * TVK_WIDTH);
+  double *sums = OUTPUT(t, double, num_sums *TVK_WIDTH);
   int32_t k;
   for (k = 0; k < num_sums * TVK_WIDTH; ++k) sums[k] = k / TVK_WIDTH == num_sums - 1;
   REPEAT(t, kernel(a.read, a.indices, a.first, a.count, a.on_plane, a.m, 1.0, cauchy, sums));
@@ -441,7 +447,7 @@ static void case_sampson_score(trial *t) {
   }
   for (k = 0; k < 9; ++k) m[k] = (float)(2 * random_unit(&t->seed) - 1);
   REPEAT(t, *score = t->set->sampson_score(read, first_block, num_blocks - first_block, on_plane, m,
-                                          inverse_sq));
+                                           inverse_sq));
 }
 
 /* Rays of random points seen from two places, some samples degenerate: equal matches, zeros. */
@@ -460,8 +466,10 @@ static void case_relpose_5pt(trial *t) {
       for (c = 0; c < 3; ++c) {
         const double x = c == 2 ? depth : depth * span * (2 * random_unit(&t->seed) - 1);
         rays[TVK_WIDTH * (6 * k + c) + s] = kind == 0 ? 0 : kind == 1 ? 1 : x;
-        rays[TVK_WIDTH * (6 * k + 3 + c) + s] =
-            kind == 0 ? 0 : kind == 1 ? 1 : kind == 2 ? x : x + move[c];
+        rays[TVK_WIDTH * (6 * k + 3 + c) + s] = kind == 0   ? 0
+                                                : kind == 1 ? 1
+                                                : kind == 2 ? x
+                                                            : x + move[c];
       }
     }
   }
@@ -505,9 +513,10 @@ static void case_triangulate(trial *t) {
     }
     for (c = 0; c < 2; ++c) {
       const double noise = kind == 2 ? 100 : 1;
-      pixels0[2 * k + c] = pair->focal[c] * X[c] / X[2] + pair->principal[c] + random_unit(&t->seed);
-      pixels1[2 * k + c] = pair->focal[2 + c] * Y[c] / Y[2] + pair->principal[2 + c] +
-                           noise * random_unit(&t->seed);
+      pixels0[2 * k + c] =
+          pair->focal[c] * X[c] / X[2] + pair->principal[c] + random_unit(&t->seed);
+      pixels1[2 * k + c] =
+          pair->focal[2 + c] * Y[c] / Y[2] + pair->principal[2 + c] + noise * random_unit(&t->seed);
     }
     if (kind == 3) pixels0[2 * k] = random_int(&t->seed, 0, 1) ? 1e200 : NAN;
   }
@@ -562,7 +571,8 @@ static void check(const char *name, void (*run)(trial *)) {
   uint64_t seed;
   for (n = 0; tvk_nth(n) != NULL; ++n) {
     for (seed = 0; seed < ROUNDS; ++seed) {
-      trial expected = make_trial(tvk_nth(0), seed, 0, 1), actual = make_trial(tvk_nth(n), seed, 0, 1);
+      trial expected = make_trial(tvk_nth(0), seed, 0, 1),
+            actual = make_trial(tvk_nth(n), seed, 0, 1);
       const char *what;
       run(&expected);
       run(&actual);

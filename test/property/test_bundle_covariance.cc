@@ -76,12 +76,11 @@ void pose_error(const double R[9], const double t[3], double error[5]) {
   error[4] = truth.dot(b2) / truth.dot(u);
 }
 
-void add_points(const double R[9], const double t[3], const double* pose_covariance,
-                Count* count) {
+void add_points(const double R[9], const double t[3], const double* pose_covariance, Count* count) {
   const Options& o = pair.options;
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_point_covariances(&o.camera[0], &o.camera[1], R, t, pose_covariance,
-                                             kNoise, points, o.num, covariances));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_point_covariances(&o.camera[0], &o.camera[1], R, t, pose_covariance, kNoise, points,
+                                  o.num, covariances));
   for (int i = 0; i < o.num; ++i) {
     if (pair.outlier[i]) continue;
     if (points[i].status != TV_POINT_OK) {

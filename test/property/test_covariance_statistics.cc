@@ -3,9 +3,8 @@
 // of them wrong, three lenses (support/pair_kinds.h).
 // TWOVIEW_PAIRS: pairs of each class, default 300; scripts/statistics takes 10000. TWOVIEW_SEED
 // moves them.
-#include <cstdlib>
-
 #include <Eigen/Cholesky>
+#include <cstdlib>
 
 #include "support/estimator.h"
 #include "support/pair_kinds.h"
@@ -13,9 +12,9 @@
 
 namespace {
 
+using scene::Vec5;
 using tv::Mat3;
 using tv::Vec3;
-using scene::Vec5;
 using Mat5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
 
 enum Class { kGeneral, kSideways, kForward, kLowParallax, kPlanar, kNumClasses };
@@ -70,7 +69,8 @@ bool draw_pair(pair_kinds::Maker& maker, Class which) {
 void test_the_ellipsoid_of_95_per_cent_holds_the_truth(void) {
   int share_wrong = 0;
   const char* only = std::getenv("TWOVIEW_KIND");
-  std::printf("%-24s %6s %10s %12s %8s\n", "class", "pairs", "within [%]", "mean e'C^-1e", "no cov.");
+  std::printf("%-24s %6s %10s %12s %8s\n", "class", "pairs", "within [%]", "mean e'C^-1e",
+              "no cov.");
   for (int which = 0; which < kNumClasses; ++which) {
     if (only != nullptr && which != std::atoi(only)) continue;
     int within = 0, total = 0, absent = 0;
@@ -120,9 +120,7 @@ void test_the_ellipsoid_of_95_per_cent_holds_the_truth(void) {
 
 }  // namespace
 
-void setUp(void) {
-  context = estimator::make_context(pair_kinds::kMaxMatches);
-}
+void setUp(void) { context = estimator::make_context(pair_kinds::kMaxMatches); }
 
 void tearDown(void) {}
 

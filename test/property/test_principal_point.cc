@@ -1,5 +1,5 @@
-// A principal point that is not where the camera says: what the matches tell of it, what the pose gains,
-// whether the covariance stays honest, and that nothing moves where nothing is wrong.
+// A principal point that is not where the camera says: what the matches tell of it, what the pose
+// gains, whether the covariance stays honest, and that nothing moves where nothing is wrong.
 // TWOVIEW_PAIRS: pairs of each case, default 300.
 #include <cmath>
 #include <cstdlib>
@@ -22,7 +22,8 @@ int num_pairs = 300;
 api_context api;
 scene::Scene pair;
 
-// Turns and parallax that tell a principal point: a turn of 0.2 to 0.5 rad, depths of 2 to 8 baselines.
+// Turns and parallax that tell a principal point: a turn of 0.2 to 0.5 rad, depths of 2 to 8
+// baselines.
 void make_pair(int k, int num, const tv_camera& camera0, const tv_camera& camera1) {
   scene::Options options;
   options.num = num;
@@ -100,9 +101,11 @@ void compare(const char* title, const tv_camera& right, double most_error_px, do
     TEST_ASSERT_TRUE(corrected.cx == told.cx + freed.principal_point_shift[0] &&
                      corrected.cy == told.cy + freed.principal_point_shift[1]);
   }
-  std::printf("%s: %d of %d moved, %.1f px from the truth on average, mean error %.3f deg (%.3f with "
-              "sigma 0), truth within the 95 %% ellipsoid in %.1f %%\n", title, shifts, num_pairs, off / shifts,
-              sum[1] / num_pairs, sum[0] / num_pairs, 100.0 * within / shifts);
+  std::printf(
+      "%s: %d of %d moved, %.1f px from the truth on average, mean error %.3f deg (%.3f with "
+      "sigma 0), truth within the 95 %% ellipsoid in %.1f %%\n",
+      title, shifts, num_pairs, off / shifts, sum[1] / num_pairs, sum[0] / num_pairs,
+      100.0 * within / shifts);
   TEST_ASSERT_TRUE(shifts > num_pairs / 8);
   TEST_ASSERT_TRUE(off / shifts < most_error_px);
   TEST_ASSERT_TRUE(sum[1] < least_gain * sum[0]);
@@ -127,13 +130,15 @@ void test_two_cameras_are_taken_as_they_are(void) {
   }
 }
 
-// A hundred pixels are no calibration's error: whatever the matches ask for, six sigmas are the most.
+// A hundred pixels are no calibration's error: whatever the matches ask for, six sigmas are the
+// most.
 void test_a_camera_that_is_not_this_one_stays(void) {
   const tv_camera right = scene::pinhole(), told = moved(right, 100, 60);
   for (int k = 0; k < 20; ++k) {
     make_pair(k, 400, right, right);
     const tv_two_view r = estimated(told);
-    for (double shift : r.principal_point_shift) TEST_ASSERT_TRUE(std::fabs(shift) <= 6 * 0.01 * 505);
+    for (double shift : r.principal_point_shift)
+      TEST_ASSERT_TRUE(std::fabs(shift) <= 6 * 0.01 * 505);
   }
 }
 
@@ -190,8 +195,8 @@ void test_matrices_are_of_the_corrected_camera(void) {
   for (double sq : rms) TEST_ASSERT_TRUE(std::sqrt(sq) < 0.35);  // of 0.3 px, times 500 over 505
 }
 
-// The gradient against differences of the cost, over cameras that are really moved; a fisheye has unit
-// rays. Least squares: the slopes themselves, no weights.
+// The gradient against differences of the cost, over cameras that are really moved; a fisheye has
+// unit rays. Least squares: the slopes themselves, no weights.
 void test_the_gradient_follows_differences(void) {
   constexpr int kNum = 60;
   static uint8_t memory[1 << 20] __attribute__((aligned(64)));

@@ -175,9 +175,9 @@ tv_two_view estimate(const Scene& s, const Kind& k, const tv_estimate_options& o
   tv_two_view result;
   tv_two_view_init(&result);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_estimate_two_view(api.context, &k.camera, &k.camera, s.pixels[swapped],
-                                  s.pixels[!swapped], k.with_ratios ? s.ratios : nullptr, s.num,
-                                  &options, &result, inlier));
+      TV_OK,
+      tv_estimate_two_view(api.context, &k.camera, &k.camera, s.pixels[swapped], s.pixels[!swapped],
+                           k.with_ratios ? s.ratios : nullptr, s.num, &options, &result, inlier));
   return result;
 }
 
@@ -188,8 +188,8 @@ Vec5 pose_error(const double R[9], const double t[3]) {
   tv::tangent_basis(scene.pose.t, &b[0], &b[1]);
   const double away = found.dot(scene.pose.t) < 0 ? 10 : 0;  // the wrong way is no small error
   Vec5 e;
-  e << (turn(2, 1) - turn(1, 2)) / 2, (turn(0, 2) - turn(2, 0)) / 2,
-      (turn(1, 0) - turn(0, 1)) / 2, b[0].dot(found) + away, b[1].dot(found) + away;
+  e << (turn(2, 1) - turn(1, 2)) / 2, (turn(0, 2) - turn(2, 0)) / 2, (turn(1, 0) - turn(0, 1)) / 2,
+      b[0].dot(found) + away, b[1].dot(found) + away;
   if (turn.trace() < 1) e[0] += 10;
   return e;
 }
@@ -285,8 +285,8 @@ void test_few_matches_give_a_pose_of_the_right_size_of_error(void) {
       below += r.has_t && normalised_error(r) < 4 * 4.35;
     }
   }
-  std::printf("few matches (seed %d): %d of %d below, %d without a pose\n",
-              static_cast<int>(kSeed), below, scenes, refused);
+  std::printf("few matches (seed %d): %d of %d below, %d without a pose\n", static_cast<int>(kSeed),
+              below, scenes, refused);
   TEST_ASSERT_TRUE(10 * below > 9 * scenes);
   TEST_ASSERT_TRUE(10 * refused < scenes);
 }

@@ -33,8 +33,14 @@ tv_two_view estimate(const tv_camera* cameras, const double* pixels0, const doub
   const tv_camera* second = cameras == nullptr ? nullptr : cameras + 1;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context, cameras, second, pixels0, pixels1,
                                                     ratios, num, &options, &result, mask));
-  const double* arrays[] = {result.R, result.t, result.E, result.F, result.H, result.alternative_R,
-                            result.alternative_t, result.covariance};
+  const double* arrays[] = {result.R,
+                            result.t,
+                            result.E,
+                            result.F,
+                            result.H,
+                            result.alternative_R,
+                            result.alternative_t,
+                            result.covariance};
   const int sizes[] = {9, 3, 9, 9, 9, 9, 3, 25};
   double sum = result.coverage + result.median_parallax_rad + result.rms_error_px;
   for (int a = 0; a < 8; ++a) {
@@ -162,13 +168,13 @@ void test_degenerate_points_end_and_give_no_pose(void) {
   for (int kind = 0; kind < 7; ++kind) {
     for (int i = 0; i < 1000; ++i) {
       const double x = scene::uniform(&random, 0, 600), y = scene::uniform(&random, 0, 470);
-      double p[4] = {x, y, x, y};                              // 0: the same image twice
-      if (kind == 1) p[0] = p[1] = p[2] = p[3] = 100;          // one point
-      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;      // a line, shifted
-      if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;          // a line, turned over
-      if (kind == 4) p[0] = p[1] = 10;                         // all from one
+      double p[4] = {x, y, x, y};                          // 0: the same image twice
+      if (kind == 1) p[0] = p[1] = p[2] = p[3] = 100;      // one point
+      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;  // a line, shifted
+      if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;      // a line, turned over
+      if (kind == 4) p[0] = p[1] = 10;                     // all from one
       if (kind == 5) p[0] = i % 4 * 50, p[1] = p[3] = i % 2, p[2] = p[0] + 4;  // eight, repeated
-      if (kind == 6) p[2] = x + 2;                             // a shift: a plane, or far away
+      if (kind == 6) p[2] = x + 2;  // a shift: a plane, or far away
       for (int k = 0; k < 2; ++k) a[2 * i + k] = p[k], b[2 * i + k] = p[2 + k];
     }
     for (int c = 0; c < 3; ++c) {
@@ -211,9 +217,7 @@ void test_covariance_covers_the_error(void) {
 
 }  // namespace
 
-void setUp(void) {
-  context = estimator::make_context(kCapMatches);
-}
+void setUp(void) { context = estimator::make_context(kCapMatches); }
 
 void tearDown(void) {}
 

@@ -31,8 +31,7 @@ uint32_t other_reasons(const tv_two_view& r, uint32_t expected) {
 
 bool named_right(const tv_two_view& r) {
   switch (pair.kind) {
-    case pair_kinds::kGeneral:
-      return r.config == TV_CONFIG_CALIBRATED && other_reasons(r, 0) == 0;
+    case pair_kinds::kGeneral: return r.config == TV_CONFIG_CALIBRATED && other_reasons(r, 0) == 0;
     case pair_kinds::kPlanar:  // whose direction of motion may be uncertain all the same
       return r.config == TV_CONFIG_PLANAR && other_reasons(r, TV_REASON_LOW_PARALLAX) == 0;
     case pair_kinds::kPureRotation: return r.config == TV_CONFIG_PANORAMIC;
@@ -62,14 +61,15 @@ double pose_error_deg(const tv_two_view& r) {
 
 void print_pair(const char* what, const tv_two_view& r, uint64_t seed) {
   if (!verbose) return;
-  std::printf("%s: %s seed %llu: %s %s reasons %x, %d matches, inliers %d (E %d H %d R %d), "
-              "parallax %.2f deg, rms %.2f noise %.2f (true %.2f) coverage %.2f error %.2f deg\n",
-              what, pair_kinds::name_of(pair.kind), static_cast<unsigned long long>(seed),
-              tv_config_string(static_cast<tv_config>(r.config)),
-              tv_verdict_string(static_cast<tv_verdict>(r.verdict)), r.reasons, r.num_matches,
-              r.num_inliers, r.essential_inliers, r.homography_inliers, r.rotation_inliers,
-              r.median_parallax_rad * 180 / tv::kPi, r.rms_error_px, r.noise_px, pair.noise_px,
-              r.coverage, pose_error_deg(r));
+  std::printf(
+      "%s: %s seed %llu: %s %s reasons %x, %d matches, inliers %d (E %d H %d R %d), "
+      "parallax %.2f deg, rms %.2f noise %.2f (true %.2f) coverage %.2f error %.2f deg\n",
+      what, pair_kinds::name_of(pair.kind), static_cast<unsigned long long>(seed),
+      tv_config_string(static_cast<tv_config>(r.config)),
+      tv_verdict_string(static_cast<tv_verdict>(r.verdict)), r.reasons, r.num_matches,
+      r.num_inliers, r.essential_inliers, r.homography_inliers, r.rotation_inliers,
+      r.median_parallax_rad * 180 / tv::kPi, r.rms_error_px, r.noise_px, pair.noise_px, r.coverage,
+      pose_error_deg(r));
 }
 
 void judge(uint64_t seed) {
@@ -115,7 +115,8 @@ void test_the_verdict_names_the_kind_and_ok_means_ok(void) {
       judge(seed);
     }
     const Count& c = counts[kind];
-    std::printf("%-14s %6d  %9.2f  ", pair_kinds::name_of(kind), c.pairs, 100.0 * c.named / c.pairs);
+    std::printf("%-14s %6d  %9.2f  ", pair_kinds::name_of(kind), c.pairs,
+                100.0 * c.named / c.pairs);
     if (c.solvable > 0) {
       std::printf("%9.2f", 100.0 * c.ok_of_solvable / c.solvable);
     } else {
@@ -136,9 +137,7 @@ void test_the_verdict_names_the_kind_and_ok_means_ok(void) {
 
 }  // namespace
 
-void setUp(void) {
-  context = estimator::make_context(pair_kinds::kMaxMatches);
-}
+void setUp(void) { context = estimator::make_context(pair_kinds::kMaxMatches); }
 
 void tearDown(void) {}
 

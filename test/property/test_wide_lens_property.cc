@@ -3,11 +3,12 @@
 // moves them.
 //
 // The pinhole is tried twice: with points spread over its own image, as the lens's are over its
-// own; and with the lens's very points and noise, which lie up to 1.3 times as far out as the pinhole's
-// image reaches. There half a pixel is a smaller angle for the pinhole than for the lens, which
-// squeezes the corners to 0.56: the pinhole knows more. By the Cramer-Rao bound (pose and plane, noise
-// in both views, the true inliers, 400 pairs of this generator: AUC@1/5/10 of 52.6, 89.0, 94.5 for
-// the lens and 61.1, 91.5, 95.7 for the pinhole) no estimator can be within two points there.
+// own; and with the lens's very points and noise, which lie up to 1.3 times as far out as the
+// pinhole's image reaches. There half a pixel is a smaller angle for the pinhole than for the lens,
+// which squeezes the corners to 0.56: the pinhole knows more. By the Cramer-Rao bound (pose and
+// plane, noise in both views, the true inliers, 400 pairs of this generator: AUC@1/5/10
+// of 52.6, 89.0, 94.5 for the lens and 61.1, 91.5, 95.7 for the pinhole) no estimator can be within
+// two points there.
 #include <cmath>
 #include <cstdlib>
 
@@ -128,10 +129,9 @@ void estimate(int view, int index) {
   const tv_camera* camera = &kCameras[kViews[view].camera];
   tv_two_view result;
   tv_two_view_init(&result);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_estimate_two_view(context, camera, camera, pair.pixels[0],
-                                             pair.pixels[1], nullptr, kNum, nullptr, &result,
-                                             nullptr));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_estimate_two_view(context, camera, camera, pair.pixels[0], pair.pixels[1], nullptr,
+                                  kNum, nullptr, &result, nullptr));
   double primary = kInfinite, other = kInfinite;
   if (result.has_R && result.has_t) primary = pose_error_deg(result.R, result.t);
   if (result.has_alternative) {

@@ -46,7 +46,8 @@ struct Bench {
     ardrone_navdata navdata{};
     for (int k = 0; k < 200; ++k) {
       if (const auto bytes = drone.next_navdata(now)) {
-        TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_navdata_decode(bytes->data(), bytes->size(), &navdata));
+        TEST_ASSERT_EQUAL_INT(TVS_OK,
+                              ardrone_navdata_decode(bytes->data(), bytes->size(), &navdata));
         return navdata;
       }
       wait(5);
@@ -162,7 +163,10 @@ void test_the_watchdog_bit_rises_in_silence_and_falls_on_comwdg() {
   TEST_ASSERT_TRUE(b.navdata().state & ARDRONE_STATE_COM_WATCHDOG);
   b.send("COMWDG");
   b.wait(1);
-  const auto bytes = [&] { b.now += 70 * kMs; return b.drone.next_navdata(b.now); }();
+  const auto bytes = [&] {
+    b.now += 70 * kMs;
+    return b.drone.next_navdata(b.now);
+  }();
   ardrone_navdata navdata{};
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_navdata_decode(bytes->data(), bytes->size(), &navdata));
   TEST_ASSERT_FALSE(navdata.state & ARDRONE_STATE_COM_WATCHDOG);

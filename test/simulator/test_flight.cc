@@ -75,7 +75,8 @@ void test_tilt_accelerates_by_gravity_as_in_the_flight_log() {
   flight.advance(0.005);
   const double acceleration = (flight.state().velocity[0] - first.velocity[0]) / 0.005;
   TEST_ASSERT_TRUE(first.pitch < -0.15);
-  // What two real flights gave: -0.146 and -0.166 mm/s^2 per millidegree; without drag it is -0.171.
+  // What two real flights gave: -0.146 and -0.166 mm/s^2 per millidegree; without drag it is
+  // -0.171.
   const double per_millidegree = 1000 * acceleration / (first.pitch * 180000 / 3.14159265358979);
   TEST_ASSERT_TRUE(per_millidegree < -0.14 && per_millidegree > -0.172);
 }

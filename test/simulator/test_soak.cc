@@ -1,6 +1,7 @@
 // The driver with its H.264 decoder against the simulated drone on a bad link: one per cent of all
-// datagrams lost, doubled and overtaken, ten cuts of the video, two reboots, in flight all the while. In
-// virtual time; the test suite runs a minute of it, scripts/drone_soak ten (TWOVIEW_SOAK_SECONDS).
+// datagrams lost, doubled and overtaken, ten cuts of the video, two reboots, in flight all the
+// while. In virtual time; the test suite runs a minute of it, scripts/drone_soak ten
+// (TWOVIEW_SOAK_SECONDS).
 #include <unistd.h>
 #include <unity.h>
 
@@ -106,7 +107,8 @@ void on_event(void*, ardrone_event event, const char*) {
 void on_navdata(void*, const uint8_t*, size_t, const ardrone_navdata* navdata, const tvs_imu* imu) {
   if ((imu->valid & TVS_IMU_ATTITUDE) == 0) return;
   const double* q = imu->attitude.world_from_body;
-  const double yaw = std::atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
+  const double yaw =
+      std::atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
   soak->psi0[imu->attitude.clock_id] = navdata->demo.psi_mdeg * 1.7453292519943295e-5 - yaw;
   soak->boot_of[imu->attitude.clock_id] = soak->drone.boot();
 }
@@ -125,8 +127,8 @@ void begin(const simulator::FaultChances& out, const simulator::FaultChances& in
   size_t size;
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_size(&options, &size));
   soak->memory = std::malloc(size);
-  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_init(&soak->session, &options, &transport,
-                                                     soak->memory, size));
+  TEST_ASSERT_EQUAL_INT(
+      TVS_OK, ardrone_session_init(&soak->session, &options, &transport, soak->memory, size));
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_frames(soak->session, &soak->frames));
 }
 
@@ -173,9 +175,9 @@ void check_frame(const tvs_frame& frame) {
   if (soak->num_frames > 0 && !follows && !(frame.flags & TVS_FRAME_GAP)) ++soak->num_unflagged;
   ++soak->num_frames;
   soak->last_number = frame.number;
-  soak->num_wrong_pictures +=
-      frame.image.width != VirtualDrone::kWidth || frame.image.height != VirtualDrone::kHeight ||
-      VirtualDrone::number_of(frame.image) != frame.number;
+  soak->num_wrong_pictures += frame.image.width != VirtualDrone::kWidth ||
+                              frame.image.height != VirtualDrone::kHeight ||
+                              VirtualDrone::number_of(frame.image) != frame.number;
   if (frame.flags & TVS_FRAME_HAS_ATTITUDE) {
     check_attitude(frame, soak->drone.exposure(frame.number));
   }
@@ -194,10 +196,9 @@ void fly() {
     return;
   }
   const double t = static_cast<double>(soak->now) * 1e-9;
-  const ardrone_move move = {static_cast<float>(0.3 * std::sin(2 * t)),
-                             static_cast<float>(0.3 * std::cos(1.7 * t)),
-                             static_cast<float>(0.2 * std::sin(0.9 * t)),
-                             static_cast<float>(0.7 * std::sin(0.6 * t))};
+  const ardrone_move move = {
+      static_cast<float>(0.3 * std::sin(2 * t)), static_cast<float>(0.3 * std::cos(1.7 * t)),
+      static_cast<float>(0.2 * std::sin(0.9 * t)), static_cast<float>(0.7 * std::sin(0.6 * t))};
   ardrone_session_move(soak->session, &move);
 }
 
@@ -255,19 +256,24 @@ void test_minutes_of_a_bad_link() {
   std::sort(soak->own_ms.begin(), soak->own_ms.end());
   const double median_ms = soak->own_ms[soak->own_ms.size() / 2];
   const double rms = std::sqrt(soak->sum_sq / std::max(1, soak->num_with_attitude));
-  std::printf("%.0f s: %d pictures (%.1f a second), %d with attitude, error %.4f rad rms, %.4f worst; video back in "
-              "%.2f s closed, %.2f s reset, %.2f s silent\n",
-              seconds, soak->num_frames, soak->num_frames / seconds, soak->num_with_attitude, rms,
-              soak->worst_rad, soak->worst_back_s[0], soak->worst_back_s[1], soak->worst_back_s[2]);
-  std::printf("navdata %llu (%.0f a second), %llu late, %llu missing, %llu rejected; links %llu, reboots %llu, "
-              "video connections %llu, gaps %llu, take-offs %d; the driver's own time a picture %.3f ms median, "
-              "%.3f ms at 99 of 100; memory %+ld kB\n",
-              (unsigned long long)n.navdata_received, (double)n.navdata_received / seconds,
-              (unsigned long long)n.navdata_late, (unsigned long long)n.navdata_missing,
-              (unsigned long long)n.navdata_rejected, (unsigned long long)n.links,
-              (unsigned long long)n.reboots, (unsigned long long)n.video_connections,
-              (unsigned long long)n.gaps, soak->num_take_offs_asked, median_ms,
-              soak->own_ms[soak->own_ms.size() * 99 / 100], grown_kb);
+  std::printf(
+      "%.0f s: %d pictures (%.1f a second), %d with attitude, error %.4f rad rms, %.4f worst; "
+      "video back in "
+      "%.2f s closed, %.2f s reset, %.2f s silent\n",
+      seconds, soak->num_frames, soak->num_frames / seconds, soak->num_with_attitude, rms,
+      soak->worst_rad, soak->worst_back_s[0], soak->worst_back_s[1], soak->worst_back_s[2]);
+  std::printf(
+      "navdata %llu (%.0f a second), %llu late, %llu missing, %llu rejected; links %llu, reboots "
+      "%llu, "
+      "video connections %llu, gaps %llu, take-offs %d; the driver's own time a picture %.3f ms "
+      "median, "
+      "%.3f ms at 99 of 100; memory %+ld kB\n",
+      (unsigned long long)n.navdata_received, (double)n.navdata_received / seconds,
+      (unsigned long long)n.navdata_late, (unsigned long long)n.navdata_missing,
+      (unsigned long long)n.navdata_rejected, (unsigned long long)n.links,
+      (unsigned long long)n.reboots, (unsigned long long)n.video_connections,
+      (unsigned long long)n.gaps, soak->num_take_offs_asked, median_ms,
+      soak->own_ms[soak->own_ms.size() * 99 / 100], grown_kb);
   TEST_ASSERT_EQUAL_INT(0, soak->num_falls);
   TEST_ASSERT_EQUAL_INT(0, soak->num_unflagged);
   TEST_ASSERT_EQUAL_INT(0, soak->num_wrong_pictures);

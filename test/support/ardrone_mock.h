@@ -1,6 +1,6 @@
-/* A drone in memory, in virtual time: a transport whose other side acknowledges, flies, films, loses,
-   doubles and reorders datagrams, cuts and stalls connections, and reboots. The pictures are their numbers; the
-   decoder refuses one whose predecessor it has not decoded. */
+/* A drone in memory, in virtual time: a transport whose other side acknowledges, flies, films,
+   loses, doubles and reorders datagrams, cuts and stalls connections, and reboots. The pictures are
+   their numbers; the decoder refuses one whose predecessor it has not decoded. */
 #ifndef TEST_SUPPORT_ARDRONE_MOCK_H
 #define TEST_SUPPORT_ARDRONE_MOCK_H
 
@@ -36,7 +36,8 @@ typedef struct mock_drone {
   int64_t next_navdata_ns, next_frame_ns;
   mock_datagram queue[MOCK_DATAGRAMS];
 
-  int video_open, video_ended, video_half_open; /* half-open: nothing comes through this connection */
+  int video_open, video_ended,
+      video_half_open; /* half-open: nothing comes through this connection */
   uint32_t frame_number;
   uint8_t stream[MOCK_STREAM];
   size_t stream_begin, stream_end;

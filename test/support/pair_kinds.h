@@ -32,15 +32,15 @@ enum Kind {
 };
 
 inline const char* name_of(int kind) {
-  static const char* const names[kNumKinds] = {"general",      "planar",  "pure rotation",
-                                               "no motion",    "low parallax", "too few",
+  static const char* const names[kNumKinds] = {"general",       "planar",       "pure rotation",
+                                               "no motion",     "low parallax", "too few",
                                                "second motion", "lattice"};
   return names[kind];
 }
 
 struct Ranges {
-  int fewest = 100, most = 500;             // matches, wrong ones included
-  double most_wrong = 0.5;                  // share of wrong matches: 0 to this
+  int fewest = 100, most = 500;  // matches, wrong ones included
+  double most_wrong = 0.5;       // share of wrong matches: 0 to this
   double least_noise_px = 0.2, most_noise_px = 0.6;
   double most_rotation_deg = 20;
 };
@@ -82,7 +82,8 @@ struct Maker {
            (*pixel)[0] < model.width - 3 && (*pixel)[1] > 2 && (*pixel)[1] < model.height - 3;
   }
 
-  // A point on the ray of a random pixel of view 0, within a box around `center` when half_size > 0.
+  // A point on the ray of a random pixel of view 0, within a box around `center` when half_size >
+  // 0.
   bool ray_of_random_pixel(Vec2 center, double half_size, Vec2* pixel, Vec3* ray) {
     *pixel = scene::random_pixel(&random, pair->camera[0]);
     if (half_size > 0) {
@@ -174,8 +175,8 @@ struct Maker {
     return std::fabs(n.dot(seen_there)) * pair->camera[1].fx;
   }
 
-  // The corners of a wall's cells, six tenths of them and more found; half of those are matched one or
-  // two cells off.
+  // The corners of a wall's cells, six tenths of them and more found; half of those are matched one
+  // or two cells off.
   bool put_lattice(int count) {
     const Vec3 normal_of_wall =
         Vec3(uniform(&random, -0.6, 0.6), uniform(&random, -0.3, 0.3), 1).normalized();
@@ -270,7 +271,8 @@ struct Maker {
     pair->noise_px = uniform(&random, ranges.least_noise_px, ranges.most_noise_px);
     draw_motion(ranges);
     const int most = ranges.most - ranges.fewest + 1;
-    int num = ranges.fewest + static_cast<int>(tv::random_below(random, static_cast<uint32_t>(most)));
+    int num =
+        ranges.fewest + static_cast<int>(tv::random_below(random, static_cast<uint32_t>(most)));
     double wrong = uniform(&random, 0, ranges.most_wrong);
     if (pair->kind == kTooFew) num = static_cast<int>(tv::random_below(random, 13));
     if (pair->kind == kSecondMotion || pair->kind == kLattice) wrong *= 0.3;
@@ -301,9 +303,7 @@ struct Maker {
       case kSecondMotion:
         made = put_general(num_true - num_true * 3 / 10, 1) && put_moving_object(num_true * 3 / 10);
         break;
-      case kLattice:
-        made = put_lattice(num_true / 2 + 20) && put_general(num_true / 2, 1);
-        break;
+      case kLattice: made = put_lattice(num_true / 2 + 20) && put_general(num_true / 2, 1); break;
       case kNumKinds: break;
     }
     if (!made) return false;

@@ -98,14 +98,14 @@ static inline void png_read_codes(png_bits *in, int kind, png_code *literals, pn
 
 /* Inflates into out; returns whether exactly out_size bytes came. */
 static inline int png_inflate(const uint8_t *bytes, size_t size, uint8_t *out, size_t out_size) {
-  static const uint16_t bases[29] = {3,  4,  5,  6,  7,  8,  9,  10,  11,  13,  15,  17,  19, 23,
-                                     27, 31, 35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258};
+  static const uint16_t bases[29] = {3,  4,  5,  6,   7,   8,   9,   10,  11, 13,
+                                     15, 17, 19, 23,  27,  31,  35,  43,  51, 59,
+                                     67, 83, 99, 115, 131, 163, 195, 227, 258};
   static const uint8_t extras[29] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2,
                                      2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 0};
-  static const uint16_t distance_bases[30] = {1,   2,   3,   4,   5,    7,    9,    13,   17,   25,
-                                              33,  49,  65,  97,  129,  193,  257,  385,  513,  769,
-                                              1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289,
-                                              16385, 24577};
+  static const uint16_t distance_bases[30] = {
+      1,   2,   3,   4,   5,   7,    9,    13,   17,   25,   33,   49,   65,    97,    129,
+      193, 257, 385, 513, 769, 1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
   png_bits in = {bytes, size, 2, 0, 0, 0}; /* after zlib's two bytes */
   size_t at = 0;
   int last = 0;

@@ -38,14 +38,14 @@ static inline int real_pair_load(real_pair *pair) {
     return 1;
   }
   if (data != NULL) {
-    const int length =
-        snprintf(folder, sizeof folder, "%s/middlebury_templeSR/images", data);
+    const int length = snprintf(folder, sizeof folder, "%s/middlebury_templeSR/images", data);
     if (length > 0 && length < (int)sizeof folder &&
         real_pair_read(pair, folder, "templeSR0001.png", "templeSR0002.png")) {
       return 1;
     }
   }
-  printf("no real images: neither " TWOVIEW_CACHE_DIR "/motorcycle (scripts/bootstrap test) nor "
+  printf("no real images: neither " TWOVIEW_CACHE_DIR
+         "/motorcycle (scripts/bootstrap test) nor "
          "TWOVIEW_DATA\n");
   return 0;
 }

@@ -1,5 +1,5 @@
-// Synthetic pairs that own their conditioning, for tests of the geometry. Static storage throughout:
-// a failing Unity test leaves by longjmp.
+// Synthetic pairs that own their conditioning, for tests of the geometry. Static storage
+// throughout: a failing Unity test leaves by longjmp.
 #ifndef TEST_SUPPORT_SCENE_H
 #define TEST_SUPPORT_SCENE_H
 
@@ -46,7 +46,14 @@ inline tv_camera pinhole() {
 }
 
 inline tv_camera distorted() {  // EuRoC's
-  return tv_camera{TV_CAMERA_BROWN_CONRADY, 752, 480, 0, 458.654, 457.296, 367.215, 248.375,
+  return tv_camera{TV_CAMERA_BROWN_CONRADY,
+                   752,
+                   480,
+                   0,
+                   458.654,
+                   457.296,
+                   367.215,
+                   248.375,
                    {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}};
 }
 
@@ -111,8 +118,7 @@ inline void make(const Options& options, Scene* s) {
   choose_motion(&random, s);
   const tv::Camera cameras[2] = {tv::prepare_camera(options.camera[0]),
                                  tv::prepare_camera(options.camera[1])};
-  const Vec3 plane =
-      Vec3(uniform(&random, -0.4, 0.4), uniform(&random, -0.4, 0.4), 1).normalized();
+  const Vec3 plane = Vec3(uniform(&random, -0.4, 0.4), uniform(&random, -0.4, 0.4), 1).normalized();
   const int num_true = static_cast<int>(options.num * options.inlier_share + 0.5);
   int restarts = 0;
   for (int i = 0; i < options.num; ++i) {
@@ -159,9 +165,10 @@ inline double translation_error_deg(const double t[3], const Vec3& truth) {
 
 using Vec5 = Eigen::Matrix<double, 5, 1>;
 
-// The true pose in the parameters of a covariance around an estimate (two_view.h); far away where the
-// directions are opposite.
-inline Vec5 pose_error(const double R[9], const double t[3], const Mat3& true_R, const Vec3& true_t) {
+// The true pose in the parameters of a covariance around an estimate (two_view.h); far away where
+// the directions are opposite.
+inline Vec5 pose_error(const double R[9], const double t[3], const Mat3& true_R,
+                       const Vec3& true_t) {
   Mat3 estimate;
   for (int k = 0; k < 9; ++k) estimate(k / 3, k % 3) = R[k];
   const Mat3 turn = true_R * estimate.transpose();

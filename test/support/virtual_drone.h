@@ -1,6 +1,7 @@
 // The simulated drone in virtual time: its firmware, flight, film and bad link behind the driver's
-// transport instead of sockets, so that ten minutes pass in one. Each picture shows its own number, and
-// each number's truth is kept: what the driver says of a picture can be compared with what was so.
+// transport instead of sockets, so that ten minutes pass in one. Each picture shows its own number,
+// and each number's truth is kept: what the driver says of a picture can be compared with what was
+// so.
 #pragma once
 
 #include <algorithm>
@@ -159,9 +160,11 @@ class VirtualDrone {
     if (channel == ARDRONE_CHANNEL_AT) d.sent_.emplace_back(text, size);
     if (d.is_dead()) return TVS_OK;
     for (const FaultyLink::Bytes& datagram : d.commands_in_.send({text, text + size})) {
-      if (channel == ARDRONE_CHANNEL_NAVDATA) d.firmware_.receive_hello(d.now_);
-      else d.firmware_.receive_commands(
-               {reinterpret_cast<const char*>(datagram.data()), datagram.size()}, d.now_);
+      if (channel == ARDRONE_CHANNEL_NAVDATA)
+        d.firmware_.receive_hello(d.now_);
+      else
+        d.firmware_.receive_commands(
+            {reinterpret_cast<const char*>(datagram.data()), datagram.size()}, d.now_);
     }
     return TVS_OK;
   }

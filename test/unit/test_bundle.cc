@@ -1,10 +1,9 @@
 // The parts of two-view bundle adjustment: derivatives against differences, the elimination against
 // the plain normal equations, points at and beyond infinity, points that cannot take part.
-#include "robust/bundle.h"
-
 #include <Eigen/Dense>
 #include <cstring>
 
+#include "robust/bundle.h"
 #include "support/bundle_scene.h"
 #include "twoview/alloc.h"
 
@@ -102,8 +101,7 @@ Vec4 residuals(const OneMatch& m, const double point_step[3], const double pose_
   const Vec3 w(pose_step[0], pose_step[1], pose_step[2]);
   const Mat3 turned =
       w.norm() > 0 ? Mat3(tv::rotation_about(w.normalized(), w.norm()) * m.pose.R) : m.pose.R;
-  const Vec3 moved_t =
-      (m.pose.t + pose_step[3] * frame.b1 + pose_step[4] * frame.b2).normalized();
+  const Vec3 moved_t = (m.pose.t + pose_step[3] * frame.b1 + pose_step[4] * frame.b2).normalized();
   Vec2 seen[2];
   TEST_ASSERT_TRUE(tv::project(m.cameras[0], d, &seen[0], nullptr));
   TEST_ASSERT_TRUE(tv::project(m.cameras[1], turned * d + rho * moved_t, &seen[1], nullptr));
@@ -148,8 +146,8 @@ void for_random_matches(void (*check)(const OneMatch&)) {
 
 BundleMatch linearised(const OneMatch& m) {
   BundleMatch match;
-  TEST_ASSERT_TRUE(tv::linearise(m.cameras, tv::bundle_frame(m.pose), m.point, m.pixel[0],
-                                 m.pixel[1], &match));
+  TEST_ASSERT_TRUE(
+      tv::linearise(m.cameras, tv::bundle_frame(m.pose), m.point, m.pixel[0], m.pixel[1], &match));
   return match;
 }
 
@@ -162,8 +160,7 @@ void check_derivatives(const OneMatch& m) {
   for (int i = 0; i < 2; ++i) {
     for (int j = 0; j < 2; ++j) {
       from_pixel0(i, j) = match.from_pixel0[i][j];
-      TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + d.point.norm()), d.error[2 * i + j],
-                                match.error[i][j]);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + d.point.norm()), d.error[2 * i + j], match.error[i][j]);
       TEST_ASSERT_DOUBLE_WITHIN(tolerance, d.point(2 + i, j), e.B[i][j]);
     }
     TEST_ASSERT_DOUBLE_WITHIN(tolerance, d.point(2 + i, 2), e.along[i] * e.length);

@@ -36,8 +36,8 @@ void project(const tv_camera& camera, const T X[3], T pixel[2]) {
   T x = X[0] / X[2], y = X[1] / X[2];
   if (camera.model == TV_CAMERA_BROWN_CONRADY) {
     const T u = x * x + y * y;
-    const T radial = (1.0 + u * (k[0] + u * (k[1] + u * k[4]))) /
-                     (1.0 + u * (k[5] + u * (k[6] + u * k[7])));
+    const T radial =
+        (1.0 + u * (k[0] + u * (k[1] + u * k[4]))) / (1.0 + u * (k[5] + u * (k[6] + u * k[7])));
     const T xx = x * radial + 2.0 * k[2] * x * y + k[3] * (u + 2.0 * x * x);
     const T yy = y * radial + k[2] * (u + 2.0 * y * y) + 2.0 * k[3] * x * y;
     x = xx, y = yy;
@@ -65,8 +65,8 @@ bool is_seen(const Scene& s, int i) {
   double pixel[2];
   double moved[3];
   for (int r = 0; r < 3; ++r) {
-    moved[r] = s.start_R[3 * r] * X[0] + s.start_R[3 * r + 1] * X[1] +
-               s.start_R[3 * r + 2] * X[2] + s.start_t[r];
+    moved[r] = s.start_R[3 * r] * X[0] + s.start_R[3 * r + 1] * X[1] + s.start_R[3 * r + 2] * X[2] +
+               s.start_t[r];
   }
   return tv_camera_project(&s.options.camera[0], X, pixel, nullptr) == TV_OK &&
          tv_camera_project(&s.options.camera[1], moved, pixel, nullptr) == TV_OK;
@@ -135,8 +135,8 @@ Answer solve_ceres(const Scene& s, const Start& start, const tv_bundle_options& 
   double q[4], t[3], R[9];
   for (int i = 0; i < 9; ++i) R[3 * (i % 3) + i / 3] = start.R[i];  // Ceres: column-major
   ceres::RotationMatrixToQuaternion(R, q);
-  const double length = std::sqrt(start.t[0] * start.t[0] + start.t[1] * start.t[1] +
-                                  start.t[2] * start.t[2]);
+  const double length =
+      std::sqrt(start.t[0] * start.t[0] + start.t[1] * start.t[1] + start.t[2] * start.t[2]);
   for (int i = 0; i < 3; ++i) t[i] = start.t[i] / length;
   std::vector<double> X;
   std::vector<int> index;
@@ -175,8 +175,7 @@ Answer solve_ceres(const Scene& s, const Start& start, const tv_bundle_options& 
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   return Answer{2 * summary.initial_cost, 2 * summary.final_cost, now_ms() - begin,
-                static_cast<int>(index.size()),
-                static_cast<int>(summary.iterations.size()) - 1};
+                static_cast<int>(index.size()), static_cast<int>(summary.iterations.size()) - 1};
 }
 
 // The answer is left in `end` and `points`.
@@ -195,16 +194,15 @@ Answer solve_ours(const Scene& s, const tv_bundle_options& options, Start* end,
   tv_bundle_result_init(result);
   const double begin = now_ms();
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_adjust_two_view(context, &s.options.camera[0], &s.options.camera[1], s.pixels[0],
-                                s.pixels[1], s.options.num, &options, end->R, end->t, points,
-                                result));
+      TV_OK,
+      tv_adjust_two_view(context, &s.options.camera[0], &s.options.camera[1], s.pixels[0],
+                         s.pixels[1], s.options.num, &options, end->R, end->t, points, result));
   return Answer{result->initial_cost, result->final_cost, now_ms() - begin, result->num_points,
                 result->num_iterations};
 }
 
 // Where Ceres ends higher, ours must be a minimum that Ceres, started there, cannot lower.
-void expect_same_minimum(const Options& options, const tv_bundle_options& bundle,
-                         int* num_lower) {
+void expect_same_minimum(const Options& options, const tv_bundle_options& bundle, int* num_lower) {
   bundle_scene::make(options, &pair);
   tv_bundle_result result;
   Start end;
@@ -296,9 +294,10 @@ void print_times() {
         theirs = solve_ceres(pair, start_of(pair), bundle, false);
         ms_ceres = std::fmin(ms_ceres, theirs.ms);
       }
-      std::printf("%5d points, outliers %.1f: %.3f ms (%d iterations), Ceres %.2f ms (%d), "
-                  "ratio %.0f\n", num, outliers, ms, ours.iterations, ms_ceres,
-                  theirs.iterations, ms_ceres / ms);
+      std::printf(
+          "%5d points, outliers %.1f: %.3f ms (%d iterations), Ceres %.2f ms (%d), "
+          "ratio %.0f\n",
+          num, outliers, ms, ours.iterations, ms_ceres, theirs.iterations, ms_ceres / ms);
     }
   }
 }

@@ -32,37 +32,82 @@ struct Named {
 
 // AR.Drone: ardrone_autonomy's and tum-vision's calibration files. EuRoC, TUM: the data sets' own.
 const Named kCameras[] = {
-    {"pinhole", {TV_CAMERA_PINHOLE, 741, 500, 0, 994.978, 994.978, 311.193, 254.877, {}},
-     0},
+    {"pinhole", {TV_CAMERA_PINHOLE, 741, 500, 0, 994.978, 994.978, 311.193, 254.877, {}}, 0},
     {"ardrone2 front",
-     {TV_CAMERA_BROWN_CONRADY, 640, 360, 0, 569.883158064802, 568.007065238522, 331.403348466206,
+     {TV_CAMERA_BROWN_CONRADY,
+      640,
+      360,
+      0,
+      569.883158064802,
+      568.007065238522,
+      331.403348466206,
       135.879365106014,
       {-0.526629354780687, 0.274357114262035, 0.0211426202132638, -0.0063942451330052, 0}},
      0},
     {"ardrone2 bottom",
-     {TV_CAMERA_BROWN_CONRADY, 640, 360, 0, 700.490828918144, 701.654116650887, 319.508832099787,
+     {TV_CAMERA_BROWN_CONRADY,
+      640,
+      360,
+      0,
+      700.490828918144,
+      701.654116650887,
+      319.508832099787,
       218.740253550967,
       {0.0182389759532889, 0.0520276742502367, 0.00651075732801101, 0.000183496184521575, 0}},
      0},
     {"ardrone1 front",
-     {TV_CAMERA_BROWN_CONRADY, 320, 240, 0, 209.62677, 210.825901, 161.275943, 123.723408,
+     {TV_CAMERA_BROWN_CONRADY,
+      320,
+      240,
+      0,
+      209.62677,
+      210.825901,
+      161.275943,
+      123.723408,
       {0.160828, -0.280969, 0.000044, 0.001607, 0}},
      29},  // its r (1 + k1 r^2 + k2 r^4) is never above 0.88, and the corners are at 0.97
     {"euroc cam0",
-     {TV_CAMERA_BROWN_CONRADY, 752, 480, 0, 458.654, 457.296, 367.215, 248.375,
+     {TV_CAMERA_BROWN_CONRADY,
+      752,
+      480,
+      0,
+      458.654,
+      457.296,
+      367.215,
+      248.375,
       {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}},
      0},
     {"tum fr1",
-     {TV_CAMERA_BROWN_CONRADY, 640, 480, 0, 517.3, 516.5, 318.6, 255.3,
+     {TV_CAMERA_BROWN_CONRADY,
+      640,
+      480,
+      0,
+      517.3,
+      516.5,
+      318.6,
+      255.3,
       {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}},
      0},
     {"rational",
-     {TV_CAMERA_BROWN_CONRADY, 1280, 720, 0, 612.1, 611.8, 638.0, 367.2,
+     {TV_CAMERA_BROWN_CONRADY,
+      1280,
+      720,
+      0,
+      612.1,
+      611.8,
+      638.0,
+      367.2,
       {0.52, -2.69, 0.0005, -0.0002, 1.55, 0.40, -2.51, 1.48}},
      0},
     {"kannala-brandt",
-     {TV_CAMERA_KANNALA_BRANDT, 512, 512, 0, 190.97847715128717, 190.9733070521226,
-      254.93170605935475, 256.8974428996504,
+     {TV_CAMERA_KANNALA_BRANDT,
+      512,
+      512,
+      0,
+      190.97847715128717,
+      190.9733070521226,
+      254.93170605935475,
+      256.8974428996504,
       {0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202,
        0.00020293673591811182}},
      0},
@@ -170,8 +215,7 @@ void test_unprojection_jacobian_equals_central_differences(void) {
         TEST_ASSERT_TRUE(tv::unproject(camera, pixel - offset, &minus, nullptr));
         const Vec3 difference = (plus - minus) / 2e-3;
         for (int row = 0; row < 3; ++row) {
-          TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-9, difference[row], jacobian(row, axis),
-                                            named.name);
+          TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-9, difference[row], jacobian(row, axis), named.name);
         }
       }
     }
@@ -304,8 +348,8 @@ void test_outside_is_refused_and_outputs_stay(void) {
   TEST_ASSERT_FALSE(tv::unproject(fisheye, Vec2(399.5 + 220 * 3.15, 399.5), &ray, nullptr));
   tv_camera folding = kCameras[8].camera;
   folding.k[0] = -0.1;  // valid to theta = 1.8257
-  TEST_ASSERT_FALSE(tv::project(prepared(folding), Vec3(std::sin(1.83), 0, std::cos(1.83)), &pixel,
-                                nullptr));
+  TEST_ASSERT_FALSE(
+      tv::project(prepared(folding), Vec3(std::sin(1.83), 0, std::cos(1.83)), &pixel, nullptr));
   TEST_ASSERT_TRUE(pixel == Vec2(-7, -7) && ray == Vec3(-7, -7, -7));
   TEST_ASSERT_TRUE(tv::unproject(barrel, Vec2(671.3, 240), &ray, nullptr));
   TEST_ASSERT_TRUE(tv::project(fisheye, Vec3(1, 0, -0.1), &pixel, nullptr));

@@ -1,8 +1,7 @@
 // Camera models against OpenCV: projectPoints (Brown-Conrady, 5 and 8 coefficients) and
 // fisheye::projectPoints (Kannala-Brandt), with their Jacobians, and undistortPoints.
-#include <opencv2/calib3d.hpp>
-
 #include <cmath>
+#include <opencv2/calib3d.hpp>
 
 #include "base/random.h"
 #include "geometry/camera.h"
@@ -22,17 +21,43 @@ constexpr uint64_t kSeed = 3;
 constexpr int kNumPoints = 500;
 
 const tv_camera kArdrone = {
-    TV_CAMERA_BROWN_CONRADY, 640, 360, 0, 569.883158064802, 568.007065238522, 331.403348466206,
+    TV_CAMERA_BROWN_CONRADY,
+    640,
+    360,
+    0,
+    569.883158064802,
+    568.007065238522,
+    331.403348466206,
     135.879365106014,
     {-0.526629354780687, 0.274357114262035, 0.0211426202132638, -0.0063942451330052, 0}};
-const tv_camera kTumFr1 = {TV_CAMERA_BROWN_CONRADY, 640, 480, 0, 517.3, 516.5, 318.6, 255.3,
+const tv_camera kTumFr1 = {TV_CAMERA_BROWN_CONRADY,
+                           640,
+                           480,
+                           0,
+                           517.3,
+                           516.5,
+                           318.6,
+                           255.3,
                            {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}};
-const tv_camera kRational = {TV_CAMERA_BROWN_CONRADY, 1280, 720, 0, 612.1, 611.8, 638.0, 367.2,
+const tv_camera kRational = {TV_CAMERA_BROWN_CONRADY,
+                             1280,
+                             720,
+                             0,
+                             612.1,
+                             611.8,
+                             638.0,
+                             367.2,
                              {0.52, -2.69, 0.0005, -0.0002, 1.55, 0.40, -2.51, 1.48}};
-const tv_camera kFisheye = {TV_CAMERA_KANNALA_BRANDT, 512, 512, 0, 190.97847715128717,
-                            190.9733070521226, 254.93170605935475, 256.8974428996504,
-                            {0.0034823894022493434, 0.0007150348452162257,
-                             -0.0020532361418706202, 0.00020293673591811182}};
+const tv_camera kFisheye = {
+    TV_CAMERA_KANNALA_BRANDT,
+    512,
+    512,
+    0,
+    190.97847715128717,
+    190.9733070521226,
+    254.93170605935475,
+    256.8974428996504,
+    {0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182}};
 
 double uniform(tv::Random* random, double low, double high) {
   return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
@@ -43,8 +68,7 @@ cv::Mat matrix_of(const tv_camera& c) {
 }
 
 cv::Mat coefficients_of(const tv_camera& c) {
-  return cv::Mat(1, c.model == TV_CAMERA_KANNALA_BRANDT ? 4 : 8, CV_64F,
-                 const_cast<double*>(c.k))
+  return cv::Mat(1, c.model == TV_CAMERA_KANNALA_BRANDT ? 4 : 8, CV_64F, const_cast<double*>(c.k))
       .clone();
 }
 
@@ -76,9 +100,9 @@ void compare(const tv_camera& model, double max_angle) {
   for (int i = 0; i < kNumPoints; ++i) {
     const double angle = uniform(&random, 0.001, max_angle);
     const double azimuth = uniform(&random, -3.2, 3.2);
-    const Vec3 point = uniform(&random, 0.5, 20) *
-                       Vec3(std::sin(angle) * std::cos(azimuth),
-                            std::sin(angle) * std::sin(azimuth), std::cos(angle));
+    const Vec3 point =
+        uniform(&random, 0.5, 20) * Vec3(std::sin(angle) * std::cos(azimuth),
+                                         std::sin(angle) * std::sin(azimuth), std::cos(angle));
     double expected[2];
     Mat23 expected_d, d;
     Vec2 pixel;

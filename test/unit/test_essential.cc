@@ -1,8 +1,7 @@
 // Poses, essential matrices and cheirality.
-#include "geometry/essential.h"
-
 #include <cmath>
 
+#include "geometry/essential.h"
 #include "support/scene.h"
 
 void setUp(void) {}

@@ -22,8 +22,7 @@ uint8_t theirs[kMaxHeight][kMaxWidth];
 real_pair real;
 
 void check_image(const uint8_t* data, int width, int height) {
-  const CVD::BasicImage<CVD::byte> image(const_cast<uint8_t*>(data),
-                                         CVD::ImageRef(width, height));
+  const CVD::BasicImage<CVD::byte> image(const_cast<uint8_t*>(data), CVD::ImageRef(width, height));
   for (int threshold : {1, 5, 10, 20, 40, 100, 200}) {
     std::vector<CVD::ImageRef> corners;
     CVD::fast_corner_detect_12(image, corners, threshold);

@@ -58,9 +58,8 @@ void check_suppressed(const tv_image& image, int threshold) {
   options.scale_factor = 2.0f;
   options.keypoint_size = 4.0f;
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
-  const int32_t count =
-      tv::find_corners(*tvk_select(TV_KERNELS_AUTO), image, nullptr, options,
-                       image.width * image.height / 4, arena, keypoints);
+  const int32_t count = tv::find_corners(*tvk_select(TV_KERNELS_AUTO), image, nullptr, options,
+                                         image.width * image.height / 4, arena, keypoints);
   TEST_ASSERT_EQUAL_INT(opencv_corners(image, threshold, true), count);
   for (int k = 0; k < count; ++k) {
     const tv_keypoint& p = keypoints[k];

@@ -1,9 +1,8 @@
 // Eight- and seven-point solvers, null spaces and singular values.
-#include "geometry/fundamental_8pt.h"
-
 #include <cmath>
 
 #include "geometry/fundamental_7pt.h"
+#include "geometry/fundamental_8pt.h"
 #include "geometry/null_space.h"
 #include "support/scene.h"
 
@@ -37,9 +36,7 @@ Sample make_sample(tv::Random* random) {
   return s;
 }
 
-double distance(const Mat3& a, const Mat3& b) {
-  return std::fmin((a - b).norm(), (a + b).norm());
-}
+double distance(const Mat3& a, const Mat3& b) { return std::fmin((a - b).norm(), (a + b).norm()); }
 
 void test_eight_exact_points_give_the_matrix(void) {
   tv::Random random = tv::random_seeded(kSeed);

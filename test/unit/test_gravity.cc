@@ -1,9 +1,8 @@
 // The gravity prior: its rows against differences, its weight, and the model that carries it.
-#include "robust/gravity.h"
-
 #include <cmath>
 #include <limits>
 
+#include "robust/gravity.h"
 #include "support/scene.h"
 
 void setUp(void) {}
@@ -264,8 +263,7 @@ void test_a_prior_that_is_not_known_changes_nothing(void) {
   const GravityPrior* priors[3] = {nullptr, &unknown, &known};
   for (int k = 0; k < 3; ++k) {
     const tv::GravityPoseModel model{pose, priors[k], 0.5};
-    cost[k + 1] =
-        model.normal_equations(pairs, nullptr, kNum, loss, upper[k + 1], gradient[k + 1]);
+    cost[k + 1] = model.normal_equations(pairs, nullptr, kNum, loss, upper[k + 1], gradient[k + 1]);
   }
   for (int k = 1; k < 3; ++k) {
     TEST_ASSERT_EQUAL_MEMORY(upper[0], upper[k], sizeof upper[0]);

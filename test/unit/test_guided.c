@@ -21,7 +21,7 @@ static double random_double(uint64_t *state, double low, double high) {
 }
 
 /* x1 = R x0 + t with R a turn by 0.2 about y. */
-static const double rotation[9] = {0.9800665778412416, 0, 0.19866933079506122, 0, 1, 0,
+static const double rotation[9] = {0.9800665778412416,   0, 0.19866933079506122, 0, 1, 0,
                                    -0.19866933079506122, 0, 0.9800665778412416};
 static const double translation[3] = {-0.8, 0.36, 0.48};
 
@@ -82,7 +82,8 @@ static void make_scene(uint64_t *state, const tv_camera *camera0, const tv_camer
   int k = 0, r;
   while (k < count) {
     const double z = random_double(state, 2, 9);
-    const double X[3] = {random_double(state, -0.6, 0.6) * z, random_double(state, -0.5, 0.5) * z, z};
+    const double X[3] = {random_double(state, -0.6, 0.6) * z, random_double(state, -0.5, 0.5) * z,
+                         z};
     double Y[3], pixel0[2], pixel1[2];
     for (r = 0; r < 3; ++r) {
       Y[r] = rotation[3 * r] * X[0] + rotation[3 * r + 1] * X[1] + rotation[3 * r + 2] * X[2] +
@@ -190,10 +191,9 @@ static int match_by_definition(const problem *p) {
 
 static int32_t run(const api_context *a, const problem *p, tv_correspondence *out) {
   int32_t count = -1;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_match_guided(a->context, p->camera0, p->camera1, p->M, keypoints0, descriptors0,
-                             p->num0, keypoints1, descriptors1, p->num1, &p->options, out,
-                             MAX_POINTS, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match_guided(a->context, p->camera0, p->camera1, p->M, keypoints0,
+                                               descriptors0, p->num0, keypoints1, descriptors1,
+                                               p->num1, &p->options, out, MAX_POINTS, &count));
   return count;
 }
 
@@ -201,10 +201,9 @@ static int32_t run_swapped(const api_context *a, const problem *p, tv_correspond
   double M[9];
   int32_t count = -1;
   transpose(p->M, M);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_match_guided(a->context, p->camera1, p->camera0, M, keypoints1, descriptors1,
-                             p->num1, keypoints0, descriptors0, p->num0, &p->options, out,
-                             MAX_POINTS, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match_guided(a->context, p->camera1, p->camera0, M, keypoints1,
+                                               descriptors1, p->num1, keypoints0, descriptors0,
+                                               p->num0, &p->options, out, MAX_POINTS, &count));
   return count;
 }
 
@@ -284,8 +283,8 @@ static void test_matches_equal_the_definition_and_swap_with_the_views(void) {
 
 static void test_without_cameras_the_matrix_is_of_pixels(void) {
   const tv_camera camera = make_camera(TV_CAMERA_PINHOLE);
-  const double inverse[9] = {1 / camera.fx, 0, -camera.cx / camera.fx, 0, 1 / camera.fy,
-                             -camera.cy / camera.fy, 0, 0, 1};
+  const double inverse[9] = {
+      1 / camera.fx, 0, -camera.cx / camera.fx, 0, 1 / camera.fy, -camera.cy / camera.fy, 0, 0, 1};
   uint64_t state = 22;
   double E[9], half[9], F[9];
   int r, c, k;

@@ -1,8 +1,7 @@
 // Homographies of four points, their two motions, and rotations of two points.
-#include "geometry/homography_4pt.h"
-
 #include <cmath>
 
+#include "geometry/homography_4pt.h"
 #include "geometry/rotation_2pt.h"
 #include "support/scene.h"
 

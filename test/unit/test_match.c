@@ -73,8 +73,8 @@ static int match_by_definition(int num0, int num1, float ratio) {
   return count;
 }
 
-static int32_t run(const api_context *a, const uint8_t *rows0, int32_t num0,
-                   const uint8_t *rows1, int32_t num1, float ratio, tv_correspondence *out) {
+static int32_t run(const api_context *a, const uint8_t *rows0, int32_t num0, const uint8_t *rows1,
+                   int32_t num1, float ratio, tv_correspondence *out) {
   tv_match_options options;
   int32_t count = -1;
   tv_match_options_init(&options);
@@ -91,8 +91,8 @@ static void check(int32_t num0, int32_t num1, float ratio) {
     TEST_ASSERT_EQUAL_INT(count,
                           run(&contexts[c], descriptors0, num0, descriptors1, num1, ratio, found));
     if (count > 0) TEST_ASSERT_EQUAL_MEMORY(expected, found, (size_t)count * sizeof found[0]);
-    TEST_ASSERT_EQUAL_INT(count,
-                          run(&contexts[c], descriptors1, num1, descriptors0, num0, ratio, swapped));
+    TEST_ASSERT_EQUAL_INT(
+        count, run(&contexts[c], descriptors1, num1, descriptors0, num0, ratio, swapped));
     for (k = 0; k < count; ++k) {
       for (other = 0; swapped[other].idx1 != found[k].idx0; ++other) {
         TEST_ASSERT_TRUE(other + 1 < count);
@@ -154,8 +154,8 @@ static void test_noisy_copies_are_found(void) {
   uint64_t state = 12;
   int32_t count, k;
   fill(&state, 2);
-  count = run(&contexts[0], descriptors0, MAX_DESCRIPTORS, descriptors1, MAX_DESCRIPTORS, 0.8f,
-              found);
+  count =
+      run(&contexts[0], descriptors0, MAX_DESCRIPTORS, descriptors1, MAX_DESCRIPTORS, 0.8f, found);
   TEST_ASSERT_EQUAL_INT(MAX_DESCRIPTORS * 4 / 5, count);
   for (k = 0; k < count; ++k) TEST_ASSERT_EQUAL_INT(found[k].idx0, found[k].idx1);
 }
@@ -205,12 +205,12 @@ static void test_a_small_array_gets_the_count_and_nothing_else(void) {
   fill(&state, 2);
   memset(few, 0x5A, sizeof few);
   memset(untouched, 0x5A, sizeof untouched);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100, descriptors1,
-                                                  100, NULL, few, 4, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100,
+                                                  descriptors1, 100, NULL, few, 4, &count));
   TEST_ASSERT_EQUAL_INT(80, count);
   TEST_ASSERT_EQUAL_MEMORY(untouched, few, sizeof few);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100, descriptors1,
-                                                  100, NULL, NULL, 0, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100,
+                                                  descriptors1, 100, NULL, NULL, 0, &count));
 }
 
 int main(void) {

@@ -52,7 +52,8 @@ tv::Octaves octaves_of_pixels() {
 }
 
 int angles_of(const tv_keypoint& keypoint, float angles_rad[2]) {
-  return tv::dominant_angles(*tvk_select(TV_KERNELS_AUTO), octaves_of_pixels(), keypoint, angles_rad);
+  return tv::dominant_angles(*tvk_select(TV_KERNELS_AUTO), octaves_of_pixels(), keypoint,
+                             angles_rad);
 }
 
 double difference(double a, double b) { return std::fabs(std::remainder(a - b, 2 * kPi)); }
@@ -169,8 +170,9 @@ void test_the_order_is_ubcs() {
     // Brighter along `direction`, counter-clockwise as seen, in the lower right quarter only.
     const double angle = direction * kPi / 4;
     render(0, [angle](double u, double v) {
-      return u < 1 || v < 1 ? 40.0 : 40 + 20 * (8 + (u - 8) * std::cos(angle) -
-                                                (v - 8) * std::sin(angle)) / 4;
+      return u < 1 || v < 1
+                 ? 40.0
+                 : 40 + 20 * (8 + (u - 8) * std::cos(angle) - (v - 8) * std::sin(angle)) / 4;
     });
     tv_keypoint keypoint = middle;
     tv::describe_keypoint(kernels, octaves_of_pixels(), keypoint, TV_DESCRIPTOR_SIFT, descriptor);

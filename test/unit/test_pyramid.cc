@@ -54,8 +54,8 @@ void check_level(const tvk_table& kernels, uint64_t* seed, int width, int height
   const int expected_width = static_cast<int>(width / factor);
   const int expected_height = static_cast<int>(height / factor);
   const bool made = tv::next_level(kernels, level, factor, 0, buffers, &next);
-  TEST_ASSERT_EQUAL_INT(
-      expected_width >= tv::kMinLevelSide && expected_height >= tv::kMinLevelSide, made);
+  TEST_ASSERT_EQUAL_INT(expected_width >= tv::kMinLevelSide && expected_height >= tv::kMinLevelSide,
+                        made);
   if (!made) return;
   TEST_ASSERT_EQUAL_INT(expected_width, next.width);
   TEST_ASSERT_EQUAL_INT(expected_height, next.height);
@@ -117,9 +117,9 @@ void test_a_constant_image_stays_constant() {
   }
 }
 
-// Bilinear at positions clamped to the image, less 128, times 127^2 / 256. Fractions are known to 1/128
-// pixel along each axis, which two black and white neighbours turn into 255 / 128 each; the last shift
-// leaves out up to 1.
+// Bilinear at positions clamped to the image, less 128, times 127^2 / 256. Fractions are known to
+// 1/128 pixel along each axis, which two black and white neighbours turn into 255 / 128 each; the
+// last shift leaves out up to 1.
 void test_patches_are_bilinear_samples() {
   constexpr double kUnit = 127.0 * 127.0 / 256.0;
   constexpr double kMaxError = 2 * 255 / 128.0 * kUnit + 1;

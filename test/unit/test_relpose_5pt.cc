@@ -1,9 +1,8 @@
 // Five-point solver and its polynomial roots, held against their definitions.
-#include "geometry/relpose_5pt.h"
-
 #include <cmath>
 
 #include "geometry/polynomial.h"
+#include "geometry/relpose_5pt.h"
 #include "support/scene.h"
 
 void setUp(void) {}
@@ -33,9 +32,7 @@ Sample make_sample(tv::Random* random, const Mat3& R, const Vec3& t) {
   return s;
 }
 
-double distance(const Mat3& a, const Mat3& b) {
-  return std::fmin((a - b).norm(), (a + b).norm());
-}
+double distance(const Mat3& a, const Mat3& b) { return std::fmin((a - b).norm(), (a + b).norm()); }
 
 double nearest_model(const Sample& s, const Mat3* models, int count) {
   double best = 2;

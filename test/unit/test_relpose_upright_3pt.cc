@@ -1,8 +1,7 @@
 // Three-point solver with gravity, held against its definition.
-#include "geometry/relpose_upright_3pt.h"
-
 #include <cmath>
 
+#include "geometry/relpose_upright_3pt.h"
 #include "support/scene.h"
 
 void setUp(void) {}
@@ -64,8 +63,7 @@ double residual(const Sample& s, const Pose& pose) {
   worst = std::fmax(worst, (pose.R * pose.R.transpose() - Mat3::Identity()).norm());
   worst = std::fmax(worst, std::fabs(pose.t.norm() - 1));
   for (int k = 0; k < 3; ++k) {
-    worst = std::fmax(worst,
-                      std::fabs(s.rays1[k].normalized().dot(E * s.rays0[k].normalized())));
+    worst = std::fmax(worst, std::fabs(s.rays1[k].normalized().dot(E * s.rays0[k].normalized())));
   }
   return worst;
 }
@@ -168,11 +166,11 @@ void test_degenerate_samples_give_finite_poses_or_none(void) {
       const Mat3 R = tv::rotation_about(down, uniform(&random, -3, 3));
       Sample s = make_sample(&random, R, scene::direction(&random), down);
       for (int k = 0; k < 3; ++k) {
-        if (kind == 0) s.rays0[k] = s.rays0[0], s.rays1[k] = s.rays1[0];   // one match thrice
-        if (kind == 1) s.rays1[k] = R * s.rays0[k];                        // pure rotation
-        if (kind == 2) s.rays1[k] = s.rays0[k], s.down1 = s.down0;         // no motion
+        if (kind == 0) s.rays0[k] = s.rays0[0], s.rays1[k] = s.rays1[0];  // one match thrice
+        if (kind == 1) s.rays1[k] = R * s.rays0[k];                       // pure rotation
+        if (kind == 2) s.rays1[k] = s.rays0[k], s.down1 = s.down0;        // no motion
         if (kind == 3) s.rays0[k] = s.rays1[k] = Vec3::Zero();
-        if (kind == 4) s.rays0[k] = s.down0;                               // along gravity
+        if (kind == 4) s.rays0[k] = s.down0;  // along gravity
         if (kind == 5) s.rays0[k] = s.down0, s.rays1[k] = -s.down1;
         if (kind == 6) s.rays0[k] = s.rays1[k] = Vec3(0.1 * k, 0.2 * k, 1);  // a line
         if (kind == 7 && k == 2) s.rays0[2] = s.rays0[1], s.rays1[2] = s.rays1[1];

@@ -1,10 +1,9 @@
 // Residuals in pixels: against the textbook, against each other, and their slopes against
 // differences.
-#include "geometry/residuals.h"
-
 #include <cmath>
 #include <cstdlib>
 
+#include "geometry/residuals.h"
 #include "robust/matches.h"
 #include "robust/refine.h"
 #include "support/scene.h"
@@ -62,18 +61,15 @@ void test_sampson_of_a_pinhole_is_the_textbooks(void) {
   second.fx = 420, second.fy = 480, second.cx = 300;
   prepare(with_cameras(scene::pinhole(), second, 1));
   const Mat3 E = tv::essential_from_pose({pair.R, pair.t});
-  const Mat3 F = inverse_intrinsics(second).transpose() * E *
-                 inverse_intrinsics(scene::pinhole());
+  const Mat3 F = inverse_intrinsics(second).transpose() * E * inverse_intrinsics(scene::pinhole());
   for (int i = 0; i < matches.pairs.num; ++i) {
     const int k = matches.order[i];
     const Vec3 x0(pair.pixels[0][2 * k], pair.pixels[0][2 * k + 1], 1);
     const Vec3 x1(pair.pixels[1][2 * k], pair.pixels[1][2 * k + 1], 1);
     const Vec3 line1 = F * x0, line0 = F.transpose() * x1;
     const double c = x1.dot(line1);
-    const double expected =
-        c * c / (line1.head<2>().squaredNorm() + line0.head<2>().squaredNorm());
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + expected), expected,
-                              tv::sampson_sq(matches.pairs, i, E));
+    const double expected = c * c / (line1.head<2>().squaredNorm() + line0.head<2>().squaredNorm());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + expected), expected, tv::sampson_sq(matches.pairs, i, E));
   }
 }
 
@@ -174,10 +170,9 @@ void test_squares_of_many_are_those_of_each(void) {
                                            tv::ray_of(matches.pairs, 1, i),
                                            1.5 * matches.pairs.pixel_angle[i])) >= 0;
         behind[p] += !in_front;
-        TEST_ASSERT_TRUE(
-            squares[k] ==
-            (in_front ? tv::sampson_sq(matches.pairs, i, tv::essential_from_pose(poses[p]))
-                      : INFINITY));
+        TEST_ASSERT_TRUE(squares[k] == (in_front ? tv::sampson_sq(matches.pairs, i,
+                                                                  tv::essential_from_pose(poses[p]))
+                                                 : INFINITY));
       }
     }
     TEST_ASSERT_TRUE(behind[0] < 30 && behind[1] > 60);
@@ -245,8 +240,7 @@ void check_gradient(const Model& model, const RobustLoss& loss, const double* st
       cost[side] = model.stepped(step).normal_equations(matches.pairs, nullptr, n, loss,
                                                         unused_upper, unused);
     }
-    const double slope =
-        0.5 * loss.scale_px * loss.scale_px * (cost[1] - cost[0]) / (2 * steps[p]);
+    const double slope = 0.5 * loss.scale_px * loss.scale_px * (cost[1] - cost[0]) / (2 * steps[p]);
     TEST_ASSERT_DOUBLE_WITHIN(2e-4 * size, slope, gradient[p]);
   }
 }

@@ -1,5 +1,5 @@
-/* The sets that kernels/select.c finds by its own cpuid and xgetbv, against the compiler's reading of the
-   CPU; under an emulator (`select SET`) also against what the CPU is known to have. */
+/* The sets that kernels/select.c finds by its own cpuid and xgetbv, against the compiler's reading
+   of the CPU; under an emulator (`select SET`) also against what the CPU is known to have. */
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,8 +1,9 @@
 // Plain SIFT against OpenCV's at the same keypoints, angles, level and blur.
 //
-// Our octave 0 is the image blurred by the 3x3 binomial, whose variance is 0.5 square pixels. OpenCV
-// takes an image to have a blur of 0.5 pixel already (variance 0.25) and adds up to `sigma`, so that
-// sigma = sqrt(0.25 + 0.5) makes its octave 0, layer 0 the same image but for the Gaussian's shape.
+// Our octave 0 is the image blurred by the 3x3 binomial, whose variance is 0.5 square pixels.
+// OpenCV takes an image to have a blur of 0.5 pixel already (variance 0.25) and adds up to `sigma`,
+// so that sigma = sqrt(0.25 + 0.5) makes its octave 0, layer 0 the same image but for the
+// Gaussian's shape.
 
 #include <stdlib.h>
 #include <string.h>
@@ -48,9 +49,8 @@ void find_keypoints(int view) {
   options.cell_px = 40;
   options.keypoint_size = 4.0f;
   tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
-  const int32_t found =
-      tv::find_corners(*tvk_select(TV_KERNELS_AUTO), image_of(view), nullptr, options,
-                       kMaxKeypoints, arena, keypoints[view]);
+  const int32_t found = tv::find_corners(*tvk_select(TV_KERNELS_AUTO), image_of(view), nullptr,
+                                         options, kMaxKeypoints, arena, keypoints[view]);
   counts[view] = 0;
   for (int k = 0; k < found; ++k) {
     const tv_keypoint p = keypoints[view][k];
@@ -122,9 +122,8 @@ double match_agreement() {
   for (int system = 0; system < 2; ++system) {
     uint8_t(*descriptors)[kMaxKeypoints * TV_DESCRIPTOR_BYTES] = system == 0 ? ours : opencvs;
     tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
-    found[system] =
-        tv::match_descriptors(*tvk_select(TV_KERNELS_AUTO), descriptors[0], counts[0],
-                              descriptors[1], counts[1], 0.8f, arena, matches[system]);
+    found[system] = tv::match_descriptors(*tvk_select(TV_KERNELS_AUTO), descriptors[0], counts[0],
+                                          descriptors[1], counts[1], 0.8f, arena, matches[system]);
   }
   int common = 0;
   for (int a = 0, b = 0; a < found[0] && b < found[1];) {

@@ -21,18 +21,23 @@ using tv::Vec3;
 
 constexpr uint64_t kSeed = 11;
 const tv_triangulation kMethods[] = {
-    TV_TRIANGULATION_POLY,         TV_TRIANGULATION_POLY_ABS,        TV_TRIANGULATION_LINEAR_EIGEN,
-    TV_TRIANGULATION_LINEAR_LS,    TV_TRIANGULATION_ITERATIVE_EIGEN, TV_TRIANGULATION_ITERATIVE_LS,
+    TV_TRIANGULATION_POLY,      TV_TRIANGULATION_POLY_ABS,        TV_TRIANGULATION_LINEAR_EIGEN,
+    TV_TRIANGULATION_LINEAR_LS, TV_TRIANGULATION_ITERATIVE_EIGEN, TV_TRIANGULATION_ITERATIVE_LS,
     TV_TRIANGULATION_MIDPOINT};
 const Mat3 kIdentity = Mat3::Identity();
 const Vec3 kSideways(-1, 0, 0);
 
-tv_camera pinhole() {
-  return tv_camera{TV_CAMERA_PINHOLE, 640, 480, 0, 500, 510, 320, 240, {}};
-}
+tv_camera pinhole() { return tv_camera{TV_CAMERA_PINHOLE, 640, 480, 0, 500, 510, 320, 240, {}}; }
 
 tv_camera distorted() {
-  return tv_camera{TV_CAMERA_BROWN_CONRADY, 752, 480, 0, 458.654, 457.296, 367.215, 248.375,
+  return tv_camera{TV_CAMERA_BROWN_CONRADY,
+                   752,
+                   480,
+                   0,
+                   458.654,
+                   457.296,
+                   367.215,
+                   248.375,
                    {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}};
 }
 
@@ -145,8 +150,8 @@ struct Scene {
 // A point in front of both cameras, at 2 to 10 baselines.
 Scene random_scene(tv::Random* random) {
   Scene scene;
-  scene.R = rotation(uniform(random, -0.2, 0.2), uniform(random, -0.2, 0.2),
-                     uniform(random, -0.3, 0.3));
+  scene.R =
+      rotation(uniform(random, -0.2, 0.2), uniform(random, -0.2, 0.2), uniform(random, -0.3, 0.3));
   scene.t = Vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -0.3, 0.3));
   scene.t.normalize();
   const double depth = uniform(random, 2, 10);
@@ -166,9 +171,8 @@ void test_exact_points_are_recovered_by_every_method_and_lens(void) {
     const Camera& camera0 = cameras[i % 3];
     const Camera& camera1 = cameras[i / 3 % 3];
     for (tv_triangulation method : kMethods) {
-      const tv_point point =
-          triangulated(method, camera0, camera1, scene.R, scene.t, seen(camera0, scene.point0),
-                       seen(camera1, scene.point1));
+      const tv_point point = triangulated(method, camera0, camera1, scene.R, scene.t,
+                                          seen(camera0, scene.point0), seen(camera1, scene.point1));
       TEST_ASSERT_EQUAL_INT(TV_POINT_OK, point.status);
       TEST_ASSERT_TRUE((position(point) - scene.point0).norm() < 1e-9);
       TEST_ASSERT_TRUE(point.error_px < 1e-6f);
@@ -184,9 +188,8 @@ void test_far_points_keep_the_digits_that_their_parallax_has(void) {
   for (double depth = 10; depth < 1e10; depth *= 10) {
     const Vec3 point0 = depth * Vec3(0.1, -0.2, 1);
     for (tv_triangulation method : kMethods) {
-      const tv_point point =
-          triangulated(method, camera, camera, kIdentity, kSideways, seen(camera, point0),
-                       seen(camera, point0 + kSideways));
+      const tv_point point = triangulated(method, camera, camera, kIdentity, kSideways,
+                                          seen(camera, point0), seen(camera, point0 + kSideways));
       TEST_ASSERT_EQUAL_INT(TV_POINT_OK, point.status);
       TEST_ASSERT_DOUBLE_WITHIN(4e-15 * depth, 0, (position(point) - point0).norm() / depth);
     }
@@ -219,8 +222,7 @@ void test_linear_ls_equals_hartley_and_sturms_equations_solved_by_qr(void) {
     const Vec2 pixel1 = seen(camera1, scene.point1) + Vec2(noise(&random, 1), noise(&random, 1));
     const tv_point point = triangulated(TV_TRIANGULATION_LINEAR_LS, camera0, camera1, scene.R,
                                         scene.t, pixel0, pixel1);
-    const Vec3 expected =
-        linear_ls_by_qr(pinhole(), other, scene.R, scene.t, pixel0, pixel1, 1, 1);
+    const Vec3 expected = linear_ls_by_qr(pinhole(), other, scene.R, scene.t, pixel0, pixel1, 1, 1);
     TEST_ASSERT_TRUE((position(point) - expected).norm() < 1e-9 * expected.norm());
   }
 }
@@ -261,8 +263,8 @@ void test_iterative_ls_is_the_fixed_point_of_its_weights(void) {
                                         scene.t, pixel0, pixel1);
     const Vec3 at = position(point);
     const double w1 = (scene.R * at + scene.t)[2];
-    const Vec3 again = linear_ls_by_qr(pinhole(), pinhole(), scene.R, scene.t, pixel0, pixel1,
-                                       at[2], w1);
+    const Vec3 again =
+        linear_ls_by_qr(pinhole(), pinhole(), scene.R, scene.t, pixel0, pixel1, at[2], w1);
     TEST_ASSERT_TRUE((again - at).norm() < 1e-8 * at.norm());
     const Vec3 linear =
         linear_ls_by_qr(pinhole(), pinhole(), scene.R, scene.t, pixel0, pixel1, 1, 1);
@@ -335,9 +337,9 @@ void test_correction_of_a_fisheye_is_least_on_its_tangent_planes(void) {
         }
         return sum;
       };
-      const tv::Correction correction = tv::correct_match(
-          squared ? TV_TRIANGULATION_POLY : TV_TRIANGULATION_POLY_ABS, pair,
-          tv::frame_of(camera, ray[0]), tv::frame_of(camera, ray[1]));
+      const tv::Correction correction =
+          tv::correct_match(squared ? TV_TRIANGULATION_POLY : TV_TRIANGULATION_POLY_ABS, pair,
+                            tv::frame_of(camera, ray[0]), tv::frame_of(camera, ray[1]));
       double moved = 0;
       for (int k = 0; k < 2; ++k) {
         const double sq = correction.step[k][0] * correction.step[k][0] +
@@ -375,8 +377,8 @@ void test_midpoint_equals_the_point_nearest_to_both_lines(void) {
     const Mat3 off1 = kIdentity - d1 * d1.transpose();
     const Mat3 sum = off0 + off1;
     const Vec3 expected = sum.ldlt().solve(Vec3(off1 * c1));
-    const tv_point point = triangulated(TV_TRIANGULATION_MIDPOINT, camera, camera, scene.R, scene.t,
-                                        pixel0, pixel1);
+    const tv_point point =
+        triangulated(TV_TRIANGULATION_MIDPOINT, camera, camera, scene.R, scene.t, pixel0, pixel1);
     TEST_ASSERT_TRUE((position(point) - expected).norm() < 1e-9 * expected.norm());
   }
 }
@@ -390,8 +392,7 @@ void test_error_is_the_rms_reprojection_through_the_lens(void) {
     const Vec2 pixel0 = seen(camera, scene.point0) + Vec2(noise(&random, 2), noise(&random, 2));
     const Vec2 pixel1 = seen(camera, scene.point1) + Vec2(noise(&random, 2), noise(&random, 2));
     for (tv_triangulation method : kMethods) {
-      const tv_point point =
-          triangulated(method, camera, camera, scene.R, scene.t, pixel0, pixel1);
+      const tv_point point = triangulated(method, camera, camera, scene.R, scene.t, pixel0, pixel1);
       const Vec3 at = position(point);
       const double squares = (seen(camera, at) - pixel0).squaredNorm() +
                              (seen(camera, scene.R * at + scene.t) - pixel1).squaredNorm();
@@ -409,8 +410,7 @@ void test_iterative_ls_has_no_more_error_than_midpoint_under_noise(void) {
     const Vec2 pixel0 = seen(camera, scene.point0) + Vec2(noise(&random, 1), noise(&random, 1));
     const Vec2 pixel1 = seen(camera, scene.point1) + Vec2(noise(&random, 1), noise(&random, 1));
     for (tv_triangulation method : kMethods) {
-      const tv_point point =
-          triangulated(method, camera, camera, scene.R, scene.t, pixel0, pixel1);
+      const tv_point point = triangulated(method, camera, camera, scene.R, scene.t, pixel0, pixel1);
       if (point.status == TV_POINT_OK) sum[method] += point.error_px;
     }
   }
@@ -423,13 +423,12 @@ void test_parallel_rays_are_at_infinity(void) {
   const Mat3 R = rotation(0.1, -0.2, 0.05);
   const Vec3 direction = Vec3(0.1, 0.05, 1).normalized();
   for (tv_triangulation method : kMethods) {
-    const tv_point same = triangulated(method, camera, camera, kIdentity, kSideways,
-                                       Vec2(400, 200), Vec2(400, 200));
+    const tv_point same =
+        triangulated(method, camera, camera, kIdentity, kSideways, Vec2(400, 200), Vec2(400, 200));
     TEST_ASSERT_EQUAL_INT(TV_POINT_INFINITE, same.status);
     TEST_ASSERT_TRUE(same.error_px < 1e-9f && same.angle_rad < 1e-14f);
-    const tv_point turned =
-        triangulated(method, camera, camera, R, Vec3(0.3, 2, -1), seen(camera, direction),
-                     seen(camera, R * direction));
+    const tv_point turned = triangulated(method, camera, camera, R, Vec3(0.3, 2, -1),
+                                         seen(camera, direction), seen(camera, R * direction));
     TEST_ASSERT_EQUAL_INT(TV_POINT_INFINITE, turned.status);
     TEST_ASSERT_TRUE((position(turned) - direction).norm() < 1e-12);
     TEST_ASSERT_TRUE(turned.error_px < 1e-9f);
@@ -448,11 +447,9 @@ void test_rays_that_meet_behind_say_so_and_where(void) {
     // With a pixel off, the error is that of the point projected through the centre.
     const Vec2 pixel0 = seen(camera, -behind);
     const Vec2 pixel1 = seen(camera, -(behind + kSideways)) + Vec2(1, 30);
-    const tv_point off =
-        triangulated(method, camera, camera, kIdentity, kSideways, pixel0, pixel1);
-    const double squares =
-        (seen(camera, -position(off)) - pixel0).squaredNorm() +
-        (seen(camera, -(position(off) + kSideways)) - pixel1).squaredNorm();
+    const tv_point off = triangulated(method, camera, camera, kIdentity, kSideways, pixel0, pixel1);
+    const double squares = (seen(camera, -position(off)) - pixel0).squaredNorm() +
+                           (seen(camera, -(position(off) + kSideways)) - pixel1).squaredNorm();
     TEST_ASSERT_EQUAL_INT(TV_POINT_BEHIND, off.status);
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, std::sqrt(squares / 2), off.error_px);
   }

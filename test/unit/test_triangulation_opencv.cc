@@ -1,11 +1,10 @@
 // Triangulation against OpenCV: Linear-Eigen is its triangulatePoints, with which the other methods
 // agree without noise, and to first order in the noise; Poly corrects pixels as its correctMatches,
 // and at no more cost where that is not at the minimum.
-#include <opencv2/calib3d.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <opencv2/calib3d.hpp>
 
 #include "base/random.h"
 #include "geometry/triangulation.h"
@@ -31,8 +30,8 @@ double uniform(tv::Random* random, double low, double high) {
 Vec3 triangulated_by_opencv(const Mat3& R, const Vec3& t, const Vec2& pixel0, const Vec2& pixel1) {
   const cv::Matx33d K(kCamera.fx, 0, kCamera.cx, 0, kCamera.fy, kCamera.cy, 0, 0, 1);
   const cv::Matx34d P0 = K * cv::Matx34d::eye();
-  const cv::Matx34d P1 = K * cv::Matx34d(R(0, 0), R(0, 1), R(0, 2), t[0], R(1, 0), R(1, 1),
-                                         R(1, 2), t[1], R(2, 0), R(2, 1), R(2, 2), t[2]);
+  const cv::Matx34d P1 = K * cv::Matx34d(R(0, 0), R(0, 1), R(0, 2), t[0], R(1, 0), R(1, 1), R(1, 2),
+                                         t[1], R(2, 0), R(2, 1), R(2, 2), t[2]);
   const cv::Mat x0 = (cv::Mat_<double>(2, 1) << pixel0[0], pixel0[1]);
   const cv::Mat x1 = (cv::Mat_<double>(2, 1) << pixel1[0], pixel1[1]);
   cv::Mat X;
@@ -197,9 +196,12 @@ void test_poly_costs_no_more_than_correct_matches_in_hard_places(void) {
     const bool sideways = i % 4 == 3;
     const Mat3 R = sideways ? Mat3(Mat3::Identity())
                             : rotation(uniform(&random, -0.1, 0.1), uniform(&random, -0.1, 0.1), 0);
-    const Vec3 t = Vec3(uniform(&random, -0.4, 0.4) + (sideways ? 1 : 0),
-                        uniform(&random, -0.4, 0.4), sideways ? 0 : i % 8 < 4 ? -1 : 1)
-                       .normalized();
+    const Vec3 t =
+        Vec3(uniform(&random, -0.4, 0.4) + (sideways ? 1 : 0), uniform(&random, -0.4, 0.4),
+             sideways    ? 0
+             : i % 8 < 4 ? -1
+                         : 1)
+            .normalized();
     const Vec3 center = R.transpose() * t;
     Vec2 pixels[2];
     if (sideways) {  // at infinity, and both epipoles there

@@ -131,8 +131,7 @@ void choose_match(tv::Random* random, Case* c) {
   Vec2 pixel0 = random_pixel(random);
   const tv_camera& m = c->camera[0].model;
   const double depth = log_uniform(random, 0.5, 1000);
-  const Vec3 point0 =
-      depth * Vec3((pixel0[0] - m.cx) / m.fx, (pixel0[1] - m.cy) / m.fy, 1);
+  const Vec3 point0 = depth * Vec3((pixel0[0] - m.cx) / m.fx, (pixel0[1] - m.cy) / m.fy, 1);
   Vec2 pixel1 = projected(c->camera[1], c->R * point0 + c->t);
   switch (c->match) {
     case 0: break;

@@ -54,9 +54,12 @@ void relative_pose(const CameraPose& cam0, const CameraPose& cam1, Mat3& R, Vec3
 }
 
 Eye::Eye(const tv_camera& camera)
-    : width_(camera.width), height_(camera.height), pixel_angle_(1 / std::max(camera.fx, camera.fy)) {
+    : width_(camera.width),
+      height_(camera.height),
+      pixel_angle_(1 / std::max(camera.fx, camera.fy)) {
   if (tv_camera_check(&camera) != TV_OK) throw std::invalid_argument("not a valid camera");
-  std::vector<double> pixels(2 * static_cast<size_t>(width_)), rays(3 * static_cast<size_t>(width_));
+  std::vector<double> pixels(2 * static_cast<size_t>(width_)),
+      rays(3 * static_cast<size_t>(width_));
   std::vector<uint8_t> inside(static_cast<size_t>(width_));
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
@@ -88,8 +91,8 @@ Room::Room(uint64_t seed)
   }
 }
 
-// Slabs: a ray is inside a box between the last of its entries and the first of its exits (T. L. Kay,
-// J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986). `from` lies within the walls.
+// Slabs: a ray is inside a box between the last of its entries and the first of its exits (T. L.
+// Kay, J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986). `from` lies within the walls.
 Room::Hit Room::first_hit(const Vec3& from, const Vec3& ray) const {
   const Vec3 inverse = {1 / ray[0], 1 / ray[1], 1 / ray[2]};
   Hit hit{HUGE_VAL, &walls_, 0, 0};
@@ -121,8 +124,9 @@ float Room::grey_at(const Vec3& from, const Vec3& ray, const Hit& hit, double pi
   const Box& box = *hit.box;
   const size_t u_axis = (hit.axis + 1) % 3, v_axis = (hit.axis + 2) % 3;
   // So that no two sides show the same piece.
-  const double shift = 0.37 * static_cast<double>(6 * (&box == &walls_ ? 0 : &box - &boxes_[0] + 1) +
-                                                  2 * static_cast<int>(hit.axis) + hit.side);
+  const double shift =
+      0.37 * static_cast<double>(6 * (&box == &walls_ ? 0 : &box - &boxes_[0] + 1) +
+                                 2 * static_cast<int>(hit.axis) + hit.side);
   const double u = (from[u_axis] + hit.distance * ray[u_axis] - box.low[u_axis]) * kTilesPerMetre;
   const double v = (from[v_axis] + hit.distance * ray[v_axis] - box.low[v_axis]) * kTilesPerMetre;
   int texture = box.texture;
@@ -130,7 +134,8 @@ float Room::grey_at(const Vec3& from, const Vec3& ray, const Hit& hit, double pi
   // The side of a pixel's patch: between its short side and the one that the slant draws out.
   const double slant = std::max(std::abs(ray[hit.axis]), 0.05);
   const double footprint = hit.distance * pixel_angle / std::sqrt(slant) * kTilesPerMetre;
-  const double light = 1.0 - 0.13 * static_cast<double>((hit.axis + static_cast<size_t>(hit.side)) % 3);
+  const double light =
+      1.0 - 0.13 * static_cast<double>((hit.axis + static_cast<size_t>(hit.side)) % 3);
   return static_cast<float>(light) *
          textures_[static_cast<size_t>(texture)].sample(u + shift, v + 1.7 * shift, footprint);
 }

@@ -1,6 +1,6 @@
 // A furnished room to fly through, rendered with its true poses and depths.
-// World and body frames are those of the drivers: x forward, y right, z down; z = 0 is the floor, so
-// what lies above it has z < 0.
+// World and body frames are those of the drivers: x forward, y right, z down; z = 0 is the floor,
+// so what lies above it has z < 0.
 #pragma once
 
 #include <array>
@@ -22,8 +22,8 @@ struct CameraPose {
   Vec3 position;  // metres
 };
 
-// A camera fixed in the body: camera axes in the body frame. Looking forward: x of the camera is y of
-// the body, y is z, z is x.
+// A camera fixed in the body: camera axes in the body frame. Looking forward: x of the camera is y
+// of the body, y is z, z is x.
 extern const Mat3 kForwardCamera;
 
 // Attitude by yaw, pitch, roll (aerospace order z y x; nose up, right side down are positive), then

@@ -159,7 +159,8 @@ float Texture::sample(double u, double v, double footprint) const {
   const int level = std::min(exponent - 1, static_cast<int>(levels_.size()) - 2);
   const float share = static_cast<float>(2 * mantissa - 1);
   const float fine = bilinear(levels_[static_cast<size_t>(level)], kSide >> level, u, v);
-  const float coarse = bilinear(levels_[static_cast<size_t>(level) + 1], kSide >> (level + 1), u, v);
+  const float coarse =
+      bilinear(levels_[static_cast<size_t>(level) + 1], kSide >> (level + 1), u, v);
   return fine + share * (coarse - fine);
 }
 

@@ -16,7 +16,8 @@ class Texture {
   // Boards with seams, for a floor.
   static Texture planks(uint64_t seed);
 
-  // Grey level at (u, v) tiles, both above -4, seen so that one pixel covers `footprint` tiles: trilinear.
+  // Grey level at (u, v) tiles, both above -4, seen so that one pixel covers `footprint` tiles:
+  // trilinear.
   float sample(double u, double v, double footprint) const;
 
  private:

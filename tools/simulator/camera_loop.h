@@ -1,5 +1,5 @@
-// The drone's camera: a thread that paints a picture at each frame time and encodes it, so that slow
-// pictures never hold up navdata.
+// The drone's camera: a thread that paints a picture at each frame time and encodes it, so that
+// slow pictures never hold up navdata.
 #pragma once
 
 #include <condition_variable>

@@ -18,8 +18,8 @@ class FaultyLink {
   using Bytes = std::vector<uint8_t>;
   FaultyLink(const FaultChances& chances, uint64_t seed) : chances_(chances), random_(seed) {}
 
-  // What arrives when this is sent: none, one or several datagrams, in the order of arrival. One that
-  // is overtaken waits for the next.
+  // What arrives when this is sent: none, one or several datagrams, in the order of arrival. One
+  // that is overtaken waits for the next.
   std::vector<Bytes> send(Bytes datagram);
 
  private:

@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kKeyEvery = 15;  // pictures, as in the captures
 
-// Bytes of a unit of this type at the start of `bytes`, its start code included; 0 for another type.
+// Bytes of a unit of this type at the start of `bytes`, its start code included; 0 for another
+// type.
 size_t unit_bytes(const uint8_t* bytes, size_t size, int type) {
   const auto start_code = [&](size_t at) -> size_t {
     if (at + 3 <= size && bytes[at] == 0 && bytes[at + 1] == 0 && bytes[at + 2] == 1) return 3;

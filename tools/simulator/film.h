@@ -1,5 +1,5 @@
-// Pictures to H.264 as the drone's encoder makes it: one packet a picture, parameter sets in each key
-// picture, no picture that waits for a later one.
+// Pictures to H.264 as the drone's encoder makes it: one packet a picture, parameter sets in each
+// key picture, no picture that waits for a later one.
 #pragma once
 
 #include <cstdint>

@@ -248,7 +248,8 @@ void Firmware::obey_config(const std::vector<std::string>& arguments) {
   if (key == "custom:session_id") choose_id(value, sessions_, ids_.session);
   if (key == "custom:profile_id") choose_id(value, users_, ids_.user);
   if (key == "custom:application_id") choose_id(value, applications_, ids_.application);
-  if (key == "custom:session_desc" && sessions_.count(ids_.session)) sessions_[ids_.session] = value;
+  if (key == "custom:session_desc" && sessions_.count(ids_.session))
+    sessions_[ids_.session] = value;
   if (key == "custom:profile_desc" && users_.count(ids_.user)) users_[ids_.user] = value;
   if (key == "custom:application_desc" && applications_.count(ids_.application)) {
     applications_[ids_.application] = value;
@@ -269,8 +270,7 @@ void Firmware::obey_control(const std::vector<std::string>& arguments) {
   if (*mode == ARDRONE_CTRL_SEND_CONFIG || *mode == ARDRONE_CTRL_SEND_IDS) {
     acknowledge_ = true;
     // Asked for again before it was fetched: the same text, once.
-    control_texts_.assign(
-        1, *mode == ARDRONE_CTRL_SEND_CONFIG ? configuration_text() : ids_text());
+    control_texts_.assign(1, *mode == ARDRONE_CTRL_SEND_CONFIG ? configuration_text() : ids_text());
   }
 }
 
@@ -313,7 +313,8 @@ uint32_t Firmware::state_word() const {
                    ARDRONE_STATE_AT_THREAD | ARDRONE_STATE_NAVDATA_THREAD |
                    ARDRONE_STATE_VIDEO_THREAD | ARDRONE_STATE_ACQUISITION_THREAD;
   if (mode != FlightMode::kLanded && mode != FlightMode::kMotorsCut) state |= ARDRONE_STATE_FLYING;
-  if (mode == FlightMode::kMotorsCut) state |= ARDRONE_STATE_EMERGENCY | ARDRONE_STATE_USER_EMERGENCY;
+  if (mode == FlightMode::kMotorsCut)
+    state |= ARDRONE_STATE_EMERGENCY | ARDRONE_STATE_USER_EMERGENCY;
   if (configuration_.at("general:navdata_demo") == "TRUE") state |= ARDRONE_STATE_DEMO;
   if (acknowledge_) state |= ARDRONE_STATE_ACKNOWLEDGE;
   if (bootstrap_) state |= ARDRONE_STATE_BOOTSTRAP;
@@ -336,8 +337,8 @@ void Firmware::fill(int64_t now_ns, ardrone_navdata* navdata) {
   noise_state_ = random.next();
   const auto noisy = [&](double value, double sigma) { return value + sigma * random.normal(); };
   const Vec3 v = body_velocity(state), force = specific_force(state);
-  const double height = std::max(
-      0.0, noisy(flight_.height() * sensors_.altitude_factor, sensors_.altitude_noise_m));
+  const double height =
+      std::max(0.0, noisy(flight_.height() * sensors_.altitude_factor, sensors_.altitude_noise_m));
   const bool in_air = (state_word() & ARDRONE_STATE_FLYING) != 0;
   navdata->state = state_word();
   navdata->sequence = sequence_;
@@ -345,12 +346,12 @@ void Firmware::fill(int64_t now_ns, ardrone_navdata* navdata) {
   navdata->present = option_mask();
 
   ardrone_demo& demo = navdata->demo;
-  constexpr uint32_t kMajor[] = {ARDRONE_CONTROL_LANDED, ARDRONE_CONTROL_TAKING_OFF,
+  constexpr uint32_t kMajor[] = {ARDRONE_CONTROL_LANDED,   ARDRONE_CONTROL_TAKING_OFF,
                                  ARDRONE_CONTROL_HOVERING, ARDRONE_CONTROL_FLYING,
-                                 ARDRONE_CONTROL_LANDING, ARDRONE_CONTROL_DEFAULT};
+                                 ARDRONE_CONTROL_LANDING,  ARDRONE_CONTROL_DEFAULT};
   demo.ctrl_state = kMajor[static_cast<int>(state.mode)] << 16;
-  demo.battery_percent = static_cast<uint32_t>(
-      std::max<int64_t>(5, 100 - uptime_ns(now_ns) / (10 * kSecond)));
+  demo.battery_percent =
+      static_cast<uint32_t>(std::max<int64_t>(5, 100 - uptime_ns(now_ns) / (10 * kSecond)));
   const double pitch = noisy(state.pitch, sensors_.attitude_noise_rad);
   const double roll = noisy(state.roll, sensors_.attitude_noise_rad);
   const double yaw = noisy(state.yaw, sensors_.attitude_noise_rad);
@@ -359,16 +360,18 @@ void Firmware::fill(int64_t now_ns, ardrone_navdata* navdata) {
   demo.psi_mdeg = static_cast<float>(yaw * kDegrees * 1000);
   demo.altitude_mm = in_air ? static_cast<int32_t>(std::lround(height * 1000)) : 0;
   for (size_t k = 0; k < 2; ++k) {  // z stays 0, as on the real drone
-    demo.velocity_mm_s[k] = in_air ? static_cast<float>(1000 * noisy(v[k] * sensors_.velocity_factor,
-                                                                     sensors_.velocity_noise_m_s))
-                                   : 0.0f;
+    demo.velocity_mm_s[k] = in_air
+                                ? static_cast<float>(1000 * noisy(v[k] * sensors_.velocity_factor,
+                                                                  sensors_.velocity_noise_m_s))
+                                : 0.0f;
   }
   navdata->time = ardrone_encode_time(uptime_ns(now_ns));
   for (size_t k = 0; k < 3; ++k) {
     navdata->phys_measures.acceleration_mg[k] = static_cast<float>(noisy(force[k] / 9.81e-3, 3));
   }
   navdata->phys_measures.rate_deg_s[0] = static_cast<float>(noisy(state.roll_rate * kDegrees, 0.1));
-  navdata->phys_measures.rate_deg_s[1] = static_cast<float>(noisy(state.pitch_rate * kDegrees, 0.1));
+  navdata->phys_measures.rate_deg_s[1] =
+      static_cast<float>(noisy(state.pitch_rate * kDegrees, 0.1));
   navdata->phys_measures.rate_deg_s[2] = static_cast<float>(noisy(state.yaw_rate * kDegrees, 0.1));
   navdata->euler_angles.theta_mdeg = demo.theta_mdeg;
   navdata->euler_angles.phi_mdeg = demo.phi_mdeg;

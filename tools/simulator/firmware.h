@@ -1,5 +1,5 @@
-// What runs on the simulated drone: it obeys AT commands, keeps a configuration and says how it is in
-// navdata. It knows bytes and a clock, no sockets.
+// What runs on the simulated drone: it obeys AT commands, keeps a configuration and says how it is
+// in navdata. It knows bytes and a clock, no sockets.
 #pragma once
 
 #include <cstdint>
@@ -57,7 +57,8 @@ class Firmware {
   bool navdata_runs() const { return hello_; }
   int num_refused() const { return num_refused_; }
   int num_obeyed() const { return num_obeyed_; }
-  // The highest sequence number obeyed since the link began, and whether one fell without starting at 1.
+  // The highest sequence number obeyed since the link began, and whether one fell without starting
+  // at 1.
   int32_t last_command() const { return last_command_; }
   int num_take_offs() const { return num_take_offs_; }
 

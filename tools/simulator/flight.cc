@@ -6,19 +6,19 @@
 namespace simulator {
 namespace {
 
-constexpr double kGravity = 9.81;           // m/s^2
-constexpr double kStep = 0.005;             // s
-constexpr double kTiltDelay = 0.12;         // s, to 63 per cent of the wanted angle
-constexpr double kClimbDelay = 0.25;        // s
-constexpr double kTurnDelay = 0.15;         // s
-constexpr double kDrag = 0.25;              // 1/s
-constexpr double kBrake = 0.16;             // rad of tilt against a m/s, while hovering
-constexpr double kHoverHeight = 1.0;        // m, where a take-off ends
-constexpr double kLandingSpeed = 0.5;       // m/s
-constexpr double kTakeOffSpeed = 0.6;       // m/s
-constexpr double kBodyRadius = 0.3;         // m, to the propellers' guards
-constexpr double kLowest = 0.3;             // m above the ground, while flying: lower, it climbs
-constexpr double kRecovery = 0.1;           // m/s
+constexpr double kGravity = 9.81;      // m/s^2
+constexpr double kStep = 0.005;        // s
+constexpr double kTiltDelay = 0.12;    // s, to 63 per cent of the wanted angle
+constexpr double kClimbDelay = 0.25;   // s
+constexpr double kTurnDelay = 0.15;    // s
+constexpr double kDrag = 0.25;         // 1/s
+constexpr double kBrake = 0.16;        // rad of tilt against a m/s, while hovering
+constexpr double kHoverHeight = 1.0;   // m, where a take-off ends
+constexpr double kLandingSpeed = 0.5;  // m/s
+constexpr double kTakeOffSpeed = 0.6;  // m/s
+constexpr double kBodyRadius = 0.3;    // m, to the propellers' guards
+constexpr double kLowest = 0.3;        // m above the ground, while flying: lower, it climbs
+constexpr double kRecovery = 0.1;      // m/s
 
 Vec3 rotate_back(const Mat3& m, const Vec3& v) {
   Vec3 out{};
@@ -82,8 +82,10 @@ void Flight::advance(double seconds) {
 
 void Flight::step(double dt) {
   // On level axes that turn with the yaw.
-  const double forward = std::cos(state_.yaw) * state_.velocity[0] + std::sin(state_.yaw) * state_.velocity[1];
-  const double right = std::cos(state_.yaw) * state_.velocity[1] - std::sin(state_.yaw) * state_.velocity[0];
+  const double forward =
+      std::cos(state_.yaw) * state_.velocity[0] + std::sin(state_.yaw) * state_.velocity[1];
+  const double right =
+      std::cos(state_.yaw) * state_.velocity[1] - std::sin(state_.yaw) * state_.velocity[0];
   const double brake_pitch = std::clamp(kBrake * forward, -limits_.tilt_rad, limits_.tilt_rad);
   const double brake_roll = std::clamp(-kBrake * right, -limits_.tilt_rad, limits_.tilt_rad);
   switch (state_.mode) {
@@ -129,8 +131,8 @@ void Flight::tilt_towards(double pitch, double roll, double turn_rad_s, double d
   state_.yaw = std::remainder(state_.yaw + state_.yaw_rate * dt, 2 * 3.14159265358979323846);
 }
 
-// The thrust holds the height: what tilt takes from it is given back, so that a level acceleration of
-// g tan(tilt) remains. Nose down, or right side down, pulls that way.
+// The thrust holds the height: what tilt takes from it is given back, so that a level acceleration
+// of g tan(tilt) remains. Nose down, or right side down, pulls that way.
 void Flight::accelerate(double climb_m_s, double dt) {
   const double forward = -kGravity * std::tan(state_.pitch);
   const double right = kGravity * std::tan(state_.roll) / std::cos(state_.pitch);
@@ -162,7 +164,8 @@ void Flight::move(double dt) {
   state_.velocity = {0, 0, 0};
   if (state_.mode == FlightMode::kLanding || state_.mode == FlightMode::kMotorsCut) {
     state_.position[2] = std::min(state_.position[2] + kLandingSpeed * dt, ground);
-    if (state_.position[2] >= ground && state_.mode == FlightMode::kLanding) state_.mode = FlightMode::kLanded;
+    if (state_.position[2] >= ground && state_.mode == FlightMode::kLanding)
+      state_.mode = FlightMode::kLanded;
   }
 }
 

@@ -1,7 +1,7 @@
 // How the simulated drone flies: simple, but with the right signs and sizes. Nothing here knows of
 // packets, sockets or clocks.
-// Body: x forward, y right, z down. World: z down, z = 0 the floor. Angles: yaw clockwise from above,
-// pitch nose up, roll right side down are positive.
+// Body: x forward, y right, z down. World: z down, z = 0 the floor. Angles: yaw clockwise from
+// above, pitch nose up, roll right side down are positive.
 #pragma once
 
 #include "room/room.h"
@@ -11,7 +11,8 @@ namespace simulator {
 using room::Mat3;
 using room::Vec3;
 
-// Fractions of the limits, each in [-1, 1]: roll + right, pitch + backward, climb + up, turn + clockwise.
+// Fractions of the limits, each in [-1, 1]: roll + right, pitch + backward, climb + up, turn +
+// clockwise.
 struct Sticks {
   double roll = 0, pitch = 0, climb = 0, turn = 0;
 };
@@ -29,10 +30,10 @@ enum class FlightMode { kLanded, kTakingOff, kHovering, kFlying, kLanding, kMoto
 // The truth at one instant.
 struct FlightState {
   FlightMode mode = FlightMode::kLanded;
-  Vec3 position{0, 0, 0};      // world, metres
-  Vec3 velocity{0, 0, 0};      // world, m/s
-  Vec3 acceleration{0, 0, 0};  // world, m/s^2, without gravity
-  double yaw = 0, pitch = 0, roll = 0;  // radians
+  Vec3 position{0, 0, 0};                              // world, metres
+  Vec3 velocity{0, 0, 0};                              // world, m/s
+  Vec3 acceleration{0, 0, 0};                          // world, m/s^2, without gravity
+  double yaw = 0, pitch = 0, roll = 0;                 // radians
   double yaw_rate = 0, pitch_rate = 0, roll_rate = 0;  // rad/s
 };
 

@@ -20,8 +20,8 @@ namespace {
 
 constexpr int64_t kSecond = 1000000000;
 constexpr int64_t kStallNs = 3 * kSecond;
-constexpr int64_t kRebootNs = kSecond;      // silent for so long
-constexpr size_t kMostUnsent = 1u << 20;    // bytes that wait for a slow client
+constexpr int64_t kRebootNs = kSecond;    // silent for so long
+constexpr size_t kMostUnsent = 1u << 20;  // bytes that wait for a slow client
 
 int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -55,7 +55,9 @@ class Stream {
     client_ = accept_client(listener_);
     unsent_.clear();
   }
-  void append(const uint8_t* bytes, size_t size) { unsent_.insert(unsent_.end(), bytes, bytes + size); }
+  void append(const uint8_t* bytes, size_t size) {
+    unsent_.insert(unsent_.end(), bytes, bytes + size);
+  }
   size_t num_unsent() const { return unsent_.size(); }
   void flush() {
     if (!client_.is_open() || has_left()) return;
@@ -92,13 +94,14 @@ void quaternion(const Mat3& m, double q[4]) {
   const double trace = m[0] + m[4] + m[8];
   const double squares[4] = {1 + 2 * m[0] - trace, 1 + 2 * m[4] - trace, 1 + 2 * m[8] - trace,
                              1 + trace};
-  const size_t largest =
-      static_cast<size_t>(std::max_element(squares, squares + 4) - squares);
+  const size_t largest = static_cast<size_t>(std::max_element(squares, squares + 4) - squares);
   const double s = 0.5 / std::sqrt(squares[largest]);
   const double x = m[7] - m[5], y = m[2] - m[6], z = m[3] - m[1];
   const double xy = m[1] + m[3], xz = m[2] + m[6], yz = m[5] + m[7];
-  const double table[4][4] = {
-      {squares[0], xy, xz, x}, {xy, squares[1], yz, y}, {xz, yz, squares[2], z}, {x, y, z, squares[3]}};
+  const double table[4][4] = {{squares[0], xy, xz, x},
+                              {xy, squares[1], yz, y},
+                              {xz, yz, squares[2], z},
+                              {x, y, z, squares[3]}};
   for (size_t k = 0; k < 4; ++k) q[k] = table[largest][k] * s;
 }
 
@@ -166,12 +169,12 @@ void Server::State::receive(int64_t now) {
   while ((size = recvfrom(at.fd(), bytes, sizeof bytes, 0, nullptr, nullptr)) >= 0) {
     if (now < dead_until_ns) continue;
     for (const FaultyLink::Bytes& datagram : commands_in.send({bytes, bytes + size})) {
-      firmware.receive_commands(
-          {reinterpret_cast<const char*>(datagram.data()), datagram.size()}, now);
+      firmware.receive_commands({reinterpret_cast<const char*>(datagram.data()), datagram.size()},
+                                now);
     }
   }
-  while ((size = recvfrom(navdata.fd(), bytes, sizeof bytes, 0,
-                          reinterpret_cast<sockaddr*>(&from), &from_size)) >= 0) {
+  while ((size = recvfrom(navdata.fd(), bytes, sizeof bytes, 0, reinterpret_cast<sockaddr*>(&from),
+                          &from_size)) >= 0) {
     if (now < dead_until_ns || size == 0) continue;
     listener = from;
     firmware.receive_hello(now);
@@ -241,8 +244,8 @@ void Server::State::send_frame(const CodedFrame& frame) {
   stream_position += header.payload_size - header.sps_size - header.pps_size;
   std::vector<uint8_t> bytes(header.header_size + frame.packet.payload.size());
   size_t size = 0;
-  if (ardrone_encode_pave(&header, frame.packet.payload.data(), bytes.data(), bytes.size(), &size) !=
-      TVS_OK) {
+  if (ardrone_encode_pave(&header, frame.packet.payload.data(), bytes.data(), bytes.size(),
+                          &size) != TVS_OK) {
     throw std::runtime_error("a picture does not fit into a PaVE packet");
   }
   write_truth(frame);

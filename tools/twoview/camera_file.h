@@ -29,8 +29,9 @@ NamedCameras parse_camera_set(const std::string& text, const std::string& name);
 const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,
                                const double K[9]);
 
-// A pinhole whose focal length is that of 35 mm film (EXIF's FocalLengthIn35mmFilm: the same angle across the
-// diagonal, 43.27 mm there, by CIPA DCG-001), with the principal point in the image's middle.
+// A pinhole whose focal length is that of 35 mm film (EXIF's FocalLengthIn35mmFilm: the same angle
+// across the diagonal, 43.27 mm there, by CIPA DCG-001), with the principal point in the image's
+// middle.
 tv_camera film_camera(double focal_35mm, int width, int height);
 
 // Throws BadInput with both sizes unless the camera is for images of this size.

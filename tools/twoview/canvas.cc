@@ -25,12 +25,17 @@ void blend(cv::Vec3b& pixel, const Colour& colour, double share) {
     pixel[c] = cv::saturate_cast<uint8_t>(pixel[c] + share * (colour[c] - pixel[c]));
 }
 
-// The character at the front of `text`, of which it takes `length` bytes; -1 and one byte where that
-// is no UTF-8.
+// The character at the front of `text`, of which it takes `length` bytes; -1 and one byte where
+// that is no UTF-8.
 int32_t front_character(const char* text, size_t size, size_t& length) {
   const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
   const uint8_t first = byte(0);
-  length = first < 0x80 ? 1 : first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF5 ? 4 : 0;
+  length = first < 0x80   ? 1
+           : first < 0xC2 ? 0
+           : first < 0xE0 ? 2
+           : first < 0xF0 ? 3
+           : first < 0xF5 ? 4
+                          : 0;
   bool is_whole = length > 0 && length <= size;
   int32_t character = length == 1 ? first : first & (0x7F >> length);
   for (size_t i = 1; is_whole && i < length; ++i) {

@@ -15,9 +15,9 @@ const Colour paper(32, 24, 20), panel(44, 34, 28), grid(72, 60, 52), text(236, 2
 
 enum class Align { kLeft, kCentre, kRight };
 
-// The text in the characters that the font of the pictures has, which are ASCII's: Latin letters lose
-// their accents, and any other character becomes one underscore. Input is UTF-8; bytes that are not
-// become an underscore each.
+// The text in the characters that the font of the pictures has, which are ASCII's: Latin letters
+// lose their accents, and any other character becomes one underscore. Input is UTF-8; bytes that
+// are not become an underscore each.
 std::string plain_letters(const std::string& text);
 
 // Text whose capitals are `height` pixels high, its baseline at `at`; drawn large and scaled down.

@@ -37,8 +37,8 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   stages.match = &options.match;
   stages.estimate = &options.estimate;
   const uint64_t start_ns = now_ns();
-  const tv_status status = tv_reconstruct(context, &views[0], &views[1], &stages,
-                                          &outcome.two_view, &outcome.reconstruction);
+  const tv_status status = tv_reconstruct(context, &views[0], &views[1], &stages, &outcome.two_view,
+                                          &outcome.reconstruction);
   const uint64_t total_ns = now_ns() - start_ns;
   if (status != TV_OK)
     throw BadInput("cannot reconstruct " + p0.path + " and " + p1.path + " with --method " +

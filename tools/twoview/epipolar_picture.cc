@@ -43,8 +43,7 @@ class Epipolar {
     if (!by_rays_) return {straight(to, applied(m, Vector3{other.x, other.y, 1}))};
     const double pixel[2] = {other.x, other.y};
     Vector3 ray;
-    if (tv_camera_unproject(&camera_[1 - to], pixel, ray.data(), nullptr) != TV_OK)
-      return {};
+    if (tv_camera_unproject(&camera_[1 - to], pixel, ray.data(), nullptr) != TV_OK) return {};
     return bent(camera_[to], applied(m, ray));
   }
 

@@ -113,10 +113,10 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
   Json& json = report.json;
   json["name0"] = pair.name0;
   json["name1"] = pair.name1;
-  for (const char* key : {"rotation_error_deg", "translation_error_deg",
-                          "translation_error_signed_deg", "pose_error_deg", "num_matches",
-                          "num_inliers", "precision", "config", "verdict",
-                          "principal_point_shift_px", "time_ms"})
+  for (const char* key :
+       {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
+        "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict",
+        "principal_point_shift_px", "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;

@@ -114,9 +114,7 @@ Picture load_picture(const std::string& path) {
       pixels = opaque;
       [[fallthrough]];
     }
-    default:
-      picture.colour = pixels;
-      cv::cvtColor(pixels, picture.luma, cv::COLOR_BGR2GRAY);
+    default: picture.colour = pixels; cv::cvtColor(pixels, picture.luma, cv::COLOR_BGR2GRAY);
   }
   picture.file_width = pixels.cols;
   picture.file_height = pixels.rows;

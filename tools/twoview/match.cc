@@ -85,7 +85,8 @@ void add_match(CLI::App& program, Run& run) {
       program.add_subcommand("match", "matches of two images, as CSV and as a picture");
   verb->add_option("A", a->image[0], "image 0")->required()->type_name("IMAGE");
   verb->add_option("B", a->image[1], "image 1")->required()->type_name("IMAGE");
-  add_common(*verb, a->common, kFeature | kMatch | kCommon, "folder for matches.csv and matches.png");
+  add_common(*verb, a->common, kFeature | kMatch | kCommon,
+             "folder for matches.csv and matches.png");
   verb->final_callback([a, &run] { run = [a] { return match(*a); }; });
 }
 

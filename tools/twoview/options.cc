@@ -80,7 +80,8 @@ std::vector<Option> table(Options& o) {
        "exactly this many samples; 0: adaptive stop"},
       {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
       {"principal-point-sigma", kEstimate, &e.principal_point_sigma, 0, 0.1, closed,
-       "how far the principal point may be off: standard deviation in focal lengths; 0: exactly where "
+       "how far the principal point may be off: standard deviation in focal lengths; 0: exactly "
+       "where "
        "the camera file has it"},
       {"guided-matching", kEstimate, &o.guided_matching, 0, 1, closed,
        "1: match again along the epipolar lines, and estimate from all matches"},
@@ -156,8 +157,8 @@ void set(const Option& option, const std::string& text) {
   if (const Choice* choice = std::get_if<Choice>(&option.target)) {
     const Names& names = *choice->names;
     if (std::find(names.begin(), names.end(), text) == names.end()) {
-      throw CLI::ValidationError(
-          flag, "'" + text + "' is none of this version's " + joined(names, ", "));
+      throw CLI::ValidationError(flag,
+                                 "'" + text + "' is none of this version's " + joined(names, ", "));
     }
     const auto found = std::find(choice->names->begin(), choice->names->end(), text);
     *choice->value = static_cast<int32_t>(found - choice->names->begin());
@@ -195,9 +196,9 @@ nlohmann::ordered_json value_json(const Option& option) {
         if constexpr (std::is_same_v<T, Choice>)
           return (*target.names)[static_cast<size_t>(*target.value)];
         else if constexpr (std::is_same_v<T, Direction>)
-          return is_zero(target) ? nlohmann::ordered_json()
-                                 : nlohmann::ordered_json{target.xyz[0], target.xyz[1],
-                                                          target.xyz[2]};
+          return is_zero(target)
+                     ? nlohmann::ordered_json()
+                     : nlohmann::ordered_json{target.xyz[0], target.xyz[1], target.xyz[2]};
         else if constexpr (std::is_same_v<T, float*>)
           return shortest(*target);
         else
@@ -213,17 +214,12 @@ std::string value_text(const Option& option) {
 
 const char* group_title(OptionGroup group) {
   switch (group) {
-    case kFeature:
-      return "Corners and descriptors";
-    case kMatch:
-      return "Matching";
+    case kFeature: return "Corners and descriptors";
+    case kMatch: return "Matching";
     case kEstimate:
-    case kGravity:
-      return "Geometry";
-    case kTriangulate:
-      return "Triangulation";
-    default:
-      return "General";
+    case kGravity: return "Geometry";
+    case kTriangulate: return "Triangulation";
+    default: return "General";
   }
 }
 

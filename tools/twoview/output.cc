@@ -39,8 +39,8 @@ struct Descriptor {
   }
 };
 
-// A link such as /dev/stdout, which stands for an open file whatever that file is: to rename over it
-// would take the link away from every program.
+// A link such as /dev/stdout, which stands for an open file whatever that file is: to rename over
+// it would take the link away from every program.
 bool stands_for_open_file(const fs::path& path) {
   std::error_code error;
   const std::string link = fs::read_symlink(path, error).string();
@@ -176,7 +176,8 @@ void OutputSet::remove_others(const std::vector<std::string>& names) const {
     for (const Entry& entry : entries_) ours = ours || entry.name == name;
     struct stat info;
     const fs::path path = folder_ / name;
-    if (!ours && !is_kept(path) && ::lstat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode)) ::unlink(path.c_str());
+    if (!ours && !is_kept(path) && ::lstat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode))
+      ::unlink(path.c_str());
   }
 }
 

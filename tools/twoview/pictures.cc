@@ -53,7 +53,8 @@ cv::Mat keypoints_picture(const Picture& picture, const std::vector<tv_keypoint>
   }
   cv::Mat page(sheet.rows + 74, std::max(sheet.cols + 24, 560), CV_8UC3, ink::paper);
   sheet.copyTo(page(cv::Rect(12, 34, sheet.cols, sheet.rows)));
-  put_text(page, fitted(plain_letters(picture.name), 11, page.cols - 24.0), {12, 23}, 11, ink::text);
+  put_text(page, fitted(plain_letters(picture.name), 11, page.cols - 24.0), {12, 23}, 11,
+           ink::text);
   const double base = page.rows - 15.0;
   const std::string count = counted(static_cast<int>(keypoints.size()), "keypoint");
   put_text(page, count, {12, base}, 11, ink::text);

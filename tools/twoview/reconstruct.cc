@@ -53,9 +53,10 @@ std::array<std::string, 2> camera_files(const Arguments& a) {
   const int32_t method = a.common.options.estimate.method;
   const bool can_do_without = method == TV_METHOD_EIGHT_POINT || method == TV_METHOD_SEVEN_POINT;
   if (files[0].empty() && !has_focal && !can_do_without)
-    throw BadInput("--method " + method_name(method) +
-                   " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate,"
-                   " or --focal-35mm, from the photographs' EXIF");
+    throw BadInput(
+        "--method " + method_name(method) +
+        " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate,"
+        " or --focal-35mm, from the photographs' EXIF");
   return files;
 }
 
@@ -104,12 +105,11 @@ void make_files(const Outcome& outcome, OutputSet& files) {
   std::vector<Figure> figures;
   files.add("result.json", json_text(outcome.json));
   if (has_cloud) {
-    figures.push_back(
-        {"The cloud from the front and from the side",
-         outcome.scale
-             ? "Each point in its colour in image 0."
-             : "Each point in its colour in image 0. One baseline is the distance between the cameras.",
-         views_picture(outcome, cloud), false});
+    figures.push_back({"The cloud from the front and from the side",
+                       outcome.scale ? "Each point in its colour in image 0."
+                                     : "Each point in its colour in image 0. One baseline is the "
+                                       "distance between the cameras.",
+                       views_picture(outcome, cloud), false});
     files.add("cloud.ply", cloud_ply(cloud));
     files.add("views.png", png_bytes(figures.back().picture));
   }
@@ -144,12 +144,13 @@ std::string uncertainty_line(const tv_two_view& v) {
 
 // Empty where the camera is as its file says.
 std::string camera_line(const tv_two_view& v) {
-  const double *shift = v.principal_point_shift;
+  const double* shift = v.principal_point_shift;
   if (shift[0] == 0 && shift[1] == 0) return "";
-  return summary_line("camera",
-                      "its principal point seems to be (%+.1f, %+.1f) px off; pose and points are of the "
-                      "corrected camera",
-                      shift[0], shift[1]);
+  return summary_line(
+      "camera",
+      "its principal point seems to be (%+.1f, %+.1f) px off; pose and points are of the "
+      "corrected camera",
+      shift[0], shift[1]);
 }
 
 std::string pose_lines(const Outcome& outcome) {
@@ -188,8 +189,8 @@ std::string truth_line(const nlohmann::ordered_json& truth) {
   return summary_line("truth", "%s", text.c_str());
 }
 
-std::string summary(const Outcome& outcome, const RecordingInput* recording,
-                    const OutputSet& files, size_t context_bytes) {
+std::string summary(const Outcome& outcome, const RecordingInput* recording, const OutputSet& files,
+                    size_t context_bytes) {
   const Style style = stdout_style();
   const tv_two_view& v = outcome.two_view;
   const tv_reconstruction& r = outcome.reconstruction;
@@ -281,7 +282,8 @@ void add_reconstruct(CLI::App& program, Run& run) {
   a->recording.add_to(*verb);
   a->cameras.add_to(*verb);
   verb->add_option("--focal-35mm", a->focal_35mm,
-                   "in place of a camera file: the focal length as for 35 mm film, from EXIF; no lens distortion")
+                   "in place of a camera file: the focal length as for 35 mm film, from EXIF; no "
+                   "lens distortion")
       ->type_name("MM")
       ->check(CLI::Range(1.0, 10000.0));
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")

@@ -15,20 +15,11 @@ std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
     switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
+      case '&': result += "&amp;"; break;
+      case '<': result += "&lt;"; break;
+      case '>': result += "&gt;"; break;
+      case '"': result += "&quot;"; break;
+      default: result += c;
     }
   }
   return result;
@@ -154,10 +145,9 @@ std::string matrices(const Json& j) {
 
 std::string tables(const Json& j) {
   std::string found;
-  for (const char* key :
-       {"num_keypoints", "num_matches", "num_inliers", "config", "verdict", "reasons", "num_points",
-        "median_parallax_deg", "rms_reprojection_px", "principal_point_shift_px", "scale",
-        "scale_sigma", "num_iterations"})
+  for (const char* key : {"num_keypoints", "num_matches", "num_inliers", "config", "verdict",
+                          "reasons", "num_points", "median_parallax_deg", "rms_reprojection_px",
+                          "principal_point_shift_px", "scale", "scale_sigma", "num_iterations"})
     found += row(key, j[key]);
   std::string text = table("What was found", found);
   if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);

@@ -86,7 +86,8 @@ void append_json(std::string& text, const Json& json, size_t depth) {
 
 tv_camera corrected_camera(const Outcome& outcome, int camera) {
   tv_camera corrected = outcome.camera[camera];
-  check(tv_corrected_camera(&outcome.two_view, &corrected, &corrected), "cannot correct the camera");
+  check(tv_corrected_camera(&outcome.two_view, &corrected, &corrected),
+        "cannot correct the camera");
   return corrected;
 }
 
@@ -124,7 +125,8 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size) {
   const auto placed = [&](const Vector3& x) {
     return applied(transposed(R), {x[0] - t[0], x[1] - t[1], x[2] - t[2]});
   };
-  const tv_camera& lens = outcome.camera[camera];  // drawn about its axis, wherever that meets the image
+  const tv_camera& lens =
+      outcome.camera[camera];  // drawn about its axis, wherever that meets the image
   Frustum frustum;
   frustum.centre = placed({0, 0, 0});
   for (size_t i = 0; i < 4; ++i) {
@@ -197,20 +199,13 @@ std::string reasons_in_words(uint32_t reasons) {
 
 std::string config_in_words(int32_t config) {
   switch (config) {
-    case TV_CONFIG_CALIBRATED:
-      return "a general scene, full pose";
-    case TV_CONFIG_UNCALIBRATED:
-      return "fundamental matrix only, no cameras";
-    case TV_CONFIG_PLANAR:
-      return "a plane";
-    case TV_CONFIG_PANORAMIC:
-      return "rotation only";
-    case TV_CONFIG_PLANAR_OR_PANORAMIC:
-      return "a homography: a plane or a rotation";
-    case TV_CONFIG_NO_MOTION:
-      return "no motion";
-    default:
-      return "no model explains the matches better than chance";
+    case TV_CONFIG_CALIBRATED: return "a general scene, full pose";
+    case TV_CONFIG_UNCALIBRATED: return "fundamental matrix only, no cameras";
+    case TV_CONFIG_PLANAR: return "a plane";
+    case TV_CONFIG_PANORAMIC: return "rotation only";
+    case TV_CONFIG_PLANAR_OR_PANORAMIC: return "a homography: a plane or a rotation";
+    case TV_CONFIG_NO_MOTION: return "no motion";
+    default: return "no model explains the matches better than chance";
   }
 }
 

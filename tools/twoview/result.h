@@ -23,17 +23,20 @@ struct MetricScale {
 struct Outcome {
   Picture picture[2];
   bool has_cameras = false;
-  tv_camera camera[2]{};  // of the images as they were used, so resized ones; as the files have them
+  tv_camera
+      camera[2]{};  // of the images as they were used, so resized ones; as the files have them
   tv_two_view two_view{};
   tv_reconstruction reconstruction{};  // its arrays lie in the context
   std::optional<MetricScale> scale;    // then outputs are in metres, else in baselines
   nlohmann::ordered_json json;         // result.json
 };
 
-// The camera that pose and points are of: the file's, its principal point where the matches have it.
+// The camera that pose and points are of: the file's, its principal point where the matches have
+// it.
 tv_camera corrected_camera(const Outcome& outcome, int camera);
 
-// What one unit of the two-view pose and of its points is in the outputs: 1, or the baseline in metres.
+// What one unit of the two-view pose and of its points is in the outputs: 1, or the baseline in
+// metres.
 double unit_of(const Outcome& outcome);
 
 // A point of the cloud with its colour in image 0.

@@ -15,8 +15,8 @@ std::string keypoints_csv(const tv_keypoint* keypoints, size_t count);
 std::string matches_csv(const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
                         const tv_correspondence* matches, size_t count);
 
-// x,y,z,angle_deg,error_px,status: a row a match, in its order; status ok, infinite (then x y z is the
-// direction), behind or invalid (then zeros).
+// x,y,z,angle_deg,error_px,status: a row a match, in its order; status ok, infinite (then x y z is
+// the direction), behind or invalid (then zeros).
 const char* point_status_name(int32_t status);
 std::string points_csv(const std::vector<tv_point>& points);
 

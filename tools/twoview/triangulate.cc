@@ -164,11 +164,11 @@ void add_triangulate(CLI::App& program, Run& run) {
                    "too, or YAML")
       ->required()
       ->type_name("FILE");
-  verb->add_option("--max-error-px", a->max_error_px, "leave points of a larger error out of the cloud")
+  verb->add_option("--max-error-px", a->max_error_px,
+                   "leave points of a larger error out of the cloud")
       ->check([](const std::string& text) {
         double value = 0;
-        const bool in_range =
-            CLI::detail::lexical_cast(text, value) && value > 0 && value <= 1e9;
+        const bool in_range = CLI::detail::lexical_cast(text, value) && value > 0 && value <= 1e9;
         return in_range ? std::string() : "'" + text + "' is not in (0, 1e9]";
       })
       ->type_name("(0, 1e9]")

@@ -31,7 +31,8 @@ KnownPose read_pose(const YAML::Node& root, const std::string& path) {
   pose.t = fixed<3>(root, "t", path);
   const Matrix3 identity = product(pose.R, transposed(pose.R));
   for (size_t i = 0; i < 9; ++i)
-    if (!(std::abs(identity[i] - (i % 4 == 0)) <= 1e-3)) throw BadInput(path + ": R is no rotation");
+    if (!(std::abs(identity[i] - (i % 4 == 0)) <= 1e-3))
+      throw BadInput(path + ": R is no rotation");
   if (determinant(pose.R) < 0) throw BadInput(path + ": R is no rotation but a reflection");
   if (norm(pose.t) == 0) throw BadInput(path + ": t is 0");
   return pose;

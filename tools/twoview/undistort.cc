@@ -47,8 +47,8 @@ Map map_to(const tv_camera& lens, const tv_camera& pinhole) {
           "cannot project");
     for (size_t x = 0; x < width; ++x) {
       const double u = pixels[2 * x], v = pixels[2 * x + 1];
-      const bool seen = inside[x] && u >= -0.5 && v >= -0.5 && u <= lens.width - 0.5 &&
-                        v <= lens.height - 0.5;
+      const bool seen =
+          inside[x] && u >= -0.5 && v >= -0.5 && u <= lens.width - 0.5 && v <= lens.height - 0.5;
       map.seen.at<uint8_t>(y, static_cast<int>(x)) = seen ? 255 : 0;
       map.place.at<cv::Vec2f>(y, static_cast<int>(x)) =
           seen ? cv::Vec2f(static_cast<float>(u), static_cast<float>(v)) : cv::Vec2f(0, 0);
@@ -97,7 +97,8 @@ int undistort(Arguments& a) {
   const Map map = map_to(lens, pinhole);
   const double share = cv::countNonZero(map.seen) / static_cast<double>(map.seen.total());
   if (share == 0)
-    throw BadInput("camera " + a.camera + " sees no pixel of the result: check its principal point and "
+    throw BadInput("camera " + a.camera +
+                   " sees no pixel of the result: check its principal point and "
                    "distortion, or --focal-scale");
   for (size_t i = 0; i < a.images.size(); ++i) {
     const cv::Mat image = load_pixels(a.images[i]);

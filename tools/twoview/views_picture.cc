@@ -79,8 +79,8 @@ class Plot {
                Align::kRight);
     }
     put_text(sheet_, title, {double(frame_.x), frame_.y - 20.0}, 14, ink::text);
-    put_text(sheet_, "horizontal: " + across_name, {double(frame_.br().x), frame_.br().y + 44.0}, 11,
-             ink::text, Align::kRight);
+    put_text(sheet_, "horizontal: " + across_name, {double(frame_.br().x), frame_.br().y + 44.0},
+             11, ink::text, Align::kRight);
     put_text(sheet_, "vertical: " + down_name, {double(frame_.br().x), frame_.y - 20.0}, 11,
              ink::text, Align::kRight);
   }

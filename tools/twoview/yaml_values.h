@@ -15,8 +15,8 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file);
 // A finite number; BadInput names `entry` when it is missing, no number, NaN or infinite.
 double number_at(const YAML::Node& map, const std::string& entry, const std::string& file);
 
-// The numbers of an entry: a list, a list of lists, or a map with `data` (OpenCV, ROS), whose `rows`
-// and `cols`, where it has both, must multiply to how many there are.
+// The numbers of an entry: a list, a list of lists, or a map with `data` (OpenCV, ROS), whose
+// `rows` and `cols`, where it has both, must multiply to how many there are.
 std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,
                                const std::string& file);
 

@@ -96,10 +96,9 @@ void tv_bundle_result_init(tv_bundle_result* result) {
 }
 
 tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
-                             const tv_camera* camera1, const double* pixels0,
-                             const double* pixels1, int32_t num_points,
-                             const tv_bundle_options* options, double R[9], double t[3],
-                             tv_point* points, tv_bundle_result* result) {
+                             const tv_camera* camera1, const double* pixels0, const double* pixels1,
+                             int32_t num_points, const tv_bundle_options* options, double R[9],
+                             double t[3], tv_point* points, tv_bundle_result* result) {
   if (context == nullptr || camera0 == nullptr || camera1 == nullptr || R == nullptr ||
       t == nullptr ||
       (num_points > 0 && (pixels0 == nullptr || pixels1 == nullptr || points == nullptr))) {
@@ -146,9 +145,9 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
 }
 
 tv_status tv_point_covariances(const tv_camera* camera0, const tv_camera* camera1,
-                               const double R[9], const double t[3],
-                               const double* pose_covariance, double noise_px,
-                               const tv_point* points, int32_t num_points, double* covariances) {
+                               const double R[9], const double t[3], const double* pose_covariance,
+                               double noise_px, const tv_point* points, int32_t num_points,
+                               double* covariances) {
   if (camera0 == nullptr || camera1 == nullptr || R == nullptr || t == nullptr ||
       (num_points > 0 && (points == nullptr || covariances == nullptr))) {
     return TV_ERR_NULL;

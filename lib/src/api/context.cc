@@ -32,7 +32,8 @@ tv_limits resolved(const tv_limits& limits) {
   return result;
 }
 
-// A tv_context of 64-bit pointers. The size depends on the limits alone, so 32-bit CPUs take as much.
+// A tv_context of 64-bit pointers. The size depends on the limits alone, so 32-bit CPUs take as
+// much.
 constexpr size_t kContextBytes = 192;
 static_assert(arena_bytes<tv_context>(1) <= kContextBytes &&
               (sizeof(void*) < 8 || arena_bytes<tv_context>(1) == kContextBytes));

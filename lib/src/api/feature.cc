@@ -147,9 +147,8 @@ tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature
   return TV_OK;
 }
 
-tv_status tv_describe(tv_context* context, const tv_image* image,
-                      const tv_feature_options* options, const tv_keypoint* keypoints,
-                      int32_t num_keypoints, uint8_t* descriptors) {
+tv_status tv_describe(tv_context* context, const tv_image* image, const tv_feature_options* options,
+                      const tv_keypoint* keypoints, int32_t num_keypoints, uint8_t* descriptors) {
   const tv::Request request = tv::check_request(context, image, nullptr, options);
   if (request.status != TV_OK) return request.status;
   if (num_keypoints < 0) return TV_ERR_ARGUMENT;
@@ -193,9 +192,9 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
   tv_keypoint* oriented =
       tv::arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(o.max_keypoints));
-  const int32_t count = tv::orient_keypoints(*context, octaves, o.orientation, corners, num_corners,
-                                             o.max_keypoints - num_corners, oriented,
-                                             o.max_keypoints);
+  const int32_t count =
+      tv::orient_keypoints(*context, octaves, o.orientation, corners, num_corners,
+                           o.max_keypoints - num_corners, oriented, o.max_keypoints);
   *num_keypoints = count;
   if (count > cap_keypoints) return TV_ERR_CAPACITY;
   std::copy(oriented, oriented + count, keypoints);

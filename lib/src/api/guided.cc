@@ -1,8 +1,9 @@
 // The boundary of guided matching: validate, turn keypoints into rays, call.
+#include "match/guided.h"
+
 #include "api/scratch.h"
 #include "api/validate.h"
 #include "geometry/camera.h"
-#include "match/guided.h"
 
 namespace tv {
 namespace {
@@ -128,8 +129,8 @@ tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const t
       tv::make_view(camera0, keypoints0, descriptors0, num0, context->arena);
   const tv::GuidedView view1 =
       tv::make_view(camera1, keypoints1, descriptors1, num1, context->arena);
-  const int32_t count = tv::match_guided(*context->kernels, view0, view1, scaled, checked,
-                                         context->arena, found);
+  const int32_t count =
+      tv::match_guided(*context->kernels, view0, view1, scaled, checked, context->arena, found);
   *num_correspondences = count;
   if (count > cap_correspondences) return TV_ERR_CAPACITY;
   for (int32_t k = 0; k < count; ++k) correspondences[k] = found[k];

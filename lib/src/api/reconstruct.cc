@@ -54,8 +54,8 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
   }
 }
 
-// Leaves those of num_found matches that use no keypoint of the num_matches first ones, and puts the
-// latter between them, ascending in idx0. Returns how many there are now.
+// Leaves those of num_found matches that use no keypoint of the num_matches first ones, and puts
+// the latter between them, ascending in idx0. Returns how many there are now.
 int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Arena& arena,
                      int32_t max_keypoints, tv_correspondence* found, int32_t num_found) {
   ArenaScope scope(arena);
@@ -78,31 +78,32 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
 
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
-// tv_match_guided with the cameras that the estimate is of. Not inlined, for the stack below its caller.
-__attribute__((noinline))
-tv_status match_guided(tv_context* context, const tv_view& view0, const tv_view& view1,
-                       const int32_t num_keypoints[2], const tv_two_view& estimate, Results& r,
-                       int32_t* count) {
+// tv_match_guided with the cameras that the estimate is of. Not inlined, for the stack below its
+// caller.
+__attribute__((noinline)) tv_status match_guided(tv_context* context, const tv_view& view0,
+                                                 const tv_view& view1,
+                                                 const int32_t num_keypoints[2],
+                                                 const tv_two_view& estimate, Results& r,
+                                                 int32_t* count) {
   tv_camera cameras[2];
   tv_corrected_camera(&estimate, view0.camera, &cameras[0]);
   tv_corrected_camera(&estimate, view1.camera, &cameras[1]);
   return tv_match_guided(context, &cameras[0], &cameras[1], estimate.E, r.keypoints[0],
                          r.descriptors[0], num_keypoints[0], r.keypoints[1], r.descriptors[1],
-                         num_keypoints[1], nullptr, r.more_matches,
-                         context->limits.max_keypoints, count);
+                         num_keypoints[1], nullptr, r.more_matches, context->limits.max_keypoints,
+                         count);
 }
 
 // Matches along the epipolar lines of `estimate`, and the estimate from all of them, where that is
-// no worse: *num_matches, the estimate and r's matches, pixels and mask are then of the second pass.
-// Not inlined, as the two stages below: what they need of the stack is not to lie under the search.
-__attribute__((noinline))
-tv_status match_along_lines(tv_context* context, const tv_view& view0, const tv_view& view1,
-                            const int32_t num_keypoints[2], const tv_estimate_options* options,
-                            Results& r, int32_t* num_matches, tv_two_view* estimate) {
+// no worse: *num_matches, the estimate and r's matches, pixels and mask are then of the second
+// pass. Not inlined, as the two stages below: what they need of the stack is not to lie under the
+// search.
+__attribute__((noinline)) tv_status match_along_lines(
+    tv_context* context, const tv_view& view0, const tv_view& view1, const int32_t num_keypoints[2],
+    const tv_estimate_options* options, Results& r, int32_t* num_matches, tv_two_view* estimate) {
   const tv_limits& limits = context->limits;
   int32_t count = 0;
-  tv_status status =
-      match_guided(context, view0, view1, num_keypoints, *estimate, r, &count);
+  tv_status status = match_guided(context, view0, view1, num_keypoints, *estimate, r, &count);
   if (status != TV_OK) return status;
   count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
                        r.more_matches, count);
@@ -129,10 +130,9 @@ tv_status match_along_lines(tv_context* context, const tv_view& view0, const tv_
 }
 
 // Triangulates the inliers of a full pose; all other points are invalid. Returns how many are good.
-__attribute__((noinline))
-tv_status triangulate_inliers(tv_context* context, tv_triangulation method, const tv_view& view0,
-                              const tv_view& view1, const tv_two_view& two_view,
-                              int32_t num_matches, Results& r, int32_t* num_points) {
+__attribute__((noinline)) tv_status triangulate_inliers(
+    tv_context* context, tv_triangulation method, const tv_view& view0, const tv_view& view1,
+    const tv_two_view& two_view, int32_t num_matches, Results& r, int32_t* num_points) {
   StageTimer timer(context, TV_STAGE_TRIANGULATE);
   *num_points = 0;
   if (num_matches == 0) return TV_OK;
@@ -168,17 +168,17 @@ Mat3 inverse_intrinsics(const tv_camera& c) {
 }
 
 // Pose and points together; what follows from the pose follows.
-__attribute__((noinline))
-tv_status adjust(tv_context* context, const tv_view& view0, const tv_view& view1,
-                 int32_t num_matches, Results& r, tv_two_view* two_view, int32_t* num_points) {
+__attribute__((noinline)) tv_status adjust(tv_context* context, const tv_view& view0,
+                                           const tv_view& view1, int32_t num_matches, Results& r,
+                                           tv_two_view* two_view, int32_t* num_points) {
   tv_camera cameras[2];
   tv_corrected_camera(two_view, view0.camera, &cameras[0]);
   tv_corrected_camera(two_view, view1.camera, &cameras[1]);
   tv_bundle_result bundle;
   tv_bundle_result_init(&bundle);
   const tv_status status =
-      tv_adjust_two_view(context, &cameras[0], &cameras[1], r.pixels[0], r.pixels[1],
-                         num_matches, nullptr, two_view->R, two_view->t, r.points, &bundle);
+      tv_adjust_two_view(context, &cameras[0], &cameras[1], r.pixels[0], r.pixels[1], num_matches,
+                         nullptr, two_view->R, two_view->t, r.points, &bundle);
   if (status != TV_OK) return status;
   Pose pose;
   for (int k = 0; k < 9; ++k) pose.R(k / 3, k % 3) = two_view->R[k];
@@ -195,9 +195,8 @@ tv_status adjust(tv_context* context, const tv_view& view0, const tv_view& view1
   return TV_OK;
 }
 
-constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
-                                              TV_TRIANGULATION_ITERATIVE_LS, nullptr, nullptr,
-                                              nullptr, 0, 0};
+constexpr tv_reconstruct_options kDefaults = {
+    sizeof(tv_reconstruct_options), TV_TRIANGULATION_ITERATIVE_LS, nullptr, nullptr, nullptr, 0, 0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                                    tv_reconstruct_options* checked) {
@@ -248,14 +247,13 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
                         r.descriptors[v], capacity, &num_keypoints[v]);
     if (status != TV_OK) return status;
   }
-  status = tv_match(context, r.descriptors[0], num_keypoints[0], r.descriptors[1],
-                    num_keypoints[1], checked.match, r.matches, capacity, &num_matches);
+  status = tv_match(context, r.descriptors[0], num_keypoints[0], r.descriptors[1], num_keypoints[1],
+                    checked.match, r.matches, capacity, &num_matches);
   if (status != TV_OK) return status;
   tv::gather_pixels(r, r.matches, num_matches);
   tv_two_view estimate = *two_view;
   status = tv_estimate_two_view(context, view0->camera, view1->camera, r.pixels[0], r.pixels[1],
-                                r.ratios, num_matches, checked.estimate, &estimate,
-                                r.inlier_mask);
+                                r.ratios, num_matches, checked.estimate, &estimate, r.inlier_mask);
   if (status != TV_OK) return status;
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
     status = tv::match_along_lines(context, *view0, *view1, num_keypoints, checked.estimate, r,

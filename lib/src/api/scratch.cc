@@ -25,10 +25,10 @@ size_t reconstruct_result_bytes(const tv_limits& limits) {
 }
 
 size_t scratch_bytes(const tv_limits& limits) {
-  const size_t stage = std::max({extract_scratch_bytes(limits), match_bytes(limits.max_keypoints),
-                                 guided_scratch_bytes(limits),
-                                 two_view_scratch_bytes(limits.max_matches),
-                                 bundle_scratch_bytes(limits.max_matches)});
+  const size_t stage =
+      std::max({extract_scratch_bytes(limits), match_bytes(limits.max_keypoints),
+                guided_scratch_bytes(limits), two_view_scratch_bytes(limits.max_matches),
+                bundle_scratch_bytes(limits.max_matches)});
   return reconstruct_result_bytes(limits) + stage;
 }
 

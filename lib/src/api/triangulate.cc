@@ -92,8 +92,7 @@ tv_status tv_correct_matches(tv_triangulation cost, const tv_camera *camera0,
   const tv::TriangulationPair pair = prepare_pair(prepared0, prepared1, R, t);
   for (size_t i = 0; i < n; ++i) {
     tv::Vec2 moved[2] = {tv::Vec2(0, 0), tv::Vec2(0, 0)};
-    valid[i] =
-        tv::correct_pixels(cost, pair, pixel_at(pixels0, i), pixel_at(pixels1, i), moved);
+    valid[i] = tv::correct_pixels(cost, pair, pixel_at(pixels0, i), pixel_at(pixels1, i), moved);
     for (size_t k = 0; k < 2; ++k) {
       corrected0[2 * i + k] = moved[0][static_cast<int>(k)];
       corrected1[2 * i + k] = moved[1][static_cast<int>(k)];

@@ -13,9 +13,17 @@ namespace {
 
 constexpr uint64_t kDefaultSeed = 20130814;  // any constant would do
 
-constexpr tv_estimate_options kDefaults = {
-    sizeof(tv_estimate_options), TV_METHOD_FIVE_POINT, 1.0, 0.9999, 10000, 0, kDefaultSeed,
-    {0, 0, 0}, {0, 0, 0}, 0, 0.01};
+constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
+                                           TV_METHOD_FIVE_POINT,
+                                           1.0,
+                                           0.9999,
+                                           10000,
+                                           0,
+                                           kDefaultSeed,
+                                           {0, 0, 0},
+                                           {0, 0, 0},
+                                           0,
+                                           0.01};
 
 // Directions that are read: finite, not zero, and a deviation of at most half a turn.
 tv_status check_gravity(const tv_estimate_options& options) {
@@ -47,12 +55,13 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
                         checked->confidence >= 0 && checked->confidence < 1 &&
                         checked->max_iterations >= 1 && checked->max_iterations <= 1000000 &&
                         checked->fixed_iterations >= 0 && checked->fixed_iterations <= 1000000 &&
-                        checked->principal_point_sigma >= 0 && checked->principal_point_sigma <= 0.1;
+                        checked->principal_point_sigma >= 0 &&
+                        checked->principal_point_sigma <= 0.1;
   const bool with_gravity = checked->gravity_sigma_rad > 0;
-  const bool method_known =
-      checked->method == TV_METHOD_EIGHT_POINT || checked->method == TV_METHOD_SEVEN_POINT ||
-      (checked->method == TV_METHOD_FIVE_POINT && calibrated) ||
-      (checked->method == TV_METHOD_UPRIGHT && calibrated && with_gravity);
+  const bool method_known = checked->method == TV_METHOD_EIGHT_POINT ||
+                            checked->method == TV_METHOD_SEVEN_POINT ||
+                            (checked->method == TV_METHOD_FIVE_POINT && calibrated) ||
+                            (checked->method == TV_METHOD_UPRIGHT && calibrated && with_gravity);
   if (!in_range || !method_known) return TV_ERR_ARGUMENT;
   return check_gravity(*checked);
 }
@@ -92,8 +101,8 @@ Pose inverse_pose(const Pose& pose) {
   Pose inverse;
   inverse.R = pose.R.transpose();
   for (int i = 0; i < 3; ++i) {
-    inverse.t[i] = -((pose.R(0, i) * pose.t[0] + pose.R(1, i) * pose.t[1]) +
-                     pose.R(2, i) * pose.t[2]);
+    inverse.t[i] =
+        -((pose.R(0, i) * pose.t[0] + pose.R(1, i) * pose.t[1]) + pose.R(2, i) * pose.t[2]);
   }
   return inverse;
 }
@@ -167,9 +176,9 @@ void pack_covariance(const Pose& pose, const Pose& inverse, const double covaria
 }
 
 // Not inlined: what it needs of the stack is not to lie under the search.
-__attribute__((noinline))
-void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewModel& model,
-          const TwoViewOutcome& outcome, bool swapped, tv_two_view* result) {
+__attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches& matches,
+                                    const TwoViewModel& model, const TwoViewOutcome& outcome,
+                                    bool swapped, tv_two_view* result) {
   tv_two_view packed{};
   packed.struct_size = sizeof(tv_two_view);
   packed.config = outcome.config;
@@ -190,8 +199,7 @@ void pack(const TwoViewProblem& problem, const Matches& matches, const TwoViewMo
     packed.principal_point_shift[k] = outcome.principal_point_shift_px[k];
   }
   packed.coverage = coverage(problem, matches, outcome.inlier, swapped ? 1 : 0);
-  if (packed.coverage > 0 && packed.coverage < 4.5 / 64 &&
-      packed.config != TV_CONFIG_DEGENERATE) {
+  if (packed.coverage > 0 && packed.coverage < 4.5 / 64 && packed.config != TV_CONFIG_DEGENERATE) {
     packed.reasons |= TV_REASON_CROWDED_MATCHES;
     if (packed.verdict == TV_VERDICT_OK) packed.verdict = TV_VERDICT_DOUBTFUL;
   }

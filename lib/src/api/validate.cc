@@ -48,14 +48,13 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
   }
   const tv_feature_options& o = *options;
   if (o.struct_size != sizeof(tv_feature_options)) return TV_ERR_STRUCT_SIZE;
-  const bool valid =
-      o.max_keypoints >= 1 && within(o.arc, 9, 12) && within(o.threshold, 1, 254) &&
-      within(o.min_threshold, 0, o.threshold) && within(o.levels, 1, 8) &&
-      within(o.scale_factor, 1.1f, 2.0f) && (o.cell_px == 0 || within(o.cell_px, 8, 16384)) &&
-      within(o.subpixel, 0, 1) &&
-      within(o.orientation, TV_ORIENTATION_UPRIGHT, TV_ORIENTATION_GRADIENT) &&
-      within(o.descriptor, TV_DESCRIPTOR_SIFT, TV_DESCRIPTOR_ROOTSIFT) &&
-      within(o.keypoint_size, 1.0f, 32.0f);
+  const bool valid = o.max_keypoints >= 1 && within(o.arc, 9, 12) && within(o.threshold, 1, 254) &&
+                     within(o.min_threshold, 0, o.threshold) && within(o.levels, 1, 8) &&
+                     within(o.scale_factor, 1.1f, 2.0f) &&
+                     (o.cell_px == 0 || within(o.cell_px, 8, 16384)) && within(o.subpixel, 0, 1) &&
+                     within(o.orientation, TV_ORIENTATION_UPRIGHT, TV_ORIENTATION_GRADIENT) &&
+                     within(o.descriptor, TV_DESCRIPTOR_SIFT, TV_DESCRIPTOR_ROOTSIFT) &&
+                     within(o.keypoint_size, 1.0f, 32.0f);
   if (!valid) return TV_ERR_ARGUMENT;
   if (o.max_keypoints > context.limits.max_keypoints) return TV_ERR_LIMITS;
   *checked = o;

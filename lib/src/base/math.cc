@@ -289,8 +289,7 @@ double log(double x) {
   const double s = f / (2.0 + f);
   const double half_square = 0.5 * f * f;
   const double r = log_series(s * s);
-  return exponent * kLn2High +
-         (f - (half_square - (s * (half_square + r) + exponent * kLn2Low)));
+  return exponent * kLn2High + (f - (half_square - (s * (half_square + r) + exponent * kLn2Low)));
 }
 
 }  // namespace tv

@@ -9,13 +9,13 @@ namespace tv {
 
 inline constexpr double kPi = 3.14159265358979323846;
 
-double atan2(double y, double x);                     // (-pi, pi]; atan2(0, 0) = 0; -0 counts as 0
+double atan2(double y, double x);  // (-pi, pi]; atan2(0, 0) = 0; -0 counts as 0
 double atan(double x);
 void sincos(double angle_rad, double* sine, double* cosine);  // |angle| up to 2^20, NaN beyond
-double tan(double angle_rad);                         // |angle| < pi/2
-double acos(double x);                                // x is clamped to [-1, 1]
-double asin(double x);                                // x is clamped to [-1, 1]
+double tan(double angle_rad);                                 // |angle| < pi/2
+double acos(double x);                                        // x is clamped to [-1, 1]
+double asin(double x);                                        // x is clamped to [-1, 1]
 double exp(double x);
-double log(double x);                                 // x > 0; log(0) = -inf, NaN below
+double log(double x);  // x > 0; log(0) = -inf, NaN below
 
 }  // namespace tv

@@ -8,7 +8,8 @@ namespace {
 // A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma); a sample every 0.28 of it.
 constexpr double kStepPerSize = 1.5 * 0.28;
 
-// A sample every quarter of that: the angle is found to half a degree, where every third leaves a degree.
+// A sample every quarter of that: the angle is found to half a degree, where every third leaves a
+// degree.
 constexpr double kOrientStep = 1.5 / 4.0;
 
 // Samples lie 1.12 to 2.24 pixels of their octave apart: closer would blur, wider would alias
@@ -108,8 +109,8 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
     if (second < 0 || smooth[k] > smooth[second]) second = k;
   }
   angles_rad[0] = peak_angle(smooth, best);
-  if (second < 0 || static_cast<double>(smooth[second]) <=
-                        kSecondPeak * static_cast<double>(smooth[best])) {
+  if (second < 0 ||
+      static_cast<double>(smooth[second]) <= kSecondPeak * static_cast<double>(smooth[best])) {
     return 1;
   }
   angles_rad[1] = peak_angle(smooth, second);

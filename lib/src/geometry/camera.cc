@@ -454,9 +454,8 @@ bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobi
 bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobian) {
   const tv_camera& model = camera.model;
   const Point2 target{(pixel[0] - model.cx) / model.fx, (pixel[1] - model.cy) / model.fy};
-  return model.model == TV_CAMERA_KANNALA_BRANDT
-             ? unproject_kannala(camera, target, ray, jacobian)
-             : unproject_central(camera, target, ray, jacobian);
+  return model.model == TV_CAMERA_KANNALA_BRANDT ? unproject_kannala(camera, target, ray, jacobian)
+                                                 : unproject_central(camera, target, ray, jacobian);
 }
 
 }  // namespace tv

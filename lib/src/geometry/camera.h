@@ -1,10 +1,10 @@
 // Camera models behind one interface: pixels to unit rays and back, with Jacobians.
 #pragma once
 
-#include "twoview/camera.h"
-
 #include <Eigen/Core>
 #include <Eigen/Geometry>  // cross()
+
+#include "twoview/camera.h"
 
 namespace tv {
 

@@ -1,8 +1,8 @@
 #include "geometry/essential.h"
 
-#include "base/math.h"
-
 #include <cmath>
+
+#include "base/math.h"
 
 namespace tv {
 
@@ -18,9 +18,9 @@ Mat3 rotation_step(const Vec3& w) {
   const double scale = 1.0 / std::sqrt(1.0 + 0.25 * w.squaredNorm());
   const double qw = scale, x = 0.5 * w[0] * scale, y = 0.5 * w[1] * scale, z = 0.5 * w[2] * scale;
   Mat3 R;
-  R << 1 - 2 * (y * y + z * z), 2 * (x * y - qw * z), 2 * (x * z + qw * y),
-      2 * (x * y + qw * z), 1 - 2 * (x * x + z * z), 2 * (y * z - qw * x),
-      2 * (x * z - qw * y), 2 * (y * z + qw * x), 1 - 2 * (x * x + y * y);
+  R << 1 - 2 * (y * y + z * z), 2 * (x * y - qw * z), 2 * (x * z + qw * y), 2 * (x * y + qw * z),
+      1 - 2 * (x * x + z * z), 2 * (y * z - qw * x), 2 * (x * z - qw * y), 2 * (y * z + qw * x),
+      1 - 2 * (x * x + y * y);
   return R;
 }
 

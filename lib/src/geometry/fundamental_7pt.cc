@@ -23,10 +23,8 @@ int fundamental_7pt(const Vec3 rays0[7], const Vec3 rays1[7], Mat3 models[3]) {
   const Vec3 a0 = A.col(0), a1 = A.col(1), a2 = A.col(2);
   const Vec3 b0 = B.col(0), b1 = B.col(1), b2 = B.col(2);
   const double cubic[4] = {
-      a0.dot(a1.cross(a2)),
-      (b0.dot(a1.cross(a2)) + a0.dot(b1.cross(a2))) + a0.dot(a1.cross(b2)),
-      (a0.dot(b1.cross(b2)) + b0.dot(a1.cross(b2))) + b0.dot(b1.cross(a2)),
-      b0.dot(b1.cross(b2))};
+      a0.dot(a1.cross(a2)), (b0.dot(a1.cross(a2)) + a0.dot(b1.cross(a2))) + a0.dot(a1.cross(b2)),
+      (a0.dot(b1.cross(b2)) + b0.dot(a1.cross(b2))) + b0.dot(b1.cross(a2)), b0.dot(b1.cross(b2))};
   double roots[3];
   const int num_roots = real_roots<3>(cubic, roots);
   for (int r = 0; r < num_roots; ++r) models[r] = (A + roots[r] * B).normalized();

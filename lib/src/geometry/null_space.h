@@ -1,9 +1,9 @@
 // Null spaces of small dense systems in nine unknowns, and the singular values of 3x3 matrices.
 #pragma once
 
-#include "geometry/camera.h"
-
 #include <cmath>
+
+#include "geometry/camera.h"
 
 namespace tv {
 

@@ -15,8 +15,8 @@ struct Samples5 {
 };
 void set_sample(Samples5* samples, int s, const Vec3 rays0[5], const Vec3 rays1[5]);
 
-// Of each sample: Frobenius norm 1, either sign; those for which the five points can all lie in front
-// of both cameras, or behind both. None for a degenerate sample.
+// Of each sample: Frobenius norm 1, either sign; those for which the five points can all lie in
+// front of both cameras, or behind both. None for a degenerate sample.
 struct Essentials {
   double entries[kSamples5][kMaxRelpose5pt][9];
   int32_t count[kSamples5];

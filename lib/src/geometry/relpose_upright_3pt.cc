@@ -11,9 +11,9 @@
 // sin), not 3, and is a quartic in tan(yaw / 2), not a polynomial of degree six.
 #include "geometry/relpose_upright_3pt.h"
 
-#include "geometry/polynomial.h"
-
 #include <cmath>
+
+#include "geometry/polynomial.h"
 
 namespace tv {
 namespace {
@@ -30,12 +30,12 @@ YawPolynomial yaw_polynomial(const Vec3 p[3], const Vec3 q[3]) {
     // conj(n_xy,i) n_xy,j = A + B u + C conj(u); its imaginary part is m0 + mc cos + ms sin.
     const double zz = p[i][2] * p[j][2], ww = q[i][2] * q[j][2];
     const double zw = p[i][2] * q[j][2], wz = q[i][2] * p[j][2];
-    const double m0 = zz * (q[i][0] * q[j][1] - q[i][1] * q[j][0]) +
-                      ww * (p[i][0] * p[j][1] - p[i][1] * p[j][0]);
-    const double mc = zw * (q[i][1] * p[j][0] - q[i][0] * p[j][1]) +
-                      wz * (p[i][1] * q[j][0] - p[i][0] * q[j][1]);
-    const double ms = wz * (p[i][0] * q[j][0] + p[i][1] * q[j][1]) -
-                      zw * (q[i][0] * p[j][0] + q[i][1] * p[j][1]);
+    const double m0 =
+        zz * (q[i][0] * q[j][1] - q[i][1] * q[j][0]) + ww * (p[i][0] * p[j][1] - p[i][1] * p[j][0]);
+    const double mc =
+        zw * (q[i][1] * p[j][0] - q[i][0] * p[j][1]) + wz * (p[i][1] * q[j][0] - p[i][0] * q[j][1]);
+    const double ms =
+        wz * (p[i][0] * q[j][0] + p[i][1] * q[j][1]) - zw * (q[i][0] * p[j][0] + q[i][1] * p[j][1]);
     // n_z,k = a cos - b sin
     const double a = p[k][0] * q[k][1] - p[k][1] * q[k][0];
     const double b = p[k][0] * q[k][0] + p[k][1] * q[k][1];
@@ -51,8 +51,7 @@ YawPolynomial yaw_polynomial(const Vec3 p[3], const Vec3 q[3]) {
 // The polynomial of yaw - offset.
 YawPolynomial turned(const YawPolynomial& f, double cosine, double sine) {
   const double c2 = cosine * cosine, s2 = sine * sine, product = cosine * sine;
-  return YawPolynomial{f.c * cosine + f.s * sine,
-                       f.s * cosine - f.c * sine,
+  return YawPolynomial{f.c * cosine + f.s * sine, f.s * cosine - f.c * sine,
                        (f.cc * c2 + f.ss * s2) + f.cs * product,
                        (f.cc * s2 + f.ss * c2) - f.cs * product,
                        2 * (f.ss - f.cc) * product + f.cs * (c2 - s2)};
@@ -129,8 +128,8 @@ int relpose_upright_3pt(const Vec3 rays0[3], const Vec3 rays1[3], const Mat3& le
   const double* offset = kOffsets[best_offset(f)];
   const YawPolynomial g = turned(f, offset[0], offset[1]);
   // x = tan of half the rest: cos = (1 - x^2) / (1 + x^2), sin = 2 x / (1 + x^2).
-  const double quartic[5] = {g.c + g.cc, 2 * (g.s + g.cs), 4 * g.ss - 2 * g.cc,
-                             2 * (g.s - g.cs), g.cc - g.c};
+  const double quartic[5] = {g.c + g.cc, 2 * (g.s + g.cs), 4 * g.ss - 2 * g.cc, 2 * (g.s - g.cs),
+                             g.cc - g.c};
   double roots[4];
   const int num_roots = real_roots<4>(quartic, roots);
   int num_poses = 0;

@@ -1,10 +1,10 @@
 #include "geometry/residuals.h"
 
-#include "base/math.h"
-#include "twoview/context.h"
-
 #include <cmath>
 #include <cstring>
+
+#include "base/math.h"
+#include "twoview/context.h"
 
 namespace tv {
 namespace {
@@ -19,8 +19,8 @@ size_t padded(int max_matches) {
 
 struct Epipolar {
   Vec3 f0, f1;
-  Vec3 line1, line0;  // M f0, M' f1
-  double c, n;        // f1' M f0, and the sum under the root
+  Vec3 line1, line0;    // M f0, M' f1
+  double c, n;          // f1' M f0, and the sum under the root
   double s0[2], s1[2];  // J0' M' f1, J1' M f0
 };
 
@@ -188,8 +188,8 @@ bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double cu
   if (!(e.n > 0)) return false;
   const double inverse = 1 / std::sqrt(e.n), share = e.c / e.n;
   slopes->residual = e.c * inverse;
-  // c / sqrt(n) has the slopes (d c - c / n (s0' d s0 + s1' d s1)) / sqrt(n), s0 = J0' M' f1 and s1 = J1' M f0:
-  // by M those of f1' M q0 + (q1 - f1)' M f0.
+  // c / sqrt(n) has the slopes (d c - c / n (s0' d s0 + s1' d s1)) / sqrt(n), s0 = J0' M' f1 and s1
+  // = J1' M f0: by M those of f1' M q0 + (q1 - f1)' M f0.
   double q0[3], q1[3];
   for (int r = 0; r < 3; ++r) {
     double* const* J = pairs.jacobian[0] + 2 * r;
@@ -249,9 +249,9 @@ void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose,
 
 namespace {
 
-// What the first `num` of all matches cost at most, 98 times in a hundred, when all cost `bound` and
-// the first are drawn at random without replacement: the mean, and two standard deviations of what
-// lies between 0 and 1 with that mean.
+// What the first `num` of all matches cost at most, 98 times in a hundred, when all cost `bound`
+// and the first are drawn at random without replacement: the mean, and two standard deviations of
+// what lies between 0 and 1 with that mean.
 int64_t bound_of_first(int64_t bound, int num, int all) {
   const double mean = static_cast<double>(bound) / (static_cast<double>(all) * kCostOne);
   if (mean >= 1) return INT64_MAX;
@@ -273,8 +273,8 @@ int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px
   int done = 0;
   for (int end = kFirstBlocks; done < num_blocks; end *= 2) {
     if (end > num_blocks) end = num_blocks;
-    sum += pairs.kernels->sampson_score(pairs.fast, done, end - done, pairs.on_plane, m,
-                                        inverse_sq);
+    sum +=
+        pairs.kernels->sampson_score(pairs.fast, done, end - done, pairs.on_plane, m, inverse_sq);
     done = end;
     if (done == num_blocks) break;
     if (bound < INT64_MAX && sum > bound_of_first(bound, done * kScoreBlock, pairs.num)) {
@@ -426,8 +426,8 @@ void direction_noise(const RayPairs& pairs, const int32_t* indices, int count, c
       }
       for (int a = 0; a < 3; ++a) g[a][c] = dot(along[a], moved);
     }
-    const double norm_sq = (g[2][0] * g[2][0] + g[2][1] * g[2][1]) +
-                           (g[2][2] * g[2][2] + g[2][3] * g[2][3]);
+    const double norm_sq =
+        (g[2][0] * g[2][0] + g[2][1] * g[2][1]) + (g[2][2] * g[2][2] + g[2][3] * g[2][3]);
     if (!(norm_sq > 0)) continue;
     const double inverse = 1 / norm_sq;
     for (int c = 0; c < 4; ++c) {
@@ -498,8 +498,8 @@ double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, i
                                 const Mat3& M, const Mat3* columns, int num_parameters,
                                 const RobustLoss& loss, double* upper, double* gradient) {
   double totals[TVK_SAMPSON_SUMS - 2], full[9][9];
-  const double cost = add_up(pairs.kernels->sampson_sums, TVK_SAMPSON_SUMS, pairs, indices, count, M,
-                             loss, totals);
+  const double cost =
+      add_up(pairs.kernels->sampson_sums, TVK_SAMPSON_SUMS, pairs, indices, count, M, loss, totals);
   int slot = 0;
   for (int i = 0; i < 9; ++i) {
     for (int j = i; j < 9; ++j) full[i][j] = full[j][i] = totals[slot++];
@@ -513,8 +513,8 @@ double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, 
                                  const RobustLoss& loss, double* upper, double* gradient) {
   static constexpr int kPlace[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   double totals[TVK_TRANSFER_SUMS - 2], full[9][9];
-  const double cost = add_up(pairs.kernels->transfer_sums, TVK_TRANSFER_SUMS, pairs, indices, count, H,
-                             loss, totals);
+  const double cost = add_up(pairs.kernels->transfer_sums, TVK_TRANSFER_SUMS, pairs, indices, count,
+                             H, loss, totals);
   for (int i = 0; i < 9; ++i) {
     for (int j = 0; j < 9; ++j) {
       full[i][j] = totals[6 * kPlace[i / 3][j / 3] + kPlace[i % 3][j % 3]];

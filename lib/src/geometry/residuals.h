@@ -24,7 +24,7 @@ inline constexpr int kCostOne = TVK_SCORE_ONE;  // what an outlier costs in an i
 struct RayPairs {
   const tvk_table* kernels;
   int num;
-  bool on_plane;      // both views: rays have z = 1, so the third rows of the Jacobians are zero
+  bool on_plane;  // both views: rays have z = 1, so the third rows of the Jacobians are zero
   double* ray[2][3];
   double* jacobian[2][6];  // row-major 3x2
   double* pixel_angle;  // the angle, in radians, that a pixel of noise in both images makes between
@@ -72,9 +72,10 @@ void finish_rays(RayPairs& pairs, int num_scored);
 // epipoles).
 double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 
-// Sampson's distance with its sign; its slopes by the entries of M, row by row; and by the coordinates of
-// a point that all pixels of both views move away from, as a principal point is: rays move by -J, Jacobians
-// by -d J. curvature: null, or d^2 ray / d pixel^2 of each view, 3 x (xx, xy, yy), row by row.
+// Sampson's distance with its sign; its slopes by the entries of M, row by row; and by the
+// coordinates of a point that all pixels of both views move away from, as a principal point is:
+// rays move by -J, Jacobians by -d J. curvature: null, or d^2 ray / d pixel^2 of each view, 3 x
+// (xx, xy, yy), row by row.
 struct SampsonSlopes {
   double residual, by_entry[9], by_point[2];
 };
@@ -87,8 +88,8 @@ void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M,
 void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
                      double* squares);
 
-// The same of a pose, which is to have the matches in front of both cameras: +inf too for one that is
-// behind by more than scale_px pixels (depth_vote). Sees the matches first .. first + count - 1.
+// The same of a pose, which is to have the matches in front of both cameras: +inf too for one that
+// is behind by more than scale_px pixels (depth_vote). Sees the matches first .. first + count - 1.
 void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose, double scale_px,
                   double* squares);
 
@@ -113,8 +114,8 @@ void transfer_squares(const RayPairs& pairs, int first, int count, const Mat3& H
 void transfer_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& H,
                       double* squares);
 
-// Of the listed matches: the square of the sine of the angle between the rays, R taken off, and 2 beyond
-// a right angle.
+// Of the listed matches: the square of the sine of the angle between the rays, R taken off, and 2
+// beyond a right angle.
 void squared_sines(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& R,
                    double* sines_sq);
 
@@ -135,8 +136,8 @@ struct RobustLoss {
 inline constexpr RobustLoss kLeastSquares{Loss::kTruncated, 1e140};
 
 // Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with at most nine
-// parameters, columns[p] = dM / dparameter p. upper: the packed upper triangle, row by row. Returns the
-// sum of rho, in units of scale^2. indices null: matches 0 .. count - 1.
+// parameters, columns[p] = dM / dparameter p. upper: the packed upper triangle, row by row. Returns
+// the sum of rho, in units of scale^2. indices null: matches 0 .. count - 1.
 double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
                                 const Mat3& M, const Mat3* columns, int num_parameters,
                                 const RobustLoss& loss, double* upper, double* gradient);

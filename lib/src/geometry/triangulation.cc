@@ -200,8 +200,8 @@ TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& cam
 
 Correction correct_match(tv_triangulation method, const TriangulationPair& pair,
                          const RayFrame& frame0, const RayFrame& frame1) {
-  const PixelCost cost = method == TV_TRIANGULATION_POLY_ABS ? PixelCost::kSumOfDistances
-                                                             : PixelCost::kSumOfSquares;
+  const PixelCost cost =
+      method == TV_TRIANGULATION_POLY_ABS ? PixelCost::kSumOfDistances : PixelCost::kSumOfSquares;
   if (pair.has_steps) return correct_rays(cost, pair.pencil, frame0, frame1);
   EpipolarPencil pencil = pair.pencil;
   set_pencil_steps(frame0, frame1, &pencil);
@@ -253,8 +253,8 @@ void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, co
   const Vec3 position1 = combine(1.0, rotate(pair.cam1_from_cam0_R, position), 1.0, pair.direction);
   // The two lines decide, the same for every method; and no method's point may lie behind and be
   // called good.
-  const bool in_front = along0 > 0.0 && along1 > 0.0 && dot(ray0, position) > 0.0 &&
-                        dot(ray1, position1) > 0.0;
+  const bool in_front =
+      along0 > 0.0 && along1 > 0.0 && dot(ray0, position) > 0.0 && dot(ray1, position1) > 0.0;
   write_point(in_front ? TV_POINT_OK : TV_POINT_BEHIND, metric, angle,
               error_px(pair, match, position, position1), point);
 }

@@ -19,8 +19,8 @@ struct TriangulationPair {
   const Camera* cameras[2];
   Mat3 cam1_from_cam0_R;
   Mat3 cam0_from_cam1_R;
-  Vec3 direction;  // t / |t|
-  Vec3 center1;    // camera 1's centre in camera 0's frame, for |t| = 1
+  Vec3 direction;   // t / |t|
+  Vec3 center1;     // camera 1's centre in camera 0's frame, for |t| = 1
   double baseline;  // |t|
   EpipolarPencil pencil;
   bool has_steps;  // of the pencil: the same for every match when both cameras have an image plane
@@ -47,11 +47,10 @@ bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, cons
 void triangulate_point(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
                        const Vec2& pixel1, tv_point* point);
 
-// Many matches at once, pixels num x 2: the same points but for rounding, in lanes where both lenses
-// are pinholes and the method has a closed form.
+// Many matches at once, pixels num x 2: the same points but for rounding, in lanes where both
+// lenses are pinholes and the method has a closed form.
 void triangulate_points(tv_triangulation method, const TriangulationPair& pair,
-                        const double* pixels0, const double* pixels1, size_t num,
-                        tv_point* points);
+                        const double* pixels0, const double* pixels1, size_t num, tv_point* points);
 
 // The same for unit rays that the caller has already (ray i in camera i's frame, through pixel i).
 void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, const Vec3& ray0,

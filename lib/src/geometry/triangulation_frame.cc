@@ -17,8 +17,8 @@ RayFrame sphere_frame(const tv_camera& model, const Vec3& ray) {
   Vec3 u, v;
   complete_basis(ray, &u, &v);
   const double pixel = 1.0 / std::sqrt(model.fx * model.fy);
-  return RayFrame{ray, {Vec3(-u[0], -u[1], -u[2]), Vec3(-v[0], -v[1], -v[2])}, {u, v}, ray,
-                  {pixel, pixel}};
+  return RayFrame{
+      ray, {Vec3(-u[0], -u[1], -u[2]), Vec3(-v[0], -v[1], -v[2])}, {u, v}, ray, {pixel, pixel}};
 }
 
 }  // namespace

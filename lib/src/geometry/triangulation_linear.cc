@@ -159,8 +159,8 @@ Vec4 inverse_times(const Homogeneous& s, double w0, double w1, const Vec4& v) {
   const double z1 = f0 * (s.n[0][0] * y1 - s.n[1][0] * y0) / det_n;
   const double c0 = f1 * y2 - (s.b[0][0] * z0 + s.b[0][1] * z1);
   const double c1 = f1 * y3 - (s.b[1][0] * z0 + s.b[1][1] * z1);
-  return Vec4{{det_d * z0, det_d * z1, s.d[1][1] * c0 - s.d[0][1] * c1,
-               s.d[0][0] * c1 - s.d[1][0] * c0}};
+  return Vec4{
+      {det_d * z0, det_d * z1, s.d[1][1] * c0 - s.d[0][1] * c1, s.d[0][0] * c1 - s.d[1][0] * c0}};
 }
 
 double product(const Vec4& a, const Vec4& b) {
@@ -218,8 +218,7 @@ Vec3 solve_least_squares(const TriangulationPair& pair, const RayFrame& frame0,
   Solution before = linear;
   for (int i = 0; iterative && i < kMaxReweightings; ++i) {
     const Depths w = scaled_depths(before.depth0, before.depth1);
-    const Solution now =
-        solve_weighted(system, frame0, w.first * w.first, w.second * w.second);
+    const Solution now = solve_weighted(system, frame0, w.first * w.first, w.second * w.second);
     if (has_settled(now.depth0, before.depth0) && has_settled(now.depth1, before.depth1)) {
       return now.position;
     }

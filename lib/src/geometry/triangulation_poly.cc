@@ -66,9 +66,9 @@ void diagonalise(const double M[2][2], V2* turn_u, V2* turn_v, double s[2]) {
 //   r_i = 1 / (1 + mu m_i),        |mu| < 1 / s0,
 // and the constraint's derivative -sum b_i^2 r_i^3 has one sign there: a single root.
 struct Secular {
-  double c;          // >= 0
+  double c;  // >= 0
   double b_sq[4];
-  double m[4];       // m[0] = -singular[0] is the one that bounds mu
+  double m[4];  // m[0] = -singular[0] is the one that bounds mu
   double sum_sq;
 };
 
@@ -99,7 +99,7 @@ bool solve_small(const Secular& s, double* mu) {
 // The upper half: in e = 1 - mu s0, in (0, 1]. The constraint is nearly A - B / e^2 there, so
 // Newton's steps are taken on e^2 constraint, and kept in a bracket.
 double solve_near_bound(const Secular& s, const double s0) {
-  const double ratio = std::fabs(s.m[2]) / s0;  // m[2] <= 0, m[3] = -m[2]
+  const double ratio = std::fabs(s.m[2]) / s0;           // m[2] <= 0, m[3] = -m[2]
   double low = std::sqrt(s.b_sq[0] / (4.0 * s0 * s.c));  // no more than 0 there
   if (!(low < 0.5)) low = 0.5;
   double high = 1.0;

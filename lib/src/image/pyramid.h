@@ -33,16 +33,17 @@ inline double to_level(const Level& level, double x) { return to_level(level.sca
 // Two buffers that take turns: a level is made from the one before it, which then is free again.
 struct LevelBuffers {
   uint8_t* pixels[2];
-  uint16_t* sums;          // one row
-  int32_t* first;          // one row
-  int32_t* column_weights; // three rows
+  uint16_t* sums;           // one row
+  int32_t* first;           // one row
+  int32_t* column_weights;  // three rows
 };
 
 size_t level_buffers_bytes(int32_t max_width, int32_t max_height);
 LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_height);
 
-// The next smaller level, by area averaging over factor x factor pixels, factor in (1, 2]. False when
-// it would be smaller than kMinLevelSide. `index` counts the levels made, and picks the buffer.
+// The next smaller level, by area averaging over factor x factor pixels, factor in (1, 2]. False
+// when it would be smaller than kMinLevelSide. `index` counts the levels made, and picks the
+// buffer.
 bool next_level(const tvk_table& kernels, const Level& level, double factor, int32_t index,
                 LevelBuffers& buffers, Level* next);
 
@@ -61,8 +62,8 @@ struct Octaves {
 
 size_t octaves_bytes(int32_t max_width, int32_t max_height);
 
-// Makes the octaves from `first` to `last` (fewer where the image is too small, at least one in all);
-// those before `first` are not filled in.
+// Makes the octaves from `first` to `last` (fewer where the image is too small, at least one in
+// all); those before `first` are not filled in.
 Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t first, int32_t last,
                      Arena& arena);
 

@@ -1,8 +1,8 @@
 /* Orientation and SIFT histograms of a sampled patch, and the 128 bytes.
-   D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, sections 5, 6.
-   No arctangent: a gradient that lies between two directions of the histogram is the sum of a vector
-   along each, and the lengths of these are what it gives to the two. All of it in integers, 16 bits
-   where they suffice (docs/decisions/0009). */
+   D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, sections
+   5, 6. No arctangent: a gradient that lies between two directions of the histogram is the sum of a
+   vector along each, and the lengths of these are what it gives to the two. All of it in integers,
+   16 bits where they suffice (docs/decisions/0009). */
 
 #include "kernels/words.h"
 
@@ -43,10 +43,11 @@ typedef struct direction_shares {
   words low, high; /* what it and the next one get */
 } direction_shares;
 
-/* The direction is folded at 0, 90, 45, 22.5 and 11.25 degrees, and unfolded as a number of bins. */
+/* The direction is folded at 0, 90, 45, 22.5 and 11.25 degrees, and unfolded as a number of bins.
+ */
 static direction_shares share_directions(words u, words v, words weights) {
   const words au = words_max(u, -u), av = words_max(v, -v);
-  const words left = u < words_of(0), up = v > words_of(0), steep = av > au;
+  const words left = u<words_of(0), up = v> words_of(0), steep = av > au;
   words big = words_max(au, av), small = words_min(au, av), bin, is_odd, a, b;
   const words root_half = words_of((int16_t)46341);
   const words cosine = words_of((int16_t)60547), sine = words_of(25080); /* of 22.5 degrees */
@@ -92,8 +93,8 @@ static void smooth_circle(const int32_t *histogram, int32_t *smooth) {
 }
 
 static void orientation_histogram(const int16_t *patch, int32_t *smooth) {
-  /* A gradient adds both its shares at once, 16 bits each; neighbours add to different tables, so that
-     none waits for the one before it. */
+  /* A gradient adds both its shares at once, 16 bits each; neighbours add to different tables, so
+     that none waits for the one before it. */
   uint32_t tables[4][TVK_ORIENT_BINS] TVK_ALIGNED;
   int32_t histogram[TVK_ORIENT_BINS];
   int32_t x, y;
@@ -123,21 +124,23 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth) {
 
 enum { PATCH_GRADIENTS = TVK_PATCH_SIDE - 1, CELL_SAMPLES = 6 };
 
-/* Along an axis cell c = 0..3 is fed by gradients k = 3 c + i, i = 0..5 of the fifteen, with the share
-   exp(-p^2 / 8) max(0, 1 - |p + 1.5 - c|), where p = 0.28 (k - 7) cells from the middle. Along y times
-   0.56 * 65536, and another sqrt(1/2) for the odd directions, so that sums fit 16 bits; along x times
-   16384. */
-static const uint16_t row_weights[2][4][CELL_SAMPLES] = {{
-    {12261, 21148, 25853, 19452, 11425, 2117},
-    {11922, 22177, 33172, 28347, 18350, 7995},
-    {7995, 18350, 28347, 33172, 22177, 11922},
-    {2117, 11425, 19452, 25853, 21148, 12261},
-}, {
-    {8670, 14954, 18281, 13755, 8078, 1497},
-    {8430, 15682, 23456, 20044, 12975, 5654},
-    {5654, 12975, 20044, 23456, 15682, 8430},
-    {1497, 8078, 13755, 18281, 14954, 8670},
-}};
+/* Along an axis cell c = 0..3 is fed by gradients k = 3 c + i, i = 0..5 of the fifteen, with the
+   share exp(-p^2 / 8) max(0, 1 - |p + 1.5 - c|), where p = 0.28 (k - 7) cells from the middle.
+   Along y times 0.56 * 65536, and another sqrt(1/2) for the odd directions, so that sums fit 16
+   bits; along x times 16384. */
+static const uint16_t row_weights[2][4][CELL_SAMPLES] = {
+    {
+        {12261, 21148, 25853, 19452, 11425, 2117},
+        {11922, 22177, 33172, 28347, 18350, 7995},
+        {7995, 18350, 28347, 33172, 22177, 11922},
+        {2117, 11425, 19452, 25853, 21148, 12261},
+    },
+    {
+        {8670, 14954, 18281, 13755, 8078, 1497},
+        {8430, 15682, 23456, 20044, 12975, 5654},
+        {5654, 12975, 20044, 23456, 15682, 8430},
+        {1497, 8078, 13755, 18281, 14954, 8670},
+    }};
 static const int16_t column_weights[4][8] = {
     {5474, 9441, 11541, 8684, 5100, 945, 0, 0},
     {5322, 9901, 14809, 12655, 8192, 3569, 0, 0},
@@ -184,17 +187,19 @@ static void pool_rows(int16_t (*rows)[8][TVK_PATCH_SIDE], int32_t cell, int16_t 
   }
 }
 
-/* Over the columns of a cell, for the eight directions; two samples more are read, and weigh nothing. */
+/* Over the columns of a cell, for the eight directions; two samples more are read, and weigh
+ * nothing. */
 static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t *sums) {
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
   const __m256i w = _mm256_broadcastsi128_si256(_mm_loadu_si128((const __m128i *)weights));
   __m256i product[4], low, high;
   int32_t bin;
   for (bin = 0; bin < 4; ++bin) {
-    const int16_t *near_row = columns + bin * TVK_PATCH_SIDE, *far_row = near_row + 4 * TVK_PATCH_SIDE;
-    const __m256i both = _mm256_inserti128_si256(
-        _mm256_castsi128_si256(_mm_loadu_si128((const __m128i *)near_row)),
-        _mm_loadu_si128((const __m128i *)far_row), 1);
+    const int16_t *near_row = columns + bin * TVK_PATCH_SIDE,
+                  *far_row = near_row + 4 * TVK_PATCH_SIDE;
+    const __m256i both =
+        _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128((const __m128i *)near_row)),
+                                _mm_loadu_si128((const __m128i *)far_row), 1);
     product[bin] = _mm256_madd_epi16(both, w);
   }
   low = _mm256_hadd_epi32(product[0], product[1]);
@@ -212,14 +217,16 @@ static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t
 
 static void gradient_histogram(const int16_t *patch, int32_t *histogram) {
   int16_t rows[PATCH_GRADIENTS][8][TVK_PATCH_SIDE] TVK_ALIGNED;
-  int16_t pooled[4 * 8 * TVK_PATCH_SIDE + 2] TVK_ALIGNED; /* the last column's cells read two beyond */
+  int16_t
+      pooled[4 * 8 * TVK_PATCH_SIDE + 2] TVK_ALIGNED; /* the last column's cells read two beyond */
   int32_t x, y;
   for (y = 0; y < PATCH_GRADIENTS; ++y) share_row(patch + y * TVK_PATCH_SIDE, rows[y]);
   for (y = 0; y < 4; ++y) pool_rows(rows + 3 * y, y, pooled + y * 8 * TVK_PATCH_SIDE);
   memset(pooled + 4 * 8 * TVK_PATCH_SIDE, 0, 2 * sizeof pooled[0]);
   for (y = 0; y < 4; ++y) {
     const int16_t *columns = pooled + y * 8 * TVK_PATCH_SIDE;
-    for (x = 0; x < 4; ++x) pool_columns(columns + 3 * x, column_weights[x], histogram + (4 * y + x) * 8);
+    for (x = 0; x < 4; ++x)
+      pool_columns(columns + 3 * x, column_weights[x], histogram + (4 * y + x) * 8);
   }
 }
 

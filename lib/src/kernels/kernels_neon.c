@@ -1,5 +1,5 @@
-/* The same source compiled for NEON, and by hand what pays. On 32-bit ARM, NEON flushes denormals and
-   has no IEEE division: integers there, and the compilers leave the rest to scalar VFP. */
+/* The same source compiled for NEON, and by hand what pays. On 32-bit ARM, NEON flushes denormals
+   and has no IEEE division: integers there, and the compilers leave the rest to scalar VFP. */
 #define TVK_SET TV_KERNELS_NEON
 #define TVK_TABLE tvk_table_neon
 #define TVK_NEON

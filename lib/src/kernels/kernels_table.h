@@ -1,5 +1,5 @@
-/* The table of a set: kernels/kernels_impl.h says how it is included. Again, with another TVK_TABLE, for a
-   table that differs in some kernels. */
+/* The table of a set: kernels/kernels_impl.h says how it is included. Again, with another
+   TVK_TABLE, for a table that differs in some kernels. */
 #define TVK_DECLARE(name, result, parameters) \
   result tvk_##name##_c parameters;           \
   result tvk_##name##_avx2 parameters;
@@ -14,12 +14,11 @@ TVK_MATCH_LIST(TVK_DECLARE)
 #undef TVK_DECLARE
 
 extern const tvk_table TVK_TABLE;
-const tvk_table TVK_TABLE = {
-    TVK_SET,
+const tvk_table TVK_TABLE = {TVK_SET,
 #define TVK_ENTRY(name, result, parameters) name,
-    TVK_PIXEL_LIST(TVK_ENTRY)
+                             TVK_PIXEL_LIST(TVK_ENTRY)
 #undef TVK_ENTRY
 #define TVK_ENTRY(name, result, parameters) TVK_MATCH(name),
-    TVK_MATCH_LIST(TVK_ENTRY)
+                                 TVK_MATCH_LIST(TVK_ENTRY)
 #undef TVK_ENTRY
 };

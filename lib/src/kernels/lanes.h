@@ -1,5 +1,5 @@
-/* Doubles in lanes: the same IEEE operations on TVK_LANES numbers at a time. Work on doubles is laid
-   out for TVK_WIDTH lanes whatever the set, so that sums over lanes have one written order. */
+/* Doubles in lanes: the same IEEE operations on TVK_LANES numbers at a time. Work on doubles is
+   laid out for TVK_WIDTH lanes whatever the set, so that sums over lanes have one written order. */
 #ifndef TWOVIEW_KERNELS_LANES_H
 #define TWOVIEW_KERNELS_LANES_H
 
@@ -41,8 +41,7 @@
 
 typedef double lanes __attribute__((vector_size(8 * TVK_LANES)));
 typedef int64_t lane_mask __attribute__((vector_size(8 * TVK_LANES))); /* all ones or all zeros */
-typedef double unaligned_lanes
-    __attribute__((vector_size(8 * TVK_LANES), aligned(8), may_alias));
+typedef double unaligned_lanes __attribute__((vector_size(8 * TVK_LANES), aligned(8), may_alias));
 
 static inline lanes lanes_of(double x) { return (lanes){0} + x; }
 static inline lanes lanes_load(const double *p) { return *(const unaligned_lanes *)p; }

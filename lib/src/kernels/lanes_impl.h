@@ -1,5 +1,5 @@
-/* One set's kernels on doubles: include with TVK_MATCH(name), their names, defined. Compiled at -O2, with
-   the loops that gain from it unrolled by TVK_UNROLL: at -O3 they are twice as large. */
+/* One set's kernels on doubles: include with TVK_MATCH(name), their names, defined. Compiled at
+   -O2, with the loops that gain from it unrolled by TVK_UNROLL: at -O3 they are twice as large. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>

@@ -38,8 +38,8 @@ static TVK_INLINE void load_arrays(const double *const *arrays, const int32_t *i
   }
 }
 
-/* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the other
-   lanes. */
+/* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the
+   other lanes. */
 static TVK_INLINE void load_block(const double *const *arrays, const int32_t *indices,
                                   int32_t first, int32_t count, int on_plane, sampson_block *b) {
   int32_t some[TVK_LANES];

@@ -1,29 +1,32 @@
 /* Strictly nearest neighbours, both ways, among 128-byte descriptors, all pairs compared.
 
-   Rows (of image 0) meet columns (of image 1) in tiles of NEAREST_QUERIES x NEAREST_COLUMNS. Of a pair
-   a, b a tile makes two keys, |a|^2 - 2 a . b for b's list and |b|^2 - 2 a . b for a's, what is missing
-   being the same for the whole list; a key is that number (24 bits with its sign) << 8, and below it
-   where it comes from: the tile's place among 256 of rows, or of columns. A tile keeps the smallest key
-   of its rows for each column, and of its columns that share a lane for each row: a group; the two
-   smallest keys of groups are kept per column, and per row and lane.
+   Rows (of image 0) meet columns (of image 1) in tiles of NEAREST_QUERIES x NEAREST_COLUMNS. Of a
+   pair a, b a tile makes two keys, |a|^2 - 2 a . b for b's list and |b|^2 - 2 a . b for a's, what
+   is missing being the same for the whole list; a key is that number (24 bits with its sign) << 8,
+   and below it where it comes from: the tile's place among 256 of rows, or of columns. A tile keeps
+   the smallest key of its rows for each column, and of its columns that share a lane for each row:
+   a group; the two smallest keys of groups are kept per column, and per row and lane.
 
-   So the two nearest groups are known in the end, by their nearest members. The second nearest neighbour
-   may hide in the nearest's own group: that group's distances are computed once more, of the few
-   descriptors that can be each other's nearest. Ties need no order: equals are not strictly nearest.
+   So the two nearest groups are known in the end, by their nearest members. The second nearest
+   neighbour may hide in the nearest's own group: that group's distances are computed once more, of
+   the few descriptors that can be each other's nearest. Ties need no order: equals are not strictly
+   nearest.
 
    A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), the structs
-   nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte where these
-   need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS after another. */
+   nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte where
+   these need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS after
+   another. */
 
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
 #define NEAREST_PLACES 256
 
-/* A key's missing part, shifted, and its place; beyond the last descriptor, what no key may beat. */
+/* A key's missing part, shifted, and its place; beyond the last descriptor, what no key may beat.
+ */
 static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
 
-/* Out of line, as what else runs once a descriptor or a tile and not once a pair: -O3 would write it out at
-   each call. */
+/* Out of line, as what else runs once a descriptor or a tile and not once a pair: -O3 would write
+   it out at each call. */
 static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * a[k];
@@ -60,9 +63,9 @@ static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
 #define NEAREST_ASSERT(name, condition) typedef char name[(condition) ? 1 : -1]
 NEAREST_ASSERT(nearest_chunk_fits, sizeof(nearest_rows) * (NEAREST_ROWS / NEAREST_QUERIES) <=
                                        TVK_NEAREST_CHUNK_BYTES(NEAREST_ROWS));
-NEAREST_ASSERT(nearest_few_rows_fit, sizeof(nearest_rows) <= 2 * TVK_NEAREST_ROW_BYTES &&
-                                         sizeof(nearest_rows) <=
-                                             NEAREST_QUERIES * TVK_NEAREST_ROW_BYTES);
+NEAREST_ASSERT(nearest_few_rows_fit,
+               sizeof(nearest_rows) <= 2 * TVK_NEAREST_ROW_BYTES &&
+                   sizeof(nearest_rows) <= NEAREST_QUERIES * TVK_NEAREST_ROW_BYTES);
 NEAREST_ASSERT(nearest_panel_fits,
                sizeof(nearest_block) <= NEAREST_COLUMNS * TVK_NEAREST_COLUMN_BYTES);
 NEAREST_ASSERT(nearest_chunks_are_whole, NEAREST_ROWS % NEAREST_QUERIES == 0 &&
@@ -74,7 +77,8 @@ NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
 
 static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
 
-/* The smallest and the second smallest distance of groups so far, and where the smallest group starts. */
+/* The smallest and the second smallest distance of groups so far, and where the smallest group
+ * starts. */
 static TVK_NOINLINE void nearest_merge(tvk_nearest *nearest, int32_t best_key, int32_t second_key,
                                        int32_t norm, int32_t group) {
   const int32_t best = (best_key >> 8) + norm;
@@ -123,8 +127,7 @@ static TVK_NOINLINE int32_t resolve_group(const uint8_t *query, const uint8_t *o
                                           tvk_nearest *nearest) {
   int32_t found = -1, equals = 0, k, member = nearest->idx;
   for (k = 0; k < count && member < num_others; ++k, member += stride) {
-    const int32_t dist =
-        squared_distance(query, others + (int64_t)member * TVK_DESCRIPTOR_SIZE);
+    const int32_t dist = squared_distance(query, others + (int64_t)member * TVK_DESCRIPTOR_SIZE);
     if (dist == nearest->best) {
       found = member;
       ++equals;
@@ -257,8 +260,8 @@ static int32_t make_chunk(const uint8_t *rows, int32_t num_rows, int32_t first, 
   int32_t t, k, row = first;
   for (t = 0; t < NEAREST_ROWS / NEAREST_QUERIES && row < num_rows; ++t, row += NEAREST_QUERIES) {
     make_rows(rows + (int64_t)row * TVK_DESCRIPTOR_SIZE,
-              nearest_min(NEAREST_QUERIES, num_rows - row),
-              row / NEAREST_QUERIES % NEAREST_PLACES, largest, &tiles[t]);
+              nearest_min(NEAREST_QUERIES, num_rows - row), row / NEAREST_QUERIES % NEAREST_PLACES,
+              largest, &tiles[t]);
     for (k = 0; k < NEAREST_QUERIES * NEAREST_LANES; ++k) {
       tiles[t].best[k] = tiles[t].second[k] = NEAREST_FAR;
     }

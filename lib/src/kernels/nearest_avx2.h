@@ -1,10 +1,10 @@
 /* The tile of nearest.h by AVX2: a lane a column, four bytes of eight columns a register.
 
-   vpmaddubsw multiplies unsigned by signed bytes and adds pairs in 16 bits. Columns are c - b, c half
-   the largest byte, so that |c - b| <= h = largest - c; two products of pairs are added in 16 bits before
-   they are widened, which is exact where four bytes of the row add up to 32767 / h at most: 255 at
-   worst, 370 for descriptors as they are, whose mean is 35. Where they add up to more, the row is split
-   into a sum of rows that do not: further steps, almost never needed. */
+   vpmaddubsw multiplies unsigned by signed bytes and adds pairs in 16 bits. Columns are c - b, c
+   half the largest byte, so that |c - b| <= h = largest - c; two products of pairs are added in 16
+   bits before they are widened, which is exact where four bytes of the row add up to 32767 / h at
+   most: 255 at worst, 370 for descriptors as they are, whose mean is 35. Where they add up to more,
+   the row is split into a sum of rows that do not: further steps, almost never needed. */
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 8, NEAREST_VECTORS = 4, NEAREST_QUERIES = 2, NEAREST_ROWS = 64 };
@@ -34,8 +34,8 @@ static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
 
 static inline int32_t nearest_centre(int32_t largest) { return largest / 2; }
 
-/* Moves to `step` what may be added in 16 bits of the eight bytes in `left`: those four that meet in a
-   sum are 0 1 4 5 and 2 3 6 7. Returns whether something stays. */
+/* Moves to `step` what may be added in 16 bits of the eight bytes in `left`: those four that meet
+   in a sum are 0 1 4 5 and 2 3 6 7. Returns whether something stays. */
 static inline int32_t take_step(uint8_t *left, int32_t most, uint8_t *step) {
   static const uint8_t meet[2][4] = {{0, 1, 4, 5}, {2, 3, 6, 7}};
   int32_t half, k, stays = 0;
@@ -117,16 +117,16 @@ static inline __m256i four_avx2(const uint8_t *row) {
 
 /* Eight bytes of the row, four and four, with those of eight columns. */
 static inline __m256i products_avx2(__m256i row, __m256i next, const int8_t *columns) {
-  const __m256i pairs = _mm256_add_epi16(
-      _mm256_maddubs_epi16(row, load_avx2(columns)),
-      _mm256_maddubs_epi16(next, load_avx2(columns + 4 * NEAREST_COLUMNS)));
+  const __m256i pairs =
+      _mm256_add_epi16(_mm256_maddubs_epi16(row, load_avx2(columns)),
+                       _mm256_maddubs_epi16(next, load_avx2(columns + 4 * NEAREST_COLUMNS)));
   return _mm256_madd_epi16(pairs, _mm256_set1_epi16(1));
 }
 
 static inline void store_avx2(int32_t *to, __m256i x) { _mm256_storeu_si256((__m256i *)to, x); }
 
-/* Each sum is a variable by name, s12 of row 1 and the third eight columns: gcc 12 keeps arrays of them in
-   memory. */
+/* Each sum is a variable by name, s12 of row 1 and the third eight columns: gcc 12 keeps arrays of
+   them in memory. */
 #define START(i)                                                           \
   __m256i s##i##0 = _mm256_set1_epi32(rows->starts[i]), s##i##1 = s##i##0; \
   __m256i s##i##2 = s##i##0, s##i##3 = s##i##0;
@@ -139,9 +139,9 @@ static inline void store_avx2(int32_t *to, __m256i x) { _mm256_storeu_si256((__m
   s##i##2 = _mm256_add_epi32(s##i##2, products_avx2(row, next, columns + 64)); \
   s##i##3 = _mm256_add_epi32(s##i##3, products_avx2(row, next, columns + 96));
 
-#define STORE(i)                              \
-  store_avx2(products + 32 * i, s##i##0);     \
-  store_avx2(products + 32 * i + 8, s##i##1); \
+#define STORE(i)                               \
+  store_avx2(products + 32 * i, s##i##0);      \
+  store_avx2(products + 32 * i + 8, s##i##1);  \
   store_avx2(products + 32 * i + 16, s##i##2); \
   store_avx2(products + 32 * i + 24, s##i##3);
 

@@ -1,5 +1,6 @@
-/* The tile of nearest.h by AVX-512 VNNI: a lane a column, four bytes of 16 columns a register, 24 sums
-   in registers. vpdpbusd multiplies unsigned by signed bytes: sum of b (127 - a) = 127 sum b - a . b. */
+/* The tile of nearest.h by AVX-512 VNNI: a lane a column, four bytes of 16 columns a register, 24
+   sums in registers. vpdpbusd multiplies unsigned by signed bytes: sum of b (127 - a) = 127 sum b -
+   a . b. */
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 16, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
@@ -65,9 +66,10 @@ static inline int32x16 add_avx512(int32x16 sum, int32x16 columns, int32x16 row) 
   return (int32x16)_mm512_dpbusd_epi32((__m512i)sum, (__m512i)columns, (__m512i)row);
 }
 
-/* Each sum is a variable by name, s20 of row 2 and the first 16 columns: gcc 12 keeps arrays of them in
-   memory, at half the speed. */
-#define EACH_ROW(do) do(0) do(1) do(2) do(3) do(4) do(5)
+/* Each sum is a variable by name, s20 of row 2 and the first 16 columns: gcc 12 keeps arrays of
+   them in memory, at half the speed. */
+#define EACH_ROW(do) \
+  do (0) do(1) do(2) do(3) do(4) do(5)
 
 #define START(i) \
   int32x16 s##i##0 = columns0, s##i##1 = columns1, s##i##2 = columns2, s##i##3 = columns3;
@@ -79,10 +81,10 @@ static inline int32x16 add_avx512(int32x16 sum, int32x16 columns, int32x16 row) 
   s##i##2 = add_avx512(s##i##2, columns2, row); \
   s##i##3 = add_avx512(s##i##3, columns3, row);
 
-#define STORE(i)                                                    \
-  _mm512_storeu_si512(products + 64 * i, (__m512i)s##i##0);         \
-  _mm512_storeu_si512(products + 64 * i + 16, (__m512i)s##i##1);    \
-  _mm512_storeu_si512(products + 64 * i + 32, (__m512i)s##i##2);    \
+#define STORE(i)                                                 \
+  _mm512_storeu_si512(products + 64 * i, (__m512i)s##i##0);      \
+  _mm512_storeu_si512(products + 64 * i + 16, (__m512i)s##i##1); \
+  _mm512_storeu_si512(products + 64 * i + 32, (__m512i)s##i##2); \
   _mm512_storeu_si512(products + 64 * i + 48, (__m512i)s##i##3);
 
 static void tile_products(const nearest_rows *rows, const nearest_block *block, int32_t *products) {

@@ -1,5 +1,5 @@
-/* The tile of nearest.h in plain C: four dot products of int16 at a time, which every compiler turns
-   into multiply-adds of its base instruction set. */
+/* The tile of nearest.h in plain C: four dot products of int16 at a time, which every compiler
+   turns into multiply-adds of its base instruction set. */
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 4, NEAREST_ROWS = 128 };
 

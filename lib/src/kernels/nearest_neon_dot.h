@@ -1,5 +1,5 @@
-/* The tile of nearest.h by the dot product of ARMv8.2: a lane a column, four bytes of four columns a
-   register, 24 sums in registers. */
+/* The tile of nearest.h by the dot product of ARMv8.2: a lane a column, four bytes of four columns
+   a register, 24 sums in registers. */
 #include <arm_neon.h>
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
@@ -53,22 +53,24 @@ static inline void store_negated(int32_t *products, uint32x4_t sums) {
   vst1q_s32(products, vnegq_s32(vreinterpretq_s32_u32(sums)));
 }
 
-/* Each sum is a variable by name, as in nearest_avx512.h: s20 of row 2 and the first four columns. */
-#define EACH_ROW(do) do(0) do(1) do(2) do(3) do(4) do(5)
+/* Each sum is a variable by name, as in nearest_avx512.h: s20 of row 2 and the first four columns.
+ */
+#define EACH_ROW(do) \
+  do (0) do(1) do(2) do(3) do(4) do(5)
 
 #define START(i) uint32x4_t s##i##0 = zero, s##i##1 = zero, s##i##2 = zero, s##i##3 = zero;
 
-#define ADD(i)                                \
-  row = four_neon(rows->bytes[i] + 4 * g);    \
+#define ADD(i)                                 \
+  row = four_neon(rows->bytes[i] + 4 * g);     \
   s##i##0 = vdotq_u32(s##i##0, columns0, row); \
   s##i##1 = vdotq_u32(s##i##1, columns1, row); \
   s##i##2 = vdotq_u32(s##i##2, columns2, row); \
   s##i##3 = vdotq_u32(s##i##3, columns3, row);
 
-#define STORE(i)                                  \
-  store_negated(products + 16 * i, s##i##0);      \
-  store_negated(products + 16 * i + 4, s##i##1);  \
-  store_negated(products + 16 * i + 8, s##i##2);  \
+#define STORE(i)                                 \
+  store_negated(products + 16 * i, s##i##0);     \
+  store_negated(products + 16 * i + 4, s##i##1); \
+  store_negated(products + 16 * i + 8, s##i##2); \
   store_negated(products + 16 * i + 12, s##i##3);
 
 static void tile_products(const nearest_rows *rows, const nearest_block *block, int32_t *products) {

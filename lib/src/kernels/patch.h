@@ -1,6 +1,6 @@
-/* Bilinear samples of a turned square, out of an image whose rows are stored in pairs: one 32-bit load
-   fetches all four neighbours, and no position needs a rule of its own at the border.
-   Shares are of 127, not of 128: they make up for the fraction's truncation, and a share times a pixel
+/* Bilinear samples of a turned square, out of an image whose rows are stored in pairs: one 32-bit
+   load fetches all four neighbours, and no position needs a rule of its own at the border. Shares
+   are of 127, not of 128: they make up for the fraction's truncation, and a share times a pixel
    (less 128) fits 16 bits. */
 
 static void pair_rows(const uint8_t *row, const uint8_t *below, int32_t width, uint16_t *pairs) {
@@ -18,8 +18,9 @@ typedef struct sampled_image {
 
 /* Bytes [127 - f, f] of a position's fraction f, twice; and the same as words. */
 static inline __m512i byte_shares(__m512i position) {
-  const __m512i spread = _mm512_shuffle_epi8(_mm512_srli_epi32(position, 1),
-                                             _mm512_set4_epi32(0x0d0d0d0d, 0x09090909, 0x05050505, 0x01010101));
+  const __m512i spread =
+      _mm512_shuffle_epi8(_mm512_srli_epi32(position, 1),
+                          _mm512_set4_epi32(0x0d0d0d0d, 0x09090909, 0x05050505, 0x01010101));
   return _mm512_xor_si512(_mm512_and_si512(spread, _mm512_set1_epi8(127)), _mm512_set1_epi16(127));
 }
 static inline __m512i word_shares(__m512i position) {
@@ -33,10 +34,14 @@ static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t
                        int16_t *out) {
   const __m512i i = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
   const __m512i zero = _mm512_setzero_si512();
-  const __m512i all_x = _mm512_add_epi32(_mm512_set1_epi32(x), _mm512_mullo_epi32(i, _mm512_set1_epi32(du_x)));
-  const __m512i all_y = _mm512_add_epi32(_mm512_set1_epi32(y), _mm512_mullo_epi32(i, _mm512_set1_epi32(du_y)));
-  const __m512i sx = _mm512_min_epi32(_mm512_max_epi32(all_x, zero), _mm512_set1_epi32(image->right));
-  const __m512i sy = _mm512_min_epi32(_mm512_max_epi32(all_y, zero), _mm512_set1_epi32(image->bottom));
+  const __m512i all_x =
+      _mm512_add_epi32(_mm512_set1_epi32(x), _mm512_mullo_epi32(i, _mm512_set1_epi32(du_x)));
+  const __m512i all_y =
+      _mm512_add_epi32(_mm512_set1_epi32(y), _mm512_mullo_epi32(i, _mm512_set1_epi32(du_y)));
+  const __m512i sx =
+      _mm512_min_epi32(_mm512_max_epi32(all_x, zero), _mm512_set1_epi32(image->right));
+  const __m512i sy =
+      _mm512_min_epi32(_mm512_max_epi32(all_y, zero), _mm512_set1_epi32(image->bottom));
   const __m512i yx = _mm512_mask_mov_epi16(sy, 0x55555555, _mm512_srli_epi32(sx, 16));
   const __m512i offset = _mm512_madd_epi16(yx, _mm512_set1_epi32(image->pitch << 16 | 1));
   const __m512i quads = _mm512_i32gather_epi32(offset, image->pairs, 2);
@@ -48,10 +53,10 @@ static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t
 #elif defined(TVK_AVX2)
 
 static inline __m256i byte_shares(__m256i position) {
-  const __m256i spread = _mm256_shuffle_epi8(
-      _mm256_srli_epi32(position, 1),
-      _mm256_setr_epi32(0x01010101, 0x05050505, 0x09090909, 0x0d0d0d0d, 0x01010101, 0x05050505,
-                        0x09090909, 0x0d0d0d0d));
+  const __m256i spread =
+      _mm256_shuffle_epi8(_mm256_srli_epi32(position, 1),
+                          _mm256_setr_epi32(0x01010101, 0x05050505, 0x09090909, 0x0d0d0d0d,
+                                            0x01010101, 0x05050505, 0x09090909, 0x0d0d0d0d));
   return _mm256_xor_si256(_mm256_and_si256(spread, _mm256_set1_epi8(127)), _mm256_set1_epi16(127));
 }
 static inline __m256i word_shares(__m256i position) {
@@ -75,12 +80,14 @@ static inline __m256i sample_eight(const sampled_image *image, __m256i x, __m256
 static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t du_x, int32_t du_y,
                        int16_t *out) {
   const __m256i i = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-  const __m256i near_x = _mm256_add_epi32(_mm256_set1_epi32(x), _mm256_mullo_epi32(i, _mm256_set1_epi32(du_x)));
-  const __m256i near_y = _mm256_add_epi32(_mm256_set1_epi32(y), _mm256_mullo_epi32(i, _mm256_set1_epi32(du_y)));
+  const __m256i near_x =
+      _mm256_add_epi32(_mm256_set1_epi32(x), _mm256_mullo_epi32(i, _mm256_set1_epi32(du_x)));
+  const __m256i near_y =
+      _mm256_add_epi32(_mm256_set1_epi32(y), _mm256_mullo_epi32(i, _mm256_set1_epi32(du_y)));
   const __m256i far_x = _mm256_add_epi32(near_x, _mm256_set1_epi32(8 * du_x));
   const __m256i far_y = _mm256_add_epi32(near_y, _mm256_set1_epi32(8 * du_y));
-  const __m256i packed = _mm256_packs_epi32(sample_eight(image, near_x, near_y),
-                                            sample_eight(image, far_x, far_y));
+  const __m256i packed =
+      _mm256_packs_epi32(sample_eight(image, near_x, near_y), sample_eight(image, far_x, far_y));
   _mm256_storeu_si256((__m256i *)out, _mm256_permute4x64_epi64(packed, 0xd8));
 }
 
@@ -111,7 +118,8 @@ static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t
   }
   for (i = 0; i < TVK_PATCH_SIDE; ++i) {
     const int16_t a = (int16_t)((int16_t)(left[i] << 8) >> 8), c = (int16_t)((int16_t)left[i] >> 8);
-    const int16_t b = (int16_t)((int16_t)(right[i] << 8) >> 8), d = (int16_t)((int16_t)right[i] >> 8);
+    const int16_t b = (int16_t)((int16_t)(right[i] << 8) >> 8),
+                  d = (int16_t)((int16_t)right[i] >> 8);
     const int16_t gx = (int16_t)(127 - fx[i]), gy = (int16_t)(127 - fy[i]);
     const int16_t at_left = (int16_t)(gy * a + fy[i] * c), at_right = (int16_t)(gy * b + fy[i] * d);
     out[i] = (int16_t)((gx * at_left + fx[i] * at_right) >> 8);

@@ -1,5 +1,5 @@
-/* Essential matrices from five matched rays, TVK_LANES samples at a time without a branch on what is
-   in a lane, but for the isolation of roots that lie close together.
+/* Essential matrices from five matched rays, TVK_LANES samples at a time without a branch on what
+   is in a lane, but for the isolation of roots that lie close together.
 
    D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 2004: the five
    epipolar constraints leave E = x X + y Y + z Z + W. The cubic constraints det E = 0 and
@@ -136,8 +136,8 @@ static TVK_NOINLINE void cubic_constraints(const lanes e[9][4], lanes rows[10][2
   }
 }
 
-/* Makes the left ten columns the identity, in the last six rows only: the first four are never used.
-   Clears the mask of lanes where they are singular. */
+/* Makes the left ten columns the identity, in the last six rows only: the first four are never
+   used. Clears the mask of lanes where they are singular. */
 static TVK_NOINLINE void eliminate(lanes rows[10][20], lane_mask *ok) {
   lanes diagonal[10];
   int k, r, c;
@@ -197,8 +197,8 @@ static inline void z_matrix_of(const lanes rows[10][20], z_matrix *b) {
   }
 }
 
-/* A function of its own, as are those above: their arrays are the most of the stack, and are gone when
-   the roots are looked for. */
+/* A function of its own, as are those above: their arrays are the most of the stack, and are gone
+   when the roots are looked for. */
 static TVK_NOINLINE void reduce_constraints(const lanes e[9][4], z_matrix *b, lane_mask *ok) {
   lanes rows[10][20];
   cubic_constraints(e, rows);
@@ -226,10 +226,10 @@ static inline void determinant_of(const z_matrix *b, lanes polynomial[11]) {
   }
 }
 
-/* Sturm's chain of the polynomial: p[0] = p, p[1] = p', p[k-1] = (a[k] z + b[k]) p[k] - c[k] p[k+1],
-   c > 0. Only the quotients are kept: evaluation from the chain's constant end takes three
-   multiplications a link. (D. G. Hook, P. R. McAree, "Using Sturm sequences to bracket real roots of
-   polynomial equations", Graphics Gems, 1990, with the quotients in place of the polynomials.)
+/* Sturm's chain of the polynomial: p[0] = p, p[1] = p', p[k-1] = (a[k] z + b[k]) p[k] - c[k]
+   p[k+1], c > 0. Only the quotients are kept: evaluation from the chain's constant end takes three
+   multiplications a link. (D. G. Hook, P. R. McAree, "Using Sturm sequences to bracket real roots
+   of polynomial equations", Graphics Gems, 1990, with the quotients in place of the polynomials.)
    Beyond the end of a chain that ends early, for repeated roots, a = c = 0 and b = 1. */
 typedef struct sturm_chain {
   lanes slope[10], offset[10], scale[10];
@@ -291,9 +291,8 @@ static inline int sign_changes_of_lane(const sturm_chain *chain, int lane, doubl
   double next = 0, current = chain->last[lane];
   int changes = 0, k;
   for (k = 9; k >= 0; --k) {
-    const double previous =
-        (chain->slope[k][lane] * z + chain->offset[k][lane]) * current -
-        chain->scale[k][lane] * next;
+    const double previous = (chain->slope[k][lane] * z + chain->offset[k][lane]) * current -
+                            chain->scale[k][lane] * next;
     changes += (previous < 0) != (current < 0);
     next = current;
     current = previous;
@@ -301,8 +300,8 @@ static inline int sign_changes_of_lane(const sturm_chain *chain, int lane, doubl
   return changes;
 }
 
-/* Where roots are: of each lane, intervals (low, high] with one root each, ascending. A repeated root
-   has an interval without length. */
+/* Where roots are: of each lane, intervals (low, high] with one root each, ascending. A repeated
+   root has an interval without length. */
 typedef struct root_brackets {
   lanes low[10], high[10];
   int num[TVK_LANES], most;
@@ -357,16 +356,35 @@ static TVK_NOINLINE void split_bracket(const sturm_chain *chain, int lane, doubl
   }
 }
 
-/* Roots within +-1e6. z is one of four homogeneous coordinates over another, so its roots are spread
-   evenly over the angle atan z: the intervals to begin with are 7.5 degrees each. */
+/* Roots within +-1e6. z is one of four homogeneous coordinates over another, so its roots are
+   spread evenly over the angle atan z: the intervals to begin with are 7.5 degrees each. */
 static inline void find_brackets(const sturm_chain *chain, lane_mask ok, root_brackets *b) {
   enum { CELLS = 24 };
-  static const double edges[CELLS + 1] = {
-      -1e6, -7.59575411272515, -3.73205080756888, -2.41421356237309, -1.73205080756888,
-      -1.30322537284121, -1.0, -0.76732698797896, -0.577350269189626, -0.414213562373095,
-      -0.267949192431123, -0.131652497587396, 0.0, 0.131652497587396, 0.267949192431123,
-      0.414213562373095, 0.577350269189626, 0.76732698797896, 1.0, 1.30322537284121,
-      1.73205080756888, 2.41421356237309, 3.73205080756888, 7.59575411272515, 1e6};
+  static const double edges[CELLS + 1] = {-1e6,
+                                          -7.59575411272515,
+                                          -3.73205080756888,
+                                          -2.41421356237309,
+                                          -1.73205080756888,
+                                          -1.30322537284121,
+                                          -1.0,
+                                          -0.76732698797896,
+                                          -0.577350269189626,
+                                          -0.414213562373095,
+                                          -0.267949192431123,
+                                          -0.131652497587396,
+                                          0.0,
+                                          0.131652497587396,
+                                          0.267949192431123,
+                                          0.414213562373095,
+                                          0.577350269189626,
+                                          0.76732698797896,
+                                          1.0,
+                                          1.30322537284121,
+                                          1.73205080756888,
+                                          2.41421356237309,
+                                          3.73205080756888,
+                                          7.59575411272515,
+                                          1e6};
   lane_mask before = sign_changes(chain, edges[0]) & ok;
   int cell, l;
   memset(b, 0, sizeof *b);
@@ -398,8 +416,8 @@ static TVK_NOINLINE lanes polynomial_at(const lanes p[11], lanes z, lanes *deriv
   return value;
 }
 
-/* The root in each lane's bracket, by Newton's steps kept within it by bisection; beyond +-1 that of
-   the reversed polynomial in 1 / z. */
+/* The root in each lane's bracket, by Newton's steps kept within it by bisection; beyond +-1 that
+   of the reversed polynomial in 1 / z. */
 static inline lanes roots_in(const lanes p[11], lanes low, lanes high) {
   const lane_mask outside = (low >= 1.0) | (high <= -1.0);
   const lanes one = lanes_of(1);
@@ -417,8 +435,7 @@ static inline lanes roots_in(const lanes p[11], lanes low, lanes high) {
   /* With equal signs the root is an end of the bracket, within rounding. */
   active = low_negative ^ (at_high < 0.0);
   z = low - at_low * (high - low) / lanes_select(active, at_high - at_low, one);
-  z = lanes_select(active, z,
-                   lanes_select(lanes_abs(at_low) < lanes_abs(at_high), low, high));
+  z = lanes_select(active, z, lanes_select(lanes_abs(at_low) < lanes_abs(at_high), low, high));
   for (iteration = 0; iteration < 60 && lanes_any(active); ++iteration) {
     const lanes value = polynomial_at(q, z, &slope);
     const lane_mask below = ~((value < 0.0) ^ low_negative);
@@ -463,10 +480,11 @@ static inline void null_vector(const z_matrix *b, lanes z, lanes best[3]) {
   }
 }
 
-/* Whether the five rays agree on which side of the epipole they lie: e x f1 and E f0 are normals of the
-   same epipolar plane, and point the same way for all matches that are in front of both cameras, or
-   for none (O. Chum, T. Werner, J. Matas, "Epipolar geometry estimation via RANSAC benefits from the
-   oriented epipolar constraint", ICPR 2004). Matches within some 0.01 rad of an epipole do not count. */
+/* Whether the five rays agree on which side of the epipole they lie: e x f1 and E f0 are normals of
+   the same epipolar plane, and point the same way for all matches that are in front of both
+   cameras, or for none (O. Chum, T. Werner, J. Matas, "Epipolar geometry estimation via RANSAC
+   benefits from the oriented epipolar constraint", ICPR 2004). Matches within some 0.01 rad of an
+   epipole do not count. */
 static inline lane_mask same_side(const lanes f[10][3], const lanes E[9]) {
   lanes e[3] = {{0}, {0}, {0}}, best_sq = {0};
   lane_mask some_positive = {0}, some_negative = {0};

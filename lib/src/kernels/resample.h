@@ -36,7 +36,8 @@ static inline int32_t blur_column(const uint8_t *above, const uint8_t *row, cons
 
 enum { BLUR_SPAN = 320 };
 
-/* Sums of columns first, 16 bits wide: a pixel is then read once, and vectors hold twice as many. */
+/* Sums of columns first, 16 bits wide: a pixel is then read once, and vectors hold twice as many.
+ */
 static inline void blur_span(const uint8_t *above, const uint8_t *row, const uint8_t *below,
                              int32_t begin, int32_t count, uint8_t *out) {
   uint16_t columns[BLUR_SPAN + 2];
@@ -63,9 +64,11 @@ static void blur_row(const uint8_t *above, const uint8_t *row, const uint8_t *be
     }
   }
   out[0] = (uint8_t)((3 * blur_column(above, row, below, 0) +
-                      blur_column(above, row, below, last > 0 ? 1 : 0) + 8) >> 4);
+                      blur_column(above, row, below, last > 0 ? 1 : 0) + 8) >>
+                     4);
   if (last > 0) {
     out[last] = (uint8_t)((3 * blur_column(above, row, below, last) +
-                           blur_column(above, row, below, last - 1) + 8) >> 4);
+                           blur_column(above, row, below, last - 1) + 8) >>
+                          4);
   }
 }

@@ -18,8 +18,7 @@ static TVK_INLINE void epipolar_of(const sampson_block *b, const double m[9], in
     line1[r] = (m[3 * r] * b->f0[0] + m[3 * r + 1] * b->f0[1]) + last1;
     line0[r] = (m[r] * b->f1[0] + m[3 + r] * b->f1[1]) + last0;
   }
-  e->c = (b->f1[0] * line1[0] + b->f1[1] * line1[1]) +
-         (on_plane ? line1[2] : b->f1[2] * line1[2]);
+  e->c = (b->f1[0] * line1[0] + b->f1[1] * line1[1]) + (on_plane ? line1[2] : b->f1[2] * line1[2]);
   for (k = 0; k < 2; ++k) {
     e->s0[k] = b->J0[k] * line0[0] + b->J0[2 + k] * line0[1];
     e->s1[k] = b->J1[k] * line1[0] + b->J1[2 + k] * line1[1];
@@ -188,8 +187,8 @@ void TVK_MATCH(sampson_sums)(const double *const *arrays, const int32_t *indices
   if (on_plane) {
     sums_of(arrays, indices, first, count, 1, m, inverse_sq, cauchy, sums);
   } else {
-    TVK_ON_SPHERE(sampson_sums, sums_of)(arrays, indices, first, count, 0, m, inverse_sq, cauchy,
-                                         sums);
+    TVK_ON_SPHERE(sampson_sums, sums_of)
+    (arrays, indices, first, count, 0, m, inverse_sq, cauchy, sums);
   }
 }
 

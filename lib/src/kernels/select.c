@@ -20,7 +20,8 @@ enum { MAX_TABLES = 4 };
 #if defined(__x86_64__)
 enum { LEVEL_SSE2, LEVEL_AVX2, LEVEL_AVX512 };
 
-/* Of registers that the system saves (XCR0's bits 1 and 2: AVX, 5 to 7: AVX-512) and of instructions.
+/* Of registers that the system saves (XCR0's bits 1 and 2: AVX, 5 to 7: AVX-512) and of
+   instructions.
    __builtin_cpu_supports knows every CPU there is, in 4.4 kB and a mutable variable. */
 static inline __attribute__((always_inline)) int32_t ask_cpu(void) {
   const unsigned avx512 = bit_AVX512F | bit_AVX512BW | bit_AVX512VL;
@@ -32,12 +33,12 @@ static inline __attribute__((always_inline)) int32_t ask_cpu(void) {
   __cpuid_count(7, 0, a, b, c, d);
   if ((saved & 0x06) != 0x06 || !(b & bit_AVX2)) return LEVEL_SSE2;
   return (saved & 0xe0) == 0xe0 && (b & avx512) == avx512 && (c & bit_AVX512VNNI) ? LEVEL_AVX512
-                                                                                 : LEVEL_AVX2;
+                                                                                  : LEVEL_AVX2;
 }
 
 #if defined(__GLIBC__)
-/* Asked once, by the loader, which keeps the answer as the address of a function: each cpuid leaves a
-   virtual machine, 35 us in all, and small calls select, too. */
+/* Asked once, by the loader, which keeps the answer as the address of a function: each cpuid leaves
+   a virtual machine, 35 us in all, and small calls select, too. */
 static int32_t level_sse2(void) { return LEVEL_SSE2; }
 static int32_t level_avx2(void) { return LEVEL_AVX2; }
 static int32_t level_avx512(void) { return LEVEL_AVX512; }

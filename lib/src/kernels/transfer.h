@@ -3,8 +3,8 @@
 #include "kernels/lanes.h"
 #include "kernels/match_block.h"
 
-/* With P the left inverse of J1 that sends f1 to zero, and a = e_z on the plane, f1 on the sphere, the
-   displacement is d = P h / (a . h), h = H f0. */
+/* With P the left inverse of J1 that sends f1 to zero, and a = e_z on the plane, f1 on the sphere,
+   the displacement is d = P h / (a . h), h = H f0. */
 typedef struct transfer_terms {
   lanes d[2], slope[2][3]; /* slope: d d / d h */
   lanes w00, w01, w11;     /* (I + D D')^-1, D = d d / d pixel0 */
@@ -44,8 +44,7 @@ static inline void transfer_of(const sampson_block *b, const double h[9], int on
       if (!on_plane) swung[r][k] += h[3 * r + 2] * b->J0[4 + k];
     }
   }
-  depth = on_plane ? moved[2]
-                   : (b->f1[0] * moved[0] + b->f1[1] * moved[1]) + b->f1[2] * moved[2];
+  depth = on_plane ? moved[2] : (b->f1[0] * moved[0] + b->f1[1] * moved[1]) + b->f1[2] * moved[2];
   inverse = 1.0 / depth;
   for (r = 0; r < 2; ++r) {
     t->d[r] = ((P[r][0] * moved[0] + P[r][1] * moved[1]) + P[r][2] * moved[2]) * inverse;
@@ -65,7 +64,8 @@ static inline void transfer_of(const sampson_block *b, const double h[9], int on
   t->w00 = g11 * inverse;
   t->w01 = -g01 * inverse;
   t->w11 = g00 * inverse;
-  r_sq = t->d[0] * (t->w00 * t->d[0] + t->w01 * t->d[1]) + t->d[1] * (t->w01 * t->d[0] + t->w11 * t->d[1]);
+  r_sq = t->d[0] * (t->w00 * t->d[0] + t->w01 * t->d[1]) +
+         t->d[1] * (t->w01 * t->d[0] + t->w11 * t->d[1]);
   t->r_sq = lanes_select((depth > 0.0) & (r_sq >= 0.0), r_sq, lanes_of((double)INFINITY));
 }
 

@@ -1,6 +1,7 @@
 /* Points from two pinholes' pixels by the closed methods, TVK_LANES matches at a time: what
-   geometry/triangulation.cc does for one match of any lens, in coordinates of the image planes z = 1.
-   R. Hartley, P. Sturm, "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md. */
+   geometry/triangulation.cc does for one match of any lens, in coordinates of the image planes z
+   = 1. R. Hartley, P. Sturm, "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md.
+ */
 
 #include "kernels/lanes.h"
 #include "twoview/triangulate.h"
@@ -14,7 +15,8 @@ typedef struct ray_lanes {
   lanes x, y;
 } ray_lanes;
 
-/* What ends as a float is reckoned in floats: their roots and quotients take a quarter of the time. */
+/* What ends as a float is reckoned in floats: their roots and quotients take a quarter of the time.
+ */
 typedef float float_lanes __attribute__((vector_size(4 * TVK_LANES)));
 typedef int32_t float_mask __attribute__((vector_size(4 * TVK_LANES)));
 typedef uint32_t float_bits __attribute__((vector_size(4 * TVK_LANES)));
@@ -49,8 +51,8 @@ static inline void load_pairs(const double *xy, lanes *x, lanes *y) {
   *y = lanes_shuffle(a, b, LANES_ODD);
 }
 
-/* Lane k's a and b side by side, two words to a store: for even k in words[0] from k on, for odd k in
-   words[1] from k - 1 on. */
+/* Lane k's a and b side by side, two words to a store: for even k in words[0] from k on, for odd k
+   in words[1] from k - 1 on. */
 static inline void store_pairs(double words[2][TVK_LANES], lanes a, lanes b) {
   lanes_store(words[0], lanes_shuffle(a, b, LANES_EVEN_PAIRS));
   lanes_store(words[1], lanes_shuffle(a, b, LANES_ODD_PAIRS));
@@ -64,8 +66,8 @@ static inline float_lanes angle_of(float_lanes sine, float_lanes cosine) {
   const float_lanes small = floats_select(steep, size, sine);
   const float_lanes large = floats_select(steep, sine, size);
   const float_mask turned = small > 0.41421356f * large; /* beyond tan of 22.5 degrees */
-  const float_lanes t = floats_select(turned, small - large, small) /
-                        floats_select(turned, small + large, large);
+  const float_lanes t =
+      floats_select(turned, small - large, small) / floats_select(turned, small + large, large);
   const float_lanes s = t * t;
   float_lanes angle = t + t * (s * (((c[3] * s + c[2]) * s + c[1]) * s + c[0]));
   angle += floats_select(turned, zero + 0.78539816f, zero);
@@ -196,8 +198,8 @@ static inline lane_mask triangulate_lanes(const tvk_triangulate_pair *p, int met
   return ~good;
 }
 
-/* TVK_LANES matches, their pixels in pixels0 and pixels1, the first `count` to points. Returns those
-   of all lanes that it leaves without a point. */
+/* TVK_LANES matches, their pixels in pixels0 and pixels1, the first `count` to points. Returns
+   those of all lanes that it leaves without a point. */
 static inline lane_mask triangulate_block(const tvk_triangulate_pair *p, int method,
                                           const double *pixels0, const double *pixels1, int count,
                                           tv_point *points) {

@@ -20,18 +20,24 @@
 #define TVK_ALIGNED __attribute__((aligned(32)))
 
 typedef int16_t words __attribute__((vector_size(2 * TVK_WORDS))); /* wrap around, as they should */
-typedef int16_t unaligned_words
-    __attribute__((vector_size(2 * TVK_WORDS), aligned(2), may_alias));
+typedef int16_t unaligned_words __attribute__((vector_size(2 * TVK_WORDS), aligned(2), may_alias));
 
 static inline words words_of(int16_t a) { return (words){0} + a; }
 static inline words words_load(const void *p) { return *(const unaligned_words *)p; }
 static inline void words_store(void *p, words a) { *(unaligned_words *)p = a; }
 
-/* words_zip: out[k] = low[k] + 65536 high[k], both taken as unsigned; words_scale: a b / 65536, too. */
+/* words_zip: out[k] = low[k] + 65536 high[k], both taken as unsigned; words_scale: a b / 65536,
+ * too. */
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
-static inline words words_min(words a, words b) { return (words)_mm256_min_epi16((__m256i)a, (__m256i)b); }
-static inline words words_max(words a, words b) { return (words)_mm256_max_epi16((__m256i)a, (__m256i)b); }
-static inline words words_scale(words a, words b) { return (words)_mm256_mulhi_epu16((__m256i)a, (__m256i)b); }
+static inline words words_min(words a, words b) {
+  return (words)_mm256_min_epi16((__m256i)a, (__m256i)b);
+}
+static inline words words_max(words a, words b) {
+  return (words)_mm256_max_epi16((__m256i)a, (__m256i)b);
+}
+static inline words words_scale(words a, words b) {
+  return (words)_mm256_mulhi_epu16((__m256i)a, (__m256i)b);
+}
 static inline void words_zip(words low, words high, uint32_t *out) {
   const __m256i a = _mm256_unpacklo_epi16((__m256i)low, (__m256i)high);
   const __m256i b = _mm256_unpackhi_epi16((__m256i)low, (__m256i)high);
@@ -43,17 +49,27 @@ static inline void words_zip(words low, words high, uint32_t *out) {
   _mm_storeu_si128((__m128i *)out, _mm_unpacklo_epi16((__m128i)low, (__m128i)high));
   _mm_storeu_si128((__m128i *)(out + 4), _mm_unpackhi_epi16((__m128i)low, (__m128i)high));
 }
-static inline words words_min(words a, words b) { return (words)_mm_min_epi16((__m128i)a, (__m128i)b); }
-static inline words words_max(words a, words b) { return (words)_mm_max_epi16((__m128i)a, (__m128i)b); }
-static inline words words_scale(words a, words b) { return (words)_mm_mulhi_epu16((__m128i)a, (__m128i)b); }
+static inline words words_min(words a, words b) {
+  return (words)_mm_min_epi16((__m128i)a, (__m128i)b);
+}
+static inline words words_max(words a, words b) {
+  return (words)_mm_max_epi16((__m128i)a, (__m128i)b);
+}
+static inline words words_scale(words a, words b) {
+  return (words)_mm_mulhi_epu16((__m128i)a, (__m128i)b);
+}
 #elif defined(__ARM_NEON)
 static inline void words_zip(words low, words high, uint32_t *out) {
   const uint16x8x2_t both = vzipq_u16((uint16x8_t)low, (uint16x8_t)high);
   vst1q_u32(out, vreinterpretq_u32_u16(both.val[0]));
   vst1q_u32(out + 4, vreinterpretq_u32_u16(both.val[1]));
 }
-static inline words words_min(words a, words b) { return (words)vminq_s16((int16x8_t)a, (int16x8_t)b); }
-static inline words words_max(words a, words b) { return (words)vmaxq_s16((int16x8_t)a, (int16x8_t)b); }
+static inline words words_min(words a, words b) {
+  return (words)vminq_s16((int16x8_t)a, (int16x8_t)b);
+}
+static inline words words_max(words a, words b) {
+  return (words)vmaxq_s16((int16x8_t)a, (int16x8_t)b);
+}
 static inline words words_scale(words a, words b) {
   const uint16x8_t ua = (uint16x8_t)a, ub = (uint16x8_t)b;
   return (words)vcombine_u16(vshrn_n_u32(vmull_u16(vget_low_u16(ua), vget_low_u16(ub)), 16),
@@ -76,7 +92,8 @@ static inline words words_max(words a, words b) {
 }
 static inline words words_scale(words a, words b) {
   int k;
-  for (k = 0; k < TVK_WORDS; ++k) a[k] = (int16_t)(((uint32_t)(uint16_t)a[k] * (uint16_t)b[k]) >> 16);
+  for (k = 0; k < TVK_WORDS; ++k)
+    a[k] = (int16_t)(((uint32_t)(uint16_t)a[k] * (uint16_t)b[k]) >> 16);
   return a;
 }
 #endif

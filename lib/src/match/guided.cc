@@ -24,9 +24,7 @@ struct Side {
 // Keypoints that the quick test takes at once.
 constexpr int32_t kBlock = 64;
 
-size_t padded(int32_t count) {
-  return (static_cast<size_t>(count) + kBlock - 1) / kBlock * kBlock;
-}
+size_t padded(int32_t count) { return (static_cast<size_t>(count) + kBlock - 1) / kBlock * kBlock; }
 
 size_t side_bytes(int32_t count) {
   return arena_bytes<double>(3 * static_cast<size_t>(count)) +

@@ -22,8 +22,8 @@ struct GuidedView {
 // Scratch of match_guided.
 size_t guided_bytes(int32_t max_keypoints);
 
-// ray1' M ray0 = 0 is the epipolar constraint, M row-major. Writes at most min(view0.num, view1.num)
-// correspondences in ascending order of idx0; returns how many.
+// ray1' M ray0 = 0 is the epipolar constraint, M row-major. Writes at most min(view0.num,
+// view1.num) correspondences in ascending order of idx0; returns how many.
 int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const GuidedView& view1,
                      const double M[9], const tv_guided_options& options, Arena& arena,
                      tv_correspondence* correspondences);

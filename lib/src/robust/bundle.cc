@@ -1,9 +1,9 @@
 // Levenberg-Marquardt on the pose with the points eliminated (B. Triggs, P. McLauchlan, R. Hartley,
 // A. Fitzgibbon, "Bundle adjustment - a modern synthesis", 2000). A match of two views leaves one
 // residual when its point is gone, so the Schur complement is formed from that one, without the
-// products J'J and their cancellation (N. Demmel et al., "Square root bundle adjustment", CVPR 2021,
-// in the smallest case). Derivation: docs/algorithms/bundle.md; tests: test/unit/test_bundle.cc,
-// test_bundle_ceres.cc.
+// products J'J and their cancellation (N. Demmel et al., "Square root bundle adjustment", CVPR
+// 2021, in the smallest case). Derivation: docs/algorithms/bundle.md; tests:
+// test/unit/test_bundle.cc, test_bundle_ceres.cc.
 #include "robust/bundle.h"
 
 #include <cmath>
@@ -24,10 +24,10 @@ constexpr double kMaxPointStep = 0.5;  // of a direction, radians; of a point's 
 constexpr double kGrowth = 2.0, kGrowthSq = 0.01;  // of a point's squared error in a step: no worry
 constexpr int kMaxPolishes = 4;
 constexpr int kMaxTrials = 30;          // of a point's own steps
-constexpr double kSettledGain = 1e-6;  // of them that ends them
+constexpr double kSettledGain = 1e-6;   // of them that ends them
 constexpr double kNearChange = 0.1;     // of the cost in a step, below which Newton takes over
 constexpr double kSmallChange = 1e-10;  // of the cost: converged
-constexpr double kNoErrorSq = 1e-20;      // px^2 a match: nothing is left to lower
+constexpr double kNoErrorSq = 1e-20;    // px^2 a match: nothing is left to lower
 constexpr double kFirstDamping = 1e-4, kMinDamping = 1e-10, kMaxDamping = 1e8;
 constexpr double kHonestDamping = 1.0;  // above it, a small change says little
 
@@ -79,8 +79,8 @@ double error_sq(const BundleMatch& match) {
 struct Sums {
   double cost, sum_sq;
   double gradient[5];
-  double upper[15];       // of sum rho' a a': positive semidefinite
-  double newton[15];      // of sum (rho' + 2 rho'' r^2) a a': the loss's own curvature
+  double upper[15];   // of sum rho' a a': positive semidefinite
+  double newton[15];  // of sum (rho' + 2 rho'' r^2) a a': the loss's own curvature
 };
 
 void add_match(const tv_bundle_options& options, const BundleMatch& match, const Elimination& e,
@@ -191,8 +191,8 @@ BundlePoint moved_point(const BundlePoint& point, const double move[3]) {
 // The whole of one adjustment.
 struct Adjustment {
   const BundleProblem& problem;
-  int num;          // points that take part
-  int32_t* index;   // which
+  int num;         // points that take part
+  int32_t* index;  // which
   BundleMatch* now;
   BundleMatch* next;
 };
@@ -217,8 +217,7 @@ bool read_point(const tv_point& point, double baseline, BundlePoint* out) {
   for (int i = 0; i < 3; ++i) scaled[i] = point.position[i] / largest;
   const double length = length3(scaled);
   for (int i = 0; i < 3; ++i) out->direction[i] = scaled[i] / length;
-  out->inverse_distance =
-      point.status == TV_POINT_INFINITE ? 0.0 : baseline / largest / length;
+  out->inverse_distance = point.status == TV_POINT_INFINITE ? 0.0 : baseline / largest / length;
   return out->inverse_distance <= kMaxInverseDistance;
 }
 
@@ -229,8 +228,7 @@ void gather(Adjustment& adjustment, const BundleFrame& frame, double baseline,
     const Vec2 pixel0 = pixel_of(problem, 0, i), pixel1 = pixel_of(problem, 1, i);
     BundlePoint point;
     if (is_usable(pixel0) && is_usable(pixel1) && read_point(points[i], baseline, &point) &&
-        linearise(problem.camera, frame, point, pixel0, pixel1,
-                  &adjustment.now[adjustment.num])) {
+        linearise(problem.camera, frame, point, pixel0, pixel1, &adjustment.now[adjustment.num])) {
       adjustment.index[adjustment.num++] = i;
     }
   }
@@ -297,8 +295,7 @@ void settle(const BundleProblem& problem, const BundleFrame& frame, const Vec2& 
     if (!damped_move(frame, *match, damping, move)) return;
     BundleMatch moved;
     const double before = error_sq(*match);
-    if (linearise(problem.camera, frame, moved_point(match->point, move), pixel0, pixel1,
-                  &moved) &&
+    if (linearise(problem.camera, frame, moved_point(match->point, move), pixel0, pixel1, &moved) &&
         error_sq(moved) < before) {
       const double gain = before - error_sq(moved);
       *match = moved;
@@ -326,8 +323,8 @@ bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far
     double back[3];
     for (int i = 0; i < 3; ++i) back[i] = turned[i] + ray1[i];
     for (int i = 0; i < 3; ++i) {
-      point.direction[i] = (frame.R(0, i) * back[0] + frame.R(1, i) * back[1]) +
-                           frame.R(2, i) * back[2];
+      point.direction[i] =
+          (frame.R(0, i) * back[0] + frame.R(1, i) * back[1]) + frame.R(2, i) * back[2];
     }
     const double length = length3(point.direction);
     for (double& x : point.direction) x /= length;
@@ -345,23 +342,23 @@ bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far
 // One point's trial at a new pose. Its linearised answer to the pose's step is nearly always good.
 // Where it is not, or a camera loses sight of the point, it settles anew: from where it was, and
 // should that not help, from its rays. `careful`: any growth of the error is no good.
-bool try_point(const BundleProblem& problem, const BundleFrame& old_frame,
-               const BundleFrame& frame, const double step[5], bool careful,
-               const BundleMatch& match, int32_t i, BundleMatch* out) {
+bool try_point(const BundleProblem& problem, const BundleFrame& old_frame, const BundleFrame& frame,
+               const double step[5], bool careful, const BundleMatch& match, int32_t i,
+               BundleMatch* out) {
   const Vec2 pixel0 = pixel_of(problem, 0, i), pixel1 = pixel_of(problem, 1, i);
   const double before = error_sq(match);
   double move[3];
   point_step(old_frame, match, step, move);
-  const bool seen = linearise(problem.camera, frame, moved_point(match.point, move), pixel0,
-                              pixel1, out);
+  const bool seen =
+      linearise(problem.camera, frame, moved_point(match.point, move), pixel0, pixel1, out);
   const double after = error_sq(*out);
   if (seen && after <= (careful ? before : kGrowth * before + kGrowthSq)) return true;
   BundleMatch other;
   bool found = seen;
   for (int from = 0; from < 3; ++from) {
-    const bool starts =
-        from == 0 ? linearise(problem.camera, frame, match.point, pixel0, pixel1, &other)
-                  : begin_anew(problem, frame, from == 2, pixel0, pixel1, &other);
+    const bool starts = from == 0
+                            ? linearise(problem.camera, frame, match.point, pixel0, pixel1, &other)
+                            : begin_anew(problem, frame, from == 2, pixel0, pixel1, &other);
     if (!starts) continue;
     settle(problem, frame, pixel0, pixel1, &other);
     if (!found || error_sq(other) < error_sq(*out)) *out = other;
@@ -371,9 +368,9 @@ bool try_point(const BundleProblem& problem, const BundleFrame& old_frame,
   return found;
 }
 
-// What is left for the point to gain is about |error|^2 - r^2: next to nothing for a good match, for
-// the projections are nearly linear over its few pixels. A wrong match's point goes on until it is
-// there, lest all others wait for it.
+// What is left for the point to gain is about |error|^2 - r^2: next to nothing for a good match,
+// for the projections are nearly linear over its few pixels. A wrong match's point goes on until it
+// is there, lest all others wait for it.
 Elimination polish(const BundleProblem& problem, const BundleFrame& frame, int32_t i,
                    BundleMatch* match) {
   Elimination e = eliminate(frame, *match);
@@ -384,8 +381,8 @@ Elimination polish(const BundleProblem& problem, const BundleFrame& frame, int32
     double move[3];
     BundleMatch moved;
     point_step(frame, *match, no_step, move);
-    if (!linearise(problem.camera, frame, moved_point(match->point, move),
-                   pixel_of(problem, 0, i), pixel_of(problem, 1, i), &moved) ||
+    if (!linearise(problem.camera, frame, moved_point(match->point, move), pixel_of(problem, 0, i),
+                   pixel_of(problem, 1, i), &moved) ||
         !(error_sq(moved) < before)) {
       break;
     }
@@ -420,7 +417,8 @@ void minimise(Adjustment& adjustment, BundleFrame* frame, Sums* sums, BundleOutc
   while (out->num_iterations < options.max_iterations) {
     out->converged = sums->sum_sq <= no_error;
     double step[5] = {};
-    if (out->converged || (options.hold_pose == 0 && !solve_step(*sums, damping, newton, step))) break;
+    if (out->converged || (options.hold_pose == 0 && !solve_step(*sums, damping, newton, step)))
+      break;
     ++out->num_iterations;
     const Pose pose = options.hold_pose != 0 ? out->pose : stepped(out->pose, *frame, step);
     const BundleFrame new_frame = bundle_frame(pose);
@@ -683,8 +681,8 @@ size_t bundle_scratch_bytes(int max_points) {
   return arena_bytes<int32_t>(n) + 2 * arena_bytes<BundleMatch>(n);
 }
 
-void adjust_two_view(const BundleProblem& problem, const Pose& start, double baseline,
-                     Arena& arena, tv_point* points, BundleOutcome* outcome) {
+void adjust_two_view(const BundleProblem& problem, const Pose& start, double baseline, Arena& arena,
+                     tv_point* points, BundleOutcome* outcome) {
   const size_t n = static_cast<size_t>(problem.num);
   ArenaScope scope(arena);
   int32_t* index = arena_alloc<int32_t>(arena, n);

@@ -69,8 +69,8 @@ struct BundleOutcome {
 size_t bundle_scratch_bytes(int max_points);
 
 // points: in units of `baseline`, updated where they take part.
-void adjust_two_view(const BundleProblem& problem, const Pose& start, double baseline,
-                     Arena& arena, tv_point* points, BundleOutcome* outcome);
+void adjust_two_view(const BundleProblem& problem, const Pose& start, double baseline, Arena& arena,
+                     tv_point* points, BundleOutcome* outcome);
 
 // Two unit vectors that span what is across a unit direction.
 void sphere_basis(const double direction[3], double e1[3], double e2[3]);

@@ -9,8 +9,9 @@ namespace tv {
 
 namespace {
 
-// Normal residuals under Cauchy's loss: the variance of the M-estimate over that of the residuals, at the loss's scale that the refinement takes (1.5 deviations for the
-// epipolar residual, kPlaneScale for the plane's).
+// Normal residuals under Cauchy's loss: the variance of the M-estimate over that of the residuals,
+// at the loss's scale that the refinement takes (1.5 deviations for the epipolar residual,
+// kPlaneScale for the plane's).
 constexpr double kVarianceOfCauchy = 1.1484187788317, kVarianceOnPlane = 1.0919;
 
 constexpr double kLeastResidual = 0.05;  // of the loss's scale
@@ -81,8 +82,8 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   const double uncut = variance_of(sums, count, 1, P, scale_px, 0);
   if (!(uncut > 0)) return false;
   const double noise_px = std::sqrt(uncut / kVarianceOfCauchy);
-  const double density = exp(-0.5 * limit_px * limit_px / (noise_px * noise_px)) /
-                         (2.5066282746310002 * noise_px);
+  const double density =
+      exp(-0.5 * limit_px * limit_px / (noise_px * noise_px)) / (2.5066282746310002 * noise_px);
   const double cut_slope = 2 * limit_px / (1 + limit_px * limit_px * inverse_sq) * density;
   const double variance = variance_of(sums, count, 1, P, scale_px, cut_slope);
   uncertainty->noise_px = noise_px;

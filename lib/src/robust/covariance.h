@@ -17,8 +17,8 @@ struct PoseUncertainty {
 //     C = K^2 sum psi(r)^2 / (n - p - 2) / (mean psi'(r))^2 (J' J)^-1,
 //     K = 1 + p / n var(psi') / (mean psi')^2.
 // It allows for what the loss loses against least squares, and for the wrong matches among the
-// listed, which lie within limit_px. J is taken without what the noise of the pixels adds to it: at a
-// low parallax that is a part of it. Residuals of a twentieth of scale_px and less count as that:
+// listed, which lie within limit_px. J is taken without what the noise of the pixels adds to it: at
+// a low parallax that is a part of it. Residuals of a twentieth of scale_px and less count as that:
 // exact input is no exact camera. False when a parameter is not determined.
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                       double scale_px, double limit_px, PoseUncertainty* uncertainty);

@@ -10,9 +10,7 @@
 namespace tv {
 namespace {
 
-inline int64_t quantised(double q) {
-  return q < 1 ? static_cast<int64_t>(q * kCostOne) : kCostOne;
-}
+inline int64_t quantised(double q) { return q < 1 ? static_cast<int64_t>(q * kCostOne) : kCostOne; }
 
 template <int kCount>
 void gather(const RayPairs& pairs, const int32_t* sample, Vec3* rays0, Vec3* rays1) {
@@ -99,8 +97,7 @@ bool pose_from_essential(const RayPairs& pairs, const int32_t* indices, int coun
   }
   int best = 0;
   for (int c = 1; c < 4; ++c) {
-    if (strict ? behind[c] < behind[best] ||
-                     (behind[c] == behind[best] && signs[c] > signs[best])
+    if (strict ? behind[c] < behind[best] || (behind[c] == behind[best] && signs[c] > signs[best])
                : votes[c] > votes[best] || (votes[c] == votes[best] && signs[c] > signs[best])) {
       best = c;
     }

@@ -7,8 +7,9 @@
 
 namespace tv {
 
-// Local optimisation looks this many thresholds far, so that matches can come in, and takes this many
-// steps. A pose's takes into account no more than kMostLocal matches: the final refinement sees all.
+// Local optimisation looks this many thresholds far, so that matches can come in, and takes this
+// many steps. A pose's takes into account no more than kMostLocal matches: the final refinement
+// sees all.
 inline constexpr int kMostLocal = 128;
 inline constexpr double kNear = 3;
 inline constexpr int kLocalIterations = 5;

@@ -13,27 +13,27 @@ namespace {
 constexpr double kInfinity = __builtin_inf();
 
 // Cauchy's loss has a scale that follows the noise, this many times the standard deviation that the
-// inliers' median residual tells, since the threshold says little about it: sub-pixel matches are far
-// better than 1 px. So for a fundamental matrix, and for the uncertainty of a pose.
+// inliers' median residual tells, since the threshold says little about it: sub-pixel matches are
+// far better than 1 px. So for a fundamental matrix, and for the uncertainty of a pose.
 constexpr double kFinalScale = 1.5;
 
 // A wrong match that lies near an epipolar line moves its point anywhere along it; a true one moves
-// it as far as its depth asks. Matches with this many times the parallax that nine in ten stay below
-// take no part.
+// it as far as its depth asks. Matches with this many times the parallax that nine in ten stay
+// below take no part.
 constexpr double kFarParallax = 3;
 constexpr int kParallaxSample = 128;  // matches that tell it
 
-// A pose is refined at the one of these scales, in standard deviations, at which Huber's estimate of
-// the variance, sum psi^2 / (sum psi')^2, is least: heavy tails want a small one, plain noise a large
-// one. Its uncertainty is still that of kFinalScale, since a variance that was chosen for being small
-// reads low. docs/decisions/0002-robust-loop.md has the measurements.
+// A pose is refined at the one of these scales, in standard deviations, at which Huber's estimate
+// of the variance, sum psi^2 / (sum psi')^2, is least: heavy tails want a small one, plain noise a
+// large one. Its uncertainty is still that of kFinalScale, since a variance that was chosen for
+// being small reads low. docs/decisions/0002-robust-loop.md has the measurements.
 constexpr double kScales[] = {1, 1.5, 2, 3};
 constexpr double kLargestScale = 2;  // in thresholds
 constexpr double kMostStretch = 1.5;
 
 // The first round's pose only says which matches are near, and how large the noise is. A step that
-// gains less than a millionth of the cost is a fiftieth of a standard deviation long, and the next one
-// a tenth of that.
+// gains less than a millionth of the cost is a fiftieth of a standard deviation long, and the next
+// one a tenth of that.
 constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
 
 // The matches that take part in a pose's final refinement, into f.indices.
@@ -71,8 +71,8 @@ BestLoss best_loss(const PoseRefiner& f, const Mat3& M, int count) {
   double least = 0;
   BestLoss best{};
   for (const double factor : kScales) {
-    const double scale = std::max(0.02 * f.threshold_px,
-                                  std::min(factor * sigma, kLargestScale * f.threshold_px));
+    const double scale =
+        std::max(0.02 * f.threshold_px, std::min(factor * sigma, kLargestScale * f.threshold_px));
     const double inverse_sq = 1 / (scale * scale);
     double psi_sq = 0, slope = 0, weights = 0;
     for (int k = 0; k < count; ++k) {
@@ -129,8 +129,8 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
   return gravity;
 }
 
-// Twice the logarithm of a thousand: of pairs whose principal point is where it is said to be, one in
-// a thousand is told otherwise.
+// Twice the logarithm of a thousand: of pairs whose principal point is where it is said to be, one
+// in a thousand is told otherwise.
 constexpr double kShiftEvidence = 13.815510557964274;
 
 // ---- On a plane ----
@@ -188,8 +188,8 @@ namespace {
 
 // A step of pose and principal point together over the matches near the pose. evidence: twice the
 // logarithm of how much likelier it makes them, to first order; from a pose at its best that is
-// chi-square of two degrees of freedom where nothing is wrong (C. R. Rao's score test, 1948), or less,
-// by the prior. Returns how many matches took part, 0 when they do not tell.
+// chi-square of two degrees of freedom where nothing is wrong (C. R. Rao's score test, 1948), or
+// less, by the prior. Returns how many matches took part, 0 when they do not tell.
 int joint_step(const PoseRefiner& f, const Pose& pose, const GravityPrior& gravity,
                double step[kShiftedParameters], double* evidence) {
   const int count = near_pose(f, pose);
@@ -251,8 +251,8 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
   for (int k = 0; k < num; ++k) {
     const PlaneModel twin{planar[k].pose, planar[k].baseline_over_depth * planar[k].normal};
     fit->pose[k] = twin.pose;
-    fit->certain[k] = plane_uncertainty(f.pairs, f.indices, count, twin, loss.scale_px,
-                                        &fit->uncertainty[k]);
+    fit->certain[k] =
+        plane_uncertainty(f.pairs, f.indices, count, twin, loss.scale_px, &fit->uncertainty[k]);
     if (!f.gravity.known || !fit->certain[k]) continue;
     GravityPrior gravity = f.gravity;
     double* covariance = fit->uncertainty[k].covariance;

@@ -14,26 +14,26 @@ struct PoseRefiner {
   double threshold_px;
   GravityPrior gravity;
   PrincipalPoint principal_point;  // of the rays of pairs
-  int32_t* indices;  // scratch, as many as matches
-  double* values;    // the same
+  int32_t* indices;                // scratch, as many as matches
+  double* values;                  // the same
 };
 
 // Minimises Cauchy's loss over the matches near the epipolar lines, gravity's prior added to it.
 Pose refined_pose(const PoseRefiner& refiner, const Pose& start);
 
-// Whether the matches speak against refiner.principal_point, with one chance in a thousand to be wrong
-// where it is right. The pose is what refined_pose gave.
+// Whether the matches speak against refiner.principal_point, with one chance in a thousand to be
+// wrong where it is right. The pose is what refined_pose gave.
 bool principal_point_is_off(const PoseRefiner& refiner, const Pose& pose);
-// One step of Gauss and Newton of the pose and the principal point together. What the point moves by, in
-// pixels, goes to shift_px; the rays are as they were. False when it is not determined.
+// One step of Gauss and Newton of the pose and the principal point together. What the point moves
+// by, in pixels, goes to shift_px; the rays are as they were. False when it is not determined.
 bool move_together(const PoseRefiner& refiner, Pose* pose, double shift_px[2]);
 
 // Allows for a principal point that is free.
 bool uncertainty_of(const PoseRefiner& refiner, const Pose& pose, PoseUncertainty* uncertainty);
 
-// The two motions of a plane that explains the matches by itself: eight parameters and two residuals
-// a match, against five and one above, which leaves a flat valley along which a plane's epipolar
-// geometry may slide. Writes up to two poses and the covariance of each; returns how many.
+// The two motions of a plane that explains the matches by itself: eight parameters and two
+// residuals a match, against five and one above, which leaves a flat valley along which a plane's
+// epipolar geometry may slide. Writes up to two poses and the covariance of each; returns how many.
 struct PlaneFit {
   Pose pose[2];
   bool certain[2];  // whether there is an uncertainty

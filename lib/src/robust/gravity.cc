@@ -25,8 +25,8 @@ TangentRows tangent_rows(const Vec3& h, const double covariance[25]) {
   const Vec3 H[2] = {h.cross(rows.b[0]), h.cross(rows.b[1])};
   for (int i = 0; i < 2; ++i) {
     for (int c = 0; c < 5; ++c) {
-      rows.across[i][c] = (H[i][0] * covariance[c] + H[i][1] * covariance[5 + c]) +
-                          H[i][2] * covariance[10 + c];
+      rows.across[i][c] =
+          (H[i][0] * covariance[c] + H[i][1] * covariance[5 + c]) + H[i][2] * covariance[10 + c];
     }
   }
   int slot = 0;
@@ -112,8 +112,8 @@ GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], d
   return prior;
 }
 
-double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px,
-                         double scale_px, double upper[15], double gradient[5]) {
+double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px, double scale_px,
+                         double upper[15], double gradient[5]) {
   const Vec3 h = R * prior.down[0];
   // A turn by w moves h by w x h, so that J = -[h]x, J'J = I - h h' and J'(h - down1) = down1 x h:
   // the two rows of a tangent basis, whichever it is, summed. The chord grows up to half a turn,
@@ -147,8 +147,7 @@ double gravity_weight(const GravityPrior& prior, const Mat3& R, const double cov
 
 void add_gravity_information(const GravityPrior& prior, const Mat3& R, double covariance[25]) {
   const TangentRows rows = tangent_rows(R * prior.down[0], covariance);
-  const Inverse2 inverse =
-      inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad / prior.weight);
+  const Inverse2 inverse = inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad / prior.weight);
   for (int r = 0; r < 5; ++r) {
     const double* u = rows.across[0];
     const double* v = rows.across[1];
@@ -163,8 +162,7 @@ void add_gravity_information(const GravityPrior& prior, const Mat3& R, double co
 
 void add_gravity(const GravityPrior& prior, Pose* pose, double covariance[25]) {
   const TangentRows rows = tangent_rows(pose->R * prior.down[0], covariance);
-  const Inverse2 inverse =
-      inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad / prior.weight);
+  const Inverse2 inverse = inverse_sum(rows, 2 * prior.sigma_rad * prior.sigma_rad / prior.weight);
   double e[2], step[5];
   tangent_residual(prior, pose->R, rows, e);
   const double u = inverse.a * e[0] + inverse.b * e[1], v = inverse.b * e[0] + inverse.c * e[1];

@@ -7,8 +7,8 @@
 // and, where kBatch is 1,
 //   int generate_models(const int32_t* sample, Model* models)
 //   int64_t fast_cost(const Model&, int64_t bound)   MSAC cost; above bound, anything above it
-// or, where kBatch samples are solved at once, and what they give becomes a model only when its cost
-// asks for it,
+// or, where kBatch samples are solved at once, and what they give becomes a model only when its
+// cost asks for it,
 //   void generate(const int32_t samples[][kSampleSize], int num_samples)   keeps what it finds
 //   int count(int s)                                                       of sample s
 //   int64_t fast_cost(int s, int k, int64_t bound)
@@ -34,7 +34,7 @@ struct LoopOptions {
   int min_iterations, max_iterations;
   int fixed_iterations;        // 0: adaptive stop
   int few_inliers_iterations;  // at least this many / inliers, up to kMostForFewInliers
-  int least_inliers = 0;       // what costs more than so many exact inliers is not locally optimised
+  int least_inliers = 0;  // what costs more than so many exact inliers is not locally optimised
 };
 
 template <typename Model>

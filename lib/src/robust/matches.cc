@@ -191,9 +191,9 @@ size_t matches_bytes(int max_matches) {
 void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches) {
   const size_t n = static_cast<size_t>(problem.num);
   matches->order = arena_alloc<int32_t>(arena, n);
-  const bool on_plane = !problem.calibrated ||
-                        (problem.camera[0].model.model != TV_CAMERA_KANNALA_BRANDT &&
-                         problem.camera[1].model.model != TV_CAMERA_KANNALA_BRANDT);
+  const bool on_plane =
+      !problem.calibrated || (problem.camera[0].model.model != TV_CAMERA_KANNALA_BRANDT &&
+                              problem.camera[1].model.model != TV_CAMERA_KANNALA_BRANDT);
   matches->pairs = alloc_ray_pairs(arena, problem.num, on_plane);
   if (problem.kernels != nullptr) matches->pairs.kernels = problem.kernels;
   ArenaScope scope(arena);
@@ -203,8 +203,8 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   int count = 0;
   for (int32_t i = 0; i < problem.num; ++i) {
     const Coordinates c = coordinates(problem, i);
-    const double sum = (std::fabs(c.v[0]) + std::fabs(c.v[1])) +
-                       (std::fabs(c.v[2]) + std::fabs(c.v[3]));
+    const double sum =
+        (std::fabs(c.v[0]) + std::fabs(c.v[1])) + (std::fabs(c.v[2]) + std::fabs(c.v[3]));
     if (!(sum < kMaxCoordinates)) continue;  // NaN, infinite, or no pixel of any image
     PixelRay ray;
     bool usable = true;
@@ -213,11 +213,9 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
     }
     if (usable) keys[count++] = SortKey{sort_ratio(problem, i), i, c.v[0]};
   }
-  std::sort(keys, keys + count, [&problem](const SortKey& a, const SortKey& b) {
-    return sorts_before(problem, a, b);
-  });
-  matches->num_unique =
-      move_repeats_last(problem, keys, count, table, table_size, matches->order);
+  std::sort(keys, keys + count,
+            [&problem](const SortKey& a, const SortKey& b) { return sorts_before(problem, a, b); });
+  matches->num_unique = move_repeats_last(problem, keys, count, table, table_size, matches->order);
   matches->pairs.num = count;
   for (int v = 0; v < 2; ++v) {
     set_rays(problem, v,

@@ -24,7 +24,7 @@ struct Matches {
   int32_t* order = nullptr;  // pairs' k-th match is the caller's order[k]
   Mat3 intrinsics[2];  // pixels (undistorted) to rays' plane: K of the view, or, uncalibrated, the
                        // similarity that normalises its points
-  double area_px = 1;      // of image 1, or, uncalibrated, of the box around its points
+  double area_px = 1;  // of image 1, or, uncalibrated, of the box around its points
 };
 
 size_t matches_bytes(int max_matches);
@@ -33,16 +33,16 @@ size_t matches_bytes(int max_matches);
 // matches last: five times the same match is one witness, not five.
 void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches);
 
-// d^2 ray / d pixel^2 of the k-th match in a view of that camera, 3 x (xx, xy, yy). False, and nothing written,
-// for rays that do not bend.
+// d^2 ray / d pixel^2 of the k-th match in a view of that camera, 3 x (xx, xy, yy). False, and
+// nothing written, for rays that do not bend.
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
                    int view, int k, double curvature[9]);
 
 // A camera of the problem with its principal point moved.
 Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_px[2]);
 
-// The rays anew, of cameras whose principal points lie shift_px beside those of the problem. A match
-// that such a lens has no ray for keeps its own.
+// The rays anew, of cameras whose principal points lie shift_px beside those of the problem. A
+// match that such a lens has no ray for keeps its own.
 void move_principal_points(const TwoViewProblem& problem, const double shift_px[2],
                            Matches* matches);
 

@@ -12,9 +12,10 @@ constexpr int row_of(int r) { return r * kAll - r * (r - 1) / 2; }
 
 }  // namespace
 
-void shifted_equations(const TwoViewProblem& problem, const Matches& matches, const int32_t* indices,
-                       int count, const GravityPoseModel& model, const PrincipalPoint& point,
-                       const RobustLoss& loss, double noise_px, ShiftedEquations* equations) {
+void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
+                       const int32_t* indices, int count, const GravityPoseModel& model,
+                       const PrincipalPoint& point, const RobustLoss& loss, double noise_px,
+                       ShiftedEquations* equations) {
   double *const upper = equations->upper, *const gradient = equations->gradient;
   double of_pose[kPose * (kPose + 1) / 2];
   model.normal_equations(matches.pairs, indices, count, loss, of_pose, gradient);
@@ -58,9 +59,9 @@ void shifted_equations(const TwoViewProblem& problem, const Matches& matches, co
   }
 }
 
-bool add_shift_variance(const TwoViewProblem& problem, const Matches& matches, const int32_t* indices,
-                        int count, const GravityPoseModel& model, const PrincipalPoint& point,
-                        double variance_px, double covariance[25]) {
+bool add_shift_variance(const TwoViewProblem& problem, const Matches& matches,
+                        const int32_t* indices, int count, const GravityPoseModel& model,
+                        const PrincipalPoint& point, double variance_px, double covariance[25]) {
   ShiftedEquations equations;
   double all[kAll * kAll], alone[kPose * kPose], of_pose[kPose * (kPose + 1) / 2];
   shifted_equations(problem, matches, indices, count, model, point, kLeastSquares,
@@ -68,8 +69,7 @@ bool add_shift_variance(const TwoViewProblem& problem, const Matches& matches, c
   for (int r = 0, slot = 0; r < kPose; ++r) {
     for (int c = r; c < kPose; ++c) of_pose[slot++] = equations.upper[row_of(r) + c - r];
   }
-  if (!invert_symmetric(kAll, equations.upper, all) ||
-      !invert_symmetric(kPose, of_pose, alone)) {
+  if (!invert_symmetric(kAll, equations.upper, all) || !invert_symmetric(kPose, of_pose, alone)) {
     return false;
   }
   for (int r = 0; r < kPose; ++r) {

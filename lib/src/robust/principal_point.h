@@ -1,5 +1,5 @@
-// The principal point of the one camera that saw both views, which a calibration knows to a few pixels
-// only. docs/algorithms/principal_point.md.
+// The principal point of the one camera that saw both views, which a calibration knows to a few
+// pixels only. docs/algorithms/principal_point.md.
 #pragma once
 
 #include "robust/gravity.h"
@@ -20,17 +20,20 @@ struct ShiftedEquations {
   double upper[kShiftedParameters * (kShiftedParameters + 1) / 2], gradient[kShiftedParameters];
 };
 
-// The normal equations of pose and principal point over the listed matches, at the rays as they are, with
-// the priors of both. noise_px: the standard deviation beside which the principal point's prior counts. A
-// principal point that moves by d moves every ray by -J d, and its Jacobian by the lens's curvature.
-void shifted_equations(const TwoViewProblem& problem, const Matches& matches, const int32_t* indices,
-                       int count, const GravityPoseModel& model, const PrincipalPoint& point,
-                       const RobustLoss& loss, double noise_px, ShiftedEquations* equations);
+// The normal equations of pose and principal point over the listed matches, at the rays as they
+// are, with the priors of both. noise_px: the standard deviation beside which the principal point's
+// prior counts. A principal point that moves by d moves every ray by -J d, and its Jacobian by the
+// lens's curvature.
+void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
+                       const int32_t* indices, int count, const GravityPoseModel& model,
+                       const PrincipalPoint& point, const RobustLoss& loss, double noise_px,
+                       ShiftedEquations* equations);
 
-// What not knowing the principal point adds to the covariance of a pose: C += G S G', S the covariance of
-// the point and G the pose's slope by it. variance_px: of a residual of the listed matches, px^2.
-bool add_shift_variance(const TwoViewProblem& problem, const Matches& matches, const int32_t* indices,
-                        int count, const GravityPoseModel& model, const PrincipalPoint& point,
-                        double variance_px, double covariance[25]);
+// What not knowing the principal point adds to the covariance of a pose: C += G S G', S the
+// covariance of the point and G the pose's slope by it. variance_px: of a residual of the listed
+// matches, px^2.
+bool add_shift_variance(const TwoViewProblem& problem, const Matches& matches,
+                        const int32_t* indices, int count, const GravityPoseModel& model,
+                        const PrincipalPoint& point, double variance_px, double covariance[25]);
 
 }  // namespace tv

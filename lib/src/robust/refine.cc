@@ -24,8 +24,7 @@ void pose_columns(const Pose& pose, Mat3 columns[5]) {
 }
 
 double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                   const RobustLoss& loss, double* upper,
-                                   double* gradient) const {
+                                   const RobustLoss& loss, double* upper, double* gradient) const {
   Mat3 columns[5];
   pose_columns(pose, columns);
   return sampson_normal_equations(pairs, indices, count, essential_from_pose(pose), columns,
@@ -111,8 +110,7 @@ RotationModel RotationModel::stepped(const double* step) const {
 Mat3 PlaneModel::matrix() const { return pose.R + pose.t * plane.transpose(); }
 
 double PlaneModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
-                                    const RobustLoss& loss, double* upper,
-                                    double* gradient) const {
+                                    const RobustLoss& loss, double* upper, double* gradient) const {
   Vec3 b1, b2;
   tangent_basis(pose.t, &b1, &b2);
   Mat3 columns[8];
@@ -212,7 +210,8 @@ struct AnyModel {
   void (*make_step)(const void* model, const double* step, void* moved);
 };
 
-// Refines *model with `moved` as scratch, another of its kind; *model ends as one of the two, the better.
+// Refines *model with `moved` as scratch, another of its kind; *model ends as one of the two, the
+// better.
 double refine_any(const AnyModel& any, const RayPairs& pairs, const int32_t* indices, int count,
                   const RobustLoss& loss, int max_iterations, void** model, void* moved,
                   double small_gain, double stretch) {
@@ -271,8 +270,8 @@ double refine(const RayPairs& pairs, const int32_t* indices, int count, const Ro
 
 template double refine<PoseModel>(const RayPairs&, const int32_t*, int, const RobustLoss&, int,
                                   PoseModel*, double, double);
-template double refine<GravityPoseModel>(const RayPairs&, const int32_t*, int,
-                                         const RobustLoss&, int, GravityPoseModel*, double, double);
+template double refine<GravityPoseModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
+                                         int, GravityPoseModel*, double, double);
 template double refine<FundamentalModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,
                                          int, FundamentalModel*, double, double);
 template double refine<HomographyModel>(const RayPairs&, const int32_t*, int, const RobustLoss&,

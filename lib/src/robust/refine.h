@@ -74,12 +74,11 @@ bool invert_symmetric(int num, const double* upper, double* inverse);
 
 // Lowers the robust cost over the listed matches, until a step gains less than small_gain of it.
 // stretch: of each step. Reweighted least squares divide by the weights' mean where the loss itself
-// curves by the mean of psi': their ratio is what the steps are too short by. Returns the final cost, in
-// units of scale^2.
+// curves by the mean of psi': their ratio is what the steps are too short by. Returns the final
+// cost, in units of scale^2.
 inline constexpr double kSmallGain = 1e-9;
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,
-              int max_iterations, Model* model, double small_gain = kSmallGain,
-              double stretch = 1);
+              int max_iterations, Model* model, double small_gain = kSmallGain, double stretch = 1);
 
 }  // namespace tv

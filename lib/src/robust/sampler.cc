@@ -21,8 +21,8 @@ void draw_distinct(Random& random, int bound, int count, int32_t* sample) {
 }  // namespace
 
 Sampler make_sampler(uint64_t seed, int num, int size, bool progressive) {
-  Sampler sampler{random_seeded(seed), num, size, progressive, size, kProsacSamples * num, 1, 0,
-                  false};
+  Sampler sampler{random_seeded(seed),  num, size, progressive, size,
+                  kProsacSamples * num, 1,   0,    false};
   for (int i = 0; i < size; ++i) {
     sampler.average *= static_cast<double>(size - i) / static_cast<double>(num - i);
   }

@@ -14,12 +14,12 @@ namespace tv {
 // uniform from the start: the surest matches may lie on one plane, or on what repeats.
 struct Sampler {
   Random random;
-  int num, size;         // matches, and how many a sample takes
+  int num, size;  // matches, and how many a sample takes
   bool progressive;
-  int pool;              // samples come from the first `pool` matches
-  double average;        // T_n of the paper for the pool
-  int64_t next_growth;   // T'_n: the draw at which the pool grows
-  int64_t drawn;  // from the pool
+  int pool;             // samples come from the first `pool` matches
+  double average;       // T_n of the paper for the pool
+  int64_t next_growth;  // T'_n: the draw at which the pool grows
+  int64_t drawn;        // from the pool
   bool uniform_next;
 };
 

@@ -9,8 +9,8 @@
 namespace tv {
 namespace {
 
-// A model of as few matches as count is missed once in twenty, one of a fifth more once in a hundred; of a
-// third of the matches left over, one in five.
+// A model of as few matches as count is missed once in twenty, one of a fifth more once in a
+// hundred; of a third of the matches left over, one in five.
 constexpr int kMostSamples = 400;
 constexpr double kConfidence = 0.95;
 constexpr int kFewestInliers = 12;
@@ -82,12 +82,12 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
 
 namespace {
 
-// Points are kept in the cells of a grid, about as many as there are points; a search looks at no more than kMostSeen of them, so that
-// points in one heap cost no more than points that are spread.
+// Points are kept in the cells of a grid, about as many as there are points; a search looks at no
+// more than kMostSeen of them, so that points in one heap cost no more than points that are spread.
 constexpr int kMostSide = 64, kNeighbours = 6, kMostSeen = 64;
 constexpr int kMostAsked = 512, kMostListed = 64;  // a share is told from fewer than an excess
-constexpr double kOpposite = 0.14;   // how far from the opposite place, of the neighbour's distance
-constexpr double kNearestPx = 8;     // nearer neighbours are not told from noise
+constexpr double kOpposite = 0.14;  // how far from the opposite place, of the neighbour's distance
+constexpr double kNearestPx = 8;    // nearer neighbours are not told from noise
 // What chance alone does is counted at a place where no usual lattice has a point: the neighbour
 // turned by 146 degrees instead of 180.
 constexpr double kControlCosine = -0.829, kControlSine = 0.559;
@@ -113,7 +113,11 @@ int grid_side(int num) {
 
 Grid make_grid(const double* xy, int num, Arena& arena) {
   const int side = grid_side(num);
-  Grid grid{xy, {0, 0}, {0, 0}, side, arena_alloc<int32_t>(arena, static_cast<size_t>(side * side)),
+  Grid grid{xy,
+            {0, 0},
+            {0, 0},
+            side,
+            arena_alloc<int32_t>(arena, static_cast<size_t>(side * side)),
             arena_alloc<int32_t>(arena, static_cast<size_t>(num))};
   for (int axis = 0; axis < 2; ++axis) {
     double low = xy[axis], high = low;
@@ -149,7 +153,8 @@ int nearest_points(const Grid& grid, int i, Neighbour* nearest) {
       const bool edge = r == row - ring || r == row + ring;
       for (int c = column - ring; c <= column + ring; c += edge || ring == 0 ? 1 : 2 * ring) {
         if (c < 0 || c >= grid.side) continue;
-        for (int32_t j = grid.first[grid.side * r + c]; j >= 0 && seen < kMostSeen; j = grid.next[j]) {
+        for (int32_t j = grid.first[grid.side * r + c]; j >= 0 && seen < kMostSeen;
+             j = grid.next[j]) {
           const double dx = grid.xy[2 * j] - x, dy = grid.xy[2 * j + 1] - y;
           const double dist_sq = dx * dx + dy * dy;
           if (dist_sq < kNearestPx * kNearestPx) continue;

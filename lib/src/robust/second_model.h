@@ -1,5 +1,5 @@
-// Whether what the pair's model leaves over follows a model of its own: a second motion, or the same
-// scene matched one period off.
+// Whether what the pair's model leaves over follows a model of its own: a second motion, or the
+// same scene matched one period off.
 #pragma once
 
 #include "robust/estimators.h"
@@ -14,9 +14,9 @@ struct SecondModel {
 
 size_t second_model_bytes(int max_matches);
 
-// Searches the unique matches that the first model does not explain (explained[i] is 0; its inliers'
-// tail, too, is to be marked) for a pose of their own. Found: the model is meaningful among them
-// (verdict.h), and counts at least kSecondShare of num_first.
+// Searches the unique matches that the first model does not explain (explained[i] is 0; its
+// inliers' tail, too, is to be marked) for a pose of their own. Found: the model is meaningful
+// among them (verdict.h), and counts at least kSecondShare of num_first.
 inline constexpr double kSecondShare = 0.15;
 SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,
                               double threshold_px, uint64_t seed, Arena& arena);

@@ -36,8 +36,8 @@ LoopOptions loop_options(const tv_estimate_options& options) {
 
 template <typename Estimator>
 LoopResult<typename Estimator::Model> run(Estimator estimator, const TwoViewProblem& problem) {
-  Sampler sampler = make_sampler(problem.options.seed, estimator.pairs.num,
-                                 Estimator::kSampleSize, problem.ratios != nullptr);
+  Sampler sampler = make_sampler(problem.options.seed, estimator.pairs.num, Estimator::kSampleSize,
+                                 problem.ratios != nullptr);
   return robust_loop(estimator, sampler, loop_options(problem.options));
 }
 
@@ -99,10 +99,10 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
   // The paper's path: the essential matrix nearest to F, the pose of most points in front.
   const int count = near_matches(pairs, pairs.num, epipolar.M, threshold, indices);
   Svd3 svd = svd3(epipolar.M);
-  const Mat3 essential = svd.U.col(0) * svd.V.col(0).transpose() +
-                         svd.U.col(1) * svd.V.col(1).transpose();
-  epipolar.has_pose = pose_from_essential(pairs, indices, count, essential, threshold, false,
-                                          &epipolar.pose);
+  const Mat3 essential =
+      svd.U.col(0) * svd.V.col(0).transpose() + svd.U.col(1) * svd.V.col(1).transpose();
+  epipolar.has_pose =
+      pose_from_essential(pairs, indices, count, essential, threshold, false, &epipolar.pose);
   epipolar.found = epipolar.has_pose;
 }
 
@@ -124,8 +124,8 @@ struct Finish {
 Mat3 refined_fundamental(const Finish& f, const Mat3& start) {
   FundamentalModel model = fundamental_model(start);
   for (int round = 0; round < kFinalRounds; ++round) {
-    const int count = near_matches(f.pairs, f.pairs.num, model.matrix(),
-                                   kFinalNear * f.threshold, f.indices);
+    const int count =
+        near_matches(f.pairs, f.pairs.num, model.matrix(), kFinalNear * f.threshold, f.indices);
     if (count < 7) break;
     refine(f.pairs, f.indices, count, final_loss(f.refiner, model.matrix(), count),
            kFinalIterations, &model);
@@ -149,8 +149,8 @@ void collect_support(Finish& f) {
   }
 }
 
-// Where one camera saw both views and the matches say that its principal point is not where it is said
-// to be, pose and principal point are refined together, and the rays follow.
+// Where one camera saw both views and the matches say that its principal point is not where it is
+// said to be, pose and principal point are refined together, and the rays follow.
 TVK_NOINLINE void place_principal_point(Finish& f) {
   constexpr int kSteps = 6;
   constexpr double kSmallStepPx = 0.01, kMostSigmas = 6;
@@ -208,10 +208,10 @@ void inliers_of_transfer(Finish& f, const Mat3& H) {
 }
 
 // A plane allows two motions. Where the plane explains nearly all of the support they are fitted
-// together with it; where there is more than the plane, each is refined as a pose, and the epipolar model's
-// own competes with them. The one of lowest cost is the pose, and a second one that is different and
-// not clearly worse the alternative.
-// Not inlined, for the stack below finish_two_view.
+// together with it; where there is more than the plane, each is refined as a pose, and the epipolar
+// model's own competes with them. The one of lowest cost is the pose, and a second one that is
+// different and not clearly worse the alternative. Not inlined, for the stack below
+// finish_two_view.
 TVK_NOINLINE void choose_planar_pose(Finish& f, const Rivals& rivals) {
   TwoViewOutcome& out = *f.out;
   Vec3 mean = Vec3::Zero();
@@ -242,8 +242,8 @@ TVK_NOINLINE void choose_planar_pose(Finish& f, const Rivals& rivals) {
   int other = -1;
   double farthest = 1e-4;  // half a degree
   for (int k = 0; k < num_poses; ++k) {
-    const double turned = (poses[k].R - poses[best].R).squaredNorm() +
-                          (poses[k].t - poses[best].t).squaredNorm();
+    const double turned =
+        (poses[k].R - poses[best].R).squaredNorm() + (poses[k].t - poses[best].t).squaredNorm();
     // Of the other two, one may be the best again, stopped elsewhere in a flat valley.
     if (k != best && turned > farthest && 10 * inliers[k] >= 9 * inliers[best]) {
       other = k;
@@ -256,8 +256,8 @@ TVK_NOINLINE void choose_planar_pose(Finish& f, const Rivals& rivals) {
     out.reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
   }
   PoseUncertainty uncertainty;
-  const bool certain = on_plane ? fit.certain[best]
-                                : uncertainty_of(f.refiner, poses[best], &uncertainty);
+  const bool certain =
+      on_plane ? fit.certain[best] : uncertainty_of(f.refiner, poses[best], &uncertainty);
   if (certain) store_uncertainty(on_plane ? fit.uncertainty[best] : uncertainty, &out);
   if (other < 0) return;
   out.has_alternative_covariance =
@@ -268,12 +268,13 @@ TVK_NOINLINE void choose_planar_pose(Finish& f, const Rivals& rivals) {
   }
 }
 
-// Whether the support moves along the epipolar lines by more than noise. What a rotation leaves over
-// has two dimensions, the epipolar residual one: under a rotation alone the sum S of the differences
-// is about as large as the sum of the squared epipolar residuals (1.3 times, since the search turns
-// the epipole to where the residuals happen to be smallest; in one of 300 pairs more than the limit),
-// and a parallax of p deviations of the noise adds p^2 / 2 times as much. leaves_parallax tells about
-// the matches that the rotation does not explain, this about those that it does.
+// Whether the support moves along the epipolar lines by more than noise. What a rotation leaves
+// over has two dimensions, the epipolar residual one: under a rotation alone the sum S of the
+// differences is about as large as the sum of the squared epipolar residuals (1.3 times, since the
+// search turns the epipole to where the residuals happen to be smallest; in one of 300 pairs more
+// than the limit), and a parallax of p deviations of the noise adds p^2 / 2 times as much.
+// leaves_parallax tells about the matches that the rotation does not explain, this about those that
+// it does.
 bool moves_along_lines(const Finish& f, const Mat3& R) {
   if (!f.out->epipolar.has_pose) return false;
   const double limit = kTransferThresholdScale * f.threshold;
@@ -298,7 +299,7 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
   const int n = f.pairs.num;
   // A pure rotation or no motion is meaningful by its own count; an epipolar model by its own.
   const double disc = std::min(1.0, kPi * kTransferThresholdScale * kTransferThresholdScale * 2 *
-                                         f.threshold * f.threshold / f.matches.area_px);
+                                        f.threshold * f.threshold / f.matches.area_px);
   const bool rotation_meaningful =
       rivals.has_rotation &&
       log_false_alarms(n, rivals.rotation_inliers, 2, 1, disc) < kLogMeaningful;
@@ -318,13 +319,11 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
   // matches where there is none: a failed search is no proof of a rotation), and the rest does not
   // agree on an epipole.
   const double most = epipolar.found ? kRivalShare * f.num_support : kRivalShareAlone * n;
-  const bool rotation_enough =
-      rotation_meaningful && rivals.rotation_inliers > most &&
-      !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold) &&
-      !moves_along_lines(f, rivals.R);
-  const bool homography_enough =
-      homography_meaningful && rivals.homography_inliers > most &&
-      !leaves_parallax(f.matches, rivals.H, f.out->inlier, f.threshold);
+  const bool rotation_enough = rotation_meaningful && rivals.rotation_inliers > most &&
+                               !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold) &&
+                               !moves_along_lines(f, rivals.R);
+  const bool homography_enough = homography_meaningful && rivals.homography_inliers > most &&
+                                 !leaves_parallax(f.matches, rivals.H, f.out->inlier, f.threshold);
   const int rival_inliers = calibrated ? rivals.rotation_inliers : rivals.homography_inliers;
   const bool still = still_meaningful && 20 * rivals.identity_inliers >= 19 * rival_inliers &&
                      (calibrated ? rotation_enough : homography_enough);
@@ -404,8 +403,8 @@ void look_for_second_model(Finish& f, Arena& arena) {
       explained[i] = f.values[i] <= limit * limit;
       num_first += out.inlier[i] != 0;
     }
-    second = find_second_model(f.matches, explained, num_first, f.threshold,
-                               f.problem.options.seed, arena)
+    second = find_second_model(f.matches, explained, num_first, f.threshold, f.problem.options.seed,
+                               arena)
                  .found;
   }
   ArenaScope scope(arena);
@@ -427,8 +426,7 @@ void look_for_second_model(Finish& f, Arena& arena) {
 
 void measure_inliers(Finish& f) {
   TwoViewOutcome& out = *f.out;
-  const bool by_transfer = out.config == TV_CONFIG_PANORAMIC ||
-                           out.config == TV_CONFIG_NO_MOTION ||
+  const bool by_transfer = out.config == TV_CONFIG_PANORAMIC || out.config == TV_CONFIG_NO_MOTION ||
                            out.config == TV_CONFIG_PLANAR_OR_PANORAMIC;
   const RayPairs& pairs = f.matches.pairs;
   double sum = 0;
@@ -514,9 +512,17 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
   int32_t* indices = arena_alloc<int32_t>(arena, n);
   double* values = arena_alloc<double>(arena, n);
   int32_t* support = arena_alloc<int32_t>(arena, n);
-  Finish f{problem, matches, unique, threshold, indices, values, support, 0,
-           PoseRefiner{problem, matches, unique, threshold, gravity_of(problem), {}, indices, values},
-           outcome};
+  Finish f{
+      problem,
+      matches,
+      unique,
+      threshold,
+      indices,
+      values,
+      support,
+      0,
+      PoseRefiner{problem, matches, unique, threshold, gravity_of(problem), {}, indices, values},
+      outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {
@@ -564,14 +570,11 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
       }
       inliers_of_transfer(f, out.H);
       break;
-    case TV_CONFIG_PLANAR_OR_PANORAMIC:
-      inliers_of_transfer(f, out.H);
-      break;
+    case TV_CONFIG_PLANAR_OR_PANORAMIC: inliers_of_transfer(f, out.H); break;
     case TV_CONFIG_DEGENERATE:
       for (size_t i = 0; i < n; ++i) out.inlier[i] = 0;
       break;
-    case TV_CONFIG_UNCALIBRATED:
-      break;
+    case TV_CONFIG_UNCALIBRATED: break;
   }
   if (out.has_t) measure_pose(f);
   measure_inliers(f);

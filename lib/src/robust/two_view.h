@@ -18,8 +18,8 @@ struct TwoViewOutcome {
   tv_verdict verdict = TV_VERDICT_REFUSED;
   uint32_t reasons = 0;
   EpipolarModel epipolar;
-  bool has_R = false, has_t = false, has_H = false, has_alternative = false,
-       has_covariance = false, has_alternative_covariance = false;
+  bool has_R = false, has_t = false, has_H = false, has_alternative = false, has_covariance = false,
+       has_alternative_covariance = false;
   Mat3 H = Mat3::Zero();
   Pose alternative;
   double covariance[25] = {}, alternative_covariance[25] = {};

@@ -63,8 +63,8 @@ int count_inliers(const RayPairs& pairs, int count, const Mat3& H, double thresh
   return inliers;
 }
 
-// Whether a share of `agreeing` of `drawn` tells a probability from the limit: were it the limit's, the
-// share would be as far away with probability exp(-kClear) at most (Chernoff's bound).
+// Whether a share of `agreeing` of `drawn` tells a probability from the limit: were it the limit's,
+// the share would be as far away with probability exp(-kClear) at most (Chernoff's bound).
 bool is_clear(int agreeing, int drawn, double limit) {
   constexpr double kClear = 25;
   if (drawn == 0 || !(limit > 0 && limit < 1)) return false;
@@ -131,8 +131,8 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   const RayPairs& pairs = matches.pairs;
   // A band of half width sqrt(2) T: Sampson's distance shares the error between the two images. Its
   // length is about the image's side.
-  const double prior = std::min(1.0, 2.8284271247461903 * threshold_px /
-                                          std::sqrt(matches.area_px));
+  const double prior =
+      std::min(1.0, 2.8284271247461903 * threshold_px / std::sqrt(matches.area_px));
   const int n = matches.num_unique;
   if (n < 2) return 1;
   Random random = random_seeded(seed);
@@ -180,7 +180,8 @@ Rivals find_rivals(const Matches& matches, const int32_t* support, int num_suppo
       rivals.rotation_inliers = count_inliers(matches.pairs, n, rivals.R, limit);
     }
   }
-  const Best homography = search(HomographyEstimator{base}, support, num_support, least_share, seed);
+  const Best homography =
+      search(HomographyEstimator{base}, support, num_support, least_share, seed);
   rivals.has_homography = homography.found;
   if (homography.found) {
     rivals.H = homography.model;

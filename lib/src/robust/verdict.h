@@ -46,8 +46,8 @@ double meaningful_chance(int n, int k, int m, int models);
 double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
                            uint64_t seed, double limit = 0);
 
-// A rival speaks for the pair when it explains this share of what the epipolar model does, or of all
-// matches where there is none.
+// A rival speaks for the pair when it explains this share of what the epipolar model does, or of
+// all matches where there is none.
 inline constexpr double kRivalShare = 0.7, kRivalShareAlone = 0.5;
 
 // The rotation and the homography that explain most of the listed matches; one that explains less

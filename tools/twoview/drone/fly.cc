@@ -20,7 +20,8 @@ struct Arguments {
 
 const char kHelp[] =
     "  t take off   space land   h hover   x EMERGENCY: motors off   r re-arm   f flat trim\n"
-    "  w s forward, back   a d left, right   up, down climb, sink   left, right turn   Esc land and end\n"
+    "  w s forward, back   a d left, right   up, down climb, sink   left, right turn   Esc land "
+    "and end\n"
     "  a movement ends when its key does\n";
 
 // What a key asks for, in words and as a movement.
@@ -125,7 +126,8 @@ int fly(const Arguments& a) {
           if (wish.kind == Wish::kNone) continue;
           const tvs_status status = send(link.session(), wish);
           if (status != TVS_OK)
-            print(std::string("\r\033[K") + wish.words + ": not now (" + tvs_status_string(status) + ")\n");
+            print(std::string("\r\033[K") + wish.words + ": not now (" + tvs_status_string(status) +
+                  ")\n");
           ends = ends || wish.kind == Wish::kEnd;
         }
         const double seconds = static_cast<double>(ardrone_now_ns() - start) * 1e-9;
@@ -136,8 +138,8 @@ int fly(const Arguments& a) {
         return ends || keyboard.has_ended();
       },
       stop, a.duration);
-  // However it ended, the drone is brought down before the program goes; a second Ctrl-C leaves that
-  // to the drone's own watchdog.
+  // However it ended, the drone is brought down before the program goes; a second Ctrl-C leaves
+  // that to the drone's own watchdog.
   ardrone_session_land(link.session());
   static const std::atomic<bool> never{false};
   link.run([&] { return !is_in_the_air(link.session()); }, never, kLandingPatienceS);

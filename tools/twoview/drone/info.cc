@@ -19,8 +19,8 @@ struct Arguments {
 };
 
 const char* state_word(uint32_t ctrl_state) {
-  constexpr const char* kWords[] = {"default",  "starting", "landed",       "flying",  "hovering",
-                                    "testing",  "taking off", "flying", "landing", "looping"};
+  constexpr const char* kWords[] = {"default", "starting",   "landed", "flying",  "hovering",
+                                    "testing", "taking off", "flying", "landing", "looping"};
   const uint32_t major = ctrl_state >> 16;
   return major < sizeof kWords / sizeof kWords[0] ? kWords[major] : "unknown";
 }
@@ -92,8 +92,9 @@ int info(const Arguments& a) {
   const bool is_emergency = (navdata->state & ARDRONE_STATE_EMERGENCY) != 0;
   print("drone        " + printable(configuration, "general:ardrone_name") + " at " +
         a.address.host + "\nfirmware     " + printable(configuration, "general:num_version_soft") +
-        "\nstate        " + state_word(navdata->demo.ctrl_state) + (is_emergency ? ", EMERGENCY" : "") +
-        "\nbattery      " + std::to_string(navdata->demo.battery_percent) + " %\n");
+        "\nstate        " + state_word(navdata->demo.ctrl_state) +
+        (is_emergency ? ", EMERGENCY" : "") + "\nbattery      " +
+        std::to_string(navdata->demo.battery_percent) + " %\n");
   if (!has_config) print("configuration not read: the drone did not send it\n");
   for (const auto& [key, value] : configuration.items())
     print("  " + key + " = " + printable(configuration, key.c_str()) + "\n");

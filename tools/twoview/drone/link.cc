@@ -59,8 +59,8 @@ struct Replay {
   explicit Replay(const std::string& folder) {
     const tvs_status status = ardrone_replay_open(&files, folder.c_str(), &transport);
     if (status != TVS_OK)
-      throw BadInput("no recording in " + folder + " (navdata.log, video.pave): " +
-                     tvs_status_string(status));
+      throw BadInput("no recording in " + folder +
+                     " (navdata.log, video.pave): " + tvs_status_string(status));
   }
   ~Replay() { ardrone_replay_close(&files); }
   Replay(const Replay&) = delete;

@@ -60,10 +60,10 @@ class Link {
   ardrone_session* session_ = nullptr;
 };
 
-// Plays a recording's folder through a session, as fast as it can or `speed` times as fast as it was,
-// until its end or `stop`. Throws BadInput where there is no recording.
-ardrone_counters play(const std::string& folder, LinkListener listener, const std::atomic<bool>& stop,
-                      double speed);
+// Plays a recording's folder through a session, as fast as it can or `speed` times as fast as it
+// was, until its end or `stop`. Throws BadInput where there is no recording.
+ardrone_counters play(const std::string& folder, LinkListener listener,
+                      const std::atomic<bool>& stop, double speed);
 
 // frames_received, frames_decoded and so on: summary.json's keys.
 nlohmann::ordered_json summary_json(const ardrone_counters& counters, double seconds);

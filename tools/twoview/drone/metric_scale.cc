@@ -8,11 +8,12 @@
 namespace cli {
 namespace {
 
-constexpr double kMaxGapS = 0.25;        // in a log that is integrated; demo mode gives 15 samples a second
-constexpr double kAltitudeWindowS = 0.1; // altitudes are averaged over so much to each side
-constexpr double kLayer = 0.04;          // thickness of a floor, of its distance below
-constexpr size_t kLeastFloor = 20;       // points
-constexpr double kFloorShare = 0.05;     // of all points
+constexpr double kMaxGapS =
+    0.25;  // in a log that is integrated; demo mode gives 15 samples a second
+constexpr double kAltitudeWindowS = 0.1;  // altitudes are averaged over so much to each side
+constexpr double kLayer = 0.04;           // thickness of a floor, of its distance below
+constexpr size_t kLeastFloor = 20;        // points
+constexpr double kFloorShare = 0.05;      // of all points
 constexpr double kWorstShare = 0.25;
 
 Vector3 plus(const Vector3& a, const Vector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
@@ -30,8 +31,10 @@ void to_quaternion(const Matrix3& m, double q[4]) {
   const double s = 0.5 / std::sqrt(squares[largest]);
   const double x = m[7] - m[5], y = m[2] - m[6], z = m[3] - m[1];
   const double xy = m[1] + m[3], xz = m[2] + m[6], yz = m[5] + m[7];
-  const double table[4][4] = {
-      {squares[0], x, y, z}, {x, squares[1], xy, xz}, {y, xy, squares[2], yz}, {z, xz, yz, squares[3]}};
+  const double table[4][4] = {{squares[0], x, y, z},
+                              {x, squares[1], xy, xz},
+                              {y, xy, squares[2], yz},
+                              {z, xz, yz, squares[3]}};
   for (size_t k = 0; k < 4; ++k) q[k] = table[largest][k] * s;
 }
 
@@ -126,12 +129,13 @@ std::optional<MetricScale> scale_by_altitude(const FlightLog& log, double time0_
   const std::optional<FlightSample> at0 = sample_at(log, time0_s, kMaxGapS);
   const std::optional<FlightSample> at1 = sample_at(log, time1_s, kMaxGapS);
   if (!altitude0 || !altitude1 || !at0 || !at1 || at0->run != at1->run) return {};
-  const double climb = camera_height(*at1, altitude1->first, mount) -
-                       camera_height(*at0, altitude0->first, mount);
+  const double climb =
+      camera_height(*at1, altitude1->first, mount) - camera_height(*at0, altitude0->first, mount);
   const double climb_sigma = std::hypot(altitude0->second, altitude1->second);
   const double up = -unit_way[2];
   if (!(std::abs(climb) > 3 * climb_sigma) || !(climb * up > 0)) return {};
-  // An error of the way's direction by an angle e changes its vertical part by e times the level one.
+  // An error of the way's direction by an angle e changes its vertical part by e times the level
+  // one.
   const double level = std::sqrt(std::max(0.0, 1 - up * up));
   const double direction_sigma = std::hypot(direction_sigma_rad, at0->attitude_sigma_rad);
   const double baseline = climb / up;
@@ -156,8 +160,8 @@ std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
   }
   std::sort(below.begin(), below.end(),
             [](const Below& a, const Below& b) { return a.depth < b.depth; });
-  const size_t least = std::max(
-      kLeastFloor, static_cast<size_t>(kFloorShare * static_cast<double>(points.size())));
+  const size_t least =
+      std::max(kLeastFloor, static_cast<size_t>(kFloorShare * static_cast<double>(points.size())));
   // The lowest layer with enough points: windows from below.
   for (size_t last = below.size(); last-- > 0;) {
     const double top = below[last].depth * (1 - kLayer);
@@ -187,7 +191,8 @@ std::optional<MetricScale> best_scale(const std::vector<std::optional<MetricScal
   std::optional<MetricScale> best;
   for (const std::optional<MetricScale>& scale : found) {
     if (!scale || scale->sigma_m > kWorstShare * scale->baseline_m) continue;
-    if (!best || scale->sigma_m * best->baseline_m < best->sigma_m * scale->baseline_m) best = scale;
+    if (!best || scale->sigma_m * best->baseline_m < best->sigma_m * scale->baseline_m)
+      best = scale;
   }
   return best;
 }

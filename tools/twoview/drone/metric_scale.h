@@ -1,6 +1,6 @@
-// Metres for a two-view reconstruction, from what a drone measures: the distance between the two camera
-// positions, each source by itself with its standard deviation.
-// World: z down. Body: x forward, y right, z down (twoview_drivers/source.h).
+// Metres for a two-view reconstruction, from what a drone measures: the distance between the two
+// camera positions, each source by itself with its standard deviation. World: z down. Body: x
+// forward, y right, z down (twoview_drivers/source.h).
 #pragma once
 
 #include <cstdint>
@@ -33,8 +33,8 @@ struct CameraMount {
 // The attitude at a time, between neighbours of one run at most max_gap_s apart; nothing elsewhere.
 std::optional<FlightSample> sample_at(const FlightLog& log, double time_s, double max_gap_s);
 
-// Body velocity, turned into the world and integrated (trapezoids) from time0 to time1, and the way of the
-// camera about the body. Nothing where the log has a gap or the way is less than 3 sigma.
+// Body velocity, turned into the world and integrated (trapezoids) from time0 to time1, and the way
+// of the camera about the body. Nothing where the log has a gap or the way is less than 3 sigma.
 std::optional<MetricScale> scale_by_velocity(const FlightLog& log, double time0_s, double time1_s,
                                              const CameraMount& mount);
 
@@ -45,8 +45,8 @@ std::optional<MetricScale> scale_by_altitude(const FlightLog& log, double time0_
                                              const Vector3& unit_way, double direction_sigma_rad,
                                              const CameraMount& mount);
 
-// The altitude over the height above a floor that is seen: of the points (camera 0's frame, units of
-// the baseline), the lowest level layer that holds enough of them. Nothing without such a layer.
+// The altitude over the height above a floor that is seen: of the points (camera 0's frame, units
+// of the baseline), the lowest level layer that holds enough of them. Nothing without such a layer.
 std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
                                           const std::vector<Vector3>& points,
                                           const CameraMount& mount);

@@ -80,8 +80,10 @@ int record(const Arguments& a) {
   if (speaks) {
     print("recorded     " + std::to_string(counters.navdata_received) + " navdata, " +
           std::to_string(counters.packets) + " frames, " + std::to_string(counters.gaps) +
-          " gaps\nfiles        " + a.output + ": video.pave navdata.log attitude.tum frames.txt "
-          "summary.json" + (a.frames ? " frames/" : "") + "\n");
+          " gaps\nfiles        " + a.output +
+          ": video.pave navdata.log attitude.tum frames.txt "
+          "summary.json" +
+          (a.frames ? " frames/" : "") + "\n");
   }
   if (counters.navdata_received == counters.navdata_rejected && counters.packets == 0) {
     throw BadInput(counters.navdata_rejected == 0 && counters.bytes_skipped == 0

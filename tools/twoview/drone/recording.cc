@@ -42,7 +42,8 @@ void GrowingFile::append(const void* bytes, size_t size) {
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) {
       const std::string why = reason();
-      if (::ftruncate(descriptor_, size_) != 0) {}  // readers stop at the last whole entry anyway
+      if (::ftruncate(descriptor_, size_) != 0) {
+      }  // readers stop at the last whole entry anyway
       throw BadInput("cannot write " + name_ + ": " + why + "; what was recorded before is kept");
     }
     at += written;
@@ -79,8 +80,9 @@ Recording::Recording(const fs::path& folder, bool with_frames)
   navdata_ = std::make_unique<GrowingFile>(folder / "navdata.log");
   attitude_ = std::make_unique<GrowingFile>(folder / "attitude.tum");
   frames_ = std::make_unique<GrowingFile>(folder / "frames.txt");
-  attitude_->append("# time tx ty tz qx qy qz qw, body to world; seconds of the host's clock; tz is "
-                    "-altitude where it is known, else 0; tx and ty are 0\n");
+  attitude_->append(
+      "# time tx ty tz qx qy qz qw, body to world; seconds of the host's clock; tz is "
+      "-altitude where it is known, else 0; tx and ty are 0\n");
   if (with_frames) make_folder(folder / "frames");
 }
 

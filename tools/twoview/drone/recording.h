@@ -1,5 +1,5 @@
-// The files of `drone record`, written as the bytes come, so that whatever ends the program, all that
-// came before can be read.
+// The files of `drone record`, written as the bytes come, so that whatever ends the program, all
+// that came before can be read.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 
 namespace cli {
 
-// A file that is only ever added to, one whole entry at a time; what cannot be written throws BadInput
-// and takes the piece of the entry back.
+// A file that is only ever added to, one whole entry at a time; what cannot be written throws
+// BadInput and takes the piece of the entry back.
 class GrowingFile {
  public:
   // Throws BadInput when it exists or cannot be made.
@@ -35,8 +35,8 @@ class GrowingFile {
 // Makes a folder where it is missing. Throws BadInput.
 void make_folder(const std::filesystem::path& folder);
 
-// A decoded picture as FOLDER/<number, six digits>.png. Numbers come again after a reboot: the later
-// picture stays. Throws BadInput.
+// A decoded picture as FOLDER/<number, six digits>.png. Numbers come again after a reboot: the
+// later picture stays. Throws BadInput.
 void write_frame(const std::filesystem::path& folder, const tvs_frame& frame);
 
 class Recording {

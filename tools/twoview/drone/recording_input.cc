@@ -44,8 +44,9 @@ std::vector<double> optional_numbers(const YAML::Node& root, const std::string& 
 CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
   const YAML::Node root = parse_yaml(read_file(file, kMaxFileBytes), file);
   const bool rotation_given = !options.body_from_camera.empty();
-  const std::vector<double> rotation =
-      rotation_given ? options.body_from_camera : optional_numbers(root, "body_from_camera", 9, file);
+  const std::vector<double> rotation = rotation_given
+                                           ? options.body_from_camera
+                                           : optional_numbers(root, "body_from_camera", 9, file);
   const std::vector<double> position = !options.camera_in_body.empty()
                                            ? options.camera_in_body
                                            : optional_numbers(root, "camera_in_body", 3, file);
@@ -69,14 +70,17 @@ struct RecordingInput::State {
 };
 
 void RecordingOptions::add_to(CLI::App& verb) {
-  verb.add_option("--recording", folder, "two frames of what `drone record` made, in place of A and B")
+  verb.add_option("--recording", folder,
+                  "two frames of what `drone record` made, in place of A and B")
       ->type_name("DIR");
-  verb.add_option("--frames", frames, "which two of its decoded pictures, from 0 (without: the best pair)")
+  verb.add_option("--frames", frames,
+                  "which two of its decoded pictures, from 0 (without: the best pair)")
       ->expected(2)
       ->check(CLI::Range(0, 1 << 30))
       ->type_name("I J");
-  verb.add_option("--body-from-camera", body_from_camera,
-                  "rotation, row-major, of body axes (forward, right, down); default: looks forward")
+  verb.add_option(
+          "--body-from-camera", body_from_camera,
+          "rotation, row-major, of body axes (forward, right, down); default: looks forward")
       ->delimiter(',')
       ->expected(9)
       ->type_name("R11,..,R33");
@@ -114,23 +118,21 @@ void RecordingInput::add_gravity(tv_estimate_options& options) {
 }
 
 void RecordingInput::add_scale(Outcome& outcome) const {
-  outcome.scale =
-      best_scale(scales_of(state_->flight, state_->pair.frame, state_->mount, outcome));
+  outcome.scale = best_scale(scales_of(state_->flight, state_->pair.frame, state_->mount, outcome));
 }
 
 void RecordingInput::add_json(Outcome& outcome) const {
   const State& s = *state_;
   const RecordedFrame* frames = s.pair.frame;
-  outcome.json["imu"] = imu_json(s.flight, frames, s.mount, outcome.two_view, s.gravity_used,
-                                 outcome.scale);
-  outcome.json["recording"] = {
-      {"folder", s.options.folder},
-      {"frames", {frames[0].index, frames[1].index}},
-      {"frame_numbers", {frames[0].number, frames[1].number}},
-      {"seconds_apart", frames[1].time_s - frames[0].time_s},
-      {"chosen", s.pair.why},
-      {"body_from_camera", s.mount.body_from_camera},
-      {"camera_in_body", s.mount.position}};
+  outcome.json["imu"] =
+      imu_json(s.flight, frames, s.mount, outcome.two_view, s.gravity_used, outcome.scale);
+  outcome.json["recording"] = {{"folder", s.options.folder},
+                               {"frames", {frames[0].index, frames[1].index}},
+                               {"frame_numbers", {frames[0].number, frames[1].number}},
+                               {"seconds_apart", frames[1].time_s - frames[0].time_s},
+                               {"chosen", s.pair.why},
+                               {"body_from_camera", s.mount.body_from_camera},
+                               {"camera_in_body", s.mount.position}};
 }
 
 std::string RecordingInput::words(const Outcome& outcome) const {

@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232;
 constexpr double kAttitudeGapS = 0.25;
-constexpr size_t kCandidates = 24;   // frames that are tried
-constexpr double kFarthestS = 4;     // between two frames of a pair
+constexpr size_t kCandidates = 24;  // frames that are tried
+constexpr double kFarthestS = 4;    // between two frames of a pair
 constexpr double kEnoughParallaxDeg = 3;
 
 Matrix3 matrix_of(const double q[4]) {
@@ -82,8 +82,8 @@ std::optional<FlightSample> sample_of(const RecordedFlight& flight, const Record
   return sample_at(flight.log, frame.time_s, kAttitudeGapS);
 }
 
-// Frames with a known attitude, evenly spread over the part of the log in which the drone moved; all
-// frames where it never did.
+// Frames with a known attitude, evenly spread over the part of the log in which the drone moved;
+// all frames where it never did.
 std::vector<RecordedFrame> candidates_of(const RecordedFlight& flight) {
   std::vector<RecordedFrame> moving, known;
   for (const RecordedFrame& frame : flight.frames) {
@@ -92,8 +92,9 @@ std::vector<RecordedFrame> candidates_of(const RecordedFlight& flight) {
     known.push_back(frame);
     if (at->velocity_m_s && norm(*at->velocity_m_s) > 0.05) moving.push_back(frame);
   }
-  const std::vector<RecordedFrame>& from =
-      moving.size() > 1 ? moving : known.size() > 1 ? known : flight.frames;
+  const std::vector<RecordedFrame>& from = moving.size() > 1  ? moving
+                                           : known.size() > 1 ? known
+                                                              : flight.frames;
   std::vector<RecordedFrame> chosen;
   const size_t count = std::min(kCandidates, from.size());
   for (size_t k = 0; k < count; ++k) chosen.push_back(from[k * from.size() / count]);
@@ -116,7 +117,8 @@ RecordedFlight read_flight(const std::string& folder) {
   };
   listener.on_frame = [&](const tvs_frame& frame) {
     const double time_s = static_cast<double>(frame.time.host_ns) * 1e-9;
-    // A picture can come before the attitude that follows its instant; the whole log has that one, too.
+    // A picture can come before the attitude that follows its instant; the whole log has that one,
+    // too.
     const bool follows_log =
         !flight.log.empty() && time_s - flight.log.back().time_s < kAttitudeGapS;
     flight.frames.push_back({static_cast<int>(flight.frames.size()), frame.number, time_s,
@@ -170,7 +172,8 @@ RecordingPair choose_pair(const std::string& folder, const RecordedFlight& fligh
         whole[k] = picture_of(frames[k], pictures.at(frames[k].index));
         outcome.picture[k] = whole[k];
         shrink(outcome.picture[k], options.resize);
-        outcome.camera[k] = resized(camera, outcome.picture[k].luma.cols, outcome.picture[k].luma.rows);
+        outcome.camera[k] =
+            resized(camera, outcome.picture[k].luma.cols, outcome.picture[k].luma.rows);
       }
       Options own = options;
       set_gravity(flight, frames, mount, own.estimate);
@@ -189,8 +192,8 @@ RecordingPair choose_pair(const std::string& folder, const RecordedFlight& fligh
     throw BadInput("no two of " + std::to_string(candidates.size()) + " frames of " + folder +
                    " give a pose to be believed; --frames I J takes two of your own");
   char why[160];
-  std::snprintf(why, sizeof why, "the best of %d pairs: %d matches agree, %.1f deg of parallax", tried,
-                inliers, parallax_deg);
+  std::snprintf(why, sizeof why, "the best of %d pairs: %d matches agree, %.1f deg of parallax",
+                tried, inliers, parallax_deg);
   best.why = why;
   return best;
 }
@@ -224,23 +227,26 @@ nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFram
   const Matrix3 by_imu =
       product(camera1_from_world, product(at0->world_from_body, mount.body_from_camera));
   // Both attitudes have the error of one about each axis; the whole angle has that of three.
-  const double imu_sigma = std::sqrt(3.0) * std::hypot(at0->attitude_sigma_rad, at1->attitude_sigma_rad);
+  const double imu_sigma =
+      std::sqrt(3.0) * std::hypot(at0->attitude_sigma_rad, at1->attitude_sigma_rad);
   const double* c = two_view.covariance;
   const double vision_sigma = two_view.has_covariance ? std::sqrt(c[0] + c[6] + c[12]) : NAN;
   nlohmann::ordered_json json;
   json["rotation_difference_deg"] = rotation_error_deg(rotation_of(two_view), by_imu);
-  json["sigma_deg"] = finite_or_null(kDegrees * (two_view.has_covariance
-                                                     ? std::hypot(imu_sigma, vision_sigma)
-                                                     : imu_sigma));
+  json["sigma_deg"] = finite_or_null(
+      kDegrees * (two_view.has_covariance ? std::hypot(imu_sigma, vision_sigma) : imu_sigma));
   json["imu_sigma_deg"] = kDegrees * imu_sigma;
   json["vision_sigma_deg"] = finite_or_null(kDegrees * vision_sigma);
   json["gravity_used"] = gravity_used;
-  json["scale_source"] = scale ? nlohmann::ordered_json(scale->source) : nlohmann::ordered_json(nullptr);
+  json["scale_source"] =
+      scale ? nlohmann::ordered_json(scale->source) : nlohmann::ordered_json(nullptr);
   return json;
 }
 
-std::vector<std::optional<MetricScale>> scales_of(const RecordedFlight& flight, const RecordedFrame frames[2],
-                                    const CameraMount& mount, const Outcome& outcome) {
+std::vector<std::optional<MetricScale>> scales_of(const RecordedFlight& flight,
+                                                  const RecordedFrame frames[2],
+                                                  const CameraMount& mount,
+                                                  const Outcome& outcome) {
   const tv_two_view& v = outcome.two_view;
   const auto at0 = sample_of(flight, frames[0]);
   if (!has_full_pose(v) || !at0) return {};

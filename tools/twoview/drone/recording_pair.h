@@ -34,12 +34,13 @@ struct RecordingPair {
 };
 
 // The pictures of two indices. Throws BadInput when the recording has no such frame.
-RecordingPair pair_of(const std::string& folder, const RecordedFlight& flight, int index0, int index1);
+RecordingPair pair_of(const std::string& folder, const RecordedFlight& flight, int index0,
+                      int index1);
 
-// Of frames with an attitude, spread over the flight, at most four seconds apart: the pair whose reconstruction is
-// believed and has the most matches that agree, those of less than three degrees of parallax
-// counting for less. `camera` is of the pictures as they are; they are shrunk as `options` say.
-// Throws BadInput when no two frames give a full pose.
+// Of frames with an attitude, spread over the flight, at most four seconds apart: the pair whose
+// reconstruction is believed and has the most matches that agree, those of less than three degrees
+// of parallax counting for less. `camera` is of the pictures as they are; they are shrunk as
+// `options` say. Throws BadInput when no two frames give a full pose.
 RecordingPair choose_pair(const std::string& folder, const RecordedFlight& flight,
                           const tv_camera& camera, const CameraMount& mount, Session& session,
                           const Options& options);
@@ -55,7 +56,8 @@ nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFram
                                 bool gravity_used, const std::optional<MetricScale>& scale);
 
 // By velocity, by altitude, by the floor, each where it can tell; for a full pose.
-std::vector<std::optional<MetricScale>> scales_of(const RecordedFlight& flight, const RecordedFrame frames[2],
-                                    const CameraMount& mount, const Outcome& outcome);
+std::vector<std::optional<MetricScale>> scales_of(const RecordedFlight& flight,
+                                                  const RecordedFrame frames[2],
+                                                  const CameraMount& mount, const Outcome& outcome);
 
 }  // namespace cli

@@ -42,15 +42,14 @@ int replay(const Arguments& a) {
   }
   const ardrone_counters counters = play(a.recording, listener, stop_flag_for_signals(), a.speed);
   if (!failure.empty()) throw BadInput(failure);
-  const double seconds =
-      last_ns > first_ns ? static_cast<double>(last_ns - first_ns) * 1e-9 : 0.0;
+  const double seconds = last_ns > first_ns ? static_cast<double>(last_ns - first_ns) * 1e-9 : 0.0;
   const nlohmann::ordered_json summary = summary_json(counters, seconds);
   if (a.json) print(summary.dump(2) + "\n");
   if (!a.json && !a.quiet) {
     char line[240];
     std::snprintf(line, sizeof line,
-                  "recording    %.1f s: %llu navdata, %llu frames, %llu decoded, %llu gaps\n", seconds,
-                  static_cast<unsigned long long>(counters.navdata_received),
+                  "recording    %.1f s: %llu navdata, %llu frames, %llu decoded, %llu gaps\n",
+                  seconds, static_cast<unsigned long long>(counters.navdata_received),
                   static_cast<unsigned long long>(counters.packets),
                   static_cast<unsigned long long>(counters.frames_decoded),
                   static_cast<unsigned long long>(counters.gaps));

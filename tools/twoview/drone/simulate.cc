@@ -94,10 +94,14 @@ std::string ports_line(const std::string& host, const simulator::Ports& ports) {
 }
 
 nlohmann::ordered_json counts_json(const simulator::ServerCounts& n) {
-  return {{"commands_obeyed", n.commands_obeyed}, {"commands_refused", n.commands_refused},
-          {"take_offs", n.take_offs},             {"navdata_sent", n.navdata_sent},
-          {"frames_sent", n.frames_sent},         {"frames_left_out", n.frames_left_out},
-          {"video_cuts", n.video_cuts},           {"video_stalls", n.video_stalls},
+  return {{"commands_obeyed", n.commands_obeyed},
+          {"commands_refused", n.commands_refused},
+          {"take_offs", n.take_offs},
+          {"navdata_sent", n.navdata_sent},
+          {"frames_sent", n.frames_sent},
+          {"frames_left_out", n.frames_left_out},
+          {"video_cuts", n.video_cuts},
+          {"video_stalls", n.video_stalls},
           {"reboots", n.reboots}};
 }
 
@@ -145,14 +149,16 @@ void add_faults(CLI::App& verb, Arguments& a) {
         ->group("Faults")
         ->capture_default_str();
   };
-  period("--cut-video-every", a.cut_every, "seconds between resets of the video connection; 0: none");
+  period("--cut-video-every", a.cut_every,
+         "seconds between resets of the video connection; 0: none");
   period("--stall-video-every", a.stall_every, "seconds between silences of 3 s on an open one");
   period("--reboot-every", a.reboot_every, "seconds between reboots, each silent for 1 s");
   verb.add_option("--first-sequence", a.first_sequence, "navdata's first number, to see it wrap")
       ->check(CLI::Range(int64_t{0}, int64_t{UINT32_MAX}))
       ->type_name("N")
       ->group("Faults");
-  verb.add_option("--firmware", a.firmware, "a version that nobody knows, with navdata options to match")
+  verb.add_option("--firmware", a.firmware,
+                  "a version that nobody knows, with navdata options to match")
       ->type_name("VERSION")
       ->group("Faults");
 }

@@ -15,11 +15,13 @@ namespace cli {
 namespace {
 
 bool is_number(const std::string& name) {
-  return !name.empty() && name.size() < 4 && name.find_first_not_of("0123456789") == std::string::npos;
+  return !name.empty() && name.size() < 4 &&
+         name.find_first_not_of("0123456789") == std::string::npos;
 }
 
 CameraSource::Kind kind_of(const std::string& name) {
-  const bool is_live = is_number(name) || name.rfind("/dev/", 0) == 0 || name.find("://") != std::string::npos;
+  const bool is_live =
+      is_number(name) || name.rfind("/dev/", 0) == 0 || name.find("://") != std::string::npos;
   return is_live ? CameraSource::Kind::kLive : CameraSource::Kind::kFile;
 }
 
@@ -69,8 +71,10 @@ bool CameraSource::State::take(Shot& shot) {
   try {
     if (!capture.read(colour) || colour.empty()) return false;
     shot.luma = cv::Mat();
-    if (colour.channels() == 1) shot.luma = colour.clone();
-    else cv::cvtColor(colour, shot.luma, cv::COLOR_BGR2GRAY);
+    if (colour.channels() == 1)
+      shot.luma = colour.clone();
+    else
+      cv::cvtColor(colour, shot.luma, cv::COLOR_BGR2GRAY);
   } catch (const cv::Exception&) {
     return false;  // a device that was pulled out
   }
@@ -81,11 +85,13 @@ bool CameraSource::State::take(Shot& shot) {
     shot.time.received_ns = shot.time.host_ns = steady_ns();
     shot.time.uncertainty_ns = INT64_MAX;
   } else {
-    // OpenCV's position is this picture's in one backend and the next one's in another; the rate is the same.
+    // OpenCV's position is this picture's in one backend and the next one's in another; the rate is
+    // the same.
     const double fps = capture.get(cv::CAP_PROP_FPS);
     const double seconds = fps > 0 ? static_cast<double>(shot.number) / fps
                                    : capture.get(cv::CAP_PROP_POS_MSEC) * 1e-3;
-    shot.time.received_ns = shot.time.host_ns = shot.time.device_ns = static_cast<int64_t>(seconds * 1e9);
+    shot.time.received_ns = shot.time.host_ns = shot.time.device_ns =
+        static_cast<int64_t>(seconds * 1e9);
     shot.time.clock_id = 1;
   }
   return true;
@@ -128,7 +134,8 @@ tvs_status CameraSource::State::next(tvs_frame* frame) {
 
 CameraSource::CameraSource(const std::string& name) : CameraSource(name, kind_of(name)) {}
 
-CameraSource::CameraSource(const std::string& name, Kind kind) : state_(std::make_unique<State>(kind)) {
+CameraSource::CameraSource(const std::string& name, Kind kind)
+    : state_(std::make_unique<State>(kind)) {
   bool is_open = false;
   const Silence silence;
   try {
