@@ -22,7 +22,7 @@ tv_feature_options options_of(float size) {
   tv_feature_options options;
   tv_feature_options_init(&options);
   options.keypoint_size = size;
-  options.descriptor = TV_DESCRIPTOR_SIFT;
+  options.descriptor = TV_NORMALISATION_SIFT;
   return options;
 }
 

@@ -141,7 +141,7 @@ void add_same_work_as_fast(const Pair& pair, float size) {
   options.feature.threshold = threshold;
   options.feature.min_threshold = 0;
   options.feature.orientation = TV_ORIENTATION_UPRIGHT;
-  options.feature.descriptor = TV_DESCRIPTOR_SIFT;
+  options.feature.descriptor = TV_NORMALISATION_SIFT;
   options.feature.keypoint_size = size;
   options.match.ratio = kRatio;
   const std::string name =
@@ -157,7 +157,7 @@ void add_same_work_as_sift(const Pair& pair) {
   for (const cv::KeyPoint& keypoint : keypoints) sizes.push_back(keypoint.size);
   Options options;
   options.feature.max_keypoints = static_cast<int32_t>(keypoints.size());
-  options.feature.descriptor = TV_DESCRIPTOR_SIFT;
+  options.feature.descriptor = TV_NORMALISATION_SIFT;
   options.feature.keypoint_size = static_cast<float>(bench::median(sizes));
   options.match.ratio = kRatio;
   const std::string name = "pair/" + pair.name + " SIFT's number and median window";

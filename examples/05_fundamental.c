@@ -44,13 +44,13 @@ int main(int argc, char **argv) {
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
   tv_estimate_options_init(&options);
-  options.method = TV_METHOD_EIGHT_POINT;
+  options.method = TV_SOLVER_EIGHT_POINT;
   if (argc > 2) options.max_error_px = atof(argv[2]);
   tv_two_view_init(&found);
   status = tv_estimate_two_view(context, NULL, NULL, pixels[0], pixels[1], ratios, n, &options,
                                 &found, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
-  printf("%s (%s): %d of %d matches agree after %d samples\n", tv_config_string(found.config),
+  printf("%s (%s): %d of %d matches agree after %d samples\n", tv_kind_string(found.kind),
          tv_verdict_string(found.verdict), found.num_inliers, n, found.num_iterations);
   for (r = 0; r < 3 && found.has_F; ++r)
     printf("  % .6e % .6e % .6e\n", found.F[3 * r], found.F[3 * r + 1], found.F[3 * r + 2]);

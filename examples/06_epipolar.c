@@ -62,7 +62,7 @@ int main(int argc, char **argv) {
   limits.max_matches = MOST;
   if (tv_context_new(&context, &limits) != TV_OK) return fail("no memory");
   tv_estimate_options_init(&options);
-  options.method = TV_METHOD_SEVEN_POINT;
+  options.method = TV_SOLVER_SEVEN_POINT;
   tv_two_view_init(&found);
   if (tv_estimate_two_view(context, NULL, NULL, pixels[0], pixels[1], ratios, n, &options, &found,
                            inlier) != TV_OK ||

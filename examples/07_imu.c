@@ -88,7 +88,7 @@ int main(int argc, char **argv) {
     for (j = 0; j < 3; ++j)
       for (k = 0; k < 3; ++k)
         trace += world[1][3 * k + i] * world[0][3 * k + j] * pose.R[3 * i + j];
-  printf("%s (%s), %d of %d matches agree\n", tv_config_string(pose.config),
+  printf("%s (%s), %d of %d matches agree\n", tv_kind_string(pose.kind),
          tv_verdict_string(pose.verdict), pose.num_inliers, n);
   printf("the cameras turned by %.3f deg, the IMU differs from that by %.3f deg\n",
          DEGREES * acos(fmax(-1, fmin(1, (pose.R[0] + pose.R[4] + pose.R[8] - 1) / 2))),

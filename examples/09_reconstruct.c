@@ -60,7 +60,7 @@ int main(int argc, char **argv) {
   tv_reconstruction_init(&cloud);
   status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, &cloud);
   if (status != TV_OK) return fail(tv_status_string(status));
-  printf("%s (%s): %d of %d matches agree, %d points\n", tv_config_string(pose.config),
+  printf("%s (%s): %d of %d matches agree, %d points\n", tv_kind_string(pose.kind),
          tv_verdict_string(pose.verdict), pose.num_inliers, pose.num_matches, cloud.num_points);
   if (!pose.has_R || !pose.has_t) return 3;
   for (k = 0; k < 3; ++k)

@@ -57,7 +57,7 @@ int main(void) {
   tv_reconstruction_init(&cloud);
   status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, &cloud);
   if (status != TV_OK) return 2;
-  printf("%s (%s): %d of %d matches agree, t = (%.3f, %.3f, %.3f)\n", tv_config_string(pose.config),
+  printf("%s (%s): %d of %d matches agree, t = (%.3f, %.3f, %.3f)\n", tv_kind_string(pose.kind),
          tv_verdict_string(pose.verdict), pose.num_inliers, pose.num_matches, pose.t[0], pose.t[1],
          pose.t[2]);
   printf("%lu of %lu bytes used, none of the heap\n", (unsigned long)tv_context_high_water(context),

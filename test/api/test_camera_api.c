@@ -360,9 +360,9 @@ static void test_every_number_has_its_name(void) {
   TEST_ASSERT_EQUAL_STRING(TV_VERSION_STRING, tv_version_string());
   TEST_ASSERT_EQUAL_STRING("neon", tv_kernels_string(TV_KERNELS_NEON));
   TEST_ASSERT_EQUAL_STRING("unknown", tv_kernels_string((tv_kernels)6));
-  TEST_ASSERT_EQUAL_STRING("planar_or_panoramic", tv_config_string(TV_CONFIG_PLANAR_OR_PANORAMIC));
-  TEST_ASSERT_EQUAL_STRING("no_motion", tv_config_string(TV_CONFIG_NO_MOTION));
-  TEST_ASSERT_EQUAL_STRING("unknown", tv_config_string((tv_config)7));
+  TEST_ASSERT_EQUAL_STRING("planar_or_panoramic", tv_kind_string(TV_KIND_PLANAR_OR_PANORAMIC));
+  TEST_ASSERT_EQUAL_STRING("no_motion", tv_kind_string(TV_KIND_NO_MOTION));
+  TEST_ASSERT_EQUAL_STRING("unknown", tv_kind_string((tv_kind)7));
   TEST_ASSERT_EQUAL_STRING("doubtful", tv_verdict_string(TV_VERDICT_DOUBTFUL));
   TEST_ASSERT_EQUAL_STRING("unknown", tv_verdict_string((tv_verdict)3));
   TEST_ASSERT_EQUAL_STRING("low_parallax", tv_reason_string(TV_REASON_LOW_PARALLAX));

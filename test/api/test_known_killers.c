@@ -72,7 +72,7 @@ static int all_finite(const double *values, int count) {
 /* What holds of every result. */
 static void expect_sound(int count) {
   int i, inliers = 0;
-  TEST_ASSERT_TRUE(result.config >= TV_CONFIG_DEGENERATE && result.config <= TV_CONFIG_NO_MOTION);
+  TEST_ASSERT_TRUE(result.kind >= TV_KIND_DEGENERATE && result.kind <= TV_KIND_NO_MOTION);
   TEST_ASSERT_EQUAL_INT(result.verdict == TV_VERDICT_OK, result.reasons == 0);
   TEST_ASSERT_TRUE(all_finite(result.R, 9) && all_finite(result.t, 3) && all_finite(result.E, 9) &&
                    all_finite(result.F, 9) && all_finite(result.H, 9));
@@ -103,8 +103,8 @@ typedef struct best {
 } best;
 
 static best estimate_every_way(int count) {
-  static const int methods[3] = {TV_METHOD_FIVE_POINT, TV_METHOD_EIGHT_POINT,
-                                 TV_METHOD_SEVEN_POINT};
+  static const int methods[3] = {TV_SOLVER_FIVE_POINT, TV_SOLVER_EIGHT_POINT,
+                                 TV_SOLVER_SEVEN_POINT};
   best b = {TV_VERDICT_REFUSED, 0};
   int lens, m;
   for (lens = -1; lens < 3; ++lens) {
@@ -115,7 +115,7 @@ static best estimate_every_way(int count) {
       b.has_t |= result.has_t;
     }
   }
-  options.method = TV_METHOD_FIVE_POINT;
+  options.method = TV_SOLVER_FIVE_POINT;
   return b;
 }
 
@@ -198,10 +198,10 @@ static void test_opencv_24967_a_still_camera_ends_with_a_verdict(void) {
       const int moves = trial % 3 == 1 && i % 4 == 0;
       set_match(i, x, y, x + moves, y - moves);
     }
-    options.method = trial % 2 == 0 ? TV_METHOD_FIVE_POINT : TV_METHOD_SEVEN_POINT;
+    options.method = trial % 2 == 0 ? TV_SOLVER_FIVE_POINT : TV_SOLVER_SEVEN_POINT;
     estimate(&camera, count);
     TEST_ASSERT_TRUE(result.verdict != TV_VERDICT_OK);
-    if (trial % 3 != 1) TEST_ASSERT_EQUAL_INT(TV_CONFIG_NO_MOTION, result.config);
+    if (trial % 3 != 1) TEST_ASSERT_EQUAL_INT(TV_KIND_NO_MOTION, result.kind);
   }
 }
 
@@ -303,7 +303,7 @@ static void test_opengv_73_rotation_only_gives_the_rotation(void) {
     TEST_ASSERT_TRUE(result.has_R && result.num_inliers > count / 2);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, R[2], result.R[2]);
     if (k >= 7 && count < 300) continue;
-    TEST_ASSERT_EQUAL_INT(TV_CONFIG_PANORAMIC, result.config);
+    TEST_ASSERT_EQUAL_INT(TV_KIND_PANORAMIC, result.kind);
     TEST_ASSERT_TRUE((result.reasons & TV_REASON_PURE_ROTATION) != 0 && !result.has_t);
   }
 }

@@ -216,7 +216,7 @@ static void test_no_geometry_is_a_result(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
   TEST_ASSERT_EQUAL_INT(0, reconstruction.num_matches);
   TEST_ASSERT_EQUAL_INT(0, reconstruction.num_points);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_DEGENERATE, two_view.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_DEGENERATE, two_view.kind);
   TEST_ASSERT_EQUAL_INT(0, two_view.has_R);
   views[0].image = api_image(drawn[0], 1, 1, 1);
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
@@ -353,7 +353,7 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   num_guided = reconstruction.num_matches;
   TEST_ASSERT_TRUE(num_guided > num_plain + num_plain / 50);
   TEST_ASSERT_TRUE(guided.num_inliers > first.num_inliers);
-  TEST_ASSERT_EQUAL_INT(first.config, guided.config);
+  TEST_ASSERT_EQUAL_INT(first.kind, guided.kind);
   TEST_ASSERT_EQUAL_INT(first.verdict, guided.verdict);
   TEST_ASSERT_EQUAL_UINT32(first.reasons, guided.reasons);
   for (k = 0; k < num_plain; ++k) TEST_ASSERT_TRUE(place_of(&plain[k]) >= 0);

@@ -183,7 +183,7 @@ static void expect_sound(int count, int cameras_given) {
   const uint8_t *has;
   int i, inliers = 0;
   TEST_ASSERT_EQUAL_UINT32(sizeof result, result.struct_size);
-  TEST_ASSERT_TRUE(result.config >= 0 && result.config <= TV_CONFIG_NO_MOTION);
+  TEST_ASSERT_TRUE(result.kind >= 0 && result.kind <= TV_KIND_NO_MOTION);
   TEST_ASSERT_TRUE(result.verdict >= 0 && result.verdict <= TV_VERDICT_OK);
   TEST_ASSERT_EQUAL_INT(result.verdict == TV_VERDICT_OK, result.reasons == 0);
   TEST_ASSERT_TRUE(result.has_alternative_covariance <= result.has_alternative);
@@ -203,7 +203,7 @@ static void expect_sound(int count, int cameras_given) {
   expect_flagged(result.has_alternative, result.alternative_R, 9);
   expect_flagged(result.has_alternative, result.alternative_t, 3);
   expect_flagged(result.has_covariance, result.covariance, 25);
-  has = has_by_config[result.config];
+  has = has_by_config[result.kind];
   TEST_ASSERT_EQUAL_INT(has[0] && cameras_given, result.has_R);
   TEST_ASSERT_EQUAL_INT(has[1], result.has_t);
   TEST_ASSERT_EQUAL_INT(has[2], result.has_E);
@@ -215,7 +215,7 @@ static void expect_sound(int count, int cameras_given) {
     expect_e_and_f_of_pose(cameras_given);
   }
   if (result.has_alternative) {
-    TEST_ASSERT_EQUAL_INT(TV_CONFIG_PLANAR, result.config);
+    TEST_ASSERT_EQUAL_INT(TV_KIND_PLANAR, result.kind);
     expect_rotation(result.alternative_R);
     TEST_ASSERT_DOUBLE_WITHIN(1e-14, 1, norm(result.alternative_t, 3));
   }
@@ -267,7 +267,7 @@ static void test_init_sets_the_documented_defaults(void) {
   memset(&options, API_PATTERN, sizeof options);
   tv_estimate_options_init(&options);
   TEST_ASSERT_EQUAL_UINT32(sizeof options, options.struct_size);
-  TEST_ASSERT_EQUAL_INT(TV_METHOD_FIVE_POINT, options.method);
+  TEST_ASSERT_EQUAL_INT(TV_SOLVER_FIVE_POINT, options.method);
   TEST_ASSERT_TRUE(options.max_error_px == 1.0 && options.confidence == 0.9999);
   TEST_ASSERT_EQUAL_INT(10000, options.max_iterations);
   TEST_ASSERT_EQUAL_INT(0, options.fixed_iterations);
@@ -306,10 +306,10 @@ static void test_null_is_fine_where_the_header_says_so(void) {
   TEST_ASSERT_EQUAL_MEMORY(&with_mask, &result, sizeof result);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, NULL, NULL,
                                                     NULL, 0, &options, &result, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_DEGENERATE, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_DEGENERATE, result.kind);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, NULL, NULL, pixels0, pixels1, NULL,
                                                     MAX_MATCHES, NULL, &result, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_UNCALIBRATED, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_UNCALIBRATED, result.kind);
 }
 
 static void test_wrong_struct_sizes_are_refused(void) {
@@ -326,7 +326,7 @@ static void test_wrong_struct_sizes_are_refused(void) {
 
 static void test_options_out_of_range_are_refused(void) {
   const double bad[3] = {NAN, INFINITY, -INFINITY};
-  const int methods[4] = {-1, TV_METHOD_UPRIGHT, 4, 1 << 30};
+  const int methods[4] = {-1, TV_SOLVER_UPRIGHT, 4, 1 << 30};
   int k;
   for (k = 0; k < 3; ++k) {
     options.max_error_px = bad[k], expect_options_refused(TV_ERR_NOT_FINITE);
@@ -382,10 +382,10 @@ static void test_the_mask_may_not_lie_over_an_input(void) {
 static void test_every_method_finds_an_exact_motion(void) {
   int method;
   spoil(800, 1000);
-  for (method = TV_METHOD_FIVE_POINT; method <= TV_METHOD_SEVEN_POINT; ++method) {
+  for (method = TV_SOLVER_FIVE_POINT; method <= TV_SOLVER_SEVEN_POINT; ++method) {
     options.method = method;
     estimate(MAX_MATCHES);
-    TEST_ASSERT_EQUAL_INT(TV_CONFIG_CALIBRATED, result.config);
+    TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, result.kind);
     TEST_ASSERT_EQUAL_INT(TV_VERDICT_OK, result.verdict);
     TEST_ASSERT_TRUE(result.num_inliers >= 800);
     TEST_ASSERT_TRUE(distance(true_R, result.R, 9) < 1e-4);
@@ -399,7 +399,7 @@ static void test_a_pinhole_and_a_fisheye_make_a_pair(void) {
   camera1.k[0] = 0.01, camera1.k[1] = -0.003;
   make_scene(300, 0, 1);
   estimate(300);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_CALIBRATED, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, result.kind);
   TEST_ASSERT_EQUAL_INT(300, result.num_inliers);
   TEST_ASSERT_TRUE(distance(true_R, result.R, 9) < 1e-7);
   TEST_ASSERT_TRUE(distance(true_t, result.t, 3) < 1e-7);
@@ -408,9 +408,9 @@ static void test_a_pinhole_and_a_fisheye_make_a_pair(void) {
 static void test_without_cameras_f_holds_for_the_pixels(void) {
   int method, i;
   spoil(200, 250);
-  for (method = TV_METHOD_EIGHT_POINT; method <= TV_METHOD_SEVEN_POINT; ++method) {
+  for (method = TV_SOLVER_EIGHT_POINT; method <= TV_SOLVER_SEVEN_POINT; ++method) {
     estimate_uncalibrated(250, method);
-    TEST_ASSERT_EQUAL_INT(TV_CONFIG_UNCALIBRATED, result.config);
+    TEST_ASSERT_EQUAL_INT(TV_KIND_UNCALIBRATED, result.kind);
     TEST_ASSERT_TRUE(result.num_inliers >= 200);
     for (i = 0; i < 200; ++i) {
       const double *F = result.F;
@@ -437,25 +437,25 @@ static void test_pixels_that_are_not_finite_are_never_inliers(void) {
   TEST_ASSERT_EQUAL_INT(MAX_MATCHES - 40, result.num_inliers);
   for (i = 0; i < 2 * MAX_MATCHES; ++i) pixels0[i] = NAN;
   estimate(MAX_MATCHES);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_DEGENERATE, result.config);
-  estimate_uncalibrated(MAX_MATCHES, TV_METHOD_EIGHT_POINT);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_DEGENERATE, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_DEGENERATE, result.kind);
+  estimate_uncalibrated(MAX_MATCHES, TV_SOLVER_EIGHT_POINT);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_DEGENERATE, result.kind);
 }
 
 static void test_too_few_matches_are_never_ok(void) {
   int method, count;
-  for (method = TV_METHOD_FIVE_POINT; method <= TV_METHOD_SEVEN_POINT; ++method) {
+  for (method = TV_SOLVER_FIVE_POINT; method <= TV_SOLVER_SEVEN_POINT; ++method) {
     for (count = 0; count < 8; ++count) {
       options.method = method;
       estimate(count);
       TEST_ASSERT_TRUE(result.verdict != TV_VERDICT_OK);
       TEST_ASSERT_TRUE(result.reasons & TV_REASON_TOO_FEW_MATCHES);
-      TEST_ASSERT_TRUE(count > 5 || result.config == TV_CONFIG_DEGENERATE);
-      if (method != TV_METHOD_FIVE_POINT) estimate_uncalibrated(count, method);
+      TEST_ASSERT_TRUE(count > 5 || result.kind == TV_KIND_DEGENERATE);
+      if (method != TV_SOLVER_FIVE_POINT) estimate_uncalibrated(count, method);
     }
     options.method = method;
     estimate(8);
-    if (method != TV_METHOD_FIVE_POINT) estimate_uncalibrated(8, method);
+    if (method != TV_SOLVER_FIVE_POINT) estimate_uncalibrated(8, method);
   }
 }
 
@@ -473,8 +473,8 @@ static void estimate_every_way(int count) {
   for (k = 0; k < 3; ++k) {
     options.max_error_px = thresholds[k];
     options.max_iterations = 300;
-    for (method = TV_METHOD_SEVEN_POINT; method >= TV_METHOD_FIVE_POINT; --method) {
-      if (method != TV_METHOD_FIVE_POINT) estimate_uncalibrated(count, method);
+    for (method = TV_SOLVER_SEVEN_POINT; method >= TV_SOLVER_FIVE_POINT; --method) {
+      if (method != TV_SOLVER_FIVE_POINT) estimate_uncalibrated(count, method);
       options.method = method;
       estimate(count);
     }
@@ -484,7 +484,7 @@ static void estimate_every_way(int count) {
 static void test_one_match_many_times_is_one_witness(void) {
   fill(MAX_MATCHES, 100, 200, 130, 190);
   estimate(MAX_MATCHES);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_DEGENERATE, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_DEGENERATE, result.kind);
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_REFUSED, result.verdict);
   TEST_ASSERT_TRUE(result.reasons & TV_REASON_TOO_FEW_MATCHES);
   estimate_every_way(MAX_MATCHES);
@@ -543,13 +543,13 @@ static void test_equal_images_are_no_motion(void) {
   camera1 = camera0;
   memcpy(pixels1, pixels0, sizeof pixels1);
   estimate(300);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_NO_MOTION, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_NO_MOTION, result.kind);
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_REFUSED, result.verdict);
   TEST_ASSERT_TRUE(result.reasons & TV_REASON_NO_MOTION);
   TEST_ASSERT_EQUAL_INT(300, result.num_inliers);
   for (i = 0; i < 9; ++i) TEST_ASSERT_TRUE(result.R[i] == (i % 4 == 0));
-  estimate_uncalibrated(300, TV_METHOD_EIGHT_POINT);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_NO_MOTION, result.config);
+  estimate_uncalibrated(300, TV_SOLVER_EIGHT_POINT);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_NO_MOTION, result.kind);
 }
 
 static void test_a_pure_rotation_is_panoramic(void) {
@@ -557,13 +557,13 @@ static void test_a_pure_rotation_is_panoramic(void) {
   make_scene(300, 0, 0);
   spoil(250, 300);
   estimate(300);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_PANORAMIC, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_PANORAMIC, result.kind);
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_REFUSED, result.verdict);
   TEST_ASSERT_TRUE(result.reasons & TV_REASON_PURE_ROTATION);
   TEST_ASSERT_TRUE(distance(true_R, result.R, 9) < 1e-6);
   TEST_ASSERT_TRUE(result.num_inliers >= 250);
-  estimate_uncalibrated(300, TV_METHOD_EIGHT_POINT);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_PLANAR_OR_PANORAMIC, result.config);
+  estimate_uncalibrated(300, TV_SOLVER_EIGHT_POINT);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_PLANAR_OR_PANORAMIC, result.kind);
 }
 
 static void test_a_plane_is_planar_and_one_of_its_poses_is_true(void) {
@@ -571,14 +571,14 @@ static void test_a_plane_is_planar_and_one_of_its_poses_is_true(void) {
   make_scene(300, 1, 1);
   spoil(250, 300);
   estimate(300);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_PLANAR, result.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_PLANAR, result.kind);
   TEST_ASSERT_EQUAL_INT(result.has_alternative,
                         (result.reasons & TV_REASON_TWO_PLANAR_SOLUTIONS) != 0);
   first = distance(true_R, result.R, 9) + distance(true_t, result.t, 3);
   second = distance(true_R, result.alternative_R, 9) + distance(true_t, result.alternative_t, 3);
   TEST_ASSERT_TRUE((first < second ? first : second) < 1e-5);
-  estimate_uncalibrated(300, TV_METHOD_EIGHT_POINT);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_PLANAR_OR_PANORAMIC, result.config);
+  estimate_uncalibrated(300, TV_SOLVER_EIGHT_POINT);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_PLANAR_OR_PANORAMIC, result.kind);
 }
 
 static void test_a_hundred_thousand_matches_fit_a_context_of_that_size(void) {

@@ -1,9 +1,9 @@
 // Metres from velocity, altitude and floor: flights whose truth is known in closed form.
-#include <unity.h>  // last: its macros take isnan and isinf
-
 #include <cmath>
 
 #include "drone/metric_scale.h"
+
+#include <unity.h>  // last: its macros take isnan and isinf
 
 using namespace cli;
 

@@ -1,7 +1,5 @@
 // reconstruct --recording: flights of the simulated drone through the room, held against its truth.
 #include <unistd.h>
-#include <unity.h>  // last: its macros take isnan and isinf
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -20,6 +18,8 @@
 #include "simulator/film.h"
 #include "simulator/firmware.h"
 #include "verbs.h"
+
+#include <unity.h>  // last: its macros take isnan and isinf
 
 using namespace cli;
 using simulator::FlightState;

@@ -126,7 +126,7 @@ void test_a_reconstruction_finds_the_true_motion() {
   TEST_ASSERT_EQUAL_INT(TV_OK,
                         tv_reconstruct(context, &views[0], &views[1], nullptr, &two_view, &result));
   tv_context_free(context);
-  TEST_ASSERT_EQUAL_INT(TV_CONFIG_CALIBRATED, two_view.config);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, two_view.kind);
   room::Mat3 R;
   Vec3 t;
   room::relative_pose(pose0, pose1, R, t);

@@ -14,7 +14,7 @@ tv_estimate_options options_of(fuzz::Bytes& bytes) {
   options.max_iterations = bytes.whole(1, kMaxSamples);
   options.fixed_iterations = bytes.whole(0, 3) == 0 ? bytes.whole(0, kMaxSamples) : 0;
   options.seed = bytes.raw<uint64_t>();
-  if (bytes.whole(0, 3) == 0 || options.method == TV_METHOD_UPRIGHT) {
+  if (bytes.whole(0, 3) == 0 || options.method == TV_SOLVER_UPRIGHT) {
     options.gravity_sigma_rad = bytes.wild(0, 0.5);
     for (double& g : options.gravity0) g = bytes.wild(-1, 1);
     for (double& g : options.gravity1) g = bytes.wild(-1, 1);
@@ -86,7 +86,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   FUZZ_REQUIRE(status[0] == status[1]);
   if (status[0] != TV_OK) return 0;
-  FUZZ_REQUIRE(result[0].config == result[1].config && result[0].verdict == result[1].verdict);
+  FUZZ_REQUIRE(result[0].kind == result[1].kind && result[0].verdict == result[1].verdict);
   for (int i = 0; i < 9; ++i) FUZZ_REQUIRE(result[0].R[i] == result[1].R[i % 3 * 3 + i / 3]);
   return 0;
 }

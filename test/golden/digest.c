@@ -99,7 +99,7 @@ static void add_matches(const tv_correspondence *matches, int32_t count) {
 }
 
 static void add_two_view(const tv_two_view *r) {
-  add_int(r->config);
+  add_int(r->kind);
   add_int(r->verdict);
   add_int(r->reasons);
   add_int(r->num_matches);
@@ -231,7 +231,7 @@ static void digest_features(const pair *p, tv_context *context, features *f) {
     options.min_threshold = options.arc == 10 ? 0 : 3;
     options.subpixel = options.arc != 11;
     options.orientation = options.arc == 12 ? TV_ORIENTATION_UPRIGHT : TV_ORIENTATION_GRADIENT;
-    options.descriptor = options.arc == 12 ? TV_DESCRIPTOR_ROOTSIFT : TV_DESCRIPTOR_SIFT;
+    options.descriptor = options.arc == 12 ? TV_NORMALISATION_ROOTSIFT : TV_NORMALISATION_SIFT;
     options.keypoint_size = (float)options.arc - 6.5f;
     extract(p, context, &options, f);
   }
@@ -332,16 +332,16 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   tv_estimate_options options;
   tv_two_view with_gravity;
   int32_t method;
-  for (method = TV_METHOD_UPRIGHT; method >= 0; --method) { /* the five-point pose is the last */
+  for (method = TV_SOLVER_UPRIGHT; method >= 0; --method) { /* the five-point pose is the last */
     tv_estimate_options_init(&options);
     options.method = method;
     options.max_iterations = 2000;
-    if (method == TV_METHOD_UPRIGHT) {
+    if (method == TV_SOLVER_UPRIGHT) {
       options.gravity0[1] = options.gravity1[1] = 1;
       options.gravity_sigma_rad = 0.02;
     }
     start();
-    if (method == TV_METHOD_EIGHT_POINT || method == TV_METHOD_SEVEN_POINT) {
+    if (method == TV_SOLVER_EIGHT_POINT || method == TV_SOLVER_SEVEN_POINT) {
       estimate(p, context, m, 0, &options, pose);
     }
     estimate(p, context, m, 1, &options, pose);

@@ -105,7 +105,7 @@ void test_the_ellipsoid_of_95_per_cent_holds_the_truth(void) {
       ++total;
       if (std::getenv("TWOVIEW_VERBOSE") != nullptr && distance > 100) {
         std::printf("far: seed %llu distance %.0f config %d %d matches\n",
-                    static_cast<unsigned long long>(seed), distance, r.config, pair.num);
+                    static_cast<unsigned long long>(seed), distance, r.kind, pair.num);
       }
     }
     std::printf("%-24s %6d %10.2f %12.2f %8d\n", kNames[which], total, 100.0 * within / total,

@@ -112,11 +112,11 @@ Statistics statistics;
 
 void gather_statistics() {
   if (statistics.base_samples > 0) return;
-  constexpr int kMethods[2] = {TV_METHOD_FIVE_POINT, TV_METHOD_UPRIGHT};
+  constexpr int kMethods[2] = {TV_SOLVER_FIVE_POINT, TV_SOLVER_UPRIGHT};
   for (int k = 0; k < kPairs; ++k) {
     Gravity truth;
     make_pair(k, &truth);
-    const tv_two_view base = estimated(TV_METHOD_FIVE_POINT, truth);
+    const tv_two_view base = estimated(TV_SOLVER_FIVE_POINT, truth);
     statistics.base_pose.add(pose_error_deg(base));
     statistics.base_rotation.add(rotation_error_deg(base));
     statistics.base_covered += scene::within_ellipsoid_95(base, pair.R, pair.t);
@@ -175,18 +175,18 @@ void test_wrong_gravity_does_not_ruin_the_pose(void) {
   for (int k = 0; k < kWrongPairs; ++k) {
     Gravity gravity;
     make_pair(k, &gravity);
-    base.add(rotation_error_deg(estimated(TV_METHOD_FIVE_POINT, gravity)));
+    base.add(rotation_error_deg(estimated(TV_SOLVER_FIVE_POINT, gravity)));
     Vec3 b1, b2;
     tv::tangent_basis(gravity.down[1], &b1, &b2);
     gravity.down[1] = tv::rotation_about(b1, 5 * kRadians) * gravity.down[1];
     gravity.sigma_rad = 0.5 * kRadians;
-    with.add(rotation_error_deg(estimated(TV_METHOD_FIVE_POINT, gravity)));
+    with.add(rotation_error_deg(estimated(TV_SOLVER_FIVE_POINT, gravity)));
   }
   TEST_ASSERT_TRUE(with.sum < 1.1 * base.sum);
 }
 
 void test_swapped_views_with_swapped_gravity_give_the_inverse(void) {
-  for (int method : {TV_METHOD_FIVE_POINT, TV_METHOD_UPRIGHT}) {
+  for (int method : {TV_SOLVER_FIVE_POINT, TV_SOLVER_UPRIGHT}) {
     for (int k = 0; k < 5; ++k) {
       Gravity truth;
       make_pair(k, &truth);
@@ -210,9 +210,9 @@ void test_vectors_of_any_length_mean_their_direction(void) {
   Gravity truth;
   make_pair(1, &truth);
   const Gravity gravity = noisy(truth, 0.5, 4);
-  const tv_two_view unit = estimated(TV_METHOD_FIVE_POINT, gravity);
+  const tv_two_view unit = estimated(TV_SOLVER_FIVE_POINT, gravity);
   const Gravity stretched{{4 * gravity.down[0], 0.5 * gravity.down[1]}, gravity.sigma_rad};
-  const tv_two_view twice = estimated(TV_METHOD_FIVE_POINT, stretched);
+  const tv_two_view twice = estimated(TV_SOLVER_FIVE_POINT, stretched);
   TEST_ASSERT_EQUAL_MEMORY(unit.R, twice.R, sizeof unit.R);
   TEST_ASSERT_EQUAL_MEMORY(unit.covariance, twice.covariance, sizeof unit.covariance);
 }
@@ -222,9 +222,9 @@ void test_vectors_without_a_sigma_are_not_read(void) {
   make_pair(2, &truth);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const tv_two_view plain =
-      estimated(TV_METHOD_FIVE_POINT, Gravity{{Vec3::Zero(), Vec3::Zero()}, 0});
+      estimated(TV_SOLVER_FIVE_POINT, Gravity{{Vec3::Zero(), Vec3::Zero()}, 0});
   const tv_two_view unread =
-      estimated(TV_METHOD_FIVE_POINT, Gravity{{Vec3(nan, 0, 0), Vec3(1, 2, 3)}, 0});
+      estimated(TV_SOLVER_FIVE_POINT, Gravity{{Vec3(nan, 0, 0), Vec3(1, 2, 3)}, 0});
   TEST_ASSERT_EQUAL_MEMORY(&plain, &unread, sizeof plain);
 }
 
@@ -239,32 +239,32 @@ void test_what_is_no_gravity_is_refused(void) {
       Gravity gravity = good;
       gravity.down[view][1] = bad;
       TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
-                            estimate(options_of(TV_METHOD_FIVE_POINT, gravity), &result));
+                            estimate(options_of(TV_SOLVER_FIVE_POINT, gravity), &result));
     }
     Gravity gravity = good;
     gravity.down[view].setZero();
     TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                          estimate(options_of(TV_METHOD_FIVE_POINT, gravity), &result));
+                          estimate(options_of(TV_SOLVER_FIVE_POINT, gravity), &result));
   }
   for (double bad : {nan, inf, -inf}) {
     good.sigma_rad = bad;
     TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE,
-                          estimate(options_of(TV_METHOD_FIVE_POINT, good), &result));
+                          estimate(options_of(TV_SOLVER_FIVE_POINT, good), &result));
   }
   for (double bad : {-1e-9, 3.2}) {
     good.sigma_rad = bad;
     TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                          estimate(options_of(TV_METHOD_FIVE_POINT, good), &result));
+                          estimate(options_of(TV_SOLVER_FIVE_POINT, good), &result));
   }
   good.sigma_rad = 0;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, estimate(options_of(TV_METHOD_UPRIGHT, good), &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, estimate(options_of(TV_SOLVER_UPRIGHT, good), &result));
 }
 
 void test_the_upright_method_needs_cameras(void) {
   Gravity good;
   make_pair(3, &good);
   good.sigma_rad = 0.01;
-  const tv_estimate_options options = options_of(TV_METHOD_UPRIGHT, good);
+  const tv_estimate_options options = options_of(TV_SOLVER_UPRIGHT, good);
   tv_two_view result;
   tv_two_view_init(&result);
   TEST_ASSERT_EQUAL_INT(
@@ -277,7 +277,7 @@ void test_the_upright_method_needs_cameras(void) {
 void test_extreme_sigmas_and_opposite_gravities_give_finite_results(void) {
   Gravity truth;
   make_pair(4, &truth);
-  for (int method : {TV_METHOD_FIVE_POINT, TV_METHOD_UPRIGHT}) {
+  for (int method : {TV_SOLVER_FIVE_POINT, TV_SOLVER_UPRIGHT}) {
     for (double sigma_rad : {1e-300, 1e-6, 3.1}) {
       for (double sign : {1.0, -1.0}) {
         const tv_two_view result =

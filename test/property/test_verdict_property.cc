@@ -73,10 +73,10 @@ void test_config_names_the_kind_of_pair(void) {
   const Kind kinds[5] = {Kind::kGeneral, Kind::kForward, Kind::kPlanar, Kind::kRotation,
                          Kind::kStill};
   const int configs[2][5] = {
-      {TV_CONFIG_UNCALIBRATED, TV_CONFIG_UNCALIBRATED, TV_CONFIG_PLANAR_OR_PANORAMIC,
-       TV_CONFIG_PLANAR_OR_PANORAMIC, TV_CONFIG_NO_MOTION},
-      {TV_CONFIG_CALIBRATED, TV_CONFIG_CALIBRATED, TV_CONFIG_PLANAR, TV_CONFIG_PANORAMIC,
-       TV_CONFIG_NO_MOTION}};
+      {TV_KIND_UNCALIBRATED, TV_KIND_UNCALIBRATED, TV_KIND_PLANAR_OR_PANORAMIC,
+       TV_KIND_PLANAR_OR_PANORAMIC, TV_KIND_NO_MOTION},
+      {TV_KIND_CALIBRATED, TV_KIND_CALIBRATED, TV_KIND_PLANAR, TV_KIND_PANORAMIC,
+       TV_KIND_NO_MOTION}};
   for (int calibrated = 0; calibrated < 2; ++calibrated) {
     for (int k = 0; k < 5; ++k) {
       int right = 0;
@@ -86,8 +86,8 @@ void test_config_names_the_kind_of_pair(void) {
         options.noise_px = trial % 4 < 2 ? 0.2 : 0.5;
         scene::make(options, &pair);
         const tv_two_view r = estimate_pair(
-            calibrated == 1, calibrated == 1 ? TV_METHOD_FIVE_POINT : TV_METHOD_SEVEN_POINT);
-        right += r.config == configs[calibrated][k];
+            calibrated == 1, calibrated == 1 ? TV_SOLVER_FIVE_POINT : TV_SOLVER_SEVEN_POINT);
+        right += r.kind == configs[calibrated][k];
       }
       TEST_ASSERT_GREATER_OR_EQUAL_INT(18, right);
     }
@@ -99,16 +99,16 @@ void test_each_kind_has_what_it_promises(void) {
     scene::make(options_of(kind, 300, 0.7, 200), &pair);
     for (int calibrated = 0; calibrated < 2; ++calibrated) {
       const tv_two_view r = estimate_pair(
-          calibrated == 1, calibrated == 1 ? TV_METHOD_FIVE_POINT : TV_METHOD_SEVEN_POINT);
-      const bool full = r.config == TV_CONFIG_CALIBRATED || r.config == TV_CONFIG_PLANAR;
+          calibrated == 1, calibrated == 1 ? TV_SOLVER_FIVE_POINT : TV_SOLVER_SEVEN_POINT);
+      const bool full = r.kind == TV_KIND_CALIBRATED || r.kind == TV_KIND_PLANAR;
       const bool rotation =
-          calibrated == 1 && (r.config == TV_CONFIG_PANORAMIC || r.config == TV_CONFIG_NO_MOTION);
+          calibrated == 1 && (r.kind == TV_KIND_PANORAMIC || r.kind == TV_KIND_NO_MOTION);
       TEST_ASSERT_EQUAL_INT(full || rotation, r.has_R);
       TEST_ASSERT_EQUAL_INT(full, r.has_t);
       TEST_ASSERT_EQUAL_INT(full, r.has_E);
-      TEST_ASSERT_EQUAL_INT(full || r.config == TV_CONFIG_UNCALIBRATED, r.has_F);
-      TEST_ASSERT_EQUAL_INT(
-          r.config == TV_CONFIG_PLANAR || r.config == TV_CONFIG_PLANAR_OR_PANORAMIC, r.has_H);
+      TEST_ASSERT_EQUAL_INT(full || r.kind == TV_KIND_UNCALIBRATED, r.has_F);
+      TEST_ASSERT_EQUAL_INT(r.kind == TV_KIND_PLANAR || r.kind == TV_KIND_PLANAR_OR_PANORAMIC,
+                            r.has_H);
       TEST_ASSERT_EQUAL_INT(r.verdict != TV_VERDICT_OK, r.reasons != 0);
       TEST_ASSERT_EQUAL_INT(calibrated == 1 ? -1 : 0, r.fundamental_inliers < 0 ? -1 : 0);
       if (rotation) {
@@ -122,16 +122,16 @@ void test_each_kind_has_what_it_promises(void) {
 // A chance of 0.01 a pair is what the test of meaning allows; of 72 pairs two are a rare accident.
 void test_random_matches_are_degenerate(void) {
   const int num[9] = {5, 6, 7, 8, 10, 20, 50, 100, 500};
-  const int methods[3] = {TV_METHOD_FIVE_POINT, TV_METHOD_SEVEN_POINT, TV_METHOD_EIGHT_POINT};
+  const int methods[3] = {TV_SOLVER_FIVE_POINT, TV_SOLVER_SEVEN_POINT, TV_SOLVER_EIGHT_POINT};
   int accepted = 0;
   for (int k = 0; k < 9; ++k) {
     for (int trial = 0; trial < 8; ++trial) {
       scene::make(options_of(Kind::kGeneral, num[k], 0, 300 + 20 * k + trial), &pair);
       for (int m = 0; m < 3; ++m) {
         const tv_two_view r = estimate_pair(m == 0 || trial % 2 == 0, methods[m]);
-        accepted += r.config != TV_CONFIG_DEGENERATE;
-        TEST_ASSERT_EQUAL_INT(r.config == TV_CONFIG_DEGENERATE, r.verdict == TV_VERDICT_REFUSED);
-        TEST_ASSERT_EQUAL_INT(r.config == TV_CONFIG_DEGENERATE, r.num_inliers == 0);
+        accepted += r.kind != TV_KIND_DEGENERATE;
+        TEST_ASSERT_EQUAL_INT(r.kind == TV_KIND_DEGENERATE, r.verdict == TV_VERDICT_REFUSED);
+        TEST_ASSERT_EQUAL_INT(r.kind == TV_KIND_DEGENERATE, r.num_inliers == 0);
       }
     }
   }
@@ -149,8 +149,8 @@ void test_every_pair_of_lenses_gives_the_pose(void) {
         options.camera[0] = lenses[a];
         options.camera[1] = lenses[b];
         scene::make(options, &pair);
-        const tv_two_view r = estimate_pair(true, TV_METHOD_FIVE_POINT);
-        TEST_ASSERT_EQUAL_INT(TV_CONFIG_CALIBRATED, r.config);
+        const tv_two_view r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
+        TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, r.kind);
         sum += std::fmax(scene::rotation_error_deg(r.R, pair.R),
                          scene::translation_error_deg(r.t, pair.t));
       }
@@ -179,13 +179,13 @@ void test_degenerate_points_end_and_give_no_pose(void) {
     }
     for (int c = 0; c < 3; ++c) {
       const tv_two_view r =
-          estimate(lenses[c], a, b, nullptr, 1000, defaults(TV_METHOD_FIVE_POINT));
+          estimate(lenses[c], a, b, nullptr, 1000, defaults(TV_SOLVER_FIVE_POINT));
       if (kind == 0 || kind == 1 || kind == 4 || kind == 5) {
         TEST_ASSERT_EQUAL_INT(0, r.has_t);
       }
     }
-    estimate(nullptr, a, b, nullptr, 1000, defaults(TV_METHOD_EIGHT_POINT));
-    estimate(nullptr, a, b, nullptr, 1000, defaults(TV_METHOD_SEVEN_POINT));
+    estimate(nullptr, a, b, nullptr, 1000, defaults(TV_SOLVER_EIGHT_POINT));
+    estimate(nullptr, a, b, nullptr, 1000, defaults(TV_SOLVER_SEVEN_POINT));
   }
 }
 
@@ -197,8 +197,8 @@ void test_covariance_covers_the_error(void) {
     scene::Options options = options_of(Kind::kGeneral, 200, 1, 600 + trial);
     options.noise_px = 0.3;
     scene::make(options, &pair);
-    const tv_two_view r = estimate_pair(true, TV_METHOD_FIVE_POINT);
-    if (r.config != TV_CONFIG_CALIBRATED) continue;
+    const tv_two_view r = estimate_pair(true, TV_SOLVER_FIVE_POINT);
+    if (r.kind != TV_KIND_CALIBRATED) continue;
     TEST_ASSERT_EQUAL_INT(1, r.has_covariance);
     const tv::Mat3 d = pair.R * tv::Mat3(Eigen::Map<const tv::Mat3>(r.R)).transpose();
     const tv::Vec3 t(r.t[0], r.t[1], r.t[2]);

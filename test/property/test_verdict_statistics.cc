@@ -31,11 +31,11 @@ uint32_t other_reasons(const tv_two_view& r, uint32_t expected) {
 
 bool named_right(const tv_two_view& r) {
   switch (pair.kind) {
-    case pair_kinds::kGeneral: return r.config == TV_CONFIG_CALIBRATED && other_reasons(r, 0) == 0;
+    case pair_kinds::kGeneral: return r.kind == TV_KIND_CALIBRATED && other_reasons(r, 0) == 0;
     case pair_kinds::kPlanar:  // whose direction of motion may be uncertain all the same
-      return r.config == TV_CONFIG_PLANAR && other_reasons(r, TV_REASON_LOW_PARALLAX) == 0;
-    case pair_kinds::kPureRotation: return r.config == TV_CONFIG_PANORAMIC;
-    case pair_kinds::kNoMotion: return r.config == TV_CONFIG_NO_MOTION;
+      return r.kind == TV_KIND_PLANAR && other_reasons(r, TV_REASON_LOW_PARALLAX) == 0;
+    case pair_kinds::kPureRotation: return r.kind == TV_KIND_PANORAMIC;
+    case pair_kinds::kNoMotion: return r.kind == TV_KIND_NO_MOTION;
     case pair_kinds::kLowParallax: return (r.reasons & TV_REASON_LOW_PARALLAX) != 0;
     case pair_kinds::kTooFew: return (r.reasons & TV_REASON_TOO_FEW_MATCHES) != 0;
     case pair_kinds::kSecondMotion: return (r.reasons & TV_REASON_SECOND_MOTION) != 0;
@@ -65,7 +65,7 @@ void print_pair(const char* what, const tv_two_view& r, uint64_t seed) {
       "%s: %s seed %llu: %s %s reasons %x, %d matches, inliers %d (E %d H %d R %d), "
       "parallax %.2f deg, rms %.2f noise %.2f (true %.2f) coverage %.2f error %.2f deg\n",
       what, pair_kinds::name_of(pair.kind), static_cast<unsigned long long>(seed),
-      tv_config_string(static_cast<tv_config>(r.config)),
+      tv_kind_string(static_cast<tv_kind>(r.kind)),
       tv_verdict_string(static_cast<tv_verdict>(r.verdict)), r.reasons, r.num_matches,
       r.num_inliers, r.essential_inliers, r.homography_inliers, r.rotation_inliers,
       r.median_parallax_rad * 180 / tv::kPi, r.rms_error_px, r.noise_px, pair.noise_px, r.coverage,

@@ -125,7 +125,7 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
     const tv_two_view& v = outcome.two_view;
     json["num_matches"] = v.num_matches;
     json["num_inliers"] = v.num_inliers;
-    json["config"] = tv_config_string(static_cast<tv_config>(v.config));
+    json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
     json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
     json["principal_point_shift_px"] = v.principal_point_shift;
     json["time_ms"] = static_cast<double>(total_ns) * 1e-6;
@@ -268,7 +268,7 @@ void split_output(const std::string& output, fs::path& folder, std::string& name
 
 int evaluate(Arguments& a) {
   Common& common = a.common;
-  if (common.options.estimate.method == TV_METHOD_UPRIGHT)
+  if (common.options.estimate.method == TV_SOLVER_UPRIGHT)
     throw BadInput("--method upright needs gravity, which a list of pairs does not have");
   common.options.settle();
   if (!fs::is_directory(a.images)) throw BadInput("--images: " + a.images + " is not a folder");

@@ -244,7 +244,7 @@ void Options::settle() {
                          gravity_sigma_deg > 0};
   if (given[0] != given[1] || given[1] != given[2])
     throw BadInput("--gravity0, --gravity1 and --gravity-sigma-deg go together");
-  if (estimate.method == TV_METHOD_UPRIGHT && !given[0])
+  if (estimate.method == TV_SOLVER_UPRIGHT && !given[0])
     throw BadInput("--method upright needs --gravity0, --gravity1 and --gravity-sigma-deg");
   estimate.gravity_sigma_rad = gravity_sigma_deg * 3.14159265358979323846 / 180;
 }

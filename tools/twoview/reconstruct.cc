@@ -51,7 +51,7 @@ std::array<std::string, 2> camera_files(const Arguments& a) {
   if (has_focal && (!files[0].empty() || a.recording.given()))
     throw BadInput("--focal-35mm is for photographs without a camera file");
   const int32_t method = a.common.options.estimate.method;
-  const bool can_do_without = method == TV_METHOD_EIGHT_POINT || method == TV_METHOD_SEVEN_POINT;
+  const bool can_do_without = method == TV_SOLVER_EIGHT_POINT || method == TV_SOLVER_SEVEN_POINT;
   if (files[0].empty() && !has_focal && !can_do_without)
     throw BadInput(
         "--method " + method_name(method) +
@@ -200,10 +200,9 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
                        b.name.c_str(), b.luma.cols, b.luma.rows);
   const char* const colours[] = {style.poor, style.fair, style.good};
   const std::string reasons = reasons_in_words(v.reasons);
-  text +=
-      summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
-                   tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
-                   config_in_words(v.config).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
+  text += summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
+                       tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
+                       kind_in_words(v.kind).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
   text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
   text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
                        v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
@@ -266,7 +265,7 @@ int reconstruct(Arguments& a) {
   if (has_full_pose(outcome.two_view)) return kExitPose;
   const std::string reasons = reasons_in_words(outcome.two_view.reasons);
   std::fprintf(stderr, "twoview: no full pose: %s%s%s\n",
-               config_in_words(outcome.two_view.config).c_str(), reasons.empty() ? "" : ": ",
+               kind_in_words(outcome.two_view.kind).c_str(), reasons.empty() ? "" : ": ",
                reasons.c_str());
   return kExitNoPose;
 }

@@ -226,21 +226,22 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
   std::string sections;
   for (const Figure& figure : figures) sections += figure_section(figure);
   const char* const classes[] = {"poor", "fair", "good"};
-  return filled(kReportPage, {{"title", name0 + " and " + name1 + ": twoview"},
-                              {"style", kReportStyle},
-                              {"images", name0 + "<small>and</small>" + name1},
-                              {"verdict_class", classes[v.verdict]},
-                              {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
-                              {"verdict_words", escaped(config_in_words(v.config) +
-                                                        (reasons.empty() ? "" : ": " + reasons))},
-                              {"cards", cards(outcome)},
-                              {"cloud", cloud_section(outcome, cloud)},
-                              {"figures", sections},
-                              {"matrices", matrices(outcome.json)},
-                              {"tables", tables(outcome.json)},
-                              {"json", escaped(json_text(outcome.json))},
-                              {"version", tv_version_string()},
-                              {"script", cloud_script(outcome, cloud)}});
+  return filled(
+      kReportPage,
+      {{"title", name0 + " and " + name1 + ": twoview"},
+       {"style", kReportStyle},
+       {"images", name0 + "<small>and</small>" + name1},
+       {"verdict_class", classes[v.verdict]},
+       {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
+       {"verdict_words", escaped(kind_in_words(v.kind) + (reasons.empty() ? "" : ": " + reasons))},
+       {"cards", cards(outcome)},
+       {"cloud", cloud_section(outcome, cloud)},
+       {"figures", sections},
+       {"matrices", matrices(outcome.json)},
+       {"tables", tables(outcome.json)},
+       {"json", escaped(json_text(outcome.json))},
+       {"version", tv_version_string()},
+       {"script", cloud_script(outcome, cloud)}});
 }
 
 }  // namespace cli

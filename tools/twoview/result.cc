@@ -148,7 +148,7 @@ Json result_json(const Outcome& outcome) {
   json["num_keypoints"] = {r.num_keypoints[0], r.num_keypoints[1]};
   json["num_matches"] = r.num_matches;
   json["num_inliers"] = v.num_inliers;
-  json["config"] = tv_config_string(static_cast<tv_config>(v.config));
+  json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
   json["reasons"] = reasons_json(v.reasons);
   json["R"] = numbers_or_null(v.R, 9, v.has_R);
@@ -197,14 +197,14 @@ std::string reasons_in_words(uint32_t reasons) {
   return text;
 }
 
-std::string config_in_words(int32_t config) {
-  switch (config) {
-    case TV_CONFIG_CALIBRATED: return "a general scene, full pose";
-    case TV_CONFIG_UNCALIBRATED: return "fundamental matrix only, no cameras";
-    case TV_CONFIG_PLANAR: return "a plane";
-    case TV_CONFIG_PANORAMIC: return "rotation only";
-    case TV_CONFIG_PLANAR_OR_PANORAMIC: return "a homography: a plane or a rotation";
-    case TV_CONFIG_NO_MOTION: return "no motion";
+std::string kind_in_words(int32_t kind) {
+  switch (kind) {
+    case TV_KIND_CALIBRATED: return "a general scene, full pose";
+    case TV_KIND_UNCALIBRATED: return "fundamental matrix only, no cameras";
+    case TV_KIND_PLANAR: return "a plane";
+    case TV_KIND_PANORAMIC: return "rotation only";
+    case TV_KIND_PLANAR_OR_PANORAMIC: return "a homography: a plane or a rotation";
+    case TV_KIND_NO_MOTION: return "no motion";
     default: return "no model explains the matches better than chance";
   }
 }

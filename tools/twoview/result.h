@@ -60,7 +60,7 @@ nlohmann::ordered_json result_json(const Outcome& outcome);
 
 // The verdict's reasons as a phrase for people: "the camera only rotated"; empty without any.
 std::string reasons_in_words(uint32_t reasons);
-std::string config_in_words(int32_t config);
+std::string kind_in_words(int32_t kind);
 
 // A number, or null where it is not finite.
 nlohmann::ordered_json finite_or_null(double value);

@@ -31,10 +31,10 @@ typedef enum tv_orientation {
 } tv_orientation;
 
 /* How a descriptor is normalised; both are bytes, and compared by L2 distance. */
-typedef enum tv_descriptor {
-  TV_DESCRIPTOR_SIFT = 0,    /* unit L2 norm x 512, saturated at 255 */
-  TV_DESCRIPTOR_ROOTSIFT = 1 /* square root of the unit-L1 descriptor x 512, saturated */
-} tv_descriptor;
+typedef enum tv_normalisation {
+  TV_NORMALISATION_SIFT = 0,    /* unit L2 norm x 512, saturated at 255 */
+  TV_NORMALISATION_ROOTSIFT = 1 /* square root of the unit-L1 descriptor x 512, saturated */
+} tv_normalisation;
 
 /* Filled by tv_feature_options_init. The defaults serve the demo, the accuracy and the speed tables;
    docs/decisions/0001-features.md has the measurements behind them. */
@@ -57,7 +57,7 @@ typedef struct tv_feature_options {
                             that they spread */
   int32_t subpixel;      /* 1 (default): refine the corner's position below a pixel; 0: integers */
   int32_t orientation;   /* a tv_orientation, default gradient */
-  int32_t descriptor;    /* a tv_descriptor, default RootSIFT */
+  int32_t descriptor;    /* a tv_normalisation, default RootSIFT */
   float keypoint_size;   /* tv_keypoint.size of a corner on level 0, in pixels, [1, 32], default 4;
                             larger sees more of the surroundings: more distinctive, less local */
 } tv_feature_options;

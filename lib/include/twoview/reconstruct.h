@@ -46,7 +46,7 @@ typedef struct tv_reconstruction {
   int32_t num_matches; /* those of tv_match, and of guided matching where that was taken */
   int32_t num_points; /* inliers whose point is TV_POINT_OK */
   const tv_correspondence *matches; /* num_matches, rows of keypoints */
-  const uint8_t *inlier_mask; /* num_matches, 1 for an inlier of the model that the result's config names */
+  const uint8_t *inlier_mask; /* num_matches, 1 for an inlier of the model that the result's kind names */
   const tv_point *points;     /* num_matches; TV_POINT_INVALID where the match is no inlier, or where
                                  there is no full pose */
 } tv_reconstruction;

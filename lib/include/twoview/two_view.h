@@ -11,26 +11,26 @@
 TV_BEGIN_DECLS
 
 /* The minimal solver that the robust loop samples with. */
-typedef enum tv_method {
-  TV_METHOD_FIVE_POINT = 0,  /* Nister, "An efficient solution to the five-point relative pose
+typedef enum tv_solver {
+  TV_SOLVER_FIVE_POINT = 0,  /* Nister, "An efficient solution to the five-point relative pose
                                 problem", PAMI 2004; the default, cameras needed */
-  TV_METHOD_EIGHT_POINT = 1, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
+  TV_SOLVER_EIGHT_POINT = 1, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
                                 paper's path */
-  TV_METHOD_SEVEN_POINT = 2, /* Hartley, Zisserman, "Multiple View Geometry", 11.1.2: smaller samples,
+  TV_SOLVER_SEVEN_POINT = 2, /* Hartley, Zisserman, "Multiple View Geometry", 11.1.2: smaller samples,
                                 where many matches are wrong */
-  TV_METHOD_UPRIGHT = 3      /* three points and gravity; cameras and gravity needed */
-} tv_method;
+  TV_SOLVER_UPRIGHT = 3      /* three points and gravity; cameras and gravity needed */
+} tv_solver;
 
 /* COLMAP's kinds of two-view geometry, and no-motion. */
-typedef enum tv_config {
-  TV_CONFIG_DEGENERATE = 0,         /* no model explains the matches */
-  TV_CONFIG_CALIBRATED = 1,         /* essential matrix: R, t */
-  TV_CONFIG_UNCALIBRATED = 2,       /* fundamental matrix: F only */
-  TV_CONFIG_PLANAR = 3,             /* homography of a plane: R, t and perhaps an alternative */
-  TV_CONFIG_PANORAMIC = 4,          /* pure rotation: R only */
-  TV_CONFIG_PLANAR_OR_PANORAMIC = 5, /* homography, uncalibrated: H only */
-  TV_CONFIG_NO_MOTION = 6           /* the camera did not move: R = I */
-} tv_config;
+typedef enum tv_kind {
+  TV_KIND_DEGENERATE = 0,         /* no model explains the matches */
+  TV_KIND_CALIBRATED = 1,         /* essential matrix: R, t */
+  TV_KIND_UNCALIBRATED = 2,       /* fundamental matrix: F only */
+  TV_KIND_PLANAR = 3,             /* homography of a plane: R, t and perhaps an alternative */
+  TV_KIND_PANORAMIC = 4,          /* pure rotation: R only */
+  TV_KIND_PLANAR_OR_PANORAMIC = 5, /* homography, uncalibrated: H only */
+  TV_KIND_NO_MOTION = 6           /* the camera did not move: R = I */
+} tv_kind;
 
 /* Whether to believe the pose. docs/algorithms/two_view.md has the rules. */
 typedef enum tv_verdict {
@@ -59,7 +59,7 @@ typedef enum tv_reason {
 } tv_reason;
 
 /* "calibrated", "planar_or_panoramic" ...; "unknown" for any other number. Static storage. */
-TV_API const char *tv_config_string(tv_config config);
+TV_API const char *tv_kind_string(tv_kind kind);
 /* "ok", "doubtful", "refused"; "unknown" for any other number. Static storage. */
 TV_API const char *tv_verdict_string(tv_verdict verdict);
 /* "low_parallax" ...; "unknown" for anything but one of the bits. Static storage. */
@@ -68,7 +68,7 @@ TV_API const char *tv_reason_string(tv_reason reason);
 /* Filled by tv_estimate_options_init. */
 typedef struct tv_estimate_options {
   uint32_t struct_size;     /* set by tv_estimate_options_init */
-  int32_t method;           /* a tv_method; default five-point */
+  int32_t method;           /* a tv_solver; default five-point */
   double max_error_px;      /* inlier threshold: Sampson distance in pixels of the images as given,
                                the same for every lens; (0, 1e9], default 1.0 */
   double confidence;        /* stop when a better model is this unlikely to have been missed;
@@ -92,11 +92,11 @@ TV_API void tv_estimate_options_init(tv_estimate_options *options);
 /* Everything that was found. Matrices are row-major; those whose has_ flag is 0 hold zeros. */
 typedef struct tv_two_view {
   uint32_t struct_size; /* set by tv_two_view_init */
-  int32_t config;       /* a tv_config */
+  int32_t kind;         /* a tv_kind */
   int32_t verdict;      /* a tv_verdict */
   uint32_t reasons;     /* tv_reason bits */
   int32_t num_matches;  /* as given */
-  int32_t num_inliers;  /* of the model that config names */
+  int32_t num_inliers;  /* of the model that kind names */
   uint8_t has_R, has_t, has_E, has_F, has_H, has_alternative, has_covariance,
       has_alternative_covariance; /* 1: the member of that name was estimated */
   int32_t num_iterations; /* samples drawn */
@@ -137,11 +137,11 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
    pixels0, pixels1: num_matches x 2 (x, y), as the images have them (distorted).
    ratios: null, or num_matches values, lower more certain (tv_correspondence.ratio): surer matches
    are sampled first.
-   inlier_mask: null, or num_matches bytes, 1 for each inlier of the model that config names.
+   inlier_mask: null, or num_matches bytes, 1 for each inlier of the model that kind names.
    result: initialised by tv_two_view_init.
    A match outside its lens's valid region, not finite, or with coordinates that add up to a million
    pixels and more, is never an inlier.
-   "No geometry" is TV_OK with config, verdict and reasons. The matches' order does not matter, and
+   "No geometry" is TV_OK with kind, verdict and reasons. The matches' order does not matter, and
    swapped views give the inverse: R the transpose, bit for bit, and t = -R^T t.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
    TV_ERR_NOT_FINITE (options only).

@@ -92,7 +92,7 @@ void tv_feature_options_init(tv_feature_options* options) {
   options->cell_px = 0;
   options->subpixel = 1;
   options->orientation = TV_ORIENTATION_GRADIENT;
-  options->descriptor = TV_DESCRIPTOR_ROOTSIFT;
+  options->descriptor = TV_NORMALISATION_ROOTSIFT;
   options->keypoint_size = 4.0f;
 }
 

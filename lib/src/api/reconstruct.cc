@@ -113,7 +113,7 @@ __attribute__((noinline)) tv_status match_along_lines(
   status = tv_estimate_two_view(context, view0.camera, view1.camera, r.pixels[0], r.pixels[1],
                                 r.ratios, count, options, &again, r.more_inlier_mask);
   if (status != TV_OK) return status;
-  const bool no_worse = is_full_pose(again) && again.config == estimate->config &&
+  const bool no_worse = is_full_pose(again) && again.kind == estimate->kind &&
                         again.verdict >= estimate->verdict &&
                         again.num_inliers >= estimate->num_inliers;
   if (!no_worse) {

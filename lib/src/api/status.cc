@@ -38,15 +38,15 @@ const char *tv_kernels_string(tv_kernels kernels) {
   }
 }
 
-const char *tv_config_string(tv_config config) {
-  switch (tv::enum_value(config)) {
-    case TV_CONFIG_DEGENERATE: return "degenerate";
-    case TV_CONFIG_CALIBRATED: return "calibrated";
-    case TV_CONFIG_UNCALIBRATED: return "uncalibrated";
-    case TV_CONFIG_PLANAR: return "planar";
-    case TV_CONFIG_PANORAMIC: return "panoramic";
-    case TV_CONFIG_PLANAR_OR_PANORAMIC: return "planar_or_panoramic";
-    case TV_CONFIG_NO_MOTION: return "no_motion";
+const char *tv_kind_string(tv_kind kind) {
+  switch (tv::enum_value(kind)) {
+    case TV_KIND_DEGENERATE: return "degenerate";
+    case TV_KIND_CALIBRATED: return "calibrated";
+    case TV_KIND_UNCALIBRATED: return "uncalibrated";
+    case TV_KIND_PLANAR: return "planar";
+    case TV_KIND_PANORAMIC: return "panoramic";
+    case TV_KIND_PLANAR_OR_PANORAMIC: return "planar_or_panoramic";
+    case TV_KIND_NO_MOTION: return "no_motion";
     default: return "unknown";
   }
 }

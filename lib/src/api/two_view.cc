@@ -14,7 +14,7 @@ namespace {
 constexpr uint64_t kDefaultSeed = 20130814;  // any constant would do
 
 constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
-                                           TV_METHOD_FIVE_POINT,
+                                           TV_SOLVER_FIVE_POINT,
                                            1.0,
                                            0.9999,
                                            10000,
@@ -45,7 +45,7 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
     if (options->struct_size != sizeof(tv_estimate_options)) return TV_ERR_STRUCT_SIZE;
     *checked = *options;
   } else if (!calibrated) {
-    checked->method = TV_METHOD_EIGHT_POINT;
+    checked->method = TV_SOLVER_EIGHT_POINT;
   }
   if (!is_finite(checked->max_error_px) || !is_finite(checked->confidence) ||
       !is_finite(checked->gravity_sigma_rad) || !is_finite(checked->principal_point_sigma)) {
@@ -58,10 +58,10 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
                         checked->principal_point_sigma >= 0 &&
                         checked->principal_point_sigma <= 0.1;
   const bool with_gravity = checked->gravity_sigma_rad > 0;
-  const bool method_known = checked->method == TV_METHOD_EIGHT_POINT ||
-                            checked->method == TV_METHOD_SEVEN_POINT ||
-                            (checked->method == TV_METHOD_FIVE_POINT && calibrated) ||
-                            (checked->method == TV_METHOD_UPRIGHT && calibrated && with_gravity);
+  const bool method_known = checked->method == TV_SOLVER_EIGHT_POINT ||
+                            checked->method == TV_SOLVER_SEVEN_POINT ||
+                            (checked->method == TV_SOLVER_FIVE_POINT && calibrated) ||
+                            (checked->method == TV_SOLVER_UPRIGHT && calibrated && with_gravity);
   if (!in_range || !method_known) return TV_ERR_ARGUMENT;
   return check_gravity(*checked);
 }
@@ -181,7 +181,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
                                     bool swapped, tv_two_view* result) {
   tv_two_view packed{};
   packed.struct_size = sizeof(tv_two_view);
-  packed.config = outcome.config;
+  packed.kind = outcome.kind;
   packed.verdict = outcome.verdict;
   packed.reasons = outcome.reasons;
   packed.num_matches = problem.num;
@@ -199,7 +199,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     packed.principal_point_shift[k] = outcome.principal_point_shift_px[k];
   }
   packed.coverage = coverage(problem, matches, outcome.inlier, swapped ? 1 : 0);
-  if (packed.coverage > 0 && packed.coverage < 4.5 / 64 && packed.config != TV_CONFIG_DEGENERATE) {
+  if (packed.coverage > 0 && packed.coverage < 4.5 / 64 && packed.kind != TV_KIND_DEGENERATE) {
     packed.reasons |= TV_REASON_CROWDED_MATCHES;
     if (packed.verdict == TV_VERDICT_OK) packed.verdict = TV_VERDICT_DOUBTFUL;
   }
@@ -231,7 +231,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
       }
     }
   }
-  if (outcome.has_t || outcome.config == TV_CONFIG_UNCALIBRATED) {
+  if (outcome.has_t || outcome.kind == TV_KIND_UNCALIBRATED) {
     const Mat3 F = (inverse1.transpose() * outcome.epipolar.M * inverse0).normalized();
     packed.has_F = 1;
     store(swapped ? Mat3(F.transpose()) : F, packed.F);

@@ -53,7 +53,7 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
                      within(o.scale_factor, 1.1f, 2.0f) &&
                      (o.cell_px == 0 || within(o.cell_px, 8, 16384)) && within(o.subpixel, 0, 1) &&
                      within(o.orientation, TV_ORIENTATION_UPRIGHT, TV_ORIENTATION_GRADIENT) &&
-                     within(o.descriptor, TV_DESCRIPTOR_SIFT, TV_DESCRIPTOR_ROOTSIFT) &&
+                     within(o.descriptor, TV_NORMALISATION_SIFT, TV_NORMALISATION_ROOTSIFT) &&
                      within(o.keypoint_size, 1.0f, 32.0f);
   if (!valid) return TV_ERR_ARGUMENT;
   if (o.max_keypoints > context.limits.max_keypoints) return TV_ERR_LIMITS;

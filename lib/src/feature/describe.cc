@@ -124,7 +124,7 @@ void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
   sample_around(kernels, octave_for(octaves, keypoint), keypoint, keypoint.angle_rad, kStepPerSize,
                 TVK_PATCH_SIDE, patch);
   kernels.gradient_histogram(patch, histogram);
-  kernels.quantize_descriptor(histogram, kind == TV_DESCRIPTOR_ROOTSIFT, descriptor);
+  kernels.quantize_descriptor(histogram, kind == TV_NORMALISATION_ROOTSIFT, descriptor);
 }
 
 }  // namespace tv

@@ -19,7 +19,7 @@ OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count);
 int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint& keypoint, float angles_rad[2]);
 
-// TV_DESCRIPTOR_BYTES bytes; descriptor is a tv_descriptor.
+// TV_DESCRIPTOR_BYTES bytes; descriptor is a tv_normalisation.
 void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
                        const tv_keypoint& keypoint, int32_t kind, uint8_t* descriptor);
 

@@ -43,8 +43,8 @@ LoopResult<typename Estimator::Model> run(Estimator estimator, const TwoViewProb
 
 // A model's degrees of freedom. An upright pose has three, but refinement frees all five.
 int least_matches(int method) {
-  if (method == TV_METHOD_EIGHT_POINT) return 8;
-  return method == TV_METHOD_SEVEN_POINT ? 7 : 5;
+  if (method == TV_SOLVER_EIGHT_POINT) return 8;
+  return method == TV_SOLVER_SEVEN_POINT ? 7 : 5;
 }
 
 GravityPrior gravity_of(const TwoViewProblem& problem) {
@@ -78,7 +78,7 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
   if (sample_size == 5) {
     const GravityPrior gravity = gravity_of(problem);
     const LoopResult<Pose> result =
-        problem.options.method == TV_METHOD_UPRIGHT
+        problem.options.method == TV_SOLVER_UPRIGHT
             ? run(make_upright_estimator(pairs, threshold, indices, gravity), problem)
             : run(PoseEstimator{pairs, threshold, indices, arena_alloc<PoseBatch>(arena, 1)},
                   problem);
@@ -88,7 +88,7 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
     return;
   }
   const LoopResult<Mat3> result =
-      problem.options.method == TV_METHOD_EIGHT_POINT
+      problem.options.method == TV_SOLVER_EIGHT_POINT
           ? run(FundamentalEstimator<8>{pairs, threshold, indices}, problem)
           : run(FundamentalEstimator<7>{pairs, threshold, indices}, problem);
   model->num_iterations = result.num_iterations;
@@ -293,7 +293,7 @@ bool moves_along_lines(const Finish& f, const Mat3& R) {
 }
 
 // Whether the pair is to be called by one of the rivals, or degenerate.
-tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
+tv_kind choose_kind(Finish& f, const Rivals& rivals, int sample_size) {
   const EpipolarModel& epipolar = f.out->epipolar;
   const bool calibrated = f.problem.calibrated;
   const int n = f.pairs.num;
@@ -327,14 +327,14 @@ tv_config choose_config(Finish& f, const Rivals& rivals, int sample_size) {
   const int rival_inliers = calibrated ? rivals.rotation_inliers : rivals.homography_inliers;
   const bool still = still_meaningful && 20 * rivals.identity_inliers >= 19 * rival_inliers &&
                      (calibrated ? rotation_enough : homography_enough);
-  if (still) return TV_CONFIG_NO_MOTION;
-  if (rotation_enough) return TV_CONFIG_PANORAMIC;
-  if (!epipolar_meaningful && !homography_enough) return TV_CONFIG_DEGENERATE;
+  if (still) return TV_KIND_NO_MOTION;
+  if (rotation_enough) return TV_KIND_PANORAMIC;
+  if (!epipolar_meaningful && !homography_enough) return TV_KIND_DEGENERATE;
   if (!calibrated) {
-    return homography_enough ? TV_CONFIG_PLANAR_OR_PANORAMIC : TV_CONFIG_UNCALIBRATED;
+    return homography_enough ? TV_KIND_PLANAR_OR_PANORAMIC : TV_KIND_UNCALIBRATED;
   }
-  if (!epipolar.has_pose) return TV_CONFIG_DEGENERATE;
-  return homography_enough ? TV_CONFIG_PLANAR : TV_CONFIG_CALIBRATED;
+  if (!epipolar.has_pose) return TV_KIND_DEGENERATE;
+  return homography_enough ? TV_KIND_PLANAR : TV_KIND_CALIBRATED;
 }
 
 // Grows with the angle between a match's rays, R taken off: 0 to 2 for 0 to 180 degrees.
@@ -426,8 +426,8 @@ void look_for_second_model(Finish& f, Arena& arena) {
 
 void measure_inliers(Finish& f) {
   TwoViewOutcome& out = *f.out;
-  const bool by_transfer = out.config == TV_CONFIG_PANORAMIC || out.config == TV_CONFIG_NO_MOTION ||
-                           out.config == TV_CONFIG_PLANAR_OR_PANORAMIC;
+  const bool by_transfer = out.kind == TV_KIND_PANORAMIC || out.kind == TV_KIND_NO_MOTION ||
+                           out.kind == TV_KIND_PLANAR_OR_PANORAMIC;
   const RayPairs& pairs = f.matches.pairs;
   double sum = 0;
   if (by_transfer) {
@@ -472,7 +472,7 @@ bool in_a_line(const Finish& f, int view) {
 
 void judge(Finish& f) {
   TwoViewOutcome& out = *f.out;
-  const bool degenerate = out.config == TV_CONFIG_DEGENERATE;
+  const bool degenerate = out.kind == TV_KIND_DEGENERATE;
   int unique_inliers = 0;
   for (int i = 0; i < f.pairs.num; ++i) unique_inliers += out.inlier[i];
   if ((degenerate ? f.pairs.num : unique_inliers) < kFewMatches) {
@@ -488,9 +488,9 @@ void judge(Finish& f) {
     out.reasons |= TV_REASON_LOW_INLIER_RATIO;
   }
   if (out.has_t && (in_a_line(f, 0) || in_a_line(f, 1))) out.reasons |= TV_REASON_CROWDED_MATCHES;
-  if (out.config == TV_CONFIG_NO_MOTION) out.reasons |= TV_REASON_NO_MOTION;
-  if (out.config == TV_CONFIG_PANORAMIC) out.reasons |= TV_REASON_PURE_ROTATION;
-  if (out.config == TV_CONFIG_NO_MOTION || out.config == TV_CONFIG_PANORAMIC) {
+  if (out.kind == TV_KIND_NO_MOTION) out.reasons |= TV_REASON_NO_MOTION;
+  if (out.kind == TV_KIND_PANORAMIC) out.reasons |= TV_REASON_PURE_ROTATION;
+  if (out.kind == TV_KIND_NO_MOTION || out.kind == TV_KIND_PANORAMIC) {
     out.verdict = TV_VERDICT_REFUSED;  // no full pose
   } else {
     out.verdict = out.reasons == 0 ? TV_VERDICT_OK : TV_VERDICT_DOUBTFUL;
@@ -541,16 +541,16 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
   out.homography_inliers = rivals.homography_inliers;
   if (!out.epipolar.found) f.num_support = 0;
   const int sample_size = least_matches(problem.options.method);
-  out.config = choose_config(f, rivals, sample_size);
+  out.kind = choose_kind(f, rivals, sample_size);
   out.H = rivals.H;
-  out.has_H = out.config == TV_CONFIG_PLANAR || out.config == TV_CONFIG_PLANAR_OR_PANORAMIC;
-  switch (out.config) {
-    case TV_CONFIG_PLANAR:
+  out.has_H = out.kind == TV_KIND_PLANAR || out.kind == TV_KIND_PLANAR_OR_PANORAMIC;
+  switch (out.kind) {
+    case TV_KIND_PLANAR:
       choose_planar_pose(f, rivals);
       out.essential_inliers = f.num_support;
       out.has_R = out.has_t = true;
       break;
-    case TV_CONFIG_CALIBRATED: {
+    case TV_KIND_CALIBRATED: {
       PoseUncertainty uncertainty;
       if (uncertainty_of(f.refiner, out.epipolar.pose, &uncertainty)) {
         store_uncertainty(uncertainty, &out);
@@ -558,27 +558,27 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
       out.has_R = out.has_t = true;
       break;
     }
-    case TV_CONFIG_PANORAMIC:
+    case TV_KIND_PANORAMIC:
       out.epipolar.pose.R = out.H = rivals.R;
       out.has_R = true;
       inliers_of_transfer(f, out.H);
       break;
-    case TV_CONFIG_NO_MOTION:
+    case TV_KIND_NO_MOTION:
       if (problem.calibrated) {
         out.epipolar.pose.R = out.H = Mat3::Identity();
         out.has_R = true;
       }
       inliers_of_transfer(f, out.H);
       break;
-    case TV_CONFIG_PLANAR_OR_PANORAMIC: inliers_of_transfer(f, out.H); break;
-    case TV_CONFIG_DEGENERATE:
+    case TV_KIND_PLANAR_OR_PANORAMIC: inliers_of_transfer(f, out.H); break;
+    case TV_KIND_DEGENERATE:
       for (size_t i = 0; i < n; ++i) out.inlier[i] = 0;
       break;
-    case TV_CONFIG_UNCALIBRATED: break;
+    case TV_KIND_UNCALIBRATED: break;
   }
   if (out.has_t) measure_pose(f);
   measure_inliers(f);
-  if (problem.calibrated && out.config != TV_CONFIG_DEGENERATE) {
+  if (problem.calibrated && out.kind != TV_KIND_DEGENERATE) {
     look_for_second_model(f, arena);
   }
   judge(f);

@@ -14,7 +14,7 @@ struct TwoViewModel {
 
 // All that the boundary packs. In canonical view order, on rays.
 struct TwoViewOutcome {
-  tv_config config = TV_CONFIG_DEGENERATE;
+  tv_kind kind = TV_KIND_DEGENERATE;
   tv_verdict verdict = TV_VERDICT_REFUSED;
   uint32_t reasons = 0;
   EpipolarModel epipolar;
