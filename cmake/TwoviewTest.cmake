@@ -1,7 +1,10 @@
 # How tests are registered.
 
-# Exit status of a test that cannot run here, after it has printed why.
+# Exit status of a program in which a test could not run here, after it has printed which and why: ctest
+# then reports it as skipped, never as passed, even when its other tests passed.
 set(TWOVIEW_SKIP_CODE 77)
+# What runs a Python test file and keeps this rule.
+set(TWOVIEW_RUN_PYTHON_TEST ${PROJECT_SOURCE_DIR}/test/support/run_python.py)
 # Both builds' tests run in one ctest (scripts/test): a sanitizer build's names say so.
 set(TWOVIEW_TEST_PREFIX "")
 if(TWOVIEW_SANITIZE)
@@ -25,13 +28,20 @@ function(tv_register_test name)
     ENVIRONMENT "${environment}")
 endfunction()
 
+# Unity's end of a program, replaced by the rule above (test/support/unity_end.c).
+add_library(twoview_unity_end STATIC ${PROJECT_SOURCE_DIR}/test/support/unity_end.c)
+target_link_libraries(twoview_unity_end PRIVATE twoview_flags twoview_unity)
+target_compile_definitions(twoview_unity_end
+  PRIVATE TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
+  INTERFACE UnityEnd=tv_UnityEnd UnityDefaultTestRun=tv_UnityDefaultTestRun)
+
 # tv_add_test(name LABEL label SOURCES file... [LIBS library...])
 # A Unity test, built and registered.
 function(tv_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "SOURCES;LIBS")
   set(target ${arg_LABEL}_${name})
   add_executable(${target} ${arg_SOURCES})
-  target_link_libraries(${target} PRIVATE twoview_flags twoview_unity ${arg_LIBS} m)
+  target_link_libraries(${target} PRIVATE twoview_flags twoview_unity_end twoview_unity ${arg_LIBS} m)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/test)
   target_compile_definitions(${target} PRIVATE
     TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}

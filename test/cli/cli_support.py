@@ -15,7 +15,14 @@ import zlib
 from pathlib import Path
 
 SKIP_CODE = 77
-RESULT_FILES = ["cloud.ply", "epipolar.png", "matches.png", "report.html", "result.json", "views.png"]
+RESULT_FILES = [
+    "cloud.ply",
+    "epipolar.png",
+    "matches.png",
+    "report.html",
+    "result.json",
+    "views.png",
+]
 
 
 def program():
@@ -73,7 +80,11 @@ def png_samples(data):
         if data[at + 4 : at + 8] == b"IDAT":
             packed += data[at + 8 : at + 8 + length]
         at += 12 + length
-    raw, step, row_bytes = zlib.decompress(packed), channels * depth // 8, width * channels * depth // 8
+    raw, step, row_bytes = (
+        zlib.decompress(packed),
+        channels * depth // 8,
+        width * channels * depth // 8,
+    )
     above, out = bytearray(row_bytes), bytearray()
     for y in range(height):
         kind, row = raw[y * (row_bytes + 1)], bytearray(raw[y * (row_bytes + 1) + 1 :][:row_bytes])
@@ -99,8 +110,8 @@ def texture(width, height, seed=7):
     return rows
 
 
-# A sideways flight past five walls that stand one above the other in the image: a pixel at distance Z
-# (in baselines) moves left by FOCAL / Z.
+# A sideways flight past five walls that stand one above the other in the image: a pixel at distance
+# Z (in baselines) moves left by FOCAL / Z.
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
 SHIFTS = (24, 6, 15, 10, 20)
 
@@ -127,7 +138,9 @@ def pfm(width, height, value_at):
     return f"Pf\n{width} {height}\n-1.0\n".encode() + b"".join(rows)
 
 
-def camera_yaml(width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL, cx=None, cy=None, k=(0, 0, 0, 0, 0)):
+def camera_yaml(
+    width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL, cx=None, cy=None, k=(0, 0, 0, 0, 0)
+):
     """OpenCV's own format."""
     cx = (WIDTH - 1) / 2 if cx is None else cx
     cy = (HEIGHT - 1) / 2 if cy is None else cy
@@ -166,10 +179,14 @@ class CliTest(unittest.TestCase):
         path.write_bytes(data.encode() if isinstance(data, str) else data)
         return path
 
-    def run_program(self, *arguments, **options):
+    def run_program(self, *arguments, before=(), **options):
+        """before: the words of a command that runs the program."""
         options.setdefault("timeout", 300)
         return subprocess.run(
-            [program(), *map(str, arguments)], capture_output=True, cwd=self.folder, **options
+            [*before, program(), *map(str, arguments)],
+            capture_output=True,
+            cwd=self.folder,
+            **options,
         )
 
     def reconstruct(self, *more, a=None, b=None, camera=True, out=None, **options):

@@ -19,8 +19,10 @@ except ImportError as missing:
     sys.exit(cli.SKIP_CODE)
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
-OPENCV_BOARDS = SHARED / "data/chessboard_opencv"
-DRONE_BOARDS = SHARED / "ardrone/fixtures/chessboard_ardrone1"
+DATA = Path(os.environ.get("TWOVIEW_DATA") or SHARED / "data")
+DRONE_DATA = Path(os.environ.get("TWOVIEW_ARDRONE_FIXTURES") or SHARED / "ardrone/fixtures")
+OPENCV_BOARDS = DATA / "chessboard_opencv"
+DRONE_BOARDS = DRONE_DATA / "chessboard_ardrone1"
 FILES = ["calibration.json", "camera.yaml", "camera_info.yaml", "coverage.png", "detections.png",
          "residuals.png"]
 
@@ -74,10 +76,14 @@ class RealBoards(CalibrateTest):
                                                   flags=cv2.CALIB_FIX_INTRINSIC)
         self.assertLess(rms, 0.25)
         lines = (OPENCV_BOARDS / "stereo_left_to_right.txt").read_text().splitlines()
-        truth = np.array(" ".join(l for l in lines if not l.startswith("#")).split(), float).reshape(4, 4)
+        truth = np.array(
+            " ".join(l for l in lines if not l.startswith("#")).split(), float
+        ).reshape(4, 4)
         turn = np.degrees(np.linalg.norm(cv2.Rodrigues(R @ truth[:3, :3].T)[0]))
         self.assertLess(turn, 0.3)
-        self.assertLess(np.linalg.norm(t.ravel() - truth[:3, 3]), 0.01 * np.linalg.norm(truth[:3, 3]))
+        self.assertLess(
+            np.linalg.norm(t.ravel() - truth[:3, 3]), 0.01 * np.linalg.norm(truth[:3, 3])
+        )
         # The view's own poses are metric, too: the baseline without stereoCalibrate.
         lengths = []
         for a, b in zip(results["left"]["views"], results["right"]["views"]):
@@ -96,12 +102,16 @@ class RealBoards(CalibrateTest):
         result = self.calibrated(*images)
         points = [(boards.board_points() / boards.SQUARE).astype(np.float32)] * len(images)
         seen = [corners_of(view) for view in result["views"]]
-        rms, K, k, _, _, sigma, _, errors = cv2.calibrateCameraExtended(points, seen, (640, 480), None, None)
+        rms, K, k, _, _, sigma, _, errors = cv2.calibrateCameraExtended(
+            points, seen, (640, 480), None, None
+        )
         self.assertAlmostEqual(result["rms_px"], rms, delta=1e-4)
         ours_K, ours_k = camera_of(result)
         np.testing.assert_allclose(ours_K, K, atol=0.02)
         np.testing.assert_allclose(list(result["sigma"].values()), sigma.ravel()[:9], rtol=0.02)
-        np.testing.assert_allclose([view["rms_px"] for view in result["views"]], errors.ravel(), atol=1e-3)
+        np.testing.assert_allclose(
+            [view["rms_px"] for view in result["views"]], errors.ravel(), atol=1e-3
+        )
         # What was written is what twoview reads: undistort takes both files.
         for name in ("camera.yaml", "camera_info.yaml"):
             self.succeed(self.run_program("undistort", images[0], "--camera", self.out / name, "-o",
@@ -124,9 +134,15 @@ class KnownCameras(CalibrateTest):
             cv2.imwrite(str(images[-1]), boards.render(rays, R, t, rng))
         result = self.calibrated(*images[:20], "--model", model, "--square", boards.SQUARE)
         held = self.calibrated(*images[20:], "--model", model, out=self.folder / "held")
-        print({n: (round(result["intrinsics"][n], 2), round(s, 3)) for n, s in result["sigma"].items()},
-              f"rms {result['rms_px']:.3f} coverage {result['coverage']:.2f}",
-              [w["name"] for w in result["warnings"]], file=sys.stderr)
+        print(
+            {
+                n: (round(result["intrinsics"][n], 2), round(s, 3))
+                for n, s in result["sigma"].items()
+            },
+            f"rms {result['rms_px']:.3f} coverage {result['coverage']:.2f}",
+            [w["name"] for w in result["warnings"]],
+            file=sys.stderr,
+        )
         self.assertGreaterEqual(result["num_views"], 18, status_of(result))
         for name, value in zip(("fx", "fy"), lens[1]):
             self.assertAlmostEqual(result["intrinsics"][name] / value, 1, delta=0.003)
@@ -149,7 +165,8 @@ class KnownCameras(CalibrateTest):
         return result
 
     def refitted(self, lens, R, t, seen, exact):
-        """The board through the estimated camera, its pose fitted by Gauss-Newton from the truth."""
+        """The board through the estimated camera, its pose fitted by Gauss-Newton from the
+        truth."""
         points = boards.board_points()
         if np.linalg.norm(boards.project(lens, R, t, points)[0] - seen[0]) > 30:
             points = points[::-1]
@@ -205,7 +222,9 @@ class Views(CalibrateTest):
         half = self.images[0].copy()
         x = int(self.outline(0)[:, 0].mean())
         half[:, x:] = 110
-        again = np.clip(self.images[1] + rng.normal(0, 3, self.images[1].shape), 0, 255).astype(np.uint8)
+        again = np.clip(self.images[1] + rng.normal(0, 3, self.images[1].shape), 0, 255).astype(
+            np.uint8
+        )
         odd = {
             "half.png": (half, "partial_board"),
             "grey.png": (np.full((480, 640), 128, np.uint8), "no_board"),
@@ -226,15 +245,22 @@ class Views(CalibrateTest):
         half[:, int(self.outline(0)[:, 0].mean()):] = 110
         parts = [self.save(f"part{i}.png", half) for i in range(4)]
         result = self.calibrated(*parts, *self.names)
-        self.assertEqual(status_of(result), dict.fromkeys(parts, "partial_board") | dict.fromkeys(self.names, "used"))
+        self.assertEqual(
+            status_of(result),
+            dict.fromkeys(parts, "partial_board") | dict.fromkeys(self.names, "used"),
+        )
         plain = self.calibrated(*self.names, out=self.folder / "plain")
         for name, value in plain["intrinsics"].items():
-            self.assertAlmostEqual(result["intrinsics"][name], value, delta=0.05 * plain["sigma"][name])
+            self.assertAlmostEqual(
+                result["intrinsics"][name], value, delta=0.05 * plain["sigma"][name]
+            )
 
     def test_a_view_far_above_the_others_is_left_out_and_named(self):
         plain = self.calibrated(*self.names)
         x, y = np.meshgrid(np.arange(640, dtype=np.float32), np.arange(480, dtype=np.float32))
-        bent = cv2.remap(self.images[7], x + 6 * np.sin(y / 60), y + 5 * np.sin(x / 70), cv2.INTER_LINEAR)
+        bent = cv2.remap(
+            self.images[7], x + 6 * np.sin(y / 60), y + 5 * np.sin(x / 70), cv2.INTER_LINEAR
+        )
         self.save(self.names[7], bent)
         result = self.calibrated(*self.names, out=self.folder / "again")
         self.assertEqual(status_of(result)[self.names[7]], "outlier")
@@ -264,7 +290,9 @@ class Views(CalibrateTest):
         self.assertEqual(result["num_views"], 5)
 
     def video(self, frames, name="v.avi"):
-        writer = cv2.VideoWriter(str(self.folder / name), cv2.VideoWriter_fourcc(*"MJPG"), 8, (640, 480))
+        writer = cv2.VideoWriter(
+            str(self.folder / name), cv2.VideoWriter_fourcc(*"MJPG"), 8, (640, 480)
+        )
         if not writer.isOpened():
             self.skipTest("this OpenCV writes no video")
         for frame in frames:
@@ -289,9 +317,13 @@ class Views(CalibrateTest):
 
     def test_no_board_in_any_image(self):
         rng = np.random.default_rng(7)
-        names = [self.save(f"n{i}.png", rng.integers(0, 255, (480, 640), np.uint8)) for i in range(3)]
+        names = [
+            self.save(f"n{i}.png", rng.integers(0, 255, (480, 640), np.uint8)) for i in range(3)
+        ]
         names.append(self.save("dark.png", rng.integers(0, 9, (480, 640), np.uint8)))
-        self.refuse(*names, words=["no 9x6 board", "4 images", "1 too_dark", "3 no_board", "inner corners"])
+        self.refuse(
+            *names, words=["no 9x6 board", "4 images", "1 too_dark", "3 no_board", "inner corners"]
+        )
 
     def test_the_wrong_board_size_is_told_the_right_one(self):
         for board in ("8x5", "10x7", "6x5"):
@@ -302,7 +334,9 @@ class Views(CalibrateTest):
 
     def test_images_of_different_sizes(self):
         small = self.save("small.png", cv2.resize(self.images[0], (320, 240)))
-        self.refuse(*self.names[:2], small, words=["small.png is 320x240", "640x480", "one resolution"])
+        self.refuse(
+            *self.names[:2], small, words=["small.png is 320x240", "640x480", "one resolution"]
+        )
 
     def test_one_view_only(self):
         self.refuse(self.names[0], words=["only 1 different view", "at least 3"])
@@ -311,7 +345,10 @@ class Views(CalibrateTest):
     def test_all_views_alike(self):
         rng = np.random.default_rng(8)
         R, t = self.poses[0]
-        names = [self.save(f"a{i}.png", boards.render(self.rays, R, t + 0.0002 * i, rng)) for i in range(5)]
+        names = [
+            self.save(f"a{i}.png", boards.render(self.rays, R, t + 0.0002 * i, rng))
+            for i in range(5)
+        ]
         self.refuse(*names, words=["all 5 views", "alike", "move and tilt"])
 
     def test_a_video_that_ends_early(self):
@@ -359,7 +396,9 @@ class Views(CalibrateTest):
         for _ in range(6000):
             x, y, s = rng.integers(0, 1600), rng.integers(0, 1200), rng.integers(4, 30)
             cv2.rectangle(image, (x, y), (x + s, y + s), int(rng.integers(0, 25)), -1)
-        board = ((np.indices((1200, 1600)) // 12).sum(0) % 2 * 12 + rng.integers(0, 6, (1200, 1600))).astype(np.uint8)
+        board = (
+            (np.indices((1200, 1600)) // 12).sum(0) % 2 * 12 + rng.integers(0, 6, (1200, 1600))
+        ).astype(np.uint8)
         for name, picture in (("squares.png", image), ("tiles.png", board)):
             self.refuse(self.save(name, picture), words=["9x6"], seconds=45)
 

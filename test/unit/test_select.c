@@ -41,15 +41,16 @@ static void test_the_sets_are_those_that_the_compiler_finds(void) {
 }
 
 static void test_the_fastest_is_that_of_the_cpu_named(void) {
-  if (fastest_known == TV_KERNELS_AUTO) TEST_IGNORE_MESSAGE("this CPU was not named");
   TEST_ASSERT_EQUAL_INT(fastest_known, tvk_select(TV_KERNELS_AUTO)->set);
 }
 
 int main(int argc, char **argv) {
-  if (argc == 2) fastest_known = atoi(argv[1]);
   UNITY_BEGIN();
   RUN_TEST(test_the_sets_are_those_that_the_compiler_finds);
-  RUN_TEST(test_the_fastest_is_that_of_the_cpu_named);
+  if (argc == 2) { /* the CPU that is emulated is known to the caller */
+    fastest_known = atoi(argv[1]);
+    RUN_TEST(test_the_fastest_is_that_of_the_cpu_named);
+  }
   return UNITY_END();
 }
 #else
