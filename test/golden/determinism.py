@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Every CPU, the same bits: builds the digest program (digest.c) for x86-64, aarch64 and armv7 with gcc
-and clang at -O0 and -O2, runs each build with every kernel set on real pairs, ARM under qemu-user, and
-compares all digests. Exit status 0 if they are equal, 1 on any difference, 2 where a build or a run
-fails.
+"""Every CPU, the same bits: builds the digest program (digest.c) for x86-64, aarch64 and armv7 with
+gcc and clang at -O0 and -O2, runs each build with every kernel set on real pairs, ARM under
+qemu-user, and compares all digests. Exit status 0 if they are equal, 1 on any difference, 2 where a
+build or a run fails.
 
-A digest covers keypoints, descriptors, matches, poses with covariance and evidence, E F H, verdicts,
-points of all seven triangulations with angles and errors, their covariances, guided matching, bundle
-adjustment, cameras. No number is stored: builds are compared with each other."""
+A digest covers keypoints, descriptors, matches, poses with covariance and evidence, E F H,
+verdicts, points of all seven triangulations with angles and errors, their covariances, guided
+matching, bundle adjustment, cameras. No number is stored: builds are compared with each other."""
 import argparse
 import os
 import shutil
@@ -17,7 +17,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 LONGER_SIDE = 320  # pixels: an -O0 build under qemu takes its time
-# (architecture, what runs its programs, what this run's "neon" is). A Cortex-A72 has no dot product.
+# (architecture, what runs its programs, what this run's "neon" is). A Cortex-A72 has no dot
+# product.
 RUNNERS = {
     "x86-64": [([], "")],
     "aarch64": [(["qemu-aarch64", "-cpu", "cortex-a72", "-L", "/usr/aarch64-linux-gnu"], ""),
@@ -67,7 +68,12 @@ def write_pairs(folder, data):
         with open(folder / name, "wb") as file:
             file.write(b"%d %d\n" % size)
             for (fx, fy, cx, cy), k in zip(cameras, distortion):
-                scaled = [scale * fx, scale * fy, scale * (cx + 0.5) - 0.5, scale * (cy + 0.5) - 0.5]
+                scaled = [
+                    scale * fx,
+                    scale * fy,
+                    scale * (cx + 0.5) - 0.5,
+                    scale * (cy + 0.5) - 0.5,
+                ]
                 file.write(" ".join(map(repr, scaled + k)).encode() + b"\n")
             for image in luma:
                 file.write(cv2.resize(image, size, interpolation=cv2.INTER_AREA).tobytes())
@@ -81,15 +87,19 @@ def read_set(folder):
     words = next(line for line in (folder / "pairs.txt").read_text().splitlines()
                  if line.strip() and not line.startswith("#")).split()
     known = yaml.safe_load((folder / "cameras.yaml").read_text())
-    entries = [next((known[key] for key in known if name.startswith(key)), next(iter(known.values())))
-               for name in words[:2]]
+    entries = [
+        next((known[key] for key in known if name.startswith(key)), next(iter(known.values())))
+        for name in words[:2]
+    ]
     return (folder.name, [folder / "images" / name for name in words[:2]],
             [[entry[key] for key in ("fx", "fy", "cx", "cy")] for entry in entries],
             [[float(entry[key]) for key in ("k1", "k2", "p1", "p2", "k3")] for entry in entries])
 
 
-def build(folder, architecture, compiler, level):
-    """The digest program of this architecture, compiler and level."""
+def build(folder, architecture, compiler, level, keep_footprint):
+    """The digest program of this architecture, compiler and level. keep_footprint: for ARM the
+    shared library and its call graphs are built with it, which scripts/footprint measures; a cache
+    of the compiler's outputs would not have the call graphs."""
     there = folder / f"{architecture}-{compiler}-{level}"
     options = [f"-DCMAKE_BUILD_TYPE={'Release' if level == 'O2' else 'Debug'}",
                "-DCMAKE_C_FLAGS_DEBUG=-O0", "-DCMAKE_CXX_FLAGS_DEBUG=-O0",
@@ -100,9 +110,15 @@ def build(folder, architecture, compiler, level):
         options += ["-DCMAKE_C_COMPILER=clang", "-DCMAKE_CXX_COMPILER=clang++"]
     elif architecture == "x86-64":
         options += ["-DCMAKE_C_COMPILER=gcc", "-DCMAKE_CXX_COMPILER=g++"]
-    if not (there / "build.ninja").exists():
+    targets = ["golden_digest"]
+    if keep_footprint and architecture != "x86-64":
+        targets.append("twoview")
+        options += ["-DCMAKE_C_COMPILER_LAUNCHER=", "-DCMAKE_CXX_COMPILER_LAUNCHER="]
+    configured = there / "configured_with"
+    if not configured.exists() or configured.read_text() != repr(options):
         run("cmake", "-S", ROOT, "-B", there, "-G", "Ninja", *options)
-    run("cmake", "--build", there, "--target", "golden_digest", "-j", "1", "--", "--quiet")
+        configured.write_text(repr(options))
+    run("cmake", "--build", there, "--target", *targets, "-j", "1", "--", "--quiet")
     return there / "test/bin/golden_digest"
 
 
@@ -142,7 +158,9 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="four builds instead of twelve")
     parser.add_argument("--build-dir", type=Path, default=ROOT / "build/determinism")
-    parser.add_argument("--native", type=Path, help="x86-64 -O2 digest program that is built already")
+    parser.add_argument(
+        "--native", type=Path, help="x86-64 -O2 digest program that is built already"
+    )
     parser.add_argument("--data", type=Path, default=os.environ.get("TWOVIEW_DATA"),
                         help="folder of data sets; default TWOVIEW_DATA, else ../shared/data")
     parser.add_argument("--jobs", type=int,
@@ -161,7 +179,7 @@ def main():
 
     def job(one):
         given = args.native if one == QUICK[0] else None
-        return digests(given or build(args.build_dir, *one), one[0], pairs)
+        return digests(given or build(args.build_dir, *one, args.quick), one[0], pairs)
 
     print(f"{'architecture':<13}{'compiler':<9}{'level':<6}{'kernels':<9} digest of "
           f"{', '.join(p.name for p in pairs)}", flush=True)

@@ -1,12 +1,17 @@
-"""A digest a stage of what the library computes from a rendered pair (scene.c), held against the committed ones.
+"""A digest a stage of what the library computes from a rendered pair (scene.c), held against the
+committed ones.
 
 test/golden/digests.txt has a line `stage digest` for each stage. The test golden/stages fails
-- where a stage's output is other bytes than those the file was made from, with any kernel set of this CPU;
-- where CHANGELOG.md does not announce the file's digest: under a heading "Results", the newest mention of
+- where a stage's output is other bytes than those the file was made from, with any kernel set of
+this CPU;
+- where CHANGELOG.md does not announce the file's digest: under a heading "Results", the newest
+mention of
   `STAGE DIGITS`, DIGITS being the first eight of the digest, must be the file's.
 So nobody changes a result without writing it down. To announce a change that is meant:
-  cmake --build build/release --target golden_update     rewrites digests.txt, prints the line for CHANGELOG.md
-and add what that prints, and why the result changed, under Results of CHANGELOG.md's newest section."""
+  cmake --build build/release --target golden_update     rewrites digests.txt, prints the line for
+  CHANGELOG.md
+and add what that prints, and why the result changed, under Results of CHANGELOG.md's newest
+section."""
 import argparse
 import re
 import subprocess
@@ -103,7 +108,9 @@ def main():
     for line in wrong:
         print(line)
     if wrong:
-        print("An output has changed. If that is meant: test/golden/stages.py says how to announce it.")
+        print(
+            "An output has changed. If that is meant: test/golden/stages.py says what to do."
+        )
     else:
         print(f"{len(STAGES)} stages with {', '.join(by_set)}: equal to the committed digests")
     return 1 if wrong else 0
