@@ -45,8 +45,8 @@ class Graph:
 
 
 def kernels_of(source):
-    """The kernels that a source file may call: those it names as members of the table. Of a file that
-    names none, and of one outside the library, nothing is known."""
+    """The kernels that a source file may call: those it names as members of the table. Of a file
+    that names none, and of one outside the library, nothing is known."""
     if not source.exists():
         return frozenset()
     list_of_all = (SOURCES / "kernels/kernels.h").read_text()
@@ -55,7 +55,8 @@ def kernels_of(source):
 
 
 def deepest_of(graph, kernel_bytes):
-    """Bytes and chain by function; a circle is a SystemExit. kernel_bytes: of an indirect call's title."""
+    """Bytes and chain by function; a circle is a SystemExit. kernel_bytes: of an indirect call's
+    title."""
     known, open_names = {}, []
 
     def visit(name):
@@ -85,7 +86,8 @@ def deepest_of(graph, kernel_bytes):
 
 
 def read_graphs(folder):
-    """Of the library outside the kernels, whose indirect calls name their file, and of the kernels."""
+    """Of the library outside the kernels, whose indirect calls name their file, and of the
+    kernels."""
     graph, kernels = Graph(), Graph()
     files = sorted(folder.rglob("*.ci"))
     if not files:
@@ -100,8 +102,8 @@ def read_graphs(folder):
 
 
 def kernel_bytes_by(kernels):
-    """Of an indirect call's title: the deepest kernel of any set that the call's file names; of all, if
-    it names none."""
+    """Of an indirect call's title: the deepest kernel of any set that the call's file names; of
+    all, if it names none."""
     # A call through a pointer inside a kernel would be one more kernel; there is none.
     deepest = {name: bytes_ for name, (bytes_, _) in deepest_of(kernels, lambda _: 0).items()}
 
@@ -136,7 +138,11 @@ def main():
     print(f"{bytes_} bytes of stack at most: {name}")
     for link in chain:
         is_kernel = link.startswith("(")
-        print("        " + link if is_kernel else f"  {graph.frame.get(link, FOREIGN_BYTES):6d} {link}")
+        print(
+            "        " + link
+            if is_kernel
+            else f"  {graph.frame.get(link, FOREIGN_BYTES):6d} {link}"
+        )
     for line in wrong:
         print(line)
     sys.exit(1 if wrong else 0)
