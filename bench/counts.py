@@ -1,11 +1,11 @@
 """Instructions a call, which no mood of the machine changes.
 
-x86-64, under valgrind --tool=callgrind: each row of the benchmark programs is called once more after a
-first call; what happens inside bench_measured (bench.cc) is counted. Once with the avx2 and once with
-the c kernel set; valgrind 3.19 hides AVX-512, so OpenCV too runs its AVX2 code.
+x86-64, under valgrind --tool=callgrind: each row of the benchmark programs is called once more
+after a first call; what happens inside bench_measured (bench.cc) is counted. Once with the avx2 and
+once with the c kernel set; valgrind 3.19 hides AVX-512, so OpenCV too runs its AVX2 code.
 
-ARM, under qemu-user with the plugin qemu_count.c: stages.c, built by the cross compiler with the library
-of the presets aarch64 and armv7; a call is the difference between one call and none.
+ARM, under qemu-user with the plugin qemu_count.c: stages.c, built by the cross compiler with the
+library of the presets aarch64 and armv7; a call is the difference between one call and none.
 """
 
 import glob
@@ -86,7 +86,9 @@ def measure(build, stages, programs):
 
 
 def _run(*command):
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    subprocess.run(
+        command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
 
 
 def _arm_program(preset, compiler, folder):
@@ -115,7 +117,9 @@ def arm(build):
         for preset, compiler, qemu in ARM:
             missing = [tool for tool in (compiler, qemu) if not shutil.which(tool)]
             if missing:
-                print(f"bench: no {' and no '.join(missing)}: {preset} is left out", file=sys.stderr)
+                print(
+                    f"bench: no {' and no '.join(missing)}: {preset} is left out", file=sys.stderr
+                )
                 continue
             print(f"bench: counting {preset} under qemu", file=sys.stderr, flush=True)
             program = _arm_program(preset, compiler, folder)

@@ -65,8 +65,17 @@ def context_kib(library, width, height):
 
 
 def _at_most(case, value, most):
-    return Row("footprint", case, value, None, "", None, "KiB", target=f"<= {most} KiB" if most else "",
-               reached=value <= most if most else None)
+    return Row(
+        "footprint",
+        case,
+        value,
+        None,
+        "",
+        None,
+        "KiB",
+        target=f"<= {most} KiB" if most else "",
+        reached=value <= most if most else None,
+    )
 
 
 def rows(build, root):

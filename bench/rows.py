@@ -165,8 +165,19 @@ def _number(value):
 
 
 def print_table(rows, out):
-    header = ("stage", "case", "ours", "peer", "unit", "peer / ours", "target", "reached", "peer's name",
-              "spread %", "found: ours; peer's")
+    header = (
+        "stage",
+        "case",
+        "ours",
+        "peer",
+        "unit",
+        "peer / ours",
+        "target",
+        "reached",
+        "peer's name",
+        "spread %",
+        "found: ours; peer's",
+    )
     table = [header]
     for row in rows:
         reached = {None: "", True: "yes", False: "NO"}[row.reached]

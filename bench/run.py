@@ -2,8 +2,8 @@
 """Speed beside the peers: one table of ours, theirs and peer / ours.
 
 Runs the programs of bench/ (OpenCV of the system, OpenGV, libcvd) and the peers that are reached
-through Python (OpenCV 5, faiss, PoseLib, pycolmap). One thread; a time is the process's CPU time, the
-median of the repetitions, all systems of a program in random turn. docs/performance.md has the
+through Python (OpenCV 5, faiss, PoseLib, pycolmap). One thread; a time is the process's CPU time,
+the median of the repetitions, all systems of a program in random turn. docs/performance.md has the
 protocol and the numbers.
 """
 

@@ -23,8 +23,11 @@ STARTUP = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable",
            "_ITM_registerTMCloneTable", "__deregister_frame_info", "__register_frame_info"}
 # Of the objects, not of the .so: there the compiler's start files have theirs.
 CONSTRUCTORS = re.compile(r"\.(init_array|fini_array|ctors|dtors)\b")
-WRITABLE = re.compile(r"\.(data|bss|tdata|tbss)\b(?!\.rel\.ro)")  # .data.rel.ro is made read-only at load
-SECTION = re.compile(r"^\s*\[\s*\d+\]\s+(\.\S+)\s+\S+\s+[0-9a-f]+\s+[0-9a-f]+\s+([0-9a-f]+)\s", re.M)
+# .data.rel.ro is made read-only at load
+WRITABLE = re.compile(r"\.(data|bss|tdata|tbss)\b(?!\.rel\.ro)")
+SECTION = re.compile(
+    r"^\s*\[\s*\d+\]\s+(\.\S+)\s+\S+\s+[0-9a-f]+\s+[0-9a-f]+\s+([0-9a-f]+)\s", re.M
+)
 NEEDED = re.compile(r"^(libc|libm|ld-linux[\w-]*)\.so\.\d+$")
 
 

@@ -11,7 +11,11 @@ OVER = 3  # samples a pixel and axis
 
 MILD = ("brown-conrady", (620.0, 617.0, 327.3, 234.6), (-0.28, 0.09, 0.001, -0.0005, 0.0))
 WIDE = ("brown-conrady", (380.0, 381.0, 315.2, 243.9), (-0.25, 0.06, 0.0008, -0.0004, -0.006))
-RATIONAL = ("brown-conrady", (520.0, 518.0, 317.5, 241.2), (0.5, 0.05, 0.0005, -0.0003, 0.0, 1.2, 0.15, 0.005))
+RATIONAL = (
+    "brown-conrady",
+    (520.0, 518.0, 317.5, 241.2),
+    (0.5, 0.05, 0.0005, -0.0003, 0.0, 1.2, 0.15, 0.005),
+)
 FISHEYE = ("kannala-brandt", (300.0, 299.0, 322.8, 238.1), (0.02, -0.01, 0.003, -0.001))
 
 
@@ -99,7 +103,12 @@ def meet(H, rays):
 
 def within(X, Y, squares):
     """The board, widened by so many squares."""
-    return (X > -1 - squares) & (X < INNER[0] + squares) & (Y > -1 - squares) & (Y < INNER[1] + squares)
+    return (
+        (X > -1 - squares)
+        & (X < INNER[0] + squares)
+        & (Y > -1 - squares)
+        & (Y < INNER[1] + squares)
+    )
 
 
 def render(rays, R, t, rng, blur=0.8, noise=3.0):
@@ -109,7 +118,9 @@ def render(rays, R, t, rng, blur=0.8, noise=3.0):
     step = 24  # a coarse look first: the board is a part of the image
     rows, columns = np.nonzero(within(*meet(H, rays[::step, ::step]), 3))
     if len(rows):
-        part = tuple(slice(max(0, step * (i.min() - 1)), step * (i.max() + 2)) for i in (rows, columns))
+        part = tuple(
+            slice(max(0, step * (i.min() - 1)), step * (i.max() + 2)) for i in (rows, columns)
+        )
         X, Y = meet(H, rays[part])
         samples[part][within(X, Y, 1)] = 205
         even = (np.floor(X).astype(np.int32) + np.floor(Y).astype(np.int32)) % 2 == 0
@@ -124,7 +135,8 @@ def poses(lens, count, rng, max_tilt_deg=42):
     outline = np.array([[-2, -2], [9.0, -2], [10, 2], [10, 7], [3, 7], [-2, 7], [-2, 2], [4, -2]])
     outline = np.c_[outline, np.zeros(len(outline))] * SQUARE
     middle = np.array([4, 2.5, 0]) * SQUARE
-    reach = np.minimum(1.2, np.array(SIZE) / (2 * np.array(lens[1][:2])))  # beyond it nothing is seen
+    # beyond it nothing is seen
+    reach = np.minimum(1.2, np.array(SIZE) / (2 * np.array(lens[1][:2])))
     found = []
     while len(found) < count:
         direction, tilt = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(5, max_tilt_deg))

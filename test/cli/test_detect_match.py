@@ -46,10 +46,14 @@ class Detect(cli.CliTest):
     def test_a_blank_image_has_an_empty_table(self):
         blank = self.write("blank.png", cli.png(64, 48, bytes(64 * 48)))
         self.succeed(self.run_program("detect", blank, "-o", self.out))
-        self.assertEqual((self.out / "keypoints.csv").read_text(), "x,y,size,angle_rad,score,level\n")
+        self.assertEqual(
+            (self.out / "keypoints.csv").read_text(), "x,y,size,angle_rad,score,level\n"
+        )
 
     def test_options_of_other_verbs_are_refused(self):
-        self.assert_refused(self.run_program("detect", self.a, "-o", self.out, "--ratio", "0.8"), "--ratio")
+        self.assert_refused(
+            self.run_program("detect", self.a, "-o", self.out, "--ratio", "0.8"), "--ratio"
+        )
 
 
 class Match(cli.CliTest):

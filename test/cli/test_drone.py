@@ -139,8 +139,19 @@ class Drone(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             summary = json.loads(result.stdout)
         self.assertEqual(summary, self.summary())
-        self.assertEqual(set(summary), {"frames_received", "frames_decoded", "frames_dropped", "gaps",
-                                        "navdata_received", "navdata_rejected", "reconnects", "seconds"})
+        self.assertEqual(
+            set(summary),
+            {
+                "frames_received",
+                "frames_decoded",
+                "frames_dropped",
+                "gaps",
+                "navdata_received",
+                "navdata_rejected",
+                "reconnects",
+                "seconds",
+            },
+        )
         packets, rest = packets_of(self.path("video.pave"))
         self.assertEqual((len(packets), rest), (summary["frames_received"], 0))
         self.assertGreater(len(packets), 5)
@@ -238,7 +249,9 @@ class Drone(unittest.TestCase):
     def test_an_output_that_cannot_be_is_refused(self):
         blocker = os.path.join(self.folder.name, "file")
         pathlib.Path(blocker).touch()
-        self.assert_refused(run("record", "-o", os.path.join(blocker, "x"), "--duration", "1"), blocker)
+        self.assert_refused(
+            run("record", "-o", os.path.join(blocker, "x"), "--duration", "1"), blocker
+        )
 
     def test_a_dry_run_sends_nothing(self):
         with Simulator() as drone:
@@ -249,7 +262,9 @@ class Drone(unittest.TestCase):
         self.assertEqual((counts["commands obeyed"], counts["navdata sent"]), (0, 0))
 
     def test_flying_needs_a_terminal(self):
-        self.assert_refused(run("fly", "--live", "--host", HOST, stdin=subprocess.DEVNULL), "terminal")
+        self.assert_refused(
+            run("fly", "--live", "--host", HOST, stdin=subprocess.DEVNULL), "terminal"
+        )
 
     def test_keys_fly_the_drone_and_leaving_lands_it(self):
         truth = os.path.join(self.folder.name, "truth.txt")

@@ -107,43 +107,85 @@ class DroneBadInput(unittest.TestCase):
 
     def test_a_host_that_sends_garbage(self):
         with Garbage() as host:
-            self.assert_refused(run("info", "--duration", "2", *host.ports()), "no AR.Drone answers")
-            self.assert_refused(run("record", "-o", self.path("r"), "--duration", "2", "--quiet", *host.ports()),
-                                "not an AR.Drone's")
+            self.assert_refused(
+                run("info", "--duration", "2", *host.ports()), "no AR.Drone answers"
+            )
+            self.assert_refused(
+                run("record", "-o", self.path("r"), "--duration", "2", "--quiet", *host.ports()),
+                "not an AR.Drone's",
+            )
             self.assertEqual(host.commands, [])
 
     def test_a_host_that_takes_everything_and_says_nothing(self):
         with Garbage(is_silent=True) as host:
-            self.assert_refused(run("info", "--duration", "2", *host.ports()), "no AR.Drone answers")
-            self.assert_refused(run("record", "-o", self.path("r"), "--duration", "2", "--quiet", *host.ports()),
-                                "nothing came from")
+            self.assert_refused(
+                run("info", "--duration", "2", *host.ports()), "no AR.Drone answers"
+            )
+            self.assert_refused(
+                run("record", "-o", self.path("r"), "--duration", "2", "--quiet", *host.ports()),
+                "nothing came from",
+            )
             self.assertEqual(host.commands, [])
 
     def test_an_unknown_firmware(self):
         with Simulator("--firmware", "9.8.7-\x1b[31mbeta") as drone:
             told = json.loads(run("info", "--json", *drone.ports()).stdout)
             self.assertEqual((told["state"], told["firmware"]), ("landed", "9.8.7-?[31mbeta"))
-            result = run("record", "-o", self.path("r"), "--duration", "3", "--json", *drone.ports())
+            result = run(
+                "record", "-o", self.path("r"), "--duration", "3", "--json", *drone.ports()
+            )
             self.assertEqual(result.returncode, 0, result.stderr)
         summary = json.loads(result.stdout)
         self.assertEqual(summary["navdata_rejected"], 0)
         self.assertGreater(summary["navdata_received"], 100)
-        self.assertGreater(len(pathlib.Path(self.path("r", "attitude.tum")).read_text().splitlines()), 100)
+        self.assertGreater(
+            len(pathlib.Path(self.path("r", "attitude.tum")).read_text().splitlines()), 100
+        )
 
     def test_values_out_of_range_are_refused(self):
         for arguments in (
-                ("info", "--duration", "0"), ("info", "--at-port", "-1"), ("info", "--video-port", "65536"),
-                ("record", "-o", "x", "--duration", "-1"), ("record", "-o", "x", "--duration", "nan"),
-                ("record", "--duration", "1"), ("record", "-o", "x", "--host", ""),
-                ("replay", "x", "--speed", "-1"), ("replay", "x", "--speed", "1e9"), ("replay",),
-                ("fly", "--speed", "0"), ("fly", "--speed", "1.1"), ("fly", "--speed", "nan"),
-                ("simulate", "--lose", "1.5"), ("simulate", "--fps", "0"), ("simulate", "--pave-header", "66"),
-                ("simulate", "--first-sequence", "-1"), ("simulate", "--start", "1"),
-                ("simulate", "--start", "100,0"), ("simulate", "--start", "nan,0"), ("simulate", "--lose", "nan"), ("simulate", "--yaw-deg", "400"),
-                ("simulate", "--images", "no-such.png"), ("simulate", "--camera", "no-such.yaml"),
-                ("simulate", "--truth", "/no/such/folder/truth.txt", "--at-port", "0", "--navdata-port", "0",
-                 "--video-port", "0", "--control-port", "0", "--recording-port", "0"),
-                ("juggle",), ()):
+            ("info", "--duration", "0"),
+            ("info", "--at-port", "-1"),
+            ("info", "--video-port", "65536"),
+            ("record", "-o", "x", "--duration", "-1"),
+            ("record", "-o", "x", "--duration", "nan"),
+            ("record", "--duration", "1"),
+            ("record", "-o", "x", "--host", ""),
+            ("replay", "x", "--speed", "-1"),
+            ("replay", "x", "--speed", "1e9"),
+            ("replay",),
+            ("fly", "--speed", "0"),
+            ("fly", "--speed", "1.1"),
+            ("fly", "--speed", "nan"),
+            ("simulate", "--lose", "1.5"),
+            ("simulate", "--fps", "0"),
+            ("simulate", "--pave-header", "66"),
+            ("simulate", "--first-sequence", "-1"),
+            ("simulate", "--start", "1"),
+            ("simulate", "--start", "100,0"),
+            ("simulate", "--start", "nan,0"),
+            ("simulate", "--lose", "nan"),
+            ("simulate", "--yaw-deg", "400"),
+            ("simulate", "--images", "no-such.png"),
+            ("simulate", "--camera", "no-such.yaml"),
+            (
+                "simulate",
+                "--truth",
+                "/no/such/folder/truth.txt",
+                "--at-port",
+                "0",
+                "--navdata-port",
+                "0",
+                "--video-port",
+                "0",
+                "--control-port",
+                "0",
+                "--recording-port",
+                "0",
+            ),
+            ("juggle",),
+            (),
+        ):
             with self.subTest(arguments=arguments):
                 self.assert_refused(run(*arguments, cwd=self.folder.name, stdin=subprocess.DEVNULL))
         self.assertEqual(os.listdir(self.folder.name), [])
@@ -152,8 +194,12 @@ class DroneBadInput(unittest.TestCase):
         with Simulator() as drone:
             for name, port in (("navdata", drone.port["navdata"]), ("video", drone.port["video"]),
                                ("control", drone.port["control"])):
-                others = [word for other in ("at", "navdata", "video", "control", "recording") if other != name
-                          for word in (f"--{other}-port", "0")]
+                others = [
+                    word
+                    for other in ("at", "navdata", "video", "control", "recording")
+                    if other != name
+                    for word in (f"--{other}-port", "0")
+                ]
                 result = run("simulate", f"--{name}-port", port, *others, "--duration", "1")
                 self.assert_refused(result, "port " + port, "in use")
 
@@ -164,8 +210,12 @@ class DroneBadInput(unittest.TestCase):
             for k in range(15):
                 output = self.path(f"r{k}")
                 verb = (["record", "-o", output, "--quiet"], ["info"], ["fly"])[k % 3]
-                process = subprocess.Popen([PROGRAM, "drone", *verb, *drone.ports()], stdin=subprocess.PIPE,
-                                           stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+                process = subprocess.Popen(
+                    [PROGRAM, "drone", *verb, *drone.ports()],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                )
                 time.sleep(chance.uniform(0, 1))
                 process.send_signal(signal.SIGINT)
                 _, error = process.communicate(timeout=10)
@@ -177,7 +227,10 @@ class DroneBadInput(unittest.TestCase):
                 self.assertEqual(packets_of(os.path.join(output, "video.pave"))[1], 0)
                 self.assertEqual(navdata_of(os.path.join(output, "navdata.log"))[1], 0)
                 for name in os.listdir(output):
-                    self.assertIn(name, ("video.pave", "navdata.log", "attitude.tum", "frames.txt", "summary.json"))
+                    self.assertIn(
+                        name,
+                        ("video.pave", "navdata.log", "attitude.tum", "frames.txt", "summary.json"),
+                    )
             self.assertEqual(drone.stop()["take offs"], 0)
 
     def test_ctrl_c_ends_a_simulator_at_any_moment(self):
@@ -185,13 +238,17 @@ class DroneBadInput(unittest.TestCase):
         for _ in range(4):
             ports = [word for name in ("at", "navdata", "video", "control", "recording")
                      for word in (f"--{name}-port", "0")]
-            process = subprocess.Popen([PROGRAM, "drone", "simulate", "--quiet", *ports], stderr=subprocess.PIPE)
+            process = subprocess.Popen(
+                [PROGRAM, "drone", "simulate", "--quiet", *ports], stderr=subprocess.PIPE
+            )
             time.sleep(chance.uniform(0, 1))
             process.send_signal(signal.SIGINT)
             self.assertEqual(process.communicate(timeout=10)[1], b"")
             self.assertIn(process.returncode, (0, -signal.SIGINT))
 
-    @unittest.skipUnless(os.geteuid() == 0 and sys.platform == "linux", "a small file system needs root")
+    @unittest.skipUnless(
+        os.geteuid() == 0 and sys.platform == "linux", "a small file system needs root"
+    )
     def test_a_disk_that_is_full(self):
         small = self.path("small")
         os.mkdir(small)
@@ -202,8 +259,12 @@ class DroneBadInput(unittest.TestCase):
         for frames in ([], ["--frames"]):
             output = os.path.join(small, "r")
             with Simulator() as drone:
-                result = run("record", "--duration", "30", "-o", output, "--quiet", *frames, *drone.ports())
-                self.assert_refused(result, "cannot write", "No space left", "what was recorded before is kept")
+                result = run(
+                    "record", "--duration", "30", "-o", output, "--quiet", *frames, *drone.ports()
+                )
+                self.assert_refused(
+                    result, "cannot write", "No space left", "what was recorded before is kept"
+                )
                 self.assertEqual(drone.stop()["take offs"], 0)
             self.assertEqual(packets_of(os.path.join(output, "video.pave"))[1], 0)
             self.assertEqual(navdata_of(os.path.join(output, "navdata.log"))[1], 0)

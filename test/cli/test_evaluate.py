@@ -24,7 +24,9 @@ def pair_line(name0="a.png", name1="b.png", K0=None, K1=None, T=None, turns=(0, 
 def auc(errors, threshold):
     """SuperGlue's pose_auc, in per cent."""
     errors = sorted(errors)
-    points = [(0.0, 0.0)] + [(e, (i + 1) / len(errors)) for i, e in enumerate(errors) if e < threshold]
+    points = [(0.0, 0.0)] + [
+        (e, (i + 1) / len(errors)) for i, e in enumerate(errors) if e < threshold
+    ]
     points.append((threshold, points[-1][1]))
     area = sum((e1 - e0) * (r0 + r1) / 2 for (e0, r0), (e1, r1) in zip(points, points[1:]))
     return 100 * area / threshold
@@ -33,7 +35,9 @@ def auc(errors, threshold):
 class Evaluate(cli.CliTest):
     def evaluate(self, text, *more, out=None):
         pairs = self.write("set/pairs.txt", text)
-        return self.run_program("evaluate", pairs, "--images", self.folder, "-o", out or self.out, *more)
+        return self.run_program(
+            "evaluate", pairs, "--images", self.folder, "-o", out or self.out, *more
+        )
 
     def report(self, *arguments, **options):
         self.succeed(self.evaluate(*arguments, **options))
@@ -48,12 +52,30 @@ class Evaluate(cli.CliTest):
         self.assertEqual([key for key in PAIR_KEYS if key in pair], PAIR_KEYS)
         self.assertLess(pair["pose_error_deg"], 0.5)
         self.assertGreater(pair["precision"], 0.9)
-        self.assertEqual(pair["pose_error_deg"], max(pair["rotation_error_deg"], pair["translation_error_deg"]))
+        self.assertEqual(
+            pair["pose_error_deg"], max(pair["rotation_error_deg"], pair["translation_error_deg"])
+        )
         self.assertGreater(report["auc"]["5"], 90)
 
     def test_auc_is_superglues_and_failures_are_infinite(self):
-        wrong = lambda deg: [math.cos(math.radians(deg)), 0, math.sin(math.radians(deg)), -1, 0, 1, 0, 0,
-                             -math.sin(math.radians(deg)), 0, math.cos(math.radians(deg)), 0, 0, 0, 0, 1]
+        wrong = lambda deg: [
+            math.cos(math.radians(deg)),
+            0,
+            math.sin(math.radians(deg)),
+            -1,
+            0,
+            1,
+            0,
+            0,
+            -math.sin(math.radians(deg)),
+            0,
+            math.cos(math.radians(deg)),
+            0,
+            0,
+            0,
+            0,
+            1,
+        ]
         lines = [pair_line()] + [pair_line(T=wrong(deg)) for deg in (3, 7, 7, 15, 40)]
         lines.append(pair_line(name1="gone.png"))
         report = self.report("".join(lines))
@@ -63,7 +85,9 @@ class Evaluate(cli.CliTest):
         errors = [math.inf if e is None else e for e in errors]
         self.assertAlmostEqual(errors[1], 3, delta=0.5)
         for threshold in (5, 10, 20):
-            self.assertAlmostEqual(report["auc"][str(threshold)], auc(errors, threshold), delta=1e-9)
+            self.assertAlmostEqual(
+                report["auc"][str(threshold)], auc(errors, threshold), delta=1e-9
+            )
 
     def test_the_sign_of_the_translation_counts_in_auc_signed_only(self):
         backwards = list(SIDEWAYS)
@@ -110,12 +134,16 @@ class Evaluate(cli.CliTest):
         self.assertEqual(self.listing(self.folder / "deep"), ["r.json"])
 
     def test_max_pairs_takes_the_first(self):
-        report = self.report(pair_line() + pair_line(name0="b.png", name1="a.png"), "--max-pairs", "1")
+        report = self.report(
+            pair_line() + pair_line(name0="b.png", name1="a.png"), "--max-pairs", "1"
+        )
         self.assertEqual([p["name0"] for p in report["pairs"]], ["a.png"])
 
     def test_json_prints_the_report_alone_and_quiet_prints_nothing(self):
         done = self.succeed(self.evaluate(pair_line(), "--json"))
-        self.assertEqual(json.loads(done.stdout), json.loads((self.out / "report.json").read_text()))
+        self.assertEqual(
+            json.loads(done.stdout), json.loads((self.out / "report.json").read_text())
+        )
         self.assertEqual(done.stderr, b"")
         done = self.succeed(self.evaluate(pair_line(), "--quiet"))
         self.assertEqual(done.stdout + done.stderr, b"")
@@ -133,8 +161,10 @@ class Evaluate(cli.CliTest):
 
     def test_a_camera_of_the_set_gives_the_distortion(self):
         entry = lambda name, k1, fx=FOCAL: (
-            f"{name}:\n  {{fx: {fx}, fy: {FOCAL}, cx: {K[2]}, cy: {K[5]}, k1: {k1}, k2: 0, p1: 0, p2: 0, "
-            f"k3: 0, image_width: {WIDTH}, image_height: {HEIGHT}}}\n")
+            f"{name}:\n  {{fx: {fx}, fy: {FOCAL}, cx: {K[2]}, cy: {K[5]}, k1: {k1}, "
+            "k2: 0, p1: 0, p2: 0, "
+            f"k3: 0, image_width: {WIDTH}, image_height: {HEIGHT}}}\n"
+        )
         error = lambda: self.report(pair_line())["pairs"][0]["pose_error_deg"]
         self.write("set/cameras.yaml", entry("cam", 0))
         straight = error()
@@ -151,11 +181,17 @@ class Evaluate(cli.CliTest):
         self.assertIn("cameras.yaml", self.report(pair_line())["pairs"][0]["error"])
 
     def test_a_camera_of_another_size_is_told_for_its_pair(self):
-        self.write("set/cameras.yaml", "c: {fx: 300, fy: 300, cx: 1, cy: 1, image_width: 9, image_height: 9}\n")
+        self.write(
+            "set/cameras.yaml",
+            "c: {fx: 300, fy: 300, cx: 1, cy: 1, image_width: 9, image_height: 9}\n",
+        )
         self.assertIn("9x9", self.report(pair_line())["pairs"][0]["error"])
 
     def test_a_broken_cameras_file_is_refused(self):
-        self.write("set/cameras.yaml", "c: {fx: 0, fy: 300, cx: 1, cy: 1, image_width: 9, image_height: 9}\n")
+        self.write(
+            "set/cameras.yaml",
+            "c: {fx: 0, fy: 300, cx: 1, cy: 1, image_width: 9, image_height: 9}\n",
+        )
         self.assert_refused(self.evaluate(pair_line()), "cameras.yaml", "fx", "is 0")
 
     def test_images_of_growing_size_share_one_context(self):
@@ -175,8 +211,11 @@ class RealData(cli.CliTest):
         folder = Path(os.environ.get("TWOVIEW_DATA", "")) / "euroc_v101_start"
         if not (folder / "pairs.txt").exists():
             self.skipTest("no TWOVIEW_DATA with euroc_v101_start")
-        self.succeed(self.run_program("evaluate", folder / "pairs.txt", "--images", folder / "images",
-                                      "-o", self.out))
+        self.succeed(
+            self.run_program(
+                "evaluate", folder / "pairs.txt", "--images", folder / "images", "-o", self.out
+            )
+        )
         report = json.loads((self.out / "report.json").read_text())
         self.assertEqual(report["num_pairs"], 5)
         self.assertGreater(report["auc"]["10"], 70)

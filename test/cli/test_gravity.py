@@ -42,7 +42,9 @@ class Gravity(cli.CliTest):
     def test_what_is_no_direction_is_refused(self):
         for text in ("0,0,0", "1,2", "1,2,3,4", "nan,0,1", "1,inf,0", "1,,2", "down", "1 2 3"):
             with self.subTest(text=text):
-                self.assert_refused(self.reconstruct(*GRAVITY[2:], "--gravity0", text), "--gravity0")
+                self.assert_refused(
+                    self.reconstruct(*GRAVITY[2:], "--gravity0", text), "--gravity0"
+                )
 
     def test_a_deviation_out_of_range_is_refused(self):
         for text in ("-1", "181", "nan", "wide"):

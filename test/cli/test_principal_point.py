@@ -13,7 +13,10 @@ from pathlib import Path
 
 import cli_support as cli
 
-DATA = Path(os.environ.get("TWOVIEW_DATA") or Path(__file__).parents[3] / "shared" / "data") / "kitti00_turn"
+DATA = (
+    Path(os.environ.get("TWOVIEW_DATA") or Path(__file__).parents[3] / "shared" / "data")
+    / "kitti00_turn"
+)
 NAMES = ("000106.png", "000110.png")
 F, CX, CY = 718.856, 607.1928, 185.2157
 CAMERA = dict(width=1241, height=376, fx=F, fy=F, cx=CX, cy=CY)
@@ -52,10 +55,14 @@ class PrincipalPoint(cli.CliTest):
         shift = result["principal_point_shift_px"]
         self.assertTrue(-18 < shift[0] < -5 and -3 < shift[1] < 9, shift)
         line = f"({shift[0]:+.1f}, {shift[1]:+.1f}) px"
-        self.assertIn(line.encode(), [x for x in done.stdout.splitlines() if x.startswith(b"camera ")][0])
+        self.assertIn(
+            line.encode(), [x for x in done.stdout.splitlines() if x.startswith(b"camera ")][0]
+        )
         report = (self.out / "report.html").read_text()
         self.assertIn("principal_point_shift_px", report)
-        self.assertIn(f"<b>{shift[0]:+.1f}, {shift[1]:+.1f}<i>px</i></b><span>the principal point", report)
+        self.assertIn(
+            f"<b>{shift[0]:+.1f}, {shift[1]:+.1f}<i>px</i></b><span>the principal point", report
+        )
         self.assertEqual(result["options"]["principal_point_sigma"], 0.01)
 
     def test_F_is_of_the_corrected_camera(self):
@@ -65,9 +72,15 @@ class PrincipalPoint(cli.CliTest):
         inverse = [1 / F, 0, -(CX + dx) / F, 0, 1 / F, -(CY + dy) / F, 0, 0, 1]
 
         def product(a, b):
-            return [sum(a[3 * i + k] * b[3 * k + j] for k in range(3)) for i in range(3) for j in range(3)]
+            return [
+                sum(a[3 * i + k] * b[3 * k + j] for k in range(3))
+                for i in range(3)
+                for j in range(3)
+            ]
 
-        expected = product(product([inverse[3 * j + i] for i in range(3) for j in range(3)], result["E"]), inverse)
+        expected = product(
+            product([inverse[3 * j + i] for i in range(3) for j in range(3)], result["E"]), inverse
+        )
         norm = math.hypot(*expected)
         for ours, theirs in zip(result["F"], expected):
             self.assertAlmostEqual(ours, theirs / norm, 9)
@@ -82,7 +95,9 @@ class PrincipalPoint(cli.CliTest):
     def test_what_is_no_such_deviation_is_refused(self):
         for text in ("-0.01", "0.11", "nan", "inf", "some", ""):
             with self.subTest(text=text):
-                self.assert_refused(self.reconstruct("--principal-point-sigma", text), "--principal-point-sigma")
+                self.assert_refused(
+                    self.reconstruct("--principal-point-sigma", text), "--principal-point-sigma"
+                )
 
     def test_a_right_camera_is_not_moved_and_none_has_no_shift(self):
         a, b = self.folder / "a.png", self.folder / "b.png"
@@ -95,8 +110,19 @@ class PrincipalPoint(cli.CliTest):
 
     def triangulate(self, pose):
         out = self.folder / "points"
-        done = self.succeed(self.run_program("triangulate", self.out / "matches.csv", "--camera", self.camera, "--pose",
-                                             pose, "--json", "-o", out))
+        done = self.succeed(
+            self.run_program(
+                "triangulate",
+                self.out / "matches.csv",
+                "--camera",
+                self.camera,
+                "--pose",
+                pose,
+                "--json",
+                "-o",
+                out,
+            )
+        )
         with open(self.out / "matches.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         matches = [tuple(float(row[key]) for key in ("x0", "y0", "x1", "y1")) for row in rows]
@@ -130,19 +156,34 @@ class PrincipalPoint(cli.CliTest):
 
     def test_a_broken_shift_is_refused(self):
         matches = self.write("m.txt", "100 100 90 100\n")
-        for text, *words in (("[1]", "principal_point_shift_px", "1 numbers"), ("[1, .nan]", "not finite"),
-                             ("far", "principal_point_shift_px"),
-                             ("[1, 2]\nimage_size0: [0, 1]", "image_size0")):
+        for text, *words in (
+            ("[1]", "principal_point_shift_px", "1 numbers"),
+            ("[1, .nan]", "not finite"),
+            ("far", "principal_point_shift_px"),
+            ("[1, 2]\nimage_size0: [0, 1]", "image_size0"),
+        ):
             with self.subTest(text=text):
                 pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [1,0,0]\n"
                                                f"principal_point_shift_px: {text}\n")
-                done = self.run_program("triangulate", matches, "--camera", self.camera, "--pose", pose, "-o", self.out)
+                done = self.run_program(
+                    "triangulate", matches, "--camera", self.camera, "--pose", pose, "-o", self.out
+                )
                 self.assert_refused(done, "pose.yaml", *words)
 
     def test_evaluate_tells_it_for_each_pair(self):
-        lines = [line for line in (DATA / "pairs.txt").read_text().splitlines() if line.startswith(" ".join(NAMES))]
-        pairs = self.write("pairs.txt", lines[0] + "\nnone.png none.png" + lines[0][len(" ".join(NAMES)):] + "\n")
-        self.succeed(self.run_program("evaluate", pairs, "--images", DATA / "images", "--quiet", "-o", self.out))
+        lines = [
+            line
+            for line in (DATA / "pairs.txt").read_text().splitlines()
+            if line.startswith(" ".join(NAMES))
+        ]
+        pairs = self.write(
+            "pairs.txt", lines[0] + "\nnone.png none.png" + lines[0][len(" ".join(NAMES)) :] + "\n"
+        )
+        self.succeed(
+            self.run_program(
+                "evaluate", pairs, "--images", DATA / "images", "--quiet", "-o", self.out
+            )
+        )
         report = json.loads((self.out / "report.json").read_text())
         self.succeed(self.reconstruct())
         for ours, theirs in zip(report["pairs"][0]["principal_point_shift_px"],

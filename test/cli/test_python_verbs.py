@@ -12,7 +12,8 @@ import cli_support as cli
 
 # Stands for either program: says what it was started with.
 SCRIPT = """import json, os, signal, sys
-json.dump({"argv": sys.argv[1:], "python": sys.executable, "library": os.environ.get("TWOVIEW_LIBRARY"),
+json.dump({"argv": sys.argv[1:], "python": sys.executable, "library":
+os.environ.get("TWOVIEW_LIBRARY"),
            "blocked": [int(s) for s in signal.pthread_sigmask(signal.SIG_BLOCK, [])]}, sys.stdout)
 sys.exit(3)
 """
@@ -34,7 +35,9 @@ class HandOver(cli.CliTest):
         self.program = shutil.copy(cli.program(), bin_dir / "twoview")
 
     def start(self, *arguments, **environment):
-        kept = {k: v for k, v in os.environ.items() if k not in ("TWOVIEW_PYTHON", "TWOVIEW_LIBRARY")}
+        kept = {
+            k: v for k, v in os.environ.items() if k not in ("TWOVIEW_PYTHON", "TWOVIEW_LIBRARY")
+        }
         return subprocess.run([self.program, *arguments], env={**kept, **environment},
                               capture_output=True, timeout=60)
 
@@ -49,7 +52,9 @@ class HandOver(cli.CliTest):
             self.assertEqual((got["library"], got["blocked"]), (self.library, []))
 
     def test_a_library_that_is_named_stays(self):
-        got = self.report(self.start("colmap", TWOVIEW_PYTHON=sys.executable, TWOVIEW_LIBRARY="/x.so"))
+        got = self.report(
+            self.start("colmap", TWOVIEW_PYTHON=sys.executable, TWOVIEW_LIBRARY="/x.so")
+        )
         self.assertEqual(got["library"], "/x.so")
 
     def test_the_python_of_bootstrap_comes_before_that_of_the_path(self):

@@ -10,10 +10,12 @@ import unittest
 import cli_support as cli
 from cli_support import FOCAL, HEIGHT, WIDTH
 
-RESULT_KEYS = """image0 image1 num_keypoints num_matches num_inliers config verdict reasons R t E F H
+RESULT_KEYS = (
+    """image0 image1 num_keypoints num_matches num_inliers config verdict reasons R t E F H
 alternative evidence covariance noise_px principal_point_shift_px num_points median_parallax_deg
 rms_reprojection_px scale
 scale_sigma imu truth timings_ms context_bytes options seed version kernels""".split()
+)
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
 max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
@@ -55,9 +57,13 @@ class Reconstruct(cli.CliTest):
                          {"essential", "fundamental", "homography", "rotation", "coverage"})
 
     def test_a_plane_flown_at_has_a_second_pose_with_its_covariance(self):
-        # The wall fills the image; one motion flies at it and aside, the other straight at one tilted.
+        # The wall fills the image; one motion flies at it and aside, the other straight at one
+        # tilted.
         rows = cli.texture(WIDTH, HEIGHT)
-        xs = [min(max(round(WIDTH / 2 + (x - WIDTH / 2) / 1.1 + 12), 0), WIDTH - 1) for x in range(WIDTH)]
+        xs = [
+            min(max(round(WIDTH / 2 + (x - WIDTH / 2) / 1.1 + 12), 0), WIDTH - 1)
+            for x in range(WIDTH)
+        ]
         ys = [round(HEIGHT / 2 + (y - HEIGHT / 2) / 1.1) for y in range(HEIGHT)]
         a = self.write("wall0.png", cli.png(WIDTH, HEIGHT, b"".join(map(bytes, rows))))
         nearer = b"".join(bytes(rows[y][x] for x in xs) for y in ys)
@@ -75,7 +81,11 @@ class Reconstruct(cli.CliTest):
         result = self.result()
         R, t = result["R"], result["t"]
         skew = [0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0]
-        E = [sum(skew[3 * i + k] * R[3 * k + j] for k in range(3)) for i in range(3) for j in range(3)]
+        E = [
+            sum(skew[3 * i + k] * R[3 * k + j] for k in range(3))
+            for i in range(3)
+            for j in range(3)
+        ]
         for ours, expected in zip(result["E"], E):
             self.assertAlmostEqual(ours, expected / math.sqrt(2), delta=1e-9)
 
@@ -87,18 +97,28 @@ class Reconstruct(cli.CliTest):
         self.assertLess(errors["rotation_error_deg"], 0.1)
         self.assertLess(errors["translation_error_deg"], 0.5)
         self.assertLess(errors["depth_error_median_percent"], 1)
-        self.assertGreaterEqual(errors["depth_error_p95_percent"], errors["depth_error_median_percent"])
+        self.assertGreaterEqual(
+            errors["depth_error_p95_percent"], errors["depth_error_median_percent"]
+        )
         self.assertIn("truth", done.stdout.decode())
 
     def test_unknown_depths_are_left_out(self):
-        self.write("depth.pfm", cli.pfm(WIDTH, HEIGHT, lambda x, y: (0, -1, math.inf, math.nan)[x % 4]))
+        self.write(
+            "depth.pfm", cli.pfm(WIDTH, HEIGHT, lambda x, y: (0, -1, math.inf, math.nan)[x % 4])
+        )
         self.succeed(self.reconstruct("--truth", self.write("truth.yaml", TRUTH)))
         self.assertIsNone(self.result()["truth"]["depth_error_median_percent"])
         self.assertIsNotNone(self.result()["truth"]["rotation_error_deg"])
 
     def test_a_translation_told_backwards_has_no_sign_free_error(self):
-        self.succeed(self.reconstruct("--truth", self.write("truth.yaml", TRUTH.replace("-1", "1").replace(
-            "depth0: depth.pfm\n", ""))))
+        self.succeed(
+            self.reconstruct(
+                "--truth",
+                self.write(
+                    "truth.yaml", TRUTH.replace("-1", "1").replace("depth0: depth.pfm\n", "")
+                ),
+            )
+        )
         errors = self.result()["truth"]
         self.assertLess(errors["translation_error_deg"], 0.5)
         self.assertGreater(errors["translation_error_signed_deg"], 179)
@@ -112,9 +132,19 @@ class Reconstruct(cli.CliTest):
         self.succeed(self.reconstruct(a=a, b=b))
         header, properties, count, points = read_ply(self.out / "cloud.ply")
         self.assertTrue(header.startswith("ply\nformat binary_little_endian 1.0\n"))
-        self.assertEqual(properties, [("float", "x"), ("float", "y"), ("float", "z"), ("uchar", "red"),
-                                      ("uchar", "green"), ("uchar", "blue"), ("float", "angle_deg"),
-                                      ("float", "error_px")])
+        self.assertEqual(
+            properties,
+            [
+                ("float", "x"),
+                ("float", "y"),
+                ("float", "z"),
+                ("uchar", "red"),
+                ("uchar", "green"),
+                ("uchar", "blue"),
+                ("float", "angle_deg"),
+                ("float", "error_px"),
+            ],
+        )
         self.assertEqual(len(points), count)
         self.assertEqual(count, self.result()["num_points"])
         near = 0
@@ -163,11 +193,27 @@ class Reconstruct(cli.CliTest):
         self.succeed(self.reconstruct())
         for key in OPTIONS:
             self.assertIn(key, self.result()["options"])
-        chosen = {"max_keypoints": 300, "arc": 9, "threshold": 15, "levels": 2, "scale_factor": 1.5,
-                  "orientation": "upright", "descriptor": "sift", "ratio": 0.75, "method": "eight-point",
-                  "max_error_px": 1.5, "confidence": 0.99, "max_iterations": 500, "seed": 2**64 - 1,
-                  "kernels": "c", "triangulation": "midpoint", "guided_matching": 1,
-                  "bundle_adjustment": 1, "principal_point_sigma": 0.02, "resize": 300}
+        chosen = {
+            "max_keypoints": 300,
+            "arc": 9,
+            "threshold": 15,
+            "levels": 2,
+            "scale_factor": 1.5,
+            "orientation": "upright",
+            "descriptor": "sift",
+            "ratio": 0.75,
+            "method": "eight-point",
+            "max_error_px": 1.5,
+            "confidence": 0.99,
+            "max_iterations": 500,
+            "seed": 2**64 - 1,
+            "kernels": "c",
+            "triangulation": "midpoint",
+            "guided_matching": 1,
+            "bundle_adjustment": 1,
+            "principal_point_sigma": 0.02,
+            "resize": 300,
+        }
         flags = [f"--{key.replace('_', '-')}={value}" for key, value in chosen.items()]
         self.succeed(self.reconstruct(*flags))
         result = self.result()
@@ -305,8 +351,20 @@ rectification_matrix:
         with os.fdopen(write, "w") as closed:
             import subprocess
 
-            done = subprocess.run([cli.program(), "reconstruct", self.a, self.b, "--camera", self.camera,
-                                   "-o", self.out], stdout=closed, stderr=subprocess.PIPE)
+            done = subprocess.run(
+                [
+                    cli.program(),
+                    "reconstruct",
+                    self.a,
+                    self.b,
+                    "--camera",
+                    self.camera,
+                    "-o",
+                    self.out,
+                ],
+                stdout=closed,
+                stderr=subprocess.PIPE,
+            )
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(self.listing(), cli.RESULT_FILES)
 

@@ -26,7 +26,9 @@ class Triangulate(cli.CliTest):
     def setUp(self):
         super().setUp()
         self.pose = self.write("pose.yaml", f"R: [1,0,0, 0,1,0, 0,0,1]\nt: {list(T)}\n")
-        self.matches = self.write("m.txt", "\n".join(" ".join(map(repr, row)) for row in seen(POINTS)))
+        self.matches = self.write(
+            "m.txt", "\n".join(" ".join(map(repr, row)) for row in seen(POINTS))
+        )
 
     def triangulate(self, *more, matches=None, out=None):
         return self.run_program("triangulate", matches or self.matches, "--camera", self.camera,
@@ -66,7 +68,9 @@ class Triangulate(cli.CliTest):
 
     def test_points_are_in_the_unit_of_t(self):
         self.pose.write_text("R: [1,0,0, 0,1,0, 0,0,1]\nt: [-0.2, 0, 0]\n")
-        matches = self.write("m.txt", "\n".join(" ".join(map(str, r)) for r in seen(POINTS, (-0.2, 0, 0))))
+        matches = self.write(
+            "m.txt", "\n".join(" ".join(map(str, r)) for r in seen(POINTS, (-0.2, 0, 0)))
+        )
         self.succeed(self.triangulate(matches=matches))
         self.assert_points(self.rows(self.out / "points.csv"), POINTS, 5)
 
@@ -80,14 +84,20 @@ class Triangulate(cli.CliTest):
         table = self.rows(self.out / "points.csv")
         self.assertEqual([row[5] for row in table], ["ok", "behind", "infinite", "invalid", "ok"])
         self.assertEqual([float(c) for c in table[3][:5]], [0] * 5)
-        self.assertEqual([result["num_" + s] for s in ("ok", "infinite", "behind", "invalid")], [2, 1, 1, 1])
+        self.assertEqual(
+            [result["num_" + s] for s in ("ok", "infinite", "behind", "invalid")], [2, 1, 1, 1]
+        )
         self.assertIn(b"element vertex 2\n", (self.out / "cloud.ply").read_bytes())
 
     def test_what_misses_its_pixels_is_left_out_of_the_cloud_only(self):
         row = seen(POINTS)[0]
-        matches = self.write("m.txt", f"{row[0]} {row[1]} {row[2]} {row[3] + 10}\n" + " ".join(map(str, row)))
+        matches = self.write(
+            "m.txt", f"{row[0]} {row[1]} {row[2]} {row[3] + 10}\n" + " ".join(map(str, row))
+        )
         done = self.succeed(self.triangulate(matches=matches))
-        self.assertTrue(done.stdout.startswith(b"1 points of 2 matches; 1 above 1 px,"), done.stdout)
+        self.assertTrue(
+            done.stdout.startswith(b"1 points of 2 matches; 1 above 1 px,"), done.stdout
+        )
         self.assertEqual(len(self.rows(self.out / "points.csv")), 2)
         self.assertIn(b"element vertex 1\n", (self.out / "cloud.ply").read_bytes())
         self.succeed(self.triangulate("--max-error-px", "20", matches=matches))
@@ -100,7 +110,11 @@ class Triangulate(cli.CliTest):
         cloud = self.folder / "new" / "cloud.ply"
         done = self.succeed(self.triangulate("--json", matches=self.out / "matches.csv", out=cloud))
         self.assertEqual(self.listing(cloud.parent), ["cloud.ply"])
-        points = [p for p in json.loads(done.stdout)["points"] if p["status"] == "ok" and p["error_px"] < 0.5]
+        points = [
+            p
+            for p in json.loads(done.stdout)["points"]
+            if p["status"] == "ok" and p["error_px"] < 0.5
+        ]
         self.assertGreater(len(points), 200)
 
     def test_what_is_read_is_not_written_over(self):
@@ -116,24 +130,38 @@ class Triangulate(cli.CliTest):
         self.assert_points(self.rows(self.out / "p.csv"), POINTS)
 
     def test_columns_are_found_by_their_names(self):
-        lines = ["idx0,y1,x1,note,y0,x0"] + [f"7,{y1},{x1},hm,{y0},{x0}" for x0, y0, x1, y1 in seen(POINTS)]
-        self.succeed(self.triangulate(matches=self.write("m.csv", "# made by hand\n" + "\r\n".join(lines))))
+        lines = ["idx0,y1,x1,note,y0,x0"] + [
+            f"7,{y1},{x1},hm,{y0},{x0}" for x0, y0, x1, y1 in seen(POINTS)
+        ]
+        self.succeed(
+            self.triangulate(matches=self.write("m.csv", "# made by hand\n" + "\r\n".join(lines)))
+        )
         self.assert_points(self.rows(self.out / "points.csv"), POINTS)
 
     def test_bad_matches_are_named_by_their_line(self):
-        for text, *words in (("1 2 3\n", "line 1", "y1"), ("1 2 3 4\n1 2 x 4\n", "line 2", "x1", "'x'"),
-                             ("x0,y0,x1\n1,2,3\n", "line 1", "y1"), ("#\n\n", "no match"), ("", "empty"),
-                             ("1,2,,4\n", "line 1", "x1")):
+        for text, *words in (
+            ("1 2 3\n", "line 1", "y1"),
+            ("1 2 3 4\n1 2 x 4\n", "line 2", "x1", "'x'"),
+            ("x0,y0,x1\n1,2,3\n", "line 1", "y1"),
+            ("#\n\n", "no match"),
+            ("", "empty"),
+            ("1,2,,4\n", "line 1", "x1"),
+        ):
             with self.subTest(text=text):
-                self.assert_refused(self.triangulate(matches=self.write("bad.txt", text)), "bad.txt", *words)
+                self.assert_refused(
+                    self.triangulate(matches=self.write("bad.txt", text)), "bad.txt", *words
+                )
         self.assert_refused(self.triangulate(matches="none.csv"), "none.csv")
 
     def test_bad_poses_and_cameras_are_refused(self):
-        for text, word in (("R: [1,0,0, 0,1,0, 0,0,1]\n", "t is missing"), ("t: [1,0,0]\n", "R is missing"),
-                           ('{"R": null, "t": null}', "R is missing"),
-                           ("R: [1,0,0, 0,1,0, 0,0,1]\nt: [0,0,0]\n", "t is 0"),
-                           ("R: [1,0,0, 0,1,0, 0,0,-1]\nt: [1,0,0]\n", "reflection"),
-                           ("R: [1,0,0, 0,1,0, 0,0,2]\nt: [1,0,0]\n", "no rotation")):
+        for text, word in (
+            ("R: [1,0,0, 0,1,0, 0,0,1]\n", "t is missing"),
+            ("t: [1,0,0]\n", "R is missing"),
+            ('{"R": null, "t": null}', "R is missing"),
+            ("R: [1,0,0, 0,1,0, 0,0,1]\nt: [0,0,0]\n", "t is 0"),
+            ("R: [1,0,0, 0,1,0, 0,0,-1]\nt: [1,0,0]\n", "reflection"),
+            ("R: [1,0,0, 0,1,0, 0,0,2]\nt: [1,0,0]\n", "no rotation"),
+        ):
             with self.subTest(word=word):
                 self.pose.write_text(text)
                 self.assert_refused(self.triangulate(), "pose.yaml", word)

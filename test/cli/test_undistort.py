@@ -68,9 +68,16 @@ def distorted_image(distort):
 
 
 LENSES = {
-    "brown_conrady": (brown_conrady((-0.25, 0.06, 0.002, -0.003)), (-0.25, 0.06, 0.002, -0.003, 0), ""),
-    "kannala_brandt": (kannala_brandt((0.02, -0.01, 0.003, 0)), (0.02, -0.01, 0.003, 0),
-                       "distortion_model: equidistant\n"),
+    "brown_conrady": (
+        brown_conrady((-0.25, 0.06, 0.002, -0.003)),
+        (-0.25, 0.06, 0.002, -0.003, 0),
+        "",
+    ),
+    "kannala_brandt": (
+        kannala_brandt((0.02, -0.01, 0.003, 0)),
+        (0.02, -0.01, 0.003, 0),
+        "distortion_model: equidistant\n",
+    ),
 }
 
 
@@ -150,14 +157,18 @@ class Undistort(cli.CliTest):
         (self.folder / "x").mkdir()
         self.write("x/d.png", png(W, H, [1] * (W * H)))
         self.assert_refused(self.undistort(images=("d.png", "none.png")), "none.png")
-        self.assert_refused(self.undistort(images=("d.png", "small.png")), "small.png", "8x8", f"{W}x{H}")
+        self.assert_refused(
+            self.undistort(images=("d.png", "small.png")), "small.png", "8x8", f"{W}x{H}"
+        )
         self.assert_refused(self.undistort(images=("d.png", "x/d.png")), "two results", "d.png")
         self.assert_refused(self.undistort("--mask", images=("mask.jpg",)), "mask.png")
         self.assert_refused(self.undistort(camera="none.yaml"), "none.yaml")
         for scale in ("0", "-1", "nan", "21", "x"):
             self.assert_refused(self.undistort("--focal-scale", scale), "--focal-scale")
         self.assert_refused(self.run_program("undistort", "d.png", "-o", self.out), "--camera")
-        self.assert_refused(self.run_program("undistort", "--camera", "lens.yaml", "-o", self.out), "IMAGE")
+        self.assert_refused(
+            self.run_program("undistort", "--camera", "lens.yaml", "-o", self.out), "IMAGE"
+        )
 
     def test_a_lens_that_sees_nothing_of_the_result_is_refused(self):
         self.write("lens.yaml", camera_yaml(W, H, F, F, 100 * W, CY, (-0.5, 0, 0, 0, 0)))

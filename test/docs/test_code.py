@@ -1,8 +1,10 @@
 """Every code block of README.md, examples/README.md and docs/ is sound.
 
 - A block names its language: c, sh, python, yaml, json, or text for what is none.
-- C with a main function compiles as it is, as C99 without warnings. Other C is the inside of a function, behind all
-  public headers and the declarations of the HTML comment in front of the block: `<!-- given: tv_two_view pose; -->`.
+- C with a main function compiles as it is, as C99 without warnings. Other C is the inside of a
+function, behind all
+  public headers and the declarations of the HTML comment in front of the block: `<!-- given:
+  tv_two_view pose; -->`.
 - Shell passes `bash -n`; Python compiles; YAML and JSON are read.
 """
 
@@ -24,7 +26,11 @@ INCLUDES = [f"-I{folder}" for folder in headers.FOLDERS]
 def as_program(page, line, text):
     if "main(" in text:
         return text
-    names = [str(path.relative_to(folder)) for folder in headers.FOLDERS for path in sorted(folder.rglob("*.h"))]
+    names = [
+        str(path.relative_to(folder))
+        for folder in headers.FOLDERS
+        for path in sorted(folder.rglob("*.h"))
+    ]
     given = page.before(line).removeprefix("given:")
     return "".join(f"#include <{name}>\n" for name in names) + \
         f"{given}\nint inside(void);\nint inside(void) {{\n{text}\nreturn 0;\n}}\n"
@@ -33,10 +39,18 @@ def as_program(page, line, text):
 class TestCode(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.blocks = [(page, *block) for page in map(markdown_pages.Page, markdown_pages.pages()) for block in page.blocks]
+        cls.blocks = [
+            (page, *block)
+            for page in map(markdown_pages.Page, markdown_pages.pages())
+            for block in page.blocks
+        ]
 
     def each(self, *languages):
-        found = [(page, line, text) for page, language, line, text in self.blocks if language in languages]
+        found = [
+            (page, line, text)
+            for page, language, line, text in self.blocks
+            if language in languages
+        ]
         self.assertTrue(found, languages)
         return found
 
@@ -46,8 +60,12 @@ class TestCode(unittest.TestCase):
 
     def test_c_compiles(self):
         for page, line, text in self.each("c"):
-            run = subprocess.run(["cc", *FLAGS, *INCLUDES, "-"], input=as_program(page, line, text), text=True,
-                                 capture_output=True)
+            run = subprocess.run(
+                ["cc", *FLAGS, *INCLUDES, "-"],
+                input=as_program(page, line, text),
+                text=True,
+                capture_output=True,
+            )
             self.assertEqual(run.returncode, 0, f"{page}:{line}\n{run.stderr}")
 
     def test_shell_is_shell(self):

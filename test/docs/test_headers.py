@@ -1,13 +1,17 @@
 """Every public symbol is documented, by rules that a program can check.
 
-- A header, type, struct, field, enum, constant, macro and function has a comment of its own, in front of it or behind
-  it; one comment serves the names of one statement. Fields of a struct whose comment says "Private" need none.
-- A function's comment names each parameter that points somewhere, unless the type says what it is (`tv_camera
+- A header, type, struct, field, enum, constant, macro and function has a comment of its own, in
+front of it or behind
+  it; one comment serves the names of one statement. Fields of a struct whose comment says "Private"
+  need none.
+- A function's comment names each parameter that points somewhere, unless the type says what it is
+(`tv_camera
   *camera0`), or it is the object that the function is of (its first parameter).
 - A function that returns a status says which ones.
 - What is said of another function ("as tv_detect") counts as said here.
 - A floating-point field has its unit in its name or comment.
-- A header of an algorithm or of a protocol names its source: the page under docs/ that has papers, formulas and tests.
+- A header of an algorithm or of a protocol names its source: the page under docs/ that has papers,
+formulas and tests.
 """
 
 import pathlib
@@ -19,11 +23,16 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools" / "
 import headers
 
 STATUS = re.compile(r"\bTVS?_(?:OK|NONE|END|ERR_\w+)\b|\b(?:Returns|Statuses) (?:also |as )")
-UNIT_NAME = re.compile(r"_(?:px|rad|deg|mdeg|ns|ms|s|us|m|mm|cm|pa|mg|mv|dc|kb|percent|celsius|bytes|sq|sigma|hz)\b")
+UNIT_NAME = re.compile(
+    r"_(?:px|rad|deg|mdeg|ns|ms|s|us|m|mm|cm|pa|mg|mv|dc|kb|percent|celsius|bytes|sq|sigma|hz)\b"
+)
 UNIT_WORD = re.compile(
-    r"\b(?:px|pixels?|radians?|rad|degrees?|deg|metres?|m/s|rad/s|nanoseconds|seconds|ms|milli\w+|percent|per cent|share|"
-    r"fractions?|ratio|factor|units?|unitless|hertz|pascals?|squares?|distance|distortion|rotation|direction|unit\b|"
-    r"quaternion|matrix|row-major|norm|grey|counts?)\b|\|t\||[\[(][-0-9]")
+    r"\b(?:px|pixels?|radians?|rad|degrees?|deg|metres?|m/s|rad/s|nanoseconds|"
+    r"seconds|ms|milli\w+|percent|per cent|share|"
+    r"fractions?|ratio|factor|units?|unitless|hertz|pascals?|squares?|"
+    r"distance|distortion|rotation|direction|unit\b|"
+    r"quaternion|matrix|row-major|norm|grey|counts?)\b|\|t\||[\[(][-0-9]"
+)
 
 
 def undocumented(symbols):
@@ -69,10 +78,15 @@ class TestHeaders(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.headers = headers.all_symbols()
-        cls.functions = {s.name: s for symbols in cls.headers.values() for s in symbols if s.kind == "function"}
+        cls.functions = {
+            s.name: s for symbols in cls.headers.values() for s in symbols if s.kind == "function"
+        }
 
     def report(self, found, what):
-        lines = [f"{path.relative_to(headers.ROOT)}:{symbol.line}: {text}" for path, symbol, text in found]
+        lines = [
+            f"{path.relative_to(headers.ROOT)}:{symbol.line}: {text}"
+            for path, symbol, text in found
+        ]
         if lines:
             self.fail(f"{len(lines)} {what}:\n" + "\n".join(lines))
 
@@ -90,17 +104,34 @@ class TestHeaders(unittest.TestCase):
         self.assertEqual(exported - set(self.functions), set())
 
     def test_every_symbol_has_a_comment(self):
-        self.report([(path, symbol, f"{symbol.kind} {symbol}") for path, symbols in self.headers.items()
-                     for symbol in undocumented(symbols)], "symbols without a comment")
+        self.report(
+            [
+                (path, symbol, f"{symbol.kind} {symbol}")
+                for path, symbols in self.headers.items()
+                for symbol in undocumented(symbols)
+            ],
+            "symbols without a comment",
+        )
 
     def test_every_pointer_is_named(self):
-        self.report([(path, function, f"{function.name}: {name}") for path, function in self.each("function")
-                     for name in unnamed_parameters(function, self.functions)],
-                    "pointers that the function's comment does not name")
+        self.report(
+            [
+                (path, function, f"{function.name}: {name}")
+                for path, function in self.each("function")
+                for name in unnamed_parameters(function, self.functions)
+            ],
+            "pointers that the function's comment does not name",
+        )
 
     def test_every_status_is_said(self):
-        self.report([(path, function, function.name) for path, function in self.each("function")
-                     if without_statuses(function, self.functions)], "functions that do not say their statuses")
+        self.report(
+            [
+                (path, function, function.name)
+                for path, function in self.each("function")
+                if without_statuses(function, self.functions)
+            ],
+            "functions that do not say their statuses",
+        )
 
     def test_every_source_is_named(self):
         named = set()
@@ -110,12 +141,20 @@ class TestHeaders(unittest.TestCase):
             named |= {pathlib.Path(page).stem for page in pages}
             if path.name in ("at.h", "navdata.h", "pave.h", "config.h"):
                 self.assertIn("docs/drivers.md", pages, path)
-        algorithms = {path.stem for path in (headers.ROOT / "docs" / "algorithms").glob("*.md")} - {"math"}  # internal
+        algorithms = {path.stem for path in (headers.ROOT / "docs" / "algorithms").glob("*.md")} - {
+            "math"
+        }  # internal
         self.assertEqual(algorithms - named, set())
 
     def test_every_quantity_has_a_unit(self):
-        self.report([(path, symbol, str(symbol)) for path, symbol in self.each("field") if without_unit(symbol)],
-                    "fields without a unit")
+        self.report(
+            [
+                (path, symbol, str(symbol))
+                for path, symbol in self.each("field")
+                if without_unit(symbol)
+            ],
+            "fields without a unit",
+        )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 """What README.md, CHANGELOG.md, examples/README.md and docs/ say is there, is there.
 
 - A relative link leads to a file, and its anchor to a heading.
-- A path that begins with a folder of the project names a file, exactly or without its extension, or a test. `{a,b}`
+- A path that begins with a folder of the project names a file, exactly or without its extension, or
+a test. `{a,b}`
   names several; a path with a star or in capitals is a pattern.
-- A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function stands in some source.
+- A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function stands
+in some source.
 - An option that stands behind a verb of `twoview` is one of that verb's, and a verb is a verb.
 - A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test.
 """
@@ -33,7 +35,11 @@ def braces(path):
 
 def exists(path):
     path = ROOT / path.rstrip("/")
-    return path.exists() or any(path.parent.glob(path.name + ".*")) or any(path.parent.glob(f"test_{path.name}.*"))
+    return (
+        path.exists()
+        or any(path.parent.glob(path.name + ".*"))
+        or any(path.parent.glob(f"test_{path.name}.*"))
+    )
 
 
 class TestPages(unittest.TestCase):
@@ -42,7 +48,9 @@ class TestPages(unittest.TestCase):
         cls.pages = {path: markdown_pages.Page(path) for path in markdown_pages.pages()}
         cls.helps = {}
         build = pathlib.Path(PROGRAM).parents[1] if PROGRAM else ROOT / "build" / "release"
-        listed = subprocess.run(["ctest", "--test-dir", str(build), "-N"], capture_output=True, text=True).stdout
+        listed = subprocess.run(
+            ["ctest", "--test-dir", str(build), "-N"], capture_output=True, text=True
+        ).stdout
         cls.tests = set(re.findall(r"Test +#\d+: (\S+)", listed))
 
     def report(self, lines, what):
@@ -69,8 +77,14 @@ class TestPages(unittest.TestCase):
                 continue  # it tells what was
             texts = itertools.chain(page.code(), ((line, text) for _, line, text in page.blocks))
             for line, text in itertools.chain(texts, page.prose):
-                for path in re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./{{}},*-]*[\w}}*/])", text):
-                    if "*" in path or re.search(r"/[A-Z]{3,}\b(?!\.md)", path) or path.startswith("test/bin"):
+                for path in re.findall(
+                    rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./{{}},*-]*[\w}}*/])", text
+                ):
+                    if (
+                        "*" in path
+                        or re.search(r"/[A-Z]{3,}\b(?!\.md)", path)
+                        or path.startswith("test/bin")
+                    ):
                         continue
                     wrong += [f"{page}:{line}: {one}" for one in braces(path)
                               if one not in self.tests and not exists(one)]
@@ -86,7 +100,11 @@ class TestPages(unittest.TestCase):
             label, _, name = text.partition("/")
             if label in labels and name and re.fullmatch(r"\w+", name) and text not in self.tests:
                 wrong.append(f"{page}:{line}: {text}")
-            if label == "fuzz" and re.fullmatch(r"\w+", name) and not (ROOT / f"test/fuzz/fuzz_{name}.cc").exists():
+            if (
+                label == "fuzz"
+                and re.fullmatch(r"\w+", name)
+                and not (ROOT / f"test/fuzz/fuzz_{name}.cc").exists()
+            ):
                 wrong.append(f"{page}:{line}: {text}")
         self.report(wrong, "tests that ctest does not know")
 
@@ -110,11 +128,19 @@ class TestPages(unittest.TestCase):
         self.assertIn("reconstruct", verbs)
         wrong, count = [], 0
         for page in self.pages.values():
-            shell = [(line, text.replace("\\\n", " ")) for language, line, text in page.blocks if language in ("sh", "bash")]
+            shell = [
+                (line, text.replace("\\\n", " "))
+                for language, line, text in page.blocks
+                if language in ("sh", "bash")
+            ]
             for first, text in itertools.chain(shell, page.code()):
                 for line in text.split("\n"):
                     words = line.split("#")[0].split("|")[0].split()
-                    starts = [k for k, word in enumerate(words) if re.fullmatch(r"(.*/bin/)?twoview", word)]
+                    starts = [
+                        k
+                        for k, word in enumerate(words)
+                        if re.fullmatch(r"(.*/bin/)?twoview", word)
+                    ]
                     if not starts or starts[0] != 0 or len(words) < 2:
                         continue
                     verb, *rest = words[1:]
@@ -125,8 +151,13 @@ class TestPages(unittest.TestCase):
                         wrong.append(f"{page}:{first}: twoview {verb}")
                         continue
                     if verb in ("compare", "colmap"):
-                        continue  # Python's: python/compare_*, python/colmap_* run what their pages say
-                    path = [verb] + ([rest[0]] if verb == "drone" and rest and re.fullmatch("[a-z]+", rest[0]) else [])
+                        # Python's: python/compare_*, python/colmap_* run what their pages say
+                        continue
+                    path = [verb] + (
+                        [rest[0]]
+                        if verb == "drone" and rest and re.fullmatch("[a-z]+", rest[0])
+                        else []
+                    )
                     for option in re.findall(r"(?<!\S)(--?[a-z][\w-]*)", " ".join(rest)):
                         if not re.search(rf"(?<![\w-]){option}\b(?!-)", self.help(*path)):
                             wrong.append(f"{page}:{first}: twoview {' '.join(path)} {option}")
@@ -134,8 +165,14 @@ class TestPages(unittest.TestCase):
         self.report(wrong, "verbs or options that the program does not have")
 
     def test_an_algorithm_has_its_six_parts(self):
-        parts = {"problem": r"\*\*Problem", "where it is valid": r"\*\*(Where it is valid|Valid)", "paper": r"\*\*Papers?\b",
-                 "file": r"\*\*Files?\b", "test": r"\*\*Tests?\b", "formula": r"(?m)^    \S|\*\*Formula"}
+        parts = {
+            "problem": r"\*\*Problem",
+            "where it is valid": r"\*\*(Where it is valid|Valid)",
+            "paper": r"\*\*Papers?\b",
+            "file": r"\*\*Files?\b",
+            "test": r"\*\*Tests?\b",
+            "formula": r"(?m)^    \S|\*\*Formula",
+        }
         pages = sorted((ROOT / "docs" / "algorithms").glob("*.md"))
         self.assertGreaterEqual(len(pages), 9)
         self.report([f"{path.name}: no {part}" for path in pages for part, pattern in parts.items()

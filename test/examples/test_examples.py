@@ -1,4 +1,5 @@
-"""The examples: built against an installed library by CMake and by pkg-config alone, and run as their README says.
+"""The examples: built against an installed library by CMake and by pkg-config alone, and run as
+their README says.
 
 Arguments: the project's folder, its build folder, cmake, the C compiler.
 """
@@ -26,7 +27,9 @@ except ImportError as missing:
 
 
 def run(*command, status=0, **options):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300, **options)
+    done = subprocess.run(
+        [str(word) for word in command], capture_output=True, text=True, timeout=300, **options
+    )
     assert done.returncode == status, (command, done.returncode, done.stdout, done.stderr)
     return done.stdout + done.stderr
 
@@ -46,20 +49,36 @@ class Examples(unittest.TestCase):
         run(CMAKE, "--install", BUILD, "--prefix", prefix)
         cls.prefix = prefix
         cls.bin = cls.folder / "build"
-        run(CMAKE, "-G", "Ninja", "-S", EXAMPLES, "-B", cls.bin, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_COMPILER={CC}",
-            "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror")
+        run(
+            CMAKE,
+            "-G",
+            "Ninja",
+            "-S",
+            EXAMPLES,
+            "-B",
+            cls.bin,
+            f"-DCMAKE_PREFIX_PATH={prefix}",
+            f"-DCMAKE_C_COMPILER={CC}",
+            "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror",
+            "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror",
+        )
         run(CMAKE, "--build", cls.bin)
         cls.image = []
         for side in ("left", "right"):
-            colour = cv2.imread(os.path.join(SOURCE, ".cache", "motorcycle", f"motorcycle_{side}.png"))
+            colour = cv2.imread(
+                os.path.join(SOURCE, ".cache", "motorcycle", f"motorcycle_{side}.png")
+            )
             if colour is None:
                 print("skipped: the Motorcycle pair is not in .cache (scripts/bootstrap)")
                 sys.exit(SKIP_CODE)
             cls.image.append(cls.folder / f"{side}.pgm")
             cv2.imwrite(str(cls.image[-1]), cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY))
         cls.matches = cls.folder / "matches.txt"
-        cls.matches.write_text(subprocess.run([cls.bin / "04_match", *cls.image], capture_output=True, text=True,
-                                              check=True).stdout)
+        cls.matches.write_text(
+            subprocess.run(
+                [cls.bin / "04_match", *cls.image], capture_output=True, text=True, check=True
+            ).stdout
+        )
 
     @classmethod
     def tearDownClass(cls):
@@ -73,13 +92,21 @@ class Examples(unittest.TestCase):
             self.skipTest("OpenCV is not installed")
         boards = []
         K = np.array([[500.0, 0, 319.5], [0, 500, 239.5], [0, 0, 1]])
-        sheet = np.kron((np.indices((8, 9)).sum(0) % 2) * 225 + 15, np.ones((40, 40))).astype(np.uint8)
+        sheet = np.kron((np.indices((8, 9)).sum(0) % 2) * 225 + 15, np.ones((40, 40))).astype(
+            np.uint8
+        )
         sheet = cv2.copyMakeBorder(sheet, 40, 40, 40, 40, cv2.BORDER_CONSTANT, value=240)
         for k in range(8):
             tilt = np.array([0.35 * np.cos(k), 0.35 * np.sin(k), 0.1 * k])
             R = cv2.Rodrigues(tilt)[0]
             M = np.diag([1 / 40, 1 / 40, 1]) @ np.array([[1, 0, -220], [0, 1, -200], [0, 0, 1.0]])
-            H = K @ np.column_stack([R[:, 0], R[:, 1], [0.6 * np.sin(2 * k), 0.4 * np.cos(3 * k), 12]]) @ M
+            H = (
+                K
+                @ np.column_stack(
+                    [R[:, 0], R[:, 1], [0.6 * np.sin(2 * k), 0.4 * np.cos(3 * k), 12]]
+                )
+                @ M
+            )
             boards.append(self.folder / f"board{k}.png")
             cv2.imwrite(str(boards[-1]), cv2.warpPerspective(sheet, H, (640, 480), borderValue=128,
                                                              flags=cv2.INTER_AREA))
@@ -89,7 +116,9 @@ class Examples(unittest.TestCase):
 
     def test_undistort(self):
         out = self.folder / "undistorted.pgm"
-        text = self.example("02_undistort", self.image[0], out, 600, 600, 370, 250, -0.3, 0.1, 0, 0, 0)
+        text = self.example(
+            "02_undistort", self.image[0], out, 600, 600, 370, 250, -0.3, 0.1, 0, 0, 0
+        )
         self.assertIn("good to", text)
         self.assertEqual(cv2.imread(str(out), 0).shape, cv2.imread(str(self.image[0]), 0).shape)
 
@@ -123,7 +152,10 @@ class Examples(unittest.TestCase):
         self.assertIn("of the estimated rotation", text)
 
     def test_triangulate(self):
-        rows = [line.split() for line in self.example("08_triangulate", self.matches, *CAMERA).splitlines()[1:]]
+        rows = [
+            line.split()
+            for line in self.example("08_triangulate", self.matches, *CAMERA).splitlines()[1:]
+        ]
         self.assertEqual(len(rows), 7)
         for row in rows:
             self.assertGreater(int(row[1]), 300)
@@ -152,7 +184,9 @@ class Examples(unittest.TestCase):
         drone = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         try:
             words = drone.stdout.readline().replace(",", "").split()
-            ports = [words[words.index(name) + 1] for name in ("commands", "navdata", "video", "control")]
+            ports = [
+                words[words.index(name) + 1] for name in ("commands", "navdata", "video", "control")
+            ]
             text = self.example("11_ardrone", "127.0.0.1", "5", *ports)
             self.assertGreater(number(r"(\d+) pictures", text), 20)
             self.assertIn("heading", text)
@@ -177,7 +211,9 @@ class Examples(unittest.TestCase):
     def test_wrong_arguments_are_told(self):
         for source in sorted(EXAMPLES.glob("0[2-9]*.c")):
             self.assertIn("usage", self.example(source.stem, status=2))
-        self.assertIn("cannot read", self.example("03_detect", "/nowhere.pgm", "/dev/null", status=2))
+        self.assertIn(
+            "cannot read", self.example("03_detect", "/nowhere.pgm", "/dev/null", status=2)
+        )
 
     def test_each_has_a_row_in_the_readme_and_is_short(self):
         readme = (EXAMPLES / "README.md").read_text()

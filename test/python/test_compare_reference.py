@@ -1,4 +1,5 @@
-"""tools/compare_colmap: COLMAP's reconstruction as the reference, and a dask cluster as the worker."""
+"""tools/compare_colmap: COLMAP's reconstruction as the reference, and a dask cluster as the
+worker."""
 
 import json
 import os

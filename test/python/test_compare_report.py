@@ -1,4 +1,5 @@
-"""tools/compare_colmap: a whole report, every system within a degree of the truth on an easy pair."""
+"""tools/compare_colmap: a whole report, every system within a degree of the truth on an easy
+pair."""
 
 import csv
 import json

@@ -60,7 +60,8 @@ class TestConventions(unittest.TestCase):
 
 
 class TestShift(unittest.TestCase):
-    """Our poses may be of a camera with another principal point; lines, residuals and points are of that camera."""
+    """Our poses may be of a camera with another principal point; lines, residuals and points are of
+    that camera."""
 
     @classmethod
     def setUpClass(cls):
@@ -69,9 +70,20 @@ class TestShift(unittest.TestCase):
         random = np.random.default_rng(9)
         points = random.uniform([-2, -1.5, 4], [2, 1.5, 9], (400, 3))
         R, t = cv2.Rodrigues(np.array([0.15, 0.3, 0.4]))[0], np.array([1.2, 0.3, 0.6])
-        right, lens = np.array([[500.0, 0, 325], [0, 500, 236], [0, 0, 1]]), [-0.1, 0.02, 0.001, -0.002, 0.0]
-        pixels = [cv2.projectPoints(points, cv2.Rodrigues(turn)[0], move, right, np.array(lens))[0].reshape(-1, 2)
-                  + random.normal(0, 0.1, (400, 2)) for turn, move in ((np.eye(3), np.zeros(3)), (R, t))]
+        right, lens = np.array([[500.0, 0, 325], [0, 500, 236], [0, 0, 1]]), [
+            -0.1,
+            0.02,
+            0.001,
+            -0.002,
+            0.0,
+        ]
+        pixels = [
+            cv2.projectPoints(points, cv2.Rodrigues(turn)[0], move, right, np.array(lens))[
+                0
+            ].reshape(-1, 2)
+            + random.normal(0, 0.1, (400, 2))
+            for turn, move in ((np.eye(3), np.zeros(3)), (R, t))
+        ]
         told = [[[500.0, 0, 319.5], [0, 500, 239.5], [0, 0, 1]], lens]
         cls.given = {"pixels0": pixels[0].tolist(), "pixels1": pixels[1].tolist(), "ratios": None,
                      "cameras": [told, told], "sizes": [[640, 480], [640, 480]]}
@@ -82,18 +94,32 @@ class TestShift(unittest.TestCase):
         import program
         import systems
         system = next(s for s in systems.of_kind("solver") if s.id == "twoview_five_point")
-        return children.call(system.python, {"call": "solver", "system": system.id, "task": {
-            **self.task, "library": program.library_path()}}, 120, json.dumps(self.given).encode())[0]
+        return children.call(
+            system.python,
+            {
+                "call": "solver",
+                "system": system.id,
+                "task": {**self.task, "library": program.library_path()},
+            },
+            120,
+            json.dumps(self.given).encode(),
+        )[0]
 
     def test_residuals_and_lines_are_of_the_camera_that_the_pose_is_of(self):
         import numpy as np
         import pair_run
         answer = self.answer()
-        self.assertLess(np.abs(np.subtract(answer["principal_point_shift_px"], (5.5, -3.5))).max(), 3)
+        self.assertLess(
+            np.abs(np.subtract(answer["principal_point_shift_px"], (5.5, -3.5))).max(), 3
+        )
         matches = pair_run._matches(self.given)
         of_pose = pair_run._of_pose(matches, answer)
-        self.assertLess(np.median(pair_run.epipolar_error_px(of_pose, answer["R"], answer["t"])), 0.1)
-        self.assertGreater(np.median(pair_run.epipolar_error_px(matches, answer["R"], answer["t"])), 0.2)
+        self.assertLess(
+            np.median(pair_run.epipolar_error_px(of_pose, answer["R"], answer["t"])), 0.1
+        )
+        self.assertGreater(
+            np.median(pair_run.epipolar_error_px(matches, answer["R"], answer["t"])), 0.2
+        )
         row = pair_run._row(self.task, {**answer, "ms": {}}, "ok", "", matches)
         self.assertGreater(row["error_px_histogram"][0], 350)  # below a quarter of a pixel
         self.assertEqual(row["principal_point_shift_px"], answer["principal_point_shift_px"])

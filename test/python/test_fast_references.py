@@ -1,9 +1,10 @@
-"""FAST-12's pixels equal scikit-image's corner_fast(n=12): before suppression, at several thresholds.
+"""FAST-12's pixels equal scikit-image's corner_fast(n=12): before suppression, at several
+thresholds.
 
-The library suppresses always, so the unsuppressed set is got from it a piece at a time: each pixel's
-own 7x7 neighbourhood is an image in which it is the only candidate. That is slow, so it is done for
-the pixels that either side might call a corner, and for a sample of the others; and the suppressed
-set over the whole image is a subset of scikit-image's.
+The library suppresses always, so the unsuppressed set is got from it a piece at a time: each
+pixel's own 7x7 neighbourhood is an image in which it is the only candidate. That is slow, so it is
+done for the pixels that either side might call a corner, and for a sample of the others; and the
+suppressed set over the whole image is a subset of scikit-image's.
 """
 
 import os
@@ -75,7 +76,9 @@ class TestFast12(unittest.TestCase):
         if not os.path.exists(LEFT):
             self.skipTest(f"no {LEFT}: run scripts/bootstrap test")
         gray = imread(LEFT).astype(np.float64) @ (0.299, 0.587, 0.114)
-        self.check(np.ascontiguousarray(np.rint(gray).astype(np.uint8)[150:150 + SIDE, 200:200 + SIDE]))
+        self.check(
+            np.ascontiguousarray(np.rint(gray).astype(np.uint8)[150 : 150 + SIDE, 200 : 200 + SIDE])
+        )
 
 
 if __name__ == "__main__":

@@ -85,7 +85,9 @@ class Figures1bAnd4(Case):
         grid = np.array([(x, y) for y in range(3) for x in range(3)], float)
         self.assertAlmostEqual(calibration.straightness(grid, (3, 3)), 0)
         grid[4] += (0, 0.3)  # the middle one: its row is off by 0.1 0.2 0.1, its column not
-        self.assertAlmostEqual(calibration.straightness(grid, (3, 3)), np.sqrt(0.06 / 18), delta=1e-3)
+        self.assertAlmostEqual(
+            calibration.straightness(grid, (3, 3)), np.sqrt(0.06 / 18), delta=1e-3
+        )
 
 
 class Figures5And6(Case):
@@ -104,8 +106,11 @@ class Figures5And6(Case):
         def passes(t):
             circle = [int(image[y + dy, x + dx]) for dx, dy in corners.CIRCLE.tolist()] * 2
             p = int(image[y, x])
-            return any(all(v > p + t for v in circle[s:s + 12]) or all(v < p - t for v in circle[s:s + 12])
-                       for s in range(16))
+            return any(
+                all(v > p + t for v in circle[s : s + 12])
+                or all(v < p - t for v in circle[s : s + 12])
+                for s in range(16)
+            )
         self.assertTrue(passes(numbers["score"]))
         self.assertFalse(passes(numbers["score"] + 1))
         self.assertEqual(numbers["score"], numbers["library_score"])
@@ -114,10 +119,13 @@ class Figures5And6(Case):
     def test_counts_are_scikit_images_and_opencvs(self):
         image = self.pair.grey[0]
         counted = corners.count(image)["arcs"]
-        # Half a grey level keeps scikit-image's threshold away from the differences, which are whole.
+        # Half a grey level keeps scikit-image's threshold away from the differences, which are
+        # whole.
         reference = corner_fast(image.astype(float), n=12, threshold=corners.THRESHOLD + 0.5)
         self.assertEqual(int((reference > 0).sum()), counted["12"]["segment_test"])
-        opencv = cv2.FastFeatureDetector_create(corners.THRESHOLD, nonmaxSuppression=True).detect(image)
+        opencv = cv2.FastFeatureDetector_create(corners.THRESHOLD, nonmaxSuppression=True).detect(
+            image
+        )
         self.assertEqual(len(opencv), counted["9"]["library"])
         for arc, entry in counted.items():
             self.assertTrue(entry["library_equals_definition"], arc)
@@ -129,7 +137,8 @@ class Figure7(Case):
         keypoints, described = descriptor.described_keypoints(image, 150)
         for kind, off in descriptor.differences(image, keypoints, described).items():
             self.assertLessEqual(np.median(off), 1, kind)
-            self.assertLessEqual(np.percentile(off, 99), 8, kind)  # of 255: shares of 127, truncated sums
+            # of 255: shares of 127, truncated sums
+            self.assertLessEqual(np.percentile(off, 99), 8, kind)
             own = described[kind] + 0.0
             cosine = (own * (own - off)).sum() / (np.linalg.norm(own) * np.linalg.norm(own - off))
             self.assertGreater(cosine, 0.99, kind)
@@ -154,7 +163,8 @@ class Figure8(Case):
             across = np.array([-direction[1], direction[0]])
             oracle = int((np.abs((x - x.mean(axis=0)) @ across) < 2.5).sum())
             self.assertLessEqual(abs(run["right"] - oracle), 8)
-            self.assertLessEqual(run["wrong"], 15)  # 200 over the image: 1 to 2 per cent lie that near
+            # 200 over the image: 1 to 2 per cent lie that near
+            self.assertLessEqual(run["wrong"], 15)
             self.assertEqual(int(run["found"].sum()), run["right"] + run["wrong"])
             self.assertEqual(int(run["truth"].sum()), 300)
 
@@ -163,7 +173,9 @@ class Figure9(Case):
     def test_inliers_are_right_by_the_rectified_pairs_own_rows(self):
         pixels0, pixels1, ratios = ransac.matches_of(self.pair)
         level = np.abs(pixels0[:, 1] - pixels1[:, 1]) < 2
-        self.assertLessEqual(int(ransac.true_matches(self.pair, pixels0, pixels1).sum()), int(level.sum()))
+        self.assertLessEqual(
+            int(ransac.true_matches(self.pair, pixels0, pixels1).sum()), int(level.sum())
+        )
         estimates = ransac.estimates(self.pair, pixels0, pixels1, ratios)
         for name, (inliers, _) in estimates.items():
             self.assertGreater((inliers & level).sum() / inliers.sum(), 0.97, name)
@@ -181,13 +193,18 @@ class Figures14And15(Case):
 
     def test_an_epipole_is_where_the_other_camera_is_seen(self):
         pair, *_ = triangulation.scene("forward")
-        self.assertLess(np.abs(motion.epipole(pair.cameras[0].K, [0, 0, 1]) - (319.5, 239.5)).max(), 1e-9)
+        self.assertLess(
+            np.abs(motion.epipole(pair.cameras[0].K, [0, 0, 1]) - (319.5, 239.5)).max(), 1e-9
+        )
         null = np.linalg.svd(pair.true_F)[2][-1]  # F e0 = 0
         center1 = -pair.R.T @ pair.t
-        self.assertLess(np.abs(null[:2] / null[2] - motion.epipole(pair.cameras[0].K, center1)).max(), 1e-6)
+        self.assertLess(
+            np.abs(null[:2] / null[2] - motion.epipole(pair.cameras[0].K, center1)).max(), 1e-6
+        )
 
     def test_a_drones_step_to_the_right_is_the_cameras_x(self):
-        level = [0, 0, 0, 0, -1, 0, 0, 0, 1, 0, 0, 0]  # number, seconds, place, quaternion x y z w, velocity
+        # number, seconds, place, quaternion x y z w, velocity
+        level = [0, 0, 0, 0, -1, 0, 0, 0, 1, 0, 0, 0]
         right = [1, 1, 0, 2, -1, 0, 0, 0, 1, 0, 0, 0]
         R, t = motion.true_motion([np.array(level, float), np.array(right, float)])
         self.assertTrue(np.allclose(R, np.eye(3)) and np.allclose(t, [-2, 0, 0]))
@@ -205,7 +222,8 @@ class Figure13(Case):
     def test_each_weight_is_one_over_the_last_rounds_depth(self):
         self.assertTrue((self.weights[0] == 1).all())
         for before, weights in zip(self.points, self.weights[1:]):
-            depths = before[:, 2], (before @ self.scene.R.T + self.scene.t)[:, 2]  # p3 . X of K [R t]
+            # p3 . X of K [R t]
+            depths = before[:, 2], (before @ self.scene.R.T + self.scene.t)[:, 2]
             for view in (0, 1):
                 self.assertLess(np.abs(weights[:, view] * depths[view] - 1).max(), 1e-9)
 
@@ -233,7 +251,10 @@ class Table1(Case):
         for kind in ("sideways", "forward", "converging"):
             scene, _, *pixels = triangulation.scene(kind, num=200)
             ours = triangulation.ours("Linear-Eigen", scene, *pixels)["position"]
-            for reference in (triangulation.dlt(scene, *pixels), triangulation.opencv(scene, *pixels)):
+            for reference in (
+                triangulation.dlt(scene, *pixels),
+                triangulation.opencv(scene, *pixels),
+            ):
                 off = np.linalg.norm(ours - reference, axis=1) / np.linalg.norm(reference, axis=1)
                 self.assertLess(np.percentile(off, 99), 1e-7, kind)
 
@@ -242,17 +263,25 @@ class Table1(Case):
         positions = triangulation.dlt(scene, *pixels)
         told = triangulation.accuracy(scene, truth, positions, *pixels)
         turn = cv2.Rodrigues(scene.R)[0]
-        squares = [((cv2.projectPoints(positions, r, t, scene.cameras[0].K, None)[0][:, 0] - p) ** 2).sum(axis=1)
-                   for r, t, p in ((np.zeros(3), np.zeros(3), pixels[0]), (turn, scene.t, pixels[1]))]
+        squares = [
+            ((cv2.projectPoints(positions, r, t, scene.cameras[0].K, None)[0][:, 0] - p) ** 2).sum(
+                axis=1
+            )
+            for r, t, p in ((np.zeros(3), np.zeros(3), pixels[0]), (turn, scene.t, pixels[1]))
+        ]
         self.assertAlmostEqual(told["rms_px"], np.sqrt(np.mean(squares)), delta=1e-9)
-        percent = [100 * np.sqrt(((p - x) ** 2).sum() / (x ** 2).sum()) for p, x in zip(positions, truth)]
+        percent = [
+            100 * np.sqrt(((p - x) ** 2).sum() / (x**2).sum()) for p, x in zip(positions, truth)
+        ]
         self.assertAlmostEqual(told["percent_median"], np.median(percent), delta=1e-9)
 
     def test_the_lens_of_the_times_distorts_nothing(self):
         scene, _, *pixels = triangulation.scene("forward", num=100)
         lensed = triangulation.through_a_lens(scene)
         for method in triangulation.METHODS:
-            plain, seen = (triangulation.ours(method, s, *pixels)["error_px"] for s in (scene, lensed))
+            plain, seen = (
+                triangulation.ours(method, s, *pixels)["error_px"] for s in (scene, lensed)
+            )
             self.assertLess(np.abs(plain - seen).max(), 1e-4, method)
 
     def test_poly_has_the_least_pixel_error(self):
@@ -260,7 +289,9 @@ class Table1(Case):
                                              for k in ("sideways", "forward", "converging")})
         for kind, methods in errors.items():
             for name, entry in methods.items():
-                self.assertLessEqual(methods["Poly"]["rms_px"], entry["rms_px"] * (1 + 1e-9), (kind, name))
+                self.assertLessEqual(
+                    methods["Poly"]["rms_px"], entry["rms_px"] * (1 + 1e-9), (kind, name)
+                )
 
 
 class Figure16(Case):
@@ -333,9 +364,23 @@ class Page(Case):
         self.assertIn("no experiment figure99", str(refused.exception.code))
 
     def test_every_experiment_of_the_paper_is_there(self):
-        self.assertEqual([e.id for e in paper.experiments()],
-                         ["figure1b", "figure4", "figure5", "figure6", "figure7", "figure8", "figure9",
-                          "figure13", "table1", "figure14", "figure15", "figure16"])
+        self.assertEqual(
+            [e.id for e in paper.experiments()],
+            [
+                "figure1b",
+                "figure4",
+                "figure5",
+                "figure6",
+                "figure7",
+                "figure8",
+                "figure9",
+                "figure13",
+                "table1",
+                "figure14",
+                "figure15",
+                "figure16",
+            ],
+        )
 
 
 if __name__ == "__main__":
