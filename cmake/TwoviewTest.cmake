@@ -28,12 +28,15 @@ function(tv_register_test name)
     ENVIRONMENT "${environment}")
 endfunction()
 
-# Unity's end of a program, replaced by the rule above (test/support/unity_end.c).
-add_library(twoview_unity_end STATIC ${PROJECT_SOURCE_DIR}/test/support/unity_end.c)
-target_link_libraries(twoview_unity_end PRIVATE twoview_flags twoview_unity)
-target_compile_definitions(twoview_unity_end
-  PRIVATE TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
-  INTERFACE UnityEnd=tv_UnityEnd UnityDefaultTestRun=tv_UnityDefaultTestRun)
+# Unity's end of a program, replaced by the rule above (test/support/unity_end.c). The benchmarks' folder
+# includes this file as well, without Unity.
+if(TARGET twoview_unity AND NOT TARGET twoview_unity_end)
+  add_library(twoview_unity_end STATIC ${PROJECT_SOURCE_DIR}/test/support/unity_end.c)
+  target_link_libraries(twoview_unity_end PRIVATE twoview_flags twoview_unity)
+  target_compile_definitions(twoview_unity_end
+    PRIVATE TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
+    INTERFACE UnityEnd=tv_UnityEnd UnityDefaultTestRun=tv_UnityDefaultTestRun)
+endif()
 
 # tv_add_test(name LABEL label SOURCES file... [LIBS library...])
 # A Unity test, built and registered.
