@@ -8,8 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[4]
-sys.path[:0] = [str(ROOT / "tools" / "compare_colmap"), str(ROOT / "python")]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 os.environ.setdefault("TWOVIEW_LIBRARY", str(ROOT / "build" / "release" / "lib" / "libtwoview.so"))
 SCRIPT = ROOT / "tools" / "compare_colmap" / "twoview_colmap"
 
@@ -69,7 +68,7 @@ def render(index):
 def photographs(tmp_path_factory):
     """A folder with images/, cameras.yaml and pairs.txt with the truth. Not to be written to."""
     import cv2
-    from colmap.pairs import write_pair
+    from twoview_tools.colmap.pairs import write_pair
     folder = tmp_path_factory.mktemp("scene")
     (folder / "images").mkdir()
     for index, name in enumerate(NAMES):
@@ -121,7 +120,7 @@ def run(*arguments, status=0):
 @pytest.fixture
 def call(capfd):
     """Runs a verb in this process: (status, stdout, stderr)."""
-    from colmap.cli import main
+    from twoview_tools.colmap.cli import main
 
     def called(*arguments):
         capfd.readouterr()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import twoview as tv
-from colmap import conventions, schema38
+from twoview_tools.colmap import conventions, schema38
 from conftest import HEIGHT, WIDTH, K, camera_pose, relative_pose
 
 pycolmap = pytest.importorskip("pycolmap")

@@ -13,9 +13,9 @@ import time
 import numpy as np
 import pytest
 import twoview as tv
-from colmap import exporter, schema38, settings
-from colmap.database import appended_database
-from colmap.errors import BadInput
+from twoview_tools.colmap import exporter, schema38, settings
+from twoview_tools.colmap.database import appended_database
+from twoview_tools.colmap.errors import BadInput
 from conftest import CAMERA, HEIGHT, NAMES, WIDTH, run, start
 
 pycolmap = pytest.importorskip("pycolmap")

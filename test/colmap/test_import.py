@@ -8,10 +8,10 @@ import subprocess
 import numpy as np
 import pytest
 import twoview as tv
-from colmap import conventions, importer, trajectory
-from colmap.cameras import read_camera_set
-from colmap.model import TwoViewModel, read_model, text_model
-from colmap.pairs import read_pairs
+from twoview_tools.colmap import conventions, importer, trajectory
+from twoview_tools.colmap.cameras import read_camera_set
+from twoview_tools.colmap.model import TwoViewModel, read_model, text_model
+from twoview_tools.colmap.pairs import read_pairs
 from conftest import CAMERA, CX, CY, FX, FY, HEIGHT, NAMES, WIDTH, K, camera_pose, relative_pose
 
 pycolmap = pytest.importorskip("pycolmap")
@@ -106,7 +106,7 @@ def test_our_tools_read_the_pairs(exported, photographs, tmp_path, call):
     program = os.environ.get("TWOVIEW_PROGRAM", "")
     if not os.path.isfile(program):
         pytest.skip("TWOVIEW_PROGRAM names no program")
-    from colmap import mapping
+    from twoview_tools.colmap import mapping
     shutil.copy(exported["4"], tmp_path / "x.db")
     [model] = mapping.MAPPERS["4"](str(tmp_path / "x.db"), str(photographs / "images"), str(tmp_path / "m"), True)
     assert call("import", "--model", model, "-o", tmp_path / "out")[0] == 0
@@ -206,7 +206,7 @@ def read_ply(path):
 
 @pytest.fixture(scope="module")
 def result(photographs, tmp_path_factory):
-    from colmap.cli import main
+    from twoview_tools.colmap.cli import main
     folder = tmp_path_factory.mktemp("result")
     (folder / "cam.yaml").write_text(OPENCV_CAMERA)
     assert main(["model", str(photographs / "images" / "a.png"), str(photographs / "images" / "c.png"), "--camera",

@@ -4,8 +4,8 @@ import shutil
 
 import numpy as np
 import pytest
-from colmap import mapping, truth
-from colmap.model import read_model
+from twoview_tools.colmap import mapping, truth
+from twoview_tools.colmap.model import read_model
 from conftest import NAMES, camera_pose
 
 pytest.importorskip("pycolmap")

@@ -1,7 +1,6 @@
-"""tools/accuracy/datasets.py: formats, camera choice, resize, undistortion."""
+"""twoview_tools.accuracy.datasets: formats, camera choice, resize, undistortion."""
 
 import os
-import sys
 import tempfile
 import unittest
 
@@ -10,10 +9,8 @@ try:
 except ImportError:
     np = None
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools",
-                                "accuracy"))
 if np is not None:
-    import datasets
+    from twoview_tools.accuracy import datasets
 
 
 def setUpModule():

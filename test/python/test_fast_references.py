@@ -7,7 +7,6 @@ set over the whole image is a subset of scikit-image's.
 """
 
 import os
-import sys
 import unittest
 
 try:
@@ -18,8 +17,7 @@ except ImportError as missing:
     raise unittest.SkipTest(f"{missing}: run scripts/bootstrap test")
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "tools", "accuracy"))
-import twoview_ctypes as tv
+from twoview_tools.accuracy import twoview_ctypes as tv
 
 LEFT = os.path.join(ROOT, ".cache", "motorcycle", "motorcycle_left.png")
 SIDE = 260

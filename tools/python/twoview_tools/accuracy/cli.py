@@ -16,14 +16,8 @@ import tempfile
 
 import numpy as np
 
-import datasets
-import estimators
-import identical
-import metrics
-import peers
-import pipeline
-import robust500
-from tables import (MIN_PAIRS, OURS, machine, mean_summary, print_table, progress, runs_of, say,
+from . import datasets, estimators, identical, metrics, peers, pipeline, robust500
+from .tables import (MIN_PAIRS, OURS, machine, mean_summary, print_table, progress, runs_of, say,
                     summarise)
 
 PROGRAM = os.path.join(datasets.ROOT, "build", "release", "bin", "twoview")

@@ -2,7 +2,7 @@
 """Pose accuracy against the inlier threshold and against the ratio: the picture of
 docs/accuracy.md.
 
-  .cache/venv/bin/python tools/accuracy/curves.py --picture docs/images/accuracy_curves.png
+  scripts/python -m twoview_tools.accuracy.curves --picture docs/images/accuracy_curves.png
 """
 
 import os
@@ -16,11 +16,7 @@ import sys
 
 import numpy as np
 
-import datasets
-import identical
-import pipeline
-import tables
-import twoview_ctypes
+from . import datasets, identical, pipeline, tables, twoview_ctypes
 
 THRESHOLDS_PX = (0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
 RATIOS = (0.75, 0.8, 0.85, 0.87, 0.9, 0.92, 0.95, 0.98)

@@ -6,7 +6,8 @@ import os
 
 import numpy as np
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from .. import ROOT
+
 MAX_NATIVE_WIDTH = 1241  # wider images are scaled down
 RESIZE_LONG_SIDE = 640   # to this long side
 # Here the truth of pairs_flagged.txt is a calibrated gantry's; "flagged" only says that plain SIFT

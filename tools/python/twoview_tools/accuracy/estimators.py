@@ -7,7 +7,7 @@ fed normalised points is much worse.
 
 import numpy as np
 
-import datasets
+from . import datasets
 
 # Same bounds for all: the sampler may draw as many samples as ours by default.
 CONFIDENCE = 0.9999
@@ -218,7 +218,7 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
 
 def run_twoview(context, matches, options=None, seed_step=0):
     """(R or None, t or None, inliers, tv_two_view) of ours; seed_step is added to its seed."""
-    import twoview_ctypes
+    from . import twoview_ctypes
     cameras = [twoview_ctypes.make_camera(K, *size, distortion)
                for (K, distortion), size in zip(matches.cameras, matches.sizes)]
     wanted = dict(options or {})

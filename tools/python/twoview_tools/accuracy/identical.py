@@ -8,14 +8,8 @@ import time
 
 import numpy as np
 
-import estimators
-import metrics
-import peers
-import pipeline
-import system_python
-import tables
-import twoview_ctypes
-from tables import MIN_PAIRS, OURS, say
+from . import estimators, metrics, peers, pipeline, system_python, tables, twoview_ctypes
+from .tables import MIN_PAIRS, OURS, say
 
 CACHE_FORMAT = 1  # raise it when a change here or in estimators.py changes results
 COLUMNS = ("num_inliers", "ms", "rotation_error_deg", "translation_error_deg",

@@ -13,9 +13,7 @@ import time
 
 import numpy as np
 
-import datasets
-import estimators
-import metrics
+from . import datasets, estimators, metrics
 
 CAP = 2048  # descriptors an image, second orientations included
 RATIO = 0.8

@@ -5,10 +5,7 @@ import time
 
 import numpy as np
 
-import datasets
-import estimators
-import metrics
-import twoview_ctypes
+from . import datasets, estimators, metrics, twoview_ctypes
 
 
 def make_context(library, data, feature_options=None):

@@ -2,7 +2,7 @@
 """The robust essential estimate beside PoseLib's: error and time on simulated matches, same run.
 
   scripts/accuracy --robust500                   # 200 problems a share of true matches
-  python tools/accuracy/robust500.py --problems 50 --lib build/release/lib/libtwoview.so
+  scripts/python -m twoview_tools.accuracy.robust500 --problems 50 --lib build/release/lib/libtwoview.so
 
 A problem is 500 matches in random order, without ratios, of two 640x480 pinhole views (f 500). The
 rotation turns by 1 to 12 degrees about any axis, the baseline has any direction; true matches lie
@@ -27,8 +27,7 @@ import time
 
 import numpy as np
 
-import metrics
-import twoview_ctypes
+from . import metrics, twoview_ctypes
 
 WIDTH, HEIGHT, FOCAL = 640, 480, 500.0
 CENTRE = np.array([320.0, 240.0])

@@ -1,7 +1,8 @@
 """Estimators of the system's Python (Debian's python3-opencv and python3-opengv), through a
 subprocess: these packages are built for that Python only.
 
-Run as a program, by that Python, it is the other side: `system_python.py JOB.npz OUT.npz`.
+Run by that Python, as a module, it is the other side: `-m twoview_tools.accuracy.system_python
+JOB.npz OUT.npz`.
 """
 
 import json
@@ -13,21 +14,23 @@ import time
 
 import numpy as np
 
-import estimators
+from .. import environment
+from . import estimators
 
 INTERPRETER = "/usr/bin/python3"
 
 
 def versions():
     """{module: version} of the estimators' modules that the system's Python has."""
-    program = ("import sys, json; sys.path.insert(0, sys.argv[1]); import estimators\n"
+    program = ("import json\n"
+               "from twoview_tools.accuracy import estimators\n"
                "have = {}\n"
                "for module in ('cv2', 'pyopengv'):\n"
                "    try: have[module] = estimators.module_version(module)\n"
                "    except Exception: pass\n"
                "print(json.dumps(have))")
     try:
-        done = subprocess.run([INTERPRETER, "-c", program, os.path.dirname(__file__)],
+        done = subprocess.run([INTERPRETER, "-c", program], env=environment(),
                               capture_output=True, text=True, check=True, timeout=120)
         return json.loads(done.stdout.splitlines()[-1])
     except (OSError, subprocess.SubprocessError, ValueError, IndexError):
@@ -47,7 +50,8 @@ def run(kind, list_of_matches, threshold_px, num_seeds):
     with tempfile.TemporaryDirectory() as folder:
         there, back = os.path.join(folder, "job.npz"), os.path.join(folder, "out.npz")
         np.savez(there, **job)
-        subprocess.run([INTERPRETER, os.path.abspath(__file__), there, back], check=True)
+        subprocess.run([INTERPRETER, "-m", __name__, there, back], env=environment(),
+                       check=True)
         with np.load(back) as found:
             table = found["table"]
     return [[(row[:9].reshape(3, 3), row[9:12], int(row[12]), row[13])

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-import metrics
+from . import metrics
 
 OURS = "twoview"
 MIN_PAIRS = 15      # sets of at least so many pairs count by themselves

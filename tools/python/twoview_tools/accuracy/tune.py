@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """One table line a set and their mean, for any options of the library.
 
-  python tools/accuracy/tune.py --sets kitti00_turn,tum_fr3_office --feature threshold=10 arc=9 \\
+  scripts/python -m twoview_tools.accuracy.tune --sets kitti00_turn,tum_fr3_office --feature threshold=10 arc=9 \\
       --match ratio=0.8 --estimate max_error_px=1 --estimator twoview --max-pairs 15
 
 Options are the fields of tv_feature_options, tv_match_options, tv_estimate_options; those not named
@@ -21,9 +21,7 @@ import sys
 
 import numpy as np
 
-import datasets
-import metrics
-import pipeline
+from . import datasets, metrics, pipeline
 
 COLUMNS = (("auc5", "AUC5", "6.1f"), ("auc10", "AUC10", "6.1f"), ("auc20", "AUC20", "6.1f"),
            ("median_error_deg", "median", "7.2f"), ("failures", "fail", "5.2f"),

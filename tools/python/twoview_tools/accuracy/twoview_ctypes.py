@@ -2,17 +2,12 @@
 as a command line has them, C structs as results."""
 
 import ctypes
-import os
-import sys
 
 import numpy as np
+import twoview
+from twoview import CORRESPONDENCE, DESCRIPTOR_BYTES, KEYPOINT, _abi, enums, stages  # noqa: F401
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-DEFAULT_LIBRARY = os.path.join(ROOT, "build", "release", "lib", "libtwoview.so")
-
-sys.path.insert(0, os.path.join(ROOT, "python"))
-import twoview  # noqa: E402  (after the path is set)
-from twoview import CORRESPONDENCE, DESCRIPTOR_BYTES, KEYPOINT, _abi, enums, stages  # noqa: E402,F401
+from .. import DEFAULT_LIBRARY
 
 STRUCTS = {struct.__name__: struct for struct in _abi.STRUCTS}
 TwoviewError = twoview.StatusError

@@ -2,11 +2,11 @@
 
 import json
 import os
-import sys
 
 import numpy as np
 import twoview as tv
 
+from ..accuracy import metrics  # the errors' definitions are those of the accuracy tables
 from . import database as db
 from .cameras import read_camera, write_camera_set
 from .conventions import camera_from_colmap, pixels_from_colmap
@@ -16,9 +16,6 @@ from .output import write_files
 from .pairs import exhaustive, read_pairs, sequential, write_pair
 from .progress import progress
 from .trajectory import write_trajectory
-
-sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "accuracy"))
-import metrics  # noqa: E402  (the errors' definitions are those of the accuracy tables)
 
 
 def _choose(names, pairs_file, overlap):

@@ -13,15 +13,12 @@ import statistics
 import sys
 import time
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[2]
-if __package__ in (None, ""):
-    sys.path[:0] = [str(HERE.parent), str(ROOT / "python")]
-    os.environ.setdefault("TWOVIEW_LIBRARY", str(ROOT / "build" / "release" / "lib" / "libtwoview.so"))
+from .. import DEFAULT_LIBRARY, ROOT
 
-from colmap import mapping, settings, truth  # noqa: E402
-from colmap.errors import BadInput  # noqa: E402
-from colmap.model import read_model  # noqa: E402
+os.environ.setdefault("TWOVIEW_LIBRARY", DEFAULT_LIBRARY)
+from . import mapping, settings, truth  # noqa: E402
+from .errors import BadInput  # noqa: E402
+from .model import read_model  # noqa: E402
 
 SETS = ("strecha_fountain_P11", "strecha_Herz_Jesus_P8", "tum_fr3_office")
 EXPORTS = {"twoview": {"max_keypoints": settings.MAPPING_KEYPOINTS}, "twoview, 2048 keypoints": {}}
@@ -30,12 +27,12 @@ OWN = "COLMAP's own"
 
 def _export(database, data, schema, options):
     import twoview as tv
-    from colmap.exporter import Job, export
+    from .exporter import Job, export
     export(Job(database, os.path.join(data, "images"), schema=schema, quiet=True), tv.FeatureOptions(**options))
 
 
 def _own(database, data, schema):
-    from colmap.cameras import read_camera_set
+    from .cameras import read_camera_set
     camera = next(iter(read_camera_set(os.path.join(data, "cameras.yaml")).values()))
     mapping.FEATURES[schema](database, os.path.join(data, "images"), camera)
 

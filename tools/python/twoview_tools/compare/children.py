@@ -9,8 +9,9 @@ import tempfile
 import threading
 from multiprocessing.connection import Pipe
 
-WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "worker.py")
+from .. import environment
 
+WORKER = "twoview_tools.compare.worker"
 TRACE = (" ", "***", "PC: ")  # of the stack that glog prints last
 
 
@@ -31,7 +32,8 @@ class Child:
         # A session of its own: killing it takes what it started along (the colmap program), and
         # Ctrl-C reaches the parent alone.
         self.process = subprocess.Popen(
-            [python, WORKER, str(theirs.fileno())], pass_fds=[theirs.fileno()],
+            [python, "-m", WORKER, str(theirs.fileno())], pass_fds=[theirs.fileno()],
+            env=environment(),
             stdin=subprocess.DEVNULL, stdout=self.errors, stderr=self.errors,
             start_new_session=True)
         theirs.close()

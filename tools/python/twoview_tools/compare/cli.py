@@ -11,10 +11,8 @@ import time
 
 import numpy as np
 
-import cluster
-import systems
-import datasets
-import results
+from ..accuracy import datasets
+from . import cluster, results, systems
 
 FORMAT = 1  # raise it when a change here changes what is stored of a pair
 REFERENCE_TIMEOUT_S = 3600
@@ -128,7 +126,7 @@ def make_task(arguments, name, folder, pair, cameras):
 
 def library_path():
     """libtwoview.so for every worker, wherever it runs."""
-    import twoview_ctypes
+    from ..accuracy import twoview_ctypes
     return os.path.abspath(os.environ.get("TWOVIEW_LIBRARY") or twoview_ctypes.DEFAULT_LIBRARY)
 
 

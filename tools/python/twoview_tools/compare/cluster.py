@@ -4,22 +4,23 @@ A worker of a cluster has this tree and the images under the same paths."""
 
 import concurrent.futures
 import contextlib
-import os
 
-HERE = os.path.dirname(os.path.abspath(__file__))
+from .. import PARENT
+from . import children, pair_run
+
+LAUNCH = str(PARENT.parent / "compare_colmap" / "launch.py")
 
 
-def _worker():
-    """The function that does a task. It is an inner one, which dask sends as it stands: the other
-    side has no path to this module yet."""
-    here = HERE
+def _remote_worker():
+    """The function that does a task in a worker of a cluster. It is an inner one, which dask sends
+    by value: the worker cannot import this package before launch.py has set its path."""
+    launch = LAUNCH
 
     def work(task):
-        import sys
-        if here not in sys.path:
-            sys.path.insert(0, here)
-        import pair_run
-        return pair_run.work(task)
+        import runpy
+        runpy.run_path(launch)
+        from twoview_tools.compare import pair_run as there
+        return there.work(task)
     return work
 
 
@@ -30,13 +31,11 @@ class Local:
 
     def run(self, tasks):
         """(index, result) as they are done."""
-        work = _worker()
-        futures = {self.pool.submit(work, task): i for i, task in enumerate(tasks)}
+        futures = {self.pool.submit(pair_run.work, task): i for i, task in enumerate(tasks)}
         for future in concurrent.futures.as_completed(futures):
             yield futures[future], future.result()
 
     def close(self):
-        import children
         self.pool.shutdown(wait=False, cancel_futures=True)
         children.close_all()
 
@@ -50,7 +49,7 @@ class Dask:
 
     def run(self, tasks):
         import distributed
-        work = _worker()
+        work = _remote_worker()
         futures = {self.client.submit(work, task, pure=False): i for i, task in enumerate(tasks)}
         for future in distributed.as_completed(futures):
             yield futures[future], future.result()

@@ -9,8 +9,8 @@ import tempfile
 import numpy as np
 import twoview
 
-from colmap import conventions
-from colmap import database as colmap_database
+from ..colmap import conventions
+from ..colmap import database as colmap_database
 
 PROGRAM = "colmap"
 NAMES = "0.png", "1.png"

@@ -8,13 +8,11 @@ import cv2
 import jinja2
 import numpy as np
 
-import pair_run
-import plots
-import systems
-import datasets
+from .. import ROOT
+from ..accuracy import datasets
+from . import pair_run, plots, systems
 
-PARTS = os.path.join(systems.HERE, "page")
-PROGRAM_STYLE = os.path.join(systems.ROOT, "tools", "twoview", "report", "style.css")
+PARTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "page")
 HISTOGRAM_EDGES_PX = pair_run.HISTOGRAM_EDGES_PX.tolist()
 THUMBNAIL_PX, THUMBNAIL_QUALITY = 420, 55
 
@@ -119,6 +117,12 @@ def read(*path):
         return f.read()
 
 
+def program_style():
+    """The style of the program's own report: in the source tree, or installed beside page.css."""
+    tree = os.path.join(ROOT, "tools", "twoview", "report", "style.css")
+    return read(tree) if os.path.isfile(tree) else read(PARTS, "style.css")
+
+
 def render(report, pairs, tasks):
     index, images = thumbnails(tasks)
     drawn = [s for kind in ("pipeline", "solver")
@@ -133,7 +137,7 @@ def render(report, pairs, tasks):
     from plotly.offline import get_plotlyjs
     return environment.from_string(read(PARTS, "page.html")).render(
         report=report, groups=table_groups(report),
-        style=read(PROGRAM_STYLE) + read(PARTS, "page.css"),
+        style=program_style() + read(PARTS, "page.css"),
         script=read(PARTS, "page.js"), plotly=get_plotlyjs(), data=script_text(data),
         plots=[{**plot, "json": script_text(plot["figure"])}
                for plot in plots.all_plots(report, pairs)],

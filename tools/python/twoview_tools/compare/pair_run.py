@@ -4,10 +4,8 @@ import json
 
 import numpy as np
 
-import children
-import systems
-import estimators
-import metrics
+from ..accuracy import estimators, metrics
+from . import children, systems
 
 OVERLAY_INLIERS, OVERLAY_OUTLIERS = 60, 25  # matches of a pipeline that the page can draw
 HISTOGRAM_EDGES_PX = np.array([0, .25, .5, .75, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])

@@ -6,8 +6,7 @@ import numpy as np
 import plotly.graph_objects as graph
 from plotly.colors import qualitative
 
-import results
-import systems
+from . import results, systems
 
 PALETTE = qualitative.D3
 FAMILIES = {"twoview": 0, "pycolmap": 1, "colmap": 3, "cv2": 2, "poselib": 4, "pyopengv": 5}

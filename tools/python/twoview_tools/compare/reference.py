@@ -6,9 +6,8 @@ import tempfile
 
 import numpy as np
 
-import colmap_program
-import datasets
-import estimators
+from ..accuracy import datasets, estimators
+from . import colmap_program
 
 
 def reconstruct(task):

@@ -8,10 +8,8 @@ import time
 
 import numpy as np
 
-import page
-import systems
-import metrics
-import tables
+from ..accuracy import metrics, tables
+from . import page, systems
 
 ERROR_KEYS = ("rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
               "pose_error_deg")

@@ -1,15 +1,9 @@
 """What is compared: each system's name, what runs it and with which options."""
 
 import dataclasses
-import os
 import sys
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-ROOT = os.path.dirname(os.path.dirname(HERE))
-sys.path[:0] = [os.path.join(ROOT, "tools", "accuracy"), os.path.join(ROOT, "python")]
-
-import estimators  # noqa: E402  (after the path is set)
-import peers  # noqa: E402
+from ..accuracy import estimators, peers
 
 COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0  # as COLMAP comes
 

@@ -1,6 +1,6 @@
 """The child process: runs one system on one pair at a time and may die doing so.
 
-`PYTHON worker.py FD`: requests and answers are JSON on that connection (numpy's pickles of the two
+`PYTHON -m twoview_tools.compare.worker FD`: requests and answers are JSON on that connection (numpy's pickles of the two
 Pythons do not fit each other).
 """
 
@@ -19,9 +19,8 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-import systems
-import datasets
-import estimators
+from ..accuracy import datasets, estimators
+from . import systems
 
 
 GRAVITY_SIGMA_RAD = np.radians(0.5)  # the references are no better
@@ -68,7 +67,7 @@ class Views:
 
 @functools.lru_cache(maxsize=2)
 def twoview_context(width, height, max_matches):
-    import twoview_ctypes
+    from ..accuracy import twoview_ctypes
     library = twoview_ctypes.Library(os.environ["TWOVIEW_LIBRARY"])
     return twoview_ctypes.Context(library, max_width=width, max_height=height,
                                   max_matches=max_matches)
@@ -89,7 +88,7 @@ def run_twoview(views, options, task):
         np.column_stack([k["x"], k["y"]])[links[side]]
         for (k, _), side in zip(features, ("idx0", "idx1"))), links["ratio"].copy())
     watch.lap()
-    import twoview_ctypes
+    from ..accuracy import twoview_ctypes
     R, t, inliers, found = estimators.run_twoview(context, matches, None, task["seed"])
     watch.lap("estimate")
     return {"num_keypoints": [len(k) for k, _ in features], **pose_answer(R, t, inliers, found),
@@ -102,7 +101,7 @@ def run_twoview(views, options, task):
 def peer_features(path, resize, front):
     """(points, descriptors, milliseconds): an image's are found once, their time counts in each of
     its pairs."""
-    import peers
+    from ..accuracy import peers
     gray = luma(path, resize)[0]
     start = time.perf_counter()
     points, descriptors = peers.extract(gray, dict(front))
@@ -113,7 +112,7 @@ def peer_features(path, resize, front):
 def peer_matches(path0, path1, resize, front):
     """(pixels0, pixels1, ratios or None, numbers of keypoints, ms): systems that differ in their
     estimator alone share them."""
-    import peers
+    from ..accuracy import peers
     (points0, d0, ms0), (points1, d1, ms1) = (peer_features(path, resize, front)
                                               for path in (path0, path1))
     watch = Stopwatch()
@@ -138,7 +137,7 @@ def run_peer_pipeline(views, options, task):
 
 
 def run_colmap_program(views, options, task):
-    import colmap_program
+    from . import colmap_program
     watch = Stopwatch()
     found = colmap_program.run(views, options["cap"], task["max_error_px"], task["seed"], watch)
     matches = views.matches(*found.pop("pixels"))
@@ -224,7 +223,7 @@ def timed(work):
 
 
 def triangulate_twoview(matches, R, t, options):
-    import twoview_ctypes
+    from ..accuracy import twoview_ctypes
     twoview = twoview_ctypes.twoview
     cameras = [twoview.Camera(*size, K[0, 0], K[1, 1], K[0, 2], K[1, 2],
                               twoview.CameraModel.BROWN_CONRADY, distortion)
@@ -291,7 +290,7 @@ def _version(module):
                 return {"version": library.version(),
                         "sha256": hashlib.sha256(f.read()).hexdigest()}
         if module == "colmap":
-            import colmap_program
+            from . import colmap_program
             return {"version": colmap_program.version()}
         return {"version": estimators.module_version(module)}
     except (ImportError, OSError) as error:
@@ -307,7 +306,7 @@ def answer(request, matches):
     if call == "images":  # so that reading them is nobody's time
         return len(Views(task).gray)
     if call == "reference":
-        import reference
+        from . import reference
         return reference.reconstruct(task)
     system = next(s for s in systems.SYSTEMS
                   if s.id == request["system"] and s.kind == request["call"])

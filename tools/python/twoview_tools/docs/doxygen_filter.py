@@ -10,7 +10,7 @@ import pathlib
 import re
 import sys
 
-import headers
+from . import headers
 
 # These begin a paragraph of their own in the comments of functions.
 SECTIONS = re.compile(r"(Time|Same input|Needs no context|The result is|A match|An image|\"No geometry\"|First order|options may|Cameras, R)\b")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The pictures of examples/README.md, from what the examples themselves write: docs/images/examples/.
-usage: .cache/venv/bin/python example_pictures.py FOLDER_OF_THE_BUILT_EXAMPLES PROGRAM_twoview
+usage: PYTHONPATH=test/cli scripts/python -m twoview_tools.docs.example_pictures FOLDER_OF_THE_BUILT_EXAMPLES PROGRAM_twoview
 
 The photographs are of the simulated drone's rendered room, so that none of other people's are committed.
 """
@@ -13,17 +13,17 @@ import subprocess
 import sys
 import tempfile
 
+import boards  # of test/cli
 import cv2
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from .. import ROOT
+
 OUT = ROOT / "docs" / "images" / "examples"
 WIDTH = 320
 CAMERA = ["560", "560", "319.5", "319.5", "179.5"]
 GREEN, RED, WHITE = (80, 200, 80), (60, 60, 230), (240, 240, 240)
 
-sys.path.insert(0, str(ROOT / "test" / "cli"))
-import boards
 
 
 def run(name, *arguments):

@@ -6,10 +6,10 @@ comment serves all names of one statement (`float x, y;`).
 """
 
 import dataclasses
-import pathlib
 import re
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from .. import ROOT
+
 FOLDERS = (ROOT / "lib/include", ROOT / "drivers/include")
 
 COMMENT = re.compile(r"/\*.*?\*/", re.S)

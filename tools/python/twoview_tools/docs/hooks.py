@@ -3,14 +3,11 @@
 import pathlib
 import posixpath
 import re
-import sys
 
 from mkdocs.structure.files import File
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-sys.path.insert(0, str(HERE))
-import reference
+from twoview_tools import ROOT
+from twoview_tools.docs import reference
 
 # Pages of the site that come from files outside docs/.
 ELSEWHERE = {"examples/README.md": "examples.md", "CHANGELOG.md": "changelog.md"}

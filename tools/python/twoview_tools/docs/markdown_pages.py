@@ -1,9 +1,8 @@
 """What the pages are made of: links, headings, code. For the tests of docs/."""
 
-import pathlib
 import re
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from .. import ROOT
 
 
 def pages():

@@ -30,7 +30,7 @@ class Reference:
                     for name in [name_of(symbol)] + [value.findtext("name") for value in symbol.findall("enumvalue")]:
                         self.place_of[name] = f"{page_name(path)}#{name_of(symbol)}"
         assert {page_name(path) for path in self.headers} - {"reference/twoview.md"} == set(self.order()), \
-            "a header is missing in LIBRARY or DRIVERS of tools/docs/reference.py"
+            "a header is missing in LIBRARY or DRIVERS of twoview_tools/docs/reference.py"
 
     def order(self):
         return [f"reference/{name}.md" for name in LIBRARY] + [f"reference/drivers/{name}.md" for name in DRIVERS]

@@ -7,9 +7,9 @@ from typing import Callable
 import cv2
 import numpy as np
 
-import drawing
-from experiment import Experiment, Missing, Result, Table, available
-from inputs import library, read_colour, read_json
+from . import drawing
+from .experiment import Experiment, Missing, Result, Table, available
+from .inputs import library, read_colour, read_json
 
 PAPER_RANGE_PX = (0.1, 0.5)  # the paper's usual error
 

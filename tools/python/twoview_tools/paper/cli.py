@@ -17,23 +17,17 @@ import time
 import traceback
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from .. import ROOT
 
 
 def experiments():
-    import calibration
-    import cloud
-    import corners
-    import descriptor
-    import motion
-    import ransac
-    import triangulation
+    from . import calibration, cloud, corners, descriptor, motion, ransac, triangulation
     modules = (calibration, corners, descriptor, ransac, triangulation, motion, cloud)  # the paper's order
     return [e for module in modules for e in module.EXPERIMENTS]
 
 
 def run(experiment, inputs):
-    from experiment import Missing
+    from .experiment import Missing
     begin = time.monotonic()
     outcome = {"experiment": experiment, "result": None, "problem": ""}
     try:
@@ -68,7 +62,7 @@ def write(path, data):
 
 
 def write_results(folder, outcomes, version, seconds, with_pictures):
-    import page
+    from . import page
     report = {"version": version, "seconds": round(seconds, 1),
               "experiments": {o["experiment"].id: numbers_of(o) for o in outcomes}}
     write(folder / "paper.json", (json.dumps(report, indent=1, allow_nan=False) + "\n").encode())
@@ -104,7 +98,7 @@ def chosen(only):
 def main(command=None):
     arguments = arguments_of(command)
     os.environ.setdefault("TWOVIEW_LIBRARY", str(arguments.build / "lib" / "libtwoview.so"))
-    import inputs
+    from . import inputs
     listed = chosen(arguments.only)
     try:
         arguments.folder.mkdir(parents=True, exist_ok=True)

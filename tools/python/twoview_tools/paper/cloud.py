@@ -3,10 +3,9 @@
 import cv2
 import numpy as np
 
-import drawing
-import ransac
-from experiment import Experiment, Result, Table
-from inputs import library
+from . import drawing, ransac
+from .experiment import Experiment, Result, Table
+from .inputs import library
 
 PATHS = {"unrefined": "FAST-12, SIFT, OpenCV's FM_RANSAC, its F as it is",
          "paper": "FAST-12, SIFT, eight-point RANSAC, refined",

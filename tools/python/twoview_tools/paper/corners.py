@@ -5,9 +5,9 @@ from the definition, one array a circle pixel, and the library is held against t
 
 import numpy as np
 
-import drawing
-from experiment import Experiment, Missing, Result, Table, available
-from inputs import grey, library, read_colour
+from . import drawing
+from .experiment import Experiment, Missing, Result, Table, available
+from .inputs import grey, library, read_colour
 
 # The Bresenham circle of radius 3, clockwise from the top.
 CIRCLE = np.array([(0, -3), (1, -3), (2, -2), (3, -1), (3, 0), (3, 1), (2, 2), (1, 3), (0, 3),

@@ -5,10 +5,9 @@ docs/algorithms/sift.md puts it, in floating point with angles: nothing of the l
 
 import numpy as np
 
-import corners
-import drawing
-from experiment import Experiment, Missing, Result
-from inputs import library
+from . import corners, drawing
+from .experiment import Experiment, Missing, Result
+from .inputs import library
 
 SIDE = 16  # samples of a patch; 15 gradients
 STEP = 0.28  # of a cell, between samples

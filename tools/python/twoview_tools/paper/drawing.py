@@ -9,7 +9,7 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402  (after the backend)
 
-from experiment import Picture  # noqa: E402
+from .experiment import Picture  # noqa: E402
 
 DPI, MOST_PNG_BYTES = 130, 100000
 GOOD, BAD, BLUE, ORANGE, GREY = "#11794a", "#c3323a", "#1667c1", "#d98a1f", "#8a949e"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiment import Missing
+from .experiment import Missing
 
 # The AR.Drone 2's front lens, about.
 CAMERA = """%YAML:1.0

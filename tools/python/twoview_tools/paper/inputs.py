@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +11,9 @@ from typing import Optional
 import cv2
 import numpy as np
 
-from experiment import Missing
+from .. import ROOT
+from .experiment import Missing
 
-ROOT = Path(__file__).resolve().parents[2]
 # Middlebury 2014's Motorcycle pair as scikit-image has it (scripts/bootstrap): rectified, so that the
 # motion is sideways and the disparity map is the depth.
 MOTORCYCLE = ROOT / ".cache" / "motorcycle"
@@ -23,9 +22,6 @@ FOCAL_PX, CX, CY, BASELINE_M = 994.978, (311.193, 342.279), 254.877, 0.193001
 
 def library():
     """The package twoview, of this source tree, on the library that TWOVIEW_LIBRARY names."""
-    path = str(ROOT / "python")
-    if path not in sys.path:
-        sys.path.insert(0, path)
     import twoview
     return twoview
 

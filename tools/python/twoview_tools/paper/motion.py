@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-import drawing
-import flight
-from experiment import Experiment, Missing, Result, Table, available
-from inputs import Pair, grey, library, read_colour
+from . import drawing, flight
+from .experiment import Experiment, Missing, Result, Table, available
+from .inputs import Pair, grey, library, read_colour
 
 NUM_LINES, FLIGHTS = 14, 3
 # A camera that looks forward: its axes in the body's (forward, right, down).

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import jinja2
 
-import inputs
+from .. import ROOT
+from . import inputs
 
 PARTS = Path(__file__).resolve().parent / "page"
-PROGRAM_STYLE = inputs.ROOT / "tools" / "twoview" / "report" / "style.css"
+PROGRAM_STYLE = ROOT / "tools" / "twoview" / "report" / "style.css"
 
 
 def sections(outcomes):

@@ -6,9 +6,9 @@ of figure 8 is written here: it shows the idea, figure 9 is the library."""
 import cv2
 import numpy as np
 
-import drawing
-from experiment import Experiment, Result, Table, available
-from inputs import library
+from . import drawing
+from .experiment import Experiment, Result, Table, available
+from .inputs import library
 
 NUM_POINTS, NUM_INLIERS = 500, 300  # the paper's figure 8
 SIGMA_PX, THRESHOLD_PX = 1.0, 2.5

@@ -9,10 +9,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-import drawing
-import ransac
-from experiment import Experiment, Missing, Result, Table
-from inputs import Pair, library
+from . import drawing, ransac
+from .experiment import Experiment, Missing, Result, Table
+from .inputs import Pair, library
 
 METHODS = {"Poly": "POLY", "Poly-Abs": "POLY_ABS", "Linear-Eigen": "LINEAR_EIGEN",
            "Linear-LS": "LINEAR_LS", "Iterative-Eigen": "ITERATIVE_EIGEN",
