@@ -283,4 +283,4 @@ def test_a_pair_without_a_pose_is_told(result, photographs, tmp_path, call, refu
     assert (status, err) == (3, "twoview: no full pose: no_motion\n") and not (tmp_path / "out").exists()
     refuse("both images are called a.png", "model", image, image, "--camera", result / "cam.yaml", "-o", tmp_path)
     (tmp_path / "cam.yaml").write_text(CAMERA)
-    refuse("camera_matrix", "model", image, copy, "--camera", tmp_path / "cam.yaml", "-o", tmp_path / "out")
+    refuse("image_width is missing", "model", image, copy, "--camera", tmp_path / "cam.yaml", "-o", tmp_path / "out")

@@ -33,10 +33,10 @@ def run_program(program, data, extra):
     """Rows of `twoview evaluate` on a set, and the report without its pairs."""
     with tempfile.TemporaryDirectory() as folder:
         pairs_file = data.pair_files[0]
-        if len(data.pair_files) > 1 or len(data.pairs) != len(datasets.read_pairs(pairs_file)):
+        if len(data.pair_files) > 1 or len(data.pairs) != len(datasets.read_measurable(pairs_file)):
             pairs_file = os.path.join(folder, "pairs.txt")
             with open(pairs_file, "w", encoding="utf-8") as f:
-                f.writelines(pair.line + "\n" for pair in data.pairs)
+                f.writelines(pair.text + "\n" for pair in data.pairs)
             cameras = os.path.join(data.dir, "cameras.yaml")
             if os.path.isfile(cameras):
                 shutil.copy(cameras, folder)

@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 
-from .. import ROOT
+from .. import ROOT, formats
 
 MAX_NATIVE_WIDTH = 1241  # wider images are scaled down
 RESIZE_LONG_SIDE = 640   # to this long side
@@ -28,84 +28,27 @@ def all_sets(folder=None):
                   if os.path.isfile(os.path.join(folder, name, "pairs.txt")))
 
 
-class Pair:
-    """One line of pairs.txt. R and t are None where the line ends with the two K."""
-
-    def __init__(self, line):
-        fields = line.split()
-        if len(fields) not in (22, 38):
-            raise ValueError(f"{len(fields)} fields, not 38 (name0 name1 rot0 rot1 K0 K1 T_0to1), or "
-                             "22 without the truth")
-        self.line = " ".join(fields)
-        self.name0, self.name1 = fields[:2]
-        if fields[2:4] != ["0", "0"]:
-            raise ValueError(f"{self.name0} {self.name1}: turned images are not measured here")
-        numbers = np.array([_number(f) for f in fields[4:]])
-        self.K0, self.K1 = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3)
-        for name, K in (("K0", self.K0), ("K1", self.K1)):
-            if K[0, 0] <= 0 or K[1, 1] <= 0 or np.any(K[[0, 1, 2, 2], [1, 0, 0, 1]]) or K[2, 2] != 1:
-                raise ValueError(f"{name} is not [fx 0 cx 0 fy cy 0 0 1]")
-        self.R = self.t = None
-        if len(numbers) > 18:
-            T = numbers[18:].reshape(4, 4)
-            self.R, self.t = T[:3, :3], T[:3, 3]
-            if (np.abs(self.R @ self.R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(self.R) < 0
-                    or T[3].tolist() != [0, 0, 0, 1]):
-                raise ValueError("T_0to1 holds no rotation and translation")
-
-
-def _number(text):
-    try:
-        number = float(text)
-    except ValueError:
-        number = np.nan
-    if not np.isfinite(number):
-        raise ValueError(f"{text!r} is no finite number")
-    return number
-
-
-def read_pairs(path, needs_truth=True):
-    """The pairs of a file. A line that is none is a ValueError that tells its number."""
-    pairs = []
-    with open(path, encoding="utf-8", errors="replace") as f:
-        for number, line in enumerate(f, 1):
-            if not line.strip() or line.lstrip().startswith("#"):
-                continue
-            try:
-                pairs.append(Pair(line))
-                if needs_truth and pairs[-1].R is None:
-                    raise ValueError("no true pose")
-            except ValueError as error:
-                raise ValueError(f"{path}: line {number}: {error}") from error
+def read_measurable(path, needs_truth=True):
+    """The pairs of a file, each with K and without turns, and with the truth where it is needed.
+    ValueError names the line that is not so."""
+    pairs = formats.read_pairs(path)
+    for pair in pairs:
+        lack = ("no K" if pair.K0 is None else "no true pose" if needs_truth and pair.R is None
+                else "turned images are not measured here" if any(pair.turns) else "")
+        if lack:
+            raise ValueError(f"{path}: line {pair.number}: {pair.name0} {pair.name1}: {lack}")
     return pairs
 
 
 def read_cameras(set_dir):
-    """{entry name: {fx, fy, cx, cy, k1, .., image_width, image_height}}, empty without a file."""
+    """{entry: formats.Camera} of a set's cameras.yaml, empty where it has none."""
     path = os.path.join(set_dir, "cameras.yaml")
-    if not os.path.isfile(path):
-        return {}
-    import yaml
-    with open(path, encoding="utf-8") as f:
-        return yaml.safe_load(f) or {}
+    return formats.read_camera_set(path) if os.path.isfile(path) else {}
 
 
-def choose_camera(cameras, name, K):
-    """The entry of an image: the only one; else the one whose name begins the file's name; else the
-    one whose fx and cx are the pair line's. None without a camera file."""
-    if len(cameras) <= 1:
-        return next(iter(cameras.values()), None)
-    begins = [entry for entry in cameras if name.startswith(entry)]
-    if begins:
-        return cameras[max(begins, key=len)]
-    for entry in cameras.values():
-        if np.allclose([entry["fx"], entry["cx"]], [K[0, 0], K[0, 2]], rtol=1e-9, atol=1e-9):
-            return entry
-    raise ValueError(f"{name}: no entry of cameras.yaml has its name or its K")
-
-
-def distortion_of(entry):
-    return [float(entry.get(k, 0)) for k in ("k1", "k2", "p1", "p2", "k3")] if entry else [0.0] * 5
+def distortion_of(camera):
+    """k1 k2 p1 p2 k3 of a formats.Camera of a cameras.yaml; zeros without one."""
+    return (list(camera.k) if camera else []) or [0.0] * 5
 
 
 def resized_shape(width, height, resize):
@@ -196,7 +139,7 @@ class Set:
         flagged_file = os.path.join(set_dir, "pairs_flagged.txt")
         if flagged and self.name in FLAGGED_SETS and os.path.isfile(flagged_file):
             self.pair_files.append(flagged_file)
-        self.pairs = [pair for path in self.pair_files for pair in read_pairs(path)]
+        self.pairs = [pair for path in self.pair_files for pair in read_measurable(path)]
         if max_pairs and max_pairs < len(self.pairs):
             step = np.linspace(0, len(self.pairs) - 1, max_pairs)
             self.pairs = [self.pairs[i] for i in sorted(set(np.round(step).astype(int)))]
@@ -228,8 +171,8 @@ class Set:
     def camera(self, pair, side):
         """(K at the images' scale, distortion) of image `side` of a pair."""
         name, K = ((pair.name0, pair.K0), (pair.name1, pair.K1))[side]
-        entry = choose_camera(self.cameras, name, K)
-        return scale_K(K, *self.gray(name)[1:]), distortion_of(entry)
+        camera = formats.choose_camera(self.cameras, name, K)
+        return scale_K(K, *self.gray(name)[1:]), distortion_of(camera)
 
     def max_size(self):
         """(width, height) that holds every image of the pairs."""

@@ -216,7 +216,7 @@ class Peer:
 
     def pair_key(self, data, pair):
         cameras = [data.camera(pair, i) for i in (0, 1)]
-        text = json.dumps([self.key, data.resize, pair.line, data.pixel_hash(pair.name0),
+        text = json.dumps([self.key, data.resize, pair.text, data.pixel_hash(pair.name0),
                            data.pixel_hash(pair.name1),
                            [[K.tolist(), list(d)] for K, d in cameras]], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()

@@ -95,7 +95,7 @@ def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_o
     if load:
         with open(load, "rb") as f:
             stored = pickle.load(f)
-        matched = [stored[pair.line] for pair in data.pairs]
+        matched = [stored[pair.text] for pair in data.pairs]
         context = None
         if estimator == "twoview":
             most = max([len(m) for m, _ in matched] + [1])
@@ -105,7 +105,7 @@ def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_o
         matched = match_pairs(context, data, feature_options, match_options)
         if save:
             with open(save, "wb") as f:
-                pickle.dump({p.line: m for p, m in zip(data.pairs, matched)}, f)
+                pickle.dump({p.text: m for p, m in zip(data.pairs, matched)}, f)
     return evaluate_matches(data, matched, estimate_options, estimator, context, num_seeds)
 
 

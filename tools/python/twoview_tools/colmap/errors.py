@@ -1,8 +1,11 @@
 """How the program says no: one line on stderr, exit status 2."""
 
+import contextlib
 import signal
 import sys
 import threading
+
+from ..formats import FormatError
 
 EXIT_DONE = 0
 EXIT_BAD_INPUT = 2
@@ -11,6 +14,17 @@ EXIT_NO_POSE = 3
 
 class BadInput(Exception):
     """str() is the line that the user reads."""
+
+
+@contextlib.contextmanager
+def refused(path):
+    """What a reader of twoview_tools.formats refuses in `path`, or cannot open, becomes BadInput."""
+    try:
+        yield
+    except FormatError as error:
+        raise BadInput(str(error)) from None
+    except OSError as error:
+        raise BadInput(f"{error.filename or path}: {error.strerror}") from None
 
 
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

@@ -51,7 +51,7 @@ def choose_pairs(job):
     for pair in read_pairs(job.pairs):
         for name in (pair.name0, pair.name1):
             if not os.path.isfile(os.path.join(job.images, name)):
-                raise BadInput(f"{job.pairs}: line {pair.line}: no image {name} in {job.images}")
+                raise BadInput(f"{job.pairs}: line {pair.number}: no image {name} in {job.images}")
         if frozenset((pair.name0, pair.name1)) not in seen:
             seen.add(frozenset((pair.name0, pair.name1)))
             pairs.append(pair)
@@ -64,7 +64,7 @@ def _intrinsics(job, pairs):
     for pair in pairs:
         for name, K in ((pair.name0, pair.K0), (pair.name1, pair.K1)):
             if given.get(name) is not None and K is not None and not np.array_equal(given[name], K):
-                raise BadInput(f"{job.pairs}: line {pair.line}: {name} has another K than before")
+                raise BadInput(f"{job.pairs}: line {pair.number}: {name} has another K than before")
             given[name] = given.get(name) if K is None else K
     return dict(sorted(given.items()))
 

@@ -26,7 +26,7 @@ def _choose(names, pairs_file, overlap):
     for pair in pairs:
         for name in (pair.name0, pair.name1):
             if name not in names:
-                raise BadInput(f"{pairs_file}: line {pair.line}: {name} is not in the model or database")
+                raise BadInput(f"{pairs_file}: line {pair.number}: {name} is not in the model or database")
     return pairs
 
 

@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 
+from .. import formats
 from ..accuracy import datasets
 from . import cluster, results, systems
 
@@ -93,14 +94,12 @@ def read_lists(arguments):
     tasks = []
     for path, name in zip(arguments.pairs, unique_names(arguments.pairs)):
         try:
-            pairs = datasets.read_pairs(path, needs_truth=False)
+            pairs = datasets.read_measurable(path, needs_truth=False)
             cameras = datasets.read_cameras(os.path.dirname(os.path.abspath(path)))
         except OSError as error:
             raise BadInput(f"{path}: {error.strerror or error}") from error
         except ValueError as error:
             raise BadInput(str(error)) from error
-        if not pairs:
-            raise BadInput(f"{path}: no pair in it")
         folder = arguments.images or os.path.join(os.path.dirname(os.path.abspath(path)), "images")
         if not os.path.isdir(folder):
             raise BadInput(f"{folder} is not a folder; --images names the images'")
@@ -112,7 +111,7 @@ def make_task(arguments, name, folder, pair, cameras):
     views = []
     for image, K in ((pair.name0, pair.K0), (pair.name1, pair.K1)):
         try:
-            distortion = datasets.distortion_of(datasets.choose_camera(cameras, image, K))
+            distortion = datasets.distortion_of(formats.choose_camera(cameras, image, K))
         except ValueError as error:
             raise BadInput(f"{name}: {error}") from error
         views.append({"name": image, "path": os.path.abspath(os.path.join(folder, image)),

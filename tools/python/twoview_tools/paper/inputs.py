@@ -11,7 +11,7 @@ from typing import Optional
 import cv2
 import numpy as np
 
-from .. import ROOT
+from .. import ROOT, formats
 from .experiment import Missing
 
 # Middlebury 2014's Motorcycle pair as scikit-image has it (scripts/bootstrap): rectified, so that the
@@ -112,19 +112,15 @@ class Inputs:
     def listed_pair(self, folder, name0, name1, title="", truth_px=2.0):
         """A pair of a set's pairs.txt, of a set without distortion."""
         tv = library()
-        with open(self.of_data(folder, "pairs.txt"), encoding="utf-8") as f:
-            lines = [line.split() for line in f]
-        fields = next((l for l in lines if l[:2] == [name0, name1]), None)
-        if fields is None:
+        listed = formats.read_pairs(str(self.of_data(folder, "pairs.txt")))
+        pair = next((p for p in listed if (p.name0, p.name1) == (name0, name1)), None)
+        if pair is None:
             raise Missing(f"{name0} {name1} in {folder}/pairs.txt")
-        numbers = np.array(fields[4:], float)
         colour = tuple(read_colour(self.of_data(folder, "images", n)) for n in (name0, name1))
-        K = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3)
-        T = numbers[18:].reshape(4, 4)
         cameras = tuple(tv.Camera(image.shape[1], image.shape[0], k[0, 0], k[1, 1], k[0, 2], k[1, 2])
-                        for image, k in zip(colour, K))
-        baseline = float(np.linalg.norm(T[:3, 3]))
-        return Pair(title or folder, colour, cameras, T[:3, :3], T[:3, 3] / baseline, baseline,
+                        for image, k in zip(colour, (pair.K0, pair.K1)))
+        baseline = float(np.linalg.norm(pair.t))
+        return Pair(title or folder, colour, cameras, pair.R, pair.t / baseline, baseline,
                     truth_px=truth_px)
 
 
