@@ -3,7 +3,6 @@
 import os
 import re
 import subprocess
-import sys
 
 from rows import Row
 
@@ -58,7 +57,7 @@ def _closure_row(ours, name, wanted):
 
 
 def context_kib(library, width, height):
-    import twoview_ctypes
+    from twoview_tools.accuracy import twoview_ctypes
     context = twoview_ctypes.Context(twoview_ctypes.Library(library), max_width=width,
                                      max_height=height, max_keypoints=2048)
     return context.size_bytes / 1024
@@ -79,7 +78,6 @@ def _at_most(case, value, most):
 
 
 def rows(build, root):
-    sys.path.insert(0, os.path.join(root, "tools", "accuracy"))
     library = os.path.join(build, "lib", "libtwoview.so")
     found = [_at_most(f"text + data of libtwoview.so, {os.uname().machine}",
                       *text_and_data(root, library))]

@@ -12,12 +12,8 @@ import time
 
 import numpy as np
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))),
-                                "tools", "accuracy"))
-import metrics  # noqa: E402
-import robust500  # noqa: E402
-import twoview_ctypes  # noqa: E402
-from rows import OURS, Measure  # noqa: E402
+from rows import OURS, Measure
+from twoview_tools.accuracy import metrics, robust500, twoview_ctypes
 
 MAX_KEYPOINTS = 2048
 RATIO = 0.8

@@ -9,15 +9,10 @@ function, behind all
 """
 
 import json
-import pathlib
 import subprocess
-import sys
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools" / "docs"))
-import headers
-import markdown_pages
-from markdown_pages import ROOT
+from twoview_tools.docs import headers, markdown_pages
 
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-Wno-unused", "-fsyntax-only", "-x", "c"]
 INCLUDES = [f"-I{folder}" for folder in headers.FOLDERS]

@@ -16,11 +16,9 @@ formulas and tests.
 
 import pathlib
 import re
-import sys
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools" / "docs"))
-import headers
+from twoview_tools.docs import headers
 
 STATUS = re.compile(r"\bTVS?_(?:OK|NONE|END|ERR_\w+)\b|\b(?:Returns|Statuses) (?:also |as )")
 UNIT_NAME = re.compile(

@@ -15,12 +15,10 @@ import os
 import pathlib
 import re
 import subprocess
-import sys
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools" / "docs"))
-import markdown_pages
-from markdown_pages import ROOT
+from twoview_tools import ROOT
+from twoview_tools.docs import markdown_pages
 
 FOLDERS = "lib|drivers|examples|tools|python|bench|test|docs|scripts|cmake"
 PROGRAM = os.environ.get("TWOVIEW_PROGRAM", "")

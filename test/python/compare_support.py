@@ -1,4 +1,4 @@
-"""What the tests of tools/compare_colmap share."""
+"""What the tests of compare_colmap share."""
 
 import importlib.util
 import os
@@ -11,7 +11,6 @@ TOOL = os.path.join(ROOT, "tools", "compare_colmap")
 PROGRAM = os.path.join(TOOL, "compare_colmap")
 MOTORCYCLE = os.path.join(ROOT, ".cache", "motorcycle")
 DATA = os.environ.get("TWOVIEW_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
-sys.path[:0] = [TOOL, os.path.join(ROOT, "tools", "accuracy")]
 
 # The Middlebury pair of scripts/demo: rectified, the second camera to the right of the first.
 K0 = "994.978 0 311.193 0 994.978 254.877 0 0 1"

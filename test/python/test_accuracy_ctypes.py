@@ -1,7 +1,6 @@
-"""tools/accuracy/twoview_ctypes.py: options as text, and a library by its path."""
+"""twoview_tools.accuracy.twoview_ctypes: options as text, and a library by its path."""
 
 import os
-import sys
 import unittest
 
 try:
@@ -10,9 +9,8 @@ except ImportError:
     np = None
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "tools", "accuracy"))
 if np is not None:
-    import twoview_ctypes as tv
+    from twoview_tools.accuracy import twoview_ctypes as tv
 
 
 def setUpModule():

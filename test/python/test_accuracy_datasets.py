@@ -1,7 +1,6 @@
-"""tools/accuracy/datasets.py: formats, camera choice, resize, undistortion."""
+"""twoview_tools.accuracy.datasets: which pairs are measured, resize, undistortion."""
 
 import os
-import sys
 import tempfile
 import unittest
 
@@ -10,19 +9,13 @@ try:
 except ImportError:
     np = None
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools",
-                                "accuracy"))
 if np is not None:
-    import datasets
+    from twoview_tools.accuracy import datasets
 
 
 def setUpModule():
     if np is None:
         raise unittest.SkipTest("no numpy: run scripts/bootstrap test")
-
-
-def make_K(fx, cx):
-    return np.array([[fx, 0, cx], [0, fx, 100.0], [0, 0, 1]])
 
 
 class TestResize(unittest.TestCase):
@@ -51,56 +44,33 @@ class TestResize(unittest.TestCase):
         self.assertEqual(datasets.default_resize(1426), 640)
 
 
-class TestCameraChoice(unittest.TestCase):
-    cameras = {"left": {"fx": 500.0, "cx": 320.0}, "right": {"fx": 510.0, "cx": 330.0}}
-
-    def test_one_entry_serves_every_image(self):
-        entry = {"fx": 1.0, "cx": 2.0}
-        self.assertIs(datasets.choose_camera({"rgb": entry}, "right_1.png", make_K(510.0, 330.0)),
-                      entry)
-
-    def test_the_file_name_comes_before_K(self):
-        self.assertIs(datasets.choose_camera(self.cameras, "left01.jpg", make_K(510.0, 330.0)),
-                      self.cameras["left"])
-
-    def test_K_decides_where_no_name_fits(self):
-        self.assertIs(datasets.choose_camera(self.cameras, "im1.png", make_K(510.0, 330.0)),
-                      self.cameras["right"])
-
-    def test_the_longest_name_wins(self):
-        cameras = {"cam1": {"fx": 1.0}, "cam10": {"fx": 2.0}}
-        self.assertIs(datasets.choose_camera(cameras, "cam10_5.png", make_K(9, 9)),
-                      cameras["cam10"])
-
-    def test_no_entry_is_an_error_and_no_file_is_none(self):
-        with self.assertRaises(ValueError):
-            datasets.choose_camera(self.cameras, "im1.png", make_K(512.0, 330.0))
-        self.assertIsNone(datasets.choose_camera({}, "im1.png", make_K(512.0, 330.0)))
-
-
-class TestPairs(unittest.TestCase):
+class TestMeasurable(unittest.TestCase):
     line = ("a.png b.png 0 0 500 0 320 0 501 240 0 0 1 510 0 330 0 511 250 0 0 1 "
             "1 0 0 0.1 0 1 0 0.2 0 0 1 0.3 0 0 0 1")
 
+    def read(self, line, **options):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "pairs.txt")
+            with open(path, "w", encoding="utf-8") as f:
+                f.write("# a comment\n" + line + "\n")
+            return datasets.read_measurable(path, **options)
+
     def test_reads_both_cameras_and_the_motion(self):
-        pair = datasets.Pair(self.line)
+        pair, = self.read(self.line)
         self.assertEqual((pair.name0, pair.name1), ("a.png", "b.png"))
         self.assertEqual((pair.K0[1, 1], pair.K1[1, 2]), (501.0, 250.0))
         np.testing.assert_array_equal(pair.R, np.eye(3))
         np.testing.assert_array_equal(pair.t, [0.1, 0.2, 0.3])
+        self.assertEqual(pair.text, self.line)
 
-    def test_skips_blank_lines_and_comments(self):
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, "pairs.txt")
-            with open(path, "w", encoding="utf-8") as f:
-                f.write(f"# a comment\n\n{self.line}\n   \n{self.line}\n")
-            self.assertEqual(len(datasets.read_pairs(path)), 2)
-
-    def test_refuses_a_short_line_and_turned_images(self):
-        with self.assertRaises(ValueError):
-            datasets.Pair(self.line.rsplit(" ", 1)[0])
-        with self.assertRaises(ValueError):
-            datasets.Pair(self.line.replace("png 0 0", "png 0 1"))
+    def test_refuses_pairs_that_cannot_be_measured(self):
+        fields = self.line.split()
+        for line, words in ((" ".join(fields[:2]), "no K"), (" ".join(fields[:22]), "no true pose"),
+                            (self.line.replace("png 0 0", "png 0 1"), "turned images")):
+            with self.assertRaisesRegex(ValueError, f"line 2: .*{words}"):
+                self.read(line)
+        pair, = self.read(" ".join(fields[:22]), needs_truth=False)
+        self.assertIsNone(pair.R)
 
 
 class TestUndistort(unittest.TestCase):

@@ -1,7 +1,5 @@
-"""tools/accuracy/identical.py and system_python.py: thresholds, verdicts, cache, the subprocess."""
+"""twoview_tools.accuracy.identical and system_python: thresholds, verdicts, cache, the subprocess."""
 
-import os
-import sys
 import tempfile
 import unittest
 from unittest import mock
@@ -12,14 +10,8 @@ try:
 except ImportError:
     np = None
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools",
-                                "accuracy"))
 if np is not None:
-    import estimators
-    import identical
-    import metrics
-    import peers
-    import system_python
+    from twoview_tools.accuracy import estimators, identical, metrics, peers, system_python
 
 
 def setUpModule():

@@ -1,8 +1,6 @@
-"""tools/accuracy/metrics.py against cases worked out by hand."""
+"""twoview_tools.accuracy.metrics against cases worked out by hand."""
 
 import math
-import os
-import sys
 import unittest
 
 try:
@@ -10,10 +8,8 @@ try:
 except ImportError:
     np = None
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools",
-                                "accuracy"))
 if np is not None:
-    import metrics
+    from twoview_tools.accuracy import metrics
 
 
 def setUpModule():

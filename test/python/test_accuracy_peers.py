@@ -1,7 +1,6 @@
-"""tools/accuracy/peers.py and estimators.py: the peers are run as they should be."""
+"""twoview_tools.accuracy.peers and estimators: the peers are run as they should be."""
 
 import os
-import sys
 import tempfile
 import unittest
 
@@ -11,13 +10,8 @@ try:
 except ImportError:
     np = None
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools",
-                                "accuracy"))
 if np is not None:
-    import datasets
-    import estimators
-    import metrics
-    import peers
+    from twoview_tools.accuracy import datasets, estimators, metrics, peers
 
 
 def setUpModule():

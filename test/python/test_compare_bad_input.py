@@ -1,4 +1,4 @@
-"""tools/compare_colmap: bad lists, missing images and systems that die."""
+"""compare_colmap: bad lists, missing images and systems that die."""
 
 import json
 import os

@@ -1,5 +1,4 @@
-"""tools/compare_colmap: COLMAP's reconstruction as the reference, and a dask cluster as the
-worker."""
+"""compare_colmap: COLMAP's reconstruction as the reference, and a dask cluster as the worker."""
 
 import json
 import os
@@ -43,8 +42,7 @@ class ComparisonTest(unittest.TestCase):
 
 class TestReference(ComparisonTest):
     def test_colmaps_reconstruction_stands_in_for_the_truth_and_every_table_says_so(self):
-        import datasets
-        import metrics
+        from twoview_tools.accuracy import datasets, metrics
         report, page = self.compare("report", [line[:22] for line in self.lines],
                                     "--reference", "colmap", "--jobs", 2)
         told, = report["reference_of_sets"].values()

@@ -1,5 +1,4 @@
-"""tools/compare_colmap: a whole report, every system within a degree of the truth on an easy
-pair."""
+"""compare_colmap: a whole report, every system within a degree of the truth on an easy pair."""
 
 import csv
 import json
@@ -52,7 +51,7 @@ class TestReport(unittest.TestCase):
         self.assertEqual(sorted(os.listdir(self.out)), ["index.html", "pairs.csv", "report.json"])
 
     def test_every_system_is_within_a_degree_of_the_truth_on_an_easy_pair(self):
-        import systems
+        from twoview_tools.compare import systems
         for system in systems.SYSTEMS:
             if system.kind == "triangulation":
                 continue
@@ -71,7 +70,7 @@ class TestReport(unittest.TestCase):
                     self.assertLess(min(errors), 1.0, told)
 
     def test_opengv_comes_within_a_degree_on_an_easy_pair(self):
-        import systems
+        from twoview_tools.compare import systems
         left = {s.id for s in systems.of_kind("solver") if s.module == "pyopengv"}
         report = self.report
         for run in range(OPENGV_RUNS):
@@ -112,7 +111,7 @@ class TestReport(unittest.TestCase):
         self.assertLess(self.report["seconds"]["twoview_share"], 0.02)
 
     def test_the_csv_has_a_row_a_pair_and_system(self):
-        import systems
+        from twoview_tools.compare import systems
         with open(os.path.join(self.out, "pairs.csv"), encoding="utf-8") as f:
             rows = list(csv.DictReader(f))
         self.assertEqual(len(rows), len(EASY) * len(systems.SYSTEMS))

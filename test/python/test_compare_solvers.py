@@ -1,4 +1,4 @@
-"""tools/compare_colmap: solvers and triangulations on simulated matches, each in its convention."""
+"""compare_colmap: solvers and triangulations on simulated matches, each in its convention."""
 
 import json
 import unittest
@@ -31,17 +31,16 @@ class TestConventions(unittest.TestCase):
         cls.with_wrong = {**cls.given, "pixels1": pixels[1].tolist()}
 
     def call(self, system, given):
-        import children
-        import program
+        from twoview_tools.compare import children, cli
         pose = {"R": self.R.tolist(), "t": self.t.tolist()}
         return children.call(system.python, {
             "call": system.kind, "system": system.id,
             "task": {"max_error_px": 1.0, "seed": 0, "reference": pose, "pose": pose,
-                     "library": program.library_path()}}, 120, json.dumps(given).encode())[0]
+                     "library": cli.library_path()}}, 120, json.dumps(given).encode())[0]
 
     def test_every_solver_finds_the_pose(self):
-        import metrics
-        import systems
+        from twoview_tools.accuracy import metrics
+        from twoview_tools.compare import systems
         for system in systems.of_kind("solver"):
             with self.subTest(system=system.id):
                 found = self.call(system, self.with_wrong)
@@ -52,7 +51,7 @@ class TestConventions(unittest.TestCase):
 
     def test_every_triangulation_finds_the_points(self):
         import numpy as np
-        import systems
+        from twoview_tools.compare import systems
         for system in systems.of_kind("triangulation"):
             with self.subTest(system=system.id):
                 found = np.array(self.call(system, self.given)["points"], float)
@@ -90,16 +89,14 @@ class TestShift(unittest.TestCase):
         cls.task = {"max_error_px": 1.0, "seed": 0, "reference": None}
 
     def answer(self):
-        import children
-        import program
-        import systems
+        from twoview_tools.compare import children, cli, systems
         system = next(s for s in systems.of_kind("solver") if s.id == "twoview_five_point")
         return children.call(
             system.python,
             {
                 "call": "solver",
                 "system": system.id,
-                "task": {**self.task, "library": program.library_path()},
+                "task": {**self.task, "library": cli.library_path()},
             },
             120,
             json.dumps(self.given).encode(),
@@ -107,7 +104,7 @@ class TestShift(unittest.TestCase):
 
     def test_residuals_and_lines_are_of_the_camera_that_the_pose_is_of(self):
         import numpy as np
-        import pair_run
+        from twoview_tools.compare import pair_run
         answer = self.answer()
         self.assertLess(
             np.abs(np.subtract(answer["principal_point_shift_px"], (5.5, -3.5))).max(), 3
@@ -125,11 +122,10 @@ class TestShift(unittest.TestCase):
         self.assertEqual(row["principal_point_shift_px"], answer["principal_point_shift_px"])
 
     def test_points_on_our_own_pose_are_of_that_camera(self):
-        import pair_run
-        import program
+        from twoview_tools.compare import cli, pair_run
         answer = {**self.given, **self.answer()}
         run = pair_run.Run({**self.task, "matches_of": "twoview", "missing": {}, "timeout_s": 120,
-                            "library": program.library_path(), "systems": []})
+                            "library": cli.library_path(), "systems": []})
         rows = {}
         wanted = ("twoview_poly", "opencv_triangulate")
         whose = pair_run._triangulate(run, rows, (answer, pair_run._matches(self.given)), wanted)

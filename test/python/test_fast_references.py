@@ -8,7 +8,6 @@ suppressed set over the whole image is a subset of scikit-image's.
 """
 
 import os
-import sys
 import unittest
 
 try:
@@ -19,8 +18,7 @@ except ImportError as missing:
     raise unittest.SkipTest(f"{missing}: run scripts/bootstrap test")
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "tools", "accuracy"))
-import twoview_ctypes as tv
+from twoview_tools.accuracy import twoview_ctypes as tv
 
 LEFT = os.path.join(ROOT, ".cache", "motorcycle", "motorcycle_left.png")
 SIDE = 260

@@ -1,4 +1,4 @@
-"""tools/paper: the numbers behind the figures against references that know nothing of it.
+"""twoview_tools.paper: the numbers behind the figures against references that know nothing of it.
 
 The drone's flights, which take their time, are scripts/paper's own; all else is made here, too."""
 
@@ -7,12 +7,10 @@ import io
 import json
 import os
 import pathlib
-import sys
 import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools" / "paper"))
 PROGRAM = os.environ.get("TWOVIEW_PROGRAM", "")
 BUILD = pathlib.Path(PROGRAM).parent.parent if PROGRAM else ROOT / "build" / "release"
 os.environ.setdefault("TWOVIEW_LIBRARY", str(BUILD / "lib" / "libtwoview.so"))
@@ -26,16 +24,9 @@ try:
 except ImportError as missing:
     raise unittest.SkipTest(f"{missing}: run scripts/bootstrap test")
 
-import calibration
-import cloud
-import corners
-import descriptor
-import experiment
-import inputs
-import motion
-import paper
-import ransac
-import triangulation
+from twoview_tools.paper import calibration, cloud, corners, descriptor, experiment, inputs, motion
+from twoview_tools.paper import cli as paper
+from twoview_tools.paper import ransac, triangulation
 
 
 def setUpModule():

@@ -165,6 +165,12 @@ NamedCameras load_camera_set(const std::string& path) {
   return parse_camera_set(read_file(path, kMaxFileBytes), path);
 }
 
+static bool is_same(const tv_camera& a, const tv_camera& b) {
+  return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
+         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy &&
+         std::equal(std::begin(a.k), std::end(a.k), std::begin(b.k));
+}
+
 const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,
                                const double K[9]) {
   if (cameras.size() == 1) return &cameras[0].second;
@@ -178,10 +184,16 @@ const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& i
     }
   }
   if (best || !K) return best;
-  const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-6 * std::abs(b); };
-  for (const auto& [name, camera] : cameras)
-    if (same(K[0], camera.fx) && same(K[2], camera.cx)) return &camera;
-  return nullptr;
+  const auto is_near = [](double a, double b) { return std::abs(a - b) <= 1e-6 * std::abs(b); };
+  std::string best_name;
+  for (const auto& [name, camera] : cameras) {
+    if (!is_near(K[0], camera.fx) || !is_near(K[2], camera.cx)) continue;
+    if (best && !is_same(*best, camera))
+      throw BadInput("image " + image_name + ": its K fits the cameras " + best_name + " and " +
+                     name + ", which differ");
+    if (!best) best = &camera, best_name = name;
+  }
+  return best;
 }
 
 void require_size(const tv_camera& camera, const std::string& camera_name, int width, int height,

@@ -25,7 +25,9 @@ NamedCameras load_camera_set(const std::string& path);
 NamedCameras parse_camera_set(const std::string& text, const std::string& name);
 
 // The entry that serves an image: the only one, else the one whose name begins the file's name (the
-// longest, if several do), else the one with this fx and cx. Null when none fits.
+// longest, if several do), else the one whose fx and cx are K's within 1e-6 of the entry's values.
+// The image's folders do not count. Null when none fits; BadInput where K fits entries that differ.
+// twoview_tools.formats states the same rules, and test/formats has cases that both pass.
 const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,
                                const double K[9]);
 

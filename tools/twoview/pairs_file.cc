@@ -15,10 +15,11 @@ constexpr size_t kMaxFileBytes = size_t{64} << 20;
 
 double parse_number(const std::string& text) {
   double value = 0;
-  const bool plus = !text.empty() && text[0] == '+';
+  const bool plus = text[0] == '+';
   const char* const end = text.data() + text.size();
   const auto result = std::from_chars(text.data() + (plus ? 1 : 0), end, value);
-  if (result.ec != std::errc() || result.ptr != end) throw BadInput("'" + text + "' is no number");
+  if (result.ec != std::errc() || result.ptr != end || (plus && text[1] == '-'))
+    throw BadInput("'" + text + "' is no number");
   if (!std::isfinite(value)) throw BadInput("'" + text + "' is not finite");
   return value;
 }
@@ -90,11 +91,11 @@ Pair parse_line(const std::string& line) {
 
 std::vector<Pair> parse_pairs(const std::string& text, const std::string& name) {
   std::vector<Pair> pairs;
-  std::istringstream stream(text);
+  std::istringstream stream(text.compare(0, 3, "\xef\xbb\xbf") == 0 ? text.substr(3) : text);
   int number = 0;
   for (std::string line; std::getline(stream, line);) {
     ++number;
-    const size_t start = line.find_first_not_of(" \t\r");
+    const size_t start = line.find_first_not_of(" \t\r\v\f");
     if (start == std::string::npos || line[start] == '#') continue;
     try {
       pairs.push_back(parse_line(line));

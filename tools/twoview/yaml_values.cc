@@ -17,7 +17,10 @@ namespace {
 // OpenCV's words for NaN and infinity are read as what they mean.
 bool read_number(std::string text, double& value) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (!text.empty() && text[0] == '+') text.erase(0, 1);
+  if (!text.empty() && text[0] == '+') {
+    text.erase(0, 1);
+    if (!text.empty() && text[0] == '-') return false;
+  }
   const std::string bare = !text.empty() && text[0] == '-' ? text.substr(1) : text;
   if (bare == ".nan" || bare == "nan") return value = NAN, true;
   if (bare == ".inf" || bare == "inf") return value = INFINITY, true;

@@ -1,0 +1,188 @@
+// The program's readers of pairs files, camera files and cameras.yaml on the cases of test/formats,
+// which test/python/test_formats.py runs for the tools' readers. Owning objects live in functions
+// that give plain values: Unity leaves a failing test by longjmp.
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "camera_file.h"
+#include "error.h"
+#include "pairs_file.h"
+
+// After all others: it defines isnan and isinf as macros.
+#include "unity.h"
+
+using namespace cli;
+using Json = nlohmann::ordered_json;
+
+void setUp(void) {}
+void tearDown(void) {}
+
+namespace {
+
+constexpr int kFewestCases = 20;
+
+Json load(const char* name) {
+  std::ifstream stream(std::string(TWOVIEW_FORMATS_DIR "/") + name);
+  return Json::parse(stream);
+}
+
+// The case's lines, each ended by LF, with the entries of `given` in place of their $NAME.
+std::string text_of(const Json& file, const Json& test) {
+  std::string text;
+  for (const Json& line : test["text"]) text += line.get<std::string>() + "\n";
+  if (!file.contains("given")) return text;
+  for (const auto& [name, value] : file["given"].items())
+    for (size_t at; (at = text.find("$" + name)) != std::string::npos;)
+      text.replace(at, name.size() + 1, value.get<std::string>());
+  return text;
+}
+
+Json pair_json(const Pair& pair) {
+  const Json null;
+  return {{"name0", pair.name0},
+          {"name1", pair.name1},
+          {"turns", {pair.turns0, pair.turns1}},
+          {"K0", pair.has_K ? Json(pair.K0) : null},
+          {"K1", pair.has_K ? Json(pair.K1) : null},
+          {"R", pair.has_truth ? Json(pair.R) : null},
+          {"t", pair.has_truth ? Json(pair.t) : null}};
+}
+
+Json camera_json(const tv_camera& camera) {
+  const char* const models[] = {"pinhole", "brown_conrady", "kannala_brandt"};
+  std::vector<double> k(camera.k, camera.k + 8);
+  while (!k.empty() && k.back() == 0) k.pop_back();
+  return {{"width", camera.width},
+          {"height", camera.height},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"model", models[camera.model]},
+          {"k", k}};
+}
+
+Json pairs_json(const std::string& text) {
+  Json pairs = Json::array();
+  for (const Pair& pair : parse_pairs(text, "the file")) pairs.push_back(pair_json(pair));
+  return pairs;
+}
+
+Json camera_set_json(const std::string& text) {
+  Json cameras = Json::array();
+  for (const auto& [name, camera] : parse_camera_set(text, "the file")) {
+    Json entry = {{"name", name}};
+    entry.update(camera_json(camera));
+    cameras.push_back(entry);
+  }
+  return cameras;
+}
+
+bool is_refused_as(const Json& test, const std::string& message) {
+  bool fits = message.find("the file") != std::string::npos &&
+              message.find('\n') == std::string::npos && test.contains("refused");
+  for (size_t i = 0; fits && i < test["refused"].size(); ++i)
+    fits = message.find(test["refused"][i].get<std::string>()) != std::string::npos;
+  return fits;
+}
+
+// How many cases of a file go wrong; each is printed. A file with too few cases counts as one.
+int num_wrong(const char* name, const std::function<Json(const std::string&)>& read) {
+  const Json file = load(name);
+  int wrong = file["cases"].size() < kFewestCases;
+  for (const Json& test : file["cases"]) {
+    std::string found;
+    bool is_right = false;
+    try {
+      const Json values = read(text_of(file, test));
+      // Through plain JSON, which compares objects whatever the order of their entries.
+      is_right =
+          test.contains("expect") && nlohmann::json(values) == nlohmann::json(test["expect"]);
+      found = values.dump();
+    } catch (const BadInput& e) {
+      is_right = is_refused_as(test, e.what());
+      found = std::string("refused: ") + e.what();
+    }
+    if (is_right) continue;
+    ++wrong;
+    std::printf("%s: %s: %s\n", name, test["name"].get<std::string>().c_str(), found.c_str());
+  }
+  return wrong;
+}
+
+std::string chosen(const NamedCameras& cameras, const Json& row) {
+  double K[9] = {0, 0, 0, 0, 0, 1, 0, 0, 1};
+  const bool has_K = !row["fx"].is_null();
+  if (has_K) {
+    K[0] = K[4] = row["fx"];
+    K[2] = row["cx"];
+  }
+  try {
+    const tv_camera* const camera = choose_camera(cameras, row["image"], has_K ? K : nullptr);
+    for (const auto& [name, entry] : cameras)
+      if (&entry == camera) return name;
+    return "none";
+  } catch (const BadInput&) {
+    return "ambiguous";
+  }
+}
+
+int num_wrong_choices() {
+  int wrong = 0;
+  const Json file = load("choice.json");
+  for (const Json& test : file["cases"]) {
+    NamedCameras cameras;
+    for (const auto& [name, values] : test["cameras"].items()) {
+      tv_camera camera{};
+      camera.model = TV_CAMERA_BROWN_CONRADY;
+      camera.width = camera.height = 8;
+      camera.fx = camera.fy = values[0];
+      camera.cx = values[1];
+      camera.k[0] = values[2];
+      cameras.emplace_back(name, camera);
+    }
+    for (const Json& row : test["chosen"]) {
+      const std::string entry = chosen(cameras, row);
+      if (entry == row["entry"]) continue;
+      ++wrong;
+      std::printf("choice.json: %s: %s: %s\n", test["name"].get<std::string>().c_str(),
+                  row.dump().c_str(), entry.c_str());
+    }
+  }
+  return wrong;
+}
+
+void test_pairs_files_are_read_as_the_cases_say() {
+  TEST_ASSERT_EQUAL_INT(0, num_wrong("pairs.json", pairs_json));
+}
+
+void test_camera_files_are_read_as_the_cases_say() {
+  const auto read = [](const std::string& text) {
+    return camera_json(parse_camera(text, "the file"));
+  };
+  TEST_ASSERT_EQUAL_INT(0, num_wrong("camera.json", read));
+}
+
+void test_camera_sets_are_read_as_the_cases_say() {
+  TEST_ASSERT_EQUAL_INT(0, num_wrong("cameras.json", camera_set_json));
+}
+
+void test_the_entry_that_serves_an_image_is_the_cases() {
+  TEST_ASSERT_EQUAL_INT(0, num_wrong_choices());
+}
+
+}  // namespace
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_pairs_files_are_read_as_the_cases_say);
+  RUN_TEST(test_camera_files_are_read_as_the_cases_say);
+  RUN_TEST(test_camera_sets_are_read_as_the_cases_say);
+  RUN_TEST(test_the_entry_that_serves_an_image_is_the_cases);
+  return UNITY_END();
+}

@@ -1,0 +1,350 @@
+"""twoview colmap export: both schemas, the choice of pairs, --append, bad input, interruption."""
+
+import contextlib
+import hashlib
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import twoview as tv
+from twoview_tools.colmap import exporter, schema38, settings
+from twoview_tools.colmap.database import appended_database
+from twoview_tools.colmap.errors import BadInput
+from conftest import CAMERA, HEIGHT, NAMES, WIDTH, run, start
+
+pycolmap = pytest.importorskip("pycolmap")
+SCHEMAS = ("4", "3.8")
+SHARED_COLUMNS = {
+    "cameras": "*", "images": "image_id, name, camera_id", "keypoints": "*", "matches": "*",
+    "descriptors": "image_id, rows, cols, data",
+    "two_view_geometries": "pair_id, rows, cols, data, config, qvec, tvec, F, E, H"}
+
+
+def rows_of(path, table):
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        return database.execute(f"SELECT {SHARED_COLUMNS[table]} FROM {table}").fetchall()
+
+
+def pairs_of(path):
+    """Names of the pairs in a database."""
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        names = dict(database.execute("SELECT image_id, name FROM images"))
+        return [tuple(names[i] for i in divmod(row[0], schema38.MAX_IMAGES))
+                for row in database.execute("SELECT pair_id FROM two_view_geometries ORDER BY pair_id")]
+
+
+def digest(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def assert_nothing_else(folder, *names):
+    assert sorted(os.listdir(folder)) == sorted(names)
+
+
+# ---- what is written ---------------------------------------------------------------------------
+
+@pytest.mark.parametrize("table", SHARED_COLUMNS)
+def test_both_schemas_hold_the_same_rows(exported, table):
+    ours, theirs = (rows_of(exported[schema], table) for schema in SCHEMAS)
+    assert len(ours) == len(theirs) > 0
+    for row4, row38 in zip(ours, theirs):
+        for value4, value38 in zip(row4, row38):
+            if value4 is None:  # COLMAP 3.8 has zeros for what was not estimated
+                assert not any(np.frombuffer(value38))
+            elif table == "two_view_geometries" and isinstance(value4, bytes) and len(value4) in (24, 32, 72):
+                np.testing.assert_allclose(np.frombuffer(value4), np.frombuffer(value38), atol=1e-15)
+            else:
+                assert value4 == value38
+
+
+def test_schema_38_is_that_of_debians_colmap(exported, tmp_path):
+    if not shutil.which("colmap"):
+        pytest.skip("no colmap: scripts/bootstrap test installs it")
+    subprocess.run(["colmap", "database_creator", "--database_path", tmp_path / "their.db"], check=True,
+                   capture_output=True, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
+
+    def shape(path):
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            tables = [row[0] for row in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+            indices = database.execute("SELECT name, tbl_name FROM sqlite_master WHERE type = 'index'").fetchall()
+            return (database.execute("PRAGMA user_version").fetchone(), sorted(indices),
+                    {t: (database.execute(f"PRAGMA table_info({t})").fetchall(),
+                         database.execute(f"PRAGMA foreign_key_list({t})").fetchall()) for t in tables})
+    assert shape(exported["3.8"]) == shape(tmp_path / "their.db")
+
+
+def test_features_are_the_librarys(exported, photographs):
+    import cv2
+    with pycolmap.Database.open(exported["4"]) as database:
+        for name in NAMES:
+            image = database.read_image_with_name(name)
+            luma = cv2.imread(str(photographs / "images" / name), cv2.IMREAD_GRAYSCALE)
+            most = settings.MAPPING_KEYPOINTS
+            with tv.Context(max_width=WIDTH, max_height=HEIGHT, max_keypoints=most) as context:
+                keypoints, descriptors = tv.extract(context, luma, max_keypoints=most)
+            found = database.read_keypoints(image.image_id)
+            np.testing.assert_array_equal(found[:, :2], np.column_stack([keypoints["x"], keypoints["y"]]) + 0.5)
+            np.testing.assert_array_equal(database.read_descriptors(image.image_id).data, descriptors)
+            camera = database.read_camera(image.camera_id)
+            assert camera.has_prior_focal_length and camera.model.name == "PINHOLE"
+            assert camera.params.tolist() == [520, 500, 330.5, 235.5]
+        assert database.num_cameras() == database.num_rigs() == 1 and database.num_frames() == len(NAMES)
+
+
+def test_geometries_are_there_and_agree_with_their_matches(exported):
+    with pycolmap.Database.open(exported["4"]) as database:
+        ids, rows = database.read_two_view_geometries()
+        assert len(ids) == 6
+        for pair, row in zip(ids, rows):
+            id0, id1 = pycolmap.pair_id_to_image_pair(pair)
+            matches = database.read_matches(id0, id1)
+            assert row.config in (2, 4)  # calibrated, or planar where the wall is nearly all
+            assert {tuple(m) for m in row.inlier_matches} <= {tuple(m) for m in matches}
+            pixels = [database.read_keypoints(i)[row.inlier_matches[:, k], :2] for k, i in enumerate((id0, id1))]
+            p0, p1 = (np.column_stack([p, np.ones(len(p))]) for p in pixels)
+            lines = p0 @ row.F.T
+            distance = np.abs((p1 * lines).sum(axis=1)) / np.linalg.norm(lines[:, :2], axis=1)
+            assert len(distance) >= 25 and np.median(distance) < 0.5
+
+
+@pytest.mark.parametrize("by", ["program", "function"])
+def test_a_geometry_is_of_the_databases_camera(bend, tmp_path, call, by):
+    """Even where the matches would have its principal point elsewhere: all pairs share the camera."""
+    if by == "program":
+        assert call("export", "--database", tmp_path / "x.db", "--images", bend / "images", "--camera",
+                    bend / "cam.yaml")[0] == 0
+    else:
+        exporter.export(exporter.Job(str(tmp_path / "x.db"), str(bend / "images"), cameras=(str(bend / "cam.yaml"),),
+                                     quiet=True))
+    with pycolmap.Database.open(tmp_path / "x.db") as database:
+        [camera], (_, [row]) = database.read_all_cameras(), database.read_two_view_geometries()
+        inverse = np.linalg.inv(camera.calibration_matrix())
+        F = inverse.T @ row.E @ inverse
+        np.testing.assert_allclose(row.F / np.linalg.norm(row.F), F / np.linalg.norm(F), atol=1e-9)
+
+
+@pytest.mark.parametrize("schema", SCHEMAS)
+def test_a_pair_that_is_named_the_other_way_round_is_the_same_row(exported, photographs, tmp_path, schema, call):
+    (tmp_path / "pairs.txt").write_text("c.png a.png\nd.png b.png\na.png c.png\n")
+    assert call("export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--pairs",
+                tmp_path / "pairs.txt", "--schema", schema)[0] == 0
+    assert pairs_of(tmp_path / "x.db") == [("a.png", "c.png"), ("b.png", "d.png")]
+    expected = {row[0]: row for row in rows_of(exported[schema], "two_view_geometries")}
+    for row in rows_of(tmp_path / "x.db", "two_view_geometries"):
+        wanted = expected[row[0]]
+        assert sorted(np.frombuffer(row[3], np.uint64)) == sorted(np.frombuffer(wanted[3], np.uint64))
+        assert row[4] == wanted[4]
+        for mine, theirs in zip(row[5:], wanted[5:]):
+            if mine is not None:
+                np.testing.assert_allclose(np.frombuffer(mine), np.frombuffer(theirs), rtol=1e-9, atol=1e-12)
+
+
+def test_sequential_pairs_follow_the_names(photographs, tmp_path, call):
+    assert call("export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--sequential", "2",
+                "--schema", "3.8")[0] == 0
+    assert pairs_of(tmp_path / "x.db") == [("a.png", "b.png"), ("a.png", "c.png"), ("b.png", "c.png"),
+                                           ("b.png", "d.png"), ("c.png", "d.png")]
+
+
+@pytest.mark.parametrize("schema", SCHEMAS)
+def test_images_that_show_different_things_are_degenerate(tmp_path, schema, call):
+    import cv2
+    (tmp_path / "images").mkdir()
+    for seed in (1, 2):
+        noise = np.random.default_rng(seed).integers(0, 256, (120, 160)).astype(np.uint8)
+        cv2.imwrite(str(tmp_path / "images" / f"{seed}.png"), cv2.GaussianBlur(noise, (0, 0), 1.5))
+    (tmp_path / "cameras.yaml").write_text(CAMERA.replace(str(WIDTH), "160").replace(str(HEIGHT), "120"))
+    status, _, err = call("export", "--database", tmp_path / "x.db", "--images", tmp_path / "images", "--schema", schema)
+    assert (status, err) == (3, "twoview: no pair has a geometry\n")
+    [(_, rows, _, _, config, *_)] = rows_of(tmp_path / "x.db", "two_view_geometries")
+    assert (rows, config) == (0, 1)
+
+
+# ---- --append ----------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("schema", SCHEMAS)
+def test_append_adds_what_is_not_there(exported, photographs, tmp_path, schema, call):
+    path = tmp_path / "x.db"
+    (tmp_path / "pairs.txt").write_text("a.png b.png\n")
+    arguments = ("export", "--database", path, "--images", photographs / "images", "--schema", schema)
+    assert call(*arguments, "--pairs", tmp_path / "pairs.txt")[0] == 0
+    assert call(*arguments, "--append")[0] == 0
+    for table in SHARED_COLUMNS:
+        assert sorted(rows_of(path, table)) == sorted(rows_of(exported[schema], table))
+    assert_nothing_else(tmp_path, "x.db", "pairs.txt")
+
+
+def test_append_refuses_what_contradicts(exported, photographs, tmp_path, refuse):
+    path = shutil.copy(exported["3.8"], tmp_path / "x.db")
+    before = digest(path)
+    arguments = ("export", "--database", path, "--images", photographs / "images", "--schema", "3.8", "--append")
+    refuse("a.png is there with other keypoints", *arguments, "--max-keypoints", 100)
+    (tmp_path / "cam.yaml").write_text(CAMERA.replace("fx: 520", "fx: 521"))
+    refuse("a.png is there with another camera", *arguments, "--camera", tmp_path / "cam.yaml")
+    refuse("no such file", *(arguments[:2] + (tmp_path / "none.db",) + arguments[3:]))
+    assert digest(path) == before
+    assert_nothing_else(tmp_path, "x.db", "cam.yaml")
+
+
+# ---- bad input ---------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("schema", SCHEMAS)
+def test_a_database_that_is_there_is_left_alone(exported, photographs, tmp_path, schema, refuse):
+    path = shutil.copy(exported[schema], tmp_path / "x.db")
+    before = digest(path)
+    refuse("x.db: there already (--append", "export", "--database", path, "--images", photographs / "images",
+           "--schema", schema)
+    assert digest(path) == before
+    assert_nothing_else(tmp_path, "x.db")
+
+
+def test_a_journal_of_another_database_is_refused(photographs, tmp_path, refuse):
+    (tmp_path / "x.db-wal").write_bytes(b"old")
+    refuse("x.db-wal: left there", "export", "--database", tmp_path / "x.db", "--images", photographs / "images")
+    assert_nothing_else(tmp_path, "x.db-wal")
+
+
+@pytest.mark.parametrize("schema", SCHEMAS)
+def test_a_locked_database_is_refused(exported, photographs, tmp_path, schema, refuse):
+    path = shutil.copy(exported[schema], tmp_path / "x.db")
+    with contextlib.closing(sqlite3.connect(path)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        refuse("x.db: locked", "export", "--database", path, "--images", photographs / "images", "--schema", schema,
+               "--append")
+    assert_nothing_else(tmp_path, "x.db")
+
+
+def test_a_lock_that_comes_during_the_work_is_told(exported, tmp_path):
+    path = shutil.copy(exported["3.8"], tmp_path / "x.db")
+    with contextlib.closing(sqlite3.connect(path)) as other:
+        with pytest.raises(BadInput, match="x.db: locked"):
+            with appended_database(str(path), schema38):
+                other.execute("BEGIN IMMEDIATE")
+    assert_nothing_else(tmp_path, "x.db")
+
+
+def test_another_versions_database_is_refused(exported, photographs, tmp_path, refuse):
+    arguments = ("--images", photographs / "images", "--append")
+    for schema, other in (("4", "3.8"), ("3.8", "4")):
+        path = shutil.copy(exported[other], tmp_path / "x.db")
+        before = digest(path)
+        refuse(("x.db: made by COLMAP " + other, "--schema " + schema), "export", "--database", path, "--schema", schema,
+               *arguments)
+        assert digest(path) == before
+    (tmp_path / "x.db").write_bytes(b"nothing that SQLite knows" * 100)
+    refuse("x.db: not a database", "export", "--database", tmp_path / "x.db", *arguments)
+    (tmp_path / "x.db").write_bytes(b"")
+    refuse("made by no COLMAP", "export", "--database", tmp_path / "x.db", *arguments)
+
+
+@pytest.mark.parametrize("line, words", [
+    ("a.png\n", "1 fields, not 38"), ("a.png b.png 0 0 1\n", "5 fields"), ("a.png b.png x 0\n", "'x' is no number"),
+    ("a.png b.png 0 nan\n", "not finite"), ("a.png a.png\n", "paired with itself"),
+    ("a.png b.png 0 0 " + "1 0 0 0 1 0 0 0 2 " * 2 + "\n", "K0 is not"),
+    ("a.png b.png 0 0 " + "1 0 0 0 1 0 0 0 1 " * 2 + "1 " * 16 + "\n", "no rotation"),
+    ("a.png missing.png\n", "no image missing.png in"),
+    ("a.png b.png 0 0 " + "500 0 9 0 500 9 0 0 1 " * 2 + "\na.png c.png 0 0 " + "501 0 9 0 501 9 0 0 1 " * 2,
+     "a.png has another K"),
+])
+def test_a_broken_line_is_named_by_its_number(photographs, tmp_path, line, words, refuse):
+    (tmp_path / "pairs.txt").write_text("# heading\n\nb.png c.png\n" + line)
+    number = "line 5: " if "another K" in words else "line 4: "
+    refuse(("pairs.txt: " + number, words), "export", "--database", tmp_path / "x.db", "--images",
+           photographs / "images", "--pairs", tmp_path / "pairs.txt")
+    assert_nothing_else(tmp_path, "pairs.txt")
+
+
+def test_images_and_folders_that_are_missing_or_broken(photographs, tmp_path, refuse):
+    images = tmp_path / "images"
+    arguments = ("export", "--database", tmp_path / "x.db", "--images", images)
+    refuse("images: no such folder", *arguments)
+    images.mkdir()
+    refuse("0 images in it", *arguments)
+    shutil.copy(photographs / "images" / "a.png", images)
+    (images / "b.png").write_bytes((photographs / "images" / "b.png").read_bytes()[:100])
+    refuse("no camera for it", *arguments)
+    (tmp_path / "cameras.yaml").write_text(CAMERA)
+    refuse("b.png: not an image", *arguments)
+    (tmp_path / "cameras.yaml").write_text(CAMERA.replace(str(WIDTH), "641"))
+    refuse("a.png is 640x480, but its camera is for 641x480", *arguments)
+    (tmp_path / "cameras.yaml").write_text(CAMERA.replace("fx: 520", "fx: wide"))
+    refuse("cameras.yaml: camera: fx is no number", *arguments)
+    refuse("none: no such folder", "export", "--database", tmp_path / "none" / "x.db", "--images", images)
+    assert_nothing_else(tmp_path, "images", "cameras.yaml")
+
+
+def test_bad_arguments_are_one_line(tmp_path, refuse):
+    base = ("export", "--database", tmp_path / "x.db", "--images", tmp_path)
+    refuse("--orientation", *base, "--orientation", "sideways")
+    refuse("--sequential", *base, "--sequential", "0")
+    refuse("not allowed with", *base, "--exhaustive", "--sequential", "2")
+    refuse("--schema", *base, "--schema", "3.9")
+    refuse("--images", "export", "--database", tmp_path / "x.db")
+
+
+def test_a_package_that_is_missing_is_told(photographs, tmp_path, refuse, monkeypatch):
+    arguments = ("export", "--database", tmp_path / "x.db", "--images", photographs / "images")
+    for package, schema, words in (("pycolmap", "4", "needs pycolmap (scripts/bootstrap"), ("cv2", "3.8", "cv2")):
+        monkeypatch.setitem(sys.modules, package, None)
+        refuse(words, *arguments, "--schema", schema)
+    assert_nothing_else(tmp_path)
+
+
+@pytest.mark.parametrize("append", [False, True])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_what_was_there(exported, photographs, tmp_path, append, number):
+    images = tmp_path / "images"
+    images.mkdir()
+    for i in range(60):
+        shutil.copy(photographs / "images" / NAMES[i % 4], images / f"{i:02}_{NAMES[i % 4]}")
+    (tmp_path / "cameras.yaml").write_text(CAMERA)
+    before = None
+    if append:
+        shutil.copy(exported["4"], tmp_path / "x.db")
+        before = digest(tmp_path / "x.db")
+    process = start("export", "--database", tmp_path / "x.db", "--images", images, *["--append"] * append)
+    deadline = time.monotonic() + 30
+    while not any(name.startswith(".x.db.") for name in os.listdir(tmp_path)):  # it has begun
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+    time.sleep(0.3)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out, err) == (-number, "", "")
+    assert_nothing_else(tmp_path, "images", "cameras.yaml", *["x.db"] * append)
+    assert not append or digest(tmp_path / "x.db") == before
+
+
+def test_json_is_alone_on_stdout(photographs, tmp_path):
+    import json
+    out = run("export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--json")
+    assert sum(json.loads(out)["configurations"].values()) == json.loads(out)["pairs_verified"] == 6
+
+
+# ---- one keypoint a corner ---------------------------------------------------------------------
+
+def test_a_corner_with_two_orientations_is_one_keypoint_to_the_mapper():
+    keypoints = np.zeros(5, tv.KEYPOINT)
+    keypoints["x"], keypoints["y"] = (4, 7, 4, 4, 7), (1, 2, 1, 2, 2)
+    keypoints["angle_rad"] = range(5)
+    assert exporter.one_keypoint_a_place(keypoints).tolist() == [0, 1, 0, 3, 1]
+    matches = np.array([[0, 5], [0, 6], [1, 5], [2, 7], [0, 5]])
+    assert exporter.one_to_one(matches, [1, 0, 2, 3, 4]).tolist() == [1, 2, 3]
+    assert exporter.one_to_one(matches, [0, 1, 2, 3, 4]).tolist() == [0, 3]
+    assert exporter.one_to_one(matches[:0], []).tolist() == []
+
+
+def test_no_keypoint_is_in_two_matches_of_a_pair(exported):
+    with pycolmap.Database.open(exported["4"]) as database:
+        for pair, row in zip(*database.read_two_view_geometries()):
+            ids = pycolmap.pair_id_to_image_pair(pair)
+            for matches in (row.inlier_matches, database.read_matches(*ids)):
+                for k, image_id in enumerate(ids):
+                    places = database.read_keypoints(image_id)[matches[:, k], :2]
+                    assert len(np.unique(places, axis=0)) == len(places)

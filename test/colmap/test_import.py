@@ -1,0 +1,286 @@
+"""twoview colmap import and model: models as reference poses, databases as input, results as models."""
+
+import json
+import os
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import twoview as tv
+from twoview_tools.colmap import conventions, importer, trajectory
+from twoview_tools.colmap.cameras import read_camera_set
+from twoview_tools.colmap.model import TwoViewModel, read_model, text_model
+from twoview_tools.colmap.pairs import read_pairs
+from conftest import CAMERA, CX, CY, FX, FY, HEIGHT, NAMES, WIDTH, K, camera_pose, relative_pose
+
+pycolmap = pytest.importorskip("pycolmap")
+OPENCV_CAMERA = f"""%YAML:1.0
+---
+image_width: {WIDTH}
+image_height: {HEIGHT}
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ {FX}, 0., {CX}, 0., {FY}, {CY}, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ 0., 0., 0., 0., 0. ]
+"""
+
+
+def scene_points(count):
+    random = np.random.default_rng(9)
+    return np.column_stack([random.uniform(-1, 1, count), random.uniform(-1, 1, count), random.uniform(4, 7, count)])
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory):
+    """{form: folder} of the scene's cameras as COLMAP has them, made by pycolmap; the last image sees 10 points."""
+    made = pycolmap.Reconstruction()
+    camera = pycolmap.Camera(model="OPENCV", width=WIDTH, height=HEIGHT, camera_id=1,
+                             params=[FX, FY, CX + 0.5, CY + 0.5, -0.1, 0.01, 0.001, 0])
+    made.add_camera_with_trivial_rig(camera)
+    points = scene_points(40)
+    ids = [made.add_point3D(point, pycolmap.Track(), np.zeros(3, np.uint8)) for point in points]
+    for i, name in enumerate(NAMES):
+        R, t = camera_pose(i)
+        seen = points[:10] if i == 3 else points
+        pixels = camera.img_from_cam(seen @ R.T + t)
+        image = pycolmap.Image(name=name, keypoints=pixels, camera_id=1, image_id=i + 1)
+        made.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pycolmap.Rotation3d(R), t))
+        for k in range(len(seen)):
+            made.add_observation(ids[k], pycolmap.TrackElement(i + 1, k))
+    folder = tmp_path_factory.mktemp("models")
+    for form in ("text", "binary"):
+        (folder / form).mkdir()
+    made.write_text(folder / "text")
+    made.write_binary(folder / "binary")
+    return {form: folder / form for form in ("text", "binary")}
+
+
+@pytest.mark.parametrize("form", ["text", "binary"])
+def test_a_models_poses_are_a_pairs_files_truth(models, tmp_path, form, call):
+    status, out, _ = call("import", "--model", models[form], "-o", tmp_path / "out", "--json")
+    assert (status, json.loads(out)) == (0, {"images": 4, "pairs": 3})
+    pairs = read_pairs(tmp_path / "out" / "pairs.txt")
+    assert [(p.name0, p.name1) for p in pairs] == [("a.png", "b.png"), ("a.png", "c.png"), ("b.png", "c.png")]
+    for pair in pairs:
+        R, t = relative_pose(NAMES.index(pair.name0), NAMES.index(pair.name1))
+        np.testing.assert_allclose(pair.R, R, atol=1e-12)
+        np.testing.assert_allclose(pair.t, t, atol=1e-12)
+        np.testing.assert_allclose(pair.K0, K, rtol=1e-15)  # half a pixel less than COLMAP's
+    camera = read_camera_set(tmp_path / "out" / "cameras.yaml")["camera_1"]
+    assert (camera.cx, camera.cy, tuple(camera.k[:5])) == (CX, CY, (-0.1, 0.01, 0.001, 0, 0))
+
+
+def test_the_choice_of_pairs(models, tmp_path, call, refuse):
+    arguments = ("import", "--model", models["text"], "-o", tmp_path / "out")
+    assert json.loads(call(*arguments, "--min-common-points", 10, "--json")[1])["pairs"] == 6
+    assert json.loads(call(*arguments, "--min-common-points", 0, "--sequential", 1, "--json")[1])["pairs"] == 3
+    (tmp_path / "pairs.txt").write_text("d.png a.png\n")
+    assert json.loads(call(*arguments, "--pairs", tmp_path / "pairs.txt", "--json")[1])["pairs"] == 1
+    [pair] = read_pairs(tmp_path / "out" / "pairs.txt")
+    np.testing.assert_allclose(pair.R, relative_pose(3, 0)[0], atol=1e-12)
+    (tmp_path / "pairs.txt").write_text("a.png b.png\na.png e.png\n")
+    refuse("pairs.txt: line 2: e.png is not in", *arguments, "--pairs", tmp_path / "pairs.txt")
+    refuse("no two images", *arguments, "--min-common-points", 41)
+
+
+def test_trajectories_come_back(models, tmp_path, call):
+    assert call("import", "--model", models["binary"], "-o", tmp_path)[0] == 0
+    poses = trajectory.read_trajectory(tmp_path / "trajectory.tum")
+    assert [time for time, _, _ in poses] == [0, 1, 2, 3]
+    for i, (_, R, centre) in enumerate(poses):
+        expected_R, t = camera_pose(i)
+        np.testing.assert_allclose(R, expected_R, atol=1e-12)
+        np.testing.assert_allclose(centre, -expected_R.T @ t, atol=1e-12)
+    assert trajectory.times_of(["images/12.5.png", "13.25.png"]) == [12.5, 13.25]
+
+
+def test_our_tools_read_the_pairs(exported, photographs, tmp_path, call):
+    """Against a model that COLMAP made of our matches our own poses are right."""
+    program = os.environ.get("TWOVIEW_PROGRAM", "")
+    if not os.path.isfile(program):
+        pytest.skip("TWOVIEW_PROGRAM names no program")
+    from twoview_tools.colmap import mapping
+    shutil.copy(exported["4"], tmp_path / "x.db")
+    [model] = mapping.MAPPERS["4"](str(tmp_path / "x.db"), str(photographs / "images"), str(tmp_path / "m"), True)
+    assert call("import", "--model", model, "-o", tmp_path / "out")[0] == 0
+    subprocess.run([program, "evaluate", tmp_path / "out" / "pairs.txt", "--images", photographs / "images", "-o",
+                    tmp_path / "report.json", "--quiet"], check=True)
+    pairs = json.loads((tmp_path / "report.json").read_text())["pairs"]
+    assert len(pairs) == 6 and max(pair["rotation_error_deg"] for pair in pairs) < 0.3
+
+
+@pytest.mark.parametrize("schema", ["4", "3.8"])
+def test_a_databases_matches_are_our_input(exported, models, tmp_path, schema, call):
+    status, out, _ = call("import", "--database", exported[schema], "--model", models["text"], "-o", tmp_path, "--json")
+    report = json.loads(out)
+    assert status == 0 and report["num_pairs"] == 6 and report["auc"]["5"] > 85
+    assert report == json.loads((tmp_path / "report.json").read_text())
+    for pair in report["pairs"]:
+        assert pair["rotation_error_deg"] < 0.3 and pair["num_inliers"] >= 25
+        assert len(pair["R"]) == 9 and len(pair["t"]) == 3
+
+
+def write_database(path, pixels, columns=6, with_matches=True, descriptors=None):
+    """Two images of one camera in pycolmap's own way."""
+    with pycolmap.Database.open(path) as database:
+        camera = pycolmap.Camera(model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FX, FY, CX + 0.5, CY + 0.5])
+        camera.camera_id = database.write_camera(camera)
+        for i in range(2):
+            image_id = database.write_image(pycolmap.Image(name=NAMES[i], camera_id=camera.camera_id))
+            rows = np.ones((len(pixels[i]), columns), np.float32)
+            rows[:, :2] = pixels[i] + 0.5
+            database.write_keypoints(image_id, rows)
+            if descriptors is not None:
+                database.write_descriptors(image_id, pycolmap.FeatureDescriptors(
+                    type=pycolmap.FeatureExtractorType.SIFT, data=descriptors))
+        if with_matches:
+            both = np.repeat(np.arange(len(pixels[0]), dtype=np.uint32)[:, None], 2, axis=1)
+            database.write_matches(1, 2, both)
+
+
+def views_of(points):
+    camera = tv.Camera(WIDTH, HEIGHT, FX, FY, CX, CY)
+    R, t = relative_pose(0, 1)
+    return [tv.camera_project_points(camera, np.ascontiguousarray(p))[0] for p in (points, points @ R.T + t)]
+
+
+@pytest.mark.parametrize("columns", [2, 4, 6])
+def test_half_a_pixel_and_the_columns_of_keypoints(tmp_path, columns, call):
+    write_database(tmp_path / "x.db", views_of(scene_points(80)), columns)
+    status, out, _ = call("import", "--database", tmp_path / "x.db", "-o", tmp_path / "out", "--json")
+    [pair] = json.loads(out)["pairs"]
+    R, t = relative_pose(0, 1)
+    assert status == 0 and pair["num_inliers"] == 80
+    # Exact matches give the exact pose; half a pixel of the principal point would be 1e-3.
+    np.testing.assert_allclose(np.reshape(pair["R"], (3, 3)), R, atol=2e-6)
+    np.testing.assert_allclose(pair["t"], t / np.linalg.norm(t), atol=2e-5)
+
+
+def test_without_matches_ours_are_made(tmp_path, call):
+    descriptors = np.random.default_rng(1).integers(0, 120, (80, 128)).astype(np.uint8)
+    write_database(tmp_path / "x.db", views_of(scene_points(80)), with_matches=False, descriptors=descriptors)
+    status, out, _ = call("import", "--database", tmp_path / "x.db", "-o", tmp_path / "out", "--json")
+    assert status == 0 and json.loads(out)["pairs"][0]["num_inliers"] == 80
+
+
+def test_what_is_no_model_or_no_database(models, tmp_path, refuse):
+    refuse("no COLMAP model in it", "import", "--model", tmp_path, "-o", tmp_path / "out")
+    broken = shutil.copytree(models["binary"], tmp_path / "broken")
+    (broken / "images.bin").write_bytes((broken / "images.bin").read_bytes()[:40])
+    refuse("broken: not a COLMAP model", "import", "--model", broken, "-o", tmp_path / "out")
+    refuse("no such file", "import", "--database", tmp_path / "none.db", "-o", tmp_path / "out")
+    (tmp_path / "x.db").write_bytes(b"no database at all" * 99)
+    refuse("not a database", "import", "--database", tmp_path / "x.db", "-o", tmp_path / "out")
+    refuse("needs --model or --database", "import", "-o", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_match_without_a_keypoint_is_named(tmp_path, refuse):
+    import sqlite3
+    write_database(tmp_path / "x.db", views_of(scene_points(20)))
+    database = sqlite3.connect(tmp_path / "x.db")
+    database.execute("UPDATE keypoints SET rows = 19, data = substr(data, 1, 19 * 24) WHERE image_id = 2")
+    database.commit()
+    database.close()
+    refuse("a match of a.png and b.png has no keypoint", "import", "--database", tmp_path / "x.db", "-o", tmp_path)
+
+
+# ---- results as models -------------------------------------------------------------------------
+
+def read_ply(path):
+    """The vertices of a binary PLY: x y z, colours, angle, error."""
+    data = path.read_bytes()
+    head, body = data.split(b"end_header\n", 1)
+    kinds = {"float": "<f4", "uchar": "u1"}
+    fields = [(line.split()[2].decode(), kinds[line.split()[1].decode()])
+              for line in head.split(b"\n") if line.startswith(b"property")]
+    return np.frombuffer(body, np.dtype(fields))
+
+
+@pytest.fixture(scope="module")
+def result(photographs, tmp_path_factory):
+    from twoview_tools.colmap.cli import main
+    folder = tmp_path_factory.mktemp("result")
+    (folder / "cam.yaml").write_text(OPENCV_CAMERA)
+    assert main(["model", str(photographs / "images" / "a.png"), str(photographs / "images" / "c.png"), "--camera",
+                 str(folder / "cam.yaml"), "-o", str(folder / "out"), "--quiet"]) == 0
+    return folder
+
+
+def test_pycolmap_reads_a_result_and_reprojects_it(result):
+    found = pycolmap.Reconstruction(result / "out")
+    assert found.num_reg_images() == 2 and found.num_points3D() > 100
+    assert found.cameras[1].params.tolist() == [FX, FY, CX + 0.5, CY + 0.5]
+    stored = np.mean([point.error for point in found.points3D.values()])
+    found.update_point_3d_errors()
+    again = np.mean([point.error for point in found.points3D.values()])
+    assert again < 0.5 and again == pytest.approx(stored, rel=0.5)
+    pose = read_model(result / "out").images["c.png"]
+    R, t = relative_pose(0, 2)
+    assert np.linalg.norm(pose.R - R) < 3e-3 and np.linalg.norm(pose.t - t / np.linalg.norm(t)) < 1e-2
+
+
+def test_a_model_has_the_camera_that_its_points_are_of(bend, tmp_path, call):
+    images = bend / "images"
+    status, out, _ = call("model", images / "000106.png", images / "000110.png", "--camera", bend / "cam.yaml", "-o",
+                          tmp_path, "--json")
+    shift = np.array(json.loads(out)["principal_point_shift_px"])
+    assert status == 0 and -18 < shift[0] < -5 and abs(shift[1]) < 9
+    found = pycolmap.Reconstruction(tmp_path)
+    assert found.num_cameras() == 1
+    np.testing.assert_allclose(found.cameras[1].params[2:], np.array([607.6928, 185.7157]) + shift, atol=1e-9)
+    found.update_point_3d_errors()
+    assert np.mean([point.error for point in found.points3D.values()]) < 0.5
+
+
+def test_a_model_comes_back_with_half_a_pixel_more(tmp_path):
+    pixels = views_of(scene_points(5))
+    R, t = relative_pose(0, 1)
+    camera = tv.Camera(WIDTH, HEIGHT, FX, FY, CX, CY, tv.CameraModel.KANNALA_BRANDT, (0.1, 0.02, 0, 0))
+    model = TwoViewModel(("a.png", "b c.png".replace(" ", "_")), (tv.Camera(WIDTH, HEIGHT, FX, FY, CX, CY), camera),
+                         R, t, tuple(pixels), scene_points(5), np.full((5, 3), 7, np.uint8), np.full(5, 0.25))
+    for name, text in text_model(model).items():
+        (tmp_path / name).write_text(text)
+    found = pycolmap.Reconstruction(tmp_path)
+    for i, name in enumerate(model.names):
+        image = found.find_image_with_name(name)
+        np.testing.assert_array_equal([point.xy for point in image.points2D], pixels[i] + 0.5)
+        assert [point.point3D_id for point in image.points2D] == [1, 2, 3, 4, 5]
+        back = conventions.camera_from_colmap(read_model(tmp_path).cameras[image.camera_id], name)
+        assert (back.cx, back.cy, back.model) == (CX, CY, model.cameras[i].model)
+    np.testing.assert_array_equal([found.points3D[i + 1].xyz for i in range(5)], scene_points(5))
+    np.testing.assert_allclose(importer.relative(*read_model(tmp_path).images.values())[0], R, atol=1e-15)
+
+
+def test_the_cloud_of_reconstruct_is_the_models(result, photographs):
+    """cloud.ply holds the same points and colours as the COLMAP model of the same pair."""
+    program = os.environ.get("TWOVIEW_PROGRAM", "")
+    if not os.path.isfile(program):
+        pytest.skip("TWOVIEW_PROGRAM names no program")
+    images = photographs / "images"
+    subprocess.run([program, "reconstruct", images / "a.png", images / "c.png", "--camera", result / "cam.yaml", "-o",
+                    result / "cloud", "--quiet"], check=True)
+    cloud = read_ply(result / "cloud" / "cloud.ply")
+    found = pycolmap.Reconstruction(result / "out")
+    points = [found.points3D[key] for key in sorted(found.points3D)]
+    np.testing.assert_array_equal(np.array([p.xyz for p in points], np.float32),
+                                  np.column_stack([cloud["x"], cloud["y"], cloud["z"]]))
+    np.testing.assert_array_equal([p.color for p in points],
+                                  np.column_stack([cloud["red"], cloud["green"], cloud["blue"]]))
+
+
+def test_a_pair_without_a_pose_is_told(result, photographs, tmp_path, call, refuse):
+    image = photographs / "images" / "a.png"
+    copy = shutil.copy(image, tmp_path / "copy.png")
+    status, _, err = call("model", image, copy, "--camera", result / "cam.yaml", "-o", tmp_path / "out")
+    assert (status, err) == (3, "twoview: no full pose: no_motion\n") and not (tmp_path / "out").exists()
+    refuse("both images are called a.png", "model", image, image, "--camera", result / "cam.yaml", "-o", tmp_path)
+    (tmp_path / "cam.yaml").write_text(CAMERA)
+    refuse("image_width is missing", "model", image, copy, "--camera", tmp_path / "cam.yaml", "-o", tmp_path / "out")

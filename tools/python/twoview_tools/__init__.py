@@ -1,0 +1,32 @@
+"""The project's Python tools, one importable package.
+
+- formats: the one reader of pairs files, camera files and a data set's cameras.yaml.
+- accuracy: the accuracy tables (scripts/accuracy) and what measures them.
+- compare: twoview beside COLMAP, OpenGV, OpenCV and PoseLib (tools/compare_colmap/compare_colmap).
+- colmap: COLMAP databases and models, in and out (tools/compare_colmap/twoview_colmap).
+- paper: the paper's figures and tables (scripts/paper).
+- docs: what builds and checks the documentation (scripts/docs, test/docs).
+
+`scripts/python -m twoview_tools.accuracy.tune` runs a module of the source tree. The tests get the
+same path from test/CMakeLists.txt, and the two programs of tools/compare_colmap from their launch.py.
+"""
+
+import os
+import pathlib
+
+# The folder that makes this package importable, and the source tree's root two folders above it.
+PARENT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = PARENT.parents[1]
+# Both packages' folders: the package twoview lies in python/ of the source tree; once installed it
+# lies beside this one, and the folder above may be any.
+FOLDERS = [str(folder) for folder in (PARENT, ROOT / "python")
+           if folder == PARENT or (folder / "twoview" / "__init__.py").is_file()]
+# The library of the release build, which TWOVIEW_LIBRARY overrides.
+DEFAULT_LIBRARY = str(ROOT / "build" / "release" / "lib" / "libtwoview.so")
+
+
+def environment():
+    """The environment of a child process that imports this package and the package twoview."""
+    folders = [*FOLDERS, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(folders),
+            "PYTHONSAFEPATH": "1"}  # a module in the user's folder must not hide one of ours

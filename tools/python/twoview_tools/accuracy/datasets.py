@@ -1,0 +1,180 @@
+"""The data sets: pairs, images, cameras, as `twoview evaluate` reads them."""
+
+import functools
+import hashlib
+import os
+
+import numpy as np
+
+from .. import ROOT, formats
+
+MAX_NATIVE_WIDTH = 1241  # wider images are scaled down
+RESIZE_LONG_SIDE = 640   # to this long side
+# Here the truth of pairs_flagged.txt is a calibrated gantry's; "flagged" only says that plain SIFT
+# could not confirm the pair.
+FLAGGED_SETS = ("middlebury_dinoSR", "middlebury_templeSR")
+
+
+def data_dir():
+    return os.environ.get("TWOVIEW_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
+
+
+def all_sets(folder=None):
+    """Names of the sets that have a pairs.txt."""
+    folder = folder or data_dir()
+    if not os.path.isdir(folder):
+        return []
+    return sorted(name for name in os.listdir(folder)
+                  if os.path.isfile(os.path.join(folder, name, "pairs.txt")))
+
+
+def read_measurable(path, needs_truth=True):
+    """The pairs of a file, each with K and without turns, and with the truth where it is needed.
+    ValueError names the line that is not so."""
+    pairs = formats.read_pairs(path)
+    for pair in pairs:
+        lack = ("no K" if pair.K0 is None else "no true pose" if needs_truth and pair.R is None
+                else "turned images are not measured here" if any(pair.turns) else "")
+        if lack:
+            raise ValueError(f"{path}: line {pair.number}: {pair.name0} {pair.name1}: {lack}")
+    return pairs
+
+
+def read_cameras(set_dir):
+    """{entry: formats.Camera} of a set's cameras.yaml, empty where it has none."""
+    path = os.path.join(set_dir, "cameras.yaml")
+    return formats.read_camera_set(path) if os.path.isfile(path) else {}
+
+
+def distortion_of(camera):
+    """k1 k2 p1 p2 k3 of a formats.Camera of a cameras.yaml; zeros without one."""
+    return (list(camera.k) if camera else []) or [0.0] * 5
+
+
+def resized_shape(width, height, resize):
+    """(width, height) with the long side brought down to `resize`, never up; 0 or None: as is."""
+    longer = max(width, height)
+    if not resize or longer <= resize:
+        return width, height
+    return tuple(max(1, int(side * resize / longer + 0.5)) for side in (width, height))
+
+
+def scale_K(K, scale_x, scale_y):
+    """K of a resized image; pixel (0,0) is a pixel's centre. The two factors differ a little where
+    the shorter side was rounded."""
+    scale = np.array([scale_x, scale_y])
+    scaled = np.array(K, float)
+    scaled[:2] *= scale[:, None]
+    scaled[:2, 2] = scale * (K[:2, 2] + 0.5) - 0.5
+    return scaled
+
+
+def default_resize(width):
+    """The rule of the tables: native up to MAX_NATIVE_WIDTH, else long side RESIZE_LONG_SIDE."""
+    return RESIZE_LONG_SIDE if width > MAX_NATIVE_WIDTH else 0
+
+
+def undistort(points, K, distortion):
+    """Pixels (n x 2) to normalised undistorted points, Brown-Conrady, by Newton's method; NaN where
+    it does not converge."""
+    points = np.asarray(points, float).reshape(-1, 2)
+    target = (points - K[:2, 2]) / [K[0, 0], K[1, 1]]
+    if not any(distortion):
+        return target
+    k1, k2, p1, p2, k3 = distortion
+    x, y = target.T.copy()
+    for _ in range(50):
+        s = x * x + y * y
+        radial = 1 + s * (k1 + s * (k2 + s * k3))
+        slope = k1 + s * (2 * k2 + 3 * k3 * s)  # d radial / d s
+        error_x = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x) - target[:, 0]
+        error_y = y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y - target[:, 1]
+        xx = radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x
+        xy = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y
+        yy = radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x
+        with np.errstate(all="ignore"):
+            determinant = xx * yy - xy * xy
+            x = x - (yy * error_x - xy * error_y) / determinant
+            y = y - (xx * error_y - xy * error_x) / determinant
+    with np.errstate(invalid="ignore"):
+        bad = ~(np.hypot(error_x, error_y) < 1e-9)
+    x[bad] = y[bad] = np.nan
+    return np.column_stack([x, y])
+
+
+def read_luma(path):
+    """The luma of an image file, by the program's way: colours first, so that it is the same
+    whatever the format (asked for grey, OpenCV takes a JPEG's own luma instead)."""
+    import cv2
+    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    if image is None or image.dtype != np.uint8:
+        raise ValueError(f"{path}: no image, or not of 8 bits")
+    if image.ndim == 3:
+        codes = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
+        image = cv2.cvtColor(image, codes[image.shape[2]])
+    return image
+
+
+def resized_luma(path, resize):
+    """(8-bit luma with the long side brought down to `resize`, scale in x, scale in y)"""
+    import cv2
+    image = read_luma(path)
+    height, width = image.shape
+    size = resized_shape(width, height, resize)
+    if size != (width, height):
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(image), size[0] / width, size[1] / height
+
+
+class Set:
+    """A data set with its images in memory once they were read."""
+
+    def __init__(self, set_dir, resize=None, flagged=False, max_pairs=None):
+        """resize: None is the tables' rule, 0 native, else the long side. max_pairs: that many,
+        evenly spaced."""
+        self.dir = set_dir
+        self.max_pairs = max_pairs
+        self.name = os.path.basename(os.path.normpath(set_dir))
+        self.pair_files = [os.path.join(set_dir, "pairs.txt")]
+        flagged_file = os.path.join(set_dir, "pairs_flagged.txt")
+        if flagged and self.name in FLAGGED_SETS and os.path.isfile(flagged_file):
+            self.pair_files.append(flagged_file)
+        self.pairs = [pair for path in self.pair_files for pair in read_measurable(path)]
+        if max_pairs and max_pairs < len(self.pairs):
+            step = np.linspace(0, len(self.pairs) - 1, max_pairs)
+            self.pairs = [self.pairs[i] for i in sorted(set(np.round(step).astype(int)))]
+        self.cameras = read_cameras(set_dir)
+        if resize is None:
+            resize = default_resize(self._native_size(self.pairs[0].name0)[0])
+        self.resize = resize
+
+    def path(self, name):
+        return os.path.join(self.dir, "images", name)
+
+    def _native_size(self, name):
+        image = read_luma(self.path(name))
+        return image.shape[1], image.shape[0]
+
+    @functools.lru_cache(maxsize=None)
+    def gray(self, name):
+        """(8-bit luma, scale in x, scale in y)"""
+        return resized_luma(self.path(name), self.resize)
+
+    @functools.lru_cache(maxsize=None)
+    def pixel_hash(self, name):
+        """Of the file and of what was decoded and resized from it."""
+        digest = hashlib.sha256(self.gray(name)[0].tobytes())
+        with open(self.path(name), "rb") as f:
+            digest.update(f.read())
+        return digest.hexdigest()
+
+    def camera(self, pair, side):
+        """(K at the images' scale, distortion) of image `side` of a pair."""
+        name, K = ((pair.name0, pair.K0), (pair.name1, pair.K1))[side]
+        camera = formats.choose_camera(self.cameras, name, K)
+        return scale_K(K, *self.gray(name)[1:]), distortion_of(camera)
+
+    def max_size(self):
+        """(width, height) that holds every image of the pairs."""
+        shapes = [self.gray(n)[0].shape for p in self.pairs for n in (p.name0, p.name1)]
+        return max(s[1] for s in shapes), max(s[0] for s in shapes)

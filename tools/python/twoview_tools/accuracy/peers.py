@@ -1,0 +1,283 @@
+"""Peers' front ends, and whole peer rows with their results kept in .cache/accuracy.
+
+OpenCV's FAST + SIFT is run as a user who knows it would: the cap's strongest corners, KeyPoint size
+5 (the default 7 loses 6 points of AUC5), plain SIFT, ratio 0.8 and mutual neighbours, pixel
+coordinates. OpenCV has no arc 12 and no public orientation: `gradient` is Lowe's histogram on
+SIFT's base level, in numpy here.
+"""
+
+import hashlib
+import json
+import os
+import time
+
+import numpy as np
+
+from . import datasets, estimators, metrics
+
+CAP = 2048  # descriptors an image, second orientations included
+RATIO = 0.8
+CACHE_FORMAT = 2  # raise it when a change here changes results
+
+CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
+
+_FAST = {"front": "fast", "threshold": 10, "size": 5, "orientation": "upright", "grid": 0,
+         "descriptor": "sift"}
+# name of the group for --peers: its rows
+GROUPS = {
+    "fast": [
+        {**_FAST, "estimator": "magsac"},
+        {**_FAST, "size": 4, "estimator": "magsac"},
+        {**_FAST, "orientation": "gradient", "estimator": "magsac"},
+        {**_FAST, "threshold": 5, "orientation": "gradient", "grid": 64, "estimator": "magsac"},
+    ],
+    "sift": [
+        {"front": "sift", "contrast": 0.02, "descriptor": "rootsift", "estimator": "magsac"},
+    ],
+    "poselib": [
+        {"front": "sift", "contrast": 0.02, "descriptor": "rootsift", "estimator": "poselib"},
+        {**_FAST, "estimator": "poselib"},
+    ],
+    "pycolmap": [
+        {"front": "pycolmap", "estimator": "pycolmap"},
+        {"front": "pycolmap", "estimator": "pycolmap_tvg"},
+    ],
+}
+
+
+def describe(config, threshold_px=1.0):
+    """A row's name, with the versions of what it runs."""
+    version = estimators.module_version
+    if config["front"] == "fast":
+        front = (f"opencv{version('cv2')} FAST9 t{config['threshold']} s{config['size']} "
+                 f"{config['orientation']}{' grid' if config['grid'] else ''}")
+    elif config["front"] == "sift":
+        kind = {"sift": "SIFT", "rootsift": "RootSIFT"}[config["descriptor"]]
+        front = f"opencv{version('cv2')} {kind} c{config['contrast']:g}"
+    else:
+        front = f"pycolmap{version('pycolmap')} SIFT"
+    title, module, _ = estimators.PEERS[config["estimator"]]
+    title = title.replace("OpenCV ", "")
+    if module == "poselib":
+        title = title.replace("PoseLib", f"PoseLib {version(module)}")
+    return f"{front} + {title} {threshold_px:.1f}"
+
+
+# ---- front ends -------------------------------------------------------------------------------
+
+def orientations(gray, points, size):
+    """[(index of the point, degrees clockwise from x)] after D. G. Lowe, IJCV 2004, section 5: 36
+    bins over a Gaussian window of 1.5 times the scale (size / 2), the highest peak and those above
+    80 per cent of it, with a parabola through three bins."""
+    import cv2
+    base = cv2.GaussianBlur(gray.astype(np.float32), (0, 0), np.sqrt(1.6**2 - 0.5**2))
+    sigma = 1.5 * size / 2
+    radius = int(round(3 * sigma))
+    dx = np.zeros_like(base)
+    dy = np.zeros_like(base)
+    dx[:, 1:-1] = base[:, 2:] - base[:, :-2]
+    dy[1:-1] = base[2:] - base[:-2]  # down, so that angles run clockwise as seen
+    dx[[0, -1]] = dy[[0, -1]] = dx[:, [0, -1]] = dy[:, [0, -1]] = 0
+    magnitude = np.pad(np.hypot(dx, dy), radius)
+    bins = np.pad(np.round(np.degrees(np.arctan2(dy, dx)) / 10).astype(int) % 36, radius)
+    offset = np.arange(-radius, radius + 1)
+    window = np.exp(-(offset[:, None] ** 2 + offset**2) / (2 * sigma**2))
+    found = []
+    rows = offset[:, None] + radius
+    for start in range(0, len(points), 256):
+        centre = np.round(points[start:start + 256]).astype(int)
+        y = centre[:, 1, None, None] + rows
+        x = centre[:, 0, None, None] + (offset + radius)[None]
+        slots = bins[y, x] + 36 * np.arange(len(centre))[:, None, None]
+        histogram = np.bincount(slots.ravel(), (magnitude[y, x] * window).ravel(),
+                                36 * len(centre)).reshape(-1, 36)
+        roll = lambda k: np.roll(histogram, k, axis=1)
+        histogram = (roll(2) + roll(-2) + 4 * (roll(1) + roll(-1)) + 6 * histogram) / 16
+        left, right = np.roll(histogram, 1, axis=1), np.roll(histogram, -1, axis=1)
+        top = histogram.max(axis=1, keepdims=True)
+        peak = (histogram > left) & (histogram > right) & (histogram >= 0.8 * top)
+        index, slot = np.nonzero(peak)
+        h, l, r = (a[index, slot] for a in (histogram, left, right))
+        degrees = (slot + 0.5 * (l - r) / (l - 2 * h + r)) * 10 % 360
+        found += zip(start + index, degrees)
+    return found
+
+
+def _strongest(points, scores, grid, shape):
+    """Order of the points to keep: strongest first; with a grid, each cell's best share first."""
+    order = np.lexsort((points[:, 0], points[:, 1], -scores))
+    if not grid or len(order) <= CAP:
+        return order[:CAP]
+    cells_x = -(-shape[1] // grid)
+    cells = (points[:, 1] // grid).astype(int) * cells_x + (points[:, 0] // grid).astype(int)
+    share = -(-CAP // (cells_x * -(-shape[0] // grid)))
+    sorted_cells = cells[order]
+    by_cell = np.argsort(sorted_cells, kind="stable")
+    starts = np.searchsorted(sorted_cells[by_cell], sorted_cells[by_cell])
+    rank = np.empty(len(order), int)
+    rank[by_cell] = np.arange(len(order)) - starts
+    return np.concatenate([order[rank < share], order[rank >= share]])[:CAP]
+
+
+def _root(descriptors):
+    descriptors = descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-12)
+    return np.sqrt(descriptors).astype(np.float32)
+
+
+def extract(gray, config):
+    """(points n x 2, descriptors n x 128 float32), at most CAP."""
+    if config["front"] == "pycolmap":
+        return _extract_pycolmap(gray, config.get("cap", CAP))
+    import cv2
+    cv2.setNumThreads(1)
+    if config["front"] == "sift":
+        sift = cv2.SIFT_create(nfeatures=CAP, contrastThreshold=config["contrast"])
+        keypoints, descriptors = sift.detectAndCompute(gray, None)
+        if len(keypoints) > CAP:  # a tie at the cap keeps both
+            best = np.argsort([-k.response for k in keypoints], kind="stable")[:CAP]
+            keypoints, descriptors = [keypoints[i] for i in best], descriptors[best]
+    else:
+        detector = cv2.FastFeatureDetector_create(config["threshold"], True,
+                                                  cv2.FAST_FEATURE_DETECTOR_TYPE_9_16)
+        corners = detector.detect(gray, None)
+        points = np.array([k.pt for k in corners], float).reshape(-1, 2)
+        scores = np.array([k.response for k in corners], float)
+        points = points[_strongest(points, scores, config["grid"], gray.shape)]
+        if config["orientation"] == "gradient":
+            oriented = orientations(gray, points, config["size"])[:CAP]
+        else:
+            oriented = [(i, 0.0) for i in range(len(points))]
+        keypoints = [cv2.KeyPoint(float(points[i][0]), float(points[i][1]), float(config["size"]),
+                                  float(angle), 0.0, 0) for i, angle in oriented]
+        keypoints, descriptors = cv2.SIFT_create().compute(gray, keypoints)
+    if not keypoints:
+        return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
+    if config["descriptor"] == "rootsift":
+        descriptors = _root(descriptors)
+    return np.array([k.pt for k in keypoints], float), descriptors
+
+
+def _extract_pycolmap(gray, cap):
+    """COLMAP's own SIFT (RootSIFT by default); its origin is the pixel's corner. The descriptors
+    stay COLMAP's objects, for its matcher."""
+    pycolmap = estimators.pycolmap_module()
+    options = pycolmap.FeatureExtractionOptions()
+    options.num_threads, options.use_gpu = 1, False
+    options.sift.max_num_features = cap
+    extractor = pycolmap.FeatureExtractor.create(options, pycolmap.Device.cpu)
+    keypoints, descriptors = extractor.extract_from_uint8_array(gray)
+    points = np.array([(k.x, k.y) for k in keypoints], float).reshape(-1, 2) - 0.5
+    return points, (keypoints, descriptors)
+
+
+def match(descriptors0, descriptors1, ratio=RATIO):
+    """(idx0, idx1, ratio): each the other's nearest, ratio test from 0 to 1."""
+    if len(descriptors0) < 2 or len(descriptors1) < 2:
+        return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
+    d0, d1 = descriptors0.astype(np.float32), descriptors1.astype(np.float32)
+    squared = np.maximum((d0**2).sum(1)[:, None] + (d1**2).sum(1) - 2 * (d0 @ d1.T), 0)
+    nearest = squared.argmin(axis=1)
+    back = squared.argmin(axis=0)
+    index = np.arange(len(d0))
+    first = squared[index, nearest]
+    squared[index, nearest] = np.inf
+    second = squared.min(axis=1)
+    keep = (back[nearest] == index) & (first < ratio**2 * second)
+    return (index[keep], nearest[keep],
+            np.sqrt(first[keep] / np.maximum(second[keep], 1e-30)))
+
+
+def match_pycolmap(features0, features1):
+    """COLMAP's matcher with its defaults (ratio 0.8, distance 0.7, mutual)."""
+    pycolmap = estimators.pycolmap_module()
+    options = pycolmap.FeatureMatchingOptions()
+    options.num_threads, options.use_gpu = 1, False
+    matcher = pycolmap.FeatureMatcher.create(options, pycolmap.Device.cpu)
+    found = np.asarray(matcher.match(*features0, *features1), int).reshape(-1, 2)
+    return found[:, 0], found[:, 1], None
+
+
+# ---- rows -------------------------------------------------------------------------------------
+
+class Peer:
+    """One row: a configuration over pairs, with results from the cache where it has them."""
+
+    def __init__(self, config, num_seeds=3, threshold_px=1.0, use_cache=True):
+        self.config, self.num_seeds, self.threshold_px = config, num_seeds, threshold_px
+        self.name = describe(config, threshold_px)
+        self.use_cache = use_cache
+        modules = {"cv2", {"pycolmap": "pycolmap"}.get(config["front"], "cv2"),
+                   estimators.PEERS[config["estimator"]][1]}
+        self.key = {"config": config, "threshold_px": threshold_px, "cap": CAP, "ratio": RATIO,
+                    "confidence": estimators.CONFIDENCE,
+                    "max_iterations": estimators.MAX_ITERATIONS, "format": CACHE_FORMAT,
+                    "numpy": np.__version__,
+                    "versions": {m: estimators.module_version(m) for m in sorted(modules)}}
+
+    def pair_key(self, data, pair):
+        cameras = [data.camera(pair, i) for i in (0, 1)]
+        text = json.dumps([self.key, data.resize, pair.text, data.pixel_hash(pair.name0),
+                           data.pixel_hash(pair.name1),
+                           [[K.tolist(), list(d)] for K, d in cameras]], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def run(self, data, progress=None):
+        """A list of rows as pipeline.evaluate_matches gives them, seed by seed."""
+        name = hashlib.sha256(json.dumps(self.key, sort_keys=True).encode()).hexdigest()[:16]
+        path = os.path.join(CACHE_DIR, f"{data.name}-{name}.json")
+        stored = {}
+        if self.use_cache and os.path.isfile(path):
+            with open(path, encoding="utf-8") as f:
+                stored = json.load(f)
+        features, rows, changed = {}, [], False
+        for number, pair in enumerate(data.pairs):
+            key = self.pair_key(data, pair)
+            have = stored.get(key, [])
+            if len(have) < self.num_seeds:
+                have = self._run_pair(data, pair, features)
+                stored[key], changed = have, True
+            rows += [{**row, "set": data.name, "name0": pair.name0, "name1": pair.name1,
+                      **{k: np.inf if row[k] is None else row[k] for k in row
+                         if k.endswith("error_deg") or k.endswith("signed_deg")}}
+                     for row in have[:self.num_seeds]]
+            if progress:
+                progress(number + 1, len(data.pairs))
+        if changed and self.use_cache:
+            os.makedirs(CACHE_DIR, exist_ok=True)
+            with open(path + ".part", "w", encoding="utf-8") as f:
+                json.dump(stored, f, allow_nan=False)
+            os.replace(path + ".part", path)
+        return rows
+
+    def matches(self, data, pair, features):
+        """(estimators.Matches, ms of extraction, ms of matching, mean number of keypoints)"""
+        for name in (pair.name0, pair.name1):
+            if name not in features:
+                start = time.perf_counter()
+                found = extract(data.gray(name)[0], self.config)
+                features[name] = found, 1e3 * (time.perf_counter() - start)
+        ((points0, d0), ms0), ((points1, d1), ms1) = features[pair.name0], features[pair.name1]
+        start = time.perf_counter()
+        find = match_pycolmap if self.config["front"] == "pycolmap" else match
+        index0, index1, ratios = find(d0, d1)
+        match_ms = 1e3 * (time.perf_counter() - start)
+        sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
+        found = estimators.Matches(points0[index0], points1[index1],
+                                   (data.camera(pair, 0), data.camera(pair, 1)), sizes, ratios)
+        return found, ms0 + ms1, match_ms, (len(points0) + len(points1)) / 2
+
+    def _run_pair(self, data, pair, features):
+        matches, extract_ms, match_ms, num_keypoints = self.matches(data, pair, features)
+        share = metrics.precision(matches.rays0, matches.rays1, pair.R, pair.t)
+        rows = []
+        for seed in range(self.num_seeds):
+            start = time.perf_counter()
+            found = estimators.run_peer(self.config["estimator"], matches, self.threshold_px, seed)
+            estimate_ms = 1e3 * (time.perf_counter() - start)
+            R, t, inliers = found or (None, None, 0)
+            rows.append(metrics.finite(
+                {"seed": seed, "num_keypoints": num_keypoints, "num_matches": len(matches),
+                 "num_inliers": inliers, "precision": share,
+                 "ms": {"extract": extract_ms, "match": match_ms, "estimate": estimate_ms},
+                 **metrics.pose_error(R, t, pair.R, pair.t)}))
+        return rows

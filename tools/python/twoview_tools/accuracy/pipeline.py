@@ -1,0 +1,124 @@
+"""Our stages on a data set through libtwoview.so, with any option, for tuning."""
+
+import pickle
+import time
+
+import numpy as np
+
+from . import datasets, estimators, metrics, twoview_ctypes
+
+
+def make_context(library, data, feature_options=None):
+    """A context that holds the set's images and features."""
+    width, height = data.max_size()
+    limits = {"max_width": width, "max_height": height}
+    cap = library.feature_options(feature_options).max_keypoints
+    limits["max_keypoints"] = max(cap, 1)
+    return twoview_ctypes.Context(library, **limits)
+
+
+def match_pairs(context, data, feature_options=None, match_options=None):
+    """[(estimators.Matches, {"extract": ms, "match": ms, "keypoints": n})] for each pair of a set;
+    an image's features are computed once and its time counted in each of its pairs."""
+    features = {}
+
+    def extract(name):
+        if name not in features:
+            start = time.perf_counter()
+            keypoints, descriptors = context.extract(data.gray(name)[0], feature_options)
+            features[name] = keypoints, descriptors, 1e3 * (time.perf_counter() - start)
+        return features[name]
+
+    found = []
+    for pair in data.pairs:
+        (kp0, d0, ms0), (kp1, d1, ms1) = extract(pair.name0), extract(pair.name1)
+        start = time.perf_counter()
+        links = context.match(d0, d1, match_options)
+        match_ms = 1e3 * (time.perf_counter() - start)
+        pixels = [np.column_stack([k["x"], k["y"]])[links[i]].astype(float)
+                  for k, i in ((kp0, "idx0"), (kp1, "idx1"))]
+        sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
+        matches = estimators.Matches(*pixels, (data.camera(pair, 0), data.camera(pair, 1)), sizes,
+                                     links["ratio"].copy())
+        found.append((matches, {"extract": ms0 + ms1, "match": match_ms,
+                                "keypoints": (len(kp0) + len(kp1)) / 2}))
+    return found
+
+
+def evaluate_matches(data, matched, estimate_options=None, estimator="twoview", context=None,
+                     num_seeds=1):
+    """A row per pair and seed: see evaluate_pairs. `matched` as match_pairs gives it."""
+    rows = []
+    for pair, (matches, stage) in zip(data.pairs, matched):
+        share = metrics.precision(matches.rays0, matches.rays1, pair.R, pair.t)
+        for seed in range(num_seeds):
+            row = {"set": data.name, "name0": pair.name0, "name1": pair.name1, "seed": seed,
+                   "num_matches": len(matches), "precision": share,
+                   "ms": {"extract": stage["extract"], "match": stage["match"]},
+                   "num_keypoints": stage["keypoints"]}
+            R = t = None
+            inliers = 0
+            start = time.perf_counter()
+            if estimator == "twoview":
+                R, t, inliers, result = estimators.run_twoview(context, matches, estimate_options,
+                                                               seed)
+                row["config"] = twoview_ctypes.enum_name("config", result.config)
+                row["verdict"] = twoview_ctypes.enum_name("verdict", result.verdict)
+                row["num_iterations"] = result.num_iterations
+            else:
+                threshold_px = float((estimate_options or {}).get("max_error_px", 1.0))
+                found = estimators.run_peer(estimator, matches, threshold_px, seed)
+                if found is not None:
+                    R, t, inliers = found
+            row["ms"]["estimate"] = 1e3 * (time.perf_counter() - start)
+            row["num_inliers"] = inliers
+            row.update(metrics.pose_error(R, t, pair.R, pair.t))
+            rows.append(row)
+    return rows
+
+
+def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_options=None,
+                   max_pairs=None, resize=None, estimator="twoview", num_seeds=1, library=None,
+                   flagged=False, save=None, load=None):
+    """Extracts, matches and estimates every pair of a set. Returns a list of rows, one per pair and
+    seed: the error keys of report.json, num_matches, num_inliers, num_keypoints, precision, and
+    ms {extract (both images), match, estimate}.
+
+    Options are dicts of the C structs' fields; values may be text. estimator: "twoview" or a key of
+    estimators.PEERS, which reads max_error_px only. resize: None is the tables' rule, 0 native.
+    library: a twoview_ctypes.Library or a path. save/load: a file for the matches (pickle, our own
+    files only), so that estimators can be tuned on fixed matches.
+    """
+    data = datasets.Set(set_dir, resize, flagged, max_pairs)
+    if not isinstance(library, twoview_ctypes.Library) and (estimator == "twoview" or not load):
+        library = twoview_ctypes.Library(library)
+    if load:
+        with open(load, "rb") as f:
+            stored = pickle.load(f)
+        matched = [stored[pair.text] for pair in data.pairs]
+        context = None
+        if estimator == "twoview":
+            most = max([len(m) for m, _ in matched] + [1])
+            context = twoview_ctypes.Context(library, max_width=64, max_height=64, max_matches=most)
+    else:
+        context = make_context(library, data, feature_options)
+        matched = match_pairs(context, data, feature_options, match_options)
+        if save:
+            with open(save, "wb") as f:
+                pickle.dump({p.text: m for p, m in zip(data.pairs, matched)}, f)
+    return evaluate_matches(data, matched, estimate_options, estimator, context, num_seeds)
+
+
+def summarise(rows):
+    """Numbers of one set out of its rows: mean over seeds of AUC, medians and means."""
+    seeds = sorted({row["seed"] for row in rows})
+    runs = [[r["pose_error_deg"] for r in rows if r["seed"] == s] for s in seeds]
+    summary = {f"auc{t:g}": metrics.auc_of_runs(runs, t) for t in metrics.THRESHOLDS_DEG}
+    summary["median_error_deg"] = float(np.median(runs))
+    summary["failures"] = float(np.mean(np.isinf(runs)))
+    for key in ("num_keypoints", "num_matches", "num_inliers", "precision"):
+        summary[key] = float(np.mean([r[key] for r in rows]))
+    for stage in ("extract", "match", "estimate"):
+        summary[stage + "_ms"] = float(np.mean([r["ms"][stage] for r in rows]))
+    summary["num_pairs"] = len(runs[0])
+    return summary

@@ -1,0 +1,108 @@
+"""The Python package (python/twoview) as measuring and tuning want it: any library by its path, options
+as a command line has them, C structs as results."""
+
+import ctypes
+
+import numpy as np
+import twoview
+from twoview import CORRESPONDENCE, DESCRIPTOR_BYTES, KEYPOINT, _abi, enums, stages  # noqa: F401
+
+from .. import DEFAULT_LIBRARY
+
+STRUCTS = {struct.__name__: struct for struct in _abi.STRUCTS}
+TwoviewError = twoview.StatusError
+
+# Options that name an enum value.
+_ENUM_FIELDS = {
+    "orientation": enums.Orientation, "descriptor": enums.Descriptor, "method": enums.Method,
+    "kernels": enums.Kernels, "verdict": enums.Verdict, "config": enums.Config,
+}
+
+
+def enum_name(field, number):
+    """'calibrated' for ('config', 1)."""
+    return _ENUM_FIELDS[field](number).name.lower()
+
+
+def _number(struct, field, text):
+    if field in _ENUM_FIELDS and not text.lstrip("-").isdigit():
+        name = text.upper().replace("-", "_")
+        if name not in _ENUM_FIELDS[field].__members__:
+            raise TwoviewError(f"{field}: no value named {text!r}")
+        return _ENUM_FIELDS[field][name]
+    kind = dict(struct._fields_).get(field)
+    return float(text) if kind in (ctypes.c_float, ctypes.c_double) else int(text, 0)
+
+
+def set_options(struct, options):
+    """Writes a dict of field: value (numbers, or strings as on a command line) into a struct."""
+    for key, value in (options or {}).items():
+        field = key.replace("-", "_")
+        try:
+            if isinstance(value, str):
+                value = _number(struct, field, value)
+            _abi.set_field(struct, field, value)
+        except (TypeError, ValueError) as error:
+            raise TwoviewError(str(error)) from error
+    return struct
+
+
+def make_camera(K, width, height, distortion=()):
+    """A tv_camera of a 3x3 K and Brown-Conrady coefficients (none: pinhole)."""
+    models = enums.CameraModel
+    return twoview.Camera(width, height, K[0][0], K[1][1], K[0][2], K[1][2],
+                          models.BROWN_CONRADY if any(distortion) else models.PINHOLE,
+                          distortion if any(distortion) else ())._struct()
+
+
+class Library(twoview.Library):
+    def __init__(self, path=None):
+        super().__init__(path or DEFAULT_LIBRARY)
+
+    def _init_struct(self, name, options=None):
+        return set_options(self.make(STRUCTS[name]), options)
+
+    def feature_options(self, options=None):
+        return self._init_struct("tv_feature_options", options)
+
+    def match_options(self, options=None):
+        return self._init_struct("tv_match_options", options)
+
+    def estimate_options(self, options=None):
+        return self._init_struct("tv_estimate_options", options)
+
+
+def _keywords(struct):
+    """A struct of options as the package's functions take them."""
+    return {name: getattr(struct, name) for name, _ in struct._fields_[1:]}
+
+
+class Context(twoview.Context):
+    def __init__(self, library, **limits):
+        super().__init__(library=library, **_keywords(library._init_struct("tv_limits", limits)))
+
+    def extract(self, gray, options=None, mask=None):
+        """(keypoints of dtype KEYPOINT, descriptors n x 128 uint8)"""
+        return twoview.extract(self, gray, mask,
+                               **_keywords(self.library.feature_options(options)))
+
+    def match(self, descriptors0, descriptors1, options=None):
+        """Array of dtype CORRESPONDENCE."""
+        return twoview.match(self, np.ascontiguousarray(descriptors0, np.uint8),
+                             np.ascontiguousarray(descriptors1, np.uint8),
+                             **_keywords(self.library.match_options(options)))
+
+    def match_guided(self, camera0, camera1, epipolar, features0, features1, options=None):
+        """Array of dtype CORRESPONDENCE; features are (keypoints, descriptors), as extract gives
+        them, epipolar E, or F with no cameras."""
+        wanted = _keywords(self.library._init_struct("tv_guided_options", options))
+        return twoview.match_guided(self, camera0, camera1, epipolar, *features0, *features1,
+                                    **wanted)
+
+    def estimate_two_view(self, camera0, camera1, pixels0, pixels1, ratios=None, options=None):
+        """(tv_two_view, inlier mask as bools); pixels as the images have them (distorted)."""
+        if ratios is not None:
+            ratios = np.ascontiguousarray(ratios, np.float32)
+        return stages._estimate(self, camera0, camera1, np.ascontiguousarray(pixels0, np.float64),
+                                np.ascontiguousarray(pixels1, np.float64), ratios,
+                                self.library.estimate_options(options))

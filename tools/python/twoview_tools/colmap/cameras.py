@@ -1,0 +1,72 @@
+"""The cameras of images: out of camera files and cameras.yaml (twoview_tools.formats), or of a pair's K."""
+
+import os
+
+import twoview as tv
+
+from .. import formats
+from .errors import BadInput, refused
+
+
+def _camera(found):
+    """A twoview.Camera of a formats.Camera."""
+    return tv.Camera(found.width, found.height, found.fx, found.fy, found.cx, found.cy,
+                     tv.CameraModel[found.model.upper()], found.k)
+
+
+def read_camera(path):
+    """One camera, in OpenCV's or ROS's form."""
+    with refused(path):
+        return _camera(formats.read_camera(path))
+
+
+def read_camera_set(path):
+    """{name: camera} of a cameras.yaml."""
+    with refused(path):
+        return {name: _camera(found) for name, found in formats.read_camera_set(path).items()}
+
+
+def write_camera_set(cameras):
+    """The text of a cameras.yaml of {name: camera}."""
+    text = ""
+    for name, camera in cameras.items():
+        k = list(camera.k) + [0.0] * 8
+        if camera.model == tv.CameraModel.KANNALA_BRANDT or any(k[5:8]):
+            raise ValueError(f"{name}: cameras.yaml holds k1 k2 p1 p2 k3 and no other lens")
+        values = [camera.fx, camera.fy, camera.cx, camera.cy, *k[:5]]
+        text += f"{name}:\n  image_width: {camera.width}\n  image_height: {camera.height}\n"
+        text += "".join(f"  {key}: {float(value)!r}\n" for key, value in
+                        zip("fx fy cx cy k1 k2 p1 p2 k3".split(), values))
+    return text
+
+
+class CameraChoice:
+    """Whose camera an image is of."""
+
+    def __init__(self, files, folders):
+        """files: of --camera; folders: where a cameras.yaml is looked for when there are none."""
+        paths = list(files)
+        for folder in folders if not files else ():
+            path = os.path.join(folder, "cameras.yaml")
+            if os.path.isfile(path):
+                paths.append(path)
+                break
+        with refused(paths[0] if paths else ""):
+            self.cameras = formats.read_cameras_of(paths)
+
+    def of(self, name, width, height, K=None):
+        """The camera that serves an image of this size: formats.choose_entry says which; the pair line's K replaces
+        its K."""
+        with refused(name):
+            found = formats.choose_camera(self.cameras, name, K)
+        camera = None if found is None else _camera(found)
+        if camera is None:
+            if K is None:
+                raise BadInput(f"image {name}: no camera for it (--camera, or a cameras.yaml beside the pairs file or "
+                               "the images)")
+            return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
+        if (camera.width, camera.height) != (width, height):
+            raise BadInput(f"image {name} is {width}x{height}, but its camera is for {camera.width}x{camera.height}")
+        if K is None:
+            return camera
+        return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], camera.model, camera.k)

@@ -1,0 +1,166 @@
+"""COLMAP's models as reference poses, and its features and matches as input."""
+
+import json
+import os
+
+import numpy as np
+import twoview as tv
+
+from ..accuracy import metrics  # the errors' definitions are those of the accuracy tables
+from . import database as db
+from .cameras import read_camera, write_camera_set
+from .conventions import camera_from_colmap, pixels_from_colmap
+from .engine import Engine
+from .errors import BadInput
+from .output import write_files
+from .pairs import exhaustive, read_pairs, sequential, write_pair
+from .progress import progress
+from .trajectory import write_trajectory
+
+
+def _choose(names, pairs_file, overlap):
+    """Pairs of a file, all of whose images must be there; else of the names."""
+    if not pairs_file:
+        return sequential(names, overlap) if overlap else exhaustive(names)
+    pairs = read_pairs(pairs_file)
+    for pair in pairs:
+        for name in (pair.name0, pair.name1):
+            if name not in names:
+                raise BadInput(f"{pairs_file}: line {pair.number}: {name} is not in the model or database")
+    return pairs
+
+
+def _camera(row, name):
+    try:
+        return camera_from_colmap(row, name)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+
+
+def _named_cameras(model):
+    """{entry: camera} of a cameras.yaml that chooses by K."""
+    used = sorted({image.camera_id for image in model.images.values()})
+    cameras = {f"camera_{key}": _camera(model.cameras[key], f"camera {key}") for key in used}
+    by_K = {}
+    for name, camera in cameras.items():
+        same = by_K.setdefault((camera.fx, camera.cx), camera)
+        if (same.width, same.height, tuple(same.k)) != (camera.width, camera.height, tuple(camera.k)):
+            raise BadInput(f"{name}: another camera has its fx and cx, and a pairs file could not tell them apart")
+    try:
+        return cameras, write_camera_set(cameras)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+
+
+def relative(image0, image1):
+    """R and t of cam1_from_cam0, in the model's unit."""
+    R = image1.R @ image0.R.T
+    return R, image1.t - R @ image0.t
+
+
+def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
+    """pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model; how many pairs."""
+    cameras, cameras_text = _named_cameras(model)
+    lines = []
+    for pair in _choose(list(model.images), pairs_file, overlap):
+        image0, image1 = model.images[pair.name0], model.images[pair.name1]
+        if not pairs_file and len(image0.point_ids & image1.point_ids) < min_common_points:
+            continue
+        K0, K1 = (cameras[f"camera_{image.camera_id}"].K for image in (image0, image1))
+        lines.append(write_pair(pair.name0, pair.name1, K0, K1, *relative(image0, image1)))
+    if not lines:
+        raise BadInput(f"no two images of the model have {min_common_points} points in common (--min-common-points)")
+    if any(any(c.isspace() for c in name) for name in model.images):
+        raise BadInput("an image's name has a space in it, which a pairs file cannot hold")
+    head = "# name0 name1 rot0 rot1 K0 K1 T_0to1; the truth is a COLMAP model's, in its unit\n"
+    write_files(folder, {"pairs.txt": head + "\n".join(lines) + "\n", "cameras.yaml": cameras_text,
+                         "trajectory.tum": write_trajectory(model.poses())})
+    return len(lines)
+
+
+class Features:
+    """What a database has: pixels and descriptors by image, matches by pair of names."""
+
+    def __init__(self, path, camera_files=()):
+        self.path = path
+        given = [read_camera(file) for file in camera_files]
+        self.pixels, self.descriptors, self.cameras, self.matches = {}, {}, {}, {}
+        with db.reading(path) as database:
+            try:
+                self._read(database, given)
+            except KeyError as error:
+                raise BadInput(f"{path}: no camera or image {error} in it") from None
+
+    def _read(self, database, given):
+        rows = db.read_cameras(database)
+        names = {}
+        for name, (image_id, camera_id) in db.read_images(database).items():
+            names[image_id] = name
+            self.cameras[name] = given[0] if given else _camera(rows[camera_id], f"image {name}")
+            self.pixels[name] = pixels_from_colmap(db.read_keypoints(database, self.path, image_id))
+            self.descriptors[name] = db.read_descriptors(database, self.path, image_id)
+        for id0, id1, matches in db.read_matches(database, self.path):
+            name0, name1 = names[id0], names[id1]
+            if len(matches) and (matches.max(axis=0) >= [len(self.pixels[name0]), len(self.pixels[name1])]).any():
+                raise BadInput(f"{self.path}: a match of {name0} and {name1} has no keypoint")
+            self.matches[name0, name1] = matches
+
+    def matches_of(self, name0, name1, engine):
+        """(n, 2) of the database in this order of the names; without a row for the pair, by our matcher."""
+        if (name0, name1) in self.matches:
+            return self.matches[name0, name1], None
+        if (name1, name0) in self.matches:
+            return self.matches[name1, name0][:, ::-1], None
+        if self.descriptors[name0].shape[1] != 128 or self.descriptors[name1].shape[1] != 128:
+            return np.zeros((0, 2), np.uint32), None
+        found = engine.match(self.descriptors[name0], self.descriptors[name1])
+        return np.column_stack([found["idx0"], found["idx1"]]), found["ratio"].copy()
+
+
+def _pair_report(name0, name1, features, engine, truth):
+    matches, ratios = features.matches_of(name0, name1, engine)
+    result, inliers = engine.estimate(
+        features.cameras[name0], features.cameras[name1], features.pixels[name0][matches[:, 0]],
+        features.pixels[name1][matches[:, 1]], ratios)
+    row = {"name0": name0, "name1": name1}
+    errors = metrics.pose_error(result.R, result.t, *truth) if truth else dict.fromkeys(
+        ("rotation_error_deg", "translation_error_deg", "translation_error_signed_deg", "pose_error_deg"))
+    row.update(errors)
+    row.update({"num_matches": len(matches), "num_inliers": int(inliers.sum()), "precision": None,
+                "config": result.config.name.lower(), "verdict": result.verdict.name.lower(), "time_ms": None})
+    row.update({key: None if value is None else np.ravel(value).tolist()
+                for key, value in (("R", result.R), ("t", result.t),
+                                   ("principal_point_shift_px", result.principal_point_shift))})
+    return row
+
+
+def import_database(path, folder, pairs_file="", overlap=0, model=None, camera_files=(), match=None, estimate=None,
+                    quiet=False):
+    """report.json, in the form of `twoview evaluate`, of our estimation on a database's features and matches."""
+    features = Features(path, camera_files)
+    if pairs_file or overlap or not features.matches:
+        pairs = _choose(list(features.pixels), pairs_file, overlap)
+    else:
+        pairs = [pair for pair in exhaustive(list(features.pixels))
+                 if features.matches.keys() & {(pair.name0, pair.name1), (pair.name1, pair.name0)}]
+    most = max([len(pixels) for pixels in features.pixels.values()] + [1])
+    engine = Engine(tv.FeatureOptions(max_keypoints=most), match, estimate,
+                    max_matches=max([len(m) for m in features.matches.values()] + [most]))
+    rows = []
+    for pair in progress(pairs, "pair", quiet):
+        truth = None if pair.R is None else (pair.R, pair.t)
+        if model and pair.name0 in model.images and pair.name1 in model.images:
+            truth = relative(model.images[pair.name0], model.images[pair.name1])
+        rows.append(_pair_report(pair.name0, pair.name1, features, engine, truth))
+    report = {key: {f"{limit:g}": _auc(rows, error, limit) for limit in metrics.THRESHOLDS_DEG}
+              for key, error in (("auc", "translation_error_deg"), ("auc_signed", "translation_error_signed_deg"))}
+    report.update(num_pairs=len(rows), pairs=rows, options={"database": os.path.basename(path)},
+                  seed=(estimate or tv.EstimateOptions()).seed, version=tv.version_string())
+    write_files(folder, {"report.json": json.dumps(metrics.finite(report), indent=1) + "\n"})
+    return report
+
+
+def _auc(rows, translation, limit):
+    errors = [max(row["rotation_error_deg"], row[translation]) for row in rows
+              if row["rotation_error_deg"] is not None]
+    return metrics.auc(errors, limit) if errors else None

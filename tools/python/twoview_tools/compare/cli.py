@@ -1,0 +1,338 @@
+"""compare_colmap: the command line, the run over all pairs, and what it leaves behind."""
+
+import argparse
+import contextlib
+import hashlib
+import json
+import os
+import signal
+import sys
+import time
+
+import numpy as np
+
+from .. import formats
+from ..accuracy import datasets
+from . import cluster, results, systems
+
+FORMAT = 1  # raise it when a change here changes what is stored of a pair
+REFERENCE_TIMEOUT_S = 3600
+DESCRIPTION = """Runs twoview, COLMAP, OpenGV, OpenCV and PoseLib on the same image pairs and writes
+a report: index.html, pairs.csv, report.json. See docs/compare.md."""
+
+
+class BadInput(Exception):
+    """One clear line for the user; exit status 2."""
+
+
+# ---- what is asked for -------------------------------------------------------------------------
+
+def parse(words):
+    parser = argparse.ArgumentParser(
+        prog="compare_colmap", description=DESCRIPTION,
+        epilog="exit status: 0 a report, whatever its rows say; 2 bad input; 130 interrupted "
+               "(the same command goes on)")
+    parser.add_argument("pairs", nargs="+", metavar="PAIRS.txt",
+                        help="lists of pairs: name0 name1 rot0 rot1 K0(9) K1(9) [T_0to1(16)]; "
+                             "cameras.yaml beside one is read")
+    parser.add_argument("--images", metavar="DIR",
+                        help="folder of the images (default: images/ beside each list)")
+    parser.add_argument("-o", "--output", required=True, metavar="REPORT_DIR")
+    parser.add_argument("--reference", choices=("truth", "colmap"), default="truth",
+                        help="errors are against the lists' true poses (default), or against "
+                             "COLMAP's own reconstruction of the images")
+    parser.add_argument("--systems", metavar="A,B,..",
+                        help="only these: ids, families (opengv, opencv, ..), pipelines, solvers, "
+                             "triangulations (default: all)")
+    parser.add_argument("--matches", default="twoview", choices=systems.PIPELINES,
+                        help="whose matches the solvers get (default twoview)")
+    parser.add_argument("--max-error-px", type=float, default=1.0, metavar="E",
+                        help="inlier threshold of every system that takes one (default 1)")
+    parser.add_argument("--resize", type=int, metavar="L",
+                        help="long side of the images; 0: as they are (default: "
+                             f"{datasets.RESIZE_LONG_SIDE} for those wider than "
+                             f"{datasets.MAX_NATIVE_WIDTH})")
+    parser.add_argument("--seed", type=int, default=0, metavar="N")
+    parser.add_argument("--max-pairs", type=int, default=0, metavar="N",
+                        help="at most N pairs of each list, evenly spaced")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N",
+                        help="pairs at a time, each in processes of its own (default 1)")
+    parser.add_argument("--scheduler", metavar="ADDRESS",
+                        help="hand the pairs to this dask.distributed cluster, which sees the same "
+                             "folders")
+    parser.add_argument("--timeout", type=float, default=60.0, metavar="S",
+                        help="seconds that a system may take for a pair (default 60)")
+    parser.add_argument("--quiet", action="store_true", help="no progress and no table")
+    arguments = parser.parse_args(words)
+    if arguments.jobs < 1:
+        raise BadInput("--jobs: at least 1")
+    if not 0 <= arguments.seed < 2**31:
+        raise BadInput("--seed: from 0 to 2147483647")
+    if not arguments.max_error_px > 0 or not arguments.timeout > 0:
+        raise BadInput("--max-error-px and --timeout: above 0")
+    if (arguments.resize or 0) < 0 or arguments.max_pairs < 0:
+        raise BadInput("--resize and --max-pairs: not below 0")
+    try:
+        arguments.systems = systems.chosen(arguments.systems)
+    except ValueError as error:
+        raise BadInput(f"--systems: {error}") from error
+    return arguments
+
+
+def unique_names(paths):
+    """A name for each list: its folder's, or its own where that is not enough."""
+    folders = [os.path.basename(os.path.dirname(os.path.abspath(p))) for p in paths]
+    stems = [os.path.splitext(os.path.basename(p))[0] for p in paths]
+    names = [f if folders.count(f) == 1 else f"{f}/{s}" for f, s in zip(folders, stems)]
+    if len(set(names)) < len(names):
+        raise BadInput("a list of pairs is named twice")
+    return names
+
+
+def read_lists(arguments):
+    """The pairs of every list as tasks, without reference; BadInput for what cannot be read."""
+    tasks = []
+    for path, name in zip(arguments.pairs, unique_names(arguments.pairs)):
+        try:
+            pairs = datasets.read_measurable(path, needs_truth=False)
+            cameras = datasets.read_cameras(os.path.dirname(os.path.abspath(path)))
+        except OSError as error:
+            raise BadInput(f"{path}: {error.strerror or error}") from error
+        except ValueError as error:
+            raise BadInput(str(error)) from error
+        folder = arguments.images or os.path.join(os.path.dirname(os.path.abspath(path)), "images")
+        if not os.path.isdir(folder):
+            raise BadInput(f"{folder} is not a folder; --images names the images'")
+        tasks += [make_task(arguments, name, folder, pair, cameras) for pair in pairs]
+    return tasks
+
+
+def make_task(arguments, name, folder, pair, cameras):
+    views = []
+    for image, K in ((pair.name0, pair.K0), (pair.name1, pair.K1)):
+        try:
+            distortion = datasets.distortion_of(formats.choose_camera(cameras, image, K))
+        except ValueError as error:
+            raise BadInput(f"{name}: {error}") from error
+        views.append({"name": image, "path": os.path.abspath(os.path.join(folder, image)),
+                      "K": K.tolist(), "distortion": distortion})
+    truth = None if pair.R is None else {"R": pair.R.tolist(), "t": pair.t.tolist()}
+    return {"what": "pair", "set": name, "views": views, "truth": truth,
+            "resize": arguments.resize, "systems": arguments.systems,
+            "matches_of": arguments.matches, "max_error_px": arguments.max_error_px,
+            "seed": arguments.seed, "timeout_s": arguments.timeout, "library": library_path()}
+
+
+def library_path():
+    """libtwoview.so for every worker, wherever it runs."""
+    from ..accuracy import twoview_ctypes
+    return os.path.abspath(os.environ.get("TWOVIEW_LIBRARY") or twoview_ctypes.DEFAULT_LIBRARY)
+
+
+def thin_out(tasks, most):
+    """At most so many pairs of each list, evenly spaced."""
+    found = []
+    for name in dict.fromkeys(t["set"] for t in tasks):
+        part = [t for t in tasks if t["set"] == name]
+        if most and most < len(part):
+            part = [part[i] for i in sorted({round(x) for x in
+                                             np.linspace(0, len(part) - 1, most)})]
+        found += part
+    return found
+
+
+def check_images(tasks, default_resize):
+    """Every image is read once: its size settles `resize`, its hash tells a changed file.
+    Returns {path: hash}; BadInput names the first that is missing, and how many are."""
+    hashes, bad, resize = {}, [], {}
+    for task in tasks:
+        for view in task["views"]:
+            path = view["path"]
+            if path in hashes or path in bad:
+                continue
+            try:
+                with open(path, "rb") as f:
+                    content = hashlib.sha256(f.read()).hexdigest()
+                width = datasets.read_luma(path).shape[1]
+                if default_resize and task["set"] not in resize:
+                    resize[task["set"]] = datasets.default_resize(width)
+                hashes[path] = content
+            except (OSError, ValueError):
+                bad.append(path)
+        task["resize"] = resize.get(task["set"], 0) if default_resize else task["resize"]
+    if bad:
+        others = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
+        raise BadInput(f"cannot read the image {bad[0]}{others}")
+    return hashes
+
+
+# ---- the reference -----------------------------------------------------------------------------
+
+def set_references(arguments, tasks, workers, store, hashes):
+    """Each task's "reference": the true pose, or COLMAP's. Returns what the report says of it."""
+    if arguments.reference == "truth":
+        for task in tasks:
+            task["reference"] = task["truth"]
+        return {}
+    told = {}
+    for name in dict.fromkeys(task["set"] for task in tasks):
+        part = [t for t in tasks if t["set"] == name]
+        models = _reconstruct(arguments, part, workers, store, hashes)
+        for task in part:
+            task["reference"] = relative_pose(models, *(v["name"] for v in task["views"]))
+        images = {v["name"] for t in part for v in t["views"]}
+        told[name] = {"images": len(images), "models": [len(model) for model in models],
+                      "pairs": len(part), "pairs_with_pose": sum(bool(t["reference"])
+                                                                 for t in part)}
+    return told
+
+
+def _reconstruct(arguments, part, workers, store, hashes):
+    images = {v["name"]: {"path": v["path"], "K": v["K"], "distortion": v["distortion"]}
+              for t in part for v in t["views"]}
+    task = {"what": "reference", "set": part[0]["set"], "images": images,
+            "resize": part[0]["resize"], "seed": arguments.seed, "threads": arguments.jobs,
+            "pairs": [[v["name"] for v in t["views"]] for t in part],
+            "timeout_s": REFERENCE_TIMEOUT_S}
+    key = digest({**task, "threads": 0}, [hashes[i["path"]] for i in images.values()])
+    models = store.get(key)
+    if models is None:
+        try:
+            (_, models), = workers.run([task])
+        except Exception as error:
+            raise BadInput(f"{part[0]['set']}: COLMAP made no reconstruction: {error}") from error
+        store.put(key, models)
+    return models
+
+
+def relative_pose(models, name0, name1):
+    """cam1_from_cam0 of two images of one model, |t| = 1; None where they share none."""
+    for model in models:
+        if name0 in model and name1 in model and name0 != name1:
+            (R0, t0), (R1, t1) = ((np.array(model[n]["R"]), np.array(model[n]["t"]))
+                                  for n in (name0, name1))
+            R = R1 @ R0.T
+            t = t1 - R @ t0
+            if np.linalg.norm(t) > 0:
+                return {"R": R.tolist(), "t": (t / np.linalg.norm(t)).tolist()}
+    return None
+
+
+# ---- a run that may be interrupted -------------------------------------------------------------
+
+def digest(*parts):
+    text = json.dumps([FORMAT, *parts], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+class Store:
+    """Results of pairs in a folder beside the report, each whole or not there."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        os.makedirs(folder, exist_ok=True)
+
+    def _path(self, key):
+        return os.path.join(self.folder, key + ".json")
+
+    def get(self, key):
+        try:
+            with open(self._path(key), encoding="utf-8") as f:
+                return json.load(f)
+        except (FileNotFoundError, ValueError):
+            return None
+
+    def put(self, key, value):
+        part = self._path(key) + ".part"
+        with open(part, "w", encoding="utf-8") as f:
+            json.dump(value, f)
+        os.replace(part, self._path(key))
+
+    def remove(self):
+        for name in os.listdir(self.folder):
+            if name.endswith((".json", ".part")):
+                os.remove(os.path.join(self.folder, name))
+        with contextlib.suppress(OSError):  # something of somebody else's in it
+            os.rmdir(self.folder)
+
+
+def run_pairs(tasks, keys, workers, store, quiet):
+    """(the pairs' results in the tasks' order, how many were run now); those that the store has are
+    not run again."""
+    from tqdm import tqdm
+    found = [store.get(key) for key in keys]
+    todo = [i for i, result in enumerate(found) if result is None]
+    if len(todo) < len(tasks) and not quiet:
+        print(f"compare_colmap: going on: {len(tasks) - len(todo)} of {len(tasks)} pairs are done",
+              file=sys.stderr)
+    with tqdm(total=len(tasks), initial=len(tasks) - len(todo), unit="pair", smoothing=0.05,
+              disable=quiet or not sys.stderr.isatty(), file=sys.stderr) as bar:
+        for number, result in workers.run([tasks[i] for i in todo]):
+            index = todo[number]
+            store.put(keys[index], result)
+            found[index] = result
+            bar.set_postfix_str(f"{result['name0']} {result['name1']}", refresh=False)
+            bar.update()
+    return found, len(todo)
+
+
+def compare(arguments):
+    tasks = read_lists(arguments)
+    tasks = thin_out(tasks, arguments.max_pairs)
+    hashes = check_images(tasks, arguments.resize is None)
+    folder = os.path.abspath(arguments.output)
+    if os.path.exists(folder) and not os.path.isdir(folder):
+        raise BadInput(f"-o: {folder} is a file")
+    try:
+        store = Store(os.path.join(folder, "unfinished"))
+    except OSError as error:
+        raise BadInput(f"-o: {error.filename}: {error.strerror}") from error
+    if arguments.reference == "truth" and not any(t["truth"] for t in tasks) \
+            and not arguments.quiet:
+        print("compare_colmap: no pair has a true pose, so there are no errors; --reference colmap "
+              "takes COLMAP's reconstruction", file=sys.stderr)
+    start = time.time()
+    try:
+        with cluster.workers(arguments.jobs, arguments.scheduler) as workers:
+            (_, versions), = workers.run([{"what": "versions", "library": library_path(),
+                                           "timeout_s": 120}])
+            missing = {m: v["missing"] for m, v in versions.items() if "missing" in v}
+            for module, why in missing.items():
+                print(f"compare_colmap: {module} is missing: {why}", file=sys.stderr)
+            told = set_references(arguments, tasks, workers, store, hashes)
+            for task in tasks:
+                task["missing"] = missing
+            keys = [digest(task, versions, [hashes[v["path"]] for v in task["views"]])
+                    for task in tasks]
+            pairs, num_run = run_pairs(tasks, keys, workers, store, arguments.quiet)
+            where = workers.description
+    except OSError as error:
+        if not arguments.scheduler:
+            raise
+        raise BadInput(f"--scheduler: {arguments.scheduler}: {error}") from error
+    run = {"versions": versions, "missing": missing, "reference_of_sets": told, "where": where,
+           "wall_seconds": time.time() - start, "pairs_run_now": num_run, "resize": {t["set"]: t["resize"] for t in tasks}}
+    report = results.make_report(arguments, run, pairs)
+    results.write(folder, report, pairs, tasks)
+    store.remove()
+    if not arguments.quiet:
+        with contextlib.suppress(BrokenPipeError):  # the report is there, whoever reads this
+            results.print_summary(report, folder)
+            sys.stdout.flush()
+
+
+def main(words=None):
+    signal.signal(signal.SIGTERM, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt()))
+    try:
+        compare(parse(words))
+    except BadInput as error:
+        print(f"compare_colmap: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("\ncompare_colmap: interrupted; the same command goes on where it stopped",
+              file=sys.stderr)
+        return 130
+    except OSError as error:
+        print(f"compare_colmap: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    return 0

@@ -1,0 +1,95 @@
+"""What is compared: each system's name, what runs it and with which options."""
+
+import dataclasses
+import sys
+
+from ..accuracy import estimators, peers
+
+COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0  # as COLMAP comes
+
+
+@dataclasses.dataclass(frozen=True)
+class System:
+    id: str      # what --systems and the files call it
+    name: str    # what the page calls it
+    kind: str    # pipeline, solver or triangulation
+    module: str  # whose version counts: twoview, cv2, pycolmap, colmap, poselib, pyopengv
+    options: dict
+    note: str = ""
+
+    @property
+    def python(self):
+        """The interpreter that has it: Debian's OpenGV is built for Debian's Python."""
+        return "/usr/bin/python3" if self.module == "pyopengv" else sys.executable
+
+
+def _pipelines():
+    fast, = (c for c in peers.GROUPS["fast"][:1])
+    sift, = peers.GROUPS["sift"]
+    colmap = {"front": "pycolmap", "cap": COLMAP_CAP, "estimator": "pycolmap_tvg"}
+    capped = f"at most {peers.CAP} features, the common threshold"
+    colmaps = f"at most {COLMAP_CAP} features"
+    yield System("twoview", "twoview", "pipeline", "twoview", {}, "its defaults")
+    yield System("pycolmap", "COLMAP (pycolmap)", "pipeline", "pycolmap", colmap,
+                 f"{colmaps}, the common threshold")
+    yield System("pycolmap_defaults", "COLMAP (pycolmap), as it comes", "pipeline", "pycolmap",
+                 {**colmap, "max_error_px": COLMAP_ERROR_PX},
+                 f"{colmaps}, {COLMAP_ERROR_PX:g} px")
+    yield System("colmap", "COLMAP (Debian's program)", "pipeline", "colmap", {"cap": COLMAP_CAP},
+                 f"{colmaps}, the common threshold")
+    yield System("opencv_fast", "OpenCV FAST + SIFT + USAC_MAGSAC", "pipeline", "cv2", fast, capped)
+    yield System("opencv_sift", "OpenCV RootSIFT + USAC_MAGSAC", "pipeline", "cv2",
+                 {**sift, "cap": peers.CAP}, capped)
+
+
+def _solvers():
+    for method, note in (("five-point", "its default"), ("eight-point", "the paper's method"),
+                         ("upright", "gravity is the reference pose's: two of the three angles "
+                                     "are given")):
+        yield System("twoview_" + method.replace("-", "_"), f"twoview {method}", "solver",
+                     "twoview", {"method": method}, note)
+    for kind, (name, module, _) in estimators.PEERS.items():
+        if module != "pyopengv":
+            yield System(kind + "_solver", name, "solver", module, {"estimator": kind})
+    for kind, (name, module, _) in estimators.OPENGV.items():
+        yield System(kind, name, "solver", module, {"estimator": kind},
+                     f"at most {estimators.OPENGV_MAX_ITERATIONS} iterations")
+
+
+def _triangulations():
+    for method in ("poly", "poly-abs", "linear-eigen", "linear-ls", "iterative-eigen",
+                   "iterative-ls", "midpoint"):
+        yield System("twoview_" + method.replace("-", "_"), f"twoview {method}", "triangulation",
+                     "twoview", {"method": method})
+    yield System("opencv_triangulate", "OpenCV triangulatePoints", "triangulation", "cv2", {})
+    yield System("opencv_correct", "OpenCV correctMatches + triangulatePoints", "triangulation",
+                 "cv2", {"correct": True})
+    yield System("pycolmap_triangulate", "COLMAP triangulate_point", "triangulation", "pycolmap",
+                 {}, "a call a point from Python")
+    for name in ("triangulate", "triangulate2"):
+        yield System("opengv_" + name, f"OpenGV {name}", "triangulation", "pyopengv",
+                     {"function": "triangulation_" + name})
+
+
+SYSTEMS = (*_pipelines(), *_solvers(), *_triangulations())
+KINDS = ("pipeline", "solver", "triangulation")
+PIPELINES = [s.id for s in SYSTEMS if s.kind == "pipeline"]
+
+
+def of_kind(kind, ids=None):
+    return [s for s in SYSTEMS if s.kind == kind and (ids is None or s.id in ids)]
+
+
+def chosen(text):
+    """The ids of a list as --systems has it: ids, kinds, or modules' families (colmap, opengv)."""
+    if not text:
+        return [s.id for s in SYSTEMS]
+    found = []
+    for word in text.split(","):
+        ids = [s.id for s in SYSTEMS
+               if word in (s.id, s.kind + "s") or s.id.startswith(word + "_")]
+        if not ids:
+            raise ValueError(f"no system {word!r}; there are {', '.join(s.id for s in SYSTEMS)}, "
+                             "and pipelines, solvers, triangulations")
+        found += ids
+    return [s.id for s in SYSTEMS if s.id in found]

@@ -1,0 +1,349 @@
+"""The child process: runs one system on one pair at a time and may die doing so.
+
+`PYTHON -m twoview_tools.compare.worker FD`: requests and answers are JSON on that connection (numpy's pickles of the two
+Pythons do not fit each other).
+"""
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one thread
+    os.environ.setdefault(_name, "1")
+
+import functools
+import hashlib
+import json
+import resource
+import sys
+import time
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from ..accuracy import datasets, estimators
+from . import systems
+
+
+GRAVITY_SIGMA_RAD = np.radians(0.5)  # the references are no better
+
+
+class Failed(Exception):
+    """A system's own way of saying that it found nothing; the text says it in words."""
+
+
+class Stopwatch:
+    """Milliseconds of each stage."""
+
+    def __init__(self):
+        self.ms, self.last = {}, time.perf_counter()
+
+    def lap(self, stage=None):
+        """What passed since the last lap belongs to `stage`; None: to nobody."""
+        now = time.perf_counter()
+        if stage:
+            self.ms[stage] = self.ms.get(stage, 0) + 1e3 * (now - self.last)
+        self.last = now
+
+
+@functools.lru_cache(maxsize=4)
+def luma(path, resize):
+    return datasets.resized_luma(path, resize)
+
+
+class Views:
+    """The two images of a task and their cameras at the images' scale."""
+
+    def __init__(self, task):
+        self.gray, self.cameras = [], []
+        for view in task["views"]:
+            image, scale_x, scale_y = luma(view["path"], task["resize"])
+            self.gray.append(image)
+            K = datasets.scale_K(np.array(view["K"]), scale_x, scale_y)
+            self.cameras.append((K, view["distortion"]))
+        self.sizes = [image.shape[::-1] for image in self.gray]
+
+    def matches(self, pixels0, pixels1, ratios=None):
+        return estimators.Matches(pixels0, pixels1, self.cameras, self.sizes, ratios)
+
+
+@functools.lru_cache(maxsize=2)
+def twoview_context(width, height, max_matches):
+    from ..accuracy import twoview_ctypes
+    library = twoview_ctypes.Library(os.environ["TWOVIEW_LIBRARY"])
+    return twoview_ctypes.Context(library, max_width=width, max_height=height,
+                                  max_matches=max_matches)
+
+
+# ---- whole pipelines ---------------------------------------------------------------------------
+
+def run_twoview(views, options, task):
+    del options
+    width, height = np.max(views.sizes, axis=0)
+    context = twoview_context(int(width), int(height), 0)
+    watch = Stopwatch()
+    features = [context.extract(gray) for gray in views.gray]
+    watch.lap("extract")
+    links = context.match(features[0][1], features[1][1])
+    watch.lap("match")
+    matches = views.matches(*(
+        np.column_stack([k["x"], k["y"]])[links[side]]
+        for (k, _), side in zip(features, ("idx0", "idx1"))), links["ratio"].copy())
+    watch.lap()
+    from ..accuracy import twoview_ctypes
+    R, t, inliers, found = estimators.run_twoview(context, matches, None, task["seed"])
+    watch.lap("estimate")
+    return {"num_keypoints": [len(k) for k, _ in features], **pose_answer(R, t, inliers, found),
+            "config": twoview_ctypes.enum_name("config", found.config),
+            "verdict": twoview_ctypes.enum_name("verdict", found.verdict),
+            **matches_answer(matches)}, watch.ms
+
+
+@functools.lru_cache(maxsize=48)
+def peer_features(path, resize, front):
+    """(points, descriptors, milliseconds): an image's are found once, their time counts in each of
+    its pairs."""
+    from ..accuracy import peers
+    gray = luma(path, resize)[0]
+    start = time.perf_counter()
+    points, descriptors = peers.extract(gray, dict(front))
+    return points, descriptors, 1e3 * (time.perf_counter() - start)
+
+
+@functools.lru_cache(maxsize=4)
+def peer_matches(path0, path1, resize, front):
+    """(pixels0, pixels1, ratios or None, numbers of keypoints, ms): systems that differ in their
+    estimator alone share them."""
+    from ..accuracy import peers
+    (points0, d0, ms0), (points1, d1, ms1) = (peer_features(path, resize, front)
+                                              for path in (path0, path1))
+    watch = Stopwatch()
+    find = peers.match_pycolmap if dict(front)["front"] == "pycolmap" else peers.match
+    index0, index1, ratios = find(d0, d1)
+    watch.lap("match")
+    return (points0[index0], points1[index1], ratios, [len(points0), len(points1)],
+            {"extract": ms0 + ms1, **watch.ms})
+
+
+def run_peer_pipeline(views, options, task):
+    front = tuple((k, v) for k, v in options.items() if k not in ("estimator", "max_error_px"))
+    *found, num_keypoints, ms = peer_matches(*(view["path"] for view in task["views"]),
+                                             task["resize"], front)
+    matches = views.matches(*found)
+    watch = Stopwatch()
+    pose = estimators.run_peer(options["estimator"], matches,
+                               options.get("max_error_px", task["max_error_px"]), task["seed"])
+    watch.lap("estimate")
+    return {"num_keypoints": num_keypoints, **pose_answer(*pose or (None, None, 0)),
+            **matches_answer(matches)}, {**ms, **watch.ms}
+
+
+def run_colmap_program(views, options, task):
+    from . import colmap_program
+    watch = Stopwatch()
+    found = colmap_program.run(views, options["cap"], task["max_error_px"], task["seed"], watch)
+    matches = views.matches(*found.pop("pixels"))
+    return {**found, **pose_answer(found["R"], found["t"], found["num_inliers"]),
+            **matches_answer(matches)}, watch.ms
+
+
+def pose_answer(R, t, inliers, found=None):
+    """found: our library's tv_two_view, whose pose may be of cameras with another principal point."""
+    if R is None or t is None:
+        return {"R": None, "t": None, "num_inliers": int(inliers or 0)}
+    answer = {"R": np.asarray(R).tolist(), "t": np.ravel(t).tolist(), "num_inliers": int(inliers)}
+    if found is not None:
+        answer["principal_point_shift_px"] = list(found.principal_point_shift)
+    return answer
+
+
+def matches_answer(matches):
+    ratios = None if matches.ratios is None else np.asarray(matches.ratios, float).tolist()
+    return {"pixels0": matches.pixels0.tolist(), "pixels1": matches.pixels1.tolist(),
+            "ratios": ratios}
+
+
+def pipeline(system, task, _):
+    views = Views(task)
+    run = {"twoview": run_twoview, "colmap": run_colmap_program}.get(system.module,
+                                                                     run_peer_pipeline)
+    answer, ms = run(views, system.options, task)
+    return {**answer, "ms": ms, "cameras": [[K.tolist(), list(d)] for K, d in views.cameras],
+            "sizes": [list(map(int, size)) for size in views.sizes]}
+
+
+# ---- solvers on identical matches --------------------------------------------------------------
+
+def given_matches(given):
+    """estimators.Matches of what a pipeline answered."""
+    cameras = [(np.array(K), d) for K, d in given["cameras"]]
+    ratios = None if given["ratios"] is None else np.array(given["ratios"], np.float32)
+    return estimators.Matches(given["pixels0"], given["pixels1"], cameras,
+                              [tuple(s) for s in given["sizes"]], ratios)
+
+
+def solver(system, task, matches):
+    if system.module != "twoview":
+        watch = Stopwatch()
+        found = estimators.run_peer(system.options["estimator"], matches, task["max_error_px"],
+                                    task["seed"])
+        watch.lap("estimate")
+        return {**pose_answer(*found or (None, None, 0)), "ms": watch.ms}
+    options = dict(system.options)
+    if options["method"] == "upright":
+        if task["reference"] is None:
+            raise Failed("no reference pose to take gravity from")
+        options["gravity0"] = np.array([0.0, 1.0, 0.0])
+        options["gravity1"] = np.array(task["reference"]["R"]) @ options["gravity0"]
+        options["gravity_sigma_rad"] = GRAVITY_SIGMA_RAD
+    context = twoview_context(64, 64, 8192)
+    watch = Stopwatch()
+    R, t, inliers, found = estimators.run_twoview(context, matches, options, task["seed"])
+    watch.lap("estimate")
+    return {**pose_answer(R, t, inliers, found), "ms": watch.ms}
+
+
+# ---- triangulations on an identical pose -------------------------------------------------------
+
+def triangulation(system, task, matches):
+    """Points in the first camera's frame; NaN where the system says that there is none."""
+    R, t = np.array(task["pose"]["R"]), np.array(task["pose"]["t"])
+    run = {"twoview": triangulate_twoview, "cv2": triangulate_opencv,
+           "pycolmap": triangulate_pycolmap, "pyopengv": triangulate_opengv}[system.module]
+    points, seconds = run(matches, R, t, system.options)
+    return {"points": points.tolist(), "ms": {"triangulate": 1e3 * seconds}}
+
+
+def timed(work):
+    """(result, least seconds of three runs: one run of a few microseconds says nothing)"""
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        result = work()
+        seconds.append(time.perf_counter() - start)
+    return result, min(seconds)
+
+
+def triangulate_twoview(matches, R, t, options):
+    from ..accuracy import twoview_ctypes
+    twoview = twoview_ctypes.twoview
+    cameras = [twoview.Camera(*size, K[0, 0], K[1, 1], K[0, 2], K[1, 2],
+                              twoview.CameraModel.BROWN_CONRADY, distortion)
+               if any(distortion) else twoview.Camera(*size, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
+               for (K, distortion), size in zip(matches.cameras, matches.sizes)]
+    method = twoview.Triangulation[options["method"].upper().replace("-", "_")]
+    found, seconds = timed(lambda: twoview.triangulate(*cameras, R, t, matches.pixels0,
+                                                       matches.pixels1, method))
+    points = found["position"].copy()
+    points[found["status"] == twoview.PointStatus.INVALID] = np.nan
+    return points, seconds
+
+
+def triangulate_opencv(matches, R, t, options):
+    import cv2
+    tx, ty, tz = t
+    E = np.array([[0, -tz, ty], [tz, 0, -tx], [-ty, tx, 0]]) @ R
+    P1 = np.column_stack([R, t])
+
+    def work():
+        rays0, rays1 = matches.rays0, matches.rays1
+        if options.get("correct"):
+            rays0, rays1 = (r[0] for r in cv2.correctMatches(E, rays0[None], rays1[None]))
+        found = cv2.triangulatePoints(np.eye(3, 4), P1, rays0.T, rays1.T)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return (found[:3] / found[3]).T
+    return timed(work)
+
+
+def triangulate_pycolmap(matches, R, t, options):
+    del options
+    pycolmap = estimators.pycolmap_module()
+    P0, P1 = np.eye(3, 4), np.column_stack([R, t])
+
+    def work():
+        found = [pycolmap.triangulate_point(P0, P1, a, b)
+                 for a, b in zip(matches.rays0, matches.rays1)]
+        return np.array([[np.nan] * 3 if point is None else np.ravel(point) for point in found])
+    return timed(work)
+
+
+def triangulate_opengv(matches, R, t, options):
+    import pyopengv
+    unit0, unit1 = (estimators.unit_rays(rays) for rays in (matches.rays0, matches.rays1))
+    function = getattr(pyopengv, options["function"])
+    # OpenGV's pose is camera 1 in camera 0.
+    position, rotation = -R.T @ t, np.ascontiguousarray(R.T)
+    found, seconds = timed(lambda: function(unit0, unit1, position, rotation))
+    return np.asarray(found, float).reshape(-1, 3), seconds
+
+
+# ---- what is here ------------------------------------------------------------------------------
+
+def versions(modules):
+    """{module: its version, or what is missing}"""
+    return {module: _version(module) for module in modules}
+
+
+def _version(module):
+    try:
+        if module == "twoview":
+            library = twoview_context(64, 64, 8192).library
+            with open(library.path, "rb") as f:  # a development version has many builds
+                return {"version": library.version(),
+                        "sha256": hashlib.sha256(f.read()).hexdigest()}
+        if module == "colmap":
+            from . import colmap_program
+            return {"version": colmap_program.version()}
+        return {"version": estimators.module_version(module)}
+    except (ImportError, OSError) as error:
+        return {"missing": str(error) or type(error).__name__}
+
+
+def answer(request, matches):
+    call, task = request["call"], request["task"]
+    if "library" in task:
+        os.environ["TWOVIEW_LIBRARY"] = task["library"]
+    if call == "versions":
+        return versions(task["modules"])
+    if call == "images":  # so that reading them is nobody's time
+        return len(Views(task).gray)
+    if call == "reference":
+        from . import reference
+        return reference.reconstruct(task)
+    system = next(s for s in systems.SYSTEMS
+                  if s.id == request["system"] and s.kind == request["call"])
+    run = {"pipeline": pipeline, "solver": solver, "triangulation": triangulation}[call]
+    return run(system, task, matches)
+
+
+def cpu_seconds():
+    """Of this process and of the programs that it ran."""
+    programs = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + programs.ru_utime + programs.ru_stime
+
+
+def serve(connection):
+    """A request may be followed by matches, which later requests share."""
+    matches = None
+    while True:
+        try:
+            request = json.loads(connection.recv_bytes())
+            if request["has_matches"]:
+                matches = given_matches(json.loads(connection.recv_bytes()))
+        except EOFError:
+            return
+        start = cpu_seconds()
+        try:
+            reply = {"ok": answer(request, matches)}
+        except Exception as error:  # pylint: disable=broad-except  (a row says it, the run goes on)
+            reply = {"error": f"{type(error).__name__}: {error}" if not isinstance(error, Failed)
+                     else str(error)}
+        reply["cpu_seconds"] = cpu_seconds() - start
+        connection.send_bytes(json.dumps(reply).encode())
+
+
+if __name__ == "__main__":
+    try:
+        import cv2
+        cv2.setNumThreads(1)
+    except ImportError:
+        pass
+    serve(Connection(int(sys.argv[1])))

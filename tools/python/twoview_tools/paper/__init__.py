@@ -1,0 +1,1 @@
+"""The paper's figures and tables, remade from real data: docs/paper.md."""
