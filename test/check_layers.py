@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""Keeps the layers of docs and DESIGN: which folder of lib/src may include which, and who may see
-Eigen, pixels, the heap and the internals at all. Reads the #include lines; prints each offence."""
+"""Keeps the layers of docs and DESIGN: which folder of lib/src may include which, who may see Eigen,
+pixels, the heap and the internals at all, and that no files include one another in a circle. Reads
+the #include lines; prints each offence."""
+import posixpath
 import re
 import sys
 from pathlib import Path
@@ -109,10 +111,61 @@ def offences(files):
                     yield f"{name}: {header}: libav is for drivers/h264 alone"
                 if (resolve(header, files) or "").startswith("lib/src/") or "lib/src" in header:
                     yield f"{name}: {header} is internal; only the public headers are for use here"
+    for circle in find_circles(files):
+        yield "a circle of files: " + " includes ".join(circle)
+
+
+def unit_of(name):
+    """A file without its suffix: x.h and x.cc are one unit, which may include itself."""
+    return name.rsplit(".", 1)[0]
+
+
+def included_units(name, headers, files):
+    """The other units that a file includes: beside it, from a folder above it, or from the folders
+    that the compiler searches."""
+    parents = [parent.as_posix() + "/" for parent in Path(name).parents][:-1]
+    for header in headers:
+        for folder in parents + ["lib/src/", "lib/include/", "drivers/include/"]:
+            found = posixpath.normpath(folder + header)
+            if found in files:
+                if unit_of(found) != unit_of(name):
+                    yield unit_of(found)
+                break
+
+
+def find_circles(files):
+    """One shortest circle of includes through each unit that lies on one; a circle is listed once."""
+    edges = {}
+    for name, headers in files.items():
+        edges.setdefault(unit_of(name), set()).update(included_units(name, headers, files))
+    circles = {}
+    for start in sorted(edges):
+        paths, seen = [[start]], {start}
+        while paths:
+            path = paths.pop(0)
+            for unit in sorted(edges.get(path[-1], ())):
+                if unit == start:
+                    circles.setdefault(frozenset(path), path + [start])
+                    paths = []
+                    break
+                if unit not in seen:
+                    seen.add(unit)
+                    paths.append(path + [unit])
+    return list(circles.values())
 
 
 def lies_beside(name, header, files):
     return f"{name.rsplit('/', 1)[0]}/{header}" in files
+
+
+# Circles that the check must find: of headers, through a .cc file, and of three files in two folders.
+CIRCLES = [
+    {"lib/src/robust/a.h": ["robust/b.h"], "lib/src/robust/b.h": ["robust/a.h"]},
+    {"lib/src/robust/refine.h": [], "lib/src/robust/refine.cc": ["robust/refine.h", "robust/gravity.h"],
+     "lib/src/robust/gravity.h": ["robust/refine.h"]},
+    {"tools/twoview/a.h": ["rooms/b.h"], "tools/twoview/rooms/b.h": ["c.h"],
+     "tools/twoview/rooms/c.h": [], "tools/twoview/rooms/c.cc": ["../a.h"]},
+]
 
 
 def self_check():
@@ -151,6 +204,13 @@ def self_check():
         bad = {file: list(headers) for file, headers in good.items()}
         bad.setdefault(name, []).append(header)
         assert list(offences(bad)), f"the check misses {name} including {header}"
+    for circle in CIRCLES:
+        assert find_circles(circle), f"the check misses a circle in {circle}"
+    # A pair may include itself, and a diamond is no circle.
+    assert not find_circles({
+        "lib/src/robust/a.h": ["robust/b.h", "robust/c.h"], "lib/src/robust/a.cc": ["robust/a.h"],
+        "lib/src/robust/b.h": ["robust/d.h"], "lib/src/robust/c.h": ["robust/d.h"],
+        "lib/src/robust/d.h": []})
 
 
 def main():

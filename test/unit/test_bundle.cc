@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <cstring>
 
-#include "robust/bundle.h"
+#include "robust/bundle_match.h"
 #include "support/bundle_scene.h"
 #include "twoview/alloc.h"
 

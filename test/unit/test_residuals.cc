@@ -3,8 +3,11 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "geometry/residuals.h"
+#include "geometry/normal_equations.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
 #include "robust/matches.h"
+#include "robust/models.h"
 #include "robust/refine.h"
 #include "support/scene.h"
 
@@ -50,11 +53,7 @@ scene::Options with_cameras(const tv_camera& a, const tv_camera& b, uint64_t see
   return options;
 }
 
-Mat3 inverse_intrinsics(const tv_camera& c) {
-  Mat3 K;
-  K << c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1;
-  return K.inverse();
-}
+Mat3 inverse_intrinsics(const tv_camera& c) { return tv::inverse_intrinsics(tv::intrinsics_of(c)); }
 
 void test_sampson_of_a_pinhole_is_the_textbooks(void) {
   tv_camera second = scene::pinhole();

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "simulator/film.h"
-#include "simulator/server.h"
+#include "simulator/server_options.h"
 
 namespace simulator {
 

@@ -6,6 +6,7 @@
 
 #include "api/validate.h"
 #include "robust/bundle.h"
+#include "robust/point_covariance.h"
 
 namespace tv {
 namespace {
@@ -40,24 +41,6 @@ tv_status read_pose(const double R[9], const double t[3], Pose* pose, double* ba
   pose->t = Vec3(x / length, y / length, z / length);
   for (int i = 0; i < 9; ++i) pose->R(i / 3, i % 3) = R[i];
   return TV_OK;
-}
-
-struct Bytes {
-  const void* data;
-  size_t size;
-};
-
-// Whether one of the first num_outputs arrays shares a byte with any other.
-bool outputs_overlap(const Bytes* arrays, int num_outputs, int num_arrays) {
-  for (int i = 0; i < num_outputs; ++i) {
-    for (int j = i + 1; j < num_arrays; ++j) {
-      if (arrays[i].data != nullptr && arrays[j].data != nullptr &&
-          overlap(arrays[i].data, arrays[i].size, arrays[j].data, arrays[j].size)) {
-        return true;
-      }
-    }
-  }
-  return false;
 }
 
 double rms(double sum_sq, int num_points) {

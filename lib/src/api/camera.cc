@@ -37,12 +37,8 @@ tv_status check_many(const tv_camera *camera, const double *in, size_t in_wide, 
   const tv_status status = tv_camera_check(camera);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(count);
-  if (tv::overlap(out, 8 * out_wide * n, in, 8 * in_wide * n) ||
-      tv::overlap(inside, n, in, 8 * in_wide * n) ||
-      tv::overlap(inside, n, out, 8 * out_wide * n)) {
-    return TV_ERR_OVERLAP;
-  }
-  return TV_OK;
+  const tv::Bytes arrays[3] = {{out, 8 * out_wide * n}, {inside, n}, {in, 8 * in_wide * n}};
+  return tv::outputs_overlap(arrays, 2, 3) ? TV_ERR_OVERLAP : TV_OK;
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "api/scratch.h"
-#include "api/validate.h"
 
 namespace tv {
 namespace {

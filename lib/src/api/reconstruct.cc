@@ -11,7 +11,7 @@
 namespace tv {
 namespace {
 
-// The arrays of one reconstruction, at the front of the arena.
+// The arrays of one reconstruction, at the front of the arena, and the cameras of its estimate.
 struct Results {
   tv_keypoint* keypoints[2];
   uint8_t* descriptors[2];
@@ -22,6 +22,7 @@ struct Results {
   tv_point* points;
   tv_correspondence* more_matches;  // of guided matching, with what was found before
   uint8_t* more_inlier_mask;
+  tv_camera cameras[2];  // of the two views, as the present estimate corrects them; full poses only
 };
 
 Results alloc_results(Arena& arena, int32_t max_keypoints) {
@@ -78,20 +79,12 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
 
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
-// tv_match_guided with the cameras that the estimate is of. Not inlined, for the stack below its
-// caller.
-__attribute__((noinline)) tv_status match_guided(tv_context* context, const tv_view& view0,
-                                                 const tv_view& view1,
-                                                 const int32_t num_keypoints[2],
-                                                 const tv_two_view& estimate, Results& r,
-                                                 int32_t* count) {
-  tv_camera cameras[2];
-  tv_corrected_camera(&estimate, view0.camera, &cameras[0]);
-  tv_corrected_camera(&estimate, view1.camera, &cameras[1]);
-  return tv_match_guided(context, &cameras[0], &cameras[1], estimate.E, r.keypoints[0],
-                         r.descriptors[0], num_keypoints[0], r.keypoints[1], r.descriptors[1],
-                         num_keypoints[1], nullptr, r.more_matches, context->limits.max_keypoints,
-                         count);
+// The cameras of an estimate, for all that follows from it. Called for each estimate that is kept.
+void correct_cameras(const tv_two_view& estimate, const tv_view& view0, const tv_view& view1,
+                     Results& r) {
+  if (!is_full_pose(estimate)) return;
+  tv_corrected_camera(&estimate, view0.camera, &r.cameras[0]);
+  tv_corrected_camera(&estimate, view1.camera, &r.cameras[1]);
 }
 
 // Matches along the epipolar lines of `estimate`, and the estimate from all of them, where that is
@@ -103,7 +96,10 @@ __attribute__((noinline)) tv_status match_along_lines(
     const tv_estimate_options* options, Results& r, int32_t* num_matches, tv_two_view* estimate) {
   const tv_limits& limits = context->limits;
   int32_t count = 0;
-  tv_status status = match_guided(context, view0, view1, num_keypoints, *estimate, r, &count);
+  tv_status status =
+      tv_match_guided(context, &r.cameras[0], &r.cameras[1], estimate->E, r.keypoints[0],
+                      r.descriptors[0], num_keypoints[0], r.keypoints[1], r.descriptors[1],
+                      num_keypoints[1], nullptr, r.more_matches, limits.max_keypoints, &count);
   if (status != TV_OK) return status;
   count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
                        r.more_matches, count);
@@ -123,6 +119,7 @@ __attribute__((noinline)) tv_status match_along_lines(
   again.verdict = estimate->verdict;
   again.reasons = estimate->reasons;
   *estimate = again;
+  correct_cameras(again, view0, view1, r);
   *num_matches = count;
   std::copy(r.more_matches, r.more_matches + count, r.matches);
   std::copy(r.more_inlier_mask, r.more_inlier_mask + count, r.inlier_mask);
@@ -130,19 +127,18 @@ __attribute__((noinline)) tv_status match_along_lines(
 }
 
 // Triangulates the inliers of a full pose; all other points are invalid. Returns how many are good.
-__attribute__((noinline)) tv_status triangulate_inliers(
-    tv_context* context, tv_triangulation method, const tv_view& view0, const tv_view& view1,
-    const tv_two_view& two_view, int32_t num_matches, Results& r, int32_t* num_points) {
+__attribute__((noinline)) tv_status triangulate_inliers(tv_context* context,
+                                                        tv_triangulation method,
+                                                        const tv_two_view& two_view,
+                                                        int32_t num_matches, Results& r,
+                                                        int32_t* num_points) {
   StageTimer timer(context, TV_STAGE_TRIANGULATE);
   *num_points = 0;
   if (num_matches == 0) return TV_OK;
   const bool full_pose = is_full_pose(two_view);
   if (full_pose) {
-    tv_camera cameras[2];
-    tv_corrected_camera(&two_view, view0.camera, &cameras[0]);
-    tv_corrected_camera(&two_view, view1.camera, &cameras[1]);
     const tv_status status =
-        tv_triangulate(method, &cameras[0], &cameras[1], two_view.R, two_view.t, r.pixels[0],
+        tv_triangulate(method, &r.cameras[0], &r.cameras[1], two_view.R, two_view.t, r.pixels[0],
                        r.pixels[1], num_matches, r.points);
     if (status != TV_OK) return status;
   }
@@ -161,31 +157,22 @@ void store_unit(const Mat3& m, double out[9]) {
   for (int k = 0; k < 9; ++k) out[k] = unit(k / 3, k % 3);
 }
 
-Mat3 inverse_intrinsics(const tv_camera& c) {
-  Mat3 inverse;
-  inverse << 1 / c.fx, 0, -c.cx / c.fx, 0, 1 / c.fy, -c.cy / c.fy, 0, 0, 1;
-  return inverse;
-}
-
 // Pose and points together; what follows from the pose follows.
-__attribute__((noinline)) tv_status adjust(tv_context* context, const tv_view& view0,
-                                           const tv_view& view1, int32_t num_matches, Results& r,
+__attribute__((noinline)) tv_status adjust(tv_context* context, int32_t num_matches, Results& r,
                                            tv_two_view* two_view, int32_t* num_points) {
-  tv_camera cameras[2];
-  tv_corrected_camera(two_view, view0.camera, &cameras[0]);
-  tv_corrected_camera(two_view, view1.camera, &cameras[1]);
   tv_bundle_result bundle;
   tv_bundle_result_init(&bundle);
   const tv_status status =
-      tv_adjust_two_view(context, &cameras[0], &cameras[1], r.pixels[0], r.pixels[1], num_matches,
-                         nullptr, two_view->R, two_view->t, r.points, &bundle);
+      tv_adjust_two_view(context, &r.cameras[0], &r.cameras[1], r.pixels[0], r.pixels[1],
+                         num_matches, nullptr, two_view->R, two_view->t, r.points, &bundle);
   if (status != TV_OK) return status;
   Pose pose;
   for (int k = 0; k < 9; ++k) pose.R(k / 3, k % 3) = two_view->R[k];
   for (int k = 0; k < 3; ++k) pose.t[k] = two_view->t[k];
   const Mat3 E = essential_from_pose(pose);
   store_unit(E, two_view->E);
-  store_unit(inverse_intrinsics(cameras[1]).transpose() * E * inverse_intrinsics(cameras[0]),
+  store_unit(inverse_intrinsics(intrinsics_of(r.cameras[1])).transpose() * E *
+                 inverse_intrinsics(intrinsics_of(r.cameras[0])),
              two_view->F);
   two_view->has_covariance = bundle.has_covariance;
   std::copy(bundle.covariance, bundle.covariance + 25, two_view->covariance);
@@ -255,16 +242,17 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   status = tv_estimate_two_view(context, view0->camera, view1->camera, r.pixels[0], r.pixels[1],
                                 r.ratios, num_matches, checked.estimate, &estimate, r.inlier_mask);
   if (status != TV_OK) return status;
+  tv::correct_cameras(estimate, *view0, *view1, r);
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
     status = tv::match_along_lines(context, *view0, *view1, num_keypoints, checked.estimate, r,
                                    &num_matches, &estimate);
     if (status != TV_OK) return status;
   }
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),
-                                   *view0, *view1, estimate, num_matches, r, &num_points);
+                                   estimate, num_matches, r, &num_points);
   if (status != TV_OK) return status;
   if (checked.bundle_adjustment != 0 && tv::is_full_pose(estimate)) {
-    status = tv::adjust(context, *view0, *view1, num_matches, r, &estimate, &num_points);
+    status = tv::adjust(context, num_matches, r, &estimate, &num_points);
     if (status != TV_OK) return status;
   }
   *two_view = estimate;

@@ -31,15 +31,6 @@ tv::Vec2 pixel_at(const double *pixels, size_t i) {
   return tv::Vec2(pixels[2 * i], pixels[2 * i + 1]);
 }
 
-bool any_overlap(const void *const *arrays, const size_t *bytes, int num_arrays, int first_output) {
-  for (int i = first_output; i < num_arrays; ++i) {
-    for (int k = 0; k < i; ++k) {
-      if (tv::overlap(arrays[i], bytes[i], arrays[k], bytes[k])) return true;
-    }
-  }
-  return false;
-}
-
 }  // namespace
 
 tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
@@ -55,9 +46,9 @@ tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
   const tv_status status = check_pair(camera0, camera1, R, t);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(num_points);
-  const void *arrays[3] = {pixels0, pixels1, points};
-  const size_t bytes[3] = {16 * n, 16 * n, n * sizeof(tv_point)};
-  if (any_overlap(arrays, bytes, 3, 2)) return TV_ERR_OVERLAP;
+  const tv::Bytes arrays[3] = {
+      {points, n * sizeof(tv_point)}, {pixels0, 16 * n}, {pixels1, 16 * n}};
+  if (tv::outputs_overlap(arrays, 1, 3)) return TV_ERR_OVERLAP;
 
   const tv::Camera prepared0 = tv::prepare_camera(*camera0);
   const tv::Camera prepared1 = tv::prepare_camera(*camera1);
@@ -83,9 +74,9 @@ tv_status tv_correct_matches(tv_triangulation cost, const tv_camera *camera0,
   const tv_status status = check_pair(camera0, camera1, R, t);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(num_points);
-  const void *arrays[5] = {pixels0, pixels1, corrected0, corrected1, valid};
-  const size_t bytes[5] = {16 * n, 16 * n, 16 * n, 16 * n, n};
-  if (any_overlap(arrays, bytes, 5, 2)) return TV_ERR_OVERLAP;
+  const tv::Bytes arrays[5] = {
+      {corrected0, 16 * n}, {corrected1, 16 * n}, {valid, n}, {pixels0, 16 * n}, {pixels1, 16 * n}};
+  if (tv::outputs_overlap(arrays, 3, 5)) return TV_ERR_OVERLAP;
 
   const tv::Camera prepared0 = tv::prepare_camera(*camera0);
   const tv::Camera prepared1 = tv::prepare_camera(*camera1);

@@ -107,12 +107,6 @@ Pose inverse_pose(const Pose& pose) {
   return inverse;
 }
 
-Mat3 inverse_intrinsics(const Mat3& K) {
-  Mat3 inverse;
-  inverse << 1 / K(0, 0), 0, -K(0, 2) / K(0, 0), 0, 1 / K(1, 1), -K(1, 2) / K(1, 1), 0, 0, 1;
-  return inverse;
-}
-
 // H of the other direction: the adjugate, which is the inverse up to scale.
 Mat3 adjugate(const Mat3& H) {
   Mat3 result;
@@ -290,13 +284,12 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     if (status != TV_OK) return status;
   }
   const size_t n = static_cast<size_t>(num_matches);
-  if (inlier_mask != nullptr &&
-      (tv::overlap(inlier_mask, n, pixels0, 16 * n) ||
-       tv::overlap(inlier_mask, n, pixels1, 16 * n) ||
-       (ratios != nullptr && tv::overlap(inlier_mask, n, ratios, 4 * n)) ||
-       tv::overlap(inlier_mask, n, result, sizeof *result))) {
-    return TV_ERR_OVERLAP;
-  }
+  const tv::Bytes arrays[5] = {{inlier_mask, n},
+                               {pixels0, 16 * n},
+                               {pixels1, 16 * n},
+                               {ratios, 4 * n},
+                               {result, sizeof *result}};
+  if (tv::outputs_overlap(arrays, 1, 5)) return TV_ERR_OVERLAP;
   tv::ArenaScope scope(context->arena);
   tv::Matches matches{};
   tv::TwoViewModel model{};

@@ -76,11 +76,16 @@ tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {
   return TV_OK;
 }
 
-bool all_finite(const double* values, int num_values) {
-  for (int i = 0; i < num_values; ++i) {
-    if (!is_finite(values[i])) return false;
+bool outputs_overlap(const Bytes* arrays, int num_outputs, int num_arrays) {
+  for (int i = 0; i < num_outputs; ++i) {
+    for (int j = i + 1; j < num_arrays; ++j) {
+      if (arrays[i].data != nullptr && arrays[j].data != nullptr &&
+          overlap(arrays[i].data, arrays[i].size, arrays[j].data, arrays[j].size)) {
+        return true;
+      }
+    }
   }
-  return true;
+  return false;
 }
 
 bool is_rotation(const double R[9]) {

@@ -6,11 +6,10 @@
 #include <cstdint>
 
 #include "api/context.h"
+#include "base/math.h"
 #include "twoview/feature.h"
 
 namespace tv {
-
-inline bool is_finite(double x) { return x - x == 0.0; }
 
 // An image that this context can take.
 tv_status check_image(const tv_context& context, const tv_image* image);
@@ -25,15 +24,21 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
 // Finite, of a positive size.
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);
 
-bool all_finite(const double* values, int num_values);
-
 // R R' = I to 1e-6 and det R > 0.
 bool is_rotation(const double R[9]);
 
-// Whether two arrays share a byte.
+// Whether two arrays share a byte. An array of no bytes shares none.
 inline bool overlap(const void* a, size_t a_bytes, const void* b, size_t b_bytes) {
   const uintptr_t a0 = reinterpret_cast<uintptr_t>(a), b0 = reinterpret_cast<uintptr_t>(b);
   return a_bytes > 0 && b_bytes > 0 && a0 < b0 + b_bytes && b0 < a0 + a_bytes;
 }
+
+struct Bytes {
+  const void* data;  // or null, for an array that is absent
+  size_t size;
+};
+
+// Whether one of the first num_outputs arrays shares a byte with any other array.
+bool outputs_overlap(const Bytes* arrays, int num_outputs, int num_arrays);
 
 }  // namespace tv

@@ -292,4 +292,11 @@ double log(double x) {
   return exponent * kLn2High + (f - (half_square - (s * (half_square + r) + exponent * kLn2Low)));
 }
 
+bool all_finite(const double* values, int num_values) {
+  for (int i = 0; i < num_values; ++i) {
+    if (!is_finite(values[i])) return false;
+  }
+  return true;
+}
+
 }  // namespace tv

@@ -9,6 +9,10 @@ namespace tv {
 
 inline constexpr double kPi = 3.14159265358979323846;
 
+// Neither infinite nor NaN.
+inline bool is_finite(double x) { return x - x == 0.0; }
+bool all_finite(const double* values, int num_values);
+
 double atan2(double y, double x);  // (-pi, pi]; atan2(0, 0) = 0; -0 counts as 0
 double atan(double x);
 void sincos(double angle_rad, double* sine, double* cosine);  // |angle| up to 2^20, NaN beyond

@@ -458,4 +458,16 @@ bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobi
                                                  : unproject_central(camera, target, ray, jacobian);
 }
 
+Mat3 intrinsics_of(const tv_camera& camera) {
+  Mat3 K;
+  K << camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1;
+  return K;
+}
+
+Mat3 inverse_intrinsics(const Mat3& K) {
+  Mat3 inverse;
+  inverse << 1 / K(0, 0), 0, -K(0, 2) / K(0, 0), 0, 1 / K(1, 1), -K(1, 2) / K(1, 1), 0, 0, 1;
+  return inverse;
+}
+
 }  // namespace tv

@@ -22,6 +22,11 @@ struct Camera {
   double valid_radius_distorted;    // a bound after distortion: Newton is never asked for more
 };
 
+// K and its inverse: the plane z = 1 to the undistorted image, in pixels, and back. K may also be
+// any other matrix with the same zeros.
+Mat3 intrinsics_of(const tv_camera& camera);
+Mat3 inverse_intrinsics(const Mat3& K);
+
 // The camera must have passed tv_camera_check.
 Camera prepare_camera(const tv_camera& camera);
 

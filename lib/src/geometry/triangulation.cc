@@ -2,6 +2,8 @@
 // test: test/unit/test_triangulation.cc, test_triangulation_opencv.cc.
 #include "geometry/triangulation.h"
 
+#include <limits>
+
 #include "base/math.h"
 #include "geometry/triangulation_linear.h"
 #include "kernels/kernels.h"
@@ -219,14 +221,14 @@ bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, cons
   const Vec2 pixels[2] = {pixel0, pixel1};
   Vec2 moved[2];
   for (int i = 0; i < 2; ++i) {
-    if (!is_finite(correction.ray[i])) return false;
+    if (!all_finite(correction.ray[i].data(), 3)) return false;
     if (cameras[i]->model.model == TV_CAMERA_PINHOLE) {
       // Without the way through a ray, which costs a rounding or two of the pixel.
       moved[i] = Vec2(pixels[i][0] + correction.step[i][0], pixels[i][1] + correction.step[i][1]);
     } else if (!project(*cameras[i], correction.ray[i], &moved[i], nullptr)) {
       return false;
     }
-    if (!is_finite(Vec3(moved[i][0], moved[i][1], 0.0))) return false;
+    if (!all_finite(moved[i].data(), 2)) return false;
   }
   corrected[0] = moved[0];
   corrected[1] = moved[1];
@@ -249,7 +251,7 @@ void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, co
   const Vec3 position = solve(method, pair, match, midpoint(pair, rays, along0, along1));
   const Vec3 metric(position[0] * pair.baseline, position[1] * pair.baseline,
                     position[2] * pair.baseline);
-  if (!is_finite(metric)) return write_infinite(pair, match, angle, point);
+  if (!all_finite(metric.data(), 3)) return write_infinite(pair, match, angle, point);
   const Vec3 position1 = combine(1.0, rotate(pair.cam1_from_cam0_R, position), 1.0, pair.direction);
   // The two lines decide, the same for every method; and no method's point may lie behind and be
   // called good.

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "geometry/camera.h"
-#include "geometry/triangulation_poly.h"
+#include "geometry/triangulation_pair.h"
 #include "twoview/triangulate.h"
 
 namespace tv {
@@ -13,18 +13,6 @@ namespace tv {
 // a few units of 2^-53 from the pixel's rounding, the unprojection and the rotation; depth is the
 // baseline divided by this sine, so that below 16 * 2^-52 nothing of the depth is known.
 inline constexpr double kParallelSine = 0x1p-48;
-
-// A pair of cameras with what every point needs. The cameras must outlive it.
-struct TriangulationPair {
-  const Camera* cameras[2];
-  Mat3 cam1_from_cam0_R;
-  Mat3 cam0_from_cam1_R;
-  Vec3 direction;   // t / |t|
-  Vec3 center1;     // camera 1's centre in camera 0's frame, for |t| = 1
-  double baseline;  // |t|
-  EpipolarPencil pencil;
-  bool has_steps;  // of the pencil: the same for every match when both cameras have an image plane
-};
 
 // R is a rotation, t not zero.
 TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1, const Mat3& R,

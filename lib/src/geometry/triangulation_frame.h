@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
 #include "geometry/camera.h"
 
@@ -24,12 +23,6 @@ inline Vec3 rotate(const Mat3& R, const Vec3& v) {
 
 inline Vec3 combine(double a, const Vec3& u, double b, const Vec3& v) {
   return Vec3(a * u[0] + b * v[0], a * u[1] + b * v[1], a * u[2] + b * v[2]);
-}
-
-inline bool is_finite(const Vec3& v) {
-  return std::fabs(v[0]) < std::numeric_limits<double>::infinity() &&
-         std::fabs(v[1]) < std::numeric_limits<double>::infinity() &&
-         std::fabs(v[2]) < std::numeric_limits<double>::infinity();
 }
 
 // Two unit vectors that make a right-handed frame with a unit axis; the coordinate axis that is

@@ -1,8 +1,6 @@
 // Test: test/unit/test_triangulation.cc, test_triangulation_opencv.cc.
 #include "geometry/triangulation_linear.h"
 
-#include "geometry/triangulation.h"
-
 namespace tv {
 namespace {
 

@@ -2,11 +2,9 @@
 // P. Sturm, "Triangulation", CVIU 68(2), 1997. Derivation: docs/algorithms/triangulation.md.
 #pragma once
 
-#include "geometry/triangulation_frame.h"
+#include "geometry/triangulation_pair.h"
 
 namespace tv {
-
-struct TriangulationPair;
 
 // The point in camera 0's frame for a baseline of 1. An iterative method that does not settle falls
 // back to its linear one. A point at infinity is not finite.

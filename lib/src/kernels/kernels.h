@@ -93,7 +93,7 @@ typedef struct tvk_triangulate_pair {
    nearest, each strictly, else -1 (and 0 for the rest); best their squared distance, second the
    smallest other distance of either, INT32_MAX where there is none. of_columns (num_columns) and
    scratch (TVK_NEAREST_SCRATCH(num_rows, num_columns) bytes, aligned to 64) are left with anything
-   in them. squared_distances: of the query to rows[indices[k]]. Of matches (geometry/residuals.h),
+   in them. squared_distances: of the query to rows[indices[k]]. Of matches (geometry/ray_pairs.h),
    arrays: rays (3 and 3) and slopes d ray / d pixel (6 and 6, row-major 3x2); on_plane: the rays
    end in 1 and the slopes' last rows are zero, and are not read; m: a model matrix, row-major;
    matches indices[0 .. count), or first, first + 1, .. where null: sampson_squares: squares[k] =

@@ -1,4 +1,4 @@
-/* Sampson's distance over arrays of matches (geometry/residuals.h). */
+/* Sampson's distance over arrays of matches (geometry/sampson.h). */
 
 #include "kernels/lanes.h"
 #include "kernels/match_block.h"

@@ -1,4 +1,4 @@
-/* The transfer residual of a homography over arrays of matches (geometry/residuals.h). */
+/* The transfer residual of a homography over arrays of matches (geometry/transfer.h). */
 
 #include "kernels/lanes.h"
 #include "kernels/match_block.h"

@@ -4,6 +4,10 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "geometry/parallax.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
+#include "robust/ldlt.h"
 
 namespace tv {
 
@@ -38,12 +42,6 @@ double variance_of(const LossSums& sums, int n, int dimensions, int p, double sc
   const double variance = student * K * K * sums.psi_sq / left / (mean * mean);
   const double least = kLeastResidual * scale_px;
   return std::max(variance, least * least);
-}
-
-bool is_finite(const double* values, int count) {
-  double sum = 0;
-  for (int k = 0; k < count; ++k) sum += values[k] - values[k];
-  return sum == 0;
 }
 
 void multiply5(const double A[25], const double B[25], double C[25]) {
@@ -111,7 +109,7 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
       uncertainty->covariance[5 * c + r] = uncertainty->covariance[5 * r + c];
     }
   }
-  return is_finite(uncertainty->covariance, 25);
+  return all_finite(uncertainty->covariance, 25);
 }
 
 bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
@@ -137,7 +135,7 @@ bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
   }
   uncertainty->variance_px = variance;
   uncertainty->noise_px = std::sqrt(std::max(variance, 0.0) / kVarianceOnPlane);
-  return variance > 0 && is_finite(uncertainty->covariance, 25);
+  return variance > 0 && all_finite(uncertainty->covariance, 25);
 }
 
 void invert_covariance(const Pose& pose, const Pose& inverse, const double covariance[25],

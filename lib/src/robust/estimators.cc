@@ -6,6 +6,7 @@
 #include "geometry/fundamental_8pt.h"
 #include "geometry/homography_4pt.h"
 #include "geometry/rotation_2pt.h"
+#include "robust/refine.h"
 
 namespace tv {
 namespace {

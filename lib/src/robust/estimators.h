@@ -2,8 +2,10 @@
 #pragma once
 
 #include "geometry/relpose_5pt.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
 #include "robust/matches.h"
-#include "robust/refine.h"
+#include "robust/models.h"
 
 namespace tv {
 

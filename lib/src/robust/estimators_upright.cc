@@ -1,5 +1,7 @@
 #include "robust/estimators_upright.h"
 
+#include "robust/refine.h"
+
 namespace tv {
 namespace {
 

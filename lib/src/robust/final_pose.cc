@@ -5,6 +5,11 @@
 
 #include "base/math.h"
 #include "geometry/homography_4pt.h"
+#include "geometry/parallax.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
+#include "robust/ldlt.h"
+#include "robust/refine.h"
 #include "robust/verdict.h"
 
 namespace tv {

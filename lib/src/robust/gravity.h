@@ -1,7 +1,7 @@
 // The direction of gravity in both views, as a prior of a pose. docs/algorithms/gravity.md.
 #pragma once
 
-#include "robust/refine.h"
+#include "robust/models.h"
 
 namespace tv {
 

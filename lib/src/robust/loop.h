@@ -18,7 +18,7 @@
 #include <cstdint>
 
 #include "base/math.h"
-#include "geometry/residuals.h"
+#include "geometry/sampson.h"
 #include "robust/sampler.h"
 
 namespace tv {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "base/math.h"
+
 namespace tv {
 namespace {
-
-bool is_finite(double x) { return x - x == 0.0; }
 
 // The four coordinates of a match add up to less than this; images end at 16384 pixels a side.
 constexpr double kMaxCoordinates = 1e6;
@@ -164,8 +164,7 @@ void set_rays(const TwoViewProblem& problem, int view, const Camera& camera, Mat
       set_ray(matches->pairs, view, k, p.ray, p.jacobian);
     }
   }
-  const tv_camera& m = camera.model;
-  matches->intrinsics[view] << m.fx, 0, m.cx, 0, m.fy, m.cy, 0, 0, 1;
+  matches->intrinsics[view] = intrinsics_of(camera.model);
 }
 
 double box_area(const double* pixels, const int32_t* order, int count) {

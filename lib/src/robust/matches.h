@@ -2,7 +2,7 @@
 #pragma once
 
 #include "base/arena.h"
-#include "geometry/residuals.h"
+#include "geometry/ray_pairs.h"
 #include "twoview/two_view.h"
 
 namespace tv {

@@ -2,6 +2,9 @@
 
 #include <cmath>
 
+#include "geometry/sampson.h"
+#include "robust/ldlt.h"
+
 namespace tv {
 namespace {
 

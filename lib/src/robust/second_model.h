@@ -1,5 +1,6 @@
-// Whether what the pair's model leaves over follows a model of its own: a second motion, or the
-// same scene matched one period off.
+// A second model for the matches that the pair's model does not explain: a second motion, or the
+// same scene matched one period off. Formula: docs/algorithms/two_view.md, second model and
+// lattice. Tests: test/property/test_verdict_property.cc.
 #pragma once
 
 #include "robust/estimators.h"
@@ -14,22 +15,12 @@ struct SecondModel {
 
 size_t second_model_bytes(int max_matches);
 
-// Searches the unique matches that the first model does not explain (explained[i] is 0; its
-// inliers' tail, too, is to be marked) for a pose of their own. Found: the model is meaningful
-// among them (verdict.h), and counts at least kSecondShare of num_first.
+// Searches the unique matches that the first model does not explain (explained[i] is 0) for a pose
+// of their own. The caller also marks those matches as explained that are just outside the first
+// model's threshold. A second model is found when it is meaningful among these matches (verdict.h)
+// and has at least kSecondShare times num_first inliers.
 inline constexpr double kSecondShare = 0.15;
 SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,
                               double threshold_px, uint64_t seed, Arena& arena);
-
-// Whether points lie as on a lattice: of a point's nearest neighbours, how many have another point
-// at the opposite place, less those that have one at a place where a lattice has none, which is
-// chance. xy: num x 2; listed: null or the indices of the points that are asked.
-struct Lattice {
-  double share;   // of neighbours, chance taken off; a full lattice has nearly 1
-  double sigmas;  // how many standard deviations of a count of chance that is
-};
-Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,
-                     Arena& arena);
-size_t lattice_bytes(int max_points);
 
 }  // namespace tv

@@ -4,9 +4,13 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
 #include "robust/estimators_upright.h"
 #include "robust/final_pose.h"
+#include "robust/lattice.h"
 #include "robust/loop.h"
+#include "robust/refine.h"
 #include "robust/second_model.h"
 
 namespace tv {

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
 #include "robust/loop.h"
 
 namespace tv {

@@ -1,0 +1,39 @@
+// Normal equations of robust least squares for a 3x3 model matrix over matches, for Sampson's
+// distance and for the transfer residual, and the robust losses they are weighted with.
+//
+// The kernels add up the sums for the matrix's nine entries (kernels/sampson.h,
+// kernels/transfer.h); here these are projected to a model's own parameters. Weights are those of
+// iteratively reweighted least squares: rho'(r^2). Tests: test/unit/test_residuals.cc, against
+// differences.
+#pragma once
+
+#include <cstdint>
+
+#include "geometry/ray_pairs.h"
+
+namespace tv {
+
+// With q = r^2 / scale^2: min(q, 1), and log(1 + q).
+enum class Loss { kTruncated, kCauchy };
+
+struct RobustLoss {
+  Loss kind;
+  double scale_px;
+};
+
+// A scale that no residual reaches.
+inline constexpr RobustLoss kLeastSquares{Loss::kTruncated, 1e140};
+
+// Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with at most nine
+// parameters, columns[p] = dM / dparameter p. upper: the packed upper triangle, row by row. Returns
+// the sum of rho, in units of scale^2. indices null: matches 0 .. count - 1.
+double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                const Mat3& M, const Mat3* columns, int num_parameters,
+                                const RobustLoss& loss, double* upper, double* gradient);
+
+// The same for the transfer residual of a matrix H; columns null: H's nine entries themselves.
+double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                 const Mat3& H, const Mat3* columns, int num_parameters,
+                                 const RobustLoss& loss, double* upper, double* gradient);
+
+}  // namespace tv

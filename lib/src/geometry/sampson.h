@@ -1,0 +1,53 @@
+// Sampson's distance of matches from a matrix M with f1' M f0 = 0 (an essential or a fundamental
+// matrix), its derivatives, and the integer score of a model that sums it over the matches.
+//
+//     r = f1' M f0 / sqrt(|J0' M' f1|^2 + |J1' M f0|^2),
+// in pixels of the images as they are, whatever the lens (P. D. Sampson, 1982; Hartley & Zisserman
+// 11.4.3). With rays on the plane z = 1 this is exactly the textbook's formula for a pinhole.
+// The kernels that compute many at once are in kernels/sampson.h. Tests:
+// test/unit/test_residuals.cc and, for the slopes, test/property/test_principal_point.cc.
+#pragma once
+
+#include <cstdint>
+
+#include "geometry/essential.h"
+#include "geometry/ray_pairs.h"
+
+namespace tv {
+
+inline constexpr int kCostOne = TVK_SCORE_ONE;  // the cost of an outlier in an integer score
+
+// Squared Sampson distance; +inf for a match about which the model says nothing, because both rays
+// lie at the epipoles.
+double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
+
+// Sampson's distance with its sign; its slopes by the entries of M, row by row; and its slopes by
+// the coordinates of a point that all pixels of both views move away from, as a principal point is:
+// rays move by -J, Jacobians by -d J. curvature: null, or d^2 ray / d pixel^2 of each view, 3 x
+// (xx, xy, yy), row by row.
+struct SampsonSlopes {
+  double residual, by_entry[9], by_point[2];
+};
+// False where the model says nothing about the match.
+bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
+                    SampsonSlopes* slopes);
+
+// sampson_sq of the matches first .. first + count - 1, or of those listed.
+void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares);
+void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
+                     double* squares);
+
+// The same for the essential matrix of a pose that is required to have the matches in front of both
+// cameras: +inf also for a match whose point lies behind one of them by more than scale_px pixels
+// (depth_vote in geometry/essential.h).
+void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose, double scale_px,
+                  double* squares);
+
+// Sum over the matches for scoring (pairs.num of them) of min(r^2 / T^2, 1), T the threshold, each
+// truncated to a multiple of 1/kCostOne: an integer, so that neither order nor vector width
+// matters. A sum above `bound` is returned as any number above `bound`. About one model in fifty
+// whose sum is just below `bound` is also returned as above it, since its first few matches cost
+// too much.
+int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound);
+
+}  // namespace tv

@@ -1,0 +1,28 @@
+// Products of vectors that are plain arrays of three doubles, with sums in a written order: for the
+// loops over matches, which are shorter without Eigen's types where the compiler optimises for
+// size. Formulas: none but the definitions. Tests: those of the files that include this one.
+#pragma once
+
+#include <cmath>
+
+#include "geometry/camera.h"
+
+namespace tv {
+
+inline double dot(const double a[3], const double b[3]) {
+  return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
+
+inline double length_of(const double v[3]) { return std::sqrt(dot(v, v)); }
+
+inline void cross(const double a[3], const double b[3], double product[3]) {
+  product[0] = a[1] * b[2] - a[2] * b[1];
+  product[1] = a[2] * b[0] - a[0] * b[2];
+  product[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+inline void rotate(const Mat3& R, const double v[3], double rotated[3]) {
+  for (int r = 0; r < 3; ++r) rotated[r] = (R(r, 0) * v[0] + R(r, 1) * v[1]) + R(r, 2) * v[2];
+}
+
+}  // namespace tv

@@ -1,0 +1,25 @@
+// Whether points lie on a lattice, as the corners of windows or tiles do: such points match as well
+// one period off. Formula: docs/algorithms/two_view.md, second model and lattice. Tests:
+// test/unit/test_lattice.cc.
+#pragma once
+
+#include <cstdint>
+
+#include "base/arena.h"
+
+namespace tv {
+
+// For each point's nearest neighbours: how many have another point at the opposite place, minus how
+// many have one at a place where a lattice has none, which is the number expected by chance.
+struct Lattice {
+  double share;   // of the neighbours, after this subtraction; a full lattice has nearly 1
+  double sigmas;  // the difference in standard deviations of a count of chance
+};
+
+// xy: num x 2. listed: null, or the indices of the points whose neighbours are examined. At most 64
+// of those listed, or 512 of all, are.
+Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,
+                     Arena& arena);
+size_t lattice_bytes(int max_points);
+
+}  // namespace tv

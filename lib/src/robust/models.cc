@@ -1,0 +1,125 @@
+#include "robust/models.h"
+
+namespace tv {
+
+void pose_columns(const Pose& pose, Mat3 columns[5]) {
+  const Mat3 translation = cross_matrix(pose.t);
+  Vec3 b1, b2;
+  tangent_basis(pose.t, &b1, &b2);
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    columns[k] = translation * (cross_matrix(axis) * pose.R);
+  }
+  columns[3] = cross_matrix(b1) * pose.R;
+  columns[4] = cross_matrix(b2) * pose.R;
+}
+
+double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                   const RobustLoss& loss, double* upper, double* gradient) const {
+  Mat3 columns[5];
+  pose_columns(pose, columns);
+  return sampson_normal_equations(pairs, indices, count, essential_from_pose(pose), columns,
+                                  kParameters, loss, upper, gradient);
+}
+
+PoseModel PoseModel::stepped(const double* step) const {
+  Vec3 b1, b2;
+  tangent_basis(pose.t, &b1, &b2);
+  PoseModel result;
+  result.pose.R = orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * pose.R);
+  result.pose.t = (pose.t + step[3] * b1 + step[4] * b2).normalized();
+  return result;
+}
+
+FundamentalModel fundamental_model(const Mat3& M) {
+  const Svd3 svd = svd3(M);
+  return FundamentalModel{svd.U, svd.V, svd.s[0] > 0 ? svd.s[1] / svd.s[0] : 0.0};
+}
+
+Mat3 FundamentalModel::matrix() const {
+  return U.col(0) * V.col(0).transpose() + s * (U.col(1) * V.col(1).transpose());
+}
+
+double FundamentalModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                          const RobustLoss& loss, double* upper,
+                                          double* gradient) const {
+  Mat3 columns[7];
+  Mat3 S = Mat3::Zero();
+  S(0, 0) = 1;
+  S(1, 1) = s;
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    const Mat3 turn = cross_matrix(axis);
+    columns[k] = U * turn * S * V.transpose();
+    columns[3 + k] = -(U * S * turn * V.transpose());
+  }
+  columns[6] = U.col(1) * V.col(1).transpose();
+  return sampson_normal_equations(pairs, indices, count, matrix(), columns, kParameters, loss,
+                                  upper, gradient);
+}
+
+FundamentalModel FundamentalModel::stepped(const double* step) const {
+  FundamentalModel result;
+  result.U = orthonormalised(U * rotation_step(Vec3(step[0], step[1], step[2])));
+  result.V = orthonormalised(V * rotation_step(Vec3(step[3], step[4], step[5])));
+  result.s = s + step[6];
+  return result;
+}
+
+double HomographyModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                         const RobustLoss& loss, double* upper,
+                                         double* gradient) const {
+  return transfer_normal_equations(pairs, indices, count, H, nullptr, kParameters, loss, upper,
+                                   gradient);
+}
+
+HomographyModel HomographyModel::stepped(const double* step) const {
+  HomographyModel result;
+  for (int k = 0; k < 9; ++k) result.H(k / 3, k % 3) = H(k / 3, k % 3) + step[k];
+  result.H /= result.H.norm();
+  return result;
+}
+
+double RotationModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                       const RobustLoss& loss, double* upper,
+                                       double* gradient) const {
+  Mat3 columns[3];
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    columns[k] = cross_matrix(axis) * R;
+  }
+  return transfer_normal_equations(pairs, indices, count, R, columns, kParameters, loss, upper,
+                                   gradient);
+}
+
+RotationModel RotationModel::stepped(const double* step) const {
+  return RotationModel{orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * R)};
+}
+
+Mat3 PlaneModel::matrix() const { return pose.R + pose.t * plane.transpose(); }
+
+double PlaneModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
+                                    const RobustLoss& loss, double* upper, double* gradient) const {
+  Vec3 b1, b2;
+  tangent_basis(pose.t, &b1, &b2);
+  Mat3 columns[8];
+  for (int k = 0; k < 3; ++k) {
+    Vec3 axis = Vec3::Zero();
+    axis[k] = 1;
+    columns[k] = cross_matrix(axis) * pose.R;
+    columns[5 + k] = pose.t * axis.transpose();
+  }
+  columns[3] = b1 * plane.transpose();
+  columns[4] = b2 * plane.transpose();
+  return transfer_normal_equations(pairs, indices, count, matrix(), columns, kParameters, loss,
+                                   upper, gradient);
+}
+
+PlaneModel PlaneModel::stepped(const double* step) const {
+  return PlaneModel{PoseModel{pose}.stepped(step).pose, plane + Vec3(step[5], step[6], step[7])};
+}
+
+}  // namespace tv

@@ -1,0 +1,52 @@
+// Points on a lattice are recognised, random points are not.
+#include "robust/lattice.h"
+#include "support/scene.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+namespace {
+
+using scene::uniform;
+
+constexpr int kSide = 12, kNum = kSide * kSide;
+
+tv::Lattice lattice_of(const double* xy) {
+  alignas(64) static unsigned char memory[1 << 16];
+  TEST_ASSERT_TRUE(tv::lattice_bytes(kNum) <= sizeof memory);
+  tv::Arena arena = tv::arena_over(memory, sizeof memory);
+  return tv::find_lattice(xy, kNum, nullptr, 0, arena);
+}
+
+void test_points_of_a_skewed_lattice_are_recognised(void) {
+  tv::Random random = tv::random_seeded(1);
+  double xy[2 * kNum];
+  for (int i = 0; i < kNum; ++i) {
+    const int column = i % kSide, row = i / kSide;
+    xy[2 * i] = 30 * column + 7 * row + uniform(&random, -0.5, 0.5);
+    xy[2 * i + 1] = 25 * row - 4 * column + uniform(&random, -0.5, 0.5);
+  }
+  const tv::Lattice lattice = lattice_of(xy);
+  TEST_ASSERT_TRUE(lattice.share > 0.6);
+  TEST_ASSERT_TRUE(lattice.sigmas > 10);
+}
+
+void test_random_points_are_no_lattice(void) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    tv::Random random = tv::random_seeded(seed);
+    double xy[2 * kNum];
+    for (double& x : xy) x = uniform(&random, 0, 400);
+    const tv::Lattice lattice = lattice_of(xy);
+    TEST_ASSERT_TRUE(lattice.share < 0.15);
+    TEST_ASSERT_TRUE(lattice.sigmas < 5);
+  }
+}
+
+}  // namespace
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_points_of_a_skewed_lattice_are_recognised);
+  RUN_TEST(test_random_points_are_no_lattice);
+  return UNITY_END();
+}
