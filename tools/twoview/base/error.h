@@ -1,4 +1,4 @@
-// How the program says no: one line on stderr, exit status 2.
+// The exception for bad input, which main() prints as one line on stderr with exit status 2.
 #pragma once
 
 #include <stdexcept>

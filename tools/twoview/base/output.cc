@@ -1,4 +1,4 @@
-#include "output.h"
+#include "base/output.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -11,7 +11,7 @@
 #include <mutex>
 #include <thread>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace fs = std::filesystem;

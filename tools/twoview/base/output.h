@@ -1,4 +1,5 @@
-// Files that appear whole or not at all, and what is printed.
+// Output files that appear whole or not at all, what happens to them on a signal, what is printed,
+// and the reading of a whole file.
 #pragma once
 
 #include <atomic>
@@ -54,8 +55,8 @@ class OutputSet {
 // committed is gone. Call once, before any other thread starts.
 void clean_up_on_signals();
 
-// For work that ends well when it is told to (a recording, a simulation): after this call the first
-// such signal sets the flag and does no more; a second one ends the program as before.
+// For work that a signal ends in order (a recording, a simulation): after this call the first such
+// signal only sets the flag, and a second one ends the program as before.
 const std::atomic<bool>& stop_flag_for_signals();
 
 // The whole of a text or image file; refuses what is missing, no file, empty, or above max_bytes.

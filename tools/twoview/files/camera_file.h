@@ -1,9 +1,8 @@
-// Camera files: OpenCV's YAML and ROS camera_info; and the cameras.yaml of a data set.
+// Camera files, in OpenCV's YAML or ROS camera_info, and what resizing and turning an image does to
+// its camera.
 #pragma once
 
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "twoview/camera.h"
 
@@ -18,16 +17,6 @@ tv_camera parse_camera(const std::string& text, const std::string& name);
 
 // The text of a file in OpenCV's format that reads back to the same camera, bit for bit.
 std::string camera_yaml(const tv_camera& camera);
-
-// A data set's cameras, each with the name it has there, in the file's order.
-using NamedCameras = std::vector<std::pair<std::string, tv_camera>>;
-NamedCameras load_camera_set(const std::string& path);
-NamedCameras parse_camera_set(const std::string& text, const std::string& name);
-
-// The entry that serves an image: the only one, else the one whose name begins the file's name (the
-// longest, if several do), else the one with this fx and cx. Null when none fits.
-const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,
-                               const double K[9]);
 
 // A pinhole whose focal length is that of 35 mm film (EXIF's FocalLengthIn35mmFilm: the same angle
 // across the diagonal, 43.27 mm there, by CIPA DCG-001), with the principal point in the image's

@@ -1,4 +1,4 @@
-#include "image_file.h"
+#include "files/image_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -8,9 +8,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "error.h"
-#include "image_header.h"
-#include "output.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/image_header.h"
 
 namespace cli {
 namespace {

@@ -19,7 +19,7 @@ struct Picture {
   int file_width = 0, file_height = 0;  // before resizing
 
   tv_image view() const;
-  // Of the file's pixel grid on this one: 1 unless resized.
+  // Pixels of this image for one pixel of the file: 1 unless resized.
   double scale_x() const { return static_cast<double>(luma.cols) / file_width; }
   double scale_y() const { return static_cast<double>(luma.rows) / file_height; }
 };
@@ -34,7 +34,8 @@ Picture load_picture(const std::string& path);
 // load_picture.
 cv::Mat load_pixels(const std::string& path);
 
-// Scales down by area averaging so that the longer side is `longer`; never up; 0: nothing.
+// Scales down by area averaging so that the longer side is `longer` pixels. An image that is not
+// longer stays as it is, and so does every image when `longer` is 0.
 void shrink(Picture& picture, int longer);
 
 // Turns by quarter turns counter-clockwise.
@@ -43,7 +44,8 @@ void turn(Picture& picture, int quarters);
 // A depth map: one 32-bit float a pixel (TIFF or PFM). Throws BadInput.
 cv::Mat load_depth(const std::string& path);
 
-// The file's bytes of an 8-bit BGR picture. JPEG is for what is seen only: a tenth of the size.
+// An 8-bit BGR picture encoded as a file. JPEG, a tenth of PNG's size, is only for photographs that
+// people look at.
 std::string png_bytes(const cv::Mat& picture);
 std::string jpeg_bytes(const cv::Mat& picture);
 

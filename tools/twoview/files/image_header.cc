@@ -1,4 +1,4 @@
-#include "image_header.h"
+#include "files/image_header.h"
 
 #include <cctype>
 

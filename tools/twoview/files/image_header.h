@@ -1,6 +1,6 @@
-// The size that an image file's header claims, and whether the file is all there: read before
-// decoding, so that a small file cannot ask for a huge buffer, and since some decoders fill what is
-// missing with grey instead of saying so.
+// The size in an image file's header, and whether the file is complete. Both are read before
+// decoding: a small file must not make the decoder allocate a huge buffer, and some decoders fill
+// missing pixels with grey without an error.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 namespace cli {
 
 struct ImageHeader {
-  int64_t width = 0, height = 0;  // 0: the format is not one that is looked into
-  bool truncated = false;         // the end that the format demands is missing
+  int64_t width = 0, height = 0;  // 0 when the format is not one of those below
+  bool truncated = false;         // the end mark that the format requires is missing
 };
 
-// PNG, JPEG, BMP, PNM and TIFF are looked into. Never fails; reads inside `bytes` only.
+// Parses the headers of PNG, JPEG, BMP, PNM and TIFF. Never fails, and reads inside `bytes` only.
 ImageHeader read_image_header(std::string_view bytes);
 
 }  // namespace cli

@@ -1,11 +1,11 @@
-#include "matches_file.h"
+#include "files/matches_file.h"
 
 #include <algorithm>
 #include <charconv>
 #include <string_view>
 
-#include "error.h"
-#include "output.h"
+#include "base/error.h"
+#include "base/output.h"
 
 namespace cli {
 namespace {

@@ -1,12 +1,12 @@
-#include "pairs_file.h"
+#include "files/pairs_file.h"
 
 #include <charconv>
 #include <cmath>
 #include <sstream>
 
-#include "error.h"
-#include "measures.h"
-#include "output.h"
+#include "base/error.h"
+#include "base/matrix.h"
+#include "base/output.h"
 
 namespace cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "yaml_values.h"
+#include "files/yaml_values.h"
 
 #include <yaml-cpp/eventhandler.h>
 
@@ -8,7 +8,7 @@
 #include <set>
 #include <sstream>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace {
@@ -124,6 +124,19 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
 
 double number_at(const YAML::Node& map, const std::string& entry, const std::string& file) {
   return finite(find(map, entry, file), entry, file);
+}
+
+int32_t side_at(const YAML::Node& map, const std::string& entry, const std::string& file) {
+  const double value = number_at(map, entry, file);
+  if (value == 0) throw BadInput(file + ": " + entry + " is 0");
+  if (value != std::floor(value) || value < 1 || value > 1e6)
+    throw BadInput(file + ": " + entry + " is not a number of pixels");
+  return static_cast<int32_t>(value);
+}
+
+void require_focal(double value, const std::string& entry, const std::string& file) {
+  if (value == 0) throw BadInput(file + ": " + entry + " is 0");
+  if (value < 0) throw BadInput(file + ": " + entry + " is negative");
 }
 
 std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,

@@ -3,6 +3,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,12 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file);
 
 // A finite number; BadInput names `entry` when it is missing, no number, NaN or infinite.
 double number_at(const YAML::Node& map, const std::string& entry, const std::string& file);
+
+// The width or height of an image: a whole number of pixels from 1 to 10^6.
+int32_t side_at(const YAML::Node& map, const std::string& entry, const std::string& file);
+
+// Throws BadInput unless the focal length `value` is above 0.
+void require_focal(double value, const std::string& entry, const std::string& file);
 
 // The numbers of an entry: a list, a list of lists, or a map with `data` (OpenCV, ROS), whose
 // `rows` and `cols`, where it has both, must multiply to how many there are.

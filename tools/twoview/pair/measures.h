@@ -1,24 +1,12 @@
-// How good an answer is: pose errors, AUC, precision, percentiles.
+// How accurate a result is: pose errors, AUC, precision, percentiles.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <vector>
 
+#include "base/matrix.h"
 #include "twoview/twoview.h"
 
 namespace cli {
-
-using Matrix3 = std::array<double, 9>;  // row-major
-using Vector3 = std::array<double, 3>;
-
-Matrix3 product(const Matrix3& a, const Matrix3& b);
-Matrix3 transposed(const Matrix3& a);
-Vector3 applied(const Matrix3& a, const Vector3& v);  // a v
-Vector3 cross(const Vector3& a, const Vector3& b);
-double dot(const Vector3& a, const Vector3& b);
-double norm(const Vector3& v);
-double determinant(const Matrix3& a);
 
 // Angle of R_est R_gt^T, degrees; exact for small angles too.
 double rotation_error_deg(const Matrix3& R_est, const Matrix3& R_gt);

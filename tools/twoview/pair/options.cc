@@ -1,4 +1,4 @@
-#include "options.h"
+#include "pair/options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace {

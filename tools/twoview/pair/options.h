@@ -24,7 +24,7 @@ struct Options {
   double gravity_sigma_deg = 0;  // settle() hands it to `estimate`
 
   Options();
-  // What cannot be said option by option. Call after parsing.
+  // Checks and completes the options that depend on each other. Call it once, after parsing.
   void settle();
 };
 

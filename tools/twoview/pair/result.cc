@@ -1,9 +1,9 @@
-#include "result.h"
+#include "pair/result.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace {

@@ -1,10 +1,10 @@
-#include "session.h"
+#include "pair/session.h"
 
 #include <time.h>
 
 #include <algorithm>
 
-#include "error.h"
+#include "base/error.h"
 #include "twoview/alloc.h"
 
 namespace cli {

@@ -1,4 +1,4 @@
-// A context of the library that grows with the images it meets, and its stage times.
+// A context of the library, which grows to the largest image so far, and the times of its stages.
 #pragma once
 
 #include <array>
@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "image_file.h"
-#include "options.h"
+#include "files/image_file.h"
+#include "pair/options.h"
 #include "twoview/twoview.h"
 
 namespace cli {
@@ -20,7 +20,8 @@ class Session {
  public:
   explicit Session(const Options& options) : options_(options) {}
 
-  // A context for images up to this size; what an earlier call gave is gone if it had to grow.
+  // A context for images up to this size. When it has to grow, the one that an earlier call
+  // returned is freed.
   tv_context* context(int width, int height);
   tv_context* get() const { return context_.get(); }
   size_t context_bytes() const { return context_bytes_; }
@@ -40,7 +41,7 @@ class Session {
   size_t context_bytes_ = 0;
 };
 
-// Keypoints with descriptors of one image, as the main job finds them.
+// Keypoints with descriptors of one image, found as reconstruct_pair finds them.
 struct Features {
   std::vector<tv_keypoint> keypoints;
   std::vector<uint8_t> descriptors;

@@ -1,12 +1,12 @@
-#include "truth.h"
+#include "pair/truth.h"
 
 #include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
 
-#include "error.h"
-#include "output.h"
-#include "yaml_values.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/yaml_values.h"
 
 namespace cli {
 namespace {
@@ -38,7 +38,8 @@ KnownPose read_pose(const YAML::Node& root, const std::string& path) {
   return pose;
 }
 
-// What `reconstruct` says of the camera in its result.json; other files need not.
+// Reads the principal point's shift that `reconstruct` writes into result.json; other files need
+// not have it.
 void read_shift(const YAML::Node& root, const std::string& path, KnownPose& pose) {
   const YAML::Node shift = root["principal_point_shift_px"];
   if (!shift || shift.IsNull()) return;

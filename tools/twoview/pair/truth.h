@@ -1,26 +1,27 @@
-// The known truth of a pair, and how far an answer is from it.
+// The true pose and depths of a pair, and the errors of a reconstruction against them.
 #pragma once
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
-#include "image_file.h"
-#include "measures.h"
+#include "files/image_file.h"
+#include "pair/measures.h"
 
 namespace cli {
 
-// R and t of cam1_from_cam0 out of a YAML or JSON file, such as result.json, which also tells which
-// camera they are of. R is the rotation nearest to the file's nine numbers, which may be rounded.
-// Throws BadInput.
+// R and t of cam1_from_cam0 from a YAML or JSON file. A result.json also holds the shift of the
+// principal point that its pose was estimated with. R is the rotation nearest to the file's nine
+// numbers, which may be rounded. Throws BadInput.
 struct KnownPose {
   Matrix3 R{};
   Vector3 t{};
-  // What the pose wants added to cx and cy of cameras for images so wide; 0: of any width.
+  // Pixels to add to cx and cy of a camera whose images are image_width wide; with image_width 0,
+  // of a camera of any size.
   double principal_point_shift_px[2] = {0, 0};
   double image_width = 0;
 
-  // The camera, at whatever size its file is for, that the pose is of.
+  // The camera that the pose refers to: `camera`, of any image size, with the shift added.
   tv_camera corrected(const tv_camera& camera) const;
 };
 KnownPose load_pose(const std::string& path);

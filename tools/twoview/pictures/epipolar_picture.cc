@@ -6,8 +6,8 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "canvas.h"
-#include "pictures.h"
+#include "pictures/canvas.h"
+#include "pictures/pictures.h"
 
 namespace cli {
 namespace {

@@ -1,11 +1,11 @@
-#include "pictures.h"
+#include "pictures/pictures.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
-#include "canvas.h"
+#include "pictures/canvas.h"
 
 namespace cli {
 namespace {

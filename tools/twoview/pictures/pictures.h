@@ -1,18 +1,18 @@
-// The pictures that a run leaves, each as 8-bit BGR.
+// The pictures that a run writes, each as 8-bit BGR.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "result.h"
+#include "pair/result.h"
 
 namespace cli {
 
 // Corners as rings of their size with a tick along their angle, coloured by pyramid level.
 cv::Mat keypoints_picture(const Picture& picture, const std::vector<tv_keypoint>& keypoints);
 
-// Matches as lines between the two images, coloured by how far the point moved; where an inlier
-// mask is given, the rejected ones faint and red beneath.
+// Matches as lines between the two images, coloured by how far the point moved. With an inlier
+// mask, outliers are faint, red and drawn first.
 cv::Mat matches_picture(const Picture& picture0, const Picture& picture1,
                         const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
                         const tv_correspondence* matches, int count, const uint8_t* inlier_mask);

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <numeric>
 
-#include "canvas.h"
-#include "pictures.h"
+#include "pictures/canvas.h"
+#include "pictures/pictures.h"
 
 namespace cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "drone/metric_scale.h"
+#include "recording/metric_scale.h"
 
 #include <algorithm>
 #include <cmath>

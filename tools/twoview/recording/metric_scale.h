@@ -1,20 +1,21 @@
-// Metres for a two-view reconstruction, from what a drone measures: the distance between the two
-// camera positions, each source by itself with its standard deviation. World: z down. Body: x
-// forward, y right, z down (twoview_drivers/source.h).
+// The metric scale of a two-view reconstruction from a drone's sensors: the distance between the
+// two camera positions, estimated by each sensor on its own, with its standard deviation. World: z
+// down. Body: x forward, y right, z down (twoview_drivers/source.h).
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "result.h"
+#include "pair/result.h"
 
 namespace cli {
 
 // One instant of the log; what was not measured is empty.
 struct FlightSample {
   double time_s = 0;
-  uint32_t run = 0;  // of the drone's clock and world frame: those of different runs do not compare
+  // Counts the starts of the drone. Times and world frames of different runs are not comparable.
+  uint32_t run = 0;
   Matrix3 world_from_body{};
   double attitude_sigma_rad = 0;
   std::optional<Vector3> velocity_m_s;  // body axes

@@ -1,4 +1,4 @@
-#include "drone/recording.h"
+#include "recording/recording.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -10,8 +10,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
-#include "error.h"
-#include "output.h"
+#include "base/error.h"
+#include "base/output.h"
 
 namespace cli {
 namespace {

@@ -1,5 +1,5 @@
-// The files of `drone record`, written as the bytes come, so that whatever ends the program, all
-// that came before can be read.
+// The files of `drone record`. They are written as the bytes arrive, so that everything received so
+// far can be read however the program ends.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 
 namespace cli {
 
-// A file that is only ever added to, one whole entry at a time; what cannot be written throws
-// BadInput and takes the piece of the entry back.
+// A file that whole entries are appended to. An entry that cannot be written is removed from the
+// file again, and BadInput is thrown.
 class GrowingFile {
  public:
   // Throws BadInput when it exists or cannot be made.

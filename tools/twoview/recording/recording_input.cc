@@ -1,12 +1,12 @@
-#include "drone/recording_input.h"
+#include "recording/recording_input.h"
 
 #include <cmath>
 #include <cstdio>
 
-#include "drone/recording_pair.h"
-#include "error.h"
-#include "output.h"
-#include "yaml_values.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/yaml_values.h"
+#include "recording/recording_pair.h"
 
 namespace cli {
 namespace {

@@ -1,5 +1,5 @@
-// The options of `reconstruct --recording`, and what they bring: two frames of a flight in place of
-// two image files, the attitudes beside them, and metres.
+// The input of `reconstruct --recording`: its options, and two frames of a flight in place of two
+// image files, with the attitudes at both and the scale in metres.
 // A program built without the driver has recording_none.cc in place of recording_input.cc.
 #pragma once
 
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "result.h"
-#include "session.h"
+#include "pair/result.h"
+#include "pair/session.h"
 
 namespace cli {
 
@@ -30,15 +30,15 @@ class RecordingInput {
   RecordingInput(const RecordingOptions& options, const std::string& camera_file);
   ~RecordingInput();
 
-  // The pictures of the pair, whole, into outcome.picture. `camera` is theirs.
+  // Puts the pictures of the pair, not resized, into outcome.picture. `camera` is their camera.
   void load(const tv_camera& camera, Session& session, const Options& options, Outcome& outcome);
-  // Gravity at both instants as a prior, unless the caller gave one.
+  // Sets gravity at both instants as a prior, unless the caller gave one.
   void add_gravity(tv_estimate_options& options);
-  // Metres, where the flight can tell them. Before result_json.
+  // Sets outcome.scale where the flight's measurements give it. Call before result_json.
   void add_scale(Outcome& outcome) const;
-  // "imu" and "recording" of result.json.
+  // Adds "imu" and "recording" to outcome.json.
   void add_json(Outcome& outcome) const;
-  // Lines for people.
+  // Lines of the summary for people.
   std::string words(const Outcome& outcome) const;
 
  private:

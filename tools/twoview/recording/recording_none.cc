@@ -1,5 +1,5 @@
 // The program without the AR.Drone driver: no option --recording.
-#include "drone/recording_input.h"
+#include "recording/recording_input.h"
 
 namespace cli {
 

@@ -1,4 +1,4 @@
-#include "drone/recording_pair.h"
+#include "recording/recording_pair.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +7,11 @@
 #include <opencv2/core.hpp>
 #include <set>
 
-#include "camera_file.h"
-#include "drone/link.h"
-#include "error.h"
-#include "output.h"
-#include "verbs.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_file.h"
+#include "pair/reconstruct_pair.h"
+#include "recording/playback.h"
 
 namespace cli {
 namespace {
@@ -226,7 +226,7 @@ nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFram
       transposed(product(at1->world_from_body, mount.body_from_camera));
   const Matrix3 by_imu =
       product(camera1_from_world, product(at0->world_from_body, mount.body_from_camera));
-  // Both attitudes have the error of one about each axis; the whole angle has that of three.
+  // The difference has the errors of both attitudes about each of three axes.
   const double imu_sigma =
       std::sqrt(3.0) * std::hypot(at0->attitude_sigma_rad, at1->attitude_sigma_rad);
   const double* c = two_view.covariance;

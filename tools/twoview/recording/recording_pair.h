@@ -1,13 +1,13 @@
-// Two frames of a recording, what the IMU says about them, and metres.
+// The choice of two frames of a recording, what the IMU measured at both, and the scale in metres.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "drone/metric_scale.h"
-#include "result.h"
-#include "session.h"
+#include "pair/result.h"
+#include "pair/session.h"
+#include "recording/metric_scale.h"
 
 namespace cli {
 
@@ -26,7 +26,7 @@ struct RecordedFlight {
 // Plays the whole recording once. Throws BadInput where there is none, or no picture in it.
 RecordedFlight read_flight(const std::string& folder);
 
-// Two chosen frames: their pictures, and in words why these two.
+// Two chosen frames, their pictures, and the reason for the choice in words.
 struct RecordingPair {
   RecordedFrame frame[2];
   Picture picture[2];
@@ -37,9 +37,9 @@ struct RecordingPair {
 RecordingPair pair_of(const std::string& folder, const RecordedFlight& flight, int index0,
                       int index1);
 
-// Of frames with an attitude, spread over the flight, at most four seconds apart: the pair whose
-// reconstruction is believed and has the most matches that agree, those of less than three degrees
-// of parallax counting for less. `camera` is of the pictures as they are; they are shrunk as
+// Chooses among frames with an attitude that are spread over the flight and at most 4 s apart: the
+// pair with the most inliers whose verdict is ok. A pair whose median parallax is below 3 degrees
+// counts for proportionally less. `camera` is of the pictures as they are; they are shrunk as
 // `options` say. Throws BadInput when no two frames give a full pose.
 RecordingPair choose_pair(const std::string& folder, const RecordedFlight& flight,
                           const tv_camera& camera, const CameraMount& mount, Session& session,
@@ -55,7 +55,8 @@ nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFram
                                 const CameraMount& mount, const tv_two_view& two_view,
                                 bool gravity_used, const std::optional<MetricScale>& scale);
 
-// By velocity, by altitude, by the floor, each where it can tell; for a full pose.
+// The scales by velocity, by altitude and by the floor; each is empty where it cannot be measured.
+// All need a full pose.
 std::vector<std::optional<MetricScale>> scales_of(const RecordedFlight& flight,
                                                   const RecordedFrame frames[2],
                                                   const CameraMount& mount, const Outcome& outcome);

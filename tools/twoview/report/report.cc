@@ -1,10 +1,10 @@
-#include "report.h"
+#include "report/report.h"
 
 #include <cmath>
 #include <cstdio>
 
-#include "assets.h"
-#include "tables.h"
+#include "report/assets.h"
+#include "report/tables.h"
 
 namespace cli {
 namespace {

@@ -1,11 +1,11 @@
-// report.html: one file that holds all it shows.
+// report.html: one file that needs no other file and no network.
 #pragma once
 
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "result.h"
+#include "pair/result.h"
 
 namespace cli {
 

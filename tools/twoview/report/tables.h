@@ -1,10 +1,10 @@
-// CSV and PLY.
+// Tables of keypoints, matches and points as CSV, and the cloud as PLY.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "result.h"
+#include "pair/result.h"
 
 namespace cli {
 

@@ -1,14 +1,17 @@
-// twoview drone simulate: an AR.Drone 2.0 on this computer's loopback, for drivers to be tried on.
+// twoview drone simulate: a simulated AR.Drone 2.0 on this computer's loopback, to try drivers
+// with.
+
+#include "simulate/simulate.h"
 
 #include <cmath>
 #include <memory>
 #include <opencv2/imgproc.hpp>
 
-#include "camera_file.h"
+#include "base/error.h"
+#include "base/output.h"
 #include "drone/drone.h"
-#include "error.h"
-#include "image_file.h"
-#include "output.h"
+#include "files/camera_file.h"
+#include "files/image_file.h"
 #include "simulator/server.h"
 
 namespace cli {
@@ -35,12 +38,12 @@ struct Arguments {
   bool json = false, quiet = false;
 };
 
-// The lens of a real AR.Drone 2.0, about (the mean of five published calibrations).
+// Approximately the lens of an AR.Drone 2.0: the mean of five published calibrations.
 tv_camera usual_camera() {
   return {TV_CAMERA_BROWN_CONRADY, 640, 360, 0, 568, 567, 320, 180, {-0.52, 0.27, 0, 0, 0}};
 }
 
-// The images in turn, to and fro, so that the film has no jump.
+// Shows the images forwards and backwards in turn, so that the film has no jump.
 simulator::Painter film_of(const std::vector<std::string>& names) {
   auto images = std::make_shared<std::vector<cv::Mat>>();
   for (const std::string& name : names) images->push_back(load_picture(name).luma);

@@ -6,13 +6,14 @@
 #include <memory>
 #include <numeric>
 
+#include "base/error.h"
+#include "base/output.h"
 #include "calibration/pictures.h"
 #include "calibration/source.h"
-#include "camera_file.h"
-#include "error.h"
-#include "image_file.h"
-#include "output.h"
-#include "verbs.h"
+#include "files/camera_file.h"
+#include "files/image_file.h"
+#include "pair/result.h"
+#include "verbs/verbs.h"
 
 namespace cli {
 namespace {

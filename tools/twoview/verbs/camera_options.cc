@@ -1,7 +1,7 @@
-#include "camera_options.h"
+#include "verbs/camera_options.h"
 
-#include "camera_file.h"
-#include "error.h"
+#include "base/error.h"
+#include "files/camera_file.h"
 
 namespace cli {
 

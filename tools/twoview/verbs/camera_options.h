@@ -1,4 +1,4 @@
-// --camera, --camera0, --camera1: which camera file serves which image.
+// The options --camera, --camera0 and --camera1, and the camera file of each image.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -13,9 +13,11 @@ struct CameraOptions {
   std::string both, of[2];
 
   void add_to(CLI::App& verb);
-  // The file of each image; both empty without cameras. Throws BadInput for half a choice.
+  // The file of each image; both are empty without cameras. Throws BadInput when only one of
+  // --camera0 and --camera1 is given.
   std::array<std::string, 2> files() const;
-  // Of files that are not empty; one that serves both is read once, for it may be a pipe.
+  // The cameras of files(), which must not be empty. A file that serves both images is read once,
+  // since it may be a pipe.
   static std::array<tv_camera, 2> load(const std::array<std::string, 2>& files);
 };
 

@@ -3,10 +3,11 @@
 #include <cstdio>
 #include <memory>
 
-#include "output.h"
-#include "pictures.h"
-#include "tables.h"
-#include "verbs.h"
+#include "base/output.h"
+#include "pair/session.h"
+#include "pictures/pictures.h"
+#include "report/tables.h"
+#include "verbs/verbs.h"
 
 namespace cli {
 namespace {

@@ -8,12 +8,14 @@
 #include <limits>
 #include <memory>
 
-#include "camera_file.h"
-#include "error.h"
-#include "measures.h"
-#include "output.h"
-#include "pairs_file.h"
-#include "verbs.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_file.h"
+#include "files/camera_set.h"
+#include "files/pairs_file.h"
+#include "pair/measures.h"
+#include "pair/reconstruct_pair.h"
+#include "verbs/verbs.h"
 
 namespace cli {
 namespace {
@@ -41,31 +43,6 @@ struct PairReport {
   Errors errors;
 };
 
-// The camera of the image as the file has it: K of the pair's line, where it gives one, with the
-// lens of the data set's entry.
-tv_camera camera_of(const NamedCameras& cameras, const std::string& image_name,
-                    const Picture& picture, const std::array<double, 9>* K) {
-  tv_camera camera{};
-  const tv_camera* entry = nullptr;
-  if (!cameras.empty()) {
-    entry = choose_camera(cameras, image_name, K ? K->data() : nullptr);
-    if (!entry) throw BadInput("no entry of cameras.yaml fits image " + image_name);
-    require_size(*entry, "in cameras.yaml", picture.luma.cols, picture.luma.rows, image_name);
-    camera = *entry;
-  } else if (!K) {
-    throw BadInput("no camera for image " + image_name + ": no K on its line, and no cameras.yaml");
-  }
-  camera.width = picture.luma.cols;
-  camera.height = picture.luma.rows;
-  if (K) {
-    camera.fx = (*K)[0];
-    camera.cx = (*K)[2];
-    camera.fy = (*K)[4];
-    camera.cy = (*K)[5];
-  }
-  return camera;
-}
-
 // The frame of a camera that was turned by quarter turns counter-clockwise, from the one before.
 Matrix3 turn_matrix(int quarters) {
   Matrix3 turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -82,7 +59,8 @@ void load_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair
   for (int i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
     picture = load_picture((fs::path(a.images) / *names[i]).string());
-    outcome.camera[i] = camera_of(cameras, *names[i], picture, pair.has_K ? Ks[i] : nullptr);
+    outcome.camera[i] = camera_of_image(cameras, *names[i], picture.luma.cols, picture.luma.rows,
+                                        pair.has_K ? Ks[i] : nullptr);
     turn(picture, turns[i]);
     outcome.camera[i] = turned(outcome.camera[i], turns[i]);
     shrink(picture, a.common.options.resize);
@@ -101,7 +79,8 @@ void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
     report.errors.translation = translation_error_deg(t, t_true);
     report.errors.translation_signed = translation_error_signed_deg(t, t_true);
   }
-  // Of the cameras as given: it is about the matches, and the truth's pose goes with those.
+  // Precision measures the matches against the true pose, which refers to the cameras as given and
+  // not to those with a shifted principal point.
   report.json["precision"] =
       match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
 }
@@ -235,7 +214,8 @@ std::string table(const Json& report) {
          cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n";
 }
 
-// One line on the terminal's stderr that is written over and taken away at the end.
+// Progress as one line on stderr, when that is a terminal; each line replaces the one before, and
+// the last is erased.
 class Progress {
  public:
   explicit Progress(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}

@@ -4,17 +4,18 @@
 #include <cstdio>
 #include <memory>
 
-#include "camera_file.h"
-#include "camera_options.h"
-#include "canvas.h"
-#include "drone/recording_input.h"
-#include "error.h"
-#include "output.h"
-#include "pictures.h"
-#include "report.h"
-#include "tables.h"
-#include "truth.h"
-#include "verbs.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_file.h"
+#include "pair/reconstruct_pair.h"
+#include "pair/truth.h"
+#include "pictures/canvas.h"
+#include "pictures/pictures.h"
+#include "recording/recording_input.h"
+#include "report/report.h"
+#include "report/tables.h"
+#include "verbs/camera_options.h"
+#include "verbs/verbs.h"
 
 namespace cli {
 namespace {
@@ -30,7 +31,7 @@ struct Arguments {
   RecordingOptions recording;
 };
 
-// Two images or a recording, not both, not half of either.
+// Throws BadInput unless there are either two images or a recording.
 void check_inputs(const Arguments& a) {
   if (!a.recording.given()) {
     for (int i = 0; i < 2; ++i)
@@ -96,7 +97,7 @@ nlohmann::ordered_json options_of(const Arguments& a) {
   return json;
 }
 
-// Every output, in the order in which a reader wants them.
+// Makes every output, in the order of the report.
 void make_files(const Outcome& outcome, OutputSet& files) {
   const std::vector<CloudPoint> cloud = cloud_of(outcome);
   const tv_reconstruction& r = outcome.reconstruction;
@@ -133,8 +134,8 @@ void make_files(const Outcome& outcome, OutputSet& files) {
   files.add("report.html", report_html(outcome, cloud, figures));
 }
 
-// Standard deviations of a pose: the root of half the trace of each block would be per axis; a
-// reader wants the whole angle, so the root of the trace.
+// Standard deviations of a pose. Each is the root of the trace of its block of the covariance, so
+// that of the whole angle and not that about one axis.
 std::string uncertainty_line(const tv_two_view& v) {
   const double* c = v.covariance;
   return summary_line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
@@ -142,7 +143,7 @@ std::string uncertainty_line(const tv_two_view& v) {
                       std::sqrt(c[18] + c[24]) * 180 / M_PI);
 }
 
-// Empty where the camera is as its file says.
+// Reports the shift of the principal point; empty without a shift.
 std::string camera_line(const tv_two_view& v) {
   const double* shift = v.principal_point_shift;
   if (shift[0] == 0 && shift[1] == 0) return "";

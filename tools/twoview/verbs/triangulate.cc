@@ -5,13 +5,13 @@
 #include <filesystem>
 #include <memory>
 
-#include "camera_options.h"
-#include "error.h"
-#include "matches_file.h"
-#include "output.h"
-#include "tables.h"
-#include "truth.h"
-#include "verbs.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/matches_file.h"
+#include "pair/truth.h"
+#include "report/tables.h"
+#include "verbs/camera_options.h"
+#include "verbs/verbs.h"
 
 namespace cli {
 namespace {

@@ -5,11 +5,12 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "camera_file.h"
-#include "error.h"
-#include "image_file.h"
-#include "output.h"
-#include "verbs.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_file.h"
+#include "files/image_file.h"
+#include "pair/result.h"
+#include "verbs/verbs.h"
 
 namespace cli {
 namespace {
