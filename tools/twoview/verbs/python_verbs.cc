@@ -1,4 +1,4 @@
-#include "python_verbs.h"
+#include "verbs/python_verbs.h"
 
 #include <unistd.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace {
@@ -24,12 +24,14 @@ constexpr PythonVerb kVerbs[] = {
     {"colmap", "twoview_colmap", "COLMAP databases and models, in and out"},
 };
 
-// The folder above this program that holds tools/compare_colmap; empty where there is none.
-fs::path source_tree(const fs::path& program) {
+// What lies as in the source tree: the folder above this program that holds TWOVIEW_PYTHON_VERBS
+// (CMakeLists.txt), which is the source tree itself, or the installed share/twoview of such a
+// folder. The nearest is taken; the path is empty where there is none.
+fs::path tree_of(const fs::path& program) {
   for (fs::path folder = program.parent_path(); folder != folder.root_path();
        folder = folder.parent_path())
-    if (std::error_code none; fs::is_directory(folder / "tools" / "compare_colmap", none))
-      return folder;
+    for (const fs::path& tree : {folder, folder / TWOVIEW_DATA_DIR})
+      if (std::error_code none; fs::is_directory(tree / TWOVIEW_PYTHON_VERBS, none)) return tree;
   return {};
 }
 
@@ -41,19 +43,28 @@ std::string python_of(const fs::path& tree) {
   return access(bootstrapped.c_str(), X_OK) == 0 ? bootstrapped.string() : "python3";
 }
 
+// The package twoview runs on this program's library unless the caller named another.
+void name_library(const fs::path& program) {
+  const fs::path prefix = program.parent_path().parent_path();
+  for (const char* folder : {"lib", TWOVIEW_LIB_DIR}) {
+    const fs::path library = prefix / folder / "libtwoview.so";
+    if (std::error_code none; !fs::is_regular_file(library, none)) continue;
+    setenv("TWOVIEW_LIBRARY", library.c_str(), 0);
+    return;
+  }
+}
+
 [[noreturn]] void become(const PythonVerb& verb, int argc, char** argv) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  const fs::path tree = source_tree(program);
-  const fs::path script = tree / "tools" / "compare_colmap" / verb.script;
+  const fs::path tree = tree_of(program);
+  const fs::path script = tree / TWOVIEW_PYTHON_VERBS / verb.script;
   if (tree.empty() || !fs::is_regular_file(script, error))
-    throw BadInput(std::string(verb.name) +
-                   " is a Python program of the source tree, tools/compare_colmap/" + verb.script +
-                   ", and there is none above " + program.string());
-
-  // The package twoview runs on this program's library unless the caller named another.
-  const fs::path library = program.parent_path().parent_path() / "lib" / "libtwoview.so";
-  if (fs::is_regular_file(library, error)) setenv("TWOVIEW_LIBRARY", library.c_str(), 0);
+    throw BadInput(
+        std::string(verb.name) + " is a Python program, " TWOVIEW_PYTHON_VERBS "/" + verb.script +
+        " of the source tree or of an installed " TWOVIEW_DATA_DIR ", and there is none above " +
+        program.string());
+  name_library(program);
 
   std::string python = python_of(tree), path = script.string();
   std::vector<char*> arguments{python.data(), path.data()};

@@ -1,4 +1,5 @@
-// The verbs that are Python programs of the source tree: tools/compare_colmap.
+// The verbs that are Python programs: compare and colmap. They are found in the source tree, and
+// below share/twoview once the program is installed.
 #pragma once
 
 #include <CLI/App.hpp>
