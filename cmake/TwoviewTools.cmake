@@ -12,8 +12,11 @@ foreach(package OpenCV yaml-cpp CLI11 nlohmann_json)
 endforeach()
 
 if(NOT missing)
-  add_subdirectory(${PROJECT_SOURCE_DIR}/tools/room ${PROJECT_BINARY_DIR}/tools/room)
-  if(TARGET ardrone_encode AND TARGET PkgConfig::LIBAV)
+  # Only `drone simulate` and the tests of flights need these two.
+  if(NOT TWOVIEW_SIMULATOR)
+    message(STATUS "The drone's simulator is not built: TWOVIEW_SIMULATOR is OFF")
+  elseif(TARGET ardrone_encode AND TARGET PkgConfig::LIBAV)
+    add_subdirectory(${PROJECT_SOURCE_DIR}/tools/room ${PROJECT_BINARY_DIR}/tools/room)
     add_subdirectory(${PROJECT_SOURCE_DIR}/tools/simulator ${PROJECT_BINARY_DIR}/tools/simulator)
   else()
     message(STATUS "The drone's simulator is not built; not found: libavcodec, libavutil")

@@ -38,6 +38,29 @@ CODECS = {f"drivers/ardrone/{stem}" for stem in (
     "navdata_layout.h", "pave.c", "pilot.c")}
 CODEC_BANNED = re.compile(
     r"^(sys|arpa|netinet)/|^(stdlib|stdio|time|unistd|poll|netdb|errno)\.h$")
+# The rooms of tools/twoview and the rooms that each may include; main.cc may include all of them.
+# tools/twoview/README.md says what they hold.
+ROOMS = {
+    "base": set(),
+    "files": {"base"},
+    "pair": {"files", "base"},
+    "pictures": {"pair", "files", "base"},
+    "report": {"pictures", "pair", "files", "base"},
+    "calibration": {"pictures", "files", "base"},
+    "recording": {"pair", "files", "base"},
+    "verbs": {"recording", "calibration", "report", "pictures", "pair", "files", "base"},
+    "drone": {"recording", "files", "base"},
+    "simulate": {"drone", "files", "base"},
+    "sources": {"base"},
+}
+# How a verb is added and run is the one header of `verbs` that the drone's verbs share.
+ROOM_HEADERS = {"drone": {"verbs/common.h"}, "simulate": {"verbs/common.h"}}
+# What lies outside tools/twoview, and the rooms that may include it.
+OUTSIDE_ROOMS = {
+    "simulator": {"simulate"},
+    "room": {"simulate"},
+    "twoview_drivers": {"recording", "drone", "simulate", "sources"},
+}
 SUFFIXES = {".c", ".cc", ".cpp", ".h", ".hpp"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 
@@ -154,6 +177,57 @@ def find_circles(files):
     return list(circles.values())
 
 
+def room_offences(files):
+    """Offences against ROOMS, in tools/twoview."""
+    folder = "tools/twoview/"
+    for name, headers in files.items():
+        if not name.startswith(folder):
+            continue
+        room = name[len(folder):].rpartition("/")[0]
+        if room not in ROOMS and name != folder + "main.cc":
+            yield f"{name}: not in a room; the rooms of {folder} are {', '.join(ROOMS)}"
+            continue
+        for header in headers:
+            target = header.split("/")[0]
+            if header.startswith(".") or room and lies_beside(name, header, files):
+                yield f"{name}: {header}: write includes from {folder}, room first"
+            elif not room or header in ROOM_HEADERS.get(room, ()):
+                continue
+            elif "/" in header and target in ROOMS and target not in ROOMS[room] | {room}:
+                yield f"{name}: room {room} may not include {header}"
+            elif target in OUTSIDE_ROOMS and room not in OUTSIDE_ROOMS[target]:
+                yield f"{name}: room {room} may not include {header}"
+
+
+def rooms_self_check():
+    """Each rule about rooms must catch an example that breaks it."""
+    good = {
+        "tools/twoview/main.cc": ["verbs/verbs.h", "drone/drone.h", "simulate/simulate.h"],
+        "tools/twoview/base/error.h": ["string", "twoview/status.h"],
+        "tools/twoview/files/image_file.h": ["base/error.h"],
+        "tools/twoview/files/image_file.cc": ["files/image_file.h"],
+        "tools/twoview/drone/drone.h": ["verbs/common.h", "twoview_drivers/source.h"],
+        "tools/twoview/simulate/simulate.cc": ["simulator/server.h", "drone/drone.h"],
+    }
+    assert not list(room_offences(good)), list(room_offences(good))
+    for name, header in [
+        ("tools/twoview/base/error.h", "files/image_file.h"),
+        ("tools/twoview/files/image_file.cc", "verbs/verbs.h"),
+        ("tools/twoview/files/image_file.cc", "image_file.h"),
+        ("tools/twoview/files/image_file.cc", "../base/error.h"),
+        ("tools/twoview/files/image_file.cc", "twoview_drivers/source.h"),
+        ("tools/twoview/drone/drone.h", "verbs/verbs.h"),
+        ("tools/twoview/drone/drone.h", "simulator/server.h"),
+        ("tools/twoview/drone/drone.h", "simulate/simulate.h"),
+        ("tools/twoview/drone/drone.h", "room/room.h"),
+        ("tools/twoview/flat.cc", "string"),
+        ("tools/twoview/attic/old.cc", "string"),
+    ]:
+        bad = {file: list(headers) for file, headers in good.items()}
+        bad.setdefault(name, []).append(header)
+        assert list(room_offences(bad)), f"the check misses {name} including {header}"
+
+
 def lies_beside(name, header, files):
     return f"{name.rsplit('/', 1)[0]}/{header}" in files
 
@@ -215,10 +289,11 @@ def self_check():
 
 def main():
     self_check()
+    rooms_self_check()
     files = read_includes(Path(sys.argv[1]))
     if not any(name.startswith("lib/src/") for name in files):
         sys.exit(f"no sources under {sys.argv[1]}/lib/src")
-    found = list(offences(files))
+    found = [*offences(files), *room_offences(files)]
     for offence in found:
         print(offence)
     print(f"{len(files)} files, {len(found)} offences")

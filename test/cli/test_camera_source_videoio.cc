@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "error.h"
+#include "base/error.h"
 #include "sources/camera_source.h"
 
 using cli::CameraSource;

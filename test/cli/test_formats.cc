@@ -9,9 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "camera_file.h"
-#include "error.h"
-#include "pairs_file.h"
+#include "base/error.h"
+#include "files/camera_file.h"
+#include "files/camera_set.h"
+#include "files/pairs_file.h"
 
 // After all others: it defines isnan and isinf as macros.
 #include "unity.h"

@@ -1,7 +1,7 @@
 // Metres from velocity, altitude and floor: flights whose truth is known in closed form.
 #include <cmath>
 
-#include "drone/metric_scale.h"
+#include "recording/metric_scale.h"
 
 #include <unity.h>  // last: its macros take isnan and isinf
 

@@ -5,16 +5,17 @@
 #include <cstring>
 #include <limits>
 
-#include "camera_file.h"
-#include "canvas.h"
-#include "error.h"
-#include "image_header.h"
-#include "matches_file.h"
-#include "measures.h"
-#include "options.h"
-#include "pairs_file.h"
-#include "report.h"
-#include "tables.h"
+#include "base/error.h"
+#include "files/camera_file.h"
+#include "files/camera_set.h"
+#include "files/image_header.h"
+#include "files/matches_file.h"
+#include "files/pairs_file.h"
+#include "pair/measures.h"
+#include "pair/options.h"
+#include "pictures/canvas.h"
+#include "report/report.h"
+#include "report/tables.h"
 
 // After all others: it defines isnan and isinf as macros.
 #include "unity.h"
@@ -155,6 +156,33 @@ void test_the_longest_name_that_begins_the_files_name_serves_it() {
   TEST_ASSERT_EQUAL_DOUBLE(0, chosen_fx("left.png", 2, 1));
 }
 
+void test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size() {
+  const NamedCameras cameras = parse_camera_set(
+      "cam: {image_width: 8, image_height: 6, fx: 1, fy: 1, cx: 1, cy: 1, k1: 0.1}\n", "c");
+  const std::array<double, 9> K = {9, 0, 4, 0, 7, 3, 0, 0, 1};
+  const tv_camera camera = camera_of_image(cameras, "a.png", 8, 6, &K);
+  TEST_ASSERT_EQUAL_DOUBLE(9, camera.fx);
+  TEST_ASSERT_EQUAL_DOUBLE(7, camera.fy);
+  TEST_ASSERT_EQUAL_DOUBLE(4, camera.cx);
+  TEST_ASSERT_EQUAL_DOUBLE(3, camera.cy);
+  TEST_ASSERT_EQUAL_DOUBLE(0.1, camera.k[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(1, camera_of_image(cameras, "a.png", 8, 6, nullptr).fx);
+  const tv_camera pinhole = camera_of_image({}, "a.png", 8, 6, &K);
+  TEST_ASSERT_EQUAL_INT(TV_CAMERA_PINHOLE, pinhole.model);
+  TEST_ASSERT_EQUAL_INT(8, pinhole.width);
+  const auto is_refused = [&](const NamedCameras& set, int width, const auto* of_line) {
+    try {
+      camera_of_image(set, "a.png", width, 6, of_line);
+    } catch (const BadInput&) {
+      return true;
+    }
+    return false;
+  };
+  const std::array<double, 9>* const none = nullptr;
+  TEST_ASSERT_TRUE(is_refused(cameras, 9, &K));  // of another size
+  TEST_ASSERT_TRUE(is_refused({}, 8, none));     // neither an entry nor K
+}
+
 // How many pairs a text holds, or minus the length of the refusal.
 int parsed_pairs(const std::string& text) {
   try {
@@ -285,6 +313,7 @@ int main() {
   RUN_TEST(test_a_turned_camera_sees_the_turned_point_at_the_turned_pixel);
   RUN_TEST(test_camera_files_give_the_numbers_and_the_model);
   RUN_TEST(test_the_longest_name_that_begins_the_files_name_serves_it);
+  RUN_TEST(test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size);
   RUN_TEST(test_pairs_lines_have_two_four_twenty_two_or_thirty_eight_fields);
   RUN_TEST(test_headers_are_read_within_their_bytes);
   RUN_TEST(test_base64_has_the_vectors_of_rfc_4648);

@@ -6,9 +6,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "measures.h"
-#include "pictures.h"
-#include "result.h"
+#include "pair/measures.h"
+#include "pair/result.h"
+#include "pictures/pictures.h"
 
 // After all others: it defines isnan and isinf as macros.
 #include "unity.h"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview compare and twoview colmap: the hand-over to the Python programs of the source tree."""
+"""twoview compare and twoview colmap: the hand-over to the Python programs, of the source tree or installed."""
 import json
 import os
 import shutil
@@ -68,6 +68,18 @@ class HandOver(cli.CliTest):
         self.assertEqual(self.start("colmap", PATH=path).stdout, f"{venv}\n".encode())
         (venv / "python").unlink()
         self.assertEqual(self.start("colmap", PATH=path).stdout, f"{on_path}\n".encode())
+
+    def test_an_installed_program_takes_those_of_its_share_folder(self):
+        share = self.tree / "share" / "twoview"
+        share.mkdir(parents=True)
+        (self.tree / "tools").rename(share / "tools")
+        (self.tree / "bin").mkdir()
+        (self.tree / "lib").mkdir()
+        library = self.tree / "lib" / "libtwoview.so"
+        library.touch()
+        self.program = shutil.copy(self.program, self.tree / "bin" / "twoview")
+        got = self.report(self.start("compare", "x", TWOVIEW_PYTHON=sys.executable))
+        self.assertEqual((got["argv"], got["library"]), (["x"], str(library)))
 
     def test_what_is_missing_is_one_line(self):
         self.assert_refused(self.start("colmap", TWOVIEW_PYTHON="/no/python"), "/no/python")

@@ -9,15 +9,15 @@
 #include <iterator>
 #include <vector>
 
-#include "camera_file.h"
-#include "drone/recording.h"
-#include "drone/recording_pair.h"
+#include "base/error.h"
 #include "encode.h"
-#include "error.h"
+#include "files/camera_file.h"
+#include "pair/reconstruct_pair.h"
+#include "recording/recording.h"
+#include "recording/recording_pair.h"
 #include "room/room.h"
 #include "simulator/film.h"
 #include "simulator/firmware.h"
-#include "verbs.h"
 
 #include <unity.h>  // last: its macros take isnan and isinf
 

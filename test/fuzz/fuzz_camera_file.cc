@@ -1,8 +1,9 @@
 // Camera files and cameras.yaml: any text is a camera that the library takes, or BadInput.
 #include <string>
 
-#include "camera_file.h"
-#include "error.h"
+#include "base/error.h"
+#include "files/camera_file.h"
+#include "files/camera_set.h"
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

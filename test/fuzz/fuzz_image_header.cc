@@ -2,8 +2,8 @@
 #include <iterator>
 #include <string>
 
+#include "files/image_header.h"
 #include "fuzz.h"
-#include "image_header.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace std::string_literals;

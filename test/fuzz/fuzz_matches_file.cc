@@ -1,9 +1,9 @@
 // Tables of matches: any text is a list of matches, or BadInput.
 #include <string>
 
-#include "error.h"
+#include "base/error.h"
+#include "files/matches_file.h"
 #include "fuzz.h"
-#include "matches_file.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   try {

@@ -1,9 +1,9 @@
 // PAIRS.txt: any text is a list of pairs, or BadInput.
 #include <string>
 
-#include "error.h"
+#include "base/error.h"
+#include "files/pairs_file.h"
 #include "fuzz.h"
-#include "pairs_file.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   try {

@@ -9,12 +9,24 @@
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
-#include "error.h"
-#include "output.h"
-#include "python_verbs.h"
-#include "verbs.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "verbs/python_verbs.h"
+#include "verbs/verbs.h"
+#ifdef TWOVIEW_HAS_DRONE
+#include "drone/drone.h"
+#endif
+#ifdef TWOVIEW_HAS_SIMULATOR
+#include "simulate/simulate.h"
+#endif
 
 namespace {
+
+#ifdef TWOVIEW_HAS_SIMULATOR
+constexpr cli::AddDroneVerb kAddSimulate = cli::add_drone_simulate;
+#elif defined(TWOVIEW_HAS_DRONE)
+constexpr cli::AddDroneVerb kAddSimulate = nullptr;
+#endif
 
 // One line, whatever the message holds.
 int refuse(std::string message) {
@@ -37,7 +49,7 @@ int run_program(int argc, char** argv) {
   cli::add_calibrate(program, run);
   cli::add_evaluate(program, run);
 #ifdef TWOVIEW_HAS_DRONE
-  cli::add_drone(program, run);
+  cli::add_drone(program, run, kAddSimulate);
 #endif
   cli::add_python_verbs(program);
   const auto verbs = program.get_subcommands([](const CLI::App*) { return true; });

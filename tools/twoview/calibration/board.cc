@@ -15,7 +15,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "canvas.h"
+#include "pictures/canvas.h"
 
 namespace cli {
 namespace {

@@ -1,4 +1,4 @@
-// What a calibration looks like.
+// Pictures of a calibration: the boards found, the coverage of the image, the residuals.
 #pragma once
 
 #include "calibration/solve.h"
@@ -12,7 +12,7 @@ cv::Mat detections_picture(const std::vector<BoardView>& views, const Board& boa
 cv::Mat coverage_picture(const std::vector<BoardView>& views, const Board& board,
                          const Calibration& calibration);
 
-// What the camera leaves unexplained: all residuals, where in the image they lie, and by view.
+// The residuals of the camera: all of them, by place in the image, and by view.
 cv::Mat residuals_picture(const std::vector<BoardView>& views, const Calibration& calibration);
 
 }  // namespace cli

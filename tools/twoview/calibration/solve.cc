@@ -5,7 +5,7 @@
 #include <numeric>
 #include <opencv2/calib3d.hpp>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace {

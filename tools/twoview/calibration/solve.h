@@ -19,7 +19,7 @@ const char* lens_name(Lens lens);
 // "k1" and so on, in the order of tv_camera's k.
 std::vector<std::string> distortion_names(Lens lens);
 
-// One view's pose and what is left over.
+// One view's pose and residuals.
 struct ViewFit {
   size_t view = 0;  // index among the views
   double rms_px = 0;
@@ -46,7 +46,7 @@ constexpr int kMinViews = 3, kCells = 8;
 Calibration calibrate_camera(std::vector<BoardView>& views, const Board& board, cv::Size image,
                              Lens lens);
 
-// Why the answer is not to be trusted, if so.
+// A reason for not trusting the camera.
 struct Warning {
   std::string name;   // "few_views"
   std::string words;  // with the number and what to do

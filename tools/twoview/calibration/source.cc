@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "error.h"
-#include "image_file.h"
-#include "output.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "files/image_file.h"
 
 namespace cli {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <memory>
 
+#include "base/error.h"
+#include "base/output.h"
 #include "drone/keyboard.h"
 #include "drone/link.h"
-#include "error.h"
-#include "output.h"
 
 namespace cli {
 namespace {

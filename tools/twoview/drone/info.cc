@@ -3,14 +3,14 @@
 #include <memory>
 #include <optional>
 
+#include "base/error.h"
+#include "base/output.h"
 #include "drone/link.h"
-#include "error.h"
-#include "output.h"
 
 namespace cli {
 namespace {
 
-constexpr double kPatienceS = 10;  // until no answer is an answer
+constexpr double kPatienceS = 10;  // seconds without an answer until it gives up
 
 struct Arguments {
   DroneAddress address;

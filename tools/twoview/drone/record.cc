@@ -3,10 +3,10 @@
 #include <memory>
 #include <optional>
 
+#include "base/error.h"
+#include "base/output.h"
 #include "drone/link.h"
-#include "drone/recording.h"
-#include "error.h"
-#include "output.h"
+#include "recording/recording.h"
 
 namespace cli {
 namespace {
@@ -61,7 +61,7 @@ int record(const Arguments& a) {
   const auto seconds = [start] { return static_cast<double>(ardrone_now_ns() - start) * 1e-9; };
   double next_word = 0;
   Link link(a.address, options, listener);
-  recording.emplace(a.output, a.frames);  // not before the host is known to exist
+  recording.emplace(a.output, a.frames);  // after Link has checked that the host exists
   link.run(
       [&] {
         if (is_terminal && seconds() >= next_word) {

@@ -3,10 +3,11 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 
-#include "drone/link.h"
-#include "drone/recording.h"
-#include "error.h"
-#include "output.h"
+#include "base/error.h"
+#include "base/output.h"
+#include "drone/drone.h"
+#include "recording/playback.h"
+#include "recording/recording.h"
 
 namespace cli {
 namespace {

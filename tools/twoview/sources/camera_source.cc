@@ -9,7 +9,7 @@
 #include <opencv2/videoio.hpp>
 #include <thread>
 
-#include "error.h"
+#include "base/error.h"
 
 namespace cli {
 namespace {

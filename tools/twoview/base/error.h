@@ -1,0 +1,26 @@
+// The exception for bad input, which main() prints as one line on stderr with exit status 2.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+#include "twoview/status.h"
+
+namespace cli {
+
+// Exit statuses, fixed by the interface.
+constexpr int kExitPose = 0;
+constexpr int kExitBadInput = 2;
+constexpr int kExitNoPose = 3;
+
+// Bad input or bad arguments. what() is the line that the user reads, without the program's name.
+struct BadInput : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// Throws BadInput with the library's own words unless status is TV_OK.
+inline void check(tv_status status, const std::string& what) {
+  if (status != TV_OK) throw BadInput(what + ": " + tv_status_string(status));
+}
+
+}  // namespace cli

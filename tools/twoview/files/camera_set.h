@@ -1,0 +1,33 @@
+// cameras.yaml of a data set: its cameras by name, and which of them took an image.
+#pragma once
+
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "twoview/camera.h"
+
+namespace cli {
+
+// The cameras of a set, each with the name it has there, in the file's order.
+using NamedCameras = std::vector<std::pair<std::string, tv_camera>>;
+NamedCameras load_camera_set(const std::string& path);
+NamedCameras parse_camera_set(const std::string& text, const std::string& name);
+
+// The entry of a set that serves an image. One entry serves every image. With several, it is the
+// entry whose name begins the file's name (the longest such name; folders do not count), else the
+// entry whose fx and cx equal those of K, the intrinsics on the pair's line, within one part in a
+// million. Null when none fits; BadInput where K fits entries that differ. K may be null.
+// twoview_tools.formats states the same rules, and test/formats has cases that both languages pass.
+const tv_camera* choose_camera(const NamedCameras& cameras, const std::string& image_name,
+                               const double K[9]);
+
+// The camera of an image of a set, for the pixels that its file holds: the chosen entry's lens with
+// the intrinsics of K where the pair's line gives them. `cameras` may be empty, then K makes a
+// pinhole. Throws BadInput when no entry fits, when the entry is for another size, and when there
+// is neither an entry nor K.
+tv_camera camera_of_image(const NamedCameras& cameras, const std::string& image_name, int width,
+                          int height, const std::array<double, 9>* K);
+
+}  // namespace cli

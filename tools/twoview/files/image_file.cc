@@ -1,0 +1,176 @@
+#include "files/image_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "files/image_header.h"
+
+namespace cli {
+namespace {
+
+constexpr size_t kMaxFileBytes = size_t{1} << 30;
+
+// Decoders (libpng, libjpeg, libtiff, OpenCV) write their own lines to stderr; the user gets one
+// clear line instead. While this lives, file descriptor 2 leads nowhere.
+class StderrSilence {
+ public:
+  StderrSilence() : saved_(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (saved_ >= 0 && nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+    if (nowhere >= 0) ::close(nowhere);
+  }
+  ~StderrSilence() {
+    if (saved_ < 0) return;
+    ::dup2(saved_, STDERR_FILENO);
+    ::close(saved_);
+  }
+  StderrSilence(const StderrSilence&) = delete;
+  StderrSilence& operator=(const StderrSilence&) = delete;
+
+ private:
+  int saved_;
+};
+
+std::string size_text(int64_t width, int64_t height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
+// Every pixel as the file has it. Throws BadInput.
+cv::Mat decode(const std::string& path) {
+  const std::string bytes = read_file(path, kMaxFileBytes);
+  const ImageHeader header = read_image_header(bytes);
+  const auto refuse_huge = [&](int64_t width, int64_t height) {
+    if (width > kMaxSide || height > kMaxSide)
+      throw BadInput("image " + path + " is too large: " + size_text(width, height) + ", at most " +
+                     std::to_string(kMaxSide) + " a side");
+  };
+  refuse_huge(header.width, header.height);
+  cv::Mat pixels;
+  try {
+    const StderrSilence silence;
+    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U,
+                          const_cast<char*>(bytes.data()));  // read only
+    pixels = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception&) {
+    pixels.release();
+  }
+  if (header.truncated) throw BadInput("image " + path + " is truncated");
+  if (pixels.empty())
+    throw BadInput("image " + path +
+                   (header.width > 0 ? " is damaged" : " is no image that can be read"));
+  refuse_huge(pixels.cols, pixels.rows);
+  return pixels;
+}
+
+// round(v / 257): 0 to 0 and 65535 to 255, exactly.
+cv::Mat to_8_bits(const cv::Mat& pixels) {
+  cv::Mat result(pixels.size(), CV_MAKETYPE(CV_8U, pixels.channels()));
+  const int count = pixels.cols * pixels.channels();
+  for (int y = 0; y < pixels.rows; ++y) {
+    const uint16_t* from = pixels.ptr<uint16_t>(y);
+    uint8_t* to = result.ptr<uint8_t>(y);
+    for (int i = 0; i < count; ++i) to[i] = static_cast<uint8_t>((from[i] + 128) / 257);
+  }
+  return result;
+}
+
+}  // namespace
+
+tv_image Picture::view() const {
+  return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};
+}
+
+cv::Mat load_pixels(const std::string& path) {
+  const cv::Mat pixels = decode(path);
+  if (pixels.depth() != CV_8U && pixels.depth() != CV_16U)
+    throw BadInput("image " + path + " has samples that are not 8 or 16 bits");
+  const int channels = pixels.channels();
+  if (channels != 1 && channels != 3 && channels != 4)
+    throw BadInput("image " + path + " has " + std::to_string(channels) + " channels");
+  return pixels;
+}
+
+Picture load_picture(const std::string& path) {
+  cv::Mat pixels = load_pixels(path);
+  if (pixels.depth() == CV_16U) pixels = to_8_bits(pixels);
+  Picture picture;
+  picture.path = path;
+  picture.name = std::filesystem::path(path).filename().string();
+  switch (pixels.channels()) {
+    case 1:
+      picture.luma = pixels;
+      cv::cvtColor(pixels, picture.colour, cv::COLOR_GRAY2BGR);
+      break;
+    case 4: {
+      cv::Mat opaque;
+      cv::cvtColor(pixels, opaque, cv::COLOR_BGRA2BGR);
+      pixels = opaque;
+      [[fallthrough]];
+    }
+    default: picture.colour = pixels; cv::cvtColor(pixels, picture.luma, cv::COLOR_BGR2GRAY);
+  }
+  picture.file_width = pixels.cols;
+  picture.file_height = pixels.rows;
+  return picture;
+}
+
+void shrink(Picture& picture, int longer) {
+  const int width = picture.luma.cols, height = picture.luma.rows;
+  if (longer <= 0 || std::max(width, height) <= longer) return;
+  const double scale = static_cast<double>(longer) / std::max(width, height);
+  const cv::Size size(std::max(1, static_cast<int>(std::lround(width * scale))),
+                      std::max(1, static_cast<int>(std::lround(height * scale))));
+  cv::Mat luma, colour;
+  cv::resize(picture.luma, luma, size, 0, 0, cv::INTER_AREA);
+  cv::resize(picture.colour, colour, size, 0, 0, cv::INTER_AREA);
+  picture.luma = luma;
+  picture.colour = colour;
+}
+
+void turn(Picture& picture, int quarters) {
+  constexpr cv::RotateFlags turns[] = {cv::ROTATE_90_COUNTERCLOCKWISE, cv::ROTATE_180,
+                                       cv::ROTATE_90_CLOCKWISE};
+  quarters &= 3;
+  if (quarters == 0) return;
+  cv::Mat luma, colour;
+  cv::rotate(picture.luma, luma, turns[quarters - 1]);
+  cv::rotate(picture.colour, colour, turns[quarters - 1]);
+  picture.luma = luma;
+  picture.colour = colour;
+  if (quarters & 1) std::swap(picture.file_width, picture.file_height);
+}
+
+cv::Mat load_depth(const std::string& path) {
+  const cv::Mat depth = decode(path);
+  if (depth.type() != CV_32F)
+    throw BadInput("depth map " + path + " is not one 32-bit float a pixel");
+  return depth;
+}
+
+namespace {
+
+std::string encoded(const cv::Mat& picture, const char* kind, const std::vector<int>& parameters) {
+  std::vector<uchar> bytes;
+  if (!cv::imencode(kind, picture, bytes, parameters))
+    throw BadInput("cannot encode a picture as " + std::string(kind + 1));
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace
+
+std::string png_bytes(const cv::Mat& picture) {
+  return encoded(picture, ".png", {cv::IMWRITE_PNG_COMPRESSION, 4});
+}
+
+std::string jpeg_bytes(const cv::Mat& picture) {
+  return encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 88});
+}
+
+}  // namespace cli

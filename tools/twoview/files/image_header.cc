@@ -1,0 +1,133 @@
+#include "files/image_header.h"
+
+#include <cctype>
+
+namespace cli {
+namespace {
+
+using Bytes = std::string_view;
+
+// Little or big endian unsigned integers; 0 beyond the end.
+uint64_t number(Bytes bytes, size_t at, int count, bool big_endian) {
+  uint64_t value = 0;
+  if (at > bytes.size() || bytes.size() - at < static_cast<size_t>(count)) return 0;
+  for (int i = 0; i < count; ++i) {
+    const int place = big_endian ? i : count - 1 - i;
+    value = value << 8 | static_cast<uint8_t>(bytes[at + static_cast<size_t>(place)]);
+  }
+  return value;
+}
+
+bool starts_with(Bytes bytes, Bytes start) { return bytes.substr(0, start.size()) == start; }
+
+ImageHeader read_png(Bytes bytes) {
+  ImageHeader header;
+  header.width = static_cast<int64_t>(number(bytes, 16, 4, true));
+  header.height = static_cast<int64_t>(number(bytes, 20, 4, true));
+  header.truncated = true;
+  for (size_t at = 8; at + 12 <= bytes.size();) {  // chunks: length, type, data, checksum
+    const uint64_t length = number(bytes, at, 4, true);
+    if (length > bytes.size() - at - 12) break;
+    if (bytes.substr(at + 4, 4) == "IEND") header.truncated = false;
+    at += static_cast<size_t>(length) + 12;
+  }
+  return header;
+}
+
+ImageHeader read_jpeg(Bytes bytes) {
+  ImageHeader header;
+  header.truncated = true;
+  size_t at = 2;
+  while (at + 4 <= bytes.size()) {
+    if (bytes[at] != '\xff') return header;
+    const auto marker = static_cast<uint8_t>(bytes[at + 1]);
+    if (marker == 0xff) {  // fill byte
+      ++at;
+      continue;
+    }
+    const bool is_size =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    if (is_size) {
+      header.height = static_cast<int64_t>(number(bytes, at + 5, 2, true));
+      header.width = static_cast<int64_t>(number(bytes, at + 7, 2, true));
+    }
+    if (marker == 0xda) {  // scans follow, up to the end-of-image marker
+      header.truncated = bytes.find("\xff\xd9", at) == Bytes::npos;
+      return header;
+    }
+    at += 2 + static_cast<size_t>(number(bytes, at + 2, 2, true));
+  }
+  return header;
+}
+
+ImageHeader read_bmp(Bytes bytes) {
+  ImageHeader header;
+  const bool is_core = number(bytes, 14, 4, false) == 12;
+  const int count = is_core ? 2 : 4;
+  header.width = static_cast<int64_t>(number(bytes, 18, count, false));
+  header.height =
+      static_cast<int64_t>(number(bytes, 18 + static_cast<size_t>(count), count, false));
+  if (!is_core && header.height > INT32_MAX) header.height = (int64_t{1} << 32) - header.height;
+  return header;
+}
+
+ImageHeader read_pnm(Bytes bytes) {
+  ImageHeader header;
+  size_t at = 2;
+  int64_t values[3] = {0, 0, 1};  // width, height, largest sample
+  const char kind = bytes[1];
+  const int count = kind == '1' || kind == '4' ? 2 : 3;
+  for (int i = 0; i < count; ++i) {
+    const auto is_space = [&] { return std::isspace(static_cast<unsigned char>(bytes[at])) != 0; };
+    while (at < bytes.size() && (is_space() || bytes[at] == '#')) {
+      if (bytes[at] == '#')
+        while (at < bytes.size() && bytes[at] != '\n') ++at;
+      else
+        ++at;
+    }
+    values[i] = 0;
+    while (at < bytes.size() && std::isdigit(static_cast<unsigned char>(bytes[at])) != 0 &&
+           values[i] < INT32_MAX)
+      values[i] = values[i] * 10 + (bytes[at++] - '0');
+  }
+  header.width = values[0];
+  header.height = values[1];
+  const int64_t sample = values[2] > 255 ? 2 : 1;
+  const size_t have = bytes.size() - (at < bytes.size() ? at + 1 : at);
+  if (header.width > INT32_MAX || header.height > INT32_MAX) return header;
+  const double pixels = static_cast<double>(header.width) * static_cast<double>(header.height);
+  if (kind == '4') header.truncated = static_cast<double>(have) * 8 < pixels;
+  if (kind == '5') header.truncated = static_cast<double>(have) < pixels * sample;
+  if (kind == '6') header.truncated = static_cast<double>(have) < pixels * 3 * sample;
+  return header;
+}
+
+ImageHeader read_tiff(Bytes bytes) {
+  ImageHeader header;
+  const bool big = bytes[0] == 'M';
+  const size_t directory = static_cast<size_t>(number(bytes, 4, 4, big));
+  const uint64_t count = number(bytes, directory, 2, big);
+  for (uint64_t i = 0; i < count; ++i) {
+    const size_t at = directory + 2 + static_cast<size_t>(i) * 12;
+    const uint64_t tag = number(bytes, at, 2, big);
+    const int width = number(bytes, at + 2, 2, big) == 3 ? 2 : 4;  // SHORT or LONG
+    const auto value = static_cast<int64_t>(number(bytes, at + 8, width, big));
+    if (tag == 256) header.width = value;
+    if (tag == 257) header.height = value;
+  }
+  return header;
+}
+
+}  // namespace
+
+ImageHeader read_image_header(std::string_view bytes) {
+  if (bytes.size() < 8) return {};
+  if (starts_with(bytes, "\x89PNG\r\n\x1a\n")) return read_png(bytes);
+  if (starts_with(bytes, "\xff\xd8\xff")) return read_jpeg(bytes);
+  if (starts_with(bytes, "BM")) return read_bmp(bytes);
+  if (bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6') return read_pnm(bytes);
+  if (starts_with(bytes, {"II*\0", 4}) || starts_with(bytes, {"MM\0*", 4})) return read_tiff(bytes);
+  return {};
+}
+
+}  // namespace cli

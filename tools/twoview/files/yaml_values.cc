@@ -1,0 +1,168 @@
+#include "files/yaml_values.h"
+
+#include <yaml-cpp/eventhandler.h>
+
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "base/error.h"
+
+namespace cli {
+namespace {
+
+// Strict but for a leading plus and a trailing point ("0."), which OpenCV writes; YAML's and
+// OpenCV's words for NaN and infinity are read as what they mean.
+bool read_number(std::string text, double& value) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (!text.empty() && text[0] == '+') {
+    text.erase(0, 1);
+    if (!text.empty() && text[0] == '-') return false;
+  }
+  const std::string bare = !text.empty() && text[0] == '-' ? text.substr(1) : text;
+  if (bare == ".nan" || bare == "nan") return value = NAN, true;
+  if (bare == ".inf" || bare == "inf") return value = INFINITY, true;
+  const char* const end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  return result.ec == std::errc() && result.ptr == end;
+}
+
+double finite(const YAML::Node& node, const std::string& entry, const std::string& file) {
+  double value = 0;
+  if (!node.IsScalar() || !read_number(node.Scalar(), value))
+    throw BadInput(file + ": " + entry + " is not a number");
+  if (!std::isfinite(value)) throw BadInput(file + ": " + entry + " is not finite");
+  return value;
+}
+
+// Refuses what YAML::Load lets pass: a name that a map has twice (it would take the first), and
+// aliases, with which a small file can stand for endless numbers.
+class StrictReader : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { value(mark, "~"); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    refuse(mark, "aliases are not supported");
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                const std::string& text) override {
+    value(mark, text);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    value(mark, "");
+    levels_.push_back({});
+  }
+  void OnSequenceEnd() override { levels_.pop_back(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    value(mark, "");
+    levels_.push_back({true, true, {}});
+  }
+  void OnMapEnd() override { levels_.pop_back(); }
+
+ private:
+  struct Level {
+    bool is_map = false, name_is_next = false;
+    std::set<std::string> names;
+  };
+
+  // A map's items are a name and a value in turn.
+  void value(const YAML::Mark& mark, const std::string& text) {
+    if (levels_.empty() || !levels_.back().is_map) return;
+    Level& level = levels_.back();
+    if (level.name_is_next && !level.names.insert(text).second)
+      refuse(mark, text + " is given twice");
+    level.name_is_next = !level.name_is_next;
+  }
+  [[noreturn]] static void refuse(const YAML::Mark& mark, const std::string& why) {
+    throw YAML::ParserException(mark, why);
+  }
+
+  std::vector<Level> levels_;
+};
+
+YAML::Node find(const YAML::Node& map, const std::string& entry, const std::string& file) {
+  const YAML::Node node = map[entry];
+  if (!node || node.IsNull()) throw BadInput(file + ": " + entry + " is missing");
+  return node;
+}
+
+void append(const YAML::Node& list, const std::string& entry, const std::string& file,
+            std::vector<double>& values) {
+  size_t index = 0;
+  for (const YAML::Node& item : list) {
+    const std::string name = entry + "[" + std::to_string(index++) + "]";
+    if (item.IsSequence())
+      append(item, name, file, values);
+    else
+      values.push_back(finite(item, name, file));
+  }
+}
+
+}  // namespace
+
+YAML::Node parse_yaml(const std::string& text, const std::string& file) {
+  std::string body = text;
+  if (body.compare(0, 3, "\xef\xbb\xbf") == 0) body.erase(0, 3);
+  // "%YAML:1.0" is a comment of the same length to us, so that line numbers stay.
+  if (body.compare(0, 6, "%YAML:") == 0) body[0] = '#';
+  YAML::Node root;
+  try {
+    std::istringstream stream(body);
+    StrictReader reader;
+    YAML::Parser(stream).HandleNextDocument(reader);
+    root = YAML::Load(body);
+  } catch (const YAML::Exception& e) {
+    const std::string where =
+        e.mark.is_null() ? "" : "line " + std::to_string(e.mark.line + 1) + ": ";
+    throw BadInput(file + ": " + where + e.msg);
+  }
+  if (!root.IsMap()) throw BadInput(file + ": no YAML map of names and values");
+  return root;
+}
+
+double number_at(const YAML::Node& map, const std::string& entry, const std::string& file) {
+  return finite(find(map, entry, file), entry, file);
+}
+
+int32_t side_at(const YAML::Node& map, const std::string& entry, const std::string& file) {
+  const double value = number_at(map, entry, file);
+  if (value == 0) throw BadInput(file + ": " + entry + " is 0");
+  if (value != std::floor(value) || value < 1 || value > 1e6)
+    throw BadInput(file + ": " + entry + " is not a number of pixels");
+  return static_cast<int32_t>(value);
+}
+
+void require_focal(double value, const std::string& entry, const std::string& file) {
+  if (value == 0) throw BadInput(file + ": " + entry + " is 0");
+  if (value < 0) throw BadInput(file + ": " + entry + " is negative");
+}
+
+std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,
+                               const std::string& file) {
+  const YAML::Node node = find(map, entry, file);
+  YAML::Node list = node;
+  if (node.IsMap()) {
+    const YAML::Node data = node["data"];
+    if (!data) throw BadInput(file + ": " + entry + " has no data");
+    list.reset(data);
+  }
+  if (!list.IsSequence()) throw BadInput(file + ": " + entry + " is not a list of numbers");
+  std::vector<double> values;
+  append(list, entry, file, values);
+  if (node.IsMap() && node["rows"] && node["cols"]) {
+    const double rows = number_at(node, "rows", file + ": " + entry);
+    const double cols = number_at(node, "cols", file + ": " + entry);
+    if (rows * cols != static_cast<double>(values.size()))
+      throw BadInput(file + ": " + entry + " has " + std::to_string(values.size()) +
+                     " numbers, not rows x cols = " + node["rows"].Scalar() + " x " +
+                     node["cols"].Scalar());
+  }
+  return values;
+}
+
+}  // namespace cli

@@ -1,0 +1,294 @@
+#include "pair/options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "base/error.h"
+
+namespace cli {
+namespace {
+
+// Names of an enumeration whose values count up from 0.
+using Names = std::vector<std::string>;
+
+const Names kOrientations = {"upright", "gradient"};
+const Names kDescriptors = {"sift", "rootsift"};
+const Names kMethods = {"five-point", "eight-point", "seven-point", "upright"};
+const Names kKernels = {"auto", "c", "sse2", "avx2", "avx512", "neon"};
+const Names kTriangulations = {
+    "poly", "poly-abs", "linear-eigen", "linear-ls", "iterative-eigen", "iterative-ls", "midpoint"};
+
+struct Choice {
+  int32_t* value;
+  const Names* names;
+};
+
+// Three numbers, of any length but 0.
+struct Direction {
+  double* xyz;
+};
+
+struct Option {
+  const char* name;
+  OptionGroup group;
+  std::variant<int32_t*, uint64_t*, float*, double*, Choice, Direction> target;
+  double low, high;
+  enum Ends { kClosed, kOpenLow, kOpenHigh } ends;  // whether low, or high, is itself refused
+  const char* help;
+};
+
+constexpr double kMaxSeed = 18446744073709551615.0;
+
+std::vector<Option> table(Options& o) {
+  using E = Option::Ends;
+  constexpr E closed = E::kClosed, open_low = E::kOpenLow, open_high = E::kOpenHigh;
+  tv_feature_options& f = o.feature;
+  tv_estimate_options& e = o.estimate;
+  return {
+      {"max-keypoints", kFeature, &f.max_keypoints, 1, 65535, closed,
+       "bound on descriptors an image, second orientations included"},
+      {"arc", kFeature, &f.arc, 9, 12, closed, "contiguous pixels of FAST's 16-pixel circle"},
+      {"threshold", kFeature, &f.threshold, 1, 254, closed, "FAST threshold, grey levels"},
+      {"min-threshold", kFeature, &f.min_threshold, 0, 254, closed,
+       "how far the threshold may fall to reach max-keypoints; 0: it is fixed"},
+      {"levels", kFeature, &f.levels, 1, 8, closed, "pyramid levels"},
+      {"scale-factor", kFeature, &f.scale_factor, 1.1, 2, closed, "between pyramid levels"},
+      {"cell-px", kFeature, &f.cell_px, 0, 16384, closed,
+       "side of the grid cell that spreads the corners; 0: no grid"},
+      {"subpixel", kFeature, &f.subpixel, 0, 1, closed, "1: refine corners below a pixel"},
+      {"orientation", kFeature, Choice{&f.orientation, &kOrientations}, 0, 0, closed,
+       "of the descriptors"},
+      {"descriptor", kFeature, Choice{&f.descriptor, &kDescriptors}, 0, 0, closed,
+       "kind of descriptor"},
+      {"keypoint-size", kFeature, &f.keypoint_size, 1, 32, closed,
+       "diameter of a corner on level 0, pixels"},
+      {"ratio", kMatch, &o.match.ratio, 0, 1, open_low,
+       "nearest over second nearest distance, both directions"},
+      {"method", kEstimate, Choice{&e.method, &kMethods}, 0, 0, closed, "minimal solver"},
+      {"max-error-px", kEstimate, &e.max_error_px, 0, 1e9, open_low,
+       "inlier threshold, Sampson distance in pixels"},
+      {"confidence", kEstimate, &e.confidence, 0, 1, open_high,
+       "stop when a better model is this unlikely to be missed"},
+      {"max-iterations", kEstimate, &e.max_iterations, 1, 1e6, closed, "hard bound on samples"},
+      {"fixed-iterations", kEstimate, &e.fixed_iterations, 0, 1e6, closed,
+       "exactly this many samples; 0: adaptive stop"},
+      {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
+      {"principal-point-sigma", kEstimate, &e.principal_point_sigma, 0, 0.1, closed,
+       "how far the principal point may be off: standard deviation in focal lengths; 0: exactly "
+       "where "
+       "the camera file has it"},
+      {"guided-matching", kEstimate, &o.guided_matching, 0, 1, closed,
+       "1: match again along the epipolar lines, and estimate from all matches"},
+      {"bundle-adjustment", kEstimate, &o.bundle_adjustment, 0, 1, closed,
+       "1: adjust pose and points together"},
+      {"gravity0", kGravity, Direction{e.gravity0}, 0, 0, closed,
+       "the direction of gravity (down) in the first camera's frame"},
+      {"gravity1", kGravity, Direction{e.gravity1}, 0, 0, closed, "the same of the second"},
+      {"gravity-sigma-deg", kGravity, &o.gravity_sigma_deg, 0, 180, closed,
+       "standard deviation of each direction about each axis across it; 0: not known"},
+      {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations}, 0, 0, closed,
+       "method"},
+      {"kernels", kCommon, Choice{&o.kernels, &kKernels}, 0, 0, closed, "kernel set"},
+      {"resize", kCommon, &o.resize, 0, 16384, closed,
+       "scale images down to this longer side, pixels; 0: as they are"},
+  };
+}
+
+std::string number_text(double value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  return {text, end};
+}
+
+std::string range_text(const Option& option) {
+  return std::string(option.ends == Option::kOpenLow ? "(" : "[") + number_text(option.low) + ", " +
+         (option.high == kMaxSeed ? "2^64 - 1" : number_text(option.high)) +
+         (option.ends == Option::kOpenHigh ? ")" : "]");
+}
+
+bool in_range(const Option& option, double value) {
+  const bool low = option.ends == Option::kOpenLow ? value > option.low : value >= option.low;
+  const bool high = option.ends == Option::kOpenHigh ? value < option.high : value <= option.high;
+  return low && high;  // false for NaN
+}
+
+// Strict: the whole text is one number.
+template <class T>
+bool parse_number(const std::string& text, T& value) {
+  const char* const end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  return result.ec == std::errc() && result.ptr == end;
+}
+
+std::string joined(const Names& names, const char* separator) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : separator) + name;
+  return text;
+}
+
+bool is_zero(const Direction& direction) {
+  return std::all_of(direction.xyz, direction.xyz + 3, [](double v) { return v == 0; });
+}
+
+void set_direction(const std::string& flag, const Direction& direction, const std::string& text) {
+  std::array<double, 3> values{};
+  std::string_view rest = text;
+  bool good = true;
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t end = k < 2 ? rest.find(',') : rest.size();
+    good = good && end != rest.npos && parse_number(std::string(rest.substr(0, end)), values[k]) &&
+           std::isfinite(values[k]);
+    if (!good) throw CLI::ValidationError(flag, "'" + text + "' is not three numbers x,y,z");
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  std::copy(values.begin(), values.end(), direction.xyz);
+  if (is_zero(direction)) throw CLI::ValidationError(flag, "'" + text + "' has no direction");
+}
+
+// Writes the option's target; throws CLI::ValidationError in words.
+void set(const Option& option, const std::string& text) {
+  const std::string flag = "--" + std::string(option.name);
+  if (const Choice* choice = std::get_if<Choice>(&option.target)) {
+    const Names& names = *choice->names;
+    if (std::find(names.begin(), names.end(), text) == names.end()) {
+      throw CLI::ValidationError(flag,
+                                 "'" + text + "' is none of this version's " + joined(names, ", "));
+    }
+    const auto found = std::find(choice->names->begin(), choice->names->end(), text);
+    *choice->value = static_cast<int32_t>(found - choice->names->begin());
+    return;
+  }
+  if (const Direction* direction = std::get_if<Direction>(&option.target)) {
+    set_direction(flag, *direction, text);
+    return;
+  }
+  std::visit(
+      [&](auto target) {
+        if constexpr (std::is_pointer_v<decltype(target)>) {
+          using T = std::remove_pointer_t<decltype(target)>;
+          T value{};
+          if (!parse_number(text, value)) {
+            const char* kind = std::is_integral_v<T> ? "a whole number" : "a number";
+            throw CLI::ValidationError(
+                flag, "'" + text + "' is not " + kind + " in " + range_text(option));
+          }
+          // Compared as decimal text would be: 1.1f lies above 1.1.
+          double compared = static_cast<double>(value);
+          if constexpr (std::is_same_v<T, float>) compared = shortest(value);
+          if (!in_range(option, compared))
+            throw CLI::ValidationError(flag, text + " is not in " + range_text(option));
+          *target = value;
+        }
+      },
+      option.target);
+}
+
+nlohmann::ordered_json value_json(const Option& option) {
+  return std::visit(
+      [&](auto target) -> nlohmann::ordered_json {
+        using T = decltype(target);
+        if constexpr (std::is_same_v<T, Choice>)
+          return (*target.names)[static_cast<size_t>(*target.value)];
+        else if constexpr (std::is_same_v<T, Direction>)
+          return is_zero(target)
+                     ? nlohmann::ordered_json()
+                     : nlohmann::ordered_json{target.xyz[0], target.xyz[1], target.xyz[2]};
+        else if constexpr (std::is_same_v<T, float*>)
+          return shortest(*target);
+        else
+          return *target;
+      },
+      option.target);
+}
+
+std::string value_text(const Option& option) {
+  const nlohmann::ordered_json value = value_json(option);
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+const char* group_title(OptionGroup group) {
+  switch (group) {
+    case kFeature: return "Corners and descriptors";
+    case kMatch: return "Matching";
+    case kEstimate:
+    case kGravity: return "Geometry";
+    case kTriangulate: return "Triangulation";
+    default: return "General";
+  }
+}
+
+}  // namespace
+
+Options::Options() {
+  tv_feature_options_init(&feature);
+  tv_match_options_init(&match);
+  tv_estimate_options_init(&estimate);
+}
+
+void Options::settle() {
+  // A threshold below the default floor is meant: the floor follows it, unless it was given too.
+  if (!min_threshold_given)
+    feature.min_threshold = std::min(feature.min_threshold, feature.threshold);
+  if (feature.min_threshold > feature.threshold)
+    throw BadInput("--min-threshold " + std::to_string(feature.min_threshold) +
+                   " is above --threshold " + std::to_string(feature.threshold));
+  if (feature.cell_px > 0 && feature.cell_px < 8)
+    throw BadInput("--cell-px: " + std::to_string(feature.cell_px) + " is not 0 or in [8, 16384]");
+  const bool given[3] = {!is_zero({estimate.gravity0}), !is_zero({estimate.gravity1}),
+                         gravity_sigma_deg > 0};
+  if (given[0] != given[1] || given[1] != given[2])
+    throw BadInput("--gravity0, --gravity1 and --gravity-sigma-deg go together");
+  if (estimate.method == TV_SOLVER_UPRIGHT && !given[0])
+    throw BadInput("--method upright needs --gravity0, --gravity1 and --gravity-sigma-deg");
+  estimate.gravity_sigma_rad = gravity_sigma_deg * 3.14159265358979323846 / 180;
+}
+
+void add_options(CLI::App& verb, Options& options, unsigned groups) {
+  for (const Option& option : table(options)) {
+    if (!(option.group & groups)) continue;
+    const bool is_floor = std::string(option.name) == "min-threshold";
+    CLI::Option* flag = verb.add_option_function<std::string>(
+        "--" + std::string(option.name),
+        [option, is_floor, &options](const std::string& text) {
+          set(option, text);
+          if (is_floor) options.min_threshold_given = true;
+        },
+        option.help);
+    const Choice* choice = std::get_if<Choice>(&option.target);
+    const bool is_direction = std::holds_alternative<Direction>(option.target);
+    flag->type_name(choice         ? joined(*choice->names, "|")
+                    : is_direction ? "x,y,z"
+                                   : range_text(option));
+    if (!is_direction) flag->default_str(value_text(option));
+    flag->group(group_title(option.group));
+  }
+}
+
+nlohmann::ordered_json options_json(const Options& options, unsigned groups) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const Option& option : table(const_cast<Options&>(options))) {  // read only
+    if (!(option.group & groups)) continue;
+    std::string key = option.name;
+    std::replace(key.begin(), key.end(), '-', '_');
+    json[key] = value_json(option);
+  }
+  return json;
+}
+
+double shortest(float value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  double result = static_cast<double>(value);
+  std::from_chars(text, end, result);
+  return result;
+}
+
+std::string method_name(int32_t method) { return kMethods.at(static_cast<size_t>(method)); }
+
+}  // namespace cli

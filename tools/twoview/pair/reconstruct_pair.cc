@@ -1,0 +1,38 @@
+#include "pair/reconstruct_pair.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+
+namespace cli {
+
+uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& outcome) {
+  const Picture &p0 = outcome.picture[0], &p1 = outcome.picture[1];
+  tv_context* context =
+      session.context(std::max(p0.luma.cols, p1.luma.cols), std::max(p0.luma.rows, p1.luma.rows));
+  tv_view views[2] = {};
+  for (int i = 0; i < 2; ++i) {
+    views[i].image = outcome.picture[i].view();
+    views[i].camera = outcome.has_cameras ? &outcome.camera[i] : nullptr;
+  }
+  tv_two_view_init(&outcome.two_view);
+  tv_reconstruction_init(&outcome.reconstruction);
+  tv_reconstruct_options stages;
+  tv_reconstruct_options_init(&stages);
+  stages.triangulation = options.triangulation;
+  stages.guided_matching = options.guided_matching;
+  stages.bundle_adjustment = options.bundle_adjustment;
+  stages.feature = &options.feature;
+  stages.match = &options.match;
+  stages.estimate = &options.estimate;
+  const uint64_t start_ns = now_ns();
+  const tv_status status = tv_reconstruct(context, &views[0], &views[1], &stages, &outcome.two_view,
+                                          &outcome.reconstruction);
+  const uint64_t total_ns = now_ns() - start_ns;
+  if (status != TV_OK)
+    throw BadInput("cannot reconstruct " + p0.path + " and " + p1.path + " with --method " +
+                   method_name(options.estimate.method) + ": " + tv_status_string(status));
+  return total_ns;
+}
+
+}  // namespace cli

@@ -1,0 +1,220 @@
+#include "pair/result.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+
+namespace cli {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;  // of a radian
+
+using Json = nlohmann::ordered_json;
+
+Json numbers_or_null(const double* values, size_t count, bool present) {
+  if (!present) return nullptr;
+  Json list = Json::array();
+  for (size_t i = 0; i < count; ++i) list.push_back(finite_or_null(values[i]));
+  return list;
+}
+
+Json count_or_null(int32_t count) { return count < 0 ? Json(nullptr) : Json(count); }
+
+struct Phrase {
+  tv_reason reason;
+  const char* words;
+};
+
+constexpr Phrase kReasons[] = {
+    {TV_REASON_TOO_FEW_MATCHES, "too few matches"},
+    {TV_REASON_LOW_INLIER_RATIO, "few of the matches agree"},
+    {TV_REASON_LOW_PARALLAX, "low parallax: the camera hardly moved for this depth"},
+    {TV_REASON_TWO_PLANAR_SOLUTIONS, "the scene is a plane, which two poses explain"},
+    {TV_REASON_PURE_ROTATION, "the camera only rotated"},
+    {TV_REASON_NO_MOTION, "the camera did not move"},
+    {TV_REASON_SECOND_MOTION, "a second motion is in the scene"},
+    {TV_REASON_CROWDED_MATCHES, "the matches crowd in a small part of the image"},
+    {TV_REASON_REPEATED_STRUCTURE, "repeated structure makes the matches doubtful"},
+};
+
+Json reasons_json(uint32_t reasons) {
+  Json list = Json::array();
+  for (const Phrase& phrase : kReasons)
+    if (reasons & phrase.reason) list.push_back(tv_reason_string(phrase.reason));
+  return list;
+}
+
+// Over the points of the cloud; NaN without any.
+double rms_reprojection_px(const tv_reconstruction& reconstruction) {
+  double sum = 0;
+  int count = 0;
+  for (int32_t i = 0; i < reconstruction.num_matches; ++i) {
+    const tv_point& point = reconstruction.points[i];
+    if (point.status != TV_POINT_OK) continue;
+    sum += static_cast<double>(point.error_px) * point.error_px;
+    ++count;
+  }
+  return count ? std::sqrt(sum / count) : NAN;
+}
+
+// As nlohmann's dump(2), but a list of plain values stays on one line.
+void append_json(std::string& text, const Json& json, size_t depth) {
+  if (json.is_primitive() || json.empty()) {
+    text += json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return;
+  }
+  const auto is_plain = [](const Json& item) { return item.is_primitive(); };
+  const bool is_short = json.is_array() && std::all_of(json.begin(), json.end(), is_plain);
+  const std::string indent = "\n" + std::string(2 * depth, ' ');
+  std::string separator = is_short ? "" : indent + "  ";
+  text += json.is_object() ? "{" : "[";
+  for (const auto& [key, value] : json.items()) {
+    text += separator;
+    if (json.is_object()) {
+      append_json(text, key, depth);
+      text += ": ";
+    }
+    append_json(text, value, depth + 1);
+    separator = is_short ? ", " : "," + indent + "  ";
+  }
+  if (!is_short) text += indent;
+  text += json.is_object() ? "}" : "]";
+}
+
+}  // namespace
+
+tv_camera corrected_camera(const Outcome& outcome, int camera) {
+  tv_camera corrected = outcome.camera[camera];
+  check(tv_corrected_camera(&outcome.two_view, &corrected, &corrected),
+        "cannot correct the camera");
+  return corrected;
+}
+
+double unit_of(const Outcome& outcome) { return outcome.scale ? outcome.scale->baseline_m : 1; }
+
+std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
+  std::vector<CloudPoint> cloud;
+  const tv_reconstruction& r = outcome.reconstruction;
+  const cv::Mat& colour = outcome.picture[0].colour;
+  const double unit = unit_of(outcome);
+  for (int32_t i = 0; i < r.num_matches; ++i) {
+    const tv_point& point = r.points[i];
+    if (point.status != TV_POINT_OK) continue;
+    const tv_keypoint& keypoint = r.keypoints[0][r.matches[i].idx0];
+    const int x = std::min(std::max(static_cast<int>(std::lround(keypoint.x)), 0), colour.cols - 1);
+    const int y = std::min(std::max(static_cast<int>(std::lround(keypoint.y)), 0), colour.rows - 1);
+    const cv::Vec3b bgr = colour.at<cv::Vec3b>(y, x);
+    cloud.push_back({unit * point.position[0], unit * point.position[1], unit * point.position[2],
+                     bgr[2], bgr[1], bgr[0],
+                     static_cast<float>(static_cast<double>(point.angle_rad) * kDegrees),
+                     point.error_px});
+  }
+  return cloud;
+}
+
+Frustum frustum_of(const Outcome& outcome, int camera, double size) {
+  Matrix3 R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Vector3 t = {0, 0, 0};
+  if (camera == 1) {
+    R = rotation_of(outcome.two_view);
+    t = translation_of(outcome.two_view);
+    for (double& part : t) part *= unit_of(outcome);
+  }
+  // A point x of the camera's frame lies at R^T (x - t).
+  const auto placed = [&](const Vector3& x) {
+    return applied(transposed(R), {x[0] - t[0], x[1] - t[1], x[2] - t[2]});
+  };
+  const tv_camera& lens =
+      outcome.camera[camera];  // drawn about its axis, wherever that meets the image
+  Frustum frustum;
+  frustum.centre = placed({0, 0, 0});
+  for (size_t i = 0; i < 4; ++i) {
+    const double x = (i == 1 || i == 2 ? 0.5 : -0.5) * lens.width / lens.fx;
+    const double y = (i >= 2 ? 0.5 : -0.5) * lens.height / lens.fy;
+    frustum.corners[i] = placed({x * size, y * size, size});
+  }
+  return frustum;
+}
+
+Json result_json(const Outcome& outcome) {
+  const tv_two_view& v = outcome.two_view;
+  const tv_reconstruction& r = outcome.reconstruction;
+  Json json;
+  json["image0"] = outcome.picture[0].name;
+  json["image1"] = outcome.picture[1].name;
+  json["image_size0"] = {outcome.picture[0].luma.cols, outcome.picture[0].luma.rows};
+  json["image_size1"] = {outcome.picture[1].luma.cols, outcome.picture[1].luma.rows};
+  json["num_keypoints"] = {r.num_keypoints[0], r.num_keypoints[1]};
+  json["num_matches"] = r.num_matches;
+  json["num_inliers"] = v.num_inliers;
+  json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
+  json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
+  json["reasons"] = reasons_json(v.reasons);
+  json["R"] = numbers_or_null(v.R, 9, v.has_R);
+  const double unit = unit_of(outcome);
+  const double t[3] = {unit * v.t[0], unit * v.t[1], unit * v.t[2]};
+  json["t"] = numbers_or_null(t, 3, v.has_t);
+  json["E"] = numbers_or_null(v.E, 9, v.has_E);
+  json["F"] = numbers_or_null(v.F, 9, v.has_F);
+  json["H"] = numbers_or_null(v.H, 9, v.has_H);
+  json["alternative"] = nullptr;
+  const double other_t[3] = {unit * v.alternative_t[0], unit * v.alternative_t[1],
+                             unit * v.alternative_t[2]};
+  if (v.has_alternative)
+    json["alternative"] = {{"R", numbers_or_null(v.alternative_R, 9, true)},
+                           {"t", numbers_or_null(other_t, 3, true)},
+                           {"covariance", numbers_or_null(v.alternative_covariance, 25,
+                                                          v.has_alternative_covariance)}};
+  json["evidence"] = {{"essential", count_or_null(v.essential_inliers)},
+                      {"fundamental", count_or_null(v.fundamental_inliers)},
+                      {"homography", count_or_null(v.homography_inliers)},
+                      {"rotation", count_or_null(v.rotation_inliers)},
+                      {"coverage", finite_or_null(v.coverage)}};
+  json["covariance"] = numbers_or_null(v.covariance, 25, v.has_covariance);
+  json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
+  json["principal_point_shift_px"] =
+      numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
+  json["num_points"] = r.num_points;
+  json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
+                                    ? finite_or_null(v.median_parallax_rad * kDegrees)
+                                    : Json(nullptr);
+  json["rms_reprojection_px"] = finite_or_null(rms_reprojection_px(r));
+  json["scale"] = outcome.scale ? "metric" : "unit";
+  json["scale_sigma"] = outcome.scale ? Json(outcome.scale->sigma_m) : Json(nullptr);
+  json["imu"] = nullptr;
+  json["truth"] = nullptr;
+  json["num_iterations"] = v.num_iterations;
+  json["seed"] = v.seed;
+  json["version"] = tv_version_string();
+  return json;
+}
+
+std::string reasons_in_words(uint32_t reasons) {
+  std::string text;
+  for (const Phrase& phrase : kReasons)
+    if (reasons & phrase.reason) text += (text.empty() ? "" : "; ") + std::string(phrase.words);
+  return text;
+}
+
+std::string kind_in_words(int32_t kind) {
+  switch (kind) {
+    case TV_KIND_CALIBRATED: return "a general scene, full pose";
+    case TV_KIND_UNCALIBRATED: return "fundamental matrix only, no cameras";
+    case TV_KIND_PLANAR: return "a plane";
+    case TV_KIND_PANORAMIC: return "rotation only";
+    case TV_KIND_PLANAR_OR_PANORAMIC: return "a homography: a plane or a rotation";
+    case TV_KIND_NO_MOTION: return "no motion";
+    default: return "no model explains the matches better than chance";
+  }
+}
+
+Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+std::string json_text(const Json& json) {
+  std::string text;
+  append_json(text, json, 0);
+  return text + "\n";
+}
+
+}  // namespace cli

@@ -1,0 +1,68 @@
+#include "recording/playback.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "base/error.h"
+#include "twoview_drivers/ardrone/replay.h"
+#include "twoview_drivers/ardrone/sockets.h"
+
+namespace cli {
+namespace {
+
+// A recording's files, closed with their owner.
+struct Replay {
+  explicit Replay(const std::string& folder) {
+    const tvs_status status = ardrone_replay_open(&files, folder.c_str(), &transport);
+    if (status != TVS_OK)
+      throw BadInput("no recording in " + folder +
+                     " (navdata.log, video.pave): " + tvs_status_string(status));
+  }
+  ~Replay() { ardrone_replay_close(&files); }
+  Replay(const Replay&) = delete;
+  Replay& operator=(const Replay&) = delete;
+  ardrone_replay files;
+  ardrone_transport transport;
+};
+
+}  // namespace
+
+ardrone_counters play(const std::string& folder, LinkListener listener,
+                      const std::atomic<bool>& stop, double speed) {
+  const Decoder decoder;
+  ardrone_session_options options;
+  ardrone_session_options_init(&options);
+  options.listen_only = 1;
+  options.skip_to_latest = 0;
+  options.queue_frames = 0;
+  options.decoder = decoder.get();
+  set_callbacks(listener, options);
+  Replay replay(folder);
+  SessionMemory memory;
+  ardrone_session* session = make_session(options, replay.transport, memory);
+  const int64_t start = ardrone_now_ns();
+  int64_t now = start;
+  ardrone_replay_advance(&replay.files, now);
+  ardrone_session_step(session, now);
+  while (!stop) {
+    const int64_t next = ardrone_replay_next_ns(&replay.files);
+    if (next == INT64_MAX) break;
+    now = std::max(now, std::min(next, ardrone_session_next_ns(session)));
+    if (speed > 0) {
+      const int64_t due = start + static_cast<int64_t>(static_cast<double>(now - start) / speed);
+      const int64_t wait = due - ardrone_now_ns();
+      const timespec pause{wait / 1000000000, wait % 1000000000};
+      if (wait > 0) ::nanosleep(&pause, nullptr);
+    }
+    ardrone_replay_advance(&replay.files, now);
+    ardrone_session_step(session, now);
+  }
+  ardrone_counters counters;
+  ardrone_session_counters(session, &counters);
+  ardrone_session_close(session);
+  return counters;
+}
+
+}  // namespace cli

@@ -1,0 +1,161 @@
+#include "recording/recording_input.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "files/yaml_values.h"
+#include "recording/recording_pair.h"
+
+namespace cli {
+namespace {
+
+constexpr size_t kMaxFileBytes = 1 << 20;
+constexpr double kOrthonormal = 1e-3;
+
+void require_rotation(const std::vector<double>& r, const std::string& name) {
+  const auto dot = [&](size_t a, size_t b) {
+    return r[3 * a] * r[3 * b] + r[3 * a + 1] * r[3 * b + 1] + r[3 * a + 2] * r[3 * b + 2];
+  };
+  bool good = true;
+  for (size_t a = 0; a < 3; ++a)
+    for (size_t b = a; b < 3; ++b)
+      good = good && std::abs(dot(a, b) - (a == b ? 1 : 0)) < kOrthonormal;
+  const double determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) -
+                             r[1] * (r[3] * r[8] - r[5] * r[6]) +
+                             r[2] * (r[3] * r[7] - r[4] * r[6]);
+  if (!good || !(determinant > 0)) throw BadInput(name + " is not a rotation");
+}
+
+// The numbers of an entry that may be missing.
+std::vector<double> optional_numbers(const YAML::Node& root, const std::string& entry, size_t count,
+                                     const std::string& file) {
+  if (!root[entry]) return {};
+  std::vector<double> numbers = numbers_at(root, entry, file);
+  if (numbers.size() != count)
+    throw BadInput(file + ": " + entry + " has " + std::to_string(numbers.size()) +
+                   " numbers, not " + std::to_string(count));
+  return numbers;
+}
+
+// The command line's numbers, else the camera file's, else a camera at the body's origin that looks
+// forward.
+CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
+  const YAML::Node root = parse_yaml(read_file(file, kMaxFileBytes), file);
+  const bool rotation_given = !options.body_from_camera.empty();
+  const std::vector<double> rotation = rotation_given
+                                           ? options.body_from_camera
+                                           : optional_numbers(root, "body_from_camera", 9, file);
+  const std::vector<double> position = !options.camera_in_body.empty()
+                                           ? options.camera_in_body
+                                           : optional_numbers(root, "camera_in_body", 3, file);
+  CameraMount mount;
+  if (!rotation.empty()) {
+    require_rotation(rotation, rotation_given ? "--body-from-camera" : file + ": body_from_camera");
+    std::copy(rotation.begin(), rotation.end(), mount.body_from_camera.begin());
+  }
+  std::copy(position.begin(), position.end(), mount.position.begin());
+  return mount;
+}
+
+}  // namespace
+
+struct RecordingInput::State {
+  RecordingOptions options;
+  CameraMount mount;
+  RecordedFlight flight;
+  RecordingPair pair;
+  bool gravity_used = false;
+};
+
+void RecordingOptions::add_to(CLI::App& verb) {
+  verb.add_option("--recording", folder,
+                  "two frames of what `drone record` made, in place of A and B")
+      ->type_name("DIR");
+  verb.add_option("--frames", frames,
+                  "which two of its decoded pictures, from 0 (without: the best pair)")
+      ->expected(2)
+      ->check(CLI::Range(0, 1 << 30))
+      ->type_name("I J");
+  verb.add_option(
+          "--body-from-camera", body_from_camera,
+          "rotation, row-major, of body axes (forward, right, down); default: looks forward")
+      ->delimiter(',')
+      ->expected(9)
+      ->type_name("R11,..,R33");
+  verb.add_option("--camera-in-body", camera_in_body, "where the camera is in the body, metres")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z");
+}
+
+RecordingInput::RecordingInput(const RecordingOptions& options, const std::string& camera_file)
+    : state_(new State) {
+  state_->options = options;
+  state_->mount = mount_of(options, camera_file);
+  state_->flight = read_flight(options.folder);
+}
+
+RecordingInput::~RecordingInput() = default;
+
+void RecordingInput::load(const tv_camera& camera, Session& session, const Options& options,
+                          Outcome& outcome) {
+  State& s = *state_;
+  const std::vector<int>& frames = s.options.frames;
+  if (frames.empty()) {
+    s.pair = choose_pair(s.options.folder, s.flight, camera, s.mount, session, options);
+    session.take_times(0, true);  // those of the choice are not the pair's
+  } else {
+    s.pair = pair_of(s.options.folder, s.flight, frames[0], frames[1]);
+  }
+  for (int k = 0; k < 2; ++k) outcome.picture[k] = s.pair.picture[k];
+}
+
+void RecordingInput::add_gravity(tv_estimate_options& options) {
+  if (options.gravity_sigma_rad > 0) return;
+  state_->gravity_used = set_gravity(state_->flight, state_->pair.frame, state_->mount, options);
+}
+
+void RecordingInput::add_scale(Outcome& outcome) const {
+  outcome.scale = best_scale(scales_of(state_->flight, state_->pair.frame, state_->mount, outcome));
+}
+
+void RecordingInput::add_json(Outcome& outcome) const {
+  const State& s = *state_;
+  const RecordedFrame* frames = s.pair.frame;
+  outcome.json["imu"] =
+      imu_json(s.flight, frames, s.mount, outcome.two_view, s.gravity_used, outcome.scale);
+  outcome.json["recording"] = {{"folder", s.options.folder},
+                               {"frames", {frames[0].index, frames[1].index}},
+                               {"frame_numbers", {frames[0].number, frames[1].number}},
+                               {"seconds_apart", frames[1].time_s - frames[0].time_s},
+                               {"chosen", s.pair.why},
+                               {"body_from_camera", s.mount.body_from_camera},
+                               {"camera_in_body", s.mount.position}};
+}
+
+std::string RecordingInput::words(const Outcome& outcome) const {
+  const State& s = *state_;
+  std::string text = summary_line(
+      "frames", "%d and %d of %zu, %.2f s apart: %s", s.pair.frame[0].index, s.pair.frame[1].index,
+      s.flight.frames.size(), s.pair.frame[1].time_s - s.pair.frame[0].time_s, s.pair.why.c_str());
+  const nlohmann::ordered_json& imu = outcome.json["imu"];
+  if (imu.is_object() && imu["sigma_deg"].is_number())
+    text +=
+        summary_line("imu", "turned by %.2f deg otherwise than the cameras (sigma %.2f)%s",
+                     imu["rotation_difference_deg"].get<double>(), imu["sigma_deg"].get<double>(),
+                     s.gravity_used ? "; its gravity was a prior" : "");
+  else
+    text += summary_line("imu", "%s", "its attitudes at the two instants are not known");
+  if (outcome.scale)
+    text += summary_line("scale", "one baseline is %.3f m (sigma %.3f), by %s",
+                         outcome.scale->baseline_m, outcome.scale->sigma_m,
+                         outcome.scale->source.c_str());
+  else
+    text += summary_line("scale", "%s",
+                         "unknown: neither velocity, altitude nor a floor tells it here");
+  return text;
+}
+
+}  // namespace cli

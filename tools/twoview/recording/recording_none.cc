@@ -1,0 +1,18 @@
+// The program without the AR.Drone driver: no option --recording.
+#include "recording/recording_input.h"
+
+namespace cli {
+
+struct RecordingInput::State {};
+
+void RecordingOptions::add_to(CLI::App&) {}
+
+RecordingInput::RecordingInput(const RecordingOptions&, const std::string&) {}
+RecordingInput::~RecordingInput() = default;
+void RecordingInput::load(const tv_camera&, Session&, const Options&, Outcome&) {}
+void RecordingInput::add_gravity(tv_estimate_options&) {}
+void RecordingInput::add_scale(Outcome&) const {}
+void RecordingInput::add_json(Outcome&) const {}
+std::string RecordingInput::words(const Outcome&) const { return {}; }
+
+}  // namespace cli

@@ -1,0 +1,247 @@
+#include "report/report.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "report/assets.h"
+#include "report/tables.h"
+
+namespace cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    switch (c) {
+      case '&': result += "&amp;"; break;
+      case '<': result += "&lt;"; break;
+      case '>': result += "&gt;"; break;
+      case '"': result += "&quot;"; break;
+      default: result += c;
+    }
+  }
+  return result;
+}
+
+std::string formatted(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+// Replaces each {{name}} once; what is put in is not looked through again.
+std::string filled(const std::string& page,
+                   const std::vector<std::pair<std::string, std::string>>& values) {
+  std::string result;
+  size_t at = 0;
+  for (size_t open; (open = page.find("{{", at)) != std::string::npos;) {
+    const size_t close = page.find("}}", open);
+    const std::string name = page.substr(open + 2, close - open - 2);
+    result += page.substr(at, open - at);
+    for (const auto& [key, value] : values)
+      if (key == name) result += value;
+    at = close + 2;
+  }
+  return result + page.substr(at);
+}
+
+std::string card(const std::string& number, const std::string& unit, const std::string& what) {
+  return "<div class=\"card\"><b>" + number + (unit.empty() ? "" : "<i>" + unit + "</i>") +
+         "</b><span>" + what + "</span></div>\n";
+}
+
+std::string number_of(const Json& value, const char* format) {
+  return value.is_number() ? formatted(format, value.get<double>()) : "&ndash;";
+}
+
+std::string cards(const Outcome& outcome) {
+  const Json& j = outcome.json;
+  std::string text =
+      card(std::to_string(outcome.reconstruction.num_points), "", "points in the cloud");
+  text += card(std::to_string(outcome.two_view.num_inliers),
+               "of " + std::to_string(outcome.two_view.num_matches), "matches that agree");
+  text += card(number_of(j["median_parallax_deg"], "%.2f"), "deg", "median parallax");
+  text += card(number_of(j["rms_reprojection_px"], "%.2f"), "px", "reprojection, rms");
+  const double* shift = outcome.two_view.principal_point_shift;
+  if (shift[0] != 0 || shift[1] != 0)
+    text += card(formatted("%+.1f, ", shift[0]) + formatted("%+.1f", shift[1]), "px",
+                 "the principal point is off; pose and points are of the corrected camera");
+  const Json& truth = j["truth"];
+  if (truth.is_object()) {
+    text += card(number_of(truth["rotation_error_deg"], "%.3f"), "deg", "rotation error");
+    text += card(number_of(truth["translation_error_deg"], "%.2f"), "deg", "direction error");
+    if (truth["depth_error_median_percent"].is_number())
+      text +=
+          card(number_of(truth["depth_error_median_percent"], "%.2f"), "%", "depth error, median");
+  }
+  if (j["imu"].is_object())
+    text += card(number_of(j["imu"]["rotation_difference_deg"], "%.2f"), "deg",
+                 "between the IMU's rotation and the cameras'");
+  if (outcome.scale)
+    text += card(formatted("%.3f", outcome.scale->baseline_m),
+                 "&plusmn; " + formatted("%.3f", outcome.scale->sigma_m) + " m",
+                 "between the cameras, by " + outcome.scale->source);
+  text += card(number_of(j["timings_ms"]["total"], "%.1f"), "ms", "computing time");
+  return text;
+}
+
+std::string leaf_text(const Json& value) {
+  if (value.is_null()) return "&ndash;";
+  if (value.is_string()) return escaped(value.get<std::string>());
+  if (value.is_number_float()) return formatted("%.6g", value.get<double>());
+  return escaped(value.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+// A row-major matrix in lines of its columns.
+std::string matrix_text(const Json& list, size_t columns) {
+  std::string text;
+  for (size_t i = 0; i < list.size(); ++i) {
+    const char* format = columns == 5 ? "%10.2e" : "%12.6f";
+    text += list[i].is_number() ? formatted(format, list[i].get<double>()) : "     -";
+    if (i + 1 < list.size()) text += (i + 1) % columns == 0 ? "\n" : " ";
+  }
+  return text;
+}
+
+std::string row(const std::string& name, const Json& value) {
+  std::string text;
+  if (value.is_array()) {
+    for (const Json& item : value) text += (text.empty() ? "" : ", ") + leaf_text(item);
+    if (text.empty()) text = "&ndash;";
+  } else {
+    text = leaf_text(value);
+  }
+  return "<tr><th>" + name + "</th><td>" + text + "</td></tr>\n";
+}
+
+std::string table(const std::string& title, const std::string& rows) {
+  return "<table><caption>" + title + "</caption>\n" + rows + "</table>\n";
+}
+
+std::string object_table(const std::string& title, const Json& object) {
+  std::string rows;
+  for (const auto& [key, value] : object.items()) rows += row(key, value);
+  return table(title, rows);
+}
+
+std::string matrix(const std::string& name, const Json& list, size_t columns) {
+  return list.is_array() ? "<figure><figcaption>" + name + "</figcaption><pre>" +
+                               matrix_text(list, columns) + "</pre></figure>\n"
+                         : "";
+}
+
+// R, t and what follows from them, side by side.
+std::string matrices(const Json& j) {
+  std::string text = matrix("R", j["R"], 3) + matrix("t", j["t"], 1) + matrix("E", j["E"], 3) +
+                     matrix("F", j["F"], 3) + matrix("H", j["H"], 3);
+  if (j["alternative"].is_object())
+    text += matrix("alternative R", j["alternative"]["R"], 3) +
+            matrix("alternative t", j["alternative"]["t"], 1);
+  text += matrix("covariance, rad&sup2; (w0 w1 w2 a b)", j["covariance"], 5);
+  return text.empty() ? "" : "<div class=\"matrices\">\n" + text + "</div>\n";
+}
+
+std::string tables(const Json& j) {
+  std::string found;
+  for (const char* key : {"num_keypoints", "num_matches", "num_inliers", "config", "verdict",
+                          "reasons", "num_points", "median_parallax_deg", "rms_reprojection_px",
+                          "principal_point_shift_px", "scale", "scale_sigma", "num_iterations"})
+    found += row(key, j[key]);
+  std::string text = table("What was found", found);
+  if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);
+  if (j["imu"].is_object()) text += object_table("Against the IMU", j["imu"]);
+  if (j.contains("recording")) text += object_table("Out of the recording", j["recording"]);
+  text += object_table("Inliers of each model", j["evidence"]);
+  text += object_table("Time, ms", j["timings_ms"]);
+  text += object_table("Options as used", j["options"]);
+  return text;
+}
+
+Json camera_json(const Outcome& outcome, int camera, double size) {
+  const Frustum frustum = frustum_of(outcome, camera, size);
+  return {{"centre", frustum.centre}, {"corners", frustum.corners}};
+}
+
+std::string cloud_section(const Outcome& outcome, const std::vector<CloudPoint>& cloud) {
+  if (cloud.empty()) return "";
+  const std::string unit = outcome.scale ? "metres" : "baselines, the distance between the cameras";
+  return "<section>\n<h2>The cloud</h2>\n<div class=\"stage\"><canvas id=\"cloud\"></canvas>\n"
+         "<div class=\"buttons\"><button id=\"view-front\">front</button>"
+         "<button id=\"view-side\">side</button><button id=\"view-top\">top</button></div></div>\n"
+         "<p class=\"hint\">Drag to turn, wheel or pinch to zoom, shift and drag to move, double "
+         "click "
+         "to start again. Camera 0 is white, camera 1 orange; x right, y down, z forward. Lengths "
+         "are in " +
+         unit + ".</p>\n</section>\n";
+}
+
+std::string cloud_script(const Outcome& outcome, const std::vector<CloudPoint>& cloud) {
+  if (cloud.empty()) return "";
+  std::string points, colours;
+  std::vector<double> depths;
+  for (const CloudPoint& p : cloud) {
+    for (const double value : {p.x, p.y, p.z}) append_float(points, static_cast<float>(value));
+    for (const uint8_t value : {p.red, p.green, p.blue}) colours += static_cast<char>(value);
+    depths.push_back(p.z);
+  }
+  const double size = 0.08 * std::abs(percentile(depths, 0.5));
+  const Json data = {{"points", base64(points)},
+                     {"colours", base64(colours)},
+                     {"cameras", {camera_json(outcome, 0, size), camera_json(outcome, 1, size)}}};
+  return "<script type=\"application/json\" id=\"cloud-data\">" + data.dump() +
+         "</script>\n<script>\n" + kReportScript + "</script>\n";
+}
+
+std::string figure_section(const Figure& figure) {
+  return "<section>\n<h2>" + figure.title + "</h2>\n<figure><img alt=\"" + figure.title +
+         "\" src=\"data:image/" + (figure.is_photo ? "jpeg" : "png") + ";base64," +
+         base64(figure.is_photo ? jpeg_bytes(figure.picture) : png_bytes(figure.picture)) +
+         "\">\n<figcaption>" + figure.caption + "</figcaption></figure>\n</section>\n";
+}
+
+}  // namespace
+
+std::string base64(const std::string& bytes) {
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t group = 0;
+    for (size_t j = 0; j < 3; ++j)
+      group = group << 8 | (i + j < bytes.size() ? static_cast<uint8_t>(bytes[i + j]) : 0u);
+    for (size_t j = 0; j < 4; ++j)
+      text += i + j <= bytes.size() ? digits[group >> (18 - 6 * j) & 63] : '=';
+  }
+  return text;
+}
+
+std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& cloud,
+                        const std::vector<Figure>& figures) {
+  const tv_two_view& v = outcome.two_view;
+  const std::string name0 = escaped(outcome.picture[0].name),
+                    name1 = escaped(outcome.picture[1].name);
+  const std::string reasons = reasons_in_words(v.reasons);
+  std::string sections;
+  for (const Figure& figure : figures) sections += figure_section(figure);
+  const char* const classes[] = {"poor", "fair", "good"};
+  return filled(
+      kReportPage,
+      {{"title", name0 + " and " + name1 + ": twoview"},
+       {"style", kReportStyle},
+       {"images", name0 + "<small>and</small>" + name1},
+       {"verdict_class", classes[v.verdict]},
+       {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
+       {"verdict_words", escaped(kind_in_words(v.kind) + (reasons.empty() ? "" : ": " + reasons))},
+       {"cards", cards(outcome)},
+       {"cloud", cloud_section(outcome, cloud)},
+       {"figures", sections},
+       {"matrices", matrices(outcome.json)},
+       {"tables", tables(outcome.json)},
+       {"json", escaped(json_text(outcome.json))},
+       {"version", tv_version_string()},
+       {"script", cloud_script(outcome, cloud)}});
+}
+
+}  // namespace cli

@@ -1,0 +1,24 @@
+// report.html: one file that needs no other file and no network.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pair/result.h"
+
+namespace cli {
+
+struct Figure {
+  std::string title, caption;
+  cv::Mat picture;
+  bool is_photo;  // kept as JPEG, else as PNG
+};
+
+std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& cloud,
+                        const std::vector<Figure>& figures);
+
+// RFC 4648, with padding.
+std::string base64(const std::string& bytes);
+
+}  // namespace cli

@@ -1,0 +1,303 @@
+// twoview evaluate PAIRS.txt: poses of many pairs against the truth; SuperGlue's measures.
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_file.h"
+#include "files/camera_set.h"
+#include "files/pairs_file.h"
+#include "pair/measures.h"
+#include "pair/reconstruct_pair.h"
+#include "verbs/verbs.h"
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+constexpr double kFailed = std::numeric_limits<double>::infinity();
+constexpr int kThresholdsDeg[] = {5, 10, 20};
+
+struct Arguments {
+  Common common;
+  std::string pairs, images;
+  int max_pairs = 0;
+};
+
+struct Errors {
+  double rotation = kFailed, translation = kFailed, translation_signed = kFailed;
+  double pose() const { return std::max(rotation, translation); }
+  double pose_signed() const { return std::max(rotation, translation_signed); }
+};
+
+struct PairReport {
+  Json json;
+  bool has_truth = false;
+  Errors errors;
+};
+
+// The frame of a camera that was turned by quarter turns counter-clockwise, from the one before.
+Matrix3 turn_matrix(int quarters) {
+  Matrix3 turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  for (int i = 0; i < (quarters & 3); ++i) turn = product({0, 1, 0, -1, 0, 0, 0, 0, 1}, turn);
+  return turn;
+}
+
+void load_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair,
+               Outcome& outcome) {
+  const std::string* names[] = {&pair.name0, &pair.name1};
+  const std::array<double, 9>* Ks[] = {&pair.K0, &pair.K1};
+  const int turns[] = {pair.turns0, pair.turns1};
+  outcome.has_cameras = true;
+  for (int i = 0; i < 2; ++i) {
+    Picture& picture = outcome.picture[i];
+    picture = load_picture((fs::path(a.images) / *names[i]).string());
+    outcome.camera[i] = camera_of_image(cameras, *names[i], picture.luma.cols, picture.luma.rows,
+                                        pair.has_K ? Ks[i] : nullptr);
+    turn(picture, turns[i]);
+    outcome.camera[i] = turned(outcome.camera[i], turns[i]);
+    shrink(picture, a.common.options.resize);
+    outcome.camera[i] = resized(outcome.camera[i], picture.luma.cols, picture.luma.rows);
+  }
+}
+
+void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
+  const Matrix3 turn0 = turn_matrix(pair.turns0), turn1 = turn_matrix(pair.turns1);
+  const Matrix3 R_true = product(product(turn1, pair.R), transposed(turn0));
+  const Vector3 t_true = applied(turn1, pair.t);
+  const tv_two_view& v = outcome.two_view;
+  if (v.has_R) report.errors.rotation = rotation_error_deg(rotation_of(v), R_true);
+  if (has_full_pose(v)) {
+    const Vector3 t = translation_of(v);
+    report.errors.translation = translation_error_deg(t, t_true);
+    report.errors.translation_signed = translation_error_signed_deg(t, t_true);
+  }
+  // Precision measures the matches against the true pose, which refers to the cameras as given and
+  // not to those with a shifted principal point.
+  report.json["precision"] =
+      match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
+}
+
+PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair,
+                         Session& session) {
+  PairReport report;
+  report.has_truth = pair.has_truth;
+  Json& json = report.json;
+  json["name0"] = pair.name0;
+  json["name1"] = pair.name1;
+  for (const char* key :
+       {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
+        "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict",
+        "principal_point_shift_px", "time_ms"})
+    json[key] = nullptr;
+  try {
+    Outcome outcome;
+    load_pair(a, cameras, pair, outcome);
+    const uint64_t total_ns = reconstruct_pair(session, a.common.options, outcome);
+    const tv_two_view& v = outcome.two_view;
+    json["num_matches"] = v.num_matches;
+    json["num_inliers"] = v.num_inliers;
+    json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
+    json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
+    json["principal_point_shift_px"] = v.principal_point_shift;
+    json["time_ms"] = static_cast<double>(total_ns) * 1e-6;
+    if (pair.has_truth) compare(pair, outcome, report);
+  } catch (const BadInput& e) {
+    json["error"] = e.what();
+  }
+  if (pair.has_truth) {
+    json["rotation_error_deg"] = finite_or_null(report.errors.rotation);
+    json["translation_error_deg"] = finite_or_null(report.errors.translation);
+    json["translation_error_signed_deg"] = finite_or_null(report.errors.translation_signed);
+    json["pose_error_deg"] = finite_or_null(report.errors.pose());
+  }
+  return report;
+}
+
+Json auc_json(const std::vector<PairReport>& reports, double (Errors::*error)() const) {
+  std::vector<double> errors;
+  for (const PairReport& report : reports)
+    if (report.has_truth) errors.push_back((report.errors.*error)());
+  Json json;
+  for (const int threshold : kThresholdsDeg)
+    json[std::to_string(threshold)] =
+        errors.empty() ? Json(nullptr) : Json(auc_percent(errors, threshold));
+  return json;
+}
+
+Json mean_of(const std::vector<PairReport>& reports, const char* key) {
+  double sum = 0;
+  int count = 0;
+  for (const PairReport& report : reports)
+    if (report.json[key].is_number()) sum += report.json[key].get<double>(), ++count;
+  return count ? Json(sum / count) : Json(nullptr);
+}
+
+Json median_error(const std::vector<PairReport>& reports) {
+  std::vector<double> errors;
+  for (const PairReport& report : reports)
+    if (report.has_truth) errors.push_back(report.errors.pose());
+  if (errors.empty()) return nullptr;
+  std::sort(errors.begin(), errors.end());
+  return finite_or_null((errors[(errors.size() - 1) / 2] + errors[errors.size() / 2]) / 2);
+}
+
+Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
+                 const Session& session) {
+  const Options& options = a.common.options;
+  Json json;
+  json["auc"] = auc_json(reports, &Errors::pose);
+  json["auc_signed"] = auc_json(reports, &Errors::pose_signed);
+  json["num_pairs"] = reports.size();
+  json["median_pose_error_deg"] = median_error(reports);
+  for (const char* key : {"num_matches", "num_inliers", "precision", "time_ms"})
+    json["mean_" + std::string(key)] = mean_of(reports, key);
+  json["pairs"] = Json::array();
+  for (const PairReport& report : reports) json["pairs"].push_back(report.json);
+  json["options"] = options_json(options, kAllOptions);
+  json["options"]["max_pairs"] = a.max_pairs;
+  json["seed"] = options.estimate.seed;
+  json["version"] = tv_version_string();
+  json["kernels"] = session.get() ? Json(session.kernels()) : Json(nullptr);
+  json["context_bytes"] = session.context_bytes();
+  return json;
+}
+
+std::string cell(const Json& value, const char* format, int width, double factor = 1) {
+  char text[64];
+  if (value.is_number())
+    std::snprintf(text, sizeof text, format, value.get<double>() * factor);
+  else
+    std::snprintf(text, sizeof text, "%*s", width, "-");
+  return text;
+}
+
+std::string padded(std::string text, size_t width) {
+  if (text.size() > width) text = "..." + text.substr(text.size() - (width - 3));
+  return text + std::string(width - text.size(), ' ');
+}
+
+std::string table(const Json& report) {
+  const Style style = stdout_style();
+  constexpr size_t name = 24;
+  std::string text = style.dim + padded("image 0", name) + " " + padded("image 1", name) +
+                     " matches inliers  prec %  R deg   t deg      ms  config" + style.off + "\n";
+  for (const Json& pair : report["pairs"]) {
+    text += padded(pair["name0"].get<std::string>(), name) + " " +
+            padded(pair["name1"].get<std::string>(), name);
+    if (pair.contains("error")) {
+      text += std::string(" ") + style.poor + pair["error"].get<std::string>() + style.off + "\n";
+      continue;
+    }
+    text += " " + cell(pair["num_matches"], "%7.0f", 7) + " " +
+            cell(pair["num_inliers"], "%7.0f", 7) + " " + cell(pair["precision"], "%7.1f", 7, 100) +
+            " " + cell(pair["rotation_error_deg"], "%6.2f", 6) + " " +
+            cell(pair["translation_error_deg"], "%7.2f", 7) + " " +
+            cell(pair["time_ms"], "%7.1f", 7) + "  " + pair["config"].get<std::string>() + ", " +
+            pair["verdict"].get<std::string>() + "\n";
+  }
+  text += style.bold;
+  for (const char* key : {"auc", "auc_signed"}) {
+    const Json& auc = report[key];
+    text += padded(key, 11) + " at 5, 10, 20 deg:" + cell(auc["5"], "%6.1f", 6) +
+            cell(auc["10"], "%6.1f", 6) + cell(auc["20"], "%6.1f", 6) + " %\n";
+  }
+  return text + std::to_string(report["num_pairs"].get<size_t>()) + " pairs; median pose error" +
+         cell(report["median_pose_error_deg"], " %.2f deg", 4) + ", mean time" +
+         cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n";
+}
+
+// Progress as one line on stderr, when that is a terminal; each line replaces the one before, and
+// the last is erased.
+class Progress {
+ public:
+  explicit Progress(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
+  ~Progress() {
+    if (shown_) std::fputs("\r\033[K", stderr);
+  }
+  void tell(size_t index, size_t count, const Pair& pair) const {
+    if (shown_)
+      std::fprintf(stderr, "\r\033[K%zu of %zu: %s %s", index + 1, count, pair.name0.c_str(),
+                   pair.name1.c_str());
+  }
+
+ private:
+  bool shown_;
+};
+
+// -o names a file when it ends in .json or is one already, else a folder.
+void split_output(const std::string& output, fs::path& folder, std::string& name) {
+  const fs::path path(output);
+  std::error_code error;
+  const bool is_folder = fs::is_directory(path, error);
+  if (!is_folder && (path.extension() == ".json" || fs::exists(path, error))) {
+    folder = path.parent_path();
+    name = path.filename().string();
+  } else {
+    folder = path;
+    name = "report.json";
+  }
+}
+
+int evaluate(Arguments& a) {
+  Common& common = a.common;
+  if (common.options.estimate.method == TV_SOLVER_UPRIGHT)
+    throw BadInput("--method upright needs gravity, which a list of pairs does not have");
+  common.options.settle();
+  if (!fs::is_directory(a.images)) throw BadInput("--images: " + a.images + " is not a folder");
+  std::vector<Pair> pairs = load_pairs(a.pairs);
+  if (a.max_pairs > 0 && pairs.size() > static_cast<size_t>(a.max_pairs))
+    pairs.resize(static_cast<size_t>(a.max_pairs));
+  NamedCameras cameras;
+  const fs::path cameras_path = fs::path(a.pairs).parent_path() / "cameras.yaml";
+  if (fs::exists(cameras_path)) cameras = load_camera_set(cameras_path.string());
+
+  fs::path folder;
+  std::string name;
+  split_output(common.output, folder, name);
+  OutputSet files(folder);  // before the long work, so that an unwritable folder is told at once
+  files.keep(a.pairs);
+  Session session(common.options);
+  std::vector<PairReport> reports;
+  {
+    const Progress progress(!common.quiet);
+    for (size_t i = 0; i < pairs.size(); ++i) {
+      progress.tell(i, pairs.size(), pairs[i]);
+      reports.push_back(evaluate_pair(a, cameras, pairs[i], session));
+    }
+  }
+  const Json report = report_json(a, reports, session);
+  files.add(name, json_text(report));
+  if (common.json) print(json_text(report));
+  if (common.speaks())
+    print(table(report) + "files      " + (files.folder() / name).string() + "\n");
+  files.commit();
+  return 0;
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& program, Run& run) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* verb = program.add_subcommand("evaluate", "poses of many pairs against the truth");
+  verb->add_option("PAIRS", a->pairs, "SuperGlue's list of pairs; cameras.yaml beside it is read")
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--images", a->images, "folder of the images")->required()->type_name("DIR");
+  verb->add_option("--max-pairs", a->max_pairs, "take the first N pairs; 0: all")
+      ->check([](const std::string& count) {
+        return count[0] == '-' ? count + " is negative" : std::string();
+      })
+      ->type_name("N");
+  add_common(*verb, a->common, kAllOptions, "folder for report.json, or the file itself");
+  verb->final_callback([a, &run] { run = [a] { return evaluate(*a); }; });
+}
+
+}  // namespace cli

@@ -1,0 +1,89 @@
+#include "verbs/python_verbs.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PythonVerb {
+  const char *name, *script, *help;
+};
+constexpr PythonVerb kVerbs[] = {
+    {"compare", "compare_colmap", "the same pairs beside COLMAP, OpenGV, OpenCV and PoseLib"},
+    {"colmap", "twoview_colmap", "COLMAP databases and models, in and out"},
+};
+
+// What lies as in the source tree: the folder above this program that holds TWOVIEW_PYTHON_VERBS
+// (CMakeLists.txt), which is the source tree itself, or the installed share/twoview of such a
+// folder. The nearest is taken; the path is empty where there is none.
+fs::path tree_of(const fs::path& program) {
+  for (fs::path folder = program.parent_path(); folder != folder.root_path();
+       folder = folder.parent_path())
+    for (const fs::path& tree : {folder, folder / TWOVIEW_DATA_DIR})
+      if (std::error_code none; fs::is_directory(tree / TWOVIEW_PYTHON_VERBS, none)) return tree;
+  return {};
+}
+
+// TWOVIEW_PYTHON, else the Python that scripts/bootstrap made, else the one in the PATH.
+std::string python_of(const fs::path& tree) {
+  const char* const named = std::getenv("TWOVIEW_PYTHON");
+  if (named && *named) return named;
+  const fs::path bootstrapped = tree / ".cache" / "venv" / "bin" / "python";
+  return access(bootstrapped.c_str(), X_OK) == 0 ? bootstrapped.string() : "python3";
+}
+
+// The package twoview runs on this program's library unless the caller named another.
+void name_library(const fs::path& program) {
+  const fs::path prefix = program.parent_path().parent_path();
+  for (const char* folder : {"lib", TWOVIEW_LIB_DIR}) {
+    const fs::path library = prefix / folder / "libtwoview.so";
+    if (std::error_code none; !fs::is_regular_file(library, none)) continue;
+    setenv("TWOVIEW_LIBRARY", library.c_str(), 0);
+    return;
+  }
+}
+
+[[noreturn]] void become(const PythonVerb& verb, int argc, char** argv) {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path tree = tree_of(program);
+  const fs::path script = tree / TWOVIEW_PYTHON_VERBS / verb.script;
+  if (tree.empty() || !fs::is_regular_file(script, error))
+    throw BadInput(
+        std::string(verb.name) + " is a Python program, " TWOVIEW_PYTHON_VERBS "/" + verb.script +
+        " of the source tree or of an installed " TWOVIEW_DATA_DIR ", and there is none above " +
+        program.string());
+  name_library(program);
+
+  std::string python = python_of(tree), path = script.string();
+  std::vector<char*> arguments{python.data(), path.data()};
+  arguments.insert(arguments.end(), argv + 2, argv + argc);
+  arguments.push_back(nullptr);
+  execvp(python.c_str(), arguments.data());
+  throw BadInput("cannot run " + python + ": " + std::strerror(errno) +
+                 " (scripts/bootstrap bench installs one, TWOVIEW_PYTHON names another)");
+}
+
+}  // namespace
+
+void add_python_verbs(CLI::App& program) {
+  for (const PythonVerb& verb : kVerbs) program.add_subcommand(verb.name, verb.help);
+}
+
+void hand_over_python_verb(int argc, char** argv) {
+  for (const PythonVerb& verb : kVerbs)
+    if (argc > 1 && std::strcmp(argv[1], verb.name) == 0) become(verb, argc, argv);
+}
+
+}  // namespace cli

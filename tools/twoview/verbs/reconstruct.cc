@@ -1,0 +1,295 @@
+// twoview reconstruct A B, or --recording DIR: two views to a pose, a cloud, pictures and a report.
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_file.h"
+#include "pair/reconstruct_pair.h"
+#include "pair/truth.h"
+#include "pictures/canvas.h"
+#include "pictures/pictures.h"
+#include "recording/recording_input.h"
+#include "report/report.h"
+#include "report/tables.h"
+#include "verbs/camera_options.h"
+#include "verbs/verbs.h"
+
+namespace cli {
+namespace {
+
+const std::vector<std::string> kFiles = {"result.json",  "cloud.ply", "matches.png",
+                                         "epipolar.png", "views.png", "report.html"};
+
+struct Arguments {
+  Common common;
+  std::string image[2], truth;
+  CameraOptions cameras;
+  double focal_35mm = 0;
+  RecordingOptions recording;
+};
+
+// Throws BadInput unless there are either two images or a recording.
+void check_inputs(const Arguments& a) {
+  if (!a.recording.given()) {
+    for (int i = 0; i < 2; ++i)
+      if (a.image[i].empty()) throw BadInput(std::string(i == 0 ? "A" : "B") + " is required");
+    if (!a.recording.frames.empty() || !a.recording.body_from_camera.empty() ||
+        !a.recording.camera_in_body.empty())
+      throw BadInput("--frames, --body-from-camera and --camera-in-body go with --recording");
+    return;
+  }
+  if (!a.image[0].empty()) throw BadInput("give A and B or --recording, not both");
+  if (a.cameras.both.empty()) throw BadInput("--recording needs --camera");
+}
+
+// The camera file of each image; both empty without cameras, which some methods can do without.
+std::array<std::string, 2> camera_files(const Arguments& a) {
+  const std::array<std::string, 2> files = a.cameras.files();
+  const bool has_focal = a.focal_35mm > 0;
+  if (has_focal && (!files[0].empty() || a.recording.given()))
+    throw BadInput("--focal-35mm is for photographs without a camera file");
+  const int32_t method = a.common.options.estimate.method;
+  const bool can_do_without = method == TV_SOLVER_EIGHT_POINT || method == TV_SOLVER_SEVEN_POINT;
+  if (files[0].empty() && !has_focal && !can_do_without)
+    throw BadInput(
+        "--method " + method_name(method) +
+        " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate,"
+        " or --focal-35mm, from the photographs' EXIF");
+  return files;
+}
+
+void load_inputs(const Arguments& a, RecordingInput* recording, Session& session,
+                 Outcome& outcome) {
+  const std::array<std::string, 2> files = camera_files(a);
+  const bool has_files = !files[0].empty();
+  outcome.has_cameras = has_files || a.focal_35mm > 0;
+  std::array<tv_camera, 2> camera{};
+  if (has_files) camera = CameraOptions::load(files);
+  if (recording) recording->load(camera[0], session, a.common.options, outcome);
+  for (int i = 0; i < 2; ++i) {
+    Picture& picture = outcome.picture[i];
+    if (!recording) picture = load_picture(a.image[i]);
+    if (!has_files && outcome.has_cameras) {
+      outcome.camera[i] = film_camera(a.focal_35mm, picture.luma.cols, picture.luma.rows);
+    } else if (has_files) {
+      outcome.camera[i] = camera[i];
+      require_size(outcome.camera[i], files[i], picture.luma.cols, picture.luma.rows, picture.path);
+    }
+    shrink(picture, a.common.options.resize);
+    if (outcome.has_cameras)
+      outcome.camera[i] = resized(outcome.camera[i], picture.luma.cols, picture.luma.rows);
+  }
+}
+
+nlohmann::ordered_json options_of(const Arguments& a) {
+  nlohmann::ordered_json json = options_json(a.common.options, kAllOptions | kGravity);
+  const std::array<std::string, 2> files = camera_files(a);
+  for (int i = 0; i < 2; ++i) {
+    const std::string key = "camera" + std::to_string(i);
+    json[key] =
+        files[i].empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(files[i]);
+  }
+  json["focal_35mm"] =
+      a.focal_35mm > 0 ? nlohmann::ordered_json(a.focal_35mm) : nlohmann::ordered_json(nullptr);
+  return json;
+}
+
+// Makes every output, in the order of the report.
+void make_files(const Outcome& outcome, OutputSet& files) {
+  const std::vector<CloudPoint> cloud = cloud_of(outcome);
+  const tv_reconstruction& r = outcome.reconstruction;
+  const bool has_cloud = !cloud.empty() && has_full_pose(outcome.two_view);
+  const bool has_lines = has_epipolar_geometry(outcome) && outcome.two_view.num_inliers > 0;
+  std::vector<Figure> figures;
+  files.add("result.json", json_text(outcome.json));
+  if (has_cloud) {
+    figures.push_back({"The cloud from the front and from the side",
+                       outcome.scale ? "Each point in its colour in image 0."
+                                     : "Each point in its colour in image 0. One baseline is the "
+                                       "distance between the cameras.",
+                       views_picture(outcome, cloud), false});
+    files.add("cloud.ply", cloud_ply(cloud));
+    files.add("views.png", png_bytes(figures.back().picture));
+  }
+  figures.push_back({"Matches",
+                     "Lines join the two images of a point; their colour tells how far it moved. "
+                     "What the geometry rejected is faint and red.",
+                     matches_picture(outcome.picture[0], outcome.picture[1], r.keypoints[0],
+                                     r.keypoints[1], r.matches, r.num_matches, r.inlier_mask),
+                     true});
+  files.add("matches.png", png_bytes(figures.back().picture));
+  if (has_lines) {
+    figures.push_back(
+        {"Epipolar lines",
+         "Each point must lie on the line of its colour. The lines of an image meet in its "
+         "epipole, "
+         "the direction in which the other camera stands: outside the image when the flight was "
+         "sideways, inside when it was forward.",
+         epipolar_picture(outcome), true});
+    files.add("epipolar.png", png_bytes(figures.back().picture));
+  }
+  files.add("report.html", report_html(outcome, cloud, figures));
+}
+
+// Standard deviations of a pose. Each is the root of the trace of its block of the covariance, so
+// that of the whole angle and not that about one axis.
+std::string uncertainty_line(const tv_two_view& v) {
+  const double* c = v.covariance;
+  return summary_line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
+                      std::sqrt(c[0] + c[6] + c[12]) * 180 / M_PI,
+                      std::sqrt(c[18] + c[24]) * 180 / M_PI);
+}
+
+// Reports the shift of the principal point; empty without a shift.
+std::string camera_line(const tv_two_view& v) {
+  const double* shift = v.principal_point_shift;
+  if (shift[0] == 0 && shift[1] == 0) return "";
+  return summary_line(
+      "camera",
+      "its principal point seems to be (%+.1f, %+.1f) px off; pose and points are of the "
+      "corrected camera",
+      shift[0], shift[1]);
+}
+
+std::string pose_lines(const Outcome& outcome) {
+  const tv_two_view& v = outcome.two_view;
+  std::string text;
+  if (v.has_R)
+    text += summary_line("rotation", "%.3f deg between the views",
+                         rotation_error_deg(rotation_of(v), {1, 0, 0, 0, 1, 0, 0, 0, 1}));
+  if (has_full_pose(v)) {
+    // Where camera 1 stands as camera 0 sees it, which is easier to picture than t.
+    const Vector3 c = applied(transposed(rotation_of(v)), translation_of(v));
+    const double unit = unit_of(outcome);
+    char far[48] = "one baseline";
+    if (outcome.scale) std::snprintf(far, sizeof far, "%.3f m", unit);
+    text += summary_line("direction",
+                         "camera 1 stands at (%+.3f right, %+.3f down, %+.3f forward), %s away",
+                         -unit * c[0], -unit * c[1], -unit * c[2], far);
+  }
+  if (v.has_covariance) text += uncertainty_line(v);
+  return text + camera_line(v);
+}
+
+std::string truth_line(const nlohmann::ordered_json& truth) {
+  std::string text = "no pose to compare";
+  const auto part = [&](const char* key, const char* format) {
+    if (!truth[key].is_number()) return;
+    char number[96];
+    std::snprintf(number, sizeof number, format, truth[key].get<double>());
+    text += number;
+  };
+  if (truth["rotation_error_deg"].is_number()) text.clear();
+  part("rotation_error_deg", "rotation off by %.3f deg");
+  part("translation_error_deg", ", direction by %.3f deg");
+  part("depth_error_median_percent", ", depth by %.2f %% (median)");
+  part("depth_error_p95_percent", ", %.2f %% (95th percentile)");
+  return summary_line("truth", "%s", text.c_str());
+}
+
+std::string summary(const Outcome& outcome, const RecordingInput* recording, const OutputSet& files,
+                    size_t context_bytes) {
+  const Style style = stdout_style();
+  const tv_two_view& v = outcome.two_view;
+  const tv_reconstruction& r = outcome.reconstruction;
+  const Picture &a = outcome.picture[0], &b = outcome.picture[1];
+  std::string text;
+  text += summary_line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows,
+                       b.name.c_str(), b.luma.cols, b.luma.rows);
+  const char* const colours[] = {style.poor, style.fair, style.good};
+  const std::string reasons = reasons_in_words(v.reasons);
+  text += summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
+                       tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
+                       kind_in_words(v.kind).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
+  text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
+  text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
+                       v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
+  text += pose_lines(outcome);
+  if (recording) text += recording->words(outcome);
+  const auto& j = outcome.json;
+  if (j["median_parallax_deg"].is_number())
+    text += summary_line("parallax", "%.2f deg (median)", j["median_parallax_deg"].get<double>());
+  if (r.num_points > 0)
+    text += summary_line("cloud", "%d points, reprojection %.2f px rms", r.num_points,
+                         j["rms_reprojection_px"].get<double>());
+  if (j["truth"].is_object()) text += truth_line(j["truth"]);
+  text += summary_line(
+      "work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
+      j["kernels"].get<std::string>().c_str(), static_cast<double>(context_bytes) / (1 << 20));
+  std::string names;
+  for (const std::string& name : files.names()) names += " " + name;
+  return text + summary_line("files", "%s:%s", files.folder().c_str(), names.c_str());
+}
+
+int reconstruct(Arguments& a) {
+  Common& common = a.common;
+  common.options.settle();
+  check_inputs(a);
+  std::unique_ptr<RecordingInput> recording;
+  if (a.recording.given())
+    recording = std::make_unique<RecordingInput>(a.recording, a.cameras.both);
+  Session session(common.options);
+  Outcome outcome;
+  load_inputs(a, recording.get(), session, outcome);
+  if (recording) recording->add_gravity(common.options.estimate);
+  const bool has_truth = !a.truth.empty();
+  Truth truth;
+  if (has_truth) {
+    truth = load_truth(a.truth);
+    check_truth(truth, outcome.picture[0]);
+  }
+  OutputSet files(common.output);
+  for (const std::string& image : a.image) files.keep(image);
+  for (const std::string& camera : a.cameras.files()) files.keep(camera);
+  files.keep(a.truth);
+  const uint64_t total_ns = reconstruct_pair(session, common.options, outcome);
+  if (recording) recording->add_scale(outcome);
+
+  outcome.json = result_json(outcome);
+  if (recording) recording->add_json(outcome);
+  if (has_truth)
+    outcome.json["truth"] =
+        truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
+  outcome.json["timings_ms"] = session.take_times(total_ns, true);
+  outcome.json["context_bytes"] = session.context_bytes();
+  outcome.json["options"] = options_of(a);
+  outcome.json["kernels"] = session.kernels();
+  make_files(outcome, files);
+
+  if (common.json) print(json_text(outcome.json));
+  if (common.speaks()) print(summary(outcome, recording.get(), files, session.context_bytes()));
+  files.commit();
+  files.remove_others(kFiles);
+  if (has_full_pose(outcome.two_view)) return kExitPose;
+  const std::string reasons = reasons_in_words(outcome.two_view.reasons);
+  std::fprintf(stderr, "twoview: no full pose: %s%s%s\n",
+               kind_in_words(outcome.two_view.kind).c_str(), reasons.empty() ? "" : ": ",
+               reasons.c_str());
+  return kExitNoPose;
+}
+
+}  // namespace
+
+void add_reconstruct(CLI::App& program, Run& run) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* verb =
+      program.add_subcommand("reconstruct", "two images to a pose, a point cloud and a report");
+  verb->add_option("A", a->image[0], "image 0")->type_name("IMAGE");
+  verb->add_option("B", a->image[1], "image 1")->type_name("IMAGE");
+  a->recording.add_to(*verb);
+  a->cameras.add_to(*verb);
+  verb->add_option("--focal-35mm", a->focal_35mm,
+                   "in place of a camera file: the focal length as for 35 mm film, from EXIF; no "
+                   "lens distortion")
+      ->type_name("MM")
+      ->check(CLI::Range(1.0, 10000.0));
+  verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
+      ->type_name("FILE");
+  add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
+  verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
+}
+
+}  // namespace cli

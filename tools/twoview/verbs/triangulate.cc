@@ -1,0 +1,181 @@
+// twoview triangulate MATCHES: points from matched pixels and a known pose.
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "files/matches_file.h"
+#include "pair/truth.h"
+#include "report/tables.h"
+#include "verbs/camera_options.h"
+#include "verbs/verbs.h"
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+constexpr double kDegrees = 57.29577951308232;  // of a radian
+
+struct Arguments {
+  Common common;
+  std::string matches, pose;
+  CameraOptions cameras;
+  double max_error_px = Options().estimate.max_error_px;
+};
+
+std::vector<tv_point> triangulated(const Arguments& a, const MatchList& matches,
+                                   const KnownPose& pose,
+                                   const std::array<std::string, 2>& camera_files) {
+  std::array<tv_camera, 2> camera = CameraOptions::load(camera_files);
+  for (tv_camera& c : camera) c = pose.corrected(c);
+  std::vector<tv_point> points(matches.size());
+  const auto method = static_cast<tv_triangulation>(a.common.options.triangulation);
+  check(tv_triangulate(method, &camera[0], &camera[1], pose.R.data(), pose.t.data(),
+                       matches.pixels[0].data(), matches.pixels[1].data(),
+                       static_cast<int32_t>(points.size()), points.data()),
+        "cannot triangulate " + a.matches);
+  return points;
+}
+
+// What the cloud holds: in front of both cameras, and near enough to its pixels.
+bool is_wanted(const tv_point& point, double max_error_px) {
+  return point.status == TV_POINT_OK && static_cast<double>(point.error_px) <= max_error_px;
+}
+
+std::vector<CloudPoint> cloud(const std::vector<tv_point>& points, double max_error_px) {
+  constexpr uint8_t grey = 200;  // there is no image to take colours from
+  std::vector<CloudPoint> cloud;
+  for (const tv_point& p : points)
+    if (is_wanted(p, max_error_px))
+      cloud.push_back({p.position[0], p.position[1], p.position[2], grey, grey, grey,
+                       static_cast<float>(p.angle_rad * kDegrees), p.error_px});
+  return cloud;
+}
+
+Json result(const Arguments& a, const std::vector<tv_point>& points, const KnownPose& pose,
+            const std::array<std::string, 2>& camera_files) {
+  int counts[4] = {};
+  int num_wanted = 0;
+  double sum_sq = 0;
+  std::vector<double> angles;
+  for (const tv_point& p : points) {
+    ++counts[p.status];
+    if (!is_wanted(p, a.max_error_px)) continue;
+    ++num_wanted;
+    sum_sq += static_cast<double>(p.error_px) * p.error_px;
+    angles.push_back(p.angle_rad * kDegrees);
+  }
+  Json json;
+  json["num_matches"] = points.size();
+  json["num_points"] = num_wanted;
+  for (int status = 0; status < 4; ++status)
+    json["num_" + std::string(point_status_name(status))] = counts[status];
+  json["rms_reprojection_px"] = num_wanted ? Json(std::sqrt(sum_sq / num_wanted)) : Json(nullptr);
+  json["median_angle_deg"] = num_wanted ? Json(percentile(angles, 0.5)) : Json(nullptr);
+  json["R"] = pose.R;
+  json["t"] = pose.t;
+  json["points"] = Json::array();
+  for (const tv_point& p : points)
+    json["points"].push_back({{"position", Json(p.position)},
+                              {"angle_deg", p.angle_rad * kDegrees},
+                              {"error_px", shortest(p.error_px)},
+                              {"status", point_status_name(p.status)}});
+  json["options"] = options_json(a.common.options, kTriangulate);
+  json["options"]["max_error_px"] = a.max_error_px;
+  json["options"]["camera0"] = camera_files[0];
+  json["options"]["camera1"] = camera_files[1];
+  json["version"] = tv_version_string();
+  return json;
+}
+
+std::string summary(const Json& json, const OutputSet& files) {
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "%d points of %d matches; %d above %g px, %d infinite, %d behind a camera, "
+                "%d invalid\n",
+                json["num_points"].get<int>(), json["num_matches"].get<int>(),
+                json["num_ok"].get<int>() - json["num_points"].get<int>(),
+                json["options"]["max_error_px"].get<double>(), json["num_infinite"].get<int>(),
+                json["num_behind"].get<int>(), json["num_invalid"].get<int>());
+  std::string words = text;
+  if (json["num_points"].get<int>() > 0) {
+    std::snprintf(text, sizeof text, "reprojection %.2f px rms, angle %.2f deg (median)\n",
+                  json["rms_reprojection_px"].get<double>(),
+                  json["median_angle_deg"].get<double>());
+    words += text;
+  }
+  words += "files        " + files.folder().string() + ":";
+  for (const std::string& name : files.names()) words += " " + name;
+  return words + "\n";
+}
+
+// -o names a folder, or one file when it ends in .csv or .ply.
+void add_files(const fs::path& output, const std::string& csv, const std::string& ply,
+               OutputSet& files) {
+  const std::string kind = output.extension().string();
+  const bool is_file = files.folder() != output;
+  if (!is_file || kind == ".csv")
+    files.add(is_file ? output.filename().string() : "points.csv", csv);
+  if (!is_file || kind == ".ply")
+    files.add(is_file ? output.filename().string() : "cloud.ply", ply);
+}
+
+int triangulate(Arguments& a) {
+  Common& common = a.common;
+  common.options.settle();
+  const std::array<std::string, 2> camera_files = a.cameras.files();
+  if (camera_files[0].empty())
+    throw BadInput("cameras are needed: give --camera, or --camera0 and --camera1");
+  const KnownPose pose = load_pose(a.pose);
+  const MatchList matches = load_matches(a.matches);
+  const std::vector<tv_point> points = triangulated(a, matches, pose, camera_files);
+
+  const fs::path output(common.output);
+  const std::string kind = output.extension().string();
+  const bool is_file = (kind == ".csv" || kind == ".ply") && !fs::is_directory(output);
+  OutputSet files(is_file ? output.parent_path() : output);
+  files.keep(a.matches);
+  files.keep(a.pose);
+  for (const std::string& camera : camera_files) files.keep(camera);
+  const Json json = result(a, points, pose, camera_files);
+  add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px)), files);
+  if (common.json) print(json_text(json));
+  if (common.speaks()) print(summary(json, files));
+  files.commit();
+  return 0;
+}
+
+}  // namespace
+
+void add_triangulate(CLI::App& program, Run& run) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* verb =
+      program.add_subcommand("triangulate", "points from matched pixels and a known pose");
+  verb->add_option("MATCHES", a->matches, "table of x0 y0 x1 y1, such as matches.csv")
+      ->required()
+      ->type_name("FILE");
+  a->cameras.add_to(*verb);
+  verb->add_option("--pose", a->pose,
+                   "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px is used "
+                   "too, or YAML")
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--max-error-px", a->max_error_px,
+                   "leave points of a larger error out of the cloud")
+      ->check([](const std::string& text) {
+        double value = 0;
+        const bool in_range = CLI::detail::lexical_cast(text, value) && value > 0 && value <= 1e9;
+        return in_range ? std::string() : "'" + text + "' is not in (0, 1e9]";
+      })
+      ->type_name("(0, 1e9]")
+      ->capture_default_str();
+  add_common(*verb, a->common, kTriangulate,
+             "folder for points.csv and cloud.ply, or one file ending in .csv or .ply");
+  verb->final_callback([a, &run] { run = [a] { return triangulate(*a); }; });
+}
+
+}  // namespace cli
