@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Keeps the layers of docs and DESIGN: which folder of lib/src may include which, and who may see
+"""Keeps the layers of docs/contributing.md: which folder of lib/src may include which, and who may see
 Eigen, pixels, the heap and the internals at all. Reads the #include lines; prints each offence."""
 import re
 import sys

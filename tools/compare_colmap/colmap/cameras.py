@@ -1,4 +1,4 @@
-"""Camera files: OpenCV's and ROS's YAML, and the cameras.yaml of a data set (INTERFACES, Cameras)."""
+"""Camera files: OpenCV's and ROS's YAML, and the cameras.yaml of a data set (docs/formats.md, Cameras)."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Which pairs: a pairs file (INTERFACES: `name0 name1 rot0 rot1 K0 K1 T_0to1`, or the first 2, 4 or 22 fields), all,
+"""Which pairs: a pairs file (docs/formats.md: `name0 name1 rot0 rot1 K0 K1 T_0to1`, or the first 2, 4 or 22 fields), all,
 or each image with its next ones."""
 
 from dataclasses import dataclass
