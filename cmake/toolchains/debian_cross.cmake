@@ -9,7 +9,7 @@ endif()
 set(CMAKE_C_COMPILER_TARGET ${tv_triplet})
 set(CMAKE_CXX_COMPILER_TARGET ${tv_triplet})
 
-# Libraries are searched in the target's folders only. Eigen has headers only, so the host's are used.
+# Libraries are searched in the target's folders only. Eigen is headers, so the host's are used.
 set(CMAKE_FIND_ROOT_PATH /usr/${tv_triplet})
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
