@@ -2,7 +2,7 @@
 
 # Exit status of a test that cannot run here, after it has printed why.
 set(TWOVIEW_SKIP_CODE 77)
-# Both builds' tests run in one ctest (scripts/test): a sanitizer build's names say so.
+# scripts/test runs the tests of several builds in one ctest, so a sanitizer build's tests have a prefix.
 set(TWOVIEW_TEST_PREFIX "")
 if(TWOVIEW_SANITIZE)
   set(TWOVIEW_TEST_PREFIX "asan/")
@@ -36,7 +36,7 @@ function(tv_add_test name)
   target_compile_definitions(${target} PRIVATE
     TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
     TWOVIEW_CACHE_DIR="${PROJECT_SOURCE_DIR}/.cache")
-  # What users compile is C99 (rules/install); a test may use what makes it short.
+  # The public headers are C99, which rules/install checks; the tests themselves are C11 with extensions.
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11
     C_EXTENSIONS ON
