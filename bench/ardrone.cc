@@ -1,5 +1,5 @@
 // The AR.Drone's codecs: packets of navdata, frames of PaVE and command datagrams a second; and
-// what a session adds of its own to a picture. Built by the project's own encoder.
+// the time that a session itself adds to a picture. Built by the project's own encoder.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

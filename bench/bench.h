@@ -2,8 +2,8 @@
 //
 // A row's name is stage/case/system; the system is "twoview", or the peer with its version. The
 // rows of a case are to do the same work, and their counters say how much of it each has found. All
-// rows of a program run in random turn, so that a change of the machine's mood meets all systems
-// alike. scripts/bench reads the JSON and divides.
+// rows of a program run in random order, so that a change of the machine's speed affects all
+// systems alike. scripts/bench reads the JSON and divides.
 #pragma once
 
 #include <functional>

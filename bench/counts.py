@@ -1,4 +1,4 @@
-"""Instructions a call, which no mood of the machine changes.
+"""Instructions a call, which do not depend on the load of the machine.
 
 x86-64, under valgrind --tool=callgrind: each row of the benchmark programs is called once more
 after a first call; what happens inside bench_measured (bench.cc) is counted. Once with the avx2 and
@@ -104,7 +104,7 @@ def _arm_program(preset, compiler, folder):
 
 
 def arm(build):
-    """Rows as measure() gives them, without peers; what is missing here is told and left out."""
+    """Rows as measure() gives them, without peers; an architecture that cannot run here is named and left out."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
         plugin = os.path.join(folder, "count.so")

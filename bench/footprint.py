@@ -7,7 +7,7 @@ import subprocess
 from rows import Row
 
 CONTEXT_SIZES = [(320, 240), (640, 360), (640, 480), (1280, 720)]
-# What a user of the stages links: a program that uses them stands for the closure.
+# What a user of the stages links: the shared libraries of a program that calls them are counted.
 PEERS = [("OpenCV features2d + calib3d", ["libopencv_features2d.so", "libopencv_calib3d.so"]),
          ("OpenGV", ["libopengv.so"]), ("COLMAP", ["/usr/bin/colmap"])]
 

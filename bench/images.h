@@ -22,7 +22,7 @@ struct Pair {
 
 enum class Size { kVga, kHd };
 
-// Ends the program with a clear line where there are no images.
+// Ends the program with one line on stderr where there are no images.
 const Pair& pair_of(Size size);
 
 tv_image view_of(const cv::Mat& image);

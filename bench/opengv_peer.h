@@ -24,8 +24,8 @@ class [[gnu::visibility("default")]] OpengvMatches {
   // Of five consecutive matches from `first`: 9 numbers a solution, appended.
   void solve_five_point(OpengvSolver solver, int first, std::vector<double>* solutions) const;
 
-  // RANSAC with Nister's solver, then OpenGV's refinement on the inliers where asked for. false: no
-  // pose.
+  // RANSAC with Nister's solver, then OpenGV's refinement on the inliers where `refine` is set.
+  // false: no pose.
   bool estimate(double max_error_rad, double confidence, int max_iterations, bool refine,
                 double R[9], double t[3]);
 

@@ -82,7 +82,7 @@ Problem make_problem(uint64_t seed, int num, int num_true, double noise_px) {
   maker.direction(problem.t);
   std::vector<double> drawn[2];
   for (int tries = 0; static_cast<int>(drawn[0].size()) < 2 * num; ++tries) {
-    if (tries == 100 * num) {  // a motion that leaves too little in common
+    if (tries == 100 * num) {  // after this motion the views have too few points in common
       maker.rotation(problem.R);
       maker.direction(problem.t);
       drawn[0].clear(), drawn[1].clear();

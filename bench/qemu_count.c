@@ -1,6 +1,6 @@
-/* A plugin for qemu-user that counts the instructions that the guest executes and tells them on
-   stderr at exit. The few declarations of qemu's plugin interface, version 1, that it needs stand
-   here: their header is not packaged. */
+/* A plugin for qemu-user that counts the instructions that the guest executes and prints their
+   number on stderr at exit. The few declarations of qemu's plugin interface, version 1, that it
+   needs stand here: their header is not packaged. */
 #include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>

@@ -6,7 +6,7 @@ import statistics
 
 OURS = "twoview"
 
-# What a stage's time is told in, and how many of Google Benchmark's microseconds that is.
+# The unit of a stage's time, and how many of Google Benchmark's microseconds it has.
 UNITS = {"fast": ("ms", 1e3), "describe": ("us/keypoint", 1), "extract": ("ms", 1e3),
          "match": ("ms", 1e3), "relpose": ("us/sample", 1), "robust": ("ms/problem", 1e3),
          "triangulate": ("us/point", 1), "pair": ("ms", 1e3)}
@@ -49,7 +49,7 @@ class Row:
 
 
 # (stage, case, peer, least ratio, most of ours in the stage's unit): regular expressions that match
-# from the beginning; the numbers are those of the issue that asked for them.
+# from the beginning. The numbers are the targets that docs/performance.md lists.
 TARGETS = [
     ("fast", "FAST-9 ", "OpenCV", 1.5, None),
     ("fast", "FAST-12 ", "libcvd", 3, None),

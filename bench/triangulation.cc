@@ -4,8 +4,8 @@
 //
 //   bench_triangulation --errors [POINTS]
 //
-// Ours takes pixels through the camera model and tells angle, error and status of each point as
-// well; the peers get rays, or pixels and projection matrices, and give the point.
+// Ours takes pixels through the camera model and computes angle, error and status of each point as
+// well; the peers take rays, or pixels and projection matrices, and compute the point only.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

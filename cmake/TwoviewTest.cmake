@@ -5,7 +5,7 @@
 set(TWOVIEW_SKIP_CODE 77)
 # What runs a Python test file and keeps this rule.
 set(TWOVIEW_RUN_PYTHON_TEST ${PROJECT_SOURCE_DIR}/test/support/run_python.py)
-# Both builds' tests run in one ctest (scripts/test): a sanitizer build's names say so.
+# scripts/test runs the tests of several builds in one ctest, so a sanitizer build's tests have a prefix.
 set(TWOVIEW_TEST_PREFIX "")
 if(TWOVIEW_SANITIZE)
   set(TWOVIEW_TEST_PREFIX "asan/")
@@ -49,7 +49,7 @@ function(tv_add_test name)
   target_compile_definitions(${target} PRIVATE
     TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
     TWOVIEW_CACHE_DIR="${PROJECT_SOURCE_DIR}/.cache")
-  # What users compile is C99 (rules/install); a test may use what makes it short.
+  # The public headers are C99, which rules/install checks; the tests themselves are C11 with extensions.
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11
     C_EXTENSIONS ON

@@ -64,7 +64,7 @@ int main(int argc, char **argv) {
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
   camera.cy = atof(argv[5]);
-  camera.width = (int)(2 * camera.cx); /* nearly; the verdict asks how many would agree by chance */
+  camera.width = (int)(2 * camera.cx); /* nearly; the verdict's test against chance needs it */
   camera.height = (int)(2 * camera.cy);
   rotation_of(argv + 6, world[0]);
   rotation_of(argv + 10, world[1]);

@@ -45,8 +45,8 @@ class Graph:
 
 
 def kernels_of(source):
-    """The kernels that a source file may call: those it names as members of the table. Of a file
-    that names none, and of one outside the library, nothing is known."""
+    """The kernels that a source file may call: those it names as members of the table. A file that
+    names none, and a file outside the library, may call any."""
     if not source.exists():
         return frozenset()
     list_of_all = (SOURCES / "kernels/kernels.h").read_text()

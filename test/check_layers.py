@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Keeps the layers of docs and DESIGN: which folder of lib/src may include which, who may see Eigen,
-pixels, the heap and the internals at all, and that no files include one another in a circle. Reads
-the #include lines; prints each offence."""
+"""Keeps the layers of docs/contributing.md: which folder of lib/src may include which, who may see
+Eigen, pixels, the heap and the internals at all, that no files include one another in a circle, and
+that the rooms of tools/twoview depend one way. Reads the #include lines; prints each offence."""
 import posixpath
 import re
 import sys

@@ -5,11 +5,11 @@ endif()
 if(NOT CMAKE_CXX_COMPILER)
   set(CMAKE_CXX_COMPILER ${tv_triplet}-g++)
 endif()
-# gcc is made for one target, clang has to be told.
+# gcc is built for one target; clang needs the target as an option.
 set(CMAKE_C_COMPILER_TARGET ${tv_triplet})
 set(CMAKE_CXX_COMPILER_TARGET ${tv_triplet})
 
-# No library of the host is taken for one of the target's; Eigen is headers only, the host's serve.
+# Libraries are searched in the target's folders only. Eigen is headers, so the host's are used.
 set(CMAKE_FIND_ROOT_PATH /usr/${tv_triplet})
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)

@@ -8,7 +8,7 @@ static const int32_t REF_TAKE_OFF = 1 << 9, REF_EMERGENCY = 1 << 8;
 
 enum { MAX_KEY_BYTES = 64, MAX_VALUE_BYTES = 256, ID_BYTES = 8 };
 
-/* A command is written behind the text and counts once it is whole. */
+/* A command is written behind the text; `size` grows only when the whole command fits. */
 typedef struct writer {
   ardrone_at *at;
   size_t size;
@@ -153,8 +153,8 @@ tvs_status ardrone_at_calib(ardrone_at *at, int device) {
   return finish(&w);
 }
 
-/* Text that a quoted argument can carry: what a quote or a control character would begin is not
- * ours. */
+/* Whether text can stand in a quoted argument. A quote or a control character in it would begin
+   another command. */
 static int is_quotable(const char *text, size_t max_bytes) {
   size_t k = 0;
   for (; text[k]; ++k) {

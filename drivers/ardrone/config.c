@@ -176,7 +176,7 @@ static const key_rule *find_rule(const char *key) {
   return NULL;
 }
 
-/* A decimal number and nothing else; strtod would listen to the locale. */
+/* A decimal number and nothing else. strtod is not used, since it depends on the locale. */
 static int parse_number(const char *text, int allow_fraction, double *value) {
   double sum = 0, place = 1;
   int negative = 0, num_digits = 0, fraction = 0;
@@ -213,7 +213,7 @@ static int obeys(const key_rule *rule, const char *value) {
     case KEY_REAL:
       return parse_number(value, rule->kind == KEY_REAL, &number) && number >= rule->low &&
              number <= rule->high;
-    case KEY_GPS: /* 500 says "not valid" */
+    case KEY_GPS: /* the drone's value for "not valid" */
       return parse_number(value, 1, &number) &&
              ((number >= rule->low && number <= rule->high) || number == 500);
     case KEY_TEXT: return 1;

@@ -7,18 +7,18 @@
 
 TV_BEGIN_DECLS
 
-/* The packet of navdata's magic (0: the usual one), state, sequence, vision_defined and those
-   options that `present` and `gps_form` name, in the order of their tags, with its checksum. The
-   part of a 480-byte GPS that nobody knows is zeros. Writes *size; TVS_ERR_CAPACITY when it does
+/* Writes the packet of navdata's magic (0: the usual one), state, sequence, vision_defined and
+   those options that `present` and `gps_form` name, in the order of their tags, with its checksum.
+   The unknown part of a 480-byte GPS option is zeros. Writes *size; TVS_ERR_CAPACITY when it does
    not fit. */
 tvs_status ardrone_encode_navdata(const ardrone_navdata *navdata, uint8_t *bytes, size_t capacity,
                                   size_t *size);
 
-/* An ardrone_time of a time in nanoseconds, wrapped as the drone does. */
+/* Converts nanoseconds to an ardrone_time, wrapped as the drone wraps it. */
 ardrone_time ardrone_encode_time(int64_t time_ns);
 
-/* A PaVE header of header_size 64 or 68 and the payload after it. header->payload_size counts, not
-   what the caller wrote to total size. */
+/* Writes a PaVE header of header_size 64 or 68 and the payload after it. The payload has
+   header->payload_size bytes. */
 tvs_status ardrone_encode_pave(const ardrone_pave_header *header, const uint8_t *payload,
                                uint8_t *bytes, size_t capacity, size_t *size);
 

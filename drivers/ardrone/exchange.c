@@ -1,6 +1,6 @@
-/* The acknowledge handshake of ardrone/config.h. The drone raises its acknowledge bit when it has
-   taken a value and keeps it until it is told to clear it; over UDP each of the four messages may
-   be lost, so each step repeats. */
+/* The acknowledge handshake of ardrone/config.h. The drone sets its
+   acknowledge bit when it has accepted a value and keeps it set until CTRL 5 clears it. Each of the
+   four messages may be lost over UDP, so each step is repeated. */
 #include <string.h>
 
 #include "twoview_drivers/ardrone/config.h"

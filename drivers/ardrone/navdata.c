@@ -7,8 +7,8 @@
 #include "navdata_layout.h"
 #include "twoview_drivers/attitude.h"
 
-/* Plain sum of bytes, eight at a time: two sums of 16-bit lanes, emptied before a lane can overflow
-   (128 blocks x 2 x 255 < 65536). */
+/* The sum of all bytes, eight at a time: two sums of 16-bit lanes, which are added to the total
+   before a lane can overflow (128 blocks x 2 x 255 < 65536). */
 static uint32_t sum_bytes(const uint8_t *p, size_t size) {
   const uint64_t even = UINT64_C(0x00ff00ff00ff00ff);
   uint32_t sum = 0;
@@ -141,7 +141,8 @@ ardrone_order ardrone_sequence_check(ardrone_sequence *sequence, const ardrone_n
   if (behind >= FAR_BEHIND || (bootstrap && !sequence->was_bootstrap)) {
     return accept(sequence, navdata, ARDRONE_ORDER_RESTART);
   }
-  /* Overtaken packets come singly; a drone that counts anew sends many, each after the other. */
+  /* A packet that was overtaken comes alone. A drone whose count started again sends many packets
+   in order, so several late ones in order are a restart. */
   if (sequence->num_late > 0 && navdata->sequence != sequence->late_last + 1) {
     sequence->num_late = 0;
   }
@@ -184,7 +185,8 @@ static void take_attitude(const ardrone_demo *demo, double psi0_rad, tvs_imu *sa
 static void take_motion(const ardrone_navdata *navdata, tvs_imu *sample) {
   const ardrone_demo *demo = &navdata->demo;
   const float *v = demo->velocity_mm_s;
-  if ((navdata->state & ARDRONE_STATE_FLYING) == 0) return; /* on the ground both are fiction */
+  if ((navdata->state & ARDRONE_STATE_FLYING) == 0)
+    return; /* on the ground the drone reports values that it did not measure */
   if (demo->altitude_mm > 0 && demo->altitude_mm < 200000) {
     sample->altitude_m = demo->altitude_mm * 1e-3;
     sample->altitude_sigma = 0.02 + 0.01 * sample->altitude_m;
@@ -197,8 +199,8 @@ static void take_motion(const ardrone_navdata *navdata, tvs_imu *sample) {
   sample->valid |= TVS_IMU_VELOCITY_XY;
   if (ARDRONE_HAS(navdata, ARDRONE_TAG_ALTITUDE) && is_within(navdata->altitude.vz_mm_s, 20e3) &&
       (sample->valid & TVS_IMU_ATTITUDE)) {
-    /* World's down velocity is the third row of the rotation times the body velocity; solved for z.
-     */
+    /* World's down velocity is the third row of the rotation times the body velocity; solved
+       for z. */
     const double theta = demo->theta_mdeg * 1e-3 * DEGREE, phi = demo->phi_mdeg * 1e-3 * DEGREE;
     const double down = cos(theta) * cos(phi);
     if (down > 0.5) {

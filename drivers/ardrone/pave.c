@@ -43,7 +43,8 @@ static void read_extra(const uint8_t *p, ardrone_pave_header *header) {
   }
 }
 
-/* Strict enough that a signature within a picture is not taken for a packet. */
+/* The check is strict, so that the bytes of a signature inside a picture do not pass for a
+   packet. */
 static int is_plausible(const ardrone_pave_header *header) {
   return header->version >= 1 && header->version <= 3 && header->codec <= ARDRONE_PAVE_H264 &&
          header->header_size >= ARDRONE_PAVE_MIN_HEADER &&

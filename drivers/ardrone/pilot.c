@@ -6,8 +6,8 @@
 
 #define MS INT64_C(1000000)
 static const int64_t TAKE_OFF_TIMEOUT_NS = 20000 * MS;
-/* A pulse holds the bit long enough that some of its datagrams arrive; the pause after it, which is
-   the falling edge, is longer than the drone needs to say what became of it. */
+/* A pulse holds the bit so long that some of its datagrams arrive although others are lost. The
+   pause after it is longer than the drone needs to report the new state. */
 static const int64_t PULSE_NS = 150 * MS, PULSE_PERIOD_NS = 600 * MS, EMERGENCY_NS = 3000 * MS;
 static const int64_t FRESH_NS = 200 * MS;
 enum { NUM_TRIMS = 10 }; /* the drone does not acknowledge it */
@@ -59,7 +59,8 @@ void ardrone_pilot_state(ardrone_pilot *pilot, uint32_t state, int64_t now_ns) {
   } else if (is_flying(pilot)) {
     pilot->was_flying = 1;
   } else if (pilot->was_flying || now_ns - pilot->take_off_ns > TAKE_OFF_TIMEOUT_NS) {
-    end_flight(pilot); /* it came down by itself; a bit 9 still set would send it up again */
+    end_flight(pilot); /* it landed by itself; bit 9 of REF, if it stayed set, would make it take
+                          off again */
   }
 }
 
@@ -107,8 +108,8 @@ static tvs_status begin_emergency(ardrone_pilot *pilot, int kind, int64_t now_ns
   return TVS_OK;
 }
 
-/* Without a state there is no telling whether the bit cuts or re-arms; one who asks for the cut
- * means it. */
+/* Without the drone's state it is not known whether the bit cuts the motors or re-arms them. A
+   request to cut them is carried out all the same. */
 tvs_status ardrone_pilot_cut_motors(ardrone_pilot *pilot, int64_t now_ns) {
   if (!pilot) return TVS_ERR_NULL;
   if (pilot->has_state && is_in_emergency(pilot)) return TVS_OK;
@@ -137,8 +138,8 @@ static int emergency_bit(ardrone_pilot *pilot, int64_t now_ns) {
     return 0;
   }
   since_ns = now_ns - pilot->pulse_start_ns;
-  /* The bit is a toggle: another pulse only if the drone has just said that the last one did
-   * nothing. */
+  /* The bit toggles the state: send another pulse only if a state word after the last pulse shows
+   that it had no effect. */
   if (since_ns >= PULSE_PERIOD_NS && (!pilot->has_state || now_ns - pilot->state_ns > FRESH_NS)) {
     return 0;
   }

@@ -11,7 +11,7 @@ static const int64_t TAKEN_LATER_NS = 10 * MS;
 
 /* ---- files ---- */
 
-/* The next whole record of a navdata.log; one that cannot be is the end. */
+/* Reads the next whole record of a navdata.log. A record with an impossible length ends the log. */
 static int read_record(FILE *file, int64_t *host_ns, uint8_t *bytes, size_t capacity,
                        size_t *size) {
   uint8_t header[RECORD_BYTES];
@@ -30,7 +30,7 @@ static void load_datagram(ardrone_replay *replay) {
                                      sizeof replay->datagram, &replay->datagram_size);
 }
 
-/* Reads the header into the buffer: its fixed part first, which says how long the whole is. */
+/* Reads the header into the buffer: first its fixed part, which holds the length of the whole. */
 static int load_header(ardrone_replay *replay, ardrone_pave_header *header) {
   tvs_status status;
   FILE *file = replay->video;
@@ -62,7 +62,8 @@ static void load_packet(ardrone_replay *replay) {
   replay->header_sent = 0;
   replay->payload_left = header.payload_size;
   if (!read_frame_line(replay->frames, header.frame_number, &replay->packet_ns)) {
-    /* By the packets' stamps from here on; a stamp that jumps waits no longer than a second. */
+    /* From here on the packets' stamps give the times. Where a stamp jumps, the wait is at
+       most 1 s. */
     const uint32_t step_ms = header.timestamp_ms - replay->paced_ms;
     replay->packet_ns = replay->paced_ns + (step_ms > 1000 ? 33 : step_ms) * MS;
     if (replay->frames) fclose(replay->frames);
@@ -116,7 +117,7 @@ static tvs_status receive_video(ardrone_replay *replay, void *bytes, size_t capa
     *size = replay->payload_left < capacity ? replay->payload_left : capacity;
     *size = fread(bytes, 1, *size, replay->video);
     replay->payload_left -= *size;
-    if (*size == 0) replay->payload_left = 0; /* cut off: the parser throws away what came of it */
+    if (*size == 0) replay->payload_left = 0; /* cut off: the parser drops the part that came */
   }
   if (replay->header_sent == replay->header_size && replay->payload_left == 0) {
     load_packet(replay);
@@ -191,7 +192,8 @@ int64_t ardrone_replay_next_ns(const ardrone_replay *replay) {
   if (replay->has_packet && due(replay, replay->packet_ns) < next_ns) {
     next_ns = due(replay, replay->packet_ns);
   }
-  /* Due and not taken: the session has closed that channel, and time alone opens it again. */
+  /* Bytes are due that the session does not receive: it has closed that channel, and opens it again
+   when its clock has advanced. */
   return next_ns > replay->now_ns ? next_ns : replay->now_ns + TAKEN_LATER_NS;
 }
 

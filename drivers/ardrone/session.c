@@ -61,11 +61,13 @@ static void init_clocks(ardrone_session *session) {
   options.period_ns = ARDRONE_TIME_PERIOD_NS;
   tvs_clock_init(&session->navdata_clock, &options, 1, 2);
   options.period_ns = INT64_C(4294967296) * MS; /* 32 bits of milliseconds */
-  options.least_delay_ns = 300 * MS; /* exposure, encoder, queues: nobody sees them from here */
+  options.least_delay_ns =
+      300 * MS; /* the delay of exposure, encoder and queues, which cannot be observed here */
   tvs_clock_init(&session->video_clock, &options, 2, 2);
 }
 
-/* The session's id is another one each time, the others are the name's. */
+/* The session's id differs each time; the ids of the user and the application are made from
+   the name. */
 static void make_ids(ardrone_session *session) {
   char text[MAX_NAME_BYTES + 24];
   const size_t length = strlen(session->options.name);
@@ -183,7 +185,7 @@ tvs_status ardrone_session_imu(ardrone_session *session, tvs_imu_source *source)
   return TVS_OK;
 }
 
-/* ---- wishes ---- */
+/* ---- requests ---- */
 
 tvs_status ardrone_session_take_off(ardrone_session *session) {
   if (!session) return TVS_ERR_NULL;

@@ -1,4 +1,4 @@
-/* What a link is set up with, then what the caller asked for, one exchange after the other. */
+/* The settings of a new link, and then the caller's requests, one exchange after the other. */
 #include <string.h>
 
 #include "session_impl.h"
@@ -21,7 +21,8 @@ static int is_idle(const ardrone_exchange *exchange) {
          exchange->state == ARDRONE_EXCHANGE_FAILED;
 }
 
-/* navdata_demo first: it ends the bootstrap. A request that was under way is begun again later. */
+/* navdata_demo comes first, since it ends the bootstrap. A request that was under way begins again
+   after the set-up. */
 void ardrone_exchanges_new_link(ardrone_session *session) {
   const ardrone_session_options *o = &session->options;
   session->exchange.state = ARDRONE_EXCHANGE_IDLE;
@@ -87,7 +88,8 @@ static void finish_exchange(ardrone_session *session) {
 
 static void complete_setup(ardrone_session *session) {
   if (session->num_setup > 0 &&
-      (session->navdata.state & ARDRONE_STATE_BOOTSTRAP)) { /* it did not take: from the start */
+      (session->navdata.state &
+       ARDRONE_STATE_BOOTSTRAP)) { /* the drone did not accept it: begin again */
     session->idx_setup = 0;
     return;
   }
@@ -113,7 +115,7 @@ static int is_reading(const ardrone_session *session) {
          session->exchange.kind != ARDRONE_EXCHANGE_SET;
 }
 
-/* The text ends with a zero byte; more than fits is no configuration. */
+/* The text ends with a zero byte. Text that does not fit is no configuration. */
 void ardrone_exchanges_receive(ardrone_session *session) {
   const ardrone_transport *t = &session->transport;
   while (is_reading(session) && session->exchange.state != ARDRONE_EXCHANGE_RELEASING) {

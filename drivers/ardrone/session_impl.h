@@ -24,7 +24,8 @@ typedef struct request {
   char key[ARDRONE_KEY_BYTES], value[ARDRONE_VALUE_BYTES];
 } request;
 
-/* One TCP stream of PaVE packets, supervised by itself. */
+/* One TCP stream of PaVE packets. Each stream is opened again by itself when it closes or is
+   silent. */
 typedef struct stream {
   ardrone_channel channel;
   int is_open, has_bytes, num_connections;
@@ -44,7 +45,7 @@ struct ardrone_session {
   int is_open, has_link, is_up;
   int64_t open_retry_ns, wake_ns, heard_ns;
   ardrone_sequence sequence;
-  uint32_t last_number; /* survives a silence, to tell a reboot */
+  uint32_t last_number; /* kept through a silence, so that a reboot is recognised */
   int was_heard;
   ardrone_navdata navdata;
   ardrone_pilot pilot;
@@ -72,7 +73,7 @@ struct ardrone_session {
   /* pictures */
   stream video, recording;
   ardrone_pave_gate gate;
-  int gap, new_stream; /* what the next picture will be flagged with */
+  int gap, new_stream; /* the flags of the next picture */
   tvs_frame frames[QUEUE_FRAMES];
   int first_frame, num_frames;
 };

@@ -1,4 +1,5 @@
-/* Navdata and commands: waking the drone, telling a lost link and a reboot, the tick. */
+/* Navdata and commands: it wakes the drone, recognises a lost link and a reboot, and sends a
+   datagram at each tick. */
 #include <string.h>
 
 #include "session_impl.h"
@@ -77,11 +78,11 @@ static void make_link(ardrone_session *session) {
   ardrone_exchanges_new_link(session);
 }
 
-/* Another boot of the drone: its clocks, its yaw and its picture numbers begin anew. */
+/* The drone started again: its clocks, its yaw and its picture numbers start again. */
 static void begin_anew(ardrone_session *session) {
   ++session->counters.reboots;
   if (session->has_link) lose_link(session);
-  session->sequence.has_last = 1; /* it is this packet's already */
+  session->sequence.has_last = 1; /* the session's state is that of this packet already */
   session->has_psi0 = 0;
   tvs_clock_restart(&session->navdata_clock);
   ardrone_video_reboot(session);
@@ -140,7 +141,8 @@ void ardrone_link_receive(ardrone_session *session) {
     size_t size = 0;
     const tvs_status status =
         t->receive(t->user, ARDRONE_CHANNEL_NAVDATA, bytes, sizeof bytes, &size);
-    if (status != TVS_OK) return; /* a broken socket is silent, and silence is supervised */
+    if (status != TVS_OK)
+      return; /* a socket that failed receives nothing, and 2 s without navdata reopen it */
     take_datagram(session, bytes, size);
   }
 }
@@ -164,7 +166,8 @@ void ardrone_link_supervise(ardrone_session *session) {
   }
 }
 
-/* A link keeps alive; without one only a pilot who was flying goes on, to say "land". */
+/* With a link, datagrams go out to keep it alive. Without one they go out only if the drone was
+   flying, and say "land". */
 void ardrone_link_send(ardrone_session *session) {
   const ardrone_transport *t = &session->transport;
   ardrone_pilot *pilot = &session->pilot;

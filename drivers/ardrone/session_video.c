@@ -27,7 +27,8 @@ static void begin_connection(ardrone_session *session, stream *s) {
   ardrone_tell(session, ARDRONE_EVENT_VIDEO_OPEN, NULL);
 }
 
-/* Silent for 1 s is as good as closed: a drone that vanished says no good-bye. */
+/* A stream that was silent for 1 s counts as closed, since a drone that is switched off does not
+   close its connections. */
 static void supervise_stream(ardrone_session *session, stream *s) {
   const ardrone_transport *t = &session->transport;
   if (s->is_open && session->now_ns - s->heard_ns > SILENT_NS) close_stream(session, s);
@@ -39,7 +40,7 @@ static void supervise_stream(ardrone_session *session, stream *s) {
   s->heard_ns = session->now_ns;
 }
 
-/* Fills the parser as far as it goes. Returns how many bytes came. */
+/* Receives into the parser as much as it has room for. Returns how many bytes came. */
 static size_t receive_stream(ardrone_session *session, stream *s) {
   const ardrone_transport *t = &session->transport;
   size_t total = 0;
@@ -51,8 +52,8 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
     status = t->receive(t->user, s->channel, to, room, &size);
     if (status == TVS_NONE) return total;
     if (status != TVS_OK || size == 0) {
-      /* What came before the end is still good: it is cut up before the next receive sees the end.
-       */
+      /* The bytes before the end of the stream are still valid: they are cut into packets before
+   the next receive returns the end. */
       if (total == 0) close_stream(session, s);
       return total;
     }
@@ -67,9 +68,9 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
 /* ---- time of a picture ---- */
 
 /* Where both stamps count from the drone's start, the picture's own stamp names an instant of the
-   navdata clock. It shows: by its arrival, less what is taken off for the least delay, the picture
-   then is up to a second and a half late, where two unrelated clocks would agree so well once in
-   1200 times. */
+   navdata clock. The arrival
+   times show whether that is so: the picture is then at most 1.5 s late (the least delay
+   subtracted). Two unrelated clocks agree so well by chance once in 1200 times. */
 typedef enum clock_relation { UNRELATED, BY_ARRIVAL, BY_STAMP } clock_relation;
 
 static clock_relation to_navdata_clock(const ardrone_session *session, const tvs_time *time,
@@ -134,8 +135,8 @@ tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs
   }
   status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns, gap_ns, &found);
   if (status != TVS_OK) return status;
-  /* Not knowing the instant is not knowing the attitude: what it turned in that time goes to sigma.
-   */
+  /* An uncertain instant makes the attitude uncertain: the angle that the drone turned within that
+   uncertainty is added to sigma. */
   if (uncertainty_ns > 0) {
     status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns - uncertainty_ns, gap_ns,
                               &earlier);
@@ -215,7 +216,7 @@ static void decode_packet(ardrone_session *session, const ardrone_pave_packet *p
     session->gap = 1;
     if (status != TVS_NONE) {
       ++session->counters.frames_failed;
-      session->gate.is_open = 0; /* what follows refers to a picture that is not there */
+      session->gate.is_open = 0; /* the following pictures refer to one that is missing */
     }
   }
 }
@@ -256,11 +257,12 @@ static void step_live(ardrone_session *session) {
       take_live(session, &packet);
     }
   } while (size > 0 && total < MAX_BYTES_A_STEP);
-  supervise_stream(session, &session->video); /* after receiving: a caller's pause is no silence */
+  supervise_stream(session, &session->video); /* after receiving, since a pause of the caller's is
+                                                 no silence of the drone's */
   session->counters.bytes_skipped = session->video.parser.bytes_skipped;
 }
 
-/* Every packet counts here: no gate, no latency rule. */
+/* Every packet of the recording is reported: without the gate and without skip_to_latest. */
 static void step_recording(ardrone_session *session) {
   size_t total = 0, size;
   do {

@@ -77,7 +77,7 @@ static tvs_status why_nothing(void) {
              : TVS_ERR_IO;
 }
 
-/* Datagrams from anywhere else are thrown away, as many as there are, up to a bound. */
+/* Datagrams from other addresses are dropped, up to a bound for each call. */
 static tvs_status receive_datagram(ardrone_sockets *sockets, ardrone_channel channel, void *bytes,
                                    size_t capacity, size_t *size) {
   int k;

@@ -9,7 +9,7 @@ enum { MAX_BYTES = 1 << 24 };
 typedef struct h264 {
   AVCodecContext *context;
   AVPacket *packet;
-  AVFrame *frame; /* received into, then moved to the picture's own */
+  AVFrame *frame; /* what libav decodes into; it is then moved to the picture's own frame */
 } h264;
 
 static int is_luma_first(int format) {
@@ -25,7 +25,7 @@ static tvs_status take_picture(h264 *own, tvs_picture *picture) {
   const int result = avcodec_receive_frame(own->context, own->frame);
   if (result == AVERROR(EAGAIN) || result == AVERROR_EOF) return TVS_NONE;
   if (result < 0) return TVS_ERR_DATA;
-  /* A picture with concealed errors is no measurement. */
+  /* A picture in which libav concealed errors is refused, since its pixels were not measured. */
   if (!is_luma_first(own->frame->format) || own->frame->linesize[0] < own->frame->width ||
       own->frame->width < 1 || own->frame->height < 1 || own->frame->decode_error_flags ||
       (own->frame->flags & AV_FRAME_FLAG_CORRUPT)) {
@@ -51,7 +51,8 @@ static tvs_status decode(void *user, const uint8_t *bytes, size_t size, tvs_pict
   int result;
   if (!bytes || !picture) return TVS_ERR_NULL;
   if (size == 0 || size > MAX_BYTES) return TVS_ERR_ARGUMENT;
-  /* A packet of libav's own, padded as it asks: the caller's bytes end where they end. */
+  /* The bytes are copied into a packet of libav's own, since libav reads beyond the end of a packet
+   and requires padding there. */
   if (av_new_packet(own->packet, (int)size) < 0) return TVS_ERR_CAPACITY;
   memcpy(own->packet->data, bytes, size);
   result = avcodec_send_packet(own->context, own->packet);
@@ -92,7 +93,7 @@ tvs_status tvs_h264_open(tvs_decoder *decoder) {
     free_all(own);
     return TVS_ERR_CAPACITY;
   }
-  own->context->thread_count = 1; /* more threads would hold pictures back */
+  own->context->thread_count = 1; /* with more threads pictures would come later */
   own->context->flags |= AV_CODEC_FLAG_LOW_DELAY;
   own->context->err_recognition = AV_EF_EXPLODE;
   if (avcodec_open2(own->context, codec, NULL) < 0) {

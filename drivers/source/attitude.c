@@ -21,7 +21,8 @@ void tvs_slerp(const double a[4], const double b[4], double s, double q[4]) {
     dot = -dot;
     sign = -1;
   }
-  if (dot < 1 - 1e-9) { /* else sin is too small to divide by, and a chord is as good */
+  if (dot < 1 - 1e-9) { /* below it sin is too small to divide by, and linear interpolation is exact
+                           to rounding */
     const double angle = acos(dot);
     weight_a = sin((1 - s) * angle) / sin(angle);
     weight_b = sin(s * angle) / sin(angle);
@@ -38,7 +39,7 @@ void tvs_attitudes_init(tvs_attitudes *attitudes) {
   if (attitudes) attitudes->first = attitudes->count = 0;
 }
 
-/* Entry k of those that are held, the oldest first, as an index into the ring. */
+/* The index into the ring of the k-th entry, the oldest being 0. */
 static int32_t slot(const tvs_attitudes *attitudes, int32_t k) {
   return (attitudes->first + k) % TVS_ATTITUDES_CAPACITY;
 }

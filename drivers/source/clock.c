@@ -1,17 +1,17 @@
 /* The least delay: received - device is the offset plus a delay that is never negative, so the
-   least of it over many packets is the offset plus the least delay. The clocks drift, so an old
-   least may have become too small or too large; it is let grow with the drift until a packet
-   confirms it. */
+   least of it over many packets is the offset plus the least delay. The clocks drift, so the
+   least of old packets may have become too small or too large: the offset may rise with the largest
+   drift until a packet confirms it. */
 #include "twoview_drivers/clock.h"
 
 #include <stddef.h>
 
 enum { SECOND = 1000000000 };
-static const int64_t LATEST_DELAY_NS =
-    30LL * SECOND; /* more than TCP holds back and still delivers */
+/* Longer than TCP delays bytes that it still delivers. */
+static const int64_t LATEST_DELAY_NS = 30LL * SECOND;
 static const int64_t JUMP_NS = SECOND;
-static const int64_t FARTHEST_NS = (int64_t)1
-                                   << 61; /* about 73 years: sums and differences are safe */
+/* About 73 years: sums and differences of such times do not overflow. */
+static const int64_t FARTHEST_NS = (int64_t)1 << 61;
 
 void tvs_clock_options_init(tvs_clock_options *options) {
   if (!options) return;
@@ -56,8 +56,8 @@ static int64_t uncertainty_at(const tvs_clock *clock, int64_t host_ns) {
          drift_over(clock, host_ns - clock->offset_host_ns);
 }
 
-/* host - device: the least delay is somewhere between 0 and what the options say, so half of that
- * is taken off. */
+/* host - device: the least delay is somewhere between 0 and what the options say, so half of
+   that is taken off. */
 static int64_t shift_of(const tvs_clock *clock) {
   return clock->offset_ns - clock->options.least_delay_ns / 2;
 }
@@ -82,7 +82,7 @@ static void begin_run(tvs_clock *clock, int64_t stamp_ns, int64_t received_ns) {
   clock->offset_ns = received_ns - stamp_ns;
 }
 
-/* Whether the stamp belongs to this run of the clock; if so, what it is unwrapped. */
+/* Whether the stamp belongs to this run of the clock; if so, its unwrapped time. */
 static int continues_run(const tvs_clock *clock, int64_t stamp_ns, int64_t received_ns,
                          int64_t *device_ns) {
   const int64_t elapsed = received_ns - clock->last_host_ns;
@@ -91,7 +91,7 @@ static int continues_run(const tvs_clock *clock, int64_t stamp_ns, int64_t recei
   *device_ns = unwrap(stamp_ns, clock->options.period_ns, expected);
   if (*device_ns < clock->last_device_ns - JUMP_NS) return 0;
   if (*device_ns - expected < -LATEST_DELAY_NS) return 0;
-  ahead = *device_ns + clock->offset_ns - received_ns; /* faster than the quickest packet ever */
+  ahead = *device_ns + clock->offset_ns - received_ns; /* smaller than the least delay so far */
   return ahead <= JUMP_NS + drift_over(clock, received_ns - clock->offset_host_ns);
 }
 
@@ -117,8 +117,8 @@ tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t receive
     device_ns = stamp_ns;
     begin_run(clock, stamp_ns, received_ns);
   } else {
-    /* After a silence in which the clocks parted by more than a packet's jitter, old packets say no
-       more than a new one. */
+    /* After a silence in which the clocks may have drifted by more than a packet's jitter, the old
+   packets bound the offset no better than a new one does. */
     ++clock->num_observed;
     if (drift_over(clock, received_ns - clock->last_host_ns) > clock->options.jitter_ns) {
       clock->num_observed = 1;

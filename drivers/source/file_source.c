@@ -25,7 +25,8 @@ void tvs_file_options_init(tvs_file_options *options) {
 size_t tvs_file_source_size(void) { return sizeof(tvs_file_source); }
 
 /* Reads samples until one is not older than device_ns. A log may hold many samples without an
-   attitude (a drone that is starting): all are read, the file is finite. */
+   attitude, while a drone starts. All of them are read; the number is bounded by the file's
+   length. */
 static void read_attitudes_until(tvs_file_source *source, int64_t device_ns) {
   const tvs_imu_source *imu = source->options.imu;
   while (!source->imu_ended && source->imu_device_ns < device_ns) {

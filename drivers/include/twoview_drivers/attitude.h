@@ -1,4 +1,4 @@
-/* twoview drivers: "what was the attitude when this frame was taken", or "unknown". */
+/* twoview drivers: the attitude at the time of a frame, from the measured ones around it. */
 #ifndef TWOVIEW_DRIVERS_ATTITUDE_H
 #define TWOVIEW_DRIVERS_ATTITUDE_H
 
@@ -8,9 +8,11 @@
 
 TV_BEGIN_DECLS
 
-enum { TVS_ATTITUDES_CAPACITY = 1024 }; /* 5 s at 200 Hz */
+/* How many attitudes are kept: 5 s of them at 200 Hz. */
+enum { TVS_ATTITUDES_CAPACITY = 1024 };
 
-/* The latest attitudes of one device, by its own time. The caller's struct, no heap. Private. */
+/* The latest attitudes of one device, in the order of its own time. The caller owns the struct; its
+   fields are private. */
 typedef struct tvs_attitudes {
   int32_t first, count;
   struct {
@@ -19,29 +21,30 @@ typedef struct tvs_attitudes {
   } entries[TVS_ATTITUDES_CAPACITY];
 } tvs_attitudes;
 
-/* None known; null is allowed. */
+/* Empties the list. Null is allowed. */
 TV_API void tvs_attitudes_init(tvs_attitudes *attitudes);
 
-/* Adds an attitude measured at device_ns of the clock that attitude->clock_id names; the oldest goes
-   when there is no room. A new clock_id forgets all that came before. One that is not newer than the
-   newest is left out (TVS_NONE).
-   Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (clock_id 0, not a unit quaternion to 1e-6, sigma not above 0). */
+/* Adds an attitude that was measured at device_ns of the clock that attitude->clock_id names. Where
+   there is no room the oldest is dropped. A new clock_id drops all earlier ones. An attitude that
+   is not newer than the newest is not added (TVS_NONE). Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT
+   (clock_id 0, not a unit quaternion to 1e-6, sigma not above 0). */
 TV_API tvs_status tvs_attitudes_add(tvs_attitudes *attitudes, int64_t device_ns,
                                     const tvs_attitude *attitude);
 
-/* The attitude at device_ns: on the shorter great circle between the two measured neighbours (slerp),
-   if they are at most max_gap_ns apart. Never extrapolated: TVS_NONE before the oldest, after the
-   newest (it may be known a moment later), within a larger gap, or for another clock_id.
-   sigma_rad is the neighbours' larger one. */
+/* The attitude at device_ns: on the shorter great circle between the two measured neighbours
+   (slerp), if they are at most max_gap_ns apart. It is never extrapolated: TVS_NONE before the
+   oldest, after the newest (ask again after the next tvs_attitudes_add), within a larger gap, and
+   for another clock_id. attitude->sigma_rad is the larger one of the two neighbours'. */
 TV_API tvs_status tvs_attitudes_at(const tvs_attitudes *attitudes, uint32_t clock_id,
                                    int64_t device_ns, int64_t max_gap_ns, tvs_attitude *attitude);
 
-/* q: the unit quaternion world_from_body (w x y z) of yaw, pitch, roll (radians), applied in this order about z, y,
-   x: pitch up, roll to the right and yaw clockwise from above are positive. */
+/* Writes to q the unit quaternion world_from_body (w x y z) of yaw, pitch and roll (radians),
+   applied in this order about z, y and x. Yaw clockwise from above, pitch up and roll to the right
+   are positive. */
 TV_API void tvs_quaternion_from_euler(double yaw, double pitch, double roll, double q[4]);
 
-/* q: on the shorter great circle between the unit quaternions a (s = 0) and b (s = 1), s in [0, 1]. It may be
-   a or b. */
+/* Writes to q the unit quaternion at the share s in [0, 1] of the shorter great circle from a (s =
+   0) to b (s = 1). q may be a or b. */
 TV_API void tvs_slerp(const double a[4], const double b[4], double s, double q[4]);
 
 TV_END_DECLS

@@ -6,34 +6,46 @@
 
 TV_BEGIN_DECLS
 
-/* Reads pictures in order; the caller knows the format. Times are those of the files. */
+/* How the pictures are read and timed. Frames' times are times of the files, not of this computer's
+   clock. */
 typedef struct tvs_file_options {
-  uint32_t struct_size; /* set by tvs_file_options_init */
-  void *user;           /* first argument of the functions */
-  /* Opens or decodes picture `index` (0, 1, ...): fills *picture and, where the file knows it,
-     *device_ns (as it stands: index / frames_per_second). TVS_END after the last one; TVS_ERR_DATA for
-     a picture that cannot be read, which is left out and makes the next one's gap flag. */
+  /* tvs_file_options_init sets it. */
+  uint32_t struct_size;
+  /* The first argument of the functions. */
+  void *user;
+  /* Opens or decodes picture `index` (0, 1, ...), fills *picture and, where the file has a time,
+     writes *device_ns, which holds index / frames_per_second before the call. TVS_END after the
+     last picture. TVS_ERR_DATA for a picture that cannot be read: it is left out and the next frame
+     gets TVS_FRAME_GAP. */
   tvs_status (*read)(void *user, uint64_t index, tvs_picture *picture, int64_t *device_ns);
-  void (*release)(void *user, tvs_picture *picture); /* null when there is nothing to release */
-  double frames_per_second;                          /* (0, 10000], default 30 */
-  uint32_t clock_id;                                 /* of the frames' times, at least 1, default 1 */
-  uint32_t reserved;                                 /* 0 */
-  /* Attitudes measured in the same clock, or null: frames then carry theirs. Read ahead as needed. */
+  /* Gives a picture back. Null when there is nothing to release. */
+  void (*release)(void *user, tvs_picture *picture);
+  /* Frames a second, (0, 10000], default 30; used where `read` writes no time. */
+  double frames_per_second;
+  /* The clock_id of the frames' times, at least 1, default 1. */
+  uint32_t clock_id;
+  /* 0. */
+  uint32_t reserved;
+  /* A source of attitudes in the same clock; each frame then carries the attitude at its time.
+     Samples are read ahead as far as a frame needs. Null: frames carry no attitude. */
   const tvs_imu_source *imu;
-  int64_t max_gap_ns; /* between an attitude's neighbours (attitude.h), default 100 ms */
+  /* The largest time between the two neighbours that an attitude is interpolated from (attitude.h),
+     ns, default 100 ms. */
+  int64_t max_gap_ns;
 } tvs_file_options;
 
-/* Writes the defaults, and struct_size; null is allowed. */
+/* Writes the defaults and struct_size. Null is allowed. */
 TV_API void tvs_file_options_init(tvs_file_options *options);
 
-/* About 75 kB: the attitudes. The caller's struct. Private. */
+/* A file source in the caller's memory, about 75 kB, nearly all of it attitudes. Private. */
 typedef struct tvs_file_source tvs_file_source;
 
-/* Bytes of a tvs_file_source, aligned as malloc does. */
+/* The bytes of a tvs_file_source, whose memory is to be aligned as malloc aligns it. */
 TV_API size_t tvs_file_source_size(void);
 
-/* Makes a source in the caller's memory. Any number of its frames may be held at once.
-   Returns TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE, TVS_ERR_ARGUMENT, TVS_ERR_CAPACITY (too few bytes). */
+/* Makes a source in `memory`, which the caller owns, and fills *source. The caller may hold any
+   number of its frames at once. Returns TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE, TVS_ERR_ARGUMENT,
+   TVS_ERR_CAPACITY (too few bytes). */
 TV_API tvs_status tvs_file_source_init(void *memory, size_t size_bytes,
                                        const tvs_file_options *options, tvs_frame_source *source);
 

@@ -1,5 +1,5 @@
-/* twoview drivers: H.264 to luma, by libavcodec. A library of its own, libtwoview_h264: nothing else of
-   the drivers needs libav. */
+/* twoview drivers: H.264 to luma by libavcodec. It is a library of its own, libtwoview_h264, so
+   that the other drivers do not depend on libav. */
 #ifndef TWOVIEW_DRIVERS_H264_H
 #define TWOVIEW_DRIVERS_H264_H
 
@@ -7,13 +7,14 @@
 
 TV_BEGIN_DECLS
 
-/* A decoder of Annex-B access units without reordering (baseline, low delay), one thread. Pictures are
-   the decoder's own memory, not copied: the Y plane, 8-bit, at the size that the stream's cropping
-   says. Close with tvs_h264_close after the last release.
+/* Opens a decoder of Annex-B access units without reordering (baseline, low delay) on one thread.
+   Its pictures are the 8-bit Y plane in the decoder's own memory, of the size that the stream's
+   cropping gives; nothing is copied. Release all pictures, then close it with tvs_h264_close.
    Returns TVS_ERR_NULL, TVS_ERR_STATE (this libavcodec has no H.264 decoder), TVS_ERR_CAPACITY (no
    memory). */
 TV_API tvs_status tvs_h264_open(tvs_decoder *decoder);
-/* Closes what tvs_h264_open opened; null is allowed. */
+
+/* Closes what tvs_h264_open opened. Null is allowed. */
 TV_API void tvs_h264_close(tvs_decoder *decoder);
 
 TV_END_DECLS

@@ -1,12 +1,12 @@
 /* twoview drivers: where frames and attitudes come from.
 
    A camera or a drone is one or two small structs of function pointers: a frame source and an IMU
-   source. ardrone/session.h fills them for the AR.Drone 2.0, file_source.h for recordings; a driver
-   of your own fills them the same way. All units are SI.
+   source. ardrone/session.h fills them for the AR.Drone 2.0, file_source.h for image files; a
+   driver of your own fills them in the same way. All units are SI.
 
-   Body frame:  x forward, y right, z down, at the vehicle.
-   World frame: z down; x along the body's x at start, projected on the level; right-handed.
-                It starts anew, like device time, with each clock_id.
+   Body frame:  x forward, y right, z down, with its origin at the vehicle.
+   World frame: z down; x is the body's x at the start, projected on the level; right-handed. With
+                each new clock_id the world frame and the device's time start again.
    Quaternions: w x y z, unit, world_from_body: v_world = q v_body q*. */
 #ifndef TWOVIEW_DRIVERS_SOURCE_H
 #define TWOVIEW_DRIVERS_SOURCE_H
@@ -18,102 +18,157 @@
 
 TV_BEGIN_DECLS
 
-/* When something was measured. Host times are nanoseconds of one monotonic clock of this computer,
-   the caller's own (file_source.h, ardrone/session.h say which). */
+/* When something was measured. Host times are nanoseconds of one monotonic clock of this computer;
+   file_source.h and ardrone/session.h say which clock that is. */
 typedef struct tvs_time {
-  int64_t received_ns;    /* host clock: when the bytes arrived */
-  int64_t host_ns;        /* host clock: when it was measured, as well as is known; else received_ns */
-  int64_t uncertainty_ns; /* host_ns is this far off or less; INT64_MAX when nobody knows */
-  int64_t device_ns;      /* the device's clock, unwrapped; 0 without one */
-  uint32_t clock_id;      /* names the clock of device_ns and the run of it: it changes when the device
-                             or its clock starts anew. Device times (and attitudes) of different ids
-                             do not compare. 0: no device time */
-  uint32_t reserved;      /* 0 */
+  /* Host time at which the bytes arrived, ns. */
+  int64_t received_ns;
+  /* Host time of the measurement, as well as it is known, ns; received_ns where nothing
+     better is. */
+  int64_t host_ns;
+  /* The largest error that host_ns may have, ns; INT64_MAX when it is not known. */
+  int64_t uncertainty_ns;
+  /* The device's own time, unwrapped, ns; 0 where the device has no clock. */
+  int64_t device_ns;
+  /* Names the device's clock and one run of it. It changes when the device starts again or
+     its clock jumps. Compare device times and attitudes of equal ids only. 0: there is no
+     device time. */
+  uint32_t clock_id;
+  /* Is 0. */
+  uint32_t reserved;
 } tvs_time;
 
-/* An attitude, and how far it may be off: one standard deviation, radians, about any axis. */
+/* An attitude and its uncertainty. */
 typedef struct tvs_attitude {
-  double world_from_body[4]; /* unit quaternion, w x y z */
-  double sigma_rad;          /* above 0 */
-  uint32_t clock_id; /* the run of the world frame that it belongs to */
-  uint32_t reserved; /* 0 */
+  /* Unit quaternion, w x y z. */
+  double world_from_body[4];
+  /* Standard deviation of the rotation about any axis, radians; above 0. */
+  double sigma_rad;
+  /* The run of the world frame that this attitude belongs to (tvs_time.clock_id). */
+  uint32_t clock_id;
+  /* Is 0. */
+  uint32_t reserved;
 } tvs_attitude;
 
+/* Bits of a frame's flags. */
 enum {
-  TVS_FRAME_KEY = 1,          /* decodable without any frame before it */
-  TVS_FRAME_GAP = 2,          /* frames between this one and the one before were lost or left out */
-  TVS_FRAME_HAS_ATTITUDE = 4, /* the attitude below was measured, not guessed */
-  TVS_FRAME_NEW_STREAM = 8    /* the first frame of a connection: nothing before it is related */
+  /* The frame can be decoded without any frame before it. */
+  TVS_FRAME_KEY = 1,
+  /* At least one frame between the last one delivered and this one was lost or left out. */
+  TVS_FRAME_GAP = 2,
+  /* The frame's attitude was measured; without this bit it holds nothing. */
+  TVS_FRAME_HAS_ATTITUDE = 4,
+  /* This is the first frame of a connection; do not relate it to the frames before it. */
+  TVS_FRAME_NEW_STREAM = 8
 };
 
-/* One picture. Its pixels belong to the source and live until `release`. */
+/* One picture. Its pixels belong to the source and are valid until release is called. */
 typedef struct tvs_frame {
-  uint32_t struct_size; /* set by the caller: sizeof(tvs_frame) */
-  uint32_t flags;       /* TVS_FRAME_ bits */
-  tv_image image;       /* 8-bit luma: pointer, width, height, stride; ready for tv_extract */
-  uint64_t number;      /* the device's own count where it has one, else from 0 */
-  tvs_time time;        /* of the exposure */
-  tvs_attitude attitude; /* at the exposure; valid with TVS_FRAME_HAS_ATTITUDE */
-  void *handle;         /* the source's own */
+  /* The caller sets it to sizeof(tvs_frame). */
+  uint32_t struct_size;
+  /* TVS_FRAME_ bits. */
+  uint32_t flags;
+  /* 8-bit luma: pointer, width, height, stride. It can be handed to tv_extract as it is. */
+  tv_image image;
+  /* The device's own frame number where it has one, else a count from 0. */
+  uint64_t number;
+  /* When the frame was exposed. */
+  tvs_time time;
+  /* The attitude at the exposure, where flags has TVS_FRAME_HAS_ATTITUDE. */
+  tvs_attitude attitude;
+  /* For the source's own use; leave it as it is. */
+  void *handle;
 } tvs_frame;
 
-/* Where frames come from. Filled by a driver; the pointers live as long as its session. */
+/* Where frames come from. A driver fills it; its pointers are valid as long as that driver's
+   session or memory. */
 typedef struct tvs_frame_source {
-  uint32_t struct_size; /* sizeof(tvs_frame_source) */
-  void *user;           /* first argument of the functions */
-  /* The next frame. TVS_OK: *frame is filled, and the caller calls release when done with it.
-     TVS_NONE: none yet (a live source does not wait). TVS_END: no more will come. Errors: frame as
-     it was. Sources state how many frames may be held at once; at least 1. */
+  /* sizeof(tvs_frame_source). */
+  uint32_t struct_size;
+  /* The first argument of the functions. */
+  void *user;
+  /* Gets the next frame and never waits. TVS_OK: *frame is filled, and the caller calls release
+     when it no longer needs the pixels. TVS_NONE: no frame has come yet. TVS_END: no further frame
+     will come. An error leaves *frame as it was. A source states how many frames the caller may
+     hold at once; it is at least 1. */
   tvs_status (*next)(void *user, tvs_frame *frame);
-  void (*release)(void *user, tvs_frame *frame); /* the caller is done with the frame's pixels */
+  /* Gives the frame's pixels back to the source. */
+  void (*release)(void *user, tvs_frame *frame);
 } tvs_frame_source;
 
-/* Which fields of a sample were measured. A field without its bit is 0. */
+/* Bits of a sample's `valid`: which fields were measured. A field without its bit is 0. */
 enum {
-  TVS_IMU_ATTITUDE = 1,     /* attitude */
-  TVS_IMU_RATE = 2,         /* rate_rad_s */
-  TVS_IMU_ACCELERATION = 4, /* acceleration_m_s2 */
-  TVS_IMU_VELOCITY_XY = 8,  /* velocity_m_s[0], [1] */
-  TVS_IMU_VELOCITY_Z = 16,  /* velocity_m_s[2] */
-  TVS_IMU_ALTITUDE = 32,    /* altitude_m */
-  TVS_IMU_PRESSURE = 64     /* pressure_pa */
+  /* attitude. */
+  TVS_IMU_ATTITUDE = 1,
+  /* rate_rad_s. */
+  TVS_IMU_RATE = 2,
+  /* acceleration_m_s2. */
+  TVS_IMU_ACCELERATION = 4,
+  /* velocity_m_s[0] and velocity_m_s[1]. */
+  TVS_IMU_VELOCITY_XY = 8,
+  /* velocity_m_s[2]. */
+  TVS_IMU_VELOCITY_Z = 16,
+  /* altitude_m. */
+  TVS_IMU_ALTITUDE = 32,
+  /* pressure_pa. */
+  TVS_IMU_PRESSURE = 64
 };
 
-/* One sample. Sigmas are one standard deviation of each component, as the source states them. */
+/* One sample. A sigma is one standard deviation of each component, as the source states it. */
 typedef struct tvs_imu {
-  uint32_t struct_size; /* set by the caller: sizeof(tvs_imu) */
-  uint32_t valid;       /* TVS_IMU_ bits */
-  tvs_time time;         /* of the measurement */
-  tvs_attitude attitude; /* with its own sigma */
-  double rate_rad_s[3], rate_sigma;             /* body axes */
-  double acceleration_m_s2[3], acceleration_sigma; /* body axes, specific force: (0, 0, -9.8) at rest */
-  double velocity_m_s[3], velocity_sigma;       /* body axes */
-  double altitude_m, altitude_sigma;            /* height above the ground below, up is positive */
-  double pressure_pa, pressure_sigma;           /* of the air, not reduced to sea level */
+  /* The caller sets it to sizeof(tvs_imu). */
+  uint32_t struct_size;
+  /* TVS_IMU_ bits. */
+  uint32_t valid;
+  /* When it was measured. */
+  tvs_time time;
+  /* The attitude, with its own sigma. */
+  tvs_attitude attitude;
+  /* Angular rate about the body's axes, radians per second, and its sigma. */
+  double rate_rad_s[3], rate_sigma;
+  /* Specific force along the body's axes, m/s^2, and its sigma: (0, 0, -9.8) at rest and level. */
+  double acceleration_m_s2[3], acceleration_sigma;
+  /* Velocity over ground along the body's axes, m/s, and its sigma. */
+  double velocity_m_s[3], velocity_sigma;
+  /* Height above the ground below, metres, positive upwards, and its sigma. */
+  double altitude_m, altitude_sigma;
+  /* Pressure of the air at the vehicle, pascals, not reduced to sea level, and its sigma. */
+  double pressure_pa, pressure_sigma;
 } tvs_imu;
 
-/* Where IMU samples come from. Filled as a tvs_frame_source. */
+/* Where IMU samples come from. A driver fills it, as it fills a tvs_frame_source. */
 typedef struct tvs_imu_source {
-  uint32_t struct_size; /* sizeof(tvs_imu_source) */
-  void *user;           /* first argument of the function */
-  tvs_status (*next)(void *user, tvs_imu *sample); /* as tvs_frame_source's, with nothing to release */
+  /* sizeof(tvs_imu_source). */
+  uint32_t struct_size;
+  /* The first argument of the function. */
+  void *user;
+  /* Gets the next sample, with the statuses of tvs_frame_source.next. There is nothing to
+     release. */
+  tvs_status (*next)(void *user, tvs_imu *sample);
 } tvs_imu_source;
 
 /* A decoded picture. */
 typedef struct tvs_picture {
-  tv_image image; /* the decoder's memory, until release */
-  void *handle;   /* the decoder's own */
+  /* Lies in the decoder's memory and is valid until release is called. */
+  tv_image image;
+  /* For the decoder's own use; leave it as it is. */
+  void *handle;
 } tvs_picture;
 
 /* Turns one compressed picture into luma. h264.h makes one from libavcodec. */
 typedef struct tvs_decoder {
-  uint32_t struct_size; /* sizeof(tvs_decoder) */
-  void *user;           /* first argument of the functions */
-  /* TVS_OK: *picture is filled, release it later. TVS_NONE: no picture from these bytes.
-     TVS_ERR_DATA: they do not decode. Pictures that were not released stay valid. */
+  /* sizeof(tvs_decoder). */
+  uint32_t struct_size;
+  /* The first argument of the functions. */
+  void *user;
+  /* Decodes `size` bytes. TVS_OK: *picture is filled; release it later. TVS_NONE: these bytes
+     give no picture. TVS_ERR_DATA: they do not decode. Pictures that were not released stay
+     valid. */
   tvs_status (*decode)(void *user, const uint8_t *bytes, size_t size, tvs_picture *picture);
-  void (*release)(void *user, tvs_picture *picture); /* its pixels are no longer needed */
-  void (*reset)(void *user); /* forget all earlier bytes: another stream begins */
+  /* Gives the picture's pixels back to the decoder. */
+  void (*release)(void *user, tvs_picture *picture);
+  /* Another stream begins: the decoder forgets all earlier bytes. */
+  void (*reset)(void *user);
 } tvs_decoder;
 
 TV_END_DECLS

@@ -1,9 +1,9 @@
-/* AR.Drone 2.0: AT commands, the text that flies it (UDP 5556). Pure: structs in, bytes out; no
-   socket, no heap, no clock, no locale.
+/* AR.Drone 2.0: AT commands, the text that controls the drone (UDP 5556). It writes bytes from
+   structs and uses no socket, heap, clock or locale.
 
-   A command is `AT*NAME=<sequence>[,argument...]` and a carriage return. Several share a datagram, none
-   is split. The drone obeys only numbers greater than the last it obeyed; 1 begins anew. The raw
-   motor command is left out on purpose.
+   A command is `AT*NAME=<sequence>[,argument...]` and a carriage return. Several commands share a
+   datagram; none is split. The drone obeys a command whose number is greater than the last one it
+   obeyed; the number 1 starts the count again. The raw motor command is left out on purpose.
    Layouts from Parrot's SDK, open drivers and captured bytes: docs/drivers.md. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_AT_H
 #define TWOVIEW_DRIVERS_ARDRONE_AT_H
@@ -15,108 +15,143 @@
 
 TV_BEGIN_DECLS
 
-/* The drone refuses a longer line; a datagram of ours is never longer either. */
+/* The drone refuses a longer line, and this driver never writes a longer datagram. */
 enum { ARDRONE_AT_MAX_BYTES = 1024 };
 
-/* One datagram being written. Start with zeros; `size` back to 0 begins the next datagram, `sequence`
-   back to 0 another link. Every function below appends one command, or returns an error and appends
-   nothing and uses no number: TVS_ERR_NULL; TVS_ERR_ARGUMENT, an argument out of range (NaN included) or
-   text with a quote, a comma where none may be, or a control character; TVS_ERR_CAPACITY, it does not fit in what is
-   left (never, for an empty datagram: longer than 1024 bytes). After sequence INT32_MAX - 1 the
-   numbers start again at 1, as the drone allows. */
+/* One datagram being written. Start with zeros; set `size` to 0 for the next datagram and
+   `sequence` to 0 for another link. Every function below appends one command. On an error it
+   appends nothing and uses no number. The errors are TVS_ERR_NULL; TVS_ERR_ARGUMENT: an argument
+   out of range (NaN included), or text with a quote, a control character, or a comma where none may
+   be; TVS_ERR_CAPACITY: the command does not fit in the rest of the datagram. An empty datagram has
+   room for any command. After the sequence number INT32_MAX - 1 the numbers start again at 1, as
+   the drone allows. */
 typedef struct ardrone_at {
-  char text[ARDRONE_AT_MAX_BYTES]; /* the commands so far */
-  size_t size;      /* bytes of text in use; no terminating zero */
-  int32_t sequence; /* the last number used */
+  /* The commands so far. */
+  char text[ARDRONE_AT_MAX_BYTES];
+  /* Bytes of text in use; no terminating zero. */
+  size_t size;
+  /* The sequence number of the last command. */
+  int32_t sequence;
 } ardrone_at;
 
-/* Flight state wanted; level-sensitive, so repeated every tick. take_off: 1 asks to fly, 0 to land.
-   emergency: the drone acts when it rises from 0 to 1: it cuts the motors, or in an emergency re-arms
-   them. ardrone/pilot.h makes it an edge. Statuses as of every command (ardrone_at). */
+/* The requested flight state; send it with every datagram. take_off: 1 requests flight, 0 landing.
+   emergency: when it rises from 0 to 1 the drone cuts the motors, or in an emergency re-arms them;
+   ardrone/pilot.h sends that edge. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_ref(ardrone_at *at, int take_off, int emergency);
 
-/* How to move: fractions of the configured limits, each in [-1, 1]. roll + right, pitch + backward
-   (nose up), climb + up, turn + clockwise from above. */
+/* How to move, as fractions of the configured limits. Positive are roll to the right, pitch
+   backward (nose up), climb upwards and turn clockwise from above. */
 typedef struct ardrone_move {
-  float roll, pitch, climb, turn; /* [-1, 1] */
+  /* Each in [-1, 1]. */
+  float roll, pitch, climb, turn;
 } ardrone_move;
 
 /* Flags of ardrone_at_pcmd. */
 enum {
-  ARDRONE_PCMD_COMBINED_YAW = 2, /* a turn while rolling flies a curve */
-  ARDRONE_PCMD_ABSOLUTE = 4      /* roll and pitch are seen from the controller, by the magnetometer */
+  /* Turn and roll together fly a curve. */
+  ARDRONE_PCMD_COMBINED_YAW = 2,
+  /* Roll and pitch are relative to the controller's heading, by the magnetometer. */
+  ARDRONE_PCMD_ABSOLUTE = 4
 };
 
-/* A movement. A null move is "hover". flags: ARDRONE_PCMD_ bits. Statuses as of every command (ardrone_at). */
+/* Sends a movement; a null move means "hover". flags: ARDRONE_PCMD_ bits. Statuses as of every
+   command (ardrone_at). */
 TV_API tvs_status ardrone_at_pcmd(ardrone_at *at, const ardrone_move *move, int flags);
-/* ardrone_at_pcmd with the controller's heading and its accuracy, fractions of pi in [-1, 1] and [0, 1].
-   Statuses as of every command (ardrone_at). */
+
+/* Sends a movement with the controller's heading and its accuracy, fractions of pi in [-1, 1] and
+   [0, 1]. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_pcmd_mag(ardrone_at *at, const ardrone_move *move, int flags,
                                       float heading, float accuracy);
 
-/* Flat trim: the drone stands level, on the ground. Statuses as of every command (ardrone_at). */
+/* Flat trim: send it while the drone stands level on the ground; its attitude becomes level.
+   Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_ftrim(ardrone_at *at);
-/* Calibrates a device, in flight: 0, the magnetometer, for which the drone spins.
+
+/* Calibrates a device in flight. Device 0 is the magnetometer; the drone turns about its axis.
    Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_calib(ardrone_at *at, int device);
+
 /* Clears the communication watchdog. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_comwdg(ardrone_at *at);
 
-/* Sets a key, "section:name" of 1 to 64 bytes; value: up to 256 bytes, may be empty.
+/* Sets a key, "section:name" of 1 to 64 bytes, to a value of at most 256 bytes, which may be empty.
    Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_config(ardrone_at *at, const char *key, const char *value);
-/* Under which ids the next ardrone_at_config counts: session, user and application, 8 hexadecimal digits
-   each. Statuses as of every command (ardrone_at). */
+
+/* The ids under which the next ardrone_at_config sets its key: session, user and application, 8
+   hexadecimal digits each. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_config_ids(ardrone_at *at, const char *session, const char *user,
                                         const char *application);
 
-/* What ardrone_at_ctrl asks for. */
+/* What ardrone_at_ctrl requests. */
 typedef enum ardrone_control_mode {
-  ARDRONE_CTRL_NONE = 0,        /* nothing */
-  ARDRONE_CTRL_SEND_CONFIG = 4, /* the configuration, on TCP 5559 */
-  ARDRONE_CTRL_ACKNOWLEDGE = 5, /* clears the state's acknowledge bit */
-  ARDRONE_CTRL_SEND_IDS = 6     /* the lists of ids, on TCP 5559 */
+  /* Nothing. */
+  ARDRONE_CTRL_NONE = 0,
+  /* Send the configuration on TCP 5559. */
+  ARDRONE_CTRL_SEND_CONFIG = 4,
+  /* Clear the state's acknowledge bit. */
+  ARDRONE_CTRL_ACKNOWLEDGE = 5,
+  /* Send the lists of ids on TCP 5559. */
+  ARDRONE_CTRL_SEND_IDS = 6
 } ardrone_control_mode;
 
-/* Asks for the configuration, for the ids, or clears the acknowledge bit. Statuses as of every command (ardrone_at). */
+/* Requests the configuration or the ids, or clears the acknowledge bit. Statuses as of every
+   command (ardrone_at). */
 TV_API tvs_status ardrone_at_ctrl(ardrone_at *at, ardrone_control_mode mode);
 
 enum {
-  ARDRONE_NUM_FLIGHT_ANIMATIONS = 20, /* flips and the like, from 0 */
-  ARDRONE_NUM_LED_ANIMATIONS = 21     /* blinking patterns, from 0 */
+  /* Flight animations, such as flips, have the numbers from 0 to one less than this. */
+  ARDRONE_NUM_FLIGHT_ANIMATIONS = 20,
+  /* Blinking patterns have the numbers from 0 to one less than this. */
+  ARDRONE_NUM_LED_ANIMATIONS = 21
 };
 
-/* A flight animation, milliseconds in [0, 60000], in its old form: today's is the key control:flight_anim
-   (ardrone/config.h). Statuses as of every command (ardrone_at). */
+/* Starts a flight animation of `milliseconds` in [0, 60000]. This is the old form; the present one
+   is the key control:flight_anim (ardrone/config.h). Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_anim(ardrone_at *at, int animation, int milliseconds);
-/* Blinking, hertz in (0, 100], seconds in [0, 3600], in its old form: today's is the key leds:leds_anim.
-   Statuses as of every command (ardrone_at). */
+
+/* Starts blinking with hertz in (0, 100] for seconds in [0, 3600]. This is the old form; the
+   present one is the key leds:leds_anim. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_led(ardrone_at *at, int animation, float hertz, int seconds);
 
-/* Commands of old firmware and of Parrot's own tools. What their arguments mean is Parrot's affair: this
-   driver writes them as they stand. */
+/* Commands of old firmware and of Parrot's own tools. The meaning of their arguments is not
+   documented; this driver writes them unchanged. */
 typedef enum ardrone_legacy {
-  ARDRONE_PMODE,     /* 1 argument */
-  ARDRONE_MISC,      /* 4 arguments */
-  ARDRONE_GAIN,      /* 13 arguments: the control loops' gains */
-  ARDRONE_VISP,      /* 9 arguments: parameters of the on-board vision */
-  ARDRONE_VISO,      /* 1 argument: its options */
-  ARDRONE_CAP,       /* 2 arguments: raw or compressed video */
-  ARDRONE_ZAP,       /* 1 argument: which camera is sent; today's is the key video:video_channel */
-  ARDRONE_CAD,       /* 2 arguments: which tags are looked for */
-  ARDRONE_MTRIM,     /* 3 arguments: trim by hand */
-  ARDRONE_POL,       /* 5 arguments: polaris, tags for positions */
-  ARDRONE_AFLIGHT,   /* 1 argument: flight by itself */
-  ARDRONE_VICON,     /* 22 arguments: a pose measured from outside */
-  ARDRONE_NUM_LEGACY /* how many there are */
+  /* 1 argument. */
+  ARDRONE_PMODE,
+  /* 4 arguments. */
+  ARDRONE_MISC,
+  /* 13 arguments: the control loops' gains. */
+  ARDRONE_GAIN,
+  /* 9 arguments: parameters of the on-board vision. */
+  ARDRONE_VISP,
+  /* 1 argument: its options. */
+  ARDRONE_VISO,
+  /* 2 arguments: raw or compressed video. */
+  ARDRONE_CAP,
+  /* 1 argument: which camera is sent; the present form is the key video:video_channel. */
+  ARDRONE_ZAP,
+  /* 2 arguments: which tags are looked for. */
+  ARDRONE_CAD,
+  /* 3 arguments: trim by hand. */
+  ARDRONE_MTRIM,
+  /* 5 arguments: polaris, tags for positions. */
+  ARDRONE_POL,
+  /* 1 argument: flight by itself. */
+  ARDRONE_AFLIGHT,
+  /* 22 arguments: a pose measured from outside. */
+  ARDRONE_VICON,
+  /* How many there are. */
+  ARDRONE_NUM_LEGACY
 } ardrone_legacy;
 
-/* Appends one of them; arguments: num_arguments numbers, as many as the command has.
-   Statuses as of every command (ardrone_at). */
+/* Appends one of these commands. arguments holds num_arguments numbers, which is as many as the
+   command has. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_legacy(ardrone_at *at, ardrone_legacy command,
                                     const int32_t *arguments, int num_arguments);
 
-/* What a float becomes in a command: its IEEE 754 bits as a signed number. -0.0 becomes 0. */
+/* Converts a float to what a command holds: its IEEE 754 bits as a signed number. -0.0
+   becomes 0. */
 TV_API int32_t ardrone_float_bits(float value);
 
 TV_END_DECLS

@@ -1,8 +1,9 @@
-/* AR.Drone 2.0: PaVE, the packets of its video streams (TCP 5555 live, 5553 recording). Pure: bytes in,
-   frames out, no socket, no heap.
+/* AR.Drone 2.0: PaVE, the packets of its video streams (TCP 5555 live, 5553 recording). It reads
+   bytes and writes structs; it uses no socket and no heap.
 
-   A packet is a header of 64 or 68 bytes and one H.264 picture. A connection may begin in the midst of one.
-   Layouts from Parrot's SDK, open drivers and captured bytes: docs/drivers.md. */
+   A packet is a header of 64 or 68 bytes and one H.264 picture. A connection may begin in the
+   middle of a packet. The layouts come from Parrot's SDK, open drivers and captured bytes:
+   docs/drivers.md. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_PAVE_H
 #define TWOVIEW_DRIVERS_ARDRONE_PAVE_H
 
@@ -15,114 +16,156 @@ TV_BEGIN_DECLS
 
 /* Bytes of a packet's parts. */
 enum {
-  ARDRONE_PAVE_MIN_HEADER = 64,       /* a shorter header is none */
-  ARDRONE_PAVE_MAX_HEADER = 256,      /* nor is a longer one */
-  ARDRONE_PAVE_MAX_PAYLOAD = 1 << 20, /* a larger picture is none */
-  ARDRONE_PAVE_SKIP_PAYLOAD = 7 /* a payload this short means "the last picture again" */
+  /* Bytes with a shorter header are no packet. */
+  ARDRONE_PAVE_MIN_HEADER = 64,
+  /* Bytes with a longer header are no packet. */
+  ARDRONE_PAVE_MAX_HEADER = 256,
+  /* Bytes with a larger payload are no packet. */
+  ARDRONE_PAVE_MAX_PAYLOAD = 1 << 20,
+  /* A payload of exactly this many bytes repeats the last picture. */
+  ARDRONE_PAVE_SKIP_PAYLOAD = 7
 };
 
 /* How the payload is compressed. */
 typedef enum ardrone_pave_codec {
-  ARDRONE_PAVE_UNKNOWN, /* not said */
-  ARDRONE_PAVE_VLIB,    /* the first drone's */
-  ARDRONE_PAVE_P264,    /* the first drone's */
-  ARDRONE_PAVE_MPEG4,   /* MPEG-4 part 2 */
-  ARDRONE_PAVE_H264     /* H.264 baseline, Annex B: what this drone sends */
+  /* The header does not say. */
+  ARDRONE_PAVE_UNKNOWN,
+  /* A codec of the first AR.Drone. */
+  ARDRONE_PAVE_VLIB,
+  /* A codec of the first AR.Drone. */
+  ARDRONE_PAVE_P264,
+  /* MPEG-4 part 2. */
+  ARDRONE_PAVE_MPEG4,
+  /* H.264 baseline, Annex B: what this drone sends. */
+  ARDRONE_PAVE_H264
 } ardrone_pave_codec;
 
-/* What kind of picture. */
+/* What the payload holds. */
 typedef enum ardrone_pave_type {
-  ARDRONE_PAVE_TYPE_UNKNOWN, /* not said */
-  ARDRONE_PAVE_IDR,    /* with its parameter sets: decoding can begin here */
-  ARDRONE_PAVE_I,      /* whole, but later pictures may reach behind it */
-  ARDRONE_PAVE_P,      /* predicted from earlier ones */
-  ARDRONE_PAVE_HEADERS /* parameter sets alone, no picture */
+  /* The header does not say. */
+  ARDRONE_PAVE_TYPE_UNKNOWN,
+  /* An IDR picture with its parameter sets: decoding can begin here. */
+  ARDRONE_PAVE_IDR,
+  /* An intra picture; later pictures may refer to pictures before it. */
+  ARDRONE_PAVE_I,
+  /* A picture predicted from earlier ones. */
+  ARDRONE_PAVE_P,
+  /* Parameter sets alone, no picture. */
+  ARDRONE_PAVE_HEADERS
 } ardrone_pave_type;
 
 /* Bits of ardrone_pave_header.control. */
 enum {
-  ARDRONE_PAVE_ADVERTISEMENT = 1, /* announces a picture of advertised_size bytes, and has no payload */
-  ARDRONE_PAVE_LAST_FRAME = 2     /* the stream ends */
+  /* Announces a picture of advertised_size bytes, and has no payload. */
+  ARDRONE_PAVE_ADVERTISEMENT = 1,
+  /* The stream ends. */
+  ARDRONE_PAVE_LAST_FRAME = 2
 };
 
 /* A packet's header, little-endian on the wire. */
 typedef struct ardrone_pave_header {
-  uint8_t version, codec; /* 2; an ardrone_pave_codec */
-  uint16_t header_size;   /* bytes */
-  uint32_t payload_size;  /* bytes */
-  uint16_t encoded_width, encoded_height, display_width, display_height; /* pixels; 368 and 360 rows, say */
-  uint32_t frame_number, timestamp_ms; /* counts up; milliseconds, wraps at 2^32 */
-  uint8_t total_chunks, chunk_index, frame_type, control; /* frame_type: an ardrone_pave_type */
-  uint32_t position_low, position_high; /* in the stream, bytes */
-  uint16_t stream_id; /* another one: another stream, nothing before it is related */
-  uint8_t total_slices, slice_index, sps_size, pps_size; /* bytes of the parameter sets, where they come first */
-  uint32_t advertised_size; /* bytes of the picture that an advertisement announces */
-  uint32_t extra; /* of the 68-byte form only; nobody has documented it */
-  /* Of the 68-byte form only. Nobody has documented them; in two captures they look like theta, phi and
-     psi in radians at this frame. Experimental: hold them against navdata before use. */
+  /* version is 2; codec is an ardrone_pave_codec. */
+  uint8_t version, codec;
+  /* Bytes of this header. */
+  uint16_t header_size;
+  /* Bytes of the payload. */
+  uint32_t payload_size;
+  /* Pixels as encoded and as shown: 368 and 360 rows, for example. */
+  uint16_t encoded_width, encoded_height, display_width, display_height;
+  /* The picture's number, which counts up, and its time in milliseconds, which wraps at 2^32. */
+  uint32_t frame_number, timestamp_ms;
+  /* frame_type: an ardrone_pave_type. */
+  uint8_t total_chunks, chunk_index, frame_type, control;
+  /* Place in the stream, bytes: lower and upper 32 bits. */
+  uint32_t position_low, position_high;
+  /* When it changes, another stream begins that refers to nothing before it. */
+  uint16_t stream_id;
+  /* Slices of the picture; bytes of the parameter sets where the payload begins with them. */
+  uint8_t total_slices, slice_index, sps_size, pps_size;
+  /* Bytes of the picture that an advertisement announces. */
+  uint32_t advertised_size;
+  /* In the 68-byte form only; its meaning is not documented. */
+  uint32_t extra;
+  /* In the 68-byte form only; their meaning is not documented. In two captures they agree with
+     theta, phi and psi in radians at this frame. Compare them with navdata before you use them. */
   float angles[3];
 } ardrone_pave_header;
 
-/* Decodes the header at the start of bytes. TVS_NONE: more bytes are needed to tell. TVS_ERR_DATA: no
-   header (signature, sizes or kinds out of range). */
+/* Decodes the header at the start of `bytes`. TVS_NONE: more bytes are needed. TVS_ERR_DATA: these
+   bytes are no header (signature, a size or a kind out of range). */
 TV_API tvs_status ardrone_pave_decode(const uint8_t *bytes, size_t size,
                                       ardrone_pave_header *header);
 
-/* A packet in the parser's buffer: `bytes` is the header, the payload follows it. Valid until the next
-   call of ardrone_pave_space, _feed or _clear. */
+/* A packet in the parser's buffer. Valid until the next call of ardrone_pave_next,
+   ardrone_pave_space or ardrone_pave_clear. */
 typedef struct ardrone_pave_packet {
-  ardrone_pave_header header;     /* decoded */
-  const uint8_t *bytes, *payload; /* in the parser's buffer: the header, and what follows it */
-  size_t size; /* header and payload */
+  /* The header, decoded. */
+  ardrone_pave_header header;
+  /* Where the header and the payload begin in the parser's buffer. */
+  const uint8_t *bytes, *payload;
+  /* Bytes of header and payload together. */
+  size_t size;
 } ardrone_pave_packet;
 
-/* Cuts a stream into packets, in the caller's buffer. Private but for the counters. */
+/* Cuts a stream into packets in the caller's buffer. Private except for bytes_skipped and
+   num_packets. */
 typedef struct ardrone_pave_parser {
   uint8_t *buffer;
   size_t capacity, begin, end;
-  uint64_t bytes_skipped; /* that belonged to no packet */
+  /* Bytes that belonged to no packet. */
+  uint64_t bytes_skipped;
   uint64_t num_packets;
 } ardrone_pave_parser;
 
-/* A buffer of ARDRONE_PAVE_BUFFER_BYTES holds any packet; a smaller one (at least 4096 bytes) refuses what
-   does not fit, as if it were no packet. */
+/* A buffer of ARDRONE_PAVE_BUFFER_BYTES holds any packet; a smaller one (at least 4096 bytes)
+   skips a packet that does not fit, as it skips bytes that are no packet. */
 #define ARDRONE_PAVE_BUFFER_BYTES ((size_t)ARDRONE_PAVE_MAX_HEADER + ARDRONE_PAVE_MAX_PAYLOAD)
-/* Starts a parser in `buffer`, the caller's, of `capacity` bytes, which stays in place while it is used.
-   TVS_ERR_NULL; TVS_ERR_CAPACITY: below 4096 bytes. */
+
+/* Starts a parser with the caller's buffer of `capacity` bytes, which stays in place while the
+   parser is used. Returns TVS_ERR_NULL; TVS_ERR_CAPACITY: below 4096 bytes. */
 TV_API tvs_status ardrone_pave_init(ardrone_pave_parser *parser, uint8_t *buffer, size_t capacity);
 
-/* A new connection: what was begun is forgotten. */
+/* Call it at a new connection: the bytes in the buffer are dropped. */
 TV_API void ardrone_pave_clear(ardrone_pave_parser *parser);
 
-/* Where to receive to; *room: how many bytes fit, at least 1 once ardrone_pave_next has said TVS_NONE. */
+/* Where to write received bytes. *room is how many fit: at least 1 after ardrone_pave_next has
+   returned TVS_NONE. */
 TV_API uint8_t *ardrone_pave_space(ardrone_pave_parser *parser, size_t *room);
-/* How many bytes were received there. */
+
+/* Call it with the number of bytes that were written there. */
 TV_API void ardrone_pave_filled(ardrone_pave_parser *parser, size_t size);
 
-/* The next whole packet, or TVS_NONE. However the stream was split on its way, the packets are the
-   same. Bytes that are no packet are passed over, one at a time, to the next signature. */
+/* Gets the next whole packet, or TVS_NONE. The packets do not depend on how the stream was split on
+   its way. Bytes that are no packet are skipped up to the next signature. */
 TV_API tvs_status ardrone_pave_next(ardrone_pave_parser *parser, ardrone_pave_packet *packet);
 
-/* The rule against latency, for the live stream only: of the whole packets in the buffer, forgets those
-   before the last one that decoding can begin with. Returns how many were dropped. */
+/* Keeps the latency of the live stream low: of the whole packets in the buffer it drops those
+   before the last one that decoding can begin with. Returns how many it dropped. */
 TV_API int ardrone_pave_skip_to_latest(ardrone_pave_parser *parser);
 
-/* What to do with each packet, so that only pictures without errors are shown. Start with zeros; zeros
-   again after each connection and decoder error. Private. */
+/* Decides what to do with each packet, so that only pictures without errors are shown. Start with
+   zeros; set it to zeros again at each new connection and after each decoder error. Private. */
 typedef struct ardrone_pave_gate {
   int is_open, has_last;
   uint32_t last_number;
   uint16_t stream_id, encoded_width, encoded_height;
 } ardrone_pave_gate;
 
+/* Bits that ardrone_pave_gate_check returns. */
 enum {
-  ARDRONE_PAVE_DECODE = 1,  /* give the payload to the decoder */
-  ARDRONE_PAVE_REPEAT = 2,  /* the last picture again: nothing to decode */
-  ARDRONE_PAVE_GAP = 4,     /* packets before this one are missing */
-  ARDRONE_PAVE_RESET = 8    /* another stream begins: reset the decoder first */
+  /* Give the payload to the decoder. */
+  ARDRONE_PAVE_DECODE = 1,
+  /* The packet repeats the last picture: there is nothing to decode. */
+  ARDRONE_PAVE_REPEAT = 2,
+  /* Packets before this one are missing. */
+  ARDRONE_PAVE_GAP = 4,
+  /* Another stream begins: reset the decoder first. */
+  ARDRONE_PAVE_RESET = 8
 };
-/* ARDRONE_PAVE_ bits; without DECODE and REPEAT the packet is left out, until one comes that can be
-   decoded by itself. */
+
+/* Returns the ARDRONE_PAVE_ bits above for the next packet. Without ARDRONE_PAVE_DECODE and
+   ARDRONE_PAVE_REPEAT leave the packet out: an earlier one is missing, and the stream goes on with
+   the next picture that can be decoded by itself. */
 TV_API int ardrone_pave_gate_check(ardrone_pave_gate *gate, const ardrone_pave_header *header);
 
 TV_END_DECLS

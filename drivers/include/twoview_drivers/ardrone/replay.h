@@ -1,11 +1,13 @@
-/* AR.Drone 2.0: a recording, played back through a session or read as a source. A recording is a folder:
+/* AR.Drone 2.0: plays a recording through a session, or reads its attitudes as a source. A
+   recording is a folder (docs/formats.md):
 
    navdata.log   per packet: u64 host time in ns, u32 length, the bytes; little-endian
    video.pave    whole packets as they came
-   frames.txt    per packet of video.pave a line: host time ns, device time ns, number, 1 for a key frame;
-                 where it is missing or ends, the packets' own stamps pace them
+   frames.txt    per packet of video.pave a line: host time ns, device time ns, number, 1 for a key
+   frame; where it is missing or ends, the packets' own stamps give the times
 
-   A file cut at any byte is read up to its last whole packet. Uses stdio, so its heap. */
+   A file that was cut at any byte is read up to its last whole packet. It uses stdio, which uses
+   the heap. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_REPLAY_H
 #define TWOVIEW_DRIVERS_ARDRONE_REPLAY_H
 
@@ -16,40 +18,45 @@
 
 TV_BEGIN_DECLS
 
-/* The caller's struct. Private. */
+/* The caller owns it. Private. */
 typedef struct ardrone_replay {
-  void *navdata, *video, *frames; /* FILE */
-  int64_t now_ns, begin_ns, origin_ns; /* origin: the recording's host time that begin_ns plays */
+  /* FILE. */
+  void *navdata, *video, *frames;
+  /* Origin: the recording's host time that begin_ns plays. */
+  int64_t now_ns, begin_ns, origin_ns;
   int has_datagram, has_packet;
-  int64_t datagram_ns, packet_ns; /* recorded host times of what comes next */
+  /* Recorded host times of what comes next. */
+  int64_t datagram_ns, packet_ns;
   int64_t paced_ns;
   uint32_t paced_ms;
   size_t datagram_size, header_size, header_sent, payload_left;
   uint8_t datagram[ARDRONE_NAVDATA_MAX_BYTES], header[ARDRONE_PAVE_MAX_HEADER];
 } ardrone_replay;
 
-/* Opens a folder that holds at least one of navdata.log and video.pave, and fills the transport, for a
-   session with listen_only and without skip_to_latest. What is sent goes nowhere.
-   Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (a path of 4000 bytes and more), TVS_ERR_IO (neither file). */
+/* Opens a folder that holds at least one of navdata.log and video.pave, and fills the transport,
+   for a session with listen_only 1 and skip_to_latest 0. What the session sends is dropped. Returns
+   TVS_ERR_NULL, TVS_ERR_ARGUMENT (a path of 4000 bytes and more), TVS_ERR_IO (neither file). */
 TV_API tvs_status ardrone_replay_open(ardrone_replay *replay, const char *folder,
                                       ardrone_transport *transport);
-/* Closes the files; null is allowed. */
+
+/* Closes the files. Null is allowed. */
 TV_API void ardrone_replay_close(ardrone_replay *replay);
 
-/* The time of the caller's clock, before each step: the first call starts the playing. Any clock will do; one that
-   jumps from ardrone_replay_next_ns to the next plays as fast as it can. */
+/* Hand over the time of the caller's clock before each step; the first call starts the playing. Any
+   clock serves. To play as fast as possible, advance to ardrone_replay_next_ns each time. */
 TV_API void ardrone_replay_advance(ardrone_replay *replay, int64_t now_ns);
 
-/* When the next bytes are due by that clock, always after its last time: what is due and was not taken waits for
-   10 ms. INT64_MAX when all has been played. */
+/* When the next bytes are due by that clock; always later than the last advance. Bytes that were
+   due and not received are due again after 10 ms. INT64_MAX when all has been played. */
 TV_API int64_t ardrone_replay_next_ns(const ardrone_replay *replay);
 
-/* The recorded host time that an instant of the caller's clock plays. */
+/* Converts an instant of the caller's clock to the recorded host time that is played then. */
 TV_API int64_t ardrone_replay_host_ns(const ardrone_replay *replay, int64_t now_ns);
 
-/* A navdata.log alone, read as an IMU source. The caller's struct. Private. */
+/* Reads a navdata.log as an IMU source. The caller owns it. Private. */
 typedef struct ardrone_log {
-  void *file; /* FILE */
+  /* FILE. */
+  void *file;
   tvs_clock clock;
   ardrone_sequence sequence;
   int has_psi0;
@@ -57,9 +64,10 @@ typedef struct ardrone_log {
   double psi0_rad;
 } ardrone_log;
 
-/* Opens the file at `path` and fills *source, for file_source.h. The samples' device times are the recording's
-   host times, freed of the network's jitter by the drone's own stamps; clock_id 1 throughout, or another one
-   after a reboot. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not open). */
+/* Opens the file at `path` and fills *source, for file_source.h. The samples' device times are the
+   recording's host times; the drone's own stamps remove the network's jitter from them. Their
+   clock_id is 1, and another one after each reboot. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not
+   open). */
 TV_API tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *source);
 /* Closes the file; null is allowed. */
 TV_API void ardrone_log_close(ardrone_log *log);

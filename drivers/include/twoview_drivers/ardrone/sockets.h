@@ -1,4 +1,4 @@
-/* AR.Drone 2.0: the transport over UDP and TCP, and a loop for those who have none. POSIX. */
+/* AR.Drone 2.0: the transport over UDP and TCP, and a loop that steps a session. POSIX. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_SOCKETS_H
 #define TWOVIEW_DRIVERS_ARDRONE_SOCKETS_H
 
@@ -6,32 +6,34 @@
 
 TV_BEGIN_DECLS
 
-/* The drone's address in its own network. */
+/* The drone's address in the network that it opens. */
 #define ARDRONE_DEFAULT_HOST "192.168.1.1"
 
-/* The caller's struct. Private but for `port`. */
+/* The caller owns it. Private except for `port`. */
 typedef struct ardrone_sockets {
-  uint32_t address; /* IPv4, network order */
+  /* IPv4, network order. */
+  uint32_t address;
   uint16_t port[ARDRONE_NUM_CHANNELS];
   int descriptor[ARDRONE_NUM_CHANNELS];
 } ardrone_sockets;
 
-/* Looks the host up (an IPv4 address in digits does not block; a name may) and fills the transport; the
-   ports are the drone's usual ones: change `port` before the first step. Opens nothing. `sockets` stays
-   in place as long as the transport is used. Local ports are the system's choice, so several drones
-   can be served at once; navdata is accepted from the host's address alone.
-   Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (no such host). */
+/* Looks the host up and fills the transport; it opens nothing. An IPv4 address in digits does not
+   block, a name may. The ports are the drone's usual ones; to change them, write `port` before the
+   first step. `sockets` stays in place as long as the transport is used. The system chooses the
+   local ports, so one computer can serve several drones. Navdata is accepted from the host's
+   address only. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (no such host). */
 TV_API tvs_status ardrone_sockets_init(ardrone_sockets *sockets, const char *host,
                                        ardrone_transport *transport);
 
-/* CLOCK_MONOTONIC. */
+/* The time of CLOCK_MONOTONIC, ns. */
 TV_API int64_t ardrone_now_ns(void);
 
-/* Waits until something arrives or the next step is due, but not longer than until_ns; a signal ends the wait. */
+/* Waits until bytes arrive, the next step is due, or until_ns has come. A signal ends the wait. */
 TV_API void ardrone_session_wait(const ardrone_session *session, int64_t until_ns);
 
-/* Steps until until_ns (INT64_MAX: no end), or until keep_going, asked after each step with `user`, says 0; a null
-   keep_going always goes on. Returns as ardrone_session_step, for the last step. */
+/* Steps the session until until_ns (INT64_MAX: without end), or until keep_going(user), which is
+   called after each step, returns 0. A null keep_going never ends it. Returns as
+   ardrone_session_step for the last step. */
 TV_API tvs_status ardrone_session_run(ardrone_session *session, int64_t until_ns,
                                       int (*keep_going)(void *user), void *user);
 

@@ -1,7 +1,7 @@
-/* AR.Drone 2.0: what a session sends and receives through: sockets (sockets.h), a recording
-   (replay.h), or whatever a test makes up.
+/* AR.Drone 2.0: how a session sends and receives: through sockets (sockets.h), from a recording
+   (replay.h), or through a test's own functions.
 
-   No function blocks; none is called from two threads. */
+   The functions do not block. The session calls them from one thread. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_TRANSPORT_H
 #define TWOVIEW_DRIVERS_ARDRONE_TRANSPORT_H
 
@@ -12,31 +12,43 @@
 
 TV_BEGIN_DECLS
 
-/* The five ways between a session and its drone. */
+/* The five channels between a session and its drone. */
 typedef enum ardrone_channel {
-  ARDRONE_CHANNEL_AT,        /* UDP 5556, to the drone */
-  ARDRONE_CHANNEL_NAVDATA,   /* UDP 5554, both ways */
-  ARDRONE_CHANNEL_VIDEO,     /* TCP 5555, from the drone */
-  ARDRONE_CHANNEL_CONTROL,   /* TCP 5559, from the drone */
-  ARDRONE_CHANNEL_RECORDING, /* TCP 5553, from the drone */
-  ARDRONE_NUM_CHANNELS       /* how many there are */
+  /* UDP 5556, to the drone. */
+  ARDRONE_CHANNEL_AT,
+  /* UDP 5554, both ways. */
+  ARDRONE_CHANNEL_NAVDATA,
+  /* TCP 5555, from the drone. */
+  ARDRONE_CHANNEL_VIDEO,
+  /* TCP 5559, from the drone. */
+  ARDRONE_CHANNEL_CONTROL,
+  /* TCP 5553, from the drone. */
+  ARDRONE_CHANNEL_RECORDING,
+  /* How many there are. */
+  ARDRONE_NUM_CHANNELS
 } ardrone_channel;
 
-/* Filled by whoever transports; the session calls. */
+/* The functions of a transport. The transport fills it, and the session calls it. */
 typedef struct ardrone_transport {
-  uint32_t struct_size; /* sizeof(ardrone_transport) */
-  void *user;           /* first argument of the functions */
-  /* Begins to open. TVS_OK: under way or done; TVS_ERR_IO: cannot. An open channel is closed first. */
+  /* sizeof(ardrone_transport). */
+  uint32_t struct_size;
+  /* The first argument of the functions. */
+  void *user;
+  /* Begins to open a channel; one that is open is closed first. TVS_OK: opening is under way or
+     done. TVS_ERR_IO: the channel cannot be opened. */
   tvs_status (*open)(void *user, ardrone_channel channel, int64_t now_ns);
-  /* One datagram, whole. TVS_OK; TVS_NONE: not now (a full buffer); TVS_ERR_IO. */
+  /* Sends one whole datagram. TVS_OK. TVS_NONE: the system's buffer is full, and nothing was sent.
+     TVS_ERR_IO: the channel failed. */
   tvs_status (*send)(void *user, ardrone_channel channel, const void *bytes, size_t size);
-  /* UDP: one datagram from the drone's address (and from nobody else), cut at capacity. TCP: what has
-     come. TVS_OK: *size bytes, at least 1 of a stream; TVS_NONE: nothing has come, or a connection is still being
-     made; TVS_END: closed by the drone; TVS_ERR_IO: broken or refused. */
+  /* Receives. UDP: one datagram that came from the drone's address, cut at `capacity`; datagrams
+     from other addresses are dropped. TCP: the bytes that have come. TVS_OK: *size bytes, at least
+     1 on TCP. TVS_NONE: nothing has come, or the connection is still being made. TVS_END: the drone
+     closed the connection. TVS_ERR_IO: the connection broke or was refused. */
   tvs_status (*receive)(void *user, ardrone_channel channel, void *bytes, size_t capacity,
                         size_t *size);
-  void (*close)(void *user, ardrone_channel channel); /* also of a channel that is not open */
-  /* For poll(2): the descriptor of an open channel, else -1. May be null. */
+  /* Closes a channel; one that is not open is left as it is. */
+  void (*close)(void *user, ardrone_channel channel);
+  /* The descriptor of an open channel for poll(2), else -1. The pointer may be null. */
   int (*descriptor)(void *user, ardrone_channel channel);
 } ardrone_transport;
 

@@ -1,4 +1,4 @@
-"""The stages' options as flags, by INTERFACES' names, and the stages run with them."""
+"""The stages' options as flags, by the names of docs/formats.md, and the stages run with them."""
 
 import dataclasses
 
