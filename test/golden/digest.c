@@ -332,7 +332,8 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   tv_estimate_options options;
   tv_two_view with_gravity;
   int32_t method;
-  for (method = TV_SOLVER_UPRIGHT; method >= TV_SOLVER_FIVE_POINT; --method) { /* the five-point pose is the last */
+  for (method = TV_SOLVER_UPRIGHT; method >= TV_SOLVER_FIVE_POINT;
+       --method) { /* the five-point pose is the last */
     tv_estimate_options_init(&options);
     options.method = method;
     options.max_iterations = 2000;

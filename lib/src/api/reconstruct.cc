@@ -76,8 +76,8 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
   return num_matches + num_new;
 }
 
-// Orders matches by ratio, then by indices, so that it does not matter which view is the first: only
-// (i, j) and (j, i) of one ratio are equal.
+// Orders matches by ratio, then by indices, so that it does not matter which view is the first:
+// only (i, j) and (j, i) of one ratio are equal.
 uint64_t rank_of(const tv_correspondence& m) {
   uint32_t ratio;
   std::memcpy(&ratio, &m.ratio, sizeof ratio);  // of no sign: ordered as the numbers are
@@ -87,8 +87,8 @@ uint64_t rank_of(const tv_correspondence& m) {
   return static_cast<uint64_t>(ratio) << 32 | low << 16 | high;
 }
 
-// Keeps the best matches, at most `most`, in their order; returns how many it left out. Where two of
-// equal rank compete for the last place, neither gets it.
+// Keeps the best matches, at most `most`, in their order; returns how many it left out. Where two
+// of equal rank compete for the last place, neither gets it.
 int32_t keep_best(tv_correspondence* matches, int32_t most, int32_t* num_matches) {
   const int32_t num = *num_matches;
   if (num <= most) return 0;
@@ -271,9 +271,9 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   tv_feature_options features;
   status = tv::read_feature_options(*context, checked.feature, &features);
   if (status != TV_OK) return status;
-  const uint32_t purposes =
-      TV_PURPOSE_RECONSTRUCT | (checked.guided_matching != 0 ? TV_PURPOSE_MATCH_GUIDED : 0) |
-      (checked.bundle_adjustment != 0 ? TV_PURPOSE_ADJUST : 0);
+  const uint32_t purposes = TV_PURPOSE_RECONSTRUCT |
+                            (checked.guided_matching != 0 ? TV_PURPOSE_MATCH_GUIDED : 0) |
+                            (checked.bundle_adjustment != 0 ? TV_PURPOSE_ADJUST : 0);
   if (!tv::made_for(*context, purposes)) return TV_ERR_LIMITS;
   tv::ArenaScope scope(context->arena);
   tv::Results r = tv::alloc_results(context->arena, context->limits.max_keypoints);

@@ -47,9 +47,9 @@ typedef struct tvk_nearest {
 #define TVK_NEAREST_MAX(a, b) ((a) < (b) ? (b) : (a))
 #define TVK_NEAREST_ROOM(num_columns, panel, bytes) \
   ((size_t)TVK_NEAREST_MIN(((num_columns) + 63) / 64 * 64, panel) * (bytes))
-#define TVK_NEAREST_PANEL_BYTES(num_columns)                                                  \
-  TVK_NEAREST_MAX(                                                                            \
-      TVK_NEAREST_ROOM(num_columns, TVK_NEAREST_PANEL, TVK_NEAREST_COLUMN_BYTES),             \
+#define TVK_NEAREST_PANEL_BYTES(num_columns)                                      \
+  TVK_NEAREST_MAX(                                                                \
+      TVK_NEAREST_ROOM(num_columns, TVK_NEAREST_PANEL, TVK_NEAREST_COLUMN_BYTES), \
       TVK_NEAREST_ROOM(num_columns, TVK_NEAREST_PANEL_16, TVK_NEAREST_COLUMN_16_BYTES))
 #define TVK_NEAREST_SCRATCH(num_rows, num_columns) \
   (TVK_NEAREST_CHUNK_BYTES(num_rows) + TVK_NEAREST_PANEL_BYTES(num_columns))

@@ -12,10 +12,10 @@
    the few descriptors that can be each other's nearest. Ties need no order: equals are not strictly
    nearest.
 
-   A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), _PANEL, the structs
-   nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte where
-   these need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS after
-   another. */
+   A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), _PANEL, the
+   structs nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte
+   where these need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS
+   after another. */
 
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
