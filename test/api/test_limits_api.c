@@ -120,7 +120,7 @@ static void test_a_context_serves_its_purposes_alone(void) {
   }
 }
 
-/* The matches of a reconstruction with room for all, sorted by ratio. */
+/* Against a reconstruction with room for all. */
 static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
   static const int32_t rooms[] = {1, 2, 7, 20, 50, 299};
   tv_reconstruct_options options;
@@ -131,6 +131,12 @@ static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
     api_context all = make(CAP, CAP, 0);
     outcome full;
     options.guided_matching = guided;
+    if (guided == 0) { /* the halves change places, and so does the order of equal scores */
+      memcpy(drawn[1], drawn[0] + sizeof drawn[0] / 2, sizeof drawn[0] / 2);
+      memcpy(drawn[1] + sizeof drawn[0] / 2, drawn[0], sizeof drawn[0] / 2);
+    } else {
+      setUp();
+    }
     TEST_ASSERT_EQUAL_INT(TV_OK, run(all.context, 0, &options, &full));
     TEST_ASSERT_EQUAL_INT(0, full.cloud.num_matches_left_out);
     TEST_ASSERT_TRUE(full.cloud.num_matches > 60);
