@@ -221,3 +221,38 @@ def test_gravity_and_seed_reach_the_library(context, scene):
         method=tv.Method.UPRIGHT, gravity0=down, gravity1=down, gravity_sigma_rad=0.01, seed=77)
     assert result.seed == 77 and result.verdict == tv.Verdict.OK
     assert angle_deg(result.R @ scene.R.T) < 0.01
+
+
+def test_a_context_for_matching_alone_is_small_and_only_matches():
+    rng = np.random.default_rng(5)
+    descriptors = rng.integers(0, 90, (1000, tv.DESCRIPTOR_BYTES), np.uint8)
+    with tv.Context(max_keypoints=1000, purposes=tv.Purpose.MATCH) as context:
+        assert context.size_bytes <= 300 * 1024
+        assert len(tv.match(context, descriptors, descriptors)) == 1000
+        with pytest.raises(tv.TV_ERR_LIMITS):
+            tv.detect(context, np.zeros((100, 100), np.uint8))
+
+
+def test_defaults_fit_any_context_with_and_without_cameras():
+    rng = np.random.default_rng(6)
+    image = rng.integers(0, 255, (100, 120), np.uint8)
+    pixels = rng.uniform(0, 100, (30, 2))
+    camera = tv.Camera(120, 100, 100.0, 100.0, 59.5, 49.5)
+    with tv.Context(max_width=120, max_height=100, max_keypoints=70) as context:
+        assert len(tv.extract(context, image)[0]) == 70
+        assert len(tv.detect(context, image)) == 70
+        for cameras in ((None, None), (camera, camera)):
+            tv.estimate_two_view(context, *cameras, pixels, pixels + 3.0)
+
+
+def test_matches_beyond_the_limit_are_left_out(image):
+    height, width = image.shape
+    camera = tv.Camera(width, height, 300.0, 300.0, width / 2, height / 2)
+    limits = {"max_width": width, "max_height": height, "max_keypoints": 300}
+    with tv.Context(**limits) as context:
+        _, whole = tv.reconstruct(context, image, camera, image, camera)
+    with tv.Context(max_matches=20, **limits) as context:
+        _, part = tv.reconstruct(context, image, camera, image, camera)
+    assert whole.num_matches_left_out == 0
+    assert len(part.matches) == 20
+    assert part.num_matches_left_out == len(whole.matches) - 20

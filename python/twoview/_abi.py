@@ -22,7 +22,8 @@ CONTEXT_ALIGNMENT = 64
 
 class tv_limits(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_width", c_int32), ("max_height", c_int32),
-                ("max_keypoints", c_int32), ("max_matches", c_int32), ("kernels", c_int32)]
+                ("max_keypoints", c_int32), ("max_matches", c_int32), ("kernels", c_int32),
+                ("purposes", c_uint32)]
 
 
 class tv_image(Structure):
@@ -105,7 +106,8 @@ class tv_reconstruction(Structure):
     _fields_ = [("struct_size", c_uint32), ("num_keypoints", c_int32 * 2),
                 ("keypoints", c_void_p * 2), ("descriptors", c_void_p * 2),
                 ("num_matches", c_int32), ("num_points", c_int32), ("matches", c_void_p),
-                ("inlier_mask", c_void_p), ("points", c_void_p)]
+                ("inlier_mask", c_void_p), ("points", c_void_p),
+                ("num_matches_left_out", c_int32)]
 
 
 class tv_bundle_options(Structure):
@@ -246,7 +248,7 @@ def set_field(struct: Any, name: str, value: Any) -> None:
             value = operator.index(value)
     except TypeError:
         raise TypeError(f"option {name}: {value!r} is not what it takes") from None
-    if kind in (c_int32, c_uint64) and kind(value).value != value:
+    if kind in (c_int32, c_uint32, c_uint64) and kind(value).value != value:
         raise ValueError(f"option {name}: {value} is out of range")
     setattr(struct, name, value)
 

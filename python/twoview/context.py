@@ -16,17 +16,18 @@ class Context:
     """tv_context in memory that Python owns.
 
     max_width, max_height: of an image, pixels; max_keypoints: descriptors an image; max_matches: an
-    estimate, 0 for max_keypoints; kernels: a Kernels. Calls from several threads wait for each other;
+    estimate, 0 for max_keypoints; kernels: a Kernels; purposes: Purpose bits, the calls that it has
+    memory for, 0 for all (another call raises TV_ERR_LIMITS). Calls from several threads wait for each other;
     use a context a thread to have them run at once. close(), or a with statement, gives the memory
     back; later calls raise ValueError."""
 
     def __init__(self, *, max_width: int = 640, max_height: int = 480, max_keypoints: int = 2048,
                  max_matches: int = 0, kernels: int = Kernels.AUTO,
-                 library: Optional[_abi.Library] = None):
+                 purposes: int = 0, library: Optional[_abi.Library] = None):
         self.library = library or _abi.default_library()
         limits = self.library.make(_abi.tv_limits, {
             "max_width": max_width, "max_height": max_height, "max_keypoints": max_keypoints,
-            "max_matches": max_matches, "kernels": kernels})
+            "max_matches": max_matches, "kernels": kernels, "purposes": purposes})
         size = ctypes.c_size_t()
         self.library.call("tv_context_size", ctypes.byref(limits), ctypes.byref(size))
         self._memory: Optional[np.ndarray] = np.empty(size.value + _abi.CONTEXT_ALIGNMENT, np.uint8)

@@ -30,6 +30,15 @@ class Kernels(IntEnum):
     NEON = 5
 
 
+class Purpose(IntFlag):
+    EXTRACT = 1 << 0
+    MATCH = 1 << 1
+    ESTIMATE = 1 << 2
+    RECONSTRUCT = 1 << 3 | 7
+    MATCH_GUIDED = 1 << 4
+    ADJUST = 1 << 5
+
+
 class Stage(IntEnum):
     PYRAMID = 0
     DETECT = 1
@@ -57,10 +66,11 @@ class CameraModel(IntEnum):
 
 
 class Method(IntEnum):
-    FIVE_POINT = 0
-    EIGHT_POINT = 1
-    SEVEN_POINT = 2
-    UPRIGHT = 3
+    AUTO = 0
+    FIVE_POINT = 1
+    EIGHT_POINT = 2
+    SEVEN_POINT = 3
+    UPRIGHT = 4
 
 
 class Config(IntEnum):
@@ -116,7 +126,7 @@ class Loss(IntEnum):
 
 # The C prefix of each.
 C_PREFIXES = {
-    Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Orientation: "TV_ORIENTATION_",
+    Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_", Orientation: "TV_ORIENTATION_",
     Descriptor: "TV_DESCRIPTOR_", CameraModel: "TV_CAMERA_", Method: "TV_METHOD_",
     Config: "TV_CONFIG_", Verdict: "TV_VERDICT_", Reason: "TV_REASON_",
     Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",

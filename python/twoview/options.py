@@ -14,7 +14,7 @@ from .enums import Descriptor, Loss, Method, Orientation
 class FeatureOptions:
     """tv_feature_options."""
 
-    max_keypoints: int = 2048  #: bound on descriptors an image, second orientations included
+    max_keypoints: int = 0  #: bound on descriptors an image; 0: 2048 or the context's, the lesser
     arc: int = 9  #: contiguous circle pixels, 9 to 12
     threshold: int = 10  #: grey levels, [1, 254]
     min_threshold: int = 3  #: the threshold falls as far as this; 0: it is fixed
@@ -48,7 +48,7 @@ class GuidedOptions:
 class EstimateOptions:
     """tv_estimate_options."""
 
-    method: int = Method.FIVE_POINT
+    method: int = Method.AUTO  #: five-point with cameras, eight-point without
     max_error_px: float = 1.0  #: inlier threshold, pixels of the images as given
     confidence: float = 0.9999
     max_iterations: int = 10000

@@ -26,6 +26,11 @@ def _images(image: np.ndarray, mask: Optional[np.ndarray]) -> list[Any]:
     return views
 
 
+def _room(context: Context, wanted: Any) -> int:
+    """Keypoints that a call can give at most."""
+    return max(wanted.max_keypoints or context.max_keypoints, 0)
+
+
 def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = None,
            options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
     """tv_detect: FAST corners, strongest first.
@@ -33,7 +38,7 @@ def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = Non
     image: (height, width) uint8, rows may lie apart; mask: the same shape, 0 where no corner is wanted.
     Returns (n,) of twoview.KEYPOINT: x, y (pixels), size, angle_rad, score, level."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
-    keypoints = np.empty(max(wanted.max_keypoints, 0), _abi.KEYPOINT)
+    keypoints = np.empty(_room(context, wanted), _abi.KEYPOINT)
     count = c_int32()
     context.call("tv_detect", *_images(image, mask), byref(wanted), _abi.pointer(keypoints),
                  c_int32(len(keypoints)), byref(count))
@@ -69,7 +74,7 @@ def extract(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = No
             **keywords: Any) -> tuple[np.ndarray, np.ndarray]:
     """tv_extract: keypoints (n,) and descriptors (n, 128), as detect, orient and describe give them."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
-    capacity = max(wanted.max_keypoints, 0)
+    capacity = _room(context, wanted)
     keypoints = np.empty(capacity, _abi.KEYPOINT)
     descriptors = np.empty((capacity, _abi.DESCRIPTOR_BYTES), np.uint8)
     count = c_int32()
@@ -218,7 +223,7 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
 
     pixels: (n, 2) float64, as the images have them (distorted); ratios: (n,) float32, lower surer.
     A pixel that is not finite is never an inlier. Without cameras: F and H only, and method
-    EIGHT_POINT or SEVEN_POINT."""
+    AUTO, EIGHT_POINT or SEVEN_POINT."""
     found, inliers = _estimate(context, camera0, camera1, pixels0, pixels1, ratios,
                                to_struct(check_context(context).library, EstimateOptions, options,
                                          keywords))
@@ -322,6 +327,7 @@ class Reconstruction:
     inlier_mask: np.ndarray  #: (m,) bool
     points: np.ndarray  #: (m,) of POINT, INVALID where the match is no inlier
     num_points: int
+    num_matches_left_out: int  #: found, but beyond the context's max_matches: of the highest ratio
 
 
 def _copied(address: Optional[int], count: int, dtype: Any) -> np.ndarray:
@@ -367,5 +373,6 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
         result = Reconstruction((first, second), (bytes0, bytes1),
                                 _copied(cloud.matches, m, _abi.CORRESPONDENCE),
                                 _copied(cloud.inlier_mask, m, np.uint8).view(bool),
-                                _copied(cloud.points, m, _abi.POINT), cloud.num_points)
+                                _copied(cloud.points, m, _abi.POINT), cloud.num_points,
+                                cloud.num_matches_left_out)
     return _two_view(found), result

@@ -45,6 +45,7 @@ static void test_limits_out_of_range_are_refused(void) {
   static const int32_t bad_counts[] = {0, -1, 65536, INT32_MAX, INT32_MIN};
   static const int32_t bad_matches[] = {-1, 1000001, INT32_MAX, INT32_MIN};
   static const int32_t bad_kernels[] = {-1, TV_KERNELS_NEON + 1, INT32_MAX, INT32_MIN};
+  static const uint32_t bad_purposes[] = {64, UINT32_MAX, 1u << 31};
   tv_limits limits;
   size_t k;
   check_size_status(TV_ERR_NULL, NULL);
@@ -59,6 +60,7 @@ static void test_limits_out_of_range_are_refused(void) {
   REFUSED(max_keypoints, bad_counts)
   REFUSED(max_matches, bad_matches)
   REFUSED(kernels, bad_kernels)
+  REFUSED(purposes, bad_purposes)
 #undef REFUSED
 }
 
@@ -98,6 +100,30 @@ static void test_a_vga_context_is_within_8_mib(void) {
   tv_limits_init(&limits); /* 640 x 480, 2048 keypoints */
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size));
   TEST_ASSERT_TRUE(size <= (size_t)8 << 20);
+}
+
+static size_t size_for(uint32_t purposes) {
+  tv_limits limits;
+  size_t size_bytes = 0;
+  tv_limits_init(&limits);
+  limits.max_keypoints = 1000;
+  limits.purposes = purposes;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size_bytes));
+  return size_bytes;
+}
+
+static void test_a_context_pays_for_its_purposes_alone(void) {
+  const size_t all = size_for(0), whole = size_for(TV_PURPOSE_RECONSTRUCT);
+  uint32_t purposes;
+  TEST_ASSERT_TRUE(size_for(TV_PURPOSE_MATCH) <= 300 * 1024);
+  TEST_ASSERT_EQUAL_UINT64(all, size_for(63));
+  TEST_ASSERT_TRUE(whole <= all);
+  for (purposes = 1; purposes < 63; ++purposes) {
+    const uint32_t one = purposes & (0u - purposes);
+    TEST_ASSERT_TRUE(size_for(purposes) <= all);
+    TEST_ASSERT_TRUE(size_for(purposes) >= size_for(one));
+    TEST_ASSERT_TRUE((purposes & 8) != 0 || size_for(purposes) < whole);
+  }
 }
 
 static void test_several_mistakes_at_once_write_nothing(void) {
@@ -250,6 +276,7 @@ int main(void) {
   RUN_TEST(test_the_size_query_needs_somewhere_to_write);
   RUN_TEST(test_the_extreme_limits_have_a_size);
   RUN_TEST(test_a_vga_context_is_within_8_mib);
+  RUN_TEST(test_a_context_pays_for_its_purposes_alone);
   RUN_TEST(test_several_mistakes_at_once_write_nothing);
   RUN_TEST(test_memory_larger_than_needed_is_left_alone);
   RUN_TEST(test_the_size_never_falls_when_a_limit_rises);

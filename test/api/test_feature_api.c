@@ -125,7 +125,7 @@ static void test_options_out_of_range_are_refused(void) {
   refused(status, a.context, &image, NULL, &bad)
   REFUSED(TV_ERR_STRUCT_SIZE, struct_size, 0);
   REFUSED(TV_ERR_STRUCT_SIZE, struct_size, sizeof bad + 4);
-  REFUSED(TV_ERR_ARGUMENT, max_keypoints, 0);
+  REFUSED(TV_ERR_ARGUMENT, max_keypoints, -1);
   REFUSED(TV_ERR_ARGUMENT, max_keypoints, INT32_MIN);
   REFUSED(TV_ERR_LIMITS, max_keypoints, CAP + 1);
   REFUSED(TV_ERR_LIMITS, max_keypoints, INT32_MAX);

@@ -20,7 +20,7 @@
    pointers. */
 #define LAYOUT(type, bytes, last, offset) \
   _Static_assert(sizeof(type) == bytes && offsetof(type, last) == offset, #type)
-LAYOUT(tv_limits, 24, kernels, 20);
+LAYOUT(tv_limits, 28, purposes, 24);
 LAYOUT(tv_keypoint, 24, level, 20);
 LAYOUT(tv_feature_options, 48, keypoint_size, 44);
 LAYOUT(tv_correspondence, 16, ratio, 12);
@@ -332,7 +332,8 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   tv_estimate_options options;
   tv_two_view with_gravity;
   int32_t method;
-  for (method = TV_SOLVER_UPRIGHT; method >= 0; --method) { /* the five-point pose is the last */
+  for (method = TV_SOLVER_UPRIGHT; method >= TV_SOLVER_FIVE_POINT;
+       --method) { /* the five-point pose is the last */
     tv_estimate_options_init(&options);
     options.method = method;
     options.max_iterations = 2000;
@@ -345,7 +346,7 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
       estimate(p, context, m, 0, &options, pose);
     }
     estimate(p, context, m, 1, &options, pose);
-    print(p, context, names[method]);
+    print(p, context, names[method - TV_SOLVER_FIVE_POINT]);
   }
   tv_estimate_options_init(&options);
   options.fixed_iterations = 40;

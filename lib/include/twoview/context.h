@@ -30,6 +30,24 @@ typedef enum tv_kernels {
   TV_KERNELS_NEON = 5    /* aarch64, and armv7 with NEON */
 } tv_kernels;
 
+/* What a context may be asked for: bits of tv_limits.purposes. Memory is needed for the purposes that
+   are named alone; a call that the context was not made for returns TV_ERR_LIMITS. Calls without a
+   context, or that are not named here, need no purpose. */
+typedef enum tv_purpose {
+  /* tv_detect, tv_orient, tv_describe, tv_extract. */
+  TV_PURPOSE_EXTRACT = 1 << 0,
+  /* tv_match. */
+  TV_PURPOSE_MATCH = 1 << 1,
+  /* tv_estimate_two_view. */
+  TV_PURPOSE_ESTIMATE = 1 << 2,
+  /* tv_reconstruct: the three above, and room for its result. */
+  TV_PURPOSE_RECONSTRUCT = 1 << 3 | 7,
+  /* tv_match_guided, and tv_reconstruct with guided_matching. */
+  TV_PURPOSE_MATCH_GUIDED = 1 << 4,
+  /* tv_adjust_two_view, and tv_reconstruct with bundle_adjustment. */
+  TV_PURPOSE_ADJUST = 1 << 5
+} tv_purpose;
+
 /* What a context is made for. Filled by tv_limits_init; change a field before tv_context_size. */
 typedef struct tv_limits {
   uint32_t struct_size;  /* set by tv_limits_init */
@@ -38,6 +56,8 @@ typedef struct tv_limits {
   int32_t max_keypoints; /* descriptors an image, [1, 65535], default 2048 */
   int32_t max_matches;   /* matches an estimate, [1, 1000000]; 0 (default) means max_keypoints */
   int32_t kernels;       /* a tv_kernels, default TV_KERNELS_AUTO */
+  /* tv_purpose bits: the calls that the context has memory for; 0 (default): all. */
+  uint32_t purposes;
 } tv_limits;
 
 /* Writes the defaults, and struct_size; null is allowed. */

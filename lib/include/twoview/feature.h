@@ -41,7 +41,8 @@ typedef enum tv_normalisation {
 typedef struct tv_feature_options {
   uint32_t struct_size;  /* set by tv_feature_options_init */
   int32_t max_keypoints; /* a bound on descriptors an image, second orientations included, which get
-                            the room that corners leave; [1, the context's], default 2048 */
+                            the room that corners leave; [1, the context's], or 0 (default): 2048 or
+                            the context's, whichever is less */
   int32_t arc;           /* contiguous pixels of the 16-pixel circle: 9 (default), 10, 11 or 12 (the
                             paper's); a longer arc gives fewer, sharper corners */
   int32_t threshold;     /* grey levels, [1, 254], default 10; a bigger value gives fewer, stronger
@@ -69,7 +70,7 @@ TV_API void tv_feature_options_init(tv_feature_options *options);
    mask: null, or an image of the same size; a corner is kept where its byte is not 0.
    keypoints: the caller's array of cap_keypoints; angle_rad is 0.
    *num_keypoints: how many were written; on TV_ERR_CAPACITY how many there are. Capacity of
-   options->max_keypoints is always enough.
+   options->max_keypoints is always enough; of the context's where that is 0.
    options may be null (defaults).
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY,
    TV_ERR_OVERLAP.

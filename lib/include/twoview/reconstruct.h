@@ -49,12 +49,17 @@ typedef struct tv_reconstruction {
   const uint8_t *inlier_mask; /* num_matches, 1 for an inlier of the model that the result's kind names */
   const tv_point *points;     /* num_matches; TV_POINT_INVALID where the match is no inlier, or where
                                  there is no full pose */
+  /* Matches that were found and are not among `matches`, which hold at most the context's
+     max_matches: those of the highest ratio are left out, with equal ratios those of the weaker
+     keypoints. With guided matching, of both passes' matches where the second was taken. */
+  int32_t num_matches_left_out;
 } tv_reconstruction;
 
 /* Writes zeros, and struct_size; null is allowed. */
 TV_API void tv_reconstruction_init(tv_reconstruction *reconstruction);
 
-/* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate. With bundle_adjustment
+/* tv_extract on both images, tv_match, tv_estimate_two_view, tv_triangulate. More matches than the
+   context's max_matches are no error: the best are taken (num_matches_left_out). With bundle_adjustment
    swapped views give the inverse to rounding only.
    With guided_matching the second estimate is taken where it is of the same kind with no fewer inliers
    and no worse a verdict, but verdict and reasons stay the first one's: matches sought along its lines

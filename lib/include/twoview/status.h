@@ -34,7 +34,8 @@ typedef enum tv_status {
   TV_ERR_STRUCT_SIZE = 4, /* struct_size was not set by tv_..._init, or is from a newer header */
   TV_ERR_ALIGNMENT = 5,   /* memory is not aligned to TV_CONTEXT_ALIGNMENT */
   TV_ERR_MEMORY = 6,      /* the memory handed over is smaller than tv_context_size says */
-  TV_ERR_LIMITS = 7,      /* an image or a count is above the context's limits */
+  TV_ERR_LIMITS = 7,      /* an image or a count is above the context's limits, or the
+                             context was not made for this call (tv_purpose) */
   TV_ERR_CAPACITY = 8,    /* an output array is too small; the count needed was written */
   TV_ERR_OVERLAP = 9,     /* an output array overlaps another argument */
   TV_ERR_CAMERA = 10,     /* intrinsics that are zero, not finite, or of an unknown model */

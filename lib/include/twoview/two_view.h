@@ -12,13 +12,15 @@ TV_BEGIN_DECLS
 
 /* The minimal solver that the robust loop samples with. */
 typedef enum tv_solver {
-  TV_SOLVER_FIVE_POINT = 0,  /* Nister, "An efficient solution to the five-point relative pose
-                                problem", PAMI 2004; the default, cameras needed */
-  TV_SOLVER_EIGHT_POINT = 1, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
+  /* The default: five-point with cameras, eight-point without. */
+  TV_SOLVER_AUTO = 0,
+  TV_SOLVER_FIVE_POINT = 1,  /* Nister, "An efficient solution to the five-point relative pose
+                                problem", PAMI 2004; cameras needed */
+  TV_SOLVER_EIGHT_POINT = 2, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
                                 paper's path */
-  TV_SOLVER_SEVEN_POINT = 2, /* Hartley, Zisserman, "Multiple View Geometry", 11.1.2: smaller samples,
+  TV_SOLVER_SEVEN_POINT = 3, /* Hartley, Zisserman, "Multiple View Geometry", 11.1.2: smaller samples,
                                 where many matches are wrong */
-  TV_SOLVER_UPRIGHT = 3      /* three points and gravity; cameras and gravity needed */
+  TV_SOLVER_UPRIGHT = 4      /* three points and gravity; cameras and gravity needed */
 } tv_solver;
 
 /* COLMAP's kinds of two-view geometry, and no-motion. */
@@ -68,7 +70,7 @@ TV_API const char *tv_reason_string(tv_reason reason);
 /* Filled by tv_estimate_options_init. */
 typedef struct tv_estimate_options {
   uint32_t struct_size;     /* set by tv_estimate_options_init */
-  int32_t method;           /* a tv_solver; default five-point */
+  int32_t method;           /* a tv_solver; default TV_SOLVER_AUTO */
   double max_error_px;      /* inlier threshold: Sampson distance in pixels of the images as given,
                                the same for every lens; (0, 1e9], default 1.0 */
   double confidence;        /* stop when a better model is this unlikely to have been missed;
@@ -132,8 +134,8 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
                                      tv_camera *corrected);
 
 /* Estimates the two-view geometry of num_matches matched pixels.
-   camera0, camera1: both given, or both null (uncalibrated: F and H only, methods eight-point and
-   seven-point; otherwise TV_ERR_ARGUMENT).
+   camera0, camera1: both given, or both null (uncalibrated: F and H only, methods auto,
+   eight-point and seven-point; otherwise TV_ERR_ARGUMENT).
    pixels0, pixels1: num_matches x 2 (x, y), as the images have them (distorted).
    ratios: null, or num_matches values, lower more certain (tv_correspondence.ratio): surer matches
    are sampled first.
@@ -143,8 +145,11 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
    pixels and more, is never an inlier.
    "No geometry" is TV_OK with kind, verdict and reasons. The matches' order does not matter, and
    swapped views give the inverse: R the transpose, bit for bit, and t = -R^T t.
+   options: null means the defaults.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
-   TV_ERR_NOT_FINITE (options only).
+   TV_ERR_NOT_FINITE (options only). TV_ERR_LIMITS is returned for more matches than the context's
+   max_matches: which of them to leave out is the caller's choice, for ratios may be null and
+   inlier_mask speaks of all matches. tv_reconstruct leaves out those of the highest ratio.
    Time: at most max_iterations samples, each of at most 10 models scored on num_matches. */
 TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,
                                       const tv_camera *camera1, const double *pixels0,

@@ -94,7 +94,9 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
   tv::BundleProblem problem{};
   tv_status status = tv::read_bundle_options(options, &problem.options);
   if (status != TV_OK) return status;
-  if (num_points > context->limits.max_matches) return TV_ERR_LIMITS;
+  if (num_points > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ADJUST)) {
+    return TV_ERR_LIMITS;
+  }
   if (tv_camera_check(camera0) != TV_OK || tv_camera_check(camera1) != TV_OK) return TV_ERR_CAMERA;
   tv::Pose pose;
   double baseline;

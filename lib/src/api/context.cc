@@ -10,6 +10,7 @@ namespace {
 constexpr int32_t kMaxSide = 16384;
 constexpr int32_t kMaxKeypoints = 65535;
 constexpr int32_t kMaxMatches = 1000000;
+constexpr uint32_t kAllPurposes = 2 * TV_PURPOSE_ADJUST - 1;
 
 bool within(int32_t value, int32_t low, int32_t high) { return value >= low && value <= high; }
 
@@ -19,7 +20,8 @@ tv_status check_limits(const tv_limits* limits) {
   if (!within(limits->max_width, 1, kMaxSide) || !within(limits->max_height, 1, kMaxSide) ||
       !within(limits->max_keypoints, 1, kMaxKeypoints) ||
       !within(limits->max_matches, 0, kMaxMatches) ||
-      !within(limits->kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON)) {
+      !within(limits->kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) ||
+      limits->purposes > kAllPurposes) {
     return TV_ERR_ARGUMENT;
   }
   return TV_OK;
@@ -28,6 +30,7 @@ tv_status check_limits(const tv_limits* limits) {
 tv_limits resolved(const tv_limits& limits) {
   tv_limits result = limits;
   if (result.max_matches == 0) result.max_matches = result.max_keypoints;
+  if (result.purposes == 0) result.purposes = kAllPurposes;
   return result;
 }
 
@@ -44,7 +47,7 @@ size_t context_bytes() { return kContextBytes; }
 
 void tv_limits_init(tv_limits* limits) {
   if (limits == nullptr) return;
-  *limits = tv_limits{sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO};
+  *limits = tv_limits{sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO, 0};
 }
 
 tv_status tv_context_size(const tv_limits* limits, size_t* size_bytes) {

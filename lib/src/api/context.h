@@ -6,7 +6,7 @@
 #include "twoview/context.h"
 
 struct tv_context {
-  tv_limits limits;  // max_matches resolved, never 0
+  tv_limits limits;  // max_matches and purposes resolved, never 0
   const tvk_table* kernels;
   tv::Arena arena;  // scratch of the running call; its front outlives a tv_reconstruct
   tv_clock clock;
@@ -15,6 +15,11 @@ struct tv_context {
 };
 
 namespace tv {
+
+// Whether the context has the memory of a call of this purpose.
+inline bool made_for(const tv_context& context, uint32_t purposes) {
+  return (context.limits.purposes & purposes) == purposes;
+}
 
 // Adds the time from its construction to its end to a stage.
 class StageTimer {

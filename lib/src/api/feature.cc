@@ -83,7 +83,6 @@ void tv_feature_options_init(tv_feature_options* options) {
   if (options == nullptr) return;
   *options = tv_feature_options{};
   options->struct_size = sizeof(tv_feature_options);
-  options->max_keypoints = 2048;
   options->arc = 9;
   options->threshold = 10;
   options->min_threshold = 3;

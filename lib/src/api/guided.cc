@@ -61,7 +61,9 @@ struct KeypointSet {
 tv_status check_set(const tv_context& context, const KeypointSet& set, const void* out,
                     size_t out_bytes) {
   if (set.num < 0) return TV_ERR_ARGUMENT;
-  if (set.num > context.limits.max_keypoints) return TV_ERR_LIMITS;
+  if (set.num > context.limits.max_keypoints || !made_for(context, TV_PURPOSE_MATCH_GUIDED)) {
+    return TV_ERR_LIMITS;
+  }
   if (set.num > 0 && (set.keypoints == nullptr || set.descriptors == nullptr)) return TV_ERR_NULL;
   const size_t n = static_cast<size_t>(set.num);
   if (overlap(out, out_bytes, set.keypoints, n * sizeof(tv_keypoint)) ||

@@ -26,7 +26,8 @@ tv_status tv_match(tv_context* context, const uint8_t* descriptors0, int32_t num
       cap_correspondences < 0) {
     return TV_ERR_ARGUMENT;
   }
-  if (num0 > context->limits.max_keypoints || num1 > context->limits.max_keypoints) {
+  if (num0 > context->limits.max_keypoints || num1 > context->limits.max_keypoints ||
+      !tv::made_for(*context, TV_PURPOSE_MATCH)) {
     return TV_ERR_LIMITS;
   }
   const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);

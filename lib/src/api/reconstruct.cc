@@ -77,6 +77,37 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
   return num_matches + num_new;
 }
 
+// Orders matches by ratio, then by indices, so that it does not matter which view is the first:
+// only (i, j) and (j, i) of one ratio are equal.
+uint64_t rank_of(const tv_correspondence& m) {
+  uint32_t ratio;
+  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // of no sign: ordered as the numbers are
+  const bool ascending = m.idx0 < m.idx1;
+  const uint32_t low = static_cast<uint32_t>(ascending ? m.idx0 : m.idx1);
+  const uint32_t high = static_cast<uint32_t>(ascending ? m.idx1 : m.idx0);
+  return static_cast<uint64_t>(ratio) << 32 | low << 16 | high;
+}
+
+// Keeps the best matches, at most `most`, in their order; returns how many it left out. Where two
+// of equal rank compete for the last place, neither gets it.
+int32_t keep_best(tv_correspondence* matches, int32_t most, int32_t* num_matches) {
+  const int32_t num = *num_matches;
+  if (num <= most) return 0;
+  uint64_t limit = 0;  // the largest with at most `most` ranks below it, bit by bit
+  for (int bit = 62;; --bit) {
+    const bool last = bit < 0;
+    const uint64_t trial = last ? limit : limit | uint64_t{1} << bit;
+    int32_t below = 0;
+    for (int32_t k = 0; k < num; ++k) {
+      if (rank_of(matches[k]) >= trial) continue;
+      if (last) matches[below] = matches[k];
+      ++below;
+    }
+    if (last) return num - (*num_matches = below);
+    if (below <= most) limit = trial;
+  }
+}
+
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
 // The cameras of an estimate, for all that follows from it. Called for each estimate that is kept.
@@ -93,7 +124,8 @@ void correct_cameras(const tv_two_view& estimate, const tv_view& view0, const tv
 // search.
 __attribute__((noinline)) tv_status match_along_lines(
     tv_context* context, const tv_view& view0, const tv_view& view1, const int32_t num_keypoints[2],
-    const tv_estimate_options* options, Results& r, int32_t* num_matches, tv_two_view* estimate) {
+    const tv_estimate_options* options, Results& r, int32_t* num_matches, int32_t* num_left_out,
+    tv_two_view* estimate) {
   const tv_limits& limits = context->limits;
   int32_t count = 0;
   tv_status status =
@@ -103,7 +135,8 @@ __attribute__((noinline)) tv_status match_along_lines(
   if (status != TV_OK) return status;
   count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
                        r.more_matches, count);
-  if (count == *num_matches || count > limits.max_matches) return TV_OK;
+  if (count == *num_matches) return TV_OK;
+  const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
   gather_pixels(r, r.more_matches, count);
   tv_two_view again = *estimate;
   status = tv_estimate_two_view(context, view0.camera, view1.camera, r.pixels[0], r.pixels[1],
@@ -121,6 +154,7 @@ __attribute__((noinline)) tv_status match_along_lines(
   *estimate = again;
   correct_cameras(again, view0, view1, r);
   *num_matches = count;
+  *num_left_out = left_out;
   std::copy(r.more_matches, r.more_matches + count, r.matches);
   std::copy(r.more_inlier_mask, r.more_inlier_mask + count, r.inlier_mask);
   return TV_OK;
@@ -224,6 +258,10 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   tv_feature_options features;
   status = tv::read_feature_options(*context, checked.feature, &features);
   if (status != TV_OK) return status;
+  const uint32_t purposes = TV_PURPOSE_RECONSTRUCT |
+                            (checked.guided_matching != 0 ? TV_PURPOSE_MATCH_GUIDED : 0) |
+                            (checked.bundle_adjustment != 0 ? TV_PURPOSE_ADJUST : 0);
+  if (!tv::made_for(*context, purposes)) return TV_ERR_LIMITS;
   tv::ArenaScope scope(context->arena);
   tv::Results r = tv::alloc_results(context->arena, context->limits.max_keypoints);
   const int32_t capacity = context->limits.max_keypoints;
@@ -237,6 +275,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   status = tv_match(context, r.descriptors[0], num_keypoints[0], r.descriptors[1], num_keypoints[1],
                     checked.match, r.matches, capacity, &num_matches);
   if (status != TV_OK) return status;
+  int32_t num_left_out = tv::keep_best(r.matches, context->limits.max_matches, &num_matches);
   tv::gather_pixels(r, r.matches, num_matches);
   tv_two_view estimate = *two_view;
   status = tv_estimate_two_view(context, view0->camera, view1->camera, r.pixels[0], r.pixels[1],
@@ -245,7 +284,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   tv::correct_cameras(estimate, *view0, *view1, r);
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
     status = tv::match_along_lines(context, *view0, *view1, num_keypoints, checked.estimate, r,
-                                   &num_matches, &estimate);
+                                   &num_matches, &num_left_out, &estimate);
     if (status != TV_OK) return status;
   }
   status = tv::triangulate_inliers(context, static_cast<tv_triangulation>(checked.triangulation),
@@ -266,5 +305,6 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   reconstruction->matches = r.matches;
   reconstruction->inlier_mask = r.inlier_mask;
   reconstruction->points = r.points;
+  reconstruction->num_matches_left_out = num_left_out;
   return TV_OK;
 }

@@ -25,11 +25,17 @@ size_t reconstruct_result_bytes(const tv_limits& limits) {
 }
 
 size_t scratch_bytes(const tv_limits& limits) {
-  const size_t stage =
-      std::max({extract_scratch_bytes(limits), match_bytes(limits.max_keypoints),
-                guided_scratch_bytes(limits), two_view_scratch_bytes(limits.max_matches),
-                bundle_scratch_bytes(limits.max_matches)});
-  return reconstruct_result_bytes(limits) + stage;
+  const size_t of_purpose[] = {extract_scratch_bytes(limits),
+                               match_bytes(limits.max_keypoints),
+                               two_view_scratch_bytes(limits.max_matches),
+                               0,  // tv_reconstruct's result lies beside them
+                               guided_scratch_bytes(limits),
+                               bundle_scratch_bytes(limits.max_matches)};
+  size_t stage = 0;
+  for (unsigned bit = 0; bit < 6; ++bit) {
+    if ((limits.purposes >> bit & 1) != 0) stage = std::max(stage, of_purpose[bit]);
+  }
+  return stage + ((limits.purposes >> 3 & 1) != 0 ? reconstruct_result_bytes(limits) : 0);
 }
 
 }  // namespace tv

@@ -7,7 +7,7 @@
 
 namespace tv {
 
-// limits.max_matches is resolved (not 0).
+// limits.max_matches and limits.purposes are resolved (not 0).
 size_t scratch_bytes(const tv_limits& limits);
 
 // The parts of it that a single stage takes.

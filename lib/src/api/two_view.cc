@@ -14,7 +14,7 @@ namespace {
 constexpr uint64_t kDefaultSeed = 20130814;  // any constant would do
 
 constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
-                                           TV_SOLVER_FIVE_POINT,
+                                           TV_SOLVER_AUTO,
                                            1.0,
                                            0.9999,
                                            10000,
@@ -44,8 +44,9 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
   if (options != nullptr) {
     if (options->struct_size != sizeof(tv_estimate_options)) return TV_ERR_STRUCT_SIZE;
     *checked = *options;
-  } else if (!calibrated) {
-    checked->method = TV_SOLVER_EIGHT_POINT;
+  }
+  if (checked->method == TV_SOLVER_AUTO) {
+    checked->method = calibrated ? TV_SOLVER_FIVE_POINT : TV_SOLVER_EIGHT_POINT;
   }
   if (!is_finite(checked->max_error_px) || !is_finite(checked->confidence) ||
       !is_finite(checked->gravity_sigma_rad) || !is_finite(checked->principal_point_sigma)) {
@@ -277,7 +278,9 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   tv::TwoViewProblem problem{};
   tv_status status = tv::read_estimate_options(options, calibrated, &problem.options);
   if (status != TV_OK) return status;
-  if (num_matches > context->limits.max_matches) return TV_ERR_LIMITS;
+  if (num_matches > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ESTIMATE)) {
+    return TV_ERR_LIMITS;
+  }
   if (calibrated) {
     status = tv_camera_check(camera0);
     if (status == TV_OK) status = tv_camera_check(camera1);

@@ -13,6 +13,7 @@ bool is_stride(int64_t stride_bytes, int32_t width) {
   return stride_bytes >= width && stride_bytes <= INT64_MAX / 65536;
 }
 
+constexpr int32_t kAutoKeypoints = 2048;
 constexpr float kMaxKeypointSize = 512.0f;
 constexpr float kMaxCoordinate = 1e5f;
 constexpr double kRotationTolerance = 1e-6;
@@ -24,7 +25,8 @@ tv_status check_image(const tv_context& context, const tv_image* image) {
   if (image->width < 1 || image->height < 1 || !is_stride(image->stride_bytes, image->width)) {
     return TV_ERR_ARGUMENT;
   }
-  if (image->width > context.limits.max_width || image->height > context.limits.max_height) {
+  if (image->width > context.limits.max_width || image->height > context.limits.max_height ||
+      !made_for(context, TV_PURPOSE_EXTRACT)) {
     return TV_ERR_LIMITS;
   }
   return TV_OK;
@@ -41,14 +43,13 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
                                tv_feature_options* checked) {
   if (options == nullptr) {
     tv_feature_options_init(checked);
-    if (checked->max_keypoints > context.limits.max_keypoints) {
-      checked->max_keypoints = context.limits.max_keypoints;
-    }
-    return TV_OK;
+  } else if (options->struct_size != sizeof(tv_feature_options)) {
+    return TV_ERR_STRUCT_SIZE;
+  } else {
+    *checked = *options;
   }
-  const tv_feature_options& o = *options;
-  if (o.struct_size != sizeof(tv_feature_options)) return TV_ERR_STRUCT_SIZE;
-  const bool valid = o.max_keypoints >= 1 && within(o.arc, 9, 12) && within(o.threshold, 1, 254) &&
+  tv_feature_options& o = *checked;
+  const bool valid = o.max_keypoints >= 0 && within(o.arc, 9, 12) && within(o.threshold, 1, 254) &&
                      within(o.min_threshold, 0, o.threshold) && within(o.levels, 1, 8) &&
                      within(o.scale_factor, 1.1f, 2.0f) &&
                      (o.cell_px == 0 || within(o.cell_px, 8, 16384)) && within(o.subpixel, 0, 1) &&
@@ -56,9 +57,9 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
                      within(o.descriptor, TV_NORMALISATION_SIFT, TV_NORMALISATION_ROOTSIFT) &&
                      within(o.keypoint_size, 1.0f, 32.0f);
   if (!valid) return TV_ERR_ARGUMENT;
-  if (o.max_keypoints > context.limits.max_keypoints) return TV_ERR_LIMITS;
-  *checked = o;
-  return TV_OK;
+  const int32_t most = context.limits.max_keypoints;
+  if (o.max_keypoints == 0) o.max_keypoints = most < kAutoKeypoints ? most : kAutoKeypoints;
+  return o.max_keypoints <= most ? TV_OK : TV_ERR_LIMITS;
 }
 
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {

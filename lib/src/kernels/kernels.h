@@ -34,17 +34,23 @@ typedef struct tvk_nearest {
 #define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
 
-#define TVK_NEAREST_PANEL 2048       /* columns that mutual_nearest prepares at once */
-#define TVK_NEAREST_COLUMN_BYTES 288 /* of one */
-#define TVK_NEAREST_ROW_BYTES                                        \
-  1024 /* of one of the rows that meet them at once, and of one more \
-        */
+/* The columns that mutual_nearest prepares at once, and the scratch of one: as bytes, and as 16-bit
+   numbers, which the sets without products of bytes take. */
+#define TVK_NEAREST_PANEL 2048
+#define TVK_NEAREST_COLUMN_BYTES 152
+#define TVK_NEAREST_PANEL_16 768
+#define TVK_NEAREST_COLUMN_16_BYTES 272
+#define TVK_NEAREST_ROW_BYTES 832 /* of one of the rows that meet them at once, and of one more */
 #define TVK_NEAREST_CHUNK_BYTES(num_rows) \
   ((size_t)((num_rows) < 63 ? (num_rows) + 1 : 64) * TVK_NEAREST_ROW_BYTES)
-#define TVK_NEAREST_PANEL_BYTES(num_columns)                                   \
-  ((size_t)((num_columns) < TVK_NEAREST_PANEL ? ((num_columns) + 63) / 64 * 64 \
-                                              : TVK_NEAREST_PANEL) *           \
-   TVK_NEAREST_COLUMN_BYTES)
+#define TVK_NEAREST_MIN(a, b) ((a) < (b) ? (a) : (b))
+#define TVK_NEAREST_MAX(a, b) ((a) < (b) ? (b) : (a))
+#define TVK_NEAREST_ROOM(num_columns, panel, bytes) \
+  ((size_t)TVK_NEAREST_MIN(((num_columns) + 63) / 64 * 64, panel) * (bytes))
+#define TVK_NEAREST_PANEL_BYTES(num_columns)                                      \
+  TVK_NEAREST_MAX(                                                                \
+      TVK_NEAREST_ROOM(num_columns, TVK_NEAREST_PANEL, TVK_NEAREST_COLUMN_BYTES), \
+      TVK_NEAREST_ROOM(num_columns, TVK_NEAREST_PANEL_16, TVK_NEAREST_COLUMN_16_BYTES))
 #define TVK_NEAREST_SCRATCH(num_rows, num_columns) \
   (TVK_NEAREST_CHUNK_BYTES(num_rows) + TVK_NEAREST_PANEL_BYTES(num_columns))
 

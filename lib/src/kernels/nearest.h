@@ -12,10 +12,10 @@
    the few descriptors that can be each other's nearest. Ties need no order: equals are not strictly
    nearest.
 
-   A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), the structs
-   nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte where
-   these need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS after
-   another. */
+   A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), _PANEL, the
+   structs nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte
+   where these need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS
+   after another. */
 
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
@@ -67,12 +67,14 @@ NEAREST_ASSERT(nearest_few_rows_fit,
                sizeof(nearest_rows) <= 2 * TVK_NEAREST_ROW_BYTES &&
                    sizeof(nearest_rows) <= NEAREST_QUERIES * TVK_NEAREST_ROW_BYTES);
 NEAREST_ASSERT(nearest_panel_fits,
-               sizeof(nearest_block) <= NEAREST_COLUMNS * TVK_NEAREST_COLUMN_BYTES);
+               sizeof(nearest_block) <= NEAREST_COLUMNS * (NEAREST_PANEL == TVK_NEAREST_PANEL
+                                                               ? TVK_NEAREST_COLUMN_BYTES
+                                                               : TVK_NEAREST_COLUMN_16_BYTES));
 NEAREST_ASSERT(nearest_chunks_are_whole, NEAREST_ROWS % NEAREST_QUERIES == 0 &&
                                              NEAREST_PLACES * NEAREST_QUERIES % NEAREST_ROWS == 0);
 NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
-                                             TVK_NEAREST_PANEL % NEAREST_COLUMNS == 0 &&
-                                             TVK_NEAREST_PANEL / NEAREST_COLUMNS <= NEAREST_PLACES);
+                                             NEAREST_PANEL % NEAREST_COLUMNS == 0 &&
+                                             NEAREST_PANEL / NEAREST_COLUMNS <= NEAREST_PLACES);
 #undef NEAREST_ASSERT
 
 static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
@@ -316,8 +318,8 @@ static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t 
   int32_t first, b, k;
   forget_nearest(of_rows, num_rows);
   forget_nearest(of_columns, num_columns);
-  for (first = 0; first < num_columns; first += TVK_NEAREST_PANEL) {
-    const int32_t count = nearest_min(TVK_NEAREST_PANEL, num_columns - first);
+  for (first = 0; first < num_columns; first += NEAREST_PANEL) {
+    const int32_t count = nearest_min(NEAREST_PANEL, num_columns - first);
     for (b = 0; b * NEAREST_COLUMNS < count; ++b) {
       const int32_t column = first + b * NEAREST_COLUMNS;
       make_block(columns + (int64_t)column * TVK_DESCRIPTOR_SIZE,

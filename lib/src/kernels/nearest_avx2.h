@@ -8,6 +8,7 @@
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 8, NEAREST_VECTORS = 4, NEAREST_QUERIES = 2, NEAREST_ROWS = 64 };
+enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4, NEAREST_MOST_STEPS = 2 * NEAREST_GROUPS };
 
 /* A step: eight bytes of each row, and which eight of the 128. */

@@ -2,6 +2,7 @@
    turns into multiply-adds of its base instruction set. */
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 4, NEAREST_ROWS = 128 };
+enum { NEAREST_PANEL = TVK_NEAREST_PANEL_16 };
 
 typedef struct nearest_rows {
   int16_t values[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE];

@@ -3,6 +3,7 @@
 #include <arm_neon.h>
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
+enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4 };
 
 typedef struct nearest_rows {

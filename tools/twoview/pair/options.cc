@@ -14,7 +14,7 @@
 namespace cli {
 namespace {
 
-// Names of an enumeration whose values count up from 0.
+// Names of an enumeration whose values count up.
 using Names = std::vector<std::string>;
 
 const Names kOrientations = {"upright", "gradient"};
@@ -27,6 +27,7 @@ const Names kTriangulations = {
 struct Choice {
   int32_t* value;
   const Names* names;
+  int32_t first = 0;  // the value of the first name
 };
 
 // Three numbers, of any length but 0.
@@ -70,7 +71,8 @@ std::vector<Option> table(Options& o) {
        "diameter of a corner on level 0, pixels"},
       {"ratio", kMatch, &o.match.ratio, 0, 1, open_low,
        "nearest over second nearest distance, both directions"},
-      {"method", kEstimate, Choice{&e.method, &kMethods}, 0, 0, closed, "minimal solver"},
+      {"method", kEstimate, Choice{&e.method, &kMethods, TV_SOLVER_FIVE_POINT}, 0, 0, closed,
+       "minimal solver"},
       {"max-error-px", kEstimate, &e.max_error_px, 0, 1e9, open_low,
        "inlier threshold, Sampson distance in pixels"},
       {"confidence", kEstimate, &e.confidence, 0, 1, open_high,
@@ -161,7 +163,7 @@ void set(const Option& option, const std::string& text) {
                                  "'" + text + "' is none of this version's " + joined(names, ", "));
     }
     const auto found = std::find(choice->names->begin(), choice->names->end(), text);
-    *choice->value = static_cast<int32_t>(found - choice->names->begin());
+    *choice->value = choice->first + static_cast<int32_t>(found - choice->names->begin());
     return;
   }
   if (const Direction* direction = std::get_if<Direction>(&option.target)) {
@@ -194,7 +196,7 @@ nlohmann::ordered_json value_json(const Option& option) {
       [&](auto target) -> nlohmann::ordered_json {
         using T = decltype(target);
         if constexpr (std::is_same_v<T, Choice>)
-          return (*target.names)[static_cast<size_t>(*target.value)];
+          return (*target.names)[static_cast<size_t>(*target.value - target.first)];
         else if constexpr (std::is_same_v<T, Direction>)
           return is_zero(target)
                      ? nlohmann::ordered_json()
@@ -229,6 +231,9 @@ Options::Options() {
   tv_feature_options_init(&feature);
   tv_match_options_init(&match);
   tv_estimate_options_init(&estimate);
+  // What is automatic in the library is a number and a word here, for --help and the files.
+  feature.max_keypoints = 2048;
+  estimate.method = TV_SOLVER_FIVE_POINT;
 }
 
 void Options::settle() {
@@ -289,6 +294,8 @@ double shortest(float value) {
   return result;
 }
 
-std::string method_name(int32_t method) { return kMethods.at(static_cast<size_t>(method)); }
+std::string method_name(int32_t method) {
+  return kMethods.at(static_cast<size_t>(method - TV_SOLVER_FIVE_POINT));
+}
 
 }  // namespace cli

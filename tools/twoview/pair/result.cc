@@ -147,6 +147,7 @@ Json result_json(const Outcome& outcome) {
   json["image_size1"] = {outcome.picture[1].luma.cols, outcome.picture[1].luma.rows};
   json["num_keypoints"] = {r.num_keypoints[0], r.num_keypoints[1]};
   json["num_matches"] = r.num_matches;
+  json["num_matches_left_out"] = r.num_matches_left_out;
   json["num_inliers"] = v.num_inliers;
   json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));

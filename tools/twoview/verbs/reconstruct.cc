@@ -207,6 +207,10 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
   text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
                        v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
+  if (r.num_matches_left_out > 0)
+    text +=
+        summary_line("left out", "%d matches, of the highest ratio: more than the context holds",
+                     r.num_matches_left_out);
   text += pose_lines(outcome);
   if (recording) text += recording->words(outcome);
   const auto& j = outcome.json;

@@ -12,7 +12,7 @@ def make_context(library, data, feature_options=None):
     """A context that holds the set's images and features."""
     width, height = data.max_size()
     limits = {"max_width": width, "max_height": height}
-    cap = library.feature_options(feature_options).max_keypoints
+    cap = library.feature_options(feature_options).max_keypoints or 2048
     limits["max_keypoints"] = max(cap, 1)
     return twoview_ctypes.Context(library, **limits)
 

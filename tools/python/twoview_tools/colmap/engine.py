@@ -18,7 +18,7 @@ class Engine:
         if self.context is None or width > self.width or height > self.height:
             self.width, self.height = max(width, self.width), max(height, self.height)
             self.context = tv.Context(max_width=self.width, max_height=self.height,
-                                      max_keypoints=max(self.feature.max_keypoints, 1),
+                                      max_keypoints=max(self.feature.max_keypoints or 2048, 1),
                                       max_matches=self.max_matches)
         return self.context
 

@@ -10,6 +10,8 @@ _KINDS = (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)
 MAPPING_KEYPOINTS = 8192
 # For a database, whose pairs share its cameras: a pair's geometry is of those, none is moved for one pair.
 PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
+# What is automatic in the library is a number and a word here, as in the C++ program.
+_EXPLICIT = {"max_keypoints": 2048, "method": tv.Method.FIVE_POINT}
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
 
 
@@ -17,13 +19,17 @@ def _spelt(value):
     return value.name.lower().replace("_", "-")
 
 
+def _words(enum):
+    return [_spelt(value) for value in enum if value is not tv.Method.AUTO]
+
+
 def _choice(enum):
     def convert(text):
         for value in enum:
-            if _spelt(value) == text:
+            if _spelt(value) == text and text in _words(enum):
                 return value
         raise ValueError
-    convert.__name__ = " or ".join(map(_spelt, enum))
+    convert.__name__ = " or ".join(_words(enum))
     return convert
 
 
@@ -35,11 +41,11 @@ def add_options(parser, kinds=_KINDS, **defaults):
             if field.name in _NOT_HERE:
                 continue
             flag = "--" + field.name.replace("_", "-")
-            default = defaults.get(field.name, field.default)
+            default = defaults.get(field.name, _EXPLICIT.get(field.name, field.default))
             if field.name in _CHOICES:
                 enum = _CHOICES[field.name]
                 group.add_argument(flag, type=_choice(enum), default=enum(default),
-                                   metavar="|".join(map(_spelt, enum)), help=_spelt(enum(default)))
+                                   metavar="|".join(_words(enum)), help=_spelt(enum(default)))
             else:
                 number = int if default is None else type(default)
                 group.add_argument(flag, type=number, default=default,

@@ -20,7 +20,7 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
     feature = feature or tv.FeatureOptions()
     try:
         with tv.Context(max_width=max(luma.shape[1] for luma in lumas), max_height=max(luma.shape[0] for luma in lumas),
-                        max_keypoints=feature.max_keypoints) as context:
+                        max_keypoints=feature.max_keypoints or 2048) as context:
             pose, cloud = tv.reconstruct(context, lumas[0], cameras[0], lumas[1], cameras[1], feature=feature,
                                          match=match, estimate=estimate)
     except tv.StatusError as error:
