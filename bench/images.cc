@@ -83,7 +83,7 @@ bool read_motorcycle(Pair* pair) {
   return true;
 }
 
-// Scaled so that it covers width x height, then cut to that from the middle.
+// Scales the image so that it covers width x height, then cuts that out of the middle.
 void fit(Pair* pair, int width, int height) {
   for (int v = 0; v < 2; ++v) {
     cv::Mat& image = pair->image[v];

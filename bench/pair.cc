@@ -62,7 +62,7 @@ class Ours {
                    "tv_reconstruct");
   }
 
-  // What was found; and where the time of one more call went.
+  // Reports what was found, and the time of each stage of one more call.
   Counters counters() {
     static const char* const stages[TV_NUM_STAGES] = {"pyramid_us",    "detect_us",   "describe_us",
                                                       "match_us",      "estimate_us", "refine_us",

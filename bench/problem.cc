@@ -38,7 +38,7 @@ struct Maker {
     p[0] = uniform(5, camera.width - 6), p[1] = uniform(5, camera.height - 6);
   }
 
-  // False where the second view does not see the point.
+  // Returns false where the second view does not see the point.
   bool true_match(const Problem& problem, double p0[2], double p1[2]) {
     const tv_camera& camera = problem.camera;
     pixel(camera, p0);

@@ -38,7 +38,7 @@ static void rotation_of(char **q, double R[9]) {
       2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
       2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
   int r;
-  for (r = 0; r < 3; ++r) { /* right is the body's y, down its z, forward its x */
+  for (r = 0; r < 3; ++r) { /* camera right = body y, down = z, forward = x */
     R[3 * r] = body[3 * r + 1];
     R[3 * r + 1] = body[3 * r + 2];
     R[3 * r + 2] = body[3 * r];

@@ -79,7 +79,7 @@ def main():
         (folder / f"camera{index}.yaml").write_text(text)
     scale = FOCAL_PX * BASELINE_M
     offset = CX[1] - CX[0]
-    # An infinite disparity becomes depth 0, unknown, by itself.
+    # An infinite disparity gives depth 0, which means unknown.
     write_pfm(folder / "depth0.pfm", array.array("f", (scale / (d + offset) for d in disparity)))
     (folder / "truth.yaml").write_text(TRUTH.format(baseline=BASELINE_M))
 

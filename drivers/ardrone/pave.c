@@ -168,7 +168,7 @@ static int is_other_stream(const ardrone_pave_gate *gate, const ardrone_pave_hea
          gate->encoded_height != header->encoded_height;
 }
 
-/* A further slice of the same picture has its number; else the next one follows. */
+/* The next packet has the next number, or the same one where it is another slice of the picture. */
 static int is_gap(const ardrone_pave_gate *gate, const ardrone_pave_header *header) {
   const uint32_t ahead = header->frame_number - gate->last_number;
   return gate->has_last && ahead != 1 && !(ahead == 0 && header->slice_index > 0);

@@ -17,12 +17,12 @@ void tvs_slerp(const double a[4], const double b[4], double s, double q[4]) {
   double dot = 0, sign = 1, weight_a = 1 - s, weight_b = s, norm_sq = 0, norm;
   int k;
   for (k = 0; k < 4; ++k) dot += a[k] * b[k];
-  if (dot < 0) { /* q and -q are one attitude; the nearer is meant */
+  if (dot < 0) { /* q and -q are the same attitude; the nearer of the two is used */
     dot = -dot;
     sign = -1;
   }
-  if (dot < 1 - 1e-9) { /* below it sin is too small to divide by, and linear interpolation is exact
-                           to rounding */
+  /* Nearer to 1, sin is too small to divide by, and linear weights are exact to rounding. */
+  if (dot < 1 - 1e-9) {
     const double angle = acos(dot);
     weight_a = sin((1 - s) * angle) / sin(angle);
     weight_b = sin(s * angle) / sin(angle);

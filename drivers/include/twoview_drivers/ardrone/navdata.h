@@ -212,7 +212,7 @@ typedef struct ardrone_time {
 typedef struct ardrone_raw_measures {
   /* Raw, as converted. */
   uint16_t accelerometer[3];
-  /* Raw; the second ones of the range of 110 degrees a second. */
+  /* Raw; gyro_110 has a range of 110 degrees a second. */
   int16_t gyro[3], gyro_110[2];
   /* Millivolts. */
   uint32_t battery_mv;
