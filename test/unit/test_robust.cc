@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "robust/chance.h"
 #include "robust/covariance.h"
 #include "robust/loop.h"
 #include "robust/two_view.h"

@@ -5,7 +5,7 @@
 
 #include "base/math.h"
 #include "geometry/homography_4pt.h"
-#include "robust/verdict.h"
+#include "robust/estimators.h"
 
 namespace tv {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robust/chance.h"
 #include "robust/loop.h"
-#include "robust/verdict.h"
 
 namespace tv {
 namespace {

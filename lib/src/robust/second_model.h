@@ -16,7 +16,7 @@ size_t second_model_bytes(int max_matches);
 
 // Searches the unique matches that the first model does not explain (explained[i] is 0; its
 // inliers' tail, too, is to be marked) for a pose of their own. Found: the model is meaningful
-// among them (verdict.h), and counts at least kSecondShare of num_first.
+// among them (chance.h), and counts at least kSecondShare of num_first.
 inline constexpr double kSecondShare = 0.15;
 SecondModel find_second_model(const Matches& matches, const uint8_t* explained, int num_first,
                               double threshold_px, uint64_t seed, Arena& arena);

@@ -1,10 +1,19 @@
-// Two-view estimation behind the API boundary.
+// Two-view estimation behind the API boundary: its two halves, search (search.cc) and finish
+// (finish.cc), and what they hand on.
 #pragma once
 
+#include "robust/gravity.h"
 #include "robust/matches.h"
-#include "robust/verdict.h"
 
 namespace tv {
+
+// An epipolar model of the pair, on rays.
+struct EpipolarModel {
+  bool found = false;
+  bool has_pose = false;
+  Pose pose;
+  Mat3 M = Mat3::Zero();  // E = [t]x R, or the uncalibrated matrix
+};
 
 // The model as the search leaves it and as refinement ends it.
 struct TwoViewModel {
@@ -32,6 +41,12 @@ struct TwoViewOutcome {
 
 // The arena that one estimate takes.
 size_t two_view_scratch_bytes(int max_matches);
+size_t search_bytes(int max_matches);  // of it, the search
+
+// What both halves read off the options. The size of a sample is the degrees of freedom of the
+// model; an upright pose has three, but refinement frees all five.
+int least_matches(int method);
+GravityPrior gravity_of(const TwoViewProblem& problem);
 
 // The robust loop (TV_STAGE_ESTIMATE).
 void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
