@@ -92,7 +92,7 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   // length is about the image's side.
   const double prior =
       std::min(1.0, 2.8284271247461903 * threshold_px / std::sqrt(matches.area_px));
-  const int n = matches.num_unique;
+  const int n = matches.num_unique();
   if (n < 2) return 1;
   Random random = random_seeded(seed);
   WrongPairs wrong(pairs);

@@ -9,9 +9,6 @@
 namespace tv {
 namespace {
 
-// An "ok" is for poses that are 5 degrees off only by an accident of four standard deviations.
-constexpr double kMostSigma = 1.25 * kPi / 180;
-
 // Grows with the angle between a match's rays, R taken off: 0 to 2 for 0 to 180 degrees.
 double pseudo_angle(const Fit& f, int i) {
   const RayPairs& pairs = f.matches.pairs;
@@ -33,95 +30,163 @@ double largest_sigma(const double covariance[25]) {
   return std::sqrt(std::max(rotation, direction));
 }
 
-}  // namespace
+// The distance of the support's rays of one view from the plane nearest to them, root mean square,
+// in pixels: small for the rays of points on a line.
+double line_distance_px(const Fit& f, int view) {
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
+  for (int k = 0; k < f.num_support; ++k) {
+    const int i = f.support[k];
+    double* const* ray = f.matches.pairs.ray[view];
+    const double x = ray[0][i], y = ray[1][i], z = ray[2][i];
+    const double weight = 1 / ((x * x + y * y) + z * z);
+    xx += weight * x * x;
+    xy += weight * x * y;
+    xz += weight * x * z;
+    yy += weight * y * y;
+    yz += weight * y * z;
+    zz += weight * z * z;
+  }
+  Mat3 sum;
+  sum << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return std::sqrt(svd3(sum).s[2] / f.num_support) / f.out->evidence.pixel_angle_rad;
+}
 
-// The parallax of a full pose, and whether it is enough.
+// Parallax, uncertainty and lines of points, of a full pose.
 void measure_pose(Fit& f) {
-  TwoViewOutcome& out = *f.out;
+  Evidence& evidence = f.out->evidence;
   double sum = 0;
+  if (f.out->has_covariance) evidence.sigma_rad = largest_sigma(f.out->covariance);
   if (f.num_support == 0) return;
   for (int k = 0; k < f.num_support; ++k) {
     f.values[k] = pseudo_angle(f, f.support[k]);
-    sum += f.pairs.pixel_angle[f.support[k]];
+    sum += f.matches.pairs.pixel_angle[f.support[k]];
   }
   double* middle = f.values + (f.num_support - 1) / 2;
   std::nth_element(f.values, middle, f.values + f.num_support);
-  out.median_parallax_rad = angle_of_pseudo(*middle);
-  const double least_px = std::max(3 * f.threshold, 10 * out.noise_px);
-  if (out.median_parallax_rad < least_px * sum / f.num_support || !out.has_covariance ||
-      largest_sigma(out.covariance) > kMostSigma) {
-    out.reasons |= TV_REASON_LOW_PARALLAX;
-  }
+  evidence.median_parallax_rad = angle_of_pseudo(*middle);
+  evidence.pixel_angle_rad = sum / f.num_support;
+  for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
 }
 
-namespace {
-
-// A model of the rest that is no part of the first: matches farther from it than kClear thresholds.
-constexpr double kClear = 3;
-
-// A second consistent model, and whether the points repeat themselves as on a lattice: then it is
-// the same scene, matched one period off; where most of the support does, so may the pose be.
-constexpr double kLatticeSigmas = 3.3, kMostlyLattice = 0.5;
-
-}  // namespace
-
-void look_for_second_model(Fit& f, Arena& arena) {
-  TwoViewOutcome& out = *f.out;
-  const int n = f.pairs.num;
-  bool second = false;
-  {
-    ArenaScope scope(arena);
-    uint8_t* explained = arena_alloc<uint8_t>(arena, static_cast<size_t>(n));
-    const bool by_pose = out.has_t;
-    const double limit = kClear * f.threshold;
-    int num_first = 0;
-    if (by_pose) {
-      sampson_squares(f.pairs, 0, n, out.epipolar.M, f.values);
-    } else {
-      transfer_squares(f.pairs, 0, n, out.H, f.values);
+// The share of an 8x8 grid on the view's image, or, uncalibrated, on the box around its points,
+// that holds an inlier.
+double coverage(const Fit& f, int view) {
+  const TwoViewProblem& problem = f.problem;
+  const double* pixels = problem.pixels[view];
+  double low[2] = {0, 0}, high[2] = {0, 0};
+  if (problem.calibrated) {
+    low[0] = low[1] = -0.5;
+    high[0] = problem.camera[view].model.width - 0.5;
+    high[1] = problem.camera[view].model.height - 0.5;
+  } else {
+    for (int k = 0; k < f.matches.num_all; ++k) {
+      for (int d = 0; d < 2; ++d) {
+        const double x = pixels[2 * f.matches.order[k] + d];
+        if (k == 0 || x < low[d]) low[d] = x;
+        if (k == 0 || x > high[d]) high[d] = x;
+      }
     }
-    for (int i = 0; i < n; ++i) {
-      explained[i] = f.values[i] <= limit * limit;
-      num_first += out.inlier[i] != 0;
+  }
+  bool cells[64] = {};
+  int filled = 0;
+  for (int k = 0; k < f.matches.num_all; ++k) {
+    if (f.out->inlier[k] == 0) continue;
+    int cell[2];
+    for (int d = 0; d < 2; ++d) {
+      const double place = 8 * (pixels[2 * f.matches.order[k] + d] - low[d]) / (high[d] - low[d]);
+      cell[d] = place >= 7 ? 7 : (place > 0 ? static_cast<int>(place) : 0);
     }
-    second = find_second_model(f.matches, explained, num_first, f.threshold, f.problem.options.seed,
-                               arena)
-                 .found;
+    bool& place = cells[8 * cell[1] + cell[0]];
+    filled += !place;
+    place = true;
   }
-  ArenaScope scope(arena);
-  double* xy = arena_alloc<double>(arena, 2 * static_cast<size_t>(n));
-  for (int i = 0; i < n; ++i) {
-    for (int d = 0; d < 2; ++d) xy[2 * i + d] = f.problem.pixels[0][2 * f.matches.order[i] + d];
-  }
-  int count = 0;
-  for (int i = 0; i < n; ++i) {
-    if (out.inlier[i] != 0) f.indices[count++] = i;
-  }
-  const Lattice lattice = find_lattice(xy, n, second ? nullptr : f.indices, count, arena);
-  if (lattice.sigmas > kLatticeSigmas && (second || lattice.share > kMostlyLattice)) {
-    out.reasons |= TV_REASON_REPEATED_STRUCTURE;
-  } else if (second) {
-    out.reasons |= TV_REASON_SECOND_MOTION;
-  }
+  return filled / 64.0;
 }
 
 void measure_inliers(Fit& f) {
   TwoViewOutcome& out = *f.out;
-  const bool by_transfer = out.kind == TV_KIND_PANORAMIC || out.kind == TV_KIND_NO_MOTION ||
-                           out.kind == TV_KIND_PLANAR_OR_PANORAMIC;
-  const RayPairs& pairs = f.matches.pairs;
+  Evidence& evidence = out.evidence;
+  const bool by_transfer = evidence.kind == TV_KIND_PANORAMIC ||
+                           evidence.kind == TV_KIND_NO_MOTION ||
+                           evidence.kind == TV_KIND_PLANAR_OR_PANORAMIC;
+  const Matches& matches = f.matches;
   double sum = 0;
   if (by_transfer) {
-    transfer_squares(pairs, 0, pairs.num, out.H, f.values);
+    transfer_squares(matches.pairs, 0, matches.num_all, out.H, f.values);
   } else {
-    sampson_squares(pairs, 0, pairs.num, out.epipolar.M, f.values);
+    sampson_squares(matches.pairs, 0, matches.num_all, out.epipolar.M, f.values);
   }
-  for (int i = 0; i < pairs.num; ++i) {
+  for (int i = 0; i < matches.num_all; ++i) {
     if (out.inlier[i] == 0) continue;
-    ++out.num_inliers;
+    ++evidence.num_inliers;
+    evidence.num_different_inliers += i < matches.num_unique();
     sum += f.values[i];
   }
-  if (out.num_inliers > 0) out.rms_error_px = std::sqrt(sum / out.num_inliers);
+  if (evidence.num_inliers > 0) out.rms_error_px = std::sqrt(sum / evidence.num_inliers);
+  evidence.num_matches = matches.num_all;
+  evidence.num_different = matches.num_unique();
+  evidence.threshold_px = f.threshold;
+  for (int v = 0; v < 2; ++v) evidence.coverage[v] = coverage(f, v);
+}
+
+// A model of the rest that is no part of the first: of the matches farther from it than kClear
+// thresholds.
+constexpr double kClear = 3;
+
+bool has_second_model(Fit& f, Arena& arena) {
+  ArenaScope scope(arena);
+  const TwoViewOutcome& out = *f.out;
+  const int n = f.matches.num_unique();
+  uint8_t* explained = arena_alloc<uint8_t>(arena, static_cast<size_t>(n));
+  const double limit = kClear * f.threshold;
+  if (out.has_t) {
+    sampson_squares(f.matches.pairs, 0, n, out.epipolar.M, f.values);
+  } else {
+    transfer_squares(f.matches.pairs, 0, n, out.H, f.values);
+  }
+  for (int i = 0; i < n; ++i) explained[i] = f.values[i] <= limit * limit;
+  return find_second_model(f.matches, explained, out.evidence.num_different_inliers, f.threshold,
+                           f.problem.options.seed, arena)
+      .found;
+}
+
+// Of all points where there is a second model, else of the inliers.
+void measure_lattices(Fit& f, Arena& arena) {
+  ArenaScope scope(arena);
+  Evidence& evidence = f.out->evidence;
+  const int n = f.matches.num_unique();
+  double* xy = arena_alloc<double>(arena, 2 * static_cast<size_t>(n));
+  int count = 0;
+  for (int i = 0; i < n; ++i) {
+    if (f.out->inlier[i] != 0) f.indices[count++] = i;
+  }
+  for (int v = 0; v < 2; ++v) {
+    for (int i = 0; i < n; ++i) {
+      for (int d = 0; d < 2; ++d) xy[2 * i + d] = f.problem.pixels[v][2 * f.matches.order[i] + d];
+    }
+    const Lattice lattice =
+        find_lattice(xy, n, evidence.has_second_model ? nullptr : f.indices, count, arena);
+    evidence.lattice_share[v] = lattice.share;
+    evidence.lattice_sigmas[v] = lattice.sigmas;
+  }
+}
+
+}  // namespace
+
+size_t evidence_bytes(int max_matches) {
+  const size_t n = static_cast<size_t>(max_matches);
+  const size_t second = arena_bytes<uint8_t>(n) + second_model_bytes(max_matches);
+  const size_t lattice = arena_bytes<double>(2 * n) + lattice_bytes(max_matches);
+  return std::max(second, lattice);
+}
+
+void measure_evidence(Fit& f, Arena& arena) {
+  Evidence& evidence = f.out->evidence;
+  measure_inliers(f);
+  if (f.out->has_t) measure_pose(f);
+  if (!f.problem.calibrated || evidence.kind == TV_KIND_DEGENERATE) return;
+  evidence.has_second_model = has_second_model(f, arena);
+  measure_lattices(f, arena);
 }
 
 }  // namespace tv

@@ -8,7 +8,6 @@
 #include "robust/kind.h"
 #include "robust/place_principal_point.h"
 #include "robust/planar_pose.h"
-#include "robust/second_model.h"
 #include "robust/two_view.h"
 #include "robust/verdict.h"
 
@@ -16,11 +15,9 @@ namespace tv {
 
 size_t two_view_scratch_bytes(int max_matches) {
   const size_t n = static_cast<size_t>(max_matches);
-  const size_t second = arena_bytes<uint8_t>(n) + second_model_bytes(max_matches);
-  const size_t lattice = arena_bytes<double>(2 * n) + lattice_bytes(max_matches);
   const size_t finish = 2 * arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) +
                         arena_bytes<double>(n) +
-                        std::max(rivals_bytes(max_matches), std::max(second, lattice));
+                        std::max(rivals_bytes(max_matches), evidence_bytes(max_matches));
   return matches_bytes(max_matches) + std::max(search_bytes(max_matches), finish);
 }
 
@@ -29,10 +26,10 @@ namespace {
 Mat3 refined_fundamental(const Fit& f, const Mat3& start) {
   FundamentalModel model = fundamental_model(start);
   for (int round = 0; round < kFinalRounds; ++round) {
-    const int count =
-        near_matches(f.pairs, f.pairs.num, model.matrix(), kFinalNear * f.threshold, f.indices);
+    const int count = near_matches(f.matches.pairs, f.matches.pairs.num, model.matrix(),
+                                   kFinalNear * f.threshold, f.indices);
     if (count < 7) break;
-    refine(f.pairs, f.indices, count, final_loss(f.refiner, model.matrix(), count),
+    refine(f.matches.pairs, f.indices, count, final_loss(f.refiner, model.matrix(), count),
            kFinalIterations, &model);
   }
   return model.matrix().normalized();
@@ -56,26 +53,20 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
                      Matches* all_matches, TwoViewOutcome* outcome) {
   Matches& matches = *all_matches;
   *outcome = TwoViewOutcome{};
-  const size_t n = static_cast<size_t>(matches.pairs.num);
+  const size_t n = static_cast<size_t>(matches.num_all);
   outcome->inlier = arena_alloc<uint8_t>(arena, n);
   for (size_t i = 0; i < n; ++i) outcome->inlier[i] = 0;
   ArenaScope scope(arena);
-  RayPairs unique = matches.pairs;
-  unique.num = matches.num_unique;
   const double threshold = problem.options.max_error_px;
   int32_t* indices = arena_alloc<int32_t>(arena, n);
   double* values = arena_alloc<double>(arena, n);
   int32_t* support = arena_alloc<int32_t>(arena, n);
-  Fit f{problem,
-        matches,
-        unique,
-        threshold,
-        indices,
-        values,
-        support,
-        0,
-        PoseRefiner{problem, matches, unique, threshold, gravity_of(problem), {}, indices, values},
-        outcome};
+  Fit f{
+      problem,   matches,
+      threshold, indices,
+      values,    support,
+      0,         PoseRefiner{problem, matches, threshold, gravity_of(problem), {}, indices, values},
+      outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {
@@ -83,8 +74,8 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
     (problem.calibrated ? out.essential_inliers : out.fundamental_inliers) = f.num_support;
   }
   if (f.num_support < 5) {  // no epipolar model: a rival may still explain the matches
-    f.num_support = f.pairs.num;
-    for (int i = 0; i < f.pairs.num; ++i) f.support[i] = i;
+    f.num_support = f.matches.pairs.num;
+    for (int i = 0; i < f.matches.pairs.num; ++i) f.support[i] = i;
     out.epipolar.found = false;
   }
   const double least_share = out.epipolar.found ? kRivalShare : kRivalShareAlone;
@@ -94,10 +85,11 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
   out.homography_inliers = rivals.homography_inliers;
   if (!out.epipolar.found) f.num_support = 0;
   const int sample_size = least_matches(problem.options.method);
-  out.kind = choose_kind(f, rivals, sample_size);
+  const tv_kind kind = choose_kind(f, rivals, sample_size);
+  out.evidence.kind = kind;
   out.H = rivals.H;
-  out.has_H = out.kind == TV_KIND_PLANAR || out.kind == TV_KIND_PLANAR_OR_PANORAMIC;
-  switch (out.kind) {
+  out.has_H = kind == TV_KIND_PLANAR || kind == TV_KIND_PLANAR_OR_PANORAMIC;
+  switch (kind) {
     case TV_KIND_PLANAR:
       choose_planar_pose(f, rivals);
       out.essential_inliers = f.num_support;
@@ -129,12 +121,8 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
       break;
     case TV_KIND_UNCALIBRATED: break;
   }
-  if (out.has_t) measure_pose(f);
-  measure_inliers(f);
-  if (problem.calibrated && out.kind != TV_KIND_DEGENERATE) {
-    look_for_second_model(f, arena);
-  }
-  judge(f);
+  measure_evidence(f, arena);
+  out.judgement = judge(out.evidence);
 }
 
 }  // namespace tv

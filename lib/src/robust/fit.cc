@@ -8,29 +8,29 @@ namespace tv {
 void collect_support(Fit& f) {
   const EpipolarModel& epipolar = f.out->epipolar;
   f.num_support = 0;
-  const RayPairs& pairs = f.matches.pairs;
+  const Matches& matches = f.matches;
   if (epipolar.has_pose) {
-    pose_squares(pairs, 0, pairs.num, epipolar.pose, f.threshold, f.values);
+    pose_squares(matches.pairs, 0, matches.num_all, epipolar.pose, f.threshold, f.values);
   } else {
-    sampson_squares(pairs, 0, pairs.num, epipolar.M, f.values);
+    sampson_squares(matches.pairs, 0, matches.num_all, epipolar.M, f.values);
   }
-  for (int i = 0; i < pairs.num; ++i) {
+  for (int i = 0; i < matches.num_all; ++i) {
     const bool inlier = f.values[i] <= f.threshold * f.threshold;
     f.out->inlier[i] = inlier;
-    if (inlier && i < f.pairs.num) f.support[f.num_support++] = i;
+    if (inlier && i < matches.num_unique()) f.support[f.num_support++] = i;
   }
 }
 
 void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out) {
   out->has_covariance = true;
-  out->noise_px = uncertainty.noise_px;
+  out->evidence.noise_px = uncertainty.noise_px;
   std::copy(uncertainty.covariance, uncertainty.covariance + 25, out->covariance);
 }
 
 void inliers_of_transfer(Fit& f, const Mat3& H) {
   const double limit = kTransferThresholdScale * f.threshold;
-  transfer_squares(f.matches.pairs, 0, f.matches.pairs.num, H, f.values);
-  for (int i = 0; i < f.matches.pairs.num; ++i) f.out->inlier[i] = f.values[i] <= limit * limit;
+  transfer_squares(f.matches.pairs, 0, f.matches.num_all, H, f.values);
+  for (int i = 0; i < f.matches.num_all; ++i) f.out->inlier[i] = f.values[i] <= limit * limit;
 }
 
 }  // namespace tv

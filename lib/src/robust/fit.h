@@ -9,14 +9,13 @@ namespace tv {
 
 struct Fit {
   const TwoViewProblem& problem;
-  Matches& matches;
-  const RayPairs& pairs;  // without repeats
+  const Matches& matches;  // the refiner may move their rays, and nothing else does
   double threshold;
   int32_t* indices;  // scratch
   double* values;    // scratch
-  int32_t* support;  // the unique inliers of the epipolar model
+  int32_t* support;  // the different inliers of the epipolar model
   int num_support;
-  PoseRefiner refiner;  // of the same pairs and scratch
+  PoseRefiner refiner;  // of the same matches and scratch
   TwoViewOutcome* out;
 };
 

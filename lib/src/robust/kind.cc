@@ -20,7 +20,7 @@ bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlie
   const double half_width = 1.4142135623730951 * threshold_px;
   int unexplained = 0, agreeing = 0;
   double expected = 0;
-  for (int i = 0; i < matches.num_unique; ++i) {
+  for (int i = 0; i < matches.num_unique(); ++i) {
     const TransferResidual residual = transfer_residual(matches.pairs, i, H);
     if (residual.r_sq <= limit * limit) continue;
     ++unexplained;
@@ -50,11 +50,11 @@ bool moves_along_lines(const Fit& f, const Mat3& R) {
   const double limit = kTransferThresholdScale * f.threshold;
   double across = 0, along = 0;
   int n = 0;
-  transfer_squares(f.pairs, f.support, f.num_support, R, f.values);
+  transfer_squares(f.matches.pairs, f.support, f.num_support, R, f.values);
   for (int k = 0; k < f.num_support; ++k) {
     const double r_sq = f.values[k];
     if (r_sq > limit * limit) continue;
-    const double epipolar_sq = sampson_sq(f.pairs, f.support[k], f.out->epipolar.M);
+    const double epipolar_sq = sampson_sq(f.matches.pairs, f.support[k], f.out->epipolar.M);
     across += epipolar_sq;
     along += r_sq - epipolar_sq;
     ++n;
@@ -68,7 +68,7 @@ bool moves_along_lines(const Fit& f, const Mat3& R) {
 tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size) {
   const EpipolarModel& epipolar = f.out->epipolar;
   const bool calibrated = f.problem.calibrated;
-  const int n = f.pairs.num;
+  const int n = f.matches.pairs.num;
   // A pure rotation or no motion is meaningful by its own count; an epipolar model by its own.
   const double disc = std::min(1.0, kPi * kTransferThresholdScale * kTransferThresholdScale * 2 *
                                         f.threshold * f.threshold / f.matches.area_px);

@@ -22,14 +22,14 @@ void place_principal_point(Fit& f) {
   for (int k = 0; k < kSteps && std::fabs(step[0]) + std::fabs(step[1]) > kSmallStepPx; ++k) {
     if (!move_together(f.refiner, &pose, step)) break;
     for (int i = 0; i < 2; ++i) point.shift_px[i] += step[i];
-    move_principal_points(f.problem, point.shift_px, &f.matches);
+    move_principal_points(f.problem, point.shift_px, &f.refiner.matches);
   }
   // What asks for more than that is no calibration's error.
   if (!(std::fabs(point.shift_px[0]) < kMostSigmas * point.sigma_px[0] &&
         std::fabs(point.shift_px[1]) < kMostSigmas * point.sigma_px[1])) {
     point = PrincipalPoint{};
     pose = as_told;
-    move_principal_points(f.problem, point.shift_px, &f.matches);
+    move_principal_points(f.problem, point.shift_px, &f.refiner.matches);
     return;
   }
   pose = refined_pose(f.refiner, pose);

@@ -7,7 +7,8 @@ namespace tv {
 void choose_planar_pose(Fit& f, const Rivals& rivals) {
   TwoViewOutcome& out = *f.out;
   Vec3 mean = Vec3::Zero();
-  for (int k = 0; k < f.num_support; ++k) mean += ray_of(f.pairs, 0, f.support[k]).normalized();
+  for (int k = 0; k < f.num_support; ++k)
+    mean += ray_of(f.matches.pairs, 0, f.support[k]).normalized();
   PlaneFit fit;
   Pose poses[3];
   int num_poses = 0;
@@ -21,7 +22,7 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
     const int count = decompose_homography(rivals.H, mean, planar);
     for (int k = 0; k < count; ++k) poses[num_poses++] = refined_pose(f.refiner, planar[k].pose);
   }
-  const PoseEstimator scorer{f.pairs, f.threshold, f.indices, nullptr};
+  const PoseEstimator scorer{f.matches.pairs, f.threshold, f.indices, nullptr};
   int best = 0, inliers[3];
   int64_t cost[3];
   for (int k = 0; k < num_poses; ++k) {
@@ -43,9 +44,8 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
     }
   }
   if (other >= 0) {
-    out.has_alternative = true;
+    out.evidence.has_alternative = true;
     out.alternative = poses[other];
-    out.reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
   }
   PoseUncertainty uncertainty;
   const bool certain =

@@ -67,7 +67,7 @@ Rivals find_rivals(const Matches& matches, const int32_t* support, int num_suppo
   }
   const double limit = kTransferThresholdScale * threshold_px;
   const TransferEstimator base{matches.pairs, limit, subset, num_subset};
-  const int n = matches.num_unique;
+  const int n = matches.num_unique();
   Rivals rivals{};
   rivals.rotation_inliers = rivals.homography_inliers = -1;
   if (calibrated) {

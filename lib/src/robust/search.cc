@@ -44,8 +44,7 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
                      TwoViewModel* model) {
   *model = TwoViewModel{};
   ArenaScope scope(arena);
-  RayPairs pairs = matches.pairs;
-  pairs.num = matches.num_unique;
+  const RayPairs& pairs = matches.pairs;
   int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(pairs.num));
   const double threshold = problem.options.max_error_px;
   EpipolarModel& epipolar = model->epipolar;

@@ -1,68 +1,120 @@
 #include "robust/verdict.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "base/math.h"
 
 namespace tv {
 namespace {
 
-// A pose that fewer matches agree on is not to be relied on (COLMAP asks for as many).
+// Fewer different inliers than this support no pose: five of them fit any pose exactly, and the
+// others are too few to contradict a wrong one. COLMAP requires as many.
 constexpr int kFewMatches = 15;
 
-// As told by the median of residuals that are spread evenly over the band: 0.74.
-constexpr double kNoiseOfChance = 0.7;
+bool has_full_pose(const Evidence& e) {
+  return e.kind == TV_KIND_CALIBRATED || e.kind == TV_KIND_PLANAR;
+}
 
-// Whether the support's rays of one view lie in one plane, as those of a line of points do: their
-// distances from it have a root mean square below three thresholds.
-bool in_a_line(const Fit& f, int view) {
-  if (f.num_support == 0) return false;
-  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0, pixel_angle = 0;
-  for (int k = 0; k < f.num_support; ++k) {
-    const int i = f.support[k];
-    double* const* ray = f.pairs.ray[view];
-    const double x = ray[0][i], y = ray[1][i], z = ray[2][i];
-    const double weight = 1 / ((x * x + y * y) + z * z);
-    xx += weight * x * x;
-    xy += weight * x * y;
-    xz += weight * x * z;
-    yy += weight * y * y;
-    yz += weight * y * z;
-    zz += weight * z * z;
-    pixel_angle += f.pairs.pixel_angle[i];
+// TOO_FEW_MATCHES: fewer than 15 different matches are inliers. Of a degenerate pair, which has no
+// inliers, fewer than 15 different matches were given.
+bool too_few_matches(const Evidence& e) {
+  return (e.kind == TV_KIND_DEGENERATE ? e.num_different : e.num_different_inliers) < kFewMatches;
+}
+
+// LOW_INLIER_RATIO: fewer than 25 % of the matches are inliers, or the residuals are uniform over
+// the threshold, as random matches' are: their median then reads as a noise of 0.74 thresholds, and
+// more than 0.7 is taken for it. A degenerate pair has this reason when its matches are not too
+// few: no model explains more of them than chance does.
+bool low_inlier_ratio(const Evidence& e) {
+  if (e.kind == TV_KIND_DEGENERATE) return !too_few_matches(e);
+  return 4 * e.num_inliers < e.num_matches || e.noise_px > 0.7 * e.threshold_px;
+}
+
+// LOW_PARALLAX: the direction of t is not determined well enough. The median parallax is below 3
+// thresholds or 10 standard deviations of the noise, or a standard deviation of the rotation or of
+// the direction is above 1.25 degrees or unknown: a pose that is "ok" is off by 5 degrees only by
+// an accident of four standard deviations (docs/decisions/0007-verdict-and-covariance.md).
+bool low_parallax(const Evidence& e) {
+  constexpr double kMostSigma = 1.25 * kPi / 180;
+  const double least_px = std::max(3 * e.threshold_px, 10 * e.noise_px);
+  return has_full_pose(e) &&
+         (e.median_parallax_rad < least_px * e.pixel_angle_rad || !(e.sigma_rad <= kMostSigma));
+}
+
+// CROWDED_MATCHES: the inliers lie in at most 4 of the 64 cells of a grid on each of the two
+// images; or, where there is a full pose, on a line of one of the images, to a root mean square of
+// 3 thresholds. Both leave part of the pose to be extrapolated. One image in which the inliers are
+// spread is enough, since its rays then constrain the pose: after a forward move or a change of
+// scale by 2 the other image's lie in a quarter of the area, and the pose is as accurate
+// (docs/decisions/0016-one-verdict.md).
+bool crowded_matches(const Evidence& e) {
+  const bool few_cells = e.num_inliers > 0 && coverage_of(e) < 4.5 / 64;
+  const double nearest = std::min(e.line_distance_px[0], e.line_distance_px[1]);
+  return few_cells || (has_full_pose(e) && nearest < 3 * e.threshold_px);
+}
+
+// The points lie as on a lattice: of the neighbours of a point, more have another point opposite
+// than chance explains, by 3.3 standard deviations in the mean of both images. Where no second
+// model was found, the inliers alone were examined, and more than half of their neighbours must
+// have one.
+bool on_a_lattice(const Evidence& e) {
+  const double sigmas = 0.5 * (e.lattice_sigmas[0] + e.lattice_sigmas[1]);
+  const double share = 0.5 * (e.lattice_share[0] + e.lattice_share[1]);
+  return sigmas > 3.3 && (e.has_second_model || share > 0.5);
+}
+
+// Reasons that do not depend on others.
+uint32_t reasons_of(const Evidence& e) {
+  uint32_t reasons = 0;
+  if (too_few_matches(e)) reasons |= TV_REASON_TOO_FEW_MATCHES;
+  if (low_inlier_ratio(e)) reasons |= TV_REASON_LOW_INLIER_RATIO;
+  if (e.kind == TV_KIND_DEGENERATE) return reasons;
+  if (low_parallax(e)) reasons |= TV_REASON_LOW_PARALLAX;
+  if (crowded_matches(e)) reasons |= TV_REASON_CROWDED_MATCHES;
+  // Two motions of the plane explain the matches about equally well; both are reported.
+  if (e.has_alternative) reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  // The kind itself is the reason: no translation was seen, and so there is no full pose.
+  if (e.kind == TV_KIND_PANORAMIC) reasons |= TV_REASON_PURE_ROTATION;
+  if (e.kind == TV_KIND_NO_MOTION) reasons |= TV_REASON_NO_MOTION;
+  // A second model is the same scene, matched one period of a lattice off, or a motion of its own.
+  // Which of a lattice's models is the scene, the matches do not tell: so even without a second
+  // one.
+  if (on_a_lattice(e)) {
+    reasons |= TV_REASON_REPEATED_STRUCTURE;
+  } else if (e.has_second_model) {
+    reasons |= TV_REASON_SECOND_MOTION;
   }
-  Mat3 sum;
-  sum << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  const double limit = 3 * f.threshold * pixel_angle / f.num_support;
-  return svd3(sum).s[2] < limit * limit * f.num_support;
+  return reasons;
 }
 
 }  // namespace
 
-void judge(Fit& f) {
-  TwoViewOutcome& out = *f.out;
-  const bool degenerate = out.kind == TV_KIND_DEGENERATE;
-  int unique_inliers = 0;
-  for (int i = 0; i < f.pairs.num; ++i) unique_inliers += out.inlier[i];
-  if ((degenerate ? f.pairs.num : unique_inliers) < kFewMatches) {
-    out.reasons |= TV_REASON_TOO_FEW_MATCHES;
+double coverage_of(const Evidence& e) { return std::max(e.coverage[0], e.coverage[1]); }
+
+// Refused: degenerate, a rotation alone, or no motion: no model of which the caller could use a
+// translation. Ok: there is no reason against. Doubtful: there is one.
+Judgement judge(const Evidence& e) {
+  const uint32_t reasons = reasons_of(e);
+  const bool refused =
+      e.kind == TV_KIND_DEGENERATE || e.kind == TV_KIND_PANORAMIC || e.kind == TV_KIND_NO_MOTION;
+  return {refused        ? TV_VERDICT_REFUSED
+          : reasons == 0 ? TV_VERDICT_OK
+                         : TV_VERDICT_DOUBTFUL,
+          reasons};
+}
+
+// Guided matching finds matches where the first estimate has their epipolar lines: that they agree
+// with it is no evidence for it, and so the verdict and the reasons stay those of the first. The
+// second estimate is the more accurate one and replaces the first, unless it is of another kind,
+// has fewer inliers or is judged worse: then the matches that were added contradict it.
+bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again) {
+  if (again->has_R == 0 || again->has_t == 0 || again->kind != first.kind ||
+      again->verdict < first.verdict || again->num_inliers < first.num_inliers) {
+    return false;
   }
-  if (degenerate) {
-    if (f.pairs.num >= kFewMatches) out.reasons |= TV_REASON_LOW_INLIER_RATIO;
-    out.verdict = TV_VERDICT_REFUSED;
-    return;
-  }
-  // Residuals that fill the band as evenly as chance does are no better than few inliers.
-  if (4 * out.num_inliers < f.matches.pairs.num || out.noise_px > kNoiseOfChance * f.threshold) {
-    out.reasons |= TV_REASON_LOW_INLIER_RATIO;
-  }
-  if (out.has_t && (in_a_line(f, 0) || in_a_line(f, 1))) out.reasons |= TV_REASON_CROWDED_MATCHES;
-  if (out.kind == TV_KIND_NO_MOTION) out.reasons |= TV_REASON_NO_MOTION;
-  if (out.kind == TV_KIND_PANORAMIC) out.reasons |= TV_REASON_PURE_ROTATION;
-  if (out.kind == TV_KIND_NO_MOTION || out.kind == TV_KIND_PANORAMIC) {
-    out.verdict = TV_VERDICT_REFUSED;  // no full pose
-  } else {
-    out.verdict = out.reasons == 0 ? TV_VERDICT_OK : TV_VERDICT_DOUBTFUL;
-  }
+  again->verdict = first.verdict;
+  again->reasons = first.reasons;
+  return true;
 }
 
 }  // namespace tv

@@ -1,10 +1,47 @@
-// The verdict and its reasons, from what was measured.
+// The verdict and its reasons: what was measured of a pair, and what is decided from it. Only here,
+// and from nothing else. All that is decided is the same when the views change places.
+// docs/decisions/0016-one-verdict.md.
 #pragma once
 
-#include "robust/fit.h"
+#include "twoview/two_view.h"
 
 namespace tv {
 
-void judge(Fit& f);
+inline constexpr double kUnknown = __builtin_inf();
+
+// What was measured of a pair. An array of two has one entry a view.
+struct Evidence {
+  tv_kind kind = TV_KIND_DEGENERATE;
+  double threshold_px = 0;
+  // Usable matches and inliers; `different` ones do not count the repeats of a match.
+  int num_matches = 0, num_inliers = 0, num_different = 0, num_different_inliers = 0;
+  double coverage[2] = {0, 0};  // share of an 8x8 grid on the image that holds an inlier
+  // Calibrated kinds but the degenerate one. Whether matches far from the pair's model have a model
+  // of their own, and how far the points lie as on a lattice (second_model.h).
+  bool has_second_model = false;
+  double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
+  // Of a full pose (calibrated or planar).
+  bool has_alternative = false;    // a second motion of the plane
+  double noise_px = 0;             // of a matched pixel; 0 where there is no covariance
+  double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
+  double median_parallax_rad = 0;  // of the inliers
+  double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
+  double line_distance_px[2] = {kUnknown,
+                                kUnknown};  // of the inliers from a line, root mean square
+};
+
+struct Judgement {
+  tv_verdict verdict = TV_VERDICT_REFUSED;
+  uint32_t reasons = 0;
+};
+
+Judgement judge(const Evidence& evidence);
+
+// The coverage that is reported and judged: the larger of the two views'.
+double coverage_of(const Evidence& evidence);
+
+// Whether the estimate with the matches of guided matching replaces the first one. Where it does,
+// it is given the first one's verdict and reasons.
+bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again);
 
 }  // namespace tv
