@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "geometry/sampson.h"
 #include "robust/principal_point.h"
 #include "support/api.h"
 #include "support/scene.h"

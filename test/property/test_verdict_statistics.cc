@@ -40,7 +40,8 @@ bool named_right(const tv_two_view& r) {
     case pair_kinds::kTooFew: return (r.reasons & TV_REASON_TOO_FEW_MATCHES) != 0;
     case pair_kinds::kSecondMotion: return (r.reasons & TV_REASON_SECOND_MOTION) != 0;
     case pair_kinds::kLattice: return (r.reasons & TV_REASON_REPEATED_STRUCTURE) != 0;
-    case pair_kinds::kNumKinds: break;
+    case pair_kinds::kForwardMove:
+    case pair_kinds::kScaleChange: break;
   }
   return false;
 }

@@ -28,13 +28,17 @@ enum Kind {
   kSecondMotion,  // general; 30 per cent of the true matches lie on an object that moves by itself
   kLattice,       // a wall of equal cells, half of it matched one or two cells off, in a general
                   // scene; off the epipolar lines, since along them two views cannot tell
-  kNumKinds
+  // What no verdict names, but which one view shows smaller than the other:
+  kForwardMove,  // along the optical axis, which makes the scene 1.5 to 8 times as large
+  kScaleChange,  // by 2: half of the distance, or twice the focal length
 };
+constexpr int kNumKinds = 8;  // that a verdict names
+constexpr int kNumAllKinds = 10;
 
 inline const char* name_of(int kind) {
-  static const char* const names[kNumKinds] = {"general",       "planar",       "pure rotation",
-                                               "no motion",     "low parallax", "too few",
-                                               "second motion", "lattice"};
+  static const char* const names[kNumAllKinds] = {
+      "general", "planar",        "pure rotation", "no motion",    "low parallax",
+      "too few", "second motion", "lattice",       "forward move", "scale change"};
   return names[kind];
 }
 
@@ -129,6 +133,19 @@ struct Maker {
     return true;
   }
 
+  // Points `distance` baselines away, give or take `spread` of them.
+  bool put_layer(int count, double distance, double spread) {
+    for (int i = 0, tries = 0; i < count; ++tries) {
+      if (tries > 100 * count + 200) return false;
+      Vec2 p0;
+      Vec3 ray;
+      if (!ray_of_random_pixel(Vec2(0, 0), 0, &p0, &ray)) continue;
+      i += put_point((distance + uniform(&random, -spread, spread)) / ray[2] * ray, p0, pair->R,
+                     pair->t);
+    }
+    return true;
+  }
+
   bool put_plane(int count) {
     for (int i = 0, tries = 0; i < count; ++tries) {
       if (tries > 40 * count + 200) return false;
@@ -215,6 +232,11 @@ struct Maker {
     pair->t = scene::direction(&random);
     if (pair->kind == kPureRotation || pair->kind == kNoMotion) pair->t.setZero();
     if (pair->kind == kNoMotion) pair->R = Mat3::Identity();
+    if (pair->kind == kForwardMove || pair->kind == kScaleChange) {
+      pair->R =
+          tv::rotation_about(scene::direction(&random), uniform(&random, 0, 3) * tv::kPi / 180);
+      pair->t = (Vec3(0, 0, -1) + 0.1 * scene::direction(&random)).normalized();
+    }
     const double tilt = uniform(&random, 0, 50) * tv::kPi / 180;
     const Vec3 axis = Vec3(uniform(&random, -1, 1), uniform(&random, -1, 1), 0).normalized();
     pair->plane = tv::rotation_about(axis, tilt) * Vec3(0, 0, 1) / uniform(&random, 2, 8);
@@ -268,6 +290,11 @@ struct Maker {
       pair->camera[v] = camera;
       cameras[v] = tv::prepare_camera(camera);
     }
+    const bool doubled = pair->kind == kScaleChange && camera.model == TV_CAMERA_PINHOLE;
+    if (doubled) {
+      pair->camera[1].fx = pair->camera[1].fy = 2 * camera.fx;
+      cameras[1] = tv::prepare_camera(pair->camera[1]);
+    }
     pair->noise_px = uniform(&random, ranges.least_noise_px, ranges.most_noise_px);
     draw_motion(ranges);
     const int most = ranges.most - ranges.fewest + 1;
@@ -304,7 +331,12 @@ struct Maker {
         made = put_general(num_true - num_true * 3 / 10, 1) && put_moving_object(num_true * 3 / 10);
         break;
       case kLattice: made = put_lattice(num_true / 2 + 20) && put_general(num_true / 2, 1); break;
-      case kNumKinds: break;
+      case kForwardMove: {
+        const double zoom = uniform(&random, 1.5, 8), left = 1 / (zoom - 1);  // after the move
+        made = put_layer(num_true, 1 + left, 0.3 * left);
+        break;
+      }
+      case kScaleChange: made = put_layer(num_true, doubled ? 6 : 2, doubled ? 2 : 0.3); break;
     }
     if (!made) return false;
     if (pair->kind == kPlanar) pair->other_motion_excluded = other_motion_is_excluded();

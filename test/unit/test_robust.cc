@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "robust/chance.h"
 #include "robust/covariance.h"
 #include "robust/loop.h"
 #include "robust/two_view.h"
@@ -104,8 +105,8 @@ void test_matches_are_sorted_and_repeated_ones_put_last(void) {
   const double pixels1[12] = {6, 6, 4, 4, 6, 6, 2, 2, 4, 5, 9, 9};
   const float ratios[6] = {0.5f, 0.2f, 0.1f, 0.5f, 0.2f, std::numeric_limits<float>::quiet_NaN()};
   const tv::Matches matches = prepare(pixels0, pixels1, ratios, 6);
-  TEST_ASSERT_EQUAL_INT(6, matches.pairs.num);
-  TEST_ASSERT_EQUAL_INT(5, matches.num_unique);
+  TEST_ASSERT_EQUAL_INT(6, matches.num_all);
+  TEST_ASSERT_EQUAL_INT(5, matches.num_unique());
   const int32_t expected[6] = {2, 1, 4, 3, 5, 0};
   TEST_ASSERT_EQUAL_INT32_ARRAY(expected, matches.order, 6);
 }
@@ -116,7 +117,7 @@ void test_matches_that_are_no_numbers_are_dropped(void) {
   const double pixels0[10] = {1, 2, nan, 1, 1, inf, 7, 7, 1e300, 0};
   const double pixels1[10] = {1, 2, 5, 5, 6, 6, -inf, 7, 1, 1};
   const tv::Matches matches = prepare(pixels0, pixels1, nullptr, 5);
-  TEST_ASSERT_EQUAL_INT(1, matches.pairs.num);
+  TEST_ASSERT_EQUAL_INT(1, matches.num_all);
   TEST_ASSERT_EQUAL_INT(0, matches.order[0]);
 }
 

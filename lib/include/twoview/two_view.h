@@ -55,9 +55,10 @@ typedef enum tv_reason {
   TV_REASON_SECOND_MOTION = 1 << 6,     /* matches far from this pose agree on another, at least 15
                                            per cent as many: something moved by itself, or which of
                                            the two the scene was is open */
-  TV_REASON_CROWDED_MATCHES = 1 << 7,   /* the inliers lie in less than 5 of 64 cells, or on a line */
-  TV_REASON_REPEATED_STRUCTURE = 1 << 8 /* the same, or most of the inliers, and the keypoints of image
-                                           0 lie as on a lattice: matched one period off, perhaps */
+  TV_REASON_CROWDED_MATCHES = 1 << 7,   /* the inliers lie in less than 5 of 64 cells of
+                                           each image, or on a line in one of them */
+  TV_REASON_REPEATED_STRUCTURE = 1 << 8 /* the same, or most of the inliers, and the points of both images
+                                           lie as on a lattice: matched one period off, perhaps */
 } tv_reason;
 
 /* "calibrated", "planar_or_panoramic" ...; "unknown" for any other number. Static storage. */
@@ -113,7 +114,8 @@ typedef struct tv_two_view {
   double alternative_covariance[25]; /* radians^2, the same around the alternative pose */
   int32_t essential_inliers, fundamental_inliers, homography_inliers,
       rotation_inliers;       /* evidence: inliers of each model, -1 where it was not estimated */
-  double coverage;            /* share of an 8x8 grid on image 0 that holds an inlier, [0, 1] */
+  double coverage;            /* share of an 8x8 grid on the image that holds an inlier, [0, 1]:
+                                 the larger of the two images' */
   double median_parallax_rad; /* of the inliers' rays, rotation removed */
   double rms_error_px;        /* Sampson distance over the inliers */
   double noise_px;            /* standard deviation of a matched pixel along one axis, as the

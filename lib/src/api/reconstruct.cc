@@ -6,6 +6,7 @@
 #include "api/validate.h"
 #include "geometry/essential.h"
 #include "geometry/triangulation.h"
+#include "robust/verdict.h"
 #include "twoview/bundle.h"
 
 namespace tv {
@@ -142,15 +143,10 @@ __attribute__((noinline)) tv_status match_along_lines(
   status = tv_estimate_two_view(context, view0.camera, view1.camera, r.pixels[0], r.pixels[1],
                                 r.ratios, count, options, &again, r.more_inlier_mask);
   if (status != TV_OK) return status;
-  const bool no_worse = is_full_pose(again) && again.kind == estimate->kind &&
-                        again.verdict >= estimate->verdict &&
-                        again.num_inliers >= estimate->num_inliers;
-  if (!no_worse) {
+  if (!takes_guided_estimate(*estimate, &again)) {
     gather_pixels(r, r.matches, *num_matches);
     return TV_OK;
   }
-  again.verdict = estimate->verdict;
-  again.reasons = estimate->reasons;
   *estimate = again;
   correct_cameras(again, view0, view1, r);
   *num_matches = count;

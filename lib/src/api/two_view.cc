@@ -82,15 +82,26 @@ uint64_t hash_of(const double* a, const double* b) {
 
 // Whether the two views are to be exchanged for the computation: a choice that depends neither on
 // which was named first nor on the order of the matches, so that both calls compute the same thing.
-bool exchanged(const tv_camera* camera0, const tv_camera* camera1, const double* pixels0,
-               const double* pixels1, int32_t num) {
-  uint64_t forward = 0, backward = 0;
-  for (int32_t i = 0; i < num; ++i) {
-    forward += hash_of(pixels0 + 2 * i, pixels1 + 2 * i);
-    backward += hash_of(pixels1 + 2 * i, pixels0 + 2 * i);
+// Decided by the pixels; where every match is there in both directions, by what else tells the
+// views apart: the cameras, the ratios of the matches, the gravity. Where nothing does, both calls
+// are of the same problem.
+bool exchanged(const tv_camera* camera0, const tv_camera* camera1, const TwoViewProblem& named) {
+  for (const bool with_ratios : {false, true}) {
+    uint64_t forward = 0, backward = 0;
+    for (int i = 0; i < named.num; ++i) {
+      uint32_t ratio = 0;
+      if (with_ratios && named.ratios != nullptr)
+        std::memcpy(&ratio, named.ratios + i, sizeof ratio);
+      const double *a = named.pixels[0] + 2 * i, *b = named.pixels[1] + 2 * i;
+      forward += hash_of(a, b) * (2 * uint64_t{ratio} + 1);
+      backward += hash_of(b, a) * (2 * uint64_t{ratio} + 1);
+    }
+    if (forward != backward) return forward > backward;
+    const int cameras = camera0 == nullptr ? 0 : std::memcmp(camera0, camera1, sizeof(tv_camera));
+    if (cameras != 0) return cameras > 0;
   }
-  if (forward != backward) return forward > backward;
-  return camera0 != nullptr && std::memcmp(camera0, camera1, sizeof(tv_camera)) > 0;
+  const tv_estimate_options& options = named.options;
+  return std::memcmp(options.gravity0, options.gravity1, sizeof options.gravity0) > 0;
 }
 
 void store(const Mat3& m, double out[9]) {
@@ -127,40 +138,6 @@ bool scale_homography(Mat3* H) {
   return true;
 }
 
-// The share of an 8x8 grid on the caller's image 0 that holds an inlier.
-double coverage(const TwoViewProblem& problem, const Matches& matches, const uint8_t* inlier,
-                int view) {
-  const double* pixels = problem.pixels[view];
-  double low[2] = {0, 0}, high[2] = {0, 0};
-  if (problem.calibrated) {
-    low[0] = low[1] = -0.5;
-    high[0] = problem.camera[view].model.width - 0.5;
-    high[1] = problem.camera[view].model.height - 0.5;
-  } else {
-    for (int k = 0; k < matches.pairs.num; ++k) {
-      for (int d = 0; d < 2; ++d) {
-        const double x = pixels[2 * matches.order[k] + d];
-        if (k == 0 || x < low[d]) low[d] = x;
-        if (k == 0 || x > high[d]) high[d] = x;
-      }
-    }
-  }
-  bool cells[64] = {};
-  int filled = 0;
-  for (int k = 0; k < matches.pairs.num; ++k) {
-    if (inlier[k] == 0) continue;
-    int cell[2];
-    for (int d = 0; d < 2; ++d) {
-      const double place = 8 * (pixels[2 * matches.order[k] + d] - low[d]) / (high[d] - low[d]);
-      cell[d] = place >= 7 ? 7 : (place > 0 ? static_cast<int>(place) : 0);
-    }
-    bool& place = cells[8 * cell[1] + cell[0]];
-    filled += !place;
-    place = true;
-  }
-  return filled / 64.0;
-}
-
 void pack_covariance(const Pose& pose, const Pose& inverse, const double covariance[25],
                      bool swapped, double packed[25]) {
   if (swapped) {
@@ -176,28 +153,24 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
                                     bool swapped, tv_two_view* result) {
   tv_two_view packed{};
   packed.struct_size = sizeof(tv_two_view);
-  packed.kind = outcome.kind;
-  packed.verdict = outcome.verdict;
-  packed.reasons = outcome.reasons;
+  packed.kind = outcome.evidence.kind;
+  packed.verdict = outcome.judgement.verdict;
+  packed.reasons = outcome.judgement.reasons;
   packed.num_matches = problem.num;
-  packed.num_inliers = outcome.num_inliers;
+  packed.num_inliers = outcome.evidence.num_inliers;
   packed.num_iterations = model.num_iterations;
   packed.seed = problem.options.seed;
   packed.essential_inliers = outcome.essential_inliers;
   packed.fundamental_inliers = outcome.fundamental_inliers;
   packed.homography_inliers = outcome.homography_inliers;
   packed.rotation_inliers = outcome.rotation_inliers;
-  packed.median_parallax_rad = outcome.median_parallax_rad;
+  packed.median_parallax_rad = outcome.evidence.median_parallax_rad;
   packed.rms_error_px = outcome.rms_error_px;
-  packed.noise_px = outcome.noise_px;
+  packed.noise_px = outcome.evidence.noise_px;
   for (int k = 0; k < 2; ++k) {
     packed.principal_point_shift[k] = outcome.principal_point_shift_px[k];
   }
-  packed.coverage = coverage(problem, matches, outcome.inlier, swapped ? 1 : 0);
-  if (packed.coverage > 0 && packed.coverage < 4.5 / 64 && packed.kind != TV_KIND_DEGENERATE) {
-    packed.reasons |= TV_REASON_CROWDED_MATCHES;
-    if (packed.verdict == TV_VERDICT_OK) packed.verdict = TV_VERDICT_DOUBTFUL;
-  }
+  packed.coverage = coverage_of(outcome.evidence);
   const Pose& pose = outcome.epipolar.pose;
   packed.has_R = outcome.has_R;
   packed.has_t = outcome.has_t;
@@ -214,7 +187,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     if (outcome.has_covariance) {
       pack_covariance(pose, inverse, outcome.covariance, swapped, packed.covariance);
     }
-    if (outcome.has_alternative) {
+    if (outcome.evidence.has_alternative) {
       const Pose other = swapped ? inverse_pose(outcome.alternative) : outcome.alternative;
       packed.has_alternative = 1;
       store(other.R, packed.alternative_R);
@@ -226,7 +199,7 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
       }
     }
   }
-  if (outcome.has_t || outcome.kind == TV_KIND_UNCALIBRATED) {
+  if (outcome.has_t || outcome.evidence.kind == TV_KIND_UNCALIBRATED) {
     const Mat3 F = (inverse1.transpose() * outcome.epipolar.M * inverse0).normalized();
     packed.has_F = 1;
     store(swapped ? Mat3(F.transpose()) : F, packed.F);
@@ -299,18 +272,21 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   bool swapped;
   {
     tv::StageTimer timer(context, TV_STAGE_ESTIMATE);
-    swapped = tv::exchanged(camera0, camera1, pixels0, pixels1, num_matches);
+    problem.pixels[0] = pixels0;
+    problem.pixels[1] = pixels1;
+    problem.ratios = ratios;
+    problem.num = num_matches;
+    swapped = tv::exchanged(camera0, camera1, problem);
     problem.calibrated = calibrated;
     problem.one_camera = calibrated && std::memcmp(camera0, camera1, sizeof *camera0) == 0;
     if (calibrated) {
       problem.camera[0] = tv::prepare_camera(swapped ? *camera1 : *camera0);
       problem.camera[1] = tv::prepare_camera(swapped ? *camera0 : *camera1);
     }
-    problem.pixels[0] = swapped ? pixels1 : pixels0;
-    problem.pixels[1] = swapped ? pixels0 : pixels1;
-    if (swapped) std::swap(problem.options.gravity0, problem.options.gravity1);
-    problem.ratios = ratios;
-    problem.num = num_matches;
+    if (swapped) {
+      std::swap(problem.pixels[0], problem.pixels[1]);
+      std::swap(problem.options.gravity0, problem.options.gravity1);
+    }
     problem.kernels = context->kernels;
     tv::prepare_matches(problem, context->arena, &matches);
     tv::search_two_view(problem, matches, context->arena, &model);
@@ -321,7 +297,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   tv::pack(problem, matches, model, outcome, swapped, result);
   if (inlier_mask != nullptr) {
     std::memset(inlier_mask, 0, n);
-    for (int k = 0; k < matches.pairs.num; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];
+    for (int k = 0; k < matches.num_all; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];
   }
   return TV_OK;
 }

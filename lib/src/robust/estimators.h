@@ -58,6 +58,10 @@ struct FundamentalEstimator {
   void refine_model(Model* model) const;
 };
 
+// A residual in two dimensions is held against the same quantile as the epipolar one: at 95 per
+// cent chi-square is 3.84 with one degree of freedom, 5.99 with two.
+inline constexpr double kTransferThresholdScale = 1.2489995996796797;  // sqrt(5.99 / 3.84)
+
 // A homography from four rays, a rotation from two; over the listed matches only.
 struct TransferEstimator {
   const RayPairs& pairs;

@@ -8,9 +8,9 @@
 #include "geometry/parallax.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/estimators.h"
 #include "robust/ldlt.h"
 #include "robust/refine.h"
-#include "robust/verdict.h"
 
 namespace tv {
 namespace {
@@ -43,12 +43,12 @@ constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
 
 // The matches that take part in a pose's final refinement, into f.indices.
 int near_pose(const PoseRefiner& f, const Pose& pose) {
-  const int count = near_matches(f.pairs, f.pairs.num, pose, kFinalNear * f.threshold_px,
-                                 f.threshold_px, f.indices);
+  const int count = near_matches(f.matches.pairs, f.matches.pairs.num, pose,
+                                 kFinalNear * f.threshold_px, f.threshold_px, f.indices);
   if (count < 10) return count;
   const int sampled = std::min(count, kParallaxSample);
   double sample[kParallaxSample], *nine_tenths = sample + sampled * 9 / 10;
-  squared_sines(f.pairs, f.indices, count, pose.R, f.values);
+  squared_sines(f.matches.pairs, f.indices, count, pose.R, f.values);
   for (int k = 0; k < sampled; ++k) {
     sample[k] = f.values[static_cast<int64_t>(k) * count / sampled];
   }
@@ -72,7 +72,7 @@ struct BestLoss {
 
 BestLoss best_loss(const PoseRefiner& f, const Mat3& M, int count) {
   const double sigma = median_noise_px(f, M, count);
-  sampson_squares(f.pairs, f.indices, count, M, f.values);
+  sampson_squares(f.matches.pairs, f.indices, count, M, f.values);
   double least = 0;
   BestLoss best{};
   for (const double factor : kScales) {
@@ -102,8 +102,8 @@ Pose refined_with(const PoseRefiner& f, const Pose& start, const GravityPrior& g
     if (count < 5) break;
     const BestLoss best = best_loss(f, essential_from_pose(model.pose), count);
     model.noise_px = best.taken;
-    refine(f.pairs, f.indices, count, best.loss, kFinalIterations, &model, kFinalGains[round],
-           best.stretch);
+    refine(f.matches.pairs, f.indices, count, best.loss, kFinalIterations, &model,
+           kFinalGains[round], best.stretch);
   }
   return model.pose;
 }
@@ -113,7 +113,7 @@ bool uncertainty_without_gravity(const PoseRefiner& f, const Pose& pose,
                                  PoseUncertainty* uncertainty) {
   const int count = near_pose(f, pose);
   const double scale = final_loss(f, essential_from_pose(pose), count).scale_px;
-  if (!pose_uncertainty(f.pairs, f.indices, count, pose, scale, kFinalNear * f.threshold_px,
+  if (!pose_uncertainty(f.matches.pairs, f.indices, count, pose, scale, kFinalNear * f.threshold_px,
                         uncertainty)) {
     return false;
   }
@@ -144,8 +144,8 @@ constexpr double kShiftEvidence = 13.815510557964274;
 int near_plane(const PoseRefiner& f, const Mat3& H) {
   const double limit = kFinalNear * kTransferThresholdScale * f.threshold_px;
   int near = 0;
-  transfer_squares(f.pairs, 0, f.pairs.num, H, f.values);
-  for (int i = 0; i < f.pairs.num; ++i) {
+  transfer_squares(f.matches.pairs, 0, f.matches.pairs.num, H, f.values);
+  for (int i = 0; i < f.matches.pairs.num; ++i) {
     if (f.values[i] <= limit * limit) f.indices[near++] = i;
   }
   return near;
@@ -153,7 +153,7 @@ int near_plane(const PoseRefiner& f, const Mat3& H) {
 
 // Two-dimensional residuals: half of them lie within 1.1774 deviations.
 RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
-  transfer_squares(f.pairs, f.indices, count, H, f.values);
+  transfer_squares(f.matches.pairs, f.indices, count, H, f.values);
   double* middle = f.values + count / 2;
   std::nth_element(f.values, middle, f.values + count);
   const double scale = kPlaneScale * std::sqrt(*middle) / 1.1774100225154747;
@@ -168,7 +168,7 @@ constexpr double kGravityExcludes = 13.816;
 
 double median_noise_px(const PoseRefiner& f, const Mat3& M, int count) {
   int within = 0;
-  sampson_squares(f.pairs, f.indices, count, M, f.values);
+  sampson_squares(f.matches.pairs, f.indices, count, M, f.values);
   for (int k = 0; k < count; ++k) {
     const double r_sq = f.values[k];
     if (r_sq <= f.threshold_px * f.threshold_px) f.values[within++] = r_sq;
@@ -247,7 +247,7 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
     count = near_plane(f, model.matrix());
     if (count < 8) return 0;
     loss = plane_loss(f, model.matrix(), count);
-    refine(f.pairs, f.indices, count, loss, kFinalIterations, &model);
+    refine(f.matches.pairs, f.indices, count, loss, kFinalIterations, &model);
   }
   const int num = decompose_homography(model.matrix(), mean_ray0, planar);
   count = near_plane(f, model.matrix());
@@ -256,8 +256,8 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
   for (int k = 0; k < num; ++k) {
     const PlaneModel twin{planar[k].pose, planar[k].baseline_over_depth * planar[k].normal};
     fit->pose[k] = twin.pose;
-    fit->certain[k] =
-        plane_uncertainty(f.pairs, f.indices, count, twin, loss.scale_px, &fit->uncertainty[k]);
+    fit->certain[k] = plane_uncertainty(f.matches.pairs, f.indices, count, twin, loss.scale_px,
+                                        &fit->uncertainty[k]);
     if (!f.gravity.known || !fit->certain[k]) continue;
     GravityPrior gravity = f.gravity;
     double* covariance = fit->uncertainty[k].covariance;

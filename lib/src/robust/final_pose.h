@@ -7,13 +7,14 @@
 
 namespace tv {
 
+// Refining a pose leaves the matches as they are; place_principal_point, which is given a refiner
+// that is not const, moves their rays.
 struct PoseRefiner {
   const TwoViewProblem& problem;
-  const Matches& matches;
-  const RayPairs& pairs;  // of the matches, without repeats
+  Matches& matches;
   double threshold_px;
   GravityPrior gravity;
-  PrincipalPoint principal_point;  // of the rays of pairs
+  PrincipalPoint principal_point;  // of the rays of the matches
   int32_t* indices;                // scratch, as many as matches
   double* values;                  // the same
 };

@@ -157,7 +157,7 @@ Camera normalising_camera(const double* pixels, const int32_t* order, int count)
 }
 
 void set_rays(const TwoViewProblem& problem, int view, const Camera& camera, Matches* matches) {
-  for (int k = 0; k < matches->pairs.num; ++k) {
+  for (int k = 0; k < matches->num_all; ++k) {
     PixelRay p;
     const double* pixel = problem.pixels[view] + 2 * matches->order[k];
     if (ray_of_pixel(camera, pixel, matches->pairs.on_plane, &p) && sane(p)) {
@@ -214,20 +214,20 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   }
   std::sort(keys, keys + count,
             [&problem](const SortKey& a, const SortKey& b) { return sorts_before(problem, a, b); });
-  matches->num_unique = move_repeats_last(problem, keys, count, table, table_size, matches->order);
-  matches->pairs.num = count;
+  matches->num_all = count;
+  matches->pairs.num = move_repeats_last(problem, keys, count, table, table_size, matches->order);
   for (int v = 0; v < 2; ++v) {
     set_rays(problem, v,
              problem.calibrated
                  ? problem.camera[v]
-                 : normalising_camera(problem.pixels[v], matches->order, matches->num_unique),
+                 : normalising_camera(problem.pixels[v], matches->order, matches->num_unique()),
              matches);
   }
   const tv_camera& second = problem.camera[1].model;
   matches->area_px = problem.calibrated
                          ? static_cast<double>(second.width) * second.height
-                         : box_area(problem.pixels[1], matches->order, matches->num_unique);
-  finish_rays(matches->pairs, matches->num_unique);
+                         : box_area(problem.pixels[1], matches->order, matches->num_unique());
+  finish_rays(matches->pairs);
 }
 
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
@@ -259,7 +259,7 @@ Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_
 void move_principal_points(const TwoViewProblem& problem, const double shift_px[2],
                            Matches* matches) {
   for (int v = 0; v < 2; ++v) set_rays(problem, v, moved_camera(problem, v, shift_px), matches);
-  finish_rays(matches->pairs, matches->num_unique);
+  finish_rays(matches->pairs);
 }
 
 }  // namespace tv

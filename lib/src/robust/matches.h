@@ -19,8 +19,13 @@ struct TwoViewProblem {
 };
 
 struct Matches {
-  RayPairs pairs = {};  // all usable matches; the first num_unique take part in the search
-  int num_unique = 0;
+  // pairs.num is num_unique(): the matches that differ from each other, by which models are
+  // searched, refined and tested. The arrays of pairs, and order, go on to num_all: behind the
+  // different ones come those that repeat one. They count among the matches and inliers reported,
+  // and nowhere else.
+  RayPairs pairs = {};
+  int num_all = 0;
+  int num_unique() const { return pairs.num; }
   int32_t* order = nullptr;  // pairs' k-th match is the caller's order[k]
   Mat3 intrinsics[2];  // pixels (undistorted) to rays' plane: K of the view, or, uncalibrated, the
                        // similarity that normalises its points

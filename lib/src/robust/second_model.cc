@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robust/chance.h"
 #include "robust/loop.h"
-#include "robust/verdict.h"
 
 namespace tv {
 namespace {
@@ -21,7 +21,7 @@ constexpr int kMaxLeft = 512;  // when more matches are left over, every n-th of
 Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena& arena) {
   Matches part = matches;
   part.pairs = alloc_ray_pairs(arena, count, matches.pairs.on_plane);
-  part.pairs.num = part.num_unique = count;
+  part.pairs.num = part.num_all = count;
   part.pairs.kernels = matches.pairs.kernels;
   for (int v = 0; v < 2; ++v) {
     for (int k = 0; k < count; ++k) {
@@ -45,13 +45,13 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
                               double threshold_px, uint64_t seed, Arena& arena) {
   SecondModel second;
   int left = 0;
-  for (int i = 0; i < matches.num_unique; ++i) left += explained[i] == 0;
+  for (int i = 0; i < matches.num_unique(); ++i) left += explained[i] == 0;
   if (left < kFewestInliers || left < kSecondShare * num_first) return second;
   ArenaScope scope(arena);
   const int count = left < kMaxLeft ? left : kMaxLeft;
   int32_t* listed = arena_alloc<int32_t>(arena, static_cast<size_t>(count));
   int taken = 0;
-  for (int i = 0, seen = 0; i < matches.num_unique; ++i) {
+  for (int i = 0, seen = 0; i < matches.num_unique(); ++i) {
     if (explained[i] != 0) continue;
     if (static_cast<int64_t>(seen) * count / left == taken) listed[taken++] = i;
     ++seen;

@@ -1,0 +1,195 @@
+#include "robust/evidence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/math.h"
+#include "robust/second_model.h"
+#include "robust/lattice.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
+
+namespace tv {
+namespace {
+
+// Grows with the angle between a match's rays, R taken off: 0 to 2 for 0 to 180 degrees.
+double pseudo_angle(const Fit& f, int i) {
+  const RayPairs& pairs = f.matches.pairs;
+  const double b[3] = {pairs.ray[1][0][i], pairs.ray[1][1][i], pairs.ray[1][2][i]};
+  double a[3], across[3];
+  turn_ray0(pairs, i, f.out->epipolar.pose.R, a);
+  cross(a, b, across);
+  const double sine = std::sqrt(dot(across, across)), cosine = dot(a, b);
+  return cosine > 0 ? sine / (sine + cosine) : 1 - cosine / (sine - cosine);
+}
+
+double angle_of_pseudo(double p) { return p < 1 ? atan2(p, 1 - p) : atan2(2 - p, 1 - p); }
+
+// The largest standard deviation of the rotation and of the direction, bounded from above by the
+// traces of their blocks.
+double largest_sigma(const double covariance[25]) {
+  const double rotation = covariance[0] + covariance[6] + covariance[12];
+  const double direction = covariance[18] + covariance[24];
+  return std::sqrt(std::max(rotation, direction));
+}
+
+// The distance of the support's rays of one view from the plane nearest to them, root mean square,
+// in pixels: small for the rays of points on a line.
+double line_distance_px(const Fit& f, int view) {
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
+  for (int k = 0; k < f.num_support; ++k) {
+    const int i = f.support[k];
+    double* const* ray = f.matches.pairs.ray[view];
+    const double x = ray[0][i], y = ray[1][i], z = ray[2][i];
+    const double weight = 1 / ((x * x + y * y) + z * z);
+    xx += weight * x * x;
+    xy += weight * x * y;
+    xz += weight * x * z;
+    yy += weight * y * y;
+    yz += weight * y * z;
+    zz += weight * z * z;
+  }
+  Mat3 sum;
+  sum << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return std::sqrt(svd3(sum).s[2] / f.num_support) / f.out->evidence.pixel_angle_rad;
+}
+
+// Parallax, uncertainty and lines of points, of a full pose.
+void measure_pose(Fit& f) {
+  Evidence& evidence = f.out->evidence;
+  double sum = 0;
+  if (f.out->has_covariance) evidence.sigma_rad = largest_sigma(f.out->covariance);
+  if (f.num_support == 0) return;
+  for (int k = 0; k < f.num_support; ++k) {
+    f.values[k] = pseudo_angle(f, f.support[k]);
+    sum += f.matches.pairs.pixel_angle[f.support[k]];
+  }
+  double* middle = f.values + (f.num_support - 1) / 2;
+  std::nth_element(f.values, middle, f.values + f.num_support);
+  evidence.median_parallax_rad = angle_of_pseudo(*middle);
+  evidence.pixel_angle_rad = sum / f.num_support;
+  for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
+}
+
+// The share of an 8x8 grid on the view's image, or, uncalibrated, on the box around its points,
+// that holds an inlier.
+double coverage(const Fit& f, int view) {
+  const TwoViewProblem& problem = f.problem;
+  const double* pixels = problem.pixels[view];
+  double low[2] = {0, 0}, high[2] = {0, 0};
+  if (problem.calibrated) {
+    low[0] = low[1] = -0.5;
+    high[0] = problem.camera[view].model.width - 0.5;
+    high[1] = problem.camera[view].model.height - 0.5;
+  } else {
+    for (int k = 0; k < f.matches.num_all; ++k) {
+      for (int d = 0; d < 2; ++d) {
+        const double x = pixels[2 * f.matches.order[k] + d];
+        if (k == 0 || x < low[d]) low[d] = x;
+        if (k == 0 || x > high[d]) high[d] = x;
+      }
+    }
+  }
+  bool cells[64] = {};
+  int filled = 0;
+  for (int k = 0; k < f.matches.num_all; ++k) {
+    if (f.out->inlier[k] == 0) continue;
+    int cell[2];
+    for (int d = 0; d < 2; ++d) {
+      const double place = 8 * (pixels[2 * f.matches.order[k] + d] - low[d]) / (high[d] - low[d]);
+      cell[d] = place >= 7 ? 7 : (place > 0 ? static_cast<int>(place) : 0);
+    }
+    bool& place = cells[8 * cell[1] + cell[0]];
+    filled += !place;
+    place = true;
+  }
+  return filled / 64.0;
+}
+
+void measure_inliers(Fit& f) {
+  TwoViewOutcome& out = *f.out;
+  Evidence& evidence = out.evidence;
+  const bool by_transfer = evidence.kind == TV_KIND_PANORAMIC ||
+                           evidence.kind == TV_KIND_NO_MOTION ||
+                           evidence.kind == TV_KIND_PLANAR_OR_PANORAMIC;
+  const Matches& matches = f.matches;
+  double sum = 0;
+  if (by_transfer) {
+    transfer_squares(matches.pairs, 0, matches.num_all, out.H, f.values);
+  } else {
+    sampson_squares(matches.pairs, 0, matches.num_all, out.epipolar.M, f.values);
+  }
+  for (int i = 0; i < matches.num_all; ++i) {
+    if (out.inlier[i] == 0) continue;
+    ++evidence.num_inliers;
+    evidence.num_different_inliers += i < matches.num_unique();
+    sum += f.values[i];
+  }
+  if (evidence.num_inliers > 0) out.rms_error_px = std::sqrt(sum / evidence.num_inliers);
+  evidence.num_matches = matches.num_all;
+  evidence.num_different = matches.num_unique();
+  evidence.threshold_px = f.threshold;
+  for (int v = 0; v < 2; ++v) evidence.coverage[v] = coverage(f, v);
+}
+
+// A model of the rest that is no part of the first: of the matches farther from it than kClear
+// thresholds.
+constexpr double kClear = 3;
+
+bool has_second_model(Fit& f, Arena& arena) {
+  ArenaScope scope(arena);
+  const TwoViewOutcome& out = *f.out;
+  const int n = f.matches.num_unique();
+  uint8_t* explained = arena_alloc<uint8_t>(arena, static_cast<size_t>(n));
+  const double limit = kClear * f.threshold;
+  if (out.has_t) {
+    sampson_squares(f.matches.pairs, 0, n, out.epipolar.M, f.values);
+  } else {
+    transfer_squares(f.matches.pairs, 0, n, out.H, f.values);
+  }
+  for (int i = 0; i < n; ++i) explained[i] = f.values[i] <= limit * limit;
+  return find_second_model(f.matches, explained, out.evidence.num_different_inliers, f.threshold,
+                           f.problem.options.seed, arena)
+      .found;
+}
+
+// Of all points where there is a second model, else of the inliers.
+void measure_lattices(Fit& f, Arena& arena) {
+  ArenaScope scope(arena);
+  Evidence& evidence = f.out->evidence;
+  const int n = f.matches.num_unique();
+  double* xy = arena_alloc<double>(arena, 2 * static_cast<size_t>(n));
+  int count = 0;
+  for (int i = 0; i < n; ++i) {
+    if (f.out->inlier[i] != 0) f.indices[count++] = i;
+  }
+  for (int v = 0; v < 2; ++v) {
+    for (int i = 0; i < n; ++i) {
+      for (int d = 0; d < 2; ++d) xy[2 * i + d] = f.problem.pixels[v][2 * f.matches.order[i] + d];
+    }
+    const Lattice lattice =
+        find_lattice(xy, n, evidence.has_second_model ? nullptr : f.indices, count, arena);
+    evidence.lattice_share[v] = lattice.share;
+    evidence.lattice_sigmas[v] = lattice.sigmas;
+  }
+}
+
+}  // namespace
+
+size_t evidence_bytes(int max_matches) {
+  const size_t n = static_cast<size_t>(max_matches);
+  const size_t second = arena_bytes<uint8_t>(n) + second_model_bytes(max_matches);
+  const size_t lattice = arena_bytes<double>(2 * n) + lattice_bytes(max_matches);
+  return std::max(second, lattice);
+}
+
+void measure_evidence(Fit& f, Arena& arena) {
+  Evidence& evidence = f.out->evidence;
+  measure_inliers(f);
+  if (f.out->has_t) measure_pose(f);
+  if (!f.problem.calibrated || evidence.kind == TV_KIND_DEGENERATE) return;
+  evidence.has_second_model = has_second_model(f, arena);
+  measure_lattices(f, arena);
+}
+
+}  // namespace tv

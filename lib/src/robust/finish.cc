@@ -1,0 +1,131 @@
+// What follows the search, in this order: the model is refined over all of its inliers, rivals are
+// fitted, the kind is chosen and with it the pose, evidence is measured, and the verdict decided.
+#include <algorithm>
+#include <cmath>
+
+#include "robust/evidence.h"
+#include "robust/fit.h"
+#include "robust/kind.h"
+#include "robust/place_principal_point.h"
+#include "robust/planar_pose.h"
+#include "robust/two_view.h"
+#include "robust/verdict.h"
+#include "robust/refine.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
+
+namespace tv {
+
+size_t two_view_scratch_bytes(int max_matches) {
+  const size_t n = static_cast<size_t>(max_matches);
+  const size_t finish = 2 * arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) +
+                        arena_bytes<double>(n) +
+                        std::max(rivals_bytes(max_matches), evidence_bytes(max_matches));
+  return matches_bytes(max_matches) + std::max(search_bytes(max_matches), finish);
+}
+
+namespace {
+
+Mat3 refined_fundamental(const Fit& f, const Mat3& start) {
+  FundamentalModel model = fundamental_model(start);
+  for (int round = 0; round < kFinalRounds; ++round) {
+    const int count = near_matches(f.matches.pairs, f.matches.pairs.num, model.matrix(),
+                                   kFinalNear * f.threshold, f.indices);
+    if (count < 7) break;
+    refine(f.matches.pairs, f.indices, count, final_loss(f.refiner, model.matrix(), count),
+           kFinalIterations, &model);
+  }
+  return model.matrix().normalized();
+}
+
+void refine_epipolar(Fit& f) {
+  EpipolarModel& epipolar = f.out->epipolar;
+  if (epipolar.has_pose) {
+    epipolar.pose = refined_pose(f.refiner, epipolar.pose);
+    place_principal_point(f);
+    epipolar.M = essential_from_pose(epipolar.pose);
+  } else {
+    epipolar.M = refined_fundamental(f, epipolar.M);
+  }
+  collect_support(f);
+}
+
+}  // namespace
+
+void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
+                     Matches* all_matches, TwoViewOutcome* outcome) {
+  Matches& matches = *all_matches;
+  *outcome = TwoViewOutcome{};
+  const size_t n = static_cast<size_t>(matches.num_all);
+  outcome->inlier = arena_alloc<uint8_t>(arena, n);
+  for (size_t i = 0; i < n; ++i) outcome->inlier[i] = 0;
+  ArenaScope scope(arena);
+  const double threshold = problem.options.max_error_px;
+  int32_t* indices = arena_alloc<int32_t>(arena, n);
+  double* values = arena_alloc<double>(arena, n);
+  int32_t* support = arena_alloc<int32_t>(arena, n);
+  Fit f{
+      problem,   matches,
+      threshold, indices,
+      values,    support,
+      0,         PoseRefiner{problem, matches, threshold, gravity_of(problem), {}, indices, values},
+      outcome};
+  TwoViewOutcome& out = *outcome;
+  out.epipolar = model.epipolar;
+  if (out.epipolar.found) {
+    refine_epipolar(f);
+    (problem.calibrated ? out.essential_inliers : out.fundamental_inliers) = f.num_support;
+  }
+  if (f.num_support < 5) {  // no epipolar model: a rival may still explain the matches
+    f.num_support = f.matches.pairs.num;
+    for (int i = 0; i < f.matches.pairs.num; ++i) f.support[i] = i;
+    out.epipolar.found = false;
+  }
+  const double least_share = out.epipolar.found ? kRivalShare : kRivalShareAlone;
+  const Rivals rivals = find_rivals(matches, f.support, f.num_support, problem.calibrated,
+                                    least_share, f.threshold, problem.options.seed, arena);
+  out.rotation_inliers = rivals.rotation_inliers;
+  out.homography_inliers = rivals.homography_inliers;
+  if (!out.epipolar.found) f.num_support = 0;
+  const int sample_size = least_matches(problem.options.method);
+  const tv_kind kind = choose_kind(f, rivals, sample_size);
+  out.evidence.kind = kind;
+  out.H = rivals.H;
+  out.has_H = kind == TV_KIND_PLANAR || kind == TV_KIND_PLANAR_OR_PANORAMIC;
+  switch (kind) {
+    case TV_KIND_PLANAR:
+      choose_planar_pose(f, rivals);
+      out.essential_inliers = f.num_support;
+      out.has_R = out.has_t = true;
+      break;
+    case TV_KIND_CALIBRATED: {
+      PoseUncertainty uncertainty;
+      if (uncertainty_of(f.refiner, out.epipolar.pose, &uncertainty)) {
+        store_uncertainty(uncertainty, &out);
+      }
+      out.has_R = out.has_t = true;
+      break;
+    }
+    case TV_KIND_PANORAMIC:
+      out.epipolar.pose.R = out.H = rivals.R;
+      out.has_R = true;
+      inliers_of_transfer(f, out.H);
+      break;
+    case TV_KIND_NO_MOTION:
+      if (problem.calibrated) {
+        out.epipolar.pose.R = out.H = Mat3::Identity();
+        out.has_R = true;
+      }
+      inliers_of_transfer(f, out.H);
+      break;
+    case TV_KIND_PLANAR_OR_PANORAMIC: inliers_of_transfer(f, out.H); break;
+    case TV_KIND_DEGENERATE:
+      for (size_t i = 0; i < n; ++i) out.inlier[i] = 0;
+      break;
+    case TV_KIND_UNCALIBRATED: break;
+  }
+  measure_evidence(f, arena);
+  out.judgement = judge(out.evidence);
+}
+
+}  // namespace tv

@@ -1,0 +1,30 @@
+// One pair while its estimate is finished (finish.cc): the matches, the scratch and the outcome
+// that the steps hand to each other, and what several of the steps do with the outcome.
+#pragma once
+
+#include "robust/final_pose.h"
+#include "robust/two_view.h"
+
+namespace tv {
+
+struct Fit {
+  const TwoViewProblem& problem;
+  const Matches& matches;  // the refiner may move their rays, and nothing else does
+  double threshold;
+  int32_t* indices;  // scratch
+  double* values;    // scratch
+  int32_t* support;  // the different inliers of the epipolar model
+  int num_support;
+  PoseRefiner refiner;  // of the same matches and scratch
+  TwoViewOutcome* out;
+};
+
+// The inliers of the outcome's epipolar model become the outcome's, and the support.
+void collect_support(Fit& f);
+
+// The matches that the named transfer explains become the inliers.
+void inliers_of_transfer(Fit& f, const Mat3& H);
+
+void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out);
+
+}  // namespace tv

@@ -1,0 +1,16 @@
+// The kind of a pair: which of the epipolar model and its rivals explains the matches.
+#pragma once
+
+#include "robust/fit.h"
+#include "robust/rivals.h"
+
+namespace tv {
+
+// A rival names the pair when it explains this share of what the epipolar model does, or of
+// all matches where there is none.
+inline constexpr double kRivalShare = 0.7, kRivalShareAlone = 0.5;
+
+// sample_size: of the solver that found the epipolar model.
+tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size);
+
+}  // namespace tv

@@ -1,0 +1,65 @@
+#include "robust/planar_pose.h"
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
+
+#include <algorithm>
+
+namespace tv {
+
+void choose_planar_pose(Fit& f, const Rivals& rivals) {
+  TwoViewOutcome& out = *f.out;
+  Vec3 mean = Vec3::Zero();
+  for (int k = 0; k < f.num_support; ++k)
+    mean += ray_of(f.matches.pairs, 0, f.support[k]).normalized();
+  PlaneFit fit;
+  Pose poses[3];
+  int num_poses = 0;
+  const bool plane_alone = 20 * rivals.homography_inliers >= 17 * f.num_support;
+  if (plane_alone) num_poses = refine_on_plane(f.refiner, rivals.H, mean, &fit);
+  const bool on_plane = num_poses > 0;
+  for (int k = 0; k < num_poses; ++k) poses[k] = fit.pose[k];
+  if (!on_plane) {
+    poses[num_poses++] = out.epipolar.pose;
+    PlanarPose planar[2];
+    const int count = decompose_homography(rivals.H, mean, planar);
+    for (int k = 0; k < count; ++k) poses[num_poses++] = refined_pose(f.refiner, planar[k].pose);
+  }
+  const PoseEstimator scorer{f.matches.pairs, f.threshold, f.indices, nullptr};
+  int best = 0, inliers[3];
+  int64_t cost[3];
+  for (int k = 0; k < num_poses; ++k) {
+    cost[k] = scorer.full_cost(poses[k], &inliers[k]);
+    best = cost[k] < cost[best] ? k : best;
+  }
+  out.epipolar.pose = poses[best];
+  out.epipolar.M = essential_from_pose(poses[best]);
+  collect_support(f);
+  int other = -1;
+  double farthest = 1e-4;  // half a degree
+  for (int k = 0; k < num_poses; ++k) {
+    const double turned =
+        (poses[k].R - poses[best].R).squaredNorm() + (poses[k].t - poses[best].t).squaredNorm();
+    // Of the other two, one may be the best again, stopped elsewhere in a flat valley.
+    if (k != best && turned > farthest && 10 * inliers[k] >= 9 * inliers[best]) {
+      other = k;
+      farthest = turned;
+    }
+  }
+  if (other >= 0) {
+    out.evidence.has_alternative = true;
+    out.alternative = poses[other];
+  }
+  PoseUncertainty uncertainty;
+  const bool certain =
+      on_plane ? fit.certain[best] : uncertainty_of(f.refiner, poses[best], &uncertainty);
+  if (certain) store_uncertainty(on_plane ? fit.uncertainty[best] : uncertainty, &out);
+  if (other < 0) return;
+  out.has_alternative_covariance =
+      on_plane ? fit.certain[other] : uncertainty_of(f.refiner, poses[other], &uncertainty);
+  if (out.has_alternative_covariance) {
+    const PoseUncertainty& u = on_plane ? fit.uncertainty[other] : uncertainty;
+    std::copy(u.covariance, u.covariance + 25, out.alternative_covariance);
+  }
+}
+
+}  // namespace tv
