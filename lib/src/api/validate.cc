@@ -1,5 +1,7 @@
 #include "api/validate.h"
 
+#include "api/sized.h"
+
 namespace tv {
 namespace {
 
@@ -39,15 +41,16 @@ tv_status check_mask(const tv_image* mask, const tv_image& image) {
 
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked) {
+  tv_feature_options_init(checked);
   if (options == nullptr) {
-    tv_feature_options_init(checked);
     if (checked->max_keypoints > context.limits.max_keypoints) {
       checked->max_keypoints = context.limits.max_keypoints;
     }
     return TV_OK;
   }
-  const tv_feature_options& o = *options;
-  if (o.struct_size != sizeof(tv_feature_options)) return TV_ERR_STRUCT_SIZE;
+  const tv_status status = read_sized(options, checked);
+  if (status != TV_OK) return status;
+  const tv_feature_options& o = *checked;
   const bool valid = o.max_keypoints >= 1 && within(o.arc, 9, 12) && within(o.threshold, 1, 254) &&
                      within(o.min_threshold, 0, o.threshold) && within(o.levels, 1, 8) &&
                      within(o.scale_factor, 1.1f, 2.0f) &&
@@ -56,9 +59,33 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
                      within(o.descriptor, TV_NORMALISATION_SIFT, TV_NORMALISATION_ROOTSIFT) &&
                      within(o.keypoint_size, 1.0f, 32.0f);
   if (!valid) return TV_ERR_ARGUMENT;
-  if (o.max_keypoints > context.limits.max_keypoints) return TV_ERR_LIMITS;
-  *checked = o;
-  return TV_OK;
+  return o.max_keypoints > context.limits.max_keypoints ? TV_ERR_LIMITS : TV_OK;
+}
+
+tv_status read_features(const tv_context& context, const tv_features* given, const void* out,
+                        size_t out_bytes, tv_features* features) {
+  if (given == nullptr) return TV_ERR_NULL;
+  *features = tv_features{};
+  const tv_status status = read_sized(given, features);
+  if (status != TV_OK) return status;
+  if (features->num < 0) return TV_ERR_ARGUMENT;
+  if (features->num > 0 && features->descriptors == nullptr) return TV_ERR_NULL;
+  if (features->num > context.limits.max_keypoints) return TV_ERR_LIMITS;
+  const size_t n = static_cast<size_t>(features->num);
+  const bool overlaps = overlap(out, out_bytes, features->descriptors, n * TV_DESCRIPTOR_BYTES) ||
+                        (features->keypoints != nullptr &&
+                         overlap(out, out_bytes, features->keypoints, n * sizeof(tv_keypoint)));
+  return overlaps ? TV_ERR_OVERLAP : TV_OK;
+}
+
+tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs) {
+  if (given == nullptr) return TV_ERR_NULL;
+  *pairs = tv_pixel_pairs{};
+  const tv_status status = read_sized(given, pairs);
+  if (status != TV_OK) return status;
+  if (pairs->num < 0) return TV_ERR_ARGUMENT;
+  const bool missing = pairs->pixels0 == nullptr || pairs->pixels1 == nullptr;
+  return pairs->num > 0 && missing ? TV_ERR_NULL : TV_OK;
 }
 
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {
