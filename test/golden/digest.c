@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "support/calls.h"
+#include "../support/calls.h"
 #include "twoview/alloc.h"
 #include "twoview/twoview.h"
 

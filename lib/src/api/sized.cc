@@ -48,7 +48,10 @@ tv_status read_sized(const void* object, size_t known_size, void* checked) {
   if (object == nullptr) return TV_OK;
   const tv_status status = check_sized_input(object, known_size);
   if (status != TV_OK) return status;
-  std::memcpy(checked, object, smaller(known_size, size_of(object)));
+  const size_t size = smaller(known_size, size_of(object));
+  const uint32_t own = static_cast<uint32_t>(known_size);
+  std::memcpy(checked, object, size);
+  std::memcpy(checked, &own, sizeof own);  // it may be handed on
   return TV_OK;
 }
 
