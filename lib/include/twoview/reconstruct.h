@@ -105,7 +105,8 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
    bit.
    options: null means the defaults.
    two_view: initialised by tv_two_view_init; reconstruction: initialised by tv_reconstruction_init.
-   Returns the statuses as tv_extract, tv_match, tv_estimate_two_view and tv_triangulate do. */
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, or a reserved field that is
+   not 0), and the statuses of the stages. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
                                 const tv_reconstruct_options *options, tv_two_view *two_view,
                                 tv_reconstruction *reconstruction);
