@@ -1,5 +1,5 @@
-/* The calls on features and on matched pixels, with the structs' members as parameters: tests change
-   one at a time. Also views in one expression. */
+/* The calls on features and on matched pixels, with the structs' members as parameters: tests
+   change one at a time. Also views in one expression. */
 #ifndef TEST_SUPPORT_CALLS_H
 #define TEST_SUPPORT_CALLS_H
 
