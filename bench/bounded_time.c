@@ -76,8 +76,8 @@ static double time_pair(tv_context *context, const char *name, int size) {
   camera.fx = camera.fy = 525;
   camera.cx = 0.5 * (WIDTH - 1);
   camera.cy = 0.5 * (HEIGHT - 1);
-  memset(views, 0, sizeof views);
   for (k = 0; k < 2; ++k) {
+    tv_view_init(&views[k]);
     views[k].image.data = pixels[k];
     views[k].image.width = views[k].image.stride_bytes = WIDTH;
     views[k].image.height = HEIGHT;

@@ -66,8 +66,13 @@ void add_case(const bench::Pair& pair, int count) {
     tv_match_options options;
     tv_match_options_init(&options);
     options.ratio = kRatio;
-    bench::require(tv_match(m->context.get(), m->side[0].bytes.data(), m->side[0].count,
-                            m->side[1].bytes.data(), m->side[1].count, &options, m->ours.data(),
+    tv_features features[2];
+    for (int v = 0; v < 2; ++v) {
+      tv_features_init(&features[v]);
+      features[v].num = m->side[v].count;
+      features[v].descriptors = m->side[v].bytes.data();
+    }
+    bench::require(tv_match(m->context.get(), &features[0], &features[1], &options, m->ours.data(),
                             count, &m->num_ours),
                    "tv_match");
   };

@@ -50,7 +50,9 @@ class Ours {
   void run() {
     tv_view views[2];
     for (int v = 0; v < 2; ++v) {
-      views[v] = tv_view{bench::view_of(pair_.image[v]), &pair_.camera[v], nullptr};
+      tv_view_init(&views[v]);
+      views[v].image = bench::view_of(pair_.image[v]);
+      views[v].camera = &pair_.camera[v];
     }
     tv_reconstruct_options options;
     tv_reconstruct_options_init(&options);
@@ -70,7 +72,8 @@ class Ours {
     uint64_t stage_ns[TV_NUM_STAGES];
     bench::require(tv_context_set_clock(context_.get(), now_ns, nullptr), "tv_context_set_clock");
     run();
-    bench::require(tv_context_take_times(context_.get(), stage_ns), "tv_context_take_times");
+    bench::require(tv_context_take_times(context_.get(), stage_ns, TV_NUM_STAGES),
+                   "tv_context_take_times");
     bench::require(tv_context_set_clock(context_.get(), nullptr, nullptr), "tv_context_set_clock");
     Counters counters = {{"keypoints", found_.num_keypoints[0]},
                          {"matches", found_.num_matches},

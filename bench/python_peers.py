@@ -157,11 +157,12 @@ class Ours:
         return work
 
     def reconstruct(self, feature=None, match=None):
-        structs, library = twoview_ctypes.STRUCTS, self.library
+        library = self.library
         height, width = self.pair.images[0].shape
         cameras = [twoview_ctypes.make_camera(K, width, height) for K in self.pair.K]
-        views = [structs["tv_view"](image, ctypes.addressof(camera), None)
-                 for image, camera in zip(self.views, cameras)]
+        views = [library._init_struct("tv_view") for _ in cameras]
+        for view, image, camera in zip(views, self.views, cameras):
+            view.image, view.camera = image, ctypes.addressof(camera)
         stages = [library.feature_options(feature), library.match_options(match)]
         options = library._init_struct("tv_reconstruct_options")
         options.feature, options.match = map(ctypes.addressof, stages)

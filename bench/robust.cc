@@ -54,9 +54,13 @@ void add_ours(const std::string& name, const Problems& problems) {
     const bench::Problem& p = (*problems)[k];
     tv_two_view pose;
     tv_two_view_init(&pose);
+    tv_pixel_pairs pairs;
+    tv_pixel_pairs_init(&pairs);
+    pairs.num = p.size();
+    pairs.pixels0 = p.pixels[0].data();
+    pairs.pixels1 = p.pixels[1].data();
     bench::require(
-        tv_estimate_two_view(context.get(), &p.camera, &p.camera, p.pixels[0].data(),
-                             p.pixels[1].data(), nullptr, p.size(), nullptr, &pose, nullptr),
+        tv_estimate_two_view(context.get(), &p.camera, &p.camera, &pairs, nullptr, &pose, nullptr),
         "tv_estimate_two_view");
     return pose.has_R && pose.has_t ? bench::pose_error_deg(pose.R, pose.t, p.R, p.t) : 180;
   });

@@ -73,8 +73,16 @@ static void extract_both(stages *s) {
 }
 
 static void match(stages *s) {
-  require(tv_match(s->context, s->descriptors[0], s->num_keypoints[0], s->descriptors[1],
-                   s->num_keypoints[1], NULL, s->matches, MAX_KEYPOINTS, &s->num_matches) == TV_OK,
+  tv_features features[2];
+  int v;
+  for (v = 0; v < 2; ++v) {
+    tv_features_init(&features[v]);
+    features[v].num = s->num_keypoints[v];
+    features[v].keypoints = s->keypoints[v];
+    features[v].descriptors = s->descriptors[v];
+  }
+  require(tv_match(s->context, &features[0], &features[1], NULL, s->matches, MAX_KEYPOINTS,
+                   &s->num_matches) == TV_OK,
           "tv_match");
 }
 
@@ -92,9 +100,15 @@ static void gather(stages *s) {
 }
 
 static void estimate(stages *s) {
+  tv_pixel_pairs pairs;
+  tv_pixel_pairs_init(&pairs);
+  pairs.num = s->num_matches;
+  pairs.pixels0 = s->pixels[0];
+  pairs.pixels1 = s->pixels[1];
+  pairs.ratios = s->ratios;
   tv_two_view_init(&s->pose);
-  require(tv_estimate_two_view(s->context, &s->camera, &s->camera, s->pixels[0], s->pixels[1],
-                               s->ratios, s->num_matches, NULL, &s->pose, NULL) == TV_OK,
+  require(tv_estimate_two_view(s->context, &s->camera, &s->camera, &pairs, NULL, &s->pose, NULL) ==
+              TV_OK,
           "tv_estimate_two_view");
 }
 
@@ -103,9 +117,9 @@ static void pair(stages *s) {
   tv_reconstruction cloud;
   int v;
   for (v = 0; v < 2; ++v) {
+    tv_view_init(&views[v]);
     views[v].image = s->image[v];
     views[v].camera = &s->camera;
-    views[v].mask = NULL;
   }
   tv_two_view_init(&s->pose);
   tv_reconstruction_init(&cloud);

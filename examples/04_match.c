@@ -38,6 +38,7 @@ int main(int argc, char **argv) {
   tv_match_options options;
   tv_limits limits;
   tv_context *context;
+  tv_features features[2];
   tv_image image[2];
   tv_status status;
   if (argc < 3) return fail("usage: 04_match A.pgm B.pgm [ratio]");
@@ -62,8 +63,13 @@ int main(int argc, char **argv) {
   }
   tv_match_options_init(&options);
   if (argc > 3) options.ratio = (float)atof(argv[3]);
-  status = tv_match(context, descriptor[0], count[0], descriptor[1], count[1], &options, match,
-                    MOST, &matches);
+  for (v = 0; v < 2; ++v) {
+    tv_features_init(&features[v]);
+    features[v].num = count[v];
+    features[v].keypoints = keypoint[v];
+    features[v].descriptors = descriptor[v];
+  }
+  status = tv_match(context, &features[0], &features[1], &options, match, MOST, &matches);
   if (status != TV_OK) return fail(tv_status_string(status));
   fprintf(stderr, "%d and %d keypoints, %d matches\n", count[0], count[1], matches);
   for (k = 0; k < matches; ++k) {

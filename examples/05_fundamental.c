@@ -31,6 +31,7 @@ int main(int argc, char **argv) {
   static uint8_t inlier[MOST];
   tv_limits limits;
   tv_context *context;
+  tv_pixel_pairs pairs;
   tv_estimate_options options;
   tv_two_view found;
   tv_status status;
@@ -47,8 +48,12 @@ int main(int argc, char **argv) {
   options.method = TV_SOLVER_EIGHT_POINT;
   if (argc > 2) options.max_error_px = atof(argv[2]);
   tv_two_view_init(&found);
-  status = tv_estimate_two_view(context, NULL, NULL, pixels[0], pixels[1], ratios, n, &options,
-                                &found, inlier);
+  tv_pixel_pairs_init(&pairs);
+  pairs.num = n;
+  pairs.pixels0 = pixels[0];
+  pairs.pixels1 = pixels[1];
+  pairs.ratios = ratios;
+  status = tv_estimate_two_view(context, NULL, NULL, &pairs, &options, &found, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
   printf("%s (%s): %d of %d matches agree after %d samples\n", tv_kind_string(found.kind),
          tv_verdict_string(found.verdict), found.num_inliers, n, found.num_iterations);

@@ -52,6 +52,7 @@ int main(int argc, char **argv) {
   static uint8_t inlier[MOST];
   tv_limits limits;
   tv_context *context;
+  tv_pixel_pairs pairs;
   tv_estimate_options options;
   tv_two_view found;
   int n, k, v, shown = 0;
@@ -64,8 +65,12 @@ int main(int argc, char **argv) {
   tv_estimate_options_init(&options);
   options.method = TV_SOLVER_SEVEN_POINT;
   tv_two_view_init(&found);
-  if (tv_estimate_two_view(context, NULL, NULL, pixels[0], pixels[1], ratios, n, &options, &found,
-                           inlier) != TV_OK ||
+  tv_pixel_pairs_init(&pairs);
+  pairs.num = n;
+  pairs.pixels0 = pixels[0];
+  pairs.pixels1 = pixels[1];
+  pairs.ratios = ratios;
+  if (tv_estimate_two_view(context, NULL, NULL, &pairs, &options, &found, inlier) != TV_OK ||
       !found.has_F)
     return fail("no fundamental matrix");
   for (v = 0; v < 2; ++v) {

@@ -51,6 +51,7 @@ int main(int argc, char **argv) {
   tv_camera camera = {0};
   tv_limits limits;
   tv_context *context;
+  tv_pixel_pairs pairs;
   tv_estimate_options options;
   tv_two_view pose;
   tv_status status;
@@ -80,8 +81,12 @@ int main(int argc, char **argv) {
   }
   options.gravity_sigma_rad = atof(argv[14]) / DEGREES;
   tv_two_view_init(&pose);
-  status = tv_estimate_two_view(context, &camera, &camera, pixels[0], pixels[1], ratios, n,
-                                &options, &pose, NULL);
+  tv_pixel_pairs_init(&pairs);
+  pairs.num = n;
+  pairs.pixels0 = pixels[0];
+  pairs.pixels1 = pixels[1];
+  pairs.ratios = ratios;
+  status = tv_estimate_two_view(context, &camera, &camera, &pairs, &options, &pose, NULL);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R) return fail("no rotation");
   for (i = 0; i < 3; ++i) /* trace of R_imu^T R, with R_imu = world1^T world0 */

@@ -36,6 +36,7 @@ int main(int argc, char **argv) {
   tv_camera camera[2] = {{0}, {0}};
   tv_limits limits;
   tv_context *context;
+  tv_pixel_pairs pairs;
   tv_two_view pose;
   tv_status status;
   int n, k, v, method, kept = 0;
@@ -55,8 +56,12 @@ int main(int argc, char **argv) {
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
   tv_two_view_init(&pose);
-  status = tv_estimate_two_view(context, &camera[0], &camera[1], pixels[0], pixels[1], ratios, n,
-                                NULL, &pose, inlier);
+  tv_pixel_pairs_init(&pairs);
+  pairs.num = n;
+  pairs.pixels0 = pixels[0];
+  pairs.pixels1 = pixels[1];
+  pairs.ratios = ratios;
+  status = tv_estimate_two_view(context, &camera[0], &camera[1], &pairs, NULL, &pose, inlier);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R || !pose.has_t) return fail("no full pose");
   for (v = 0; v < 2; ++v)

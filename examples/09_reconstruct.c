@@ -28,7 +28,7 @@ static int fail(const char *what) {
 }
 
 int main(int argc, char **argv) {
-  tv_view view[2] = {{{NULL, 0, 0, 0}, NULL, NULL}, {{NULL, 0, 0, 0}, NULL, NULL}};
+  tv_view view[2];
   tv_camera camera[2] = {{0}, {0}};
   tv_limits limits;
   tv_context *context;
@@ -41,6 +41,7 @@ int main(int argc, char **argv) {
   tv_limits_init(&limits);
   limits.max_width = limits.max_height = 1;
   for (v = 0; v < 2; ++v) {
+    tv_view_init(&view[v]);
     view[v].image = read_pgm(argv[1 + v]);
     if (!view[v].image.data) return fail("cannot read an image");
     camera[v].model = TV_CAMERA_PINHOLE;

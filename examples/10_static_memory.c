@@ -36,14 +36,15 @@ static void paint(void) {
 
 int main(void) {
   const tv_camera camera = {TV_CAMERA_PINHOLE, WIDTH, HEIGHT, 0, 520, 520, 319.5, 239.5, {0}};
-  const tv_view view[2] = {{{pixels[0], WIDTH, HEIGHT, WIDTH}, &camera, NULL},
-                           {{pixels[1], WIDTH, HEIGHT, WIDTH}, &camera, NULL}};
+  const tv_image image[2] = {{pixels[0], WIDTH, HEIGHT, WIDTH}, {pixels[1], WIDTH, HEIGHT, WIDTH}};
+  tv_view view[2];
   tv_limits limits;
   tv_context *context;
   tv_two_view pose;
   tv_reconstruction cloud;
   tv_status status;
   size_t needed;
+  int v;
   tv_limits_init(&limits); /* 640 x 480, 2048 keypoints */
   status = tv_context_size(&limits, &needed);
   if (status == TV_OK) status = tv_context_init(&context, &limits, memory, sizeof memory);
@@ -53,6 +54,11 @@ int main(void) {
     return 2;
   }
   paint();
+  for (v = 0; v < 2; ++v) {
+    tv_view_init(&view[v]);
+    view[v].image = image[v];
+    view[v].camera = &camera;
+  }
   tv_two_view_init(&pose);
   tv_reconstruction_init(&cloud);
   status = tv_reconstruct(context, &view[0], &view[1], NULL, &pose, &cloud);

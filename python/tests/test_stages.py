@@ -69,12 +69,12 @@ def test_match_is_the_definition(context):
 def test_estimate_finds_the_pose(context, scene):
     result, inliers = tv.estimate_two_view(context, scene.camera, scene.camera, scene.pixels0,
                                            scene.pixels1)
-    assert result.config == tv.Config.CALIBRATED and result.verdict == tv.Verdict.OK
+    assert result.kind == tv.Kind.CALIBRATED and result.verdict == tv.Verdict.OK
     assert result.reasons == tv.Reason(0) and inliers.dtype == bool and inliers.all()
     assert angle_deg(result.R @ scene.R.T) < 1e-3 and result.t @ scene.t > 1 - 1e-8
     assert result.covariance.shape == (5, 5) and result.H is None
     uncalibrated, _ = tv.estimate_two_view(context, None, None, scene.pixels0, scene.pixels1,
-                                           method=tv.Method.EIGHT_POINT)
+                                           method=tv.Solver.EIGHT_POINT)
     assert uncalibrated.R is None and uncalibrated.F.shape == (3, 3)
 
 
@@ -166,7 +166,7 @@ def test_reconstruct_is_the_stages(context, image):
     camera = tv.Camera(320, 240, 300, 300, 159.5, 119.5)
     options = tv.FeatureOptions(max_keypoints=500)
     result, cloud = tv.reconstruct(context, image, camera, image, camera, feature=options)
-    assert result.config == tv.Config.NO_MOTION and result.verdict == tv.Verdict.REFUSED
+    assert result.kind == tv.Kind.NO_MOTION and result.verdict == tv.Verdict.REFUSED
     keypoints, descriptors = tv.extract(context, image, options=options)
     assert np.array_equal(cloud.keypoints[0], keypoints)
     assert np.array_equal(cloud.descriptors[1], descriptors)
@@ -218,7 +218,7 @@ def test_gravity_and_seed_reach_the_library(context, scene):
     down = (0.0, 1.0, 0.0)
     result, _ = tv.estimate_two_view(
         context, scene.camera, scene.camera, scene.pixels0, scene.pixels1,
-        method=tv.Method.UPRIGHT, gravity0=down, gravity1=down, gravity_sigma_rad=0.01, seed=77)
+        method=tv.Solver.UPRIGHT, gravity0=down, gravity1=down, gravity_sigma_rad=0.01, seed=77)
     assert result.seed == 77 and result.verdict == tv.Verdict.OK
     assert angle_deg(result.R @ scene.R.T) < 0.01
 

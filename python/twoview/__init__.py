@@ -10,8 +10,8 @@ from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, KEYPOINT, POINT, TV_ERR_ALI
 from .camera import (Camera, camera_check, camera_project_points, camera_scale,
                      camera_undistort, camera_unproject_points, camera_valid_angle)
 from .context import Context
-from .enums import (CameraModel, Config, Descriptor, Kernels, Loss, Method, Orientation,
-                    PointStatus, Purpose, Reason, Stage, Status, Triangulation, Verdict)
+from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, Orientation, PointStatus,
+                    Purpose, Reason, Solver, Stage, Status, Triangulation, Verdict)
 from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOptions,
                       MatchOptions)
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,

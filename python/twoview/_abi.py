@@ -42,6 +42,11 @@ class tv_keypoint(Structure):
                 ("score", c_float), ("level", c_int32)]
 
 
+class tv_features(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num", c_int32), ("keypoints", c_void_p),
+                ("descriptors", c_void_p)]
+
+
 class tv_feature_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_keypoints", c_int32), ("arc", c_int32),
                 ("threshold", c_int32), ("min_threshold", c_int32), ("levels", c_int32),
@@ -62,6 +67,11 @@ class tv_guided_options(Structure):
                 ("max_distance", c_float), ("neighbourhood_px", c_float)]
 
 
+class tv_pixel_pairs(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num", c_int32), ("pixels0", c_void_p),
+                ("pixels1", c_void_p), ("ratios", c_void_p)]
+
+
 class tv_estimate_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("method", c_int32), ("max_error_px", c_double),
                 ("confidence", c_double), ("max_iterations", c_int32),
@@ -71,7 +81,7 @@ class tv_estimate_options(Structure):
 
 
 class tv_two_view(Structure):
-    _fields_ = [("struct_size", c_uint32), ("config", c_int32), ("verdict", c_int32),
+    _fields_ = [("struct_size", c_uint32), ("kind", c_int32), ("verdict", c_int32),
                 ("reasons", c_uint32), ("num_matches", c_int32), ("num_inliers", c_int32),
                 ("has_R", c_uint8), ("has_t", c_uint8), ("has_E", c_uint8), ("has_F", c_uint8),
                 ("has_H", c_uint8), ("has_alternative", c_uint8), ("has_covariance", c_uint8),
@@ -93,7 +103,8 @@ class tv_point(Structure):
 
 
 class tv_view(Structure):
-    _fields_ = [("image", tv_image), ("camera", c_void_p), ("mask", c_void_p)]
+    _fields_ = [("struct_size", c_uint32), ("reserved", c_uint32), ("image", tv_image),
+                ("camera", c_void_p), ("mask", c_void_p)]
 
 
 class tv_reconstruct_options(Structure):
@@ -104,10 +115,10 @@ class tv_reconstruct_options(Structure):
 
 class tv_reconstruction(Structure):
     _fields_ = [("struct_size", c_uint32), ("num_keypoints", c_int32 * 2),
+                ("num_matches_left_out", c_int32),
                 ("keypoints", c_void_p * 2), ("descriptors", c_void_p * 2),
                 ("num_matches", c_int32), ("num_points", c_int32), ("matches", c_void_p),
-                ("inlier_mask", c_void_p), ("points", c_void_p),
-                ("num_matches_left_out", c_int32)]
+                ("inlier_mask", c_void_p), ("points", c_void_p)]
 
 
 class tv_bundle_options(Structure):
@@ -123,10 +134,10 @@ class tv_bundle_result(Structure):
                 ("noise_px", c_double)]
 
 
-STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_feature_options, tv_correspondence,
-           tv_match_options, tv_guided_options, tv_estimate_options, tv_two_view, tv_point,
-           tv_view, tv_reconstruct_options, tv_reconstruction, tv_bundle_options,
-           tv_bundle_result]
+STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
+           tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
+           tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
+           tv_reconstruction, tv_bundle_options, tv_bundle_result]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
@@ -201,20 +212,17 @@ class Library:
         for name in ("tv_version_string", "tv_status_string"):
             getattr(self.lib, name).restype = c_char_p
         self.lib.tv_context_high_water.restype = c_size_t
-        for struct in (tv_limits, tv_feature_options, tv_match_options, tv_guided_options,
-                       tv_estimate_options, tv_two_view, tv_reconstruct_options,
-                       tv_reconstruction, tv_bundle_options, tv_bundle_result):
-            self.make(struct)
+        for struct in STRUCTS:
+            if struct._fields_[0][0] == "struct_size":
+                init = getattr(self.lib, struct.__name__ + "_init_sized")
+                init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
     def make(self, struct: Any, fields: Optional[dict[str, Any]] = None) -> Any:
-        """A struct filled by its tv_..._init; `fields` then replace the defaults."""
+        """A struct filled by its tv_..._init_sized; `fields` then replace the defaults. The library
+        may be of another release, whose structs are shorter or longer."""
         made = struct()
-        init = getattr(self.lib, struct.__name__ + "_init")
-        init.restype = None
-        init(ctypes.byref(made))
-        if made.struct_size != ctypes.sizeof(struct):
-            raise ImportError(f"{struct.__name__}: {made.struct_size} bytes in {self.path}, "
-                              f"{ctypes.sizeof(struct)} in this package: not the same version")
+        init = getattr(self.lib, struct.__name__ + "_init_sized")
+        init(ctypes.byref(made), ctypes.sizeof(struct))
         for name, value in (fields or {}).items():
             set_field(made, name, value)
         return made

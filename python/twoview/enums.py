@@ -54,7 +54,7 @@ class Orientation(IntEnum):
     GRADIENT = 1
 
 
-class Descriptor(IntEnum):
+class Normalisation(IntEnum):
     SIFT = 0
     ROOTSIFT = 1
 
@@ -65,7 +65,7 @@ class CameraModel(IntEnum):
     KANNALA_BRANDT = 2
 
 
-class Method(IntEnum):
+class Solver(IntEnum):
     AUTO = 0
     FIVE_POINT = 1
     EIGHT_POINT = 2
@@ -73,7 +73,7 @@ class Method(IntEnum):
     UPRIGHT = 4
 
 
-class Config(IntEnum):
+class Kind(IntEnum):
     DEGENERATE = 0
     CALIBRATED = 1
     UNCALIBRATED = 2
@@ -126,8 +126,9 @@ class Loss(IntEnum):
 
 # The C prefix of each.
 C_PREFIXES = {
-    Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_", Orientation: "TV_ORIENTATION_",
-    Descriptor: "TV_DESCRIPTOR_", CameraModel: "TV_CAMERA_", Method: "TV_METHOD_",
-    Config: "TV_CONFIG_", Verdict: "TV_VERDICT_", Reason: "TV_REASON_",
+    Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_",
+    Orientation: "TV_ORIENTATION_", Normalisation: "TV_NORMALISATION_",
+    CameraModel: "TV_CAMERA_", Solver: "TV_SOLVER_", Kind: "TV_KIND_", Verdict: "TV_VERDICT_",
+    Reason: "TV_REASON_",
     Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",
 }

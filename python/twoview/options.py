@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Optional, Sequence
 
 from . import _abi
-from .enums import Descriptor, Loss, Method, Orientation
+from .enums import Loss, Normalisation, Orientation, Solver
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class FeatureOptions:
     cell_px: int = 0  #: grid cell in which corners are budgeted, pixels; 0: the best anywhere
     subpixel: int = 1  #: 1: positions below a pixel
     orientation: int = Orientation.GRADIENT
-    descriptor: int = Descriptor.ROOTSIFT
+    descriptor: int = Normalisation.ROOTSIFT
     keypoint_size: float = 4.0  #: diameter, pixels
 
 
@@ -48,7 +48,7 @@ class GuidedOptions:
 class EstimateOptions:
     """tv_estimate_options."""
 
-    method: int = Method.AUTO  #: five-point with cameras, eight-point without
+    method: int = Solver.AUTO  #: five-point with cameras, eight-point without
     max_error_px: float = 1.0  #: inlier threshold, pixels of the images as given
     confidence: float = 0.9999
     max_iterations: int = 10000

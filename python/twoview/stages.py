@@ -12,7 +12,7 @@ import numpy as np
 from . import _abi
 from .camera import Camera, camera_struct
 from .context import Context, check_context
-from .enums import Config, Reason, Triangulation, Verdict
+from .enums import Kind, Reason, Triangulation, Verdict
 from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOptions, MatchOptions,
                       to_struct)
 
@@ -87,6 +87,22 @@ def _descriptors(name: str, array: np.ndarray) -> np.ndarray:
     return _abi.check_array(name, array, np.uint8, _abi.DESCRIPTOR_BYTES)
 
 
+def _features(context: Context, keypoints: Optional[np.ndarray], descriptors: np.ndarray) -> Any:
+    features = context.library.make(_abi.tv_features)
+    features.num = len(descriptors)
+    features.keypoints, features.descriptors = _abi.pointer(keypoints), _abi.pointer(descriptors)
+    return features
+
+
+def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
+           ratios: Optional[np.ndarray]) -> Any:
+    pairs = context.library.make(_abi.tv_pixel_pairs)
+    pairs.num = len(pixels0)
+    pairs.pixels0, pairs.pixels1 = _abi.pointer(pixels0), _abi.pointer(pixels1)
+    pairs.ratios = _abi.pointer(ratios)
+    return byref(pairs)
+
+
 def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
           options: Optional[MatchOptions] = None, **keywords: Any) -> np.ndarray:
     """tv_match: mutual nearest neighbours that pass the ratio test both ways.
@@ -97,8 +113,8 @@ def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
     descriptors1 = _descriptors("descriptors1", descriptors1)
     found = np.empty(min(len(descriptors0), len(descriptors1)), _abi.CORRESPONDENCE)
     count = c_int32()
-    context.call("tv_match", _abi.pointer(descriptors0), c_int32(len(descriptors0)),
-                 _abi.pointer(descriptors1), c_int32(len(descriptors1)), byref(wanted),
+    features = [_features(context, None, rows) for rows in (descriptors0, descriptors1)]
+    context.call("tv_match", byref(features[0]), byref(features[1]), byref(wanted),
                  _abi.pointer(found), c_int32(len(found)), byref(count))
     return found[: count.value].copy()
 
@@ -123,7 +139,7 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
         descriptors = _descriptors(f"descriptors{view}", descriptors)
         if len(keypoints) != len(descriptors):
             raise ValueError(f"{len(keypoints)} keypoints{view} and {len(descriptors)} descriptors")
-        arguments += [_abi.pointer(keypoints), _abi.pointer(descriptors), c_int32(len(keypoints))]
+        arguments.append(byref(_features(context, keypoints, descriptors)))
     found = np.empty(min(len(keypoints0), len(keypoints1)), _abi.CORRESPONDENCE)
     count = c_int32()
     context.call("tv_match_guided", *_two_cameras(camera0, camera1), _abi.pointer(matrix),
@@ -135,7 +151,7 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
 class TwoView:
     """tv_two_view. cam1_from_cam0: x1 = R x0 + t, |t| = 1; what was not estimated is None."""
 
-    config: Config
+    kind: Kind
     verdict: Verdict
     reasons: Reason
     num_matches: int
@@ -170,7 +186,7 @@ def _two_view(found: Any) -> TwoView:
         return count if count >= 0 else None
 
     return TwoView(
-        Config(found.config), Verdict(found.verdict), Reason(found.reasons), found.num_matches,
+        Kind(found.kind), Verdict(found.verdict), Reason(found.reasons), found.num_matches,
         found.num_inliers, found.num_iterations, matrix("R", found.has_R, 3, 3),
         matrix("t", found.has_t, 3), matrix("E", found.has_E, 3, 3),
         matrix("F", found.has_F, 3, 3), matrix("H", found.has_H, 3, 3),
@@ -208,9 +224,9 @@ def _estimate(context: Context, camera0: Optional[Camera], camera1: Optional[Cam
             raise ValueError(f"{len(ratios)} ratios and {len(pixels0)} matches")
     found = context.library.make(_abi.tv_two_view)
     inliers = np.zeros(len(pixels0), np.uint8)
-    context.call("tv_estimate_two_view", *_two_cameras(camera0, camera1), _abi.pointer(pixels0),
-                 _abi.pointer(pixels1), _abi.pointer(ratios), c_int32(len(pixels0)),
-                 byref(wanted), byref(found), _abi.pointer(inliers))
+    context.call("tv_estimate_two_view", *_two_cameras(camera0, camera1),
+                 _pairs(context, pixels0, pixels1, ratios), byref(wanted), byref(found),
+                 _abi.pointer(inliers))
     return found, inliers.view(bool)
 
 
@@ -291,10 +307,9 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
     if len(points) != len(pixels0):
         raise ValueError(f"{len(points)} points and {len(pixels0)} matches")
     result = context.library.make(_abi.tv_bundle_result)
-    context.call("tv_adjust_two_view", *_two_cameras(camera0, camera1), _abi.pointer(pixels0),
-                 _abi.pointer(pixels1), c_int32(len(pixels0)), byref(wanted),
-                 _abi.pointer(rotation), _abi.pointer(translation), _abi.pointer(points),
-                 byref(result))
+    context.call("tv_adjust_two_view", *_two_cameras(camera0, camera1),
+                 _pairs(context, pixels0, pixels1, None), byref(wanted), _abi.pointer(rotation),
+                 _abi.pointer(translation), _abi.pointer(points), byref(result))
     covariance = np.array(result.covariance).reshape(5, 5) if result.has_covariance else None
     return BundleResult(rotation, translation, points, result.num_points, result.num_iterations,
                         bool(result.converged), result.initial_cost, result.final_cost,
@@ -355,7 +370,8 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
     views = []
     for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
         kept.append(camera_struct("camera" + name, camera))
-        view = _abi.tv_view(_abi.check_image("image" + name, image), ctypes.addressof(kept[-1]))
+        view = library.make(_abi.tv_view)
+        view.image, view.camera = _abi.check_image("image" + name, image), ctypes.addressof(kept[-1])
         if mask is not None:
             kept.append(_abi.check_image("mask" + name, mask))
             view.mask = ctypes.addressof(kept[-1])

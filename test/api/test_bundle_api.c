@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 
 #define NUM_POINTS 20
 
@@ -55,8 +56,8 @@ void setUp(void) {
 void tearDown(void) { api_release(&a); }
 
 static tv_status run(void) {
-  return tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1, NUM_POINTS, &options,
-                            R, t, points, &result);
+  return adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1, NUM_POINTS, &options, R, t,
+                       points, &result);
 }
 
 static void expect_untouched(void) {
@@ -92,8 +93,8 @@ static void test_defaults_and_no_result_are_fine(void) {
   memcpy(by_default, points, sizeof points);
   memcpy(R, start_R, sizeof R), memcpy(t, start_t, sizeof t);
   memcpy(points, start, sizeof points);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1,
-                                                  NUM_POINTS, NULL, R, t, points, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1,
+                                             NUM_POINTS, NULL, R, t, points, NULL));
   TEST_ASSERT_EQUAL_MEMORY(by_default, points, sizeof points);
 }
 
@@ -116,8 +117,8 @@ static void test_no_iterations_only_measure(void) {
 }
 
 static void test_no_points_are_fine(void) {
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(a.context, &camera0, &camera1, NULL, NULL, 0,
-                                                  NULL, R, t, NULL, &result));
+  TEST_ASSERT_EQUAL_INT(TV_OK, adjust_pixels(a.context, &camera0, &camera1, NULL, NULL, 0, NULL, R,
+                                             t, NULL, &result));
   TEST_ASSERT_EQUAL_INT(0, result.num_points);
   TEST_ASSERT_EQUAL_DOUBLE(0, result.rms_px);
   TEST_ASSERT_FALSE(result.has_covariance);
@@ -129,22 +130,22 @@ static void test_null_pointers_are_refused(void) {
   const int n = NUM_POINTS;
   tv_bundle_options *o = &options;
   tv_bundle_result *r = &result;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(NULL, &camera0, &camera1, pixels0, pixels1,
-                                                        n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(NULL, &camera0, &camera1, pixels0, pixels1, n, o,
+                                                   R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        adjust_pixels(c, NULL, &camera1, pixels0, pixels1, n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        adjust_pixels(c, &camera0, NULL, pixels0, pixels1, n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        adjust_pixels(c, &camera0, &camera1, NULL, pixels1, n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL,
+                        adjust_pixels(c, &camera0, &camera1, pixels0, NULL, n, o, R, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, n, o,
+                                                   NULL, t, points, r));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, n, o, R,
+                                                   NULL, points, r));
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_adjust_two_view(c, NULL, &camera1, pixels0, pixels1, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_adjust_two_view(c, &camera0, NULL, pixels0, pixels1, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, NULL, pixels1, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, NULL, n, o, R, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
-                                                        o, NULL, t, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
-                                                        o, R, NULL, points, r));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, n,
-                                                        o, R, t, NULL, r));
+      TV_ERR_NULL, adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, n, o, R, t, NULL, r));
   expect_untouched();
   tv_bundle_options_init(NULL);
   tv_bundle_result_init(NULL);
@@ -179,28 +180,26 @@ static void test_poses_cameras_and_counts_are_checked(void) {
   t[0] = start_t[0] = -1e-300, t[1] = t[2] = start_t[1] = start_t[2] = 0;
   camera1.fx = 0, expect_refusal(TV_ERR_CAMERA), camera1 = good;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
-                        tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1, -1,
-                                           &options, R, t, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS,
-                        tv_adjust_two_view(a.context, &camera0, &camera1, pixels0, pixels1,
-                                           NUM_POINTS + 1, &options, R, t, points, &result));
+                        adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1, -1, &options,
+                                      R, t, points, &result));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_LIMITS, adjust_pixels(a.context, &camera0, &camera1, pixels0, pixels1, NUM_POINTS + 1,
+                                   &options, R, t, points, &result));
   expect_untouched();
 }
 
 static void test_outputs_may_not_overlap(void) {
   tv_context *c = a.context;
   double *inside = (double *)points;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, &camera0, &camera1, inside, pixels1,
+                                                      NUM_POINTS, &options, R, t, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, &camera0, &camera1, pixels0, inside,
+                                                      NUM_POINTS, &options, R, t, points, &result));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_adjust_two_view(c, &camera0, &camera1, inside, pixels1, NUM_POINTS,
-                                           &options, R, t, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_adjust_two_view(c, &camera0, &camera1, pixels0, inside, NUM_POINTS,
-                                           &options, R, t, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_adjust_two_view(c, &camera0, &camera1, pixels0, pixels1, NUM_POINTS,
-                                           &options, R, R + 6, points, &result));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_adjust_two_view(c, &camera0, &camera1, pixels0, R, 2,
-                                                           &options, R, t, points, &result));
+                        adjust_pixels(c, &camera0, &camera1, pixels0, pixels1, NUM_POINTS, &options,
+                                      R, R + 6, points, &result));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, adjust_pixels(c, &camera0, &camera1, pixels0, R, 2,
+                                                      &options, R, t, points, &result));
   expect_untouched();
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_point_covariances(&camera0, &camera1, R, t, NULL, 0.5,
                                                              points, NUM_POINTS, (double *)points));

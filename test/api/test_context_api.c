@@ -64,16 +64,61 @@ static void test_limits_out_of_range_are_refused(void) {
 #undef REFUSED
 }
 
-static void test_a_struct_of_another_size_is_refused(void) {
+static void test_a_size_that_no_struct_has_is_refused(void) {
+  static const uint32_t bad[] = {0, 1, 3, sizeof(tv_limits) - 1, 4100, UINT32_MAX};
   tv_limits limits = small_limits();
-  limits.struct_size = 0;
-  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
-  limits.struct_size = sizeof limits - 4; /* of a header before the last field */
-  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
-  limits.struct_size = sizeof limits + 4;
-  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
-  limits.struct_size = UINT32_MAX;
-  check_size_status(TV_ERR_STRUCT_SIZE, &limits);
+  size_t k;
+  for (k = 0; k < sizeof bad / sizeof bad[0]; ++k) {
+    limits.struct_size = bad[k];
+    check_size_status(TV_ERR_STRUCT_SIZE, &limits);
+  }
+}
+
+static void test_an_older_callers_missing_fields_have_their_defaults(void) {
+  const size_t before_kernels = offsetof(tv_limits, kernels);
+  tv_limits limits = small_limits();
+  size_t all = 0, older = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &all));
+  limits.struct_size = (uint32_t)before_kernels;
+  limits.kernels = -1; /* it is not the library's to read */
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &older));
+  TEST_ASSERT_EQUAL_UINT64(all, older);
+}
+
+static void test_a_newer_callers_unknown_fields_must_be_zero(void) {
+  struct {
+    tv_limits known;
+    uint8_t unknown[24];
+  } limits;
+  size_t k, size;
+  memset(&limits, API_PATTERN, sizeof limits);
+  tv_limits_init_sized(&limits.known, sizeof limits);
+  TEST_ASSERT_EQUAL_UINT32(sizeof limits, limits.known.struct_size);
+  TEST_ASSERT_EQUAL_INT(640, limits.known.max_width);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits.known, &size));
+  for (k = 0; k < sizeof limits.unknown; ++k) {
+    limits.unknown[k] = 1;
+    check_size_status(TV_ERR_STRUCT_SIZE, &limits.known);
+    limits.unknown[k] = 0;
+  }
+}
+
+/* Of every size, and never a byte more. */
+static void test_init_writes_as_far_as_the_callers_size(void) {
+  uint8_t memory[80], whole[sizeof(tv_limits)];
+  tv_limits limits;
+  size_t size, k;
+  tv_limits_init(&limits);
+  memcpy(whole, &limits, sizeof whole);
+  for (size = 0; size <= 64; ++size) {
+    const uint32_t own = (uint32_t)size;
+    memset(memory, API_PATTERN, sizeof memory);
+    tv_limits_init_sized((tv_limits *)(void *)memory, size);
+    TEST_ASSERT_EQUAL_INT(0, memcmp(&own, memory, size < 4 ? size : 4));
+    for (k = 4; k < size; ++k) TEST_ASSERT_EQUAL_UINT8(k < sizeof whole ? whole[k] : 0, memory[k]);
+    TEST_ASSERT_TRUE(api_is_pattern(memory + size, sizeof memory - size));
+  }
+  tv_limits_init_sized(NULL, 24);
 }
 
 static void test_the_size_query_needs_somewhere_to_write(void) {
@@ -215,7 +260,7 @@ static void test_a_null_context_is_answered(void) {
   TEST_ASSERT_EQUAL_INT(TV_KERNELS_AUTO, tv_context_kernels(NULL));
   TEST_ASSERT_EQUAL_UINT64(0, tv_context_high_water(NULL));
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_set_clock(NULL, NULL, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_take_times(NULL, times));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_take_times(NULL, times, TV_NUM_STAGES));
 }
 
 static void test_strings_name_every_value(void) {
@@ -245,22 +290,27 @@ static void test_times_come_from_the_callers_clock_and_start_again(void) {
   api_context a = api_make(&limits);
   const tv_image image = api_image(pixels, 64, 48, 64);
   tv_keypoint keypoints[32];
-  uint64_t times[TV_NUM_STAGES], ticks = 100;
+  uint64_t times[TV_NUM_STAGES + 2], ticks = 100;
   tv_feature_options options;
   int32_t count, k;
   tv_feature_options_init(&options);
   options.max_keypoints = 32;
   api_draw(1, pixels, 64, 48);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_detect(a.context, &image, NULL, &options, keypoints, 32, &count));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times));
-  for (k = 0; k < TV_NUM_STAGES; ++k) TEST_ASSERT_EQUAL_UINT64(0, times[k]);
+  memset(times, API_PATTERN, sizeof times);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times, TV_NUM_STAGES + 1));
+  for (k = 0; k <= TV_NUM_STAGES; ++k) TEST_ASSERT_EQUAL_UINT64(0, times[k]);
+  TEST_ASSERT_TRUE(api_is_pattern(&times[TV_NUM_STAGES + 1], sizeof times[0]));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_set_clock(a.context, ticking, &ticks));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_detect(a.context, &image, NULL, &options, keypoints, 32, &count));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_take_times(a.context, NULL));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_context_take_times(a.context, NULL, 1));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_context_take_times(a.context, times, -1));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times, TV_STAGE_DETECT + 1));
+  TEST_ASSERT_TRUE(api_is_pattern(&times[TV_NUM_STAGES + 1], sizeof times[0]));
   TEST_ASSERT_EQUAL_UINT64(5, times[TV_STAGE_DETECT]);
   TEST_ASSERT_EQUAL_UINT64(0, times[TV_STAGE_MATCH]);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, NULL, 0));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_take_times(a.context, times, TV_NUM_STAGES));
   TEST_ASSERT_EQUAL_UINT64(0, times[TV_STAGE_DETECT]);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_set_clock(a.context, NULL, NULL));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_detect(a.context, &image, NULL, &options, keypoints, 32, &count));
@@ -272,7 +322,10 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_limits_have_the_documented_defaults);
   RUN_TEST(test_limits_out_of_range_are_refused);
-  RUN_TEST(test_a_struct_of_another_size_is_refused);
+  RUN_TEST(test_a_size_that_no_struct_has_is_refused);
+  RUN_TEST(test_an_older_callers_missing_fields_have_their_defaults);
+  RUN_TEST(test_a_newer_callers_unknown_fields_must_be_zero);
+  RUN_TEST(test_init_writes_as_far_as_the_callers_size);
   RUN_TEST(test_the_size_query_needs_somewhere_to_write);
   RUN_TEST(test_the_extreme_limits_have_a_size);
   RUN_TEST(test_a_vga_context_is_within_8_mib);

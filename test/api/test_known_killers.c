@@ -6,6 +6,7 @@
 #include <time.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 #include "twoview/alloc.h"
 
 enum { MAX_MATCHES = 100000, MANY = 1000 };
@@ -90,8 +91,8 @@ static void estimate(const tv_camera *camera, int count) {
   const clock_t start = clock();
   tv_two_view_init(&result);
   memset(mask, 0x5A, (size_t)count);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context, camera, camera, pixels[0], pixels[1],
-                                                    ratios, count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(context, camera, camera, pixels[0], pixels[1],
+                                               ratios, count, &options, &result, mask));
   TEST_ASSERT_TRUE((double)(clock() - start) / CLOCKS_PER_SEC < max_seconds);
   expect_sound(count);
 }
@@ -463,8 +464,8 @@ static void test_thresholds_of_nothing_are_refused_and_of_everything_conclude_no
   for (k = 0; k < 5; ++k) {
     options.max_error_px = refused[k];
     tv_two_view_init(&result);
-    TEST_ASSERT_TRUE(tv_estimate_two_view(context, &lenses[0], &lenses[0], pixels[0], pixels[1],
-                                          ratios, 300, &options, &result, mask) != TV_OK);
+    TEST_ASSERT_TRUE(estimate_pixels(context, &lenses[0], &lenses[0], pixels[0], pixels[1], ratios,
+                                     300, &options, &result, mask) != TV_OK);
   }
   options.max_error_px = 1e9; /* every model fits every match */
   TEST_ASSERT_TRUE(estimate_every_way(300).verdict != TV_VERDICT_OK);

@@ -5,6 +5,7 @@
 #include <unity.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 
 enum { COUNT = 50 };
 
@@ -39,7 +40,7 @@ static void refused(tv_status expected, tv_context *context, const uint8_t *d0, 
                     int32_t capacity) {
   int32_t count = -7;
   TEST_ASSERT_EQUAL_INT(expected,
-                        tv_match(context, d0, num0, d1, num1, options, found, capacity, &count));
+                        match_rows(context, d0, num0, d1, num1, options, found, capacity, &count));
   TEST_ASSERT_EQUAL_INT(-7, count);
   TEST_ASSERT_TRUE(api_is_pattern(found, sizeof found));
 }
@@ -50,9 +51,9 @@ static void test_null_pointers_are_refused(void) {
   refused(TV_ERR_NULL, a.context, NULL, 1, descriptors1, 1, NULL, 1);
   refused(TV_ERR_NULL, a.context, descriptors0, 1, NULL, 1, NULL, 1);
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_match(a.context, descriptors0, 1, descriptors1, 1, NULL, found, 1, NULL));
+      TV_ERR_NULL, match_rows(a.context, descriptors0, 1, descriptors1, 1, NULL, found, 1, NULL));
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_NULL, tv_match(a.context, descriptors0, 1, descriptors1, 1, NULL, NULL, 1, &count));
+      TV_ERR_NULL, match_rows(a.context, descriptors0, 1, descriptors1, 1, NULL, NULL, 1, &count));
 }
 
 static void test_counts_out_of_range_are_refused(void) {
@@ -85,20 +86,20 @@ static void test_a_full_context_matches_in_its_memory(void) {
   int32_t count = 0, k;
   tv_match_options options;
   tv_match_options_init(&options);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(a.context, descriptors0, COUNT, descriptors1, COUNT,
-                                        &options, found, COUNT, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(a.context, descriptors0, COUNT, descriptors1, COUNT,
+                                          &options, found, COUNT, &count));
   TEST_ASSERT_EQUAL_INT(COUNT, count);
   for (k = 0; k < count; ++k) TEST_ASSERT_EQUAL_INT(k, found[k].idx1);
 }
 
 static void test_capacity_is_told_and_the_least_of_both_is_enough(void) {
   int32_t count = 0;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(a.context, descriptors0, COUNT, descriptors1, 20,
-                                                  NULL, found, 19, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, match_rows(a.context, descriptors0, COUNT, descriptors1,
+                                                    20, NULL, found, 19, &count));
   TEST_ASSERT_EQUAL_INT(20, count);
   TEST_ASSERT_TRUE(api_is_pattern(found, sizeof found));
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_match(a.context, descriptors0, COUNT, descriptors1, 20, NULL, found, 20, &count));
+      TV_OK, match_rows(a.context, descriptors0, COUNT, descriptors1, 20, NULL, found, 20, &count));
   TEST_ASSERT_TRUE(api_is_pattern(found + 20, sizeof found - 20 * sizeof found[0]));
 }
 
@@ -108,12 +109,12 @@ static void test_two_contexts_give_the_same_bytes(void) {
   tv_correspondence other[COUNT];
   int32_t count = 0, other_count = 0;
   memset(other, API_PATTERN, sizeof other);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(b.context, descriptors1, 30, descriptors0, COUNT, NULL,
-                                        other, COUNT, &other_count));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(a.context, descriptors0, COUNT, descriptors1, COUNT, NULL,
-                                        found, COUNT, &count));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(b.context, descriptors0, COUNT, descriptors1, COUNT, NULL,
-                                        other, COUNT, &other_count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(b.context, descriptors1, 30, descriptors0, COUNT, NULL,
+                                          other, COUNT, &other_count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(a.context, descriptors0, COUNT, descriptors1, COUNT, NULL,
+                                          found, COUNT, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(b.context, descriptors0, COUNT, descriptors1, COUNT, NULL,
+                                          other, COUNT, &other_count));
   TEST_ASSERT_EQUAL_INT(count, other_count);
   TEST_ASSERT_EQUAL_MEMORY(found, other, sizeof found);
   api_release(&b);

@@ -4,6 +4,7 @@
 #include <unity.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
 extern void *__libc_malloc(size_t size);
@@ -87,8 +88,8 @@ static void call_stages(void) {
                                             descriptors[v], MOST, &counts[v]));
     TEST_ASSERT_TRUE(counts[v] > 100);
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(context.context, descriptors[0], counts[0], descriptors[1],
-                                        counts[1], NULL, matches, MOST, &num));
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(context.context, descriptors[0], counts[0],
+                                          descriptors[1], counts[1], NULL, matches, MOST, &num));
   TEST_ASSERT_TRUE(num > 50);
   for (k = 0; k < num; ++k) {
     at[0][2 * k] = keypoints[0][matches[k].idx0].x;
@@ -98,19 +99,20 @@ static void call_stages(void) {
     ratios[k] = matches[k].ratio;
   }
   tv_two_view_init(&pose);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context.context, &c, &c, at[0], at[1], ratios,
-                                                    num, NULL, &pose, inliers));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(context.context, &c, &c, at[0], at[1], ratios, num,
+                                               NULL, &pose, inliers));
   TEST_ASSERT_TRUE(pose.has_F);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match_guided(context.context, NULL, NULL, pose.F, keypoints[0],
-                                               descriptors[0], counts[0], keypoints[1],
-                                               descriptors[1], counts[1], NULL, guided, MOST, &k));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, match_rows_guided(context.context, NULL, NULL, pose.F, keypoints[0], descriptors[0],
+                               counts[0], keypoints[1], descriptors[1], counts[1], NULL, guided,
+                               MOST, &k));
   tv_two_view_init(&pose);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context.context, NULL, NULL, at[0], at[1], NULL,
-                                                    num, NULL, &pose, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(context.context, NULL, NULL, at[0], at[1], NULL, num,
+                                               NULL, &pose, NULL));
   TEST_ASSERT_EQUAL_INT(
       TV_OK, tv_triangulate(TV_TRIANGULATION_POLY, &c, &c, R, t, at[0], at[1], num, points));
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(context.context, &c, &c, at[0], at[1], num, NULL,
-                                                  R, t, points, NULL));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, adjust_pixels(context.context, &c, &c, at[0], at[1], num, NULL, R, t, points, NULL));
   TEST_ASSERT_EQUAL_INT(TV_OK,
                         tv_point_covariances(&c, &c, R, t, NULL, 0.5, points, num, covariances));
 }
@@ -121,10 +123,8 @@ static void call_reconstruct(void) {
   tv_two_view pose;
   tv_reconstruction cloud;
   int32_t v;
-  memset(views, 0, sizeof views);
   for (v = 0; v < 2; ++v) {
-    views[v].image = api_image(pixels[v], WIDTH, HEIGHT, WIDTH);
-    views[v].camera = &c;
+    views[v] = view_of(api_image(pixels[v], WIDTH, HEIGHT, WIDTH), &c, NULL);
   }
   tv_two_view_init(&pose);
   tv_reconstruction_init(&cloud);

@@ -6,6 +6,7 @@
 #include <unity.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 #include "support/real_pair.h"
 
 enum { WIDTH = 200, HEIGHT = 150, CAP = 300 };
@@ -57,9 +58,7 @@ void setUp(void) {
   draw_pair(81);
   camera = camera_of(WIDTH, HEIGHT);
   for (v = 0; v < 2; ++v) {
-    views[v].image = api_image(drawn[v], WIDTH, HEIGHT, WIDTH);
-    views[v].camera = &camera;
-    views[v].mask = NULL;
+    views[v] = view_of(api_image(drawn[v], WIDTH, HEIGHT, WIDTH), &camera, NULL);
   }
   tv_two_view_init(&two_view);
   tv_reconstruction_init(&reconstruction);
@@ -125,7 +124,13 @@ static void test_structs_of_another_size_are_refused(void) {
     *sizes[k] = 3;
     refused(TV_ERR_STRUCT_SIZE, &o.all);
   }
-  two_view.struct_size += 8;
+  for (k = 0; k < 2; ++k) {
+    const uint32_t size = views[k].struct_size;
+    views[k].struct_size = 0;
+    refused(TV_ERR_STRUCT_SIZE, NULL);
+    views[k].struct_size = size;
+  }
+  two_view.struct_size += 1;
   refused(TV_ERR_STRUCT_SIZE, NULL);
   tv_two_view_init(&two_view);
   reconstruction.struct_size = 0;

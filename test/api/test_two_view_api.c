@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 
 enum { MAX_MATCHES = 1000 };
 
@@ -231,16 +232,16 @@ static void expect_sound(int count, int cameras_given) {
 
 static void estimate(int count) {
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0,
-                                                    pixels1, NULL, count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1,
+                                               NULL, count, &options, &result, mask));
   expect_sound(count, 1);
 }
 
 static void estimate_uncalibrated(int count, int method) {
   options.method = method;
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, NULL, NULL, pixels0, pixels1, NULL,
-                                                    count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, NULL, NULL, pixels0, pixels1, NULL,
+                                               count, &options, &result, mask));
   expect_sound(count, 0);
 }
 
@@ -251,8 +252,8 @@ static void expect_refusal(tv_status expected, const tv_camera *c0, const tv_cam
   before.struct_size = sizeof before;
   result = before;
   memset(mask, API_PATTERN, sizeof mask);
-  TEST_ASSERT_EQUAL_INT(expected, tv_estimate_two_view(api.context, c0, c1, pixels0, pixels1, NULL,
-                                                       count, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(expected, estimate_pixels(api.context, c0, c1, pixels0, pixels1, NULL,
+                                                  count, &options, &result, mask));
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
   TEST_ASSERT_TRUE(api_is_pattern(mask, sizeof mask));
 }
@@ -284,14 +285,14 @@ static void test_init_sets_the_documented_defaults(void) {
 static void test_null_pointers_are_refused(void) {
   const tv_camera *c0 = &camera0, *c1 = &camera1;
   const tv_two_view before = result;
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_estimate_two_view(NULL, c0, c1, pixels0, pixels1, NULL, 10,
-                                                          &options, &result, mask));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_estimate_two_view(api.context, c0, c1, NULL, pixels1, NULL,
-                                                          10, &options, &result, mask));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_estimate_two_view(api.context, c0, c1, pixels0, NULL, NULL,
-                                                          10, &options, &result, mask));
-  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_estimate_two_view(api.context, c0, c1, pixels0, pixels1,
-                                                          NULL, 10, &options, NULL, mask));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, estimate_pixels(NULL, c0, c1, pixels0, pixels1, NULL, 10,
+                                                     &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, estimate_pixels(api.context, c0, c1, NULL, pixels1, NULL, 10,
+                                                     &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, estimate_pixels(api.context, c0, c1, pixels0, NULL, NULL, 10,
+                                                     &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, estimate_pixels(api.context, c0, c1, pixels0, pixels1, NULL,
+                                                     10, &options, NULL, mask));
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
   TEST_ASSERT_TRUE(api_is_pattern(mask, sizeof mask));
 }
@@ -300,15 +301,14 @@ static void test_null_is_fine_where_the_header_says_so(void) {
   tv_two_view with_mask;
   estimate(MAX_MATCHES);
   with_mask = result;
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1, NULL,
-                                  MAX_MATCHES, NULL, &result, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1,
+                                               NULL, MAX_MATCHES, NULL, &result, NULL));
   TEST_ASSERT_EQUAL_MEMORY(&with_mask, &result, sizeof result);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, NULL, NULL,
-                                                    NULL, 0, &options, &result, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, &camera0, &camera1, NULL, NULL, NULL, 0,
+                                               &options, &result, NULL));
   TEST_ASSERT_EQUAL_INT(TV_KIND_DEGENERATE, result.kind);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, NULL, NULL, pixels0, pixels1, NULL,
-                                                    MAX_MATCHES, NULL, &result, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, NULL, NULL, pixels0, pixels1, NULL,
+                                               MAX_MATCHES, NULL, &result, NULL));
   TEST_ASSERT_EQUAL_INT(TV_KIND_UNCALIBRATED, result.kind);
 }
 
@@ -319,8 +319,8 @@ static void test_wrong_struct_sizes_are_refused(void) {
   memset(&result, 0, sizeof result);
   before = result;
   TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE,
-                        tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1,
-                                             NULL, 10, &options, &result, mask));
+                        estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1, NULL, 10,
+                                        &options, &result, mask));
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
 }
 
@@ -367,15 +367,15 @@ static void test_cameras_are_checked(void) {
 
 static void test_the_mask_may_not_lie_over_an_input(void) {
   const tv_two_view before = result;
-  TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1, NULL,
-                                           10, &options, &result, (uint8_t *)pixels0));
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
-                        tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1,
-                                             ratios, 10, &options, &result, (uint8_t *)ratios));
+                        estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1, NULL, 10,
+                                        &options, &result, (uint8_t *)pixels0));
   TEST_ASSERT_EQUAL_INT(
-      TV_ERR_OVERLAP, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1, NULL,
-                                           10, &options, &result, (uint8_t *)&result + 8));
+      TV_ERR_OVERLAP, estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1, ratios, 10,
+                                      &options, &result, (uint8_t *)ratios));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1, NULL, 10,
+                                        &options, &result, (uint8_t *)&result + 8));
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
 }
 
@@ -431,9 +431,8 @@ static void test_pixels_that_are_not_finite_are_never_inliers(void) {
   for (i = 0; i < MAX_MATCHES; ++i) ratios[i] = i % 7 == 0 ? NAN : i % 11 == 0 ? INFINITY : 0.5f;
   estimate(MAX_MATCHES);
   for (i = 0; i < MAX_MATCHES; ++i) TEST_ASSERT_EQUAL_INT(i % 3 != 0 || i >= 120, mask[i]);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, pixels0, pixels1, ratios,
-                                  MAX_MATCHES, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(api.context, &camera0, &camera1, pixels0, pixels1,
+                                               ratios, MAX_MATCHES, &options, &result, mask));
   expect_sound(MAX_MATCHES, 1);
   TEST_ASSERT_EQUAL_INT(MAX_MATCHES - 40, result.num_inliers);
   for (i = 0; i < 2 * MAX_MATCHES; ++i) pixels0[i] = NAN;
@@ -602,16 +601,16 @@ static void test_a_hundred_thousand_matches_fit_a_context_of_that_size(void) {
     memcpy(many0 + 2 * MAX_MATCHES * i, pixels0, sizeof pixels0);
     memcpy(many1 + 2 * MAX_MATCHES * i, pixels1, sizeof pixels1);
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(large.context, &camera0, &camera1, many0, many1,
-                                                    NULL, MANY, &options, &result, many_mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(large.context, &camera0, &camera1, many0, many1,
+                                               NULL, MANY, &options, &result, many_mask));
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_OK, result.verdict);
   TEST_ASSERT_TRUE(distance(true_R, result.R, 9) < 1e-4);
   for (i = 0; i < MANY; ++i) inliers += many_mask[i];
   TEST_ASSERT_EQUAL_INT(inliers, result.num_inliers);
   TEST_ASSERT_TRUE(inliers >= 7 * MANY / 10);
   TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS,
-                        tv_estimate_two_view(large.context, &camera0, &camera1, many0, many1, NULL,
-                                             MANY + 1, &options, &result, NULL));
+                        estimate_pixels(large.context, &camera0, &camera1, many0, many1, NULL,
+                                        MANY + 1, &options, &result, NULL));
   api_release(&large);
   free(many0);
   free(many1);

@@ -112,10 +112,10 @@ void test_a_reconstruction_finds_the_true_motion() {
   tv_context* context = nullptr;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_new(&context, &limits));
   tv_view views[2];
-  std::memset(views, 0, sizeof views);
   for (int k = 0; k < 2; ++k) {
     room::add_sensor_noise(films[k].luma.data(), kWidth, kHeight, kWidth, 2,
                            static_cast<uint64_t>(k));
+    tv_view_init(&views[k]);
     views[k].image = tv_image{films[k].luma.data(), kWidth, kHeight, kWidth};
     views[k].camera = &camera;
   }

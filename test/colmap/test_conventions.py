@@ -82,12 +82,12 @@ def test_keypoints_of_any_width_are_read(columns):
 
 def test_configuration_codes_are_colmaps():
     codes = pycolmap.TwoViewGeometryConfiguration
-    for ours, name in ((tv.Config.DEGENERATE, "DEGENERATE"), (tv.Config.CALIBRATED, "CALIBRATED"),
-                       (tv.Config.UNCALIBRATED, "UNCALIBRATED"), (tv.Config.PLANAR, "PLANAR"),
-                       (tv.Config.PANORAMIC, "PANORAMIC"), (tv.Config.NO_MOTION, "PANORAMIC"),
-                       (tv.Config.PLANAR_OR_PANORAMIC, "PLANAR_OR_PANORAMIC")):
+    for ours, name in ((tv.Kind.DEGENERATE, "DEGENERATE"), (tv.Kind.CALIBRATED, "CALIBRATED"),
+                       (tv.Kind.UNCALIBRATED, "UNCALIBRATED"), (tv.Kind.PLANAR, "PLANAR"),
+                       (tv.Kind.PANORAMIC, "PANORAMIC"), (tv.Kind.NO_MOTION, "PANORAMIC"),
+                       (tv.Kind.PLANAR_OR_PANORAMIC, "PLANAR_OR_PANORAMIC")):
         assert conventions.CONFIGURATIONS[ours] == getattr(codes, name).value
-    assert set(conventions.CONFIGURATIONS) == set(tv.Config)
+    assert set(conventions.CONFIGURATIONS) == set(tv.Kind)
 
 
 def test_pair_ids_are_colmaps():
@@ -188,5 +188,5 @@ def test_a_rotation_is_a_panorama_without_translation():
 def test_no_geometry_keeps_no_match():
     random = np.random.default_rng(2)
     found, row = estimate(*(np.ascontiguousarray(random.uniform(0, 400, (40, 2))) for _ in range(2)))
-    assert found.config == tv.Config.DEGENERATE
+    assert found.kind == tv.Kind.DEGENERATE
     assert row.config == 1 and row.inlier_matches.shape == (0, 2) and row.F is None

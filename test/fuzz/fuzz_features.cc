@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "fuzz.h"
+#include "support/calls.h"
 
 namespace {
 
@@ -76,8 +77,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   tv_correspondence matches[kMaxKeypoints];
   int32_t count = 0;
-  if (tv_match(context, descriptors[0].data(), counts[0], descriptors[1].data(), counts[1],
-               &match_options, matches, std::min(counts[0], counts[1]), &count) != TV_OK)
+  if (match_rows(context, descriptors[0].data(), counts[0], descriptors[1].data(), counts[1],
+                 &match_options, matches, std::min(counts[0], counts[1]), &count) != TV_OK)
     return 0;
   for (int i = 0; i < count; ++i) {
     FUZZ_REQUIRE(matches[i].idx0 >= 0 && matches[i].idx0 < counts[0]);

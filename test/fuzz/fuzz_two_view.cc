@@ -1,5 +1,6 @@
 // tv_estimate_two_view: any matches, any options; swapped views as well.
 #include "fuzz.h"
+#include "support/calls.h"
 
 namespace {
 
@@ -79,8 +80,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   for (int swap = 0; swap < 2; ++swap) {
     tv_two_view_init(&result[swap]);
     status[swap] =
-        tv_estimate_two_view(context, given[swap], given[1 - swap], pixels[swap], pixels[1 - swap],
-                             ratios, count, &options, &result[swap], mask[swap]);
+        estimate_pixels(context, given[swap], given[1 - swap], pixels[swap], pixels[1 - swap],
+                        ratios, count, &options, &result[swap], mask[swap]);
     if (status[swap] == TV_OK) require_sound(result[swap], mask[swap], count);
     if (options.gravity_sigma_rad != 0) return 0;  // gravity belongs to its view
   }

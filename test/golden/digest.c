@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../support/calls.h"
 #include "twoview/alloc.h"
 #include "twoview/twoview.h"
 
@@ -253,8 +254,8 @@ typedef struct matched {
 static void digest_matches(const pair *p, tv_context *context, const features *f, matched *m) {
   int32_t k, v;
   start();
-  must("match", tv_match(context, f->descriptors[0], f->count[0], f->descriptors[1], f->count[1],
-                         NULL, m->matches, MAX_KEYPOINTS, &m->count));
+  must("match", match_rows(context, f->descriptors[0], f->count[0], f->descriptors[1], f->count[1],
+                           NULL, m->matches, MAX_KEYPOINTS, &m->count));
   add_matches(m->matches, m->count);
   print(p, context, "matches");
   for (k = 0; k < m->count; ++k) {
@@ -272,9 +273,8 @@ static void estimate_with(const tv_camera *camera0, const tv_camera *camera1, tv
                           tv_two_view *result) {
   uint8_t inliers[MAX_KEYPOINTS];
   tv_two_view_init(result);
-  must("estimate_two_view",
-       tv_estimate_two_view(context, camera0, camera1, m->pixels[0], m->pixels[1], m->ratios,
-                            m->count, options, result, inliers));
+  must("estimate_two_view", estimate_pixels(context, camera0, camera1, m->pixels[0], m->pixels[1],
+                                            m->ratios, m->count, options, result, inliers));
   add_two_view(result);
   add_bytes(inliers, (size_t)m->count);
 }
@@ -365,14 +365,14 @@ static void digest_guided(const pair *p, tv_context *context, const features *f,
   int32_t count;
   start();
   must("match_guided",
-       tv_match_guided(context, &p->camera[0], &p->camera[1], pose->E, f->keypoints[0],
-                       f->descriptors[0], f->count[0], f->keypoints[1], f->descriptors[1],
-                       f->count[1], NULL, found, MAX_KEYPOINTS, &count));
+       match_rows_guided(context, &p->camera[0], &p->camera[1], pose->E, f->keypoints[0],
+                         f->descriptors[0], f->count[0], f->keypoints[1], f->descriptors[1],
+                         f->count[1], NULL, found, MAX_KEYPOINTS, &count));
   add_matches(found, count);
   must("match_guided",
-       tv_match_guided(context, NULL, NULL, pose->F, f->keypoints[0], f->descriptors[0],
-                       f->count[0], f->keypoints[1], f->descriptors[1], f->count[1], NULL, found,
-                       MAX_KEYPOINTS, &count));
+       match_rows_guided(context, NULL, NULL, pose->F, f->keypoints[0], f->descriptors[0],
+                         f->count[0], f->keypoints[1], f->descriptors[1], f->count[1], NULL, found,
+                         MAX_KEYPOINTS, &count));
   add_matches(found, count);
   print(p, context, "guided");
 }
@@ -425,8 +425,8 @@ static void digest_bundle(const pair *p, tv_context *context, const matched *m,
     memcpy(adjusted, points, sizeof adjusted);
     tv_bundle_result_init(&result);
     must("adjust_two_view",
-         tv_adjust_two_view(context, &p->camera[0], &p->camera[1], m->pixels[0], m->pixels[1],
-                            m->count, &options, R, t, adjusted, &result));
+         adjust_pixels(context, &p->camera[0], &p->camera[1], m->pixels[0], m->pixels[1], m->count,
+                       &options, R, t, adjusted, &result));
     add_bundle(&result);
     add_doubles(R, 9);
     add_doubles(t, 3);
@@ -449,9 +449,7 @@ static void digest_reconstruct(const pair *p, tv_context *context) {
   options.feature = &feature;
   options.guided_matching = options.bundle_adjustment = 1;
   for (v = 0; v < 2; ++v) {
-    view[v].image = p->image[v];
-    view[v].camera = &p->camera[v];
-    view[v].mask = NULL;
+    view[v] = view_of(p->image[v], &p->camera[v], NULL);
   }
   tv_two_view_init(&pose);
   tv_reconstruction_init(&cloud);

@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include "support/bundle_scene.h"
+#include "support/calls.h"
 #include "twoview/alloc.h"
 
 using bundle_scene::Geometry;
@@ -115,8 +116,8 @@ Counts run(const Options& base, const tv_bundle_options& bundle, int num_pairs, 
     tv_bundle_result result;
     tv_bundle_result_init(&result);
     TEST_ASSERT_EQUAL_INT(
-        TV_OK, tv_adjust_two_view(context, &options.camera[0], &options.camera[1], pair.pixels[0],
-                                  pair.pixels[1], options.num, &bundle, R, t, points, &result));
+        TV_OK, adjust_pixels(context, &options.camera[0], &options.camera[1], pair.pixels[0],
+                             pair.pixels[1], options.num, &bundle, R, t, points, &result));
     TEST_ASSERT_TRUE(result.converged);
     if (bundle.hold_pose != 0) {
       TEST_ASSERT_EQUAL_MEMORY(pair.start_R, R, sizeof R);

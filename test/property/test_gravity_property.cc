@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "support/api.h"
+#include "support/calls.h"
 #include "support/scene.h"
 
 void setUp(void) {}
@@ -43,9 +44,9 @@ tv_estimate_options options_of(int method, const Gravity& gravity) {
 
 tv_status estimate(const tv_estimate_options& options, tv_two_view* result) {
   tv_two_view_init(result);
-  return tv_estimate_two_view(api.context, &pair.options.camera[0], &pair.options.camera[1],
-                              pair.pixels[0], pair.pixels[1], nullptr, pair.options.num, &options,
-                              result, nullptr);
+  return estimate_pixels(api.context, &pair.options.camera[0], &pair.options.camera[1],
+                         pair.pixels[0], pair.pixels[1], nullptr, pair.options.num, &options,
+                         result, nullptr);
 }
 
 tv_two_view estimated(int method, const Gravity& gravity) {
@@ -269,8 +270,8 @@ void test_the_upright_method_needs_cameras(void) {
   tv_two_view_init(&result);
   TEST_ASSERT_EQUAL_INT(
       TV_ERR_ARGUMENT,
-      tv_estimate_two_view(api.context, nullptr, nullptr, pair.pixels[0], pair.pixels[1], nullptr,
-                           pair.options.num, &options, &result, nullptr));
+      estimate_pixels(api.context, nullptr, nullptr, pair.pixels[0], pair.pixels[1], nullptr,
+                      pair.options.num, &options, &result, nullptr));
 }
 
 // Extremes end, and leave no number undefined.

@@ -8,6 +8,7 @@
 #include "geometry/sampson.h"
 #include "robust/principal_point.h"
 #include "support/api.h"
+#include "support/calls.h"
 #include "support/scene.h"
 
 void setUp(void) {}
@@ -42,9 +43,9 @@ tv_status estimate(const tv_camera& camera0, const tv_camera& camera1, double si
   options.principal_point_sigma = sigma;
   tv_two_view_init(result);
   const int a = swapped ? 1 : 0;
-  return tv_estimate_two_view(api.context, swapped ? &camera1 : &camera0,
-                              swapped ? &camera0 : &camera1, pair.pixels[a], pair.pixels[1 - a],
-                              nullptr, pair.options.num, &options, result, nullptr);
+  return estimate_pixels(api.context, swapped ? &camera1 : &camera0, swapped ? &camera0 : &camera1,
+                         pair.pixels[a], pair.pixels[1 - a], nullptr, pair.options.num, &options,
+                         result, nullptr);
 }
 
 tv_two_view estimated(const tv_camera& camera, double sigma = 0.01) {

@@ -17,6 +17,7 @@
 #include "base/random.h"
 #include "geometry/essential.h"
 #include "support/api.h"
+#include "support/calls.h"
 #include "twoview/twoview.h"
 
 namespace {
@@ -176,8 +177,8 @@ tv_two_view estimate(const Scene& s, const Kind& k, const tv_estimate_options& o
   tv_two_view_init(&result);
   TEST_ASSERT_EQUAL_INT(
       TV_OK,
-      tv_estimate_two_view(api.context, &k.camera, &k.camera, s.pixels[swapped], s.pixels[!swapped],
-                           k.with_ratios ? s.ratios : nullptr, s.num, &options, &result, inlier));
+      estimate_pixels(api.context, &k.camera, &k.camera, s.pixels[swapped], s.pixels[!swapped],
+                      k.with_ratios ? s.ratios : nullptr, s.num, &options, &result, inlier));
   return result;
 }
 

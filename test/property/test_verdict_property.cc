@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "support/calls.h"
 #include "support/estimator.h"
 #include "support/scene.h"
 #include "twoview/two_view.h"
@@ -31,8 +32,8 @@ tv_two_view estimate(const tv_camera* cameras, const double* pixels0, const doub
   tv_two_view result;
   tv_two_view_init(&result);
   const tv_camera* second = cameras == nullptr ? nullptr : cameras + 1;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(context, cameras, second, pixels0, pixels1,
-                                                    ratios, num, &options, &result, mask));
+  TEST_ASSERT_EQUAL_INT(TV_OK, estimate_pixels(context, cameras, second, pixels0, pixels1, ratios,
+                                               num, &options, &result, mask));
   const double* arrays[] = {result.R,
                             result.t,
                             result.E,

@@ -4,6 +4,7 @@
 // moves them. TWOVIEW_VERBOSE=1 prints each pair that is misnamed, and each wrong "ok".
 #include <cstdlib>
 
+#include "support/calls.h"
 #include "support/estimator.h"
 #include "support/pair_kinds.h"
 #include "twoview/two_view.h"
@@ -78,9 +79,9 @@ void judge(uint64_t seed) {
   tv_estimate_options_init(&options);
   tv_two_view r;
   tv_two_view_init(&r);
-  TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_estimate_two_view(context, &pair.camera[0], &pair.camera[1], pair.pixels[0],
-                                  pair.pixels[1], nullptr, pair.num, &options, &r, nullptr));
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        estimate_pixels(context, &pair.camera[0], &pair.camera[1], pair.pixels[0],
+                                        pair.pixels[1], nullptr, pair.num, &options, &r, nullptr));
   Count& c = counts[pair.kind];
   ++c.pairs;
   const bool named = named_right(r), ok = r.verdict == TV_VERDICT_OK;

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "support/calls.h"
 #include "support/estimator.h"
 #include "support/scene.h"
 #include "twoview/two_view.h"
@@ -130,8 +131,8 @@ void estimate(int view, int index) {
   tv_two_view result;
   tv_two_view_init(&result);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_estimate_two_view(context, camera, camera, pair.pixels[0], pair.pixels[1], nullptr,
-                                  kNum, nullptr, &result, nullptr));
+      TV_OK, estimate_pixels(context, camera, camera, pair.pixels[0], pair.pixels[1], nullptr, kNum,
+                             nullptr, &result, nullptr));
   double primary = kInfinite, other = kInfinite;
   if (result.has_R && result.has_t) primary = pose_error_deg(result.R, result.t);
   if (result.has_alternative) {

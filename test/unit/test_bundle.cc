@@ -5,6 +5,7 @@
 
 #include "robust/bundle_match.h"
 #include "support/bundle_scene.h"
+#include "support/calls.h"
 #include "twoview/alloc.h"
 
 using bundle_scene::Geometry;
@@ -48,9 +49,8 @@ void begin() {
 }
 
 tv_status adjust(const tv_bundle_options& bundle) {
-  return tv_adjust_two_view(context, &pair.options.camera[0], &pair.options.camera[1],
-                            pair.pixels[0], pair.pixels[1], pair.options.num, &bundle, R, t, points,
-                            &result);
+  return adjust_pixels(context, &pair.options.camera[0], &pair.options.camera[1], pair.pixels[0],
+                       pair.pixels[1], pair.options.num, &bundle, R, t, points, &result);
 }
 
 // ---- one match ----

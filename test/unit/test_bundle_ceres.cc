@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/bundle_scene.h"
+#include "support/calls.h"
 #include "twoview/alloc.h"
 
 using bundle_scene::Geometry;
@@ -194,9 +195,8 @@ Answer solve_ours(const Scene& s, const tv_bundle_options& options, Start* end,
   tv_bundle_result_init(result);
   const double begin = now_ms();
   TEST_ASSERT_EQUAL_INT(
-      TV_OK,
-      tv_adjust_two_view(context, &s.options.camera[0], &s.options.camera[1], s.pixels[0],
-                         s.pixels[1], s.options.num, &options, end->R, end->t, points, result));
+      TV_OK, adjust_pixels(context, &s.options.camera[0], &s.options.camera[1], s.pixels[0],
+                           s.pixels[1], s.options.num, &options, end->R, end->t, points, result));
   return Answer{result->initial_cost, result->final_cost, now_ms() - begin, result->num_points,
                 result->num_iterations};
 }

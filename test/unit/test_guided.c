@@ -7,6 +7,7 @@
 #include <unity.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 
 enum { MAX_POINTS = 90, SIZE = TV_DESCRIPTOR_BYTES };
 
@@ -191,9 +192,10 @@ static int match_by_definition(const problem *p) {
 
 static int32_t run(const api_context *a, const problem *p, tv_correspondence *out) {
   int32_t count = -1;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match_guided(a->context, p->camera0, p->camera1, p->M, keypoints0,
-                                               descriptors0, p->num0, keypoints1, descriptors1,
-                                               p->num1, &p->options, out, MAX_POINTS, &count));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK,
+      match_rows_guided(a->context, p->camera0, p->camera1, p->M, keypoints0, descriptors0, p->num0,
+                        keypoints1, descriptors1, p->num1, &p->options, out, MAX_POINTS, &count));
   return count;
 }
 
@@ -201,9 +203,9 @@ static int32_t run_swapped(const api_context *a, const problem *p, tv_correspond
   double M[9];
   int32_t count = -1;
   transpose(p->M, M);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match_guided(a->context, p->camera1, p->camera0, M, keypoints1,
-                                               descriptors1, p->num1, keypoints0, descriptors0,
-                                               p->num0, &p->options, out, MAX_POINTS, &count));
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows_guided(a->context, p->camera1, p->camera0, M, keypoints1,
+                                                 descriptors1, p->num1, keypoints0, descriptors0,
+                                                 p->num0, &p->options, out, MAX_POINTS, &count));
   return count;
 }
 
@@ -326,8 +328,9 @@ static void test_repeated_structure_is_matched_along_the_lines(void) {
     memcpy(descriptors0 + k * SIZE, descriptors0 + k % 6 * SIZE, SIZE);
     memcpy(descriptors1 + k * SIZE, descriptors1 + k % 6 * SIZE, SIZE);
   }
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(contexts[0].context, descriptors0, MAX_POINTS, descriptors1,
-                                        MAX_POINTS, NULL, found, MAX_POINTS, &plain));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, match_rows(contexts[0].context, descriptors0, MAX_POINTS, descriptors1, MAX_POINTS,
+                        NULL, found, MAX_POINTS, &plain));
   TEST_ASSERT_EQUAL_INT(0, plain);
   p = make_problem(&camera0, &camera1, E);
   p.options.max_error_px = 1;

@@ -7,6 +7,7 @@
 #include <unity.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 
 enum { MANY = 2200, MAX_DESCRIPTORS = 120, SIZE = TV_DESCRIPTOR_BYTES };
 
@@ -80,7 +81,7 @@ static int32_t run(const api_context *a, const uint8_t *rows0, int32_t num0, con
   tv_match_options_init(&options);
   options.ratio = ratio;
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_match(a->context, rows0, num0, rows1, num1, &options, out, MANY, &count));
+      TV_OK, match_rows(a->context, rows0, num0, rows1, num1, &options, out, MANY, &count));
   return count;
 }
 
@@ -205,12 +206,12 @@ static void test_a_small_array_gets_the_count_and_nothing_else(void) {
   fill(&state, 2);
   memset(few, 0x5A, sizeof few);
   memset(untouched, 0x5A, sizeof untouched);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100,
-                                                  descriptors1, 100, NULL, few, 4, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, match_rows(contexts[0].context, descriptors0, 100,
+                                                    descriptors1, 100, NULL, few, 4, &count));
   TEST_ASSERT_EQUAL_INT(80, count);
   TEST_ASSERT_EQUAL_MEMORY(untouched, few, sizeof few);
-  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_match(contexts[0].context, descriptors0, 100,
-                                                  descriptors1, 100, NULL, NULL, 0, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, match_rows(contexts[0].context, descriptors0, 100,
+                                                    descriptors1, 100, NULL, NULL, 0, &count));
 }
 
 int main(void) {

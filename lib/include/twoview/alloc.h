@@ -1,5 +1,5 @@
-/* twoview: a convenience outside the library, for programs that do have a heap. Not included by
-   twoview.h: the library itself never allocates. */
+/* twoview: a context in memory from the heap, for programs that have one. This header is compiled
+   into the program and is not included by twoview.h, because the library itself never allocates. */
 #ifndef TWOVIEW_ALLOC_H
 #define TWOVIEW_ALLOC_H
 
@@ -8,8 +8,9 @@
 
 #include "twoview/context.h"
 
-/* A context in memory from the heap; release with tv_context_free. Statuses of tv_context_init, and
-   TV_ERR_MEMORY when the heap has none. */
+/* Makes a context in memory that malloc returns, and writes a pointer to it to *context. Release it
+   with tv_context_free.
+   Returns the statuses as tv_context_init does; TV_ERR_MEMORY where malloc fails. */
 static inline tv_status tv_context_new(tv_context **context, const tv_limits *limits) {
   size_t size_bytes = 0;
   tv_status status;
@@ -21,13 +22,14 @@ static inline tv_status tv_context_new(tv_context **context, const tv_limits *li
   if (block == NULL) return TV_ERR_MEMORY;
   memory = block + sizeof(void *);
   memory += TV_CONTEXT_ALIGNMENT - (uintptr_t)memory % TV_CONTEXT_ALIGNMENT;
-  memcpy(memory - sizeof(void *), &block, sizeof(void *)); /* for tv_context_free */
+  /* tv_context_free finds the block in front of the context. */
+  memcpy(memory - sizeof(void *), &block, sizeof(void *));
   status = tv_context_init(context, limits, memory, size_bytes);
   if (status != TV_OK) free(block);
   return status;
 }
 
-/* Releases a context of tv_context_new; null is allowed. */
+/* Frees a context that tv_context_new made; null is allowed. */
 static inline void tv_context_free(tv_context *context) {
   void *block;
   if (context == NULL) return;

@@ -1,7 +1,7 @@
 /* twoview: camera models, from pixels to rays and back.
 
-   D. C. Brown, "Close-range camera calibration", 1971; J. Kannala, S. Brandt, "A generic camera model and
-   calibration method", PAMI 2006. Formulas and tests: docs/algorithms/camera.md. */
+   D. C. Brown, "Close-range camera calibration", 1971; J. Kannala, S. Brandt, "A generic camera
+   model and calibration method", PAMI 2006. Formulas and tests: docs/algorithms/camera.md. */
 #ifndef TWOVIEW_CAMERA_H
 #define TWOVIEW_CAMERA_H
 
@@ -11,73 +11,98 @@
 
 TV_BEGIN_DECLS
 
-/* With (x, y) = (X/Z, Y/Z), r the length of (x, y), theta = atan(r), s the Brown-Conrady factor:
-   the distorted (x', y') is mapped to pixels (fx x' + cx, fy y' + cy). */
+/* The lens model. A point (X, Y, Z) of the camera frame has (x, y) = (X/Z, Y/Z); r is the length of
+   (x, y) and theta = atan(r). The model maps (x, y) to the distorted (x', y'), and the pixel is
+   (fx x' + cx, fy y' + cy). */
 typedef enum tv_camera_model {
-  TV_CAMERA_PINHOLE = 0,       /* no distortion; k is ignored */
-  TV_CAMERA_BROWN_CONRADY = 1, /* k = k1 k2 p1 p2 k3 [k4 k5 k6], OpenCV's order and formula */
-  TV_CAMERA_KANNALA_BRANDT = 2 /* k = k1..k4: theta (1 + k1 theta^2 + .. + k4 theta^8), OpenCV fisheye */
+  /* No distortion: x' = x, y' = y. The coefficients k are ignored. */
+  TV_CAMERA_PINHOLE = 0,
+  /* Radial and tangential distortion; k holds k1 k2 p1 p2 k3 [k4 k5 k6] in the order and with the
+     formula of OpenCV. */
+  TV_CAMERA_BROWN_CONRADY = 1,
+  /* Fisheye; k holds k1 k2 k3 k4. The distorted radius is theta (1 + k1 theta^2 + k2 theta^4 +
+     k3 theta^6 + k4 theta^8), as in OpenCV's fisheye module. */
+  TV_CAMERA_KANNALA_BRANDT = 2
 } tv_camera_model;
 
-/* Pixel (0,0) is the centre of the top-left pixel (OpenCV, ROS, Kalibr; COLMAP's origin is half a
-   pixel up and left: its cx, cy are ours + 0.5). */
+/* The intrinsics of a camera. Pixel (0, 0) is the centre of the top-left pixel, as in OpenCV, ROS
+   and Kalibr. COLMAP's origin is the corner of that pixel: add 0.5 to cx and cy for COLMAP. */
 typedef struct tv_camera {
-  int32_t model;         /* a tv_camera_model */
-  int32_t width, height; /* of the image, pixels, >= 1; the verdict needs them, too */
-  int32_t reserved;      /* 0 */
-  double fx, fy;         /* focal lengths, pixels, > 0 */
-  double cx, cy;         /* principal point, pixels */
-  double k[8];           /* distortion, as the model says; unused ones 0 */
+  /* A tv_camera_model. */
+  int32_t model;
+  /* Width of the image in pixels, at least 1. The verdict of an estimate depends on it. */
+  int32_t width;
+  /* Height of the image in pixels, at least 1. */
+  int32_t height;
+  /* Must be 0. */
+  int32_t reserved;
+  /* Focal lengths along x and y in pixels, above 0. */
+  double fx, fy;
+  /* The principal point in pixels. */
+  double cx, cy;
+  /* The distortion coefficients, in the order that the model documents; the unused ones are 0. */
+  double k[8];
 } tv_camera;
 
-/* TV_OK, or TV_ERR_NULL, or TV_ERR_CAMERA: unknown model, size below 1, fx or fy not above 0, a
-   number that is not finite.
-   The functions below find the valid region anew at each call (about 10 microseconds with
-   distortion on a desktop core); those that take many points find it once. */
+/* Returns TV_OK where the camera is valid, else TV_ERR_NULL or TV_ERR_CAMERA. Every function that
+   takes a camera checks it like this.
+   The functions below compute the valid region of the lens model anew at each call, which takes
+   about 10 microseconds for a distorted camera on a desktop core. Those that take many points do it
+   once for all of them. Thread-safe, as all functions of this header. */
 TV_API tv_status tv_camera_check(const tv_camera *camera);
 
-/* The model is used only where its distortion is monotonic: up to this angle (radians) off the
-   optical axis, found from the derivative's first zero, and bounded by what 64-bit Newton can
-   invert. Writes *angle_rad in [0, pi/2] (pi for Kannala-Brandt); 0 for a
-   distortion so strong that no ray is left. Returns TV_ERR_NULL, TV_ERR_CAMERA. */
+/* Writes to *angle_rad the angle off the optical axis, in radians, up to which the lens model is
+   used. It ends where the distortion stops being monotonic (the first zero of its derivative) or
+   where Newton's method in 64 bits stops inverting it. The angle is in [0, pi/2], and in [0, pi]
+   for Kannala-Brandt; 0 means that the distortion is so strong that no ray is valid. Returns
+   TV_ERR_NULL, TV_ERR_CAMERA. */
 TV_API tv_status tv_camera_valid_angle(const tv_camera *camera, double *angle_rad);
 
-/* Pixel of a point (or ray) in the camera frame (x right, y down, z forward).
-   jacobian: null, or 2x3 row-major d pixel / d point.
-   Returns TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_OUTSIDE (behind the camera, beyond the valid angle,
-   or a result that is too large for a double). */
+/* Writes to `pixel` the image of a point (or of a ray) of the camera frame: x right, y down, z
+   forward. The unit of `point` does not matter.
+   jacobian: null, or 6 numbers, the row-major 2x3 derivative of the pixel by the point.
+   Returns TV_ERR_NULL, TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_OUTSIDE (the point lies behind the
+   camera or beyond the valid angle, or the result is too large for a double). */
 TV_API tv_status tv_camera_project(const tv_camera *camera, const double point[3], double pixel[2],
                                    double *jacobian);
 
-/* The pixels of many points, the valid region found once: num_points x 3 in, num_points x 2 out.
-   inside: num_points bytes, 1 where the point has a pixel; else 0 and the pixel is zeros (behind the
-   camera, beyond the valid angle, or not finite).
+/* Projects many points and computes the valid region only once.
+   points: num_points x 3; pixels: room for num_points x 2.
+   inside: room for num_points bytes. A byte is 1 where the point has a pixel; else it is 0 and the
+   pixel is (0, 0), because the point lies behind the camera, lies beyond the valid angle or is not
+   finite.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT (num_points below 0), TV_ERR_CAMERA, TV_ERR_OVERLAP. */
 TV_API tv_status tv_camera_project_points(const tv_camera *camera, const double *points,
                                           int32_t num_points, double *pixels, uint8_t *inside);
 
-/* Unit ray through a pixel, by Newton's method on the distortion.
-   jacobian: null, or 3x2 row-major d ray / d pixel.
-   Returns TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_OUTSIDE (no ray within the valid angle meets the
-   pixel). */
+/* Writes to `ray` the unit vector from the camera's centre through a pixel, in the camera frame,
+   found by Newton's method on the distortion.
+   jacobian: null, or 6 numbers, the row-major 3x2 derivative of the ray by the pixel.
+   Returns TV_ERR_NULL, TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_OUTSIDE (no ray within the valid
+   angle meets the pixel). */
 TV_API tv_status tv_camera_unproject(const tv_camera *camera, const double pixel[2], double ray[3],
                                      double *jacobian);
 
-/* The unit rays of many pixels, the valid region found once: num_pixels x 2 in, num_pixels x 3 out.
-   inside: num_pixels bytes, 1 where the pixel has a ray; else 0 and the ray is zeros.
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (num_pixels below 0), TV_ERR_CAMERA, TV_ERR_OVERLAP. */
+/* Writes the unit rays of many pixels and computes the valid region only once.
+   pixels: num_pixels x 2; rays: room for num_pixels x 3.
+   inside: room for num_pixels bytes. A byte is 1 where the pixel has a ray; else it is 0 and the
+   ray is (0, 0, 0). Returns TV_ERR_NULL, TV_ERR_ARGUMENT (num_pixels below 0), TV_ERR_CAMERA,
+   TV_ERR_OVERLAP. */
 TV_API tv_status tv_camera_unproject_points(const tv_camera *camera, const double *pixels,
                                             int32_t num_pixels, double *rays, uint8_t *inside);
 
-/* undistorted: the pixel where a camera without distortion and with the same fx fy cx cy would see what
-   this one sees at `pixel`. Returns as tv_camera_unproject; TV_ERR_OUTSIDE also for rays at 90 degrees and
-   more. */
+/* Writes to `undistorted` the pixel at which a camera without distortion, with the same fx, fy, cx
+   and cy, would see what this camera sees at `pixel`.
+   Returns the statuses as tv_camera_unproject does; TV_ERR_OUTSIDE also for a ray that is 90
+   degrees or more off the optical axis. */
 TV_API tv_status tv_camera_undistort(const tv_camera *camera, const double pixel[2],
                                      double undistorted[2]);
 
-/* The camera of an image that was scaled by `scale` in (0, 16]: f' = s f, c' = s (c + 0.5) - 0.5,
-   width and height rounded to the nearest, at least 1.
-   Returns TV_ERR_NULL, TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_ARGUMENT (scale, or a result that no camera has). */
+/* Writes to `scaled` the camera of an image that was resized by the factor `scale` in (0, 16]: f' =
+   scale f, c' = scale (c + 0.5) - 0.5; width and height are rounded to the nearest, and at least 1.
+   `scaled` may be the camera itself.
+   Returns TV_ERR_NULL, TV_ERR_CAMERA, TV_ERR_NOT_FINITE, TV_ERR_ARGUMENT (the scale is out of
+   range, or the result is no valid camera). */
 TV_API tv_status tv_camera_scale(const tv_camera *camera, double scale, tv_camera *scaled);
 
 TV_END_DECLS

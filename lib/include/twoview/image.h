@@ -1,4 +1,4 @@
-/* twoview: an 8-bit luma image, as the caller has it. */
+/* twoview: an 8-bit grey image that lies in the caller's memory. */
 #ifndef TWOVIEW_IMAGE_H
 #define TWOVIEW_IMAGE_H
 
@@ -9,14 +9,18 @@
 
 TV_BEGIN_DECLS
 
-/* A view on the caller's pixels, never copied as a whole and never written: the Y plane of a decoded
-   video frame serves as it is. Pixel (0,0) is the centre of the top-left pixel, x right, y down.
-   The caller keeps `data` alive during each call. */
+/* A view on the caller's pixels. They are read where they lie and never written, so that the Y
+   plane of a decoded video frame can be passed as it is. Pixel (0, 0) is the centre of the top-left
+   pixel; x points right, y down. The caller keeps `data` alive and unchanged during each call. */
 typedef struct tv_image {
-  const uint8_t *data;    /* row 0, 8-bit luma */
-  int32_t width;          /* pixels, at least 1 */
-  int32_t height;         /* pixels, at least 1 */
-  int64_t stride_bytes;   /* from a row to the next, at least width */
+  /* The first pixel of the top row; 8-bit luma, 0 is black. */
+  const uint8_t *data;
+  /* Width in pixels, at least 1. */
+  int32_t width;
+  /* Height in pixels, at least 1. */
+  int32_t height;
+  /* Distance in bytes from the start of a row to the start of the next one, at least `width`. */
+  int64_t stride_bytes;
 } tv_image;
 
 TV_END_DECLS

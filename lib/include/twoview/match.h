@@ -1,7 +1,7 @@
-/* twoview: which descriptors belong together.
+/* twoview: which descriptors of two images belong together.
 
-   Ratio test: D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, 7.1. Formulas
-   and tests: docs/algorithms/match.md. */
+   Ratio test: D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004,
+   7.1. Formulas and tests: docs/algorithms/match.md. */
 #ifndef TWOVIEW_MATCH_H
 #define TWOVIEW_MATCH_H
 
@@ -11,80 +11,98 @@
 
 TV_BEGIN_DECLS
 
-/* A row of one image's descriptors and the row of the other's that it belongs to. */
+/* A match: a feature of image 0 and the feature of image 1 that it belongs to. */
 typedef struct tv_correspondence {
-  int32_t idx0, idx1; /* rows of descriptors0 and descriptors1 */
-  uint32_t dist_sq;   /* squared L2 distance of the two */
-  float ratio;        /* distance to the nearest / to the second nearest, the worse of the two
-                         directions; [0, 1], lower is more certain */
+  /* Indices of the feature in image 0 and in image 1. */
+  int32_t idx0, idx1;
+  /* The squared L2 distance of the two descriptors. */
+  uint32_t dist_sq;
+  /* The distance to the nearest descriptor over the distance to the second nearest, the larger of
+     the two directions; [0, 1]. The lower it is, the more certain is the match. */
+  float ratio;
 } tv_correspondence;
 
-/* Filled by tv_match_options_init. */
+/* Options of tv_match. Filled by tv_match_options_init. */
 typedef struct tv_match_options {
-  uint32_t struct_size; /* set by tv_match_options_init */
-  float ratio;          /* keep where ratio < this in both directions, (0, 1], default 0.92;
-                           1 keeps ties out only */
+  /* The caller's sizeof, set by tv_match_options_init. */
+  uint32_t struct_size;
+  /* A match is kept where its ratio is below this value in both directions; (0, 1], default 0.92. A
+     bigger value gives more matches, of which more are wrong; 1 rejects only exact ties. */
+  float ratio;
 } tv_match_options;
 
-/* Writes the defaults, and struct_size; null is allowed. */
-TV_API void tv_match_options_init(tv_match_options *options);
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_match_options_init. */
+TV_API void tv_match_options_init_sized(tv_match_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_match_options_init(options) tv_match_options_init_sized((options), sizeof *(options))
 
-/* Exact two nearest neighbours in both directions; a pair is kept when each is the other's nearest
-   and both pass the ratio test. Equal distances count the lower index as nearer. Swapped inputs give
-   the same pairs, swapped. The result is in ascending order of idx0.
-   descriptors0/1: num x TV_DESCRIPTOR_BYTES, num in [0, context's max_keypoints].
-   correspondences: the caller's array; capacity of min(num0, num1) is always enough.
+/* Finds for each descriptor the two nearest ones of the other image by exhaustive search, and keeps
+   a pair when each is the nearest of the other and both pass the ratio test. Of equal distances the
+   one with the lower index counts as nearer. When both images are exchanged, the pairs are the same
+   ones, exchanged. If an image has only one descriptor, there is no second nearest one, and nothing
+   is matched.
+   features0, features1: the descriptors of the two images; keypoints are not read and may be null.
+   options: null means the defaults.
+   correspondences: room for cap_correspondences, in ascending order of idx0; the smaller of both
+   counts of features is always enough.
    *num_correspondences: how many were written; on TV_ERR_CAPACITY how many there are.
-   A side with one descriptor only has no second neighbour: the ratio test cannot pass.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY,
    TV_ERR_OVERLAP.
-   Time: num0 * num1 * 128 multiply-adds. */
-TV_API tv_status tv_match(tv_context *context, const uint8_t *descriptors0, int32_t num0,
-                          const uint8_t *descriptors1, int32_t num1,
-                          const tv_match_options *options, tv_correspondence *correspondences,
-                          int32_t cap_correspondences, int32_t *num_correspondences);
+   Time: 128 multiply-adds for each pair of descriptors. */
+TV_API tv_status tv_match(tv_context *context, const tv_features *features0,
+                          const tv_features *features1, const tv_match_options *options,
+                          tv_correspondence *correspondences, int32_t cap_correspondences,
+                          int32_t *num_correspondences);
 
-/* Filled by tv_guided_options_init. */
+/* Options of tv_match_guided. Filled by tv_guided_options_init. */
 typedef struct tv_guided_options {
-  uint32_t struct_size;   /* set by tv_guided_options_init */
-  float max_error_px;     /* half the width of the band along an epipolar line: Sampson distance in
-                             pixels of the images as given, [0.01, 1000], default 4; a narrow one holds
-                             the next estimate to the first */
-  float ratio;            /* keep where the ratio < this, (0, 1], default 0.87 */
-  float max_distance;     /* L2 distance of descriptors that counts as a rival where the band holds no
-                             other, (0, 3000], default 180: true matches lie below it nineteen times
-                             out of twenty */
-  float neighbourhood_px; /* keypoints this near the nearest one are no rivals of it: the same
-                             corner's second orientation, the same edge's next corner; [0, 1000],
-                             default 4 */
+  /* The caller's sizeof, set by tv_guided_options_init. */
+  uint32_t struct_size;
+  /* Half the width of the band around the epipolar line in which a match is searched: a Sampson
+     distance in pixels of the images as given, [0.01, 1000], default 4. A wider band finds matches
+     where the first estimate is inaccurate; a narrow one biases the next estimate towards it. */
+  float max_error_px;
+  /* A match is kept where its ratio is below this value in both directions; (0, 1], default 0.87. A
+     bigger value gives more matches, of which more are wrong. */
+  float ratio;
+  /* The L2 distance of descriptors that replaces the distance to the second nearest one where the
+     band holds no other keypoint, (0, 3000], default 180: 95 % of the correct matches lie below it.
+     A bigger value gives more matches, of which more are wrong. */
+  float max_distance;
+  /* Keypoints within this distance in pixels of the nearest one are not counted as the second
+     nearest one, because they are second orientations of the same corner or its neighbours on the
+     same edge; [0, 1000], default 4. */
+  float neighbourhood_px;
 } tv_guided_options;
 
-/* Writes the defaults, and struct_size; null is allowed. */
-TV_API void tv_guided_options_init(tv_guided_options *options);
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_guided_options_init. */
+TV_API void tv_guided_options_init_sized(tv_guided_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_guided_options_init(options) tv_guided_options_init_sized((options), sizeof *(options))
 
-/* A second matching pass: the nearest neighbour among the keypoints within a band along the epipolar
-   line, each the other's nearest. There are few rivals in a band, so that matches pass which the
-   ratio test over the whole image drops. `ratio` of the result is the distance over the smaller of
-   max_distance and the distance to the nearest rival in the band, the worse of the two directions.
-   Equal distances count the lower index as nearer.
-   camera0, camera1, epipolar: both cameras and E (tv_two_view.E; of any lens: the band is measured in
-   pixels of the images as given), or no cameras and F of the pixels. epipolar: row-major 3x3, finite.
-   Swapped views with the transposed matrix give the same pairs, swapped.
-   A keypoint outside its lens's valid region is not matched.
-   keypoints, descriptors: num of each, num in [0, context's max_keypoints]; keypoints are checked as
-   tv_describe checks them, all of their fields. options may be null.
-   correspondences: the caller's array, in ascending order of idx0; capacity of min(num0, num1) is always
-   enough.
+/* Matches again where the epipolar geometry is known. A pair is kept when each is the nearest of
+   the other among the keypoints within a band around the epipolar line, and both pass the ratio
+   test. There are few candidates in a band, so that matches pass that the ratio test over the whole
+   image rejects. The ratio of the result is the distance over the smaller of max_distance and the
+   distance to the second nearest keypoint in the band, the larger of the two directions. Of equal
+   distances the one with the lower index counts as nearer. Exchanged views with the transposed
+   matrix give the same pairs, exchanged. A keypoint outside its lens's valid region is not matched.
+   camera0, camera1: both cameras, with E in `epipolar` (tv_two_view.E); any lens is possible, since
+   the band is measured in pixels of the images as given. Or both null, with F of the pixels.
+   epipolar: row-major 3x3, finite.
+   features0, features1: keypoints and descriptors of the two images. Every field of the keypoints
+   is checked as tv_describe checks it. options: null means the defaults. correspondences: room for
+   cap_correspondences, in ascending order of idx0; the smaller of both counts of features is always
+   enough. *num_correspondences: how many were written; on TV_ERR_CAPACITY how many there are.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
-   TV_ERR_NOT_FINITE, TV_ERR_CAPACITY (*num_correspondences then is how many there are),
-   TV_ERR_OVERLAP.
-   Time: num0 * num1 products of three numbers, and 128 multiply-adds for each pair in the band,
-   at most twice. */
+   TV_ERR_NOT_FINITE, TV_ERR_CAPACITY, TV_ERR_OVERLAP.
+   Time: a product of three numbers for each pair of keypoints, and 128 multiply-adds, at most
+   twice, for each pair in a band. */
 TV_API tv_status tv_match_guided(tv_context *context, const tv_camera *camera0,
                                  const tv_camera *camera1, const double epipolar[9],
-                                 const tv_keypoint *keypoints0, const uint8_t *descriptors0,
-                                 int32_t num0, const tv_keypoint *keypoints1,
-                                 const uint8_t *descriptors1, int32_t num1,
+                                 const tv_features *features0, const tv_features *features1,
                                  const tv_guided_options *options,
                                  tv_correspondence *correspondences, int32_t cap_correspondences,
                                  int32_t *num_correspondences);

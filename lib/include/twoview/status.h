@@ -1,20 +1,20 @@
-/* twoview: what every function returns, and how a symbol is exported. */
+/* twoview: the status that functions return, how structs grow, and how a symbol is exported. */
 #ifndef TWOVIEW_STATUS_H
 #define TWOVIEW_STATUS_H
 
 #include "twoview/version.h"
 
 #if defined(__GNUC__)
-/* Marks what the shared library exports; everything else in it is hidden. */
+/* Marks a function that the shared library exports; all other functions in it are hidden. */
 #define TV_API __attribute__((visibility("default")))
 #else
 #define TV_API
 #endif
 
 #ifdef __cplusplus
-/* From here on names are C's, in C++ too. */
+/* Begins declarations with C linkage, also when a C++ program includes them. */
 #define TV_BEGIN_DECLS extern "C" {
-/* Up to here. */
+/* Ends the declarations with C linkage. */
 #define TV_END_DECLS }
 #else
 #define TV_BEGIN_DECLS
@@ -23,31 +23,63 @@
 
 TV_BEGIN_DECLS
 
-/* A caller's mistake or a buffer that is too small is an error; "no geometry in these images" is a
-   result (see two_view.h). On any error the outputs are as they were, but for a size or count that
-   the function says it writes. Values are stable across releases of one major version. */
+/* How a struct may grow, and why programs and libraries of different releases work together.
+   A struct that begins with struct_size grows only at its end, and a zero in a new field means the
+   old behaviour. Its init macro (tv_limits_init and so on) passes the caller's sizeof to the
+   library, which writes that size into struct_size and never writes beyond it.
+   An input is read as far as struct_size reaches; a field beyond it has its default. An input that
+   is longer than the library's struct is from a newer header: the bytes that the library does not
+   know must all be zero, else TV_ERR_STRUCT_SIZE is returned.
+   An output is written as far as struct_size reaches: an older caller does not receive the newer
+   fields, a newer caller receives zeros in the fields that the library does not know. struct_size
+   is kept. On an error nothing is written.
+   A struct_size that is below 4 bytes, above 4096 bytes or no multiple of 4 bytes was not set by an
+   init macro: TV_ERR_STRUCT_SIZE.
+   Structs without struct_size (tv_camera, tv_image, and the elements of arrays) and the values of
+   enums never change within one soname; an enum may gain values. */
+
+/* What a call returns. A mistake of the caller and a buffer that is too small are errors. That two
+   images have no common geometry is a result and no error (see two_view.h). On an error the outputs
+   stay as they were, except for a size or a count that the function documents to write then. */
 typedef enum tv_status {
-  TV_OK = 0,              /* done; also when the answer is that there is no geometry */
-  TV_ERR_NULL = 1,        /* a required pointer is null */
-  TV_ERR_ARGUMENT = 2,    /* a value is out of its documented range */
-  TV_ERR_NOT_FINITE = 3,  /* NaN or infinity where a finite number is required */
-  TV_ERR_STRUCT_SIZE = 4, /* struct_size was not set by tv_..._init, or is from a newer header */
-  TV_ERR_ALIGNMENT = 5,   /* memory is not aligned to TV_CONTEXT_ALIGNMENT */
-  TV_ERR_MEMORY = 6,      /* the memory handed over is smaller than tv_context_size says */
-  TV_ERR_LIMITS = 7,      /* an image or a count is above the context's limits, or the
-                             context was not made for this call (tv_purpose) */
-  TV_ERR_CAPACITY = 8,    /* an output array is too small; the count needed was written */
-  TV_ERR_OVERLAP = 9,     /* an output array overlaps another argument */
-  TV_ERR_CAMERA = 10,     /* intrinsics that are zero, not finite, or of an unknown model */
-  TV_ERR_OUTSIDE = 11,    /* a pixel or a ray outside the lens model's valid region */
-  TV_ERR_KERNELS = 12     /* this CPU or this build lacks the kernel set that was asked for */
+  /* The call did its work. Also returned when the answer is that there is no geometry. */
+  TV_OK = 0,
+  /* A required pointer is null. */
+  TV_ERR_NULL = 1,
+  /* A value is out of its documented range. */
+  TV_ERR_ARGUMENT = 2,
+  /* A number is NaN or infinite where a finite number is required. */
+  TV_ERR_NOT_FINITE = 3,
+  /* struct_size was not set by an init macro, or a field that this library does not know is not
+     zero: the program needs a newer library. */
+  TV_ERR_STRUCT_SIZE = 4,
+  /* The memory is not aligned to TV_CONTEXT_ALIGNMENT bytes. */
+  TV_ERR_ALIGNMENT = 5,
+  /* The memory is smaller than tv_context_size reports. */
+  TV_ERR_MEMORY = 6,
+  /* An image or a count exceeds the limits that the context was made with, or the context was not
+     made for this call (tv_purpose). */
+  TV_ERR_LIMITS = 7,
+  /* An output array is too small; the count that is needed was written. */
+  TV_ERR_CAPACITY = 8,
+  /* An output array overlaps another argument. */
+  TV_ERR_OVERLAP = 9,
+  /* A camera has an unknown model, a size or focal length that is not above 0, a number that is not
+     finite, or a reserved field that is not 0. */
+  TV_ERR_CAMERA = 10,
+  /* A pixel or a ray lies outside the region in which the lens model is valid. */
+  TV_ERR_OUTSIDE = 11,
+  /* This CPU or this build of the library does not have the kernel set that was chosen. */
+  TV_ERR_KERNELS = 12
 } tv_status;
 
-/* A short English phrase for a status; "unknown status" for any other number. Static storage.
-   Thread-safe. */
+/* Returns a short English phrase for a status, or "unknown status" for any other number. The string
+   is constant and never freed. Thread-safe. */
 TV_API const char *tv_status_string(tv_status status);
 
-/* TV_VERSION_STRING of the library that is linked (the header's may be another). Static storage. */
+/* Returns the version of the library that is linked, such as "0.1.0". It can differ from
+   TV_VERSION_STRING, which is the version of the headers that the program was compiled with. The
+   string is constant and never freed. Thread-safe. */
 TV_API const char *tv_version_string(void);
 
 TV_END_DECLS

@@ -1,7 +1,7 @@
-/* twoview: points from two rays.
+/* twoview: the point that two pixels see.
 
-   The methods of R. Hartley, P. Sturm, "Triangulation", CVIU 1997, which the paper chose among.
-   Formulas and tests: docs/algorithms/triangulation.md. */
+   The methods of R. Hartley, P. Sturm, "Triangulation", CVIU 1997, which the FAST-SIFT paper
+   compared. Formulas and tests: docs/algorithms/triangulation.md. */
 #ifndef TWOVIEW_TRIANGULATE_H
 #define TWOVIEW_TRIANGULATE_H
 
@@ -9,67 +9,88 @@
 
 TV_BEGIN_DECLS
 
-/* What a method makes least. A pixel's error is measured on the undistorted image, where a pixel is
-   1/fx by 1/fy; for TV_CAMERA_KANNALA_BRANDT, which sees beyond a half space, on the plane that
-   touches the viewing sphere at the match's own ray, where a pixel is 1 / sqrt(fx fy). They
-   are the textbook's pixels for a pinhole. Lengths are in units of |t|: no method depends on it. */
+/* A triangulation method: each one is named with the quantity that it minimises. Errors in pixels
+   are measured on the undistorted image, where a pixel is 1/fx wide and 1/fy high; for
+   TV_CAMERA_KANNALA_BRANDT, which sees more than a half space, on the plane that touches the
+   viewing sphere at the ray of the match, where a pixel has the side 1 / sqrt(fx fy). For a pinhole
+   these are the errors of the textbook. No method depends on the length of t. */
 typedef enum tv_triangulation {
-  TV_TRIANGULATION_POLY = 0,     /* squared distances from both pixels to the point's images: the
-                                    global minimum, the most likely point under normal noise */
-  TV_TRIANGULATION_POLY_ABS = 1, /* the distances instead of their squares, the global minimum */
-  TV_TRIANGULATION_LINEAR_EIGEN = 2,    /* the four linear equations over unit vectors (X, W), X / W
-                                           the point; counts from camera 0 */
-  TV_TRIANGULATION_LINEAR_LS = 3,       /* the same equations with W = 1 */
-  TV_TRIANGULATION_ITERATIVE_EIGEN = 4, /* LINEAR_EIGEN with each camera's equations divided by the
-                                           point's depth in it, again up to ten times; the linear
-                                           answer when that does not settle */
-  TV_TRIANGULATION_ITERATIVE_LS = 5,    /* LINEAR_LS so repeated; the paper's choice, the default */
-  TV_TRIANGULATION_MIDPOINT = 6         /* the distances from the point to both rays */
+  /* The sum of the squared distances from both pixels to the images of the point. The global
+     minimum, which is the most likely point if the noise is Gaussian. */
+  TV_TRIANGULATION_POLY = 0,
+  /* The sum of the distances instead of their squares. The global minimum. */
+  TV_TRIANGULATION_POLY_ABS = 1,
+  /* The residual of the four linear equations over unit vectors (X, W); the point is X / W in the
+     frame of camera 0. */
+  TV_TRIANGULATION_LINEAR_EIGEN = 2,
+  /* The residual of the same equations with W = 1. */
+  TV_TRIANGULATION_LINEAR_LS = 3,
+  /* As LINEAR_EIGEN, with the equations of each camera divided by the depth of the point in it,
+     repeated up to ten times. If that does not converge, the result is that of LINEAR_EIGEN. */
+  TV_TRIANGULATION_ITERATIVE_EIGEN = 4,
+  /* As LINEAR_LS, repeated in the same way. The paper's choice and the default of tv_reconstruct.
+   */
+  TV_TRIANGULATION_ITERATIVE_LS = 5,
+  /* The distances from the point to both rays: the middle of their shortest connection. */
+  TV_TRIANGULATION_MIDPOINT = 6
 } tv_triangulation;
 
-/* What a point's position is. */
+/* What the position of a tv_point means. */
 typedef enum tv_point_status {
-  TV_POINT_OK = 0,       /* in front of both cameras: position is the point */
-  TV_POINT_INFINITE = 1, /* rays parallel within what a double can tell, or the method's answer at
-                            infinity: position is the unit direction in camera 0 */
-  TV_POINT_BEHIND = 2,   /* the rays meet behind a camera: position is where */
-  TV_POINT_INVALID = 3   /* no ray (pixel outside the lens model), input not finite, or opposed rays
-                            along the baseline: zeros */
+  /* The position is a point in front of both cameras. */
+  TV_POINT_OK = 0,
+  /* The rays are parallel to the precision of a double, or the method's result is at infinity. The
+     position is the unit vector of the direction in the frame of camera 0. */
+  TV_POINT_INFINITE = 1,
+  /* The rays meet behind a camera. The position is where they meet. */
+  TV_POINT_BEHIND = 2,
+  /* There is no point: a pixel has no ray in the lens model, a number is not finite, or the two
+     rays point at each other along the baseline. The position is zero. */
+  TV_POINT_INVALID = 3
 } tv_point_status;
 
-/* What is known of the point that one match sees. */
+/* The point that was triangulated from one match. */
 typedef struct tv_point {
-  double position[3]; /* camera 0 frame, in units of |t|; never NaN */
-  float angle_rad;    /* between the two rays; 0 if invalid */
-  float error_px;     /* root mean square over the two images of the distance between the pixel and
-                         the point's projection; for a point at infinity, of its direction's
-                         projection; 0 if invalid */
-  int32_t status;     /* a tv_point_status */
-  int32_t reserved;   /* 0 */
+  /* Position in the frame of camera 0, in the unit of t; status tells what it means. It is never
+     NaN. */
+  double position[3];
+  /* Angle between the two rays in radians; 0 if the point is invalid. */
+  float angle_rad;
+  /* Root mean square, over the two images, of the distance in pixels between the pixel and the
+     projection of the point (of its direction, for a point at infinity); 0 if the point is
+     invalid. */
+  float error_px;
+  /* A tv_point_status. */
+  int32_t status;
+  /* Always 0. */
+  int32_t reserved;
 } tv_point;
 
 /* Triangulates num_points matches.
-   cam1_from_cam0: x1 = R x0 + t; R row-major 3x3, a rotation to 1e-6; t not zero.
-   pixels0, pixels1: num_points x 2 (x, y), distorted pixels as the image has them.
-   points: the caller's array of num_points; overlaps neither pixels0 nor pixels1.
-   A pixel that is not finite makes its point TV_POINT_INVALID, not an error.
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (method, count, R, t), TV_ERR_NOT_FINITE (R, t),
-   TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context; thread-safe. */
+   R, t: cam1_from_cam0, that is x1 = R x0 + t. R is a row-major 3x3 rotation to within 1e-6; t is
+   not zero.
+   pixels0, pixels1: num_points x 2 (x, y), distorted as in the images. A pixel that is not finite
+   makes its point TV_POINT_INVALID and is no error.
+   points: room for num_points; it overlaps neither pixels0 nor pixels1.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (the method, the count, R or t), TV_ERR_NOT_FINITE (R or t),
+   TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context. Thread-safe. */
 TV_API tv_status tv_triangulate(tv_triangulation method, const tv_camera *camera0,
                                 const tv_camera *camera1, const double R[9], const double t[3],
                                 const double *pixels0, const double *pixels1, int32_t num_points,
                                 tv_point *points);
 
-/* Moves the pixels of num_points matches to where their rays meet, by the least sum of squared
-   distances (cost TV_TRIANGULATION_POLY) or of distances (TV_TRIANGULATION_POLY_ABS) that does it.
-   Pixels are distorted, in and out; the distances are those described at tv_triangulation.
-   Whether the rays then meet in front of the cameras is tv_triangulate's to say.
-   Cameras, R, t and pixels as for tv_triangulate.
-   corrected0, corrected1: num_points x 2; may not overlap anything else.
-   valid: num_points bytes, 1 where the match was corrected; else 0 and both pixels are zeros (a
-   pixel without a ray or not finite, or a correction that leaves the lens's valid region).
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (cost, count, R, t), TV_ERR_NOT_FINITE (R, t),
-   TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context; thread-safe. */
+/* Moves the pixels of each match as little as possible so that their rays meet. "As little" is the
+   sum of the squared distances for cost TV_TRIANGULATION_POLY and the sum of the distances for
+   TV_TRIANGULATION_POLY_ABS; other costs are TV_ERR_ARGUMENT. Distances are measured as documented
+   at tv_triangulation; the pixels themselves are distorted, before and after. The rays may meet
+   behind a camera, which tv_triangulate reports.
+   The cameras, R, t, pixels0 and pixels1 are as for tv_triangulate.
+   corrected0, corrected1: room for num_points x 2; they overlap no other argument.
+   valid: room for num_points bytes. A byte is 1 where the match was corrected. It is 0, and both
+   pixels are (0, 0), where a pixel has no ray or is not finite, or where a corrected pixel would
+   lie outside the valid region of its lens. Returns TV_ERR_NULL, TV_ERR_ARGUMENT (the cost, the
+   count, R or t), TV_ERR_NOT_FINITE (R or t), TV_ERR_CAMERA, TV_ERR_OVERLAP. Needs no context.
+   Thread-safe. */
 TV_API tv_status tv_correct_matches(tv_triangulation cost, const tv_camera *camera0,
                                     const tv_camera *camera1, const double R[9], const double t[3],
                                     const double *pixels0, const double *pixels1,

@@ -1,7 +1,7 @@
 /* twoview: the geometry of two views from matched pixels.
 
-   Formulas, papers, rules of the verdict, tests: docs/algorithms/two_view.md, docs/algorithms/gravity.md,
-   docs/algorithms/principal_point.md. */
+   Formulas, papers, the rules of the verdict, and tests: docs/algorithms/two_view.md,
+   docs/algorithms/gravity.md, docs/algorithms/principal_point.md. */
 #ifndef TWOVIEW_TWO_VIEW_H
 #define TWOVIEW_TWO_VIEW_H
 
@@ -10,154 +10,243 @@
 
 TV_BEGIN_DECLS
 
-/* The minimal solver that the robust loop samples with. */
+/* Matched pixels: pixel i of image 0 and pixel i of image 1 show the same point. Filled by
+   tv_pixel_pairs_init with zeros; the arrays are the caller's and are read during the call only. */
+typedef struct tv_pixel_pairs {
+  /* The caller's sizeof, set by tv_pixel_pairs_init. */
+  uint32_t struct_size;
+  /* How many pairs there are, [0, the context's max_matches]. */
+  int32_t num;
+  /* num x 2 (x, y) each, in pixels, distorted as in the images. */
+  const double *pixels0, *pixels1;
+  /* Null, or `num` values, of which a lower one marks a more certain match
+     (tv_correspondence.ratio): more certain matches are sampled first. */
+  const float *ratios;
+} tv_pixel_pairs;
+
+/* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
+   tv_pixel_pairs_init. */
+TV_API void tv_pixel_pairs_init_sized(tv_pixel_pairs *pairs, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_pixel_pairs_init(pairs) tv_pixel_pairs_init_sized((pairs), sizeof *(pairs))
+
+/* The minimal solver that computes a model from each random sample. */
 typedef enum tv_solver {
   /* The default: five-point with cameras, eight-point without. */
   TV_SOLVER_AUTO = 0,
-  TV_SOLVER_FIVE_POINT = 1,  /* Nister, "An efficient solution to the five-point relative pose
-                                problem", PAMI 2004; cameras needed */
-  TV_SOLVER_EIGHT_POINT = 2, /* Hartley, "In defense of the eight-point algorithm", PAMI 1997: the
-                                paper's path */
-  TV_SOLVER_SEVEN_POINT = 3, /* Hartley, Zisserman, "Multiple View Geometry", 11.1.2: smaller samples,
-                                where many matches are wrong */
-  TV_SOLVER_UPRIGHT = 4      /* three points and gravity; cameras and gravity needed */
+  /* Five matches; cameras are required. D. Nister, "An efficient solution to the five-point
+     relative pose problem", PAMI 2004. */
+  TV_SOLVER_FIVE_POINT = 1,
+  /* Eight matches; the method of the FAST-SIFT paper. R. Hartley, "In defense of the eight-point
+     algorithm", PAMI 1997. */
+  TV_SOLVER_EIGHT_POINT = 2,
+  /* Seven matches: fewer iterations than eight-point where many matches are wrong. R. Hartley,
+     A. Zisserman, "Multiple View Geometry", 11.1.2. */
+  TV_SOLVER_SEVEN_POINT = 3,
+  /* Three matches and the direction of gravity; cameras and gravity are required. */
+  TV_SOLVER_UPRIGHT = 4
 } tv_solver;
 
-/* COLMAP's kinds of two-view geometry, and no-motion. */
+/* The kind of geometry that explains the matches: the kinds of COLMAP, and no-motion. */
 typedef enum tv_kind {
-  TV_KIND_DEGENERATE = 0,         /* no model explains the matches */
-  TV_KIND_CALIBRATED = 1,         /* essential matrix: R, t */
-  TV_KIND_UNCALIBRATED = 2,       /* fundamental matrix: F only */
-  TV_KIND_PLANAR = 3,             /* homography of a plane: R, t and perhaps an alternative */
-  TV_KIND_PANORAMIC = 4,          /* pure rotation: R only */
-  TV_KIND_PLANAR_OR_PANORAMIC = 5, /* homography, uncalibrated: H only */
-  TV_KIND_NO_MOTION = 6           /* the camera did not move: R = I */
+  /* No model explains the matches. */
+  TV_KIND_DEGENERATE = 0,
+  /* An essential matrix: R and t are known, t up to its length. */
+  TV_KIND_CALIBRATED = 1,
+  /* A fundamental matrix: only F is known, because no cameras were given. */
+  TV_KIND_UNCALIBRATED = 2,
+  /* The homography of a plane: R and t are known, and perhaps an alternative pose. */
+  TV_KIND_PLANAR = 3,
+  /* A pure rotation: R is known, t is not. */
+  TV_KIND_PANORAMIC = 4,
+  /* A homography, of a plane or of a rotation: only H is known, because no cameras were given. */
+  TV_KIND_PLANAR_OR_PANORAMIC = 5,
+  /* The camera did not move: R is the identity, t is not known. */
+  TV_KIND_NO_MOTION = 6
 } tv_kind;
 
-/* Whether to believe the pose. docs/algorithms/two_view.md has the rules. */
+/* Whether the pose can be relied on. docs/algorithms/two_view.md has the rules. */
 typedef enum tv_verdict {
-  TV_VERDICT_REFUSED = 0,  /* there is no full pose */
-  TV_VERDICT_DOUBTFUL = 1, /* there is one, and a reason against it */
-  TV_VERDICT_OK = 2        /* no reason against it */
+  /* There is no full pose (R and t). */
+  TV_VERDICT_REFUSED = 0,
+  /* There is a full pose, and at least one reason why it may be wrong. */
+  TV_VERDICT_DOUBTFUL = 1,
+  /* There is a full pose, and no reason against it. */
+  TV_VERDICT_OK = 2
 } tv_verdict;
 
-/* Why a verdict is not "ok": bits of tv_two_view.reasons. */
+/* Why a verdict is not "ok". The values are bits of tv_two_view.reasons. */
 typedef enum tv_reason {
-  TV_REASON_TOO_FEW_MATCHES = 1 << 0,   /* fewer than 15 different ones agree */
-  TV_REASON_LOW_INLIER_RATIO = 1 << 1,  /* fewer than a quarter agree, or what they leave is spread
-                                           over the whole threshold as chance would have it */
-  TV_REASON_LOW_PARALLAX = 1 << 2,      /* a median parallax below 3 max_error_px or 10 times the
-                                           noise, or a pose whose standard deviation is above 1.25
-                                           degrees: t is little known */
-  TV_REASON_TWO_PLANAR_SOLUTIONS = 1 << 3, /* a plane's two motions explain the matches alike */
-  TV_REASON_PURE_ROTATION = 1 << 4,     /* refused: there is no t */
-  TV_REASON_NO_MOTION = 1 << 5,         /* refused: there is no t */
-  TV_REASON_SECOND_MOTION = 1 << 6,     /* matches far from this pose agree on another, at least 15
-                                           per cent as many: something moved by itself, or which of
-                                           the two the scene was is open */
-  TV_REASON_CROWDED_MATCHES = 1 << 7,   /* the inliers lie in less than 5 of 64 cells of
-                                           each image, or on a line in one of them */
-  TV_REASON_REPEATED_STRUCTURE = 1 << 8 /* the same, or most of the inliers, and the points of both images
-                                           lie as on a lattice: matched one period off, perhaps */
+  /* Fewer than 15 distinct matches are inliers. */
+  TV_REASON_TOO_FEW_MATCHES = 1 << 0,
+  /* Fewer than 25 % of the matches are inliers, or the residuals are uniform over the threshold, as
+     random matches' are. */
+  TV_REASON_LOW_INLIER_RATIO = 1 << 1,
+  /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
+     10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees. */
+  TV_REASON_LOW_PARALLAX = 1 << 2,
+  /* The matches lie on a plane, and two different poses explain them equally well. Both are in the
+     result. */
+  TV_REASON_TWO_PLANAR_SOLUTIONS = 1 << 3,
+  /* The camera only rotated: t cannot be determined. The verdict is "refused". */
+  TV_REASON_PURE_ROTATION = 1 << 4,
+  /* The camera did not move: t cannot be determined. The verdict is "refused". */
+  TV_REASON_NO_MOTION = 1 << 5,
+  /* Matches far from this pose agree on another one, and are at least 15 % as many as its inliers.
+     Something in the scene moves by itself, or this pose is that of the moving object. */
+  TV_REASON_SECOND_MOTION = 1 << 6,
+  /* The inliers cover fewer than 5 of the 64 cells of an 8x8 grid over each of the two images, or
+     lie on a line in one of them. */
+  TV_REASON_CROWDED_MATCHES = 1 << 7,
+  /* The keypoints of both images lie on a regular lattice, and either most inliers do, too, or a
+     second model fits the other matches: the pose may be wrong by one period of a repeated
+     structure. */
+  TV_REASON_REPEATED_STRUCTURE = 1 << 8
 } tv_reason;
 
-/* "calibrated", "planar_or_panoramic" ...; "unknown" for any other number. Static storage. */
+/* Returns the name of a kind, such as "calibrated" or "planar_or_panoramic", or "unknown" for any
+   other number. The string is constant and never freed. Thread-safe. */
 TV_API const char *tv_kind_string(tv_kind kind);
-/* "ok", "doubtful", "refused"; "unknown" for any other number. Static storage. */
+/* Returns "ok", "doubtful" or "refused", or "unknown" for any other number. The string is constant
+   and never freed. Thread-safe. */
 TV_API const char *tv_verdict_string(tv_verdict verdict);
-/* "low_parallax" ...; "unknown" for anything but one of the bits. Static storage. */
+/* Returns the name of one reason, such as "low_parallax", or "unknown" for anything but exactly one
+   of the bits. The string is constant and never freed. Thread-safe. */
 TV_API const char *tv_reason_string(tv_reason reason);
 
-/* Filled by tv_estimate_options_init. */
+/* Options of the estimate. Filled by tv_estimate_options_init. */
 typedef struct tv_estimate_options {
-  uint32_t struct_size;     /* set by tv_estimate_options_init */
-  int32_t method;           /* a tv_solver; default TV_SOLVER_AUTO */
-  double max_error_px;      /* inlier threshold: Sampson distance in pixels of the images as given,
-                               the same for every lens; (0, 1e9], default 1.0 */
-  double confidence;        /* stop when a better model is this unlikely to have been missed;
-                               [0, 1), default 0.9999 */
-  int32_t max_iterations;   /* hard bound on samples, [1, 10^6], default 10000 */
-  int32_t fixed_iterations; /* 0 (default): adaptive stop. N: exactly N samples, near constant time */
-  uint64_t seed;            /* of the sampler; default constant, never the clock */
-  double gravity0[3], gravity1[3]; /* the direction of gravity ("down") in each camera's frame, of any
-                                      length above 0; read when gravity_sigma_rad > 0 */
-  double gravity_sigma_rad; /* standard deviation of each direction about each axis across it,
-                               [0, pi]; 0 (default): gravity is not known */
-  double principal_point_sigma; /* how far from cx, cy the principal point may be: a standard deviation in
-                               focal lengths, [0, 0.1], default 0.01; 0: exactly there. Read where
-                               camera0 and camera1 are equal; it then stays where it is unless the
-                               matches speak against that at one in a thousand */
+  /* The caller's sizeof, set by tv_estimate_options_init. */
+  uint32_t struct_size;
+  /* A tv_solver, default TV_SOLVER_AUTO. */
+  int32_t method;
+  /* The inlier threshold: the largest Sampson distance of an inlier, in pixels of the images as
+     given, for every lens alike; (0, 1e9], default 1. A bigger value accepts noisier matches and
+     more wrong ones. */
+  double max_error_px;
+  /* The search stops when the probability of having missed a better model is below 1 - confidence;
+     [0, 1), default 0.9999. A bigger value draws more samples. */
+  double confidence;
+  /* The most samples that are drawn, [1, 1000000], default 10000. It bounds the time. */
+  int32_t max_iterations;
+  /* 0 (default): the search stops as confidence determines. Otherwise exactly this many samples are
+     drawn, up to 1000000, and the time is nearly constant. */
+  int32_t fixed_iterations;
+  /* The seed of the sampler. Its default is constant and never the time of day: equal inputs give
+     equal results. */
+  uint64_t seed;
+  /* The direction of gravity ("down") in the frame of each camera, of any length above 0. Read only
+     when gravity_sigma_rad is above 0. */
+  double gravity0[3], gravity1[3];
+  /* The standard deviation in radians of each direction of gravity about each axis across it,
+     [0, pi]; 0 (default) means that gravity is not known. */
+  double gravity_sigma_rad;
+  /* The standard deviation of the principal point around (cx, cy), in focal lengths, [0, 0.1],
+     default 0.01; 0 means that it is exactly there. Used only when camera0 and camera1 are equal.
+     The principal point is moved only if the matches contradict (cx, cy) at a significance of
+     0.001. */
+  double principal_point_sigma;
 } tv_estimate_options;
 
-/* Writes the defaults, and struct_size; null is allowed. */
-TV_API void tv_estimate_options_init(tv_estimate_options *options);
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_estimate_options_init. */
+TV_API void tv_estimate_options_init_sized(tv_estimate_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_estimate_options_init(options) \
+  tv_estimate_options_init_sized((options), sizeof *(options))
 
-/* Everything that was found. Matrices are row-major; those whose has_ flag is 0 hold zeros. */
+/* The result of an estimate. Matrices are row-major. A matrix or vector whose has_ flag is 0 holds
+   zeros. */
 typedef struct tv_two_view {
-  uint32_t struct_size; /* set by tv_two_view_init */
-  int32_t kind;         /* a tv_kind */
-  int32_t verdict;      /* a tv_verdict */
-  uint32_t reasons;     /* tv_reason bits */
-  int32_t num_matches;  /* as given */
-  int32_t num_inliers;  /* of the model that kind names */
+  /* The caller's sizeof, set by tv_two_view_init. */
+  uint32_t struct_size;
+  /* A tv_kind. */
+  int32_t kind;
+  /* A tv_verdict. */
+  int32_t verdict;
+  /* The tv_reason bits; 0 if the verdict is "ok". */
+  uint32_t reasons;
+  /* How many matches were given. */
+  int32_t num_matches;
+  /* How many of them are inliers of the model that `kind` names. */
+  int32_t num_inliers;
+  /* Each is 1 where the member of that name was estimated, else 0. */
   uint8_t has_R, has_t, has_E, has_F, has_H, has_alternative, has_covariance,
-      has_alternative_covariance; /* 1: the member of that name was estimated */
-  int32_t num_iterations; /* samples drawn */
-  double R[9], t[3];      /* cam1_from_cam0: x1 = R x0 + t, |t| = 1 */
-  double E[9];            /* [t]x R, Frobenius norm 1, the sign that this gives */
-  double F[9];            /* K1^-T E K0^-1, Frobenius norm 1; of undistorted pixels */
-  double H[9];            /* undistorted pixels of image 0 to image 1; H[8] = 1 where finite */
-  double alternative_R[9], alternative_t[3]; /* the second pose of a plane, |t| = 1 */
-  double covariance[25]; /* radians^2, order (w0 w1 w2 a b): R_true = exp([w]x) R,
-                            t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), k the index
-                            of the smallest |t_k| (the lowest on a tie), b2 = t x b1 */
-  double alternative_covariance[25]; /* radians^2, the same around the alternative pose */
-  int32_t essential_inliers, fundamental_inliers, homography_inliers,
-      rotation_inliers;       /* evidence: inliers of each model, -1 where it was not estimated */
-  double coverage;            /* share of an 8x8 grid on the image that holds an inlier, [0, 1]:
-                                 the larger of the two images' */
-  double median_parallax_rad; /* of the inliers' rays, rotation removed */
-  double rms_error_px;        /* Sampson distance over the inliers */
-  double noise_px;            /* standard deviation of a matched pixel along one axis, as the
-                                 residuals of a full pose tell it; 0 without one */
-  uint64_t seed;              /* as used */
-  double principal_point_shift[2]; /* pixels: what the matches want added to cx and cy of both cameras
-                                 (tv_estimate_options.principal_point_sigma); all above is of the
-                                 cameras with it (tv_corrected_camera); nearly always 0, 0 */
+      has_alternative_covariance;
+  /* How many samples were drawn. */
+  int32_t num_iterations;
+  /* The pose cam1_from_cam0: x1 = R x0 + t, where R is a rotation matrix and |t| = 1. */
+  double R[9], t[3];
+  /* The essential matrix [t]x R, scaled to Frobenius norm 1. */
+  double E[9];
+  /* The fundamental matrix K1^-T E K0^-1, scaled to Frobenius norm 1; of undistorted pixels. */
+  double F[9];
+  /* The homography from undistorted pixels of image 0 to undistorted pixels of image 1, scaled so
+     that H[8] = 1, or to Frobenius norm 1 where H[8] is nearly 0. */
+  double H[9];
+  /* The second pose that explains a plane, in the form of R and t, |t| = 1. */
+  double alternative_R[9], alternative_t[3];
+  /* The covariance of the pose, 5x5, in radians^2, in the order (w0 w1 w2 a b): R_true =
+     exp([w]x) R, t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), b2 = t x b1, where k
+     is the index of the smallest |t_k| (the lowest one on a tie). */
+  double covariance[25];
+  /* The covariance of the alternative pose, in radians^2 and in the same parameters. */
+  double alternative_covariance[25];
+  /* How many inliers each model has; -1 where that model was not estimated. */
+  int32_t essential_inliers, fundamental_inliers, homography_inliers, rotation_inliers;
+  /* The share of the cells of an 8x8 grid over an image that hold an inlier, [0, 1]: the larger of
+     the two images' shares. */
+  double coverage;
+  /* The median, over the inliers, of the angle in radians between the two rays of a match after the
+     rotation was removed. */
+  double median_parallax_rad;
+  /* The root mean square of the inliers' Sampson distances, in pixels. */
+  double rms_error_px;
+  /* The standard deviation of a matched pixel along one axis, in pixels, estimated from the
+     residuals of a full pose; 0 without one. */
+  double noise_px;
+  /* The seed that was used. */
+  uint64_t seed;
+  /* What the estimate adds to (cx, cy) of both cameras, in pixels; it is usually (0, 0). All of the
+     result refers to the cameras with it, which tv_corrected_camera computes. */
+  double principal_point_shift[2];
 } tv_two_view;
 
+/* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
+   tv_two_view_init. */
+TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
 /* Writes zeros, and struct_size; null is allowed. */
-TV_API void tv_two_view_init(tv_two_view *result);
+#define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
 
-/* Writes to `corrected` the camera that the result is of: cx and cy plus principal_point_shift. For what
-   follows the estimate: triangulation, guided matching, bundle adjustment. It may be the camera itself.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. */
+/* Writes to `corrected` the camera that the result refers to: `camera` with the result's
+   principal_point_shift added to cx and cy. Use it for what follows the estimate: triangulation,
+   guided matching and bundle adjustment. `corrected` may be `camera` itself.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. Thread-safe. */
 TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera *camera,
                                      tv_camera *corrected);
 
-/* Estimates the two-view geometry of num_matches matched pixels.
-   camera0, camera1: both given, or both null (uncalibrated: F and H only, methods auto,
-   eight-point and seven-point; otherwise TV_ERR_ARGUMENT).
-   pixels0, pixels1: num_matches x 2 (x, y), as the images have them (distorted).
-   ratios: null, or num_matches values, lower more certain (tv_correspondence.ratio): surer matches
-   are sampled first.
-   inlier_mask: null, or num_matches bytes, 1 for each inlier of the model that kind names.
-   result: initialised by tv_two_view_init.
-   A match outside its lens's valid region, not finite, or with coordinates that add up to a million
-   pixels and more, is never an inlier.
-   "No geometry" is TV_OK with kind, verdict and reasons. The matches' order does not matter, and
-   swapped views give the inverse: R the transpose, bit for bit, and t = -R^T t.
+/* Estimates the two-view geometry of matched pixels.
+   camera0, camera1: both cameras; or both null, which gives F and H only and requires the solver
+   eight-point, seven-point or TV_SOLVER_AUTO.
+   pairs: the matched pixels. The order of the matches has no influence on the result. A match is
+   never an inlier if a pixel lies outside its lens's valid region, is not finite, or has
+   coordinates whose absolute values add up to a million pixels or more.
    options: null means the defaults.
+   result: initialised by tv_two_view_init. That no geometry was found is TV_OK, and reported in
+   kind, verdict and reasons. With both views exchanged, R is the transpose bit for bit, and t is
+   -R^T t.
+   inlier_mask: null, or room for pairs->num bytes; a byte is 1 where the match is an inlier of the
+   model that the kind names.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
-   TV_ERR_NOT_FINITE (options only). TV_ERR_LIMITS is returned for more matches than the context's
-   max_matches: which of them to leave out is the caller's choice, for ratios may be null and
-   inlier_mask speaks of all matches. tv_reconstruct leaves out those of the highest ratio.
-   Time: at most max_iterations samples, each of at most 10 models scored on num_matches. */
+   TV_ERR_NOT_FINITE (the options only), TV_ERR_OVERLAP. More matches than the context's max_matches
+   are TV_ERR_LIMITS: which of them to leave out is the caller's choice here (tv_reconstruct leaves
+   out those of the highest ratio).
+   Time: at most max_iterations samples, of at most 10 models each, which are scored on all
+   matches. */
 TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,
-                                      const tv_camera *camera1, const double *pixels0,
-                                      const double *pixels1, const float *ratios,
-                                      int32_t num_matches, const tv_estimate_options *options,
-                                      tv_two_view *result, uint8_t *inlier_mask);
+                                      const tv_camera *camera1, const tv_pixel_pairs *pairs,
+                                      const tv_estimate_options *options, tv_two_view *result,
+                                      uint8_t *inlier_mask);
 
 TV_END_DECLS
 

@@ -1,4 +1,4 @@
-/* twoview: FAST-SIFT matching and two-view geometry. One include for all stages; see README.md. */
+/* twoview: FAST-SIFT matching and two-view geometry. This header includes those of all stages. */
 #ifndef TWOVIEW_TWOVIEW_H
 #define TWOVIEW_TWOVIEW_H
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "api/sized.h"
 #include "api/validate.h"
 #include "robust/bundle.h"
 #include "robust/point_covariance.h"
@@ -16,9 +17,8 @@ constexpr double kLargest = 1e9;
 
 tv_status read_bundle_options(const tv_bundle_options* options, tv_bundle_options* checked) {
   *checked = kDefaults;
-  if (options == nullptr) return TV_OK;
-  if (options->struct_size != sizeof(tv_bundle_options)) return TV_ERR_STRUCT_SIZE;
-  *checked = *options;
+  const tv_status status = read_sized(options, checked);
+  if (status != TV_OK) return status;
   const tv_bundle_options& o = *checked;
   if (!is_finite(o.loss_scale_px)) return TV_ERR_NOT_FINITE;
   const bool valid = o.loss >= TV_LOSS_NONE && o.loss <= TV_LOSS_CAUCHY && o.loss_scale_px > 0 &&
@@ -49,7 +49,6 @@ double rms(double sum_sq, int num_points) {
 
 void pack(const BundleOutcome& outcome, tv_bundle_result* result) {
   tv_bundle_result packed{};
-  packed.struct_size = sizeof(tv_bundle_result);
   packed.num_points = outcome.num_points;
   packed.num_iterations = outcome.num_iterations;
   packed.converged = outcome.converged;
@@ -62,37 +61,37 @@ void pack(const BundleOutcome& outcome, tv_bundle_result* result) {
     std::memcpy(packed.covariance, outcome.covariance, sizeof packed.covariance);
     packed.noise_px = outcome.noise_px;
   }
-  *result = packed;
+  write_sized(packed, result);
 }
 
 }  // namespace
 }  // namespace tv
 
-void tv_bundle_options_init(tv_bundle_options* options) {
-  if (options != nullptr) *options = tv::kDefaults;
+void tv_bundle_options_init_sized(tv_bundle_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
 }
 
-void tv_bundle_result_init(tv_bundle_result* result) {
-  if (result == nullptr) return;
-  *result = tv_bundle_result{};
-  result->struct_size = sizeof(tv_bundle_result);
+void tv_bundle_result_init_sized(tv_bundle_result* result, size_t struct_size) {
+  tv::init_zeros(result, struct_size);
 }
 
 tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
-                             const tv_camera* camera1, const double* pixels0, const double* pixels1,
-                             int32_t num_points, const tv_bundle_options* options, double R[9],
-                             double t[3], tv_point* points, tv_bundle_result* result) {
+                             const tv_camera* camera1, const tv_pixel_pairs* pairs,
+                             const tv_bundle_options* options, double R[9], double t[3],
+                             tv_point* points, tv_bundle_result* result) {
   if (context == nullptr || camera0 == nullptr || camera1 == nullptr || R == nullptr ||
-      t == nullptr ||
-      (num_points > 0 && (pixels0 == nullptr || pixels1 == nullptr || points == nullptr))) {
+      t == nullptr) {
     return TV_ERR_NULL;
   }
-  if (result != nullptr && result->struct_size != sizeof(tv_bundle_result)) {
-    return TV_ERR_STRUCT_SIZE;
-  }
-  if (num_points < 0) return TV_ERR_ARGUMENT;
+  tv_pixel_pairs matches;
+  tv_status status = tv::read_pixel_pairs(pairs, &matches);
+  if (status == TV_OK && result != nullptr) status = tv::check_sized(result);
+  if (status != TV_OK) return status;
+  const double *const pixels0 = matches.pixels0, *const pixels1 = matches.pixels1;
+  const int32_t num_points = matches.num;
+  if (num_points > 0 && points == nullptr) return TV_ERR_NULL;
   tv::BundleProblem problem{};
-  tv_status status = tv::read_bundle_options(options, &problem.options);
+  status = tv::read_bundle_options(options, &problem.options);
   if (status != TV_OK) return status;
   if (num_points > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ADJUST)) {
     return TV_ERR_LIMITS;
@@ -103,16 +102,17 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
   status = tv::read_pose(R, t, &pose, &baseline);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(num_points);
-  const tv::Bytes arrays[9] = {{points, n * sizeof(tv_point)},
-                               {R, 9 * sizeof(double)},
-                               {t, 3 * sizeof(double)},
-                               {result, sizeof(tv_bundle_result)},
-                               {pixels0, 2 * n * sizeof(double)},
-                               {pixels1, 2 * n * sizeof(double)},
-                               {camera0, sizeof(tv_camera)},
-                               {camera1, sizeof(tv_camera)},
-                               {options, sizeof(tv_bundle_options)}};
-  if (tv::outputs_overlap(arrays, 4, 9)) return TV_ERR_OVERLAP;
+  const tv::Bytes arrays[10] = {{points, n * sizeof(tv_point)},
+                                {R, 9 * sizeof(double)},
+                                {t, 3 * sizeof(double)},
+                                {result, result != nullptr ? result->struct_size : 0},
+                                {pixels0, 2 * n * sizeof(double)},
+                                {pixels1, 2 * n * sizeof(double)},
+                                {camera0, sizeof(tv_camera)},
+                                {camera1, sizeof(tv_camera)},
+                                {options, options != nullptr ? options->struct_size : 0},
+                                {pairs, pairs->struct_size}};
+  if (tv::outputs_overlap(arrays, 4, 10)) return TV_ERR_OVERLAP;
   tv::StageTimer timer(context, TV_STAGE_REFINE);
   problem.camera[0] = tv::prepare_camera(*camera0);
   problem.camera[1] = tv::prepare_camera(*camera1);

@@ -48,7 +48,7 @@ tv_status tv_camera_check(const tv_camera *camera) {
   if (camera->model < TV_CAMERA_PINHOLE || camera->model > TV_CAMERA_KANNALA_BRANDT) {
     return TV_ERR_CAMERA;
   }
-  if (camera->width < 1 || camera->height < 1) return TV_ERR_CAMERA;
+  if (camera->width < 1 || camera->height < 1 || camera->reserved != 0) return TV_ERR_CAMERA;
   if (!is_finite(camera->fx) || !is_finite(camera->fy)) return TV_ERR_CAMERA;
   if (!(camera->fx > 0.0) || !(camera->fy > 0.0)) return TV_ERR_CAMERA;
   if (!is_finite(camera->cx) || !is_finite(camera->cy)) return TV_ERR_CAMERA;

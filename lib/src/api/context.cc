@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "api/scratch.h"
+#include "api/sized.h"
 
 namespace tv {
 namespace {
@@ -14,9 +15,14 @@ constexpr uint32_t kAllPurposes = 2 * TV_PURPOSE_ADJUST - 1;
 
 bool within(int32_t value, int32_t low, int32_t high) { return value >= low && value <= high; }
 
-tv_status check_limits(const tv_limits* limits) {
-  if (limits == nullptr) return TV_ERR_NULL;
-  if (limits->struct_size != sizeof(tv_limits)) return TV_ERR_STRUCT_SIZE;
+constexpr tv_limits kDefaults = {sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO, 0};
+
+// Reads the limits, and resolves max_matches 0 and purposes 0.
+tv_status read_limits(const tv_limits* given, tv_limits* limits) {
+  if (given == nullptr) return TV_ERR_NULL;
+  *limits = kDefaults;
+  const tv_status status = read_sized(given, limits);
+  if (status != TV_OK) return status;
   if (!within(limits->max_width, 1, kMaxSide) || !within(limits->max_height, 1, kMaxSide) ||
       !within(limits->max_keypoints, 1, kMaxKeypoints) ||
       !within(limits->max_matches, 0, kMaxMatches) ||
@@ -24,14 +30,9 @@ tv_status check_limits(const tv_limits* limits) {
       limits->purposes > kAllPurposes) {
     return TV_ERR_ARGUMENT;
   }
+  if (limits->max_matches == 0) limits->max_matches = limits->max_keypoints;
+  if (limits->purposes == 0) limits->purposes = kAllPurposes;
   return TV_OK;
-}
-
-tv_limits resolved(const tv_limits& limits) {
-  tv_limits result = limits;
-  if (result.max_matches == 0) result.max_matches = result.max_keypoints;
-  if (result.purposes == 0) result.purposes = kAllPurposes;
-  return result;
 }
 
 // A tv_context of 64-bit pointers. The size depends on the limits alone, so 32-bit CPUs take as
@@ -45,32 +46,33 @@ size_t context_bytes() { return kContextBytes; }
 }  // namespace
 }  // namespace tv
 
-void tv_limits_init(tv_limits* limits) {
-  if (limits == nullptr) return;
-  *limits = tv_limits{sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO, 0};
+void tv_limits_init_sized(tv_limits* limits, size_t struct_size) {
+  tv::init_sized(limits, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
 }
 
 tv_status tv_context_size(const tv_limits* limits, size_t* size_bytes) {
-  const tv_status status = tv::check_limits(limits);
+  tv_limits read;
+  const tv_status status = tv::read_limits(limits, &read);
   if (status != TV_OK) return status;
   if (size_bytes == nullptr) return TV_ERR_NULL;
-  *size_bytes = tv::context_bytes() + tv::scratch_bytes(tv::resolved(*limits));
+  *size_bytes = tv::context_bytes() + tv::scratch_bytes(read);
   return TV_OK;
 }
 
 tv_status tv_context_init(tv_context** context, const tv_limits* limits, void* memory,
                           size_t size_bytes) {
-  size_t needed = 0;
-  const tv_status status = tv_context_size(limits, &needed);
+  tv_limits read;
+  const tv_status status = tv::read_limits(limits, &read);
   if (status != TV_OK) return status;
+  const size_t needed = tv::context_bytes() + tv::scratch_bytes(read);
   if (context == nullptr || memory == nullptr) return TV_ERR_NULL;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   if (size_bytes < needed) return TV_ERR_MEMORY;
-  const tvk_table* kernels = tvk_select(limits->kernels);
+  const tvk_table* kernels = tvk_select(read.kernels);
   if (kernels == nullptr) return TV_ERR_KERNELS;
   tv_context* made = static_cast<tv_context*>(memory);
   *made = tv_context{};
-  made->limits = tv::resolved(*limits);
+  made->limits = read;
   made->kernels = kernels;
   made->arena = tv::arena_over(static_cast<uint8_t*>(memory) + tv::context_bytes(),
                                needed - tv::context_bytes());
@@ -93,9 +95,12 @@ tv_status tv_context_set_clock(tv_context* context, tv_clock now_ns, void* user)
   return TV_OK;
 }
 
-tv_status tv_context_take_times(tv_context* context, uint64_t* stage_ns) {
-  if (context == nullptr || stage_ns == nullptr) return TV_ERR_NULL;
-  std::copy(context->stage_ns, context->stage_ns + TV_NUM_STAGES, stage_ns);
+tv_status tv_context_take_times(tv_context* context, uint64_t* stage_ns, int32_t cap_stages) {
+  if (context == nullptr || (stage_ns == nullptr && cap_stages > 0)) return TV_ERR_NULL;
+  if (cap_stages < 0) return TV_ERR_ARGUMENT;
+  for (int32_t k = 0; k < cap_stages; ++k) {
+    stage_ns[k] = k < TV_NUM_STAGES ? context->stage_ns[k] : 0;
+  }
   std::fill(context->stage_ns, context->stage_ns + TV_NUM_STAGES, uint64_t{0});
   return TV_OK;
 }

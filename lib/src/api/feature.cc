@@ -2,12 +2,17 @@
 
 #include <algorithm>
 
+#include "api/sized.h"
 #include "api/validate.h"
 #include "feature/corners.h"
 #include "feature/describe.h"
 
 namespace tv {
 namespace {
+
+constexpr tv_feature_options kDefaults = {
+    sizeof(tv_feature_options), 0,   9, 10, 3, 1, 2.0f, 0, 1, TV_ORIENTATION_GRADIENT,
+    TV_NORMALISATION_ROOTSIFT,  4.0f};
 
 struct Request {
   tv_feature_options options;
@@ -79,20 +84,12 @@ size_t bytes_of(int32_t count, size_t element) { return static_cast<size_t>(coun
 }  // namespace
 }  // namespace tv
 
-void tv_feature_options_init(tv_feature_options* options) {
-  if (options == nullptr) return;
-  *options = tv_feature_options{};
-  options->struct_size = sizeof(tv_feature_options);
-  options->arc = 9;
-  options->threshold = 10;
-  options->min_threshold = 3;
-  options->levels = 1;
-  options->scale_factor = 2.0f;
-  options->cell_px = 0;
-  options->subpixel = 1;
-  options->orientation = TV_ORIENTATION_GRADIENT;
-  options->descriptor = TV_NORMALISATION_ROOTSIFT;
-  options->keypoint_size = 4.0f;
+void tv_features_init_sized(tv_features* features, size_t struct_size) {
+  tv::init_zeros(features, struct_size);
+}
+
+void tv_feature_options_init_sized(tv_feature_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
 }
 
 tv_status tv_detect(tv_context* context, const tv_image* image, const tv_image* mask,

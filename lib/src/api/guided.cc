@@ -1,7 +1,10 @@
 // The boundary of guided matching: validate, turn keypoints into rays, call.
 #include "match/guided.h"
 
+#include <algorithm>
+
 #include "api/scratch.h"
+#include "api/sized.h"
 #include "api/validate.h"
 #include "geometry/camera.h"
 
@@ -16,9 +19,8 @@ bool in_range(float value, float lowest, float largest) {
 
 tv_status read_guided_options(const tv_guided_options* options, tv_guided_options* checked) {
   *checked = kDefaults;
-  if (options == nullptr) return TV_OK;
-  if (options->struct_size != sizeof(tv_guided_options)) return TV_ERR_STRUCT_SIZE;
-  *checked = *options;
+  const tv_status status = read_sized(options, checked);
+  if (status != TV_OK) return status;
   const bool valid = in_range(checked->max_error_px, 0.01f, 1000.0f) && checked->ratio > 0.0f &&
                      checked->ratio <= 1.0f && checked->max_distance > 0.0f &&
                      checked->max_distance <= 3000.0f &&
@@ -32,9 +34,9 @@ size_t rays_bytes(int32_t max_keypoints) {
 }
 
 // camera may be null: the ray of a pixel is then (x, y, 1).
-GuidedView make_view(const tv_camera* camera, const tv_keypoint* keypoints,
-                     const uint8_t* descriptors, int32_t num, Arena& arena) {
-  const size_t n = static_cast<size_t>(num);
+GuidedView make_view(const tv_camera* camera, const tv_features& features, Arena& arena) {
+  const tv_keypoint* const keypoints = features.keypoints;
+  const size_t n = static_cast<size_t>(features.num);
   double* rays = arena_alloc<double>(arena, 3 * n);
   double* slopes = arena_alloc<double>(arena, 6 * n);
   uint8_t* valid = arena_alloc<uint8_t>(arena, n);
@@ -49,28 +51,7 @@ GuidedView make_view(const tv_camera* camera, const tv_keypoint* keypoints,
     for (int i = 0; i < 3; ++i) to[i] = ray[i];
     for (int i = 0; i < 6; ++i) slopes[6 * k + static_cast<size_t>(i)] = slope(i / 2, i % 2);
   }
-  return GuidedView{keypoints, descriptors, rays, slopes, valid, num};
-}
-
-struct KeypointSet {
-  const tv_keypoint* keypoints;
-  const uint8_t* descriptors;
-  int32_t num;
-};
-
-tv_status check_set(const tv_context& context, const KeypointSet& set, const void* out,
-                    size_t out_bytes) {
-  if (set.num < 0) return TV_ERR_ARGUMENT;
-  if (set.num > context.limits.max_keypoints || !made_for(context, TV_PURPOSE_MATCH_GUIDED)) {
-    return TV_ERR_LIMITS;
-  }
-  if (set.num > 0 && (set.keypoints == nullptr || set.descriptors == nullptr)) return TV_ERR_NULL;
-  const size_t n = static_cast<size_t>(set.num);
-  if (overlap(out, out_bytes, set.keypoints, n * sizeof(tv_keypoint)) ||
-      overlap(out, out_bytes, set.descriptors, n * TV_DESCRIPTOR_BYTES)) {
-    return TV_ERR_OVERLAP;
-  }
-  return check_keypoints(set.keypoints, set.num);
+  return GuidedView{keypoints, features.descriptors, rays, slopes, valid, features.num};
 }
 
 }  // namespace
@@ -82,16 +63,15 @@ size_t guided_scratch_bytes(const tv_limits& limits) {
 
 }  // namespace tv
 
-void tv_guided_options_init(tv_guided_options* options) {
-  if (options != nullptr) *options = tv::kDefaults;
+void tv_guided_options_init_sized(tv_guided_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
 }
 
 tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const tv_camera* camera1,
-                          const double epipolar[9], const tv_keypoint* keypoints0,
-                          const uint8_t* descriptors0, int32_t num0, const tv_keypoint* keypoints1,
-                          const uint8_t* descriptors1, int32_t num1,
-                          const tv_guided_options* options, tv_correspondence* correspondences,
-                          int32_t cap_correspondences, int32_t* num_correspondences) {
+                          const double epipolar[9], const tv_features* features0,
+                          const tv_features* features1, const tv_guided_options* options,
+                          tv_correspondence* correspondences, int32_t cap_correspondences,
+                          int32_t* num_correspondences) {
   if (context == nullptr || epipolar == nullptr || num_correspondences == nullptr ||
       (correspondences == nullptr && cap_correspondences > 0)) {
     return TV_ERR_NULL;
@@ -116,21 +96,23 @@ tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const t
     if (status != TV_OK) return status;
   }
   const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);
-  const tv::KeypointSet sets[2] = {{keypoints0, descriptors0, num0},
-                                   {keypoints1, descriptors1, num1}};
-  for (const tv::KeypointSet& set : sets) {
-    status = tv::check_set(*context, set, correspondences, out_bytes);
+  const tv_features* const given[2] = {features0, features1};
+  tv_features features[2];
+  for (int v = 0; v < 2; ++v) {
+    status = tv::read_features(*context, given[v], TV_PURPOSE_MATCH_GUIDED, correspondences,
+                               out_bytes, &features[v]);
+    if (status != TV_OK) return status;
+    if (features[v].num > 0 && features[v].keypoints == nullptr) return TV_ERR_NULL;
+    status = tv::check_keypoints(features[v].keypoints, features[v].num);
     if (status != TV_OK) return status;
   }
   tv::StageTimer timer(context, TV_STAGE_MATCH);
   tv::ArenaScope scope(context->arena);
-  const int32_t most = num0 < num1 ? num0 : num1;
+  const int32_t most = std::min(features[0].num, features[1].num);
   tv_correspondence* found =
       tv::arena_alloc<tv_correspondence>(context->arena, static_cast<size_t>(most));
-  const tv::GuidedView view0 =
-      tv::make_view(camera0, keypoints0, descriptors0, num0, context->arena);
-  const tv::GuidedView view1 =
-      tv::make_view(camera1, keypoints1, descriptors1, num1, context->arena);
+  const tv::GuidedView view0 = tv::make_view(camera0, features[0], context->arena);
+  const tv::GuidedView view1 = tv::make_view(camera1, features[1], context->arena);
   const int32_t count =
       tv::match_guided(*context->kernels, view0, view1, scaled, checked, context->arena, found);
   *num_correspondences = count;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "api/sized.h"
 #include "api/validate.h"
 #include "geometry/essential.h"
 #include "geometry/triangulation.h"
@@ -109,6 +110,14 @@ int32_t keep_best(tv_correspondence* matches, int32_t most, int32_t* num_matches
   }
 }
 
+tv_features features_of(const Results& r, const int32_t num_keypoints[2], int view) {
+  return {sizeof(tv_features), num_keypoints[view], r.keypoints[view], r.descriptors[view]};
+}
+
+tv_pixel_pairs pairs_of(const Results& r, int32_t num_matches) {
+  return {sizeof(tv_pixel_pairs), num_matches, r.pixels[0], r.pixels[1], r.ratios};
+}
+
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
 // The cameras of an estimate, for all that follows from it. Called for each estimate that is kept.
@@ -129,10 +138,11 @@ __attribute__((noinline)) tv_status match_along_lines(
     tv_two_view* estimate) {
   const tv_limits& limits = context->limits;
   int32_t count = 0;
+  const tv_features features[2] = {features_of(r, num_keypoints, 0),
+                                   features_of(r, num_keypoints, 1)};
   tv_status status =
-      tv_match_guided(context, &r.cameras[0], &r.cameras[1], estimate->E, r.keypoints[0],
-                      r.descriptors[0], num_keypoints[0], r.keypoints[1], r.descriptors[1],
-                      num_keypoints[1], nullptr, r.more_matches, limits.max_keypoints, &count);
+      tv_match_guided(context, &r.cameras[0], &r.cameras[1], estimate->E, &features[0],
+                      &features[1], nullptr, r.more_matches, limits.max_keypoints, &count);
   if (status != TV_OK) return status;
   count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
                        r.more_matches, count);
@@ -140,8 +150,9 @@ __attribute__((noinline)) tv_status match_along_lines(
   const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
   gather_pixels(r, r.more_matches, count);
   tv_two_view again = *estimate;
-  status = tv_estimate_two_view(context, view0.camera, view1.camera, r.pixels[0], r.pixels[1],
-                                r.ratios, count, options, &again, r.more_inlier_mask);
+  const tv_pixel_pairs pairs = pairs_of(r, count);
+  status = tv_estimate_two_view(context, view0.camera, view1.camera, &pairs, options, &again,
+                                r.more_inlier_mask);
   if (status != TV_OK) return status;
   if (!takes_guided_estimate(*estimate, &again)) {
     gather_pixels(r, r.matches, *num_matches);
@@ -192,9 +203,9 @@ __attribute__((noinline)) tv_status adjust(tv_context* context, int32_t num_matc
                                            tv_two_view* two_view, int32_t* num_points) {
   tv_bundle_result bundle;
   tv_bundle_result_init(&bundle);
-  const tv_status status =
-      tv_adjust_two_view(context, &r.cameras[0], &r.cameras[1], r.pixels[0], r.pixels[1],
-                         num_matches, nullptr, two_view->R, two_view->t, r.points, &bundle);
+  const tv_pixel_pairs pairs = pairs_of(r, num_matches);
+  const tv_status status = tv_adjust_two_view(context, &r.cameras[0], &r.cameras[1], &pairs,
+                                              nullptr, two_view->R, two_view->t, r.points, &bundle);
   if (status != TV_OK) return status;
   Pose pose;
   for (int k = 0; k < 9; ++k) pose.R(k / 3, k % 3) = two_view->R[k];
@@ -218,9 +229,8 @@ constexpr tv_reconstruct_options kDefaults = {
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                                    tv_reconstruct_options* checked) {
   *checked = kDefaults;
-  if (options == nullptr) return TV_OK;
-  if (options->struct_size != sizeof(tv_reconstruct_options)) return TV_ERR_STRUCT_SIZE;
-  *checked = *options;
+  const tv_status status = read_sized(options, checked);
+  if (status != TV_OK) return status;
   const bool valid = is_triangulation_method(checked->triangulation) &&
                      (checked->guided_matching == 0 || checked->guided_matching == 1) &&
                      (checked->bundle_adjustment == 0 || checked->bundle_adjustment == 1);
@@ -230,14 +240,14 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
 }  // namespace
 }  // namespace tv
 
-void tv_reconstruct_options_init(tv_reconstruct_options* options) {
-  if (options != nullptr) *options = tv::kDefaults;
+void tv_view_init_sized(tv_view* view, size_t struct_size) { tv::init_zeros(view, struct_size); }
+
+void tv_reconstruct_options_init_sized(tv_reconstruct_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
 }
 
-void tv_reconstruction_init(tv_reconstruction* reconstruction) {
-  if (reconstruction == nullptr) return;
-  *reconstruction = tv_reconstruction{};
-  reconstruction->struct_size = sizeof(tv_reconstruction);
+void tv_reconstruction_init_sized(tv_reconstruction* reconstruction, size_t struct_size) {
+  tv::init_zeros(reconstruction, struct_size);
 }
 
 tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_view* view1,
@@ -247,10 +257,15 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
       reconstruction == nullptr) {
     return TV_ERR_NULL;
   }
-  if (reconstruction->struct_size != sizeof(tv_reconstruction)) return TV_ERR_STRUCT_SIZE;
+  tv_view views[2] = {};
   tv_reconstruct_options checked;
-  tv_status status = tv::read_reconstruct_options(options, &checked);
+  tv_status status = tv::read_sized(view0, &views[0]);
+  if (status == TV_OK) status = tv::read_sized(view1, &views[1]);
+  if (status == TV_OK) status = tv::check_sized(two_view);
+  if (status == TV_OK) status = tv::check_sized(reconstruction);
+  if (status == TV_OK) status = tv::read_reconstruct_options(options, &checked);
   if (status != TV_OK) return status;
+  if (views[0].reserved != 0 || views[1].reserved != 0) return TV_ERR_ARGUMENT;
   tv_feature_options features;
   status = tv::read_feature_options(*context, checked.feature, &features);
   if (status != TV_OK) return status;
@@ -261,25 +276,28 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   tv::ArenaScope scope(context->arena);
   tv::Results r = tv::alloc_results(context->arena, context->limits.max_keypoints);
   const int32_t capacity = context->limits.max_keypoints;
-  const tv_view* views[2] = {view0, view1};
   int32_t num_keypoints[2] = {0, 0}, num_matches = 0, num_points = 0;
   for (int v = 0; v < 2; ++v) {
-    status = tv_extract(context, &views[v]->image, views[v]->mask, &features, r.keypoints[v],
+    status = tv_extract(context, &views[v].image, views[v].mask, &features, r.keypoints[v],
                         r.descriptors[v], capacity, &num_keypoints[v]);
     if (status != TV_OK) return status;
   }
-  status = tv_match(context, r.descriptors[0], num_keypoints[0], r.descriptors[1], num_keypoints[1],
-                    checked.match, r.matches, capacity, &num_matches);
+  const tv_features found[2] = {tv::features_of(r, num_keypoints, 0),
+                                tv::features_of(r, num_keypoints, 1)};
+  status =
+      tv_match(context, &found[0], &found[1], checked.match, r.matches, capacity, &num_matches);
   if (status != TV_OK) return status;
   int32_t num_left_out = tv::keep_best(r.matches, context->limits.max_matches, &num_matches);
   tv::gather_pixels(r, r.matches, num_matches);
-  tv_two_view estimate = *two_view;
-  status = tv_estimate_two_view(context, view0->camera, view1->camera, r.pixels[0], r.pixels[1],
-                                r.ratios, num_matches, checked.estimate, &estimate, r.inlier_mask);
+  tv_two_view estimate;
+  tv_two_view_init(&estimate);
+  const tv_pixel_pairs pairs = tv::pairs_of(r, num_matches);
+  status = tv_estimate_two_view(context, views[0].camera, views[1].camera, &pairs, checked.estimate,
+                                &estimate, r.inlier_mask);
   if (status != TV_OK) return status;
-  tv::correct_cameras(estimate, *view0, *view1, r);
+  tv::correct_cameras(estimate, views[0], views[1], r);
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
-    status = tv::match_along_lines(context, *view0, *view1, num_keypoints, checked.estimate, r,
+    status = tv::match_along_lines(context, views[0], views[1], num_keypoints, checked.estimate, r,
                                    &num_matches, &num_left_out, &estimate);
     if (status != TV_OK) return status;
   }
@@ -290,17 +308,19 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
     status = tv::adjust(context, num_matches, r, &estimate, &num_points);
     if (status != TV_OK) return status;
   }
-  *two_view = estimate;
+  tv_reconstruction packed{};
   for (int v = 0; v < 2; ++v) {
-    reconstruction->num_keypoints[v] = num_keypoints[v];
-    reconstruction->keypoints[v] = r.keypoints[v];
-    reconstruction->descriptors[v] = r.descriptors[v];
+    packed.num_keypoints[v] = num_keypoints[v];
+    packed.keypoints[v] = r.keypoints[v];
+    packed.descriptors[v] = r.descriptors[v];
   }
-  reconstruction->num_matches = num_matches;
-  reconstruction->num_points = num_points;
-  reconstruction->matches = r.matches;
-  reconstruction->inlier_mask = r.inlier_mask;
-  reconstruction->points = r.points;
-  reconstruction->num_matches_left_out = num_left_out;
+  packed.num_matches_left_out = num_left_out;
+  packed.num_matches = num_matches;
+  packed.num_points = num_points;
+  packed.matches = r.matches;
+  packed.inlier_mask = r.inlier_mask;
+  packed.points = r.points;
+  tv::write_sized(estimate, two_view);
+  tv::write_sized(packed, reconstruction);
   return TV_OK;
 }

@@ -1,8 +1,10 @@
 #include "twoview/two_view.h"
 
+#include <cstddef>
 #include <cstring>
 #include <utility>
 
+#include "api/sized.h"
 #include "api/validate.h"
 #include "base/math.h"
 #include "robust/covariance.h"
@@ -41,10 +43,8 @@ tv_status check_gravity(const tv_estimate_options& options) {
 tv_status read_estimate_options(const tv_estimate_options* options, bool calibrated,
                                 tv_estimate_options* checked) {
   *checked = kDefaults;
-  if (options != nullptr) {
-    if (options->struct_size != sizeof(tv_estimate_options)) return TV_ERR_STRUCT_SIZE;
-    *checked = *options;
-  }
+  const tv_status status = read_sized(options, checked);
+  if (status != TV_OK) return status;
   if (checked->method == TV_SOLVER_AUTO) {
     checked->method = calibrated ? TV_SOLVER_FIVE_POINT : TV_SOLVER_EIGHT_POINT;
   }
@@ -152,7 +152,6 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
                                     const TwoViewModel& model, const TwoViewOutcome& outcome,
                                     bool swapped, tv_two_view* result) {
   tv_two_view packed{};
-  packed.struct_size = sizeof(tv_two_view);
   packed.kind = outcome.evidence.kind;
   packed.verdict = outcome.judgement.verdict;
   packed.reasons = outcome.judgement.reasons;
@@ -210,46 +209,55 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     packed.has_H = scale_homography(&H);
     if (packed.has_H) store(H, packed.H);
   }
-  *result = packed;
+  write_sized(packed, result);
 }
 
 }  // namespace
 }  // namespace tv
 
-void tv_estimate_options_init(tv_estimate_options* options) {
-  if (options != nullptr) *options = tv::kDefaults;
+void tv_pixel_pairs_init_sized(tv_pixel_pairs* pairs, size_t struct_size) {
+  tv::init_zeros(pairs, struct_size);
 }
 
-void tv_two_view_init(tv_two_view* result) {
-  if (result == nullptr) return;
-  *result = tv_two_view{};
-  result->struct_size = sizeof(tv_two_view);
+void tv_estimate_options_init_sized(tv_estimate_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
+}
+
+void tv_two_view_init_sized(tv_two_view* result, size_t struct_size) {
+  tv::init_zeros(result, struct_size);
 }
 
 tv_status tv_corrected_camera(const tv_two_view* result, const tv_camera* camera,
                               tv_camera* corrected) {
   if (result == nullptr || camera == nullptr || corrected == nullptr) return TV_ERR_NULL;
-  if (result->struct_size != sizeof(tv_two_view)) return TV_ERR_STRUCT_SIZE;
+  const tv_status status = tv::check_sized_input(result, sizeof(tv_two_view));
+  if (status != TV_OK) return status;
   *corrected = *camera;
-  corrected->cx += result->principal_point_shift[0];
-  corrected->cy += result->principal_point_shift[1];
+  const double* const shift = result->principal_point_shift;
+  if (result->struct_size < offsetof(tv_two_view, principal_point_shift) + sizeof(double[2])) {
+    return TV_OK;  // a caller without the field: not shifted
+  }
+  corrected->cx += shift[0];
+  corrected->cy += shift[1];
   return TV_OK;
 }
 
 tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
-                               const tv_camera* camera1, const double* pixels0,
-                               const double* pixels1, const float* ratios, int32_t num_matches,
+                               const tv_camera* camera1, const tv_pixel_pairs* pairs,
                                const tv_estimate_options* options, tv_two_view* result,
                                uint8_t* inlier_mask) {
-  if (context == nullptr || result == nullptr ||
-      (num_matches > 0 && (pixels0 == nullptr || pixels1 == nullptr))) {
-    return TV_ERR_NULL;
-  }
-  if (result->struct_size != sizeof(tv_two_view)) return TV_ERR_STRUCT_SIZE;
-  if (num_matches < 0 || (camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
+  if (context == nullptr || result == nullptr) return TV_ERR_NULL;
+  tv_pixel_pairs given;
+  tv_status status = tv::read_pixel_pairs(pairs, &given);
+  if (status == TV_OK) status = tv::check_sized(result);
+  if (status != TV_OK) return status;
+  const double *const pixels0 = given.pixels0, *const pixels1 = given.pixels1;
+  const float* const ratios = given.ratios;
+  const int32_t num_matches = given.num;
+  if ((camera0 == nullptr) != (camera1 == nullptr)) return TV_ERR_ARGUMENT;
   const bool calibrated = camera0 != nullptr;
   tv::TwoViewProblem problem{};
-  tv_status status = tv::read_estimate_options(options, calibrated, &problem.options);
+  status = tv::read_estimate_options(options, calibrated, &problem.options);
   if (status != TV_OK) return status;
   if (num_matches > context->limits.max_matches || !tv::made_for(*context, TV_PURPOSE_ESTIMATE)) {
     return TV_ERR_LIMITS;
@@ -264,7 +272,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
                                {pixels0, 16 * n},
                                {pixels1, 16 * n},
                                {ratios, 4 * n},
-                               {result, sizeof *result}};
+                               {result, result->struct_size}};
   if (tv::outputs_overlap(arrays, 1, 5)) return TV_ERR_OVERLAP;
   tv::ArenaScope scope(context->arena);
   tv::Matches matches{};

@@ -1,5 +1,7 @@
 #include "api/validate.h"
 
+#include "api/sized.h"
+
 namespace tv {
 namespace {
 
@@ -41,13 +43,9 @@ tv_status check_mask(const tv_image* mask, const tv_image& image) {
 
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked) {
-  if (options == nullptr) {
-    tv_feature_options_init(checked);
-  } else if (options->struct_size != sizeof(tv_feature_options)) {
-    return TV_ERR_STRUCT_SIZE;
-  } else {
-    *checked = *options;
-  }
+  tv_feature_options_init(checked);
+  const tv_status status = read_sized(options, checked);
+  if (status != TV_OK) return status;
   tv_feature_options& o = *checked;
   const bool valid = o.max_keypoints >= 0 && within(o.arc, 9, 12) && within(o.threshold, 1, 254) &&
                      within(o.min_threshold, 0, o.threshold) && within(o.levels, 1, 8) &&
@@ -60,6 +58,33 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
   const int32_t most = context.limits.max_keypoints;
   if (o.max_keypoints == 0) o.max_keypoints = most < kAutoKeypoints ? most : kAutoKeypoints;
   return o.max_keypoints <= most ? TV_OK : TV_ERR_LIMITS;
+}
+
+tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
+                        const void* out, size_t out_bytes, tv_features* features) {
+  if (given == nullptr) return TV_ERR_NULL;
+  *features = tv_features{};
+  const tv_status status = read_sized(given, features);
+  if (status != TV_OK) return status;
+  if (features->num < 0) return TV_ERR_ARGUMENT;
+  if (features->num > 0 && features->descriptors == nullptr) return TV_ERR_NULL;
+  if (features->num > context.limits.max_keypoints || !made_for(context, purpose)) {
+    return TV_ERR_LIMITS;
+  }
+  const size_t n = static_cast<size_t>(features->num);
+  const bool overlaps = overlap(out, out_bytes, features->descriptors, n * TV_DESCRIPTOR_BYTES) ||
+                        overlap(out, out_bytes, features->keypoints, n * sizeof(tv_keypoint));
+  return overlaps ? TV_ERR_OVERLAP : TV_OK;
+}
+
+tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs) {
+  if (given == nullptr) return TV_ERR_NULL;
+  *pairs = tv_pixel_pairs{};
+  const tv_status status = read_sized(given, pairs);
+  if (status != TV_OK) return status;
+  if (pairs->num < 0) return TV_ERR_ARGUMENT;
+  const bool missing = pairs->pixels0 == nullptr || pairs->pixels1 == nullptr;
+  return pairs->num > 0 && missing ? TV_ERR_NULL : TV_OK;
 }
 
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {

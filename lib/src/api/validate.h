@@ -8,6 +8,7 @@
 #include "api/context.h"
 #include "base/math.h"
 #include "twoview/feature.h"
+#include "twoview/two_view.h"
 
 namespace tv {
 
@@ -20,6 +21,14 @@ tv_status check_mask(const tv_image* mask, const tv_image& image);
 // Copies the options (or the defaults for null) after checking them.
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked);
+
+// Reads an image's features for a call of that purpose. They need descriptors and may have
+// keypoints; neither overlaps the output.
+tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
+                        const void* out, size_t out_bytes, tv_features* features);
+
+// Reads matched pixels.
+tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 
 // Finite, of a positive size.
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);

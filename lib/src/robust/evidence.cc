@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "base/math.h"
-#include "robust/second_model.h"
-#include "robust/lattice.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/lattice.h"
+#include "robust/second_model.h"
 
 namespace tv {
 namespace {

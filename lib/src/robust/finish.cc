@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/sampson.h"
+#include "geometry/transfer.h"
 #include "robust/evidence.h"
 #include "robust/fit.h"
 #include "robust/kind.h"
 #include "robust/place_principal_point.h"
 #include "robust/planar_pose.h"
+#include "robust/refine.h"
 #include "robust/two_view.h"
 #include "robust/verdict.h"
-#include "robust/refine.h"
-#include "geometry/sampson.h"
-#include "geometry/transfer.h"
 
 namespace tv {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "base/math.h"
-#include "robust/chance.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/chance.h"
 
 namespace tv {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "geometry/homography_4pt.h"
-#include "robust/loop.h"
-#include "geometry/transfer.h"
 #include "geometry/camera.h"
+#include "geometry/homography_4pt.h"
+#include "geometry/transfer.h"
+#include "robust/loop.h"
 
 namespace tv {
 namespace {

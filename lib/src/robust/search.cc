@@ -1,9 +1,9 @@
 // The robust loop (loop.h) with the solver and the priors that the caller's options name.
 #include "base/math.h"
+#include "geometry/sampson.h"
 #include "robust/estimators_upright.h"
 #include "robust/loop.h"
 #include "robust/two_view.h"
-#include "geometry/sampson.h"
 
 namespace tv {
 namespace {

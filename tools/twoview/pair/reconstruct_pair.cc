@@ -10,8 +10,9 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   const Picture &p0 = outcome.picture[0], &p1 = outcome.picture[1];
   tv_context* context =
       session.context(std::max(p0.luma.cols, p1.luma.cols), std::max(p0.luma.rows, p1.luma.rows));
-  tv_view views[2] = {};
+  tv_view views[2];
   for (int i = 0; i < 2; ++i) {
+    tv_view_init(&views[i]);
     views[i].image = outcome.picture[i].view();
     views[i].camera = outcome.has_cameras ? &outcome.camera[i] : nullptr;
   }

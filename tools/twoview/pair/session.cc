@@ -58,7 +58,8 @@ std::string Session::kernels() const {
 
 nlohmann::ordered_json Session::take_times(uint64_t total_ns, bool all) {
   std::array<uint64_t, TV_NUM_STAGES> stages{};
-  check(tv_context_take_times(context_.get(), stages.data()), "cannot read the times");
+  check(tv_context_take_times(context_.get(), stages.data(), TV_NUM_STAGES),
+        "cannot read the times");
   nlohmann::ordered_json json;
   for (size_t i = 0; i < stages.size(); ++i)
     if (all || stages[i] != 0) json[kStages[i]] = static_cast<double>(stages[i]) * 1e-6;

@@ -62,7 +62,7 @@ def evaluate_matches(data, matched, estimate_options=None, estimator="twoview", 
             if estimator == "twoview":
                 R, t, inliers, result = estimators.run_twoview(context, matches, estimate_options,
                                                                seed)
-                row["config"] = twoview_ctypes.enum_name("config", result.config)
+                row["config"] = twoview_ctypes.enum_name("kind", result.kind)
                 row["verdict"] = twoview_ctypes.enum_name("verdict", result.verdict)
                 row["num_iterations"] = result.num_iterations
             else:

@@ -14,13 +14,13 @@ TwoviewError = twoview.StatusError
 
 # Options that name an enum value.
 _ENUM_FIELDS = {
-    "orientation": enums.Orientation, "descriptor": enums.Descriptor, "method": enums.Method,
-    "kernels": enums.Kernels, "verdict": enums.Verdict, "config": enums.Config,
+    "orientation": enums.Orientation, "descriptor": enums.Normalisation, "method": enums.Solver,
+    "kernels": enums.Kernels, "verdict": enums.Verdict, "kind": enums.Kind,
 }
 
 
 def enum_name(field, number):
-    """'calibrated' for ('config', 1)."""
+    """'calibrated' for ('kind', 1)."""
     return _ENUM_FIELDS[field](number).name.lower()
 
 

@@ -129,7 +129,7 @@ def _model(arguments):
     pose, model = reconstruct(a.images, names, cameras, *(settings.options_of(a, kind) for kind in (
         tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))
     if model is None:
-        print(f"twoview: no full pose: {pose.config.name.lower()}", file=sys.stderr)
+        print(f"twoview: no full pose: {pose.kind.name.lower()}", file=sys.stderr)
         return EXIT_NO_POSE
     poses = {names[0]: (np.eye(3), np.zeros(3)), names[1]: (model.R, -model.R.T @ model.t)}
     write_files(a.output, {**text_model(model), "trajectory.tum": write_trajectory(poses)})

@@ -18,9 +18,9 @@ _FROM_COLMAP = np.array([[1, 0, -HALF_PIXEL], [0, 1, -HALF_PIXEL], [0, 0, 1]])
 DEGENERATE, CALIBRATED, UNCALIBRATED, PLANAR, PANORAMIC, PLANAR_OR_PANORAMIC = 1, 2, 3, 4, 5, 6
 # No motion is a panorama whose rotation is none: its matches still join tracks.
 CONFIGURATIONS = {
-    tv.Config.DEGENERATE: DEGENERATE, tv.Config.CALIBRATED: CALIBRATED,
-    tv.Config.UNCALIBRATED: UNCALIBRATED, tv.Config.PLANAR: PLANAR, tv.Config.PANORAMIC: PANORAMIC,
-    tv.Config.PLANAR_OR_PANORAMIC: PLANAR_OR_PANORAMIC, tv.Config.NO_MOTION: PANORAMIC}
+    tv.Kind.DEGENERATE: DEGENERATE, tv.Kind.CALIBRATED: CALIBRATED,
+    tv.Kind.UNCALIBRATED: UNCALIBRATED, tv.Kind.PLANAR: PLANAR, tv.Kind.PANORAMIC: PANORAMIC,
+    tv.Kind.PLANAR_OR_PANORAMIC: PLANAR_OR_PANORAMIC, tv.Kind.NO_MOTION: PANORAMIC}
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class PairGeometry:
 
 def geometry_to_colmap(found, matches):
     """A twoview.TwoView and its inlier matches (n, 2) to a row. A degenerate pair keeps no match."""
-    config = CONFIGURATIONS[found.config]
+    config = CONFIGURATIONS[found.kind]
     if config == DEGENERATE:
         return PairGeometry(DEGENERATE, np.zeros((0, 2), np.uint32))
     F, H = found.F, found.H

@@ -177,7 +177,7 @@ def export(job, feature=None, match=None, estimate=None):
             matches, result, inliers = two_view(engine, views[pair.name0], views[pair.name1])
             row = conventions.geometry_to_colmap(result, matches[inliers])
             writer.add_pair(id0, id1, matches, row)
-            name = result.config.name.lower()
+            name = result.kind.name.lower()
             counts["pairs"] += 1
             counts["pairs_verified"] += row.config != conventions.DEGENERATE
             counts["inlier_matches"] += len(row.inlier_matches)

@@ -127,7 +127,7 @@ def _pair_report(name0, name1, features, engine, truth):
         ("rotation_error_deg", "translation_error_deg", "translation_error_signed_deg", "pose_error_deg"))
     row.update(errors)
     row.update({"num_matches": len(matches), "num_inliers": int(inliers.sum()), "precision": None,
-                "config": result.config.name.lower(), "verdict": result.verdict.name.lower(), "time_ms": None})
+                "config": result.kind.name.lower(), "verdict": result.verdict.name.lower(), "time_ms": None})
     row.update({key: None if value is None else np.ravel(value).tolist()
                 for key, value in (("R", result.R), ("t", result.t),
                                    ("principal_point_shift_px", result.principal_point_shift))})

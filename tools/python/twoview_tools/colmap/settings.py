@@ -4,7 +4,7 @@ import dataclasses
 
 import twoview as tv
 
-_CHOICES = {"orientation": tv.Orientation, "descriptor": tv.Descriptor, "method": tv.Method}
+_CHOICES = {"orientation": tv.Orientation, "descriptor": tv.Normalisation, "method": tv.Solver}
 _KINDS = (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)
 # For a mapper, which has time and gains by long tracks: as many as COLMAP's own extractor (docs/colmap.md).
 MAPPING_KEYPOINTS = 8192

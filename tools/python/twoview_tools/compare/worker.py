@@ -92,7 +92,7 @@ def run_twoview(views, options, task):
     R, t, inliers, found = estimators.run_twoview(context, matches, None, task["seed"])
     watch.lap("estimate")
     return {"num_keypoints": [len(k) for k, _ in features], **pose_answer(R, t, inliers, found),
-            "config": twoview_ctypes.enum_name("config", found.config),
+            "config": twoview_ctypes.enum_name("kind", found.kind),
             "verdict": twoview_ctypes.enum_name("verdict", found.verdict),
             **matches_answer(matches)}, watch.ms
 

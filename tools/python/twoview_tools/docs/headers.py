@@ -13,7 +13,7 @@ from .. import ROOT
 FOLDERS = (ROOT / "lib/include", ROOT / "drivers/include")
 
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
-DIRECTIVE = re.compile(r"#(?:[^\n/]|/(?!\*)|\\\n)*")
+DIRECTIVE = re.compile(r"#(?:\\\n|[^\n/]|/(?!\*))*")
 ALONE = re.compile(r"(?:TV_BEGIN_DECLS|TV_END_DECLS|extern \"C\" \{|\})(?=\s|$)")
 
 

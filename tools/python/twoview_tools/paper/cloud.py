@@ -20,7 +20,7 @@ MATCH_NOISE_PX = 0.2  # of a coordinate, about what the residuals of this pair t
 def matches_of(pair, path):
     if path != "default":
         return ransac.matches_of(pair)
-    return ransac.matches_of(pair, arc=9, descriptor=library().Descriptor.ROOTSIFT)
+    return ransac.matches_of(pair, arc=9, descriptor=library().Normalisation.ROOTSIFT)
 
 
 def estimated(context, pair, path, pixels0, pixels1, ratios):
@@ -28,7 +28,7 @@ def estimated(context, pair, path, pixels0, pixels1, ratios):
     refinement."""
     tv = library()
     if path != "unrefined":
-        method = tv.Method.EIGHT_POINT if path == "paper" else tv.Method.FIVE_POINT
+        method = tv.Solver.EIGHT_POINT if path == "paper" else tv.Solver.FIVE_POINT
         found, inliers = tv.estimate_two_view(context, *pair.cameras, pixels0, pixels1, ratios, method=method)
         cameras = [tv.corrected_camera(found, camera) for camera in pair.cameras]
         return found.R, found.t, inliers, found.covariance, cameras

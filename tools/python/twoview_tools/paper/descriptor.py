@@ -103,8 +103,8 @@ def described_keypoints(image, count):
         keypoints = tv.orient(context, image, tv.detect(context, image, arc=12))[:count]
         keypoints = np.ascontiguousarray(keypoints)
         return keypoints, {kind: tv.describe(context, image, keypoints, descriptor=value)
-                           for kind, value in (("sift", tv.Descriptor.SIFT),
-                                               ("rootsift", tv.Descriptor.ROOTSIFT))}
+                           for kind, value in (("sift", tv.Normalisation.SIFT),
+                                               ("rootsift", tv.Normalisation.ROOTSIFT))}
 
 
 def differences(image, keypoints, described):

@@ -113,7 +113,7 @@ def matches_of(pair, **options):
     tv = library()
     height = max(image.shape[0] for image in pair.grey)
     width = max(image.shape[1] for image in pair.grey)
-    feature = {"arc": 12, "descriptor": tv.Descriptor.SIFT, **options}
+    feature = {"arc": 12, "descriptor": tv.Normalisation.SIFT, **options}
     with tv.Context(max_width=width, max_height=height) as context:
         (keys0, bytes0), (keys1, bytes1) = (tv.extract(context, image, **feature) for image in pair.grey)
         found = tv.match(context, bytes0, bytes1)
@@ -144,8 +144,8 @@ def estimates(pair, pixels0, pixels1, ratios):
     tv = library()
     found = {}
     with tv.Context(max_matches=len(pixels0)) as context:
-        for name, cameras, method in (("eight-point, no camera", (None, None), tv.Method.EIGHT_POINT),
-                                      ("five-point, calibrated", pair.cameras, tv.Method.FIVE_POINT)):
+        for name, cameras, method in (("eight-point, no camera", (None, None), tv.Solver.EIGHT_POINT),
+                                      ("five-point, calibrated", pair.cameras, tv.Solver.FIVE_POINT)):
             result, inliers = tv.estimate_two_view(context, *cameras, pixels0, pixels1, ratios,
                                                    method=method)
             found[name] = inliers, result.num_iterations

@@ -1,0 +1,43 @@
+// Structs that grow (twoview/status.h has the rule): reading as much of an input as the caller has,
+// and writing as much of an output as the caller has room for.
+#pragma once
+
+#include <cstddef>
+
+#include "twoview/status.h"
+
+namespace tv {
+
+// Writes `defaults` of known_size bytes into a struct of struct_size bytes, zeros behind them, and
+// struct_size itself; never more than struct_size bytes. Null is allowed.
+void init_sized(void* object, size_t struct_size, const void* defaults, size_t known_size);
+
+// The same with zeros alone.
+inline void init_zeros(void* object, size_t struct_size) {
+  init_sized(object, struct_size, object, 0);
+}
+
+// Whether struct_size can be that of a struct of any release.
+tv_status check_sized(const void* object);
+
+// Also whether all that lies behind known_size is zero.
+tv_status check_sized_input(const void* object, size_t known_size);
+
+// Reads an input over the defaults that *checked holds; null leaves them. On an error *checked is
+// as it was.
+tv_status read_sized(const void* object, size_t known_size, void* checked);
+
+template <typename Struct>
+tv_status read_sized(const Struct* object, Struct* checked) {
+  return read_sized(object, sizeof(Struct), checked);
+}
+
+// Writes an output as far as its struct_size reaches, which stays.
+void write_sized(const void* packed, size_t known_size, void* object);
+
+template <typename Struct>
+void write_sized(const Struct& packed, Struct* object) {
+  write_sized(&packed, sizeof(Struct), object);
+}
+
+}  // namespace tv

@@ -1,0 +1,112 @@
+/* twoview: which descriptors of two images belong together.
+
+   Ratio test: D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004,
+   7.1. Formulas and tests: docs/algorithms/match.md. */
+#ifndef TWOVIEW_MATCH_H
+#define TWOVIEW_MATCH_H
+
+#include "twoview/camera.h"
+#include "twoview/context.h"
+#include "twoview/feature.h"
+
+TV_BEGIN_DECLS
+
+/* A match: a feature of image 0 and the feature of image 1 that it belongs to. */
+typedef struct tv_correspondence {
+  /* Indices of the feature in image 0 and in image 1. */
+  int32_t idx0, idx1;
+  /* The squared L2 distance of the two descriptors. */
+  uint32_t dist_sq;
+  /* The distance to the nearest descriptor over the distance to the second nearest, the larger of
+     the two directions; [0, 1]. The lower it is, the more certain is the match. */
+  float ratio;
+} tv_correspondence;
+
+/* Options of tv_match. Filled by tv_match_options_init. */
+typedef struct tv_match_options {
+  /* The caller's sizeof, set by tv_match_options_init. */
+  uint32_t struct_size;
+  /* A match is kept where its ratio is below this value in both directions; (0, 1], default 0.92. A
+     bigger value gives more matches, of which more are wrong; 1 rejects only exact ties. */
+  float ratio;
+} tv_match_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_match_options_init. */
+TV_API void tv_match_options_init_sized(tv_match_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_match_options_init(options) tv_match_options_init_sized((options), sizeof *(options))
+
+/* Finds for each descriptor the two nearest ones of the other image by exhaustive search, and keeps
+   a pair when each is the nearest of the other and both pass the ratio test. Of equal distances the
+   one with the lower index counts as nearer. When both images are exchanged, the pairs are the same
+   ones, exchanged. If an image has only one descriptor, there is no second nearest one, and nothing
+   is matched.
+   features0, features1: the descriptors of the two images; keypoints are not read and may be null.
+   options: null means the defaults.
+   correspondences: room for cap_correspondences, in ascending order of idx0; the smaller of both
+   counts of features is always enough.
+   *num_correspondences: how many were written; on TV_ERR_CAPACITY how many there are.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY,
+   TV_ERR_OVERLAP.
+   Time: 128 multiply-adds for each pair of descriptors. */
+TV_API tv_status tv_match(tv_context *context, const tv_features *features0,
+                          const tv_features *features1, const tv_match_options *options,
+                          tv_correspondence *correspondences, int32_t cap_correspondences,
+                          int32_t *num_correspondences);
+
+/* Options of tv_match_guided. Filled by tv_guided_options_init. */
+typedef struct tv_guided_options {
+  /* The caller's sizeof, set by tv_guided_options_init. */
+  uint32_t struct_size;
+  /* Half the width of the band around the epipolar line in which a match is searched: a Sampson
+     distance in pixels of the images as given, [0.01, 1000], default 4. A wider band finds matches
+     where the first estimate is inaccurate; a narrow one biases the next estimate towards it. */
+  float max_error_px;
+  /* A match is kept where its ratio is below this value in both directions; (0, 1], default 0.87. A
+     bigger value gives more matches, of which more are wrong. */
+  float ratio;
+  /* The L2 distance of descriptors that replaces the distance to the second nearest one where the
+     band holds no other keypoint, (0, 3000], default 180: 95 % of the correct matches lie below it.
+     A bigger value gives more matches, of which more are wrong. */
+  float max_distance;
+  /* Keypoints within this distance in pixels of the nearest one are not counted as the second
+     nearest one, because they are second orientations of the same corner or its neighbours on the
+     same edge; [0, 1000], default 4. */
+  float neighbourhood_px;
+} tv_guided_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_guided_options_init. */
+TV_API void tv_guided_options_init_sized(tv_guided_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_guided_options_init(options) tv_guided_options_init_sized((options), sizeof *(options))
+
+/* Matches again where the epipolar geometry is known. A pair is kept when each is the nearest of
+   the other among the keypoints within a band around the epipolar line, and both pass the ratio
+   test. There are few candidates in a band, so that matches pass that the ratio test over the whole
+   image rejects. The ratio of the result is the distance over the smaller of max_distance and the
+   distance to the second nearest keypoint in the band, the larger of the two directions. Of equal
+   distances the one with the lower index counts as nearer. Exchanged views with the transposed
+   matrix give the same pairs, exchanged. A keypoint outside its lens's valid region is not matched.
+   camera0, camera1: both cameras, with E in `epipolar` (tv_two_view.E); any lens is possible, since
+   the band is measured in pixels of the images as given. Or both null, with F of the pixels.
+   epipolar: row-major 3x3, finite.
+   features0, features1: keypoints and descriptors of the two images. Every field of the keypoints
+   is checked as tv_describe checks it. options: null means the defaults. correspondences: room for
+   cap_correspondences, in ascending order of idx0; the smaller of both counts of features is always
+   enough. *num_correspondences: how many were written; on TV_ERR_CAPACITY how many there are.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
+   TV_ERR_NOT_FINITE, TV_ERR_CAPACITY, TV_ERR_OVERLAP.
+   Time: a product of three numbers for each pair of keypoints, and 128 multiply-adds, at most
+   twice, for each pair in a band. */
+TV_API tv_status tv_match_guided(tv_context *context, const tv_camera *camera0,
+                                 const tv_camera *camera1, const double epipolar[9],
+                                 const tv_features *features0, const tv_features *features1,
+                                 const tv_guided_options *options,
+                                 tv_correspondence *correspondences, int32_t cap_correspondences,
+                                 int32_t *num_correspondences);
+
+TV_END_DECLS
+
+#endif

@@ -1,0 +1,116 @@
+/* twoview: the whole way, from two images in memory to a pose and points.
+
+   It calls the stages in a row; the header of each stage names its sources. Signs and frames:
+   docs/conventions.md. */
+#ifndef TWOVIEW_RECONSTRUCT_H
+#define TWOVIEW_RECONSTRUCT_H
+
+#include "twoview/feature.h"
+#include "twoview/match.h"
+#include "twoview/triangulate.h"
+#include "twoview/two_view.h"
+
+TV_BEGIN_DECLS
+
+/* One of the two views. Filled by tv_view_init with zeros; what it points to is the caller's and
+   stays valid during the call. */
+typedef struct tv_view {
+  /* The caller's sizeof, set by tv_view_init. */
+  uint32_t struct_size;
+  /* Must be 0. */
+  uint32_t reserved;
+  /* The image. */
+  tv_image image;
+  /* The camera of this image; null in both views means uncalibrated, which gives no pose. */
+  const tv_camera *camera;
+  /* Null, or an image of the same size; only corners where its byte is not 0 are kept. */
+  const tv_image *mask;
+} tv_view;
+
+/* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
+   tv_view_init. */
+TV_API void tv_view_init_sized(tv_view *view, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_view_init(view) tv_view_init_sized((view), sizeof *(view))
+
+/* Options of tv_reconstruct. Filled by tv_reconstruct_options_init. */
+typedef struct tv_reconstruct_options {
+  /* The caller's sizeof, set by tv_reconstruct_options_init. */
+  uint32_t struct_size;
+  /* A tv_triangulation, default TV_TRIANGULATION_ITERATIVE_LS. */
+  int32_t triangulation;
+  /* Options of tv_extract; null (default) means its defaults. */
+  const tv_feature_options *feature;
+  /* Options of tv_match; null (default) means its defaults. */
+  const tv_match_options *match;
+  /* Options of tv_estimate_two_view; null (default) means its defaults. */
+  const tv_estimate_options *estimate;
+  /* 1: after a first full pose, tv_match_guided with its default options searches further matches,
+     and the pose is estimated again from all of them; 0 (default): it is not. It takes more time
+     and helps where few matches pass the ratio test. */
+  int32_t guided_matching;
+  /* 1: a full pose and the points of its inliers are adjusted together by tv_adjust_two_view with
+     its default options, and R, t, E, F, the covariance and noise_px are those of the adjustment; 0
+     (default): they are those of the estimate, which was measured to be as accurate
+     (docs/decisions/0005-bundle.md). */
+  int32_t bundle_adjustment;
+} tv_reconstruct_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_reconstruct_options_init. */
+TV_API void tv_reconstruct_options_init_sized(tv_reconstruct_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_reconstruct_options_init(options) \
+  tv_reconstruct_options_init_sized((options), sizeof *(options))
+
+/* The features, matches and points that tv_reconstruct found. The arrays lie in the context's
+   memory and stay valid until the next call with the context. */
+typedef struct tv_reconstruction {
+  /* The caller's sizeof, set by tv_reconstruction_init. */
+  uint32_t struct_size;
+  /* How many keypoints view 0 and view 1 have, second orientations included. */
+  int32_t num_keypoints[2];
+  /* The keypoints of view 0 and of view 1, num_keypoints[0] and num_keypoints[1] of them. */
+  const tv_keypoint *keypoints[2];
+  /* Their descriptors, num_keypoints x TV_DESCRIPTOR_BYTES; row i describes keypoint i. */
+  const uint8_t *descriptors[2];
+  /* How many matches there are: those of tv_match, and those of guided matching where its estimate
+     was taken. */
+  int32_t num_matches;
+  /* How many inliers have a point whose status is TV_POINT_OK. */
+  int32_t num_points;
+  /* num_matches matches; their indices refer to `keypoints`. */
+  const tv_correspondence *matches;
+  /* num_matches bytes; a byte is 1 where the match is an inlier of the model that the kind of the
+     result names. */
+  const uint8_t *inlier_mask;
+  /* num_matches points; the status is TV_POINT_INVALID where the match is no inlier, and everywhere
+     if there is no full pose. */
+  const tv_point *points;
+} tv_reconstruction;
+
+/* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
+   tv_reconstruction_init. */
+TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_reconstruction_init(reconstruction) \
+  tv_reconstruction_init_sized((reconstruction), sizeof *(reconstruction))
+
+/* Computes the pose and the points of two images: tv_extract on both, tv_match,
+   tv_estimate_two_view, tv_triangulate.
+   With guided_matching, the second estimate replaces the first one if it is of the same kind, has
+   no fewer inliers and no worse a verdict. Verdict and reasons remain those of the first estimate,
+   because matches that were searched along its epipolar lines are no independent evidence for it.
+   With bundle_adjustment, exchanged views give the inverse pose up to rounding; without it, bit for
+   bit.
+   options: null means the defaults.
+   two_view: initialised by tv_two_view_init; reconstruction: initialised by tv_reconstruction_init.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, or a reserved field that is
+   not 0), and the statuses of the stages. */
+TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
+                                const tv_reconstruct_options *options, tv_two_view *two_view,
+                                tv_reconstruction *reconstruction);
+
+TV_END_DECLS
+
+#endif

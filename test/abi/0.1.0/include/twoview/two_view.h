@@ -1,0 +1,245 @@
+/* twoview: the geometry of two views from matched pixels.
+
+   Formulas, papers, the rules of the verdict, and tests: docs/algorithms/two_view.md,
+   docs/algorithms/gravity.md, docs/algorithms/principal_point.md. */
+#ifndef TWOVIEW_TWO_VIEW_H
+#define TWOVIEW_TWO_VIEW_H
+
+#include "twoview/camera.h"
+#include "twoview/context.h"
+
+TV_BEGIN_DECLS
+
+/* Matched pixels: pixel i of image 0 and pixel i of image 1 show the same point. Filled by
+   tv_pixel_pairs_init with zeros; the arrays are the caller's and are read during the call only. */
+typedef struct tv_pixel_pairs {
+  /* The caller's sizeof, set by tv_pixel_pairs_init. */
+  uint32_t struct_size;
+  /* How many pairs there are, [0, the context's max_matches]. */
+  int32_t num;
+  /* num x 2 (x, y) each, in pixels, distorted as in the images. */
+  const double *pixels0, *pixels1;
+  /* Null, or `num` values, of which a lower one marks a more certain match
+     (tv_correspondence.ratio): more certain matches are sampled first. */
+  const float *ratios;
+} tv_pixel_pairs;
+
+/* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
+   tv_pixel_pairs_init. */
+TV_API void tv_pixel_pairs_init_sized(tv_pixel_pairs *pairs, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_pixel_pairs_init(pairs) tv_pixel_pairs_init_sized((pairs), sizeof *(pairs))
+
+/* The minimal solver that computes a model from each random sample. */
+typedef enum tv_solver {
+  /* Five matches; cameras are required. The default. D. Nister, "An efficient solution to the
+     five-point relative pose problem", PAMI 2004. */
+  TV_SOLVER_FIVE_POINT = 0,
+  /* Eight matches; the method of the FAST-SIFT paper. R. Hartley, "In defense of the eight-point
+     algorithm", PAMI 1997. */
+  TV_SOLVER_EIGHT_POINT = 1,
+  /* Seven matches: fewer iterations than eight-point where many matches are wrong. R. Hartley,
+     A. Zisserman, "Multiple View Geometry", 11.1.2. */
+  TV_SOLVER_SEVEN_POINT = 2,
+  /* Three matches and the direction of gravity; cameras and gravity are required. */
+  TV_SOLVER_UPRIGHT = 3
+} tv_solver;
+
+/* The kind of geometry that explains the matches: the kinds of COLMAP, and no-motion. */
+typedef enum tv_kind {
+  /* No model explains the matches. */
+  TV_KIND_DEGENERATE = 0,
+  /* An essential matrix: R and t are known, t up to its length. */
+  TV_KIND_CALIBRATED = 1,
+  /* A fundamental matrix: only F is known, because no cameras were given. */
+  TV_KIND_UNCALIBRATED = 2,
+  /* The homography of a plane: R and t are known, and perhaps an alternative pose. */
+  TV_KIND_PLANAR = 3,
+  /* A pure rotation: R is known, t is not. */
+  TV_KIND_PANORAMIC = 4,
+  /* A homography, of a plane or of a rotation: only H is known, because no cameras were given. */
+  TV_KIND_PLANAR_OR_PANORAMIC = 5,
+  /* The camera did not move: R is the identity, t is not known. */
+  TV_KIND_NO_MOTION = 6
+} tv_kind;
+
+/* Whether the pose can be relied on. docs/algorithms/two_view.md has the rules. */
+typedef enum tv_verdict {
+  /* There is no full pose (R and t). */
+  TV_VERDICT_REFUSED = 0,
+  /* There is a full pose, and at least one reason why it may be wrong. */
+  TV_VERDICT_DOUBTFUL = 1,
+  /* There is a full pose, and no reason against it. */
+  TV_VERDICT_OK = 2
+} tv_verdict;
+
+/* Why a verdict is not "ok". The values are bits of tv_two_view.reasons. */
+typedef enum tv_reason {
+  /* Fewer than 15 distinct matches are inliers. */
+  TV_REASON_TOO_FEW_MATCHES = 1 << 0,
+  /* Fewer than 25 % of the matches are inliers, or the residuals are uniform over the threshold, as
+     random matches' are. */
+  TV_REASON_LOW_INLIER_RATIO = 1 << 1,
+  /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
+     10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees. */
+  TV_REASON_LOW_PARALLAX = 1 << 2,
+  /* The matches lie on a plane, and two different poses explain them equally well. Both are in the
+     result. */
+  TV_REASON_TWO_PLANAR_SOLUTIONS = 1 << 3,
+  /* The camera only rotated: t cannot be determined. The verdict is "refused". */
+  TV_REASON_PURE_ROTATION = 1 << 4,
+  /* The camera did not move: t cannot be determined. The verdict is "refused". */
+  TV_REASON_NO_MOTION = 1 << 5,
+  /* Matches far from this pose agree on another one, and are at least 15 % as many as its inliers.
+     Something in the scene moves by itself, or this pose is that of the moving object. */
+  TV_REASON_SECOND_MOTION = 1 << 6,
+  /* The inliers cover fewer than 5 of the 64 cells of an 8x8 grid over the image, or lie on a
+     line. */
+  TV_REASON_CROWDED_MATCHES = 1 << 7,
+  /* The keypoints of image 0 lie on a regular lattice, and either most inliers do, too, or a second
+     model fits the other matches: the pose may be wrong by one period of a repeated structure. */
+  TV_REASON_REPEATED_STRUCTURE = 1 << 8
+} tv_reason;
+
+/* Returns the name of a kind, such as "calibrated" or "planar_or_panoramic", or "unknown" for any
+   other number. The string is constant and never freed. Thread-safe. */
+TV_API const char *tv_kind_string(tv_kind kind);
+/* Returns "ok", "doubtful" or "refused", or "unknown" for any other number. The string is constant
+   and never freed. Thread-safe. */
+TV_API const char *tv_verdict_string(tv_verdict verdict);
+/* Returns the name of one reason, such as "low_parallax", or "unknown" for anything but exactly one
+   of the bits. The string is constant and never freed. Thread-safe. */
+TV_API const char *tv_reason_string(tv_reason reason);
+
+/* Options of the estimate. Filled by tv_estimate_options_init. */
+typedef struct tv_estimate_options {
+  /* The caller's sizeof, set by tv_estimate_options_init. */
+  uint32_t struct_size;
+  /* A tv_solver, default TV_SOLVER_FIVE_POINT. */
+  int32_t method;
+  /* The inlier threshold: the largest Sampson distance of an inlier, in pixels of the images as
+     given, for every lens alike; (0, 1e9], default 1. A bigger value accepts noisier matches and
+     more wrong ones. */
+  double max_error_px;
+  /* The search stops when the probability of having missed a better model is below 1 - confidence;
+     [0, 1), default 0.9999. A bigger value draws more samples. */
+  double confidence;
+  /* The most samples that are drawn, [1, 1000000], default 10000. It bounds the time. */
+  int32_t max_iterations;
+  /* 0 (default): the search stops as confidence determines. Otherwise exactly this many samples are
+     drawn, up to 1000000, and the time is nearly constant. */
+  int32_t fixed_iterations;
+  /* The seed of the sampler. Its default is constant and never the time of day: equal inputs give
+     equal results. */
+  uint64_t seed;
+  /* The direction of gravity ("down") in the frame of each camera, of any length above 0. Read only
+     when gravity_sigma_rad is above 0. */
+  double gravity0[3], gravity1[3];
+  /* The standard deviation in radians of each direction of gravity about each axis across it,
+     [0, pi]; 0 (default) means that gravity is not known. */
+  double gravity_sigma_rad;
+  /* The standard deviation of the principal point around (cx, cy), in focal lengths, [0, 0.1],
+     default 0.01; 0 means that it is exactly there. Used only when camera0 and camera1 are equal.
+     The principal point is moved only if the matches contradict (cx, cy) at a significance of
+     0.001. */
+  double principal_point_sigma;
+} tv_estimate_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_estimate_options_init. */
+TV_API void tv_estimate_options_init_sized(tv_estimate_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_estimate_options_init(options) \
+  tv_estimate_options_init_sized((options), sizeof *(options))
+
+/* The result of an estimate. Matrices are row-major. A matrix or vector whose has_ flag is 0 holds
+   zeros. */
+typedef struct tv_two_view {
+  /* The caller's sizeof, set by tv_two_view_init. */
+  uint32_t struct_size;
+  /* A tv_kind. */
+  int32_t kind;
+  /* A tv_verdict. */
+  int32_t verdict;
+  /* The tv_reason bits; 0 if the verdict is "ok". */
+  uint32_t reasons;
+  /* How many matches were given. */
+  int32_t num_matches;
+  /* How many of them are inliers of the model that `kind` names. */
+  int32_t num_inliers;
+  /* Each is 1 where the member of that name was estimated, else 0. */
+  uint8_t has_R, has_t, has_E, has_F, has_H, has_alternative, has_covariance,
+      has_alternative_covariance;
+  /* How many samples were drawn. */
+  int32_t num_iterations;
+  /* The pose cam1_from_cam0: x1 = R x0 + t, where R is a rotation matrix and |t| = 1. */
+  double R[9], t[3];
+  /* The essential matrix [t]x R, scaled to Frobenius norm 1. */
+  double E[9];
+  /* The fundamental matrix K1^-T E K0^-1, scaled to Frobenius norm 1; of undistorted pixels. */
+  double F[9];
+  /* The homography from undistorted pixels of image 0 to undistorted pixels of image 1, scaled so
+     that H[8] = 1, or to Frobenius norm 1 where H[8] is nearly 0. */
+  double H[9];
+  /* The second pose that explains a plane, in the form of R and t, |t| = 1. */
+  double alternative_R[9], alternative_t[3];
+  /* The covariance of the pose, 5x5, in radians^2, in the order (w0 w1 w2 a b): R_true =
+     exp([w]x) R, t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), b2 = t x b1, where k
+     is the index of the smallest |t_k| (the lowest one on a tie). */
+  double covariance[25];
+  /* The covariance of the alternative pose, in radians^2 and in the same parameters. */
+  double alternative_covariance[25];
+  /* How many inliers each model has; -1 where that model was not estimated. */
+  int32_t essential_inliers, fundamental_inliers, homography_inliers, rotation_inliers;
+  /* The share of the cells of an 8x8 grid over image 0 that hold an inlier, [0, 1]. */
+  double coverage;
+  /* The median, over the inliers, of the angle in radians between the two rays of a match after the
+     rotation was removed. */
+  double median_parallax_rad;
+  /* The root mean square of the inliers' Sampson distances, in pixels. */
+  double rms_error_px;
+  /* The standard deviation of a matched pixel along one axis, in pixels, estimated from the
+     residuals of a full pose; 0 without one. */
+  double noise_px;
+  /* The seed that was used. */
+  uint64_t seed;
+  /* What the estimate adds to (cx, cy) of both cameras, in pixels; it is usually (0, 0). All of the
+     result refers to the cameras with it, which tv_corrected_camera computes. */
+  double principal_point_shift[2];
+} tv_two_view;
+
+/* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
+   tv_two_view_init. */
+TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
+
+/* Writes to `corrected` the camera that the result refers to: `camera` with the result's
+   principal_point_shift added to cx and cy. Use it for what follows the estimate: triangulation,
+   guided matching and bundle adjustment. `corrected` may be `camera` itself.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. Thread-safe. */
+TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera *camera,
+                                     tv_camera *corrected);
+
+/* Estimates the two-view geometry of matched pixels.
+   camera0, camera1: both cameras; or both null, which gives F and H only and requires the solver
+   eight-point or seven-point.
+   pairs: the matched pixels. The order of the matches has no influence on the result. A match is
+   never an inlier if a pixel lies outside its lens's valid region, is not finite, or has
+   coordinates whose absolute values add up to a million pixels or more. options: null means the
+   defaults, with the eight-point solver where no cameras are given. result: initialised by
+   tv_two_view_init. That no geometry was found is TV_OK, and reported in kind, verdict and reasons.
+   With both views exchanged, R is the transpose bit for bit, and t is -R^T t. inlier_mask: null, or
+   room for pairs->num bytes; a byte is 1 where the match is an inlier of the model that the kind
+   names. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
+   TV_ERR_NOT_FINITE (the options only), TV_ERR_OVERLAP.
+   Time: at most max_iterations samples, of at most 10 models each, which are scored on all
+   matches. */
+TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,
+                                      const tv_camera *camera1, const tv_pixel_pairs *pairs,
+                                      const tv_estimate_options *options, tv_two_view *result,
+                                      uint8_t *inlier_mask);
+
+TV_END_DECLS
+
+#endif

@@ -1,0 +1,17 @@
+/* twoview: FAST-SIFT matching and two-view geometry. This header includes those of all stages. */
+#ifndef TWOVIEW_TWOVIEW_H
+#define TWOVIEW_TWOVIEW_H
+
+#include "twoview/bundle.h"
+#include "twoview/camera.h"
+#include "twoview/context.h"
+#include "twoview/feature.h"
+#include "twoview/image.h"
+#include "twoview/match.h"
+#include "twoview/reconstruct.h"
+#include "twoview/status.h"
+#include "twoview/triangulate.h"
+#include "twoview/two_view.h"
+#include "twoview/version.h"
+
+#endif
