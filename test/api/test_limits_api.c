@@ -4,6 +4,7 @@
 #include <unity.h>
 
 #include "support/api.h"
+#include "support/calls.h"
 
 enum { WIDTH = 200, HEIGHT = 150, CAP = 300 };
 
@@ -78,14 +79,13 @@ static uint32_t calls_that_work(tv_context *context) {
   status[k++] = tv_describe(context, &views[0].image, NULL, keypoints, 0, descriptors);
   status[k++] =
       tv_extract(context, &views[0].image, NULL, NULL, keypoints, descriptors, CAP, &count);
-  status[k++] = tv_match(context, descriptors, 9, descriptors, 9, NULL, matches, CAP, &count);
-  status[k++] = tv_match_guided(context, NULL, NULL, E, keypoints, descriptors, 0, keypoints,
-                                descriptors, 0, NULL, matches, CAP, &count);
+  status[k++] = match_rows(context, descriptors, 9, descriptors, 9, NULL, matches, CAP, &count);
+  status[k++] = match_rows_guided(context, NULL, NULL, E, keypoints, descriptors, 0, keypoints,
+                                  descriptors, 0, NULL, matches, CAP, &count);
   tv_two_view_init(&o.two_view);
   status[k++] =
-      tv_estimate_two_view(context, &camera, &camera, NULL, NULL, NULL, 0, NULL, &o.two_view, NULL);
-  status[k++] =
-      tv_adjust_two_view(context, &camera, &camera, NULL, NULL, 0, NULL, R, t, NULL, NULL);
+      estimate_pixels(context, &camera, &camera, NULL, NULL, NULL, 0, NULL, &o.two_view, NULL);
+  status[k++] = adjust_pixels(context, &camera, &camera, NULL, NULL, 0, NULL, R, t, NULL, NULL);
   status[k++] = run(context, 0, &options, &o);
   options.guided_matching = 1;
   status[k++] = run(context, 0, &options, &o);
@@ -243,15 +243,15 @@ static void run_stages(tv_context *context, const tv_camera *lens, int initialis
                                          r->oriented, ROOM, &r->num_oriented));
   TEST_ASSERT_EQUAL_INT(
       TV_OK, tv_describe(context, &views[0].image, f, r->detected, r->num_detected, r->described));
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_match(context, r->descriptors[0], r->num_extracted[0], r->descriptors[1],
-                                 r->num_extracted[1], initialised ? &match : NULL, r->matches, ROOM,
-                                 &r->num_matches));
   TEST_ASSERT_EQUAL_INT(
-      TV_OK,
-      tv_match_guided(context, lens, lens, E, r->keypoints[0], r->descriptors[0],
-                      r->num_extracted[0], r->keypoints[1], r->descriptors[1], r->num_extracted[1],
-                      initialised ? &guided : NULL, r->guided, ROOM, &r->num_guided));
+      TV_OK, match_rows(context, r->descriptors[0], r->num_extracted[0], r->descriptors[1],
+                        r->num_extracted[1], initialised ? &match : NULL, r->matches, ROOM,
+                        &r->num_matches));
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, match_rows_guided(context, lens, lens, E, r->keypoints[0], r->descriptors[0],
+                               r->num_extracted[0], r->keypoints[1], r->descriptors[1],
+                               r->num_extracted[1], initialised ? &guided : NULL, r->guided, ROOM,
+                               &r->num_guided));
   for (k = 0; k < r->num_matches; ++k) {
     pixels[0][2 * k] = r->keypoints[0][r->matches[k].idx0].x;
     pixels[0][2 * k + 1] = r->keypoints[0][r->matches[k].idx0].y;
@@ -260,8 +260,8 @@ static void run_stages(tv_context *context, const tv_camera *lens, int initialis
   }
   tv_two_view_init(&r->estimate);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_estimate_two_view(context, lens, lens, pixels[0], pixels[1], NULL, r->num_matches,
-                                  initialised ? &estimate : NULL, &r->estimate, NULL));
+      TV_OK, estimate_pixels(context, lens, lens, pixels[0], pixels[1], NULL, r->num_matches,
+                             initialised ? &estimate : NULL, &r->estimate, NULL));
   tv_two_view_init(&r->whole);
   tv_reconstruction_init(&cloud);
   views[0].camera = views[1].camera = lens;
@@ -273,8 +273,8 @@ static void run_stages(tv_context *context, const tv_camera *lens, int initialis
                                               r->t, pixels[0], pixels[1], r->num_matches, points));
   tv_bundle_result_init(&r->bundle);
   TEST_ASSERT_EQUAL_INT(
-      TV_OK, tv_adjust_two_view(context, &camera, &camera, pixels[0], pixels[1], r->num_matches,
-                                initialised ? &bundle : NULL, r->R, r->t, points, &r->bundle));
+      TV_OK, adjust_pixels(context, &camera, &camera, pixels[0], pixels[1], r->num_matches,
+                           initialised ? &bundle : NULL, r->R, r->t, points, &r->bundle));
 }
 
 static void test_null_options_mean_initialised_ones(void) {

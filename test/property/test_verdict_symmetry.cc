@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "support/calls.h"
 #include "support/estimator.h"
 #include "support/pair_kinds.h"
 #include "twoview/two_view.h"
@@ -27,10 +28,9 @@ tv_two_view estimate(bool calibrated, bool swapped, const float* of_matches) {
   tv_two_view_init(&r);
   const int first = swapped ? 1 : 0;
   TEST_ASSERT_EQUAL_INT(
-      TV_OK,
-      tv_estimate_two_view(context, calibrated ? &pair.camera[first] : nullptr,
-                           calibrated ? &pair.camera[1 - first] : nullptr, pair.pixels[first],
-                           pair.pixels[1 - first], of_matches, pair.num, &options, &r, nullptr));
+      TV_OK, estimate_pixels(context, calibrated ? &pair.camera[first] : nullptr,
+                             calibrated ? &pair.camera[1 - first] : nullptr, pair.pixels[first],
+                             pair.pixels[1 - first], of_matches, pair.num, &options, &r, nullptr));
   return r;
 }
 
