@@ -1,13 +1,14 @@
 /* The rotation between two views against an IMU's, with its gravity as a prior: the paper's check.
-   Attitudes are w x y z, world from body; the body's x is forward, y right, z down, and so is the
-   world's z. The camera looks forward. usage: 07_imu MATCHES.txt fx fy cx cy  w0 x0 y0 z0  w1 x1 y1
-   z1  sigma_deg */
+   Attitudes are w x y z, world from body; x is forward, y right, z down. The camera looks forward.
+   usage: 07_imu MATCHES.txt fx fy cx cy  w0 x0 y0 z0  w1 x1 y1 z1  sigma_deg */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <twoview/alloc.h>
 #include <twoview/twoview.h>
 
+#define DEGREES 57.29577951308232
 enum { MOST = 20000 };
 
 /* Lines of x0 y0 x1 y1 ratio, as 04_match prints them. */
@@ -27,10 +28,7 @@ static int fail(const char *what) {
   return 2;
 }
 
-#define DEGREES 57.29577951308232
-
-/* world_from_camera, row-major: the body's rotation, with camera axes (right, down, forward) in
- * columns. */
+/* world_from_camera, row-major; its columns are the camera's axes right, down and forward. */
 static void rotation_of(char **q, double R[9]) {
   const double w = atof(q[0]), x = atof(q[1]), y = atof(q[2]), z = atof(q[3]);
   const double body[9] = {
@@ -48,7 +46,7 @@ static void rotation_of(char **q, double R[9]) {
 int main(int argc, char **argv) {
   static double pixels[2][2 * MOST], world[2][9];
   static float ratios[MOST];
-  tv_camera camera = {0};
+  tv_camera camera = {TV_CAMERA_PINHOLE};
   tv_limits limits;
   tv_context *context;
   tv_pixel_pairs pairs;
@@ -57,10 +55,8 @@ int main(int argc, char **argv) {
   tv_status status;
   double trace = 0;
   int n, i, j, k;
-  if (argc != 15)
-    return fail("usage: 07_imu MATCHES.txt fx fy cx cy w0 x0 y0 z0 w1 x1 y1 z1 sigma_deg");
+  if (argc != 15) return fail("usage: 07_imu MATCHES fx fy cx cy ATTITUDE0 ATTITUDE1 sigma_deg");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
-  camera.model = TV_CAMERA_PINHOLE;
   camera.fx = atof(argv[2]);
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
@@ -70,15 +66,13 @@ int main(int argc, char **argv) {
   rotation_of(argv + 6, world[0]);
   rotation_of(argv + 10, world[1]);
   tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 1;
+  limits.purposes = TV_PURPOSE_ESTIMATE;
   limits.max_matches = MOST;
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
   tv_estimate_options_init(&options);
-  for (k = 0; k < 3; ++k) { /* down, in each camera */
-    options.gravity0[k] = world[0][6 + k];
-    options.gravity1[k] = world[1][6 + k];
-  }
+  memcpy(options.gravity0, world[0] + 6, sizeof options.gravity0); /* down, in each camera */
+  memcpy(options.gravity1, world[1] + 6, sizeof options.gravity1);
   options.gravity_sigma_rad = atof(argv[14]) / DEGREES;
   tv_two_view_init(&pose);
   tv_pixel_pairs_init(&pairs);

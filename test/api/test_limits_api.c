@@ -29,9 +29,7 @@ void setUp(void) {
   camera.cx = 0.5 * (WIDTH - 1);
   camera.cy = 0.5 * (HEIGHT - 1);
   for (v = 0; v < 2; ++v) {
-    views[v].image = api_image(drawn[v], WIDTH, HEIGHT, WIDTH);
-    views[v].camera = &camera;
-    views[v].mask = NULL;
+    views[v] = view_of(api_image(drawn[v], WIDTH, HEIGHT, WIDTH), &camera, NULL);
   }
 }
 

@@ -42,13 +42,14 @@ class ComparisonTest(unittest.TestCase):
 
 class TestReference(ComparisonTest):
     def test_colmaps_reconstruction_stands_in_for_the_truth_and_every_table_says_so(self):
-        from twoview_tools.accuracy import datasets, metrics
+        from twoview_tools import formats
+        from twoview_tools.accuracy import metrics
         report, page = self.compare("report", [line[:22] for line in self.lines],
                                     "--reference", "colmap", "--jobs", 2)
         told, = report["reference_of_sets"].values()
         self.assertEqual(told["models"], [len(FIRST_IMAGES)])
         for line, pair in zip(self.lines, report["pairs"]):
-            true = datasets.Pair(" ".join(line))
+            true = formats.parse_pair(" ".join(line))
             error = metrics.pose_error(pair["reference"]["R"], pair["reference"]["t"], true.R,
                                        true.t)
             self.assertLess(max(error["rotation_error_deg"],

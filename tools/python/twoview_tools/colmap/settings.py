@@ -11,7 +11,7 @@ MAPPING_KEYPOINTS = 8192
 # For a database, whose pairs share its cameras: a pair's geometry is of those, none is moved for one pair.
 PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
 # What is automatic in the library is a number and a word here, as in the C++ program.
-_EXPLICIT = {"max_keypoints": 2048, "method": tv.Method.FIVE_POINT}
+_EXPLICIT = {"max_keypoints": 2048, "method": tv.Solver.FIVE_POINT}
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
 
 
@@ -20,7 +20,7 @@ def _spelt(value):
 
 
 def _words(enum):
-    return [_spelt(value) for value in enum if value is not tv.Method.AUTO]
+    return [_spelt(value) for value in enum if value is not tv.Solver.AUTO]
 
 
 def _choice(enum):
