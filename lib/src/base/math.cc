@@ -147,7 +147,8 @@ Pair subtract(const Pair& a, const Pair& b) {
 
 // ---- exponential and logarithm ----
 
-constexpr double kLn2High = 0x1.62e42fefa2000p-1;  // 40 bits: exact times any exponent
+constexpr double kLn2High =
+    0x1.62e42fefa2000p-1;  // 40 bits: its product with any exponent is exact
 constexpr double kLn2Low = 0x1.9ef35793c7673p-41;
 constexpr double kOneOverLn2 = 0x1.71547652b82fep+0;
 

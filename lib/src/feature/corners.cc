@@ -1,3 +1,5 @@
+// Finds the corners of one image over the levels of its pyramid. Problem and formulas:
+// docs/algorithms/fast.md; test: test/unit/test_fast.cc.
 #include "feature/corners.h"
 
 #include <algorithm>

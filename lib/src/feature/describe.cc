@@ -1,3 +1,5 @@
+// Samples the patch of a keypoint and passes it to the kernels of kernels/describe.h. Problem and
+// formulas: docs/algorithms/sift.md; tests: test/unit/test_orientation.cc and test_sift_opencv.cc.
 #include "feature/describe.h"
 
 #include "base/math.h"

@@ -1,3 +1,4 @@
+// Moves corners to the maximum of the contrast around them. Test: test/unit/test_subpixel.cc.
 #include "feature/subpixel.h"
 
 #include "kernels/kernels.h"

@@ -1,3 +1,5 @@
+// Makes the levels and octaves of image/pyramid.h, row by row with the kernels of
+// kernels/resample.h and pair_rows. Test: test/unit/test_pyramid.cc.
 #include "image/pyramid.h"
 
 namespace tv {

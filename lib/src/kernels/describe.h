@@ -52,7 +52,7 @@ static direction_shares share_directions(words u, words v, words weights) {
   const words left = u<words_of(0), up = v> words_of(0), steep = av > au;
   words big = words_max(au, av), small = words_min(au, av), bin, is_odd, a, b;
   const words root_half = words_of((int16_t)46341);
-  const words cosine = words_of((int16_t)60547), sine = words_of(25080); /* of 22.5 degrees */
+  const words cosine = words_of((int16_t)60547), sine = words_of(25080); /* 22.5 degrees, * 65536 */
   const words big45 = words_scale(big + small, root_half);
   const words small45 = words_scale(big - small, root_half);
   const words over22 = small45 < small;
@@ -77,7 +77,7 @@ static direction_shares share_directions(words u, words v, words weights) {
   b = b + words_scale(small, words_of(8258));
   a = words_scale(a, weights);
   b = words_scale(b, weights);
-  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1); /* u points to bin 4 */
+  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1); /* u is bin 4 */
   shares.low = (a & ~is_odd) | (b & is_odd);
   shares.high = (b & ~is_odd) | (a & is_odd);
   return shares;

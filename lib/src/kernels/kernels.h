@@ -30,7 +30,7 @@ typedef struct tvk_nearest {
 #define TVK_CIRCLE_RADIUS 3 /* in pixels, of the segment test */
 
 #define TVK_PATCH_SIDE 16  /* samples along each side of a descriptor's patch: 15 gradients */
-#define TVK_ORIENT_SIDE 12 /* the same for the patch of the orientation */
+#define TVK_ORIENT_SIDE 12 /* samples along each side of the orientation's patch */
 #define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
 

@@ -42,7 +42,7 @@
 #define TVK_INLINE inline __attribute__((always_inline))
 
 typedef double lanes __attribute__((vector_size(8 * TVK_LANES)));
-typedef int64_t lane_mask __attribute__((vector_size(8 * TVK_LANES))); /* all ones or all zeros */
+typedef int64_t lane_mask __attribute__((vector_size(8 * TVK_LANES))); /* lanes are -1 or 0 */
 typedef double unaligned_lanes __attribute__((vector_size(8 * TVK_LANES), aligned(8), may_alias));
 
 static inline lanes lanes_of(double x) { return (lanes){0} + x; }

@@ -8,7 +8,7 @@ enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4 };
 
 typedef struct nearest_rows {
-  int8_t bytes[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE]; /* 127 - a */
+  int8_t bytes[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE]; /* 127 - (the byte of row a) */
   int32_t best[NEAREST_QUERIES * NEAREST_LANES], second[NEAREST_QUERIES * NEAREST_LANES];
   int32_t norms[8], terms[8];
 } nearest_rows;
@@ -16,7 +16,7 @@ typedef struct nearest_rows {
 typedef struct nearest_block {
   uint8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
-  int32_t starts[NEAREST_COLUMNS]; /* -127 sum b */
+  int32_t starts[NEAREST_COLUMNS]; /* -127 (sum of the bytes of b) */
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 

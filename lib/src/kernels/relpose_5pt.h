@@ -39,7 +39,7 @@ static inline void null_space_5x9(lanes rows[5][9], lanes basis[4][9], lane_mask
     }
   }
   for (b = 0; b < 4; ++b) {
-    /* The last reflector is applied to a unit vector, which has a single entry. */
+    /* The last reflector is applied to a vector with a single entry that is not 0. */
     const lanes first = rows[4][5 + b] * scale[4];
     for (i = 0; i < 4; ++i) basis[b][i] = lanes_of(0);
     for (i = 4; i < 9; ++i) basis[b][i] = (i == 5 + b ? 1.0 : 0.0) - first * rows[4][i];
@@ -186,7 +186,7 @@ typedef struct z_matrix {
 
 static inline void z_matrix_of(const lanes rows[10][20], z_matrix *b) {
   int k;
-  for (k = 0; k < 3; ++k) { /* row - z * next row */
+  for (k = 0; k < 3; ++k) { /* row 4 + 2k - z * the next row */
     const lanes *e = rows[4 + 2 * k], *f = rows[5 + 2 * k];
     b->x[k][0] = e[12];
     b->x[k][1] = e[11] - f[12];
@@ -264,7 +264,8 @@ static TVK_NOINLINE void make_sturm_chain(const lanes p[11], sturm_chain *chain)
     chain->scale[k] = lanes_of(0);
     chain->last = lanes_select(alive, lead, chain->last);
     if (d == 0) break;
-    /* -remainder = slope z current + offset current - previous, of degree below d */
+    /* The remainder of the division, with its sign changed: slope z current + offset current -
+       previous, of a degree below d. */
     for (i = 0; i < d; ++i) {
       const lanes shifted = i > 0 ? slope * current[i - 1] : lanes_of(0);
       remainder[i] = (offset * current[i] + shifted) - previous[i];

@@ -1,3 +1,4 @@
+// Guided matching. Formulas: docs/algorithms/match.md; test: test/unit/test_guided.c.
 #include "match/guided.h"
 
 #include <algorithm>

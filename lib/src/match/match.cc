@@ -1,3 +1,5 @@
+// Matching by the kernel mutual_nearest and the ratio test. Formulas: docs/algorithms/match.md;
+// test: test/unit/test_match.c.
 #include "match/match.h"
 
 #include <cmath>
