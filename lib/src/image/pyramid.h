@@ -37,9 +37,9 @@ inline double to_level(const Level& level, double x) { return to_level(level.sca
 // that made it.
 struct LevelBuffers {
   uint8_t* pixels[2];
-  uint16_t* sums;           // one number per column of the source
-  int32_t* first;           // one number per column of the new level
-  int32_t* column_weights;  // three numbers per column of the new level
+  uint16_t* sums;           // for each source column: the weighted sum of up to three pixels
+  int32_t* first;           // for each new column: its first source column
+  int32_t* column_weights;  // for each new column: the weights of three source columns
 };
 
 size_t level_buffers_bytes(int32_t max_width, int32_t max_height);

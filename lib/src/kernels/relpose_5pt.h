@@ -326,8 +326,9 @@ static inline void add_bracket(root_brackets *b, int lane, double low, double hi
   if (n + 1 > b->most) b->most = n + 1;
 }
 
-/* Halves an interval with several roots until each part has one. Intervals beyond +-1 are halved in
-   1 / z, the others in z. */
+/* Halves an interval with several roots until each part has one. A part whose relative length is at
+   most 1e-12 is counted as one repeated root. Intervals beyond +-1 are halved in 1 / z, the others
+   in z. */
 static TVK_NOINLINE void split_bracket(const sturm_chain *chain, int lane, double low, double high,
                                        int changes_low, int changes_high, root_brackets *brackets) {
   struct {

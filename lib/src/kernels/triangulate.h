@@ -1,7 +1,7 @@
-/* The kernel triangulate: points from the pixels of two pinhole cameras by the closed methods,
-   TVK_LANES matches at a time. It computes what geometry/triangulation.cc computes for one match of
-   any lens, in coordinates of the image planes z = 1. R. Hartley, P. Sturm, "Triangulation", CVIU
-   68(2), 1997. docs/algorithms/triangulation.md. */
+/* The kernel triangulate: points from the pixels of two pinhole cameras by Midpoint, Linear-LS or
+   Iterative-LS, TVK_LANES matches at a time. It computes what geometry/triangulation.cc computes
+   for one match of any lens, in coordinates of the image planes z = 1. R. Hartley, P. Sturm,
+   "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md. */
 
 #include "kernels/lanes.h"
 #include "twoview/triangulate.h"
@@ -39,7 +39,7 @@ static inline float_lanes floats_sqrt(float_lanes a) {
 #endif
 }
 
-/* Packs two floats into each word of eight bytes, the first in its lower half. */
+/* Packs a lane's two floats into a word of eight bytes, `lower` in the lower half. */
 static inline lanes pack_floats(float_lanes lower, float_lanes upper) {
   return (lanes)(__builtin_convertvector((float_bits)lower, word_lanes) |
                  __builtin_convertvector((float_bits)upper, word_lanes) << 32);
