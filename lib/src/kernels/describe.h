@@ -2,8 +2,9 @@
    normalisation to 128 bytes. D. G. Lowe, "Distinctive image features from scale-invariant
    keypoints", IJCV 2004, sections 5 and 6. No arctangent is needed: a gradient between two
    directions of a histogram is the sum of a vector along each direction, and the lengths of these
-   two vectors are its shares. All arithmetic is in integers, of 16 bits where these suffice
-   (docs/decisions/0009). */
+   two vectors are its shares. Arithmetic is in integers, of 16 bits where these suffice
+   (docs/decisions/0009), except for the square roots and one division of the normalisation, which
+   are single IEEE operations. */
 
 #include "kernels/words.h"
 

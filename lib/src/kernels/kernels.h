@@ -72,8 +72,8 @@ struct tv_point;
 typedef struct tvk_triangulate_pair {
   double focal[4], inverse_focal[4], principal[4];
   double R[9], direction[3], center1[3], baseline;
-  double parallel_sine_sq; /* two rays are parallel if the squared sine of their angle is not above
-                              this */
+  double
+      parallel_sine_sq; /* rays are parallel if the squared sine of their angle is at most this */
 } tvk_triangulate_pair;
 
 /* The contract of each kernel.

@@ -15,6 +15,6 @@ TVK_LEND(orientation_histogram, avx2);
 TVK_LEND(gradient_histogram, avx2);
 TVK_LEND(quantize_descriptor, avx2);
 
-/* The C set's kernel is as fast as this set's. */
+/* This kernel is the C set's, which is as fast. */
 #define average_columns tvk_average_columns_c
 #include "kernels/kernels_table.h"

@@ -11,7 +11,8 @@
 #define tvk_transfer_squares_avx512 tvk_transfer_squares_avx2
 #define tvk_transfer_sums_avx512 tvk_transfer_sums_avx2
 
-/* The other set's kernel is as fast, or the difference does not show in the time of a pair. */
+/* These kernels are other sets', which are as fast, or whose difference does not show in the time
+   of a pair. */
 #define average_columns tvk_average_columns_c
 #define fast_contrasts tvk_fast_contrasts_avx2
 #define average_rows tvk_average_rows_avx2

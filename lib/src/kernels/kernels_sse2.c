@@ -5,7 +5,7 @@
 #define TVK_SSE2
 #include "kernels/kernels_impl.h"
 
-/* The C set's kernel is as fast as this set's. */
+/* These kernels are the C set's, which are as fast. */
 #define average_columns tvk_average_columns_c
 #define sample_patch tvk_sample_patch_c
 #define quantize_descriptor tvk_quantize_descriptor_c

@@ -113,7 +113,8 @@ static inline void merge_columns(const nearest_block *block, int32_t first_row, 
   }
 }
 
-/* Merges the lists of a row, one per lane, into of_row. */
+/* Merges the lists of a row, one per lane, into of_row: its nearest group, its smallest and second
+   smallest distance. */
 static inline void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
                                int32_t first_column, tvk_nearest *of_row) {
   int32_t smallest = NEAREST_FAR, next = NEAREST_FAR, equals = 0, lane;
@@ -131,8 +132,8 @@ static inline void merge_lanes(const int32_t *best, const int32_t *second, int32
 
 /* Computes the distances from the query to the members of its nearest group again: `count`
    descriptors of `others`, `stride` apart, from nearest->idx on. Lowers nearest->second to the
-   distance of the next member. Returns the index of the strictly nearest descriptor, or -1 if there
-   is a tie. */
+   smallest distance of the other members. Returns the index of the strictly nearest descriptor, or
+   -1 if there is a tie. */
 static TVK_NOINLINE int32_t resolve_group(const uint8_t *query, const uint8_t *others,
                                           int32_t num_others, int32_t stride, int32_t count,
                                           tvk_nearest *nearest) {
@@ -345,7 +346,7 @@ static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t 
   }
 }
 
-#if !defined(TVK_NEON_DOT) /* that set takes this kernel from the NEON set */
+#if !defined(TVK_NEON_DOT) /* whose table has the NEON set's kernel */
 static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
                               int32_t count, int32_t *out) {
   int32_t k;

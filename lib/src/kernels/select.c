@@ -45,8 +45,8 @@ static int32_t level_sse2(void) { return LEVEL_SSE2; }
 static int32_t level_avx2(void) { return LEVEL_AVX2; }
 static int32_t level_avx512(void) { return LEVEL_AVX512; }
 typedef int32_t (*level_of)(void);
-/* The loader calls this function before a sanitizer is initialised. Clang does not see that it is
-   used. */
+/* The loader calls this function before a sanitizer is initialised, so it must not be instrumented.
+   `unused` suppresses a warning of clang, which does not see the use by ifunc. */
 __attribute__((no_sanitize("address", "undefined"), unused)) static level_of resolve_level(void) {
   const int32_t level = ask_cpu();
   return level == LEVEL_AVX512 ? level_avx512 : level == LEVEL_AVX2 ? level_avx2 : level_sse2;

@@ -204,7 +204,7 @@ static inline lane_mask triangulate_lanes(const tvk_triangulate_pair *p, int met
 }
 
 /* Triangulates TVK_LANES matches and writes the points of the first `count`. Returns the mask of
-   the lanes without a point, of all TVK_LANES. */
+   the lanes without a point, which includes lanes after the first `count`. */
 static inline lane_mask triangulate_block(const tvk_triangulate_pair *p, int method,
                                           const double *pixels0, const double *pixels1, int count,
                                           tv_point *points) {
