@@ -78,7 +78,8 @@ static direction_shares share_directions(words u, words v, words weights) {
   b = b + words_scale(small, words_of(8258));
   a = words_scale(a, weights);
   b = words_scale(b, weights);
-  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1); /* u is bin 4 */
+  /* The number is counted from u so far. u is 45 degrees from x, which is four bins. */
+  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1);
   shares.low = (a & ~is_odd) | (b & is_odd);
   shares.high = (b & ~is_odd) | (a & is_odd);
   return shares;

@@ -346,7 +346,8 @@ static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t 
   }
 }
 
-#if !defined(TVK_NEON_DOT) /* whose table has the NEON set's kernel */
+/* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */
+#if !defined(TVK_NEON_DOT)
 static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
                               int32_t count, int32_t *out) {
   int32_t k;
