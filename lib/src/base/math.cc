@@ -225,7 +225,7 @@ double atan2(double y, double x) {
   if (y != y || x != x) return kNaN;
   double size_y = y < 0 ? -y : y;
   double size_x = x < 0 ? -x : x;
-  if (size_y == kInfinity || size_x == kInfinity) {  // only the quadrant or diagonal matters
+  if (size_y == kInfinity || size_x == kInfinity) {  // finite sizes count as 0
     size_y = size_y == kInfinity ? 1.0 : 0.0;
     size_x = size_x == kInfinity ? 1.0 : 0.0;
   }
