@@ -1,13 +1,14 @@
-# Flags of every target of the project; those that only the library needs: lib/CMakeLists.txt.
+# Compiler flags of every target of the project. Flags that only the library needs are in
+# lib/CMakeLists.txt.
 
 add_library(twoview_flags INTERFACE)
 target_compile_options(twoview_flags INTERFACE
   -Wall -Wextra -Wshadow
   $<$<COMPILE_LANGUAGE:C>:-Werror=implicit-function-declaration>
   $<$<BOOL:${TWOVIEW_WERROR}>:-Werror>
-  # 32-bit ARM: no note that GCC 7 changed how Eigen's types are passed.
+  # On 32-bit ARM: suppresses the note that GCC 7 changed how Eigen's types are passed.
   $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>
-  # a * b + c stays two roundings on every CPU: results are the same bytes everywhere.
+  # a * b + c is rounded twice on every CPU, so that results have the same bytes everywhere.
   -ffp-contract=off)
 
 if(TWOVIEW_SANITIZE)

@@ -1,17 +1,21 @@
-# How tests are registered.
+# Functions that build and register tests: tv_register_test for any command, tv_add_test for a Unity
+# test.
 
-# Exit status of a program in which a test could not run here, after it has printed which and why: ctest
-# then reports it as skipped, never as passed, even when its other tests passed.
+# The exit status of a program in which a test could not run here; the program prints which test and
+# why. ctest reports such a program as skipped, never as passed, even if its other tests passed.
 set(TWOVIEW_SKIP_CODE 77)
-# What runs a Python test file and keeps this rule.
+# Runs a Python test file and returns this exit status where it applies.
 set(TWOVIEW_RUN_PYTHON_TEST ${PROJECT_SOURCE_DIR}/test/support/run_python.py)
-# scripts/test runs the tests of several builds in one ctest, so a sanitizer build's tests have a prefix.
+# The prefix of test names. scripts/test runs the tests of several builds in one ctest, so those of
+# a sanitizer build need a prefix.
 set(TWOVIEW_TEST_PREFIX "")
 if(TWOVIEW_SANITIZE)
   set(TWOVIEW_TEST_PREFIX "asan/")
 endif()
 
 # tv_register_test(name LABEL label COMMAND command... [DIRECTORY working_directory])
+# Registers the command as the test label/name, with the time limit and the environment of all
+# tests.
 function(tv_register_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL;DIRECTORY" "COMMAND")
   if(NOT arg_DIRECTORY)
@@ -28,8 +32,8 @@ function(tv_register_test name)
     ENVIRONMENT "${environment}")
 endfunction()
 
-# Unity's end of a program, replaced by the rule above (test/support/unity_end.c). The benchmarks' folder
-# includes this file as well, without Unity.
+# Replaces Unity's end of a program by one that returns TWOVIEW_SKIP_CODE as described above
+# (test/support/unity_end.c). The folder of the benchmarks includes this file, too, without Unity.
 if(TARGET twoview_unity AND NOT TARGET twoview_unity_end)
   add_library(twoview_unity_end STATIC ${PROJECT_SOURCE_DIR}/test/support/unity_end.c)
   target_link_libraries(twoview_unity_end PRIVATE twoview_flags twoview_unity)
@@ -39,7 +43,7 @@ if(TARGET twoview_unity AND NOT TARGET twoview_unity_end)
 endif()
 
 # tv_add_test(name LABEL label SOURCES file... [LIBS library...])
-# A Unity test, built and registered.
+# Builds and registers a Unity test.
 function(tv_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "SOURCES;LIBS")
   set(target ${arg_LABEL}_${name})
@@ -49,7 +53,8 @@ function(tv_add_test name)
   target_compile_definitions(${target} PRIVATE
     TWOVIEW_SKIP_CODE=${TWOVIEW_SKIP_CODE}
     TWOVIEW_CACHE_DIR="${PROJECT_SOURCE_DIR}/.cache")
-  # The public headers are C99, which rules/install checks; the tests themselves are C11 with extensions.
+  # The public headers are C99, which rules/install checks. The tests themselves are C11 with
+  # extensions.
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11
     C_EXTENSIONS ON

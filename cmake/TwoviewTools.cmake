@@ -1,4 +1,5 @@
-# The command line, where its libraries are found. TWOVIEW_TOOLS=ON makes a missing one an error.
+# Adds the command line program if its libraries are found. With TWOVIEW_TOOLS=ON a missing library
+# is an error.
 
 find_package(yaml-cpp QUIET)
 find_package(CLI11 QUIET)
@@ -12,7 +13,7 @@ foreach(package OpenCV yaml-cpp CLI11 nlohmann_json)
 endforeach()
 
 if(NOT missing)
-  # Only `drone simulate` and the tests of flights need these two.
+  # tools/room and tools/simulator are needed only by `drone simulate` and by the tests of flights.
   if(NOT TWOVIEW_SIMULATOR)
     message(STATUS "The drone's simulator is not built: TWOVIEW_SIMULATOR is OFF")
   elseif(TARGET ardrone_encode AND TARGET PkgConfig::LIBAV)

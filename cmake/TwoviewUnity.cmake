@@ -1,11 +1,12 @@
-# The test framework as target twoview_unity: the folder named by TWOVIEW_UNITY_DIR, an installed
-# Unity, the copy that scripts/bootstrap took from the source package of Debian's cjson, or
-# upstream's release.
+# Provides the test framework Unity as the target twoview_unity. It is, in this order: the folder
+# named by TWOVIEW_UNITY_DIR, an installed Unity that has doubles, the copy that scripts/bootstrap
+# took from the source package of Debian's cjson, or upstream's release.
 
 set(TWOVIEW_UNITY_DIR "" CACHE PATH "Folder with unity.c, unity.h and unity_internals.h")
 
 add_library(twoview_unity INTERFACE)
-# Defined as nothing, as the copy in cjson does itself. 64-bit numbers are off by default on a 32-bit CPU.
+# The macros are defined as empty, as the copy in cjson itself defines them. UNITY_SUPPORT_64 is
+# needed because 64-bit numbers are off by default on a 32-bit CPU.
 target_compile_definitions(twoview_unity INTERFACE UNITY_INCLUDE_DOUBLE= UNITY_SUPPORT_64=)
 
 function(tv_build_unity folder)
@@ -15,13 +16,13 @@ function(tv_build_unity folder)
   message(STATUS "Unity: ${folder}")
   add_library(twoview_unity_source STATIC ${folder}/unity.c)
   target_include_directories(twoview_unity_source SYSTEM PUBLIC ${folder})
-  # setUp and tearDown of a test that defines none are empty.
+  # Provides empty setUp and tearDown for tests that define none.
   target_compile_definitions(twoview_unity_source PRIVATE
     UNITY_INCLUDE_SETUP_STUBS= UNITY_INCLUDE_DOUBLE= UNITY_SUPPORT_64=)
   target_link_libraries(twoview_unity INTERFACE twoview_unity_source)
 endfunction()
 
-# An installed Unity serves only if it was built with doubles.
+# Sets `result` to true if a Unity is installed and was built with doubles.
 function(tv_check_installed_unity result)
   find_package(unity QUIET CONFIG)
   if(unity_FOUND)
@@ -53,7 +54,7 @@ else()
       URL https://github.com/ThrowTheSwitch/Unity/archive/refs/tags/v2.6.1.tar.gz
       URL_HASH SHA256=b41a66d45a6b99758fb3202ace6178177014d52fc524bf1f72687d93e9867292
       DOWNLOAD_EXTRACT_TIMESTAMP OFF
-      SOURCE_SUBDIR none) # only its sources: its own build exports and installs
+      SOURCE_SUBDIR none) # only its sources are used, because its own build exports and installs
     FetchContent_MakeAvailable(unity)
     tv_build_unity(${unity_SOURCE_DIR}/src)
   endif()

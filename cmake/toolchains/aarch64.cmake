@@ -1,4 +1,4 @@
-# 64-bit ARM, Linux: Debian's g++-aarch64-linux-gnu, or clang++ with the same sysroot
+# Toolchain for 64-bit ARM Linux: Debian's g++-aarch64-linux-gnu, or clang++ with the same sysroot
 # (-DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++). Tests run under qemu-user.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)

@@ -1,15 +1,17 @@
-# What Debian's cross compilers share; `tv_triplet` names one.
+# Settings that Debian's cross compilers share. Set `tv_triplet` to the triplet of the target before
+# including this file.
 if(NOT CMAKE_C_COMPILER)
   set(CMAKE_C_COMPILER ${tv_triplet}-gcc)
 endif()
 if(NOT CMAKE_CXX_COMPILER)
   set(CMAKE_CXX_COMPILER ${tv_triplet}-g++)
 endif()
-# gcc is built for one target; clang needs the target as an option.
+# clang needs the target as an option. gcc does not, because each gcc is built for one target.
 set(CMAKE_C_COMPILER_TARGET ${tv_triplet})
 set(CMAKE_CXX_COMPILER_TARGET ${tv_triplet})
 
-# Libraries are searched in the target's folders only. Eigen is headers, so the host's are used.
+# Libraries are searched in the target's folders only. Eigen has only headers, so the host's are
+# used.
 set(CMAKE_FIND_ROOT_PATH /usr/${tv_triplet})
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)

@@ -1,5 +1,5 @@
-// The arena: the context's memory, handed out from the front in a fixed order and given back by
-// rewinding. The library's only allocator.
+// The arena is the library's only allocator. It hands out the context's memory from the front, in
+// the order of the calls, and ArenaScope gives back all that was taken within a scope.
 #pragma once
 
 #include <cstddef>
@@ -20,14 +20,16 @@ inline Arena arena_over(void* memory, size_t size_bytes) {
   return Arena{static_cast<uint8_t*>(memory), size_bytes, 0, 0};
 }
 
-// What arena_alloc takes for `count` elements of T, padding included.
+// The bytes that arena_alloc takes for `count` elements of T, padding included. Size queries add
+// these up in the order of the allocations.
 template <typename T>
 constexpr size_t arena_bytes(size_t count) {
   return (count * sizeof(T) + kArenaAlignment - 1) / kArenaAlignment * kArenaAlignment;
 }
 
-// Uninitialised memory for `count` elements, aligned to kArenaAlignment; null when the arena is
-// spent, which the size query makes impossible: callers check in debug builds only.
+// Uninitialised memory for `count` elements, aligned to kArenaAlignment bytes; null when the arena
+// is full. Callers do not check: every function that allocates has a size query, and the context
+// reserves what the queries return.
 template <typename T>
 T* arena_alloc(Arena& arena, size_t count) {
   static_assert(__is_trivially_copyable(T), "the arena runs no constructors");
@@ -39,7 +41,7 @@ T* arena_alloc(Arena& arena, size_t count) {
   return memory;
 }
 
-// Gives back, at the end of a scope, all that was taken from the arena within it.
+// On destruction, gives back everything that was taken from the arena since construction.
 class ArenaScope {
  public:
   explicit ArenaScope(Arena& arena) : arena_(arena), used_bytes_(arena.used_bytes) {}

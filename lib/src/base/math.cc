@@ -1,8 +1,8 @@
-// Elementary functions with equal bits everywhere. Each reduces its argument to a short interval
-// with constants in two or three parts (W. J. Cody, W. Waite, "Software Manual for the Elementary
-// Functions", 1980), sums a Taylor series there, and carries what the reduction rounded away into
-// the last addition, so that one rounding dominates. Series lengths and bounds:
-// docs/algorithms/math.md; test: test/unit/test_math.cc.
+// Elementary functions whose results have the same bits on every CPU. Each function reduces its
+// argument to a short interval, with constants stored in two or three parts (W. J. Cody, W. Waite,
+// "Software Manual for the Elementary Functions", 1980), sums a Taylor series there, and adds the
+// rounding error of the reduction in the last addition, so that a single rounding dominates the
+// error. Series lengths and error bounds: docs/algorithms/math.md; test: test/unit/test_math.cc.
 #include "base/math.h"
 
 #include <cmath>
@@ -28,19 +28,19 @@ double double_of(uint64_t bits) {
   return x;
 }
 
-// 2^exponent for a normal result, exponent in [-1022, 1023].
+// 2^exponent, for exponents in [-1022, 1023]: the result is then a normal number.
 double power_of_two(int exponent) {
   return double_of(static_cast<uint64_t>(exponent + 1023) << 52);
 }
 
 int nearest_int(double x) { return static_cast<int>(x < 0 ? x - 0.5 : x + 0.5); }
 
-// A value and what rounding left out of it: high + low is exact.
+// An unevaluated sum: high is the rounded value and low the rounding error.
 struct Pair {
   double high, low;
 };
 
-// Knuth's TwoSum: a + b without error, whatever their order.
+// Knuth's TwoSum: a + b as a Pair without any error, whichever of the two is larger.
 Pair exact_sum(double a, double b) {
   const double sum = a + b;
   const double b_seen = sum - a;
@@ -50,15 +50,16 @@ Pair exact_sum(double a, double b) {
 
 // ---- sine and cosine ----
 
-// pi/2 in 33 + 33 + 53 bits: a multiple up to 2^20 of the first two is exact in a double.
+// pi/2 as a sum of parts of 33, 33 and 53 bits. The first two parts times an integer up to 2^20 are
+// exact in a double.
 constexpr double kHalfPi1 = 0x1.921fb54400000p+0;
 constexpr double kHalfPi2 = 0x1.0b4611a600000p-34;
 constexpr double kHalfPi3 = 0x1.3198a2e037073p-69;
 constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
 constexpr double kMaxAngle = 1048576.0;
 
-// Taylor at 0 for |r| <= pi/4: the first term left out is below 2^-63 of the result. `low` is the
-// part of the angle that r could not hold.
+// Taylor series at 0 for |r| <= pi/4; the first omitted term is below 2^-63 of the result. `low` is
+// the rounding error of r: the angle is r + low.
 double sine_series(double r, double low) {
   const double z = r * r;
   double p = 1.0 / 355687428096000.0;
@@ -89,7 +90,7 @@ double cosine_series(double r, double low) {
 
 // ---- arctangent ----
 
-// atan(i / 8) in two parts.
+// kAtanEighths[i] is atan(i / 8).
 constexpr Pair kAtanEighths[9] = {{0.0, 0.0},
                                   {0x1.fd5ba9aac2f6ep-4, -0x1.cd37686760c17p-59},
                                   {0x1.f5b75f92c80ddp-3, 0x1.8ab6e3cf7afbdp-57},
@@ -102,7 +103,7 @@ constexpr Pair kAtanEighths[9] = {{0.0, 0.0},
 constexpr Pair kPiParts = {0x1.921fb54442d18p+1, 0x1.1a62633145c07p-53};
 constexpr Pair kHalfPiParts = {0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
 
-// atan(z) - z by Taylor for |z| <= 1/8: the first term left out is below 2^-64 of z.
+// atan(z) - z by Taylor series for |z| <= 1/8; the first omitted term is below 2^-64 of z.
 double atan_series_beyond_first(double z) {
   const double s = z * z;
   double p = -1.0 / 19.0;
@@ -117,18 +118,20 @@ double atan_series_beyond_first(double z) {
   return z * s * p;
 }
 
-// atan(smaller / larger) for 0 <= smaller <= larger, 0 < larger, both finite, as an unevaluated
-// sum: atan(c) + atan((smaller - c larger) / (larger + c smaller)) with c the nearest eighth.
+// atan(smaller / larger) as an unevaluated sum, for finite arguments with 0 <= smaller <= larger
+// and 0 < larger: atan(c) + atan((smaller - c larger) / (larger + c smaller)), where c is the
+// multiple of 1/8 nearest to the ratio.
 Pair atan_of_ratio(double smaller, double larger) {
   const double ratio = smaller / larger;
   if (ratio < 0.125) return {ratio, atan_series_beyond_first(ratio)};
   const int eighth = static_cast<int>(8.0 * ratio + 0.5);
-  // Away from overflow and from subnormal numbers; the two are within a factor of 8 here.
+  // The scale keeps the products below clear of overflow and of subnormal numbers. The two
+  // arguments are within a factor of 8 of each other here.
   const double scale = larger > 0x1p1000 ? 0x1p-100 : larger < 0x1p-800 ? 0x1p200 : 1.0;
   const double y = smaller * scale;
   const double x = larger * scale;
   const double c = eighth * 0.125;
-  // c x in two exact parts: the subtraction that cancels loses nothing.
+  // c x is subtracted as two exact products, so that cancellation loses no bits.
   const double x_head = double_of(bits_of(x) & ~UINT64_C(0x7ffffff));
   const double numerator = (y - c * x_head) - c * (x - x_head);
   const double z = numerator / (x + c * y);
@@ -144,11 +147,12 @@ Pair subtract(const Pair& a, const Pair& b) {
 
 // ---- exponential and logarithm ----
 
-constexpr double kLn2High = 0x1.62e42fefa2000p-1;  // 40 bits: exact times any exponent
+constexpr double kLn2High =
+    0x1.62e42fefa2000p-1;  // 40 bits: its product with any exponent is exact
 constexpr double kLn2Low = 0x1.9ef35793c7673p-41;
 constexpr double kOneOverLn2 = 0x1.71547652b82fep+0;
 
-// exp(r) - 1 - r for |r| <= ln(2)/2: the first term left out is below 2^-57.
+// exp(r) - 1 - r for |r| <= ln(2)/2; the first omitted term is below 2^-57.
 double exp_series_beyond_second(double r) {
   double p = 1.0 / 6227020800.0;
   p = p * r + 1.0 / 479001600.0;
@@ -221,7 +225,7 @@ double atan2(double y, double x) {
   if (y != y || x != x) return kNaN;
   double size_y = y < 0 ? -y : y;
   double size_x = x < 0 ? -x : x;
-  if (size_y == kInfinity || size_x == kInfinity) {  // only the direction counts
+  if (size_y == kInfinity || size_x == kInfinity) {  // finite sizes count as 0
     size_y = size_y == kInfinity ? 1.0 : 0.0;
     size_x = size_x == kInfinity ? 1.0 : 0.0;
   }
@@ -241,7 +245,7 @@ double atan2(double y, double x) {
 
 double atan(double x) { return atan2(x, 1.0); }
 
-// (1 - x)(1 + x) rather than 1 - x^2: no cancellation near 1.
+// Computes 1 - x^2 as (1 - x)(1 + x), which does not cancel near 1.
 double acos(double x) {
   const double c = clamp_to_one(x);
   return atan2(std::sqrt((1.0 - c) * (1.0 + c)), c);
@@ -264,7 +268,7 @@ double exp(double x) {
   const double value = 1.0 + (r + (low * (1.0 + r) + exp_series_beyond_second(r)));
   if (exponent > 1022) return value * power_of_two(exponent - 1) * 2.0;
   if (exponent >= -1021) return value * power_of_two(exponent);
-  return value * power_of_two(exponent + 100) * 0x1p-100;  // subnormal: rounds once, here
+  return value * power_of_two(exponent + 100) * 0x1p-100;  // subnormal: rounded only here
 }
 
 double log(double x) {
@@ -275,7 +279,7 @@ double log(double x) {
     x *= 0x1p54;
     exponent = -54;
   }
-  // x = 2^exponent m with m in [sqrt(1/2), sqrt(2)): an integer comparison of the upper bits.
+  // Splits x = 2^exponent m with m in [sqrt(1/2), sqrt(2)).
   uint64_t bits = bits_of(x);
   exponent += static_cast<int>(bits >> 52) - 1023;
   bits = (bits & UINT64_C(0xfffffffffffff)) | UINT64_C(0x3ff0000000000000);
@@ -284,7 +288,7 @@ double log(double x) {
     m *= 0.5;
     exponent += 1;
   }
-  // log(1 + f) = f - (f^2/2 - s (f^2/2 + R)), s = f / (2 + f): the small terms are summed first.
+  // log(1 + f) = f - (f^2/2 - s (f^2/2 + R)), s = f / (2 + f). The small terms are added first.
   const double f = m - 1.0;
   const double s = f / (2.0 + f);
   const double half_square = 0.5 * f * f;

@@ -1,4 +1,5 @@
-// Our own random numbers: the same everywhere, seeded by the caller, never by the clock.
+// The library's random numbers: the same on every platform. The caller gives the seed; it is never
+// taken from the clock.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +25,9 @@ inline Random random_seeded(uint64_t seed) {
   return random;
 }
 
-// Uniform in [0, bound), bound > 0, by Lemire's multiplication without rejection: the bias is below
-// bound / 2^32, and the time does not depend on the number drawn.
+// A number in [0, bound), bound > 0, by Lemire's multiplication without rejection. Each number's
+// probability differs from 1 / bound by less than the fraction bound / 2^32 of it. The time does
+// not depend on the number drawn.
 inline uint32_t random_below(Random& random, uint32_t bound) {
   return static_cast<uint32_t>((static_cast<uint64_t>(random_next(random)) * bound) >> 32);
 }

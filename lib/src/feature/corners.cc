@@ -1,3 +1,5 @@
+// Finds the corners of one image over the levels of its pyramid. Problem and formulas:
+// docs/algorithms/fast.md; test: test/unit/test_fast.cc.
 #include "feature/corners.h"
 
 #include <algorithm>
@@ -13,7 +15,7 @@ struct Corner {
   uint8_t score;
 };
 
-// The corners of one level, best first.
+// The keypoints of one level, best first.
 struct LevelCorners {
   Level level;
   tv_keypoint* keypoints;
@@ -21,12 +23,12 @@ struct LevelCorners {
 };
 
 size_t candidate_capacity(int32_t width, int32_t height) {
-  // Two corners are never neighbours: at most one in each 2x2 block.
+  // Non-maximum suppression never keeps two neighbours, so each 2x2 block holds at most one corner.
   return static_cast<size_t>((width + 1) / 2) * static_cast<size_t>((height + 1) / 2);
 }
 
 struct Workspace {
-  uint8_t* scores[3];  // a ring of rows
+  uint8_t* scores[3];  // row y is in scores[y % 3]
   uint16_t* xs;
   Corner* candidates;
   Corner* sorted;
@@ -46,12 +48,13 @@ bool is_masked_out(const tv_image* mask, const Level& level, int32_t x, int32_t 
   return mask->data[full_y * mask->stride_bytes + full_x] == 0;
 }
 
-// How many candidates there are of each score.
+// The number of candidates of each score.
 struct Histogram {
   int32_t counts[256];
 };
 
-// Adds the candidates of row y that the kernel found; returns how many there are now.
+// Appends the corners that the kernel found in row y at xs[0 .. found) to the candidates, except
+// masked ones and those below the threshold. Returns the new number of candidates.
 int32_t add_row(const Level& level, const tv_image* mask, int32_t threshold, const uint16_t* xs,
                 int32_t found, int32_t y, const uint8_t* scores, Corner* candidates, int32_t count,
                 Histogram& histogram) {
@@ -64,16 +67,16 @@ int32_t add_row(const Level& level, const tv_image* mask, int32_t threshold, con
   return count;
 }
 
-// The corners of a level in raster order, those that can be among the `wanted` best at least. As
-// soon as there are enough at a higher threshold, the rest of the image is scanned at that, up to
-// `highest`.
+// Writes the corners of a level to work.candidates in raster order and returns their number. All
+// corners that can be among the `wanted` best are included. Once at least `wanted` corners score
+// above the threshold, the threshold rises by one for the rest of the image, up to `highest`.
 int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image* mask, int32_t arc,
                    int32_t threshold, int32_t highest, int32_t wanted, Workspace& work,
                    Histogram& histogram) {
   const int32_t rim = TVK_CIRCLE_RADIUS;
   histogram = Histogram{};
   if (level.width <= 2 * rim || level.height <= 2 * rim) return 0;
-  int32_t count = 0, below = 0;  // candidates, and how many of them are below the threshold
+  int32_t count = 0, below = 0;  // candidates, and those of them below the threshold
   memset(work.scores[(rim - 1) % 3], 0, static_cast<size_t>(level.width));
   for (int32_t y = rim; y <= level.height - rim; ++y) {
     uint8_t* row = work.scores[y % 3];
@@ -97,11 +100,12 @@ int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image*
   return count;
 }
 
-// Counting sort to descending scores, raster order among equals. The corners below the highest
-// threshold that leaves `wanted`, at most `highest`, are left out; returns how many remain.
+// Counting sort by descending score; corners of equal score keep their raster order. Corners below
+// a cutoff are left out: the cutoff is the highest score at which at least `wanted` corners remain,
+// limited to [lowest, highest]. Returns the number of corners kept.
 int32_t sort_by_score(const Corner* corners, int32_t count, const Histogram& histogram,
                       int32_t lowest, int32_t highest, int32_t wanted, Corner* sorted) {
-  int32_t starts[256];  // how many have a higher score
+  int32_t starts[256];  // where the next corner of a score goes
   int32_t cutoff = 255, kept = 0;
   while (cutoff > lowest && (cutoff > highest || kept < wanted)) {
     starts[--cutoff] = kept;
@@ -113,8 +117,9 @@ int32_t sort_by_score(const Corner* corners, int32_t count, const Histogram& his
   return kept;
 }
 
-// Moves to the front up to `wanted` corners: first the best of each cell up to an even share, then
-// the best of what is left. Returns how many; their order is of no account.
+// Moves up to `wanted` corners to the front: first the best of each grid cell, up to an equal share
+// of `wanted` for each cell, then the best of all others. Returns their number. Their order means
+// nothing afterwards.
 int32_t spread_over_grid(Corner* corners, int32_t count, int32_t wanted, const Level& level,
                          int32_t cell_px, uint16_t* cell_counts, Corner* rest) {
   if (count <= wanted || cell_px == 0) return std::min(count, wanted);
@@ -135,7 +140,7 @@ int32_t spread_over_grid(Corner* corners, int32_t count, int32_t wanted, const L
   return taken;
 }
 
-// A total order: best first.
+// A total order, best first, so that the result does not depend on the sorting algorithm.
 struct IsBetter {
   bool operator()(const tv_keypoint& a, const tv_keypoint& b) const {
     if (a.score != b.score) return a.score > b.score;
@@ -145,7 +150,8 @@ struct IsBetter {
   }
 };
 
-// By IsBetter, keypoints whose scores fall already: runs of equal scores are short.
+// Sorts by IsBetter keypoints that are already in descending order of score: only runs of equal
+// scores, which are short, need sorting.
 void sort_within_scores(tv_keypoint* keypoints, int32_t count) {
   int32_t begin = 0;
   for (int32_t k = 1; k <= count; ++k) {
@@ -155,7 +161,7 @@ void sort_within_scores(tv_keypoint* keypoints, int32_t count) {
   }
 }
 
-// Keypoints of a level's corners, one for one.
+// Makes one keypoint from each corner of a level, in the same order.
 void make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
                     const Level& level, int32_t index, const tv_feature_options& options,
                     tv_keypoint* keypoints) {
@@ -178,7 +184,8 @@ void make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t cou
   }
 }
 
-// The share of the budget that level `index` of `count` starts with: areas fall by factor squared.
+// The part of the budget that level `index` of `count` may use at least, in proportion to its area:
+// areas fall by factor squared from level to level.
 int32_t level_share(int32_t budget, int32_t index, int32_t count, double factor) {
   double sum = 0.0, weight = 1.0, own = 1.0;
   for (int32_t k = 0; k < count; ++k) {
@@ -210,12 +217,14 @@ Workspace alloc_workspace(Arena& arena, int32_t width, int32_t height) {
   return work;
 }
 
-// The corners of a level within its share of the budget; returns how many.
+// Writes the best corners of a level, `share` of them at most, as keypoints and returns their
+// number.
 int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_image* mask,
                       const tv_feature_options& options, int32_t index, int32_t share,
                       Workspace& work, tv_keypoint* keypoints) {
   const int32_t lowest = options.min_threshold > 0 ? options.min_threshold : options.threshold;
-  // Without a grid the best are taken, wherever they are; with one, all above the threshold count.
+  // Without a grid the threshold may rise, because only the best corners count. With a grid it may
+  // not rise above options.threshold, because weaker corners can fill a cell.
   const int32_t highest = options.cell_px == 0 ? 254 : options.threshold;
   Histogram histogram;
   const int32_t found =
@@ -249,7 +258,7 @@ int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_i
   Level level = full_level(image);
   int32_t count = 0;
   for (int32_t k = 0; k < levels; ++k) {
-    // Whatever a finer level left unused is the coarser ones' to use.
+    // A level may also use what the finer levels left of their shares.
     int32_t share = level_share(budget, k, levels, factor);
     int32_t promised = 0;
     for (int32_t j = k + 1; j < levels; ++j) promised += level_share(budget, j, levels, factor);

@@ -1,3 +1,5 @@
+// Samples the patch of a keypoint and passes it to the kernels of kernels/describe.h. Problem and
+// formulas: docs/algorithms/sift.md; tests: test/unit/test_orientation.cc and test_sift_opencv.cc.
 #include "feature/describe.h"
 
 #include "base/math.h"
@@ -5,18 +7,20 @@
 namespace tv {
 namespace {
 
-// A spatial bin is 1.5 size wide (Lowe's 3 sigma with size = 2 sigma); a sample every 0.28 of it.
+// A spatial bin is 1.5 keypoint sizes wide (Lowe's 3 sigma with size = 2 sigma). Samples of the
+// descriptor are 0.28 bins apart.
 constexpr double kStepPerSize = 1.5 * 0.28;
 
-// A sample every quarter of that: the angle is found to half a degree, where every third leaves a
-// degree.
+// Samples of the orientation are a quarter of a bin apart, which finds the angle to half a degree;
+// at a third of a bin the error is a degree.
 constexpr double kOrientStep = 1.5 / 4.0;
 
-// Samples lie 1.12 to 2.24 pixels of their octave apart: closer would blur, wider would alias
-// (docs/decisions/0009).
+// Samples of the descriptor are 1.12 to 2.24 pixels of their octave apart. Closer samples would be
+// blurred, and wider ones would alias (docs/decisions/0009).
 constexpr double kMaxStep = 2.24;
 
-// A second direction counts above this share of the highest peak (Lowe, section 5).
+// A second peak is a direction of its own if it is above this share of the highest peak (Lowe,
+// section 5).
 constexpr double kSecondPeak = 0.8;
 
 const Octave& octave_for(const Octaves& octaves, const tv_keypoint& keypoint) {
@@ -24,8 +28,9 @@ const Octave& octave_for(const Octaves& octaves, const tv_keypoint& keypoint) {
   return octaves.octaves[octave < octaves.count ? octave : octaves.count - 1];
 }
 
-// A keypoint further outside than this sees the border's pixels only, wherever it is. Keeps every
-// sample's position within 32 bits for images up to 16384 and keypoints up to 512 pixels.
+// In pixels of the octave. A keypoint farther outside the image is moved to this distance; its
+// samples are border pixels either way. This keeps the positions of all samples within 32 bits for
+// images up to 16384 pixels and keypoints up to 512 pixels.
 constexpr double kMaxOutside = 8192.0;
 
 int32_t to_q16(double x) {
@@ -37,15 +42,15 @@ double near_image(double x, int32_t side) {
   return x < -kMaxOutside ? -kMaxOutside : x > side + kMaxOutside ? side + kMaxOutside : x;
 }
 
-// Samples a square patch of `side` samples whose middle is the keypoint and whose x axis points
-// along angle_rad.
+// Samples a square patch of side x side samples that is centred on the keypoint and whose x axis
+// points along angle_rad.
 void sample_around(const tvk_table& kernels, const Octave& octave, const tv_keypoint& keypoint,
                    double angle_rad, double step_per_size, int32_t side, int16_t* patch) {
   const double step = keypoint.size * step_per_size / octave.scale;
   double sine = 0.0, cosine = 1.0;
   if (angle_rad != 0.0) sincos(angle_rad, &sine, &cosine);
   const int32_t du_x = to_q16(step * cosine), du_y = to_q16(step * sine);
-  // The first sample, half a patch before the middle along both axes.
+  // The position of the first sample, half a patch before the centre along both axes.
   const double half = 0.5 * (side - 1);
   const int32_t x = to_q16(near_image(to_level(octave.scale, keypoint.x), octave.width)) -
                     static_cast<int32_t>(half * (du_x - du_y));
@@ -54,7 +59,7 @@ void sample_around(const tvk_table& kernels, const Octave& octave, const tv_keyp
   kernels.sample_patch(octave.pairs, octave.width, octave.height, x, y, du_x, du_y, side, patch);
 }
 
-// Peak of the parabola through a bin and its neighbours.
+// The angle, in (-pi, pi], at the top of the parabola through a bin and its two neighbours.
 float peak_angle(const int32_t* smooth, int32_t bin) {
   constexpr int32_t n = TVK_ORIENT_BINS;
   const double left = static_cast<double>(smooth[(bin + n - 1) % n]);

@@ -6,20 +6,22 @@
 
 namespace tv {
 
-// The octave whose pixels come nearest to the samples of a patch of this keypoint.
+// The octave for a keypoint of this size: there, the samples of its descriptor are 1.12 to 2.24
+// pixels apart, closer only in octave 0 and wider only in the last one.
 int32_t octave_of(float keypoint_size);
 
-// The octaves that these keypoints need.
+// The first and the last octave that these keypoints need, for make_octaves.
 struct OctaveRange {
   int32_t first, last;
 };
 OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count);
 
-// The angles of the peaks of the gradient histogram, the highest first; returns 1 or 2.
+// Writes the angles of the one or two peaks of the gradient histogram, the highest first. Returns
+// how many.
 int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint& keypoint, float angles_rad[2]);
 
-// TV_DESCRIPTOR_BYTES bytes; descriptor is a tv_normalisation.
+// Writes the TV_DESCRIPTOR_BYTES bytes of `descriptor`. `kind` is a tv_normalisation.
 void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
                        const tv_keypoint& keypoint, int32_t kind, uint8_t* descriptor);
 

@@ -1,3 +1,4 @@
+// Moves corners to the maximum of the contrast around them. Test: test/unit/test_subpixel.cc.
 #include "feature/subpixel.h"
 
 #include "kernels/kernels.h"
@@ -7,9 +8,10 @@ namespace {
 
 constexpr double kMaxShift = 0.75;
 
-// Least squares over nine values, row by row: c(u, v) = .. + gx u + gy v + hxx u^2/2 + hxy u v +
-// hyy v^2/2, all coefficients times 12 to stay in integers; the contrasts lie in -255..255, so that
-// no product leaves 32 bits.
+// Moves the position to the maximum of the quadratic c(u, v) = .. + gx u + gy v + hxx u^2/2 + hxy u
+// v + hyy v^2/2 that is fitted to the nine values by least squares, row by row. All coefficients
+// are 12 times their value, which makes them integers. Contrasts are in -255..255, so that every
+// product fits 32 bits.
 void move_to_top(const int16_t* c, Position* position) {
   const int32_t left = c[0] + c[3] + c[6], middle_x = c[1] + c[4] + c[7],
                 right = c[2] + c[5] + c[8];
@@ -19,7 +21,7 @@ void move_to_top(const int16_t* c, Position* position) {
   const int32_t gy = 2 * (bottom - top), hyy = 4 * (top - 2 * middle_y + bottom);
   const int32_t hxy = 3 * (c[8] - c[6] - c[2] + c[0]);
   const int32_t determinant = hxx * hyy - hxy * hxy;
-  if (hxx >= 0 || determinant <= 0) return;  // no top
+  if (hxx >= 0 || determinant <= 0) return;  // the quadratic has no maximum
   const double scale = 1.0 / determinant;
   const double dx = (hxy * gy - hyy * gx) * scale, dy = (hxy * gx - hxx * gy) * scale;
   if (dx > kMaxShift || dx < -kMaxShift || dy > kMaxShift || dy < -kMaxShift) return;

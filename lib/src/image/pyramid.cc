@@ -1,9 +1,12 @@
+// Makes the levels and octaves of image/pyramid.h, row by row with the kernels of
+// kernels/resample.h and pair_rows. Test: test/unit/test_pyramid.cc.
 #include "image/pyramid.h"
 
 namespace tv {
 namespace {
 
-// Which source pixels make up target pixel x, and their shares of 256.
+// The source pixels that are averaged into target pixel x: `first` and the two after it, with
+// weights that add up to 256. A weight of 0 means that the pixel is not used.
 struct Footprint {
   int32_t first;
   int32_t weights[3];
@@ -53,7 +56,7 @@ void average(const tvk_table& kernels, const Level& source, double factor, Level
   }
 }
 
-// Blurs the level, two rows at a time in `rows`, and stores the pairs.
+// Blurs the level and writes the blurred rows in pairs. `rows` is scratch for two blurred rows.
 void make_octave(const tvk_table& kernels, const Level& source, uint8_t* rows[2], uint16_t* pairs) {
   const int32_t last = source.height - 1;
   for (int32_t y = 0; y <= last; ++y) {
@@ -107,7 +110,8 @@ bool next_level(const tvk_table& kernels, const Level& level, double factor, int
 }
 
 size_t octaves_bytes(int32_t max_width, int32_t max_height) {
-  // Each octave is a halved image, but for the first, and its pairs; the areas fall by four.
+  // Every octave needs its rows in pairs, and all but the first a halved image. Areas fall by a
+  // factor of four from one octave to the next.
   size_t bytes = 2 * arena_bytes<uint8_t>(static_cast<size_t>(max_width));
   for (int32_t o = 0; o < kMaxOctaves; ++o) {
     const int32_t width = max_width >> o, height = max_height >> o;

@@ -1,4 +1,5 @@
-// Smaller images of an image: levels to find corners on, octaves to describe them on.
+// Reduced images of an image: levels, on which corners are found, and octaves, on which keypoints
+// are described.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +13,10 @@ namespace tv {
 
 inline constexpr int32_t kMaxLevels = 8;
 inline constexpr int32_t kMaxOctaves = 8;
-inline constexpr int32_t kMinLevelSide = 24;  // a smaller level holds no patch worth describing
+inline constexpr int32_t kMinLevelSide = 24;  // pixels; smaller levels are not worth describing
 
-// An image whose pixel (x, y) is the average around ((x + 0.5) scale - 0.5, ...) of the full image.
+// A reduced image. Its pixel (x, y) is the average of scale x scale pixels of the full image around
+// ((x + 0.5) scale - 0.5, (y + 0.5) scale - 0.5).
 struct Level {
   const uint8_t* data;
   int32_t width, height;
@@ -30,25 +32,28 @@ inline double to_level(double scale, double x) { return (x + 0.5) / scale - 0.5;
 inline double to_full(const Level& level, double x) { return (x + 0.5) * level.scale - 0.5; }
 inline double to_level(const Level& level, double x) { return to_level(level.scale, x); }
 
-// Two buffers that take turns: a level is made from the one before it, which then is free again.
+// Buffers for making levels one after another. Each level is made from the one before and written
+// to the other pixel buffer, so a level is valid until the second call of next_level after the one
+// that made it.
 struct LevelBuffers {
   uint8_t* pixels[2];
-  uint16_t* sums;           // one row
-  int32_t* first;           // one row
-  int32_t* column_weights;  // three rows
+  uint16_t* sums;           // for each source column: the weighted sum of up to three pixels
+  int32_t* first;           // for each new column: its first source column
+  int32_t* column_weights;  // for each new column: the weights of three source columns
 };
 
 size_t level_buffers_bytes(int32_t max_width, int32_t max_height);
 LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_height);
 
-// The next smaller level, by area averaging over factor x factor pixels, factor in (1, 2]. False
-// when it would be smaller than kMinLevelSide. `index` counts the levels made, and picks the
-// buffer.
+// Makes the next smaller level by averaging factor x factor pixels for each of its pixels, factor
+// in (1, 2]. Returns false, and makes nothing, when a side would be shorter than kMinLevelSide.
+// `index` is the number of levels made so far; it selects the buffer.
 bool next_level(const tvk_table& kernels, const Level& level, double factor, int32_t index,
                 LevelBuffers& buffers, Level* next);
 
-// The image halved some times and blurred by the 3x3 binomial, its rows stored in pairs:
-// pairs[y (width + 1) + x] holds pixel (x, y) and the one below it, each less 128 (tvk pair_rows).
+// The image halved zero or more times and blurred by the 3x3 binomial filter. Its rows are stored
+// in pairs: pairs[y (width + 1) + x] holds pixel (x, y) in the low byte and the pixel below it in
+// the high byte, each less 128 (kernel pair_rows).
 struct Octave {
   const uint16_t* pairs;
   int32_t width, height;
@@ -62,8 +67,8 @@ struct Octaves {
 
 size_t octaves_bytes(int32_t max_width, int32_t max_height);
 
-// Makes the octaves from `first` to `last` (fewer where the image is too small, at least one in
-// all); those before `first` are not filled in.
+// Makes the octaves `first` to `last` and leaves those before `first` unfilled. If the image is too
+// small for `last`, `count` is smaller; the octave count - 1 is always filled in.
 Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t first, int32_t last,
                      Arena& arena);
 

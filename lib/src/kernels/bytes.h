@@ -1,15 +1,17 @@
-/* Bytes in lanes: TVK_BYTES unsigned 8-bit numbers at a time. */
+/* Vectors of TVK_BYTES unsigned 8-bit lanes for the pixel kernels: one implementation per
+   instruction set, all with the same results. */
 #ifndef TWOVIEW_KERNELS_BYTES_H
 #define TWOVIEW_KERNELS_BYTES_H
 
 #include <stdint.h>
 #include <string.h>
 
-/* bytes_add, bytes_sub saturate. bytes_any(a): whether a lane is not 0.
-   bytes_above(a, b): a bit for each lane in which a > b, at lane * TVK_BYTES_BITS.
-   bytes_where_above(a, b, x): x in those lanes, 0 in the others.
-   bytes_of_rows(at, stride): of each group of 16 lanes the first 12 are 4 bytes at at[group] -
-   stride, 4 at at[group], 4 at at[group] + stride; the last 4 are anything. */
+/* bytes_add and bytes_sub saturate at 255 and at 0.
+   bytes_any(a): true when some lane is not 0.
+   bytes_above(a, b): a bit mask; the bit lane * TVK_BYTES_BITS is set where a > b.
+   bytes_where_above(a, b, x): x in the lanes where a > b, 0 in the others.
+   bytes_of_rows(at, stride): fills each group of 16 lanes with 4 bytes from at[group] - stride, 4
+   from at[group] and 4 from at[group] + stride. The last 4 lanes of a group are unspecified. */
 #if defined(TVK_AVX512) || defined(TVK_AVX2) || defined(TVK_SSE2)
 #include <immintrin.h>
 static inline __m128i bytes_of_three(const uint8_t *at, int64_t stride) {
@@ -140,7 +142,7 @@ static inline byte_lanes bytes_of_rows(const uint8_t *const *at, int64_t stride)
       vsetq_lane_u32(rows[2], vsetq_lane_u32(rows[1], vdupq_n_u32(rows[0]), 1), 2));
 }
 
-#else /* the definition; compilers make one instruction of each loop where there is one */
+#else /* the definition; compilers turn each loop into one vector instruction where they can */
 
 #define TVK_BYTES 16
 #define TVK_BYTES_BITS 1

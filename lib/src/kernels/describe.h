@@ -1,13 +1,15 @@
-/* Orientation and SIFT histograms of a sampled patch, and the 128 bytes.
-   D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, sections
-   5, 6. No arctangent: a gradient that lies between two directions of the histogram is the sum of a
-   vector along each, and the lengths of these are what it gives to the two. All of it in integers,
-   16 bits where they suffice (docs/decisions/0009). */
+/* The kernels that describe a sampled patch: orientation histogram, SIFT histogram, and its
+   normalisation to 128 bytes. D. G. Lowe, "Distinctive image features from scale-invariant
+   keypoints", IJCV 2004, sections 5 and 6. No arctangent is needed: a gradient between two
+   directions of a histogram is the sum of a vector along each direction, and the lengths of these
+   two vectors are its shares. Arithmetic is in integers, of 16 bits where these suffice
+   (docs/decisions/0009), except for the square roots and one division of the normalisation, which
+   are single IEEE operations. */
 
 #include "kernels/words.h"
 
-/* A gradient along the diagonals of four samples, in samples' units: u to the lower right, v to the
-   upper right. Sums and differences of u and v fit 16 bits. */
+/* The gradient as two differences along the diagonals of four neighbouring samples: u points to the
+   lower right, v to the upper right. Sums and differences of u and v fit 16 bits. */
 static inline words gradient_u(const int16_t *at) {
   return words_load(at + TVK_PATCH_SIDE + 1) - words_load(at);
 }
@@ -17,8 +19,8 @@ static inline words gradient_v(const int16_t *at) {
 
 enum { ORIENT_GRADIENTS = TVK_ORIENT_SIDE - 1 };
 
-/* 65536 * 0.11 exp(-(x^2 + y^2) / (2 * 2^2)) for x^2 + y^2 < 6^2: all together give a bin less than
-   65536. */
+/* The Gaussian weights 65536 * 0.11 exp(-(x^2 + y^2) / (2 * 2^2)) for x^2 + y^2 < 6^2, else 0. The
+   factor 0.11 keeps every bin of a histogram below 65536. */
 static const uint16_t orientation_weights[ORIENT_GRADIENTS][TVK_PATCH_SIDE] = {
     {0, 0, 103, 192, 280, 317, 280, 192, 103, 0, 0},
     {0, 132, 317, 592, 861, 976, 861, 592, 317, 132, 0},
@@ -33,24 +35,25 @@ static const uint16_t orientation_weights[ORIENT_GRADIENTS][TVK_PATCH_SIDE] = {
     {0, 0, 103, 192, 280, 317, 280, 192, 103, 0, 0},
 };
 
-/* Lanes of `x` turned around within `span` where the mask is set: span - x. */
+/* span - x in the lanes where the mask is set, x in the others. */
 static inline words reflect(words x, words mask, int16_t span) {
   return (x ^ mask) - mask + (words_of(span) & mask);
 }
 
 typedef struct direction_shares {
-  words bin;       /* of 32, clockwise as seen from x */
-  words low, high; /* what it and the next one get */
+  words bin;       /* 0..31, clockwise in the image from x */
+  words low, high; /* the weighted shares of `bin` and of the next bin */
 } direction_shares;
 
-/* The direction is folded at 0, 90, 45, 22.5 and 11.25 degrees, and unfolded as a number of bins.
- */
+/* The two bins between which each gradient (u, v) lies, and its shares in them. Reflections at 0,
+   90, 45, 22.5 and 11.25 degrees bring the direction into a single bin; they are then undone on the
+   number of the bin. */
 static direction_shares share_directions(words u, words v, words weights) {
   const words au = words_max(u, -u), av = words_max(v, -v);
   const words left = u<words_of(0), up = v> words_of(0), steep = av > au;
   words big = words_max(au, av), small = words_min(au, av), bin, is_odd, a, b;
   const words root_half = words_of((int16_t)46341);
-  const words cosine = words_of((int16_t)60547), sine = words_of(25080); /* of 22.5 degrees */
+  const words cosine = words_of((int16_t)60547), sine = words_of(25080); /* 22.5 degrees, * 65536 */
   const words big45 = words_scale(big + small, root_half);
   const words small45 = words_scale(big - small, root_half);
   const words over22 = small45 < small;
@@ -68,20 +71,21 @@ static direction_shares share_directions(words u, words v, words weights) {
   bin = reflect(bin, steep, 8);
   bin = reflect(bin, left, 16);
   bin = reflect(bin, up, 0);
-  is_odd = over11 ^ over22 ^ steep ^ left ^ up; /* it lies before `bin`, not behind it */
-  /* big - small cot(11.25 deg) and small / sin(11.25 deg). */
+  is_odd = over11 ^ over22 ^ steep ^ left ^ up; /* the gradient lies before `bin`, not after it */
+  /* The shares are big - small cot(11.25 deg) and small / sin(11.25 deg). */
   b = words_of(5) * small;
   a = words_positive(big - b - words_scale(small, words_of(1796)));
   b = b + words_scale(small, words_of(8258));
   a = words_scale(a, weights);
   b = words_scale(b, weights);
-  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1); /* u points to bin 4 */
+  /* The number is counted from u so far. u is 45 degrees from x, which is four bins. */
+  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1);
   shares.low = (a & ~is_odd) | (b & is_odd);
   shares.high = (b & ~is_odd) | (a & is_odd);
   return shares;
 }
 
-/* (1 4 6 4 1) / 16 around the circle, left at 16 times the value. */
+/* Smooths a histogram by (1 4 6 4 1) around the circle. The sums are not divided by 16. */
 static void smooth_circle(const int32_t *histogram, int32_t *smooth) {
   int32_t around[TVK_ORIENT_BINS + 4], k;
   memcpy(around, histogram + TVK_ORIENT_BINS - 2, 2 * sizeof around[0]);
@@ -93,8 +97,8 @@ static void smooth_circle(const int32_t *histogram, int32_t *smooth) {
 }
 
 static void orientation_histogram(const int16_t *patch, int32_t *smooth) {
-  /* A gradient adds both its shares at once, 16 bits each; neighbours add to different tables, so
-     that none waits for the one before it. */
+  /* A single addition adds both shares of a gradient, 16 bits each. Neighbouring samples add to
+     different tables, so that no addition waits for the one before. */
   uint32_t tables[4][TVK_ORIENT_BINS] TVK_ALIGNED;
   int32_t histogram[TVK_ORIENT_BINS];
   int32_t x, y;
@@ -124,10 +128,11 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth) {
 
 enum { PATCH_GRADIENTS = TVK_PATCH_SIDE - 1, CELL_SAMPLES = 6 };
 
-/* Along an axis cell c = 0..3 is fed by gradients k = 3 c + i, i = 0..5 of the fifteen, with the
-   share exp(-p^2 / 8) max(0, 1 - |p + 1.5 - c|), where p = 0.28 (k - 7) cells from the middle.
-   Along y times 0.56 * 65536, and another sqrt(1/2) for the odd directions, so that sums fit 16
-   bits; along x times 16384. */
+/* The weights of the 4x4 cells, a product of one along y and one along x. Along an axis, cell c =
+   0..3 gets the gradients k = 3 c + i, i = 0..5, of the fifteen, with weight exp(-p^2 / 8) max(0, 1
+   - |p + 1.5 - c|), where p = 0.28 (k - 7) is the distance from the centre in cells. row_weights
+   are these times 0.56 * 65536, and for the odd directions also times sqrt(1/2), so that sums fit
+   16 bits; column_weights are these times 16384. */
 static const uint16_t row_weights[2][4][CELL_SAMPLES] = {
     {
         {12261, 21148, 25853, 19452, 11425, 2117},
@@ -148,9 +153,9 @@ static const int16_t column_weights[4][8] = {
     {945, 5100, 8684, 11541, 9441, 5474, 0, 0},
 };
 
-/* What each gradient of a row gives to the eight directions, counter-clockwise as seen from x: the
-   part along an axis (times sqrt(1/2)) and along a diagonal. A row's shares lie one direction after
-   the other. */
+/* Splits each gradient of a row into its shares in the eight directions, counter-clockwise in the
+   image from x: the part along an axis, times sqrt(1/2), and the part along a diagonal. shares[d]
+   is the row of shares in direction d. */
 static void share_row(const int16_t *row, int16_t shares[8][TVK_PATCH_SIDE]) {
   int32_t x;
   for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
@@ -169,7 +174,7 @@ static void share_row(const int16_t *row, int16_t shares[8][TVK_PATCH_SIDE]) {
   }
 }
 
-/* Over the rows of a cell. */
+/* Sums the shares over the rows of a cell, for each column and direction. */
 static void pool_rows(int16_t (*rows)[8][TVK_PATCH_SIDE], int32_t cell, int16_t *pooled) {
   int32_t bin, x, i;
   for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
@@ -187,8 +192,8 @@ static void pool_rows(int16_t (*rows)[8][TVK_PATCH_SIDE], int32_t cell, int16_t 
   }
 }
 
-/* Over the columns of a cell, for the eight directions; two samples more are read, and weigh
- * nothing. */
+/* Sums the pooled rows over the columns of a cell, for the eight directions. Two columns more than
+   the cell has are read, with weight 0. */
 static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t *sums) {
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
   const __m256i w = _mm256_broadcastsi128_si256(_mm_loadu_si128((const __m128i *)weights));
@@ -217,8 +222,8 @@ static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t
 
 static void gradient_histogram(const int16_t *patch, int32_t *histogram) {
   int16_t rows[PATCH_GRADIENTS][8][TVK_PATCH_SIDE] TVK_ALIGNED;
-  int16_t
-      pooled[4 * 8 * TVK_PATCH_SIDE + 2] TVK_ALIGNED; /* the last column's cells read two beyond */
+  /* pool_columns reads two elements after the last column of cells. */
+  int16_t pooled[4 * 8 * TVK_PATCH_SIDE + 2] TVK_ALIGNED;
   int32_t x, y;
   for (y = 0; y < PATCH_GRADIENTS; ++y) share_row(patch + y * TVK_PATCH_SIDE, rows[y]);
   for (y = 0; y < 4; ++y) pool_rows(rows + 3 * y, y, pooled + y * 8 * TVK_PATCH_SIDE);
@@ -230,7 +235,7 @@ static void gradient_histogram(const int16_t *patch, int32_t *histogram) {
   }
 }
 
-/* Scaled to 12 bits: their squares' sum fits 31. */
+/* Shifts the values down to 12 bits, so that the sum of their squares fits 31 bits. */
 static void normalise_histogram(const int32_t *histogram, int16_t *values) {
   int32_t any = 0, shift, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) any |= histogram[k];
@@ -259,8 +264,8 @@ static void quantize_descriptor(const int32_t *histogram, int32_t root, uint8_t 
     return;
   }
   if (root) {
-    /* 512^2 times the share as an integer: its root is never so near to a half that rounding could
-       go either way. */
+    /* The integer is 512^2 times the share of the L1 norm. The square root of an integer is never
+       so close to n + 1/2 that its rounding could differ between CPUs. */
     scale = (1u << 31) / (uint32_t)l1;
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
       const int32_t square = (int32_t)(((uint32_t)values[k] * scale) >> 13);

@@ -1,19 +1,21 @@
-/* FAST's segment test and its score, and non-maximum suppression.
-   E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006. */
+/* FAST's segment test with its score, and non-maximum suppression. E. Rosten, T. Drummond, "Machine
+   learning for high-speed corner detection", ECCV 2006. */
 #include "kernels/bytes.h"
 
-/* The circle of radius 3, clockwise from below the centre: row of rows[], column offset. */
+/* The 16 pixels of the circle of radius 3, clockwise from below the centre: the index into rows[]
+   and the column offset of each. */
 static const int8_t fast_circle_row[16] = {6, 6, 5, 4, 3, 2, 1, 0, 0, 0, 1, 2, 3, 4, 5, 6};
 static const int8_t fast_circle_column[16] = {0, 1,  2,  3,  3,  3,  2,  1,
                                               0, -1, -2, -3, -3, -3, -2, -1};
 
-/* The greatest, over the arcs of the circle p, of the least pixel of the arc; the other way round
-   for darker ones. The arcs from 2i and 2i + 1 share the pixels 2i + 1 .. 2i + arc - 1; each has
-   one end more. A macro, for compilers make no vectors of a condition on which of the two it is;
-   not inlined, for it is long and called from two places. */
+/* For each lane, the largest over all arcs of the circle p of the arc's smallest pixel
+   (brightest_arc), or the smallest over all arcs of the arc's largest pixel (darkest_arc). The arcs
+   that start at 2i and at 2i + 1 share the pixels 2i + 1 .. 2i + arc - 1, and each has one more
+   pixel at one end. This is a macro because compilers do not vectorise a run-time choice between
+   the two cases. It is not inlined because it is long and called from two places. */
 #define BEST_ARC(name, lesser, greater)                                                            \
   static TVK_NOINLINE byte_lanes name(const byte_lanes p[16], int32_t arc) {                       \
-    byte_lanes run2[8], run4[8], least[8], best; /* run[i] starts at 2i + 1 */                     \
+    byte_lanes run2[8], run4[8], least[8], best; /* runs start at pixel 2i + 1 */                  \
     int32_t i;                                                                                     \
     for (i = 0; i < 8; ++i) run2[i] = lesser(p[2 * i + 1], p[(2 * i + 2) & 15]);                   \
     for (i = 0; i < 8; ++i) run4[i] = lesser(run2[i], run2[(i + 1) & 7]);                          \
@@ -33,8 +35,8 @@ BEST_ARC(brightest_arc, bytes_min, bytes_max)
 BEST_ARC(darkest_arc, bytes_max, bytes_min)
 #undef BEST_ARC
 
-/* Bounds that four pixels, evenly on the circle, set to every arc: an arc of 9 holds two neighbours
-   of them, one of 12 holds three. */
+/* Bounds on brightest_arc and darkest_arc from four pixels a quarter of the circle apart: an arc of
+   9 pixels contains two neighbouring ones of the four, an arc of 12 contains three. */
 typedef struct arc_bounds {
   byte_lanes brightest, darkest;
 } arc_bounds;
@@ -44,7 +46,7 @@ static inline arc_bounds bounds_of_arcs(const byte_lanes p[16], int32_t first, i
   arc_bounds bounds;
   bounds.brightest = bytes_min(bytes_max(a, c), bytes_max(b, d));
   bounds.darkest = bytes_max(bytes_min(a, c), bytes_min(b, d));
-  if (arc == 12) { /* second of four from below, and from above */
+  if (arc == 12) { /* second smallest and second largest of the four */
     const byte_lanes brightest = bounds.brightest;
     bounds.brightest = bytes_min(brightest, bounds.darkest);
     bounds.darkest = bytes_max(brightest, bounds.darkest);
@@ -56,8 +58,8 @@ static inline byte_lanes circle_pixel(const uint8_t *const rows[7], int32_t x, i
   return bytes_load(rows[fast_circle_row[i]] + x + fast_circle_column[i]);
 }
 
-/* Scores of TVK_BYTES pixels from x on. Given up early where four or eight of the circle's pixels
-   let none of them be a corner. */
+/* Scores of the TVK_BYTES pixels from x on. Returns zeros early when four or eight pixels of the
+   circle show that none of them is a corner. */
 static inline byte_lanes fast_scores(const uint8_t *const rows[7], int32_t x, int32_t arc,
                                      int32_t threshold) {
   const byte_lanes t = bytes_of((uint8_t)threshold), c = bytes_load(rows[3] + x);
@@ -89,14 +91,14 @@ static void fast_score_row(const uint8_t *const rows[7], int32_t width, int32_t 
   uint8_t copy[7][NARROW], narrow_scores[NARROW], *out = scores;
   const uint8_t *copies[7];
   int32_t x, i;
-  if (width < NARROW) { /* on a copy, so that nothing is read or written beyond the rows */
+  if (width < NARROW) { /* uses a copy, so that nothing is read or written beyond the rows */
     memset(copy, 0, sizeof copy);
     for (i = 0; i < 7; ++i) copies[i] = (uint8_t *)memcpy(copy[i], rows[i], (size_t)width);
     memset(scores, 0, (size_t)width);
     rows = copies;
     out = narrow_scores;
   }
-  for (x = RIM; x < end; x += TVK_BYTES) { /* the last chunk may overlap the one before it */
+  for (x = RIM; x < end; x += TVK_BYTES) { /* the last may overlap the one before */
     const int32_t at = x < last ? x : last;
     bytes_store(out + at, fast_scores(rows, at, arc, threshold));
   }
@@ -109,7 +111,8 @@ static void fast_score_row(const uint8_t *const rows[7], int32_t width, int32_t 
   }
 }
 
-/* A group of 16 lanes holds a corner: three rows of three pixels and one that is not used. */
+/* Each group of 16 lanes holds one of the `count` pixels and its neighbours: three rows of three
+   pixels and one unused. */
 static void fast_contrasts(const uint8_t *const *centres, int32_t count, int64_t stride,
                            int32_t arc, int16_t *contrasts) {
   enum { GROUPS = TVK_BYTES / 16 };
@@ -128,7 +131,7 @@ static void fast_contrasts(const uint8_t *const *centres, int32_t count, int64_t
     }
     brightest = brightest_arc(p, arc);
     darkest = darkest_arc(p, arc);
-    /* Of the two contrasts at most one is above 0, for two arcs have pixels in common. */
+    /* At most one of the two contrasts is above 0, because any two arcs have pixels in common. */
     bytes_store(above, bytes_max(bytes_sub(brightest, c), bytes_sub(c, darkest)));
     bytes_store(below, bytes_min(bytes_sub(c, brightest), bytes_sub(darkest, c)));
     for (k = 0; k < TVK_BYTES; ++k) wide[k] = (int16_t)(above[k] - below[k]);
@@ -140,7 +143,8 @@ static void fast_contrasts(const uint8_t *const *centres, int32_t count, int64_t
   }
 }
 
-/* The scores of TVK_BYTES pixels at x that are above those of all eight neighbours: a bit each. */
+/* A bit mask, as bytes_above returns it, of the TVK_BYTES pixels from x on whose score is above the
+   scores of all eight neighbours. */
 static inline uint64_t suppress(const uint8_t *prev, const uint8_t *cur, const uint8_t *next,
                                 int32_t x) {
   byte_lanes most = bytes_max(bytes_load(cur + x - 1), bytes_load(cur + x + 1));
@@ -165,7 +169,7 @@ static int32_t suppress_row(const uint8_t *prev, const uint8_t *cur, const uint8
     }
     return count;
   }
-  for (x = 1; x < end; x += TVK_BYTES) { /* the last chunk may overlap the one before it */
+  for (x = 1; x < end; x += TVK_BYTES) { /* the last may overlap the one before */
     const int32_t at = x < last ? x : last;
     uint64_t kept = suppress(prev, cur, next, at) & ~(uint64_t)0 << (x - at) * TVK_BYTES_BITS;
     for (; kept != 0; kept &= kept - 1) {

@@ -1,9 +1,10 @@
-/* The kernels: the inner loops over pixels, patches and descriptors.
+/* The kernels: the inner loops over pixels, patches, descriptors and matches.
 
-   TVK_LIST names each kernel once; the table, the sets and the checker (test/kernel) all come from
-   it. The C files are the definition: integer arithmetic, or single IEEE operations in a written
-   order, so that every set gives the same bytes. A set is the same source compiled for another
-   instruction set, with intrinsics only where they were measured to pay. */
+   TVK_LIST names each kernel once. The function tables, the declarations and the checker
+   (test/kernel) all come from it. The C files are the definition: they use integer arithmetic, or
+   single IEEE operations in a written order, so that every set gives the same bytes. A set is the
+   same source compiled for another instruction set, with intrinsics only where they were measured
+   to be faster. */
 #ifndef TWOVIEW_KERNELS_H
 #define TWOVIEW_KERNELS_H
 
@@ -11,8 +12,7 @@
 #include <stdint.h>
 
 #define TVK_NOINLINE __attribute__((noinline))
-/* Before a loop that is smaller when the compiler does not unroll it, and as fast, or seldom run.
- */
+/* Put before a loop that should not be unrolled: it is smaller, and as fast or seldom run. */
 #if defined(__clang__)
 #define TVK_ROLLED _Pragma("nounroll")
 #else
@@ -27,20 +27,21 @@ typedef struct tvk_nearest {
   int32_t best, second, idx;
 } tvk_nearest;
 
-#define TVK_CIRCLE_RADIUS 3 /* of the segment test */
+#define TVK_CIRCLE_RADIUS 3 /* in pixels, of the segment test */
 
-#define TVK_PATCH_SIDE 16  /* samples a side of a descriptor's patch, 15 gradients between them */
-#define TVK_ORIENT_SIDE 12 /* the same for the orientation's patch */
+#define TVK_PATCH_SIDE 16  /* samples along each side of a descriptor's patch: 15 gradients */
+#define TVK_ORIENT_SIDE 12 /* samples along each side of the orientation's patch */
 #define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
 
-/* The columns that mutual_nearest prepares at once, and the scratch of one: as bytes, and as 16-bit
-   numbers, which the sets without products of bytes take. */
+/* Scratch of mutual_nearest. It prepares up to TVK_NEAREST_PANEL columns at once, each of
+   TVK_NEAREST_COLUMN_BYTES. The sets without products of bytes store 16-bit numbers and use the two
+   _16 constants instead. */
 #define TVK_NEAREST_PANEL 2048
 #define TVK_NEAREST_COLUMN_BYTES 152
 #define TVK_NEAREST_PANEL_16 768
 #define TVK_NEAREST_COLUMN_16_BYTES 272
-#define TVK_NEAREST_ROW_BYTES 832 /* of one of the rows that meet them at once, and of one more */
+#define TVK_NEAREST_ROW_BYTES 832 /* per row of a chunk, and for one row more */
 #define TVK_NEAREST_CHUNK_BYTES(num_rows) \
   ((size_t)((num_rows) < 63 ? (num_rows) + 1 : 64) * TVK_NEAREST_ROW_BYTES)
 #define TVK_NEAREST_MIN(a, b) ((a) < (b) ? (a) : (b))
@@ -54,75 +55,122 @@ typedef struct tvk_nearest {
 #define TVK_NEAREST_SCRATCH(num_rows, num_columns) \
   (TVK_NEAREST_CHUNK_BYTES(num_rows) + TVK_NEAREST_PANEL_BYTES(num_columns))
 
-#define TVK_WIDTH 8              /* lanes of the kernels on doubles */
-#define TVK_SCORE_BLOCK 32       /* matches */
-#define TVK_SCORE_ONE 65536      /* what a match outside the threshold costs */
-#define TVK_LARGEST_LOSS 16384.0 /* r^2 / scale^2 beyond which Cauchy's loss is level */
-#define TVK_RELPOSE_MODELS 10    /* most essential matrices of a sample of five */
-#define TVK_SAMPSON_SUMS 56      /* numbers that sampson_sums adds up */
-#define TVK_TRANSFER_SUMS 47     /* of transfer_sums */
+#define TVK_WIDTH 8              /* numbers side by side in the arrays of the kernels on doubles */
+#define TVK_SCORE_BLOCK 32       /* matches in a block of sampson_score */
+#define TVK_SCORE_ONE 65536      /* the cost of a match outside the threshold */
+#define TVK_LARGEST_LOSS 16384.0 /* r^2 / scale^2 from which on Cauchy's loss is constant */
+#define TVK_RELPOSE_MODELS 10    /* the most essential matrices that a sample of five has */
+#define TVK_SAMPSON_SUMS 56      /* the number of sums of sampson_sums */
+#define TVK_TRANSFER_SUMS 47     /* the number of sums of transfer_sums */
 
 struct tv_point;
 
-/* Two pinholes: x, y of camera 0, then of camera 1; x1 = R x0 + baseline direction, direction of
-   length 1, and camera 1's centre at baseline center1. */
+/* A pair of pinhole cameras. focal, inverse_focal and principal hold x, y of camera 0, then x, y of
+   camera 1, in pixels (inverse_focal: 1 / pixel). A point x0 of camera 0 is R x0 + baseline
+   direction in camera 1, with |direction| = 1, and the centre of camera 1 is baseline center1 in
+   camera 0. */
 typedef struct tvk_triangulate_pair {
   double focal[4], inverse_focal[4], principal[4];
   double R[9], direction[3], center1[3], baseline;
-  double parallel_sine_sq; /* rays with a smaller sine, squared, between them are parallel */
+  double
+      parallel_sine_sq; /* rays are parallel if the squared sine of their angle is at most this */
 } tvk_triangulate_pair;
 
-/* fast_score_row: rows[0..6] are the image rows y-3..y+3. Writes for each x in [0, width) the
-   largest threshold at which (x, y) is a corner with `arc` (9..12) contiguous brighter or darker
-   circle pixels, where that is at least `threshold` (>= 1), else 0. 0 in the 3-pixel rim.
-   fast_contrasts: the score before the threshold of each of `count` pixels and its eight
-   neighbours, in raster order: by how much the best arc is brighter or darker, below 0 where none
-   is. Each circle lies in the image; of the last row of the nine nothing behind the circle is read.
-   suppress_row: x of the scores in `cur` that are above 0 and above all eight neighbours; returns
-   how many. xs has room for (width + 1) / 2. The first and last x are never kept. average_rows:
-   columns of up to three rows, weights (of 256) in row_weights, to sums in [0, 65280].
+/* The contract of each kernel.
+
+   fast_score_row: rows[0..6] are the image rows y - 3 .. y + 3. Writes scores[x] for each x in [0,
+   width): the largest threshold at which (x, y) is a corner, that is, has `arc` (9..12) contiguous
+   brighter or darker pixels on its circle. Writes 0 where this is below `threshold` (>= 1), and in
+   the 3 pixels at each end of the row.
+
+   fast_contrasts: for each of `count` pixels and its eight neighbours, in raster order: by how many
+   grey levels the best arc is brighter or darker than the pixel; negative where no arc is. The
+   caller passes pixels whose nine circles lie in the image. In the last of the nine rows that these
+   circles cover, no byte to the right of the circles is read.
+
+   suppress_row: writes to xs, in ascending order, each x whose score in `cur` is above 0 and above
+   the scores of all eight neighbours, and returns their number. The first and the last x are never
+   written. xs has room for (width + 1) / 2.
+
+   average_rows: sums[x] = the sum of up to three rows, weighted by row_weights, which add up to
+   256; the sums are in [0, 65280].
+
    average_columns: out[x] = (sum over k < 3 of column_weights[3 x + k] * sums[first[x] + k] + 2^15)
-     >> 16; where a weight is 0 the sum is not read.
+   >> 16. A sum after the first whose weight is 0 is not read.
+
    halve_row: out[x] = (a[2x] + a[2x+1] + b[2x] + b[2x+1] + 2) / 4.
-   blur_row: 3x3 binomial (1 2 1)/4 in both directions, edges repeated, rounded once at the end.
-   pair_rows: pairs[x] = the pixel and the one below it, in the low and the high byte, each less 128
-   in two's complement; pairs[width] = pairs[width - 1]. sample_patch: num_rows rows of
-   TVK_PATCH_SIDE bilinear samples of an image of pairs, width + 1 to a row, the last row paired
-   with itself, and a 0 behind them; sample (i, j) lies at (x + i du_x - j du_y, y + i du_y + j
-   du_x), all in 1/65536 pixel; positions are clamped to the image. In 256 / 127^2 grey level, less
-   128 levels. orientation_histogram: of the gradients within 6 samples of the middle of
-   TVK_ORIENT_SIDE upright rows of TVK_ORIENT_SIDE samples, Gaussian weight of sigma 2 samples:
-   TVK_ORIENT_BINS directions, clockwise as seen, smoothed around the circle. gradient_histogram:
-   SIFT's 4x4x8 histogram of TVK_PATCH_SIDE rows (feature/describe.h), with trilinear sharing and
-   Gaussian window. quantize_descriptor: SIFT's normalisation, clipping at 0.2, and 128 bytes; root:
-   RootSIFT. mutual_nearest: of_rows[i].idx is the column whose nearest is row i and that is i's
-   nearest, each strictly, else -1 (and 0 for the rest); best their squared distance, second the
-   smallest other distance of either, INT32_MAX where there is none. of_columns (num_columns) and
-   scratch (TVK_NEAREST_SCRATCH(num_rows, num_columns) bytes, aligned to 64) are left with anything
-   in them. squared_distances: of the query to rows[indices[k]]. Of matches (geometry/ray_pairs.h),
-   arrays: rays (3 and 3) and slopes d ray / d pixel (6 and 6, row-major 3x2); on_plane: the rays
-   end in 1 and the slopes' last rows are zero, and are not read; m: a model matrix, row-major;
-   matches indices[0 .. count), or first, first + 1, .. where null: sampson_squares: squares[k] =
-   r^2 of Sampson's distance, infinite where that is no number. pose_squares: the same of a pose's
-   matrix E, R and t (21 numbers), infinite too where the match is behind a camera by more than
-   arrays[18][k] times scale (an angle; essential.h's depth_vote). transfer_squares: the same of the
-   transfer residual of a homography. sampson_sums: to sums[TVK_WIDTH n + k % TVK_WIDTH] adds match
-   k's part of sum n: with slopes g of r by m's entries and the loss's weight w, upper triangle of w
-   g g' (45, row by row), w g r (9), the truncated loss (r^2 / scale^2 or 1); the last is a product,
-   of Cauchy's 1 + r^2 / scale^2. Of the two losses the one that is asked for is added.
-   transfer_sums: the same of the transfer residual; in place of w g g' the 36 products of the upper
-     triangles of w S' W S and f0 f0', S = d d / d (H f0), W the residual's weight.
-   sampson_score: arrays in single precision, on the plane x0 y0 x1 y1 and the upper triangles of J
-   J' (3 and 3), else all 18: the sum over blocks first_block .. first_block + num_blocks - 1 of
-     min(r^2 / T^2, 1) TVK_SCORE_ONE, each truncated to an integer.
-   relpose_5pt: rays[TVK_WIDTH (6 k + 3 view + c) + s] is entry c of sample s's k-th ray in a view,
-   for TVK_WIDTH samples, of which the first num_samples are to be solved; the others are finite.
-   Writes sample s's essential matrices, row-major, Frobenius norm 1, that have no match before one
-   camera and behind the other, to essentials + 9 TVK_RELPOSE_MODELS s, and their number to
-   counts[s], 0 for a degenerate sample. What lies behind them is scratch. triangulate: count
-   matches of two pinholes (pixels: x and y each) by Midpoint, Linear-LS or Iterative-LS (method, a
-   tv_triangulation). status -1, and zeros, for a match that is none of "ok" and "behind", or needs
-   more care; returns whether there is one. */
+
+   blur_row: the 3x3 binomial filter (1 2 1)/4 in both directions. Edge pixels are repeated, and the
+   result is rounded once.
+
+   pair_rows: pairs[x] = row[x] in the low byte and below[x] in the high byte, each less 128 in
+   two's complement. pairs[width] = pairs[width - 1].
+
+   sample_patch: writes num_rows rows of TVK_PATCH_SIDE bilinear samples, and one 0 after them. The
+   image is one of pairs, width + 1 to a row, the last row paired with itself. Sample (i, j) lies at
+   (x + i du_x - j du_y, y + i du_y + j du_x), all in 1/65536 pixel; positions are clamped to the
+   image. A sample is the grey level less 128, in units of 256 / 127^2 grey level.
+
+   orientation_histogram: `patch` is TVK_ORIENT_SIDE rows of an upright patch, of which
+   TVK_ORIENT_SIDE samples each count. Writes the histogram of the gradients within 6 samples of the
+   centre, with a Gaussian weight of sigma 2 samples, in TVK_ORIENT_BINS directions, clockwise in
+   the image from x, smoothed around the circle.
+
+   gradient_histogram: SIFT's 4x4x8 histogram of TVK_PATCH_SIDE rows, with Gaussian weights. A
+   gradient is shared bilinearly between cells, and between two directions by decomposition
+   (kernels/describe.h).
+
+   quantize_descriptor: writes the 128 bytes of a histogram by SIFT's normalisation with clipping at
+   0.2, or by RootSIFT's if `root` is not 0.
+
+   mutual_nearest: of_rows[i].idx is the column that is strictly the nearest to row i and whose
+   strictly nearest row is i, else -1 (and best = second = 0). best is their squared distance;
+   second is the smallest of all other squared distances of the row and of the column, INT32_MAX if
+   there is none. of_columns (num_columns elements) and scratch (TVK_NEAREST_SCRATCH(num_rows,
+   num_columns) bytes, aligned to 64) hold unspecified values afterwards.
+
+   squared_distances: out[k] = the squared distance of the query and rows[indices[k]].
+
+   The kernels on matches (geometry/ray_pairs.h) read `arrays`: the rays of view 0 and of view 1 (3
+   and 3) and their slopes d ray / d pixel (6 and 6, row-major 3x2). If on_plane is not 0, all rays
+   have z = 1 and the last rows of the slopes are 0, and these are not read. m is the matrix of a
+   model, row-major. Match k is indices[k], or first + k if indices is null or no parameter.
+
+   sampson_squares: squares[k] = r^2, the squared Sampson distance; infinite where it is not a
+   number.
+
+   pose_squares: the same for a pose of 21 numbers: the essential matrix E, then R and t. Also
+   infinite where the point of the match is behind a camera by more than the angle scale *
+   arrays[18][k] (depth_vote in geometry/essential.h).
+
+   transfer_squares: squares[k] = r^2, the squared transfer residual of a homography.
+
+   sampson_sums: adds match k's term of sum n to sums[TVK_WIDTH n + k % TVK_WIDTH]. With g = dr/dm
+   (9 entries) and w the weight of the loss, the sums are those of w g g' (45, the upper triangle
+   row by row), of w g r (9) and of the truncated loss (r^2 / scale^2, at most 1). The last one is
+   not a sum but the product of Cauchy's 1 + r^2 / scale^2. `cauchy` selects the loss; the entry of
+   the other loss does not change.
+
+   transfer_sums: the same for the transfer residual. In place of w g g' it adds the 36 products of
+   the upper triangles of w S' W S and of f0 f0', where S = d d / d (H f0), d is the displacement
+   and W the weight of the residual (kernels/transfer.h).
+
+   sampson_score: the sum of min(r^2 / T^2, 1) TVK_SCORE_ONE, each term truncated to an integer,
+   over the blocks first_block .. first_block + num_blocks - 1 of TVK_SCORE_BLOCK matches. The
+   arrays are in single precision: on the plane x0 y0 x1 y1 and the upper triangles of J J' of view
+   0 and of view 1 (3 and 3), else all 18.
+
+   relpose_5pt: rays[TVK_WIDTH (6 k + 3 view + c) + s] is entry c of the k-th ray of sample s in a
+   view. The first num_samples of the TVK_WIDTH samples are solved; the rays of the others must be
+   finite. For sample s, writes counts[s] essential matrices, row-major, of Frobenius norm 1, to
+   essentials + 9 TVK_RELPOSE_MODELS s: those for which the five matches satisfy the oriented
+   epipolar constraint (same_side in kernels/relpose_5pt.h). counts[s] is 0 for a degenerate sample.
+   The entries after these matrices are unspecified.
+
+   triangulate: the points of `count` matches of two pinholes by Midpoint, Linear-LS or Iterative-LS
+   (`method`, a tv_triangulation). A pixel is two numbers, x and y. A match whose point is neither
+   TV_POINT_OK nor TV_POINT_BEHIND, or that needs more care, gets status -1 and zeros; the caller
+   solves it by geometry/triangulation.cc. Returns whether there is such a match. */
 #define TVK_PIXEL_LIST(X)                                                                          \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                  \
@@ -154,7 +202,8 @@ typedef struct tvk_triangulate_pair {
     (const uint8_t *query, const uint8_t *rows, const int32_t *indices, int32_t count,             \
      int32_t *out))
 
-/* Those on matches, in files of their own (lanes_*.c): a set may take another set's. */
+/* The kernels on matches. They are in files of their own (lanes_*.c), so that a set may use another
+   set's. */
 #define TVK_MATCH_LIST(X)                                                                   \
   X(sampson_squares, void,                                                                  \
     (const double *const *arrays, const int32_t *indices, int32_t first, int32_t count,     \
@@ -183,17 +232,19 @@ typedef struct tvk_triangulate_pair {
 #define TVK_LIST(X) TVK_PIXEL_LIST(X) TVK_MATCH_LIST(X)
 
 typedef struct tvk_table {
-  int32_t set; /* a tv_kernels */
+  int32_t set; /* the tv_kernels value of the set */
 #define TVK_MEMBER(name, result, parameters) result(*name) parameters;
   TVK_LIST(TVK_MEMBER)
 #undef TVK_MEMBER
 } tvk_table;
 
-/* All tables that this CPU and this build have, n = 0, 1, .. from the C set's to the fastest, then
-   null. The NEON set has two where the CPU has ARMv8.2's dot product: without it and with it. */
+/* The tables that this build has and this CPU can run, for n = 0, 1, .. in order from the C set to
+   the fastest, then null. The NEON set has two tables on CPUs with ARMv8.2's dot product: one
+   without it, then one with it. */
 const tvk_table *tvk_nth(int32_t n);
 
-/* The fastest of them of a tv_kernels number, of all for 0 (auto); null if there is none. */
+/* The fastest table of the set `set` (a tv_kernels), or of all sets for TV_KERNELS_AUTO. Null if
+   this build or this CPU has none. */
 const tvk_table *tvk_select(int32_t set);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* The same source compiled for AVX2 (without FMA, whose rounding differs), and by hand what pays.
- */
+/* The AVX2 set: the common source compiled for AVX2, with intrinsics where they were measured to be
+   faster. FMA is not used, because it rounds differently. */
 #define TVK_SET TV_KERNELS_AVX2
 #define TVK_TABLE tvk_table_avx2
 #define TVK_AVX2
@@ -15,6 +15,6 @@ TVK_LEND(orientation_histogram, avx2);
 TVK_LEND(gradient_histogram, avx2);
 TVK_LEND(quantize_descriptor, avx2);
 
-/* The C set's is as fast. */
+/* This kernel is the C set's, which is as fast. */
 #define average_columns tvk_average_columns_c
 #include "kernels/kernels_table.h"

@@ -1,15 +1,18 @@
-/* The same source compiled for AVX-512 with VNNI, and by hand what pays. */
+/* The AVX-512 set: the common source compiled for AVX-512 with VNNI, with intrinsics where they
+   were measured to be faster. */
 #define TVK_SET TV_KERNELS_AVX512
 #define TVK_TABLE tvk_table_avx512
 #define TVK_AVX512
 #define TVK_MATCH(name) tvk_##name##_avx512
 #include "kernels/kernels_impl.h"
 
-/* AVX2's: rivals alone ask for it, a hundredth of an estimate's time. */
+/* The transfer kernels are AVX2's. Only homographies and rotations, the rivals of the epipolar
+   model, use them: a hundredth of the time of an estimate. */
 #define tvk_transfer_squares_avx512 tvk_transfer_squares_avx2
 #define tvk_transfer_sums_avx512 tvk_transfer_sums_avx2
 
-/* Another set's are as fast, or a pair's time does not show the difference. */
+/* These kernels are other sets', which are as fast, or whose difference does not show in the time
+   of a pair. */
 #define average_columns tvk_average_columns_c
 #define fast_contrasts tvk_fast_contrasts_avx2
 #define average_rows tvk_average_rows_avx2

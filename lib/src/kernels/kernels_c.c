@@ -1,4 +1,5 @@
-/* The portable set: the definition. */
+/* The C set, which is portable and the definition of every kernel on pixels, patches and
+   descriptors. */
 #define TVK_SET TV_KERNELS_C
 #define TVK_TABLE tvk_table_c
 #include "kernels/kernels_impl.h"

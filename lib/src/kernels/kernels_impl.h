@@ -1,7 +1,7 @@
-/* One kernel set's own kernels: include with TVK_SET (a tv_kernels) and TVK_TABLE (the table's
-   name) defined, and TVK_MATCH(name), its kernels on matches, where they are not the portable ones;
-   then kernels/kernels_table.h. In between a set may put another's kernel in the place of its own,
-   which then is not compiled: the same speed, and a kernel less. */
+/* The body of a kernel set's file. Define TVK_SET (a tv_kernels), TVK_TABLE (the name of the table)
+   and, unless the set uses the portable kernels on matches, TVK_MATCH(name) (the names of its own);
+   then include this file and after it kernels/kernels_table.h. Between the two a set may #define
+   one of its kernels as another set's that is as fast; its own is then not compiled. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "kernels/kernels.h"
 #include "twoview/context.h"
 
-#pragma GCC diagnostic ignored "-Wunused-function" /* those of them that another set lends */
+#pragma GCC diagnostic ignored "-Wunused-function" /* kernels replaced by another set's */
 
 /* clang-format off */
 #include "kernels/fast.h"
@@ -20,5 +20,5 @@
 #include "kernels/nearest.h"
 /* clang-format on */
 
-/* Gives a kernel of this file a name for other sets' tables. */
+/* Exports a kernel of this file under a name by which the tables of other sets can use it. */
 #define TVK_LEND(name, set) extern __typeof__(name) tvk_##name##_##set __attribute__((alias(#name)))

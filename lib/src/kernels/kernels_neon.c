@@ -1,5 +1,6 @@
-/* The same source compiled for NEON, and by hand what pays. On 32-bit ARM, NEON flushes denormals
-   and has no IEEE division: integers there, and the compilers leave the rest to scalar VFP. */
+/* The NEON set: the common source compiled for NEON, with intrinsics where they were measured to be
+   faster. On 32-bit ARM, NEON flushes denormals to zero and has no IEEE division. It is therefore
+   used for integers only, and compilers leave floating point to the scalar VFP. */
 #define TVK_SET TV_KERNELS_NEON
 #define TVK_TABLE tvk_table_neon
 #define TVK_NEON
@@ -7,7 +8,7 @@
 #include "kernels/kernels_table.h"
 
 #if defined(__aarch64__)
-/* The same with what gains by the dot product of ARMv8.2. */
+/* A second table of the set, for CPUs with the dot product of ARMv8.2. */
 #include "kernels/neon_dot.h"
 #undef TVK_TABLE
 #define TVK_TABLE tvk_table_neon_dot

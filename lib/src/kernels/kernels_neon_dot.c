@@ -1,5 +1,5 @@
-/* The kernels that gain by the dot product of ARMv8.2. The table is beside the NEON set's
-   (kernels_neon.c), whose other kernels it shares. */
+/* The kernels that are faster with the dot product of ARMv8.2. Their table, in kernels_neon.c,
+   takes all other kernels from the NEON set. */
 #define TVK_NEON_DOT
 #include <string.h>
 

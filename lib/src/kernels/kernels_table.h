@@ -1,5 +1,5 @@
-/* The table of a set: kernels/kernels_impl.h says how it is included. Again, with another
-   TVK_TABLE, for a table that differs in some kernels. */
+/* Defines the table TVK_TABLE of a set; kernels/kernels_impl.h says how to include this file. A set
+   with several tables includes it again with another TVK_TABLE. */
 #define TVK_DECLARE(name, result, parameters) \
   result tvk_##name##_c parameters;           \
   result tvk_##name##_avx2 parameters;

@@ -1,5 +1,6 @@
-/* Doubles in lanes: the same IEEE operations on TVK_LANES numbers at a time. Work on doubles is
-   laid out for TVK_WIDTH lanes whatever the set, so that sums over lanes have one written order. */
+/* Vectors of TVK_LANES doubles for the kernels on matches: each operation is the same IEEE
+   operation on every lane. Arrays are laid out for TVK_WIDTH lanes in every set, so that sums over
+   matches are added in one written order. */
 #ifndef TWOVIEW_KERNELS_LANES_H
 #define TWOVIEW_KERNELS_LANES_H
 
@@ -20,7 +21,7 @@
 #include <immintrin.h>
 #endif
 
-/* Before a loop whose number of turns is a constant, at most 10. */
+/* Put before a loop that should be unrolled: its number of turns is a constant of at most 10. */
 #if defined(__OPTIMIZE_SIZE__)
 #define TVK_UNROLL
 #elif defined(__clang__)
@@ -29,18 +30,19 @@
 #define TVK_UNROLL _Pragma("GCC unroll 10")
 #endif
 
-/* A kernel's way for wide lenses: AVX-512 takes AVX2's, for its size. */
+/* Names the variant of a kernel for rays that are not on the image plane, those of wide lenses.
+   AVX-512 uses AVX2's, to save code size. */
 #if defined(TVK_AVX512)
 #define TVK_ON_SPHERE(kernel, own) tvk_##kernel##_avx2
 #else
 #define TVK_ON_SPHERE(kernel, own) own
 #endif
 
-/* For what is compiled once for the image plane and once for the sphere. */
+/* For functions that are compiled twice: for rays on the image plane and for rays on the sphere. */
 #define TVK_INLINE inline __attribute__((always_inline))
 
 typedef double lanes __attribute__((vector_size(8 * TVK_LANES)));
-typedef int64_t lane_mask __attribute__((vector_size(8 * TVK_LANES))); /* all ones or all zeros */
+typedef int64_t lane_mask __attribute__((vector_size(8 * TVK_LANES))); /* lanes are -1 or 0 */
 typedef double unaligned_lanes __attribute__((vector_size(8 * TVK_LANES), aligned(8), may_alias));
 
 static inline lanes lanes_of(double x) { return (lanes){0} + x; }
@@ -49,9 +51,9 @@ static inline void lanes_store(double *p, lanes x) { *(unaligned_lanes *)p = x; 
 static inline lanes lanes_select(lane_mask mask, lanes a, lanes b) {
   return (lanes)((mask & (lane_mask)a) | (~mask & (lane_mask)b));
 }
-/* a where the mask is set, else 0. */
+/* a in the lanes where the mask is set, 0 in the others. */
 static inline lanes lanes_keep(lane_mask mask, lanes a) { return (lanes)(mask & (lane_mask)a); }
-/* Lanes of a, from 0 on, and of b, from TVK_LANES on, by their numbers. */
+/* The lanes with the given numbers: 0 .. TVK_LANES - 1 are those of a, TVK_LANES .. those of b. */
 #if defined(__clang__)
 #define lanes_shuffle(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #else

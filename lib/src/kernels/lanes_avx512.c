@@ -1,4 +1,4 @@
-/* The same source compiled for AVX-512: no fused multiply-add, whose rounding differs. */
+/* The kernels on matches compiled for AVX-512. FMA is not used, because it rounds differently. */
 #define TVK_MATCH(name) tvk_##name##_avx512
 #define TVK_AVX512
 #include "kernels/lanes_impl.h"

@@ -1,3 +1,3 @@
-/* The portable kernels on doubles: the definition. */
+/* The portable kernels on matches: the definition. */
 #define TVK_MATCH(name) tvk_##name##_c
 #include "kernels/lanes_impl.h"

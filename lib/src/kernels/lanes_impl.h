@@ -1,5 +1,6 @@
-/* One set's kernels on doubles: include with TVK_MATCH(name), their names, defined. Compiled at
-   -O2, with the loops that gain from it unrolled by TVK_UNROLL: at -O3 they are twice as large. */
+/* The body of a set's file of kernels on matches. Define TVK_MATCH(name), which gives their names,
+   then include this file. It is compiled at -O2, where TVK_UNROLL unrolls the loops that gain from
+   it; at -O3 these kernels would be twice as large. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -18,7 +19,7 @@ TVK_MATCH_LIST(TVK_DECLARE)
 /* clang-format off */
 #include "kernels/relpose_5pt.h"
 #include "kernels/sampson.h"
-#if !defined(TVK_AVX512) /* it takes AVX2's */
+#if !defined(TVK_AVX512) /* AVX-512 uses AVX2's */
 #include "kernels/transfer.h"
 #endif
 #include "kernels/triangulate.h"

@@ -1,10 +1,10 @@
-/* TVK_LANES matches at a time: loading them, and adding up their loss. */
+/* Blocks of TVK_LANES matches: loading them, and adding up their loss. */
 #ifndef TWOVIEW_KERNELS_MATCH_BLOCK_H
 #define TWOVIEW_KERNELS_MATCH_BLOCK_H
 
 #include "kernels/lanes.h"
 
-/* Rays, and slopes d ray / d pixel. */
+/* The rays f0, f1 and their slopes J = d ray / d pixel (row-major 3x2) of TVK_LANES matches. */
 typedef struct sampson_block {
   lanes f0[3], f1[3], J0[6], J1[6];
 } sampson_block;
@@ -19,14 +19,14 @@ static inline lanes gather_lanes(const double *array, const int32_t index[TVK_LA
 #endif
 }
 
-/* index null: from the array's element `first` on. */
+/* Elements index[0 ..] of the array, or its elements from `first` on if index is null. */
 static inline lanes load_lanes(const double *array, const int32_t *index, int32_t first) {
   return index ? gather_lanes(array, index) : lanes_load(array + first);
 }
 
 static TVK_INLINE void load_arrays(const double *const *arrays, const int32_t *index, int32_t first,
                                    int on_plane, sampson_block *b) {
-  const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6; /* else ones and zeros */
+  const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6; /* those that are not 1 or 0 */
   int k;
   for (k = 0; k < rays; ++k) {
     b->f0[k] = load_lanes(arrays[k], index, first);
@@ -38,8 +38,8 @@ static TVK_INLINE void load_arrays(const double *const *arrays, const int32_t *i
   }
 }
 
-/* `count` matches from indices[0 ..] (or first, first + 1, ..), the first of them again in the
-   other lanes. */
+/* Loads the `count` matches indices[0 ..], or first, first + 1, .. if indices is null. The
+   remaining lanes repeat the first match. */
 static TVK_INLINE void load_block(const double *const *arrays, const int32_t *indices,
                                   int32_t first, int32_t count, int on_plane, sampson_block *b) {
   int32_t some[TVK_LANES];
@@ -58,7 +58,7 @@ static TVK_INLINE void load_block(const double *const *arrays, const int32_t *in
   load_arrays(arrays, indices, 0, on_plane, b);
 }
 
-/* `count` numbers, and zeros in the other lanes. */
+/* Loads `count` numbers; the remaining lanes are 0. */
 static TVK_INLINE lanes load_first(const double *from, int32_t count) {
   lanes x = {0};
   int32_t l;
@@ -76,8 +76,9 @@ static TVK_INLINE void store_first(double *to, lanes x, int32_t count) {
   }
 }
 
-/* Adds the first `count` lanes' loss at q = r^2 / scale^2: sums points to the truncated loss, and
-   Cauchy's product follows. Writes the weight, and returns the lanes where there is a slope. */
+/* Adds the loss of the first `count` lanes at q = r^2 / scale^2. `sums` points to the entry of the
+   truncated loss; the entry of Cauchy's product follows it. Writes the weights of the loss and
+   returns the mask of the lanes where the loss is not constant. */
 static inline lane_mask add_loss(lanes q, int32_t count, int cauchy, double *sums, lanes *weight) {
   lanes number = {0};
   lane_mask used, ok;

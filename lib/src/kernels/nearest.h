@@ -1,32 +1,37 @@
-/* Strictly nearest neighbours, both ways, among 128-byte descriptors, all pairs compared.
+/* The kernel mutual_nearest: pairs of strictly nearest neighbours among 128-byte descriptors, found
+   by comparing all pairs.
 
-   Rows (of image 0) meet columns (of image 1) in tiles of NEAREST_QUERIES x NEAREST_COLUMNS. Of a
-   pair a, b a tile makes two keys, |a|^2 - 2 a . b for b's list and |b|^2 - 2 a . b for a's, what
-   is missing being the same for the whole list; a key is that number (24 bits with its sign) << 8,
-   and below it where it comes from: the tile's place among 256 of rows, or of columns. A tile keeps
-   the smallest key of its rows for each column, and of its columns that share a lane for each row:
-   a group; the two smallest keys of groups are kept per column, and per row and lane.
+   Rows (descriptors of image 0) and columns (of image 1) are compared in tiles of NEAREST_QUERIES x
+   NEAREST_COLUMNS. For each pair a, b a tile makes two keys: one from |a|^2 - 2 a . b for b's list
+   and one from |b|^2 - 2 a . b for a's list. The term that is missing for the squared distance is
+   the same for the whole list. A key is that number (24 bits with its sign) << 8, plus the place of
+   its tile in the low 8 bits: among 256 tiles of rows, or of columns.
 
-   So the two nearest groups are known in the end, by their nearest members. The second nearest
-   neighbour may hide in the nearest's own group: that group's distances are computed once more, of
-   the few descriptors that can be each other's nearest. Ties need no order: equals are not strictly
-   nearest.
+   A group is the set of descriptors of a tile that share a list entry: all rows of the tile for a
+   column; the columns of the tile in one lane for a row. A tile computes the smallest key of each
+   group. The two smallest keys of groups are kept for each column, and for each row and lane.
 
-   A set brings its products: NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (of a chunk), _PANEL, the
-   structs nearest_rows and nearest_block, make_rows and make_block, which fill them, largest_byte
-   where these need it (AVX2), and tile_products, -a . b of a tile's pairs, a row of NEAREST_COLUMNS
-   after another. */
+   At the end the two nearest groups are known, each by the distance of its nearest member. The
+   second nearest neighbour may be in the same group as the nearest one. The distances within that
+   group are therefore computed again, but only for descriptors that can be mutual nearest
+   neighbours. Ties need no order, because descriptors at equal distances are not strictly nearest.
+
+   Each kernel set provides the tile in a file of its own (nearest_*.h): the constants
+   NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (rows of a chunk) and _PANEL; the structs nearest_rows
+   and nearest_block; make_rows and make_block, which fill them; largest_byte where these need it
+   (AVX2); and tile_products, which writes -a . b of all pairs of a tile, row by row. */
 
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
 #define NEAREST_PLACES 256
 
-/* A key's missing part, shifted, and its place; beyond the last descriptor, what no key may beat.
- */
+/* The part of a key that does not depend on the product: the squared norm and the place. make_rows
+   and make_block write NEAREST_FAR instead for rows and columns after the last descriptor; no key
+   is larger. */
 static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
 
-/* Out of line, as what else runs once a descriptor or a tile and not once a pair: -O3 would write
-   it out at each call. */
+/* Not inlined, like the other functions that run once per descriptor or tile instead of once per
+   pair: -O3 would copy them to each call. */
 static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * a[k];
@@ -52,7 +57,7 @@ static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b)
 #include "kernels/nearest_c.h"
 #endif
 
-#if !defined(TVK_AVX2) /* the others have no use for it */
+#if !defined(TVK_AVX2) /* for the tiles that do not use its result */
 static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
   (void)bytes;
   (void)count;
@@ -79,8 +84,9 @@ NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
 
 static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
 
-/* The smallest and the second smallest distance of groups so far, and where the smallest group
- * starts. */
+/* Merges the two smallest keys of groups into `nearest`, which holds the smallest and the second
+   smallest distance of groups so far, and in idx the first member of the nearest group. `norm` is
+   the term that the keys lack; `group` is the first member of best_key's group. */
 static TVK_NOINLINE void nearest_merge(tvk_nearest *nearest, int32_t best_key, int32_t second_key,
                                        int32_t norm, int32_t group) {
   const int32_t best = (best_key >> 8) + norm;
@@ -107,7 +113,8 @@ static inline void merge_columns(const nearest_block *block, int32_t first_row, 
   }
 }
 
-/* The lanes of a row to one nearest group. */
+/* Merges the lists of a row, one per lane, into of_row: its nearest group, its smallest and second
+   smallest distance. */
 static inline void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
                                int32_t first_column, tvk_nearest *of_row) {
   int32_t smallest = NEAREST_FAR, next = NEAREST_FAR, equals = 0, lane;
@@ -123,7 +130,10 @@ static inline void merge_lanes(const int32_t *best, const int32_t *second, int32
                 first_column + (smallest & (NEAREST_PLACES - 1)) * NEAREST_COLUMNS + lane);
 }
 
-/* Whether `best` is the distance of one member of a group alone: which, and the next distance. */
+/* Computes the distances from the query to the members of its nearest group again: `count`
+   descriptors of `others`, `stride` apart, from nearest->idx on. Lowers nearest->second to the
+   smallest distance of the other members. Returns the index of the strictly nearest descriptor, or
+   -1 if there is a tie. */
 static TVK_NOINLINE int32_t resolve_group(const uint8_t *query, const uint8_t *others,
                                           int32_t num_others, int32_t stride, int32_t count,
                                           tvk_nearest *nearest) {
@@ -140,7 +150,8 @@ static TVK_NOINLINE int32_t resolve_group(const uint8_t *query, const uint8_t *o
   return equals == 1 && nearest->best < nearest->second ? found : -1;
 }
 
-/* Whether a column of row i's nearest group has i in its own, at the same distance. */
+/* Whether a column in row i's nearest group has the group of row i as its own nearest group, at the
+   same distance. If not, row i has no mutual nearest neighbour. */
 static inline int32_t may_be_mutual(int32_t i, const tvk_nearest *of_row,
                                     const tvk_nearest *of_columns, int32_t num_columns) {
   int32_t k, j = of_row->idx;
@@ -172,7 +183,7 @@ static inline void resolve_row(const uint8_t *rows, int32_t num_rows, int32_t i,
   of_row->idx = j;
 }
 
-/* NEAREST_LANES numbers. */
+/* Vectors of NEAREST_LANES keys, signed and unsigned. */
 typedef int32_t int_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
 typedef uint32_t key_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
 typedef int32_t unaligned_int_lanes
@@ -207,14 +218,14 @@ static inline int_lanes make_keys(int_lanes terms, const int32_t *products) {
   return (int_lanes)((key_lanes)terms + ((key_lanes)load_ints(products) << 9));
 }
 
-/* The two smallest of each lane, with one more. */
+/* Updates the two smallest keys of each lane with one more key. */
 static inline void update_two(int_lanes keys, int32_t *best, int32_t *second) {
   const int_lanes old = load_ints(best);
   store_ints(second, min_lanes(load_ints(second), max_lanes(keys, old)));
   store_ints(best, min_lanes(keys, old));
 }
 
-/* A row's keys, the smallest of each lane, into its list. */
+/* Updates a row's lists, one per lane, with its keys of a tile: the smallest key of each lane. */
 static inline void update_row(const int32_t *products, const int32_t *terms, int32_t *best,
                               int32_t *second) {
   int_lanes keys = make_keys(load_ints(terms), products);
@@ -225,7 +236,8 @@ static inline void update_row(const int32_t *products, const int32_t *terms, int
   update_two(keys, best, second);
 }
 
-/* The columns' keys, the smallest of the rows, into their lists. */
+/* Updates the columns' lists with their keys of a tile: for each column the smallest key of the
+   rows. */
 static inline void update_columns(const int32_t *products, const int32_t *terms, int32_t *best,
                                   int32_t *second) {
   const int_lanes zero = {0};
@@ -256,7 +268,7 @@ static void forget_columns(nearest_block *blocks, int32_t num_columns) {
   }
 }
 
-/* The tiles of a chunk, from row `first` on; returns how many. */
+/* Prepares the tiles of the chunk of rows that starts at row `first`; returns their number. */
 static int32_t make_chunk(const uint8_t *rows, int32_t num_rows, int32_t first, int32_t largest,
                           nearest_rows *tiles) {
   int32_t t, k, row = first;
@@ -271,7 +283,8 @@ static int32_t make_chunk(const uint8_t *rows, int32_t num_rows, int32_t first, 
   return t;
 }
 
-/* All rows meet a panel: a chunk of them at a time, which stays in the first-level cache. */
+/* Compares all rows with a panel of columns, a chunk of rows at a time: a chunk stays in the
+   first-level cache. */
 static void meet_panel(const uint8_t *rows, int32_t num_rows, nearest_block *blocks,
                        int32_t first_column, int32_t num_columns, int32_t largest,
                        nearest_rows *tiles, tvk_nearest *of_rows, tvk_nearest *of_columns) {
@@ -294,13 +307,14 @@ static void meet_panel(const uint8_t *rows, int32_t num_rows, nearest_block *blo
         merge_columns(blocks + j / NEAREST_COLUMNS, start,
                       nearest_min(NEAREST_COLUMNS, num_columns - j), of_columns + j);
       }
-      forget_columns(blocks, num_columns); /* no place is left in a key for further tiles */
+      /* All 256 places of a key are used, or the rows are finished. */
+      forget_columns(blocks, num_columns);
       start = first + count;
     }
   }
 }
 
-/* Rolled up, too: together 570 bytes less of AVX-512's set. */
+/* Neither inlined nor unrolled: together this saves 570 bytes in the AVX-512 set. */
 static TVK_NOINLINE void forget_nearest(tvk_nearest *nearest, int32_t count) {
   const tvk_nearest none = {NEAREST_FAR, NEAREST_FAR, 0};
   int32_t k;
@@ -332,7 +346,8 @@ static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t 
   }
 }
 
-#if !defined(TVK_NEON_DOT) /* which takes the other kernels of the NEON set */
+/* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */
+#if !defined(TVK_NEON_DOT)
 static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
                               int32_t count, int32_t *out) {
   int32_t k;

@@ -1,21 +1,25 @@
-/* The tile of nearest.h by AVX2: a lane a column, four bytes of eight columns a register.
+/* The tile of nearest.h for AVX2. A lane is a column; a register holds four bytes each of eight
+   columns.
 
-   vpmaddubsw multiplies unsigned by signed bytes and adds pairs in 16 bits. Columns are c - b, c
-   half the largest byte, so that |c - b| <= h = largest - c; two products of pairs are added in 16
-   bits before they are widened, which is exact where four bytes of the row add up to 32767 / h at
-   most: 255 at worst, 370 for descriptors as they are, whose mean is 35. Where they add up to more,
-   the row is split into a sum of rows that do not: further steps, almost never needed. */
+   vpmaddubsw multiplies unsigned by signed bytes and adds pairs of products in 16 bits. Columns are
+   stored as c - b, where c is half the largest byte, so that |c - b| <= h = largest - c. Two such
+   sums of pairs are added in 16 bits before they are widened. This is exact if the four bytes of
+   the row add up to at most 32767 / h: 255 at worst, 370 for descriptors as they are, whose mean
+   byte is 35. A row whose bytes add up to more is split into a sum of rows that satisfy the bound.
+   Each of these is a further step; they are almost never needed. */
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 8, NEAREST_VECTORS = 4, NEAREST_QUERIES = 2, NEAREST_ROWS = 64 };
 enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4, NEAREST_MOST_STEPS = 2 * NEAREST_GROUPS };
 
-/* A step: eight bytes of each row, and which eight of the 128. */
+/* A row as a sequence of steps. bytes[s] are eight bytes of each row of the tile, and places[s]
+   says with which of the groups of four bytes of a column they are multiplied: this one and the
+   next. */
 typedef struct nearest_rows {
   uint8_t bytes[NEAREST_MOST_STEPS][NEAREST_QUERIES][8];
   int32_t places[NEAREST_MOST_STEPS], num_steps;
-  int32_t starts[NEAREST_QUERIES]; /* -c sum a */
+  int32_t starts[NEAREST_QUERIES]; /* -c (sum of the bytes of row a) */
   int32_t norms[NEAREST_QUERIES], terms[NEAREST_QUERIES];
   int32_t best[NEAREST_QUERIES * NEAREST_LANES], second[NEAREST_QUERIES * NEAREST_LANES];
 } nearest_rows;
@@ -35,8 +39,9 @@ static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
 
 static inline int32_t nearest_centre(int32_t largest) { return largest / 2; }
 
-/* Moves to `step` what may be added in 16 bits of the eight bytes in `left`: those four that meet
-   in a sum are 0 1 4 5 and 2 3 6 7. Returns whether something stays. */
+/* Moves from `left` to `step` as much of eight bytes as may be added in 16 bits. The bytes that are
+   added in one sum are 0 1 4 5 and 2 3 6 7; each sum is limited to `most`. Returns whether a part
+   is left for a further step. */
 static inline int32_t take_step(uint8_t *left, int32_t most, uint8_t *step) {
   static const uint8_t meet[2][4] = {{0, 1, 4, 5}, {2, 3, 6, 7}};
   int32_t half, k, stays = 0;
@@ -116,7 +121,8 @@ static inline __m256i four_avx2(const uint8_t *row) {
   return _mm256_set1_epi32(four);
 }
 
-/* Eight bytes of the row, four and four, with those of eight columns. */
+/* For each of eight columns, the products with eight bytes of the row, four in `row` and four in
+   `next`, summed. */
 static inline __m256i products_avx2(__m256i row, __m256i next, const int8_t *columns) {
   const __m256i pairs =
       _mm256_add_epi16(_mm256_maddubs_epi16(row, load_avx2(columns)),
@@ -126,8 +132,8 @@ static inline __m256i products_avx2(__m256i row, __m256i next, const int8_t *col
 
 static inline void store_avx2(int32_t *to, __m256i x) { _mm256_storeu_si256((__m256i *)to, x); }
 
-/* Each sum is a variable by name, s12 of row 1 and the third eight columns: gcc 12 keeps arrays of
-   them in memory. */
+/* Each sum is a variable with its own name (s12: row 1, third eight columns), because gcc 12 keeps
+   arrays of sums in memory. */
 #define START(i)                                                           \
   __m256i s##i##0 = _mm256_set1_epi32(rows->starts[i]), s##i##1 = s##i##0; \
   __m256i s##i##2 = s##i##0, s##i##3 = s##i##0;
@@ -154,7 +160,8 @@ static void tile_products(const nearest_rows *rows, const nearest_block *block, 
   for (step = 0; step < rows->num_steps; ++step) {
     const int8_t *const columns = block->bytes[rows->places[step]][0];
     ADD(0)
-    /* Not to hold all columns in registers until the second row: there are too few. */
+    /* Prevents the compiler from holding all columns in registers until the second row: there are
+       too few registers. */
     __asm__ volatile("" ::: "memory");
     ADD(1)
   }

@@ -1,6 +1,6 @@
-/* The tile of nearest.h by AVX-512 VNNI: a lane a column, four bytes of 16 columns a register, 24
-   sums in registers. vpdpbusd multiplies unsigned by signed bytes: sum of b (127 - a) = 127 sum b -
-   a . b. */
+/* The tile of nearest.h for AVX-512 VNNI. A lane is a column; a register holds four bytes each of
+   16 columns, and 24 sums stay in registers. vpdpbusd multiplies unsigned by signed bytes, so rows
+   are stored as 127 - a: the sum of b (127 - a) is 127 sum b - a . b. */
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 16, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
@@ -8,7 +8,7 @@ enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4 };
 
 typedef struct nearest_rows {
-  int8_t bytes[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE]; /* 127 - a */
+  int8_t bytes[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE]; /* 127 - (the byte of row a) */
   int32_t best[NEAREST_QUERIES * NEAREST_LANES], second[NEAREST_QUERIES * NEAREST_LANES];
   int32_t norms[8], terms[8];
 } nearest_rows;
@@ -16,7 +16,7 @@ typedef struct nearest_rows {
 typedef struct nearest_block {
   uint8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
-  int32_t starts[NEAREST_COLUMNS]; /* -127 sum b */
+  int32_t starts[NEAREST_COLUMNS]; /* -127 (sum of the bytes of b) */
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 
@@ -52,7 +52,7 @@ static void make_block(const uint8_t *columns, int32_t count, int32_t place, int
   }
 }
 
-/* Sums keep this type: as __m512i, which is of 64-bit numbers, gcc 12 holds each of them twice. */
+/* The type of the sums. With __m512i, a vector of 64-bit numbers, gcc 12 holds each sum twice. */
 typedef int32_t int32x16 __attribute__((vector_size(64)));
 
 static inline int32x16 load_avx512(const void *from) { return (int32x16)_mm512_loadu_si512(from); }
@@ -67,8 +67,8 @@ static inline int32x16 add_avx512(int32x16 sum, int32x16 columns, int32x16 row) 
   return (int32x16)_mm512_dpbusd_epi32((__m512i)sum, (__m512i)columns, (__m512i)row);
 }
 
-/* Each sum is a variable by name, s20 of row 2 and the first 16 columns: gcc 12 keeps arrays of
-   them in memory, at half the speed. */
+/* Each sum is a variable with its own name (s20: row 2, first 16 columns), because gcc 12 keeps
+   arrays of sums in memory, which halves the speed. */
 #define EACH_ROW(do) \
   do (0) do(1) do(2) do(3) do(4) do(5)
 

@@ -1,5 +1,5 @@
-/* The tile of nearest.h in plain C: four dot products of int16 at a time, which every compiler
-   turns into multiply-adds of its base instruction set. */
+/* The tile of nearest.h in plain C. It computes four dot products of 16-bit numbers at a time, a
+   loop that every compiler turns into the multiply-adds of its base instruction set. */
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 4, NEAREST_ROWS = 128 };
 enum { NEAREST_PANEL = TVK_NEAREST_PANEL_16 };

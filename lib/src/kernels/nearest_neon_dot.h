@@ -1,5 +1,5 @@
-/* The tile of nearest.h by the dot product of ARMv8.2: a lane a column, four bytes of four columns
-   a register, 24 sums in registers. */
+/* The tile of nearest.h for the dot product of ARMv8.2. A lane is a column; a register holds four
+   bytes each of four columns, and 24 sums stay in registers. */
 #include <arm_neon.h>
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
@@ -54,8 +54,8 @@ static inline void store_negated(int32_t *products, uint32x4_t sums) {
   vst1q_s32(products, vnegq_s32(vreinterpretq_s32_u32(sums)));
 }
 
-/* Each sum is a variable by name, as in nearest_avx512.h: s20 of row 2 and the first four columns.
- */
+/* Each sum is a variable with its own name (s20: row 2, first four columns), as in
+   nearest_avx512.h. */
 #define EACH_ROW(do) \
   do (0) do(1) do(2) do(3) do(4) do(5)
 

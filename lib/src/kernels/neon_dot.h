@@ -1,4 +1,5 @@
-/* What kernels_neon_dot.c gives to the NEON set of CPUs that have the dot product of ARMv8.2. */
+/* Declares the kernels of kernels_neon_dot.c, which replace the NEON set's on CPUs with the dot
+   product of ARMv8.2. */
 #ifndef TWOVIEW_KERNELS_NEON_DOT_H
 #define TWOVIEW_KERNELS_NEON_DOT_H
 

@@ -1,7 +1,8 @@
-/* Bilinear samples of a turned square, out of an image whose rows are stored in pairs: one 32-bit
-   load fetches all four neighbours, and no position needs a rule of its own at the border. Shares
-   are of 127, not of 128: they make up for the fraction's truncation, and a share times a pixel
-   (less 128) fits 16 bits. */
+/* The kernels pair_rows and sample_patch: bilinear samples of a rotated square. The rows of the
+   image are stored in pairs, so that a single 32-bit load reads the four neighbours of a position,
+   and positions at the border need no special case. The two weights of an interpolation add up to
+   127, not to 128. This compensates for the truncation of the fraction, and lets a weight times a
+   pixel (less 128) fit 16 bits. */
 
 static void pair_rows(const uint8_t *row, const uint8_t *below, int32_t width, uint16_t *pairs) {
   int32_t x;
@@ -11,12 +12,14 @@ static void pair_rows(const uint8_t *row, const uint8_t *below, int32_t width, u
 
 typedef struct sampled_image {
   const uint16_t *pairs;
-  int32_t pitch, right, bottom; /* the last positions, in 1/65536 pixel */
+  int32_t pitch, right,
+      bottom; /* pitch in pixels; right and bottom are the largest positions, in 1/65536 pixel */
 } sampled_image;
 
 #if defined(TVK_AVX512)
 
-/* Bytes [127 - f, f] of a position's fraction f, twice; and the same as words. */
+/* byte_shares: the weights [127 - f, f] of a position's fraction f as bytes, twice. word_shares:
+   the same weights as 16-bit numbers, once. */
 static inline __m512i byte_shares(__m512i position) {
   const __m512i spread =
       _mm512_shuffle_epi8(_mm512_srli_epi32(position, 1),
@@ -65,7 +68,7 @@ static inline __m256i word_shares(__m256i position) {
   return _mm256_xor_si256(spread, _mm256_set1_epi32(127));
 }
 
-/* Eight samples, the first one `first` along the row, 32 bits each. */
+/* Eight samples at the positions (x, y), in 1/65536 pixel, as 32-bit numbers. */
 static inline __m256i sample_eight(const sampled_image *image, __m256i x, __m256i y) {
   const __m256i zero = _mm256_setzero_si256();
   const __m256i sx = _mm256_min_epi32(_mm256_max_epi32(x, zero), _mm256_set1_epi32(image->right));
@@ -98,7 +101,7 @@ static inline int32_t clamp_i32(int32_t value, int32_t low, int32_t high) {
   return raised < high ? raised : high;
 }
 
-/* In three steps, so that all but the loads can run in vectors. */
+/* The work is in three loops, so that compilers can vectorise all of it except the loads. */
 static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t du_x, int32_t du_y,
                        int16_t *out) {
   int32_t offset[TVK_PATCH_SIDE];

@@ -1,18 +1,22 @@
-/* Essential matrices from five matched rays, TVK_LANES samples at a time without a branch on what
-   is in a lane, but for the isolation of roots that lie close together.
+/* The kernel relpose_5pt: essential matrices from five matched rays, for TVK_LANES samples at a
+   time. The code does not branch on the values in single lanes, except to separate roots that are
+   close together.
 
-   D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 2004: the five
-   epipolar constraints leave E = x X + y Y + z Z + W. The cubic constraints det E = 0 and
-   2 E E' E - tr(E E') E = 0 are ten equations in twenty monomials; elimination, here by Householder
-   reflections, which need no pivot, leaves a 3x3 matrix of polynomials in z, whose determinant has
-   degree ten. Its real roots give x and y. Measured in test/unit/test_relpose_5pt.cc. */
+   D. Nister, "An efficient solution to the five-point relative pose problem", PAMI 2004. The five
+   epipolar constraints leave E = x X + y Y + z Z + W. The cubic constraints det E = 0 and 2 E E' E
+   - tr(E E') E = 0 are ten equations in twenty monomials. Elimination gives a 3x3 matrix of
+   polynomials in z, whose determinant has degree ten; its real roots z give x and y. Elimination is
+   by Householder reflections here, which need no pivot. Accuracy is measured in
+   test/unit/test_relpose_5pt.cc. */
 
 #include "kernels/lanes.h"
 
-/* Nine-vectors orthogonal to the five rows, by Householder reflections; rows are destroyed. Clears
-   the mask of lanes whose rows are dependent. */
+/* Writes an orthonormal basis of the vectors orthogonal to the five rows, by Householder
+   reflections. The rows are overwritten. Clears the bits of `ok` for lanes whose rows are linearly
+   dependent. */
 static inline void null_space_5x9(lanes rows[5][9], lanes basis[4][9], lane_mask *ok) {
-  lanes scale[5], largest = {0}; /* scale: 2 / |v|^2 of the reflector v kept in rows[k][k..8] */
+  lanes scale[5],
+      largest = {0}; /* scale[k]: 2 / |v|^2 of the reflector v that is stored in rows[k][k..8] */
   int k, i, c, b;
   for (k = 0; k < 5; ++k) {
     lanes sum = {0};
@@ -35,7 +39,7 @@ static inline void null_space_5x9(lanes rows[5][9], lanes basis[4][9], lane_mask
     }
   }
   for (b = 0; b < 4; ++b) {
-    /* The last reflector meets a unit vector, which has one entry. */
+    /* The last reflector is applied to a vector with a single entry that is not 0. */
     const lanes first = rows[4][5 + b] * scale[4];
     for (i = 0; i < 4; ++i) basis[b][i] = lanes_of(0);
     for (i = 4; i < 9; ++i) basis[b][i] = (i == 5 + b ? 1.0 : 0.0) - first * rows[4][i];
@@ -49,9 +53,10 @@ static inline void null_space_5x9(lanes rows[5][9], lanes basis[4][9], lane_mask
   }
 }
 
-/* Turns the basis about, by a fixed reflection without zeros. The null space comes with ones and
-   zeros in it; the essential matrix of a camera that moved exactly along an axis has zeros too, and
-   where they meet W would have no part in it: a root at infinity, in every sample. */
+/* Replaces the basis by its image under a fixed reflection without zero entries. The basis of
+   null_space_5x9 contains ones and zeros, and the essential matrix of a motion exactly along an
+   axis contains zeros, too. Without the reflection, W could have the coefficient 0 in that matrix,
+   which is a root at infinity, in every sample. */
 static inline void mix_basis(lanes basis[4][9]) {
   static const double v[4] = {1.0, 1.3, 1.7, 2.3};
   const double scale = 2.0 / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3]);
@@ -63,8 +68,9 @@ static inline void mix_basis(lanes basis[4][9]) {
   }
 }
 
-/* Linear polynomials over (x, y, z, 1); quadratic ones over (xx xy xz x yy yz y zz z 1); cubic ones
-   over Nister's order (xxx yyy xxy xyy xxz xx yyz yy xyz xy | xzz xz x yzz yz y zzz zz z 1). */
+/* The order of coefficients. Linear polynomials: x, y, z, 1. Quadratic ones: xx xy xz x yy yz y zz
+   z 1. Cubic ones, in Nister's order: xxx yyy xxy xyy xxz xx yyz yy xyz xy | xzz xz x yzz yz y zzz
+   zz z 1. */
 static TVK_NOINLINE void add_product(const lanes a[4], const lanes b[4], lanes out[10]) {
   out[0] += a[0] * b[0];
   out[1] += a[0] * b[1] + a[1] * b[0];
@@ -101,7 +107,7 @@ static TVK_NOINLINE void add_cubic_product(const lanes q[10], const lanes l[4], 
   out[19] += q[9] * l[3];
 }
 
-/* The ten cubic constraints, a row each. */
+/* The ten cubic constraints, one in each row. */
 static TVK_NOINLINE void cubic_constraints(const lanes e[9][4], lanes rows[10][20]) {
   static const int place[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   lanes gram[6][10]; /* E E' - tr(E E') / 2: entries 00 01 02 11 12 22 */
@@ -124,7 +130,7 @@ static TVK_NOINLINE void cubic_constraints(const lanes e[9][4], lanes rows[10][2
       for (k = 0; k < 3; ++k) add_cubic_product(gram[place[i][k]], e[3 * k + j], rows[3 * i + j]);
     }
   }
-  for (j = 0; j < 3; ++j) { /* determinant, by the first row */
+  for (j = 0; j < 3; ++j) { /* the determinant, expanded along the first row */
     const int a = (j + 1) % 3, b = (j + 2) % 3;
     lanes minor[10], negative[10];
     memset(minor, 0, sizeof minor);
@@ -136,8 +142,8 @@ static TVK_NOINLINE void cubic_constraints(const lanes e[9][4], lanes rows[10][2
   }
 }
 
-/* Makes the left ten columns the identity, in the last six rows only: the first four are never
-   used. Clears the mask of lanes where they are singular. */
+/* Reduces the left ten columns to the identity. Only the last six rows are finished, because the
+   first four are never used. Clears the bits of `ok` for lanes where these columns are singular. */
 static TVK_NOINLINE void eliminate(lanes rows[10][20], lane_mask *ok) {
   lanes diagonal[10];
   int k, r, c;
@@ -172,14 +178,15 @@ static TVK_NOINLINE void eliminate(lanes rows[10][20], lane_mask *ok) {
   }
 }
 
-/* The 3x3 matrix of polynomials in z, lowest power first: columns multiply x, y and 1. */
+/* The 3x3 matrix of polynomials in z, with the coefficient of the lowest power first. Its columns
+   multiply x, y and 1; x[k], y[k], one[k] are row k. */
 typedef struct z_matrix {
   lanes x[3][4], y[3][4], one[3][5];
 } z_matrix;
 
 static inline void z_matrix_of(const lanes rows[10][20], z_matrix *b) {
   int k;
-  for (k = 0; k < 3; ++k) { /* row - z * next row */
+  for (k = 0; k < 3; ++k) { /* row 4 + 2k - z * the next row */
     const lanes *e = rows[4 + 2 * k], *f = rows[5 + 2 * k];
     b->x[k][0] = e[12];
     b->x[k][1] = e[11] - f[12];
@@ -197,8 +204,8 @@ static inline void z_matrix_of(const lanes rows[10][20], z_matrix *b) {
   }
 }
 
-/* A function of its own, as are those above: their arrays are the most of the stack, and are gone
-   when the roots are looked for. */
+/* Not inlined, like the functions above: their arrays are the largest part of the stack, and are
+   released before the search for roots begins. */
 static TVK_NOINLINE void reduce_constraints(const lanes e[9][4], z_matrix *b, lane_mask *ok) {
   lanes rows[10][20];
   cubic_constraints(e, rows);
@@ -226,14 +233,15 @@ static inline void determinant_of(const z_matrix *b, lanes polynomial[11]) {
   }
 }
 
-/* Sturm's chain of the polynomial: p[0] = p, p[1] = p', p[k-1] = (a[k] z + b[k]) p[k] - c[k]
-   p[k+1], c > 0. Only the quotients are kept: evaluation from the chain's constant end takes three
-   multiplications a link. (D. G. Hook, P. R. McAree, "Using Sturm sequences to bracket real roots
-   of polynomial equations", Graphics Gems, 1990, with the quotients in place of the polynomials.)
-   Beyond the end of a chain that ends early, for repeated roots, a = c = 0 and b = 1. */
+/* Sturm's chain of the polynomial: p[0] = p, p[1] = p', and p[k-1] = (a[k] z + b[k]) p[k] - c[k]
+   p[k+1] with c > 0. Only a (slope), b (offset) and c (scale) are kept. Evaluation starts at the
+   constant end of the chain and takes three multiplications per link. (D. G. Hook, P. R. McAree,
+   "Using Sturm sequences to bracket real roots of polynomial equations", Graphics Gems, 1990, with
+   the quotients in place of the polynomials.) With repeated roots the chain ends early; the links
+   after its end have a = c = 0 and b = 1. */
 typedef struct sturm_chain {
   lanes slope[10], offset[10], scale[10];
-  lanes last; /* the sign of the chain's end */
+  lanes last; /* +1 or -1, the sign of the last polynomial of the chain */
 } sturm_chain;
 
 static TVK_NOINLINE void make_sturm_chain(const lanes p[11], sturm_chain *chain) {
@@ -256,7 +264,8 @@ static TVK_NOINLINE void make_sturm_chain(const lanes p[11], sturm_chain *chain)
     chain->scale[k] = lanes_of(0);
     chain->last = lanes_select(alive, lead, chain->last);
     if (d == 0) break;
-    /* -remainder = slope z current + offset current - previous, of degree below d */
+    /* The remainder of the division, with its sign changed: slope z current + offset current -
+       previous, of a degree below d. */
     for (i = 0; i < d; ++i) {
       const lanes shifted = i > 0 ? slope * current[i - 1] : lanes_of(0);
       remainder[i] = (offset * current[i] + shifted) - previous[i];
@@ -271,10 +280,11 @@ static TVK_NOINLINE void make_sturm_chain(const lanes p[11], sturm_chain *chain)
   }
 }
 
-/* How often each lane's chain changes sign at z. */
+/* The number of sign changes of each lane's chain at z. The difference between two values of z is
+   the number of distinct roots between them. */
 static TVK_NOINLINE lane_mask sign_changes(const sturm_chain *chain, double z) {
   lanes next = {0}, current = chain->last;
-  lane_mask changes = {0}; /* counts down: a set mask is -1 */
+  lane_mask changes = {0}; /* counts down, because a set mask is -1 */
   int k;
   TVK_UNROLL
   for (k = 9; k >= 0; --k) {
@@ -300,8 +310,8 @@ static inline int sign_changes_of_lane(const sturm_chain *chain, int lane, doubl
   return changes;
 }
 
-/* Where roots are: of each lane, intervals (low, high] with one root each, ascending. A repeated
-   root has an interval without length. */
+/* Intervals (low, high] with one root each, in ascending order, for each lane. A repeated root has
+   an interval of length 0. `num` is the number of each lane, `most` the largest of them. */
 typedef struct root_brackets {
   lanes low[10], high[10];
   int num[TVK_LANES], most;
@@ -316,7 +326,9 @@ static inline void add_bracket(root_brackets *b, int lane, double low, double hi
   if (n + 1 > b->most) b->most = n + 1;
 }
 
-/* Halves an interval with several roots, in z or, beyond +-1, in 1 / z. */
+/* Halves an interval with several roots until each part has one. A part whose relative length is at
+   most 1e-12 is counted as one repeated root. Intervals beyond +-1 are halved in 1 / z, the others
+   in z. */
 static TVK_NOINLINE void split_bracket(const sturm_chain *chain, int lane, double low, double high,
                                        int changes_low, int changes_high, root_brackets *brackets) {
   struct {
@@ -356,8 +368,9 @@ static TVK_NOINLINE void split_bracket(const sturm_chain *chain, int lane, doubl
   }
 }
 
-/* Roots within +-1e6. z is one of four homogeneous coordinates over another, so its roots are
-   spread evenly over the angle atan z: the intervals to begin with are 7.5 degrees each. */
+/* Finds intervals for the roots within +-1e6. z is the quotient of two of four homogeneous
+   coordinates, so the roots are distributed evenly over the angle atan z: the initial intervals are
+   7.5 degrees each. */
 static inline void find_brackets(const sturm_chain *chain, lane_mask ok, root_brackets *b) {
   enum { CELLS = 24 };
   static const double edges[CELLS + 1] = {-1e6,
@@ -416,8 +429,8 @@ static TVK_NOINLINE lanes polynomial_at(const lanes p[11], lanes z, lanes *deriv
   return value;
 }
 
-/* The root in each lane's bracket, by Newton's steps kept within it by bisection; beyond +-1 that
-   of the reversed polynomial in 1 / z. */
+/* The root in each lane's interval, by Newton steps; a step that would leave the interval is
+   replaced by bisection. Beyond +-1 this is done with the reversed polynomial in 1 / z. */
 static inline lanes roots_in(const lanes p[11], lanes low, lanes high) {
   const lane_mask outside = (low >= 1.0) | (high <= -1.0);
   const lanes one = lanes_of(1);
@@ -432,7 +445,7 @@ static inline lanes roots_in(const lanes p[11], lanes low, lanes high) {
   at_low = polynomial_at(q, low, &slope);
   at_high = polynomial_at(q, high, &slope);
   low_negative = at_low < 0.0;
-  /* With equal signs the root is an end of the bracket, within rounding. */
+  /* If the signs at both ends are equal, the root is an end of the interval, within rounding. */
   active = low_negative ^ (at_high < 0.0);
   z = low - at_low * (high - low) / lanes_select(active, at_high - at_low, one);
   z = lanes_select(active, z, lanes_select(lanes_abs(at_low) < lanes_abs(at_high), low, high));
@@ -446,7 +459,8 @@ static inline lanes roots_in(const lanes p[11], lanes low, lanes high) {
     newton = z - value / slope;
     inside = (newton > low) & (newton < high);
     next = lanes_select(inside, newton, 0.5 * (low + high));
-    /* Newton squares its error: after a step this short, the next would be rounding. */
+    /* Newton's method squares the error: after a step shorter than this the next step would be
+       rounding only. */
     limit = lanes_select(inside, lanes_of(1e-9), lanes_of(1e-15)) * (1.0 + lanes_abs(z));
     step = lanes_abs(next - z);
     z = lanes_select(active, next, z);
@@ -455,7 +469,8 @@ static inline lanes roots_in(const lanes p[11], lanes low, lanes high) {
   return lanes_select(outside, 1.0 / z, z);
 }
 
-/* (x, y, 1) up to scale at a root z: the longest cross product of two rows of the matrix. */
+/* A multiple of (x, y, 1) at a root z: the longest of the cross products of two rows of the
+   matrix. */
 static inline void null_vector(const z_matrix *b, lanes z, lanes best[3]) {
   lanes rows[3][3], best_sq = {0};
   int k, i;
@@ -480,16 +495,16 @@ static inline void null_vector(const z_matrix *b, lanes z, lanes best[3]) {
   }
 }
 
-/* Whether the five rays agree on which side of the epipole they lie: e x f1 and E f0 are normals of
-   the same epipolar plane, and point the same way for all matches that are in front of both
-   cameras, or for none (O. Chum, T. Werner, J. Matas, "Epipolar geometry estimation via RANSAC
-   benefits from the oriented epipolar constraint", ICPR 2004). Matches within some 0.01 rad of an
-   epipole do not count. */
+/* The mask of lanes where the five matches satisfy the oriented epipolar constraint (O. Chum, T.
+   Werner, J. Matas, "Epipolar geometry estimation via RANSAC benefits from the oriented epipolar
+   constraint", ICPR 2004). e x f1 and E f0 are normals of the same epipolar plane. For matches in
+   front of both cameras they all point the same way, or all point opposite ways, for the sign of E
+   is arbitrary. Matches within about 0.01 rad of the epipoles are ignored. */
 static inline lane_mask same_side(const lanes f[10][3], const lanes E[9]) {
   lanes e[3] = {{0}, {0}, {0}}, best_sq = {0};
   lane_mask some_positive = {0}, some_negative = {0};
   int k, i;
-  for (k = 0; k < 3; ++k) { /* the left null vector: the longest cross product of two columns */
+  for (k = 0; k < 3; ++k) { /* e, the left null vector: the longest cross product of two columns */
     const int a = k, c = (k + 1) % 3;
     lanes cross[3], sq;
     lane_mask longer;
@@ -527,7 +542,7 @@ static inline void load_rays(const double *rays, int first, lanes f[10][3]) {
   }
 }
 
-/* E's entries as linear polynomials. */
+/* Writes the entries of E as linear polynomials in x, y, z. */
 static TVK_NOINLINE void null_space_of(const double *rays, int first, lanes e[9][4],
                                        lane_mask *ok) {
   lanes f[10][3], constraints[5][9], basis[4][9];
@@ -545,7 +560,7 @@ static TVK_NOINLINE void null_space_of(const double *rays, int first, lanes e[9]
   }
 }
 
-/* The models of the polynomial's roots. */
+/* Writes the essential matrices that belong to the roots of the determinant. */
 static TVK_NOINLINE void write_models(const double *rays, int first, const lanes e[9][4],
                                       const z_matrix *b, lane_mask ok, double *essentials,
                                       int32_t *counts) {
@@ -580,7 +595,7 @@ static TVK_NOINLINE void write_models(const double *rays, int first, const lanes
   }
 }
 
-/* Lanes first .. first + TVK_LANES - 1 of the kernel. */
+/* Solves the samples first .. first + TVK_LANES - 1. */
 static void solve_lanes(const double *rays, int first, double *essentials, int32_t *counts) {
   lanes e[9][4];
   lane_mask ok = lanes_of(1) > 0.0;

@@ -1,4 +1,4 @@
-/* The rows of the pyramid: area averages, halving, blur. */
+/* The kernels that make the rows of the pyramid: area averages, halving, blur. */
 
 static void average_rows(const uint8_t *const rows[3], const int32_t row_weights[3], int32_t width,
                          uint16_t *sums) {
@@ -36,8 +36,8 @@ static inline int32_t blur_column(const uint8_t *above, const uint8_t *row, cons
 
 enum { BLUR_SPAN = 320 };
 
-/* Sums of columns first, 16 bits wide: a pixel is then read once, and vectors hold twice as many.
- */
+/* Sums each column first, in 16 bits: every pixel is then read once, and vectors hold twice as many
+   numbers as with 32 bits. */
 static inline void blur_span(const uint8_t *above, const uint8_t *row, const uint8_t *below,
                              int32_t begin, int32_t count, uint8_t *out) {
   uint16_t columns[BLUR_SPAN + 2];

@@ -1,10 +1,11 @@
-/* Sampson's distance over arrays of matches (geometry/sampson.h). */
+/* The kernels of Sampson's distance over arrays of matches: squared residuals, normal equations and
+   the integer score. The formula is in geometry/sampson.h. */
 
 #include "kernels/lanes.h"
 #include "kernels/match_block.h"
 
 typedef struct epipolar_terms {
-  lanes c, n; /* f1' M f0; |J0' M' f1|^2 + |J1' M f0|^2 */
+  lanes c, n; /* c = f1' M f0, n = |J0' M' f1|^2 + |J1' M f0|^2: r^2 = c^2 / n */
   lanes s0[2], s1[2];
 } epipolar_terms;
 
@@ -55,8 +56,8 @@ void TVK_MATCH(sampson_squares)(const double *const *arrays, const int32_t *indi
   }
 }
 
-/* Where a match is behind a camera by more than the angle that is allowed: geometry/essential.h's
-   depth_signs and depth_vote. */
+/* The mask of matches whose point is behind a camera by more than `angle`; the same test as
+   depth_signs and depth_vote of geometry/essential.h. */
 static TVK_INLINE lane_mask behind_of(const sampson_block *b, lanes angle, int on_plane,
                                       const double R[9], const double t[3]) {
   lanes a[3], aa, ff, af, at, ft, depth0, depth1, turn;
@@ -111,8 +112,8 @@ void TVK_MATCH(pose_squares)(const double *const *arrays, int32_t first, int32_t
   }
 }
 
-/* The slopes of r by M's entries: dr/dM_ij = (f1_i (f0_j - s g0_j) - s g1_i f0_j) / sqrt(n), with
-   s = c / n, g0 = J0 J0' M' f1, g1 = J1 J1' M f0. */
+/* The derivatives of r by the entries of M: dr/dM_ij = (f1_i (f0_j - s g0_j) - s g1_i f0_j) /
+   sqrt(n), with s = c / n, g0 = J0 J0' M' f1, g1 = J1 J1' M f0. `root` is 1 / sqrt(n). */
 static TVK_INLINE void slopes_of(const sampson_block *b, const epipolar_terms *e, lanes s,
                                  lanes root, int on_plane, lanes slopes[9]) {
   lanes u0[3], u1[3];
@@ -135,7 +136,7 @@ static TVK_INLINE void slopes_of(const sampson_block *b, const epipolar_terms *e
   }
 }
 
-/* To the sums the upper triangle of weight g g', row by row, and weight g r. */
+/* Adds the upper triangle of weight g g', row by row, and then weight g r to the sums. */
 static TVK_NOINLINE void add_products(const lanes g[9], lanes weight, lanes residual,
                                       double *sums) {
   int i, j, slot = 0;
@@ -152,7 +153,7 @@ static TVK_NOINLINE void add_products(const lanes g[9], lanes weight, lanes resi
   }
 }
 
-/* One block's part of the sums; `sums` points to the block's first lane. */
+/* Adds one block's terms to the sums. `sums` points to the lane of the block's first match. */
 static TVK_INLINE void add_block(const sampson_block *b, int32_t count, int on_plane,
                                  const double m[9], double inverse_sq, int cauchy, double *sums) {
   epipolar_terms e;
@@ -192,9 +193,9 @@ void TVK_MATCH(sampson_sums)(const double *const *arrays, const int32_t *indices
   }
 }
 
-/* The integer cost of a block of r^2 / T^2. Whole arrays through their bits, so that every step is
-   a plain vector operation: read as unsigned integers, floats in [0, 1) are those below 1.0f's
-   bits; a NaN or a negative rounding error is above and costs 1. */
+/* The integer cost of a block of q = r^2 / T^2. Capping is done on the bits of the floats, so that
+   every step is a plain vector operation: as unsigned integers, exactly the floats in [0, 1) are
+   below the bits of 1.0f. A NaN or a negative rounding error is above them and costs 1. */
 static inline int32_t sum_of_costs(const float q[TVK_SCORE_BLOCK]) {
   const uint32_t one = 0x3f800000u;
   uint32_t bits[TVK_SCORE_BLOCK];

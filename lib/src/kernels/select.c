@@ -1,4 +1,4 @@
-/* Which sets this build has, and which of them this CPU runs. */
+/* Lists the kernel sets that this build has and this CPU can run, and selects one of them. */
 #include <stddef.h>
 
 #include "kernels/kernels.h"
@@ -20,9 +20,10 @@ enum { MAX_TABLES = 4 };
 #if defined(__x86_64__)
 enum { LEVEL_SSE2, LEVEL_AVX2, LEVEL_AVX512 };
 
-/* Of registers that the system saves (XCR0's bits 1 and 2: AVX, 5 to 7: AVX-512) and of
-   instructions.
-   __builtin_cpu_supports knows every CPU there is, in 4.4 kB and a mutable variable. */
+/* The highest level that both the CPU and the operating system support: the CPU has the
+   instructions, and the system saves the registers (XCR0 bits 1 and 2 for AVX, bits 5 to 7 for
+   AVX-512). __builtin_cpu_supports is not used: it detects every known CPU, with 4.4 kB of code and
+   a mutable variable. */
 static inline __attribute__((always_inline)) int32_t ask_cpu(void) {
   const unsigned avx512 = bit_AVX512F | bit_AVX512BW | bit_AVX512VL;
   unsigned a, b, c, d, saved, high;
@@ -37,13 +38,15 @@ static inline __attribute__((always_inline)) int32_t ask_cpu(void) {
 }
 
 #if defined(__GLIBC__)
-/* Asked once, by the loader, which keeps the answer as the address of a function: each cpuid leaves
-   a virtual machine, 35 us in all, and small calls select, too. */
+/* The loader finds the level once and stores it as the address of a function. Each cpuid
+   instruction traps in a virtual machine, 35 us for all of them, and small API calls select a
+   table, too. */
 static int32_t level_sse2(void) { return LEVEL_SSE2; }
 static int32_t level_avx2(void) { return LEVEL_AVX2; }
 static int32_t level_avx512(void) { return LEVEL_AVX512; }
 typedef int32_t (*level_of)(void);
-/* The loader calls it before a sanitizer is ready; clang does not see that it is used. */
+/* The loader calls this function before a sanitizer is initialised, so it must not be instrumented.
+   `unused` suppresses a warning of clang, which does not see the use by ifunc. */
 __attribute__((no_sanitize("address", "undefined"), unused)) static level_of resolve_level(void) {
   const int32_t level = ask_cpu();
   return level == LEVEL_AVX512 ? level_avx512 : level == LEVEL_AVX2 ? level_avx2 : level_sse2;

@@ -1,14 +1,15 @@
-/* The transfer residual of a homography over arrays of matches (geometry/transfer.h). */
+/* The kernels of the transfer residual of a homography over arrays of matches: squared residuals
+   and normal equations. The formula is in geometry/transfer.h. */
 
 #include "kernels/lanes.h"
 #include "kernels/match_block.h"
 
-/* With P the left inverse of J1 that sends f1 to zero, and a = e_z on the plane, f1 on the sphere,
-   the displacement is d = P h / (a . h), h = H f0. */
+/* The displacement is d = P h / (a . h) with h = H f0. P is the left inverse of J1 that maps f1 to
+   zero; a is e_z for rays on the plane, f1 for rays on the sphere. */
 typedef struct transfer_terms {
   lanes d[2], slope[2][3]; /* slope: d d / d h */
   lanes w00, w01, w11;     /* (I + D D')^-1, D = d d / d pixel0 */
-  lanes r_sq;              /* infinite where H sends the ray behind */
+  lanes r_sq;              /* infinite where H maps the ray behind view 1 */
 } transfer_terms;
 
 static inline void transfer_of(const sampson_block *b, const double h[9], int on_plane,
@@ -89,8 +90,9 @@ void TVK_MATCH(transfer_squares)(const double *const *arrays, const int32_t *ind
   transfer_squares_of(arrays, indices, first, count, on_plane, h, squares);
 }
 
-/* One block's part: with A = S' W S and S = d d / d h, d d / d H_ab = S_a f0_b, so that the normal
-   equations of H's entries are products of A's six entries and f0 f0's. */
+/* Adds one block's terms to the sums. With A = S' W S and S = d d / d h, d d / d H_ab = S_a f0_b.
+   The normal equations of the entries of H are therefore products of the six entries of A and of
+   those of f0 f0'. */
 static inline void add_transfer_block(const sampson_block *b, int32_t count, int on_plane,
                                       const double h[9], double inverse_sq, int cauchy,
                                       double *sums) {

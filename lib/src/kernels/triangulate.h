@@ -1,22 +1,23 @@
-/* Points from two pinholes' pixels by the closed methods, TVK_LANES matches at a time: what
-   geometry/triangulation.cc does for one match of any lens, in coordinates of the image planes z
-   = 1. R. Hartley, P. Sturm, "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md.
- */
+/* The kernel triangulate: points from the pixels of two pinhole cameras by Midpoint, Linear-LS or
+   Iterative-LS, TVK_LANES matches at a time. It computes what geometry/triangulation.cc computes
+   for one match of any lens, in coordinates of the image planes z = 1. R. Hartley, P. Sturm,
+   "Triangulation", CVIU 68(2), 1997. docs/algorithms/triangulation.md. */
 
 #include "kernels/lanes.h"
 #include "twoview/triangulate.h"
 
-/* tv_point in words of eight bytes: the position; the angle and the error; the status. */
+/* The layout of tv_point in words of eight bytes: three for the position, one for the angle and the
+   error (floats), one for the status. */
 enum { POINT_WORDS = 5 };
 typedef char triangulate_words_fit[sizeof(tv_point) == 8 * POINT_WORDS ? 1 : -1];
 
-/* x, y: of the rays (x, y, 1). */
+/* Rays (x, y, 1). */
 typedef struct ray_lanes {
   lanes x, y;
 } ray_lanes;
 
-/* What ends as a float is reckoned in floats: their roots and quotients take a quarter of the time.
- */
+/* Results that are stored as floats are computed in floats: their square roots and divisions take a
+   quarter of the time. */
 typedef float float_lanes __attribute__((vector_size(4 * TVK_LANES)));
 typedef int32_t float_mask __attribute__((vector_size(4 * TVK_LANES)));
 typedef uint32_t float_bits __attribute__((vector_size(4 * TVK_LANES)));
@@ -38,34 +39,35 @@ static inline float_lanes floats_sqrt(float_lanes a) {
 #endif
 }
 
-/* Two floats in a word, the first in its lower half. */
+/* Packs a lane's two floats into a word of eight bytes, `lower` in the lower half. */
 static inline lanes pack_floats(float_lanes lower, float_lanes upper) {
   return (lanes)(__builtin_convertvector((float_bits)lower, word_lanes) |
                  __builtin_convertvector((float_bits)upper, word_lanes) << 32);
 }
 
-/* x y x y .. to x x .. and y y .. */
+/* Separates x y x y .. into x x .. and y y .. */
 static inline void load_pairs(const double *xy, lanes *x, lanes *y) {
   const lanes a = lanes_load(xy), b = lanes_load(xy + TVK_LANES);
   *x = lanes_shuffle(a, b, LANES_EVEN);
   *y = lanes_shuffle(a, b, LANES_ODD);
 }
 
-/* Lane k's a and b side by side, two words to a store: for even k in words[0] from k on, for odd k
-   in words[1] from k - 1 on. */
+/* Stores a and b of each lane as two neighbouring words: those of an even lane k start at
+   words[0][k], those of an odd lane k at words[1][k - 1]. */
 static inline void store_pairs(double words[2][TVK_LANES], lanes a, lanes b) {
   lanes_store(words[0], lanes_shuffle(a, b, LANES_EVEN_PAIRS));
   lanes_store(words[1], lanes_shuffle(a, b, LANES_ODD_PAIRS));
 }
 
-/* atan2(sine, cosine) for sine >= 0, to a float's rounding: the polynomial to 2e-8. */
+/* atan2(sine, cosine) for sine >= 0, to the rounding of a float; the polynomial is exact to
+   2e-8. */
 static inline float_lanes angle_of(float_lanes sine, float_lanes cosine) {
   static const float c[4] = {-0.333329552f, 0.199779254f, -0.138798422f, 0.0806028197f};
   const float_lanes zero = {0}, size = (float_lanes)((float_mask)cosine & INT32_MAX);
   const float_mask steep = sine > size;
   const float_lanes small = floats_select(steep, size, sine);
   const float_lanes large = floats_select(steep, sine, size);
-  const float_mask turned = small > 0.41421356f * large; /* beyond tan of 22.5 degrees */
+  const float_mask turned = small > 0.41421356f * large; /* beyond 22.5 degrees */
   const float_lanes t =
       floats_select(turned, small - large, small) / floats_select(turned, small + large, large);
   const float_lanes s = t * t;
@@ -75,8 +77,8 @@ static inline float_lanes angle_of(float_lanes sine, float_lanes cosine) {
   return floats_select(cosine < 0.0f, 3.14159265f - angle, angle);
 }
 
-/* Linear-LS and Iterative-LS: geometry/triangulation_linear.cc's equations for two image planes.
-   Clears the mask of lanes that do not settle. */
+/* Linear-LS and Iterative-LS: the equations of geometry/triangulation_linear.cc for two image
+   planes. Clears the bits of `settled` for lanes where the iteration does not converge. */
 static inline void least_squares_point(const tvk_triangulate_pair *p, const ray_lanes *ray0,
                                        const ray_lanes *ray1, int iterative, lanes point[3],
                                        lane_mask *settled) {
@@ -99,7 +101,7 @@ static inline void least_squares_point(const tvk_triangulate_pair *p, const ray_
   cov[1] = A[0][0] * A[1][0] * step0[0] + A[0][1] * A[1][1] * step0[1];
   cov[2] = A[1][0] * A[1][0] * step0[0] + A[1][1] * A[1][1] * step0[1];
   active = square0 > 0.0;
-  for (i = 0; i <= 10; ++i) { /* Hartley and Sturm's bound */
+  for (i = 0; i <= 10; ++i) { /* at most 10 iterations, as in Hartley and Sturm */
     const lanes xx = square0 * cov[0] + square1 * step1[0], xy = square0 * cov[1];
     const lanes yy = square0 * cov[2] + square1 * step1[1];
     const lanes m0 = yy * m[0] - xy * m[1], m1 = xx * m[1] - xy * m[0];
@@ -127,8 +129,9 @@ static inline void least_squares_point(const tvk_triangulate_pair *p, const ray_
   *settled &= ~active;
 }
 
-/* One block, from pixels less the principal points to what points hold: words by store_pairs, the
-   last one alone. Returns the lanes that it leaves without a point. */
+/* Triangulates one block of pixels, given relative to the principal points. Writes the words of
+   the points: two pairs by store_pairs, then the status. Returns the mask of the lanes without a
+   point. */
 static inline lane_mask triangulate_lanes(const tvk_triangulate_pair *p, int method, lanes u0,
                                           lanes v0, lanes u1, lanes v1,
                                           double words[POINT_WORDS][TVK_LANES]) {
@@ -165,7 +168,7 @@ static inline lane_mask triangulate_lanes(const tvk_triangulate_pair *p, int met
   for (i = 0; i < 3; ++i) {
     moved[i] = ((R[3 * i] * point[0] + R[3 * i + 1] * point[1]) + R[3 * i + 2] * point[2]) + d[i];
   }
-  /* Projected through the centre where it lies behind. */
+  /* A point behind a camera is projected through the camera's centre. */
   inverse = 1.0 / (point[2] * moved[2]);
   {
     const lanes inverse0 = moved[2] * inverse, inverse1 = point[2] * inverse;
@@ -179,7 +182,8 @@ static inline lane_mask triangulate_lanes(const tvk_triangulate_pair *p, int met
     const lanes ahead0 = (r0.x * point[0] + r0.y * point[1]) + point[2];
     const lanes ahead1 = (r1.x * moved[0] + r1.y * moved[1]) + moved[2];
     const lane_mask in_front = (along0 > 0.0) & (along1 > 0.0) & (ahead0 > 0.0) & (ahead1 > 0.0);
-    /* Where the rays' and the axes' sides differ no pixel sees the point. */
+    /* No pixel sees a point whose depths along the ray and along the optical axis differ in
+       sign. */
     good &= (ahead0 * point[2] > 0.0) & (ahead1 * moved[2] > 0.0) & (error_sq < 1e36);
     status = (in_front & TV_POINT_OK) | (~in_front & TV_POINT_BEHIND);
   }
@@ -194,12 +198,13 @@ static inline lane_mask triangulate_lanes(const tvk_triangulate_pair *p, int met
                        floats_sqrt(floats_of(error_sq)));
   store_pairs(words, point[0], point[1]);
   store_pairs(words + 2, point[2], lanes_keep(good, floats));
-  lanes_store(words[4], (lanes)((status | ~good) & UINT32_MAX)); /* -1 where it is not good */
+  lanes_store(words[4],
+              (lanes)((status | ~good) & UINT32_MAX)); /* status -1 in the lanes without a point */
   return ~good;
 }
 
-/* TVK_LANES matches, their pixels in pixels0 and pixels1, the first `count` to points. Returns
-   those of all lanes that it leaves without a point. */
+/* Triangulates TVK_LANES matches and writes the points of the first `count`. Returns the mask of
+   the lanes without a point, which includes lanes after the first `count`. */
 static inline lane_mask triangulate_block(const tvk_triangulate_pair *p, int method,
                                           const double *pixels0, const double *pixels1, int count,
                                           tv_point *points) {

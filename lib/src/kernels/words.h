@@ -1,4 +1,5 @@
-/* Sixteen bits in lanes, as many as the set's vectors hold but no more than a patch's row. */
+/* Vectors of TVK_WORDS 16-bit lanes for the kernels on patches: as many as fit a register of the
+   set, and at most one row of a patch (16). */
 #ifndef TWOVIEW_KERNELS_WORDS_H
 #define TWOVIEW_KERNELS_WORDS_H
 
@@ -19,15 +20,15 @@
 
 #define TVK_ALIGNED __attribute__((aligned(32)))
 
-typedef int16_t words __attribute__((vector_size(2 * TVK_WORDS))); /* wrap around, as they should */
+typedef int16_t words __attribute__((vector_size(2 * TVK_WORDS))); /* arithmetic must wrap around */
 typedef int16_t unaligned_words __attribute__((vector_size(2 * TVK_WORDS), aligned(2), may_alias));
 
 static inline words words_of(int16_t a) { return (words){0} + a; }
 static inline words words_load(const void *p) { return *(const unaligned_words *)p; }
 static inline void words_store(void *p, words a) { *(unaligned_words *)p = a; }
 
-/* words_zip: out[k] = low[k] + 65536 high[k], both taken as unsigned; words_scale: a b / 65536,
- * too. */
+/* words_zip: out[k] = low[k] + 65536 high[k], both read as unsigned. words_scale: a b / 65536,
+   rounded down, both read as unsigned. */
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
 static inline words words_min(words a, words b) {
   return (words)_mm256_min_epi16((__m256i)a, (__m256i)b);

@@ -1,3 +1,4 @@
+// Guided matching. Formulas: docs/algorithms/match.md; test: test/unit/test_guided.c.
 #include "match/guided.h"
 
 #include <algorithm>
@@ -9,19 +10,20 @@ namespace {
 
 constexpr int32_t kFar = INT32_MAX;
 
-// Wider than any rounding of the quick test below: it only has to let all candidates through.
+// Factor on the bound of quick_test, larger than any rounding error of that test: it may let
+// keypoints outside the band through, but never rejects one inside.
 constexpr double kSlack = 1.0 + 1e-6;
 
-// A view with what the band test needs of each keypoint.
+// A view and what the band test needs of each of its keypoints.
 struct Side {
   GuidedView view;
-  double* lines;           // 3 each: M ray0, or M' ray1, the epipolar line in the other view
-  double* coordinates[3];  // of the rays, an array each, for the quick test; padded to kBlock
-  double* line_norms;      // squared; padded
-  double* slope_norms;     // squared, Frobenius; padded
+  double* lines;           // 3 per keypoint: its epipolar line in the other view, M ray0 or M' ray1
+  double* coordinates[3];  // x, y, z of the rays, for quick_test; padded to kBlock
+  double* line_norms;      // squared lengths of `lines`; padded
+  double* slope_norms;     // squared Frobenius norms of the view's slopes; padded
 };
 
-// Keypoints that the quick test takes at once.
+// The number of keypoints that one call of quick_test tests.
 constexpr int32_t kBlock = 64;
 
 size_t padded(int32_t count) { return (static_cast<size_t>(count) + kBlock - 1) / kBlock * kBlock; }
@@ -33,7 +35,7 @@ size_t side_bytes(int32_t count) {
 
 double dot3(const double* a, const double* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
 
-// |slopes' line|^2: how fast the residual changes with the pixel.
+// The squared gradient of the residual by the pixel: |slopes' line|^2.
 double squared_gradient(const double* slopes, const double* line) {
   double sum = 0;
   for (int c = 0; c < 2; ++c) {
@@ -72,9 +74,10 @@ Side make_side(const GuidedView& view, const double* M, bool transposed, Arena& 
   return side;
 }
 
-// Whether Sampson's distance of keypoint i of one side and j of the other is within the band. The
-// same bits from either side: each sum is of two terms that change places. Strict, so that at the
-// epipoles, where all of it vanishes, nothing passes.
+// True when Sampson's distance of keypoint i of one side and keypoint j of the other is within the
+// band. Exchanging the sides gives the same bits, because each sum has two terms that change
+// places. The comparison is strict so that a pair at the epipoles, where both sides of it are zero,
+// is rejected.
 bool in_band(const Side& a, int32_t i, const Side& b, int32_t j, double band_sq) {
   const double residual = 0.5 * (dot3(a.lines + 3 * i, b.view.rays + 3 * j) +
                                  dot3(b.lines + 3 * j, a.view.rays + 3 * i));
@@ -83,8 +86,8 @@ bool in_band(const Side& a, int32_t i, const Side& b, int32_t j, double band_sq)
   return residual * residual < band_sq * gradient;
 }
 
-// Not above 0 for those of a block's keypoints that may be in the band: |J' l| <= |J| |l|, and most
-// are far outside.
+// Sets excess[j] <= 0 for each keypoint of the block that may be in the band, since |J' l| <= |J|
+// |l|; in_band decides about these. Most keypoints are far outside the band and are rejected here.
 void quick_test(const double* line, double of_line, double of_slope, const Side& b, int32_t first,
                 double* excess) {
   const double *x = b.coordinates[0] + first, *y = b.coordinates[1] + first,
@@ -105,7 +108,8 @@ struct Nearest {
   int32_t dist, idx;
 };
 
-// The keypoints of the other view in one keypoint's band, in ascending order.
+// The keypoints of the other view that are in the band of one keypoint, in ascending order, and
+// their descriptor distances.
 struct Candidates {
   int32_t *indices, *dists;
   int32_t count;
@@ -132,7 +136,8 @@ void find_candidates(const tvk_table& kernels, const Side& a, int32_t i, const S
                             candidates->dists);
 }
 
-// The smallest distance among candidates that do not lie beside keypoint `best`.
+// The smallest descriptor distance among the candidates that are not within `radius` pixels of
+// keypoint `best`; kFar if there is none.
 int32_t rival_distance(const Candidates& candidates, const tv_keypoint* keypoints, int32_t best,
                        double radius) {
   int32_t rival = kFar;
@@ -148,8 +153,9 @@ struct Row {
   int32_t dist, idx, rival;
 };
 
-// Each row's nearest and rival, each column's nearest. Rows and candidates come in ascending order,
-// so that the lower index wins a tie on both sides.
+// Finds the nearest candidate and its rival for each row (keypoint of view 0), and the nearest row
+// for each column (keypoint of view 1). Rows and candidates are visited in ascending order, so that
+// the lower index wins a tie on both sides.
 void find_nearest(const tvk_table& kernels, const Side& side0, const Side& side1, double band_sq,
                   double radius, Candidates* candidates, Row* rows, Nearest* columns) {
   std::fill(columns, columns + side1.view.num, Nearest{kFar, -1});
@@ -168,7 +174,8 @@ void find_nearest(const tvk_table& kernels, const Side& side0, const Side& side1
   }
 }
 
-// 1 and more where the nearest is farther than the largest distance.
+// The ratio of two squared distances as a ratio of distances; 1 if the rival's distance is 0. It is
+// above 1 if the nearest descriptor is farther than max_distance.
 float distance_ratio(int32_t best, double rival) {
   return rival > 0 ? static_cast<float>(std::sqrt(best / rival)) : 1.0f;
 }

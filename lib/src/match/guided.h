@@ -1,5 +1,5 @@
-// A second matching pass, along the epipolar lines of a first estimate. The match layer knows no
-// cameras: a view comes as rays and their slopes.
+// Guided matching: a second matching pass along the epipolar lines of a first estimate. This layer
+// knows no cameras; the caller passes each view as rays and their derivatives.
 #pragma once
 
 #include "base/arena.h"
@@ -8,22 +8,24 @@
 
 namespace tv {
 
-// One view's keypoints. A ray is any multiple of the direction through the pixel; slopes are
-// d ray / d pixel, 3x2 row-major. A keypoint without a ray (valid 0) is never matched.
+// One view's keypoints. A ray is any multiple except 0 of the direction through the pixel; slopes
+// are its derivatives d ray / d pixel, 3x2 row-major. Keypoints with valid = 0 have no ray and are
+// never matched.
 struct GuidedView {
   const tv_keypoint* keypoints;
   const uint8_t* descriptors;
-  const double* rays;    // 3 each
-  const double* slopes;  // 6 each
+  const double* rays;    // 3 per keypoint
+  const double* slopes;  // 6 per keypoint
   const uint8_t* valid;
   int32_t num;
 };
 
-// Scratch of match_guided.
+// The bytes of the arena that match_guided needs for views of at most max_keypoints keypoints.
 size_t guided_bytes(int32_t max_keypoints);
 
-// ray1' M ray0 = 0 is the epipolar constraint, M row-major. Writes at most min(view0.num,
-// view1.num) correspondences in ascending order of idx0; returns how many.
+// Matches the keypoints near each other's epipolar lines: ray1' M ray0 = 0, M row-major. Writes at
+// most min(view0.num, view1.num) correspondences in ascending order of idx0 and returns their
+// number.
 int32_t match_guided(const tvk_table& kernels, const GuidedView& view0, const GuidedView& view1,
                      const double M[9], const tv_guided_options& options, Arena& arena,
                      tv_correspondence* correspondences);

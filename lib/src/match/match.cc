@@ -1,3 +1,5 @@
+// Matching by the kernel mutual_nearest and the ratio test. Formulas: docs/algorithms/match.md;
+// test: test/unit/test_match.c.
 #include "match/match.h"
 
 #include <cmath>
@@ -15,7 +17,7 @@ size_t match_bytes(int32_t max_keypoints) {
 int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0, int32_t num0,
                           const uint8_t* descriptors1, int32_t num1, float ratio, Arena& arena,
                           tv_correspondence* correspondences) {
-  if (num0 < 2 || num1 < 2) return 0;  // no second neighbour: the ratio is 1
+  if (num0 < 2 || num1 < 2) return 0;  // without a second neighbour the ratio is 1
   ArenaScope scope(arena);
   tvk_nearest* rows = arena_alloc<tvk_nearest>(arena, static_cast<size_t>(num0));
   tvk_nearest* columns = arena_alloc<tvk_nearest>(arena, static_cast<size_t>(num1));
@@ -25,7 +27,8 @@ int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0,
   for (int32_t i = 0; i < num0; ++i) {
     const tvk_nearest& row = rows[i];
     if (row.idx < 0) continue;
-    // The smaller of the two directions' second distances gives the worse of their ratios.
+    // row.second is the smaller of the two directions' second distances, so this is the larger of
+    // their two ratios.
     const float worse = static_cast<float>(
         std::sqrt(static_cast<double>(row.best) / static_cast<double>(row.second)));
     if (worse >= ratio) continue;
