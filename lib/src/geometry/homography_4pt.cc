@@ -39,7 +39,7 @@ int decompose_homography(const Mat3& H, const Vec3& mean_ray0, PlanarPose poses[
                length = std::sqrt((s1 - s3) * (s1 + s3));
   int count = 0;
   for (int k = 0; k < 2; ++k) {
-    // u lies in the plane that H keeps in length, with v2.
+    // v2 and u span the plane of the vectors whose length H keeps.
     const Vec3 u = (p * v1 + (k == 0 ? q : -q) * v3) / length;
     Vec3 normal = v2.cross(u);
     Mat3 before, after;

@@ -7,9 +7,9 @@
 
 namespace tv {
 
-// Scores as PoseEstimator does. Gravity is noisy, and a sampled pose is off by as much: local
-// optimisation turns it freely, with gravity as a prior, and with a threshold that begins wide
-// enough and halves to the true one.
+// Scores as PoseEstimator does. A sampled pose has the error of the measured gravity. Local
+// optimisation therefore refines all five parameters, with gravity as a prior, and with a threshold
+// that begins at width_first thresholds and is halved down to one.
 struct UprightEstimator : PoseEstimator {
   static constexpr int kSampleSize = 3;
   static constexpr int kMaxModels = kMaxRelposeUpright3pt;

@@ -22,7 +22,7 @@ struct Fit {
 // The inliers of the outcome's epipolar model become the outcome's, and the support.
 void collect_support(Fit& f);
 
-// The matches that the named transfer explains become the inliers.
+// The matches that the transfer by H explains become the outcome's inliers.
 void inliers_of_transfer(Fit& f, const Mat3& H);
 
 void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out);

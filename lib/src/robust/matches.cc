@@ -9,7 +9,8 @@
 namespace tv {
 namespace {
 
-// The four coordinates of a match add up to less than this; images end at 16384 pixels a side.
+// The absolute values of a match's four coordinates must add up to less than this, in pixels;
+// images have at most 16384 pixels a side.
 constexpr double kMaxCoordinates = 1e6;
 
 uint64_t mix(uint64_t h) {  // the finaliser of splitmix64 (G. Steele et al., 2014)
