@@ -61,7 +61,7 @@ typedef enum tv_kind {
   TV_KIND_PANORAMIC = 4,
   /* A homography, of a plane or of a rotation: only H is known, because no cameras were given. */
   TV_KIND_PLANAR_OR_PANORAMIC = 5,
-  /* The camera did not move: R is the identity, t is not known. */
+  /* The camera did not move: with cameras, R is the identity; t is not known. */
   TV_KIND_NO_MOTION = 6
 } tv_kind;
 
@@ -100,8 +100,8 @@ typedef enum tv_reason {
   /* The inliers cover fewer than 5 of the 64 cells of an 8x8 grid over each of the two images, or
      lie on a line in one of them. */
   TV_REASON_CROWDED_MATCHES = 1 << 7,
-  /* The keypoints of both images lie on a regular lattice, and either most inliers do, too, or a
-     second model fits the other matches: the pose may be wrong by one period of a repeated
+  /* The matched pixels of both images lie on a regular lattice, and either most inliers do, too, or
+     a second model fits the other matches: the pose may be wrong by one period of a repeated
      structure. */
   TV_REASON_REPEATED_STRUCTURE = 1 << 8
 } tv_reason;

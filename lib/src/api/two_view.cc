@@ -86,7 +86,7 @@ uint64_t hash_of(const double* a, const double* b) {
 // Whether the two views are exchanged for the computation. The choice depends neither on which view
 // the caller names first nor on the order of the matches, so that both calls compute the same
 // result. The pixels decide; where every match occurs in both directions, the cameras, then the
-// matches' ratios, then gravity. Where all of these are equal, both calls state the same problem.
+// matches' ratios, then gravity. Where all of these are equal, both calls are the same problem.
 bool exchanged(const tv_camera* camera0, const tv_camera* camera1, const TwoViewProblem& named) {
   for (const bool with_ratios : {false, true}) {
     uint64_t forward = 0, backward = 0;

@@ -1,5 +1,5 @@
-// Checks of arguments that several entry points share, and the reading of options and inputs that
-// includes them. A tv_status that they return is the one that the entry point must return.
+// Checks of arguments that several entry points share, and the functions that check and copy
+// options and inputs. A tv_status that they return is the one that the entry point must return.
 #pragma once
 
 #include <cmath>
@@ -23,8 +23,8 @@ tv_status check_mask(const tv_image* mask, const tv_image& image);
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked);
 
-// Reads an image's features for a call of that purpose. They need descriptors and may have
-// keypoints; neither overlaps the output.
+// Checks and copies an image's features for a call of that purpose: descriptors are required,
+// keypoints are not, and neither may overlap the output.
 tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
                         const void* out, size_t out_bytes, tv_features* features);
 

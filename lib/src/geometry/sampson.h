@@ -17,8 +17,8 @@ namespace tv {
 
 inline constexpr int kCostOne = TVK_SCORE_ONE;  // the cost of an outlier in an integer score
 
-// Squared Sampson distance; +inf for a match about which the model says nothing, because both rays
-// lie at the epipoles.
+// Squared Sampson distance; +inf for a match both of whose rays lie at the epipoles, where M does
+// not constrain them.
 double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 
 // Sampson's distance with its sign; its slopes by the entries of M, row by row; and its slopes by x

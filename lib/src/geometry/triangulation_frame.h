@@ -41,7 +41,7 @@ inline void complete_basis(const Vec3& axis, Vec3* u, Vec3* v) {
 
 // The plane of a camera's undistorted image, where a pixel is 1/fx by 1/fy; or, for a camera that
 // sees beyond a half space and has no such plane, the plane that touches the viewing sphere at the
-// ray, where a pixel is 1 / sqrt(fx fy) both ways.
+// ray, where a pixel is 1 / sqrt(fx fy) wide and high.
 struct RayFrame {
   Vec3 ray;         // of depth 1: z = 1 on the image plane, a unit vector on the sphere
   Vec3 rows[2];     // n, so that n . ray = 0

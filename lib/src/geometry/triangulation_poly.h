@@ -14,7 +14,7 @@ namespace tv {
 // |alpha . v| / sqrt(v step step^T v) pixels away.
 struct EpipolarPencil {
   Vec3 axis[2][2];         // of camera i, in its own frame
-  double step[2][2][2];    // of camera i: [axis][basis]
+  double step[2][2][2];    // of camera i: d alpha[axis] / d (pixels along basis)
   double turned[2][2][2];  // the same after the turns that make step0^T [0 1; -1 0] step1 diagonal
   double singular[2];      // that diagonal, |singular[1]| <= singular[0]
 };

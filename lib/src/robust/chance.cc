@@ -90,8 +90,9 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   constexpr int kPairings = 1024;
   constexpr double kPriorWeight = 100;
   const RayPairs& pairs = matches.pairs;
-  // The share of the image that a band around a line covers, of half width sqrt(2) T: Sampson's
-  // distance shares the error between the two images. Its length is about the image's side.
+  // The share of the image that a band around a line covers, of half width sqrt(2) T, because
+  // Sampson's distance shares the error between the two images. The band's length is taken as the
+  // image's side.
   const double prior =
       std::min(1.0, 2.8284271247461903 * threshold_px / std::sqrt(matches.area_px));
   const int n = matches.num_unique();

@@ -26,9 +26,9 @@ struct LossSums {
   double psi_sq = 0, slope = 0, slope_sq = 0;
 };
 
-// Huber's variance for n residuals of `dimensions` each and p parameters; negative where the loss
-// has no curvature left. cut_slope: what the mean of psi' loses because matches beyond a limit take
-// no part: 2 psi(limit) times the density of the residuals there.
+// Huber's variance for n residuals of `dimensions` each and p parameters; negative where the mean
+// curvature of the loss is too small. cut_slope: what the mean of psi' loses because matches beyond
+// a limit take no part: 2 psi(limit) times the density of the residuals there.
 double variance_of(const LossSums& sums, int n, int dimensions, int p, double scale_px,
                    double cut_slope) {
   const double mean = sums.slope / n - cut_slope;

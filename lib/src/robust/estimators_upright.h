@@ -16,7 +16,7 @@ struct UprightEstimator : PoseEstimator {
   static constexpr int kBatch = 1;
   const GravityPrior& gravity;
   Mat3 level0, level1;  // level_from_camera of gravity.down
-  double width_first;   // of local optimisation, thresholds
+  double width_first;   // the first threshold of local optimisation, in thresholds
   int generate_models(const int32_t* sample, Pose* models) const;
   void refine_model(Pose* model) const;
 };

@@ -1,5 +1,5 @@
 // One pair while its estimate is finished (finish.cc): the matches, the scratch and the outcome
-// that the steps hand to each other, and what several of the steps do with the outcome.
+// that the steps of finish.cc share, and the functions on the outcome that several steps call.
 #pragma once
 
 #include "robust/final_pose.h"

@@ -8,17 +8,17 @@ namespace tv {
 struct GravityPrior {
   bool known = false;
   Vec3 down[2] = {Vec3::Zero(), Vec3::Zero()};  // unit vectors, each in its camera's frame
-  double sigma_rad = 0;                         // of each direction, about each axis across it
-  double weight = 1;  // (0, 1]: less where the points contradict it (gravity_weight)
+  double sigma_rad = 0;  // standard deviation of each direction, about each axis across it
+  double weight = 1;     // (0, 1]: less where the points contradict it (gravity_weight)
 };
 
 // The prior of a caller's vectors of any length; not known when sigma_rad is 0 or when a vector has
 // no direction.
 GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad);
 
-// Adds the prior's rows to the normal equations of PoseModel. With h = R down0, |h - down1|^2 over
-// its variance 2 sigma^2 is multiplied by noise_px^2 and added to the matches' r^2, noise_px being
-// their standard deviation. Returns what it adds to the cost, which is in units of scale_px^2.
+// Adds the prior's rows to the normal equations of PoseModel. With h = R down0, the term noise_px^2
+// |h - down1|^2 / (2 sigma^2) is added to the sum of the matches' r^2; noise_px is the standard
+// deviation of r. Returns what it adds to the cost, which is in units of scale_px^2.
 double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px, double scale_px,
                          double upper[15], double gradient[5]);
 

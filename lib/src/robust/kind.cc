@@ -11,11 +11,12 @@
 namespace tv {
 namespace {
 
-// Whether the matches that a rival H leaves unexplained agree on an epipole more often than chance
-// explains. A match that H misses by a vector d falls into the epipolar band, were d's direction
-// random, with probability (2/pi) asin(w / |d|), w the band's half width. By Hoeffding (1963), of n
-// such matches k or more do with probability at most exp(-n KL(k/n || mean)). inlier[i]: whether
-// match i is an inlier of the epipolar model. True: there is a translation, or depth off the plane.
+// Whether the matches that a rival H does not explain agree on an epipole more often than chance
+// explains. If the vector d by which H misses a match had a random direction, the match would lie
+// in the epipolar band with probability (2/pi) asin(w / |d|), w the band's half width. By Hoeffding
+// (1963), of n such matches k or more do with probability at most exp(-n KL(k/n || mean)).
+// inlier[i]: whether match i is an inlier of the epipolar model. True: there is a translation, or
+// depth off the plane.
 bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlier,
                      double threshold_px) {
   const double limit = kTransferThresholdScale * threshold_px;

@@ -15,8 +15,8 @@ constexpr int kMostAsked = 512, kMostListed = 64;
 constexpr double kOpposite = 0.14;  // the tolerated distance from the opposite place, as a part of
                                     // the neighbour's distance
 constexpr double kNearestPx = 8;    // nearer neighbours cannot be distinguished from noise
-// The count of chance is taken at a place where no usual lattice has a point: where the neighbour
-// would be if turned by 146 degrees instead of 180.
+// The count that chance explains is taken at a place where no usual lattice has a point: the
+// neighbour's place after a turn by 146 degrees instead of 180.
 constexpr double kControlCosine = -0.829, kControlSine = 0.559;
 
 struct Grid {

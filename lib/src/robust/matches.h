@@ -21,9 +21,9 @@ struct TwoViewProblem {
 
 struct Matches {
   // pairs.num is num_unique(): the matches that differ from each other, by which models are
-  // searched, refined and tested. The arrays of pairs, and order, go on to num_all: behind the
-  // different ones come those that repeat one. They count among the matches and inliers reported,
-  // and nowhere else.
+  // searched, refined and tested. The arrays of pairs, and order, have num_all entries: the
+  // different matches, then those that repeat one of them. Repeats count in the numbers of matches
+  // and inliers that are reported, and nowhere else.
   RayPairs pairs = {};
   int num_all = 0;
   int num_unique() const { return pairs.num; }

@@ -13,7 +13,7 @@ struct PrincipalPoint {
   bool is_free = false;         // refined with the pose
 };
 
-// The parameters of PoseModel, then x and y by which the principal point moves, pixels.
+// The parameters of PoseModel, then the step of the principal point in x and y, in pixels.
 inline constexpr int kShiftedParameters = PoseModel::kParameters + 2;
 
 struct ShiftedEquations {

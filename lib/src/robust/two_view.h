@@ -40,7 +40,7 @@ struct TwoViewOutcome {
   uint8_t* inlier = nullptr;  // of all matches, repeats included
 };
 
-// The arena that one estimate takes.
+// How many bytes of arena one estimate takes.
 size_t two_view_scratch_bytes(int max_matches);
 size_t search_bytes(int max_matches);  // the part of it that the search takes
 

@@ -73,7 +73,8 @@ uint32_t reasons_of(const Evidence& e) {
   if (crowded_matches(e)) reasons |= TV_REASON_CROWDED_MATCHES;
   // Two motions of the plane explain the matches about equally well; both are reported.
   if (e.has_alternative) reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
-  // The kind itself is the reason: no translation was seen, and so there is no full pose.
+  // These two kinds are reasons by themselves: the translation is not determined, and so there is
+  // no full pose.
   if (e.kind == TV_KIND_PANORAMIC) reasons |= TV_REASON_PURE_ROTATION;
   if (e.kind == TV_KIND_NO_MOTION) reasons |= TV_REASON_NO_MOTION;
   // A second model is the same scene, matched one period of a lattice off, or a motion of its own.

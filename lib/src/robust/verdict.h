@@ -26,8 +26,8 @@ struct Evidence {
   double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
   double median_parallax_rad = 0;  // of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
-  double line_distance_px[2] = {kUnknown,
-                                kUnknown};  // of the inliers from a line, root mean square
+  // The root mean square distance of the inliers from the line nearest to them, in each image.
+  double line_distance_px[2] = {kUnknown, kUnknown};
 };
 
 struct Judgement {
