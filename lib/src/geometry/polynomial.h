@@ -147,7 +147,7 @@ int real_roots(const double* p, double* roots) {
       middle = 0;
     } else if (width <= 2) {
       middle = 0.5 * (interval.low + interval.high);
-    } else {  // by size, since roots are spread evenly over angles, not over the line
+    } else {  // a geometric mean: roots are spread evenly over angles
       const double low = interval.low < 0 ? -interval.high : interval.low;
       const double high = interval.low < 0 ? -interval.low : interval.high;
       const double size_middle =

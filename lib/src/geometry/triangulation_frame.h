@@ -44,7 +44,7 @@ inline void complete_basis(const Vec3& axis, Vec3* u, Vec3* v) {
 // ray, where a pixel is 1 / sqrt(fx fy) wide and high.
 struct RayFrame {
   Vec3 ray;         // of depth 1: z = 1 on the image plane, a unit vector on the sphere
-  Vec3 rows[2];     // n, so that n . ray = 0
+  Vec3 rows[2];     // the vectors n of the two equations n . ray = 0
   Vec3 basis[2];    // of the plane of equal depth: -rows[i] . basis[j] = (i == j)
   Vec3 depth;       // depth of X is depth . X
   double pixel[2];  // a pixel's length along basis[i]

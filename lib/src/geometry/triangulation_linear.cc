@@ -4,7 +4,7 @@
 namespace tv {
 namespace {
 
-constexpr int kMaxReweightings = 10;  // Hartley & Sturm's bound
+constexpr int kMaxReweightings = 10;  // the bound that Hartley & Sturm use
 constexpr double kSettled = 1e-10;    // relative change of both depths that ends the reweighting
 
 // ---- Linear-LS and Iterative-LS ----

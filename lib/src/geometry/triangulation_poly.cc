@@ -546,7 +546,7 @@ Correction correct_rays(PixelCost cost, const EpipolarPencil& pencil, const RayF
   const V2 alpha[2] = {coordinates(pencil, 0, frame0.ray), coordinates(pencil, 1, frame1.ray)};
   V2 v = cost == PixelCost::kSumOfSquares ? plane_of_least_squares(pencil, alpha[0], alpha[1])
                                           : plane_of_least_distances(pencil, alpha[0], alpha[1]);
-  if (v.x == 0.0 && v.y == 0.0) v.x = 1.0;  // both pixels on their epipoles: any plane
+  if (v.x == 0.0 && v.y == 0.0) v.x = 1.0;  // both pixels on their epipoles: any plane fits
   Correction correction;
   for (int i = 0; i < 2; ++i) {
     const V2 across = gradient(pencil.step[i], v);

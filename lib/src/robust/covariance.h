@@ -17,11 +17,11 @@ struct PoseUncertainty {
 // parameters,
 //     C = K^2 sum psi(r)^2 / (n - p - 2) / (mean psi'(r))^2 (J' J)^-1,
 //     K = 1 + p / n var(psi') / (mean psi')^2.
-// The formula accounts for the loss being less efficient than least squares, and for wrong matches
-// among the listed ones. limit_px: the largest residual of a listed match. What the noise of the
-// pixels contributes to J' J is subtracted, because at a low parallax it is a considerable part.
-// The standard deviation of a residual counts as at least scale_px / 20, since even exact input
-// comes from a camera that is not exact. False when a parameter is not determined.
+// The formula includes the lower efficiency of the loss compared with least squares, and the effect
+// of wrong matches among the listed ones. limit_px: the largest residual of a listed match. What
+// the noise of the pixels contributes to J' J is subtracted, because at a low parallax it is a
+// considerable part. The standard deviation of a residual counts as at least scale_px / 20, since
+// even exact input comes from a camera that is not exact. False when a parameter is not determined.
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                       double scale_px, double limit_px, PoseUncertainty* uncertainty);
 

@@ -26,8 +26,8 @@ double pseudo_angle(const Fit& f, int i) {
 
 double angle_of_pseudo(double p) { return p < 1 ? atan2(p, 1 - p) : atan2(2 - p, 1 - p); }
 
-// The largest standard deviation of the rotation and of the direction, bounded from above by the
-// traces of their blocks.
+// An upper bound of the standard deviations of the rotation and of the direction about any axis:
+// the root of the larger trace of their two blocks.
 double largest_sigma(const double covariance[25]) {
   const double rotation = covariance[0] + covariance[6] + covariance[12];
   const double direction = covariance[18] + covariance[24];

@@ -15,7 +15,7 @@ struct PoseRefiner {
   Matches& matches;
   double threshold_px;
   GravityPrior gravity;
-  PrincipalPoint principal_point;  // of the rays of the matches
+  PrincipalPoint principal_point;  // that the matches' rays were computed with
   int32_t* indices;                // scratch, as many as matches
   double* values;                  // the same
 };

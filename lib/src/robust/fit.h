@@ -19,10 +19,10 @@ struct Fit {
   TwoViewOutcome* out;
 };
 
-// The inliers of the outcome's epipolar model become the outcome's, and the support.
+// Sets the outcome's inliers and the support to the inliers of the outcome's epipolar model.
 void collect_support(Fit& f);
 
-// The matches that the transfer by H explains become the outcome's inliers.
+// Sets the outcome's inliers to the matches whose transfer residual from H is below the threshold.
 void inliers_of_transfer(Fit& f, const Mat3& H);
 
 void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out);

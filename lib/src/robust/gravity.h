@@ -16,9 +16,9 @@ struct GravityPrior {
 // no direction.
 GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad);
 
-// Adds the prior's rows to the normal equations of PoseModel. With h = R down0, the term noise_px^2
-// |h - down1|^2 / (2 sigma^2) is added to the sum of the matches' r^2; noise_px is the standard
-// deviation of r. Returns what it adds to the cost, which is in units of scale_px^2.
+// Adds the prior's rows to the normal equations of PoseModel. With h = R down0, the term weight
+// noise_px^2 |h - down1|^2 / (2 sigma^2) is added to the sum of the matches' r^2; noise_px is the
+// standard deviation of r. Returns what it adds to the cost, which is in units of scale_px^2.
 double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px, double scale_px,
                          double upper[15], double gradient[5]);
 

@@ -30,7 +30,7 @@ struct Matches {
   int32_t* order = nullptr;  // pairs' k-th match is the caller's order[k]
   Mat3 intrinsics[2];        // from the rays' plane to pixels (undistorted): K of the view, or,
                              // uncalibrated, of the pinhole that normalises its points
-  double area_px = 1;        // of image 1, or, uncalibrated, of the box around its points
+  double area_px = 1;        // px^2, of image 1, or, uncalibrated, of the box around its points
 };
 
 size_t matches_bytes(int max_matches);
@@ -44,7 +44,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
                    int view, int k, double curvature[9]);
 
-// A camera of the problem with its principal point moved.
+// The camera of a view with its principal point moved by shift_px.
 Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_px[2]);
 
 // Computes the rays again, for cameras whose principal points lie shift_px beside those of the

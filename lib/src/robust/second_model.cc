@@ -61,7 +61,7 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
   int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(taken));
   PoseEstimator estimator{part.pairs, threshold_px, indices, arena_alloc<PoseBatch>(arena, 1)};
   Sampler sampler = make_sampler(seed, taken, PoseEstimator::kSampleSize, false);
-  // A model with fewer inliers than are required below need not be found.
+  // The number of samples is chosen for a model with just as many inliers as are required below.
   const double fewest = std::max<double>(kFewestInliers, kSecondShare * num_first * taken / left);
   const int most = samples_needed(kConfidence, static_cast<int>(fewest), taken,
                                   PoseEstimator::kSampleSize, kMostSamples);
