@@ -23,8 +23,8 @@ struct Grid {
   const double* xy;
   double low[2], inverse[2];
   int side;
-  int32_t* first;  // side^2, -1: empty
-  int32_t* next;   // num
+  int32_t* first;  // the first point of each of side^2 cells; -1: none
+  int32_t* next;   // the next point of the same cell, num entries; -1: none
 
   int cell(double value, int axis) const {
     const double place = (value - low[axis]) * inverse[axis];

@@ -9,9 +9,9 @@
 namespace tv {
 namespace {
 
-// With these numbers of samples, a model with only just enough inliers to be found is missed once
-// in twenty pairs, one with a fifth more inliers once in a hundred, and one whose inliers are a
-// third of the matches left over once in five (since kMostSamples ends the search).
+// With these numbers of samples, a model with just as many inliers as are required is missed once
+// in twenty pairs, and one with 20 % more once in a hundred. A model whose inliers are a third of
+// the searched matches is missed once in five pairs, because kMostSamples ends the search.
 constexpr int kMostSamples = 400;
 constexpr double kConfidence = 0.95;
 constexpr int kFewestInliers = 12;

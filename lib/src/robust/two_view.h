@@ -25,7 +25,7 @@ struct TwoViewModel {
 // All that the entry point writes to the caller's result: models on rays, and the views in the
 // canonical order that api/two_view.cc chooses.
 struct TwoViewOutcome {
-  Evidence evidence;  // with the kind
+  Evidence evidence;  // includes the kind
   Judgement judgement;
   EpipolarModel epipolar;
   bool has_R = false, has_t = false, has_H = false, has_covariance = false,

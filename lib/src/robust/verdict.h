@@ -21,7 +21,7 @@ struct Evidence {
   bool has_second_model = false;
   double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
   // Of a full pose (calibrated or planar).
-  bool has_alternative = false;    // a second motion of the plane
+  bool has_alternative = false;    // whether a second motion of the plane fits
   double noise_px = 0;             // of a matched pixel; 0 where there is no covariance
   double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
   double median_parallax_rad = 0;  // of the inliers
