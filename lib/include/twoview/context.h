@@ -66,7 +66,8 @@ typedef struct tv_limits {
   int32_t max_height;
   /* The most keypoints of an image, second orientations included, [1, 65535], default 2048. */
   int32_t max_keypoints;
-  /* The most matches of an estimate, [0, 1000000]; 0 (default) means max_keypoints. */
+  /* The most matches of an estimate, and points of a bundle adjustment, [0, 1000000]; 0
+     (default) means max_keypoints. */
   int32_t max_matches;
   /* A tv_kernels, default TV_KERNELS_AUTO. */
   int32_t kernels;

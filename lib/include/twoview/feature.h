@@ -82,7 +82,8 @@ typedef struct tv_feature_options {
      grows with the square. */
   int32_t max_keypoints;
   /* How many contiguous pixels of the circle of 16 must all be brighter or all be darker than the
-     centre: 9 (default), 10, 11 or 12 (the paper's). A longer arc gives fewer, sharper corners. */
+     centre: 9 (default), 10, 11 or 12 (the FAST-SIFT paper's). A longer arc gives fewer, sharper
+     corners. */
   int32_t arc;
   /* The difference in grey levels that these pixels must exceed, [1, 254], default 10. A bigger
      value gives fewer, stronger corners. */
@@ -92,7 +93,8 @@ typedef struct tv_feature_options {
   int32_t min_threshold;
   /* How many levels the pyramid has, [1, 8], default 1. More levels find matches across a change of
      scale. They cost precision, because corners of coarse levels, which are located less precisely,
-     take a share of max_keypoints: that of the level's area, and what finer levels leave unused. */
+     take a share of max_keypoints in proportion to the level's area, and what finer levels leave
+     unused. */
   int32_t levels;
   /* The scale factor from a pyramid level to the next, [1.1, 2], default 2. */
   float scale_factor;

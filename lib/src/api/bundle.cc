@@ -1,4 +1,5 @@
-// The boundary of bundle adjustment and of points' covariances: validate, call, pack.
+// The entry points of bundle adjustment and of points' covariances: they validate, call
+// robust/bundle.h and robust/point_covariance.h, and write the results.
 #include "twoview/bundle.h"
 
 #include <cmath>
@@ -27,7 +28,7 @@ tv_status read_bundle_options(const tv_bundle_options* options, tv_bundle_option
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-// Checks a pose, and takes |t| out of it.
+// Checks a pose. Writes it with t of unit length, and |t| to *baseline.
 tv_status read_pose(const double R[9], const double t[3], Pose* pose, double* baseline) {
   if (!all_finite(R, 9) || !all_finite(t, 3)) return TV_ERR_NOT_FINITE;
   if (!is_rotation(R)) return TV_ERR_ARGUMENT;
@@ -121,7 +122,7 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
   problem.num = num_points;
   tv::BundleOutcome outcome;
   tv::adjust_two_view(problem, pose, baseline, context->arena, points, &outcome);
-  if (outcome.moved) {  // else they stay to the last bit
+  if (outcome.moved) {  // else R and t keep their bits
     for (int i = 0; i < 9; ++i) R[i] = outcome.pose.R(i / 3, i % 3);
     for (int i = 0; i < 3; ++i) t[i] = baseline * outcome.pose.t[i];
   }

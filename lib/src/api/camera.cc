@@ -1,4 +1,5 @@
-// The boundary of the camera models: validate, call, pack.
+// The entry points of the camera models: they validate, call geometry/camera.h, and write the
+// results.
 #include "twoview/camera.h"
 
 #include <cstdint>
@@ -11,7 +12,7 @@ namespace {
 
 using tv::is_finite;
 
-// Checks the camera and what goes into the model: null, then the camera, then finite numbers.
+// Checks the arguments in this order: null pointers, the camera, numbers that are not finite.
 tv_status check_input(const tv_camera *camera, const double *values, int num_values,
                       const void *output) {
   if (camera == nullptr || values == nullptr || output == nullptr) return TV_ERR_NULL;
@@ -28,7 +29,8 @@ int32_t scaled_size(int32_t size, double scale) {
   return rounded < 1.0 ? 1 : static_cast<int32_t>(rounded);
 }
 
-// What the calls on many points share: `in_wide` numbers in and `out_wide` out a point.
+// The checks of the calls on many points. Each point has `in_wide` numbers of input and `out_wide`
+// of output.
 tv_status check_many(const tv_camera *camera, const double *in, size_t in_wide, int32_t count,
                      const double *out, size_t out_wide, const uint8_t *inside) {
   if (camera == nullptr) return TV_ERR_NULL;
@@ -76,7 +78,7 @@ tv_status tv_camera_project(const tv_camera *camera, const double point[3], doub
                    jacobian ? &d_pixel : nullptr)) {
     return TV_ERR_OUTSIDE;
   }
-  // Overflow, where a focal length or a coordinate is near a double's end.
+  // A focal length or a coordinate near the largest double makes the result overflow.
   if (!tv::all_finite(projected.data(), 2)) return TV_ERR_OUTSIDE;
   if (jacobian && !tv::all_finite(d_pixel.data(), 6)) return TV_ERR_OUTSIDE;
   pixel[0] = projected[0];

@@ -1,3 +1,4 @@
+// The entry points of the context: its limits, its size, its kernels, its memory and its times.
 #include "api/context.h"
 
 #include <algorithm>
@@ -35,8 +36,8 @@ tv_status read_limits(const tv_limits* given, tv_limits* limits) {
   return TV_OK;
 }
 
-// A tv_context of 64-bit pointers. The size depends on the limits alone, so 32-bit CPUs take as
-// much.
+// The size of a tv_context with 64-bit pointers. CPUs with 32-bit pointers reserve as much, because
+// tv_context_size depends on the limits alone.
 constexpr size_t kContextBytes = 192;
 static_assert(arena_bytes<tv_context>(1) <= kContextBytes &&
               (sizeof(void*) < 8 || arena_bytes<tv_context>(1) == kContextBytes));

@@ -1,4 +1,5 @@
-// The inside of tv_context. It lies at the front of the caller's memory; the arena is the rest.
+// The members of tv_context, and the timer that measures a stage. The struct lies at the front of
+// the caller's memory; the arena is the rest.
 #pragma once
 
 #include "base/arena.h"
@@ -8,7 +9,7 @@
 struct tv_context {
   tv_limits limits;  // max_matches and purposes resolved, never 0
   const tvk_table* kernels;
-  tv::Arena arena;  // scratch of the running call; its front outlives a tv_reconstruct
+  tv::Arena arena;  // scratch of the running call; after tv_reconstruct its front holds the results
   tv_clock clock;
   void* clock_user;
   uint64_t stage_ns[TV_NUM_STAGES];
@@ -21,7 +22,7 @@ inline bool made_for(const tv_context& context, uint32_t purposes) {
   return (context.limits.purposes & purposes) == purposes;
 }
 
-// Adds the time from its construction to its end to a stage.
+// Adds the time from its construction to its destruction to the time of a stage.
 class StageTimer {
  public:
   StageTimer(tv_context* context, tv_stage stage)

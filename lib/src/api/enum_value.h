@@ -1,5 +1,5 @@
-// The number in an enum that a caller passed, whatever it is. In C++ even to read an enum out of
-// its range is undefined; in C it is not, and the API's callers are C.
+// The number in an enum that a caller passed, also where no enumerator has this number. In C++,
+// reading such an enum is undefined; in C it is not, and callers of the API may be C.
 #pragma once
 
 #include <cstring>

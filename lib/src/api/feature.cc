@@ -1,3 +1,5 @@
+// The entry points of features: they validate, run detection, orientation and description over one
+// pyramid, and write the results that fit.
 #include "twoview/feature.h"
 
 #include <algorithm>
@@ -19,7 +21,7 @@ struct Request {
   tv_status status;
 };
 
-// What all entry points check first.
+// The checks that all entry points begin with.
 Request check_request(const tv_context* context, const tv_image* image, const tv_image* mask,
                       const tv_feature_options* options) {
   Request request{};
@@ -52,8 +54,8 @@ Octaves octaves_for(tv_context* context, const tv_image& image, const tv_keypoin
   return make_octaves(*context->kernels, image, range.first, range.last, context->arena);
 }
 
-// Writes as many as fit; returns how many there are, with at most max_seconds second orientations:
-// the first keypoints have the first claim on them.
+// Writes as many oriented keypoints as fit; returns how many there are in all. At most max_seconds
+// second orientations are kept: those that come first in the order of the keypoints.
 int32_t orient_keypoints(const tv_context& context, const Octaves& octaves, int32_t orientation,
                          const tv_keypoint* keypoints, int32_t count, int32_t max_seconds,
                          tv_keypoint* oriented, int32_t capacity) {

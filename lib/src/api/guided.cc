@@ -1,4 +1,5 @@
-// The boundary of guided matching: validate, turn keypoints into rays, call.
+// The entry point of guided matching: it validates, computes the keypoints' rays, and calls
+// match/guided.h.
 #include "match/guided.h"
 
 #include <algorithm>
@@ -82,7 +83,8 @@ tv_status tv_match_guided(tv_context* context, const tv_camera* camera0, const t
   if (cap_correspondences < 0 || (camera0 == nullptr) != (camera1 == nullptr)) {
     return TV_ERR_ARGUMENT;
   }
-  // The matrix has no scale; with a largest entry of 1 its squares stay within a double's range.
+  // The scale of the matrix is arbitrary; with a largest entry of 1 its squares stay within a
+  // double's range.
   double scaled[9], largest = 0;
   for (int k = 0; k < 9; ++k) {
     if (!tv::is_finite(epipolar[k])) return TV_ERR_NOT_FINITE;

@@ -1,3 +1,4 @@
+// The entry point of matching: it validates, calls match/match.h, and writes the matches that fit.
 #include "match/match.h"
 
 #include <algorithm>

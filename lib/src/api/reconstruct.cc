@@ -1,3 +1,6 @@
+// The entry point tv_reconstruct: it calls the other entry points in a row and keeps the results at
+// the front of the arena. The merging of guided matches and the choice of the best matches are
+// here, too.
 #include "twoview/reconstruct.h"
 
 #include <algorithm>
@@ -22,7 +25,7 @@ struct Results {
   float* ratios;
   uint8_t* inlier_mask;
   tv_point* points;
-  tv_correspondence* more_matches;  // of guided matching, with what was found before
+  tv_correspondence* more_matches;  // those of tv_match and guided matching together
   uint8_t* more_inlier_mask;
   tv_camera cameras[2];  // of the two views, as the present estimate corrects them; full poses only
 };
@@ -57,8 +60,9 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
   }
 }
 
-// Leaves those of num_found matches that use no keypoint of the num_matches first ones, and puts
-// the latter between them, ascending in idx0. Returns how many there are now.
+// Merges `matches` into `found`, which has room for both: removes the found matches that use a
+// keypoint of `matches`, then inserts `matches` so that idx0 ascends. Returns how many matches
+// `found` then holds.
 int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Arena& arena,
                      int32_t max_keypoints, tv_correspondence* found, int32_t num_found) {
   ArenaScope scope(arena);
@@ -79,11 +83,11 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
   return num_matches + num_new;
 }
 
-// Orders matches by ratio, then by indices, so that it does not matter which view is the first:
-// only (i, j) and (j, i) of one ratio are equal.
+// The rank of a match: by its ratio, then by its lower and its higher index, so that exchanged
+// views give the same rank. Only (i, j) and (j, i) with the same ratio have equal ranks.
 uint64_t rank_of(const tv_correspondence& m) {
   uint32_t ratio;
-  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // of no sign: ordered as the numbers are
+  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // not negative: ordered as the numbers are
   const bool ascending = m.idx0 < m.idx1;
   const uint32_t low = static_cast<uint32_t>(ascending ? m.idx0 : m.idx1);
   const uint32_t high = static_cast<uint32_t>(ascending ? m.idx1 : m.idx0);
@@ -120,7 +124,8 @@ tv_pixel_pairs pairs_of(const Results& r, int32_t num_matches) {
 
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
-// The cameras of an estimate, for all that follows from it. Called for each estimate that is kept.
+// Stores the cameras that an estimate refers to in r, for the stages that follow. Call it for each
+// estimate that is kept.
 void correct_cameras(const tv_two_view& estimate, const tv_view& view0, const tv_view& view1,
                      Results& r) {
   if (!is_full_pose(estimate)) return;
@@ -128,10 +133,10 @@ void correct_cameras(const tv_two_view& estimate, const tv_view& view0, const tv
   tv_corrected_camera(&estimate, view1.camera, &r.cameras[1]);
 }
 
-// Matches along the epipolar lines of `estimate`, and the estimate from all of them, where that is
-// no worse: *num_matches, the estimate and r's matches, pixels and mask are then of the second
-// pass. Not inlined, as the two stages below: what they need of the stack is not to lie under the
-// search.
+// Matches again along the epipolar lines of `estimate`, and estimates from all matches. If
+// takes_guided_estimate accepts the second estimate, *num_matches, *num_left_out, *estimate and r's
+// matches, pixels and mask become those of the second pass; else they stay. Not inlined, like the
+// two stages below, so that their stack frames are not in use during the search.
 __attribute__((noinline)) tv_status match_along_lines(
     tv_context* context, const tv_view& view0, const tv_view& view1, const int32_t num_keypoints[2],
     const tv_estimate_options* options, Results& r, int32_t* num_matches, int32_t* num_left_out,
@@ -167,7 +172,8 @@ __attribute__((noinline)) tv_status match_along_lines(
   return TV_OK;
 }
 
-// Triangulates the inliers of a full pose; all other points are invalid. Returns how many are good.
+// Triangulates the inliers of a full pose; all other points are invalid. Writes to *num_points how
+// many have the status TV_POINT_OK.
 __attribute__((noinline)) tv_status triangulate_inliers(tv_context* context,
                                                         tv_triangulation method,
                                                         const tv_two_view& two_view,
@@ -198,7 +204,8 @@ void store_unit(const Mat3& m, double out[9]) {
   for (int k = 0; k < 9; ++k) out[k] = unit(k / 3, k % 3);
 }
 
-// Pose and points together; what follows from the pose follows.
+// Adjusts pose and points together, and computes E, F, the covariance and the number of points
+// anew.
 __attribute__((noinline)) tv_status adjust(tv_context* context, int32_t num_matches, Results& r,
                                            tv_two_view* two_view, int32_t* num_points) {
   tv_bundle_result bundle;

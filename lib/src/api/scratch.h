@@ -1,4 +1,5 @@
-// How much arena the calls of one context need: the sum that tv_context_size answers with.
+// How many bytes of arena the calls of one context need. tv_context_size reports them, and the
+// context itself.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +11,7 @@ namespace tv {
 // limits.max_matches and limits.purposes are resolved (not 0).
 size_t scratch_bytes(const tv_limits& limits);
 
-// The parts of it that a single stage takes.
+// Parts of it: the scratch of tv_extract and of tv_match_guided, and the results of tv_reconstruct.
 size_t extract_scratch_bytes(const tv_limits& limits);
 size_t guided_scratch_bytes(const tv_limits& limits);
 size_t reconstruct_result_bytes(const tv_limits& limits);

@@ -1,5 +1,5 @@
-// Structs that grow (twoview/status.h has the rule): reading as much of an input as the caller has,
-// and writing as much of an output as the caller has room for.
+// Structs that grow (twoview/status.h has the rule): initialising them, reading as much of an input
+// as the caller has, and writing as much of an output as the caller has room for.
 #pragma once
 
 #include <cstddef>
@@ -20,11 +20,11 @@ inline void init_zeros(void* object, size_t struct_size) {
 // Whether struct_size can be that of a struct of any release.
 tv_status check_sized(const void* object);
 
-// Also whether all that lies behind known_size is zero.
+// The same, and whether all bytes beyond known_size are zero.
 tv_status check_sized_input(const void* object, size_t known_size);
 
-// Reads an input over the defaults that *checked holds; null leaves them. On an error *checked is
-// as it was.
+// Copies an input over the defaults that *checked holds; a null input keeps the defaults. On an
+// error *checked stays as it was.
 tv_status read_sized(const void* object, size_t known_size, void* checked);
 
 template <typename Struct>
@@ -32,7 +32,7 @@ tv_status read_sized(const Struct* object, Struct* checked) {
   return read_sized(object, sizeof(Struct), checked);
 }
 
-// Writes an output as far as its struct_size reaches, which stays.
+// Writes an output as far as its struct_size reaches, and keeps this struct_size.
 void write_sized(const void* packed, size_t known_size, void* object);
 
 template <typename Struct>

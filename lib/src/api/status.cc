@@ -1,4 +1,5 @@
-// Names of statuses and of results, in static storage.
+// The strings of statuses, kernel sets, kinds, verdicts and reasons, and of the library's version;
+// all are constants.
 #include "twoview/status.h"
 
 #include "api/enum_value.h"

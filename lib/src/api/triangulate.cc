@@ -1,4 +1,5 @@
-// The boundary of triangulation: validate, call.
+// The entry points of triangulation and of corrected matches: they validate and call
+// geometry/triangulation.h.
 #include "twoview/triangulate.h"
 
 #include <cstddef>
@@ -10,7 +11,7 @@
 
 namespace {
 
-// What both entry points ask of cameras and pose.
+// The checks of cameras and pose that both entry points share.
 tv_status check_pair(const tv_camera *camera0, const tv_camera *camera1, const double R[9],
                      const double t[3]) {
   if (tv_camera_check(camera0) != TV_OK || tv_camera_check(camera1) != TV_OK) return TV_ERR_CAMERA;

@@ -1,3 +1,5 @@
+// The entry points of two-view estimation: they validate, choose the canonical order of the views,
+// run the search and the finish, and write the result in the caller's order.
 #include "twoview/two_view.h"
 
 #include <cstddef>
@@ -27,7 +29,8 @@ constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            0,
                                            0.01};
 
-// Directions that are read: finite, not zero, and a deviation of at most half a turn.
+// Checks the directions of gravity, where they are used: finite and not zero, with a standard
+// deviation of at most pi.
 tv_status check_gravity(const tv_estimate_options& options) {
   if (options.gravity_sigma_rad == 0) return TV_OK;
   const double* gravity[2] = {options.gravity0, options.gravity1};
@@ -80,11 +83,10 @@ uint64_t hash_of(const double* a, const double* b) {
   return hash;
 }
 
-// Whether the two views are to be exchanged for the computation: a choice that depends neither on
-// which was named first nor on the order of the matches, so that both calls compute the same thing.
-// Decided by the pixels; where every match is there in both directions, by what else tells the
-// views apart: the cameras, the ratios of the matches, the gravity. Where nothing does, both calls
-// are of the same problem.
+// Whether the two views are exchanged for the computation. The choice depends neither on which view
+// the caller names first nor on the order of the matches, so that both calls compute the same
+// result. The pixels decide; where every match occurs in both directions, the cameras, then the
+// matches' ratios, then gravity. Where all of these are equal, both calls are the same problem.
 bool exchanged(const tv_camera* camera0, const tv_camera* camera1, const TwoViewProblem& named) {
   for (const bool with_ratios : {false, true}) {
     uint64_t forward = 0, backward = 0;
@@ -108,7 +110,8 @@ void store(const Mat3& m, double out[9]) {
   for (int k = 0; k < 9; ++k) out[k] = m(k / 3, k % 3);
 }
 
-// t of the inverse pose, -R' t, each entry in this order of operations.
+// The inverse pose, R' and -R' t. The written order of operations gives the bits that are promised
+// for exchanged views.
 Pose inverse_pose(const Pose& pose) {
   Pose inverse;
   inverse.R = pose.R.transpose();
@@ -129,7 +132,8 @@ Mat3 adjugate(const Mat3& H) {
   return result;
 }
 
-// H[8] = 1 where that is finite, else unit norm.
+// Scales H to H[8] = 1, or to Frobenius norm 1 where |H[8]| is at most 1e-12 of the norm. False
+// when H is zero or not finite.
 bool scale_homography(Mat3* H) {
   const double norm = H->norm();
   if (!(norm > 0) || !is_finite(norm)) return false;
@@ -147,7 +151,7 @@ void pack_covariance(const Pose& pose, const Pose& inverse, const double covaria
   }
 }
 
-// Not inlined: what it needs of the stack is not to lie under the search.
+// Not inlined, so that its stack frame is not in use during the search.
 __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches& matches,
                                     const TwoViewModel& model, const TwoViewOutcome& outcome,
                                     bool swapped, tv_two_view* result) {
@@ -235,7 +239,7 @@ tv_status tv_corrected_camera(const tv_two_view* result, const tv_camera* camera
   *corrected = *camera;
   const double* const shift = result->principal_point_shift;
   if (result->struct_size < offsetof(tv_two_view, principal_point_shift) + sizeof(double[2])) {
-    return TV_OK;  // a caller without the field: not shifted
+    return TV_OK;  // a struct of an older header, without the field
   }
   corrected->cx += shift[0];
   corrected->cy += shift[1];

@@ -1,4 +1,5 @@
-// Checks that several entry points share. Each answers with the status to return.
+// Checks of arguments that several entry points share, and the functions that check and copy
+// options and inputs. A tv_status that they return is the one that the entry point must return.
 #pragma once
 
 #include <cmath>
@@ -12,25 +13,26 @@
 
 namespace tv {
 
-// An image that this context can take.
+// Whether an image is valid and within the context's limits.
 tv_status check_image(const tv_context& context, const tv_image* image);
 
-// A mask is absent, or an image of the same size.
+// Whether a mask is null or a valid image of the same size.
 tv_status check_mask(const tv_image* mask, const tv_image& image);
 
 // Copies the options (or the defaults for null) after checking them.
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked);
 
-// Reads an image's features for a call of that purpose. They need descriptors and may have
-// keypoints; neither overlaps the output.
+// Checks and copies an image's features for a call of that purpose: descriptors are required,
+// keypoints are not, and neither may overlap the output.
 tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
                         const void* out, size_t out_bytes, tv_features* features);
 
-// Reads matched pixels.
+// Copies the matched pixels' struct after checking it.
 tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 
-// Finite, of a positive size.
+// Whether each keypoint is finite, with coordinates within 1e5 pixels, a size in (0, 512] pixels
+// and an angle within 1000 radians.
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);
 
 // R R' = I to 1e-6 and det R > 0.

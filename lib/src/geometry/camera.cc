@@ -16,14 +16,15 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Where the distortion's derivative falls to this, Newton's method in 64 bits still finds the ray
-// to about 1e-10; below it, no promise could be kept.
+// The least derivative of the distortion in the valid region. At this derivative, Newton's method
+// in 64 bits finds the ray to about 1e-10; below it, no accuracy can be promised.
 constexpr double kMinDerivative = 1e-6;
 constexpr double kTan89Degrees = 57.289961630759425;
 constexpr double kTan44p5Degrees = 0.98269726101190570;
-// A ray that was just within the valid region comes back just within it, whatever was rounded.
+// The tolerance of the region's edge: a pixel that was projected from a ray just within the region
+// is not rejected because of rounding.
 constexpr double kEdgeSlack = 1.0 + 1e-9;
-constexpr double kConverged = 1e-11;  // the step after it is below the last bit: quadratic
+constexpr double kConverged = 1e-11;  // quadratic: the next step is below the last bit
 
 constexpr int kMaxBisections = 80;
 constexpr int kMaxThirds = 40;
@@ -34,7 +35,7 @@ struct Point2 {
   double x, y;
 };
 
-// Symmetric 2x2: the Jacobian of both of Brown-Conrady's parts is one.
+// A symmetric 2x2 matrix, such as the Jacobian of Brown-Conrady's distortion.
 struct Symmetric2 {
   double xx, xy, yy;
 };
@@ -126,8 +127,9 @@ double least_between(const Margin& margin, double low, double high) {
   return 0.5 * (low + high);
 }
 
-// The first zero of margin over sample(0) = 0 < sample(1) < ... < sample(last), or sample(last). A
-// dip between samples shows as a local minimum of the samples and is followed to its bottom.
+// The first zero of margin over sample(0) = 0 < sample(1) < ... < sample(last), or sample(last).
+// Where the samples have a local minimum, the margin may fall to 0 between them: its minimum there
+// is searched.
 template <typename Margin, typename Sample>
 double first_zero(const Margin& margin, const Sample& sample, int last) {
   double x[3] = {0.0, 0.0, 0.0};
@@ -221,7 +223,8 @@ bool project_kannala(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23
   if (!(theta <= camera.valid_angle_rad)) return false;
   double derivative;
   const double distorted = kannala_distort(model.k, theta, &derivative);
-  // (nx, ny): the azimuth, any on the axis, where the map is the same in all directions.
+  // (nx, ny): the unit vector of the azimuth. On the axis any vector serves, because the map is the
+  // same in all directions there.
   const double nx = r > 0.0 ? x / r : 1.0;
   const double ny = r > 0.0 ? y / r : 0.0;
   const double u = model.fx * (r > 0.0 ? distorted * nx : 0.0) + model.cx;
@@ -263,8 +266,9 @@ bool is_small(const Point2& step, const Point2& p) {
   return std::fabs(step.x) + std::fabs(step.y) <= kConverged * scale;
 }
 
-// The usual case: plain Newton, which lands in two to five steps. Wherever it lands inside the
-// valid disc is the answer, for the map is one-to-one there.
+// The usual case: Newton's method alone, which converges in two to five steps. If it converges
+// inside the valid disc, the result is the solution, because the map is one-to-one there. False:
+// call brown_invert_safe.
 bool brown_invert_fast(const Camera& camera, const Point2& target, double target_sq, Point2* out) {
   const double limit_sq = camera.valid_radius_undistorted * camera.valid_radius_undistorted;
   Point2 p = target;
@@ -302,9 +306,9 @@ double brown_invert_radius(const Camera& camera, double distorted) {
   return r;
 }
 
-// Near the edge of the valid disc, or under strong distortion: from the radial solution, Newton
-// with step halving. The map is the gradient of a convex function on the disc, so each Newton
-// direction lowers the error.
+// For pixels near the edge of the valid disc, or under strong distortion: Newton's method with step
+// halving, from the radial solution. The map is the gradient of a convex function on the disc, so
+// each Newton direction lowers the error.
 bool brown_invert_safe(const Camera& camera, const Point2& target, double target_sq, Point2* out) {
   const double limit = camera.valid_radius_undistorted;
   const double length = std::sqrt(target_sq);
@@ -332,7 +336,7 @@ bool brown_invert_safe(const Camera& camera, const Point2& target, double target
         break;
       }
     }
-    if (halvings == kMaxHalvings) break;  // at the last bit, or at the edge
+    if (halvings == kMaxHalvings) break;  // no step lowers the error further
     step = next_step;
     error_sq = next_error_sq;
   }
@@ -348,7 +352,7 @@ bool unproject_central(const Camera& camera, const Point2& target, Vec3* ray, Ma
   if (!(target_sq <= limit * limit)) return false;
   Point2 p = target;
   if (model.model == TV_CAMERA_BROWN_CONRADY) {
-    // Both stay within the valid disc, but for a last step of 1e-11.
+    // Both results lie within the valid disc, but for a last step of 1e-11.
     if (!brown_invert_fast(camera, target, target_sq, &p) &&
         !brown_invert_safe(camera, target, target_sq, &p)) {
       return false;

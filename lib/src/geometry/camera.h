@@ -1,4 +1,5 @@
-// Camera models behind one interface: pixels to unit rays and back, with Jacobians.
+// Camera models behind one interface: pixels to unit rays and back, with Jacobians; the matrix K of
+// a camera; and the vector and matrix types of the geometry.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,12 +15,12 @@ using Mat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;  // as the C API stor
 using Mat23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 using Mat32 = Eigen::Matrix<double, 3, 2>;
 
-// A checked camera with what unprojection needs to know beforehand.
+// A checked camera with the bounds of its valid region, which prepare_camera computes once.
 struct Camera {
   tv_camera model;                  // a Brown-Conrady without any distortion is a pinhole here
   double valid_angle_rad;           // rays beyond it are outside
   double valid_radius_undistorted;  // the same as a radius on the plane z = 1 (Brown-Conrady)
-  double valid_radius_distorted;    // a bound after distortion: Newton is never asked for more
+  double valid_radius_distorted;    // a bound after distortion; unproject rejects more
 };
 
 // K and its inverse: the plane z = 1 to the undistorted image, in pixels, and back. K may also be
@@ -30,7 +31,8 @@ Mat3 inverse_intrinsics(const Mat3& K);
 // The camera must have passed tv_camera_check.
 Camera prepare_camera(const tv_camera& camera);
 
-// False: outside the valid angle (or behind); outputs untouched. jacobian may be null.
+// Both return false, and leave the outputs as they were, for a point or a pixel beyond the valid
+// angle or behind the camera. jacobian may be null.
 bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobian);
 bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobian);
 

@@ -17,7 +17,8 @@ Mat3 essential_from_pose(const Pose& pose);
 // steps of an optimiser, free of trigonometry.
 Mat3 rotation_step(const Vec3& w);
 
-// The nearest rows that are exactly orthonormal, by Gram-Schmidt: undoes the drift of products.
+// R with its rows made orthonormal by Gram-Schmidt. It removes the rounding errors that products of
+// rotations accumulate.
 Mat3 orthonormalised(const Mat3& R);
 
 // b1 = normalise(e_k x t), k the index of the smallest |t_k| (the lowest on a tie), b2 = t x b1.
@@ -27,21 +28,22 @@ void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);
 Mat3 rotation_about(const Vec3& unit_axis, double angle_rad);
 
 // R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1, in closed form (B. K. P. Horn, "Recovering
-// baseline and orientation from essential matrix", 1990). They are rotations as exactly as E is
-// essential: orthonormalise the one that is kept. False when E is zero or not finite.
+// baseline and orientation from essential matrix", 1990). R0 and R1 are rotations only as exactly
+// as E is an essential matrix: call orthonormalised for the one that is kept. False when E is zero
+// or not finite.
 bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 
-// Where two rays meet, as signs only. The numerators of the depths that minimise
-// |d0 R f0 + t - d1 f1| (the normal equations of the midpoint; their denominator is positive), for
-// rays of any length.
+// On which side of each camera two rays meet. depth0 and depth1, of which only the signs matter,
+// are the numerators of the depths that minimise |d0 R f0 + t - d1 f1| (the normal equations of the
+// midpoint; their denominator is positive), for rays of any length.
 struct DepthSigns {
   double depth0, depth1;
-  double tolerance0_sq, tolerance1_sq;  // squares of what turning a ray by `angle_rad` does to them
+  double tolerance0_sq, tolerance1_sq;  // squares of their changes when a ray turns by angle_rad
 };
 DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, double angle_rad);
 
-// +1 in front of both cameras, -1 behind one, 0 when the parallax is within angle_rad: a point that
-// far away says nothing.
+// +1 in front of both cameras, -1 behind one, 0 when the parallax is within angle_rad: a point so
+// far away is no evidence for either.
 inline int depth_vote(const DepthSigns& d) {
   const bool clear0 = d.depth0 * d.depth0 > d.tolerance0_sq;
   const bool clear1 = d.depth1 * d.depth1 > d.tolerance1_sq;

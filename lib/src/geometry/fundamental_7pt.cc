@@ -1,5 +1,5 @@
-// Hartley & Zisserman, "Multiple View Geometry", 2nd edition, 11.1.2: seven equations leave
-// M = A + x B; det M = 0 is a cubic in x.
+// Hartley & Zisserman, "Multiple View Geometry", 2nd edition, 11.1.2: seven equations determine M
+// up to one unknown x, M = A + x B; det M = 0 is a cubic in x.
 #include "geometry/fundamental_7pt.h"
 
 #include "geometry/null_space.h"

@@ -8,8 +8,8 @@
 namespace tv {
 namespace {
 
-// Centroid to the origin, mean squared distance to 2. The identity when a ray is far off the axis,
-// where the plane z = 1 is no measure (fisheye).
+// Centroid to the origin, mean squared distance to 2. The identity when a ray has z <= 0.1
+// (fisheye), because distances on the plane z = 1 mean little there.
 Mat3 hartley_normalisation(const Vec3 rays[8]) {
   Vec2 sum = Vec2::Zero();
   for (int k = 0; k < 8; ++k) {

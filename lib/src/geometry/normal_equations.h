@@ -13,7 +13,7 @@
 
 namespace tv {
 
-// With q = r^2 / scale^2: min(q, 1), and log(1 + q).
+// With q = r^2 / scale^2, kTruncated is min(q, 1) and kCauchy is log(1 + q).
 enum class Loss { kTruncated, kCauchy };
 
 struct RobustLoss {
@@ -21,7 +21,7 @@ struct RobustLoss {
   double scale_px;
 };
 
-// A scale that no residual reaches.
+// Least squares: the truncated loss, with a scale that no residual reaches.
 inline constexpr RobustLoss kLeastSquares{Loss::kTruncated, 1e140};
 
 // Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with at most nine

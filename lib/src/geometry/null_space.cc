@@ -64,7 +64,7 @@ Svd3 svd3(const Mat3& M) {
   if (s1 > 1e-300 && s1 > 1e-15 * s0) {
     u1 = A.col(1) / s1;
     u1 = (u1 - u1.dot(u0) * u0).normalized();
-  } else {  // any direction across u0
+  } else {  // any direction orthogonal to u0
     const int k = std::fabs(u0[0]) < 0.6 ? 0 : 1;
     Vec3 axis = Vec3::Zero();
     axis[k] = 1;

@@ -15,9 +15,10 @@ namespace tv {
 void squared_sines(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& R,
                    double* sines_sq);
 
-// The information that noise of one pixel in each coordinate alone adds to what the matches say
-// about the direction of the translation. Its rows b . (R f0 x f1) / |gradient of the residual| are
-// as small as the parallax. block: the entries (0, 0), (0, 1) and (1, 1) of its 2x2 block, for b1
+// The part of J' J, for the direction of the translation, that comes from noise of one pixel in
+// each coordinate and not from the motion. At a low parallax it is considerable, because the rows b
+// . (R f0 x f1) / |gradient of the residual| of J are as small as the parallax. Subtract it, times
+// the variance of the noise. block: the entries (0, 0), (0, 1) and (1, 1) of this 2x2 block, for b1
 // and b2 of tangent_basis.
 void direction_noise(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                      double block[3]);

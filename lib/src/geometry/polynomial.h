@@ -104,7 +104,8 @@ double bracketed_root(const double* p, double low, double high) {
     const double next = inside ? newton : 0.5 * (low + high);
     const double step = std::fabs(next - z);
     z = next;
-    // Newton squares its error: after a step this short, the next would be rounding.
+    // Newton's method squares its error: after a step this short, the next one would be below
+    // rounding.
     if (step <= (inside ? 1e-9 : 1e-15) * (1 + std::fabs(z))) break;
   }
   return z;
@@ -130,7 +131,7 @@ int real_roots(const double* p, double* roots) {
     const int count = interval.changes_low - interval.changes_high;
     if (count <= 0) continue;
     const double width = interval.high - interval.low;
-    // Newton starts from a bracket that is short against the root's size.
+    // Newton's method starts only in a bracket that is at most 0.5 plus the root's size wide.
     const double size = std::fabs(interval.high) > std::fabs(interval.low)
                             ? std::fabs(interval.low)
                             : std::fabs(interval.high);
@@ -146,7 +147,7 @@ int real_roots(const double* p, double* roots) {
       middle = 0;
     } else if (width <= 2) {
       middle = 0.5 * (interval.low + interval.high);
-    } else {  // by size, since roots are spread evenly over angles, not over the line
+    } else {  // a geometric mean: roots are spread evenly over angles
       const double low = interval.low < 0 ? -interval.high : interval.low;
       const double high = interval.low < 0 ? -interval.low : interval.high;
       const double size_middle =

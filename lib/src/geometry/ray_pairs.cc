@@ -7,8 +7,9 @@
 namespace tv {
 namespace {
 
-// Half of the sum of the squared angles that one pixel makes, over both views and both coordinates,
-// under a root. Only the part of a Jacobian's column that is across the ray turns it.
+// The square root of half the sum, over both views and both coordinates, of the squared angle by
+// which a step of one pixel turns the ray. Only the component of a Jacobian's column orthogonal to
+// the ray turns it.
 double pixel_angle(const RayPairs& pairs, int i) {
   double sum = 0;
   for (int v = 0; v < 2; ++v) {

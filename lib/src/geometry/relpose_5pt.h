@@ -15,8 +15,9 @@ struct Samples5 {
 };
 void set_sample(Samples5* samples, int s, const Vec3 rays0[5], const Vec3 rays1[5]);
 
-// Of each sample: Frobenius norm 1, either sign; those for which the five points can all lie in
-// front of both cameras, or behind both. None for a degenerate sample.
+// The essential matrices of each sample, of Frobenius norm 1 and either sign: those for which the
+// five points can all lie in front of both cameras, or all behind both. A degenerate sample has
+// none.
 struct Essentials {
   double entries[kSamples5][kMaxRelpose5pt][9];
   int32_t count[kSamples5];
@@ -28,11 +29,12 @@ struct Essentials {
   }
 };
 
-// All kSamples5 samples are set, with finite rays; the first num_samples are solved.
+// All kSamples5 samples must be set, with finite rays; only the first num_samples are solved.
 void relpose_5pt(const tvk_table& kernels, const Samples5& samples, int num_samples,
                  Essentials* models);
 
-// One sample. essentials: room for kMaxRelpose5pt. Returns how many there are.
+// The same for one sample, with the portable kernel. essentials: room for kMaxRelpose5pt. Returns
+// how many there are.
 int relpose_5pt(const Vec3 rays0[5], const Vec3 rays1[5], Mat3 essentials[kMaxRelpose5pt]);
 
 }  // namespace tv

@@ -1,13 +1,14 @@
 // O. Naroditsky, X. S. Zhou, J. Gallier, S. I. Roumeliotis, K. Daniilidis, "Two efficient solutions
 // for visual odometry using directional correspondence", PAMI 2012: with one direction known in
-// both views, three points leave a quartic. The derivation here: docs/algorithms/gravity.md.
+// both views, three points give a quartic equation. The derivation here:
+// docs/algorithms/gravity.md.
 //
 // In level frames x1 = Rz(yaw) x0 + t, so that t is orthogonal to the three vectors
 // n_k = (Rz p_k) x q_k, and det(n_0, n_1, n_2) = 0 in the yaw alone. Written with complex numbers
 // P = px + i py, Q = qx + i qy, u = exp(i yaw):
 //   n_xy = i (pz Q - qz u P),   n_z = Im(conj(u P) Q),
 //   det = sum over cyclic (i, j, k) of n_z,k Im(conj(n_xy,i) n_xy,j).
-// Where u meets conj(u) in the second factor they cancel: the determinant has degree 2 in (cos,
+// In the second factor, every product u conj(u) is 1, so the determinant has degree 2 in (cos,
 // sin), not 3, and is a quartic in tan(yaw / 2), not a polynomial of degree six.
 #include "geometry/relpose_upright_3pt.h"
 
@@ -57,9 +58,10 @@ YawPolynomial turned(const YawPolynomial& f, double cosine, double sine) {
                        2 * (f.ss - f.cc) * product + f.cs * (c2 - s2)};
 }
 
-// cos, sin of multiples of 72 degrees. A polynomial with five coefficients cannot vanish at five
-// angles; so one of these offsets puts half a turn from it, where the tangent is infinite, far from
-// every root.
+// The cosine and sine of multiples of 72 degrees. The unknown is the tangent of half of yaw -
+// offset, with one of these as the offset; it is infinite half a turn from the offset. A polynomial
+// with five coefficients cannot vanish at all of five angles, so an offset exists for which no root
+// is there.
 constexpr double kOffsets[5][2] = {{1, 0},
                                    {0.30901699437494745, 0.95105651629515353},
                                    {-0.80901699437494745, 0.58778525229247314},
@@ -127,7 +129,7 @@ int relpose_upright_3pt(const Vec3 rays0[3], const Vec3 rays1[3], const Mat3& le
   const YawPolynomial f = yaw_polynomial(p, q);
   const double* offset = kOffsets[best_offset(f)];
   const YawPolynomial g = turned(f, offset[0], offset[1]);
-  // x = tan of half the rest: cos = (1 - x^2) / (1 + x^2), sin = 2 x / (1 + x^2).
+  // x = tan of half of yaw - offset: cos = (1 - x^2) / (1 + x^2), sin = 2 x / (1 + x^2).
   const double quartic[5] = {g.c + g.cc, 2 * (g.s + g.cs), 4 * g.ss - 2 * g.cc, 2 * (g.s - g.cs),
                              g.cc - g.c};
   double roots[4];

@@ -36,9 +36,10 @@ inline void epipolar(const RayPairs& p, int i, const Mat3& M, Epipolar* e) {
   e->n = (e->s0[0] * e->s0[0] + e->s0[1] * e->s0[1]) + (e->s1[0] * e->s1[0] + e->s1[1] * e->s1[1]);
 }
 
-// If all matches cost `bound` and the first `num` of `all` are drawn at random without replacement,
-// these cost at most the returned sum with a probability of 98 per cent: their mean plus two
-// standard deviations, each at most that of a variable in [0, 1] with this mean.
+// If the cost of all matches is `bound` and the first `num` of `all` are drawn at random without
+// replacement, the cost of these is at most the returned sum with a probability of 98 per cent:
+// their mean plus two standard deviations, each at most that of a variable in [0, 1] with this
+// mean.
 int64_t bound_of_first(int64_t bound, int num, int all) {
   const double mean = static_cast<double>(bound) / (static_cast<double>(all) * kCostOne);
   if (mean >= 1) return INT64_MAX;
@@ -64,7 +65,8 @@ bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double cu
   const double inverse = 1 / std::sqrt(e.n), share = e.c / e.n;
   slopes->residual = e.c * inverse;
   // c / sqrt(n) has the slopes (d c - c / n (s0' d s0 + s1' d s1)) / sqrt(n), s0 = J0' M' f1 and s1
-  // = J1' M f0: by M those of f1' M q0 + (q1 - f1)' M f0.
+  // = J1' M f0. Its slopes by the entries of M are those of the form f1' M q0 + (q1 - f1)' M f0,
+  // divided by sqrt(n).
   double q0[3], q1[3];
   for (int r = 0; r < 3; ++r) {
     double* const* J = pairs.jacobian[0] + 2 * r;
@@ -72,7 +74,7 @@ bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double cu
     J = pairs.jacobian[1] + 2 * r;
     q1[r] = e.f1[r] - share * (J[0][i] * e.s1[0] + J[1][i] * e.s1[1]);
   }
-  double along[2][3];  // M' q1, M q0: what a ray that moves changes
+  double along[2][3];  // M' q1, M q0: sqrt(n) times the slopes by ray 0 and by ray 1
   for (int r = 0; r < 3; ++r) {
     along[0][r] = (M(0, r) * q1[0] + M(1, r) * q1[1]) + M(2, r) * q1[2];
     along[1][r] = (M(r, 0) * q0[0] + M(r, 1) * q0[1]) + M(r, 2) * q0[2];
@@ -128,7 +130,7 @@ int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px
   const double inverse = 1 / (threshold_px * threshold_px);
   const float inverse_sq = static_cast<float>(inverse < 1e37 ? inverse : 1e37);
   const int num_blocks = static_cast<int>(padded_to_blocks(pairs.num)) / kScoreBlock;
-  // The padding costs kCostOne each.
+  // The kernel gives each entry of the padding the cost kCostOne.
   int64_t sum = -static_cast<int64_t>(num_blocks * kScoreBlock - pairs.num) * kCostOne;
   int done = 0;
   for (int end = kFirstBlocks; done < num_blocks; end *= 2) {

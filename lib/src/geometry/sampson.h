@@ -17,18 +17,18 @@ namespace tv {
 
 inline constexpr int kCostOne = TVK_SCORE_ONE;  // the cost of an outlier in an integer score
 
-// Squared Sampson distance; +inf for a match about which the model says nothing, because both rays
-// lie at the epipoles.
+// Squared Sampson distance; +inf for a match both of whose rays lie at the epipoles, where M does
+// not constrain them.
 double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 
-// Sampson's distance with its sign; its slopes by the entries of M, row by row; and its slopes by
-// the coordinates of a point that all pixels of both views move away from, as a principal point is:
-// rays move by -J, Jacobians by -d J. curvature: null, or d^2 ray / d pixel^2 of each view, 3 x
-// (xx, xy, yy), row by row.
+// Sampson's distance with its sign; its slopes by the entries of M, row by row; and its slopes by x
+// and y of the principal point that both views share, in pixels. A principal point that moves by d
+// moves every ray by -J d, and the Jacobians by the lens's curvature. curvature: null, or d^2 ray /
+// d pixel^2 of each view, 3 x (xx, xy, yy), row by row.
 struct SampsonSlopes {
   double residual, by_entry[9], by_point[2];
 };
-// False where the model says nothing about the match.
+// False where both rays lie at the epipoles.
 bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
                     SampsonSlopes* slopes);
 

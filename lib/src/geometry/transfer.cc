@@ -5,9 +5,9 @@ namespace {
 
 constexpr double kInfinity = __builtin_inf();
 
-// The prediction's displacement d, in pixels of image 1, and its slope d d / d h (2x3), h = H f0.
-// With P the left inverse of J1 that sends f1 to zero, d = P h / (m . h), where m = e_z on the
-// plane and f1 on the sphere.
+// The displacement d of the predicted pixel from the matched one, in pixels of image 1, and its
+// derivative by h = H f0, a 2x3 matrix. With P the left inverse of J1 that sends f1 to zero, d = P
+// h / (m . h), where m = e_z on the plane and f1 on the sphere.
 struct Transfer {
   double f0[3];
   double d[2];

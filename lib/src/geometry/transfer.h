@@ -1,8 +1,8 @@
 // The transfer residual of matches from a homography or a rotation H, which predicts where view 1
 // sees the ray of view 0.
 //
-// With d = the displacement in image 1, in pixels, between what H predicts and what view 1 saw,
-// weighted for noise in both images alike,
+// With d = the displacement in image 1, in pixels, from the matched pixel to the one that H
+// predicts, weighted for noise in both images alike,
 //     r^2 = d' (I + D D')^-1 d,  D = d (prediction) / d pixel0,
 // which is Sampson's distance of the two equations (Hartley & Zisserman 4.2.6). The kernels that
 // compute many at once are in kernels/transfer.h. Tests: test/unit/test_residuals.cc.

@@ -53,11 +53,11 @@ Vec3 solve_corrected(const TriangulationPair& pair, const Correction& correction
   return midpoint(pair, rays, along0, along1);
 }
 
-// ---- what is said about a point ----
+// ---- the fields of a point ----
 
 // Squared distance in pixels between a pixel and the projection of a point in the camera's frame. A
-// point behind is projected through the centre. Where the lens model cannot see it at all: the
-// angle off the pixel's ray, times the focal length.
+// point behind is projected through the centre. If the lens model does not see the point, the error
+// is the angle between it and the pixel's ray, times the focal length sqrt(fx fy).
 double error_sq_px(const Camera& camera, const Vec3& ray, const Vec2& pixel, const Vec3& point) {
   const double along = dot(ray, point);
   const Vec3 ahead = along < 0.0 ? Vec3(-point[0], -point[1], -point[2]) : point;
@@ -105,7 +105,7 @@ void write_infinite(const TriangulationPair& pair, const Match& match, double an
               point);
 }
 
-// Not finite where the method's own answer is at infinity.
+// The method's point for a baseline of 1. It is not finite where that point is at infinity.
 Vec3 solve(tv_triangulation method, const TriangulationPair& pair, const Match& match,
            const Vec3& midpoint_of_rays) {
   if (method == TV_TRIANGULATION_MIDPOINT) return midpoint_of_rays;
@@ -122,7 +122,7 @@ Vec3 solve(tv_triangulation method, const TriangulationPair& pair, const Match& 
   }
 }
 
-// What the kernel asks of a method and of the cameras.
+// Whether the kernel supports this method and these cameras.
 bool in_lanes(tv_triangulation method, const TriangulationPair& pair) {
   return (method == TV_TRIANGULATION_MIDPOINT || method == TV_TRIANGULATION_LINEAR_LS ||
           method == TV_TRIANGULATION_ITERATIVE_LS) &&
@@ -151,7 +151,8 @@ tvk_triangulate_pair kernel_pair(const TriangulationPair& pair) {
   return p;
 }
 
-// The kernel's points; returns whether one of them, with status -1, is left to triangulate_point.
+// Writes the kernel's points. Returns whether any of them has the status -1, which means that
+// triangulate_point must compute it.
 bool kernel_leaves_some(tv_triangulation method, const TriangulationPair& pair,
                         const double* pixels0, const double* pixels1, size_t num,
                         tv_point* points) {
@@ -182,7 +183,8 @@ TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& cam
   for (int row = 0; row < 3; ++row) {
     for (int col = 0; col < 3; ++col) pair.cam0_from_cam1_R(row, col) = R(col, row);
   }
-  // By the largest entry first: the square of a tiny or a huge t would be lost.
+  // t is divided by its largest entry first, because the squares of a tiny or a huge t would under-
+  // or overflow.
   double largest = 0.0;
   for (int i = 0; i < 3; ++i) largest = std::fabs(t[i]) > largest ? std::fabs(t[i]) : largest;
   const Vec3 scaled(t[0] / largest, t[1] / largest, t[2] / largest);
@@ -223,7 +225,8 @@ bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, cons
   for (int i = 0; i < 2; ++i) {
     if (!all_finite(correction.ray[i].data(), 3)) return false;
     if (cameras[i]->model.model == TV_CAMERA_PINHOLE) {
-      // Without the way through a ray, which costs a rounding or two of the pixel.
+      // The step is added to the pixel, because a projection of the corrected ray would add
+      // rounding errors.
       moved[i] = Vec2(pixels[i][0] + correction.step[i][0], pixels[i][1] + correction.step[i][1]);
     } else if (!project(*cameras[i], correction.ray[i], &moved[i], nullptr)) {
       return false;
@@ -242,7 +245,7 @@ void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, co
   const double cosine = dot(rays.ray0, rays.ray1_in_0);
   const double angle = atan2(std::sqrt(rays.normal_sq), cosine);
   if (!(rays.normal_sq > kParallelSine * kParallelSine)) {
-    // Opposed rays leave the depth open, too, but not because the point is far.
+    // Opposed rays do not determine the depth either, but their point is not at infinity.
     if (cosine > 0.0) return write_infinite(pair, match, angle, point);
     return write_invalid(point);
   }
@@ -253,8 +256,8 @@ void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, co
                     position[2] * pair.baseline);
   if (!all_finite(metric.data(), 3)) return write_infinite(pair, match, angle, point);
   const Vec3 position1 = combine(1.0, rotate(pair.cam1_from_cam0_R, position), 1.0, pair.direction);
-  // The two lines decide, the same for every method; and no method's point may lie behind and be
-  // called good.
+  // The two rays decide, so that the status is the same for every method. In addition, the method's
+  // own point must lie in front of both cameras.
   const bool in_front =
       along0 > 0.0 && along1 > 0.0 && dot(ray0, position) > 0.0 && dot(ray1, position1) > 0.0;
   write_point(in_front ? TV_POINT_OK : TV_POINT_BEHIND, metric, angle,

@@ -9,9 +9,9 @@
 
 namespace tv {
 
-// The sine of the angle between two rays at which they count as parallel. A ray's direction carries
-// a few units of 2^-53 from the pixel's rounding, the unprojection and the rotation; depth is the
-// baseline divided by this sine, so that below 16 * 2^-52 nothing of the depth is known.
+// The sine of the angle between two rays at which they count as parallel. A ray's direction has
+// errors of a few units of 2^-53 from the pixel's rounding, the unprojection and the rotation;
+// depth is the baseline divided by this sine, so that below 16 * 2^-52 the depth is not determined.
 inline constexpr double kParallelSine = 0x1p-48;
 
 // R is a rotation, t not zero.
@@ -35,8 +35,8 @@ bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, cons
 void triangulate_point(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
                        const Vec2& pixel1, tv_point* point);
 
-// Many matches at once, pixels num x 2: the same points but for rounding, in lanes where both
-// lenses are pinholes and the method has a closed form.
+// Many matches at once, pixels num x 2: the same points but for rounding. They are computed several
+// at once where both lenses are pinholes and the method has a closed form.
 void triangulate_points(tv_triangulation method, const TriangulationPair& pair,
                         const double* pixels0, const double* pixels1, size_t num, tv_point* points);
 

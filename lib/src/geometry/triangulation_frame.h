@@ -1,5 +1,5 @@
-// What the methods of triangulation share: sums in a written order, and the plane on which a
-// camera's pixel errors are measured.
+// What the methods of triangulation share: products of vectors with sums in a written order, a
+// basis across an axis, and the plane on which a camera's pixel errors are measured.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,8 @@
 
 namespace tv {
 
-// Written out: Eigen's sums are free to change their order with its version.
+// These products are written out, because another version of Eigen may form its sums in another
+// order, which would change the last bits.
 inline double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 inline Vec3 cross(const Vec3& a, const Vec3& b) {
@@ -25,8 +26,8 @@ inline Vec3 combine(double a, const Vec3& u, double b, const Vec3& v) {
   return Vec3(a * u[0] + b * v[0], a * u[1] + b * v[1], a * u[2] + b * v[2]);
 }
 
-// Two unit vectors that make a right-handed frame with a unit axis; the coordinate axis that is
-// farthest from it starts them.
+// Writes two unit vectors u, v that make a right-handed frame (axis, u, v) with a unit axis. They
+// are constructed from the coordinate axis that makes the largest angle with it.
 inline void complete_basis(const Vec3& axis, Vec3* u, Vec3* v) {
   const double size[3] = {std::fabs(axis[0]), std::fabs(axis[1]), std::fabs(axis[2])};
   Vec3 start(1.0, 0.0, 0.0);
@@ -40,10 +41,10 @@ inline void complete_basis(const Vec3& axis, Vec3* u, Vec3* v) {
 
 // The plane of a camera's undistorted image, where a pixel is 1/fx by 1/fy; or, for a camera that
 // sees beyond a half space and has no such plane, the plane that touches the viewing sphere at the
-// ray, where a pixel is 1 / sqrt(fx fy) both ways.
+// ray, where a pixel is 1 / sqrt(fx fy) wide and high.
 struct RayFrame {
   Vec3 ray;         // of depth 1: z = 1 on the image plane, a unit vector on the sphere
-  Vec3 rows[2];     // n, so that n . ray = 0
+  Vec3 rows[2];     // the vectors n of the two equations n . ray = 0
   Vec3 basis[2];    // of the plane of equal depth: -rows[i] . basis[j] = (i == j)
   Vec3 depth;       // depth of X is depth . X
   double pixel[2];  // a pixel's length along basis[i]

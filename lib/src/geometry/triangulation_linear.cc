@@ -4,7 +4,7 @@
 namespace tv {
 namespace {
 
-constexpr int kMaxReweightings = 10;  // Hartley & Sturm's bound
+constexpr int kMaxReweightings = 10;  // the bound that Hartley & Sturm use
 constexpr double kSettled = 1e-10;    // relative change of both depths that ends the reweighting
 
 // ---- Linear-LS and Iterative-LS ----
@@ -14,9 +14,9 @@ constexpr double kSettled = 1e-10;    // relative change of both depths that end
 // a camera that sees beyond a half space, where that plane does not exist, they are two directions
 // of the plane tangent to the viewing sphere at the ray. With X = depth ray0 + across . basis, the
 // equations of camera 0 read across = 0, those of camera 1 A across + m depth + b = 0, and least
-// squares over (across, depth) with row weights comes down to one division for the depth. No normal
-// matrix in X is formed: its condition grows with the square of the depth, this one's does not.
-// Camera 1's two equations in camera 0's unknowns.
+// squares over (across, depth) with row weights needs one division for the depth. No normal matrix
+// in X is formed, because its condition number grows with the square of the depth; that of this
+// system does not. LinearSystem holds camera 1's two equations in these unknowns.
 struct LinearSystem {
   double A[2][2], m[2], b[2];
   double cov0[3], cov1[3];  // xx, xy, yy of the residuals' covariance at unit weights
@@ -48,8 +48,8 @@ LinearSystem linear_system(const TriangulationPair& pair, const RayFrame& frame0
 
 // Least squares with the equations of camera i weighted by 1 / depth_i: the residuals m depth + b
 // have the covariance C = depth0^2 cov0 + depth1^2 cov1, so depth = -(m C^-1 b) / (m C^-1 m), and
-// what is left over, moved into camera 0's image by A, is `across`. C^-1 is used without its
-// determinant where only a ratio counts.
+// the remaining residual, carried into camera 0's image by A, gives `across`. The division of C^-1
+// by det C is left out where only a ratio matters.
 struct Solution {
   double depth0, depth1;
   Vec3 position;
@@ -82,8 +82,8 @@ bool has_settled(double now, double before) {
   return std::fabs(now - before) <= kSettled * std::fabs(now);
 }
 
-// Of the weights 1 / depth only the ratio counts: the larger becomes 1, and squares stay far from
-// overflow. Returns the depths' sizes, so scaled.
+// Returns |depth0| and |depth1|, both divided by the larger one: only the ratio of the weights 1 /
+// depth matters, and the squares of the scaled depths cannot overflow.
 struct Depths {
   double first, second;
 };
@@ -98,10 +98,10 @@ Depths scaled_depths(double depth0, double depth1) {
 //
 // The unit 4-vector (X, W) of the least |A (X, W)|^2, A the same four equations. In coordinates
 // along camera 0's ray and across it, still orthonormal, camera 0's rows are [N 0] and camera 1's
-// [B D], 2x2 blocks: N is never small, and det D is, of the order of the parallax times the
-// distance of the rays. The smallest singular vector comes by inverse iteration, (A^T A)^-1 with
-// its division by (det D)^2 left out: it counts for nothing in a direction, and for exact matches
-// it is one by zero.
+// [B D], 2x2 blocks: N is well conditioned; det D is small, of the order of the parallax times the
+// distance of the rays. The smallest singular vector is found by inverse iteration with (A^T A)^-1,
+// without its division by (det D)^2: the length of the vector does not matter, and for exact
+// matches det D is 0.
 struct Homogeneous {
   double n[2][2], b[2][2], d[2][2];
   Vec3 across[2], along;
@@ -144,14 +144,14 @@ Vec3 direction_of(const Homogeneous& s, const Vec4& v) {
 Vec4 inverse_times(const Homogeneous& s, double w0, double w1, const Vec4& v) {
   const double det_d = s.d[0][0] * s.d[1][1] - s.d[0][1] * s.d[1][0];
   const double det_n = s.n[0][0] * s.n[1][1] - s.n[0][1] * s.n[1][0];
-  // det y of A^T y = v, for rows without weights.
+  // det(D) y, where A^T y = v, for rows without weights.
   const double y2 = s.d[1][1] * v.x[2] - s.d[1][0] * v.x[3];
   const double y3 = s.d[0][0] * v.x[3] - s.d[0][1] * v.x[2];
   const double a0 = det_d * v.x[0] - (s.b[0][0] * y2 + s.b[1][0] * y3);
   const double a1 = det_d * v.x[1] - (s.b[0][1] * y2 + s.b[1][1] * y3);
   const double y0 = (s.n[1][1] * a0 - s.n[1][0] * a1) / det_n;
   const double y1 = (s.n[0][0] * a1 - s.n[0][1] * a0) / det_n;
-  // det^2 z of A z = y, each row's weight coming in twice.
+  // det(D)^2 z, where A z = y; each row's weight enters squared.
   const double f0 = w0 * w0, f1 = w1 * w1;
   const double z0 = f0 * (s.n[1][1] * y0 - s.n[0][1] * y1) / det_n;
   const double z1 = f0 * (s.n[0][0] * y1 - s.n[1][0] * y0) / det_n;
@@ -169,8 +169,10 @@ Vec4 scaled(const Vec4& v, double by) {
   return Vec4{{v.x[0] * by, v.x[1] * by, v.x[2] * by, v.x[3] * by}};
 }
 
-// When the two smallest singular values are near to each other: squaring (A^T A)^-1 squares their
-// ratio, and what is left after twelve times is of rank one, or has no single answer.
+// The smallest singular vector where the two smallest singular values are so close that inverse
+// iteration has not converged. Each squaring of (A^T A)^-1 squares their ratio: after thirteen
+// squarings the matrix has rank one, or the two are equal within rounding and the vector is not
+// unique.
 Vec4 by_squaring(const Homogeneous& s, double w0, double w1) {
   Vec4 column[4];
   for (int k = 0; k < 4; ++k) {

@@ -8,7 +8,7 @@ struct V2 {
   double x, y;
 };
 
-using tv::dot;  // of Vec3; those of V2 would hide it
+using tv::dot;  // dot of Vec3, which the one of V2 would hide
 double dot(V2 a, V2 b) { return a.x * b.x + a.y * b.y; }
 double cross(V2 a, V2 b) { return a.x * b.y - a.y * b.x; }
 V2 normal_of(V2 a) { return V2{-a.y, a.x}; }
@@ -17,12 +17,12 @@ V2 coordinates(const EpipolarPencil& pencil, int i, const Vec3& ray) {
   return V2{dot(pencil.axis[i][0], ray), dot(pencil.axis[i][1], ray)};
 }
 
-// step^T v: where a pixel's step along each direction takes it, across the line v.
+// step^T v: how far a step of one pixel along each direction moves the pixel across the line v.
 V2 gradient(const double step[2][2], V2 v) {
   return V2{step[0][0] * v.x + step[1][0] * v.y, step[0][1] * v.x + step[1][1] * v.y};
 }
 
-// The root of a complex number of length 1 that has no negative real part.
+// The square root, with a real part of at least 0, of a complex number of length 1.
 V2 half_turn(V2 z) {
   if (z.x >= 0.0) {
     const double re = std::sqrt(0.5 * (1.0 + z.x));
@@ -49,7 +49,8 @@ void diagonalise(const double M[2][2], V2* turn_u, V2* turn_v, double s[2]) {
   *turn_v = V2{z_mirror.x * turn_u->x + z_mirror.y * turn_u->y,
                z_mirror.y * turn_u->x - z_mirror.x * turn_u->y};
   s[0] = turn + mirror;
-  // turn - mirror would lose the small one's digits.
+  // The determinant is used, because turn - mirror would cancel the digits of the smaller singular
+  // value.
   const double det = M[0][0] * M[1][1] - M[0][1] * M[1][0];
   s[1] = s[0] > 0.0 ? det / s[0] : 0.0;
   if (std::fabs(s[1]) > s[0]) s[1] = s[1] < 0.0 ? -s[0] : s[0];
@@ -72,7 +73,7 @@ struct Secular {
   double sum_sq;
 };
 
-// False when mu leaves the lower half of its range; Newton's steps from mu = 0.
+// Newton's method from mu = 0. False when mu leaves the lower half of its range.
 bool solve_small(const Secular& s, double* mu) {
   const double largest = -0.5 / s.m[0];  // infinite when both epipoles are
   double at = s.c / s.sum_sq;
@@ -87,7 +88,8 @@ bool solve_small(const Secular& s, double* mu) {
     }
     const double step = (s.c - 0.5 * at * value) / slope;
     at += step;
-    // The next error is the square of this step, and the cost's the square of that.
+    // The error of mu after this step is about the square of the step, and the error of the cost is
+    // about the square of that.
     if (std::fabs(step) <= 1e-6 * at) {
       *mu = at;
       return at <= largest;
@@ -96,11 +98,12 @@ bool solve_small(const Secular& s, double* mu) {
   return false;
 }
 
-// The upper half: in e = 1 - mu s0, in (0, 1]. The constraint is nearly A - B / e^2 there, so
-// Newton's steps are taken on e^2 constraint, and kept in a bracket.
+// The upper half of mu's range, solved for e = 1 - mu s0, which lies in (0, 1]. The constraint is
+// nearly A - B / e^2 there, so Newton's method is applied to e^2 times the constraint, and kept in
+// a bracket. Returns e.
 double solve_near_bound(const Secular& s, const double s0) {
   const double ratio = std::fabs(s.m[2]) / s0;           // m[2] <= 0, m[3] = -m[2]
-  double low = std::sqrt(s.b_sq[0] / (4.0 * s0 * s.c));  // no more than 0 there
+  double low = std::sqrt(s.b_sq[0] / (4.0 * s0 * s.c));  // the constraint is <= 0
   if (!(low < 0.5)) low = 0.5;
   double high = 1.0;
   double e = low > 0.25 ? 0.7 : 2.0 * low;
@@ -160,9 +163,10 @@ double size_sq(const double step[2][2]) {
 // The plane of the least sum of squares.
 V2 plane_of_least_squares(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
   const double c = cross(alpha0, alpha1);
-  // The multiplier has the constraint's sign; turned positive, the eigenvalues change theirs. Along
-  // each singular direction the eigenvectors are d0 + d1 and d0 - d1 over sqrt 2; d0 + side d1 is
-  // the one whose eigenvalue is negative then.
+  // The multiplier has the sign of the constraint. Both are made positive by `sign`, which also
+  // changes the signs of the eigenvalues. Along each singular direction the eigenvectors are (d0 +
+  // d1) / sqrt 2 and (d0 - d1) / sqrt 2; (d0 + side d1) / sqrt 2 is then the one with the negative
+  // eigenvalue.
   const double sign = c < 0.0 ? -1.0 : 1.0;
   const double side[2] = {-sign, pencil.singular[1] < 0.0 ? sign : -sign};
   double low[2], high[2];  // b times sqrt 2
@@ -179,8 +183,8 @@ V2 plane_of_least_squares(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
             {-s0, s0, -s1, s1},
             0.0};
   s.sum_sq = (s.b_sq[0] + s.b_sq[1]) + (s.b_sq[2] + s.b_sq[3]);
-  // A gradient of zero along the first would leave its side open: two equal minima. One that is far
-  // below a pixel's rounding chooses.
+  // If the gradient along the first eigenvector is zero, there are two equal minima, one on either
+  // side. A gradient far below a pixel's rounding replaces it and so chooses one of the two.
   const double least = 1e-40 * (s.sum_sq + s.c * s0);
   if (s.b_sq[0] < least) {
     s.b_sq[0] = least;
@@ -198,7 +202,8 @@ V2 plane_of_least_squares(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
   }
   const V2 moved0 = moved_by(alpha0, pencil.turned[0], d0[0], d0[1]);
   const V2 moved1 = moved_by(alpha1, pencil.turned[1], d1[0], d1[1]);
-  // The two agree; the one that is farther from its epipole, in pixels, says it better.
+  // Both corrected pixels lie on the plane. It is computed from the one that is farther from its
+  // epipole, in pixels, because that one determines it more accurately.
   return dot(moved0, moved0) * size_sq(pencil.step[1]) >=
                  dot(moved1, moved1) * size_sq(pencil.step[0])
              ? normal_of(moved0)
@@ -211,7 +216,8 @@ V2 plane_of_least_squares(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
 // with N = |alpha . v| = a r + b t (an arc ends where it is zero) and Q = A r^2 + 2 B r t + C t^2,
 // and its derivative has the sign of L0 Q1^(3/2) + L1 Q0^(3/2), L = (A b - B a) r + (B b - C a) t.
 // (Squared, that is Hartley & Sturm's polynomial of degree 8.) Between the zeros of L0, L1 and of
-// the quartic of `critical_quartic` the ratio of the two terms is monotonic: one root at most.
+// the quartic of `critical_quartic` the ratio of the two terms is monotonic, so there is at most
+// one root.
 struct Arc {
   double a[2], b[2];
   double A[2], B[2], C[2];
@@ -225,7 +231,7 @@ double linear(const Arc& arc, int i, double t) {
 double form(const Arc& arc, int i, double t) {
   const double r = 1.0 - t;
   const double q = arc.A[i] * r * r + 2.0 * arc.B[i] * r * t + arc.C[i] * t * t;
-  return q > 0.0 ? q : 0.0;  // a line at infinity may come out below zero
+  return q > 0.0 ? q : 0.0;  // rounding may give a line at infinity a value below 0
 }
 
 double distance(const Arc& arc, int i, double t) {
@@ -235,7 +241,7 @@ double distance(const Arc& arc, int i, double t) {
 
 double cost(const Arc& arc, double t) { return distance(arc, 0, t) + distance(arc, 1, t); }
 
-// The cost's derivative but for a positive factor.
+// The derivative of the cost, times a positive factor.
 double slope(const Arc& arc, double t) {
   const double q0 = form(arc, 0, t), q1 = form(arc, 1, t);
   return linear(arc, 0, t) * (q1 * std::sqrt(q1)) + linear(arc, 1, t) * (q0 * std::sqrt(q0));
@@ -272,7 +278,7 @@ int num_sign_changes(const double p[5]) {
   return changes;
 }
 
-// de Casteljau's halves.
+// The Bernstein coefficients of the two halves of the interval, by de Casteljau's algorithm.
 void halve(const double p[5], double left[5], double right[5]) {
   double q[5];
   for (int k = 0; k < 5; ++k) q[k] = p[k];
@@ -283,9 +289,9 @@ void halve(const double p[5], double left[5], double right[5]) {
   }
 }
 
-// The zeros in (0, 1) of a quartic in Bernstein's basis, ascending, to 2^-kDepth. The number of
-// sign changes bounds that of the zeros, and halving brings it down to it; roots nearer to each
-// other than the rounding come out as one.
+// Writes the zeros in (0, 1) of a quartic in Bernstein's basis, ascending, to 2^-kDepth. The number
+// of sign changes of the coefficients bounds the number of zeros: a piece without any is dropped,
+// every other one is halved down to that width. Zeros closer together are returned as one.
 int zeros_in_unit_interval(const double quartic[5], double zeros[8]) {
   constexpr int kDepth = 40;
   struct Piece {
@@ -316,8 +322,9 @@ int zeros_in_unit_interval(const double quartic[5], double zeros[8]) {
   return num_zeros;
 }
 
-// The minimum of a piece whose slope goes from negative to positive, once: the secant's zero, with
-// the weight of an end that stays halved (the Illinois rule), or the middle.
+// The minimum of a piece on which the slope changes its sign once, from negative to positive: by
+// the secant method, in which the slope at an end that stays is halved (the Illinois rule), and by
+// bisection where the secant leaves the bracket or after 50 steps.
 double bracketed_minimum(const Arc& arc, double low, double high, double at_low, double at_high) {
   const double enough = 1e-10 * (high - low);
   for (int i = 0; i < 100 && high - low > enough; ++i) {
@@ -338,8 +345,9 @@ double bracketed_minimum(const Arc& arc, double low, double high, double at_low,
   return 0.5 * (low + high);
 }
 
-// Whether the slope surely keeps its sign, by bounds of its parts over the whole arc: a polynomial
-// in Bernstein's basis lies within its coefficients.
+// Whether the slope certainly has one sign on the whole arc, from bounds of its parts: the values
+// of a polynomial lie between its smallest and its largest Bernstein coefficient. False means only
+// that this is not certain.
 bool is_surely_monotonic(const Arc& arc) {
   double q_min[2], q_max[2], l_min[2], l_max[2];
   for (int i = 0; i < 2; ++i) {
@@ -358,7 +366,8 @@ bool is_surely_monotonic(const Arc& arc) {
          l_min[1] * l_min[1] * cube(q_min[0]) > l_max[0] * l_max[0] * cube(q_max[1]);
 }
 
-// The inner minimum of an arc that costs less than *best, if there is one: its place, else -1.
+// Returns the place of the lowest inner minimum of an arc if its cost is below *best, which then
+// becomes that cost; else -1.
 double search_arc(const Arc& arc, double* best) {
   double split[12];
   double quartic[5];
@@ -385,7 +394,8 @@ double search_arc(const Arc& arc, double* best) {
     best_t = t;
   };
   // The slope may be zero at a split, with any sign after rounding (where L0 and Q0 vanish
-  // together, it jumps there): it is asked just inside, and the split itself is a candidate.
+  // together, it jumps there): it is therefore evaluated just inside the piece, and the split
+  // itself is a candidate for the minimum.
   double low = 0.0;
   for (int i = 0; i < num; ++i) {
     const double high = split[i];
@@ -402,7 +412,7 @@ double search_arc(const Arc& arc, double* best) {
   return best_t;
 }
 
-// A plane with what the two images make of it.
+// A plane v, with its gradient and its numerator |alpha . v| in each image.
 struct Plane {
   V2 v;
   V2 gradient[2];
@@ -453,13 +463,14 @@ void improve(const Plane& first, const Plane& last, const Arc& arc, double* best
   *v = V2{(1.0 - t) * first.v.x + t * last.v.x, (1.0 - t) * first.v.y + t * last.v.y};
 }
 
-// The planes of the two pixels part the pencil into two arcs; the longer is halved. Along an arc of
-// which no pixel's plane is an inner point each distance rises and falls at most once, and is
-// nowhere less than at the nearer end.
+// The planes of the two pixels divide the pencil into two arcs; the longer one is halved. Along an
+// arc that has no pixel's plane inside it, each distance first rises and then falls at most once,
+// so its least value is at one of the ends.
 V2 plane_of_least_distances(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
   const V2 alpha[2] = {alpha0, alpha1};
   if (cross(alpha0, alpha1) == 0.0) {
-    // On a common plane already, which a pixel on its epipole leaves to the other.
+    // Both pixels lie on a common plane already. If pixel 0 is on its epipole, pixel 1 determines
+    // the plane.
     return dot(alpha0, alpha0) > 0.0 ? normal_of(alpha0) : normal_of(alpha1);
   }
   Plane own[2] = {scaled_plane(pencil, alpha, normal_of(alpha0)),
@@ -474,7 +485,8 @@ V2 plane_of_least_distances(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) 
   const Arc shorter = arc_between(own[0], own[1]);
   if (!is_surely_monotonic(shorter)) improve(own[0], own[1], shorter, &best, &v);
 
-  // The middle of the longer arc: orthogonal, for the product of `inner_product`, to the shorter's.
+  // The middle of the longer arc: orthogonal, for the product of `inner_product`, to the middle of
+  // the shorter one.
   V2 sum[2];
   for (int i = 0; i < 2; ++i) {
     sum[i] = V2{own[0].gradient[i].x + own[1].gradient[i].x,
@@ -534,7 +546,7 @@ Correction correct_rays(PixelCost cost, const EpipolarPencil& pencil, const RayF
   const V2 alpha[2] = {coordinates(pencil, 0, frame0.ray), coordinates(pencil, 1, frame1.ray)};
   V2 v = cost == PixelCost::kSumOfSquares ? plane_of_least_squares(pencil, alpha[0], alpha[1])
                                           : plane_of_least_distances(pencil, alpha[0], alpha[1]);
-  if (v.x == 0.0 && v.y == 0.0) v.x = 1.0;  // both pixels on their epipoles: every plane will do
+  if (v.x == 0.0 && v.y == 0.0) v.x = 1.0;  // both pixels on their epipoles: any plane fits
   Correction correction;
   for (int i = 0; i < 2; ++i) {
     const V2 across = gradient(pencil.step[i], v);

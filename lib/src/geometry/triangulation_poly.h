@@ -7,22 +7,23 @@
 
 namespace tv {
 
-// The planes through the baseline, n = v[0] axis[0] + v[1] axis[1], and what a pixel's step does to
-// them. A point with ray x of an image has the coordinates alpha = (axis[0] . x, axis[1] . x); it
-// is on the plane v where alpha . v = 0, two points correspond where alpha0 x alpha1 = 0, and a
-// step d (in pixels along the frame's basis) moves alpha by step d. The line v is |alpha . v| /
-// sqrt(v step step^T v) pixels away.
+// The planes through the baseline, n = v[0] axis[0] + v[1] axis[1], and how a pixel's step changes
+// the distances from them. A point with ray x of an image has the coordinates alpha = (axis[0] . x,
+// axis[1] . x); it is on the plane v where alpha . v = 0, two points correspond where alpha0 x
+// alpha1 = 0, and a step d (in pixels along the frame's basis) moves alpha by step d. The line v is
+// |alpha . v| / sqrt(v step step^T v) pixels away.
 struct EpipolarPencil {
   Vec3 axis[2][2];         // of camera i, in its own frame
-  double step[2][2][2];    // of camera i: [axis][basis]
+  double step[2][2][2];    // of camera i: d alpha[axis] / d (pixels along basis)
   double turned[2][2][2];  // the same after the turns that make step0^T [0 1; -1 0] step1 diagonal
   double singular[2];      // that diagonal, |singular[1]| <= singular[0]
 };
 
-// The axes alone: cam0_from_cam1's centre is a unit vector in camera 0's frame.
+// Sets `axis` alone. center1: the centre of camera 1, as a unit vector in camera 0's frame.
 void set_pencil_axes(const Vec3& center1, const Mat3& cam1_from_cam0_R, EpipolarPencil* pencil);
 
-// The rest. On an image plane it is the same for all rays; on the sphere each ray has its own.
+// Sets `step`, `turned` and `singular`. On an image plane they are the same for all rays; on the
+// sphere each ray has its own.
 void set_pencil_steps(const RayFrame& frame0, const RayFrame& frame1, EpipolarPencil* pencil);
 
 struct Correction {
@@ -32,7 +33,8 @@ struct Correction {
 
 enum class PixelCost { kSumOfSquares, kSumOfDistances };
 
-// The global minimum. With numbers too large for doubles the result is not finite.
+// Returns the correction of least cost, which is the global minimum. With numbers too large for
+// doubles the result is not finite.
 Correction correct_rays(PixelCost cost, const EpipolarPencil& pencil, const RayFrame& frame0,
                         const RayFrame& frame1);
 

@@ -23,7 +23,7 @@ constexpr double kMaxFloat = std::numeric_limits<float>::max();
 constexpr double kMaxPixel = 1e6;
 constexpr double kNearChange = 0.1;     // a smaller relative change of the cost: Newton takes over
 constexpr double kSmallChange = 1e-10;  // a smaller relative change of the cost: converged
-constexpr double kNoErrorSq = 1e-20;    // px^2 for each match: nothing is left to lower
+constexpr double kNoErrorSq = 1e-20;    // px^2 for each match: errors this small count as none
 constexpr double kFirstDamping = 1e-4, kMinDamping = 1e-10, kMaxDamping = 1e8;
 // With more damping, a small change of the cost is no evidence for a minimum.
 constexpr double kHonestDamping = 1.0;

@@ -18,7 +18,7 @@ struct BundleOutcome {
   double noise_px;
 };
 
-// The arena that one adjustment takes.
+// How many bytes of arena one adjustment takes.
 size_t bundle_scratch_bytes(int max_points);
 
 // points: in units of `baseline`; those that take part are updated.

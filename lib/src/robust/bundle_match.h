@@ -58,9 +58,9 @@ bool linearise(const Camera cameras[2], const BundleFrame& frame, const BundlePo
 // The squared error of both projections, px^2.
 double error_sq(const BundleMatch& match);
 
-// The match with its point eliminated: to first order, the least error that the pose leaves is one
-// signed distance r (Sampson's, about the present point), and the Schur complement of the match's
-// block is a a', a = dr / dpose.
+// The match with its point eliminated: to first order, the least error over all points is, for a
+// given pose, one signed distance r (Sampson's, about the present point), and the Schur complement
+// of the match's block is a a', a = dr / dpose.
 struct Elimination {
   double r;
   double a[5];      // for the pose parameters (w, a, b) of PoseModel

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kMaxPointStep = 0.5;  // of a direction, radians; of a point's distance to camera 1
 // A step of the pose may make a point's squared error grow to kGrowth times itself plus kGrowthSq,
-// px^2, before the point is brought to its least error anew.
+// px^2; beyond that the point's error is minimised at the new pose.
 constexpr double kGrowth = 2.0, kGrowthSq = 0.01;
 constexpr int kMaxPolishes = 4;
 constexpr int kMaxTrials = 30;         // steps of one point at a fixed pose

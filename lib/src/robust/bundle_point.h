@@ -7,20 +7,20 @@
 
 namespace tv {
 
-// The i-th match's point after a step of the pose that leads from old_frame to frame. Its
-// linearised answer to the step is nearly always good. Where it is not, or where a camera does not
-// see the point any more, the point is brought to its least error anew: first from where it was,
-// then, if this does not help, from the match's rays. `careful`: no growth of the error is accepted
-// without this. False where no place is found at which both cameras see the point.
+// The i-th match's point after a step of the pose that leads from old_frame to frame. Nearly always
+// the point moves by linear_step. Where its error then grows too much, or a camera no longer sees
+// it, its error is minimised at the new pose: from its old position, and, if that fails, from the
+// match's rays. `careful`: this is done at any growth of the error. False where no position is
+// found that both cameras see.
 bool try_point(const BundleProblem& problem, const BundleFrame& old_frame, const BundleFrame& frame,
                const double step[5], bool careful, const BundleMatch& match, int32_t i,
                BundleMatch* out);
 
-// Moves the i-th match's point nearer to its least error at the present pose while this gains
-// anything, and returns its elimination. What is left to gain is about |error|^2 - r^2. This is
-// next to nothing for a good match, since the projections are nearly linear over its few pixels;
-// only the points of wrong matches take several steps, and without these the whole adjustment would
-// converge as slowly as they do.
+// Lowers the error of the i-th match's point at the present pose while a step gains more than a
+// millionth of it, and returns the point's elimination. A step can gain about |error|^2 - r^2. For
+// a correct match this is nearly 0, since the projections are nearly linear over its few pixels.
+// Points of wrong matches take several steps; without these steps the whole adjustment would
+// converge slowly.
 Elimination polish_point(const BundleProblem& problem, const BundleFrame& frame, int32_t i,
                          BundleMatch* match);
 

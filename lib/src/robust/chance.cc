@@ -23,8 +23,9 @@ double log_factorial(int n) {
   return (x + 0.5) * log(x) - x + 0.91893853320467274178 + 1 / (12 * x) - 1 / (360 * x * x * x);
 }
 
-// Whether a share of `agreeing` of `drawn` tells a probability from the limit: were it the limit's,
-// the share would be as far away with probability exp(-kClear) at most (Chernoff's bound).
+// Whether the share agreeing / drawn shows on which side of the limit its probability lies: if the
+// probability were equal to the limit, a share as far from it would occur with a probability of at
+// most exp(-kClear) (Chernoff's bound).
 bool is_clear(int agreeing, int drawn, double limit) {
   constexpr double kClear = 25;
   if (drawn == 0 || !(limit > 0 && limit < 1)) return false;
@@ -35,7 +36,7 @@ bool is_clear(int agreeing, int drawn, double limit) {
   return n * divergence > kClear;
 }
 
-// Points of view 0 with others of view 1, in the arrays' own form.
+// Wrong matches, made of points of view 0 and other points of view 1, stored as RayPairs.
 struct WrongPairs {
   double storage[18][kChunk];
   RayPairs arrays;
@@ -89,8 +90,9 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   constexpr int kPairings = 1024;
   constexpr double kPriorWeight = 100;
   const RayPairs& pairs = matches.pairs;
-  // A band of half width sqrt(2) T: Sampson's distance shares the error between the two images. Its
-  // length is about the image's side.
+  // The share of the image that a band around a line covers, of half width sqrt(2) T, because
+  // Sampson's distance shares the error between the two images. The band's length is taken as the
+  // image's side.
   const double prior =
       std::min(1.0, 2.8284271247461903 * threshold_px / std::sqrt(matches.area_px));
   const int n = matches.num_unique();
@@ -109,7 +111,7 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
     agreeing += wrong.count_agreeing(pairs, listed, M, threshold_px);
     drawn += kChunk;
   }
-  // Of few matches there are fewer different pairings than were drawn.
+  // Few matches have fewer different pairings than were drawn, and count less against the prior.
   const double different = 0.5 * n * (n - 1.0);
   const double weight = different < kPairings ? different : kPairings;
   return (weight * agreeing / drawn + kPriorWeight * prior) / (weight + kPriorWeight);

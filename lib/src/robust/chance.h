@@ -10,7 +10,7 @@ namespace tv {
 double log_binomial(int n, int k);
 
 // log of the expected number of models, among all that samples of m matches give, that k or more of
-// n matches agree with by chance, when one does with probability p (L. Moisan, B. Stival, "A
+// n matches agree with by chance, where each does with probability p (L. Moisan, B. Stival, "A
 // probabilistic criterion to detect rigid point matches", IJCV 2004):
 //   NFA = models (n - m) C(n, k) C(k, m) p^(k - m).
 double log_false_alarms(int n, int k, int m, int models, double p);
@@ -20,10 +20,10 @@ inline constexpr double kLogMeaningful = -4.605170185988091;  // NFA < 0.01
 // The probability p at which log_false_alarms is kLogMeaningful; k > m.
 double meaningful_chance(int n, int k, int m, int models);
 
-// The probability that a match of view 0's point with a wrong point of view 1 agrees with M:
-// counted over wrong pairings of these very points, so that crowded points are allowed for; weighed
-// with the share of the image that a band of the threshold's width covers. Counting ends when it is
-// clear on which side of `limit` the count will lie.
+// The probability that a point of view 0, matched with a wrong point of view 1, agrees with M. It
+// is counted over wrong pairings of the matched points, so that it is right for crowded points,
+// too, and averaged with a prior: the share of the image that a band of the threshold's width
+// covers. Counting ends early when it is clear on which side of `limit` the probability lies.
 double chance_of_agreement(const Matches& matches, const Mat3& M, double threshold_px,
                            uint64_t seed, double limit = 0);
 

@@ -21,14 +21,14 @@ constexpr double kVarianceOfCauchy = 1.1484187788317, kVarianceOnPlane = 1.0919;
 constexpr double kLeastResidual = 0.05;  // of the loss's scale
 constexpr int kChunk = 64;               // matches at a time, on the stack
 
-// What the residuals say about the loss: sums over the matches.
+// Sums over the matches of psi^2, psi' and psi'^2.
 struct LossSums {
   double psi_sq = 0, slope = 0, slope_sq = 0;
 };
 
-// Huber's variance for n residuals of `dimensions` each and p parameters; negative where the loss
-// has no curvature left. cut_slope: what the mean of psi' loses because matches beyond a limit take
-// no part: 2 psi(limit) times the density of the residuals there.
+// Huber's variance for n residuals of `dimensions` each and p parameters; negative where the mean
+// curvature of the loss is too small. cut_slope: what the mean of psi' loses because matches beyond
+// a limit take no part: 2 psi(limit) times the density of the residuals there.
 double variance_of(const LossSums& sums, int n, int dimensions, int p, double scale_px,
                    double cut_slope) {
   const double mean = sums.slope / n - cut_slope;
@@ -37,7 +37,8 @@ double variance_of(const LossSums& sums, int n, int dimensions, int p, double sc
   const double K = 1 + p / static_cast<double>(dimensions * n) * of_slope / (mean * mean);
   const int left = dimensions * n - p;
   if (left <= 2) return -1;
-  // Student's: the noise is told by as many residuals only.
+  // The variance of Student's distribution, since the noise itself is estimated from `left` degrees
+  // of freedom.
   const double student = static_cast<double>(left) / (left - 2);
   const double variance = student * K * K * sums.psi_sq / left / (mean * mean);
   const double least = kLeastResidual * scale_px;
@@ -87,8 +88,8 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   uncertainty->noise_px = noise_px;
   uncertainty->variance_px = variance;
   if (!(variance > 0)) return false;
-  // A = J' J holds J at the noisy pixels. A0, without what the noise adds to it, is what the motion
-  // of the points tells: C = A0^-1 A A0^-1.
+  // A = J' J holds J at the noisy pixels. A0, without what the noise adds to it, is the information
+  // of the points' motion alone: C = A0^-1 A A0^-1.
   double noise[3];
   direction_noise(pairs, indices, count, pose, noise);
   double exact[15], A[25], half[25];

@@ -1,4 +1,5 @@
-// How sure a pose is.
+// The covariance of a pose, alone or fitted with a plane, and the noise of a pixel, both from the
+// residuals; and the covariance of the inverse pose.
 #pragma once
 
 #include "robust/estimators.h"
@@ -16,10 +17,11 @@ struct PoseUncertainty {
 // parameters,
 //     C = K^2 sum psi(r)^2 / (n - p - 2) / (mean psi'(r))^2 (J' J)^-1,
 //     K = 1 + p / n var(psi') / (mean psi')^2.
-// It allows for what the loss loses against least squares, and for the wrong matches among the
-// listed, which lie within limit_px. J is taken without what the noise of the pixels adds to it: at
-// a low parallax that is a part of it. Residuals of a twentieth of scale_px and less count as that:
-// exact input is no exact camera. False when a parameter is not determined.
+// The formula includes the lower efficiency of the loss compared with least squares, and the effect
+// of wrong matches among the listed ones. limit_px: the largest residual of a listed match. What
+// the noise of the pixels contributes to J' J is subtracted, because at a low parallax it is a
+// considerable part. The standard deviation of a residual counts as at least scale_px / 20, since
+// even exact input comes from a camera that is not exact. False when a parameter is not determined.
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                       double scale_px, double limit_px, PoseUncertainty* uncertainty);
 

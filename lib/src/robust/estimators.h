@@ -1,4 +1,5 @@
-// The models that the robust loop (loop.h) estimates.
+// The models that the robust loop (loop.h) estimates, the matches that are near a model, and the
+// pose of an essential matrix.
 #pragma once
 
 #include "geometry/relpose_5pt.h"
@@ -9,15 +10,16 @@
 
 namespace tv {
 
-// Local optimisation looks this many thresholds far, so that matches can come in, and takes this
-// many steps. A pose's takes into account no more than kMostLocal matches: the final refinement
-// sees all.
+// Local optimisation uses the matches within kNear thresholds, so that further matches can become
+// inliers. It takes at most kLocalIterations steps, until a step lowers the cost by less than
+// kLocalGain of it. For a pose it uses at most kMostLocal matches; the final refinement uses all.
 inline constexpr int kMostLocal = 128;
 inline constexpr double kNear = 3;
 inline constexpr int kLocalIterations = 5;
 inline constexpr double kLocalGain = 1e-3;
 
-// What PoseEstimator solves and finds at once: 7.7 KB, in the arena for the stack's sake.
+// The samples that PoseEstimator solves at once, and their models: 7.7 KB, in the arena to save
+// stack.
 struct PoseBatch {
   Samples5 rays;
   Essentials models;
@@ -58,8 +60,8 @@ struct FundamentalEstimator {
   void refine_model(Model* model) const;
 };
 
-// A residual in two dimensions is held against the same quantile as the epipolar one: at 95 per
-// cent chi-square is 3.84 with one degree of freedom, 5.99 with two.
+// A residual in two dimensions has its threshold at the same quantile as the epipolar one: at 95
+// per cent chi-square is 3.84 with one degree of freedom, 5.99 with two.
 inline constexpr double kTransferThresholdScale = 1.2489995996796797;  // sqrt(5.99 / 3.84)
 
 // A homography from four rays, a rotation from two; over the listed matches only.
@@ -101,13 +103,14 @@ struct RotationEstimator : TransferEstimator {
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
                  int32_t* indices);
 
-// The same for a pose, which also has them not behind a camera by more than the threshold's
-// parallax.
+// The same for a pose, without the matches whose point lies behind a camera by more than
+// threshold_px of parallax.
 int near_matches(const RayPairs& pairs, int count, const Pose& pose, double limit_px,
                  double threshold_px, int32_t* indices);
 
 // The pose of an essential matrix that puts most of the listed matches in front of both cameras;
-// false when E is none, or when a listed match is clearly behind and `strict`.
+// False when E is zero or not finite, or when `strict` is set and a listed match is clearly behind
+// a camera.
 bool pose_from_essential(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& E,
                          double threshold_px, bool strict, Pose* pose);
 

@@ -5,13 +5,13 @@
 namespace tv {
 namespace {
 
-// Rounds with a wider threshold only bring the pose near.
+// The rounds with a wider threshold only bring the pose near its minimum and need few steps.
 constexpr int kWideIterations = 4;
 constexpr double kWidest = 16;
 
-// How many thresholds wide local optimisation begins: about what gravity's error moves a point by,
-// less what yaw and translation make up for; a power of two. docs/algorithms/gravity.md has the
-// measurements.
+// The width, in thresholds, with which local optimisation begins: about the distance by which
+// gravity's error moves a point, less the part that yaw and translation compensate; a power of two,
+// at most kWidest. docs/algorithms/gravity.md has the measurements.
 double first_width(const RayPairs& pairs, double threshold_px, double sigma_rad) {
   double sum = 0;
   for (int i = 0; i < pairs.num; ++i) sum += pairs.pixel_angle[i];
@@ -21,7 +21,8 @@ double first_width(const RayPairs& pairs, double threshold_px, double sigma_rad)
   return power;
 }
 
-// Turns t where the sample asks for it. False when a match is clearly behind a camera either way.
+// Gives t the sign with which the sample's points lie in front of the cameras. False when a match
+// is clearly behind a camera with either sign.
 bool face_forward(const RayPairs& pairs, const int32_t* sample, double threshold_px, Pose* pose) {
   int behind[2] = {}, in_front[2] = {};
   for (int k = 0; k < 3; ++k) {

@@ -7,16 +7,16 @@
 
 namespace tv {
 
-// Scores as PoseEstimator does. Gravity is noisy, and a sampled pose is off by as much: local
-// optimisation turns it freely, with gravity as a prior, and with a threshold that begins wide
-// enough and halves to the true one.
+// Scores as PoseEstimator does. A sampled pose has the error of the measured gravity. Local
+// optimisation therefore refines all five parameters, with gravity as a prior, and with a threshold
+// that begins at width_first thresholds and is halved down to one.
 struct UprightEstimator : PoseEstimator {
   static constexpr int kSampleSize = 3;
   static constexpr int kMaxModels = kMaxRelposeUpright3pt;
   static constexpr int kBatch = 1;
   const GravityPrior& gravity;
   Mat3 level0, level1;  // level_from_camera of gravity.down
-  double width_first;   // of local optimisation, thresholds
+  double width_first;   // the first threshold of local optimisation, in thresholds
   int generate_models(const int32_t* sample, Pose* models) const;
   void refine_model(Pose* model) const;
 };

@@ -12,7 +12,8 @@
 namespace tv {
 namespace {
 
-// Grows with the angle between a match's rays, R taken off: 0 to 2 for 0 to 180 degrees.
+// A number that increases with the angle between a match's rays after the rotation was removed:
+// from 0 to 2 for 0 to 180 degrees.
 double pseudo_angle(const Fit& f, int i) {
   const RayPairs& pairs = f.matches.pairs;
   const double b[3] = {pairs.ray[1][0][i], pairs.ray[1][1][i], pairs.ray[1][2][i]};
@@ -25,8 +26,8 @@ double pseudo_angle(const Fit& f, int i) {
 
 double angle_of_pseudo(double p) { return p < 1 ? atan2(p, 1 - p) : atan2(2 - p, 1 - p); }
 
-// The largest standard deviation of the rotation and of the direction, bounded from above by the
-// traces of their blocks.
+// An upper bound of the standard deviations of the rotation and of the direction about any axis:
+// the root of the larger trace of their two blocks.
 double largest_sigma(const double covariance[25]) {
   const double rotation = covariance[0] + covariance[6] + covariance[12];
   const double direction = covariance[18] + covariance[24];
@@ -132,8 +133,8 @@ void measure_inliers(Fit& f) {
   for (int v = 0; v < 2; ++v) evidence.coverage[v] = coverage(f, v);
 }
 
-// A model of the rest that is no part of the first: of the matches farther from it than kClear
-// thresholds.
+// A second model is searched only among the matches that are farther from the first than kClear
+// thresholds, so that it is no part of the first.
 constexpr double kClear = 3;
 
 bool has_second_model(Fit& f, Arena& arena) {
@@ -153,7 +154,7 @@ bool has_second_model(Fit& f, Arena& arena) {
       .found;
 }
 
-// Of all points where there is a second model, else of the inliers.
+// Examines the neighbours of all points where there is a second model, else those of the inliers.
 void measure_lattices(Fit& f, Arena& arena) {
   ArenaScope scope(arena);
   Evidence& evidence = f.out->evidence;

@@ -17,31 +17,31 @@ namespace {
 
 constexpr double kInfinity = __builtin_inf();
 
-// Cauchy's loss has a scale that follows the noise, this many times the standard deviation that the
-// inliers' median residual tells, since the threshold says little about it: sub-pixel matches are
-// far better than 1 px. So for a fundamental matrix, and for the uncertainty of a pose.
+// The scale of Cauchy's loss, in standard deviations of the noise as median_noise_px estimates it.
+// It follows the noise and not the threshold, because the noise of sub-pixel matches is far below a
+// threshold of 1 px. It is used for a fundamental matrix and for the covariance of a pose.
 constexpr double kFinalScale = 1.5;
 
-// A wrong match that lies near an epipolar line moves its point anywhere along it; a true one moves
-// it as far as its depth asks. Matches with this many times the parallax that nine in ten stay
-// below take no part.
+// A wrong match near an epipolar line may lie anywhere along it, and a correct one lies where its
+// depth puts it. Matches whose parallax exceeds kFarParallax times the 90 % quantile take no part.
 constexpr double kFarParallax = 3;
-constexpr int kParallaxSample = 128;  // matches that tell it
+constexpr int kParallaxSample = 128;  // matches that the quantile is computed from
 
 // A pose is refined at the one of these scales, in standard deviations, at which Huber's estimate
-// of the variance, sum psi^2 / (sum psi')^2, is least: heavy tails want a small one, plain noise a
-// large one. Its uncertainty is still that of kFinalScale, since a variance that was chosen for
-// being small reads low. docs/decisions/0002-robust-loop.md has the measurements.
+// of the variance, sum psi^2 / (sum psi')^2, is least: with heavy tails that is a small one, with
+// normal noise a large one. The covariance is still computed at kFinalScale, since a variance that
+// was chosen for being small is biased low. docs/decisions/0002-robust-loop.md has the
+// measurements.
 constexpr double kScales[] = {1, 1.5, 2, 3};
 constexpr double kLargestScale = 2;  // in thresholds
 constexpr double kMostStretch = 1.5;
 
-// The first round's pose only says which matches are near, and how large the noise is. A step that
-// gains less than a millionth of the cost is a fiftieth of a standard deviation long, and the next
-// one a tenth of that.
+// The relative gain of the cost at which each round stops. The pose of the first round only serves
+// to select the near matches and to estimate the noise. A step that gains less than a millionth of
+// the cost is a fiftieth of a standard deviation long, and the next one a tenth of that.
 constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
 
-// The matches that take part in a pose's final refinement, into f.indices.
+// Writes the matches that take part in a pose's final refinement to f.indices; returns how many.
 int near_pose(const PoseRefiner& f, const Pose& pose) {
   const int count = near_matches(f.matches.pairs, f.matches.pairs.num, pose,
                                  kFinalNear * f.threshold_px, f.threshold_px, f.indices);
@@ -65,9 +65,9 @@ int near_pose(const PoseRefiner& f, const Pose& pose) {
 // The loss of least estimated variance over the listed matches.
 struct BestLoss {
   RobustLoss loss;
-  double taken;    // sqrt(sum psi^2 / sum psi'), what it takes from the matches in deviations of a
-                   // residual, for a prior to count as much less
-  double stretch;  // of steps of refine
+  double taken;    // sqrt(sum psi^2 / sum psi'), in pixels: the standard deviation of a residual
+                   // under this loss, with which a prior is weighed against the matches
+  double stretch;  // the factor of refine on each step
 };
 
 BestLoss best_loss(const PoseRefiner& f, const Mat3& M, int count) {
@@ -108,7 +108,7 @@ Pose refined_with(const PoseRefiner& f, const Pose& start, const GravityPrior& g
   return model.pose;
 }
 
-// Of the pose that the points alone gave.
+// The uncertainty of a pose that was refined without gravity.
 bool uncertainty_without_gravity(const PoseRefiner& f, const Pose& pose,
                                  PoseUncertainty* uncertainty) {
   const int count = near_pose(f, pose);
@@ -122,7 +122,8 @@ bool uncertainty_without_gravity(const PoseRefiner& f, const Pose& pose,
                             f.principal_point, uncertainty->variance_px, uncertainty->covariance);
 }
 
-// The prior with the weight that the points leave it, where they alone would put the pose.
+// The prior of gravity, with a weight below 1 where it contradicts the pose that the matches alone
+// give.
 GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
   GravityPrior gravity = f.gravity;
   if (!gravity.known) return gravity;
@@ -134,13 +135,13 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
   return gravity;
 }
 
-// Twice the logarithm of a thousand: of pairs whose principal point is where it is said to be, one
-// in a thousand is told otherwise.
+// Twice the logarithm of a thousand: the limit of the test for a significance of 0.001. One in a
+// thousand pairs with a correct principal point exceeds it.
 constexpr double kShiftEvidence = 13.815510557964274;
 
 // ---- On a plane ----
 
-// The matches that the plane explains, into f.indices.
+// Writes the matches that the plane explains to f.indices; returns how many.
 int near_plane(const PoseRefiner& f, const Mat3& H) {
   const double limit = kFinalNear * kTransferThresholdScale * f.threshold_px;
   int near = 0;
@@ -161,7 +162,8 @@ RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
                     std::max(0.02 * f.threshold_px, std::min(scale, 2 * f.threshold_px))};
 }
 
-// Beyond this squared distance in deviations, gravity and a pose are a chance of one in a thousand.
+// The 99.9 % quantile of chi-square with two degrees of freedom: a pose whose squared distance from
+// gravity is larger contradicts gravity.
 constexpr double kGravityExcludes = 13.816;
 
 }  // namespace
@@ -192,15 +194,17 @@ Pose refined_pose(const PoseRefiner& f, const Pose& start) {
 namespace {
 
 // A step of pose and principal point together over the matches near the pose. evidence: twice the
-// logarithm of how much likelier it makes them, to first order; from a pose at its best that is
-// chi-square of two degrees of freedom where nothing is wrong (C. R. Rao's score test, 1948), or
-// less, by the prior. Returns how many matches took part, 0 when they do not tell.
+// logarithm of the factor by which the step makes the matches likelier, to first order. From a pose
+// at its minimum it follows chi-square with two degrees of freedom where the principal point is
+// correct (C. R. Rao's score test, 1948), or is less because of the prior. Returns how many matches
+// took part, 0 when they do not determine the step.
 int joint_step(const PoseRefiner& f, const Pose& pose, const GravityPrior& gravity,
                double step[kShiftedParameters], double* evidence) {
   const int count = near_pose(f, pose);
   if (count <= kShiftedParameters) return 0;
   const BestLoss best = best_loss(f, essential_from_pose(pose), count);
-  // What exact input leaves is rounding, and speaks for nothing.
+  // The residuals of exact input are rounding errors and no evidence, so the noise counts as at
+  // least 0.02 thresholds.
   const double noise_px = std::max(best.taken, 0.02 * f.threshold_px);
   ShiftedEquations equations;
   shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{pose, &gravity},
@@ -217,7 +221,7 @@ int joint_step(const PoseRefiner& f, const Pose& pose, const GravityPrior& gravi
 bool principal_point_is_off(const PoseRefiner& f, const Pose& pose) {
   double step[kShiftedParameters], evidence;
   const int count = joint_step(f, pose, GravityPrior{}, step, &evidence);
-  // Over 2 it follows F(2, left), whose tail is (1 + evidence / left)^(-left / 2).
+  // Divided by 2, the evidence follows F(2, left), whose tail is (1 + evidence / left)^(-left / 2).
   const int left = count - kShiftedParameters;
   return count > 0 && left * log(1 + evidence / left) > kShiftEvidence;
 }
@@ -265,7 +269,7 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
     gravity.weight = gravity_weight(gravity, twin.pose.R, covariance);
     add_gravity(gravity, &fit->pose[k], covariance);
   }
-  // Gravity may know which of the two it was.
+  // If gravity contradicts one of the two motions and not the other, only the other is returned.
   for (int k = 0; k < num && num == 2; ++k) {
     if (from_gravity[k] > kGravityExcludes && from_gravity[1 - k] < kGravityExcludes) {
       fit->pose[0] = fit->pose[1 - k];

@@ -1,4 +1,5 @@
-// The pose that a pair ends with: refined over all matches near it, with its uncertainty.
+// The final refinement of a pose over all matches near it; its covariance; the test and the step of
+// the principal point; the two motions of a plane; and the loss that they share.
 #pragma once
 
 #include "robust/covariance.h"
@@ -7,34 +8,38 @@
 
 namespace tv {
 
-// Refining a pose leaves the matches as they are; place_principal_point, which is given a refiner
-// that is not const, moves their rays.
+// What the refinement works on. The functions below do not change the matches; only
+// place_principal_point moves their rays.
 struct PoseRefiner {
   const TwoViewProblem& problem;
   Matches& matches;
   double threshold_px;
   GravityPrior gravity;
-  PrincipalPoint principal_point;  // of the rays of the matches
+  PrincipalPoint principal_point;  // that the matches' rays were computed with
   int32_t* indices;                // scratch, as many as matches
   double* values;                  // the same
 };
 
-// Minimises Cauchy's loss over the matches near the epipolar lines, gravity's prior added to it.
+// The pose that minimises Cauchy's loss over the matches near the epipolar lines, with gravity as a
+// prior where it is known.
 Pose refined_pose(const PoseRefiner& refiner, const Pose& start);
 
-// Whether the matches speak against refiner.principal_point, with one chance in a thousand to be
-// wrong where it is right. The pose is what refined_pose gave.
+// Whether the matches contradict refiner.principal_point at a significance of 0.001. pose: the
+// result of refined_pose.
 bool principal_point_is_off(const PoseRefiner& refiner, const Pose& pose);
-// One step of Gauss and Newton of the pose and the principal point together. What the point moves
-// by, in pixels, goes to shift_px; the rays are as they were. False when it is not determined.
+// One Gauss-Newton step of the pose and the principal point together. Writes the principal point's
+// step, in pixels, to shift_px; the caller then moves the rays. False when the step is not
+// determined.
 bool move_together(const PoseRefiner& refiner, Pose* pose, double shift_px[2]);
 
-// Allows for a principal point that is free.
+// The covariance of a refined pose and the noise of a pixel. It includes the uncertainty of a
+// principal point that is free. False when the pose is not determined.
 bool uncertainty_of(const PoseRefiner& refiner, const Pose& pose, PoseUncertainty* uncertainty);
 
-// The two motions of a plane that explains the matches by itself: eight parameters and two
-// residuals a match, against five and one above, which leaves a flat valley along which a plane's
-// epipolar geometry may slide. Writes up to two poses and the covariance of each; returns how many.
+// The two motions of a plane that explains nearly all matches, refined together with the plane:
+// eight parameters, and two residuals for each match. A pose alone has five and one; on a plane its
+// minimum is so flat that the pose is poorly determined. Writes up to two poses and the covariance
+// of each; returns how many.
 struct PlaneFit {
   Pose pose[2];
   bool certain[2];  // whether there is an uncertainty
@@ -43,14 +48,15 @@ struct PlaneFit {
 int refine_on_plane(const PoseRefiner& refiner, const Mat3& H, const Vec3& mean_ray0,
                     PlaneFit* fit);
 
-// The inliers' median residual as the standard deviation of normal noise, over the matches of
-// refiner.indices that lie within the threshold of M.
+// The standard deviation of normal noise, estimated from the median residual of those of the first
+// `count` matches in refiner.indices that lie within the threshold of M.
 double median_noise_px(const PoseRefiner& refiner, const Mat3& M, int count);
 
 // The final loss around a model of which `count` matches are listed in refiner.indices.
 RobustLoss final_loss(const PoseRefiner& refiner, const Mat3& M, int count);
 
-// The final refinement looks this many thresholds far, this often, each time with so many steps.
+// The final refinement takes the matches within kFinalNear thresholds. It selects them kFinalRounds
+// times, and takes at most kFinalIterations steps each time.
 inline constexpr double kFinalNear = 3;
 inline constexpr int kFinalRounds = 2, kFinalIterations = 20;
 

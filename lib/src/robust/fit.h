@@ -1,5 +1,5 @@
 // One pair while its estimate is finished (finish.cc): the matches, the scratch and the outcome
-// that the steps hand to each other, and what several of the steps do with the outcome.
+// that the steps of finish.cc share, and the functions on the outcome that several steps call.
 #pragma once
 
 #include "robust/final_pose.h"
@@ -19,10 +19,10 @@ struct Fit {
   TwoViewOutcome* out;
 };
 
-// The inliers of the outcome's epipolar model become the outcome's, and the support.
+// Sets the outcome's inliers and the support to the inliers of the outcome's epipolar model.
 void collect_support(Fit& f);
 
-// The matches that the named transfer explains become the inliers.
+// Sets the outcome's inliers to the matches whose transfer residual from H is below the threshold.
 void inliers_of_transfer(Fit& f, const Mat3& H);
 
 void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out);

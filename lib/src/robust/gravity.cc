@@ -5,14 +5,15 @@
 namespace tv {
 namespace {
 
-// Finer than any accelerometer; keeps the weights finite.
+// The least standard deviation that is used, finer than any accelerometer's. It keeps the weights
+// finite.
 constexpr double kSmallestSigmaRad = 1e-6;
 
 // Chi-square of two degrees of freedom at 99 per cent.
 constexpr double kAgreementSq = 9.21;
 
-// What a pose's covariance C says about h = R down0 in a basis b of h's tangent plane: the
-// derivatives of (b[0], b[1]) . (w x h) by w are the rows H = h x b.
+// The covariance of h = R down0, in a basis b of h's tangent plane, that follows from a pose's
+// covariance C: the derivatives of (b[0], b[1]) . (w x h) by w are the rows H = h x b.
 struct TangentRows {
   Vec3 b[2];
   double across[2][5];  // H C
@@ -39,7 +40,7 @@ TangentRows tangent_rows(const Vec3& h, const double covariance[25]) {
   return rows;
 }
 
-// h - down1 in h's tangent plane, stretched to its own length.
+// h - down1 in h's tangent plane, scaled to the length of h - down1.
 void tangent_residual(const GravityPrior& prior, const Mat3& R, const TangentRows& rows,
                       double e[2]) {
   const double chord = (R * prior.down[0] - prior.down[1]).norm();
@@ -58,7 +59,8 @@ struct Inverse2 {
   double a, b, c;
 };
 
-// The covariance in the tangent basis of another t: the basis may turn far where t moves little.
+// Changes a covariance from the tangent basis of old_t to that of t, since the basis may turn far
+// where t moves little.
 void turn_tangent_basis(const Vec3& old_t, const Vec3& t, double covariance[25]) {
   Vec3 from[2], to[2];
   tangent_basis(old_t, &from[0], &from[1]);
@@ -96,7 +98,7 @@ GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], d
   if (!(sigma_rad > 0)) return prior;
   const double* gravity[2] = {gravity0, gravity1};
   for (int v = 0; v < 2; ++v) {
-    // By the largest entry first: the squares of a vector of any length stay finite.
+    // The vector is divided by its largest entry first, so that its squares stay finite.
     double largest = 0, sum = 0;
     for (int k = 0; k < 3; ++k) {
       const double size = std::fabs(gravity[v][k]);
@@ -116,8 +118,8 @@ double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_
                          double upper[15], double gradient[5]) {
   const Vec3 h = R * prior.down[0];
   // A turn by w moves h by w x h, so that J = -[h]x, J'J = I - h h' and J'(h - down1) = down1 x h:
-  // the two rows of a tangent basis, whichever it is, summed. The chord grows up to half a turn,
-  // where the components of the residual in a tangent plane would fall again.
+  // the two rows of a tangent basis, whichever it is, summed. The residual is the chord, which
+  // increases up to half a turn; its components in a tangent plane decrease beyond a quarter turn.
   const double weight =
       prior.weight * (noise_px * noise_px) / (2 * prior.sigma_rad * prior.sigma_rad);
   const Vec3 slope = prior.down[1].cross(h);

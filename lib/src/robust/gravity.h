@@ -8,17 +8,17 @@ namespace tv {
 struct GravityPrior {
   bool known = false;
   Vec3 down[2] = {Vec3::Zero(), Vec3::Zero()};  // unit vectors, each in its camera's frame
-  double sigma_rad = 0;                         // of each direction, about each axis across it
-  double weight = 1;  // (0, 1]: less where the points contradict it (gravity_weight)
+  double sigma_rad = 0;  // standard deviation of each direction, about each axis across it
+  double weight = 1;     // (0, 1]: less where the points contradict it (gravity_weight)
 };
 
 // The prior of a caller's vectors of any length; not known when sigma_rad is 0 or when a vector has
 // no direction.
 GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad);
 
-// Adds the prior's rows to the normal equations of PoseModel. With h = R down0, |h - down1|^2 over
-// its variance 2 sigma^2 counts noise_px^2 beside the matches' r^2, noise_px being their standard
-// deviation. Returns what it adds to the cost, which is in units of scale_px^2.
+// Adds the prior's rows to the normal equations of PoseModel. With h = R down0, the term weight
+// noise_px^2 |h - down1|^2 / (2 sigma^2) is added to the sum of the matches' r^2; noise_px is the
+// standard deviation of r. Returns what it adds to the cost, which is in units of scale_px^2.
 double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_px, double scale_px,
                          double upper[15], double gradient[5]);
 
@@ -26,17 +26,18 @@ double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_
 // the pose's covariance it follows chi-square with two degrees of freedom where both are right.
 double gravity_distance_sq(const GravityPrior& prior, const Mat3& R, const double covariance[25]);
 
-// How far to believe the prior beside a pose that the points alone gave, with its covariance: 1
-// while the two agree at 99 per cent, then falling with the fourth power of their distance in
-// standard deviations. So a direction that is wrong pulls no further than one on that limit.
+// The weight of the prior against a pose, with its covariance, that the points alone gave: 1 while
+// the two agree at 99 per cent, then falling with the fourth power of their distance in standard
+// deviations. A wrong direction then pulls the pose no farther than one at that limit does.
 double gravity_weight(const GravityPrior& prior, const Mat3& R, const double covariance[25]);
 
 // The covariance of a pose that the points gave, once the prior has been added to them: the two
 // informations' sum, C - C H' (H C H' + 2 sigma^2 / weight I)^-1 H C with the prior's rows H.
 void add_gravity_information(const GravityPrior& prior, const Mat3& R, double covariance[25]);
 
-// Both at once for a pose that is not refined with the prior: the step of Kalman's filter, to first
-// order the refinement's result. (R. E. Kalman, "A new approach to linear filtering", 1960.)
+// Adds the prior to a pose that was refined without it, and to its covariance: the step of Kalman's
+// filter, to first order the refinement's result. (R. E. Kalman, "A new approach to linear
+// filtering", 1960.)
 void add_gravity(const GravityPrior& prior, Pose* pose, double covariance[25]);
 
 // PoseModel with the prior; without one (null, or not known) it is PoseModel, bit for bit.

@@ -11,11 +11,12 @@
 namespace tv {
 namespace {
 
-// Whether the matches that a rival H leaves unexplained agree on an epipole more than chance would
-// have it. A match that H misses by a vector d falls into the epipolar band, were d's direction
-// random, with probability (2/pi) asin(w / |d|), w the band's half width. By Hoeffding (1963), of n
-// such matches k or more do with probability at most exp(-n KL(k/n || mean)). inlier[i]: whether
-// match i is an inlier of the epipolar model. True: there is a translation, or depth off the plane.
+// Whether the matches that a rival H does not explain agree on an epipole more often than chance
+// explains. If the vector d by which H misses a match had a random direction, the match would lie
+// in the epipolar band with probability (2/pi) asin(w / |d|), w the band's half width. By Hoeffding
+// (1963), of n such matches k or more do with probability at most exp(-n KL(k/n || mean)).
+// inlier[i]: whether match i is an inlier of the epipolar model. True: there is a translation, or
+// depth off the plane.
 bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlier,
                      double threshold_px) {
   const double limit = kTransferThresholdScale * threshold_px;
@@ -40,13 +41,13 @@ bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlie
   return log_binomial(unexplained, 2) - n * divergence < kLogMeaningful;
 }
 
-// Whether the support moves along the epipolar lines by more than noise. What a rotation leaves
-// over has two dimensions, the epipolar residual one: under a rotation alone the sum S of the
-// differences is about as large as the sum of the squared epipolar residuals (1.3 times, since the
-// search turns the epipole to where the residuals happen to be smallest; in one of 300 pairs more
-// than the limit), and a parallax of p deviations of the noise adds p^2 / 2 times as much.
-// leaves_parallax tells about the matches that the rotation does not explain, this about those that
-// it does.
+// Whether the support moves along the epipolar lines by more than noise. The residual of a rotation
+// has two dimensions, the epipolar residual has one: under a rotation alone the sum S of the
+// differences of their squares is about as large as the sum of the squared epipolar residuals (1.3
+// times, since the search turns the epipole to where the residuals happen to be smallest; in one of
+// 300 pairs more than the limit), and a parallax of p deviations of the noise adds p^2 / 2 times as
+// much. leaves_parallax tests the matches that the rotation does not explain; this function tests
+// those that it explains.
 bool moves_along_lines(const Fit& f, const Mat3& R) {
   if (!f.out->epipolar.has_pose) return false;
   const double limit = kTransferThresholdScale * f.threshold;
@@ -66,12 +67,13 @@ bool moves_along_lines(const Fit& f, const Mat3& R) {
 
 }  // namespace
 
-// Whether the pair is to be called by one of the rivals, or degenerate.
+// Chooses the kind of the first of these that holds: no motion, pure rotation, degenerate, a
+// homography, an epipolar model.
 tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size) {
   const EpipolarModel& epipolar = f.out->epipolar;
   const bool calibrated = f.problem.calibrated;
   const int n = f.matches.pairs.num;
-  // A pure rotation or no motion is meaningful by its own count; an epipolar model by its own.
+  // Each model must be meaningful by its own number of inliers.
   const double disc = std::min(1.0, kPi * kTransferThresholdScale * kTransferThresholdScale * 2 *
                                         f.threshold * f.threshold / f.matches.area_px);
   const bool rotation_meaningful =
@@ -89,9 +91,9 @@ tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size) {
     epipolar_meaningful = chance_of_agreement(f.matches, epipolar.M, f.threshold,
                                               f.problem.options.seed, limit) < limit;
   }
-  // A rival speaks for the pair when it explains most of what the epipolar model does (half of all
-  // matches where there is none: a failed search is no proof of a rotation), and the rest does not
-  // agree on an epipole.
+  // A rival determines the kind when it explains most of the epipolar model's inliers (or half of
+  // all matches where there is no such model, since a failed search is no proof of a rotation) and
+  // the matches that it does not explain do not agree on an epipole.
   const double most = epipolar.found ? kRivalShare * f.num_support : kRivalShareAlone * n;
   const bool rotation_enough = rotation_meaningful && rivals.rotation_inliers > most &&
                                !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold) &&

@@ -6,8 +6,8 @@
 
 namespace tv {
 
-// A rival names the pair when it explains this share of what the epipolar model does, or of
-// all matches where there is none.
+// A rival determines the kind only if it explains more than this share of the epipolar model's
+// inliers, or of all matches where there is no epipolar model.
 inline constexpr double kRivalShare = 0.7, kRivalShareAlone = 0.5;
 
 // sample_size: of the solver that found the epipolar model.

@@ -15,16 +15,16 @@ constexpr int kMostAsked = 512, kMostListed = 64;
 constexpr double kOpposite = 0.14;  // the tolerated distance from the opposite place, as a part of
                                     // the neighbour's distance
 constexpr double kNearestPx = 8;    // nearer neighbours cannot be distinguished from noise
-// The count of chance is taken at a place where no usual lattice has a point: where the neighbour
-// would be if turned by 146 degrees instead of 180.
+// The count that chance explains is taken at a place where no usual lattice has a point: the
+// neighbour's place after a turn by 146 degrees instead of 180.
 constexpr double kControlCosine = -0.829, kControlSine = 0.559;
 
 struct Grid {
   const double* xy;
   double low[2], inverse[2];
   int side;
-  int32_t* first;  // side^2, -1: empty
-  int32_t* next;   // num
+  int32_t* first;  // the first point of each of side^2 cells; -1: none
+  int32_t* next;   // the next point of the same cell, num entries; -1: none
 
   int cell(double value, int axis) const {
     const double place = (value - low[axis]) * inverse[axis];

@@ -16,8 +16,8 @@ struct Lattice {
   double sigmas;  // the difference in standard deviations of a count of chance
 };
 
-// xy: num x 2. listed: null, or the indices of the points whose neighbours are examined. At most 64
-// of those listed, or 512 of all, are.
+// xy: num x 2. listed: null, or the indices of the points whose neighbours are examined. Of a list
+// at most 64 points are examined, of all points at most 512.
 Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,
                      Arena& arena);
 size_t lattice_bytes(int max_points);

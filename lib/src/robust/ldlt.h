@@ -8,7 +8,8 @@ namespace tv {
 
 inline constexpr int kMostParameters = 9;  // rows of A
 
-// Solves (A + lambda diag(A)) step = -gradient. False when A is singular.
+// Solves (A + lambda (diag(A) + 1e-9 d I)) step = -gradient, where d is the largest entry of
+// diag(A). False when this matrix is not positive definite.
 bool solve_damped(int num, const double* upper, const double* gradient, double lambda,
                   double* step);
 

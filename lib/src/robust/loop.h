@@ -6,9 +6,9 @@
 //   void refine_model(Model*)                         local optimisation on the model's inliers
 // and, where kBatch is 1,
 //   int generate_models(const int32_t* sample, Model* models)
-//   int64_t fast_cost(const Model&, int64_t bound)   MSAC cost; above bound, anything above it
-// or, where kBatch samples are solved at once, and what they give becomes a model only when its
-// cost asks for it,
+//   int64_t fast_cost(const Model&, int64_t bound)   MSAC cost; above bound: any number above it
+// or, where kBatch samples are solved at once, and a solution is completed to a Model only if its
+// cost is low enough,
 //   void generate(const int32_t samples[][kSampleSize], int num_samples)   keeps what it finds
 //   int count(int s)                                                       of sample s
 //   int64_t fast_cost(int s, int k, int64_t bound)
@@ -26,7 +26,7 @@ namespace tv {
 // A window of local optimisation is kWindow samples and one more for every kWindowShare matches.
 inline constexpr int kWindow = 8, kWindowShare = 2;
 
-// The most samples that few inliers alone can ask for (LoopOptions::few_inliers_iterations).
+// The most samples that few inliers alone can require (LoopOptions::few_inliers_iterations).
 inline constexpr int kMostForFewInliers = 1000;
 
 struct LoopOptions {
@@ -34,7 +34,7 @@ struct LoopOptions {
   int min_iterations, max_iterations;
   int fixed_iterations;        // 0: adaptive stop
   int few_inliers_iterations;  // at least this many / inliers, up to kMostForFewInliers
-  int least_inliers = 0;  // what costs more than so many exact inliers is not locally optimised
+  int least_inliers = 0;       // a model whose cost excludes so many inliers is not refined
 };
 
 template <typename Model>
@@ -48,7 +48,7 @@ struct LoopResult {
 
 // Samples after which a sample of inliers alone has been drawn with the given confidence.
 inline int samples_needed(double confidence, int num_inliers, int num, int sample_size, int most) {
-  double good = 1;  // that one sample is of inliers alone, drawn without replacement
+  double good = 1;  // the probability that a sample, drawn without replacement, is of inliers alone
   for (int k = 0; k < sample_size; ++k) {
     if (num_inliers <= k) return most;
     good *= static_cast<double>(num_inliers - k) / static_cast<double>(num - k);
@@ -59,13 +59,13 @@ inline int samples_needed(double confidence, int num_inliers, int num, int sampl
   return needed < most ? static_cast<int>(needed) + 1 : most;
 }
 
-// samples_needed, and not fewer than the options ask.
+// samples_needed, and at least as many as the options require.
 inline int samples_wanted(const LoopOptions& options, int num_inliers, int num, int sample_size) {
   const int most = options.max_iterations;
   int wanted = samples_needed(options.confidence, num_inliers, num, sample_size, most);
   int least = options.min_iterations;
-  // A sample of inliers alone is not yet one from which local optimisation finds the best minimum:
-  // with few inliers there are several, and samples cost little.
+  // Local optimisation from a sample of inliers alone need not reach the best minimum: with few
+  // inliers there are several minima, and samples cost little.
   if (options.few_inliers_iterations > 0 && num_inliers > 0) {
     int more = options.few_inliers_iterations / num_inliers;
     if (more > kMostForFewInliers) more = kMostForFewInliers;

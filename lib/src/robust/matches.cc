@@ -9,7 +9,8 @@
 namespace tv {
 namespace {
 
-// The four coordinates of a match add up to less than this; images end at 16384 pixels a side.
+// The absolute values of a match's four coordinates must add up to less than this, in pixels;
+// images have at most 16384 pixels a side.
 constexpr double kMaxCoordinates = 1e6;
 
 uint64_t mix(uint64_t h) {  // the finaliser of splitmix64 (G. Steele et al., 2014)
@@ -204,7 +205,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
     const Coordinates c = coordinates(problem, i);
     const double sum =
         (std::fabs(c.v[0]) + std::fabs(c.v[1])) + (std::fabs(c.v[2]) + std::fabs(c.v[3]));
-    if (!(sum < kMaxCoordinates)) continue;  // NaN, infinite, or no pixel of any image
+    if (!(sum < kMaxCoordinates)) continue;  // NaN, infinite, or outside any image
     PixelRay ray;
     bool usable = true;
     for (int v = 0; v < 2 && usable && problem.calibrated; ++v) {
@@ -234,7 +235,7 @@ bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const 
                    int view, int k, double curvature[9]) {
   if (camera.model.model == TV_CAMERA_PINHOLE && matches.pairs.on_plane) return false;
   const double* pixel = problem.pixels[view] + 2 * matches.order[k];
-  for (int along = 0; along < 2; ++along) {  // by differences over a pixel
+  for (int along = 0; along < 2; ++along) {  // differences of the Jacobian over one pixel
     const double beside[2] = {pixel[0] + (along == 0), pixel[1] + (along == 1)};
     PixelRay p;
     const bool known = ray_of_pixel(camera, beside, matches.pairs.on_plane, &p) && sane(p);

@@ -1,4 +1,5 @@
-// A caller's matches, made ready for the robust loop: rays, sorted, repeated ones last.
+// A caller's matches, made ready for the robust loop: sorted, repeated ones last, and with rays,
+// which can be computed again for a moved principal point.
 #pragma once
 
 #include "base/arena.h"
@@ -20,34 +21,34 @@ struct TwoViewProblem {
 
 struct Matches {
   // pairs.num is num_unique(): the matches that differ from each other, by which models are
-  // searched, refined and tested. The arrays of pairs, and order, go on to num_all: behind the
-  // different ones come those that repeat one. They count among the matches and inliers reported,
-  // and nowhere else.
+  // searched, refined and tested. The arrays of pairs, and order, have num_all entries: the
+  // different matches, then those that repeat one of them. Repeats count in the numbers of matches
+  // and inliers that are reported, and nowhere else.
   RayPairs pairs = {};
   int num_all = 0;
   int num_unique() const { return pairs.num; }
   int32_t* order = nullptr;  // pairs' k-th match is the caller's order[k]
-  Mat3 intrinsics[2];  // pixels (undistorted) to rays' plane: K of the view, or, uncalibrated, the
-                       // similarity that normalises its points
-  double area_px = 1;  // of image 1, or, uncalibrated, of the box around its points
+  Mat3 intrinsics[2];        // from the rays' plane to pixels (undistorted): K of the view, or,
+                             // uncalibrated, of the pinhole that normalises its points
+  double area_px = 1;        // px^2, of image 1, or, uncalibrated, of the box around its points
 };
 
 size_t matches_bytes(int max_matches);
 
-// Drops what is not finite or outside the lens model, sorts by (ratio, coordinates), puts repeated
-// matches last: five times the same match is one witness, not five.
+// Drops what is not finite or outside the lens model, sorts by (ratio, coordinates), and puts
+// repeated matches last: a match that is given five times is evidence once.
 void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches);
 
 // d^2 ray / d pixel^2 of the k-th match in a view of that camera, 3 x (xx, xy, yy). False, and
-// nothing written, for rays that do not bend.
+// nothing is written, for a pinhole on the plane, where the derivative is 0.
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
                    int view, int k, double curvature[9]);
 
-// A camera of the problem with its principal point moved.
+// The camera of a view with its principal point moved by shift_px.
 Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_px[2]);
 
-// The rays anew, of cameras whose principal points lie shift_px beside those of the problem. A
-// match that such a lens has no ray for keeps its own.
+// Computes the rays again, for cameras whose principal points lie shift_px beside those of the
+// problem. A match for which such a camera has no ray keeps its previous one.
 void move_principal_points(const TwoViewProblem& problem, const double shift_px[2],
                            Matches* matches);
 

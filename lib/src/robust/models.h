@@ -20,7 +20,7 @@ struct PoseModel {
   PoseModel stepped(const double* step) const;
 };
 
-// d ([t]x R) / d each of the five.
+// The derivatives of [t]x R by each of the five parameters.
 void pose_columns(const Pose& pose, Mat3 columns[5]);
 
 // A fundamental matrix U diag(1, s, 0) V' with rotations U, V: seven parameters (A. Bartoli, P.
@@ -36,8 +36,8 @@ struct FundamentalModel {
 };
 FundamentalModel fundamental_model(const Mat3& M);
 
-// A homography by its nine entries; the scale is free, which damping takes care of. Transfer
-// residual.
+// A homography by its nine entries; its scale is not determined, so that its normal equations need
+// damping. Transfer residual.
 struct HomographyModel {
   static constexpr int kParameters = 9;
   Mat3 H;

@@ -24,7 +24,7 @@ void place_principal_point(Fit& f) {
     for (int i = 0; i < 2; ++i) point.shift_px[i] += step[i];
     move_principal_points(f.problem, point.shift_px, &f.refiner.matches);
   }
-  // What asks for more than that is no calibration's error.
+  // A larger shift is no error of a calibration: the principal point stays where it was.
   if (!(std::fabs(point.shift_px[0]) < kMostSigmas * point.sigma_px[0] &&
         std::fabs(point.shift_px[1]) < kMostSigmas * point.sigma_px[1])) {
     point = PrincipalPoint{};

@@ -6,8 +6,8 @@
 
 namespace tv {
 
-// Where one camera saw both views and the matches say that its principal point is not where it is
-// said to be, pose and principal point are refined together, and the rays follow.
+// Where one camera saw both views and the matches contradict its principal point, pose and
+// principal point are refined together, and the rays follow.
 TVK_NOINLINE void place_principal_point(Fit& f);
 
 }  // namespace tv

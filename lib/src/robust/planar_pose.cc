@@ -35,11 +35,12 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
   out.epipolar.M = essential_from_pose(poses[best]);
   collect_support(f);
   int other = -1;
-  double farthest = 1e-4;  // half a degree
+  double farthest = 1e-4;  // a squared distance, about half a degree
   for (int k = 0; k < num_poses; ++k) {
     const double turned =
         (poses[k].R - poses[best].R).squaredNorm() + (poses[k].t - poses[best].t).squaredNorm();
-    // Of the other two, one may be the best again, stopped elsewhere in a flat valley.
+    // One of the other two may be the best pose again, where its refinement stopped near the same
+    // flat minimum; so the most different pose is taken.
     if (k != best && turned > farthest && 10 * inliers[k] >= 9 * inliers[best]) {
       other = k;
       farthest = turned;

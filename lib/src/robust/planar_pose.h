@@ -7,11 +7,11 @@
 
 namespace tv {
 
-// A plane allows two motions. Where the plane explains nearly all of the support they are fitted
-// together with it; where there is more than the plane, each is refined as a pose, and the epipolar
-// model's own competes with them. The one of lowest cost is the pose, and a second one that is
-// different and not clearly worse the alternative. Not inlined, for the stack below
-// finish_two_view.
+// A plane allows two motions. Where the plane explains at least 85 % of the support, they are
+// refined together with the plane. Otherwise each is refined as a pose, and the epipolar model's
+// pose is a third candidate. The candidate of lowest cost becomes the pose; another one that
+// differs from it and has at least 90 % as many inliers becomes the alternative. Not inlined, so
+// that its stack frame is in use only while it runs.
 TVK_NOINLINE void choose_planar_pose(Fit& f, const Rivals& rivals);
 
 }  // namespace tv

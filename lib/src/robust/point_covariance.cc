@@ -16,8 +16,8 @@ bool point_covariance(const Camera cameras[2], const BundleFrame& frame, double 
   }
   const Elimination e = eliminate(frame, match);
   if (!(e.length > 0.0)) return false;
-  // Columns: how (direction step, inverse distance) answers to a pixel of each of the four
-  // coordinates' noise, then to the pose's five parameters.
+  // Columns: the derivatives of (direction step, inverse distance) by the noise of the four pixel
+  // coordinates, then by the pose's five parameters.
   double answer[3][9];
   for (int c = 0; c < 9; ++c) {
     double noise[4] = {}, parameter[5] = {};

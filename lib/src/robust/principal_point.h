@@ -8,12 +8,12 @@
 namespace tv {
 
 struct PrincipalPoint {
-  double shift_px[2] = {0, 0};  // where the rays have it, less where the calibration has it
+  double shift_px[2] = {0, 0};  // that of the rays, less that of the calibration
   double sigma_px[2] = {0, 0};  // of the calibration
   bool is_free = false;         // refined with the pose
 };
 
-// The parameters of PoseModel, then x and y by which the principal point moves, pixels.
+// The parameters of PoseModel, then the step of the principal point in x and y, in pixels.
 inline constexpr int kShiftedParameters = PoseModel::kParameters + 2;
 
 struct ShiftedEquations {
@@ -21,15 +21,15 @@ struct ShiftedEquations {
 };
 
 // The normal equations of pose and principal point over the listed matches, at the rays as they
-// are, with the priors of both. noise_px: the standard deviation beside which the principal point's
-// prior counts. A principal point that moves by d moves every ray by -J d, and its Jacobian by the
-// lens's curvature.
+// are, with the priors of both. noise_px: the standard deviation of a residual, against which the
+// prior of the principal point is weighed. A principal point that moves by d moves every ray by -J
+// d, and its Jacobian by the lens's curvature.
 void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
                        const int32_t* indices, int count, const GravityPoseModel& model,
                        const PrincipalPoint& point, const RobustLoss& loss, double noise_px,
                        ShiftedEquations* equations);
 
-// What not knowing the principal point adds to the covariance of a pose: C += G S G', S the
+// Adds the uncertainty of the principal point to the covariance of a pose: C += G S G', S the
 // covariance of the point and G the pose's slope by it. variance_px: of a residual of the listed
 // matches, px^2.
 bool add_shift_variance(const TwoViewProblem& problem, const Matches& matches,

@@ -11,7 +11,7 @@
 namespace tv {
 namespace {
 
-// A model without its type: one loop for all of them.
+// A model without its static type, so that one compiled loop refines all models.
 struct AnyModel {
   int num_parameters;
   double (*normal_equations)(const void* model, const RayPairs& pairs, const int32_t* indices,
@@ -19,8 +19,8 @@ struct AnyModel {
   void (*make_step)(const void* model, const double* step, void* moved);
 };
 
-// Refines *model with `moved` as scratch, another of its kind; *model ends as one of the two, the
-// better.
+// Refines **model and returns its cost. moved: scratch, another object of the same type. On return
+// *model points to the one of the two objects that holds the better model.
 double refine_any(const AnyModel& any, const RayPairs& pairs, const int32_t* indices, int count,
                   const RobustLoss& loss, int max_iterations, void** model, void* moved,
                   double small_gain, double stretch) {

@@ -10,10 +10,9 @@ namespace tv {
 
 // Lowers the robust cost over the listed matches until a step lowers it by less than small_gain of
 // it. Model: one of robust/models.h, or GravityPoseModel. Returns the final cost, in units of
-// scale^2.
-// stretch: the factor on each step. Reweighted least squares divide by the mean of the weights
-// where the loss itself, with its own curvature, divides by the mean of psi'; the ratio of the two
-// is the factor by which their steps are too short.
+// scale^2. stretch: the factor on each step. Reweighted least squares take the mean of the weights
+// as the curvature of the loss, which is the mean of psi'. Their steps are too short by the ratio
+// of the two; give this ratio as stretch to lengthen them.
 inline constexpr double kSmallGain = 1e-9;
 template <typename Model>
 double refine(const RayPairs& pairs, const int32_t* indices, int count, const RobustLoss& loss,

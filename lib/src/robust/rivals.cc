@@ -12,8 +12,9 @@ namespace {
 
 constexpr int kChunk = 64;  // matches at a time, on the stack
 
-// The rivals need few samples, since only one that explains most of the support matters, and few
-// matches to be told apart. Of models that explain least_share, one in ten thousand is missed.
+// Few samples suffice, since only a rival that explains most of the support matters, and few
+// matches suffice to compare models. A model that explains least_share of them is missed once in
+// ten thousand pairs.
 constexpr double kRivalConfidence = 0.9999;
 constexpr int kMostRivalSamples = 200;
 constexpr int kMaxSubset = 64;
@@ -87,7 +88,8 @@ Rivals find_rivals(const Matches& matches, const int32_t* support, int num_suppo
     rivals.H = homography.model;
     rivals.homography_inliers = count_inliers(matches.pairs, n, rivals.H, limit);
   }
-  // The same pixel in both images, whatever the camera; with two equal cameras the identity.
+  // The model of no motion: the identity on rays, or, without cameras, the same pixel in both
+  // images.
   const Mat3 identity =
       calibrated ? Mat3::Identity()
                  : Mat3(inverse_intrinsics(matches.intrinsics[1]) * matches.intrinsics[0]);

@@ -37,7 +37,7 @@ void draw_sample(Sampler& sampler, int32_t* sample) {
   while (sampler.drawn > sampler.next_growth && sampler.pool < sampler.num) {
     const double n = sampler.pool;
     const double grown = sampler.average * (n + 1) / (n + 1 - sampler.size);
-    // At least one sample a pool, as the paper's rounding up.
+    // Rounded up, as in the paper, so that each pool gets at least one sample.
     const double samples = grown - sampler.average;
     const int64_t whole = static_cast<int64_t>(samples);
     sampler.next_growth += whole + (static_cast<double>(whole) < samples ? 1 : 0);

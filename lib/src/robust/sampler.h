@@ -8,10 +8,11 @@
 namespace tv {
 
 // PROSAC (O. Chum, J. Matas, "Matching with PROSAC: progressive sample consensus", CVPR 2005): the
-// matches are sorted, surest first; samples come from a pool of the first ones, which grows so that
-// after kProsacSamples samples a match it has treated the sure ones as often as uniform sampling
-// would. Once the pool holds all, or without an order, sampling is uniform. Every other sample is
-// uniform from the start: the surest matches may lie on one plane, or on what repeats.
+// matches are sorted, most certain first; samples come from a pool of the first ones, which grows
+// so that after kProsacSamples samples a match it has drawn the certain ones as often as uniform
+// sampling would. Once the pool holds all, or without an order, sampling is uniform. Every other
+// sample is uniform from the start: the most certain matches may lie on one plane, or on a repeated
+// structure.
 struct Sampler {
   Random random;
   int num, size;  // matches, and how many a sample takes

@@ -8,9 +8,9 @@
 namespace tv {
 namespace {
 
-// A model from a few lucky samples is not the best that local optimisation can reach: go on a
-// little, and longer where inliers are few. docs/decisions/0002-robust-loop.md has the
-// measurements.
+// The first samples of inliers alone may not lead to the best model that local optimisation can
+// reach. At least kMinIterations samples are therefore drawn, and at least kFewInliersIterations /
+// inliers where inliers are few. docs/decisions/0002-robust-loop.md has the measurements.
 constexpr int kMinIterations = 50, kFewInliersIterations = 20000;
 
 LoopOptions loop_options(const tv_estimate_options& options) {
@@ -72,7 +72,8 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
   if (!result.found) return;
   epipolar.M = result.model;
   if (!problem.calibrated) return;
-  // The paper's path: the essential matrix nearest to F, the pose of most points in front.
+  // As in the FAST-SIFT paper: the essential matrix nearest to M, and its pose with most points in
+  // front of both cameras.
   const int count = near_matches(pairs, pairs.num, epipolar.M, threshold, indices);
   Svd3 svd = svd3(epipolar.M);
   const Mat3 essential =

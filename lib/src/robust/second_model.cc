@@ -9,13 +9,13 @@
 namespace tv {
 namespace {
 
-// With these numbers of samples, a model with only just enough inliers to be found is missed once
-// in twenty pairs, one with a fifth more inliers once in a hundred, and one whose inliers are a
-// third of the matches left over once in five (since kMostSamples ends the search).
+// With these numbers of samples, a model with just as many inliers as are required is missed once
+// in twenty pairs, and one with 20 % more once in a hundred. A model whose inliers are a third of
+// the searched matches is missed once in five pairs, because kMostSamples ends the search.
 constexpr int kMostSamples = 400;
 constexpr double kConfidence = 0.95;
 constexpr int kFewestInliers = 12;
-constexpr int kMaxLeft = 512;  // when more matches are left over, every n-th of them is searched
+constexpr int kMaxLeft = 512;  // of more matches, this many are searched, evenly spaced
 
 // A copy of the listed matches alone.
 Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena& arena) {
@@ -61,7 +61,7 @@ SecondModel find_second_model(const Matches& matches, const uint8_t* explained, 
   int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(taken));
   PoseEstimator estimator{part.pairs, threshold_px, indices, arena_alloc<PoseBatch>(arena, 1)};
   Sampler sampler = make_sampler(seed, taken, PoseEstimator::kSampleSize, false);
-  // A model with fewer inliers than are required below need not be found.
+  // The number of samples is chosen for a model with just as many inliers as are required below.
   const double fewest = std::max<double>(kFewestInliers, kSecondShare * num_first * taken / left);
   const int most = samples_needed(kConfidence, static_cast<int>(fewest), taken,
                                   PoseEstimator::kSampleSize, kMostSamples);

@@ -1,5 +1,5 @@
 // Two-view estimation behind the API boundary: its two halves, search (search.cc) and finish
-// (finish.cc), and what they hand on.
+// (finish.cc), and the data that they pass on.
 #pragma once
 
 #include "robust/gravity.h"
@@ -16,15 +16,16 @@ struct EpipolarModel {
   Mat3 M = Mat3::Zero();  // E = [t]x R, or the uncalibrated matrix
 };
 
-// The model as the search leaves it and as refinement ends it.
+// The result of the search.
 struct TwoViewModel {
   EpipolarModel epipolar;
   int num_iterations = 0;
 };
 
-// All that the boundary packs. In canonical view order, on rays.
+// All that the entry point writes to the caller's result: models on rays, and the views in the
+// canonical order that api/two_view.cc chooses.
 struct TwoViewOutcome {
-  Evidence evidence;  // with the kind
+  Evidence evidence;  // includes the kind
   Judgement judgement;
   EpipolarModel epipolar;
   bool has_R = false, has_t = false, has_H = false, has_covariance = false,
@@ -34,17 +35,17 @@ struct TwoViewOutcome {
   double covariance[25] = {}, alternative_covariance[25] = {};
   int essential_inliers = -1, fundamental_inliers = -1, homography_inliers = -1,
       rotation_inliers = -1;
-  double principal_point_shift_px[2] = {0, 0};  // taken into account in all that is here
+  double principal_point_shift_px[2] = {0, 0};  // models and poses refer to shifted cameras
   double rms_error_px = 0;
   uint8_t* inlier = nullptr;  // of all matches, repeats included
 };
 
-// The arena that one estimate takes.
+// How many bytes of arena one estimate takes.
 size_t two_view_scratch_bytes(int max_matches);
-size_t search_bytes(int max_matches);  // of it, the search
+size_t search_bytes(int max_matches);  // the part of it that the search takes
 
-// What both halves read off the options. The size of a sample is the degrees of freedom of the
-// model; an upright pose has three, but refinement frees all five.
+// What both halves read from the options. least_matches: the degrees of freedom of the solver's
+// model; 5 for an upright pose, too, since its refinement frees all five.
 int least_matches(int method);
 GravityPrior gravity_of(const TwoViewProblem& problem);
 

@@ -22,9 +22,9 @@ bool too_few_matches(const Evidence& e) {
 }
 
 // LOW_INLIER_RATIO: fewer than 25 % of the matches are inliers, or the residuals are uniform over
-// the threshold, as random matches' are: their median then reads as a noise of 0.74 thresholds, and
-// more than 0.7 is taken for it. A degenerate pair has this reason when its matches are not too
-// few: no model explains more of them than chance does.
+// the threshold, as random matches' are: the noise that is estimated from their median is then 0.74
+// thresholds, and more than 0.7 counts as uniform. A degenerate pair has this reason when its
+// matches are not too few: no model explains more of them than chance does.
 bool low_inlier_ratio(const Evidence& e) {
   if (e.kind == TV_KIND_DEGENERATE) return !too_few_matches(e);
   return 4 * e.num_inliers < e.num_matches || e.noise_px > 0.7 * e.threshold_px;
@@ -63,7 +63,7 @@ bool on_a_lattice(const Evidence& e) {
   return sigmas > 3.3 && (e.has_second_model || share > 0.5);
 }
 
-// Reasons that do not depend on others.
+// All reasons of a pair, as bits of tv_reason.
 uint32_t reasons_of(const Evidence& e) {
   uint32_t reasons = 0;
   if (too_few_matches(e)) reasons |= TV_REASON_TOO_FEW_MATCHES;
@@ -73,12 +73,13 @@ uint32_t reasons_of(const Evidence& e) {
   if (crowded_matches(e)) reasons |= TV_REASON_CROWDED_MATCHES;
   // Two motions of the plane explain the matches about equally well; both are reported.
   if (e.has_alternative) reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
-  // The kind itself is the reason: no translation was seen, and so there is no full pose.
+  // These two kinds are reasons by themselves: the translation is not determined, and so there is
+  // no full pose.
   if (e.kind == TV_KIND_PANORAMIC) reasons |= TV_REASON_PURE_ROTATION;
   if (e.kind == TV_KIND_NO_MOTION) reasons |= TV_REASON_NO_MOTION;
   // A second model is the same scene, matched one period of a lattice off, or a motion of its own.
-  // Which of a lattice's models is the scene, the matches do not tell: so even without a second
-  // one.
+  // The matches on a lattice cannot show which of these models is the scene; the reason is
+  // therefore given even where no second model was found.
   if (on_a_lattice(e)) {
     reasons |= TV_REASON_REPEATED_STRUCTURE;
   } else if (e.has_second_model) {
@@ -91,8 +92,8 @@ uint32_t reasons_of(const Evidence& e) {
 
 double coverage_of(const Evidence& e) { return std::max(e.coverage[0], e.coverage[1]); }
 
-// Refused: degenerate, a rotation alone, or no motion: no model of which the caller could use a
-// translation. Ok: there is no reason against. Doubtful: there is one.
+// Refused: the kind is degenerate, a pure rotation or no motion, so the caller has no translation
+// to use. Ok: there is no reason. Doubtful: there is at least one.
 Judgement judge(const Evidence& e) {
   const uint32_t reasons = reasons_of(e);
   const bool refused =
@@ -103,7 +104,7 @@ Judgement judge(const Evidence& e) {
           reasons};
 }
 
-// Guided matching finds matches where the first estimate has their epipolar lines: that they agree
+// Guided matching finds matches where the first estimate has their epipolar lines: their agreement
 // with it is no evidence for it, and so the verdict and the reasons stay those of the first. The
 // second estimate is the more accurate one and replaces the first, unless it is of another kind,
 // has fewer inliers or is judged worse: then the matches that were added contradict it.

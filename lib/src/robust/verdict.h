@@ -1,6 +1,6 @@
-// The verdict and its reasons: what was measured of a pair, and what is decided from it. Only here,
-// and from nothing else. All that is decided is the same when the views change places.
-// docs/decisions/0016-one-verdict.md.
+// The verdict and its reasons: what was measured of a pair, and what is decided from it. Verdict
+// and reasons are decided only here, and only from Evidence. They are the same when the views are
+// exchanged. docs/decisions/0016-one-verdict.md.
 #pragma once
 
 #include "twoview/two_view.h"
@@ -17,17 +17,17 @@ struct Evidence {
   int num_matches = 0, num_inliers = 0, num_different = 0, num_different_inliers = 0;
   double coverage[2] = {0, 0};  // share of an 8x8 grid on the image that holds an inlier
   // Calibrated kinds but the degenerate one. Whether matches far from the pair's model have a model
-  // of their own, and how far the points lie as on a lattice (second_model.h).
+  // of their own (second_model.h), and how far the points lie as on a lattice (lattice.h).
   bool has_second_model = false;
   double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
   // Of a full pose (calibrated or planar).
-  bool has_alternative = false;    // a second motion of the plane
+  bool has_alternative = false;    // whether a second motion of the plane fits
   double noise_px = 0;             // of a matched pixel; 0 where there is no covariance
   double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
   double median_parallax_rad = 0;  // of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
-  double line_distance_px[2] = {kUnknown,
-                                kUnknown};  // of the inliers from a line, root mean square
+  // The root mean square distance of the inliers from the line nearest to them, in each image.
+  double line_distance_px[2] = {kUnknown, kUnknown};
 };
 
 struct Judgement {
