@@ -44,8 +44,7 @@ class Ours {
   Ours(const Pair& pair, const Options& options)
       : pair_(pair),
         options_(options),
-        context_(
-            bench::make_context(pair.image[0].cols, pair.image[0].rows, kDefaultKeypoints)) {}
+        context_(bench::make_context(pair.image[0].cols, pair.image[0].rows, kMaxKeypoints)) {}
 
   void run() {
     tv_view views[2];

@@ -40,7 +40,7 @@ int main(int argc, char **argv) {
   if (argc < 2) return fail("usage: 05_fundamental MATCHES.txt [max_error_px]");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 1; /* no image is looked at */
+  limits.purposes = TV_PURPOSE_ESTIMATE; /* the context pays for no image */
   limits.max_matches = MOST;
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));

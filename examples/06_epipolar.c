@@ -59,7 +59,7 @@ int main(int argc, char **argv) {
   if (argc != 4) return fail("usage: 06_epipolar MATCHES.txt WIDTH HEIGHT");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 1;
+  limits.purposes = TV_PURPOSE_ESTIMATE;
   limits.max_matches = MOST;
   if (tv_context_new(&context, &limits) != TV_OK) return fail("no memory");
   tv_estimate_options_init(&options);

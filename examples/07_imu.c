@@ -54,7 +54,7 @@ int main(int argc, char **argv) {
   tv_two_view pose;
   tv_status status;
   double trace = 0;
-  int n, i, j, k;
+  int n, i, k;
   if (argc != 15) return fail("usage: 07_imu MATCHES fx fy cx cy ATTITUDE0 ATTITUDE1 sigma_deg");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   camera.fx = atof(argv[2]);
@@ -83,10 +83,8 @@ int main(int argc, char **argv) {
   status = tv_estimate_two_view(context, &camera, &camera, &pairs, &options, &pose, NULL);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R) return fail("no rotation");
-  for (i = 0; i < 3; ++i) /* trace of R_imu^T R, with R_imu = world1^T world0 */
-    for (j = 0; j < 3; ++j)
-      for (k = 0; k < 3; ++k)
-        trace += world[1][3 * k + i] * world[0][3 * k + j] * pose.R[3 * i + j];
+  for (i = 0; i < 9; ++i) /* trace of R_imu^T R, with R_imu = world1^T world0 */
+    for (k = 0; k < 3; ++k) trace += world[1][3 * k + i / 3] * world[0][3 * k + i % 3] * pose.R[i];
   printf("%s (%s), %d of %d matches agree\n", tv_kind_string(pose.kind),
          tv_verdict_string(pose.verdict), pose.num_inliers, n);
   printf("the cameras turned by %.3f deg, the IMU differs from that by %.3f deg\n",

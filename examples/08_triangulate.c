@@ -51,7 +51,7 @@ int main(int argc, char **argv) {
     camera[v].cy = atof(argv[6]);
   }
   tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 1;
+  limits.purposes = TV_PURPOSE_ESTIMATE;
   limits.max_matches = MOST;
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));

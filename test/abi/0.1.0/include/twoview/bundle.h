@@ -32,8 +32,8 @@ typedef struct tv_bundle_options {
   /* A tv_loss, default TV_LOSS_CAUCHY. */
   int32_t loss;
   /* The scale c of the loss in pixels, (0, 1e9], default 1. A smaller value reduces the influence
-     of more matches. With twice the noise of a pixel or more, correct matches keep most of theirs.
-   */
+     of more matches. With a scale of at least twice the noise of a pixel, correct matches keep most
+     of their influence. */
   double loss_scale_px;
   /* The most steps that are tried, [0, 1000], default 50; 0 only measures the cost. */
   int32_t max_iterations;

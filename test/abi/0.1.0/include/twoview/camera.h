@@ -12,16 +12,17 @@
 TV_BEGIN_DECLS
 
 /* The lens model. A point (X, Y, Z) of the camera frame has (x, y) = (X/Z, Y/Z); r is the length of
-   (x, y) and theta = atan(r). The model maps (x, y) to the distorted (x', y'), and the pixel is
-   (fx x' + cx, fy y' + cy). */
+   (x, y), and theta is the angle off the optical axis, which is atan(r) in front of the camera. The
+   model maps (x, y) to the distorted (x', y'), and the pixel is (fx x' + cx, fy y' + cy). */
 typedef enum tv_camera_model {
   /* No distortion: x' = x, y' = y. The coefficients k are ignored. */
   TV_CAMERA_PINHOLE = 0,
   /* Radial and tangential distortion; k holds k1 k2 p1 p2 k3 [k4 k5 k6] in the order and with the
      formula of OpenCV. */
   TV_CAMERA_BROWN_CONRADY = 1,
-  /* Fisheye; k holds k1 k2 k3 k4. The distorted radius is theta (1 + k1 theta^2 + k2 theta^4 +
-     k3 theta^6 + k4 theta^8), as in OpenCV's fisheye module. */
+  /* Fisheye; k holds k1 k2 k3 k4. The distorted point lies in the direction of (X, Y), at the
+     radius theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8), as in OpenCV's fisheye
+     module. */
   TV_CAMERA_KANNALA_BRANDT = 2
 } tv_camera_model;
 
@@ -45,7 +46,7 @@ typedef struct tv_camera {
 } tv_camera;
 
 /* Returns TV_OK where the camera is valid, else TV_ERR_NULL or TV_ERR_CAMERA. Every function that
-   takes a camera checks it like this.
+   takes a camera checks it like this, except for tv_corrected_camera.
    The functions below compute the valid region of the lens model anew at each call, which takes
    about 10 microseconds for a distorted camera on a desktop core. Those that take many points do it
    once for all of them. Thread-safe, as all functions of this header. */

@@ -37,6 +37,24 @@ typedef enum tv_kernels {
   TV_KERNELS_NEON = 5
 } tv_kernels;
 
+/* What a context is made for: bits of tv_limits.purposes. The context has memory for the calls of
+   these purposes alone; every other call that takes a context and is listed here returns
+   TV_ERR_LIMITS. Calls that are not listed need no purpose. */
+typedef enum tv_purpose {
+  /* tv_detect, tv_orient, tv_describe and tv_extract. */
+  TV_PURPOSE_EXTRACT = 1 << 0,
+  /* tv_match. */
+  TV_PURPOSE_MATCH = 1 << 1,
+  /* tv_estimate_two_view. */
+  TV_PURPOSE_ESTIMATE = 1 << 2,
+  /* tv_reconstruct. It includes the three purposes above. */
+  TV_PURPOSE_RECONSTRUCT = 1 << 3 | 7,
+  /* tv_match_guided, and tv_reconstruct with guided_matching. */
+  TV_PURPOSE_MATCH_GUIDED = 1 << 4,
+  /* tv_adjust_two_view, and tv_reconstruct with bundle_adjustment. */
+  TV_PURPOSE_ADJUST = 1 << 5
+} tv_purpose;
+
 /* The largest inputs that a context is made for. They decide how much memory it needs. Filled by
    tv_limits_init; change fields before tv_context_size. */
 typedef struct tv_limits {
@@ -48,10 +66,14 @@ typedef struct tv_limits {
   int32_t max_height;
   /* The most keypoints of an image, second orientations included, [1, 65535], default 2048. */
   int32_t max_keypoints;
-  /* The most matches of an estimate, [0, 1000000]; 0 (default) means max_keypoints. */
+  /* The most matches of an estimate, and points of a bundle adjustment, [0, 1000000]; 0
+     (default) means max_keypoints. */
   int32_t max_matches;
   /* A tv_kernels, default TV_KERNELS_AUTO. */
   int32_t kernels;
+  /* Bits of tv_purpose: the calls that the context has memory for; 0 (default) means all of them.
+     Fewer purposes need less memory. */
+  uint32_t purposes;
 } tv_limits;
 
 /* Writes the default limits into a struct of struct_size bytes; null is allowed. Programs call

@@ -76,12 +76,14 @@ typedef enum tv_normalisation {
 typedef struct tv_feature_options {
   /* The caller's sizeof, set by tv_feature_options_init. */
   uint32_t struct_size;
-  /* The most keypoints of an image, [1, the context's max_keypoints], default 2048. Second
-     orientations are counted, too, and use the room that corners leave. More keypoints give more
-     matches and take more time: matching grows with the square. */
+  /* The most keypoints of an image, [1, the context's max_keypoints]; 0 (default) means 2048 or
+     the context's max_keypoints, whichever is less. Second orientations are counted, too, and use
+     the room that corners leave. More keypoints give more matches and take more time: matching
+     grows with the square. */
   int32_t max_keypoints;
   /* How many contiguous pixels of the circle of 16 must all be brighter or all be darker than the
-     centre: 9 (default), 10, 11 or 12 (the paper's). A longer arc gives fewer, sharper corners. */
+     centre: 9 (default), 10, 11 or 12 (the FAST-SIFT paper's). A longer arc gives fewer, sharper
+     corners. */
   int32_t arc;
   /* The difference in grey levels that these pixels must exceed, [1, 254], default 10. A bigger
      value gives fewer, stronger corners. */
@@ -91,7 +93,8 @@ typedef struct tv_feature_options {
   int32_t min_threshold;
   /* How many levels the pyramid has, [1, 8], default 1. More levels find matches across a change of
      scale. They cost precision, because corners of coarse levels, which are located less precisely,
-     take a share of max_keypoints: that of the level's area, and what finer levels leave unused. */
+     take a share of max_keypoints in proportion to the level's area, and what finer levels leave
+     unused. */
   int32_t levels;
   /* The scale factor from a pyramid level to the next, [1.1, 2], default 2. */
   float scale_factor;
@@ -121,10 +124,11 @@ TV_API void tv_feature_options_init_sized(tv_feature_options *options, size_t st
    and x.
    mask: null, or an image of the same size; only corners where its byte is not 0 are kept.
    options: null means the defaults.
-   keypoints: room for cap_keypoints, of which options->max_keypoints are always enough; angle_rad
-   of each is 0. *num_keypoints: how many were written; on TV_ERR_CAPACITY how many there are. An
-   image that is too small for any corner gives 0 keypoints and TV_OK. Returns TV_ERR_NULL,
-   TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
+   keypoints: room for cap_keypoints, of which options->max_keypoints (the context's where that is
+   0) are always enough; angle_rad of each is 0. *num_keypoints: how many were written; on
+   TV_ERR_CAPACITY how many there are. An image that is too small for any corner gives 0 keypoints
+   and TV_OK. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS,
+   TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
 TV_API tv_status tv_detect(tv_context *context, const tv_image *image, const tv_image *mask,
                            const tv_feature_options *options, tv_keypoint *keypoints,
                            int32_t cap_keypoints, int32_t *num_keypoints);

@@ -70,6 +70,10 @@ typedef struct tv_reconstruction {
   uint32_t struct_size;
   /* How many keypoints view 0 and view 1 have, second orientations included. */
   int32_t num_keypoints[2];
+  /* How many matches were found beyond the context's max_matches and left out: those of the highest
+     ratio and, among equal ratios, those of the weaker keypoints. If the second
+     estimate of guided matching was taken, the matches of both passes are counted. */
+  int32_t num_matches_left_out;
   /* The keypoints of view 0 and of view 1, num_keypoints[0] and num_keypoints[1] of them. */
   const tv_keypoint *keypoints[2];
   /* Their descriptors, num_keypoints x TV_DESCRIPTOR_BYTES; row i describes keypoint i. */
@@ -98,6 +102,8 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
 
 /* Computes the pose and the points of two images: tv_extract on both, tv_match,
    tv_estimate_two_view, tv_triangulate.
+   More matches than the context's max_matches are no error: the best are taken, and
+   num_matches_left_out says how many were not.
    With guided_matching, the second estimate replaces the first one if it is of the same kind, has
    no fewer inliers and no worse a verdict. Verdict and reasons remain those of the first estimate,
    because matches that were searched along its epipolar lines are no independent evidence for it.

@@ -57,7 +57,8 @@ typedef enum tv_status {
   TV_ERR_ALIGNMENT = 5,
   /* The memory is smaller than tv_context_size reports. */
   TV_ERR_MEMORY = 6,
-  /* An image or a count exceeds the limits that the context was made with. */
+  /* An image or a count exceeds the limits that the context was made with, or the context was not
+     made for this call (tv_purpose). */
   TV_ERR_LIMITS = 7,
   /* An output array is too small; the count that is needed was written. */
   TV_ERR_CAPACITY = 8,

@@ -32,17 +32,19 @@ TV_API void tv_pixel_pairs_init_sized(tv_pixel_pairs *pairs, size_t struct_size)
 
 /* The minimal solver that computes a model from each random sample. */
 typedef enum tv_solver {
-  /* Five matches; cameras are required. The default. D. Nister, "An efficient solution to the
-     five-point relative pose problem", PAMI 2004. */
-  TV_SOLVER_FIVE_POINT = 0,
+  /* The default: five-point with cameras, eight-point without. */
+  TV_SOLVER_AUTO = 0,
+  /* Five matches; cameras are required. D. Nister, "An efficient solution to the five-point
+     relative pose problem", PAMI 2004. */
+  TV_SOLVER_FIVE_POINT = 1,
   /* Eight matches; the method of the FAST-SIFT paper. R. Hartley, "In defense of the eight-point
      algorithm", PAMI 1997. */
-  TV_SOLVER_EIGHT_POINT = 1,
+  TV_SOLVER_EIGHT_POINT = 2,
   /* Seven matches: fewer iterations than eight-point where many matches are wrong. R. Hartley,
      A. Zisserman, "Multiple View Geometry", 11.1.2. */
-  TV_SOLVER_SEVEN_POINT = 2,
+  TV_SOLVER_SEVEN_POINT = 3,
   /* Three matches and the direction of gravity; cameras and gravity are required. */
-  TV_SOLVER_UPRIGHT = 3
+  TV_SOLVER_UPRIGHT = 4
 } tv_solver;
 
 /* The kind of geometry that explains the matches: the kinds of COLMAP, and no-motion. */
@@ -59,17 +61,19 @@ typedef enum tv_kind {
   TV_KIND_PANORAMIC = 4,
   /* A homography, of a plane or of a rotation: only H is known, because no cameras were given. */
   TV_KIND_PLANAR_OR_PANORAMIC = 5,
-  /* The camera did not move: R is the identity, t is not known. */
+  /* The camera did not move: with cameras, R is the identity; t is not known. */
   TV_KIND_NO_MOTION = 6
 } tv_kind;
 
-/* Whether the pose can be relied on. docs/algorithms/two_view.md has the rules. */
+/* Whether the result can be relied on. docs/algorithms/two_view.md has the rules. */
 typedef enum tv_verdict {
-  /* There is no full pose (R and t). */
+  /* No model explains the matches, or the camera only rotated or did not move: the translation is
+     not known. */
   TV_VERDICT_REFUSED = 0,
-  /* There is a full pose, and at least one reason why it may be wrong. */
+  /* There is a model that the kind names, and at least one reason why it may be wrong. */
   TV_VERDICT_DOUBTFUL = 1,
-  /* There is a full pose, and no reason against it. */
+  /* There is such a model, and no reason against it. Without cameras it is F or H and no pose: test
+     has_R and has_t before using R and t. */
   TV_VERDICT_OK = 2
 } tv_verdict;
 
@@ -93,11 +97,12 @@ typedef enum tv_reason {
   /* Matches far from this pose agree on another one, and are at least 15 % as many as its inliers.
      Something in the scene moves by itself, or this pose is that of the moving object. */
   TV_REASON_SECOND_MOTION = 1 << 6,
-  /* The inliers cover fewer than 5 of the 64 cells of an 8x8 grid over the image, or lie on a
-     line. */
+  /* The inliers cover fewer than 5 of the 64 cells of an 8x8 grid over each of the two images, or
+     lie on a line in one of them. */
   TV_REASON_CROWDED_MATCHES = 1 << 7,
-  /* The keypoints of image 0 lie on a regular lattice, and either most inliers do, too, or a second
-     model fits the other matches: the pose may be wrong by one period of a repeated structure. */
+  /* The matched pixels of both images lie on a regular lattice, and either most inliers do, too, or
+     a second model fits the other matches: the pose may be wrong by one period of a repeated
+     structure. */
   TV_REASON_REPEATED_STRUCTURE = 1 << 8
 } tv_reason;
 
@@ -115,11 +120,12 @@ TV_API const char *tv_reason_string(tv_reason reason);
 typedef struct tv_estimate_options {
   /* The caller's sizeof, set by tv_estimate_options_init. */
   uint32_t struct_size;
-  /* A tv_solver, default TV_SOLVER_FIVE_POINT. */
+  /* A tv_solver, default TV_SOLVER_AUTO. */
   int32_t method;
   /* The inlier threshold: the largest Sampson distance of an inlier, in pixels of the images as
-     given, for every lens alike; (0, 1e9], default 1. A bigger value accepts noisier matches and
-     more wrong ones. */
+     given, for every lens alike; (0, 1e9], default 1. The residual of a homography or a rotation
+     has two dimensions; its threshold is 1.25 times as large. A bigger value accepts noisier
+     matches and more wrong ones. */
   double max_error_px;
   /* The search stops when the probability of having missed a better model is below 1 - confidence;
      [0, 1), default 0.9999. A bigger value draws more samples. */
@@ -136,7 +142,8 @@ typedef struct tv_estimate_options {
      when gravity_sigma_rad is above 0. */
   double gravity0[3], gravity1[3];
   /* The standard deviation in radians of each direction of gravity about each axis across it,
-     [0, pi]; 0 (default) means that gravity is not known. */
+     [0, pi]; 0 (default) means that gravity is not known. With every solver, a pose is refined with
+     gravity as a prior; a direction that contradicts the matches counts less. */
   double gravity_sigma_rad;
   /* The standard deviation of the principal point around (cx, cy), in focal lengths, [0, 0.1],
      default 0.01; 0 means that it is exactly there. Used only when camera0 and camera1 are equal.
@@ -176,10 +183,12 @@ typedef struct tv_two_view {
   double R[9], t[3];
   /* The essential matrix [t]x R, scaled to Frobenius norm 1. */
   double E[9];
-  /* The fundamental matrix K1^-T E K0^-1, scaled to Frobenius norm 1; of undistorted pixels. */
+  /* The fundamental matrix, scaled to Frobenius norm 1: K1^-T E K0^-1, of undistorted pixels; or,
+     without cameras, of the pixels as given. */
   double F[9];
-  /* The homography from undistorted pixels of image 0 to undistorted pixels of image 1, scaled so
-     that H[8] = 1, or to Frobenius norm 1 where H[8] is nearly 0. */
+  /* The homography from undistorted pixels of image 0 to undistorted pixels of image 1 (without
+     cameras, pixels as given), scaled so that H[8] = 1, or to Frobenius norm 1 where H[8] is nearly
+     0. */
   double H[9];
   /* The second pose that explains a plane, in the form of R and t, |t| = 1. */
   double alternative_R[9], alternative_t[3];
@@ -189,14 +198,17 @@ typedef struct tv_two_view {
   double covariance[25];
   /* The covariance of the alternative pose, in radians^2 and in the same parameters. */
   double alternative_covariance[25];
-  /* How many inliers each model has; -1 where that model was not estimated. */
+  /* How many inliers each model has, repeated matches counted once; -1 where that model was not
+     estimated. */
   int32_t essential_inliers, fundamental_inliers, homography_inliers, rotation_inliers;
-  /* The share of the cells of an 8x8 grid over image 0 that hold an inlier, [0, 1]. */
+  /* The share of the cells of an 8x8 grid over an image that hold an inlier, [0, 1]: the larger of
+     the two images' shares. */
   double coverage;
   /* The median, over the inliers, of the angle in radians between the two rays of a match after the
-     rotation was removed. */
+     rotation was removed; 0 without a full pose. */
   double median_parallax_rad;
-  /* The root mean square of the inliers' Sampson distances, in pixels. */
+  /* The root mean square of the inliers' residuals, in pixels: Sampson distances, or, where the
+     kind is panoramic, planar-or-panoramic or no-motion, transfer errors. */
   double rms_error_px;
   /* The standard deviation of a matched pixel along one axis, in pixels, estimated from the
      residuals of a full pose; 0 without one. */
@@ -223,16 +235,20 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
 
 /* Estimates the two-view geometry of matched pixels.
    camera0, camera1: both cameras; or both null, which gives F and H only and requires the solver
-   eight-point or seven-point.
+   eight-point, seven-point or TV_SOLVER_AUTO.
    pairs: the matched pixels. The order of the matches has no influence on the result. A match is
-   never an inlier if a pixel lies outside its lens's valid region, is not finite, or has
-   coordinates whose absolute values add up to a million pixels or more. options: null means the
-   defaults, with the eight-point solver where no cameras are given. result: initialised by
-   tv_two_view_init. That no geometry was found is TV_OK, and reported in kind, verdict and reasons.
-   With both views exchanged, R is the transpose bit for bit, and t is -R^T t. inlier_mask: null, or
-   room for pairs->num bytes; a byte is 1 where the match is an inlier of the model that the kind
-   names. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
-   TV_ERR_NOT_FINITE (the options only), TV_ERR_OVERLAP.
+   never an inlier if a pixel lies outside its lens's valid region or is not finite, or if the
+   absolute values of its four coordinates add up to a million pixels or more.
+   options: null means the defaults.
+   result: initialised by tv_two_view_init. That no geometry was found is TV_OK, and reported in
+   kind, verdict and reasons. With both views exchanged, R is the transpose bit for bit, and t is
+   -R^T t.
+   inlier_mask: null, or room for pairs->num bytes; a byte is 1 where the match is an inlier of the
+   model that the kind names.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
+   TV_ERR_NOT_FINITE (the options only), TV_ERR_OVERLAP. More matches than the context's max_matches
+   are TV_ERR_LIMITS: which of them to leave out is the caller's choice here (tv_reconstruct leaves
+   out those of the highest ratio).
    Time: at most max_iterations samples, of at most 10 models each, which are scored on all
    matches. */
 TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,

@@ -1,4 +1,5 @@
-/* twoview: FAST-SIFT matching and two-view geometry. This header includes those of all stages. */
+/* twoview: FAST-SIFT matching and two-view geometry. This header includes those of all
+   stages; include twoview/alloc.h, for a context on the heap, by itself. */
 #ifndef TWOVIEW_TWOVIEW_H
 #define TWOVIEW_TWOVIEW_H
 
