@@ -1,5 +1,5 @@
 /* The fundamental matrix from matches by RANSAC with the eight-point algorithm, the paper's own
-   path: no camera is needed. Prints F and how many matches agree.
+   path: no camera is needed. Prints F and the number of inliers.
    usage: 05_fundamental MATCHES.txt [max_error_px] */
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +40,8 @@ int main(int argc, char **argv) {
   if (argc < 2) return fail("usage: 05_fundamental MATCHES.txt [max_error_px]");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   tv_limits_init(&limits);
-  limits.max_width = limits.max_height = 1; /* no image is looked at */
+  /* no image is read, so the context needs no room for one */
+  limits.max_width = limits.max_height = 1;
   limits.max_matches = MOST;
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));

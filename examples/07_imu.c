@@ -1,7 +1,8 @@
-/* The rotation between two views against an IMU's, with its gravity as a prior: the paper's check.
+/* Compares the rotation between two views with an IMU's, with the IMU's gravity as a prior: the
+   paper's check.
    Attitudes are w x y z, world from body; the body's x is forward, y right, z down, and so is the
-   world's z. The camera looks forward. usage: 07_imu MATCHES.txt fx fy cx cy  w0 x0 y0 z0  w1 x1 y1
-   z1  sigma_deg */
+   world's z. The camera looks forward.
+   usage: 07_imu MATCHES.txt fx fy cx cy  w0 x0 y0 z0  w1 x1 y1 z1  sigma_deg */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -65,7 +66,8 @@ int main(int argc, char **argv) {
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
   camera.cy = atof(argv[5]);
-  camera.width = (int)(2 * camera.cx); /* nearly; the verdict's test against chance needs it */
+  /* about the true size; the verdict's test against chance needs the image's area */
+  camera.width = (int)(2 * camera.cx);
   camera.height = (int)(2 * camera.cy);
   rotation_of(argv + 6, world[0]);
   rotation_of(argv + 10, world[1]);
@@ -75,7 +77,7 @@ int main(int argc, char **argv) {
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
   tv_estimate_options_init(&options);
-  for (k = 0; k < 3; ++k) { /* down, in each camera */
+  for (k = 0; k < 3; ++k) { /* the direction of gravity in each camera's frame */
     options.gravity0[k] = world[0][6 + k];
     options.gravity1[k] = world[1][6 + k];
   }

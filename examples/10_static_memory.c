@@ -1,5 +1,6 @@
-/* No malloc at all: the context lies in a static array, as on a flight computer. The pair is made
-   here: a textured wall in two depths, seen from two places. usage: 10_static_memory */
+/* Uses no malloc: the context lies in a static array, as on a flight computer. The program draws
+   its own pair of images: a textured wall with two depths, seen from two places. usage:
+   10_static_memory */
 #include <stdio.h>
 #include <stdlib.h>
 #include <twoview/twoview.h>
@@ -45,7 +46,7 @@ int main(void) {
   tv_status status;
   size_t needed;
   int v;
-  tv_limits_init(&limits); /* 640 x 480, 2048 keypoints */
+  tv_limits_init(&limits); /* the defaults: 640 x 480, 2048 keypoints */
   status = tv_context_size(&limits, &needed);
   if (status == TV_OK) status = tv_context_init(&context, &limits, memory, sizeof memory);
   if (status != TV_OK) {

@@ -23,7 +23,8 @@ SUPPRESSIONS = """[suppress_type]
   has_data_member_inserted_at = end
 """
 
-# What the self-test does to the headers: (what, file, from, to, whether it is a break).
+# The changes that the self-test makes to the headers: (what, file, from, to, whether it breaks the
+# ABI).
 CHANGES = [
     ("a removed field", "two_view.h", "  double noise_px;\n", "", True),
     ("a field of another name", "two_view.h", "double noise_px;", "double noise;", True),
@@ -51,7 +52,7 @@ def declarations(headers):
 
 
 def members(include):
-    """{struct or enum: its fields or enumerators as they are written, without comments}"""
+    """{struct or enum: its fields or enumerators as the header writes them, without comments}"""
     text = "".join(path.read_text() for path in sorted((include / "twoview").glob("*.h")))
     text = re.sub(r"/\*.*?\*/", " ", text, flags=re.S)
     return {name: [" ".join(part.split()) for part in re.split("[;,]" if kind == "enum" else ";", body)
@@ -60,8 +61,9 @@ def members(include):
 
 
 def broken_members(old, new, growing):
-    """What abidiff does not see where it is told to allow growth: members that are not those of the release, followed
-    by new ones in structs that may grow and in enums."""
+    """Structs and enums whose members break the release's: abidiff, with the option that allows
+    growth, does not report them. The release's members must come first and unchanged; only
+    structs that may grow and enums may have further ones."""
     before, after = members(old), members(new)
     for name, parts in before.items():
         found = after.get(name, [])
@@ -71,7 +73,7 @@ def broken_members(old, new, growing):
 
 
 def compile_headers(cc, include, work, soname):
-    """A library of empty functions, with debug information."""
+    """Compiles a library of empty functions, with debug information."""
     work.mkdir(parents=True, exist_ok=True)
     source, library = work / "declared.c", work / "libtwoview.so"
     source.write_text('#include "twoview/twoview.h"\n' +

@@ -37,13 +37,14 @@ def undocumented(symbols):
     documented = {symbol.name for symbol in symbols if symbol.comment}
     for symbol in symbols:
         private = symbol.kind == "field" and "rivate" in symbol.parent.comment
-        either = symbol.kind == "macro" and symbol.name in documented  # of #if and #else
+        # a macro that #if and #else define twice needs one comment
+        either = symbol.kind == "macro" and symbol.name in documented
         if not symbol.comment and not private and not either:
             yield symbol
 
 
 def said(function, functions):
-    """A function's comment, and those of the functions that it refers to."""
+    """The words of a function's comment, and of the comments of the functions that it refers to."""
     texts = [function.comment]
     for name in re.findall(r"\bas\s+(?:for )?(\w+)", function.comment):
         if name in functions:
@@ -141,7 +142,7 @@ class TestHeaders(unittest.TestCase):
                 self.assertIn("docs/drivers.md", pages, path)
         algorithms = {path.stem for path in (headers.ROOT / "docs" / "algorithms").glob("*.md")} - {
             "math"
-        }  # internal
+        }  # internal macros need no comment
         self.assertEqual(algorithms - named, set())
 
     def test_every_quantity_has_a_unit(self):
