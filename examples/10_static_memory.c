@@ -1,6 +1,6 @@
 /* Uses no malloc: the context lies in a static array, as on a flight computer. The program draws
-   its own pair of images: a textured wall with two depths, seen from two places. usage:
-   10_static_memory */
+   its own pair of images: a textured wall with two depths, seen from two places.
+   usage: 10_static_memory */
 #include <stdio.h>
 #include <stdlib.h>
 #include <twoview/twoview.h>

@@ -234,7 +234,8 @@ def lies_beside(name, header, files):
     return f"{name.rsplit('/', 1)[0]}/{header}" in files
 
 
-# Circles that the check must find: of headers, through a .cc file, and of three files in two folders.
+# Circles that the check must find: two headers, a circle through a .cc file, and three files in two
+# folders.
 CIRCLES = [
     {"lib/src/robust/a.h": ["robust/b.h"], "lib/src/robust/b.h": ["robust/a.h"]},
     {"lib/src/robust/refine.h": [], "lib/src/robust/refine.cc": ["robust/refine.h", "robust/gravity.h"],

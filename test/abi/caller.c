@@ -1,6 +1,6 @@
 /* A program on the public headers, compiled with those of one release and run on a library of
-   another. It uses every struct that may grow, checks that the library writes nothing behind one,
-   and prints results that do not depend on which headers and library they are.
+   another. It uses every struct that may grow, checks that the library writes nothing behind a
+   struct's end, and prints results that must be equal for all headers and libraries.
 
    usage: caller [known|unknown]   compiled with TWOVIEW_ABI_GROWN (the headers of grow.py): whether
    the library knows the new fields, too */

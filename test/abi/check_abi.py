@@ -1,11 +1,14 @@
-"""Compares the ABI that the public headers declare with the frozen dump of its soname (libabigail), and fails on any
-change but growth: a field at the end of a struct that has struct_size, a new enumerator at the end, a new function. The library must export what
-the headers declare. First it shows that it would fail, with copies of the headers in which something was changed.
+"""Compares the ABI that the public headers declare with the frozen dump of its soname, by libabigail,
+and fails on any change but growth: a field at the end of a struct that has struct_size, a new
+enumerator at the end, a new function. The library must export what the headers declare. A self-test
+comes first: it changes copies of the headers and requires that each break is found.
 
-What is compared is a library of empty functions that is compiled from the headers: it has the symbols, signatures and
-types of the true one, whose own files are compiled with the same headers, and none of what lies below them.
+The comparison uses a library of empty functions that is compiled from the headers. It has the
+symbols, signatures and types of the true library, whose own files are compiled with the same
+headers, and none of the types of its internals.
 
-usage: check_abi.py --cc CC --headers INCLUDE --work FOLDER [--abidiff ABIDIFF --dump DUMP --nm NM --library LIBRARY]
+usage: check_abi.py --cc CC --headers INCLUDE --work FOLDER
+                    [--abidiff ABIDIFF --dump DUMP --nm NM --library LIBRARY]
        without --abidiff: only makes FOLDER/libtwoview.so, for test/abi/freeze"""
 
 import argparse

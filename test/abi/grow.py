@@ -1,5 +1,5 @@
-"""Copies the public headers and adds fields at the end of every struct that has struct_size, as a later release may:
-what test/abi builds the library and its callers with.
+"""Copies the public headers and adds fields at the end of every struct that has struct_size, as a
+later release may. test/abi builds a library and callers with the copies.
 
 usage: grow.py INCLUDE OUTPUT"""
 

@@ -104,8 +104,9 @@ void test_altitude_divides_by_the_vertical_part_of_the_way() {
   const auto scale = scale_by_altitude(climb(), 10.2, 11.7, {half, 0, -half}, 0.02, CameraMount());
   TEST_ASSERT_TRUE(scale.has_value());
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.45 / half, scale->baseline_m);
-  // sigma: each of the two altitudes has 0.01 over the vertical part; the direction has 0.02 and
-  // the attitude 0.01, times the level part.
+  // The expected sigma has two parts: 0.01 m of each of the two altitudes over the vertical part of
+  // the direction; and the baseline times the level part over the vertical part (1), times 0.02 rad
+  // of the direction and 0.01 rad of the attitude.
   const double expected =
       std::hypot(0.01 * std::sqrt(2.0) / half, 0.45 / half * std::hypot(0.02, 0.01) * 1.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, scale->sigma_m);

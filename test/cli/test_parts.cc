@@ -204,8 +204,8 @@ void test_pairs_lines_have_two_four_twenty_two_or_thirty_eight_fields() {
   TEST_ASSERT_LESS_THAN_INT(0, parsed_pairs(""));
 }
 
-// Reads the header of every prefix of the bytes. Returns width * 1e6 + height of the whole, negated
-// when the reader calls a prefix truncated.
+// Reads the header of every prefix of the bytes, at last of the whole. Returns width * 1e6 + height
+// of the whole, negated when the reader reports the whole as truncated.
 double header_of(const std::string& bytes) {
   ImageHeader header;
   for (size_t length = 0; length <= bytes.size(); ++length) {

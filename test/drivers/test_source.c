@@ -130,7 +130,7 @@ static void test_attitude_between_neighbours_or_unknown(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 125, 100, &a));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, 2 * atan2(a.world_from_body[3], a.world_from_body[0]));
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.018, a.sigma_rad);
-  /* at a sample's instant */
+  /* the instant is that of a sample */
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 900, 100, &a));
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 200, 100, &a));
   /* the gap between the samples is too large */

@@ -277,7 +277,7 @@ void test_the_upright_method_needs_cameras(void) {
                       pair.options.num, &options, &result, nullptr));
 }
 
-// Extreme sigmas: the call returns, and no output is NaN.
+// With extreme sigmas and opposite gravities the call returns, and every output is finite.
 void test_extreme_sigmas_and_opposite_gravities_give_finite_results(void) {
   Gravity truth;
   make_pair(4, &truth);

@@ -172,8 +172,9 @@ void check_derivatives(const OneMatch& m) {
 
 void test_derivatives_agree_with_differences() { for_random_matches(check_derivatives); }
 
-// The matrix of the reduced equations, Q' (I - P (P'P)^-1 P') Q = a a', and the same for the
-// gradient and the error.
+// Eliminating the point leaves one equation (a, r) of a match. It must be the match's four
+// equations times n, the direction that is orthogonal to the point's derivatives P. With S the
+// pose's derivatives: S' (I - P (P'P)^-1 P') S = a a', and the same for the gradient and the error.
 void check_elimination(const OneMatch& m) {
   const Derivatives d = derivatives(m);
   const Elimination e = tv::eliminate(tv::bundle_frame(m.pose), linearised(m));

@@ -148,9 +148,10 @@ void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int
   }
 }
 
-// The `budget` best peaks of at least the lowest threshold, in their order; with cells, the best
-// ones of each cell up to an even share among the peaks of the highest threshold that leaves the
-// budget, then the best of the rest.
+// The expected corners. Without cells: the `budget` best of the peaks that reach the lowest
+// threshold, in their order. With cells: of the peaks that reach the highest threshold at which
+// there are `budget` of them, first the best of each cell up to an even share, then the best of the
+// rest.
 void check_budget(const tvk_table& kernels, const tv_image& image, int budget, int cell_px) {
   tv_feature_options options;
   memset(&options, 0, sizeof options);

@@ -90,7 +90,8 @@ void test_the_angle_follows_the_rotation() {
   check_rotation(bent_ramp, 0.4, 2.0);  // the bend shifts the peak
 }
 
-// The angle 0 is x, to the right; y, downwards, is a quarter turn: clockwise as seen.
+// An angle of 0 points along x, to the right; a quarter turn along y, downwards. So angles grow
+// clockwise as seen.
 void test_the_sign_is_clockwise_as_seen() {
   float angles_rad[2];
   render(0, [](double u, double) { return 100 + 3 * u; });  // brighter to the right

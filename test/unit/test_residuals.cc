@@ -201,7 +201,7 @@ void test_matrices_that_say_nothing_cost_the_most(void) {
 
 void test_transfer_residual_of_a_pinhole_is_the_textbooks(void) {
   prepare(with_cameras(scene::pinhole(), scene::pinhole(), 32));
-  const Mat3 H = pair.R;  // any matrix that keeps points in front of the camera will do
+  const Mat3 H = pair.R;  // H may be any matrix that keeps the points in front of the camera
   const Mat3 Ki = inverse_intrinsics(scene::pinhole());
   const Mat3 G = Ki.inverse() * H * Ki;
   for (int i = 0; i < matches.pairs.num; ++i) {
