@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""What the built library needs and gives: no heap, no printing, no libstdc++; libc and libm alone
-at run time; and nothing exported but tv_*.
-And what its objects hold: no static constructor, nothing that may be written to.
+"""Checks the symbols of the built library: it needs no heap, no printing and no libstdc++, at run
+time only libc and libm, and it exports tv_* only. Its object files hold no static constructor and
+no writable data.
 usage: check_symbols.py --nm NM --readelf READELF SO ARCHIVE"""
 import argparse
 import re

@@ -1,4 +1,4 @@
-"""Compares the ABI that the public headers declare with the frozen dump of its soname, by libabigail,
+"""Compares the ABI that the public headers declare with its soname's frozen dump, by libabigail,
 and fails on any change but growth: a field at the end of a struct that has struct_size, a new
 enumerator at the end, a new function. The library must export what the headers declare. A self-test
 comes first: it changes copies of the headers and requires that each break is found.

@@ -1,5 +1,5 @@
-"""twoview colmap import and model: models as reference poses, databases as input, and results written
-as models."""
+"""twoview colmap import and model: models as reference poses, databases as input, and results
+written as models."""
 
 import json
 import os

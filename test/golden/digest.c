@@ -1,12 +1,13 @@
-/* A digest of every output of the library over pairs of images, for scripts/determinism: two builds
-   that agree in these lines gave the same bits.
+/* Prints digests of every output of the library for pairs of images, for scripts/determinism: two
+   builds that print the same lines gave the same bits.
 
    digest PAIR...   for each pair and each kernel set of this CPU: `pair set part digest`, a part
                     being the outputs of a few calls
    PAIR is what determinism.py writes: a line of text, `width height`, a line of numbers for each
    camera (fx fy cx cy k1 k2 p1 p2 k3), and the bytes of both images.
 
-   Values are digested field by field (padding is nobody's), floating point as its bits. */
+   Structs are digested field by field, since padding has no defined value; floating point by its
+   bits. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>

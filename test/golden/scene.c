@@ -1,8 +1,8 @@
-/* scene FILE   writes a pair of images as digest.c reads it, which depends on nothing outside this
-   file: whole numbers alone make it, so that it has the same bytes on every machine. golden/stages
-   has every stage of the library work on it.
+/* scene FILE   writes a pair of images in the format that digest.c reads. The pair is computed with
+   integers only and depends on nothing outside this file, so it has the same bytes on every
+   machine. golden/stages runs every stage of the library on it.
 
-   Square faces with random grey patches stand at distances of their own before a wall; the camera
+   Square faces with random grey patches stand at different distances before a wall; the camera
    moves to the right, up and forward without turning. A ray takes the grey of the patch that it
    meets first; a pixel is the average of 3 x 3 rays. */
 #include <stdint.h>

@@ -1,8 +1,8 @@
-"""A digest a stage of what the library computes from a rendered pair (scene.c), held against the
-committed ones.
+"""Computes one digest for each stage of the library from a rendered pair (scene.c), and compares it
+with the committed one.
 
 test/golden/digests.txt has a line `stage digest` for each stage. The test golden/stages fails
-- where a stage's output is other bytes than those the file was made from, with any kernel set of
+- where a stage's output differs from the bytes that the file was made from, with any kernel set of
 this CPU;
 - where CHANGELOG.md does not announce the file's digest: under a heading "Results", the newest
 mention of

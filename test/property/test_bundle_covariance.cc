@@ -100,8 +100,9 @@ struct Counts {
   Count points, pose;
 };
 
-// The bundle's covariance uses the noise that it estimated from the residuals; with `known_noise`
-// it is scaled to the true noise.
+// Adjusts num_pairs pairs and counts how often the ellipsoids hold the truth. The bundle's
+// covariance uses the noise estimated from the residuals; with `known_noise` it is scaled to the
+// true noise.
 Counts run(const Options& base, const tv_bundle_options& bundle, int num_pairs, bool known_noise) {
   Counts counts;
   for (int p = 0; p < num_pairs; ++p) {

@@ -21,7 +21,7 @@ using tv::Vec3;
 constexpr int kPairs = 200, kWrongPairs = 40, kMatches = 150, kSigmas = 4;
 constexpr double kSigmasDeg[kSigmas] = {0.1, 0.5, 1, 2};
 constexpr double kRadians = tv::kPi / 180;
-// the error that a pair without a pose counts as, degrees; larger errors are cut to it
+// degrees: a pair without a pose counts as this error, and larger errors are reduced to it
 constexpr double kMostDeg = 10;
 
 api_context api;

@@ -1,14 +1,14 @@
-// Two-view estimation on synthetic pairs: the errors are held against the Cramer-Rao bound of the
+// Two-view estimation on synthetic pairs: the errors are compared with the Cramer-Rao bound of the
 // true inliers, so that one bound serves every scene and lens.
 //
 // For true matches with independent normal noise of sigma pixels per coordinate, no unbiased
 // estimator of the pose has a covariance below C = sigma^2 (J' J)^-1, J the derivatives of
 // Sampson's residuals at the truth. The normalised squared error e' C^-1 e of an efficient
 // estimator follows chi-square with 5 degrees of freedom: mean 5. Cauchy's loss at 1.5 sigma has an
-// efficiency of 0.8, which makes the mean 6.25 and the standard deviation 4; wrong matches near a
-// line (half a per cent of the wrong ones) cost a little more. So the mean of n scenes is to stay
-// below 6.25 + 17 / sqrt(n), four deviations and a little: 10 for 20 scenes. No scene is to exceed
-// 100 (chi-square's 1e-9 quantile, 50, twice).
+// efficiency of 0.8, which makes the mean 6.25 and the standard deviation 4; wrong matches near an
+// epipolar line (half a per cent of the wrong ones) add to it. So the mean of n scenes must stay
+// below 6.25 + 17 / sqrt(n), slightly more than four deviations: 10 for 20 scenes. No scene
+// may exceed 100 (twice 50, chi-square's 1e-9 quantile).
 #include <Eigen/LU>
 #include <cmath>
 #include <cstdio>

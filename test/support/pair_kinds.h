@@ -161,9 +161,9 @@ struct Maker {
     return true;
   }
 
-  // Adds an object, a box with a half size of 60 to 150 pixels and points 2 to 5 baselines away,
-  // that moves by itself: by
-  // 5 to 20 degrees about their middle and by a tenth to four tenths of their distance.
+  // Adds an object that moves by itself: a box with a half size of 60 to 150 pixels and points 2 to
+  // 5 baselines away. It turns by 5 to 20 degrees about its middle and moves by a tenth to four
+  // tenths of its distance.
   bool put_moving_object(int count) {
     const tv_camera& camera = pair->camera[0];
     const double half_size = uniform(&random, 60, 150);
