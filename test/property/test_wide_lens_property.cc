@@ -6,10 +6,9 @@
 // own; and with the lens's very points and noise, which lie up to 1.3 times as far out as the
 // pinhole's image reaches. There half a pixel is a smaller angle for the pinhole than for the lens,
 // whose scale in the corners is 0.56: the pinhole's matches contain more information. By the
-// Cramer-Rao bound (pose and
-// plane, noise in both views, the true inliers, 400 pairs of this generator: AUC@1/5/10
-// of 52.6, 89.0, 94.5 for the lens and 61.1, 91.5, 95.7 for the pinhole) no estimator can be within
-// two points there.
+// Cramer-Rao bound (pose and plane, noise in both views, the true inliers, 400 pairs of this
+// generator: AUC@1/5/10 of 52.6, 89.0, 94.5 for the lens and 61.1, 91.5, 95.7 for the pinhole) no
+// estimator can be within two points there.
 #include <cmath>
 #include <cstdlib>
 

@@ -1,8 +1,7 @@
 // FAST's corners and scores, on real and synthetic images, compared with a literal implementation
 // of the definition: a pixel is a corner at threshold t when `arc` contiguous pixels of its circle
-// are all
-// brighter than it by more than t, or all darker; its score is the largest such t, found by trying
-// each.
+// are all brighter than it by more than t, or all darker; its score is the largest such t, found by
+// trying each.
 
 #include <stdlib.h>
 #include <string.h>
