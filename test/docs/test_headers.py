@@ -1,17 +1,15 @@
 """Every public symbol is documented, by rules that a program can check.
 
 - A header, type, struct, field, enum, constant, macro and function has a comment of its own, in
-front of it or behind
-  it; one comment serves the names of one statement. Fields of a struct whose comment says "Private"
-  need none.
-- A function's comment names each parameter that points somewhere, unless the type says what it is
-(`tv_camera
-  *camera0`), or it is the object that the function is of (its first parameter).
-- A function that returns a status says which ones.
-- What is said of another function ("as tv_detect") counts as said here.
+  front of it or behind it; one comment serves the names of one statement. Fields of a struct whose
+  comment says "Private" need none.
+- A function's comment names each pointer parameter, unless its type says what it is
+  (`tv_camera *camera0`), or it is the object that the function works on (its first parameter).
+- The comment of a function that returns a status says which statuses it returns.
+- Where a comment refers to another function ("as tv_detect"), that function's comment counts too.
 - A floating-point field has its unit in its name or comment.
 - A header of an algorithm or of a protocol names its source: the page under docs/ that has papers,
-formulas and tests.
+  formulas and tests.
 """
 
 import pathlib

@@ -352,7 +352,7 @@ static void test_ten_minutes_of_a_bad_link(void) {
       (unsigned long long)counters.navdata_late, (unsigned long long)counters.navdata_missing);
   TEST_ASSERT_TRUE(c.num > 17500);
   TEST_ASSERT_TRUE(c.with_attitude > 0.98 * c.num);
-  /* time stamps are 1 ms apart at 1 rad/s, and samples 5 ms */
+  /* at 1 rad/s: time stamps have steps of 1 ms, samples are 5 ms apart */
   TEST_ASSERT_TRUE(c.worst_error < 0.005);
   TEST_ASSERT_EQUAL_INT(0, own_decoder.num_refused);
   TEST_ASSERT_EQUAL_UINT64(2, counters.reboots);
