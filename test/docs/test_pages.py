@@ -1,12 +1,12 @@
-"""What README.md, CHANGELOG.md, examples/README.md and docs/ say is there, is there.
+"""Checks that what README.md, CHANGELOG.md, examples/README.md and docs/ name exists.
 
 - A relative link leads to a file, and its anchor to a heading.
 - A path that begins with a folder of the project names a file, exactly or without its extension, or
-a test. `{a,b}`
-  names several; a path with a star or in capitals is a pattern.
-- A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function stands
-in some source.
-- An option that stands behind a verb of `twoview` is one of that verb's, and a verb is a verb.
+  a test. `{a,b}` names several; a path with a star or in capitals is a pattern.
+- A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function is
+  found in some source file.
+- The word behind `twoview` is a verb of the program, and an option behind it is an option of that
+  verb.
 - A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test.
 """
 
