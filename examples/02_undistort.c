@@ -1,4 +1,4 @@
-/* An image without its lens's distortion, by the camera model alone: figure 1b of the paper.
+/* Removes a lens's distortion from an image, using the camera model only: figure 1b of the paper.
    usage: 02_undistort IN.pgm OUT.pgm fx fy cx cy k1 k2 p1 p2 k3 */
 #include <math.h>
 #include <stdio.h>
@@ -27,7 +27,7 @@ static int fail(const char *what) {
   return 2;
 }
 
-/* Grey level between pixels; 0 outside. */
+/* The grey level at a position between pixels, interpolated; 0 outside the image. */
 static uint8_t sample(const tv_image *image, double x, double y) {
   const int left = (int)floor(x), top = (int)floor(y);
   const double fx = x - left, fy = y - top;
@@ -61,7 +61,8 @@ int main(int argc, char **argv) {
   fprintf(out, "P5\n%d %d\n255\n", image.width, image.height);
   for (y = 0; y < image.height; ++y) {
     for (x = 0; x < image.width; ++x) {
-      /* The ray of this pixel in a camera without distortion, and where the lens shows it. */
+      /* The ray of this pixel in a camera without distortion, and the pixel at which the lens
+         shows that ray. */
       const double ray[3] = {(x - lens.cx) / lens.fx, (y - lens.cy) / lens.fy, 1};
       double pixel[2];
       const int found = tv_camera_project(&lens, ray, pixel, NULL) == TV_OK;

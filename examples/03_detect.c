@@ -53,7 +53,7 @@ int main(int argc, char **argv) {
   options.max_keypoints = MOST;
   options.arc = argc > 3 ? atoi(argv[3]) : 12;
   options.threshold = argc > 4 ? atoi(argv[4]) : 20;
-  options.min_threshold = 0; /* the threshold stays as it is, however few there are */
+  options.min_threshold = 0; /* keeps the threshold, however few corners there are */
   status = tv_detect(context, &image, NULL, &options, corner, MOST, &count);
   if (status != TV_OK) return fail(tv_status_string(status));
   printf("FAST-%d at threshold %d: %d corners\n", options.arc, options.threshold, count);

@@ -1,5 +1,5 @@
 /* The fundamental matrix from matches by RANSAC with the eight-point algorithm, the paper's own
-   path: no camera is needed. Prints F and how many matches agree.
+   path: no camera is needed. Prints F and the number of inliers.
    usage: 05_fundamental MATCHES.txt [max_error_px] */
 #include <stdio.h>
 #include <stdlib.h>

@@ -26,7 +26,7 @@ static int fail(const char *what) {
   return 2;
 }
 
-/* The null vector of F (or, transposed, of its rows): the largest cross product of two rows. */
+/* The null vector of F, or with `transposed` of F^T: the largest cross product of two rows. */
 static void epipole_of(const double F[9], int transposed, double e[3]) {
   double largest = -1;
   int i, j, c;

@@ -1,4 +1,4 @@
-/* The rotation between two views against an IMU's, with its gravity as a prior: the paper's check.
+/* Compares the rotation between two views with an IMU's, with the IMU's gravity as a prior.
    Attitudes are w x y z, world from body; x is forward, y right, z down. The camera looks forward.
    usage: 07_imu MATCHES.txt fx fy cx cy  w0 x0 y0 z0  w1 x1 y1 z1  sigma_deg */
 #include <math.h>
@@ -61,7 +61,8 @@ int main(int argc, char **argv) {
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
   camera.cy = atof(argv[5]);
-  camera.width = (int)(2 * camera.cx); /* nearly; the verdict's test against chance needs it */
+  /* about the true size; the verdict's test against chance needs the image's area */
+  camera.width = (int)(2 * camera.cx);
   camera.height = (int)(2 * camera.cy);
   rotation_of(argv + 6, world[0]);
   rotation_of(argv + 10, world[1]);

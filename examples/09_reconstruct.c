@@ -1,4 +1,5 @@
-/* Two images to a pose and a cloud in one call; the cloud as PLY, in camera 0's frame.
+/* Computes a pose and a point cloud from two images in one call. Writes the cloud as PLY, in
+   camera 0's frame.
    usage: 09_reconstruct A.pgm B.pgm OUT.ply fx fy cx0 cx1 cy */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,6 @@
-/* No malloc at all: the context lies in a static array, as on a flight computer. The pair is made
-   here: a textured wall in two depths, seen from two places. usage: 10_static_memory */
+/* Uses no malloc: the context lies in a static array, as on a flight computer. The program draws
+   its own pair of images: a textured wall with two depths, seen from two places.
+   usage: 10_static_memory */
 #include <stdio.h>
 #include <stdlib.h>
 #include <twoview/twoview.h>
@@ -15,8 +16,7 @@ static unsigned next_random(void) {
   return state >> 8;
 }
 
-/* Blocks of random grey; those of the lower half are nearer, so that they move three times as far.
- */
+/* Blocks of random grey. Those of the lower half are nearer, so they move three times as far. */
 static void paint(void) {
   int k, x, y;
   for (k = 0; k < 6000; ++k) {
@@ -45,7 +45,7 @@ int main(void) {
   tv_status status;
   size_t needed;
   int v;
-  tv_limits_init(&limits); /* 640 x 480, 2048 keypoints */
+  tv_limits_init(&limits); /* the defaults: 640 x 480, 2048 keypoints */
   status = tv_context_size(&limits, &needed);
   if (status == TV_OK) status = tv_context_init(&context, &limits, memory, sizeof memory);
   if (status != TV_OK) {

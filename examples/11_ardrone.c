@@ -1,5 +1,6 @@
-/* An AR.Drone 2.0, live: pictures with their attitudes, features of every tenth. It flies nothing.
-   Try it against the simulator: twoview drone simulate
+/* Receives live pictures of an AR.Drone 2.0 with their attitudes, and detects features in every
+   tenth one. It sends no flight command. To try it without a drone, run the simulator: twoview
+   drone simulate
    usage: 11_ardrone [host [seconds [at-port navdata-port video-port control-port]]] */
 #include <math.h>
 #include <stdio.h>

@@ -1,5 +1,6 @@
 #!/bin/bash
-# Our features, matches and poses for COLMAP's mapper: no feature_extractor, no matcher, no verification.
+# Gives twoview's features, matches and poses to COLMAP's mapper; COLMAP's feature_extractor,
+# matcher and verification are not run.
 # usage: 12_colmap.sh IMAGE_DIR CAMERA.yaml OUT_DIR     (twoview and Debian's colmap in the PATH)
 set -euo pipefail
 images=$1 camera=$2 out=$3

@@ -21,7 +21,7 @@ NOT_OURS = {"build", "out", "__pycache__"}
 
 
 def files_of(root):
-    """Those that git knows or would know; without git, those outside the folders of builds."""
+    """The files that git tracks or would track; without git, all files outside build folders."""
     if (root / ".git").exists() and shutil.which("git"):
         done = subprocess.run(["git", "-C", root, "ls-files", "-z", "--cached", "--others",
                                "--exclude-standard"], capture_output=True, check=False)
@@ -65,7 +65,7 @@ def long_and_unformatted_lines(root, paths):
 
 
 def clang_format():
-    """The program of the version whose format is the project's; None where it is not installed."""
+    """The path of the clang-format of the project's version; None where it is not installed."""
     for name in (f"clang-format-{CLANG_FORMAT_VERSION}", "clang-format"):
         if shutil.which(name):
             said = subprocess.run([name, "--version"], capture_output=True, text=True, check=True)

@@ -7,7 +7,7 @@ import re
 import sys
 from pathlib import Path
 
-# A layer and the layers it may include.
+# For each layer, the layers that it may include.
 LAYERS = {
     "base": set(),
     "kernels": {"base"},
@@ -29,7 +29,7 @@ BANNED = {
     "cstdlib", "stdlib.h", "stdexcept", "exception", "thread", "mutex", "future", "chrono", "ctime",
     "time.h", "random", "regex", "locale", "any", "typeinfo",
 }
-OUTSIDE = ("drivers", "examples", "tools", "python", "bench")  # public headers only
+OUTSIDE = ("drivers", "examples", "tools", "python", "bench")  # may include the public headers only
 # The five-point solver is timed beside its peers', and no function of the public API.
 EXCEPT = {("bench/relpose.cc", "kernels/kernels.h")}
 # The AR.Drone's codecs: bytes in, structs out.
@@ -53,9 +53,10 @@ ROOMS = {
     "simulate": {"drone", "files", "base"},
     "sources": {"base"},
 }
-# How a verb is added and run is the one header of `verbs` that the drone's verbs share.
+# The one header of `verbs` that the drone's verbs may include: it declares how a verb is added and
+# run.
 ROOM_HEADERS = {"drone": {"verbs/common.h"}, "simulate": {"verbs/common.h"}}
-# What lies outside tools/twoview, and the rooms that may include it.
+# Folders outside tools/twoview, and the rooms that may include each.
 OUTSIDE_ROOMS = {
     "simulator": {"simulate"},
     "room": {"simulate"},
@@ -84,7 +85,7 @@ def resolve(header, files):
 
 
 def closure(start, files):
-    """All headers that `start` includes, by whatever way, as they are spelt."""
+    """All headers that `start` includes, directly or through others, as the includes spell them."""
     seen, open_files = set(), [start]
     while open_files:
         for header in files[open_files.pop()]:
@@ -139,7 +140,7 @@ def offences(files):
 
 
 def unit_of(name):
-    """A file without its suffix: x.h and x.cc are one unit, which may include itself."""
+    """A path without its suffix: x.h and x.cc are one unit, and a unit may include itself."""
     return name.rsplit(".", 1)[0]
 
 
@@ -157,7 +158,8 @@ def included_units(name, headers, files):
 
 
 def find_circles(files):
-    """One shortest circle of includes through each unit that lies on one; a circle is listed once."""
+    """One shortest circle of includes through each unit that is part of a circle; each circle is
+    listed once."""
     edges = {}
     for name, headers in files.items():
         edges.setdefault(unit_of(name), set()).update(included_units(name, headers, files))
@@ -178,7 +180,7 @@ def find_circles(files):
 
 
 def room_offences(files):
-    """Offences against ROOMS, in tools/twoview."""
+    """The includes in tools/twoview that ROOMS does not allow."""
     folder = "tools/twoview/"
     for name, headers in files.items():
         if not name.startswith(folder):
@@ -200,7 +202,7 @@ def room_offences(files):
 
 
 def rooms_self_check():
-    """Each rule about rooms must catch an example that breaks it."""
+    """Runs each rule about rooms on an example that breaks it: the rule must report it."""
     good = {
         "tools/twoview/main.cc": ["verbs/verbs.h", "drone/drone.h", "simulate/simulate.h"],
         "tools/twoview/base/error.h": ["string", "twoview/status.h"],
@@ -232,7 +234,8 @@ def lies_beside(name, header, files):
     return f"{name.rsplit('/', 1)[0]}/{header}" in files
 
 
-# Circles that the check must find: of headers, through a .cc file, and of three files in two folders.
+# Circles that the check must find: two headers, a circle through a .cc file, and three files in two
+# folders.
 CIRCLES = [
     {"lib/src/robust/a.h": ["robust/b.h"], "lib/src/robust/b.h": ["robust/a.h"]},
     {"lib/src/robust/refine.h": [], "lib/src/robust/refine.cc": ["robust/refine.h", "robust/gravity.h"],
@@ -243,7 +246,8 @@ CIRCLES = [
 
 
 def self_check():
-    """Each rule must catch an example that breaks it: a check that finds nothing proves nothing."""
+    """Runs each rule on an example that breaks it: the rule must report it, else a check that finds
+    nothing would prove nothing."""
     good = {
         "lib/include/twoview/image.h": ["stdint.h"],
         "lib/include/twoview/two_view.h": ["twoview/image.h"],
@@ -280,7 +284,7 @@ def self_check():
         assert list(offences(bad)), f"the check misses {name} including {header}"
     for circle in CIRCLES:
         assert find_circles(circle), f"the check misses a circle in {circle}"
-    # A pair may include itself, and a diamond is no circle.
+    # A unit that includes its own header, and a diamond of includes, are no circles.
     assert not find_circles({
         "lib/src/robust/a.h": ["robust/b.h", "robust/c.h"], "lib/src/robust/a.cc": ["robust/a.h"],
         "lib/src/robust/b.h": ["robust/d.h"], "lib/src/robust/c.h": ["robust/d.h"],

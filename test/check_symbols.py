@@ -1,27 +1,30 @@
 #!/usr/bin/env python3
-"""What the built library needs and gives: no heap, no printing, no libstdc++; libc and libm alone
-at run time; and nothing exported but tv_*.
-And what its objects hold: no static constructor, nothing that may be written to.
+"""Checks the symbols of the built library: it needs no heap, no printing and no libstdc++, at run
+time only libc and libm, and it exports tv_* only. Its object files hold no static constructor and
+no writable data.
 usage: check_symbols.py --nm NM --readelf READELF SO ARCHIVE"""
 import argparse
 import re
 import subprocess
 import sys
 
-# All that the library may ask of others. A new name here is a decision: say why.
+# All symbols that the library may need from other libraries. Whoever adds a name says why.
 ALLOWED = {
     "memcpy", "memmove", "memset", "memcmp",  # the compiler writes these calls itself
     "sqrt", "sqrtf",  # exact by IEEE 754, so the same everywhere; the only libm functions
-    "getauxval",  # libc's, for the same on ARM: the CPU's features as the kernel hands them over
-    "__stack_chk_fail", "__stack_chk_guard",  # where the compiler guards the stack by default
+    "getauxval",  # from libc on ARM: returns the CPU's features as the kernel reports them
+    # needed where the compiler protects the stack by default
+    "__stack_chk_fail", "__stack_chk_guard",
     "_GLOBAL_OFFSET_TABLE_",
-    "__popcountdi2",  # libgcc's, linked into the program or the .so: integers only
-    "__aeabi_memcpy", "__aeabi_memmove", "__aeabi_memset", "__aeabi_memclr",  # ARM's names
+    "__popcountdi2",  # from libgcc, linked into the program or the .so: integers only
+    # ARM's names of the functions above
+    "__aeabi_memcpy", "__aeabi_memmove", "__aeabi_memset", "__aeabi_memclr",
 }
-# Weak references that every shared object has, from the compiler's start files.
+# Weak references that the compiler's start files put into every shared object.
 STARTUP = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable",
            "_ITM_registerTMCloneTable", "__deregister_frame_info", "__register_frame_info"}
-# Of the objects, not of the .so: there the compiler's start files have theirs.
+# Sections that must be empty in the object files. The .so is not checked for these: the compiler's
+# start files have constructors there.
 CONSTRUCTORS = re.compile(r"\.(init_array|fini_array|ctors|dtors)\b")
 # .data.rel.ro is made read-only at load
 WRITABLE = re.compile(r"\.(data|bss|tdata|tbss)\b(?!\.rel\.ro)")
@@ -42,7 +45,8 @@ def names(nm_output):
 
 
 def sections_that_run_or_change(readelf, archive):
-    """Names of the constructors' and the writable sections that are not empty, of all members."""
+    """The names of the constructor sections and writable sections that are not empty, over all
+    members."""
     text = run(readelf, "--section-headers", "--wide", archive)
     sections = SECTION.findall(text)
     if len(sections) < 100:

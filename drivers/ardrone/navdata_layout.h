@@ -22,7 +22,8 @@ typedef struct navdata_layout {
   uint16_t bytes; /* on the wire, with tag and size */
 } navdata_layout;
 
-/* The layout of a tag; tag 27 has several, which `size` tells apart. Null when there is none. */
+/* The layout of a tag; tag 27 has several, and `size` decides which one it is. Null when there is
+ * none. */
 const navdata_layout *ardrone_navdata_layout(uint32_t tag, size_t bytes);
 
 #endif

@@ -125,7 +125,8 @@ void ardrone_exchanges_receive(ardrone_session *session) {
                                          sizeof session->text - session->text_size, &size);
     const char *end;
     if (status == TVS_NONE) return;
-    if (status != TVS_OK || size == 0) { /* the exchange asks again, or ends in time */
+    /* The exchange repeats its request, or ends when its time is over. */
+    if (status != TVS_OK || size == 0) {
       session->text_size = 0;
       t->open(t->user, ARDRONE_CHANNEL_CONTROL, session->now_ns);
       return;

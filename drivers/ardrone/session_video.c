@@ -257,8 +257,9 @@ static void step_live(ardrone_session *session) {
       take_live(session, &packet);
     }
   } while (size > 0 && total < MAX_BYTES_A_STEP);
-  supervise_stream(session, &session->video); /* after receiving, since a pause of the caller's is
-                                                 no silence of the drone's */
+  /* This follows the receiving, so that a pause of the caller's does not count as a silence of the
+     drone's. */
+  supervise_stream(session, &session->video);
   session->counters.bytes_skipped = session->video.parser.bytes_skipped;
 }
 

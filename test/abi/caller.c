@@ -1,6 +1,6 @@
 /* A program on the public headers, compiled with those of one release and run on a library of
-   another. It uses every struct that may grow, checks that the library writes nothing behind one,
-   and prints results that do not depend on which headers and library they are.
+   another. It uses every struct that may grow, checks that the library writes nothing behind a
+   struct's end, and prints results that must be equal for all headers and libraries.
 
    usage: caller [known|unknown]   compiled with TWOVIEW_ABI_GROWN (the headers of grow.py): whether
    the library knows the new fields, too */
@@ -56,7 +56,7 @@ static int known;
         (it).grown_more[1] == 0)
 #define SPOIL_GROWN(it) memset(&(it).grown_number, PATTERN, sizeof(it) - offsetof_grown(it))
 #define offsetof_grown(it) ((size_t)((const char *)&(it).grown_number - (const char *)&(it)))
-/* A new field that is not zero: an error where the library does not know it. */
+/* A new field that is not zero: a library that does not know the field must return an error. */
 #define REFUSES_UNKNOWN(field, call)                       \
   do {                                                     \
     (field).grown_more[1] = 1;                             \
@@ -98,7 +98,7 @@ static unsigned next_random(void) {
   return state >> 8;
 }
 
-/* Blocks at two depths, seen by a camera that moved to the right. */
+/* Draws blocks at two depths, as a camera that moves to the right sees them. */
 static void paint(void) {
   int k, x, y;
   for (k = 0; k < 3000; ++k) {

@@ -1,11 +1,14 @@
-"""Compares the ABI that the public headers declare with the frozen dump of its soname (libabigail), and fails on any
-change but growth: a field at the end of a struct that has struct_size, a new enumerator at the end, a new function. The library must export what
-the headers declare. First it shows that it would fail, with copies of the headers in which something was changed.
+"""Compares the ABI that the public headers declare with its soname's frozen dump, by libabigail,
+and fails on any change but growth: a field at the end of a struct that has struct_size, a new
+enumerator at the end, a new function. The library must export what the headers declare. A self-test
+comes first: it changes copies of the headers and requires that each break is found.
 
-What is compared is a library of empty functions that is compiled from the headers: it has the symbols, signatures and
-types of the true one, whose own files are compiled with the same headers, and none of what lies below them.
+The comparison uses a library of empty functions that is compiled from the headers. It has the
+symbols, signatures and types of the true library, whose own files are compiled with the same
+headers, and none of the types of its internals.
 
-usage: check_abi.py --cc CC --headers INCLUDE --work FOLDER [--abidiff ABIDIFF --dump DUMP --nm NM --library LIBRARY]
+usage: check_abi.py --cc CC --headers INCLUDE --work FOLDER
+                    [--abidiff ABIDIFF --dump DUMP --nm NM --library LIBRARY]
        without --abidiff: only makes FOLDER/libtwoview.so, for test/abi/freeze"""
 
 import argparse
@@ -23,7 +26,8 @@ SUPPRESSIONS = """[suppress_type]
   has_data_member_inserted_at = end
 """
 
-# What the self-test does to the headers: (what, file, from, to, whether it is a break).
+# The changes that the self-test makes to the headers: (what, file, from, to, whether it breaks the
+# ABI).
 CHANGES = [
     ("a removed field", "two_view.h", "  double noise_px;\n", "", True),
     ("a field of another name", "two_view.h", "double noise_px;", "double noise;", True),
@@ -51,7 +55,7 @@ def declarations(headers):
 
 
 def members(include):
-    """{struct or enum: its fields or enumerators as they are written, without comments}"""
+    """{struct or enum: its fields or enumerators as the header writes them, without comments}"""
     text = "".join(path.read_text() for path in sorted((include / "twoview").glob("*.h")))
     text = re.sub(r"/\*.*?\*/", " ", text, flags=re.S)
     return {name: [" ".join(part.split()) for part in re.split("[;,]" if kind == "enum" else ";", body)
@@ -60,8 +64,9 @@ def members(include):
 
 
 def broken_members(old, new, growing):
-    """What abidiff does not see where it is told to allow growth: members that are not those of the release, followed
-    by new ones in structs that may grow and in enums."""
+    """Structs and enums whose members break the release's: abidiff, with the option that allows
+    growth, does not report them. The release's members must come first and unchanged; only
+    structs that may grow and enums may have further ones."""
     before, after = members(old), members(new)
     for name, parts in before.items():
         found = after.get(name, [])
@@ -71,7 +76,7 @@ def broken_members(old, new, growing):
 
 
 def compile_headers(cc, include, work, soname):
-    """A library of empty functions, with debug information."""
+    """Compiles a library of empty functions, with debug information."""
     work.mkdir(parents=True, exist_ok=True)
     source, library = work / "declared.c", work / "libtwoview.so"
     source.write_text('#include "twoview/twoview.h"\n' +

@@ -1,5 +1,5 @@
-"""Copies the public headers and adds fields at the end of every struct that has struct_size, as a later release may:
-what test/abi builds the library and its callers with.
+"""Copies the public headers and adds fields at the end of every struct that has struct_size, as a
+later release may. test/abi builds a library and callers with the copies.
 
 usage: grow.py INCLUDE OUTPUT"""
 
@@ -12,12 +12,12 @@ FIELDS = """  /* Fields of a later release. */
   double grown_more[2];
 """
 
-# One of a struct's own fields; nested braces do not occur.
+# Matches a struct without nested braces; structs that may grow have none.
 STRUCT = re.compile(r"(typedef struct (\w+) \{\n(?:(?!\n\} ).)*?uint32_t struct_size;.*?)(\} \2;)", re.S)
 
 
 def growing(text):
-    """The names of the structs in a header that may grow."""
+    """The names of those structs of a header that may grow."""
     return [match.group(2) for match in STRUCT.finditer(text)]
 
 
@@ -29,7 +29,8 @@ def main():
         count += found
         copy = output / header.relative_to(source)
         copy.parent.mkdir(parents=True, exist_ok=True)
-        if not copy.exists() or copy.read_text() != text:  # else nothing is compiled again
+        # an unchanged file keeps its time, so that nothing is compiled again
+        if not copy.exists() or copy.read_text() != text:
             copy.write_text(text)
     if count < 13:
         sys.exit(f"grow.py: {count} structs found: the headers are not understood")

@@ -1,4 +1,5 @@
-/* tv_adjust_two_view and tv_point_covariances: what the header promises of statuses and outputs. */
+/* tv_adjust_two_view and tv_point_covariances: the statuses and outputs that the header
+   promises. */
 #include <math.h>
 #include <string.h>
 
@@ -16,7 +17,8 @@ static tv_bundle_result result, start_result;
 static double covariances[9 * NUM_POINTS + 1];
 static api_context a;
 
-/* Twenty points 2 to 5 ahead, seen from 2 apart; pixels rounded to halves, which is the noise. */
+/* Twenty points at depths of 2 to 5, with a baseline of 2; pixels are rounded to multiples of
+   0.5, which is the noise. */
 void setUp(void) {
   uint64_t seed = 1;
   int i, k;
@@ -176,7 +178,7 @@ static void test_poses_cameras_and_counts_are_checked(void) {
   t[1] = start_t[1] = INFINITY, expect_refusal(TV_ERR_NOT_FINITE);
   memset(t, 0, sizeof t), memset(start_t, 0, sizeof t), expect_refusal(TV_ERR_ARGUMENT);
   t[0] = t[1] = t[2] = start_t[0] = start_t[1] = start_t[2] = 1.5e308;
-  expect_refusal(TV_ERR_ARGUMENT); /* its length is not a number */
+  expect_refusal(TV_ERR_ARGUMENT); /* its length overflows to infinity */
   t[0] = start_t[0] = -1e-300, t[1] = t[2] = start_t[1] = start_t[2] = 0;
   camera1.fx = 0, expect_refusal(TV_ERR_CAMERA), camera1 = good;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,

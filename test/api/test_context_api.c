@@ -1,4 +1,5 @@
-/* Limits, size, init, times: every status of context.h, and what it leaves untouched. */
+/* Limits, size, init, times: every status of context.h, and that outputs stay untouched on
+   errors. */
 
 #include <unity.h>
 
@@ -80,7 +81,8 @@ static void test_an_older_callers_missing_fields_have_their_defaults(void) {
   size_t all = 0, older = 0;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &all));
   limits.struct_size = (uint32_t)before_kernels;
-  limits.kernels = -1; /* it is not the library's to read */
+  /* it lies behind the caller's struct_size, so the library must not read it */
+  limits.kernels = -1;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &older));
   TEST_ASSERT_EQUAL_UINT64(all, older);
 }
@@ -103,7 +105,7 @@ static void test_a_newer_callers_unknown_fields_must_be_zero(void) {
   }
 }
 
-/* Of every size, and never a byte more. */
+/* For every caller's size, init writes exactly that many bytes. */
 static void test_init_writes_as_far_as_the_callers_size(void) {
   uint8_t memory[80], whole[sizeof(tv_limits)];
   tv_limits limits;
@@ -142,7 +144,7 @@ static void test_the_extreme_limits_have_a_size(void) {
 static void test_a_vga_context_is_within_8_mib(void) {
   tv_limits limits;
   size_t size = 0;
-  tv_limits_init(&limits); /* 640 x 480, 2048 keypoints */
+  tv_limits_init(&limits); /* the defaults: 640 x 480, 2048 keypoints */
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size));
   TEST_ASSERT_TRUE(size <= (size_t)8 << 20);
 }
@@ -188,7 +190,7 @@ static void test_memory_larger_than_needed_is_left_alone(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, a.memory, SIZE_MAX));
   TEST_ASSERT_EQUAL_PTR(a.memory, context);
   a.context = context;
-  api_release(&a); /* the guard behind the size that was asked for is whole */
+  api_release(&a); /* checks the guard bytes behind the size that was returned */
 }
 
 static void test_the_size_never_falls_when_a_limit_rises(void) {

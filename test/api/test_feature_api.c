@@ -1,5 +1,5 @@
-/* tv_detect, tv_orient, tv_describe, tv_extract: every status of feature.h, what it leaves
-   untouched, the options' promises, memory, and equal bytes. */
+/* tv_detect, tv_orient, tv_describe, tv_extract: every status of feature.h, outputs that stay
+   untouched on errors, what the options promise, memory, and determinism. */
 
 #include <math.h>
 #include <unity.h>
@@ -58,7 +58,7 @@ static int32_t extract(tv_context *context, tv_keypoint *out, uint8_t *rows) {
   return count;
 }
 
-/* All four entry points refuse, and write nothing. */
+/* All four functions must return this status and write nothing. */
 static void refused(tv_status expected, tv_context *context, const tv_image *view,
                     const tv_image *mask, const tv_feature_options *o) {
   tv_keypoint point = {50, 50, 4, 0, 1, 0};
@@ -251,7 +251,7 @@ static void test_capacity_is_told_and_nothing_is_written(void) {
 }
 
 static void test_keypoints_are_in_order_and_inside(void) {
-  const float sizes[4] = {4.0f, 5.2f, 6.76f, 8.788f}; /* times 1.3 a level */
+  const float sizes[4] = {4.0f, 5.2f, 6.76f, 8.788f}; /* each level multiplies the size by 1.3 */
   int32_t count, k;
   options.levels = 4;
   options.scale_factor = 1.3f;
@@ -283,7 +283,7 @@ static void test_extract_is_detect_orient_describe(void) {
         TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others, CAP, &oriented));
     TEST_ASSERT_EQUAL_INT(
         TV_OK, tv_describe(a.context, &image, &options, others, oriented, other_descriptors));
-    options.max_keypoints = CAP; /* room for all second orientations */
+    options.max_keypoints = CAP; /* room for every second orientation too */
     options.arc = 12;
     options.min_threshold = 0;
     corners = detect(a.context, keypoints);
@@ -384,7 +384,7 @@ static void test_any_point_of_a_1x1_image_is_described(void) {
   }
 }
 
-/* Strong corners all on the left: without a grid they take the whole budget. */
+/* All strong corners lie in the left half: without a grid they use up max_keypoints. */
 static void test_a_grid_spreads_the_corners(void) {
   int32_t count, k, right[2] = {0, 0}, with_grid;
   for (k = 0; k < WIDTH * HEIGHT; ++k) {
@@ -399,10 +399,10 @@ static void test_a_grid_spreads_the_corners(void) {
     for (k = 0; k < count; ++k) right[with_grid] += keypoints[k].x >= WIDTH / 2;
   }
   TEST_ASSERT_TRUE(right[0] < 3);
-  TEST_ASSERT_TRUE(right[1] > 10); /* of 24 cells, some of them without a corner */
+  TEST_ASSERT_TRUE(right[1] > 10); /* the right half has 24 cells, some without a corner */
 }
 
-/* The threshold falls only as far as the wanted count needs, and never below min_threshold. */
+/* The threshold falls only until max_keypoints corners are found, and never below min_threshold. */
 static void test_the_threshold_adapts(void) {
   int32_t strict, count, k, lowest = 255;
   options.threshold = 120;
@@ -441,8 +441,9 @@ static void test_interleaved_contexts_give_the_bytes_of_separate_ones(void) {
   api_release(&b);
 }
 
-/* Levels, factors, cells and odd sizes; most of it is for the sanitizers. The context is of the
-   image's size, so that nothing is hidden by room to spare. */
+/* All combinations of levels, factors, cells and odd sizes; mainly for the sanitizers. The
+   context is made for exactly the image's size, so that a write beyond the image's share is
+   seen. */
 static void test_options_work_in_all_combinations(void) {
   static const float factors[] = {1.1f, 1.2345f, 1.5f, 1.99f, 2.0f};
   static const int32_t cells[] = {0, 8, 31, 16384}, levels[] = {1, 2, 5, 8};

@@ -1,5 +1,5 @@
-/* tv_match_guided: every status of match.h, what it leaves untouched, and determinism. The matches
-   themselves are checked in test/unit/test_guided.c. */
+/* tv_match_guided: every status of match.h, outputs that stay untouched on errors, and
+   determinism. The matches themselves are checked in test/unit/test_guided.c. */
 
 #include <math.h>
 #include <unity.h>
@@ -14,7 +14,7 @@ static uint8_t descriptors0[(COUNT + 1) * TV_DESCRIPTOR_BYTES];
 static uint8_t descriptors1[(COUNT + 1) * TV_DESCRIPTOR_BYTES];
 static tv_correspondence found[COUNT];
 static tv_camera camera;
-static double sideways[9]; /* the epipolar lines are the rows */
+static double sideways[9]; /* the E of a sideways motion: the epipolar lines are the rows */
 static api_context a;
 
 static tv_limits small_limits(void) {
@@ -120,7 +120,7 @@ static void test_null_pointers_are_refused(void) {
   refused(TV_ERR_NULL, &c);
   c = good_call();
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, run(&c, NULL));
-  c.camera0 = NULL; /* one camera only */
+  c.camera0 = NULL; /* only one of the two cameras is given */
   refused(TV_ERR_ARGUMENT, &c);
 }
 
@@ -231,7 +231,7 @@ static void test_a_full_context_matches_in_its_memory(void) {
   int32_t count = 0, k;
   tv_guided_options_init(&options);
   options.max_distance = 3000;
-  options.max_error_px = 1000; /* every pair is a candidate */
+  options.max_error_px = 1000; /* every pair of keypoints is a candidate */
   c.options = &options;
   TEST_ASSERT_EQUAL_INT(TV_OK, run(&c, &count));
   TEST_ASSERT_EQUAL_INT(COUNT, count);

@@ -1,6 +1,6 @@
-/* Input that is known to hang, crash or fool libraries of this kind, this one's limits among it: a
-   status or a verdict in bounded time, and never a NaN. Issue numbers name the reports of others.
- */
+/* Inputs that are known to hang, crash or mislead libraries of this kind, and inputs at the
+   limits of this one. Each must give a status or a verdict in bounded time, and never a NaN.
+   Issue numbers name the reports about other libraries. */
 #include <math.h>
 #include <string.h>
 #include <time.h>
@@ -11,8 +11,9 @@
 
 enum { MAX_MATCHES = 100000, MANY = 1000 };
 
-/* Processor time that one call may take here, on any machine and under the sanitizers too: what
-   hangs takes forever. A desktop core needs 0.3 s for the slowest of these. */
+/* The largest processor time that one call may take, on any machine and under the sanitizers:
+   the bound is only meant to find calls that do not end. A desktop core needs 0.3 s for the
+   slowest call. */
 static const double max_seconds = 60;
 
 static tv_context *context;
@@ -27,7 +28,7 @@ static uint64_t seed;
 
 static double uniform(double low, double high) { return low + (high - low) * random_unit(&seed); }
 
-static double normal(void) { /* near enough: a sum of 12 */
+static double normal(void) { /* Approximately normal: a sum of 12 uniform numbers. */
   double sum = -6;
   int k;
   for (k = 0; k < 12; ++k) sum += random_unit(&seed);
@@ -70,7 +71,7 @@ static int all_finite(const double *values, int count) {
   return count == 0;
 }
 
-/* What holds of every result. */
+/* The conditions that hold for every result. */
 static void expect_sound(int count) {
   int i, inliers = 0;
   TEST_ASSERT_TRUE(result.kind >= TV_KIND_DEGENERATE && result.kind <= TV_KIND_NO_MOTION);
@@ -97,8 +98,9 @@ static void estimate(const tv_camera *camera, int count) {
   expect_sound(count);
 }
 
-/* With every lens and solver, and without a lens. Returns the best verdict that the pinhole and no
-   lens gave, which is how these pairs are made, and whether any lens gave a translation. */
+/* Estimates with every lens and solver, and without cameras. Returns the best verdict that the
+   pinhole or no camera gave, since the pairs are made with a pinhole, and whether any lens gave
+   a translation. */
 typedef struct best {
   int verdict, has_t;
 } best;
@@ -120,7 +122,7 @@ static best estimate_every_way(int count) {
   return b;
 }
 
-/* Points as all methods of triangulation give them for the first matches; none may hold a NaN. */
+/* Triangulates the first matches by all methods; no point may hold a NaN. */
 static void expect_sound_points(const tv_camera *camera, const double R[9], const double t[3],
                                 int count, int expected_status) {
   int method, i;
@@ -142,7 +144,8 @@ static void turn_about_y(double angle_rad, double R[9]) {
   memcpy(R, turn, sizeof turn);
 }
 
-/* Both views of a point that the first lens sees; whether both do. */
+/* Sets match i to a point's pixels in both views; false when the first lens does not see it in
+   both. */
 static int see(const tv_camera *camera, const double R[9], const double t[3], const double p[3],
                double noise_px, int i) {
   double moved[3], at[2][2];
@@ -160,7 +163,8 @@ static int see(const tv_camera *camera, const double R[9], const double t[3], co
   return 1;
 }
 
-/* Depths of low to high baselines over the image of the pinhole. */
+/* Fills the matches with points at depths from low to high baselines, over the whole image of
+   the pinhole. */
 static void make_scene(int count, double low, double high, double noise_px, const double R[9],
                        const double t[3]) {
   int i;
@@ -183,9 +187,10 @@ static double direction_error_deg(const double a[3], const double b[3]) {
 
 static const double still[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-/* OpenCV 24967: findEssentialMat never returned, for samples of points that do not move give the
-   solver's polynomial coefficients that are not finite. There: focal length 1211.2, principal point
-   (0, 0), threshold 5 px; matches of a camera that stands still, rounded to pixels. */
+/* OpenCV 24967: findEssentialMat never returned, since a sample of points that do not move gives
+   the solver's polynomial coefficients that are not finite. The report's data: focal length
+   1211.2, principal point (0, 0), threshold 5 px; matches of a camera that stands still, rounded
+   to pixels. */
 static void test_opencv_24967_a_still_camera_ends_with_a_verdict(void) {
   tv_camera camera = lenses[0];
   int trial, i;
@@ -206,9 +211,9 @@ static void test_opencv_24967_a_still_camera_ends_with_a_verdict(void) {
   }
 }
 
-/* OpenCV 24482: None for valid input. There: points about the principal point, half of them equal
-   in both views, the others a tenth of a pixel apart this way or that; a camera that hardly moves.
- */
+/* OpenCV 24482: the call returned None for valid input. The report's data: points about the
+   principal point, half of them equal in both views, the others moved by a tenth of a pixel in
+   either direction; a camera that hardly moves. */
 static void test_opencv_24482_points_a_tenth_of_a_pixel_apart_have_an_answer(void) {
   tv_camera camera = lenses[0];
   int i;
@@ -225,7 +230,7 @@ static void test_opencv_24482_points_a_tenth_of_a_pixel_apart_have_an_answer(voi
   for (i = 0; i < 9; ++i) TEST_ASSERT_DOUBLE_WITHIN(1e-3, i % 4 == 0, result.R[i]);
 }
 
-/* The same report's title: valid input must have an answer. */
+/* The title of the same report: valid input must give a result. */
 static void test_opencv_24482_valid_input_always_has_an_answer(void) {
   int trial;
   for (trial = 0; trial < 40; ++trial) {
@@ -238,8 +243,8 @@ static void test_opencv_24482_valid_input_always_has_an_answer(void) {
   }
 }
 
-/* OpenCV 19639: findFundamentalMat crashed on these seven matches; three of them end in one point.
- */
+/* OpenCV 19639: findFundamentalMat crashed on these seven matches; three of them have the same
+   point in one image. */
 static void test_opencv_19639_repeated_points_are_survived(void) {
   static const double x[14] = {941, 890, 596, 940, 898, 941, 894,
                                933, 586, 938, 902, 933, 887, 935};
@@ -255,8 +260,8 @@ static void test_opencv_19639_repeated_points_are_survived(void) {
   }
 }
 
-/* OpenCV 24394: triangulatePoints gave NaN and infinities where the rays are parallel, and for
-   whole numbers of pixels. */
+/* OpenCV 24394: triangulatePoints gave NaN and infinities where the rays are parallel, and where
+   pixel coordinates are integers. */
 static void test_opencv_24394_parallel_rays_are_points_at_infinity(void) {
   static const double t[3] = {-1, 0, 0};
   int lens, i;
@@ -269,7 +274,7 @@ static void test_opencv_24394_parallel_rays_are_points_at_infinity(void) {
   }
 }
 
-/* OpenCV 8032: recoverPose took points beyond a fixed 50 baselines for wrong. */
+/* OpenCV 8032: recoverPose rejected points farther away than a fixed 50 baselines. */
 static void test_opencv_8032_points_beyond_fifty_baselines_count(void) {
   const double t[3] = {-1, 0, 0};
   double R[9];
@@ -319,7 +324,7 @@ static void test_equal_points_are_refused(void) {
 
 static void test_a_thousand_copies_of_one_match_are_refused(void) {
   int count, i;
-  for (count = 1; count <= 8; ++count) { /* of so many different ones */
+  for (count = 1; count <= 8; ++count) { /* `count` different matches, the rest are copies */
     for (i = 0; i < count; ++i) {
       set_match(i, uniform(0, 640), uniform(0, 480), uniform(0, 640), uniform(0, 480));
     }
@@ -343,7 +348,7 @@ static void test_points_on_a_line_are_not_ok(void) {
     }
     TEST_ASSERT_TRUE(estimate_every_way(MANY).verdict != TV_VERDICT_OK);
   }
-  for (i = 0; i < MANY; ++i) { /* a line in the images that no motion explains */
+  for (i = 0; i < MANY; ++i) { /* matches on a line in each image that no motion explains */
     const double s = uniform(0, 600);
     set_match(i, s, 200 + 0.1 * s, 600 - s, 300);
   }
@@ -360,7 +365,7 @@ static void test_points_on_a_conic_of_a_plane_have_a_verdict(void) {
     i += see(&lenses[0], R, t, p, i % 2 == 0 ? 0 : 0.3, i);
   }
   estimate_every_way(MANY);
-  for (i = 0; i < MANY; ++i) { /* and of none */
+  for (i = 0; i < MANY; ++i) { /* points on a conic in view 0, with random pixels in view 1 */
     set_match(i, 320 + 200 * cos(0.01 * i), 240 + 200 * sin(0.01 * i), uniform(0, 640),
               uniform(0, 480));
   }
@@ -414,7 +419,7 @@ static void test_rays_of_no_length_and_turned_rays_are_told(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
                         tv_triangulate(TV_TRIANGULATION_MIDPOINT, &lenses[0], &lenses[0], still,
                                        zero, pixels[0], pixels[1], 1, points));
-  for (i = 0; i < 100; ++i) { /* moved the wrong way: the rays meet behind both cameras */
+  for (i = 0; i < 100; ++i) { /* t has the wrong sign: the rays meet behind both cameras */
     const double x = uniform(220, 420), y = uniform(140, 340);
     set_match(i, x, y, x + uniform(10, 50), y);
   }
@@ -443,7 +448,7 @@ static void test_a_hundred_thousand_matches_end_in_bounded_time(void) {
   }
   estimate(&lenses[0], MAX_MATCHES);
   TEST_ASSERT_TRUE(result.has_t && direction_error_deg(result.t, t) < 1);
-  for (i = 0; i < MAX_MATCHES; ++i) { /* no two agree: the worst case of the loop */
+  for (i = 0; i < MAX_MATCHES; ++i) { /* unrelated matches: the loop runs to max_iterations */
     set_match(i, uniform(0, 640), uniform(0, 480), uniform(0, 640), uniform(0, 480));
   }
   options.max_iterations = 200;
@@ -469,13 +474,14 @@ static void test_thresholds_of_nothing_are_refused_and_of_everything_conclude_no
   }
   options.max_error_px = 1e9; /* every model fits every match */
   TEST_ASSERT_TRUE(estimate_every_way(300).verdict != TV_VERDICT_OK);
-  options.max_error_px = 1e-9; /* no model fits any match but those it was made from */
+  options.max_error_px = 1e-9; /* a model fits only the matches of its sample */
   TEST_ASSERT_TRUE(estimate_every_way(300).verdict != TV_VERDICT_OK);
   options.max_error_px = 5e-324;
   TEST_ASSERT_TRUE(estimate_every_way(300).verdict != TV_VERDICT_OK);
 }
 
-/* expect_sound looks at the numbers; here that there are pairs to look at. */
+/* expect_sound checks the numbers of a covariance; this test checks that some of the pairs have
+   one. */
 static void test_covariance_of_a_poor_pair_is_a_number_or_absent(void) {
   double R[9];
   int k, with = 0;

@@ -1,5 +1,5 @@
-/* Limits that are gentle: what a context was not made for is refused, more matches than it holds
-   are left out by ratio, and null options mean what initialised ones mean. */
+/* Limits: a call that the context was not made for is refused, of more matches than fit the best
+   by ratio are kept, and null options mean the same as initialised ones. */
 
 #include <unity.h>
 
@@ -12,7 +12,7 @@ static uint8_t drawn[2][WIDTH * HEIGHT];
 static tv_camera camera;
 static tv_view views[2];
 
-/* The second image is the first, moved sideways by twice as much in its lower half. */
+/* The second image is the first one moved sideways, its lower half by twice as much. */
 void setUp(void) {
   int v, x, y;
   api_draw(81, drawn[0], WIDTH, HEIGHT);
@@ -59,7 +59,8 @@ static tv_status run(tv_context *context, int first, const tv_reconstruct_option
                         &o->cloud);
 }
 
-/* Every call that takes a context's memory, with valid arguments: the statuses, a bit each. */
+/* Makes every call that uses a context's memory, with valid arguments. Returns a bit for each
+   call: 1 when its status is TV_OK. */
 static uint32_t calls_that_work(tv_context *context) {
   static tv_keypoint keypoints[CAP];
   static uint8_t descriptors[CAP * TV_DESCRIPTOR_BYTES];
@@ -118,7 +119,7 @@ static void test_a_context_serves_its_purposes_alone(void) {
   }
 }
 
-/* Against a reconstruction with room for all. */
+/* Compares with a reconstruction in a context that has room for all matches. */
 static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
   static const int32_t rooms[] = {1, 2, 7, 20, 50, 299};
   tv_reconstruct_options options;
@@ -129,7 +130,8 @@ static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
     api_context all = make(CAP, CAP, 0);
     outcome full;
     options.guided_matching = guided;
-    if (guided == 0) { /* the halves change places, and so does the order of equal scores */
+    /* swaps the halves of the image, so that corners of equal score come in another order */
+    if (guided == 0) {
       memcpy(drawn[1], drawn[0] + sizeof drawn[0] / 2, sizeof drawn[0] / 2);
       memcpy(drawn[1] + sizeof drawn[0] / 2, drawn[0], sizeof drawn[0] / 2);
     } else {
@@ -169,7 +171,7 @@ static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
           better += full.cloud.matches[i].ratio < worst;
           as_good += full.cloud.matches[i].ratio <= worst;
         }
-        /* At most one place stays empty, where two of equal rank compete for it. */
+        /* At most one place stays empty, where two matches of equal rank compete for it. */
         TEST_ASSERT_TRUE(better <= kept.cloud.num_matches && kept.cloud.num_matches <= as_good);
         TEST_ASSERT_TRUE(kept.cloud.num_matches_left_out == 0 ||
                          kept.cloud.num_matches >= rooms[k] - 1);
@@ -181,7 +183,7 @@ static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
   }
 }
 
-/* Identical images: every ratio is 0, and every match (i, i). */
+/* The images are identical, so every ratio is 0 and every match is (i, i). */
 static void test_equal_ratios_leave_the_weaker_keypoints_out(void) {
   api_context a = make(CAP, 20, 0);
   outcome o;
@@ -205,7 +207,7 @@ typedef struct stage_results {
   double R[9], t[3];
 } stage_results;
 
-/* Every call that takes options. */
+/* The outputs of every call that takes options. */
 static void run_stages(tv_context *context, const tv_camera *lens, int initialised,
                        stage_results *r) {
   enum { ROOM = 2100 };

@@ -1,5 +1,5 @@
-/* No call after tv_context_init takes heap: malloc and its like are this program's own, and count.
- */
+/* No call after tv_context_init allocates: this program defines malloc, calloc, realloc and free
+   itself, and counts their calls. */
 
 #include <unity.h>
 
@@ -12,10 +12,11 @@ extern void *__libc_calloc(size_t count, size_t size);
 extern void *__libc_realloc(void *block, size_t size);
 extern void __libc_free(void *block);
 
-static volatile int watching; /* the compiler thinks that malloc does not see these */
+/* volatile, since the compiler assumes that malloc does not read these */
+static volatile int watching;
 static volatile long allocations;
 
-/* The dynamic linker takes these for the shared library too. */
+/* The dynamic linker uses these definitions for the shared library too. */
 void *malloc(size_t size) {
   allocations += watching;
   return __libc_malloc(size);
@@ -49,7 +50,7 @@ void setUp(void) {
   limits.max_keypoints = MOST;
   context = api_make(&limits);
   api_draw(3, pixels[0], WIDTH, HEIGHT);
-  for (y = 0; y < HEIGHT; ++y) { /* the same, 5 pixels to the left */
+  for (y = 0; y < HEIGHT; ++y) { /* the same image, moved 5 pixels to the left */
     memmove(pixels[1] + y * WIDTH, pixels[0] + y * WIDTH + 5, WIDTH - 5);
   }
 }
@@ -68,7 +69,7 @@ static tv_camera camera(void) {
   return c;
 }
 
-/* The stages, and what comes after a pose. */
+/* Calls each stage by itself, and the functions that need a pose. */
 static void call_stages(void) {
   static tv_correspondence matches[MOST], guided[MOST];
   static double at[2][2 * MOST], covariances[9 * MOST];

@@ -1,5 +1,5 @@
-/* tv_reconstruct: every status of reconstruct.h, what it leaves untouched, where its arrays lie,
-   and equal bytes. How good the poses are is checked elsewhere. */
+/* tv_reconstruct: every status of reconstruct.h, outputs that stay untouched on errors, where
+   its arrays lie, and determinism. Other tests check how accurate the poses are. */
 
 #include <math.h>
 #include <stdio.h>
@@ -39,7 +39,7 @@ static tv_camera camera_of(int32_t width, int32_t height) {
   return c;
 }
 
-/* The second image is the first, moved sideways by twice as much in its lower half. */
+/* The second image is the first one moved sideways, its lower half by twice as much. */
 static void draw_pair(uint64_t seed) {
   int32_t x, y;
   api_draw(seed, drawn[0], WIDTH, HEIGHT);
@@ -70,7 +70,7 @@ static tv_status run(tv_context *context) {
   return tv_reconstruct(context, &views[0], &views[1], NULL, &two_view, &reconstruction);
 }
 
-/* Fills the outputs but for struct_size with a pattern, which a refusal leaves. */
+/* Fills the outputs except struct_size with a pattern, which a refused call must leave as it is. */
 static void refused(tv_status expected, const tv_reconstruct_options *options) {
   const size_t skip = sizeof two_view.struct_size;
   memset((uint8_t *)&two_view + skip, API_PATTERN, sizeof two_view - skip);
@@ -81,7 +81,7 @@ static void refused(tv_status expected, const tv_reconstruct_options *options) {
   TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&reconstruction + skip, sizeof reconstruction - skip));
 }
 
-/* Every stage's options, at their defaults. */
+/* The options of every stage, at their defaults. */
 typedef struct stage_options {
   tv_feature_options feature;
   tv_match_options match;
@@ -227,7 +227,7 @@ static void test_no_geometry_is_a_result(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
 }
 
-/* Everything that the result points to, in one hash. */
+/* One hash over everything that the result points to. */
 static uint64_t hash_of_result(void) {
   const tv_reconstruction *r = &reconstruction;
   const size_t n = (size_t)r->num_matches;
@@ -260,7 +260,7 @@ static void test_the_same_call_gives_the_same_bytes(void) {
   first = hash_of_result();
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
   TEST_ASSERT_TRUE(first == hash_of_result());
-  draw_pair(82); /* another pair in between, in another context and in this one */
+  draw_pair(82); /* reconstructs another pair in between, in another context and in this one */
   TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
   TEST_ASSERT_TRUE(first != hash_of_result());
@@ -270,7 +270,8 @@ static void test_the_same_call_gives_the_same_bytes(void) {
   api_release(&b);
 }
 
-/* The size query asks for what a full call uses, not for much more. */
+/* tv_context_size returns at least what a full call uses, and the call uses over 80 per cent of
+   it. */
 static void test_a_full_call_uses_most_of_the_memory(void) {
   size_t high_water;
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
@@ -281,7 +282,7 @@ static void test_a_full_call_uses_most_of_the_memory(void) {
 
 static void view_real_pair(const real_pair *pair) {
   int v;
-  camera = camera_of(pair->width, pair->height); /* setUp makes the drawn pair's again */
+  camera = camera_of(pair->width, pair->height); /* setUp sets the drawn pair's camera again */
   for (v = 0; v < 2; ++v) {
     views[v].image = api_image(pair->luma[v], pair->width, pair->height, pair->width);
     views[v].camera = &camera;
@@ -308,7 +309,7 @@ static void test_a_real_pair_has_the_same_bytes_with_every_kernel_set(void) {
   free(pair.luma[1]);
 }
 
-/* The place of a match among those of the result, or -1. */
+/* The index of a match among the result's matches, or -1. */
 static int32_t place_of(const tv_correspondence *match) {
   int32_t k;
   for (k = 0; k < reconstruction.num_matches; ++k) {
@@ -375,7 +376,7 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   free(pair.luma[1]);
 }
 
-/* Sum of squared errors of the points that are good in both. */
+/* The sum of squared errors over the points whose status is TV_POINT_OK in both arrays. */
 static double sum_sq(const tv_point *points, const tv_point *others, int32_t count) {
   double sum = 0;
   int32_t k;

@@ -1,4 +1,4 @@
-/* tv_triangulate: what the header promises of statuses and outputs. */
+/* tv_triangulate: the statuses and outputs that the header promises. */
 #include <math.h>
 #include <string.h>
 
@@ -12,7 +12,7 @@ static double R[9], t[3];
 static double pixels0[2 * NUM_POINTS], pixels1[2 * NUM_POINTS];
 static tv_point points[NUM_POINTS + 1], untouched[NUM_POINTS + 1];
 
-/* Four points 2 to 5 ahead, seen from 1 apart. */
+/* Four points at depths of 2 to 5, with a baseline of 1. */
 static const double truth[NUM_POINTS][3] = {
     {0.1, 0.2, 2}, {-0.3, 0.1, 3}, {0.5, -0.4, 4}, {1, 0.5, 5}};
 

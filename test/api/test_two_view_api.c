@@ -1,4 +1,5 @@
-/* tv_estimate_two_view: what the header promises of statuses, outputs and kinds of pairs. */
+/* tv_estimate_two_view: the statuses and outputs that the header promises, and the kinds of
+   pairs. */
 #include <math.h>
 #include <string.h>
 
@@ -42,8 +43,8 @@ static int see(const double point[3], double baseline, int i) {
          tv_camera_project(&camera1, moved, pixels1 + 2 * i, NULL) == TV_OK;
 }
 
-/* Points of a field of view of about 60 degrees. flatness 0: depths of 4 to 12; 1: on a slanted
-   plane. */
+/* Points in a field of view of about 60 degrees. flatness 0 gives depths of 4 to 12, flatness 1
+   a slanted plane. */
 static void make_scene(int count, double flatness, double baseline) {
   int i;
   for (i = 0; i < count; ++i) {
@@ -354,7 +355,7 @@ static void test_cameras_are_checked(void) {
   tv_camera bad = camera0;
   expect_refusal(TV_ERR_ARGUMENT, &camera0, NULL, 10);
   expect_refusal(TV_ERR_ARGUMENT, NULL, &camera1, 10);
-  options.method = TV_SOLVER_FIVE_POINT; /* which needs them */
+  options.method = TV_SOLVER_FIVE_POINT; /* this solver needs cameras, and none are given */
   expect_refusal(TV_ERR_ARGUMENT, NULL, NULL, 10);
   bad.fx = 0;
   expect_refusal(TV_ERR_CAMERA, &bad, &camera1, 10);
@@ -379,7 +380,7 @@ static void test_the_mask_may_not_lie_over_an_input(void) {
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
 }
 
-/* Every method at exact data finds the motion; a fifth of the matches is wrong. */
+/* With exact true matches and a fifth of wrong ones every solver finds the motion. */
 static void test_every_method_finds_an_exact_motion(void) {
   int method;
   spoil(800, 1000);

@@ -1,4 +1,4 @@
-"""Chessboards rendered through lenses that are known exactly: what `calibrate` must find again."""
+"""Chessboards rendered through lenses with known parameters, which `calibrate` must recover."""
 import functools
 
 import cv2
@@ -7,7 +7,7 @@ import numpy as np
 INNER = (9, 6)
 SQUARE = 0.03
 SIZE = (640, 480)
-OVER = 3  # samples a pixel and axis
+OVER = 3  # samples per pixel along each axis
 
 MILD = ("brown-conrady", (620.0, 617.0, 327.3, 234.6), (-0.28, 0.09, 0.001, -0.0005, 0.0))
 WIDE = ("brown-conrady", (380.0, 381.0, 315.2, 243.9), (-0.25, 0.06, 0.0008, -0.0004, -0.006))
@@ -30,7 +30,7 @@ def matrix(numbers):
 
 
 def distorted(model, k, rays):
-    """The models' formulas, from points before the camera to the plane that K maps to pixels."""
+    """Pixels of points in front of the camera, by the lens model's formulas and the matrix K."""
     x, y = rays[:, 0] / rays[:, 2], rays[:, 1] / rays[:, 2]
     if model == "kannala-brandt":
         r = np.maximum(np.hypot(x, y), 1e-12)
@@ -52,12 +52,12 @@ def project(lens, R, t, points):
 
 @functools.lru_cache(maxsize=None)
 def ray_table(lens):
-    """Where each sample of the image looks, on the plane z = 1, by Newton's method along the radius
-    and then in both axes."""
+    """The ray of each sample of the image, as a point of the plane z = 1: Newton's method along the
+    radius, then in both axes."""
     model, (fx, fy, cx, cy), k = lens
     u = (np.arange(SIZE[0] * OVER) + 0.5) / OVER - 0.5
     v = (np.arange(SIZE[1] * OVER) + 0.5) / OVER - 0.5
-    # The lens is smooth: solved on every eighth sample and interpolated by cubic splines' kin.
+    # The lens is smooth, so rays are solved at every eighth sample and interpolated by Catmull-Rom.
     gu, gv = np.linspace(u[0], u[-1], 241), np.linspace(v[0], v[-1], 181)
     grid = np.stack(np.meshgrid((gu - cx) / fx, (gv - cy) / fy), -1).reshape(-1, 2)
     flat = grid.copy()
@@ -83,7 +83,7 @@ def ray_table(lens):
 
 
 def smooth_lookup(coarse, mx, my):
-    """Catmull-Rom in both axes, in doubles: cv2.remap's table has steps of 1/32."""
+    """Catmull-Rom interpolation in both axes, in doubles: cv2.remap rounds positions to 1/32."""
     def along(values, place, axis):
         n = values.shape[axis]
         i = np.clip(place.astype(int), 1, n - 3)
@@ -94,7 +94,8 @@ def smooth_lookup(coarse, mx, my):
 
 
 def meet(H, rays):
-    """Where rays meet the board, in squares; far away what does not."""
+    """The points, in squares, where rays meet the board's plane; points far off the board for rays
+    that do not meet it."""
     x, y = rays[..., 0], rays[..., 1]
     w = H[2, 0] * x + H[2, 1] * y + H[2, 2]
     w = np.where(w > 0, SQUARE * w, 1e-9)
@@ -102,7 +103,7 @@ def meet(H, rays):
 
 
 def within(X, Y, squares):
-    """The board, widened by so many squares."""
+    """Whether points lie on the board, widened on all sides by this many squares."""
     return (
         (X > -1 - squares)
         & (X < INNER[0] + squares)
@@ -112,10 +113,11 @@ def within(X, Y, squares):
 
 
 def render(rays, R, t, rng, blur=0.8, noise=3.0):
-    """A board with a white margin of one square on grey, seen through the lens."""
+    """Renders a board with a white margin of one square on a grey background, seen through the
+    lens."""
     H = np.linalg.inv(np.stack([R[:, 0], R[:, 1], t], 1))
     samples = np.full(rays.shape[:2], 110, np.float32)
-    step = 24  # a coarse look first: the board is a part of the image
+    step = 24  # a coarse pass first finds the part of the image that the board covers
     rows, columns = np.nonzero(within(*meet(H, rays[::step, ::step]), 3))
     if len(rows):
         part = tuple(
@@ -125,17 +127,18 @@ def render(rays, R, t, rng, blur=0.8, noise=3.0):
         samples[part][within(X, Y, 1)] = 205
         even = (np.floor(X).astype(np.int32) + np.floor(Y).astype(np.int32)) % 2 == 0
         samples[part][within(X, Y, 0) & even] = 45
-    image = cv2.resize(samples, SIZE, interpolation=cv2.INTER_AREA)  # the mean of OVER x OVER
+    # each pixel is the mean of OVER x OVER samples
+    image = cv2.resize(samples, SIZE, interpolation=cv2.INTER_AREA)
     image = cv2.GaussianBlur(image, (0, 0), blur)
     return np.clip(np.rint(image + rng.normal(0, noise, image.shape)), 0, 255).astype(np.uint8)
 
 
 def poses(lens, count, rng, max_tilt_deg=42):
-    """Boards that lie in the image with their margin, anywhere, tilted and rolled."""
+    """Random tilted and rolled poses of boards that lie in the image with their margin."""
     outline = np.array([[-2, -2], [9.0, -2], [10, 2], [10, 7], [3, 7], [-2, 7], [-2, 2], [4, -2]])
     outline = np.c_[outline, np.zeros(len(outline))] * SQUARE
     middle = np.array([4, 2.5, 0]) * SQUARE
-    # beyond it nothing is seen
+    # the half extent of the field of view on the plane z = 1, at most 1.2
     reach = np.minimum(1.2, np.array(SIZE) / (2 * np.array(lens[1][:2])))
     found = []
     while len(found) < count:
@@ -144,7 +147,8 @@ def poses(lens, count, rng, max_tilt_deg=42):
         R = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0, 0, rng.normal(0, 0.5)]))[0]
         depth = rng.uniform(0.12, 0.6)
         way = np.r_[rng.uniform(-reach, reach), 1]
-        # Turned to face the camera from the side: the tilt is against the line of sight.
+        # The board is turned to face the camera first, so that its tilt is against the line of
+        # sight.
         z = way / np.linalg.norm(way)
         x = np.cross([0, 1.0, 0], z)
         x /= np.linalg.norm(x)

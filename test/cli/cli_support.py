@@ -1,6 +1,6 @@
-"""What the command line's tests share: running the program, images and cameras made on the spot.
-
-Python's own library only. The program is the one that TWOVIEW_PROGRAM names, or the first argument.
+"""Helpers of the command line's tests: they run the program and make images and cameras. Only
+Python's standard library is used. The program is the one that TWOVIEW_PROGRAM names, or the first
+argument.
 """
 import json
 import os
@@ -34,7 +34,7 @@ def program():
 
 
 def main():
-    """unittest.main, but the program may be the first argument."""
+    """Calls unittest.main; the program may be the first argument."""
     if len(sys.argv) > 1 and os.path.isfile(sys.argv[1]):
         os.environ["TWOVIEW_PROGRAM"] = os.path.abspath(sys.argv.pop(1))
     program()
@@ -64,7 +64,7 @@ def png_chunk(kind, data):
 
 
 def png_size(data):
-    """Width and height of a whole PNG file; fails on one that is cut."""
+    """The width and height of a PNG file; fails if the file is incomplete."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n" and data[-8:-4] == b"IEND", "no whole PNG"
     return struct.unpack(">II", data[16:24])
 
@@ -98,7 +98,8 @@ def png_samples(data):
 
 
 def texture(width, height, seed=7):
-    """Small patches of random grey on grey: corners everywhere, no two places alike."""
+    """Small patches of random grey on grey: there are corners everywhere, and no two places look
+    alike."""
     rng = random.Random(seed)
     rows = [bytearray([128]) * width for _ in range(height)]
     for _ in range(width * height // 40):
@@ -110,14 +111,14 @@ def texture(width, height, seed=7):
     return rows
 
 
-# A sideways flight past five walls that stand one above the other in the image: a pixel at distance
-# Z (in baselines) moves left by FOCAL / Z.
+# The scene is a sideways flight past five walls, which stand one above the other in the image. A
+# pixel at distance Z (in baselines) moves left by FOCAL / Z.
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
 SHIFTS = (24, 6, 15, 10, 20)
 
 
 def stereo_pair(seed=7):
-    """The two images as flat bytes."""
+    """The two images as flat bytes, row by row."""
     wide = texture(WIDTH + max(SHIFTS), HEIGHT, seed)
     left, right = bytearray(), bytearray()
     for y, row in enumerate(wide):
@@ -141,7 +142,7 @@ def pfm(width, height, value_at):
 def camera_yaml(
     width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL, cx=None, cy=None, k=(0, 0, 0, 0, 0)
 ):
-    """OpenCV's own format."""
+    """A camera file in OpenCV's YAML format."""
     cx = (WIDTH - 1) / 2 if cx is None else cx
     cy = (HEIGHT - 1) / 2 if cy is None else cy
     return f"""%YAML:1.0
@@ -180,7 +181,7 @@ class CliTest(unittest.TestCase):
         return path
 
     def run_program(self, *arguments, before=(), **options):
-        """before: the words of a command that runs the program."""
+        """before: words put in front of the program, a command that runs it."""
         options.setdefault("timeout", 300)
         return subprocess.run(
             [*before, program(), *map(str, arguments)],
@@ -200,7 +201,7 @@ class CliTest(unittest.TestCase):
         return done
 
     def one_line(self, done, *words):
-        """Exactly one line on stderr, which holds the words."""
+        """Requires exactly one line on stderr, and that it contains the words."""
         text = done.stderr.decode()
         self.assertEqual(text.count("\n"), 1, text)
         self.assertTrue(text.startswith("twoview: ") and text.endswith("\n"), text)
@@ -208,14 +209,14 @@ class CliTest(unittest.TestCase):
             self.assertIn(word, text)
 
     def assert_refused(self, done, *words, out=None):
-        """Status 2, one clear line, and nothing written."""
+        """Requires exit status 2, one line on stderr with the words, and no output file."""
         self.assertEqual(done.returncode, 2, done.stdout.decode() + done.stderr.decode())
         self.one_line(done, *words)
         self.assertEqual(done.stdout, b"")
         self.assertFalse((out or self.out).exists(), "something was written")
 
     def assert_no_pose(self, done, *words):
-        """Status 3, one clear line, and a result.json that says why."""
+        """Requires exit status 3, one line on stderr, and a result.json with the reason."""
         self.assertEqual(done.returncode, 3, done.stderr.decode())
         self.one_line(done, "no full pose", *words)
         result = self.result()
@@ -227,5 +228,5 @@ class CliTest(unittest.TestCase):
         return json.loads(((out or self.out) / "result.json").read_text())
 
     def listing(self, folder=None):
-        """Every name in the folder, hidden ones too."""
+        """Every name in the folder, hidden files included."""
         return sorted(os.listdir(folder or self.out))

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Bad input and bad surroundings: one clear line, the right exit status, nothing half written."""
+"""Bad input and a full or read-only disk: one clear line, the right exit status, no incomplete
+file."""
 import base64
 import os
 import resource
@@ -69,7 +70,7 @@ class Images(cli.CliTest):
         self.assert_refused(self.run_program("detect", cut, "-o", self.out), "cut.pgm", "truncated")
 
     def test_headers_that_claim_huge_images_are_refused_before_decoding(self):
-        def limit():  # decoding any of these would need more
+        def limit():  # the limit of memory, in which none of these images can be decoded
             resource.setrlimit(resource.RLIMIT_DATA, (1 << 30, 1 << 30))
 
         is_asan = b"__asan" in Path(cli.program()).read_bytes()
@@ -348,7 +349,7 @@ class Surroundings(cli.CliTest):
         closed = self.folder / "closed"
         closed.mkdir(mode=0o555)
         before = []
-        if os.geteuid() == 0:  # root may write everywhere, unless that capability is taken away
+        if os.geteuid() == 0:  # root may write everywhere, unless that capability was removed
             before = ["setpriv", "--bounding-set", "-dac_override,-dac_read_search"]
         done = self.reconstruct(out=closed / "out", before=before)
         self.assert_refused(done, "Permission", out=closed / "out")
@@ -360,7 +361,7 @@ class Surroundings(cli.CliTest):
         self.assert_refused(done, "cannot write")
 
     def limited(self, num_bytes, **options):
-        """As on a disk that is full after so many bytes of a file."""
+        """Limits the size of files: a write fails after this many bytes, as on a full disk."""
 
         def limit():
             resource.setrlimit(resource.RLIMIT_FSIZE, (num_bytes, num_bytes))
@@ -410,7 +411,7 @@ class Surroundings(cli.CliTest):
 
     def test_a_signal_leaves_nothing_behind(self):
         self.out.mkdir()
-        # to open it waits for a reader: a run that does not end
+        # opening a FIFO waits for a reader, so the run does not end by itself
         os.mkfifo(self.out / "epipolar.png")
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             with self.subTest(signal=number):
@@ -433,7 +434,8 @@ class Surroundings(cli.CliTest):
                 while not any("matches.png" in name for name in self.listing()):
                     self.assertLess(time.monotonic(), deadline)
                     time.sleep(0.01)
-                self.assertGreater(len(self.listing()), 3)  # temporary files
+                # the run had begun to write temporary files
+                self.assertGreater(len(self.listing()), 3)
                 run.send_signal(number)
                 self.assertEqual(run.wait(timeout=60), -number)
                 run.stderr.close()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview calibrate: real boards, boards of known cameras, and what is refused."""
+"""twoview calibrate: real boards, boards rendered with known cameras, and input that is refused."""
 import json
 import os
 import sys
@@ -84,7 +84,7 @@ class RealBoards(CalibrateTest):
         self.assertLess(
             np.linalg.norm(t.ravel() - truth[:3, 3]), 0.01 * np.linalg.norm(truth[:3, 3])
         )
-        # The view's own poses are metric, too: the baseline without stereoCalibrate.
+        # Each view's pose is metric, so two poses give the baseline without stereoCalibrate.
         lengths = []
         for a, b in zip(results["left"]["views"], results["right"]["views"]):
             turned = np.array(b["R"]).reshape(3, 3) @ np.array(a["R"]).reshape(3, 3).T
@@ -112,7 +112,7 @@ class RealBoards(CalibrateTest):
         np.testing.assert_allclose(
             [view["rms_px"] for view in result["views"]], errors.ravel(), atol=1e-3
         )
-        # What was written is what twoview reads: undistort takes both files.
+        # twoview reads both files that calibrate wrote, and they give undistort the same result.
         for name in ("camera.yaml", "camera_info.yaml"):
             self.succeed(self.run_program("undistort", images[0], "--camera", self.out / name, "-o",
                                           self.folder / name[:-5]))
@@ -165,8 +165,8 @@ class KnownCameras(CalibrateTest):
         return result
 
     def refitted(self, lens, R, t, seen, exact):
-        """The board through the estimated camera, its pose fitted by Gauss-Newton from the
-        truth."""
+        """The board projected with the estimated camera, its pose fitted by Gauss-Newton from the
+        true pose."""
         points = boards.board_points()
         if np.linalg.norm(boards.project(lens, R, t, points)[0] - seen[0]) > 30:
             points = points[::-1]
@@ -194,7 +194,7 @@ class KnownCameras(CalibrateTest):
 
 
 class Views(CalibrateTest):
-    """What is left out, and what is warned of."""
+    """Views that are left out, and warnings."""
 
     lens = boards.MILD
 
@@ -390,7 +390,7 @@ class Views(CalibrateTest):
         self.refuse("none.png", words=["none.png", "No such file"])
 
     def test_a_hopeless_image_costs_seconds(self):
-        # Thousands of squares of every size, in the dark: what the search has most work with.
+        # Thousands of dark squares of all sizes, which cost the search for a board the most time.
         rng = np.random.default_rng(9)
         image = rng.integers(0, 4, (1200, 1600), np.uint8)
         for _ in range(6000):

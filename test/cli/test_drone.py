@@ -1,4 +1,4 @@
-"""twoview drone against its own simulator, over real sockets."""
+"""twoview drone against `drone simulate`, over real sockets."""
 
 import json
 import os
@@ -23,7 +23,8 @@ def has_drone():
 
 
 class Simulator:
-    """A drone on free ports of the loopback; `options` are the program's."""
+    """A running `drone simulate` on free ports of the loopback; `options` are its command-line
+    options."""
 
     def __init__(self, *options):
         command = [PROGRAM, "drone", "simulate", "--duration", "120"]
@@ -40,7 +41,7 @@ class Simulator:
                 "--control-port", self.port["control"]]
 
     def stop(self):
-        """Ends it as Ctrl-C does; its counts by name."""
+        """Ends the simulator as Ctrl-C does; returns its counts by name."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         text = self.process.communicate(timeout=20)[0]
@@ -63,7 +64,7 @@ def run(*arguments, **options):
 
 
 def packets_of(path):
-    """The PaVE packets of a file; what is left over at its end."""
+    """(the PaVE packets of a file, the number of bytes of an incomplete packet at its end)"""
     data = pathlib.Path(path).read_bytes()
     at, packets = 0, []
     while at + 64 <= len(data) and data[at:at + 4] == b"PaVE":
@@ -76,7 +77,8 @@ def packets_of(path):
 
 
 def navdata_of(path):
-    """(host time, bytes) of each packet of a navdata.log; what is left over at its end."""
+    """([(host time, bytes) of each packet of a navdata.log], the number of bytes left over at its
+    end)"""
     data = pathlib.Path(path).read_bytes()
     at, packets = 0, []
     while at + 12 <= len(data):
@@ -175,7 +177,7 @@ class Drone(unittest.TestCase):
         for name in os.listdir(self.path("frames")):
             self.assertEqual(pathlib.Path(self.path("frames"), name).read_bytes(),
                              pathlib.Path(self.path("again"), name).read_bytes())
-        # Another run does not touch it.
+        # Another run into the same folder must not change the recording.
         again = run("record", "--duration", "1", "-o", self.output, *drone.ports())
         self.assert_refused(again, "holds a recording already")
         self.assertEqual(summary, self.summary())
@@ -283,7 +285,7 @@ class Drone(unittest.TestCase):
                         continue
                     try:
                         shown += os.read(master, 4096)
-                    except OSError:  # the program has left the terminal
+                    except OSError:  # the read fails once the program has closed the terminal
                         return
 
             watch(3)

@@ -1,4 +1,5 @@
-"""twoview drone and what can go wrong around it: docs/contract.md lists each with its test."""
+"""twoview drone with bad hosts, ports, options, firmware and disks: docs/contract.md lists each
+mistake with its test."""
 
 import json
 import os
@@ -17,7 +18,8 @@ from test_drone import HOST, PROGRAM, Simulator, has_drone, navdata_of, packets_
 
 
 class Garbage:
-    """A host that answers every port with random bytes, or takes all and says nothing."""
+    """A host that answers on every port with random bytes, or accepts everything and answers
+    nothing."""
 
     def __init__(self, is_silent=False):
         self.random = random.Random(5)
@@ -204,7 +206,8 @@ class DroneBadInput(unittest.TestCase):
                 self.assert_refused(result, "port " + port, "in use")
 
     def test_ctrl_c_at_any_moment(self):
-        """Each verb ends by itself, at once, says at most a line, and leaves whole files."""
+        """After Ctrl-C each verb ends within 10 s, prints at most one line, and leaves no
+        incomplete file."""
         chance = random.Random(7)
         with Simulator() as drone:
             for k in range(15):
@@ -219,7 +222,8 @@ class DroneBadInput(unittest.TestCase):
                 time.sleep(chance.uniform(0, 1))
                 process.send_signal(signal.SIGINT)
                 _, error = process.communicate(timeout=10)
-                # 2 of a verb that has nothing to show yet; the signal's own before it has begun.
+                # The status is 2 where the verb has nothing to show yet, -SIGINT before its handler
+                # is installed.
                 self.assertIn(process.returncode, (0, 2, -signal.SIGINT), error)
                 self.assertLessEqual(error.count(b"\n"), 1, error)
                 if not os.path.exists(os.path.join(output, "video.pave")):

@@ -1,6 +1,7 @@
 // The program's readers of pairs files, camera files and cameras.yaml on the cases of test/formats,
-// which test/python/test_formats.py runs for the tools' readers. Owning objects live in functions
-// that give plain values: Unity leaves a failing test by longjmp.
+// which test/python/test_formats.py runs for the tools' readers. Objects with destructors are used
+// only inside functions that return plain values, since Unity leaves a failing test by longjmp,
+// which skips destructors.
 
 #include <cstdio>
 #include <fstream>
@@ -14,7 +15,7 @@
 #include "files/camera_set.h"
 #include "files/pairs_file.h"
 
-// After all others: it defines isnan and isinf as macros.
+// unity.h comes after all other headers: it defines isnan and isinf as macros.
 #include "unity.h"
 
 using namespace cli;
@@ -32,7 +33,7 @@ Json load(const char* name) {
   return Json::parse(stream);
 }
 
-// The case's lines, each ended by LF, with the entries of `given` in place of their $NAME.
+// The case's lines, each ended by LF; a $NAME in them is replaced by its entry of `given`.
 std::string text_of(const Json& file, const Json& test) {
   std::string text;
   for (const Json& line : test["text"]) text += line.get<std::string>() + "\n";
@@ -92,7 +93,8 @@ bool is_refused_as(const Json& test, const std::string& message) {
   return fits;
 }
 
-// How many cases of a file go wrong; each is printed. A file with too few cases counts as one.
+// The number of cases in a file that fail; each one is printed. A file with too few cases counts as
+// one failure.
 int num_wrong(const char* name, const std::function<Json(const std::string&)>& read) {
   const Json file = load(name);
   int wrong = file["cases"].size() < kFewestCases;
@@ -101,7 +103,7 @@ int num_wrong(const char* name, const std::function<Json(const std::string&)>& r
     bool is_right = false;
     try {
       const Json values = read(text_of(file, test));
-      // Through plain JSON, which compares objects whatever the order of their entries.
+      // Compares as plain JSON, so that the order of an object's entries does not matter.
       is_right =
           test.contains("expect") && nlohmann::json(values) == nlohmann::json(test["expect"]);
       found = values.dump();

@@ -1,9 +1,10 @@
-// Metres from velocity, altitude and floor: flights whose truth is known in closed form.
+// The scale in metres from velocity, altitude and floor, for flights whose truth is a closed
+// formula.
 #include <cmath>
 
 #include "recording/metric_scale.h"
 
-#include <unity.h>  // last: its macros take isnan and isinf
+#include <unity.h>  // last, since it defines isnan and isinf as macros
 
 using namespace cli;
 
@@ -21,7 +22,7 @@ Matrix3 pitch_of(double pitch) {
   return {c, 0, s, 0, 1, 0, -s, 0, c};
 }
 
-// Two seconds at 100 Hz; velocity and attitude by time.
+// A log of two seconds at 100 Hz; velocity and attitude are functions of time.
 template <class Attitude, class Velocity, class Altitude>
 FlightLog flight(Attitude attitude, Velocity velocity, Altitude altitude) {
   FlightLog log;
@@ -39,7 +40,7 @@ FlightLog flight(Attitude attitude, Velocity velocity, Altitude altitude) {
   return log;
 }
 
-// A quarter circle of radius 1 m, flown forward while it turns.
+// A quarter circle of radius 1 m, flown forward while the drone turns with it.
 FlightLog circle() {
   return flight([](double t) { return yaw_of(t * kPi / 4); },
                 [](double) {
@@ -77,7 +78,7 @@ void test_a_camera_before_the_body_moves_when_it_turns() {
   mount.position = {0.2, 0, 0};
   const auto scale = scale_by_velocity(circle(), 10, 12, mount);
   TEST_ASSERT_TRUE(scale.has_value());
-  // From (0.2, 0) to (1, 1) + (0, 0.2).
+  // The camera moves from (0.2, 0) to (1, 1) + (0, 0.2).
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, std::hypot(0.8, 1.2), scale->baseline_m);
 }
 
@@ -98,13 +99,14 @@ void test_velocity_gives_nothing_over_a_gap_outside_or_at_rest() {
 }
 
 void test_altitude_divides_by_the_vertical_part_of_the_way() {
-  // 0.45 m up, of a way that rises by 45 degrees.
+  // The drone climbs 0.45 m, and its direction rises by 45 degrees.
   const double half = std::sqrt(0.5);
   const auto scale = scale_by_altitude(climb(), 10.2, 11.7, {half, 0, -half}, 0.02, CameraMount());
   TEST_ASSERT_TRUE(scale.has_value());
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.45 / half, scale->baseline_m);
-  // sigma: altitudes 0.01 each over the part, direction 0.02 and attitude 0.01 times the level
-  // part.
+  // The expected sigma has two parts: 0.01 m of each of the two altitudes over the vertical part of
+  // the direction; and the baseline times the level part over the vertical part (1), times 0.02 rad
+  // of the direction and 0.01 rad of the attitude.
   const double expected =
       std::hypot(0.01 * std::sqrt(2.0) / half, 0.45 / half * std::hypot(0.02, 0.01) * 1.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, scale->sigma_m);
@@ -117,12 +119,13 @@ void test_altitude_gives_nothing_in_level_flight_or_against_the_way() {
       scale_by_altitude(climb(), 10.2, 11.7, {0.6, 0, 0.8}, 0.02, CameraMount()).has_value());
 }
 
-// Points of a floor 1.5 m below, one baseline being 0.25 m, and of things that stand on it.
+// Points of a floor 1.5 m below the camera and of things that stand on it, for a baseline of 0.25
+// m.
 std::vector<Vector3> floor_points(double pitch, const CameraMount& mount) {
   std::vector<Vector3> points;
   const Matrix3 camera_from_world = transposed(product(pitch_of(pitch), mount.body_from_camera));
   for (int k = 0; k < 300; ++k) {
-    const double height = k % 3 == 0 ? 0 : 0.004 * k;  // a third on the floor
+    const double height = k % 3 == 0 ? 0 : 0.004 * k;  // a third of the points lie on the floor
     const Vector3 world = {1.5 + 0.01 * k, -1 + 0.007 * k, 1.5 - height};
     const Vector3 p = applied(camera_from_world, world);
     points.push_back({p[0] / 0.25, p[1] / 0.25, p[2] / 0.25});
@@ -138,7 +141,7 @@ void test_a_seen_floor_gives_the_scale() {
                                },
                                [](double) { return 1.5; });
   std::vector<Vector3> points = floor_points(-0.15, mount);
-  points.push_back({0, 40, 40});  // wrong ones far below
+  points.push_back({0, 40, 40});  // wrong points far below the floor
   points.push_back({1, 44, 40});
   const auto scale = scale_by_floor(log, 11, points, mount);
   TEST_ASSERT_TRUE(scale.has_value());

@@ -1,5 +1,6 @@
-// The pieces of the command line that can be asked directly. Owning objects live in functions that
-// give plain values: Unity leaves a failing test by longjmp.
+// Functions of the command-line program that can be called directly. Objects with destructors are
+// used only inside functions that return plain values, since Unity leaves a failing test by
+// longjmp, which skips destructors.
 
 #include <cmath>
 #include <cstring>
@@ -17,7 +18,7 @@
 #include "report/report.h"
 #include "report/tables.h"
 
-// After all others: it defines isnan and isinf as macros.
+// unity.h comes after all other headers: it defines isnan and isinf as macros.
 #include "unity.h"
 
 using namespace cli;
@@ -38,9 +39,10 @@ void test_auc_is_the_area_under_straight_lines_of_recall() {
   TEST_ASSERT_EQUAL_DOUBLE(100, auc_of({0, 0, 0}, 5));
   TEST_ASSERT_EQUAL_DOUBLE(0, auc_of({kInfinity, 7}, 5));
   TEST_ASSERT_EQUAL_DOUBLE(0, auc_of({5}, 5));
-  // (0,0) to (2,1/2) to (4,1), flat to 5: 0.5 + 1.5 + 1 = 3 of 5.
+  // Recall rises from (0, 0) to (2, 1/2) and (4, 1) and is level to 5: the area is 0.5 + 1.5 + 1 =
+  // 3 of 5.
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 60, auc_of({4, 2}, 5));
-  // One of two fails: 0.5 * (1 * 0.5) + 4 * 0.5 = 2.25 of 5.
+  // One of two pairs fails: 0.5 * (1 * 0.5) + 4 * 0.5 = 2.25 of 5.
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 45, auc_of({1, kInfinity}, 5));
 }
 
@@ -138,7 +140,7 @@ void test_camera_files_give_the_numbers_and_the_model() {
   TEST_ASSERT_EQUAL_INT(TV_CAMERA_KANNALA_BRANDT, fisheye.model);
 }
 
-// The fx of the entry that is chosen; 0 for none.
+// The fx of the entry that is chosen; 0 when none is.
 double chosen_fx(const char* image, double fx, double cx) {
   const NamedCameras cameras = parse_camera_set(
       "cam: {image_width: 8, image_height: 8, fx: 1, fy: 1, cx: 1, cy: 1}\n"
@@ -179,11 +181,11 @@ void test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size() {
     return false;
   };
   const std::array<double, 9>* const none = nullptr;
-  TEST_ASSERT_TRUE(is_refused(cameras, 9, &K));  // of another size
-  TEST_ASSERT_TRUE(is_refused({}, 8, none));     // neither an entry nor K
+  TEST_ASSERT_TRUE(is_refused(cameras, 9, &K));  // the entries are for another image size
+  TEST_ASSERT_TRUE(is_refused({}, 8, none));     // there is neither an entry nor K
 }
 
-// How many pairs a text holds, or minus the length of the refusal.
+// The number of pairs that a text holds, or minus the length of the message that refuses it.
 int parsed_pairs(const std::string& text) {
   try {
     return static_cast<int>(parse_pairs(text, "p").size());
@@ -202,12 +204,13 @@ void test_pairs_lines_have_two_four_twenty_two_or_thirty_eight_fields() {
   TEST_ASSERT_LESS_THAN_INT(0, parsed_pairs(""));
 }
 
-// Reads the header of every prefix of the bytes; gives what the whole says, width * 1e6 + height,
-// negative when it is called truncated.
+// Reads the header of every prefix of the bytes, at last of the whole. Returns width * 1e6 + height
+// of the whole, negated when the reader reports the whole as truncated.
 double header_of(const std::string& bytes) {
   ImageHeader header;
   for (size_t length = 0; length <= bytes.size(); ++length) {
-    const std::string prefix = bytes.substr(0, length);  // its own memory, for the sanitizer
+    // a copy of exactly this length, so that the sanitizer sees a read beyond it
+    const std::string prefix = bytes.substr(0, length);
     header = read_image_header(prefix);
   }
   const double size = static_cast<double>(header.width) * 1e6 + static_cast<double>(header.height);
@@ -266,7 +269,7 @@ void test_a_written_camera_reads_back_to_the_same_bits() {
   }
 }
 
-// How many matches a text holds and the sum of their first coordinates; -1 when it is refused.
+// 100 times the number of matches in a text, plus the sum of their x0; -1 when it is refused.
 double parsed_matches(const char* text) {
   try {
     const MatchList matches = parse_matches(text, "m");

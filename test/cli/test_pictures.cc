@@ -1,5 +1,6 @@
-// The pictures of a pair whose camera the estimate corrected. Owning objects live in functions that
-// give plain values: Unity leaves a failing test by longjmp.
+// The pictures of a pair whose principal point the estimate corrected. Objects with destructors are
+// used only inside functions that return plain values, since Unity leaves a failing test by
+// longjmp, which skips destructors.
 
 #include <array>
 #include <cmath>
@@ -10,7 +11,7 @@
 #include "pair/result.h"
 #include "pictures/pictures.h"
 
-// After all others: it defines isnan and isinf as macros.
+// unity.h comes after all other headers: it defines isnan and isinf as macros.
 #include "unity.h"
 
 using namespace cli;
@@ -24,7 +25,8 @@ constexpr int kWidth = 640, kHeight = 480, kMatches = 12;
 constexpr double kFocal = 500, kCx = 330, kCy = 230;
 constexpr double kShift[2] = {-25, 15};
 
-// A grey pair with a pose, and matches all over; `has_cameras` as told.
+// A grey pair with a pose and matches over the whole image; has_cameras says whether cameras are
+// given.
 struct Case {
   std::vector<tv_keypoint> keypoints[2];
   std::vector<tv_correspondence> matches;
@@ -64,7 +66,7 @@ struct Case {
 const Matrix3 kR = {std::cos(0.3), 0, std::sin(0.3), 0, 1, 0, -std::sin(0.3), 0, std::cos(0.3)};
 const Vector3 kT = {0.6, 0.0, 0.8};
 
-// The picture by pose and cameras, the principal point moved.
+// The epipolar picture drawn from pose and cameras, with a shift of the principal point.
 cv::Mat by_rays() {
   Case c(true);
   tv_two_view& v = c.outcome.two_view;
@@ -75,7 +77,8 @@ cv::Mat by_rays() {
   return epipolar_picture(c.outcome);
 }
 
-// The same by the fundamental matrix of cameras with that principal point: no camera is read.
+// The same picture drawn from the fundamental matrix of cameras with this principal point; the
+// drawing code reads no camera.
 cv::Mat by_F(double cx, double cy) {
   Case c(false);
   const Matrix3 inverse = {1 / kFocal, 0, -cx / kFocal, 0, 1 / kFocal, -cy / kFocal, 0, 0, 1};
@@ -86,7 +89,7 @@ cv::Mat by_F(double cx, double cy) {
   return epipolar_picture(c.outcome);
 }
 
-// Share of the pictures' samples that differ by more than anti-aliasing does.
+// The share of samples that differ by more than 60 of 255, which anti-aliasing does not reach.
 double difference(const cv::Mat& a, const cv::Mat& b) {
   cv::Mat gap;
   if (a.size() != b.size()) return 1;
@@ -95,7 +98,7 @@ double difference(const cv::Mat& a, const cv::Mat& b) {
   return static_cast<double>(cv::countNonZero(samples > 60)) / static_cast<double>(samples.total());
 }
 
-// Of the drawn pair from the same by F.
+// How much the picture drawn from cameras differs from the one drawn from F.
 double difference_from(double cx, double cy) { return difference(by_rays(), by_F(cx, cy)); }
 
 void test_epipolar_lines_and_epipoles_are_of_the_corrected_camera() {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Where the matches move the principal point: what is told, and which camera the points are of.
-
-A real pair, KITTI's car in a bend, whose camera is off by about ten pixels."""
+"""A pair whose matches move the principal point: what is reported, and to which camera the points
+belong. The pair is real, of KITTI's car in a bend, and its camera file is off by about ten
+pixels."""
 import csv
 import json
 import math
@@ -23,7 +23,7 @@ CAMERA = dict(width=1241, height=376, fx=F, fy=F, cx=CX, cy=CY)
 
 
 def cloud(path):
-    """Positions of cloud.ply."""
+    """The positions of cloud.ply."""
     data = path.read_bytes()
     body = data[data.index(b"end_header\n") + len(b"end_header\n"):]
     return [row[:3] for row in struct.iter_unpack("<fffBBBff", body)]
@@ -34,7 +34,8 @@ def rounded(points):
 
 
 def rms_px(points, matches, R, t, shift):
-    """Of points in both views of the camera with the shift; written from the definition."""
+    """The RMS of the points' reprojection in both views, in pixels, for the camera with the shift;
+    written from the definition."""
     total = 0
     for X, (x0, y0, x1, y1) in zip(points, matches):
         Y = [sum(R[3 * i + k] * X[k] for k in range(3)) + t[i] for i in range(3)]

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""twoview compare and twoview colmap: the hand-over to the Python programs, of the source tree or installed."""
+"""twoview compare and twoview colmap: how twoview starts the Python programs, from the source tree
+and installed."""
 import json
 import os
 import shutil
@@ -10,7 +11,7 @@ import unittest
 
 import cli_support as cli
 
-# Stands for either program: says what it was started with.
+# Stands in for either program: prints the arguments that it was started with.
 SCRIPT = """import json, os, signal, sys
 json.dump({"argv": sys.argv[1:], "python": sys.executable, "library":
 os.environ.get("TWOVIEW_LIBRARY"),

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview reconstruct, from two images to its files."""
+"""twoview reconstruct: from two images to its output files."""
 import json
 import math
 import os
@@ -58,8 +58,8 @@ class Reconstruct(cli.CliTest):
                          {"essential", "fundamental", "homography", "rotation", "coverage"})
 
     def test_a_plane_flown_at_has_a_second_pose_with_its_covariance(self):
-        # The wall fills the image; one motion flies at it and aside, the other straight at one
-        # tilted.
+        # The wall fills the image. One motion goes towards it and sideways; the other straight
+        # towards a tilted wall.
         rows = cli.texture(WIDTH, HEIGHT)
         xs = [
             min(max(round(WIDTH / 2 + (x - WIDTH / 2) / 1.1 + 12), 0), WIDTH - 1)
@@ -237,7 +237,7 @@ class Reconstruct(cli.CliTest):
         self.assertAlmostEqual(self.result()["t"][0], -1, delta=2e-3)
 
     def test_two_cameras_serve_their_own_images(self):
-        # Image 1 moved by 12 pixels, and its principal point along with it: the same rays.
+        # Image 1 and its principal point are moved by 12 pixels, so the rays stay the same.
         shifted = cli.camera_yaml(cx=(WIDTH - 1) / 2 + 12)
         rows = []
         right = cli.stereo_pair()[1]

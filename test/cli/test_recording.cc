@@ -1,4 +1,5 @@
-// reconstruct --recording: flights of the simulated drone through the room, held against its truth.
+// reconstruct --recording: flights of the simulated drone through the room, compared with the
+// simulator's truth.
 #include <unistd.h>
 #include <algorithm>
 #include <cmath>
@@ -19,7 +20,7 @@
 #include "simulator/film.h"
 #include "simulator/firmware.h"
 
-#include <unity.h>  // last: its macros take isnan and isinf
+#include <unity.h>  // last, since it defines isnan and isinf as macros
 
 using namespace cli;
 using simulator::FlightState;
@@ -30,12 +31,12 @@ namespace fs = std::filesystem;
 constexpr int64_t kMs = 1000000;
 constexpr double kDegrees = 57.29577951308232;
 constexpr int kWidth = 640, kHeight = 360;
-// The AR.Drone's front lens, about.
+// Approximately the AR.Drone's front lens.
 const tv_camera kCamera{TV_CAMERA_BROWN_CONRADY, kWidth, kHeight, 0, 560, 560, 320, 180,
                         {-0.5, 0.25, 0, 0, 0}};
 const char kFly[] = "290718208";
 
-// What the pilot's sticks do after the take-off, and how far the sensors are off.
+// The pilot's commands after the take-off, and the errors of the sensors.
 struct Plan {
   const char* name;
   simulator::Vec3 start;
@@ -51,11 +52,11 @@ simulator::Sensors sensors(double altitude_factor, double velocity_factor) {
   return s;
 }
 
-// The sideways flight's velocity is 2 per cent off, the climb's altitude 1 per cent.
+// The velocity of the sideways flight is 2 per cent wrong, the altitude of the climb 1 per cent.
 const Plan kSideways{"sideways", {0, -2, 0}, 0.25F, 0, 0, 0, sensors(1, 1.02)};
 const Plan kForward{"forward", {-1.5, 0, 0}, 0, -0.25F, 0, 0.1F, sensors(1.01, 1.02)};
 const Plan kClimbing{"climbing", {0, 1, 0}, 0, 0, 0.6F, 0, sensors(1.01, 1)};
-// As over the loopback: a picture comes before the attitude that follows its instant.
+// As over the loopback: a picture arrives before the attitude sample that follows its instant.
 const Plan kPrompt{"prompt", {0, -2, 0}, 0.25F, 0, 0, 0, sensors(1, 1), 0};
 
 int32_t bits(float value) {
@@ -64,10 +65,10 @@ int32_t bits(float value) {
   return word;
 }
 
-// A drone that flies a plan, its pictures and packets recorded as `drone record` does.
+// A drone that flies a plan; its pictures and packets are recorded as `drone record` does.
 struct Flown {
   fs::path folder;
-  std::vector<FlightState> truth;  // of each picture
+  std::vector<FlightState> truth;  // for each picture
 };
 
 const room::Room& the_room() {
@@ -111,7 +112,7 @@ class Flyer {
     send("PCMD", arguments);
   }
   void record_navdata(const std::vector<uint8_t>& packet) {
-    tvs_imu imu{};  // the reader decodes the packet itself
+    tvs_imu imu{};  // not used: the reader decodes the packet itself
     imu.time.received_ns = now_ + 3 * kMs;
     recording_.add_navdata(packet.data(), packet.size(), imu);
   }
@@ -157,7 +158,7 @@ class Flyer {
   std::vector<FlightState> truth_;
 };
 
-// Each plan is flown once.
+// Returns the recording of a plan; each plan is flown once.
 const Flown& flown(const Plan& plan) {
   static std::vector<std::pair<const Plan*, Flown>> all;
   for (const auto& [known, flight] : all)
@@ -172,7 +173,7 @@ const Flown& flown(const Plan& plan) {
   return all.back().second;
 }
 
-// A pair of a flight, reconstructed, with what the truth says of it.
+// A pair of pictures of a flight, its reconstruction, and the truth.
 struct Result {
   Outcome outcome;
   std::vector<std::optional<MetricScale>> scales;
@@ -215,7 +216,7 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// Pairs half a second and a second apart, all along the flight.
+// Pairs of pictures half a second and a second apart, along the whole flight.
 std::vector<Result> all_pairs(const Plan& plan) {
   const Flown& flight = flown(plan);
   const RecordedFlight read = read_flight(flight.folder);
@@ -230,7 +231,8 @@ std::vector<Result> all_pairs(const Plan& plan) {
   return results;
 }
 
-// The cameras' rotation against the truth, and the noisy IMU's against the cameras'.
+// Checks the cameras' rotation against the truth, and the noisy IMU's rotation against the
+// cameras'.
 void check_rotations(const std::vector<Result>& results) {
   std::vector<double> errors, differences;
   size_t within = 0;
@@ -248,8 +250,8 @@ void check_rotations(const std::vector<Result>& results) {
   TEST_ASSERT_TRUE(10 * within >= 9 * results.size());
 }
 
-// A source by itself, or the surest of them (source empty), over the truth; most pairs must have
-// it.
+// Checks a source's scale against the truth, or that of the source with the least sigma (`source`
+// empty). Most pairs must have a scale.
 void check_scales(const std::vector<Result>& results, const std::string& source) {
   std::vector<double> errors;
   size_t covered = 0;
@@ -298,7 +300,7 @@ void test_a_climbing_flight() {
   check_scales(results, "");
 }
 
-// Hovering turns and stands: no pose, no metres, and no word of one.
+// The drone hardly moves between the first two frames, so the velocity must give no scale.
 void test_a_pair_that_hardly_moved_has_no_scale_by_velocity() {
   const Flown& flight = flown(kSideways);
   const RecordedFlight read = read_flight(flight.folder);
@@ -344,10 +346,10 @@ void test_a_frame_that_is_not_there_is_refused() {
 
 struct Ran {
   int status;
-  std::string text;  // stdout and stderr
+  std::string text;  // stdout and stderr together
 };
 
-// The program itself.
+// Runs the twoview program.
 Ran run(const std::string& arguments) {
   const std::string command =
       std::string(std::getenv("TWOVIEW_PROGRAM")) + " reconstruct " + arguments + " 2>&1";
@@ -392,7 +394,7 @@ void test_the_program_tells_metres() {
   const std::string report = text_of(out / "report.html");
   TEST_ASSERT_TRUE(report.find("Against the IMU") != std::string::npos);
   TEST_ASSERT_TRUE(report.find("are in metres") != std::string::npos);
-  // The command line's mount goes before the file's.
+  // A mount given on the command line takes precedence over the file's.
   const Ran turned =
       run("--recording " + flight.folder.string() + " --frames 10 24 --camera " + camera +
           " --body-from-camera 1,0,0,0,1,0,0,0,1 --json -o " + out.string());

@@ -1,4 +1,4 @@
-// The rendered room: what it films is what its poses and depths say.
+// The rendered room: its pictures and depths agree with its poses.
 #include <unity.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kWidth = 640, kHeight = 360;
 
-// The AR.Drone's front lens, about.
+// Approximately the AR.Drone's front lens.
 const tv_camera camera{TV_CAMERA_BROWN_CONRADY, kWidth, kHeight, 0, 560, 560, 320, 180,
                        {-0.5, 0.25, 0, 0, 0}};
 
@@ -46,7 +46,7 @@ Film film(const CameraPose& at) {
   return film;
 }
 
-// Where a pixel of view 0 with its depth is seen in view 1, and its depth there.
+// Projects a pixel of view 0 with its depth into view 1; also gives its depth there.
 bool carry(const float* ray, float depth, const room::Mat3& R, const Vec3& t, double pixel[2],
            double* depth1) {
   const double scale = depth / ray[2];
@@ -83,7 +83,8 @@ void test_a_view_is_the_other_one_carried_by_depth_and_pose() {
       if (!carry(eye().ray(x, y), film0.depth[i], R, t, pixel, &depth1)) continue;
       const size_t j = static_cast<size_t>(static_cast<int>(pixel[1] + 0.5) * kWidth +
                                            static_cast<int>(pixel[0] + 0.5));
-      if (std::abs(film1.depth[j] - depth1) > 0.02 * depth1) continue;  // hidden there
+      // the point is hidden in view 1
+      if (std::abs(film1.depth[j] - depth1) > 0.02 * depth1) continue;
       ++seen;
       alike += std::abs(bilinear(film1, pixel) - static_cast<float>(film0.luma[i])) < 16;
     }
@@ -97,7 +98,8 @@ double angle_deg(double cosine) {
 }
 
 void test_a_ray_along_an_axis_hits_something() {
-  const Film level = film(pose(0, 0, 0, {0, 0, -1.2}));  // its middle column and row have such rays
+  // the middle column and row have rays parallel to an axis plane
+  const Film level = film(pose(0, 0, 0, {0, 0, -1.2}));
   for (const float depth : level.depth) TEST_ASSERT_TRUE(depth > 0 && depth < 20);
 }
 

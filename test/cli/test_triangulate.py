@@ -18,7 +18,7 @@ def pixel(point):
 
 
 def seen(points, t=T):
-    """Rows x0 y0 x1 y1 of points under x1 = x0 + t."""
+    """Rows x0 y0 x1 y1: the pixels of points under x1 = x0 + t."""
     return [(*pixel(p), *pixel(tuple(a + b for a, b in zip(p, t)))) for p in points]
 
 

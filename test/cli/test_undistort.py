@@ -13,12 +13,13 @@ CX, CY = 46.0, 37.0
 
 
 def scene(x, y):
-    """What a pinhole sees at a pixel: smooth, so that interpolation costs little."""
+    """The grey level that a pinhole sees at a pixel: smooth, so that interpolation errors are
+    small."""
     return 128 + 70 * math.sin(x / 9) * math.cos(y / 7)
 
 
 def brown_conrady(k):
-    """Distorted from straight, on the plane z = 1."""
+    """Distorted coordinates from straight ones, on the plane z = 1."""
 
     def distort(x, y):
         r2 = x * x + y * y
@@ -42,7 +43,8 @@ def kannala_brandt(k):
 
 
 def straightened(distort, x, y):
-    """The inverse, by Newton's method with differences; None where it does not converge."""
+    """The inverse of the distortion, by Newton's method with differences; None where it does not
+    converge."""
     sx, sy = x, y
     for _ in range(50):
         dx, dy = distort(sx, sy)
@@ -138,8 +140,8 @@ class Undistort(cli.CliTest):
         self.assertEqual(list(cli.png_samples((self.out / "grey16.png").read_bytes())), grey16)
 
     def test_what_the_lens_model_cannot_reach_is_black(self):
-        # The AR.Drone's kind of lens: its polynomial turns back at 0.8 on the plane z = 1, which a
-        # wide pinhole looks beyond.
+        # A lens like the AR.Drone's: its polynomial turns back at radius 0.8 on the plane z = 1,
+        # which a wide pinhole's image exceeds.
         self.write("lens.yaml", camera_yaml(W, H, F, F, CX, CY, (-0.5, 0, 0, 0, 0)))
         self.write("d.png", png(W, H, [200] * (W * H)))
         self.succeed(self.undistort("--focal-scale", "0.2", "--mask"))
@@ -183,7 +185,8 @@ class Undistort(cli.CliTest):
         done = self.run_program("undistort", "d.png", "--camera", "camera.yaml", "-o", self.folder)
         self.assertEqual(done.returncode, 2)
         self.one_line(done, "d.png", "read by this run")
-        image.rename(self.folder / "e.jpg")  # its result is e.png, but camera.yaml is still read
+        # the result is e.png, and camera.yaml is still found and read
+        image.rename(self.folder / "e.jpg")
         done = self.run_program("undistort", "e.jpg", "--camera", "camera.yaml", "-o", ".")
         self.assertEqual(done.returncode, 2)
         self.one_line(done, "camera.yaml", "read by this run")

@@ -1,4 +1,5 @@
-"""A scene of tilted textured planes, photographed from four places that are known; and the program's verbs."""
+"""A scene of tilted textured planes, photographed from four known places, and fixtures that run the
+program's verbs."""
 
 import os
 import pathlib
@@ -26,20 +27,20 @@ CAMERA = f"""camera:
 
 
 def camera_pose(index):
-    """R, t of camera from world: an arc around the scene."""
+    """R, t (camera from world) of camera k, on an arc around the scene."""
     angle = np.radians(-12 + 8 * index)
     R = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     centre = np.array([6 * np.sin(-angle), 0.15 * (index % 2), 6 - 6 * np.cos(angle)])
     return R, -R @ centre
 
 
-# Each plane: the place of its middle, two half sides. From far to near.
+# Each plane: the position of its middle and two half sides, from far to near.
 PLANES = [((0, 0, 8), (5.5, 0, 0.8), (0, 4, 0)), ((-1.6, 0.6, 6.3), (0.9, 0, -0.5), (0, 1, 0.2)),
           ((1.5, -0.7, 5.6), (0.8, 0.1, 0.5), (0, 0.8, 0)), ((0.2, 1.0, 5), (1, 0, 0), (0, 0.3, -0.8))]
 
 
 def _texture(random, cv2):
-    """Blobs of several sizes, so that corners lie everywhere."""
+    """Blobs of several sizes, so that there are corners everywhere."""
     total = np.zeros((512, 512))
     for sigma in (1.5, 3, 8):
         layer = cv2.GaussianBlur(random.normal(size=(512, 512)), (0, 0), sigma)
@@ -66,7 +67,8 @@ def render(index):
 
 @pytest.fixture(scope="session")
 def photographs(tmp_path_factory):
-    """A folder with images/, cameras.yaml and pairs.txt with the truth. Not to be written to."""
+    """A folder with images/, cameras.yaml, and pairs.txt with the true poses. Tests must not write
+    to it."""
     import cv2
     from twoview_tools.colmap.pairs import write_pair
     folder = tmp_path_factory.mktemp("scene")
@@ -84,7 +86,8 @@ def photographs(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def bend(tmp_path_factory):
-    """A folder with images/ and cam.yaml: a car in a bend, its camera's principal point off by about ten pixels."""
+    """A folder with images/ and cam.yaml: a car in a bend; the camera file's principal point is off
+    by about ten pixels."""
     data = pathlib.Path(os.environ.get("TWOVIEW_DATA") or ROOT.parent / "shared" / "data") / "kitti00_turn" / "images"
     if not data.is_dir():
         pytest.skip(f"no {data}")
@@ -110,7 +113,7 @@ def start(*arguments, **options):
 
 
 def run(*arguments, status=0):
-    """stdout of a run of its own process."""
+    """The stdout of the program, run in a process of its own."""
     process = start(*arguments)
     out, err = process.communicate(timeout=120)
     assert process.returncode == status, out + err
@@ -131,7 +134,7 @@ def call(capfd):
 
 @pytest.fixture
 def refuse(call):
-    """Runs a verb that must be refused: one line with these words on stderr."""
+    """Runs a verb that must be refused with one line on stderr that contains these words."""
     def refused(words, *arguments):
         status, out, err = call(*arguments)
         assert status == 2 and out == "" and err.startswith("twoview: ") and err.count("\n") == 1, err
@@ -142,7 +145,7 @@ def refuse(call):
 
 @pytest.fixture(scope="session")
 def exported(photographs, tmp_path_factory):
-    """{schema: database} of all pairs. Not to be written to."""
+    """{schema: database} of all pairs. Tests must not write to it."""
     pytest.importorskip("pycolmap")
     folder = tmp_path_factory.mktemp("exported")
     for schema in ("4", "3.8"):

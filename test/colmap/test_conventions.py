@@ -1,4 +1,4 @@
-"""Cameras, keypoints, poses and pair geometry beside pycolmap's own."""
+"""Cameras, keypoints, poses and pair geometry compared with pycolmap's."""
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ CAMERA = tv.Camera(WIDTH, HEIGHT, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
 
 
 def two_views(R, t, plane=False, noise_px=0.2):
-    """(pixels0, pixels1) of points that both see."""
+    """(pixels0, pixels1) of points that both views see."""
     random = np.random.default_rng(7)
     points = np.column_stack([random.uniform(-1.5, 1.5, 300), random.uniform(-1, 1, 300), random.uniform(4, 8, 300)])
     if plane:
@@ -127,14 +127,14 @@ def estimate(pixels0, pixels1):
 
 
 def epipolar_distances(F, pixels0, pixels1):
-    """Of the second pixels from their lines."""
+    """The distances of the second image's pixels from the epipolar lines of the first one's."""
     p0, p1 = (np.column_stack([p, np.ones(len(p))]) for p in (pixels0, pixels1))
     lines = p0 @ F.T
     return np.abs((p1 * lines).sum(axis=1)) / np.linalg.norm(lines[:, :2], axis=1)
 
 
 def test_F_is_of_colmaps_pixels():
-    # A rotation about the axis: there half a pixel does not cancel.
+    # With a rotation about the optical axis, a wrong half pixel does not cancel.
     R = pycolmap.Rotation3d(np.array([0, 0, np.sin(0.5), np.cos(0.5)])).matrix()
     pixels = two_views(R, np.array([0.5, 0.1, 0.2]), noise_px=0.02)
     found, row = estimate(*pixels)

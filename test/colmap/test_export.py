@@ -47,7 +47,7 @@ def assert_nothing_else(folder, *names):
     assert sorted(os.listdir(folder)) == sorted(names)
 
 
-# ---- what is written ---------------------------------------------------------------------------
+# ---- the database's content --------------------------------------------------------------------
 
 @pytest.mark.parametrize("table", SHARED_COLUMNS)
 def test_both_schemas_hold_the_same_rows(exported, table):
@@ -115,7 +115,8 @@ def test_geometries_are_there_and_agree_with_their_matches(exported):
 
 @pytest.mark.parametrize("by", ["program", "function"])
 def test_a_geometry_is_of_the_databases_camera(bend, tmp_path, call, by):
-    """Even where the matches would have its principal point elsewhere: all pairs share the camera."""
+    """The exported geometry belongs to the database's camera, which all pairs share, even where the
+    matches would move its principal point."""
     if by == "program":
         assert call("export", "--database", tmp_path / "x.db", "--images", bend / "images", "--camera",
                     bend / "cam.yaml")[0] == 0
@@ -310,7 +311,8 @@ def test_an_interrupted_run_leaves_what_was_there(exported, photographs, tmp_pat
         before = digest(tmp_path / "x.db")
     process = start("export", "--database", tmp_path / "x.db", "--images", images, *["--append"] * append)
     deadline = time.monotonic() + 30
-    while not any(name.startswith(".x.db.") for name in os.listdir(tmp_path)):  # it has begun
+    # waits until the export has begun to write
+    while not any(name.startswith(".x.db.") for name in os.listdir(tmp_path)):
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.02)
     time.sleep(0.3)

@@ -1,4 +1,5 @@
-"""twoview colmap import and model: models as reference poses, databases as input, results as models."""
+"""twoview colmap import and model: models as reference poses, databases as input, and results
+written as models."""
 
 import json
 import os
@@ -39,7 +40,8 @@ def scene_points(count):
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """{form: folder} of the scene's cameras as COLMAP has them, made by pycolmap; the last image sees 10 points."""
+    """{format: folder} of the scene's cameras as a COLMAP model that pycolmap wrote; the last image
+    sees 10 points."""
     made = pycolmap.Reconstruction()
     camera = pycolmap.Camera(model="OPENCV", width=WIDTH, height=HEIGHT, camera_id=1,
                              params=[FX, FY, CX + 0.5, CY + 0.5, -0.1, 0.01, 0.001, 0])
@@ -72,7 +74,8 @@ def test_a_models_poses_are_a_pairs_files_truth(models, tmp_path, form, call):
         R, t = relative_pose(NAMES.index(pair.name0), NAMES.index(pair.name1))
         np.testing.assert_allclose(pair.R, R, atol=1e-12)
         np.testing.assert_allclose(pair.t, t, atol=1e-12)
-        np.testing.assert_allclose(pair.K0, K, rtol=1e-15)  # half a pixel less than COLMAP's
+        # COLMAP's principal point less half a pixel
+        np.testing.assert_allclose(pair.K0, K, rtol=1e-15)
     camera = read_camera_set(tmp_path / "out" / "cameras.yaml")["camera_1"]
     assert (camera.cx, camera.cy, tuple(camera.k[:5])) == (CX, CY, (-0.1, 0.01, 0.001, 0, 0))
 
@@ -102,7 +105,7 @@ def test_trajectories_come_back(models, tmp_path, call):
 
 
 def test_our_tools_read_the_pairs(exported, photographs, tmp_path, call):
-    """Against a model that COLMAP made of our matches our own poses are right."""
+    """Our own poses agree with a model that COLMAP made from our matches."""
     program = os.environ.get("TWOVIEW_PROGRAM", "")
     if not os.path.isfile(program):
         pytest.skip("TWOVIEW_PROGRAM names no program")
@@ -128,7 +131,7 @@ def test_a_databases_matches_are_our_input(exported, models, tmp_path, schema, c
 
 
 def write_database(path, pixels, columns=6, with_matches=True, descriptors=None):
-    """Two images of one camera in pycolmap's own way."""
+    """Writes a database with two images of one camera as pycolmap does."""
     with pycolmap.Database.open(path) as database:
         camera = pycolmap.Camera(model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FX, FY, CX + 0.5, CY + 0.5])
         camera.camera_id = database.write_camera(camera)
@@ -158,7 +161,8 @@ def test_half_a_pixel_and_the_columns_of_keypoints(tmp_path, columns, call):
     [pair] = json.loads(out)["pairs"]
     R, t = relative_pose(0, 1)
     assert status == 0 and pair["num_inliers"] == 80
-    # Exact matches give the exact pose; half a pixel of the principal point would be 1e-3.
+    # Exact matches give the exact pose; an error of half a pixel in the principal point would give
+    # 1e-3.
     np.testing.assert_allclose(np.reshape(pair["R"], (3, 3)), R, atol=2e-6)
     np.testing.assert_allclose(pair["t"], t / np.linalg.norm(t), atol=2e-5)
 
@@ -195,7 +199,7 @@ def test_a_match_without_a_keypoint_is_named(tmp_path, refuse):
 # ---- results as models -------------------------------------------------------------------------
 
 def read_ply(path):
-    """The vertices of a binary PLY: x y z, colours, angle, error."""
+    """The vertices of a binary PLY: x y z, colour, angle, error."""
     data = path.read_bytes()
     head, body = data.split(b"end_header\n", 1)
     kinds = {"float": "<f4", "uchar": "u1"}
@@ -260,7 +264,7 @@ def test_a_model_comes_back_with_half_a_pixel_more(tmp_path):
 
 
 def test_the_cloud_of_reconstruct_is_the_models(result, photographs):
-    """cloud.ply holds the same points and colours as the COLMAP model of the same pair."""
+    """cloud.ply has the same points and colours as the COLMAP model of the same pair."""
     program = os.environ.get("TWOVIEW_PROGRAM", "")
     if not os.path.isfile(program):
         pytest.skip("TWOVIEW_PROGRAM names no program")

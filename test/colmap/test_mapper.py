@@ -1,4 +1,4 @@
-"""The mappers of COLMAP 4 and 3.8 go on from an export without verification of their own."""
+"""The mappers of COLMAP 4 and 3.8 work on an export without running their own verification."""
 
 import shutil
 
@@ -21,7 +21,8 @@ def test_every_image_is_registered_where_it_was(exported, photographs, tmp_path,
     assert set(model.images) == set(NAMES) and model.num_points > 300 and model.mean_error_px < 0.6
     true = {name: (camera_pose(i)[0], -camera_pose(i)[0].T @ camera_pose(i)[1]) for i, name in enumerate(NAMES)}
     _, positions, angles = truth.pose_errors(model.poses(), true)
-    assert positions.max() < 0.01 and angles.max() < 0.1  # 0.8 between neighbours, 8 degrees
+    # neighbouring cameras are 0.8 and 8 degrees apart
+    assert positions.max() < 0.01 and angles.max() < 0.1
 
 
 def test_alignment_undoes_a_similarity():
@@ -40,7 +41,8 @@ def test_alignment_undoes_a_similarity():
 
 @pytest.mark.parametrize("schema", ["4", "3.8"])
 def test_an_image_without_keypoints_is_left_out(photographs, tmp_path, schema, call):
-    """The mappers read the keypoints of every image, and refuse a table of none whose columns are not 2, 4 or 6."""
+    """The mappers read the keypoints of every image, and refuse an empty table whose number of
+    columns is not 2, 4 or 6."""
     if schema == "3.8" and not shutil.which("colmap"):
         pytest.skip("no colmap: scripts/bootstrap test installs it")
     import cv2

@@ -1,17 +1,15 @@
 """Every public symbol is documented, by rules that a program can check.
 
 - A header, type, struct, field, enum, constant, macro and function has a comment of its own, in
-front of it or behind
-  it; one comment serves the names of one statement. Fields of a struct whose comment says "Private"
-  need none.
-- A function's comment names each parameter that points somewhere, unless the type says what it is
-(`tv_camera
-  *camera0`), or it is the object that the function is of (its first parameter).
-- A function that returns a status says which ones.
-- What is said of another function ("as tv_detect") counts as said here.
+  front of it or behind it; one comment serves the names of one statement. Fields of a struct whose
+  comment says "Private" need none.
+- A function's comment names each pointer parameter, unless its type says what it is
+  (`tv_camera *camera0`), or it is the object that the function works on (its first parameter).
+- The comment of a function that returns a status says which statuses it returns.
+- Where a comment refers to another function ("as tv_detect"), that function's comment counts too.
 - A floating-point field has its unit in its name or comment.
 - A header of an algorithm or of a protocol names its source: the page under docs/ that has papers,
-formulas and tests.
+  formulas and tests.
 """
 
 import pathlib
@@ -37,13 +35,14 @@ def undocumented(symbols):
     documented = {symbol.name for symbol in symbols if symbol.comment}
     for symbol in symbols:
         private = symbol.kind == "field" and "rivate" in symbol.parent.comment
-        either = symbol.kind == "macro" and symbol.name in documented  # of #if and #else
+        # a macro that #if and #else define twice needs one comment
+        either = symbol.kind == "macro" and symbol.name in documented
         if not symbol.comment and not private and not either:
             yield symbol
 
 
 def said(function, functions):
-    """A function's comment, and those of the functions that it refers to."""
+    """The words of a function's comment, and of the comments of the functions that it refers to."""
     texts = [function.comment]
     for name in re.findall(r"\bas\s+(?:for )?(\w+)", function.comment):
         if name in functions:
@@ -141,7 +140,7 @@ class TestHeaders(unittest.TestCase):
                 self.assertIn("docs/drivers.md", pages, path)
         algorithms = {path.stem for path in (headers.ROOT / "docs" / "algorithms").glob("*.md")} - {
             "math"
-        }  # internal
+        }  # internal macros need no comment
         self.assertEqual(algorithms - named, set())
 
     def test_every_quantity_has_a_unit(self):

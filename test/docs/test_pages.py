@@ -1,12 +1,12 @@
-"""What README.md, CHANGELOG.md, examples/README.md and docs/ say is there, is there.
+"""Checks that what README.md, CHANGELOG.md, examples/README.md and docs/ name exists.
 
 - A relative link leads to a file, and its anchor to a heading.
 - A path that begins with a folder of the project names a file, exactly or without its extension, or
-a test. `{a,b}`
-  names several; a path with a star or in capitals is a pattern.
-- A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function stands
-in some source.
-- An option that stands behind a verb of `twoview` is one of that verb's, and a verb is a verb.
+  a test. `{a,b}` names several; a path with a star or in capitals is a pattern.
+- A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function is
+  found in some source file.
+- The word behind `twoview` is a verb of the program, and an option behind it is an option of that
+  verb.
 - A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test.
 """
 
@@ -25,7 +25,7 @@ PROGRAM = os.environ.get("TWOVIEW_PROGRAM", "")
 
 
 def braces(path):
-    """a/{b,c}.{h,cc} -> each of its paths."""
+    """Expands braces: a/{b,c}.{h,cc} gives four paths."""
     pieces = re.split(r"\{([^}]*)\}", path)
     choices = [piece.split(",") if k % 2 else [piece] for k, piece in enumerate(pieces)]
     return ["".join(choice) for choice in itertools.product(*choices)]
@@ -72,7 +72,7 @@ class TestPages(unittest.TestCase):
         wrong = []
         for page in self.pages.values():
             if page.path.name == "CHANGELOG.md":
-                continue  # it tells what was
+                continue  # the CHANGELOG may name files that are gone
             texts = itertools.chain(page.code(), ((line, text) for _, line, text in page.blocks))
             for line, text in itertools.chain(texts, page.prose):
                 for path in re.findall(
@@ -149,7 +149,8 @@ class TestPages(unittest.TestCase):
                         wrong.append(f"{page}:{first}: twoview {verb}")
                         continue
                     if verb in ("compare", "colmap"):
-                        # Python's: python/compare_*, python/colmap_* run what their pages say
+                        # verbs in Python: python/compare_* and python/colmap_* run the commands of
+                        # their pages
                         continue
                     path = [verb] + (
                         [rest[0]]

@@ -1,4 +1,4 @@
-/* The text of every command, the sequence rules, and what the pilot sends when. */
+/* The text of every command, the rules of sequence numbers, and what the pilot sends and when. */
 #include <locale.h>
 #include <math.h>
 #include <stdlib.h>
@@ -153,7 +153,7 @@ static int holds(const char *part) {
   return strstr(text, part) != NULL;
 }
 
-/* The value of the tick's REF, or 0 when there is none. */
+/* The value of the tick's REF command, or 0 when there is none. */
 static long ref_value(void) {
   char text[ARDRONE_AT_MAX_BYTES + 1];
   const char *found;
@@ -199,7 +199,8 @@ static void take_off_and_fly(void) {
 
 static void test_take_off_is_level_and_land_ends_it(void) {
   begin_pilot();
-  TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_pilot_take_off(&pilot, now)); /* no state yet */
+  /* the drone's state is not known yet */
+  TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_pilot_take_off(&pilot, now));
   take_off_and_fly();
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_land(&pilot));
   tick(READY | ARDRONE_STATE_FLYING);
@@ -209,7 +210,7 @@ static void test_take_off_is_level_and_land_ends_it(void) {
 static void test_a_drone_that_came_down_is_not_sent_up_again(void) {
   begin_pilot();
   take_off_and_fly();
-  tick(READY); /* landed by itself */
+  tick(READY); /* the drone landed by itself */
   TEST_ASSERT_EQUAL_INT(LAND, ref_value());
   begin_pilot();
   take_off_and_fly();
@@ -221,7 +222,7 @@ static void test_a_drone_that_came_down_is_not_sent_up_again(void) {
   take_off_and_fly();
   tick(READY | ARDRONE_STATE_FLYING | ARDRONE_STATE_EMERGENCY);
   TEST_ASSERT_EQUAL_INT(LAND, ref_value());
-  tick(READY); /* re-armed */
+  tick(READY); /* the drone was re-armed */
   TEST_ASSERT_EQUAL_INT(LAND, ref_value());
 }
 
@@ -253,7 +254,7 @@ static void test_a_movement_becomes_hover(void) {
   TEST_ASSERT_TRUE(holds(",0,0,0,0,0\r"));
 }
 
-/* Counts the rising edges of the emergency bit over the given ticks. */
+/* Counts the rising edges of the emergency bit over this many ticks. */
 static int count_edges(int ticks, uint32_t state) {
   int edges = 0, last = 0, k;
   for (k = 0; k < ticks; ++k) {
@@ -272,14 +273,16 @@ static void test_the_emergency_bit_is_an_edge(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
   tick(READY | ARDRONE_STATE_FLYING);
   TEST_ASSERT_EQUAL_INT(LAND | EMERGENCY_BIT, ref_value());
-  tick(READY | ARDRONE_STATE_EMERGENCY); /* done: released at once, never toggled back */
+  /* the drone reports the emergency: the bit falls at once and does not rise again */
+  tick(READY | ARDRONE_STATE_EMERGENCY);
   TEST_ASSERT_EQUAL_INT(0, count_edges(200, READY | ARDRONE_STATE_EMERGENCY));
   TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_pilot_take_off(&pilot, now));
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_rearm(&pilot, now));
   tick(READY | ARDRONE_STATE_EMERGENCY);
   TEST_ASSERT_EQUAL_INT(LAND | EMERGENCY_BIT, ref_value());
   TEST_ASSERT_EQUAL_INT(0, count_edges(200, READY));
-  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_rearm(&pilot, now)); /* nothing to do */
+  /* there is no emergency to clear */
+  TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_rearm(&pilot, now));
   TEST_ASSERT_EQUAL_INT(0, count_edges(50, READY));
 }
 
@@ -288,10 +291,13 @@ static void test_a_lost_pulse_is_repeated_while_the_drone_says_so(void) {
   begin_pilot();
   take_off_and_fly();
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
-  TEST_ASSERT_EQUAL_INT(5, count_edges(200, READY | ARDRONE_STATE_FLYING)); /* within 3 s */
+  /* five pulses within 3 s */
+  TEST_ASSERT_EQUAL_INT(5, count_edges(200, READY | ARDRONE_STATE_FLYING));
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
   for (k = 0; k < 200;
-       ++k) { /* the drone says nothing: one pulse, for a second might undo the first */
+       /* while the drone reports nothing only one pulse is sent, since a second one might undo
+          the first */
+       ++k) {
     int bit;
     now += ARDRONE_TICK_NS;
     TEST_ASSERT_EQUAL_INT(1, ardrone_pilot_tick(&pilot, now));
@@ -326,7 +332,7 @@ static void test_flat_trim_only_on_the_ground(void) {
 }
 
 int main(void) {
-  setlocale(LC_ALL, "de_DE.UTF-8"); /* where it is installed, a decimal comma */
+  setlocale(LC_ALL, "de_DE.UTF-8"); /* has a decimal comma; used where it is installed */
   UNITY_BEGIN();
   RUN_TEST(test_each_command_has_its_text);
   RUN_TEST(test_floats_are_their_bits);

@@ -1,5 +1,5 @@
-/* Configuration text, keys and values, and the acknowledge handshake against a drone that loses any
-   of its messages. */
+/* Configuration text, keys and values, and the acknowledge handshake with a drone that may lose
+   any of its messages. */
 #include <locale.h>
 #include <math.h>
 #include <string.h>
@@ -114,7 +114,7 @@ static void test_ids_are_crc_32(void) {
   char id[ARDRONE_ID_BYTES];
   ardrone_make_id("123456789", id); /* the check value of this CRC */
   TEST_ASSERT_EQUAL_STRING("cbf43926", id);
-  ardrone_make_id("", id); /* CRC 0, which is the default configuration's */
+  ardrone_make_id("", id); /* its CRC is 0, which would name the default configuration */
   TEST_ASSERT_EQUAL_STRING("00000001", id);
 }
 
@@ -122,7 +122,7 @@ static void test_ids_are_crc_32(void) {
 
 #define MS INT64_C(1000000)
 
-/* A drone with one acknowledge bit, which loses the messages that `lost` names, by number. */
+/* A drone with one acknowledge bit. It loses the messages whose numbers are bits of `lost`. */
 typedef struct mock {
   int acknowledged, num_config, num_messages;
   uint32_t lost;
@@ -171,7 +171,7 @@ static void test_the_handshake_completes_whatever_single_message_is_lost(void) {
     for (lost = 0; lost < 8; ++lost) {
       mock drone = {0};
       ardrone_exchange exchange;
-      drone.acknowledged = old_bit; /* left by an earlier client */
+      drone.acknowledged = old_bit; /* the bit may still be set by an earlier client */
       drone.lost = 1u << lost;
       begin_set(&exchange);
       TEST_ASSERT_EQUAL_INT(ARDRONE_EXCHANGE_DONE, run_exchange(&exchange, &drone));
@@ -181,8 +181,8 @@ static void test_the_handshake_completes_whatever_single_message_is_lost(void) {
   }
 }
 
-/* Nothing is sent that is not needed: value, release; and a release before, where an old bit
- * stands. */
+/* Only what is needed is sent: the value, then the release of the bit; where an old bit is still
+   set, a release before the value. */
 static void test_a_good_link_takes_two_messages(void) {
   int old_bit;
   for (old_bit = 0; old_bit < 2; ++old_bit) {
@@ -193,7 +193,8 @@ static void test_a_good_link_takes_two_messages(void) {
     memset(&at, 0, sizeof at);
     begin_set(&exchange);
     TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_exchange_tick(&exchange, &at, 0));
-    TEST_ASSERT_EQUAL_UINT64(0, at.size); /* before the drone has said whether the bit is set */
+    /* nothing is sent before the drone has reported whether the bit is set */
+    TEST_ASSERT_EQUAL_UINT64(0, at.size);
     TEST_ASSERT_EQUAL_INT(ARDRONE_EXCHANGE_DONE, run_exchange(&exchange, &drone));
     TEST_ASSERT_EQUAL_INT(2 + old_bit, drone.num_messages);
   }
@@ -214,7 +215,7 @@ static void test_ids_and_command_share_a_datagram(void) {
   memset(&at, 0, sizeof at);
   begin_set(&exchange);
   ardrone_exchange_navdata(&exchange, 0, 0);
-  at.size = 950; /* no room for both */
+  at.size = 950; /* the datagram has no room for ids and command together */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_CAPACITY, ardrone_exchange_tick(&exchange, &at, 0));
   TEST_ASSERT_EQUAL_UINT64(950, at.size);
   TEST_ASSERT_EQUAL_INT32(0, at.sequence);

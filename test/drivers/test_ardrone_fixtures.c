@@ -1,5 +1,5 @@
-/* Real captures against the values of the protocol sheet, which come from others' parsers and from
-   checks among the values themselves. */
+/* Real captures compared with the values of the protocol description, which come from other
+   programs' parsers and from cross-checks between the values. */
 #include <math.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ static uint8_t *decode_fixture(const char *name, size_t *size) {
   return bytes;
 }
 
-/* Decoded and encoded again: a byte that the decoder lost or misplaced would differ. */
+/* A packet is decoded and encoded again: a byte that the decoder lost or misplaced would differ. */
 static void check_every_byte_survives(const char *name) {
   static uint8_t again[ARDRONE_NAVDATA_MAX_BYTES];
   size_t size, size_again;
@@ -74,8 +74,8 @@ static void test_the_landed_packet_has_the_values_of_the_sheet(void) {
   TEST_ASSERT_EQUAL_INT(ARDRONE_GPS_ZIMMU, navdata.gps_form);
 }
 
-/* Gravity alone, so the accelerometer's own angles must be those that the drone made of it: a sign
-   or an axis that is wrong would show. */
+/* In this capture only gravity acts, so the angles computed from the accelerometer must agree
+   with the packet's own; a wrong sign or axis would show. */
 static void test_the_accelerometer_agrees_with_the_angles_in_the_packet(void) {
   size_t size;
   tvs_imu imu;
@@ -91,7 +91,8 @@ static void test_the_accelerometer_agrees_with_the_angles_in_the_packet(void) {
     TEST_ASSERT_DOUBLE_WITHIN(6e-4, 2.0246, atan2(-a[1], -a[2]) / degree);
   }
   {
-    /* Where the body's x points, and its y: nose up is -z, right side down is +z. */
+    /* The directions of the body's x and y axes: nose up makes x point to -z, right side down
+       makes y point to +z. */
     const double *q = imu.attitude.world_from_body;
     const double nose_z = 2 * (q[1] * q[3] - q[0] * q[2]),
                  right_z = 2 * (q[2] * q[3] + q[0] * q[1]);
@@ -128,8 +129,8 @@ static void test_the_bootstrap_packet(void) {
   TEST_ASSERT_EQUAL_HEX32(0, navdata.present);
 }
 
-/* A copy that ends where the prefix ends, so that the address sanitizer sees a byte read too far.
- */
+/* Decodes a copy of exactly the prefix's length, so that the address sanitizer sees a read
+   beyond it. */
 static tvs_status decode_copy(const uint8_t *bytes, size_t size) {
   uint8_t *copy = malloc(size ? size : 1);
   tvs_status status;
@@ -200,7 +201,7 @@ static void drain(ardrone_pave_parser *parser, ardrone_pave_gate *gate, stream_f
   }
 }
 
-/* Feeds the stream in pieces of step bytes, after a first one of `first`. */
+/* Feeds the stream in pieces of `step` bytes, after a first piece of `first` bytes. */
 static stream_facts parse(const uint8_t *bytes, size_t size, size_t first, size_t step) {
   ardrone_pave_parser parser;
   ardrone_pave_gate gate = {0};
@@ -263,7 +264,7 @@ static void test_the_captures_of_20_and_5_frames(void) {
   TEST_ASSERT_EQUAL_INT(20, facts.packets);
   TEST_ASSERT_EQUAL_INT(2, facts.idr);
   TEST_ASSERT_EQUAL_INT(18, facts.p);
-  TEST_ASSERT_EQUAL_INT(1, facts.gaps); /* 17368 -> 17563 */
+  TEST_ASSERT_EQUAL_INT(1, facts.gaps); /* the frame number jumps from 17368 to 17563 */
   TEST_ASSERT_EQUAL_UINT32(17368, facts.first_number);
   TEST_ASSERT_EQUAL_UINT64(0, facts.skipped);
   free(bytes);
@@ -289,8 +290,8 @@ static void test_a_stream_split_at_every_byte_gives_the_same_packets(void) {
   free(bytes);
 }
 
-/* A connection that begins in the midst of a packet: from any byte, the parser finds the next one.
- */
+/* A connection may begin in the middle of a packet: from any byte on, the parser finds the next
+   packet. */
 static void test_a_stream_joined_at_any_byte_loses_one_packet(void) {
   size_t size, at;
   uint8_t *bytes = fixture_read("video/pave68_h264_360p_5frames.pave", &size);

@@ -1,5 +1,5 @@
-/* Every picture of the captures decodes: 517 of 517, 17 of 20 (three come before the first that
-   decoding can begin with), 5 of 5. */
+/* The pictures of the captures decode: 517 of 517, 17 of 20 (the other three come before the
+   first picture at which decoding can begin), and 5 of 5. */
 #include <string.h>
 
 #include "support/ardrone_fixtures.h"
@@ -11,7 +11,7 @@ void tearDown(void) {}
 
 static uint8_t video_buffer[ARDRONE_PAVE_BUFFER_BYTES];
 
-/* 1 for a picture, 0 for a packet that is left out. */
+/* Returns 1 for a picture, 0 for a packet that the gate leaves out. */
 static int decode_packet(tvs_decoder *decoder, ardrone_pave_gate *gate,
                          const ardrone_pave_packet *packet) {
   const int answer = ardrone_pave_gate_check(gate, &packet->header);

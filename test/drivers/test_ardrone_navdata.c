@@ -1,4 +1,4 @@
-/* Packets built by hand: what a hostile or an odd firmware may send. */
+/* Packets built by hand, as a hostile or an unknown firmware may send them. */
 #include <math.h>
 #include <string.h>
 #include <unity.h>
@@ -67,7 +67,7 @@ static void test_unknown_tags_and_sizes_are_passed_over(void) {
   size_t k;
   begin(0x55667788);
   for (k = 0; k < 4; ++k) add_option(tags[k], 10 + (unsigned)k, 1);
-  add_option(27, 100, 1); /* a GPS of some other firmware */
+  add_option(27, 100, 1); /* a GPS option of another firmware's size */
   add_option(26, 8, 3);
   end_packet();
   TEST_ASSERT_EQUAL_INT(TVS_OK, decode());
@@ -85,14 +85,14 @@ static void test_option_sizes_below_4_are_refused(void) {
     end_packet();
     memset(&navdata, 0x5a, sizeof navdata);
     TEST_ASSERT_EQUAL_INT(TVS_ERR_DATA, decode());
-    TEST_ASSERT_EACH_EQUAL_HEX8(0x5a, &navdata, sizeof navdata); /* untouched */
+    TEST_ASSERT_EACH_EQUAL_HEX8(0x5a, &navdata, sizeof navdata); /* the output is untouched */
   }
 }
 
 static void test_longer_options_give_what_is_known_shorter_ones_nothing(void) {
   begin(0x55667788);
   add_option(1, 12, 0x21);
-  add_option(9, 75, 1); /* a byte short */
+  add_option(9, 75, 1); /* the option is one byte too short */
   end_packet();
   TEST_ASSERT_EQUAL_INT(TVS_OK, decode());
   TEST_ASSERT_EQUAL_HEX32(1u << 1, navdata.present);
@@ -116,7 +116,7 @@ static void test_tag_27_goes_by_its_size(void) {
   }
 }
 
-/* Found by fuzzing: two forms of tag 27 in one packet filled both. */
+/* Found by fuzzing: a packet with two forms of tag 27 filled both structs. */
 static void test_of_a_tag_that_comes_twice_the_first_counts(void) {
   begin(0x55667788);
   add_option(27, 12, 1);
@@ -140,7 +140,7 @@ static void test_a_wrong_checksum_is_refused_and_nothing_used(void) {
   TEST_ASSERT_EQUAL_UINT32(0, navdata.sequence);
 }
 
-/* More than a 16-bit lane of the sum holds. */
+/* The sum exceeds what one 16-bit lane holds. */
 static void test_a_packet_of_ones_has_its_sum(void) {
   begin(0x55667788);
   add_option(200, 4000, 0xff);
@@ -183,12 +183,12 @@ static void test_order_gap_late_wrap_and_reboot(void) {
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 0xfffffffe, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_NEXT, check(&s, 0xffffffff, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_NEXT, check(&s, 0, 0));
-  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 0, 0)); /* doubled */
+  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 0, 0)); /* the same packet again */
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_GAP, check(&s, 3, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 2, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 1, ARDRONE_STATE_COM_WATCHDOG));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_GAP, check(&s, 300711, 0));
-  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 1, 0)); /* reboot */
+  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 1, 0)); /* the drone rebooted */
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_GAP, check(&s, 500, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 1, ARDRONE_STATE_BOOTSTRAP));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 0, ARDRONE_STATE_BOOTSTRAP));
@@ -233,7 +233,7 @@ static void test_units_frames_and_signs(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 101586, imu.pressure_pa);
 }
 
-/* Level flight with the nose up: climbing velocity has a share along the body's x. */
+/* In level flight with the nose up, a climbing velocity has a component along the body's x. */
 static void test_vertical_velocity_is_turned_into_the_body(void) {
   const double degree = 0.017453292519943295;
   navdata.state = ARDRONE_STATE_FLYING;

@@ -1,4 +1,5 @@
-/* Streams built by the encoder: resynchronisation, the latency rule, the gate. */
+/* Streams made by the encoder: resynchronisation, the latency rule, and the gate that leaves out
+   packets which cannot be decoded. */
 #include <string.h>
 #include <unity.h>
 
@@ -80,7 +81,8 @@ static void test_header_survives_encoding(void) {
   TEST_ASSERT_EQUAL_UINT64(73, size);
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pave_decode(stream, size, &back));
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&back, payload, stream + 100, 100, &size));
-  TEST_ASSERT_EQUAL_MEMORY(stream, stream + 100, 73); /* each field has its bytes */
+  /* decoding and encoding keep every field's bytes */
+  TEST_ASSERT_EQUAL_MEMORY(stream, stream + 100, 73);
   TEST_ASSERT_EQUAL_UINT32(42, back.frame_number);
   TEST_ASSERT_EQUAL_UINT(14, back.sps_size);
   TEST_ASSERT_EQUAL_UINT(10, back.pps_size);
@@ -102,7 +104,7 @@ static void test_garbage_between_packets_is_passed_over(void) {
   TEST_ASSERT_EQUAL_UINT64(31, parser.bytes_skipped);
 }
 
-/* Joined within a picture that holds a signature and a header of absurd sizes. */
+/* The stream begins inside a picture that holds a signature and a header with absurd sizes. */
 static void test_a_signature_within_a_picture_is_no_packet(void) {
   uint8_t fake[64];
   memset(fake, 0xff, sizeof fake);
@@ -122,11 +124,11 @@ static void test_absurd_sizes_are_refused(void) {
   stream[6] = 1;
   stream[7] = 1; /* 257 */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_DATA, ardrone_pave_decode(stream, size, &back));
-  stream[6] = 0; /* 256: more is needed */
+  stream[6] = 0; /* header_size is 256, for which more bytes are needed */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, ardrone_pave_decode(stream, size, &back));
   stream[6] = 64;
   stream[7] = 0;
-  stream[10] = 0x20; /* payload 2 MiB */
+  stream[10] = 0x20; /* a payload of 2 MiB */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_DATA, ardrone_pave_decode(stream, size, &back));
 }
 
@@ -135,7 +137,7 @@ static void test_an_advertisement_carries_no_payload(void) {
   size_t written;
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, NULL, stream, sizeof stream, &written));
   stream[31] = ARDRONE_PAVE_ADVERTISEMENT;
-  stream[8] = 77; /* the size of what is to come */
+  stream[8] = 77; /* in an advertisement: the size of a packet to come */
   size = written;
   add(2, ARDRONE_PAVE_IDR, 100);
   feed(stream, size);
@@ -158,7 +160,8 @@ static void test_the_buffer_turns_over(void) {
     expect(k);
   }
   size = 0;
-  add(1000, ARDRONE_PAVE_P, 4090); /* does not fit: refused, not waited for */
+  /* does not fit into the buffer: the parser skips it and does not wait for its end */
+  add(1000, ARDRONE_PAVE_P, 4090);
   feed(stream, 100);
   expect_none();
   size = 0;
@@ -175,7 +178,7 @@ static void test_the_latency_rule_keeps_the_last_idr(void) {
   feed(stream, size);
   size = 0;
   add(5, ARDRONE_PAVE_IDR, 50);
-  feed(stream, size / 2); /* not whole: not jumped to */
+  feed(stream, size / 2); /* the packet is incomplete, so the parser does not skip to it */
   TEST_ASSERT_EQUAL_INT(2, ardrone_pave_skip_to_latest(&parser));
   expect(3);
   expect(4);
@@ -200,10 +203,11 @@ static void test_the_gate_opens_on_idr_and_shuts_on_a_gap(void) {
   TEST_ASSERT_EQUAL_INT(0, gate(&g, 7, ARDRONE_PAVE_P, 100));
   TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_DECODE | ARDRONE_PAVE_RESET,
                         gate(&g, 8, ARDRONE_PAVE_IDR, 100));
-  TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_GAP, gate(&g, 8, ARDRONE_PAVE_P, 100)); /* the same again */
+  /* the same packet a second time */
+  TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_GAP, gate(&g, 8, ARDRONE_PAVE_P, 100));
   g.is_open = 1;
   h = header_of(9, ARDRONE_PAVE_P, 100);
-  h.stream_id = 2; /* 720p now */
+  h.stream_id = 2; /* the stream changes to 720p */
   TEST_ASSERT_EQUAL_INT(0, ardrone_pave_gate_check(&g, &h));
   h = header_of(10, ARDRONE_PAVE_IDR, 100);
   h.stream_id = 2;

@@ -1,4 +1,4 @@
-/* A recording of the drone in memory, played back: whole, and cut at any byte. */
+/* A recording of the drone in memory is played back, complete and cut at any byte. */
 #include <stdio.h>
 #include <unistd.h>
 
@@ -11,7 +11,7 @@ static char folder[] = "/tmp/ardrone_replay_XXXXXX";
 static FILE *navdata_log, *video_pave, *frames_txt;
 static int64_t now;
 static int num_recorded_packets, num_recorded_navdata;
-static int num_undecodable; /* packets before the first that decoding can begin with */
+static int num_undecodable; /* packets before the first at which decoding can begin */
 static int num_navdata, num_frames, num_gaps;
 
 void setUp(void) {}
@@ -51,8 +51,8 @@ static void record_packet(void *user, const ardrone_pave_packet *packet, const t
   ++num_recorded_packets;
 }
 
-/* Four seconds; `silent_ms` of them, from the second on, without video, the last 250 ms without
- * navdata. */
+/* Makes a recording of four seconds. From its second second on, `silent_ms` of it have no video,
+   and the last 250 ms of these no navdata. */
 static void make_recording(int64_t silent_ms) {
   ardrone_session_options options;
   const ardrone_transport transport = mock_transport(&drone);
@@ -103,7 +103,7 @@ static void count_frame(void *user, const tvs_frame *frame) {
   num_gaps += (frame->flags & TVS_FRAME_GAP) != 0;
 }
 
-/* Plays as fast as it can. Returns the playing time in ms. */
+/* Plays the recording without waiting. Returns the playing time in ms. */
 static int64_t play(void) {
   ardrone_session_options options;
   ardrone_transport transport;
@@ -148,8 +148,8 @@ static void test_a_recording_plays_back_whole(void) {
   TEST_ASSERT_EQUAL_INT(0, num_gaps);
 }
 
-/* The session takes the video for dead, and opens it again a moment after the next packet is due.
- */
+/* After the silence the session closes the video stream, and opens it again shortly after the
+   next packet is due. */
 static void test_a_silence_is_played_over(void) {
   make_recording(1300);
   TEST_ASSERT_TRUE(play() > 3500);
@@ -198,13 +198,14 @@ static void test_a_log_is_an_imu_source(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_IO, ardrone_log_open(&log, "/nowhere/at/all", &source));
 }
 
-/* Ever shorter: never more than was there, and never a picture that the decoder refuses. */
+/* The recording is cut shorter and shorter: the counts never exceed those of the whole, and the
+   decoder refuses no picture. */
 static void test_a_recording_cut_at_any_byte(void) {
   long video = length_of("video.pave"), navdata = length_of("navdata.log");
   int frames_before = num_recorded_packets, navdata_before = num_recorded_navdata;
   int k;
   for (k = 0; k < 150 && video > 0; ++k) {
-    video -= k < 70 ? 1 : 1567; /* through a header's and a packet's end */
+    video -= k < 70 ? 1 : 1567; /* small steps cut through a header and the end of a packet */
     navdata -= k < 70 ? 3 : 1001;
     if (video < 0) video = 0;
     if (navdata < 0) navdata = 0;

@@ -1,4 +1,4 @@
-/* A session against the drone of support/ardrone_mock.h, in virtual time. */
+/* A session with the simulated drone of support/ardrone_mock.h, in virtual time. */
 #include <stdio.h>
 
 #include "support/ardrone_mock.h"
@@ -20,7 +20,7 @@ static void count_event(void *user, ardrone_event event, const char *key) {
   ++num_events[event];
 }
 
-/* The yaw that became 0, by what the session says of one packet. */
+/* The yaw that the session takes as 0, computed from each packet by the observer below. */
 static double psi0;
 
 static void take_psi0(void *user, const uint8_t *bytes, size_t size, const ardrone_navdata *navdata,
@@ -76,7 +76,7 @@ static void step(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_session_step(session, now));
 }
 
-/* Steps for a time, and throws pictures away. Returns how many there were. */
+/* Steps for this long and discards the pictures. Returns how many there were. */
 static int run_ms(int64_t ms) {
   const int64_t end = now + ms * MOCK_MS;
   tvs_frame frame;
@@ -106,8 +106,10 @@ static void test_it_ends_the_bootstrap_and_asks_for_nothing_else(void) {
   TEST_ASSERT_EQUAL_INT(0, drone.acknowledged);
   TEST_ASSERT_EQUAL_INT(2, drone.num_configs);
   TEST_ASSERT_EQUAL_STRING("general:navdata_options", drone.last_key);
-  TEST_ASSERT_EQUAL_INT(0, drone.num_refs + drone.num_pcmds); /* nobody asked to fly */
-  TEST_ASSERT_TRUE(drone.num_commands > 30);                  /* and yet the watchdog is content */
+  /* no flight was requested, so no command of movement was sent */
+  TEST_ASSERT_EQUAL_INT(0, drone.num_refs + drone.num_pcmds);
+  /* the watchdog is cleared all the same */
+  TEST_ASSERT_TRUE(drone.num_commands > 30);
   TEST_ASSERT_NOT_NULL(ardrone_session_navdata(session));
   TEST_ASSERT_EQUAL_UINT32(77, ardrone_session_navdata(session)->demo.battery_percent);
 }
@@ -177,7 +179,7 @@ static void test_take_off_is_dropped_when_the_link_is_lost(void) {
   run_ms(2500);
   TEST_ASSERT_EQUAL_INT(1, num_events[ARDRONE_EVENT_LINK_LOST]);
   TEST_ASSERT_EQUAL_INT(1, drone.num_restarts);
-  TEST_ASSERT_FALSE(drone.flies); /* it was told to land */
+  TEST_ASSERT_FALSE(drone.flies); /* the session sent the command to land */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_session_take_off(session));
   drone.num_take_offs = 0;
   drone.navdata_off = 0;
@@ -187,7 +189,8 @@ static void test_take_off_is_dropped_when_the_link_is_lost(void) {
   TEST_ASSERT_EQUAL_INT(0, drone.num_falls);
 }
 
-/* Its commands count from 1 again, so whoever watches them must hear of it. */
+/* The command numbers start at 1 again, so the event must be reported to a caller who counts
+   them. */
 static void test_a_link_lost_before_it_was_up_is_told(void) {
   start_default();
   while (drone.num_commands == 0) step();
@@ -211,7 +214,7 @@ static void test_a_session_without_steps_sends_nothing(void) {
   TEST_ASSERT_EQUAL_INT(before, drone.num_commands);
 }
 
-/* Milliseconds until the next picture, at most the limit. */
+/* The time in milliseconds until the next picture; at most `limit`. */
 static int64_t wait_for_picture(int64_t limit_ms) {
   const int64_t begin = now;
   while (now - begin < limit_ms * MOCK_MS && run_ms(STEP_MS) == 0) {
@@ -230,7 +233,7 @@ static void test_video_returns_after_a_cut_and_after_silence(void) {
     run_ms(700 + 37 * k);
   }
   for (k = 0; k < 20; ++k) {
-    drone.video_half_open = 1; /* the connection stands, and nothing comes through it any more */
+    drone.video_half_open = 1; /* the connection stays open, but no byte arrives through it */
     run_ms(40);
     TEST_ASSERT_TRUE(wait_for_picture(3000) < 2000 - 40);
     run_ms(700 + 41 * k);
@@ -256,8 +259,8 @@ static void test_reading_too_slowly_drops_the_oldest_and_says_so(void) {
   TEST_ASSERT_TRUE(counters.frames_dropped >= 10);
 }
 
-/* Nobody steps for two seconds; the pictures that have piled up are worth nothing but for the last
- * group. */
+/* The caller does not step for two seconds; of the pictures that have piled up only the last
+   group is delivered. */
 static void test_the_latency_rule_drops_what_piled_up(void) {
   ardrone_session_options options = default_options();
   ardrone_counters counters;
@@ -281,7 +284,7 @@ static void test_the_latency_rule_drops_what_piled_up(void) {
 
 /* ---- the long run ---- */
 
-/* What every picture must be, whatever happened before it. */
+/* The conditions that every picture fulfils in any run. */
 typedef struct frame_check {
   int num, with_attitude, num_gaps;
   uint64_t last_number;
@@ -349,7 +352,8 @@ static void test_ten_minutes_of_a_bad_link(void) {
       (unsigned long long)counters.navdata_late, (unsigned long long)counters.navdata_missing);
   TEST_ASSERT_TRUE(c.num > 17500);
   TEST_ASSERT_TRUE(c.with_attitude > 0.98 * c.num);
-  TEST_ASSERT_TRUE(c.worst_error < 0.005); /* 1 ms stamps at 1 rad/s, and samples 5 ms apart */
+  /* at 1 rad/s: time stamps have steps of 1 ms, samples are 5 ms apart */
+  TEST_ASSERT_TRUE(c.worst_error < 0.005);
   TEST_ASSERT_EQUAL_INT(0, own_decoder.num_refused);
   TEST_ASSERT_EQUAL_UINT64(2, counters.reboots);
   TEST_ASSERT_EQUAL_UINT64(3, counters.links);
@@ -362,7 +366,8 @@ static void test_ten_minutes_of_a_bad_link(void) {
   session = NULL;
 }
 
-/* Stamps that count from another start: the arrival times alone tell, and sigma says how well. */
+/* The PaVE stamps count from an unrelated start: only the arrival times relate the clocks, and
+   sigma must cover the error. */
 static void test_unrelated_clocks_are_mapped_with_an_honest_sigma(void) {
   frame_check c = {0};
   start_default();

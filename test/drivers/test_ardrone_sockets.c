@@ -1,4 +1,4 @@
-/* The socket transport against a few sockets of this test's own on loopback. */
+/* The socket transport, connected to sockets of this test on the loopback. */
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <string.h>
@@ -21,7 +21,7 @@ void tearDown(void) {
   for (k = 0; k < ARDRONE_NUM_CHANNELS; ++k) transport.close(transport.user, (ardrone_channel)k);
 }
 
-/* A socket bound to a free port of an address of loopback. */
+/* A socket bound to a free port of a loopback address. */
 static int bound(int type, const char *address, uint16_t *port) {
   struct sockaddr_in a;
   socklen_t length = sizeof a;

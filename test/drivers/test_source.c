@@ -1,4 +1,4 @@
-/* Clock mapper, attitudes between two samples, and the file source. */
+/* The clock mapper, attitudes between two samples, and the file source. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,8 +30,8 @@ static tvs_time observe(tvs_clock *clock, int64_t device, int64_t host) {
   return time;
 }
 
-/* Two hours of packets with random delays and a drift of 50 ppm: across three wraps and a silence
-   of 50 minutes, the host time is right within the stated uncertainty. */
+/* Two hours of packets with random delays and a drift of 50 ppm, over three wraps and a silence
+   of 50 minutes: the host time is right within the reported uncertainty. */
 static void test_unwrapped_and_mapped_within_its_uncertainty(void) {
   tvs_clock clock = mapper();
   uint32_t seed = 12345;
@@ -42,7 +42,7 @@ static void test_unwrapped_and_mapped_within_its_uncertainty(void) {
     if (t > 1000 * S && t < 4000 * S) continue;
     seed = seed * 1664525u + 1013904223u;
     delay = 1 * MS + (int64_t)(-20e6 * log((seed / 2 + 1.0) / 2147483650.0));
-    host = 77 * S + t + t / 20000; /* the host's clock is the faster one */
+    host = 77 * S + t + t / 20000; /* the host's clock runs faster */
     time = observe(&clock, device0 + t, host + delay);
     TEST_ASSERT_EQUAL_INT64(device0 + t, time.device_ns);
     TEST_ASSERT_EQUAL_UINT32(1, time.clock_id);
@@ -58,11 +58,12 @@ static void test_a_late_packet_keeps_its_time(void) {
   tvs_time time;
   observe(&clock, 10 * S, 100 * S);
   observe(&clock, 11 * S, 101 * S);
-  time = observe(&clock, 12 * S, 117 * S); /* held back for 15 s */
+  time = observe(&clock, 12 * S, 117 * S); /* the packet was delayed by 15 s */
   TEST_ASSERT_EQUAL_INT64(12 * S, time.device_ns);
   TEST_ASSERT_EQUAL_UINT32(1, time.clock_id);
   TEST_ASSERT_TRUE(llabs(time.host_ns - 102 * S) < 10 * MS);
-  time = observe(&clock, 11 * S + 500 * MS, 117 * S + 1); /* overtaken */
+  /* the packet was overtaken by a later one */
+  time = observe(&clock, 11 * S + 500 * MS, 117 * S + 1);
   TEST_ASSERT_EQUAL_INT64(11 * S + 500 * MS, time.device_ns);
   TEST_ASSERT_EQUAL_UINT32(1, time.clock_id);
 }
@@ -73,11 +74,13 @@ static void test_a_reboot_or_jump_is_another_clock(void) {
   uint32_t id;
   int64_t uncertainty;
   observe(&clock, 500 * S, 100 * S);
-  TEST_ASSERT_EQUAL_UINT32(3, observe(&clock, 2 * S, 101 * S).clock_id);  /* back to its start */
-  TEST_ASSERT_EQUAL_UINT32(5, observe(&clock, 60 * S, 102 * S).clock_id); /* ahead of what can be */
+  /* the device's clock went back: a new clock id */
+  TEST_ASSERT_EQUAL_UINT32(3, observe(&clock, 2 * S, 101 * S).clock_id);
+  /* the device's clock jumped ahead of what is possible: a new clock id */
+  TEST_ASSERT_EQUAL_UINT32(5, observe(&clock, 60 * S, 102 * S).clock_id);
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_clock_to_host(&clock, 3, 2 * S, &host, &uncertainty));
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_clock_to_host(&clock, 5, 61 * S, &host, &uncertainty));
-  TEST_ASSERT_EQUAL_INT64(103 * S - 1 * MS, host); /* half of the least delay */
+  TEST_ASSERT_EQUAL_INT64(103 * S - 1 * MS, host); /* half of the least delay is subtracted */
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_clock_to_device(&clock, host, &id, &device, &uncertainty));
   TEST_ASSERT_EQUAL_INT64(61 * S, device);
   tvs_clock_restart(&clock);
@@ -127,16 +130,21 @@ static void test_attitude_between_neighbours_or_unknown(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 125, 100, &a));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, 2 * atan2(a.world_from_body[3], a.world_from_body[0]));
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.018, a.sigma_rad);
-  TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 900, 100, &a)); /* exactly there */
+  /* the instant is that of a sample */
+  TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 900, 100, &a));
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 200, 100, &a));
-  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 201, 100, &a)); /* a large gap */
-  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 901, 100, &a)); /* the future */
+  /* the gap between the samples is too large */
+  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 201, 100, &a));
+  /* the instant is in the future */
+  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 901, 100, &a));
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, -1, 100, &a));
-  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 2, 125, 100, &a)); /* another clock */
-  add(0.0, 50, 3); /* the drone started again */
+  /* the samples belong to another clock */
+  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 2, 125, 100, &a));
+  add(0.0, 50, 3); /* the drone was restarted */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 125, 100, &a));
   a = yaw(0, 3);
-  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_add(&history, 50, &a)); /* not newer */
+  /* not newer than the last sample */
+  TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_add(&history, 50, &a));
 }
 
 static void test_the_ring_forgets_the_oldest(void) {
@@ -163,8 +171,8 @@ static void test_bad_attitudes_are_refused(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, tvs_attitudes_add(&history, 0, &a));
 }
 
-/* Slerp takes the short way and halves the angle, also between nearly equal and nearly opposite
- * ones. */
+/* Slerp takes the shorter arc and halves the angle, also between nearly equal and nearly
+   opposite quaternions. */
 static void test_slerp(void) {
   const double angles[] = {1e-9, 1e-5, 0.1, 1.0, 3.0};
   size_t k;
@@ -179,12 +187,11 @@ static void test_slerp(void) {
 
 static void test_euler_angles_turn_as_documented(void) {
   double q[4];
-  tvs_quaternion_from_euler(0, 0.3, 0,
-                            q); /* nose up: the body's x points against z, which is down */
+  tvs_quaternion_from_euler(0, 0.3, 0, q); /* nose up: the body's x points to -z; z is down */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -sin(0.3), 2 * (q[1] * q[3] - q[0] * q[2]));
-  tvs_quaternion_from_euler(0, 0, 0.3, q); /* right side down: the body's y points along z */
+  tvs_quaternion_from_euler(0, 0, 0.3, q); /* right side down: the body's y points to +z */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, sin(0.3), 2 * (q[2] * q[3] + q[0] * q[1]));
-  tvs_quaternion_from_euler(0.3, 0, 0, q); /* clockwise from above: x turns to y */
+  tvs_quaternion_from_euler(0.3, 0, 0, q); /* clockwise from above: x turns towards y */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, sin(0.3), 2 * (q[1] * q[2] + q[0] * q[3]));
 }
 

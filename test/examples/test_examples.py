@@ -16,7 +16,8 @@ SOURCE, BUILD, CMAKE, CC = sys.argv[1:5]
 EXAMPLES = pathlib.Path(SOURCE, "examples")
 PROGRAM = pathlib.Path(BUILD, "bin", "twoview")
 SKIP_CODE = 77
-CAMERA = ["994.978", "994.978", "311.193", "342.279", "254.877"]  # of the cache's Motorcycle pair
+# fx fy cx0 cx1 cy of the Motorcycle pair in the cache
+CAMERA = ["994.978", "994.978", "311.193", "342.279", "254.877"]
 
 try:
     import cv2
@@ -132,7 +133,7 @@ class Examples(unittest.TestCase):
     def test_match(self):
         rows = [line.split() for line in self.matches.read_text().splitlines()]
         self.assertGreater(len(rows), 400)
-        # The pair is rectified: nearly all true matches lie in one row.
+        # The pair is rectified, so both pixels of nearly all true matches lie in the same row.
         level = sum(abs(float(r[1]) - float(r[3])) < 2 for r in rows)
         self.assertGreater(level, 0.7 * len(rows))
 

@@ -1,4 +1,5 @@
-// What the fuzz targets share: values out of the fuzzer's bytes, and what must hold.
+// Helpers of the fuzz targets: fuzz::Bytes turns the fuzzer's bytes into values, FUZZ_REQUIRE
+// checks a condition.
 #ifndef TEST_FUZZ_FUZZ_H
 #define TEST_FUZZ_FUZZ_H
 
@@ -14,7 +15,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
-// In every build: the fuzzer keeps the input that ends here.
+// Active in every build. It aborts, so that the fuzzer keeps the input that breaks the condition.
 #define FUZZ_REQUIRE(condition)                                            \
   do {                                                                     \
     if (!(condition)) {                                                    \
@@ -25,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace fuzz {
 
-// Bytes as values; zeros once they have run out.
+// Values made of the fuzzer's bytes; zeros once the bytes have run out.
 class Bytes {
  public:
   Bytes(const uint8_t* data, size_t size) : data_(data), size_(size) {}
@@ -43,7 +44,7 @@ class Bytes {
     return low + static_cast<int32_t>(raw<uint16_t>() % (high - low + 1));
   }
   double between(double low, double high) { return low + (high - low) * raw<uint16_t>() / 65535; }
-  // Mostly in the range, at times any double that there is.
+  // A value in the range most of the time, sometimes any double at all.
   double wild(double low, double high) {
     return raw<uint8_t>() < 240 ? between(low, high) : raw<double>();
   }
@@ -73,7 +74,7 @@ inline tv_camera camera(Bytes& bytes) {
   return camera;
 }
 
-// One for the whole run: targets are called many times.
+// One context for the whole run, since a target is called many times.
 inline tv_context* context(int side, int max_keypoints, int max_matches) {
   tv_limits limits;
   tv_limits_init(&limits);

@@ -1,5 +1,5 @@
-// Commands with any arguments: each is written whole, as the protocol has it, or refused; a refused
-// one leaves the datagram and its number as they were.
+// Commands with any arguments: a command is either written whole, in the protocol's form, or
+// refused; after a refusal the datagram and its number are unchanged.
 #include <string>
 
 #include "fuzz.h"
@@ -34,7 +34,7 @@ tvs_status write_one(ardrone_at* at, fuzz::Bytes& bytes) {
   }
 }
 
-// One line, printable, with its own number and no quote left open.
+// A command must be one printable line with its own number and closed quotes.
 void check_line(const std::string& line, int32_t number) {
   FUZZ_REQUIRE(line.compare(0, 3, "AT*") == 0 && line.back() == '\r');
   const size_t equals = line.find('=');

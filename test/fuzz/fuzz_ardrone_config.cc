@@ -1,5 +1,5 @@
-// Configuration and id texts of any bytes; keys and values of any bytes, which become a command or
-// are refused, but never two commands.
+// Configuration and id texts of any bytes, and keys and values of any bytes: a value becomes
+// exactly one command or is refused.
 #include <algorithm>
 #include <cstdlib>
 #include <string>

@@ -1,6 +1,6 @@
-// Navdata: any bytes are a packet, or refused; what is read survives encoding, and nothing that is
-// not a number comes out in SI units. The checksum is put right most times, else nothing would get
-// past it.
+// Navdata: any bytes are decoded as a packet or refused; a decoded packet survives encoding, and
+// its SI values are finite. The checksum is corrected for most inputs, else nearly all would be
+// refused.
 #include <vector>
 
 #include "encode.h"
@@ -41,7 +41,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static ardrone_navdata navdata, again;
   static ardrone_sequence sequence;
   if (size == 0) return 0;
-  std::vector<uint8_t> bytes(data + 1, data + size);  // ends where it ends: the sanitizer watches
+  // a copy of exactly this length, so that the sanitizer sees a read beyond it
+  std::vector<uint8_t> bytes(data + 1, data + size);
   if (data[0] < 240) mend_checksum(bytes);
   if (ardrone_navdata_decode(bytes.data(), bytes.size(), &navdata) != TVS_OK) return 0;
   ardrone_sequence_check(&sequence, &navdata);

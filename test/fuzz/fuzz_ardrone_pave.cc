@@ -1,5 +1,5 @@
-// PaVE: any stream, split as the input says, gives the packets of the stream in one piece; none
-// lies outside the bytes that were fed.
+// PaVE: a stream that is split in any way gives the same packets as the stream in one piece, and no
+// packet lies outside the bytes that were fed.
 #include <vector>
 
 #include "fuzz.h"
@@ -30,7 +30,7 @@ struct Parser {
     }
   }
 
-  // Feeds as much as there is room for.
+  // Feeds as many bytes as the parser has room for.
   size_t feed(const uint8_t* bytes, size_t size) {
     size_t room;
     uint8_t* to = ardrone_pave_space(&parser, &room);
@@ -59,7 +59,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   for (size_t at = 0; at < size;) at += whole.feed(data + at, size - at);
   for (size_t at = 0; at < size;) {
-    if (skips) ardrone_pave_skip_to_latest(&split.parser);  // nothing whole is left after a drain
+    // all whole packets were taken, so this must skip nothing
+    if (skips) ardrone_pave_skip_to_latest(&split.parser);
     at += split.feed(data + at, size - at < piece ? size - at : piece);
   }
   FUZZ_REQUIRE(whole.seen == split.seen);

@@ -1,5 +1,5 @@
-// A session against a drone that sends anything at any time: no take-off that was not asked for, no
-// command number falling within a link, every datagram whole, every picture given back.
+// A session with a drone that may send anything at any time: no take-off that was not requested, no
+// command number that decreases within a link, every datagram complete, every picture released.
 #include <cstdlib>
 #include <string>
 
@@ -48,7 +48,7 @@ tvs_status send(void* user, ardrone_channel channel, const void* data, size_t si
   return TVS_OK;
 }
 
-// A packet that is right but for what the input says, or raw bytes.
+// A navdata packet with values from the input; some packets have a wrong byte.
 size_t make_navdata(Drone* drone, uint8_t* to, size_t capacity) {
   static ardrone_navdata navdata;
   size_t size = 0;

@@ -27,7 +27,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (seen) FUZZ_REQUIRE(fuzz::all_finite(back, 2) && fuzz::all_finite(d_pixel, 6));
     if (good) {
       FUZZ_REQUIRE(tv_camera_project_points(&camera, point, 1, many, &inside) == TV_OK);
-      // Without a Jacobian, which may end beyond a double's range before the pixel does.
+      // Projects without a Jacobian: a Jacobian may overflow where the pixel is still finite.
       const bool projected = tv_camera_project(&camera, point, back, nullptr) == TV_OK;
       FUZZ_REQUIRE(projected || !seen);
       FUZZ_REQUIRE(inside == projected &&

@@ -1,4 +1,4 @@
-// Camera files and cameras.yaml: any text is a camera that the library takes, or BadInput.
+// Camera files and cameras.yaml: any text gives a camera that the library accepts, or BadInput.
 #include <string>
 
 #include "base/error.h"

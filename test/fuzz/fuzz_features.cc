@@ -26,7 +26,7 @@ tv_feature_options options_of(fuzz::Bytes& bytes) {
   return options;
 }
 
-// The bytes that are left, over and over, in rows with some padding.
+// An image of the bytes that are left, repeated, in rows with some padding.
 std::vector<uint8_t> pixels_of(fuzz::Bytes& bytes, tv_image& image) {
   image.width = bytes.whole(1, kSide);
   image.height = bytes.whole(1, kSide);

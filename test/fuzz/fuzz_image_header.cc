@@ -1,4 +1,4 @@
-// Headers of image files: any bytes, after the beginning of a file of each kind.
+// Headers of image files: the first bytes of each file type, followed by any bytes.
 #include <iterator>
 #include <string>
 

@@ -1,4 +1,4 @@
-// Tables of matches: any text is a list of matches, or BadInput.
+// Tables of matches: any text gives a list of matches, or BadInput.
 #include <string>
 
 #include "base/error.h"

@@ -1,4 +1,4 @@
-// PAIRS.txt: any text is a list of pairs, or BadInput.
+// PAIRS.txt: any text gives a list of pairs, or BadInput.
 #include <string>
 
 #include "base/error.h"

@@ -7,7 +7,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const bool lens = bytes.whole(0, 3) == 0;
   const tv_camera camera0 = lens ? fuzz::camera(bytes) : plain;
   const tv_camera camera1 = lens ? fuzz::camera(bytes) : plain;
-  // A quaternion's rotation, or nine numbers.
+  // A rotation from a quaternion, or any nine numbers.
   double R[9], q[4], norm = 0;
   for (double& value : q) value = bytes.between(-1, 1), norm += value * value;
   norm = std::sqrt(norm > 0 ? norm : 1);

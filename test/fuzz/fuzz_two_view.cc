@@ -1,4 +1,4 @@
-// tv_estimate_two_view: any matches, any options; swapped views as well.
+// tv_estimate_two_view: any matches and any options; the views are swapped as well.
 #include "fuzz.h"
 #include "support/calls.h"
 
@@ -24,7 +24,7 @@ tv_estimate_options options_of(fuzz::Bytes& bytes) {
   return options;
 }
 
-// Matches of their own, copies of earlier ones, ones that do not move, and shifted ones.
+// The matches are new ones, copies of earlier ones, ones with equal pixels, and shifted ones.
 int matches_of(fuzz::Bytes& bytes, double pixels[2][2 * kMaxMatches], float* ratios) {
   const int count = bytes.whole(0, kMaxMatches);
   for (int i = 0; i < count; ++i) {
@@ -83,7 +83,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         estimate_pixels(context, given[swap], given[1 - swap], pixels[swap], pixels[1 - swap],
                         ratios, count, &options, &result[swap], mask[swap]);
     if (status[swap] == TV_OK) require_sound(result[swap], mask[swap], count);
-    if (options.gravity_sigma_rad != 0) return 0;  // gravity belongs to its view
+    // not compared: a gravity belongs to one view and would have to be swapped too
+    if (options.gravity_sigma_rad != 0) return 0;
   }
   FUZZ_REQUIRE(status[0] == status[1]);
   if (status[0] != TV_OK) return 0;

@@ -1,4 +1,4 @@
-/* Writes the seeds of the ardrone targets, made by the project's own encoder.
+/* Writes the seeds of the ardrone targets with the project's own encoder.
    usage: make_ardrone_seeds test/fuzz/seeds */
 #include <stdio.h>
 #include <string.h>
@@ -23,7 +23,7 @@ static size_t make_navdata(ardrone_gps_form form, uint8_t *to, size_t capacity) 
   navdata.sequence = 1000;
   navdata.present = 0x0fffffff;
   navdata.gps_form = form;
-  to[0] = 0; /* the target's own first byte */
+  to[0] = 0; /* the target's own first byte; below 240 the target corrects the checksum */
   ardrone_encode_navdata(&navdata, to + 1, capacity - 1, &size);
   return size + 1;
 }

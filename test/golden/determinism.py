@@ -16,9 +16,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-LONGER_SIDE = 320  # pixels: an -O0 build under qemu takes its time
-# (architecture, what runs its programs, what this run's "neon" is). A Cortex-A72 has no dot
-# product.
+LONGER_SIDE = 320  # pixels of the longer side, since an -O0 build under qemu is slow
+# (architecture, the command that runs its programs, the kernel set that "neon" stands for in this
+# run). A Cortex-A72 has no dot product instructions.
 RUNNERS = {
     "x86-64": [([], "")],
     "aarch64": [(["qemu-aarch64", "-cpu", "cortex-a72", "-L", "/usr/aarch64-linux-gnu"], ""),
@@ -28,7 +28,7 @@ RUNNERS = {
 SETS = {"x86-64": {"c", "sse2"}, "aarch64": {"c", "neon", "neon+dot"}, "armv7": {"c", "neon"}}
 BUILDS = [(architecture, compiler, level) for level in ("O2", "O0")
           for compiler in ("gcc", "clang") for architecture in RUNNERS]
-# One of each architecture, each compiler and each level: what the test suite has time for.
+# One build of each architecture, compiler and level: as many as the test suite has time for.
 QUICK = [("x86-64", "gcc", "O2"), ("x86-64", "clang", "O0"), ("aarch64", "gcc", "O2"),
          ("armv7", "gcc", "O2")]
 
@@ -39,7 +39,7 @@ NEEDED = ("cmake", "ninja", "gcc", "clang", "aarch64-linux-gnu-gcc", "arm-linux-
 
 
 class Failure(Exception):
-    """A build or a run that did not come to its end."""
+    """A build or a run that failed."""
 
 
 def run(*command):
@@ -50,7 +50,8 @@ def run(*command):
 
 
 def write_pairs(folder, data):
-    """The pairs as digest.c reads them: luma, decoded and scaled down once, here."""
+    """Writes the pairs as digest.c reads them: luma, decoded and scaled down here, once for all
+    builds."""
     import cv2
 
     motorcycle = ROOT / ".cache/motorcycle"
@@ -97,9 +98,9 @@ def read_set(folder):
 
 
 def build(folder, architecture, compiler, level, keep_footprint):
-    """The digest program of this architecture, compiler and level. keep_footprint: for ARM the
-    shared library and its call graphs are built with it, which scripts/footprint measures; a cache
-    of the compiler's outputs would not have the call graphs."""
+    """Builds the digest program for this architecture, compiler and level. keep_footprint: for ARM
+    also builds the shared library and its call graphs, which scripts/footprint measures; a
+    compiler cache would not have the call graphs."""
     there = folder / f"{architecture}-{compiler}-{level}"
     options = [f"-DCMAKE_BUILD_TYPE={'Release' if level == 'O2' else 'Debug'}",
                "-DCMAKE_C_FLAGS_DEBUG=-O0", "-DCMAKE_CXX_FLAGS_DEBUG=-O0",
@@ -123,13 +124,13 @@ def build(folder, architecture, compiler, level, keep_footprint):
 
 
 def digests(program, architecture, pairs):
-    """{kernel set: [(pair and part, digest)]} of one build."""
+    """The digests of one build: {kernel set: [(pair and part, digest)]}."""
     found = {}
     for command, suffix in RUNNERS[architecture]:
         for line in run(*command, program, *pairs).splitlines():
             pair, kernels, part, digest = line.split()
             if suffix and kernels == "c":
-                continue  # the first runner's
+                continue  # the first run is not compared with itself
             found.setdefault(kernels + (suffix if kernels == "neon" else ""), []).append(
                 (f"{pair}/{part}", digest))
     missing = SETS[architecture] - set(found)
@@ -139,7 +140,7 @@ def digests(program, architecture, pairs):
 
 
 def summary(lines):
-    """One number out of the digests of all pairs and parts."""
+    """One digest over the digests of all pairs and parts."""
     total = 14695981039346656037
     for _, digest in lines:
         for byte in bytes.fromhex(digest):
@@ -148,7 +149,7 @@ def summary(lines):
 
 
 def compare(expected, actual):
-    """The pairs' parts that differ."""
+    """The names of the parts, with their pair, that differ."""
     parts, other = dict(expected), dict(actual)
     return [part for part in {**parts, **other} if parts.get(part) != other.get(part)]
 

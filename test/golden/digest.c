@@ -1,12 +1,13 @@
-/* A digest of every output of the library over pairs of images, for scripts/determinism: two builds
-   that agree in these lines gave the same bits.
+/* Prints digests of every output of the library for pairs of images, for scripts/determinism: two
+   builds that print the same lines gave the same bits.
 
    digest PAIR...   for each pair and each kernel set of this CPU: `pair set part digest`, a part
                     being the outputs of a few calls
    PAIR is what determinism.py writes: a line of text, `width height`, a line of numbers for each
    camera (fx fy cx cy k1 k2 p1 p2 k3), and the bytes of both images.
 
-   Values are digested field by field (padding is nobody's), floating point as its bits. */
+   Structs are digested field by field, since padding has no defined value; floating point by its
+   bits. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -17,8 +18,8 @@
 #include "twoview/alloc.h"
 #include "twoview/twoview.h"
 
-/* What programs exchange, and ctypes declares, has one layout on every CPU: all structs without
-   pointers. */
+/* Structs that programs exchange, and that ctypes declares, must have one layout on every CPU:
+   these are all structs without pointers. */
 #define LAYOUT(type, bytes, last, offset) \
   _Static_assert(sizeof(type) == bytes && offsetof(type, last) == offset, #type)
 LAYOUT(tv_limits, 28, purposes, 24);
@@ -157,7 +158,7 @@ static void add_camera(const tv_camera *camera) {
   tv_camera scaled;
   double angle;
   int k;
-  for (k = 0; k < 64; ++k) { /* from beyond one corner to beyond the other */
+  for (k = 0; k < 64; ++k) { /* from beyond one corner of the image to beyond the opposite one */
     pixels[k][0] = camera->width * (0.16 * (k % 8) - 0.05);
     pixels[k][1] = camera->height * (0.16 * (k / 8) - 0.05);
   }
@@ -185,7 +186,7 @@ static void add_camera(const tv_camera *camera) {
   add_doubles(&scaled.fx, 4);
 }
 
-/* The pair's own cameras, and both models of distortion with strong lenses. */
+/* Cameras: the pair's own, and both distortion models with strong lenses. */
 static void digest_cameras(const pair *p, tv_context *context) {
   static const double brown[8] = {-0.32, 0.12, 0.001, -0.0007, 0.01, 0.02, -0.01, 0.001};
   static const double fisheye[8] = {-0.02, 0.01, -0.004, 0.0006, 0, 0, 0, 0};
@@ -218,7 +219,8 @@ static void extract(const pair *p, tv_context *context, const tv_feature_options
   }
 }
 
-/* Every option of a feature is met with two values at least. Ends with the defaults' in `f`. */
+/* Runs every option of a feature stage with two values at least. `f` holds the result of the
+   default options at the end. */
 static void digest_features(const pair *p, tv_context *context, features *f) {
   tv_feature_options options;
   tv_feature_options_init(&options);
@@ -290,8 +292,9 @@ static double uniform(uint64_t *seed, double low, double high) {
   return low + (high - low) * (double)(*seed >> 33) / 2147483648.0;
 }
 
-/* Simulated matches of one camera that turns by 23 degrees and moves, its principal point told
-   wrongly, which the matches must find: few real pairs turn enough. A pinhole, then a lens. */
+/* Simulated matches of one camera that turns by 23 degrees and moves. The principal point that
+   the library gets is wrong, and the estimate must find that; few real pairs turn enough for
+   this. First a pinhole, then a lens with distortion. */
 static void digest_principal_point(const pair *p, tv_context *context) {
   static matched m;
   const double cosine = 0.96 / 1.04, sine = 0.4 / 1.04; /* t = 0.2 in (1 - t^2, 2 t) / (1 + t^2) */
@@ -333,7 +336,7 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   tv_two_view with_gravity;
   int32_t method;
   for (method = TV_SOLVER_UPRIGHT; method >= TV_SOLVER_FIVE_POINT;
-       --method) { /* the five-point pose is the last */
+       --method) { /* the five-point solver comes last, since its pose is returned */
     tv_estimate_options_init(&options);
     options.method = method;
     options.max_iterations = 2000;
@@ -350,7 +353,8 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   }
   tv_estimate_options_init(&options);
   options.fixed_iterations = 40;
-  options.gravity0[1] = options.gravity1[1] = 1; /* a prior, and a wrong one at that */
+  /* gravity as a prior, and for this pair a wrong one */
+  options.gravity0[1] = options.gravity1[1] = 1;
   options.gravity0[0] = 0.1;
   options.gravity_sigma_rad = 0.05;
   start();
@@ -435,7 +439,7 @@ static void digest_bundle(const pair *p, tv_context *context, const matched *m,
   print(p, context, "bundle");
 }
 
-/* The main job in one call, with what is off by default. */
+/* tv_reconstruct, with the options that are off by default switched on. */
 static void digest_reconstruct(const pair *p, tv_context *context) {
   tv_reconstruct_options options;
   tv_feature_options feature;
@@ -466,7 +470,7 @@ static void digest_reconstruct(const pair *p, tv_context *context) {
   print(p, context, "reconstruct");
 }
 
-/* The context's size is the limits' alone, and so is how much of it was used the data's. */
+/* The context's size depends on the limits only, and the high water mark on the data only. */
 static void digest_memory(const pair *p, tv_context *context, const tv_limits *limits) {
   size_t bytes = 0;
   start();

@@ -1,14 +1,15 @@
-/* scene FILE   writes a pair of images as digest.c reads it, which depends on nothing outside this
-   file: whole numbers alone make it, so that it has the same bytes on every machine. golden/stages
-   has every stage of the library work on it.
+/* scene FILE   writes a pair of images in the format that digest.c reads. The pair is computed with
+   integers only and depends on nothing outside this file, so it has the same bytes on every
+   machine. golden/stages runs every stage of the library on it.
 
-   Square faces with random grey patches stand at distances of their own before a wall; the camera
+   Square faces with random grey patches stand at different distances before a wall; the camera
    moves to the right, up and forward without turning. A ray takes the grey of the patch that it
    meets first; a pixel is the average of 3 x 3 rays. */
 #include <stdint.h>
 #include <stdio.h>
 
-enum { WIDTH = 320, HEIGHT = 240, FOCAL = 300, RAYS = 3 }; /* pixels; rays of a pixel and axis */
+/* WIDTH, HEIGHT and FOCAL are pixels; RAYS is the number of rays of a pixel along each axis */
+enum { WIDTH = 320, HEIGHT = 240, FOCAL = 300, RAYS = 3 };
 enum { METRE = 1 << 12, PATCH = METRE / 12, NUM_FACES = 27 };
 
 typedef struct face {
@@ -21,7 +22,7 @@ static uint32_t next_random(uint64_t *state) {
   return (uint32_t)(*state >> 33);
 }
 
-/* The nearest first; the last is the wall. */
+/* Ordered by distance, the nearest first; the last one is the wall. */
 static void make_faces(face *faces) {
   uint64_t state = 14;
   int k;
@@ -48,7 +49,8 @@ static uint32_t grey(const face *f, int64_t x, int64_t y) {
   return 20 + (value >> 16) % 216;
 }
 
-/* eye: of the camera; it looks along z. The slope of a ray is a whole number over `scale`. */
+/* The grey level that a ray meets. The camera is at `eye` and looks along z; a ray's slope is a
+   whole number over `scale`. */
 static uint32_t ray(const face *faces, const int64_t eye[3], int64_t slope_x, int64_t slope_y) {
   const int64_t scale = 2 * RAYS * FOCAL;
   int k;

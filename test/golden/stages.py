@@ -1,8 +1,8 @@
-"""A digest a stage of what the library computes from a rendered pair (scene.c), held against the
-committed ones.
+"""Computes one digest for each stage of the library from a rendered pair (scene.c), and compares it
+with the committed one.
 
 test/golden/digests.txt has a line `stage digest` for each stage. The test golden/stages fails
-- where a stage's output is other bytes than those the file was made from, with any kernel set of
+- where a stage's output differs from the bytes that the file was made from, with any kernel set of
 this CPU;
 - where CHANGELOG.md does not announce the file's digest: under a heading "Results", the newest
 mention of
@@ -23,7 +23,8 @@ from determinism import summary
 ROOT = Path(__file__).resolve().parents[2]
 COMMITTED = Path(__file__).with_name("digests.txt")
 CHANGELOG = ROOT / "CHANGELOG.md"
-# The parts that digest.c prints. The sizes of its part "memory" are layout and no result.
+# The parts that digest.c prints. Its part "memory" is left out, since sizes and layout are no
+# results.
 STAGES = {
     "camera": ["camera"],
     "features": ["features", "features_options"],
@@ -45,7 +46,7 @@ def run(*command):
 
 
 def computed(scene_program, digest_program, folder):
-    """{kernel set: {stage: digest}}"""
+    """The digests of this build: {kernel set: {stage: digest}}."""
     folder.mkdir(parents=True, exist_ok=True)
     run(scene_program, folder / "scene")
     parts = {}
@@ -61,7 +62,8 @@ def computed(scene_program, digest_program, folder):
 
 
 def announced(text):
-    """{stage: digits} of the newest mention, the first from the top, under a heading Results."""
+    """The digits that the CHANGELOG announces, {stage: digits}: the first mention from the top,
+    which is the newest, under a heading Results."""
     found, results = {}, False
     for line in text.splitlines():
         if line.startswith("#"):

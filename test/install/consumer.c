@@ -1,4 +1,5 @@
-/* Links against an installed libtwoview and sees that header and library are of one version. */
+/* Links against an installed libtwoview and checks that header and library have the same
+   version. */
 #include <stdio.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-/* Links against the installed drivers, and writes a command that a drone would land by. */
+/* Links against the installed drivers and writes the command by which a drone lands. */
 #include <stdio.h>
 #include <string.h>
 

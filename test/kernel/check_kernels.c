@@ -5,7 +5,7 @@
 
    check_kernels          runs the checks
    check_kernels --time   prints nanoseconds per call of typical size, a column per set */
-#define _POSIX_C_SOURCE 199309L /* clock_gettime */
+#define _POSIX_C_SOURCE 199309L /* for clock_gettime */
 
 #include <math.h>
 #include <stdio.h>
@@ -27,12 +27,12 @@ typedef struct block {
   int is_output;
 } block;
 
-/* One run of a case: the same seed gives the same inputs, whatever the set. */
+/* One run of a case: the same seed gives the same inputs to every kernel set. */
 typedef struct trial {
   const tvk_table *set;
   uint64_t seed;
-  int typical;   /* the size of a 640x480 image's work, for --time */
-  int64_t calls; /* how often to call the kernel on the same input */
+  int typical;   /* 1: use the sizes of a 640 x 480 image, for --time */
+  int64_t calls; /* how often the kernel is called on the same input */
   block blocks[MAX_BLOCKS];
   int num_blocks;
 } trial;
@@ -62,13 +62,14 @@ static void release(trial *t) {
     for (left_ = (t)->calls; left_ > 0; --left_) call; \
   } while (0)
 
-/* In [low, high], or the typical value. */
+/* A random size in [low, high], or `typical` for --time. */
 static int32_t pick(trial *t, int32_t low, int32_t high, int32_t typical) {
   const int32_t value = random_int(&t->seed, low, high);
   return t->typical ? typical : value;
 }
 
-/* Noise; black and white; one grey; a ramp with small steps, where ties are many. */
+/* Random pixels of one of four sorts: noise; black and white; one grey level; a ramp with small
+   steps, where many values are equal. */
 static void fill_bytes(trial *t, uint8_t *bytes, int32_t count) {
   const int32_t kind = random_int(&t->seed, 0, 3), base = random_int(&t->seed, 0, 255);
   int32_t k;
@@ -104,7 +105,7 @@ static void case_fast_score_row(trial *t) {
 static void case_fast_contrasts(trial *t) {
   const int32_t stride = pick(t, 9, 40, 640), arc = pick(t, 9, 12, 9), count = pick(t, 1, 9, 64);
   const int32_t height = pick(t, 9, 12, 480), width = pick(t, 9, stride, stride);
-  /* Ends with the last pixel: the last circle's, now and then. */
+  /* The image ends with its last pixel, and in some trials the last circle touches that pixel. */
   const uint8_t *image = row_of_bytes(t, (height - 1) * stride + width);
   const uint8_t *centres[64];
   int16_t *contrasts = OUTPUT(t, int16_t, 9 * count);
@@ -135,7 +136,8 @@ static void case_suppress_row(trial *t) {
   found = OUTPUT(t, int32_t, 1);
   REPEAT(t, *found = t->set->suppress_row(rows[0], rows[1], rows[2], width, xs));
   TEST_ASSERT_TRUE(*found >= 0 && *found <= room);
-  memset(xs + *found, PATTERN, (size_t)(room - *found) * sizeof xs[0]); /* free to be scratch */
+  /* the kernel may use the rest as scratch */
+  memset(xs + *found, PATTERN, (size_t)(room - *found) * sizeof xs[0]);
 }
 
 static void case_average_rows(trial *t) {
@@ -167,7 +169,7 @@ static void case_average_columns(trial *t) {
     weights[3 * x + 2] = 256 - weights[3 * x] - weights[3 * x + 1];
     if (first[x] + used > width) width = first[x] + used;
   }
-  sums = INPUT(t, uint16_t, width); /* ends with the last one that has a weight */
+  sums = INPUT(t, uint16_t, width); /* ends with the last element that has a weight */
   for (x = 0; x < width; ++x) {
     const int32_t noise = random_int(&t->seed, 0, 65280);
     sums[x] = (uint16_t)(random_int(&t->seed, 0, 3) == 0 ? 65280 : noise);
@@ -203,9 +205,9 @@ static void case_sample_patch(trial *t) {
   static const int32_t heights[4] = {TVK_PATCH_SIDE, TVK_ORIENT_SIDE, 1, 7};
   const int32_t width = pick(t, 1, 90, 640), height = pick(t, 1, 90, 480);
   const int32_t num_rows = t->typical ? TVK_PATCH_SIDE : heights[random_int(&t->seed, 0, 3)];
-  const int32_t num_pairs = height * (width + 1); /* nothing behind the last */
-  /* Steps from none to far beyond the image; a step of whole pixels from a whole position ends on
-     the last column or row exactly. */
+  const int32_t num_pairs = height * (width + 1); /* nothing may be read behind the last pair */
+  /* Steps from zero to far beyond the image. Whole steps from a whole position end exactly on
+     the last column or row. */
   const int32_t whole = random_int(&t->seed, 0, 3) == 0;
   const int32_t farthest = random_int(&t->seed, 0, 7) == 0 ? 160 << 16 : 2 << 16;
   const int32_t margin = 40 << 16;
@@ -283,7 +285,7 @@ static int is_pattern(const uint8_t *begin, const uint8_t *end) {
   return 1;
 }
 
-/* Descriptors with ties, near copies of each other and extremes. */
+/* Random descriptors, with equal ones, near copies of each other, and extreme values. */
 static uint8_t *random_descriptors(trial *t, int32_t count, const uint8_t *similar, int32_t num) {
   const int32_t kind = random_int(&t->seed, 0, 4);
   uint8_t *rows = INPUT(t, uint8_t, count * TVK_DESCRIPTOR_SIZE);
@@ -308,7 +310,7 @@ static uint8_t *random_descriptors(trial *t, int32_t count, const uint8_t *simil
 }
 
 static void case_mutual_nearest(trial *t) {
-  /* Now and then more rows or columns than are met at once. */
+  /* A few trials have more rows or columns than a kernel handles at a time. */
   const int32_t many = random_int(&t->seed, 0, 59);
   const int32_t num_rows = pick(t, 0, many == 0 ? 2000 : 40, 1000);
   const int32_t num_columns = pick(t, 0, many == 1 ? TVK_NEAREST_PANEL + 300 : 150, 1000);
@@ -336,7 +338,8 @@ static void case_squared_distances(trial *t) {
   REPEAT(t, t->set->squared_distances(query, rows, indices, count, out));
 }
 
-/* Rays near the axis and slopes of a lens of some 500 pixels; now and then an extreme match. */
+/* Rays near the axis, with slopes of a lens whose focal length is about 500 pixels; in a few
+   trials one match is extreme. */
 static void fill_matches(trial *t, double *const *arrays, int32_t n, int32_t on_plane) {
   const int32_t extreme = random_int(&t->seed, 0, 3);
   int32_t a, i;
@@ -450,7 +453,7 @@ static void case_sampson_score(trial *t) {
                                            inverse_sq));
 }
 
-/* Rays of random points seen from two places, some samples degenerate: equal matches, zeros. */
+/* Rays of random points seen from two places; some samples are degenerate: equal matches, zeros. */
 static void case_relpose_5pt(trial *t) {
   const int32_t num_samples = pick(t, 1, TVK_WIDTH, TVK_WIDTH);
   const double span = random_int(&t->seed, 0, 1) ? 1 : 1e-3;
@@ -474,7 +477,7 @@ static void case_relpose_5pt(trial *t) {
     }
   }
   REPEAT(t, t->set->relpose_5pt(rays, num_samples, essentials, counts));
-  for (s = 0; s < TVK_WIDTH; ++s) { /* the rest is scratch */
+  for (s = 0; s < TVK_WIDTH; ++s) { /* lanes beyond the solutions are scratch */
     const int32_t count = s < num_samples ? counts[s] : 0;
     TEST_ASSERT_TRUE(count >= 0 && count <= TVK_RELPOSE_MODELS);
     if (s >= num_samples) counts[s] = 0;
@@ -483,8 +486,8 @@ static void case_relpose_5pt(trial *t) {
   }
 }
 
-/* Points before and behind two cameras, far ones, pixels that belong to none, and some that are no
-   numbers. */
+/* Points in front of and behind two cameras, far points, pixels that belong to no point, and
+   some NaN. */
 static void case_triangulate(trial *t) {
   const int32_t num = pick(t, 0, 100, 500), method = random_int(&t->seed, 0, 2);
   const double angle = random_unit(&t->seed) - 0.5, sine = sin(angle), cosine = cos(angle);
@@ -539,7 +542,7 @@ static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_
   return t;
 }
 
-/* What differs, or null. */
+/* Compares the kernel set with C on one input; returns what differs, or null. */
 static const char *difference(const trial *expected, const trial *actual) {
   int k;
   for (k = 0; k < actual->num_blocks; ++k) {
@@ -557,7 +560,8 @@ static const char *difference(const trial *expected, const trial *actual) {
   return NULL;
 }
 
-/* "neon", and "neon+" for the table above it with more instructions. */
+/* The set's name; a "+" is added for a second table of the same set, which uses more
+   instructions. */
 static const char *name_of(int32_t n) {
   static char name[16];
   const tvk_table *table = tvk_nth(n), *below = tvk_nth(n - 1);
@@ -600,14 +604,14 @@ static double now_ns(void) {
   return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
 }
 
-/* The least of several runs of about a millisecond each. */
+/* The shortest of several runs of about a millisecond each. */
 static double time_per_call(const tvk_table *set, void (*run)(trial *)) {
   double best = 1e30;
   int64_t calls = 1;
   int repeat = 0;
   while (repeat < 9) {
     trial t = make_trial(set, 1, 1, 1);
-    double setup, total; /* setup includes one call */
+    double setup, total; /* setup is the time of the inputs and one call */
     const double start = now_ns();
     run(&t);
     setup = now_ns() - start;
@@ -645,7 +649,7 @@ static int print_all_times(void) {
   return 0;
 }
 
-/* The sets that this machine runs, from C upwards, and what tvk_select makes of each number. */
+/* Checks every set that this machine runs, C first, and what tvk_select returns for each number. */
 static void test_the_sets_are_those_of_this_cpu(void) {
   int32_t n, set;
   const tvk_table *fastest = NULL;

@@ -1,4 +1,4 @@
-// Monte Carlo: how often the 95 % ellipsoids of poses and of points hold the truth.
+// Monte Carlo test: how often the 95 % ellipsoids of poses and of points contain the truth.
 #include <cstdlib>
 
 #include "support/bundle_scene.h"
@@ -62,7 +62,7 @@ void expect_coverage(const Count& count, int least, const char* what) {
   TEST_ASSERT_TRUE_MESSAGE(count.share() >= 0.93 && count.share() <= 0.97, text);
 }
 
-// R_true = exp([w]x) R, t_true = normalise(t + a b1 + b b2).
+// The pose's error (w, a, b): R_true = exp([w]x) R, t_true = normalise(t + a b1 + b b2).
 void pose_error(const double R[9], const double t[3], double error[5]) {
   Mat3 estimate;
   for (int k = 0; k < 9; ++k) estimate(k / 3, k % 3) = R[k];
@@ -100,8 +100,9 @@ struct Counts {
   Count points, pose;
 };
 
-// The bundle's own covariance speaks of the noise that it found; with `known_noise` it is scaled to
-// the noise that there is.
+// Adjusts num_pairs pairs and counts how often the ellipsoids hold the truth. The bundle's
+// covariance uses the noise estimated from the residuals; with `known_noise` it is scaled to the
+// true noise.
 Counts run(const Options& base, const tv_bundle_options& bundle, int num_pairs, bool known_noise) {
   Counts counts;
   for (int p = 0; p < num_pairs; ++p) {

@@ -1,8 +1,8 @@
-// Whether the covariance is honest: how many of many simulated pairs have the true pose within the
-// 95 per cent ellipsoid, by class of motion. Noise of 0.5 px, 100 to 400 matches, up to 30 per cent
+// The share of simulated pairs whose true pose lies within the covariance's 95 per cent ellipsoid,
+// for each class of motion. Noise of 0.5 px, 100 to 400 matches, up to 30 per cent
 // of them wrong, three lenses (support/pair_kinds.h).
 // TWOVIEW_PAIRS: pairs of each class, default 300; scripts/statistics takes 10000. TWOVIEW_SEED
-// moves them.
+// selects other pairs.
 #include <Eigen/Cholesky>
 #include <cstdlib>
 

@@ -1,5 +1,6 @@
-// Gravity in two-view estimation, on synthetic pairs with 30 to 60 per cent of true matches: what
-// it gives where it is true to its sigma, what it costs where it is wrong, and what is refused.
+// Gravity in two-view estimation, on synthetic pairs with 30 to 60 per cent of true matches: the
+// gain in accuracy where gravity's error agrees with its sigma, the loss where gravity is wrong,
+// and which input is refused.
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -20,7 +21,8 @@ using tv::Vec3;
 constexpr int kPairs = 200, kWrongPairs = 40, kMatches = 150, kSigmas = 4;
 constexpr double kSigmasDeg[kSigmas] = {0.1, 0.5, 1, 2};
 constexpr double kRadians = tv::kPi / 180;
-constexpr double kMostDeg = 10;  // what a failure counts
+// degrees: a pair without a pose counts as this error, and larger errors are reduced to it
+constexpr double kMostDeg = 10;
 
 api_context api;
 scene::Scene pair;
@@ -104,7 +106,8 @@ struct Sum {
 // Indexed by sigma, then by method: five-point, upright.
 struct Statistics {
   Sum base_pose, base_rotation;
-  Sum pose_gain[kSigmas][2], rotation_gain[kSigmas][2];  // against five points without gravity
+  // against the five-point solver without gravity
+  Sum pose_gain[kSigmas][2], rotation_gain[kSigmas][2];
   int base_covered = 0, covered[kSigmas][2] = {};
   int64_t base_samples = 0, samples[kSigmas][2] = {};
 };
@@ -170,7 +173,7 @@ void test_the_upright_method_needs_fewer_samples(void) {
   }
 }
 
-// Five degrees off, half a degree told.
+// Gravity is five degrees wrong, and its sigma is given as half a degree.
 void test_wrong_gravity_does_not_ruin_the_pose(void) {
   Sum base, with;
   for (int k = 0; k < kWrongPairs; ++k) {
@@ -274,7 +277,7 @@ void test_the_upright_method_needs_cameras(void) {
                       pair.options.num, &options, &result, nullptr));
 }
 
-// Extremes end, and leave no number undefined.
+// With extreme sigmas and opposite gravities the call returns, and every output is finite.
 void test_extreme_sigmas_and_opposite_gravities_give_finite_results(void) {
   Gravity truth;
   make_pair(4, &truth);

@@ -1,5 +1,6 @@
-// A principal point that is not where the camera says: what the matches tell of it, what the pose
-// gains, whether the covariance stays honest, and that nothing moves where nothing is wrong.
+// A principal point that differs from the camera's: how well the matches determine it, how much
+// more accurate the pose becomes, whether the covariance still contains the truth as often as it
+// should, and that a right principal point stays.
 // TWOVIEW_PAIRS: pairs of each case, default 300.
 #include <cmath>
 #include <cstdlib>
@@ -24,8 +25,8 @@ int num_pairs = 300;
 api_context api;
 scene::Scene pair;
 
-// Turns and parallax that tell a principal point: a turn of 0.2 to 0.5 rad, depths of 2 to 8
-// baselines.
+// Pairs whose turn and parallax determine the principal point: a turn of 0.2 to 0.5 rad, depths of
+// 2 to 8 baselines.
 void make_pair(int k, int num, const tv_camera& camera0, const tv_camera& camera1) {
   scene::Options options;
   options.num = num;
@@ -77,7 +78,8 @@ void test_a_principal_point_as_told_stays(void) {
     shifts += has_shift(estimated(scene::pinhole()));
   }
   std::printf("as told: %d of %d moved\n", shifts, 5 * num_pairs);
-  // One in a thousand by design: nine of 1000 is a chance of 2e-7, with the approximation's share.
+  // By design one pair in a thousand moves. With the share that the approximation adds, nine of
+  // 1000 have a probability of 2e-7.
   TEST_ASSERT_TRUE(shifts < 2 + 5 * num_pairs * 7 / 1000);
 }
 
@@ -114,7 +116,7 @@ void compare(const char* title, const tv_camera& right, double most_error_px, do
   TEST_ASSERT_TRUE(within > 0.9 * shifts);
 }
 
-// Off by what the default sigma says.
+// The camera is wrong by as much as the default sigma allows.
 void test_a_principal_point_off_is_found_and_the_pose_gains(void) {
   compare("pinhole", scene::pinhole(), 4, 0.85);
   compare("Brown-Conrady", scene::distorted(), 4, 0.85);
@@ -132,8 +134,7 @@ void test_two_cameras_are_taken_as_they_are(void) {
   }
 }
 
-// A hundred pixels are no calibration's error: whatever the matches ask for, six sigmas are the
-// most.
+// An error of a hundred pixels is no calibration error: a shift above six sigmas is not applied.
 void test_a_camera_that_is_not_this_one_stays(void) {
   const tv_camera right = scene::pinhole(), told = moved(right, 100, 60);
   for (int k = 0; k < 20; ++k) {
@@ -158,10 +159,11 @@ void test_swapped_views_give_the_same_shift(void) {
     for (int i = 0; i < 9; ++i) TEST_ASSERT_TRUE(forward.R[i] == backward.R[i % 3 * 3 + i / 3]);
     shifts += has_shift(forward);
   }
-  TEST_ASSERT_TRUE(shifts > 0);  // so that equal ones mean something, here and for two cameras
+  // some pairs have a shift, else equal shifts would prove nothing; also for two cameras below
+  TEST_ASSERT_TRUE(shifts > 0);
 }
 
-// A little of every match beside the truth: E and F are of the corrected cameras.
+// E and F belong to the corrected cameras: their residuals of the true matches are small.
 void test_matrices_are_of_the_corrected_camera(void) {
   const tv_camera right = scene::pinhole(), told = moved(right, 12, -12);
   make_pair(3, 400, right, right);
@@ -194,11 +196,12 @@ void test_matrices_are_of_the_corrected_camera(void) {
       rms[which] += value * value / lines * to_px * to_px / pair.options.num;
     }
   }
-  for (double sq : rms) TEST_ASSERT_TRUE(std::sqrt(sq) < 0.35);  // of 0.3 px, times 500 over 505
+  for (double sq : rms) TEST_ASSERT_TRUE(std::sqrt(sq) < 0.35);  // the noise is 0.3 px
 }
 
-// The gradient against differences of the cost, over cameras that are really moved; a fisheye has
-// unit rays. Least squares: the slopes themselves, no weights.
+// The gradient is compared with differences of the cost, for cameras whose principal point is
+// really moved; a fisheye's rays are unit vectors. The loss is plain least squares, so there are no
+// weights.
 void test_the_gradient_follows_differences(void) {
   constexpr int kNum = 60;
   static uint8_t memory[1 << 20] __attribute__((aligned(64)));

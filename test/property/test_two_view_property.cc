@@ -1,14 +1,14 @@
-// Two-view estimation on synthetic pairs: the errors are held against the Cramer-Rao bound of the
+// Two-view estimation on synthetic pairs: the errors are compared with the Cramer-Rao bound of the
 // true inliers, so that one bound serves every scene and lens.
 //
 // For true matches with independent normal noise of sigma pixels per coordinate, no unbiased
 // estimator of the pose has a covariance below C = sigma^2 (J' J)^-1, J the derivatives of
 // Sampson's residuals at the truth. The normalised squared error e' C^-1 e of an efficient
 // estimator follows chi-square with 5 degrees of freedom: mean 5. Cauchy's loss at 1.5 sigma has an
-// efficiency of 0.8, which makes the mean 6.25 and the standard deviation 4; wrong matches near a
-// line (half a per cent of the wrong ones) cost a little more. So the mean of n scenes is to stay
-// below 6.25 + 17 / sqrt(n), four deviations and a little: 10 for 20 scenes. No scene is to exceed
-// 100 (chi-square's 1e-9 quantile, 50, twice).
+// efficiency of 0.8, which makes the mean 6.25 and the standard deviation 4; wrong matches near an
+// epipolar line (half a per cent of the wrong ones) add to it. So the mean of n scenes must stay
+// below 6.25 + 17 / sqrt(n), slightly more than four deviations: 10 for 20 scenes. No scene
+// may exceed 100 (twice 50, chi-square's 1e-9 quantile).
 #include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
@@ -39,7 +39,7 @@ struct Kind {
   Motion motion;
   bool planar;
   int num;
-  double outliers;  // share
+  double outliers;  // the share of wrong matches
   double noise_px;
   bool with_ratios;
   tv_camera camera;
@@ -51,17 +51,17 @@ struct Scene {
   int num;
   double pixels[2][2 * kMaxMatches];
   float ratios[kMaxMatches];
-  Mat5 information;  // C^-1
+  Mat5 information;  // the inverse of the bound C
 };
 
-Scene scene, other;  // static: large
+Scene scene, other;  // static, since they are large
 uint8_t mask[kMaxMatches], other_mask[kMaxMatches];
 
 double uniform(tv::Random* random, double low, double high) {
   return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
 }
 
-double normal(tv::Random* random) {  // by the sum of 12
+double normal(tv::Random* random) {  // approximately normal: a sum of 12 uniform numbers
   double sum = -6;
   for (int i = 0; i < 12; ++i) sum += uniform(random, 0, 1);
   return sum;
@@ -90,7 +90,7 @@ Kind kind(Motion motion) {
   return Kind{motion, false, 300, 0.3, 0.5, false, pinhole(), TV_SOLVER_FIVE_POINT};
 }
 
-// Forward and backward: the epipole lies inside the image.
+// For forward and backward motion the epipole lies inside the image.
 void choose_motion(tv::Random* random, Motion motion) {
   const Vec3 axis = direction(random);
   scene.pose.R = tv::rotation_about(axis, uniform(random, 0, 0.15));
@@ -104,7 +104,7 @@ bool inside(const double pixel[2]) {
   return pixel[0] > 0 && pixel[0] < 639 && pixel[1] > 0 && pixel[1] < 359;
 }
 
-// Adds what a true match tells of (w, a, b).
+// Adds the information of a true match about the error (w, a, b).
 void add_information(const Kind& k, const double pixel0[2], const double pixel1[2]) {
   double j0[6], j1[6];
   Vec3 f0, f1;
@@ -130,7 +130,7 @@ void add_information(const Kind& k, const double pixel0[2], const double pixel1[
   scene.information += row * row.transpose() / (n * k.noise_px * k.noise_px);
 }
 
-// Depths of 2 to 8 baselines, or of a slanted plane at about 4.
+// Depths of 2 to 8 baselines, or those of a slanted plane at about 4.
 bool true_match(tv::Random* random, const Kind& k, double pixel0[2], double pixel1[2]) {
   pixel0[0] = uniform(random, 5, 634), pixel0[1] = uniform(random, 5, 354);
   Vec3 ray;
@@ -140,7 +140,8 @@ bool true_match(tv::Random* random, const Kind& k, double pixel0[2], double pixe
   return tv_camera_project(&k.camera, point.data(), pixel1, nullptr) == TV_OK && inside(pixel1);
 }
 
-// Wrong matches come last. Ratios: of true ones in (0.3, 0.8), of wrong ones in (0.5, 0.8).
+// The wrong matches come last. Ratios are in (0.3, 0.8) for true matches, in (0.5, 0.8) for wrong
+// ones.
 void make_scene(tv::Random* random, const Kind& k) {
   choose_motion(random, k.motion);
   scene.information.setZero();
@@ -187,7 +188,8 @@ Vec5 pose_error(const double R[9], const double t[3]) {
   const Vec3 found(t[0], t[1], t[2]);
   Vec3 b[2];
   tv::tangent_basis(scene.pose.t, &b[0], &b[1]);
-  const double away = found.dot(scene.pose.t) < 0 ? 10 : 0;  // the wrong way is no small error
+  // the opposite direction counts as a large error
+  const double away = found.dot(scene.pose.t) < 0 ? 10 : 0;
   Vec5 e;
   e << (turn(2, 1) - turn(1, 2)) / 2, (turn(0, 2) - turn(2, 0)) / 2, (turn(1, 0) - turn(0, 1)) / 2,
       b[0].dot(found) + away, b[1].dot(found) + away;
@@ -195,7 +197,7 @@ Vec5 pose_error(const double R[9], const double t[3]) {
   return e;
 }
 
-// Of a plane's two poses, the nearer one.
+// The error of the nearer one of a plane's two poses.
 double normalised_error(const tv_two_view& r) {
   TEST_ASSERT_EQUAL_INT(1, r.has_t);
   const Vec5 e = pose_error(r.R, r.t);
@@ -235,9 +237,9 @@ void test_planes_are_estimated_near_the_bound(void) {
   expect_efficient("plane", k);
 }
 
-// Five true of five drawn: 1 in 3000 samples at 80 per cent wrong. At 90 per cent it is 1 in 10^5:
-// what makes that solvable in time is the order of the ratios. The hard scenes are few: their
-// samples take the time.
+// At 80 per cent wrong matches, 1 of 3000 samples of five has only true ones; at 90 per cent, 1 of
+// 10^5, and only the order by ratio makes that solvable in time. There are few of these hard
+// scenes, since their samples take long.
 void test_wrong_matches_do_little_harm(void) {
   Kind k = kind(kGeneral);
   k.num = 1000;
@@ -268,10 +270,10 @@ void test_eight_and_seven_points_end_near_the_bound(void) {
   expect_efficient("seven-point", k);
 }
 
-// With few matches of small noise all are inliers. At an efficiency of 0.8, 98 per cent of the
-// scenes lie below four times chi-square's median (4.35); so few residuals tell the loss's scale
-// badly, and chance may explain eight matches: nine in ten are to lie below, and nine in ten to
-// have a pose.
+// With few matches and small noise all matches are inliers. At an efficiency of 0.8, 98 per cent of
+// the scenes lie below four times chi-square's median (4.35). But so few residuals determine the
+// loss's scale badly, and chance may explain eight matches; so the test requires nine scenes in ten
+// below that, and a pose for nine in ten.
 void test_few_matches_give_a_pose_of_the_right_size_of_error(void) {
   tv::Random random = tv::random_seeded(kSeed);
   Kind k = kind(kGeneral);
@@ -292,8 +294,9 @@ void test_few_matches_give_a_pose_of_the_right_size_of_error(void) {
   TEST_ASSERT_TRUE(10 * refused < scenes);
 }
 
-// Cauchy's loss at 1.5 sigma has a variance of 1.15 times the bound, and the wrong side of chance
-// another 5 per cent; +- 0.1 from 300 residuals' own scatter: the bounds are four of these away.
+// Cauchy's loss at 1.5 sigma has a variance of 1.15 times the bound, and chance may add another 5
+// per cent. The scatter of 300 residuals is 0.1; the limits below are four times
+// that away.
 void test_the_covariance_is_near_the_bound(void) {
   tv::Random random = tv::random_seeded(kSeed);
   Kind k = kind(kGeneral);
@@ -303,7 +306,8 @@ void test_the_covariance_is_near_the_bound(void) {
     const tv_two_view r = estimate(scene, k, options_of(k), false, mask);
     TEST_ASSERT_EQUAL_INT(1, r.has_covariance);
     const Mat5 bound = scene.information.inverse();
-    for (int p = 0; p < 3; ++p) {  // the basis (b1, b2) may differ between estimate and truth
+    // rotation only: the basis (b1, b2) may differ between estimate and truth
+    for (int p = 0; p < 3; ++p) {
       const double ratio = r.covariance[6 * p] / bound(p, p);
       TEST_ASSERT_TRUE(ratio > 0.8 && ratio < 1.65);
     }
@@ -331,7 +335,8 @@ void test_swapped_views_give_the_inverse(void) {
       TEST_ASSERT_TRUE(a.F[e] == b.F[transposed]);
       TEST_ASSERT_TRUE(a.alternative_R[e] == b.alternative_R[transposed]);
     }
-    // One of the two is computed; the other is its inverse, -R' t in the order of the rows.
+    // The pose of one order is computed, that of the other is its inverse: t = -R' t, summed in the
+    // order of the rows.
     bool a_from_b = true, b_from_a = true;
     for (int c = 0; c < 3; ++c) {
       b_from_a &= b.t[c] == -((a.R[c] * a.t[0] + a.R[3 + c] * a.t[1]) + a.R[6 + c] * a.t[2]);

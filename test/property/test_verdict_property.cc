@@ -1,5 +1,5 @@
-// What kind of pair tv_estimate_two_view says it is, over many synthetic pairs, lenses and hostile
-// inputs. TWOVIEW_SEED moves the pairs.
+// The kind that tv_estimate_two_view reports, for many synthetic pairs, lenses and hostile inputs.
+// TWOVIEW_SEED selects other pairs.
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -69,7 +69,8 @@ scene::Options options_of(Kind kind, int num, double inlier_share, uint64_t seed
   return options;
 }
 
-// At least nine in ten, over shares of inliers and noise up to half the threshold.
+// The kind must be right for nine pairs in ten, over shares of inliers and noise up to half the
+// threshold.
 void test_config_names_the_kind_of_pair(void) {
   const Kind kinds[5] = {Kind::kGeneral, Kind::kForward, Kind::kPlanar, Kind::kRotation,
                          Kind::kStill};
@@ -120,7 +121,8 @@ void test_each_kind_has_what_it_promises(void) {
   }
 }
 
-// A chance of 0.01 a pair is what the test of meaning allows; of 72 pairs two are a rare accident.
+// The test against chance accepts random matches with a probability of 0.01 a pair; of 72 pairs
+// more than two are very unlikely.
 void test_random_matches_are_degenerate(void) {
   const int num[9] = {5, 6, 7, 8, 10, 20, 50, 100, 500};
   const int methods[3] = {TV_SOLVER_FIVE_POINT, TV_SOLVER_SEVEN_POINT, TV_SOLVER_EIGHT_POINT};
@@ -171,11 +173,13 @@ void test_degenerate_points_end_and_give_no_pose(void) {
       const double x = scene::uniform(&random, 0, 600), y = scene::uniform(&random, 0, 470);
       double p[4] = {x, y, x, y};                          // 0: the same image twice
       if (kind == 1) p[0] = p[1] = p[2] = p[3] = 100;      // one point
-      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;  // a line, shifted
-      if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;      // a line, turned over
-      if (kind == 4) p[0] = p[1] = 10;                     // all from one
-      if (kind == 5) p[0] = i % 4 * 50, p[1] = p[3] = i % 2, p[2] = p[0] + 4;  // eight, repeated
-      if (kind == 6) p[2] = x + 2;  // a shift: a plane, or far away
+      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;  // on a line, shifted
+      if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;      // on a line, in reverse order
+      // all matches share their point of view 0
+      if (kind == 4) p[0] = p[1] = 10;
+      // eight different matches, repeated
+      if (kind == 5) p[0] = i % 4 * 50, p[1] = p[3] = i % 2, p[2] = p[0] + 4;
+      if (kind == 6) p[2] = x + 2;  // all shifted alike: a plane, or points far away
       for (int k = 0; k < 2; ++k) a[2 * i + k] = p[k], b[2 * i + k] = p[2 + k];
     }
     for (int c = 0; c < 3; ++c) {
@@ -190,7 +194,8 @@ void test_degenerate_points_end_and_give_no_pose(void) {
   }
 }
 
-// Of poses of scenes with fresh noise, the share within the covariance's 90 % ellipsoid.
+// The share of poses, over scenes with fresh noise, that lie within the covariance's 90 %
+// ellipsoid.
 void test_covariance_covers_the_error(void) {
   using Mat5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
   int inside = 0, total = 0;

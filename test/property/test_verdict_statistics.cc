@@ -1,7 +1,7 @@
 // How often the verdict names the kind of a simulated pair (support/pair_kinds.h has the kinds and
 // their ranges), how often a solvable pair gets its "ok", and how often an "ok" is wrong.
 // TWOVIEW_PAIRS: pairs of each kind, default 100; scripts/statistics takes 10000. TWOVIEW_SEED
-// moves them. TWOVIEW_VERBOSE=1 prints each pair that is misnamed, and each wrong "ok".
+// selects other pairs. TWOVIEW_VERBOSE=1 prints each pair that is misnamed, and each wrong "ok".
 #include <cstdlib>
 
 #include "support/calls.h"
@@ -33,7 +33,7 @@ uint32_t other_reasons(const tv_two_view& r, uint32_t expected) {
 bool named_right(const tv_two_view& r) {
   switch (pair.kind) {
     case pair_kinds::kGeneral: return r.kind == TV_KIND_CALIBRATED && other_reasons(r, 0) == 0;
-    case pair_kinds::kPlanar:  // whose direction of motion may be uncertain all the same
+    case pair_kinds::kPlanar:  // a plane may have low parallax all the same
       return r.kind == TV_KIND_PLANAR && other_reasons(r, TV_REASON_LOW_PARALLAX) == 0;
     case pair_kinds::kPureRotation: return r.kind == TV_KIND_PANORAMIC;
     case pair_kinds::kNoMotion: return r.kind == TV_KIND_NO_MOTION;
@@ -47,8 +47,8 @@ bool named_right(const tv_two_view& r) {
   return false;
 }
 
-// Where the matches determine one pose: a general scene, and a plane whose other motion they rule
-// out.
+// Whether the matches determine one pose: in a general scene, and for a plane whose other motion
+// they exclude.
 bool solvable() {
   return pair.kind == pair_kinds::kGeneral ||
          (pair.kind == pair_kinds::kPlanar && pair.other_motion_excluded);
@@ -99,7 +99,7 @@ void judge(uint64_t seed) {
   }
 }
 
-// At least `share` of n, less three standard deviations of a binomial count.
+// Requires at least `share` of n, less three standard deviations of a binomial count.
 bool at_least(int count, int n, double share) {
   return count >= n * share - 3 * std::sqrt(n * share * (1 - share));
 }

@@ -1,8 +1,8 @@
 // Which image is named first makes no difference to what is reported: simulated pairs of all kinds,
 // forward moves and changes of scale by 2 among them, are estimated in both orders. The kind, the
 // verdict, the reasons and the evidence must be the same to the last bit, and R the transposed one.
-// TWOVIEW_PAIRS: pairs in all, default 400; scripts/statistics takes 10000. TWOVIEW_SEED moves
-// them. TWOVIEW_VERBOSE=1 prints each pair that differs.
+// TWOVIEW_PAIRS: pairs in all, default 400; scripts/statistics takes 10000. TWOVIEW_SEED selects
+// other pairs. TWOVIEW_VERBOSE=1 prints each pair that differs.
 #include <cstdlib>
 #include <cstring>
 
@@ -85,8 +85,9 @@ void test_swapped_images_get_the_same_verdict(void) {
   TEST_ASSERT_EQUAL_INT(0, num_different);
 }
 
-// Every match is there in both directions, so that neither the pixels nor the cameras say which
-// view comes first. Where the ratios differ, they do.
+// Every match is there in both directions, so neither the pixels nor the cameras show which view
+// comes first; with equal ratios nothing does. In the second case a match and its reversed copy
+// have different ratios.
 void test_matches_that_are_the_same_in_both_orders(void) {
   const pair_kinds::Ranges ranges;
   for (int k = 0; k < 20; ++k) {

@@ -1,14 +1,14 @@
 // A wide lens costs no accuracy: planar pairs seen through a lens like the AR.Drone's, and the same
-// pairs through a pinhole of the same focal length. TWOVIEW_PAIRS says how many pairs, TWOVIEW_SEED
-// moves them.
+// pairs through a pinhole of the same focal length. TWOVIEW_PAIRS is the number of pairs,
+// TWOVIEW_SEED selects other ones.
 //
 // The pinhole is tried twice: with points spread over its own image, as the lens's are over its
 // own; and with the lens's very points and noise, which lie up to 1.3 times as far out as the
 // pinhole's image reaches. There half a pixel is a smaller angle for the pinhole than for the lens,
-// which squeezes the corners to 0.56: the pinhole knows more. By the Cramer-Rao bound (pose and
-// plane, noise in both views, the true inliers, 400 pairs of this generator: AUC@1/5/10
-// of 52.6, 89.0, 94.5 for the lens and 61.1, 91.5, 95.7 for the pinhole) no estimator can be within
-// two points there.
+// whose scale in the corners is 0.56: the pinhole's matches contain more information. By the
+// Cramer-Rao bound (pose and plane, noise in both views, the true inliers, 400 pairs of this
+// generator: AUC@1/5/10 of 52.6, 89.0, 94.5 for the lens and 61.1, 91.5, 95.7 for the pinhole) no
+// estimator can be within two points there.
 #include <cmath>
 #include <cstdlib>
 
@@ -33,7 +33,8 @@ tv_context* context;
 uint64_t seed = 360;
 int num_pairs = 100;
 
-constexpr double kBoundLoss[3] = {8.5, 2.5, 1.2};  // of the lens's very points, see above
+// AUC@1/5/10 of the pinhole less that of the lens at the bound, with the lens's points: see above
+constexpr double kBoundLoss[3] = {8.5, 2.5, 1.2};
 
 enum { kLens, kPinhole, kNumCameras };
 const tv_camera kCameras[kNumCameras] = {
@@ -41,7 +42,7 @@ const tv_camera kCameras[kNumCameras] = {
     {TV_CAMERA_PINHOLE, 640, 360, 0, 560, 560, 319.5, 179.5, {}}};
 tv::Camera cameras[kNumCameras];
 
-// Which camera looks, and over whose image the points are spread.
+// Which camera takes the pictures, and over whose image the points are spread.
 enum { kLensView, kPinholeOwn, kPinholeSame, kNumViews };
 struct View {
   const char* name;
@@ -59,13 +60,13 @@ struct Pair {
 };
 Pair pair;
 
-// By what each rule takes for the answer: the primary pose, or the nearer of the two of a plane.
+// Which pose is judged: the primary one, or the nearer one of a plane's two.
 enum { kPrimary, kNearer, kNumRules };
 double errors[kNumViews][kNumRules][kMaxPairs];
 
 bool in_image(const Vec2& p) { return p[0] >= 0 && p[0] <= 639 && p[1] >= 0 && p[1] <= 359; }
 
-// A point of the plane that both views of the camera see, spread evenly over the first.
+// A point of the plane that both views of the camera see, spread evenly over the first image.
 bool see(tv::Random* random, int camera, Vec3 points[2]) {
   const Vec2 pixel(scene::uniform(random, 0, 639), scene::uniform(random, 0, 359));
   Vec3 ray;
@@ -79,9 +80,9 @@ bool see(tv::Random* random, int camera, Vec3 points[2]) {
          in_image(other);
 }
 
-// Turned by 5 to 30 degrees about any axis, moved any way, the plane tilted by up to about 35
-// degrees and 1 to 5 baselines away; drawn again until a third of the first image is in the second,
-// and a quarter of the pinhole's.
+// The pose turns by 5 to 30 degrees about any axis and moves in any direction; the plane is tilted
+// by up to about 35 degrees and is 1 to 5 baselines away. A pose is drawn again until a third of
+// the lens's first image is in the second, and a quarter of the pinhole's.
 void draw_motion(tv::Random* random) {
   for (;;) {
     const double angle = scene::uniform(random, 5, 30) * tv::kPi / 180;
@@ -105,7 +106,7 @@ void make_matches(uint64_t matches_seed, const View& view) {
   for (int i = 0; i < kNum; ++i) {
     while (!see(&random, view.points, points)) {
     }
-    if (i >= kNumTrue) {  // the second view looks anywhere else
+    if (i >= kNumTrue) {  // a wrong match: the second pixel is anywhere
       const double x = scene::uniform(&random, 0, 639);
       const Vec2 pixel(x, scene::uniform(&random, 0, 359));
       TEST_ASSERT_TRUE(tv::unproject(cameras[view.points], pixel, &points[1], nullptr));
@@ -120,7 +121,7 @@ void make_matches(uint64_t matches_seed, const View& view) {
   }
 }
 
-// The larger of rotation and translation error, the latter without its sign.
+// The larger one of rotation error and translation error; the latter ignores the sign of t.
 double pose_error_deg(const double R[9], const double t[3]) {
   const double direction = scene::translation_error_deg(t, pair.t);
   return std::fmax(scene::rotation_error_deg(R, pair.R), std::fmin(direction, 180 - direction));
@@ -160,7 +161,7 @@ int ascending(const void* a, const void* b) {
   return (x > y) - (x < y);
 }
 
-// Sorts the errors and prints a line.
+// Sorts the errors and prints a line of the table.
 void sum_up(int view, int rule, double auc[3]) {
   const char* const rules[kNumRules] = {"primary pose", "nearer of the two"};
   const size_t count = static_cast<size_t>(num_pairs);
@@ -184,8 +185,8 @@ void test_a_wide_lens_is_as_good_as_a_pinhole(void) {
   for (int rule = 0; rule < kNumRules; ++rule) {
     for (int view = 0; view < kNumViews; ++view) sum_up(view, rule, auc[rule][view]);
   }
-  // Which of a plane's two poses comes first is chance, in the lens and in the pinhole apart: the
-  // nearer one tells about the lens. Fewer pairs than 1000 are a sample.
+  // Which one of a plane's two poses comes first is chance, separately for the lens and for the
+  // pinhole, so the nearer pose is compared. Fewer pairs than 1000 are only a sample.
   const double chance = num_pairs < 1000 ? 2 * 30 / std::sqrt(num_pairs) : 0;
   for (int k = 0; k < 3; ++k) {
     const double lens = auc[kNearer][kLensView][k];

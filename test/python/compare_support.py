@@ -1,4 +1,4 @@
-"""What the tests of compare_colmap share."""
+"""Helpers of the tests of compare_colmap."""
 
 import importlib.util
 import os
@@ -12,7 +12,8 @@ PROGRAM = os.path.join(TOOL, "compare_colmap")
 MOTORCYCLE = os.path.join(ROOT, ".cache", "motorcycle")
 DATA = os.environ.get("TWOVIEW_DATA") or os.path.join(os.path.dirname(ROOT), "shared", "data")
 
-# The Middlebury pair of scripts/demo: rectified, the second camera to the right of the first.
+# The Middlebury pair of scripts/demo: it is rectified, and the second camera is to the right of the
+# first.
 K0 = "994.978 0 311.193 0 994.978 254.877 0 0 1"
 K1 = "994.978 0 342.279 0 994.978 254.877 0 0 1"
 TRUTH = "1 0 0 -1 0 1 0 0 0 0 1 0 0 0 0 1"

@@ -1,4 +1,4 @@
-"""twoview_tools.accuracy.twoview_ctypes: options as text, and a library by its path."""
+"""twoview_tools.accuracy.twoview_ctypes: options given as text, and a library given by its path."""
 
 import os
 import unittest

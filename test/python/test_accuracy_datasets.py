@@ -1,4 +1,4 @@
-"""twoview_tools.accuracy.datasets: which pairs are measured, resize, undistortion."""
+"""twoview_tools.accuracy.datasets: which pairs are measured, resizing, undistortion."""
 
 import os
 import tempfile
@@ -95,7 +95,8 @@ class TestUndistort(unittest.TestCase):
                                    [[0.0, 1.0]])
 
     def test_marks_a_pixel_that_no_ray_meets(self):
-        barrel = [-0.5, 0, 0, 0, 0]  # x (1 - x^2 / 2) is never above 0.5443
+        # x (1 - x^2 / 2) is never above 0.5443, so pixels beyond have no ray
+        barrel = [-0.5, 0, 0, 0, 0]
         found = datasets.undistort([[325.1 + 520.9 * 0.6, 249.7]], self.K, barrel)
         self.assertTrue(np.isnan(found).all())
 

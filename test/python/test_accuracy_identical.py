@@ -1,4 +1,5 @@
-"""twoview_tools.accuracy.identical and system_python: thresholds, verdicts, cache, the subprocess."""
+"""twoview_tools.accuracy.identical and system_python: thresholds, verdicts, the cache, and the
+subprocess that runs the system's Python."""
 
 import tempfile
 import unittest
@@ -58,7 +59,7 @@ class TestVerdicts(unittest.TestCase):
         mixed, _ = identical.judge(good, {"worse": bad, "better": {"a": rows(base - 0.9),
                                                                    "b": rows(base + 3)}}, None, 200)
         sentences = {text.split(":")[0]: ok for ok, text in mixed}
-        self.assertFalse(sentences["a"])  # the best differs from set to set
+        self.assertFalse(sentences["a"])  # each set has its own best peer: on set a it beats ours
         self.assertTrue(sentences["b"])
 
     def test_small_sets_do_not_count_by_themselves(self):

@@ -1,4 +1,4 @@
-"""twoview_tools.accuracy.metrics against cases worked out by hand."""
+"""twoview_tools.accuracy.metrics on cases that were computed by hand."""
 
 import math
 import unittest
@@ -18,7 +18,8 @@ def setUpModule():
 
 
 def superglue_auc(errors, threshold):
-    """The published formula, in its own words: trapezoids under the sorted errors' recall."""
+    """The published formula, written independently: trapezoids under the recall of the sorted
+    errors."""
     errors = sorted(errors)
     recall = [(i + 1) / len(errors) for i in range(len(errors))]
     errors, recall = [0.0] + errors, [0.0] + recall
@@ -31,12 +32,12 @@ def superglue_auc(errors, threshold):
 
 class TestAuc(unittest.TestCase):
     def test_equals_a_case_done_by_hand(self):
-        # Errors 1, 3 and a failure: recall rises 0 to 1/3 over [0, 1], to 2/3 over [1, 3], stays
-        # there to 5: 1/6 + 1 + 4/3 = 2.5, of 5.
+        # Errors 1 and 3 and a failure: recall rises to 1/3 over [0, 1] and to 2/3 over [1, 3], and
+        # stays there to 5: 1/6 + 1 + 4/3 = 2.5, of 5.
         self.assertAlmostEqual(metrics.auc([3.0, 1.0, math.inf], 5.0), 50.0)
 
     def test_leaves_out_errors_at_and_above_the_threshold(self):
-        # recall 1/2 at 2, level to 5: 1/2 + 3/2 = 2, of 5
+        # recall is 1/2 at 2 and stays level to 5: 1/2 + 3/2 = 2, of 5
         self.assertAlmostEqual(metrics.auc([2.0, 5.0], 5.0), 40.0)
 
     def test_is_100_for_exact_poses_and_0_for_failures(self):
@@ -83,8 +84,8 @@ class TestPoseError(unittest.TestCase):
 
 class TestPrecision(unittest.TestCase):
     def test_counts_matches_below_the_limit(self):
-        # Sideways motion: the epipolar error is the difference of y; the squared symmetric distance
-        # is 2 dy^2, below 5e-4 for dy = 0.0158 and not for 0.0159.
+        # For sideways motion the epipolar error is the difference of y. The squared symmetric
+        # distance is 2 dy^2, which is below 5e-4 for dy = 0.0158 and above it for 0.0159.
         points0 = np.array([[0.1, 0.2], [0.3, -0.1], [0.0, 0.0]])
         points1 = points0 + [[0.05, 0.0158], [0.02, 0.0159], [0.5, 0.0]]
         self.assertAlmostEqual(metrics.precision(points0, points1, np.eye(3), [1.0, 0, 0]), 2 / 3)
@@ -103,8 +104,8 @@ class TestBootstrap(unittest.TestCase):
             self.assertFalse(summary["worse"])
 
     def test_has_the_standard_error_of_a_mean(self):
-        # Exact or failed, so that AUC is the share of exact pairs: ours all exact, the peer's every
-        # second one. The share's standard error is sqrt(p (1 - p) / n).
+        # Every error is 0 or a failure, so that AUC is the share of exact pairs: all of ours, every
+        # second one of the peer's. The share's standard error is sqrt(p (1 - p) / n).
         num = 100
         peer = [0.0 if i % 2 else math.inf for i in range(num)]
         found = metrics.paired_bootstrap({"a": ([[math.inf] * num], [peer])}, 4000)
@@ -116,7 +117,8 @@ class TestBootstrap(unittest.TestCase):
         self.assertTrue(summary["worse"])
 
     def test_pairing_removes_what_both_share(self):
-        # Half the pairs are lost to both: AUC itself spreads, the difference does not.
+        # Both systems fail on the same half of the pairs: AUC itself has a spread, the difference
+        # has none.
         both = [0.0, math.inf] * 10
         found = metrics.paired_bootstrap({"a": ([both], [both])}, 100)
         self.assertEqual(found["sets"]["a"]["5"]["standard_error"], 0.0)

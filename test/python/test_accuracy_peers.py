@@ -1,4 +1,4 @@
-"""twoview_tools.accuracy.peers and estimators: the peers are run as they should be."""
+"""twoview_tools.accuracy.peers and estimators: the peers get the input that they need."""
 
 import os
 import tempfile
@@ -66,7 +66,7 @@ class TestFrontEnd(unittest.TestCase):
         random = np.random.default_rng(3)
         d0 = random.integers(0, 20, (40, 128)).astype(np.float32)
         d1 = np.concatenate([d0[:10] + 1, random.integers(0, 20, (30, 128))]).astype(np.float32)
-        d1 = np.concatenate([d1, d1[:1]])  # a second copy: the first is ambiguous
+        d1 = np.concatenate([d1, d1[:1]])  # a second copy of row 0 makes its match ambiguous
         i0, i1, ratios = peers.match(d0, d1)
         self.assertEqual(list(i0), list(range(1, 10)))
         self.assertEqual(list(i1), list(range(1, 10)))
@@ -130,10 +130,10 @@ class TestCache(unittest.TestCase):
             self.assertEqual(len(first), 2)
             original = peers.extract
             self.addCleanup(setattr, peers, "extract", original)
-            peers.extract = None  # a call would fail
+            peers.extract = None  # calling None would fail, so the result must come from the cache
             self.assertEqual(peer.run(datasets.Set(folder)), first)
             cv2.imwrite(os.path.join(images, "b.png"), np.roll(gray, 5, axis=1))
-            with self.assertRaises(TypeError):  # another image: not from the cache
+            with self.assertRaises(TypeError):  # another image is not in the cache
                 peer.run(datasets.Set(folder))
 
 

@@ -1,4 +1,4 @@
-"""compare_colmap: bad lists, missing images and systems that die."""
+"""compare_colmap: broken lists, missing images, and systems that die."""
 
 import json
 import os
@@ -111,7 +111,7 @@ class TestLists(BadInputTest):
 
 
 class TestSystemsThatFail(BadInputTest):
-    """A fake COLMAP and a fake PoseLib in front of the real ones."""
+    """A fake COLMAP and a fake PoseLib, which are found before the real ones."""
 
     def rows(self, systems, *words, **environment):
         pairs = self.list_of(f"{support.LINE} {support.TRUTH}", f"{support.LINE} {support.TRUTH}")

@@ -1,4 +1,4 @@
-"""compare_colmap: COLMAP's reconstruction as the reference, and a dask cluster as the worker."""
+"""compare_colmap: COLMAP's reconstruction as reference, and a dask cluster for the work."""
 
 import json
 import os
@@ -64,7 +64,7 @@ class TestCluster(ComparisonTest):
         import distributed
         lines = self.lines[:4]
         here, _ = self.compare("here", lines)
-        # The workers find the library by the task, not by their environment.
+        # The task names the library to the workers; their environment does not.
         with unittest.mock.patch.dict(os.environ):
             os.environ.pop("TWOVIEW_LIBRARY", None)
             cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1,

@@ -1,4 +1,4 @@
-"""compare_colmap: solvers and triangulations on simulated matches, each in its convention."""
+"""compare_colmap: solvers and triangulations on simulated matches, each with its own convention."""
 
 import json
 import unittest
@@ -59,8 +59,8 @@ class TestConventions(unittest.TestCase):
 
 
 class TestShift(unittest.TestCase):
-    """Our poses may be of a camera with another principal point; lines, residuals and points are of
-    that camera."""
+    """Our poses may belong to a camera with a shifted principal point; then lines, residuals and
+    points belong to that camera too."""
 
     @classmethod
     def setUpClass(cls):
@@ -118,7 +118,7 @@ class TestShift(unittest.TestCase):
             np.median(pair_run.epipolar_error_px(matches, answer["R"], answer["t"])), 0.2
         )
         row = pair_run._row(self.task, {**answer, "ms": {}}, "ok", "", matches)
-        self.assertGreater(row["error_px_histogram"][0], 350)  # below a quarter of a pixel
+        self.assertGreater(row["error_px_histogram"][0], 350)  # errors below a quarter of a pixel
         self.assertEqual(row["principal_point_shift_px"], answer["principal_point_shift_px"])
 
     def test_points_on_our_own_pose_are_of_that_camera(self):

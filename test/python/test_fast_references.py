@@ -1,10 +1,10 @@
 """FAST-12's pixels equal scikit-image's corner_fast(n=12): before suppression, at several
 thresholds.
 
-The library suppresses always, so the unsuppressed set is got from it a piece at a time: each
-pixel's own 7x7 neighbourhood is an image in which it is the only candidate. That is slow, so it is
-done for the pixels that either side might call a corner, and for a sample of the others; and the
-suppressed set over the whole image is a subset of scikit-image's.
+The library always suppresses non-maxima, so the unsuppressed set is computed pixel by pixel: each
+pixel's 7x7 neighbourhood is an image in which that pixel is the only candidate. This is slow, so it
+is done for the pixels that may be corners to either library and for a sample of the others.
+Besides, the library's suppressed corners of the whole image must be a subset of scikit-image's.
 """
 
 import os
@@ -22,15 +22,15 @@ from twoview_tools.accuracy import twoview_ctypes as tv
 
 LEFT = os.path.join(ROOT, ".cache", "motorcycle", "motorcycle_left.png")
 SIDE = 260
-# What the tests were built with, beside the program that ctest names.
+# The folder of the test programs' build, beside the program that ctest names.
 PROGRAM = os.environ.get("TWOVIEW_PROGRAM")
 LIBRARY = (os.path.join(os.path.dirname(os.path.dirname(PROGRAM)), "lib", "libtwoview.so")
            if PROGRAM else tv.DEFAULT_LIBRARY)
 
 
 def reference_set(gray, threshold):
-    """Pixels where scikit-image finds a corner. It compares floats: half a grey level keeps its
-    threshold away from the differences, which are whole."""
+    """The pixels where scikit-image finds a corner. It compares floats; half a grey level is added
+    to the threshold, since the differences are integers."""
     image = gray.astype(np.float64)
     return corner_fast(image, n=12, threshold=threshold + 0.5 - 1e-9) > 0
 

@@ -1,4 +1,5 @@
-"""twoview_tools.formats on the cases of test/formats, which the program's readers run as well."""
+"""The readers of twoview_tools.formats on the cases of test/formats, which test/cli/test_formats.cc
+runs for the program's readers."""
 
 import json
 import pathlib
@@ -16,7 +17,7 @@ FOLDER = pathlib.Path(__file__).resolve().parents[1] / "formats"
 
 
 def cases(name):
-    """Each case with its text."""
+    """The cases of a file, each with its text."""
     content = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     for case in content["cases"]:
         text = "".join(line + "\n" for line in case.get("text", ()))

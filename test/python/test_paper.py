@@ -1,6 +1,5 @@
-"""twoview_tools.paper: the numbers behind the figures against references that know nothing of it.
-
-The drone's flights, which take their time, are scripts/paper's own; all else is made here, too."""
+"""twoview_tools.paper: the numbers behind the figures, compared with independent references.
+scripts/paper also makes the drone's flights, which take long; this test makes everything else."""
 
 import contextlib
 import io
@@ -57,7 +56,7 @@ class Figures1bAnd4(Case):
         i = self.found["intrinsics"]
         K = np.array([[i["fx"], 0, i["cx"]], [0, i["fy"], i["cy"]], [0, 0, 1]])
         k = np.array([i[name] for name in ("k1", "k2", "p1", "p2", "k3")])
-        # The board's corners, written out once more: row by row, 8 a row.
+        # The board's corners computed independently: row by row, 8 in a row.
         board = np.array([(x * 0.02485, y * 0.02485, 0) for y in range(6) for x in range(8)])
         squares = []
         for view in self.found["views"]:
@@ -75,7 +74,8 @@ class Figures1bAnd4(Case):
     def test_straightness_is_the_distance_from_a_line(self):
         grid = np.array([(x, y) for y in range(3) for x in range(3)], float)
         self.assertAlmostEqual(calibration.straightness(grid, (3, 3)), 0)
-        grid[4] += (0, 0.3)  # the middle one: its row is off by 0.1 0.2 0.1, its column not
+        # moves the middle corner: its row deviates by 0.1 0.2 0.1, its column stays straight
+        grid[4] += (0, 0.3)
         self.assertAlmostEqual(
             calibration.straightness(grid, (3, 3)), np.sqrt(0.06 / 18), delta=1e-3
         )
@@ -87,7 +87,8 @@ class Figures5And6(Case):
         self.assertEqual({(x, y) for x in reach for y in reach if round(np.hypot(x, y)) == 3},
                          {tuple(p) for p in corners.CIRCLE.tolist()})
         turns = np.diff(np.unwrap(np.arctan2(corners.CIRCLE[:, 1], corners.CIRCLE[:, 0])))
-        self.assertTrue((turns > 0).all() and (turns < 0.5).all())  # clockwise in an image
+        # clockwise in an image: positive angles
+        self.assertTrue((turns > 0).all() and (turns < 0.5).all())
 
     def test_the_drawn_corner_is_one_up_to_its_score(self):
         numbers = corners.figure5(self.given).numbers
@@ -110,8 +111,8 @@ class Figures5And6(Case):
     def test_counts_are_scikit_images_and_opencvs(self):
         image = self.pair.grey[0]
         counted = corners.count(image)["arcs"]
-        # Half a grey level keeps scikit-image's threshold away from the differences, which are
-        # whole.
+        # scikit-image compares floats; half a grey level is added to the threshold, since the
+        # differences are integers.
         reference = corner_fast(image.astype(float), n=12, threshold=corners.THRESHOLD + 0.5)
         self.assertEqual(int((reference > 0).sum()), counted["12"]["segment_test"])
         opencv = cv2.FastFeatureDetector_create(corners.THRESHOLD, nonmaxSuppression=True).detect(
@@ -128,7 +129,7 @@ class Figure7(Case):
         keypoints, described = descriptor.described_keypoints(image, 150)
         for kind, off in descriptor.differences(image, keypoints, described).items():
             self.assertLessEqual(np.median(off), 1, kind)
-            # of 255: shares of 127, truncated sums
+            # of 255: a weight of 0.5 is 127, and sums are truncated
             self.assertLessEqual(np.percentile(off, 99), 8, kind)
             own = described[kind] + 0.0
             cosine = (own * (own - off)).sum() / (np.linalg.norm(own) * np.linalg.norm(own - off))
@@ -145,16 +146,16 @@ class Figure7(Case):
 class Figure8(Case):
     def test_as_many_are_found_as_the_noise_lets(self):
         runs = [ransac.line_run(seed) for seed in range(60)]
-        expected = 300 * 0.98758  # of a normal number, within 2.5 deviations
+        expected = 300 * 0.98758  # the share of a normal distribution within 2.5 deviations
         self.assertAlmostEqual(np.mean([r["right"] for r in runs]), expected, delta=2.0)
         for run in runs:
-            # The best fit to the 300 that are known to be the line's.
+            # The best fit to those 300 points that are known to belong to the line.
             x = run["points"][run["truth"]]
             direction = np.linalg.eigh(np.cov(x.T))[1][:, 1]
             across = np.array([-direction[1], direction[0]])
             oracle = int((np.abs((x - x.mean(axis=0)) @ across) < 2.5).sum())
             self.assertLessEqual(abs(run["right"] - oracle), 8)
-            # 200 over the image: 1 to 2 per cent lie that near
+            # of 200 points over the image, 1 to 2 per cent lie this near by chance
             self.assertLessEqual(run["wrong"], 15)
             self.assertEqual(int(run["found"].sum()), run["right"] + run["wrong"])
             self.assertEqual(int(run["truth"].sum()), 300)

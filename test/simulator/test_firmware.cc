@@ -1,4 +1,4 @@
-// The simulated drone keeps the protocol's rules, told in bytes.
+// The simulated drone follows the protocol's rules; the tests send and compare bytes.
 #include <unity.h>
 
 #include <cmath>
@@ -20,7 +20,7 @@ const room::Room& the_room() {
   return room;
 }
 
-// A drone, a clock, and a controller that counts.
+// A drone, a virtual clock, and a controller that numbers its commands.
 struct Bench {
   int64_t now = 5000 * kMs;
   int sequence = 0;
@@ -35,7 +35,7 @@ struct Bench {
     now += ms * kMs;
     drone.advance(now);
   }
-  // Waits while a controller repeats what it wants, every 30 ms.
+  // Lets time pass while the controller repeats its commands every 30 ms.
   void keep(const std::string& ref, int64_t ms) {
     for (int64_t t = 0; t < ms; t += 30) {
       send("REF", ref);
@@ -55,7 +55,7 @@ struct Bench {
     TEST_FAIL_MESSAGE("no navdata");
     return navdata;
   }
-  // As a driver starts: wake, ask for a mode, acknowledge.
+  // Starts as a driver does: wakes the drone, requests the navdata mode, acknowledges.
   void start(const std::string& demo) {
     drone.receive_hello(now);
     send("CONFIG", "\"general:navdata_demo\",\"" + demo + "\"");
@@ -179,7 +179,7 @@ void test_emergency_acts_on_its_edge() {
   b.send("REF", kEmergency);
   TEST_ASSERT_TRUE(b.drone.truth().mode == FlightMode::kMotorsCut);
   b.wait(1500);
-  b.send("REF", kEmergency);  // still up: no edge
+  b.send("REF", kEmergency);  // the bit is still set, so there is no rising edge
   TEST_ASSERT_TRUE(b.drone.truth().mode == FlightMode::kMotorsCut);
   TEST_ASSERT_TRUE(b.navdata().state & ARDRONE_STATE_EMERGENCY);
   b.send("REF", kLand);

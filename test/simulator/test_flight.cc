@@ -1,4 +1,4 @@
-// The simulated flight has the signs and sizes of the real one.
+// The simulated flight has the signs and magnitudes of real flights.
 #include <unity.h>
 
 #include <cmath>
@@ -75,7 +75,7 @@ void test_tilt_accelerates_by_gravity_as_in_the_flight_log() {
   flight.advance(0.005);
   const double acceleration = (flight.state().velocity[0] - first.velocity[0]) / 0.005;
   TEST_ASSERT_TRUE(first.pitch < -0.15);
-  // What two real flights gave: -0.146 and -0.166 mm/s^2 per millidegree; without drag it is
+  // Two real flights gave -0.146 and -0.166 mm/s^2 per millidegree; without drag the value would be
   // -0.171.
   const double per_millidegree = 1000 * acceleration / (first.pitch * 180000 / 3.14159265358979);
   TEST_ASSERT_TRUE(per_millidegree < -0.14 && per_millidegree > -0.172);
@@ -114,7 +114,7 @@ void test_cut_motors_fall_and_need_arming() {
   flight.cut_motors();
   flight.advance(0.2);
   TEST_ASSERT_TRUE(flight.state().velocity[2] > 1.5);
-  flight.rearm();  // in the air: no
+  flight.rearm();  // refused in the air
   TEST_ASSERT_TRUE(flight.state().mode == FlightMode::kMotorsCut);
   flight.advance(2);
   flight.take_off();

@@ -1,6 +1,6 @@
-// The driver with its H.264 decoder against the simulated drone on a bad link: one per cent of all
-// datagrams lost, doubled and overtaken, ten cuts of the video, two reboots, in flight all the
-// while. In virtual time; the test suite runs a minute of it, scripts/drone_soak ten
+// The driver with its H.264 decoder against the simulated drone on a bad link: one per cent each of
+// all datagrams are lost, doubled and overtaken, the video is cut ten times, and the drone reboots
+// twice, always in flight. Time is virtual; the test suite runs one minute, scripts/drone_soak ten
 // (TWOVIEW_SOAK_SECONDS).
 #include <unistd.h>
 #include <unity.h>
@@ -43,7 +43,7 @@ long resident_kb() {
   return resident * (sysconf(_SC_PAGESIZE) / 1024);
 }
 
-// libavcodec's decoder; counts its time and what is not given back.
+// libavcodec's decoder; measures its time and counts the pictures that are not released.
 struct TimedDecoder {
   tvs_decoder inner{};
   double seconds = 0;
@@ -78,10 +78,10 @@ struct Soak {
   tvs_frame_source frames{};
   int64_t now = 1000 * kMs;
 
-  // What the yaw's zero was, and whose boot it was, by the run of the world frame.
+  // For each run of the world frame: the yaw that is its zero, and the number of the drone's boot.
   std::map<uint32_t, double> psi0;
   std::map<uint32_t, int> boot_of;
-  bool may_restart = true;  // the command numbers
+  bool may_restart = true;  // whether the next command may have the number 1
   long last_command = 0;
   int num_falls = 0, num_take_offs_asked = 0;
 
@@ -91,7 +91,7 @@ struct Soak {
   uint64_t last_number = 0;
   std::vector<double> own_ms;
 
-  // A cut, until the next picture.
+  // The state from a cut of the video to the next picture.
   int64_t cut_ns = 0;
   Cut cut = Cut::kClosed;
   bool awaits = false;
@@ -142,7 +142,7 @@ void end() {
   soak = nullptr;
 }
 
-// Numbers rise, or start at 1 after the driver has said that the link is another one.
+// Command numbers rise; they start at 1 only after the driver has reported a new link.
 void check_commands() {
   for (const std::string& datagram : soak->drone.take_sent()) {
     TEST_ASSERT_TRUE(datagram.size() <= ARDRONE_AT_MAX_BYTES && datagram.back() == '\r');
@@ -187,7 +187,8 @@ void check_frame(const tvs_frame& frame) {
   soak->awaits = false;
 }
 
-// A pilot who always flies: takes off as soon as he may, then turns and tilts to and fro.
+// A pilot who always flies: he takes off as soon as the drone allows it, then turns and tilts to
+// and fro.
 void fly() {
   const ardrone_navdata* n = ardrone_session_navdata(soak->session);
   if (n == nullptr || !ardrone_session_is_up(soak->session)) return;
@@ -279,7 +280,8 @@ void test_minutes_of_a_bad_link() {
   TEST_ASSERT_EQUAL_INT(0, soak->num_wrong_pictures);
   TEST_ASSERT_EQUAL_INT(0, soak->num_stale);
   TEST_ASSERT_EQUAL_INT(0, soak->num_beyond_5_sigma);
-  TEST_ASSERT_TRUE(soak->worst_rad < 0.015);  // 0.002 of noise on each axis; at 1 rad/s, 15 ms
+  // noise of 0.002 rad on each axis, and 15 ms at 1 rad/s
+  TEST_ASSERT_TRUE(soak->worst_rad < 0.015);
   TEST_ASSERT_TRUE(soak->num_with_attitude > 0.95 * soak->num_frames);
   TEST_ASSERT_TRUE(soak->worst_back_s[0] < 1 && soak->worst_back_s[1] < 1);
   TEST_ASSERT_TRUE(soak->worst_back_s[2] < 2);
@@ -287,7 +289,8 @@ void test_minutes_of_a_bad_link() {
   TEST_ASSERT_EQUAL_UINT64(3, n.links);
   TEST_ASSERT_EQUAL_UINT64(13, n.video_connections);
   TEST_ASSERT_EQUAL_INT(3, soak->drone.firmware().num_take_offs());
-  // Each cut and boot costs some, and the latency rule one in a hundred.
+  // The lower bounds allow for the frames that each cut and boot costs, and for one in a hundred
+  // that the latency rule drops.
   TEST_ASSERT_TRUE(soak->num_frames > 29 * (seconds - 12));
   TEST_ASSERT_TRUE((double)n.navdata_received > 190 * (seconds - 6));
   TEST_ASSERT_TRUE(median_ms < 1);
@@ -297,7 +300,8 @@ void test_minutes_of_a_bad_link() {
   end();
 }
 
-// Packets cut short and bits turned over besides: they are refused, and nothing else changes.
+// Packets are also shortened and bits inverted: these packets are refused, and nothing else
+// changes.
 void test_broken_navdata_is_never_used() {
   simulator::FaultChances faults;
   faults.truncate = faults.corrupt = faults.lose = 0.1;

@@ -1,4 +1,4 @@
-/* A context in memory with guard bytes around it, and images, for tests of the API. */
+/* Helpers of the tests of the API: a context in memory with guard bytes around it, and images. */
 #ifndef TEST_SUPPORT_API_H
 #define TEST_SUPPORT_API_H
 
@@ -17,7 +17,7 @@ typedef struct api_context {
   tv_context *context;
 } api_context;
 
-/* The status of tv_context_init; the memory is freed if it is not TV_OK. */
+/* Returns the status of tv_context_init; on any other than TV_OK the memory is freed. */
 static inline tv_status api_try(const tv_limits *limits, api_context *a) {
   uintptr_t start;
   size_t block_bytes;
@@ -41,7 +41,8 @@ static inline api_context api_make(const tv_limits *limits) {
   return a;
 }
 
-/* A context of each kernel set that this machine has, into an array of room for all. How many. */
+/* Fills the array, which has room for all, with a context for each kernel set that this machine
+   runs. Returns how many. */
 static inline int api_make_all_kernels(tv_limits limits, api_context *contexts) {
   int count = 0;
   for (limits.kernels = TV_KERNELS_C; limits.kernels <= TV_KERNELS_NEON; ++limits.kernels) {
@@ -57,8 +58,8 @@ static inline int api_is_pattern(const void *begin, size_t bytes) {
   return bytes == 0;
 }
 
-/* Frees the context after checking that nothing outside its memory was written, and that the high
-   water mark tells the truth: the bytes above it are as they were. */
+/* Frees the context. First it checks that nothing outside its memory was written, and that no
+   byte above the high water mark changed. */
 static inline void api_release(api_context *a) {
   const size_t high_water = tv_context_high_water(a->context);
   TEST_ASSERT_TRUE(high_water <= a->size_bytes);
@@ -78,7 +79,8 @@ static inline tv_image api_image(const uint8_t *data, int32_t width, int32_t hei
   return image;
 }
 
-/* Bright and dark squares of random places and sizes on noise: many corners, some of them equal. */
+/* Draws bright and dark squares of random places and sizes on noise: many corners, some with
+   equal scores. */
 static inline void api_draw(uint64_t seed, uint8_t *pixels, int32_t width, int32_t height) {
   int32_t k, x, y;
   for (k = 0; k < width * height; ++k) pixels[k] = (uint8_t)random_int(&seed, 100, 104);

@@ -1,4 +1,4 @@
-/* Captures of real drones, read in place from the folder TWOVIEW_ARDRONE_FIXTURES names. */
+/* Captures of real drones, read from the folder that TWOVIEW_ARDRONE_FIXTURES names. */
 #ifndef TEST_SUPPORT_ARDRONE_FIXTURES_H
 #define TEST_SUPPORT_ARDRONE_FIXTURES_H
 
@@ -9,7 +9,7 @@
 
 static inline const char *fixtures_folder(void) { return getenv("TWOVIEW_ARDRONE_FIXTURES"); }
 
-/* Ends the program as skipped when there are none. */
+/* Ends the program as skipped when TWOVIEW_ARDRONE_FIXTURES is not set. */
 static inline void fixtures_need(void) {
   if (fixtures_folder() && *fixtures_folder()) return;
   printf("skipped: no AR.Drone captures (TWOVIEW_ARDRONE_FIXTURES)\n");

@@ -1,6 +1,6 @@
 /* A drone in memory, in virtual time: a transport whose other side acknowledges, flies, films,
-   loses, doubles and reorders datagrams, cuts and stalls connections, and reboots. The pictures are
-   their numbers; the decoder refuses one whose predecessor it has not decoded. */
+   loses, doubles and reorders datagrams, cuts and stalls connections, and reboots. A picture's
+   payload is its number; the decoder refuses a picture whose predecessor it has not decoded. */
 #ifndef TEST_SUPPORT_ARDRONE_MOCK_H
 #define TEST_SUPPORT_ARDRONE_MOCK_H
 
@@ -27,8 +27,9 @@ typedef struct mock_drone {
   uint64_t seed;
   int64_t now_ns, boot_ns;
   int32_t lose_permille, double_permille, reorder_permille;
-  int navdata_off, video_off, video_refused, deaf; /* faults that last */
-  int clocks_differ;                               /* PaVE stamps count from another start */
+  int navdata_off, video_off, video_refused, deaf; /* faults that last until the test clears them */
+  /* PaVE stamps count from another start than navdata's */
+  int clocks_differ;
   int64_t video_latency_ns;
 
   uint32_t state, sequence;
@@ -37,7 +38,7 @@ typedef struct mock_drone {
   mock_datagram queue[MOCK_DATAGRAMS];
 
   int video_open, video_ended,
-      video_half_open; /* half-open: nothing comes through this connection */
+      video_half_open; /* 1: half open, no byte comes through this connection */
   uint32_t frame_number;
   uint8_t stream[MOCK_STREAM];
   size_t stream_begin, stream_end;
@@ -47,9 +48,10 @@ typedef struct mock_drone {
   const char *control_text;
   size_t control_size;
 
-  /* what it saw */
+  /* what the drone received */
   int32_t last_command;
-  int num_restarts, num_falls; /* sequence back to 1; lower without being 1 */
+  /* how often the command number went back to 1, and to another lower number */
+  int num_restarts, num_falls;
   int num_commands, num_refs, num_take_offs, num_pcmds, num_configs;
   char last_key[64], last_value[64];
   int flies;
@@ -83,7 +85,7 @@ static inline void mock_boot(mock_drone *d) {
 }
 
 static inline double mock_device_s(const mock_drone *d) {
-  return (double)(d->now_ns - d->boot_ns) * 1e-9 + 2040; /* soon wraps */
+  return (double)(d->now_ns - d->boot_ns) * 1e-9 + 2040; /* wraps after 8 s */
 }
 
 static inline void mock_post(mock_drone *d, const uint8_t *bytes, size_t size) {
@@ -135,7 +137,7 @@ static inline void mock_send_frame(mock_drone *d) {
   h.encoded_width = 640;
   h.encoded_height = 368;
   h.frame_number = number;
-  /* Taken a latency ago. */
+  /* The picture was taken one latency ago. */
   h.timestamp_ms = (uint32_t)((mock_device_s(d) - (double)d->video_latency_ns * 1e-9) * 1e3 +
                               (d->clocks_differ ? 987654 : 0));
   h.frame_type = number % MOCK_GOP == 1 ? ARDRONE_PAVE_IDR : ARDRONE_PAVE_P;
@@ -145,7 +147,8 @@ static inline void mock_send_frame(mock_drone *d) {
     memmove(d->stream, d->stream + d->stream_begin, d->stream_end - d->stream_begin);
     d->stream_end -= d->stream_begin;
     d->stream_begin = 0;
-    if (d->stream_end + MOCK_PAYLOAD + 68 > MOCK_STREAM) return; /* the client does not read */
+    /* the client does not read its stream */
+    if (d->stream_end + MOCK_PAYLOAD + 68 > MOCK_STREAM) return;
   }
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, payload, d->stream + d->stream_end,
                                                     MOCK_STREAM - d->stream_end, &size));
@@ -165,7 +168,7 @@ static inline void mock_advance(mock_drone *d, int64_t now_ns) {
   }
 }
 
-/* ---- its side of the transport ---- */
+/* ---- the drone's side of the transport ---- */
 
 static inline void mock_obey(mock_drone *d, char *line) {
   char *comma = strchr(line, ',');

@@ -1,5 +1,6 @@
-// Pairs for the tests of bundle adjustment: up to 5000 points, a start off the truth, points
-// triangulated there. Static storage throughout: a failing Unity test leaves by longjmp.
+// Pairs for the tests of bundle adjustment: up to 5000 points, a start pose that differs from the
+// true one, and points triangulated with the start pose. Static storage throughout: a failing Unity
+// test leaves by longjmp.
 #ifndef TEST_SUPPORT_BUNDLE_SCENE_H
 #define TEST_SUPPORT_BUNDLE_SCENE_H
 
@@ -24,7 +25,8 @@ struct Options {
   int num = 500;
   double noise_px = 0.5;
   double outlier_share = 0;
-  double start_off_rad = 0.01;  // how far the start's rotation and direction of t are turned
+  // the angle by which the start's rotation and direction of t differ from the truth
+  double start_off_rad = 0.01;
   double baseline = 1;
   tv_camera camera[2] = {scene::pinhole(), scene::pinhole()};
   uint64_t seed = 1;
@@ -55,7 +57,7 @@ inline Vec2 noisy(tv::Random* random, const Vec2& pixel, double noise_px) {
   return pixel + Vec2(x, y);
 }
 
-// Depths of 2 to 8 baselines.
+// Points at depths of 2 to 8 baselines.
 inline void make_match(tv::Random* random, const tv::Camera cameras[2], int i, Scene* s) {
   const Options& o = s->options;
   for (int tries = 0;; ++tries) {

@@ -1,5 +1,6 @@
-/* The calls on features and on matched pixels, with the structs' members as parameters: tests
-   change one at a time. Also views in one expression. */
+/* Wrappers of the calls on features and on matched pixels that take the structs' members as
+   parameters, so that a test can change one of them at a time; and functions that make a view in
+   one expression. */
 #ifndef TEST_SUPPORT_CALLS_H
 #define TEST_SUPPORT_CALLS_H
 

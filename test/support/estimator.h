@@ -1,5 +1,5 @@
-// What the tests over many simulated pairs share: a context for matches alone, how many pairs there
-// are to be, and from which seed. Static storage: a failing Unity test leaves by longjmp.
+// Helpers of the tests over many simulated pairs: a context for estimation alone, the number of
+// pairs, and the seed. Static storage: a failing Unity test leaves by longjmp.
 #ifndef TEST_SUPPORT_ESTIMATOR_H
 #define TEST_SUPPORT_ESTIMATOR_H
 
@@ -11,7 +11,8 @@
 
 namespace estimator {
 
-// A context that estimates from up to max_matches and sees no image. One at a time.
+// Makes a context that estimates from up to max_matches matches and has no room for images. Only
+// one exists at a time.
 inline tv_context* make_context(int max_matches) {
   alignas(TV_CONTEXT_ALIGNMENT) static uint8_t memory[8 << 20];
   tv_limits limits;
@@ -27,8 +28,8 @@ inline tv_context* make_context(int max_matches) {
   return context;
 }
 
-// TWOVIEW_PAIRS and TWOVIEW_SEED, where they are given; a count below `fewest` would test nothing
-// and ends the program.
+// Reads TWOVIEW_PAIRS and TWOVIEW_SEED where they are set. A count below `fewest` would make the
+// test meaningless and ends the program.
 inline void read_environment(int fewest, int* num_pairs, uint64_t* seed) {
   if (const char* text = std::getenv("TWOVIEW_PAIRS")) *num_pairs = std::atoi(text);
   if (const char* text = std::getenv("TWOVIEW_SEED")) *seed = std::strtoull(text, nullptr, 10);

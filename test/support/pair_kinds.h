@@ -19,20 +19,21 @@ using tv::Vec3;
 constexpr int kMaxMatches = 1024;
 
 enum Kind {
-  kGeneral,       // depths of 2 to 10 baselines
+  kGeneral,       // points at depths of 2 to 10 baselines
   kPlanar,        // a plane 2 to 8 baselines away, tilted by up to 50 degrees
-  kPureRotation,  // by 1 to 20 degrees
+  kPureRotation,  // the camera turns by 1 to 20 degrees
   kNoMotion,
   kLowParallax,   // general, with a median parallax of 5 to 8 times the noise
   kTooFew,        // general, 0 to 12 matches in all
   kSecondMotion,  // general; 30 per cent of the true matches lie on an object that moves by itself
-  kLattice,       // a wall of equal cells, half of it matched one or two cells off, in a general
-                  // scene; off the epipolar lines, since along them two views cannot tell
-  // What no verdict names, but which one view shows smaller than the other:
-  kForwardMove,  // along the optical axis, which makes the scene 1.5 to 8 times as large
-  kScaleChange,  // by 2: half of the distance, or twice the focal length
+  kLattice,       // general, with a wall of equal cells; half of the wall is matched one or two
+                  // cells off, away from the epipolar lines: along these lines two views cannot
+                  // show that a match is wrong
+  // Two kinds that no verdict names, in which a view shows the scene smaller than the other:
+  kForwardMove,  // a move along the optical axis, which makes the scene 1.5 to 8 times as large
+  kScaleChange,  // a change by 2: half of the distance, or twice the focal length
 };
-constexpr int kNumKinds = 8;  // that a verdict names
+constexpr int kNumKinds = 8;  // the kinds that a verdict names
 constexpr int kNumAllKinds = 10;
 
 inline const char* name_of(int kind) {
@@ -44,7 +45,7 @@ inline const char* name_of(int kind) {
 
 struct Ranges {
   int fewest = 100, most = 500;  // matches, wrong ones included
-  double most_wrong = 0.5;       // share of wrong matches: 0 to this
+  double most_wrong = 0.5;       // the share of wrong matches is drawn from 0 to this
   double least_noise_px = 0.2, most_noise_px = 0.6;
   double most_rotation_deg = 20;
 };
@@ -57,13 +58,14 @@ struct Pair {
   int num;
   double pixels[2][2 * kMaxMatches];
   double noise_px;
-  // Planar: n . X = 1 in camera 0, and whether the plane's other motion puts a tenth of the points
-  // and more behind a camera, so that the matches tell which of the two it was.
+  // For kPlanar: the plane n . X = 1 in camera 0, and whether the plane's other motion puts a tenth
+  // of the points or more behind a camera, so that the matches exclude that motion.
   Vec3 plane;
   bool other_motion_excluded;
 };
 
-// An image holds 0.5 to half a million of them: wide, medium, and with an EuRoC-like distortion.
+// Draws EuRoC's camera with its distortion, a fisheye, or a pinhole with a focal length of 380 to
+// 650 pixels.
 inline tv_camera draw_camera(tv::Random* random) {
   switch (tv::random_below(*random, 3)) {
     case 0: return scene::distorted();
@@ -86,8 +88,8 @@ struct Maker {
            (*pixel)[0] < model.width - 3 && (*pixel)[1] > 2 && (*pixel)[1] < model.height - 3;
   }
 
-  // A point on the ray of a random pixel of view 0, within a box around `center` when half_size >
-  // 0.
+  // Draws a random pixel of view 0 and its ray; when half_size > 0 the pixel lies within a box
+  // around `center`.
   bool ray_of_random_pixel(Vec2 center, double half_size, Vec2* pixel, Vec3* ray) {
     *pixel = scene::random_pixel(&random, pair->camera[0]);
     if (half_size > 0) {
@@ -107,7 +109,7 @@ struct Maker {
     ++pair->num;
   }
 
-  // A point at `depth` along the ray, seen after (R, t).
+  // Adds a point at `depth` along the ray, seen by view 1 after (R, t).
   bool put_point(const Vec3& X, const Vec2& p0, const Mat3& R, const Vec3& t) {
     Vec2 p1;
     if (!seen(1, R * X + t, &p1)) return false;
@@ -122,7 +124,7 @@ struct Maker {
     }
   }
 
-  bool put_general(int count, double scale) {  // depths of 2 to 10 baselines, times scale
+  bool put_general(int count, double scale) {  // at depths of 2 to 10 baselines, times scale
     for (int i = 0, tries = 0; i < count; ++tries) {
       if (tries > 40 * count + 200) return false;
       Vec2 p0;
@@ -133,7 +135,7 @@ struct Maker {
     return true;
   }
 
-  // Points `distance` baselines away, give or take `spread` of them.
+  // Adds points that are `distance` baselines away, plus or minus `spread` baselines.
   bool put_layer(int count, double distance, double spread) {
     for (int i = 0, tries = 0; i < count; ++tries) {
       if (tries > 100 * count + 200) return false;
@@ -159,8 +161,9 @@ struct Maker {
     return true;
   }
 
-  // A box of 60 to 150 pixels half size whose points, 2 to 5 baselines away, move by themselves: by
-  // 5 to 20 degrees about their middle and by a tenth to four tenths of their distance.
+  // Adds an object that moves by itself: a box with a half size of 60 to 150 pixels and points 2 to
+  // 5 baselines away. It turns by 5 to 20 degrees about its middle and moves by a tenth to four
+  // tenths of its distance.
   bool put_moving_object(int count) {
     const tv_camera& camera = pair->camera[0];
     const double half_size = uniform(&random, 60, 150);
@@ -185,15 +188,15 @@ struct Maker {
     return true;
   }
 
-  // How far Y's image in view 1 lies from the epipolar line of X, about.
+  // The approximate distance of Y's image in view 1 from the epipolar line of X, in pixels.
   double line_distance_px(const Vec3& X, const Vec3& Y) const {
     const Vec3 n = pair->t.cross(pair->R * X).normalized();
     const Vec3 seen_there = (pair->R * Y + pair->t).normalized();
     return std::fabs(n.dot(seen_there)) * pair->camera[1].fx;
   }
 
-  // The corners of a wall's cells, six tenths of them and more found; half of those are matched one
-  // or two cells off.
+  // Adds the corners of a wall's cells. At least six tenths of them are found, and half of the
+  // found ones are matched one or two cells off.
   bool put_lattice(int count) {
     const Vec3 normal_of_wall =
         Vec3(uniform(&random, -0.6, 0.6), uniform(&random, -0.3, 0.3), 1).normalized();
@@ -242,7 +245,7 @@ struct Maker {
     pair->plane = tv::rotation_about(axis, tilt) * Vec3(0, 0, 1) / uniform(&random, 2, 8);
   }
 
-  // The pixels that the baseline moves a typical point by.
+  // The number of pixels by which the baseline moves a typical point.
   double median_parallax_px() const {
     static double values[kMaxMatches];
     for (int i = 0; i < pair->num; ++i) {
@@ -313,7 +316,7 @@ struct Maker {
       case kPureRotation:
       case kNoMotion: made = put_general(num_true, 1); break;
       case kLowParallax: {
-        // The parallax goes with 1 / scale: measured once, then set.
+        // The parallax is proportional to 1 / scale, so it is measured once and then set.
         const double wanted = uniform(&random, 5, 8) * pair->noise_px;
         const double noise = pair->noise_px;
         const tv::Random start = random;

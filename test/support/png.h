@@ -1,6 +1,7 @@
-/* Reads what the tests need of PNG (8 bits a sample, not interlaced, no palette) into 8-bit luma,
-   so that tests of the C library need no image library. RFC 1950, RFC 1951, and the PNG
-   specification; checksums are not looked at. For files that ship with the tests only. */
+/* Reads the PNG files that the tests need (8 bits a sample, not interlaced, no palette) into
+   8-bit luma, so that tests of the C library need no image library. By RFC 1950, RFC 1951 and
+   the PNG specification; checksums are not verified, so use it only for files that ship with the
+   tests. */
 #ifndef TEST_SUPPORT_PNG_H
 #define TEST_SUPPORT_PNG_H
 
@@ -106,7 +107,7 @@ static inline int png_inflate(const uint8_t *bytes, size_t size, uint8_t *out, s
   static const uint16_t distance_bases[30] = {
       1,   2,   3,   4,   5,   7,    9,    13,   17,   25,   33,   49,   65,    97,    129,
       193, 257, 385, 513, 769, 1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
-  png_bits in = {bytes, size, 2, 0, 0, 0}; /* after zlib's two bytes */
+  png_bits in = {bytes, size, 2, 0, 0, 0}; /* skips the two bytes of the zlib header */
   size_t at = 0;
   int last = 0;
   while (!last && !in.failed) {

@@ -1,4 +1,4 @@
-/* Random inputs of tests: a fixed seed each, printed when a test that used it fails. */
+/* Random inputs of tests: each test uses a fixed seed, which is printed when the test fails. */
 #ifndef TEST_SUPPORT_RANDOM_H
 #define TEST_SUPPORT_RANDOM_H
 

@@ -9,7 +9,7 @@
 #include "support/png.h"
 
 typedef struct real_pair {
-  uint8_t *luma[2]; /* rows without padding; from malloc */
+  uint8_t *luma[2]; /* rows without padding; allocated by malloc */
   int32_t width, height;
 } real_pair;
 
@@ -29,7 +29,7 @@ static inline int real_pair_read(real_pair *pair, const char *folder, const char
          heights[0] == heights[1];
 }
 
-/* 0 after saying why when there is none. */
+/* Loads the pair; prints why and returns 0 when there is none. */
 static inline int real_pair_load(real_pair *pair) {
   const char *data = getenv("TWOVIEW_DATA");
   char folder[4096];

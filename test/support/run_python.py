@@ -16,7 +16,7 @@ SKIP_CODE = 77
 
 
 def finish(run, failed, skipped):
-    """skipped: (name, reason) of each test. Ends the program."""
+    """Ends the program with the exit status above. skipped: (name, reason) of each skipped test."""
     if failed:
         sys.exit(1)
     if skipped:
@@ -32,14 +32,15 @@ def finish(run, failed, skipped):
 
 
 class Program(unittest.TestProgram):
-    """unittest.main that ends by the rule above."""
+    """unittest.main that ends with the exit status above."""
 
     def runTests(self):
         wanted, self.exit = self.exit, False
         super().runTests()
         self.exit = wanted
         result = self.result
-        # A class or module that is skipped as a whole is one entry and no test that ran.
+        # A class or module that is skipped as a whole has one entry here, though none of its tests
+        # ran.
         finish(max(result.testsRun, len(result.skipped)), not result.wasSuccessful(),
                [(test.id(), reason) for test, reason in result.skipped])
 
@@ -54,7 +55,7 @@ def run_unittest(path, arguments):
 
 
 class Report:
-    """What pytest tells its plugins about each test."""
+    """A pytest plugin that records the result of each test."""
 
     def __init__(self):
         self.run, self.skipped = 0, []
@@ -83,7 +84,7 @@ def run_pytest(packages, path):
     sys.path[0] = os.path.dirname(os.path.abspath(path))
     report = Report()
     status = pytest.main(["-q", "-p", "no:cacheprovider", path], plugins=[report])
-    # A file of which nothing is collected because it was skipped as a whole is no failure.
+    # A file that was skipped as a whole collects no tests; that is no failure.
     skipped_whole = status == pytest.ExitCode.NO_TESTS_COLLECTED and report.skipped
     finish(report.run, status != 0 and not skipped_whole, report.skipped)
 

@@ -1,5 +1,5 @@
-// Synthetic pairs that own their conditioning, for tests of the geometry. Static storage
-// throughout: a failing Unity test leaves by longjmp.
+// Synthetic pairs for tests of the geometry, drawn again until they are well conditioned. Static
+// storage throughout, since a failing Unity test leaves by longjmp.
 #ifndef TEST_SUPPORT_SCENE_H
 #define TEST_SUPPORT_SCENE_H
 
@@ -27,7 +27,7 @@ inline double uniform(tv::Random* random, double low, double high) {
   return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
 }
 
-// A sum of 12: near enough to a normal distribution.
+// Approximately normal: a sum of 12 uniform numbers.
 inline double normal(tv::Random* random) {
   double sum = -6;
   for (int i = 0; i < 12; ++i) sum += uniform(random, 0, 1);
@@ -45,7 +45,7 @@ inline tv_camera pinhole() {
   return tv_camera{TV_CAMERA_PINHOLE, 640, 480, 0, 500, 505, 321, 238, {}};
 }
 
-inline tv_camera distorted() {  // EuRoC's
+inline tv_camera distorted() {  // the lens of EuRoC's camera
   return tv_camera{TV_CAMERA_BROWN_CONRADY,
                    752,
                    480,
@@ -82,7 +82,7 @@ struct Scene {
   uint8_t inlier[kMaxMatches];
 };
 
-// A pixel in the inner part of the image.
+// A random pixel in the inner part of the image.
 inline Vec2 random_pixel(tv::Random* random, const tv_camera& camera) {
   return Vec2(uniform(random, 5, camera.width - 6), uniform(random, 5, camera.height - 6));
 }
@@ -96,7 +96,7 @@ inline void choose_motion(tv::Random* random, Scene* s) {
   if (kind == Kind::kStill) s->R = Mat3::Identity();
 }
 
-// Depths from 2 to 8 times the baseline, or those of a plane four baselines away.
+// Points at depths of 2 to 8 baselines, or on a plane four baselines away.
 inline bool true_match(tv::Random* random, const tv::Camera* cameras, const Vec3& normal_of_plane,
                        Scene* s, Vec2* p0, Vec2* p1) {
   *p0 = random_pixel(random, s->options.camera[0]);
@@ -127,7 +127,7 @@ inline void make(const Options& options, Scene* s) {
     if (s->inlier[i]) {
       int tries = 0;
       while (tries < 1000 && !true_match(&random, cameras, plane, s, &p[0], &p[1])) ++tries;
-      if (tries == 1000) {  // the views hardly overlap
+      if (tries == 1000) {  // too few points are seen by both views
         TEST_ASSERT_TRUE(++restarts < 100);
         choose_motion(&random, s);
         i = -1;
@@ -148,7 +148,7 @@ inline void make(const Options& options, Scene* s) {
 
 inline double degrees(double rad) { return rad * 180 / tv::kPi; }
 
-// Angle of R_est R_gt'.
+// The angle of R_est R_gt', the rotation error.
 inline double rotation_error_deg(const double R[9], const Mat3& truth) {
   Mat3 estimate;
   for (int k = 0; k < 9; ++k) estimate(k / 3, k % 3) = R[k];
@@ -157,7 +157,7 @@ inline double rotation_error_deg(const double R[9], const Mat3& truth) {
   return degrees(tv::atan2(axis.norm(), d.trace() - 1));
 }
 
-// Angle between the directions, with their signs.
+// The angle between two directions, whose signs count.
 inline double translation_error_deg(const double t[3], const Vec3& truth) {
   const Vec3 estimate(t[0], t[1], t[2]);
   return degrees(tv::atan2(estimate.cross(truth).norm(), estimate.dot(truth)));
@@ -165,8 +165,8 @@ inline double translation_error_deg(const double t[3], const Vec3& truth) {
 
 using Vec5 = Eigen::Matrix<double, 5, 1>;
 
-// The true pose in the parameters of a covariance around an estimate (two_view.h); far away where
-// the directions are opposite.
+// The error of an estimate in the parameters of its covariance (two_view.h); very large where the
+// directions of t are opposite.
 inline Vec5 pose_error(const double R[9], const double t[3], const Mat3& true_R,
                        const Vec3& true_t) {
   Mat3 estimate;

@@ -1,8 +1,8 @@
-/* The end of a Unity program, for every test: tv_add_test has the tests call these two functions in
-   the place of Unity's own of nearly the same names. Unity's exit status is the number of failures,
-   so that a program whose tests were all ignored would count as passed. Here a program in which a
-   test was ignored and none failed exits with TWOVIEW_SKIP_CODE, after it has printed the ignored
-   tests' names. */
+/* The end of every Unity program: tv_add_test makes the tests call these two functions instead
+   of Unity's functions of nearly the same names. Unity's exit status is the number of failures,
+   so a program whose tests were all ignored would count as passed. Here a program in which a
+   test was ignored and none failed prints the ignored tests' names and exits with
+   TWOVIEW_SKIP_CODE. */
 #include <unity.h>
 
 enum { MAX_NAMES = 64 };

@@ -1,7 +1,7 @@
 // The simulated drone in virtual time: its firmware, flight, film and bad link behind the driver's
-// transport instead of sockets, so that ten minutes pass in one. Each picture shows its own number,
-// and each number's truth is kept: what the driver says of a picture can be compared with what was
-// so.
+// transport instead of sockets, so that ten minutes of flight take one. Each picture shows its own
+// number, and the true state at each number is kept, so that the driver's report on a picture can
+// be compared with the truth.
 #pragma once
 
 #include <algorithm>
@@ -89,7 +89,7 @@ class VirtualDrone {
     return {sizeof(ardrone_transport), this, open, send, receive, close, nullptr};
   }
 
-  // What the driver sent, in the order of sending, before the link did anything to it.
+  // The datagrams of the driver in the order of sending, before the link changes them.
   std::vector<std::string> take_sent() { return std::exchange(sent_, {}); }
 
  private:
@@ -135,7 +135,7 @@ class VirtualDrone {
       std::abort();
     }
     if (is_cut_) return;
-    // The encoder's and the radio's delay; TCP keeps the order.
+    // Delays of the encoder and the radio; TCP keeps the order.
     const int64_t due = now_ + static_cast<int64_t>(random_.uniform(30, 90)) * kMs;
     last_due_ = due > last_due_ ? due : last_due_;
     video_.push_back({last_due_, std::move(bytes)});
@@ -174,7 +174,8 @@ class VirtualDrone {
     if (channel == ARDRONE_CHANNEL_NAVDATA) {
       if (d.navdata_.empty()) return TVS_NONE;
       *size = std::min(capacity, d.navdata_.front().size());
-      if (*size > 0) std::memcpy(to, d.navdata_.front().data(), *size);  // all of it may be cut off
+      // the link may have cut the whole packet
+      if (*size > 0) std::memcpy(to, d.navdata_.front().data(), *size);
       d.navdata_.pop_front();
       return TVS_OK;
     }
@@ -202,7 +203,7 @@ class VirtualDrone {
   Film film_;
   std::vector<uint8_t> luma_;
   uint64_t num_exposed_ = 0;
-  std::vector<Exposure> exposures_;  // a ring: memory stays as it is
+  std::vector<Exposure> exposures_;  // a ring, so that the memory does not grow
   std::deque<FaultyLink::Bytes> navdata_;
   std::deque<Sending> video_;
   bool is_open_ = false, is_cut_ = false;

@@ -62,7 +62,7 @@ struct OneMatch {
   Vec2 pixel[2];
 };
 
-// Pixels up to a few pixels off the point's projections.
+// Pixels that differ by a few pixels from the point's projections.
 OneMatch random_match(const tv_camera& first, const tv_camera& second) {
   tv::Random random = tv::random_seeded(++seed);
   OneMatch m{{tv::prepare_camera(first), tv::prepare_camera(second)}, Pose{}, {}, {}};
@@ -86,8 +86,8 @@ OneMatch random_match(const tv_camera& first, const tv_camera& second) {
 
 using Vec4 = Eigen::Matrix<double, 4, 1>;
 
-// The four residuals after a step of the point (two along sphere_basis, inverse distance) and of
-// the pose.
+// The four residuals after a step of the point (two parameters along sphere_basis, and the inverse
+// distance) and of the pose.
 Vec4 residuals(const OneMatch& m, const double point_step[3], const double pose_step[5]) {
   const BundleFrame frame = tv::bundle_frame(m.pose);
   double e1[3], e2[3];
@@ -116,7 +116,7 @@ struct Derivatives {
   Eigen::Matrix<double, 4, 5> pose;
 };
 
-// By central differences.
+// The Jacobian by central differences.
 Derivatives derivatives(const OneMatch& m) {
   const double zero3[3] = {}, zero5[5] = {}, h = 1e-6;
   Derivatives d;
@@ -172,13 +172,15 @@ void check_derivatives(const OneMatch& m) {
 
 void test_derivatives_agree_with_differences() { for_random_matches(check_derivatives); }
 
-// Q' (I - P (P'P)^-1 P') Q = a a', and the same of the gradient and of the error.
+// Eliminating the point leaves one equation (a, r) of a match. It must be the match's four
+// equations times n, the direction that is orthogonal to the point's derivatives P. With S the
+// pose's derivatives: S' (I - P (P'P)^-1 P') S = a a', and the same for the gradient and the error.
 void check_elimination(const OneMatch& m) {
   const Derivatives d = derivatives(m);
   const Elimination e = tv::eliminate(tv::bundle_frame(m.pose), linearised(m));
   const Eigen::HouseholderQR<Eigen::Matrix<double, 4, 3>> qr(d.point);
   const Eigen::Matrix4d Q = qr.householderQ();
-  const Vec4 n = Q.col(3);  // the one direction that no step of the point reaches
+  const Vec4 n = Q.col(3);  // the residuals' one direction that no step of the point changes
   Eigen::Matrix<double, 5, 1> a;
   for (int k = 0; k < 5; ++k) a[k] = e.a[k];
   const Eigen::Matrix<double, 5, 1> expected = d.pose.transpose() * n;
@@ -244,7 +246,8 @@ void test_the_cost_never_rises_and_the_answer_is_closer() {
   }
 }
 
-// Half of the points so far away that noise decides on which side of infinity their rays meet.
+// Half of the points are so far away that noise decides whether their rays meet in front of or
+// beyond infinity.
 void test_points_at_and_beyond_infinity_take_part() {
   Options options;
   options.seed = ++seed;
@@ -331,7 +334,7 @@ void test_holding_the_pose_gives_each_point_its_least_error() {
     if (points[i].status != TV_POINT_OK) continue;
     TEST_ASSERT_TRUE(points[i].error_px <= pair.start[i].error_px + 1e-6f);
     const Vec3 X(points[i].position[0], points[i].position[1], points[i].position[2]);
-    for (int trial = 0; trial < 10; ++trial) {  // no neighbour is better
+    for (int trial = 0; trial < 10; ++trial) {  // no point nearby has a smaller error
       const Vec3 other = X + 1e-4 * X.norm() * scene::direction(&random);
       Vec2 p[2];
       TEST_ASSERT_TRUE(tv::project(cameras[0], other, &p[0], nullptr));
@@ -395,13 +398,13 @@ void test_degenerate_pairs_end_without_a_nan() {
         options.seed = ++seed;
         bundle_scene::make(options, &pair);
         for (int i = 1; i < options.num; ++i) {
-          if (kind == 4) {  // the same match again and again
+          if (kind == 4) {  // copies of one match
             for (int v = 0; v < 2; ++v) {
               std::memcpy(pair.pixels[v] + 2 * i, pair.pixels[v], 2 * sizeof(double));
             }
-          } else if (kind == 5) {  // no motion at all
+          } else if (kind == 5) {  // equal pixels: no motion
             std::memcpy(pair.pixels[1] + 2 * i, pair.pixels[0] + 2 * i, 2 * sizeof(double));
-          } else if (kind == 6) {  // unrelated
+          } else if (kind == 6) {  // unrelated matches
             tv::Random random = tv::random_seeded(seed * 1000 + static_cast<uint64_t>(i));
             const Vec2 p = scene::random_pixel(&random, options.camera[1]);
             pair.pixels[1][2 * i] = p[0], pair.pixels[1][2 * i + 1] = p[1];
@@ -420,7 +423,7 @@ void test_degenerate_pairs_end_without_a_nan() {
   }
 }
 
-// Points on the baseline: image 1 sees them at its epipole, whatever their depth.
+// Points on the baseline: image 1 sees them at its epipole at any depth.
 void test_points_on_the_baseline_do_no_harm() {
   Options options;
   options.geometry = Geometry::kForward;

@@ -1,5 +1,5 @@
-// Two-view bundle adjustment against Ceres: the same cost, written anew with homogeneous points and
-// automatic derivatives, from the same start, to the same minimum.
+// Two-view bundle adjustment compared with Ceres: the same cost, written independently with
+// homogeneous points and automatic derivatives, must reach the same minimum from the same start.
 #include <ceres/ceres.h>
 #include <ceres/manifold.h>
 #include <ceres/rotation.h>
@@ -53,13 +53,14 @@ void project(const tv_camera& camera, const T X[3], T pixel[2]) {
   pixel[1] = camera.fy * y + camera.cy;
 }
 
-// A fisheye sees behind, too; the other lenses must not look at a point's mirror image.
+// Only a fisheye sees points behind the camera; with the other lenses these would be projected as
+// mirror images.
 template <typename T>
 bool is_ahead(const tv_camera& camera, const T& z) {
   return camera.model == TV_CAMERA_KANNALA_BRANDT || z > 0.0;
 }
 
-// Whether the point takes part.
+// Whether the point takes part in the adjustment.
 bool is_seen(const Scene& s, int i) {
   if (s.start[i].status != TV_POINT_OK) return false;
   const double* X = s.start[i].position;
@@ -73,7 +74,7 @@ bool is_seen(const Scene& s, int i) {
          tv_camera_project(&s.options.camera[1], moved, pixel, nullptr) == TV_OK;
 }
 
-// The four coordinates of one match.
+// The four residuals of one match, in pixels.
 struct MatchError {
   const tv_camera* camera;
   const double *pixel0, *pixel1;
@@ -99,7 +100,7 @@ struct Answer {
   int num_points, iterations;
 };
 
-// Where a solver starts.
+// The pose and points at which a solver starts.
 struct Start {
   double R[9], t[3];
   const tv_point* points;
@@ -113,7 +114,7 @@ Start start_of(const Scene& s) {
   return start;
 }
 
-// The point as a unit vector of four, ahead of the cameras: beyond infinity its last entry is
+// The point as a unit vector of four, in front of the cameras; beyond infinity its last entry is
 // negative.
 void append_homogeneous(const tv_point& point, double baseline, std::vector<double>* X) {
   const double* p = point.position;
@@ -130,7 +131,7 @@ ceres::LossFunction* loss_of(const tv_bundle_options& options) {
   return nullptr;
 }
 
-// tight: to the last digit; else with Ceres's own tolerances, for the clock.
+// tight: converges to rounding error; otherwise Ceres's own tolerances are used, to compare times.
 Answer solve_ceres(const Scene& s, const Start& start, const tv_bundle_options& options,
                    bool tight) {
   double q[4], t[3], R[9];
@@ -179,7 +180,7 @@ Answer solve_ceres(const Scene& s, const Start& start, const tv_bundle_options& 
                 static_cast<int>(index.size()), static_cast<int>(summary.iterations.size()) - 1};
 }
 
-// The answer is left in `end` and `points`.
+// Leaves the pose in `end` and the points in `points`.
 Answer solve_ours(const Scene& s, const tv_bundle_options& options, Start* end,
                   tv_bundle_result* result) {
   static tv_context* context = nullptr;
@@ -201,7 +202,8 @@ Answer solve_ours(const Scene& s, const tv_bundle_options& options, Start* end,
                 result->num_iterations};
 }
 
-// Where Ceres ends higher, ours must be a minimum that Ceres, started there, cannot lower.
+// Where Ceres ends at a higher cost, ours must be a minimum: Ceres, started there, must not lower
+// it.
 void expect_same_minimum(const Options& options, const tv_bundle_options& bundle, int* num_lower) {
   bundle_scene::make(options, &pair);
   tv_bundle_result result;
@@ -304,7 +306,7 @@ void print_times() {
 
 }  // namespace
 
-// --time prints times instead.
+// With --time the program prints times instead of testing.
 int main(int argc, char** argv) {
   if (argc > 1 && std::strcmp(argv[1], "--time") == 0) {
     print_times();

@@ -1,5 +1,5 @@
-// Camera models: there and back over whole images, Jacobians against central differences, the
-// valid region, and refusals.
+// Camera models: project and unproject are inverse over whole images, Jacobians agree with central
+// differences, the valid region, and refused parameters.
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -27,7 +27,7 @@ const double kNaN = std::numeric_limits<double>::quiet_NaN();
 struct Named {
   const char* name;
   tv_camera camera;
-  int num_lost;  // pixels of the 7-pixel grid that no ray reaches under the model
+  int num_lost;  // pixels of a grid with 7-pixel steps that have no ray under the model
 };
 
 // AR.Drone: ardrone_autonomy's and tum-vision's calibration files. EuRoC, TUM: the data sets' own.
@@ -201,7 +201,7 @@ void test_unprojection_jacobian_equals_central_differences(void) {
   for (const Named& named : kCameras) {
     const Camera camera = prepared(named.camera);
     for (int i = 0; i < 300; ++i) {
-      // Not in the corners, where one lens's third derivative is felt in the differences.
+      // Not in the corners: there one lens's third derivative makes the differences inexact.
       Vec2 pixel(uniform(&random, 0.15, 0.85) * named.camera.width,
                  uniform(&random, 0.15, 0.85) * named.camera.height);
       if (i == 0) pixel = Vec2(named.camera.cx, named.camera.cy);
@@ -237,18 +237,18 @@ void test_the_two_jacobians_are_inverse_to_each_other(void) {
 }
 
 void test_valid_region_ends_at_the_derivatives_first_zero(void) {
-  // 1 + 3 k1 r^2 = 0
+  // The edge: 1 + 3 k1 r^2 = 0.
   const Camera barrel = prepared(brown(-0.3, 0, 0, 0, 0));
   TEST_ASSERT_DOUBLE_WITHIN(2e-6, std::sqrt(1 / 0.9), barrel.valid_radius_undistorted);
   TEST_ASSERT_DOUBLE_WITHIN(2e-6, std::atan(std::sqrt(1 / 0.9)), barrel.valid_angle_rad);
-  // 1 + 3 k1 u + 5 k2 u^2 = 0 with a second, later zero
+  // The edge: 1 + 3 k1 u + 5 k2 u^2 = 0 for u = r^2, which has a second, later zero.
   const Camera twice = prepared(brown(-0.5, 0.1, 0, 0, 0));
   const double u = (1.5 - std::sqrt(2.25 - 2.0)) / 1.0;
   TEST_ASSERT_DOUBLE_WITHIN(2e-6, std::sqrt(u), twice.valid_radius_undistorted);
   // AR.Drone 2: the discriminant 9 k1^2 - 20 k2 is negative, so it is monotonic everywhere.
   const Camera drone = prepared(brown(-0.526629354780687, 0.274357114262035, 0, 0, 0));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 89.0 * tv::kPi / 180, drone.valid_angle_rad);
-  // theta + k1 theta^3: 1 + 3 k1 theta^2 = 0
+  // The edge for theta + k1 theta^3: 1 + 3 k1 theta^2 = 0.
   tv_camera fisheye = {TV_CAMERA_KANNALA_BRANDT, 640, 480, 0, 300, 300, 320, 240, {-0.1}};
   TEST_ASSERT_DOUBLE_WITHIN(2e-6, std::sqrt(1 / 0.3), prepared(fisheye).valid_angle_rad);
   fisheye.k[0] = 0.05;
@@ -256,7 +256,7 @@ void test_valid_region_ends_at_the_derivatives_first_zero(void) {
 }
 
 void test_a_dip_of_the_derivative_between_samples_is_found(void) {
-  // 1 + 3 k1 u + 5 k2 u^2 with its minimum at u = 0.6, just below zero there.
+  // 1 + 3 k1 u + 5 k2 u^2 has its minimum at u = 0.6, and is just below zero there.
   const double u0 = 0.6, depth = 1e-4;
   const double k2 = (1 + depth) / (5 * u0 * u0);
   const Camera camera = prepared(brown(-10 * k2 * u0 / 3, k2, 0, 0, 0));
@@ -272,7 +272,8 @@ void test_a_pole_of_the_rational_factor_ends_the_valid_region(void) {
   TEST_ASSERT_TRUE(camera.valid_radius_undistorted <= 1.0);
   Vec2 pixel;
   TEST_ASSERT_FALSE(tv::project(camera, Vec3(1.01, 0, 1), &pixel, nullptr));
-  // Numerator and denominator change sign together: only the pole itself tells.
+  // Numerator and denominator change sign together, so only a test of the pole itself finds the
+  // edge.
   model.k[0] = -0.999;
   TEST_ASSERT_TRUE(prepared(model).valid_radius_undistorted <= 1.0);
 }
@@ -293,11 +294,11 @@ void test_the_map_is_one_to_one_in_the_valid_disc_with_strong_tangential_terms(v
       Vec2 pixel, again;
       Vec3 ray;
       if (!tv::project(camera, point, &pixel, nullptr)) {
-        TEST_ASSERT_TRUE(i == 0);  // a rounding past the edge
+        TEST_ASSERT_TRUE(i == 0);  // allowed only where r rounds beyond the edge
         continue;
       }
       if (!tv::unproject(camera, pixel, &ray, nullptr)) {
-        TEST_ASSERT_TRUE(i < 20);  // at the edge itself
+        TEST_ASSERT_TRUE(i < 20);  // allowed only very near the edge
         continue;
       }
       TEST_ASSERT_TRUE((ray - point.normalized()).norm() < (i < 20 ? 1e-6 : 1e-8));
@@ -334,7 +335,7 @@ void test_outside_is_refused_and_outputs_stay(void) {
   const Camera barrel = prepared(brown(-0.3, 0, 0, 0, 0));
   Vec2 pixel(-7, -7);
   Vec3 ray(-7, -7, -7);
-  // r = 1.0541: the edge is at 320 + 500 * 1.0541 * (1 - 0.3 * 1.1111) = 671.36
+  // The edge is at r = 1.0541, which is the pixel 320 + 500 * 1.0541 * (1 - 0.3 * 1.1111) = 671.36.
   TEST_ASSERT_FALSE(tv::project(barrel, Vec3(1.06, 0, 1), &pixel, nullptr));
   TEST_ASSERT_TRUE(tv::project(barrel, Vec3(1.05, 0, 1), &pixel, nullptr));
   pixel = Vec2(-7, -7);

@@ -5,7 +5,7 @@
 
 #include "base/random.h"
 #include "geometry/camera.h"
-// After OpenCV: unity.h takes isnan and isinf as macros.
+// unity.h comes after OpenCV: it defines isnan and isinf as macros.
 #include "unity.h"
 
 void setUp(void) {}
@@ -72,7 +72,8 @@ cv::Mat coefficients_of(const tv_camera& c) {
       .clone();
 }
 
-// OpenCV's pixel and d pixel / d translation, which for a rotation of zero is d pixel / d point.
+// OpenCV's pixel and d pixel / d translation, which equals d pixel / d point for a rotation of
+// zero.
 void project_by_opencv(const tv_camera& camera, const Vec3& point, double pixel[2],
                        Mat23* jacobian) {
   const cv::Mat object(1, 1, CV_64FC3, cv::Scalar(point[0], point[1], point[2]));
@@ -82,7 +83,7 @@ void project_by_opencv(const tv_camera& camera, const Vec3& point, double pixel[
   if (camera.model == TV_CAMERA_KANNALA_BRANDT) {
     cv::fisheye::projectPoints(object, image, zero, zero, matrix_of(camera),
                                coefficients_of(camera), 0, d);
-    first = 11;  // f 2, c 2, k 4, rotation 3, translation 3, skew 1
+    first = 11;  // the column of the translation: f 2, c 2, k 4, rotation 3, translation 3, skew 1
   } else {
     cv::projectPoints(object, zero, zero, matrix_of(camera), coefficients_of(camera), image, d);
   }

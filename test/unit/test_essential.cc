@@ -1,4 +1,4 @@
-// Poses, essential matrices and cheirality.
+// Poses from essential matrices, essential matrices from poses, and cheirality.
 #include <cmath>
 
 #include "geometry/essential.h"
@@ -42,7 +42,7 @@ void test_decomposition_returns_the_pose_and_its_twin(void) {
     const double same = std::fmin((R[0] - pose.R).norm(), (R[1] - pose.R).norm());
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, same);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, std::fmin((t - pose.t).norm(), (t + pose.t).norm()));
-    // The twin is the same turned by half a turn about t.
+    // The twisted pose is the pose turned by half a turn about t.
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, (tv::rotation_about(t, tv::kPi) * R[0] - R[1]).norm());
   }
 }
@@ -75,10 +75,10 @@ void test_steps_are_rotations_and_agree_with_the_exponential(void) {
 void test_the_tangent_basis_is_the_stated_one(void) {
   const Vec3 tie = Vec3(1, -1, 1).normalized();
   Vec3 b1, b2;
-  tv::tangent_basis(tie, &b1, &b2);  // a tie: e_0 x t
+  tv::tangent_basis(tie, &b1, &b2);  // all components have the same size: b1 is along e_0 x t
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, (b1 - Vec3(0, -1, -1).normalized()).norm());
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, (b2 - tie.cross(b1)).norm());
-  tv::tangent_basis(Vec3(0.6, 0.8, 0), &b1, &b2);  // e_2 x t
+  tv::tangent_basis(Vec3(0.6, 0.8, 0), &b1, &b2);  // b1 is along e_2 x t
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, (b1 - Vec3(-0.8, 0.6, 0)).norm());
 }
 

@@ -1,7 +1,7 @@
-// FAST's corners and scores, on real and synthetic images, against the definition read word for
-// word: a pixel is a corner at threshold t when `arc` contiguous pixels of its circle are all
-// brighter than it by more than t, or all darker; its score is the largest such t, found by trying
-// each.
+// FAST's corners and scores, on real and synthetic images, compared with a literal implementation
+// of the definition: a pixel is a corner at threshold t when `arc` contiguous pixels of its circle
+// are all brighter than it by more than t, or all darker; its score is the largest such t, found by
+// trying each.
 
 #include <stdlib.h>
 #include <string.h>
@@ -71,7 +71,7 @@ void check_score_map(const tvk_table& kernels, const tv_image& image, int arc, i
   }
 }
 
-// The contrast is the score carried on below 0: the pixel is a corner at t where it is above t.
+// The contrast continues the score below 0: the pixel is a corner at every t below its contrast.
 void check_contrasts(const tvk_table& kernels, const tv_image& image, int arc) {
   for (int y = 4; y < image.height - 4; y += 3) {
     for (int x = 4; x < image.width - 4; x += 3) {
@@ -140,16 +140,17 @@ void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int
     const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
     TEST_ASSERT_TRUE(p.x == x && p.y == y && is_peak(x, y, threshold));
     TEST_ASSERT_EQUAL_INT(expected_scores[y][x], static_cast<int>(p.score));
-    if (k == 0) continue;  // strictly in order, so that none is there twice
+    if (k == 0) continue;  // strictly ordered, so no corner is there twice
     const tv_keypoint& q = keypoints[k - 1];
     TEST_ASSERT_TRUE(q.score > p.score ||
                      (q.score == p.score && (q.y < p.y || (q.y == p.y && q.x < p.x))));
   }
 }
 
-// The `budget` best peaks of at least the lowest threshold, in their order; with cells, the best
-// ones of each cell up to an even share among the peaks of the highest threshold that leaves the
-// budget, then the best of the rest.
+// The expected corners. Without cells: the `budget` best of the peaks that reach the lowest
+// threshold, in their order. With cells: of the peaks that reach the highest threshold at which
+// there are `budget` of them, first the best of each cell up to an even share, then the best of the
+// rest.
 void check_budget(const tvk_table& kernels, const tv_image& image, int budget, int cell_px) {
   tv_feature_options options;
   memset(&options, 0, sizeof options);
@@ -235,19 +236,21 @@ int checkerboard(int x, int y) { return ((x / 9 + y / 9) & 1) * 255; }
 int single_dots(int x, int y) { return x % 11 == 5 && y % 10 == 4 ? 255 : 0; }
 int holes(int x, int y) { return 255 - single_dots(x, y); }
 int white(int, int) { return 255; }
-// A step of 255 of which the score's two ends, 0 and 254, both come.
+// The image has a step of 255, so that the score's extremes 0 and 254 both occur.
 int soft_squares(int x, int y) { return (x % 16 < 8 && y % 16 < 8 ? x * 37 + y * 11 : 0) & 255; }
 
 void test_corners_equal_the_definition_on_a_real_image() {
 #ifdef __SANITIZE_ADDRESS__
-  const int32_t height = real.height / 5;  // what the sanitizers look for is in every row
+  // every row gives the sanitizers the same accesses, so a part is enough
+  const int32_t height = real.height / 5;
 #else
   const int32_t height = real.height;
 #endif
   check_image(tv_image{real.luma[0], real.width, height, real.width});
 }
 
-// The scan gives up on weak corners as soon as there are enough strong ones; nobody may notice.
+// The scan stops looking at weak corners as soon as there are enough strong ones; the result must
+// not change.
 void test_the_best_corners_are_kept_within_a_budget() {
   noise_state = 3;
   int (*const values[])(int, int) = {noise, black_and_white, faint, checkerboard, soft_squares};
@@ -264,8 +267,8 @@ void test_corners_equal_the_definition_on_synthetic_images() {
   for (auto value : values) check_image(filled(150, 61, value));
 }
 
-// Widths around the kernels' chunks of 16, 32 and 64, and images that hold one candidate pixel or
-// none.
+// Widths near multiples of the kernels' blocks of 16, 32 and 64, and images with one candidate
+// pixel or none.
 void test_corners_equal_the_definition_in_images_of_any_size() {
   noise_state = 2;
   for (int width = 1; width <= 12; ++width) {
@@ -278,7 +281,7 @@ void test_corners_equal_the_definition_in_images_of_any_size() {
   for (int width = 130; width <= 138; ++width) check_image(filled(width, 9, noise));
 }
 
-// The score's two ends: 254 is the largest t that 255 grey levels allow.
+// The score's extremes: 254 is the largest t that 255 grey levels allow.
 void test_a_white_dot_on_black_scores_254() {
   const tv_image image = filled(33, 30, single_dots);
   fill_expected(image, 12);

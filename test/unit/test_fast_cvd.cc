@@ -1,4 +1,4 @@
-// FAST-12 equals libcvd's fast_corner_detect_12, by the authors of FAST: the same pixels.
+// FAST-12 finds the same pixels as libcvd's fast_corner_detect_12, which is by the authors of FAST.
 
 #include <cvd/fast_corner.h>
 #include <cvd/image.h>

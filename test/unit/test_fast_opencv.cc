@@ -1,4 +1,5 @@
-// FAST-9 equals OpenCV's cv::FAST, scores too, with and without suppression.
+// FAST-9 finds the same corners with the same scores as OpenCV's cv::FAST, with and without
+// suppression.
 
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +22,8 @@ alignas(64) uint8_t arena_memory[24 << 20];
 tv_keypoint keypoints[kMaxWidth * kMaxHeight / 4];
 real_pair real;
 
-// OpenCV's corners as a map of scores; without suppression it gives no scores, so 1 for each.
+// OpenCV's corners as an image of scores. Without suppression OpenCV gives no scores, so a corner
+// is 1.
 int opencv_corners(const tv_image& image, int threshold, bool suppress) {
   const cv::Mat view(image.height, image.width, CV_8U, const_cast<uint8_t*>(image.data),
                      static_cast<size_t>(image.stride_bytes));

@@ -47,7 +47,8 @@ void test_eight_exact_points_give_the_matrix(void) {
     TEST_ASSERT_TRUE(tv::fundamental_8pt(s.rays0, s.rays1, &M));
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, M.norm());
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, M.determinant());
-    missed += distance(M, s.truth) > 1e-7;  // nearly critical samples lose digits
+    // nearly critical samples lose digits, so a few may miss
+    missed += distance(M, s.truth) > 1e-7;
   }
   TEST_ASSERT_LESS_OR_EQUAL_INT(5, missed);
 }

@@ -1,4 +1,5 @@
-// The gravity prior: its rows against differences, its weight, and the model that carries it.
+// The gravity prior: its rows of the normal equations against differences, its weight, and a model
+// that includes it.
 #include <cmath>
 #include <limits>
 
@@ -56,8 +57,8 @@ void test_vectors_of_any_length_give_unit_directions(void) {
   TEST_ASSERT_TRUE(tv::gravity_prior(up, up, 1e-300).sigma_rad > 1e-9);
 }
 
-// The cost is |R down0 - down1|^2 / (2 sigma^2) in units of (scale / noise)^2; half its slope times
-// scale^2 is the gradient.
+// The cost is |R down0 - down1|^2 / (2 sigma^2) in units of (scale / noise)^2; the gradient is half
+// the cost's derivative times scale^2.
 void test_gradient_follows_differences_of_the_cost(void) {
   tv::Random random = tv::random_seeded(21);
   constexpr double kStep = 1e-6, kNoise = 0.4, kScale = 1.5;
@@ -81,7 +82,7 @@ void test_gradient_follows_differences_of_the_cost(void) {
   }
 }
 
-// The matrix is J'J of the residual R down0 - down1, by differences.
+// The matrix is J'J of the residual R down0 - down1, with J by differences.
 void test_matrix_follows_differences_of_the_residual(void) {
   tv::Random random = tv::random_seeded(22);
   constexpr double kStep = 1e-6, kNoise = 0.4;
@@ -122,7 +123,7 @@ void test_rows_are_added_to_what_is_there(void) {
   for (int k = 0; k < 5; ++k) TEST_ASSERT_DOUBLE_WITHIN(1e-9, -k + alone.gradient[k], gradient[k]);
 }
 
-// A pose whose tilt is off by `angle` from what gravity says, and known to sigma_pose.
+// A pose whose tilt differs by `angle` from gravity's and has a standard deviation of sigma_pose.
 double weight_at(double angle, double sigma_pose) {
   tv::Random random = tv::random_seeded(24);
   const Pose pose = any_pose(&random);
@@ -142,7 +143,7 @@ void test_gravity_that_agrees_has_its_full_weight(void) {
   TEST_ASSERT_EQUAL_DOUBLE(1, weight_at(0, 0));
   TEST_ASSERT_EQUAL_DOUBLE(1, weight_at(3.0 * deviation, 0));
   TEST_ASSERT_TRUE(weight_at(3.1 * deviation, 0) < 1);
-  // A pose that is not well known does not contradict it.
+  // A pose with a large standard deviation does not contradict gravity.
   TEST_ASSERT_EQUAL_DOUBLE(1, weight_at(0.5, 0.2));
 }
 
@@ -157,13 +158,14 @@ void test_gravity_that_disagrees_pulls_less_the_farther_it_is(void) {
   }
   const double chord = 2 * std::sin(0.1 / 2), z_sq = chord * chord / (2 * kSigma * kSigma);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, (9.21 / z_sq) * (9.21 / z_sq), weight_at(0.1, 0));
-  TEST_ASSERT_TRUE(weight_at(tv::kPi, 0) < 1e-4);  // exactly opposite, too
+  // the weight is also small for exactly opposite directions
+  TEST_ASSERT_TRUE(weight_at(tv::kPi, 0) < 1e-4);
   const double down[3] = {0, 0, 1}, up[3] = {0, 0, -1}, covariance[25] = {};
   const GravityPrior opposite = tv::gravity_prior(down, up, kSigma);
   TEST_ASSERT_TRUE(tv::gravity_weight(opposite, Mat3::Identity(), covariance) < 1e-4);
 }
 
-// The sum of the informations, by the inverse of the inverse.
+// Reference: the inverse of the summed informations, each the inverse of its covariance.
 void test_information_of_gravity_is_added_to_that_of_the_points(void) {
   using Matrix5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
   tv::Random random = tv::random_seeded(26);
@@ -174,7 +176,8 @@ void test_information_of_gravity_is_added_to_that_of_the_points(void) {
     Matrix5 C;
     for (int k = 0; k < 25; ++k) C(k / 5, k % 5) = 2 * kSigma * uniform(&random, -1, 1);
     C = (C * C.transpose() + 1e-6 * Matrix5::Identity()).eval();
-    const Rows rows = rows_at(prior, pose.R, 1, 1);  // 1: J'J over the variance itself
+    // scale and noise are 1: J'J over gravity's variance
+    const Rows rows = rows_at(prior, pose.R, 1, 1);
     Matrix5 information = C.inverse();
     int slot = 0;
     for (int p = 0; p < 5; ++p) {
@@ -195,7 +198,7 @@ void test_information_of_gravity_is_added_to_that_of_the_points(void) {
   }
 }
 
-// The minimum of the sum of both squared distances, by its gradient.
+// The estimate must be the minimum of the sum of both squared distances: its gradient is zero.
 void test_a_pose_with_a_covariance_moves_to_where_both_agree_best(void) {
   using Vector5 = Eigen::Matrix<double, 5, 1>;
   using Matrix5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
@@ -203,7 +206,7 @@ void test_a_pose_with_a_covariance_moves_to_where_both_agree_best(void) {
   for (int trial = 0; trial < 300; ++trial) {
     const Pose pose = any_pose(&random);
     const Vec3 down0 = scene::direction(&random);
-    // A small disagreement: to first order all is linear.
+    // The disagreement is small, so that all is linear to first order.
     const Vec3 down1 = tv::rotation_about(scene::direction(&random), 1e-4) * (pose.R * down0);
     GravityPrior prior = tv::gravity_prior(down0.data(), down1.data(), kSigma);
     prior.weight = uniform(&random, 0.1, 1);
@@ -214,7 +217,7 @@ void test_a_pose_with_a_covariance_moves_to_where_both_agree_best(void) {
     for (int k = 0; k < 25; ++k) covariance[k] = expected[k] = C(k / 5, k % 5);
     Pose moved = pose;
     tv::add_gravity(prior, &moved, covariance);
-    // The step taken, in the parameters of the pose it started from.
+    // The step that was taken, in the parameters of the pose before it.
     const Mat3 turn = moved.R * pose.R.transpose();
     Vec3 b1, b2, c1, c2;
     tv::tangent_basis(pose.t, &b1, &b2);
@@ -227,7 +230,7 @@ void test_a_pose_with_a_covariance_moves_to_where_both_agree_best(void) {
     const double size = gradient.norm();
     for (int p = 0; p < 5; ++p) gradient[p] += rows.gradient[p];
     TEST_ASSERT_TRUE(gradient.norm() < 1e-3 * size);
-    // The covariance is that of the sum, in the new basis.
+    // The covariance must be that of the sum, in the basis at the new pose.
     tv::add_gravity_information(prior, pose.R, expected);
     Matrix5 basis = Matrix5::Identity();
     basis.block<2, 2>(3, 3) << c1.dot(b1), c1.dot(b2), c2.dot(b1), c2.dot(b2);

@@ -1,5 +1,5 @@
-/* Guided matching against a reading of match.h that looks at all pairs, through a pinhole, a
-   Brown-Conrady and a fisheye lens and without cameras. */
+/* Guided matching compared with a direct implementation of match.h's definition that looks at
+   all pairs, through a pinhole, a Brown-Conrady and a fisheye lens and without cameras. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@ static double random_double(uint64_t *state, double low, double high) {
   return low + (high - low) * random_unit(state);
 }
 
-/* x1 = R x0 + t with R a turn by 0.2 about y. */
+/* R and t of x1 = R x0 + t; R turns by 0.2 rad about y. */
 static const double rotation[9] = {0.9800665778412416,   0, 0.19866933079506122, 0, 1, 0,
                                    -0.19866933079506122, 0, 0.9800665778412416};
 static const double translation[3] = {-0.8, 0.36, 0.48};
@@ -77,7 +77,7 @@ static void set_pixel(tv_keypoint *k, double x, double y) {
   k->size = 4;
 }
 
-/* Points in front of both cameras, seen by both; keypoint k of both images is point k. */
+/* Points in front of both cameras that both see; keypoint k of each image is point k. */
 static void make_scene(uint64_t *state, const tv_camera *camera0, const tv_camera *camera1,
                        int count) {
   int k = 0, r;
@@ -238,7 +238,7 @@ static problem make_problem(const tv_camera *camera0, const tv_camera *camera1, 
   return p;
 }
 
-/* Descriptors of point k in both images, `noise` apart at most. */
+/* Descriptors of point k in both images; they differ by at most `noise` in each byte. */
 static void fill_descriptors(uint64_t *state, int noise) {
   int k;
   random_bytes(state, descriptors0, sizeof descriptors0);
@@ -262,13 +262,14 @@ static void test_matches_equal_the_definition_and_swap_with_the_views(void) {
       int k;
       make_scene(&state, &camera0, &camera1, MAX_POINTS);
       fill_descriptors(&state, 12);
-      if (round % 2 == 1) { /* few values: ties everywhere */
+      if (round % 2 == 1) { /* few values, so that many distances are equal */
         for (k = 0; k < (int)sizeof descriptors0; ++k) {
           descriptors0[k] = (uint8_t)(k % SIZE < 4 ? descriptors0[k] & 1 : 0);
           descriptors1[k] = (uint8_t)(k % SIZE < 4 ? descriptors1[k] & 1 : 0);
         }
       }
-      for (k = 0; k < MAX_POINTS; k += 3) { /* some anywhere, some outside the lens */
+      /* a third lie anywhere, some of them outside the lens's valid region */
+      for (k = 0; k < MAX_POINTS; k += 3) {
         set_pixel(&keypoints1[k], random_double(&state, -900, 1500), random_double(&state, 0, 480));
       }
       p.num0 = random_int(&state, 0, MAX_POINTS);
@@ -312,7 +313,8 @@ static void test_without_cameras_the_matrix_is_of_pixels(void) {
   TEST_ASSERT_EQUAL_INT(MAX_POINTS, check(&p));
 }
 
-/* Points in groups that look the same: the whole image holds rivals, a line does not. */
+/* Points in groups that look alike: over the whole image a descriptor has rivals, along an
+   epipolar line it has none. */
 static void test_repeated_structure_is_matched_along_the_lines(void) {
   const tv_camera camera0 = make_camera(TV_CAMERA_KANNALA_BRANDT);
   const tv_camera camera1 = make_camera(TV_CAMERA_BROWN_CONRADY);
@@ -340,8 +342,8 @@ static void test_repeated_structure_is_matched_along_the_lines(void) {
   TEST_ASSERT_TRUE(count - right < right / 10);
 }
 
-/* Sideways: the lines are the rows. Two keypoints of image 1 lie in the band of the only one of
-   image 0, one of them 3 pixels beside the other. */
+/* For a sideways motion the epipolar lines are the rows. Two keypoints of image 1 lie in the
+   band of image 0's only keypoint, one of them 3 pixels off the line. */
 static void test_what_lies_beside_the_nearest_is_no_rival(void) {
   const tv_camera camera = make_camera(TV_CAMERA_PINHOLE);
   const double E[9] = {0, 0, 0, 0, 0, -1, 0, 1, 0};
@@ -384,8 +386,9 @@ static void test_a_keypoint_outside_the_lens_is_not_matched(void) {
   tv_camera camera = make_camera(TV_CAMERA_BROWN_CONRADY);
   const double E[9] = {0, 0, 0, 0, 0, -1, 0, 1, 0};
   problem p;
-  camera.k[1] = camera.k[2] = camera.k[3] = 0; /* folds at 520 pixels from the middle */
-  camera.cy = 0; /* both on the line y = 0, whatever their ray's length */
+  /* the polynomial turns back at 520 pixels from the centre */
+  camera.k[1] = camera.k[2] = camera.k[3] = 0;
+  camera.cy = 0; /* both pixels lie on the same epipolar line, the row y = 0 */
   p = make_problem(&camera, &camera, E);
   memset(descriptors0, 0, sizeof descriptors0);
   memset(descriptors1, 0, sizeof descriptors1);

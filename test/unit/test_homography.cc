@@ -1,4 +1,4 @@
-// Homographies of four points, their two motions, and rotations of two points.
+// Homographies from four points and their two motions, and rotations from two points.
 #include <cmath>
 
 #include "geometry/homography_4pt.h"
@@ -76,7 +76,7 @@ void test_one_of_the_two_motions_is_the_true_one(void) {
     TEST_ASSERT_EQUAL_INT(2, count);
     double best = 10;
     for (int k = 0; k < 2; ++k) {
-      // Both explain H: R + t n' / d.
+      // Both motions explain H: it is R + t n' / d for each.
       const Mat3 rebuilt = poses[k].pose.R + poses[k].baseline_over_depth * poses[k].pose.t *
                                                  poses[k].normal.transpose();
       TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0, (rebuilt - p.H).norm());

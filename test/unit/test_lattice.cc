@@ -1,4 +1,4 @@
-// Points on a lattice are recognised, random points are not.
+// A lattice of points is recognised; random points are not taken for one.
 #include "robust/lattice.h"
 #include "support/scene.h"
 

@@ -1,5 +1,5 @@
-/* Mutual nearest neighbours with a ratio test in both directions, against a reading of match.h that
-   sorts all distances. */
+/* Mutual nearest neighbours with a ratio test in both directions, compared with a direct
+   implementation of match.h's definition that sorts all distances. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -35,7 +35,8 @@ static int64_t distance_sq(const uint8_t *a, const uint8_t *b) {
   return sum;
 }
 
-/* The nearest row, the lowest of equals, and the ratio to the second; 1 without a second. */
+/* The nearest row, of equal ones that with the lowest index, and the ratio to the second
+   nearest; the ratio is 1 without a second row. */
 static int nearest(const uint8_t *query, const uint8_t *rows, int num_rows, int64_t *best,
                    double *ratio) {
   int64_t second = -1;
@@ -111,15 +112,15 @@ static void fill(uint64_t *state, int kind) {
   random_bytes(state, descriptors0, sizeof descriptors0);
   random_bytes(state, descriptors1, sizeof descriptors1);
   for (k = 0; k < (int)sizeof descriptors0; ++k) {
-    if (kind == 1) { /* few values: ties everywhere */
+    if (kind == 1) { /* few values, so that many distances are equal */
       descriptors0[k] = (uint8_t)(k % SIZE < 4 ? descriptors0[k] & 1 : 0);
       descriptors1[k] = (uint8_t)(k % SIZE < 4 ? descriptors1[k] & 1 : 0);
-    } else if (kind == 2) { /* most of image 1 is image 0 with some noise */
+    } else if (kind == 2) { /* most rows of image 1 are rows of image 0 with noise */
       const int noise = random_int(state, -9, 9) + descriptors0[k];
       if (k / SIZE % 5 != 0) {
         descriptors1[k] = (uint8_t)(noise < 0 ? 0 : noise > 255 ? 255 : noise);
       }
-    } else if (kind == 3) { /* the ends of the range */
+    } else if (kind == 3) { /* the extremes 0 and 255 */
       descriptors0[k] = descriptors0[k] < 128 ? 0 : 255;
       descriptors1[k] = descriptors1[k] < 200 ? 0 : 255;
     }
@@ -140,7 +141,7 @@ static void test_matches_equal_the_definition_and_swap_with_the_images(void) {
   }
 }
 
-/* More rows, then more columns, than any kernel set takes at once. */
+/* First more rows, then more columns, than any kernel set handles at a time. */
 static void test_many_descriptors_match_by_the_definition(void) {
   uint64_t state = 15;
   int kind;
@@ -180,7 +181,8 @@ static void test_equal_distances_are_rejected(void) {
   uint64_t state = 13;
   fill(&state, 0);
   memcpy(descriptors1, descriptors0, sizeof descriptors0);
-  memcpy(descriptors1 + SIZE, descriptors1, SIZE); /* rows 0 and 1 are as near to query 0 */
+  /* rows 0 and 1 have the same distance from query 0 */
+  memcpy(descriptors1 + SIZE, descriptors1, SIZE);
   TEST_ASSERT_EQUAL_INT(8, run(&contexts[0], descriptors0, 10, descriptors1, 10, 1.0f, found));
   TEST_ASSERT_EQUAL_INT(2, found[0].idx0);
 }

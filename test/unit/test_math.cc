@@ -1,5 +1,5 @@
-// Elementary functions against long double libm (64 or more bits on x86 and aarch64), at special
-// values, and across the seams of their intervals.
+// Elementary functions compared with long double libm (64 or more bits on x86 and aarch64): at
+// random and special values, and across the boundaries of their intervals.
 #include <cfloat>
 #include <cmath>
 #include <cstdio>
@@ -17,11 +17,12 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 const double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr uint64_t kSeed = 20241;
-// Where long double is double, the reference itself is half an ulp off and more.
+// Where long double is only double, the reference itself may be wrong by half an ulp and more.
 constexpr double kReferenceUlp = LDBL_MANT_DIG > 53 ? 0.0 : 1.0;
 constexpr int kSamples = 200000;
 
-bool is_nan(double x) { return x != x; }  // unity.h takes the standard's name
+// std::isnan is not usable here: unity.h defines that name as a macro
+bool is_nan(double x) { return x != x; }
 
 double sin_of(double x) {
   double s, c;

@@ -1,4 +1,4 @@
-// Dominant orientations and descriptors under known rotations of smooth patterns.
+// Dominant orientations and descriptors of smooth patterns that are rotated by known angles.
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,8 +21,8 @@ uint8_t pixels[kSide * kSide];
 alignas(64) uint8_t arena_memory[1 << 20];
 const tv_keypoint middle{40.0f, 40.0f, 4.0f, 0.0f, 1.0f, 0};
 
-// Fills the image with pattern(u, v), where (u, v) is the pixel in a frame turned by `angle`
-// clockwise as seen (from x towards y) around the middle.
+// Fills the image with pattern(u, v). (u, v) is the pixel's position in a frame around the middle
+// that is turned by `angle`, clockwise as seen (from x towards y).
 template <typename Pattern>
 void render(double angle, Pattern pattern) {
   const double c = std::cos(angle), s = std::sin(angle);
@@ -35,13 +35,13 @@ void render(double angle, Pattern pattern) {
   }
 }
 
-// Brightness rises along u: the gradient's direction is the frame's angle.
+// Brightness rises along u, so the gradient's direction is the frame's angle.
 double ramp(double u, double) { return 128 + 100 * std::tanh(u / 6); }
 
-// The same with directions spread evenly to both sides, as real patches have them.
+// As `ramp`, with gradient directions spread evenly to both sides as in real patches.
 double bent_ramp(double u, double v) { return 128 + 100 * std::tanh((u - 0.03 * v * v) / 6); }
 
-// Half the patch rises along u, half along v, `share` as steeply.
+// One half of the patch rises along u; the other along v, `share` times as steeply.
 double share;
 double two_ramps(double u, double v) { return 120 + 6 * std::fmax(u, share * v); }
 
@@ -58,8 +58,9 @@ int angles_of(const tv_keypoint& keypoint, float angles_rad[2]) {
 
 double difference(double a, double b) { return std::fabs(std::remainder(a - b, 2 * kPi)); }
 
-// Bins are 10 degrees wide; a sample is shared between two, and a parabola finds the peak between
-// them: exact on a bin's middle and halfway between two, a fraction of a degree off elsewhere.
+// Bins are 10 degrees wide, a sample is shared between two bins, and a parabola finds the peak
+// between them. The result is exact in a bin's middle and halfway between two, and wrong by a
+// fraction of a degree elsewhere.
 void check_rotation(double (*pattern)(double, double), double max_mean_degrees,
                     double max_degrees) {
   double sum = 0.0, worst = 0.0;
@@ -86,10 +87,11 @@ void check_rotation(double (*pattern)(double, double), double max_mean_degrees,
 
 void test_the_angle_follows_the_rotation() {
   check_rotation(ramp, 0.5, 1.0);
-  check_rotation(bent_ramp, 0.4, 2.0);  // the bend leans the peak
+  check_rotation(bent_ramp, 0.4, 2.0);  // the bend shifts the peak
 }
 
-// x to the right is 0, y downwards a quarter turn: clockwise as seen.
+// An angle of 0 points along x, to the right; a quarter turn along y, downwards. So angles grow
+// clockwise as seen.
 void test_the_sign_is_clockwise_as_seen() {
   float angles_rad[2];
   render(0, [](double u, double) { return 100 + 3 * u; });  // brighter to the right
@@ -162,12 +164,14 @@ void test_a_descriptor_turns_with_its_angle() {
   }
 }
 
-// UBC order: direction 0 points along x, direction 2 upwards as seen; cells row by row.
+// The order of UBC's descriptors: direction 0 points along x, direction 2 upwards as seen; cells
+// row by row.
 void test_the_order_is_ubcs() {
   uint8_t descriptor[TV_DESCRIPTOR_BYTES];
   const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
   for (int direction = 0; direction < 8; ++direction) {
-    // Brighter along `direction`, counter-clockwise as seen, in the lower right quarter only.
+    // Brightness rises along `direction`, counter-clockwise as seen, in the lower right quarter
+    // only.
     const double angle = direction * kPi / 4;
     render(0, [angle](double u, double v) {
       return u < 1 || v < 1
@@ -181,11 +185,12 @@ void test_the_order_is_ubcs() {
     for (int k = 0; k < 8; ++k) {
       TEST_ASSERT_TRUE(k == direction || last_cell[k] < last_cell[direction]);
     }
-    for (int k = 0; k < 8; ++k) TEST_ASSERT_EQUAL_INT(0, descriptor[k]);  // the first cell is flat
+    // the first cell has no gradient
+    for (int k = 0; k < 8; ++k) TEST_ASSERT_EQUAL_INT(0, descriptor[k]);
   }
 }
 
-// Any finite keypoint is described, and reads nothing outside the image.
+// Any finite keypoint gets a descriptor, and nothing outside the image is read.
 void test_points_outside_and_of_any_size_are_described() {
   uint64_t seed = 41;
   render(0.3, texture);

@@ -1,4 +1,5 @@
-// The pyramid's levels against area averaging in long double, its coordinates, and the octaves.
+// The pyramid's levels compared with area averaging in long double, its coordinates, and the
+// octaves.
 
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +18,7 @@ constexpr int kMaxSide = 260;
 uint8_t pixels[kMaxSide * kMaxSide];
 alignas(64) uint8_t arena_memory[1 << 20];
 
-// The average over [x0, x1) x [y0, y1) of the image as squares of one grey each.
+// The average of the image over [x0, x1) x [y0, y1), each pixel being a square of one grey level.
 long double area_average(const tv::Level& image, long double x0, long double y0, long double x1,
                          long double y1) {
   long double sum = 0;
@@ -39,9 +40,9 @@ tv::Level noise_image(uint64_t* seed, int width, int height, int stride) {
   return tv::Level{pixels, width, height, stride, 1.0};
 }
 
-// Shares are of 256 along each axis. A share is off by at most 1/256 and the shares sum to 1, so an
-// axis adds at most 255/256 (three pixels: one share is rounded by 0.5/256 twice); the rounding of
-// the result adds 0.5.
+// The weights are multiples of 1/256 along each axis. The weights of a pixel sum to 1 and each is
+// wrong by at most 1/256, so an axis adds at most 255/256 (with three pixels one weight is rounded
+// by 0.5/256 twice); rounding the result adds 0.5.
 constexpr double kMaxAverageError = 2 * 255.0 / 256.0 + 0.5;
 
 void check_level(const tvk_table& kernels, uint64_t* seed, int width, int height, double factor) {
@@ -71,7 +72,7 @@ void check_level(const tvk_table& kernels, uint64_t* seed, int width, int height
       sum_error += error;
     }
   }
-  // No drift but that of rounding halves up: 3/16 for quarters of black and white.
+  // The mean drifts only by the rounding of halves upwards: 3/16 for quarters of black and white.
   TEST_ASSERT_DOUBLE_WITHIN(0.2, 0.0, sum_error / (next.width * next.height));
 }
 
@@ -90,7 +91,7 @@ void test_levels_are_area_averages() {
 }
 
 void test_the_largest_factor_reads_nothing_outside() {
-  // Sizes that the factor divides exactly end on the last pixel's far edge.
+  // Where the factor divides the size exactly, the last pixel ends at the image's edge.
   uint64_t seed = 22;
   for (int side = 48; side <= 120; side += 3) {
     for (float factor : {1.125f, 1.5f, 1.5000001f, 1.75f, 2.0f}) {
@@ -117,9 +118,9 @@ void test_a_constant_image_stays_constant() {
   }
 }
 
-// Bilinear at positions clamped to the image, less 128, times 127^2 / 256. Fractions are known to
-// 1/128 pixel along each axis, which two black and white neighbours turn into 255 / 128 each; the
-// last shift leaves out up to 1.
+// Bilinear interpolation at positions clamped to the image, less 128, times 127^2 / 256. Fractions
+// are multiples of 1/128 pixel along each axis, an error of 255 / 128 each between a black and a
+// white pixel; the last shift truncates by up to 1.
 void test_patches_are_bilinear_samples() {
   constexpr double kUnit = 127.0 * 127.0 / 256.0;
   constexpr double kMaxError = 2 * 255 / 128.0 * kUnit + 1;
@@ -164,12 +165,14 @@ void test_coordinates_go_to_a_level_and_back() {
     for (double x : {-0.5, 0.0, 17.25, 16383.5}) {
       TEST_ASSERT_DOUBLE_WITHIN(1e-10, x, tv::to_level(level, tv::to_full(level, x)));
     }
-    // The image's corner, half a pixel before the first centre, is the corner of every level.
+    // The image's corner, half a pixel before the first pixel's centre, is the corner of every
+    // level too.
     TEST_ASSERT_EQUAL_DOUBLE(-0.5, tv::to_full(level, -0.5));
   }
 }
 
-// A horizontal ramp keeps its value at the place that to_full names: levels are not shifted.
+// A horizontal ramp has the same value at the position that to_full returns, so levels are not
+// shifted.
 void test_a_ramp_keeps_its_place_on_every_level() {
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 250; ++x) pixels[y * 250 + x] = static_cast<uint8_t>(x);
@@ -181,7 +184,8 @@ void test_a_ramp_keeps_its_place_on_every_level() {
     double tolerance = 0.0;
     for (int k = 0; tv::next_level(*tvk_select(TV_KERNELS_C), level, factor, k, buffers, &level);
          ++k) {
-      // Neighbours differ by `scale` greys; shares are off by 1/256; each level rounds by 0.5.
+      // Neighbours differ by `scale` grey levels, weights are wrong by 1/256, and each level rounds
+      // by 0.5.
       tolerance += 0.5 + level.scale * 2 / 256;
       for (int x = 0; x < level.width; ++x) {
         TEST_ASSERT_DOUBLE_WITHIN(tolerance, tv::to_full(level, x), level.data[x]);

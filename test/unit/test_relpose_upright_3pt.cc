@@ -1,4 +1,4 @@
-// Three-point solver with gravity, held against its definition.
+// The three-point solver with gravity, checked against its definition.
 #include <cmath>
 
 #include "geometry/relpose_upright_3pt.h"
@@ -27,7 +27,7 @@ Sample make_sample(tv::Random* random, const Mat3& R, const Vec3& t, const Vec3&
   for (int k = 0; k < 3; ++k) {
     const Vec3 point(uniform(random, -2, 2), uniform(random, -2, 2), uniform(random, 2, 8));
     s.rays0[k] = point.normalized();
-    s.rays1[k] = R * point + t;  // of any length
+    s.rays1[k] = R * point + t;  // rays need not have unit length
   }
   s.down0 = down0;
   s.down1 = (R * down0).normalized();
@@ -72,7 +72,7 @@ void test_level_frames_have_gravity_along_z(void) {
   tv::Random random = tv::random_seeded(kSeed);
   for (int trial = 0; trial < 1000; ++trial) {
     Vec3 down = scene::direction(&random);
-    if (trial < 6) {  // along an axis, both ways
+    if (trial < 6) {  // a translation along an axis, in both directions
       down = Vec3::Zero();
       down[trial / 2] = trial % 2 == 0 ? 1 : -1;
     }
@@ -102,7 +102,7 @@ void test_the_true_pose_is_among_the_solutions_of_random_problems(void) {
     coarse += error > 1e-9;
   }
   TEST_ASSERT_TRUE(worst < 1e-12);
-  // Two roots that nearly meet cost half the digits.
+  // Two roots that are nearly equal lose half the digits.
   TEST_ASSERT_LESS_OR_EQUAL_INT(2, missed);
   TEST_ASSERT_LESS_OR_EQUAL_INT(20, coarse);
   TEST_ASSERT_GREATER_THAN_INT(3 * kTrials, total);
@@ -128,7 +128,7 @@ void test_matches_that_no_motion_made_satisfy_the_constraints(void) {
   TEST_ASSERT_GREATER_THAN_INT(10000, total);
 }
 
-// Half a turn is where the tangent of half the yaw is infinite.
+// At half a turn the tangent of half the yaw is infinite.
 void test_quarter_turns_and_half_turns_of_yaw_are_found(void) {
   tv::Random random = tv::random_seeded(kSeed + 3);
   for (int quarter = 0; quarter < 4; ++quarter) {
@@ -166,13 +166,15 @@ void test_degenerate_samples_give_finite_poses_or_none(void) {
       const Mat3 R = tv::rotation_about(down, uniform(&random, -3, 3));
       Sample s = make_sample(&random, R, scene::direction(&random), down);
       for (int k = 0; k < 3; ++k) {
-        if (kind == 0) s.rays0[k] = s.rays0[0], s.rays1[k] = s.rays1[0];  // one match thrice
-        if (kind == 1) s.rays1[k] = R * s.rays0[k];                       // pure rotation
-        if (kind == 2) s.rays1[k] = s.rays0[k], s.down1 = s.down0;        // no motion
+        // three copies of one match
+        if (kind == 0) s.rays0[k] = s.rays0[0], s.rays1[k] = s.rays1[0];
+        if (kind == 1) s.rays1[k] = R * s.rays0[k];                 // pure rotation
+        if (kind == 2) s.rays1[k] = s.rays0[k], s.down1 = s.down0;  // no motion
         if (kind == 3) s.rays0[k] = s.rays1[k] = Vec3::Zero();
-        if (kind == 4) s.rays0[k] = s.down0;  // along gravity
+        if (kind == 4) s.rays0[k] = s.down0;  // rays along gravity
         if (kind == 5) s.rays0[k] = s.down0, s.rays1[k] = -s.down1;
-        if (kind == 6) s.rays0[k] = s.rays1[k] = Vec3(0.1 * k, 0.2 * k, 1);  // a line
+        // all rays of a view lie in one plane
+        if (kind == 6) s.rays0[k] = s.rays1[k] = Vec3(0.1 * k, 0.2 * k, 1);
         if (kind == 7 && k == 2) s.rays0[2] = s.rays0[1], s.rays1[2] = s.rays1[1];
         if (kind == 8) s.rays1[k][k] = nan;
       }

@@ -1,5 +1,5 @@
-// Residuals in pixels: against the textbook, against each other, and their slopes against
-// differences.
+// Residuals in pixels, compared with textbook formulas and with each other; their derivatives
+// compared with differences.
 #include <cmath>
 #include <cstdlib>
 
@@ -26,7 +26,7 @@ alignas(64) uint8_t arena_memory[1 << 21];
 scene::Scene pair;
 tv::Matches matches;
 
-// Matches of a scene as the library holds them.
+// The matches of a scene, prepared as the library does it.
 void prepare(const scene::Options& options) {
   scene::make(options, &pair);
   tv::TwoViewProblem problem{};
@@ -72,7 +72,7 @@ void test_sampson_of_a_pinhole_is_the_textbooks(void) {
   }
 }
 
-// Through a lens: c's slopes by pixel, from central differences of the camera model itself.
+// c's derivatives by pixel, through the lens, from central differences of the camera model itself.
 void test_sampson_is_in_pixels_of_the_image_for_every_lens(void) {
   const tv_camera lenses[3] = {scene::pinhole(), scene::distorted(), scene::fisheye()};
   for (int a = 0; a < 3; ++a) {
@@ -83,7 +83,7 @@ void test_sampson_is_in_pixels_of_the_image_for_every_lens(void) {
     TEST_ASSERT_TRUE(matches.pairs.num > 150);
     for (int i = 0; i < matches.pairs.num; ++i) {
       const int k = matches.order[i];
-      if (!pair.inlier[k]) continue;  // far off, the scale of the rays matters
+      if (!pair.inlier[k]) continue;  // far from the model the scale of the rays matters
       double gradient_sq = 0, c = 0;
       for (int v = 0; v < 2; ++v) {
         for (int d = 0; d < 2; ++d) {
@@ -201,7 +201,7 @@ void test_matrices_that_say_nothing_cost_the_most(void) {
 
 void test_transfer_residual_of_a_pinhole_is_the_textbooks(void) {
   prepare(with_cameras(scene::pinhole(), scene::pinhole(), 32));
-  const Mat3 H = pair.R;  // any matrix that keeps points in front
+  const Mat3 H = pair.R;  // H may be any matrix that keeps the points in front of the camera
   const Mat3 Ki = inverse_intrinsics(scene::pinhole());
   const Mat3 G = Ki.inverse() * H * Ki;
   for (int i = 0; i < matches.pairs.num; ++i) {
@@ -221,8 +221,8 @@ void test_transfer_residual_of_a_pinhole_is_the_textbooks(void) {
   }
 }
 
-// gradient = half the slope of scale^2 * cost: compared along each parameter by central
-// differences.
+// The gradient is half the derivative of scale^2 * cost; it is compared along each parameter with
+// central differences.
 template <typename Model>
 void check_gradient(const Model& model, const RobustLoss& loss, const double* steps) {
   constexpr int P = Model::kParameters;
@@ -277,7 +277,8 @@ void test_slopes_of_a_rotation_agree_with_differences(void) {
     scene::Options options = with_cameras(lenses[a], lenses[1 - a], 60 + a);
     options.kind = scene::Kind::kRotation;
     options.inlier_share = 1;
-    options.noise_px = 0;  // the weights (I + DD')^-1 count as constant: their slope times d^2
+    // the weights (I + DD')^-1 are taken as constant, which is exact at residual 0
+    options.noise_px = 0;
     prepare(options);
     const Mat3 R = tv::rotation_step(Vec3(1e-4, -2e-4, 1e-4)) * pair.R;
     check_gradient(tv::RotationModel{R}, RobustLoss{Loss::kTruncated, 1e4}, kSteps);

@@ -1,4 +1,5 @@
-// The robust loop's parts: sampler, stop, preparation of matches, chance, covariance.
+// Parts of the robust loop: sampler, stopping rule, preparation of matches, the test against
+// chance, covariance.
 #include <cmath>
 #include <limits>
 
@@ -46,7 +47,8 @@ void test_uniform_samples_draw_each_match_equally_often(void) {
     tv::draw_sample(sampler, sample);
     for (int32_t i : sample) ++counts[i];
   }
-  // Expected 10000 each; the deviation is below 100, five of them below 500.
+  // Each index is expected 10000 times; the standard deviation is below 100, so 500 is five of
+  // them.
   for (int count : counts) TEST_ASSERT_INT_WITHIN(500, kDraws / 4, count);
 }
 
@@ -57,7 +59,7 @@ void test_progressive_samples_start_with_the_surest_and_end_with_all(void) {
   for (int k = 0; k < static_cast<int>(3 * kNum * tv::kProsacSamples); ++k) {
     int32_t sample[5];
     tv::draw_sample(sampler, sample);
-    if (k % 2 == 1) {  // every other one is uniform
+    if (k % 2 == 1) {  // half of the samples are uniform
       expect_distinct(sample, 5, kNum);
       continue;
     }
@@ -75,7 +77,7 @@ void test_progressive_samples_start_with_the_surest_and_end_with_all(void) {
 }
 
 void test_samples_needed_follow_the_formula(void) {
-  // Half of 1000: a sample of five is good with about 2^-5.
+  // Half of 1000 matches are true: a sample of five is all true with a probability of about 2^-5.
   TEST_ASSERT_INT_WITHIN(5, 294, tv::samples_needed(0.9999, 500, 1000, 5, 100000));
   TEST_ASSERT_EQUAL_INT(1, tv::samples_needed(0.99, 100, 100, 5, 1000));
   TEST_ASSERT_EQUAL_INT(1000, tv::samples_needed(0.99, 4, 100, 5, 1000));
@@ -158,7 +160,7 @@ void test_covariance_of_the_inverse_of_the_inverse_is_itself(void) {
   }
 }
 
-// The map of parameters itself, by a small step.
+// Reference: the Jacobian of the map from the pose's parameters to the inverse's, by a small step.
 void test_covariance_of_the_inverse_follows_a_step_of_the_pose(void) {
   tv::Random random = tv::random_seeded(13);
   const tv::Pose pose{tv::rotation_about(scene::direction(&random), 0.7),
@@ -176,7 +178,8 @@ void test_covariance_of_the_inverse_follows_a_step_of_the_pose(void) {
     if (p < 3) w[p] = kStep;
     const Mat3 R = tv::rotation_step(w) * pose.R;
     const Vec3 t = (pose.t + (p == 3 ? kStep : 0) * b1 + (p == 4 ? kStep : 0) * b2).normalized();
-    const Mat3 turn = R.transpose() * pose.R;  // of the inverse, against its old rotation
+    // the inverse's rotation after the step, relative to before
+    const Mat3 turn = R.transpose() * pose.R;
     const Vec3 moved = -(R.transpose() * t);
     step[0] = 0.5 * (turn(2, 1) - turn(1, 2)) / kStep;
     step[1] = 0.5 * (turn(0, 2) - turn(2, 0)) / kStep;

@@ -1,5 +1,6 @@
-/* The sets that kernels/select.c finds by its own cpuid and xgetbv, against the compiler's reading
-   of the CPU; under an emulator (`select SET`) also against what the CPU is known to have. */
+/* The sets that kernels/select.c finds by its own cpuid and xgetbv, compared with the compiler's
+   __builtin_cpu_supports; under an emulator (`select SET`) also with the set that the emulated CPU
+   is known to have. */
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,7 +15,7 @@ void tearDown(void) {}
 #if defined(__x86_64__)
 static int32_t fastest_known = TV_KERNELS_AUTO;
 
-/* A set's instructions are those that lib/CMakeLists.txt compiles it with. */
+/* A set requires the instructions that lib/CMakeLists.txt compiles it with. */
 static int32_t has_instructions_of(int32_t set) {
   if (set == TV_KERNELS_AVX2) return __builtin_cpu_supports("avx2") != 0;
   if (set == TV_KERNELS_AVX512) {
@@ -47,7 +48,7 @@ static void test_the_fastest_is_that_of_the_cpu_named(void) {
 int main(int argc, char **argv) {
   UNITY_BEGIN();
   RUN_TEST(test_the_sets_are_those_that_the_compiler_finds);
-  if (argc == 2) { /* the CPU that is emulated is known to the caller */
+  if (argc == 2) { /* the caller names the set of the CPU that is emulated */
     fastest_known = atoi(argv[1]);
     RUN_TEST(test_the_fastest_is_that_of_the_cpu_named);
   }

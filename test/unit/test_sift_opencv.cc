@@ -1,4 +1,4 @@
-// Plain SIFT against OpenCV's at the same keypoints, angles, level and blur.
+// Plain SIFT compared with OpenCV's at the same keypoints, angles, level and blur.
 //
 // Our octave 0 is the image blurred by the 3x3 binomial, whose variance is 0.5 square pixels.
 // OpenCV takes an image to have a blur of 0.5 pixel already (variance 0.25) and adds up to `sigma`,
@@ -38,7 +38,8 @@ tv_image image_of(int view) {
   return tv_image{real.luma[view], real.width, real.height, real.width};
 }
 
-// Corners at integer positions, away from the border, where the two extend the image differently.
+// Corners at integer positions, away from the border, where the two libraries extend the image
+// differently.
 void find_keypoints(int view) {
   tv_feature_options options;
   memset(&options, 0, sizeof options);
@@ -76,7 +77,7 @@ void describe_with_opencv(int view) {
   std::vector<cv::KeyPoint> points;
   for (int k = 0; k < counts[view]; ++k) {
     const tv_keypoint& p = keypoints[view][k];
-    // OpenCV's angle is in degrees, clockwise as seen; octave 0, layer 0 is packed as 0.
+    // OpenCV's angle is in degrees, clockwise as seen; octave 0, layer 0 is encoded as 0.
     const float degrees = static_cast<float>(p.angle_rad * 180 / kPi);
     points.emplace_back(p.x, p.y, p.size, degrees < 0 ? degrees + 360 : degrees, 0.0f, 0, k);
   }
@@ -116,7 +117,7 @@ double median_cosine() {
   return cosines[n / 2];
 }
 
-// The matches that both descriptors give, as a share of those that the more generous one gives.
+// The number of matches common to both descriptors over the larger of the two numbers of matches.
 double match_agreement() {
   int found[2];
   for (int system = 0; system < 2; ++system) {

@@ -1,4 +1,4 @@
-// Sub-pixel positions: corners rendered at known places, symmetric ones among them.
+// Sub-pixel positions of corners that are rendered at known places, symmetric corners included.
 
 #include <string.h>
 #include <unity.h>
@@ -16,22 +16,22 @@ constexpr int kOversampling = 16;
 uint8_t pixels[kSide * kSide];
 const tv::Level level{pixels, kSide, kSide, kSide, 1.0};
 
-// Inside a wedge of the given opening (radians) whose tip is at the origin and whose axis is turned
-// by `turn`.
+// Whether a point lies inside a wedge with this opening (radians). The wedge's tip is at the
+// origin, and its axis is turned by `turn`.
 bool in_wedge(double x, double y, double turn, double opening) {
   const double along = x * std::cos(turn) + y * std::sin(turn);
   const double across = std::fabs(y * std::cos(turn) - x * std::sin(turn));
   return along > 0 && across < along * std::tan(opening / 2);
 }
 
-// Pixels are averages over their area, as a sensor's are, then blurred a little by the lens.
+// A pixel is the average over its area, as on a sensor, and then blurred slightly as by a lens.
 void render_wedge(double tip_x, double tip_y, double turn, double opening, int dark, int bright) {
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
       int inside = 0;
       for (int j = 0; j < kOversampling; ++j) {
         for (int i = 0; i < kOversampling; ++i) {
-          // Two pixels wide: the pixel and half of each neighbour.
+          // Averages over two pixels: the pixel and half of each neighbour.
           const double sx = x - 1 + 2 * (i + 0.5) / kOversampling;
           const double sy = y - 1 + 2 * (j + 0.5) / kOversampling;
           inside += in_wedge(sx - tip_x, sy - tip_y, turn, opening);
@@ -43,7 +43,8 @@ void render_wedge(double tip_x, double tip_y, double turn, double opening, int d
   }
 }
 
-// A round blob has its corner in its middle, whatever the segment test's bias on wedges.
+// A round blob has its corner in its middle; the segment test's bias on wedges does not matter
+// there.
 void render_blob(double centre_x, double centre_y, double sigma, int base, int height) {
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
@@ -62,7 +63,7 @@ int score_at(int x, int y, int arc) {
   return scores[x];
 }
 
-// The pixel of the highest score, the first of equals; false where there is no corner.
+// The pixel with the highest score, the first of equal ones; false where there is no corner.
 bool find_corner(int arc, int* best_x, int* best_y) {
   int best = 0;
   for (int y = 3; y < kSide - 3; ++y) {
@@ -99,13 +100,13 @@ void test_a_blobs_middle_is_found_below_a_pixel() {
     sum_integer += std::hypot(x - cx, y - cy);
     sum_refined += std::hypot(rx - cx, ry - cy);
   }
-  // A uniform position in a pixel lies 0.383 from its centre on average.
+  // A uniformly distributed position in a pixel is 0.383 from the pixel's centre on average.
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.383, sum_integer / kTrials);
   TEST_ASSERT_TRUE(sum_refined / kTrials <= 0.15);
 }
 
-// The segment test places a wedge's corner a little inside it, the same for all sub-pixel shifts:
-// what counts is that the position follows the shift.
+// The segment test places a wedge's corner a little inside the wedge, by the same amount at every
+// sub-pixel shift; so the test compares shifts.
 void test_a_wedge_that_moves_takes_its_corner_along() {
   uint64_t seed = 32;
   double sum_integer = 0, sum_refined = 0;

@@ -50,7 +50,7 @@ double uniform(tv::Random* random, double low, double high) {
   return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
 }
 
-// A sum of 4: near enough to a normal distribution of the given deviation.
+// Approximately normal with the given deviation: a sum of 4 uniform numbers.
 double noise(tv::Random* random, double sigma) {
   double sum = 0;
   for (int i = 0; i < 4; ++i) sum += uniform(random, -1, 1);
@@ -111,8 +111,9 @@ Vec3 linear_ls_by_qr(const tv_camera& camera0, const tv_camera& camera1, const M
   return A.colPivHouseholderQr().solve(b);
 }
 
-// (X, 1) spans the smallest singular vector of the same equations in (X, W), R a rotation and |t|
-// 1. Held against A itself: where the two smallest values are equal, so are all vectors between.
+// Checks that (X, 1) is the smallest singular vector of the same equations in (X, W), with R a
+// rotation and |t| 1. The check multiplies by A itself, since with two equal smallest values every
+// vector between their vectors is right.
 void expect_singular_vector(const tv_camera& camera0, const tv_camera& camera1, const Mat3& R,
                             const Vec3& t, const Vec2& pixel0, const Vec2& pixel1, double w0,
                             double w1, const tv_point& point) {
@@ -147,7 +148,7 @@ struct Scene {
   Vec3 t, point0, point1;
 };
 
-// A point in front of both cameras, at 2 to 10 baselines.
+// A point in front of both cameras, at a depth of 2 to 10 baselines.
 Scene random_scene(tv::Random* random) {
   Scene scene;
   scene.R =
@@ -239,7 +240,8 @@ void test_linear_ls_of_a_fisheye_equals_equations_on_the_viewing_sphere(void) {
     Vec3 ray0, ray1;
     TEST_ASSERT_TRUE(tv::unproject(camera, pixel0, &ray0, nullptr));
     TEST_ASSERT_TRUE(tv::unproject(camera, pixel1, &ray1, nullptr));
-    // Distances from the two lines: I - d d^T is the same for every basis of the tangent plane.
+    // The distances from the two lines; I - d d^T does not depend on the basis of the tangent
+    // plane.
     Eigen::Matrix<double, 6, 3> A;
     Eigen::Matrix<double, 6, 1> b;
     A << kIdentity - ray0 * ray0.transpose(), (kIdentity - ray1 * ray1.transpose()) * R;
@@ -270,7 +272,7 @@ void test_iterative_ls_is_the_fixed_point_of_its_weights(void) {
         linear_ls_by_qr(pinhole(), pinhole(), scene.R, scene.t, pixel0, pixel1, 1, 1);
     moved = std::max(moved, (linear - at).norm());
   }
-  TEST_ASSERT_TRUE(moved > 1e-5);  // the weights have done something
+  TEST_ASSERT_TRUE(moved > 1e-5);  // the weights have had an effect
 }
 
 void test_linear_eigen_is_the_smallest_singular_vector(void) {
@@ -281,7 +283,7 @@ void test_linear_eigen_is_the_smallest_singular_vector(void) {
   const Camera camera1 = tv::prepare_camera(other);
   for (int i = 0; i < 5000; ++i) {
     const Scene scene = random_scene(&random);
-    // Up to so much noise that the two smallest singular values are often near to each other.
+    // The noise goes up to values at which the two smallest singular values are often nearly equal.
     const double sigma = i % 3 == 0 ? 0.5 : i % 3 == 1 ? 5 : 100;
     const Vec2 pixel0 =
         seen(camera0, scene.point0) + Vec2(noise(&random, sigma), noise(&random, sigma));
@@ -370,7 +372,7 @@ void test_midpoint_equals_the_point_nearest_to_both_lines(void) {
     Vec3 ray0, ray1;
     TEST_ASSERT_TRUE(tv::unproject(camera, pixel0, &ray0, nullptr));
     TEST_ASSERT_TRUE(tv::unproject(camera, pixel1, &ray1, nullptr));
-    // Least squares of the distances to the lines: sum (I - d d^T) (X - c) = 0.
+    // The least sum of squared distances to the lines: sum (I - d d^T) (X - c) = 0.
     const Vec3 d1 = scene.R.transpose() * ray1;
     const Vec3 c1 = -(scene.R.transpose() * scene.t);
     const Mat3 off0 = kIdentity - ray0 * ray0.transpose();
@@ -444,7 +446,7 @@ void test_rays_that_meet_behind_say_so_and_where(void) {
     TEST_ASSERT_EQUAL_INT(TV_POINT_BEHIND, point.status);
     TEST_ASSERT_TRUE((position(point) - behind).norm() < 1e-9);
     TEST_ASSERT_TRUE(point.error_px < 1e-9f);
-    // With a pixel off, the error is that of the point projected through the centre.
+    // With an inexact pixel the error is that of the point projected through the camera's centre.
     const Vec2 pixel0 = seen(camera, -behind);
     const Vec2 pixel1 = seen(camera, -(behind + kSideways)) + Vec2(1, 30);
     const tv_point off = triangulated(method, camera, camera, kIdentity, kSideways, pixel0, pixel1);
@@ -457,7 +459,7 @@ void test_rays_that_meet_behind_say_so_and_where(void) {
 
 void test_a_point_behind_one_camera_only_is_behind(void) {
   const Camera camera = tv::prepare_camera(pinhole());
-  const Vec3 forward(0, 0, -5);  // camera 1 is 5 ahead
+  const Vec3 forward(0, 0, -5);  // camera 1 is 5 in front of camera 0
   const Vec3 point0(0.3, 0.2, 2);
   for (tv_triangulation method : kMethods) {
     const tv_point point = triangulated(method, camera, camera, kIdentity, forward,
@@ -472,7 +474,8 @@ void test_a_point_on_the_baseline_has_no_depth(void) {
   const Camera wide = tv::prepare_camera(fisheye());
   const Mat3 about = rotation(0, 3.14159265358979323846, 0);
   for (tv_triangulation method : kMethods) {
-    // Ahead of both: the rays are parallel. Between two cameras that face each other: opposed.
+    // A point in front of both cameras has parallel rays; one between two cameras that face each
+    // other has opposed rays.
     const tv_point ahead = triangulated(method, camera, camera, kIdentity, Vec3(0, 0, -1),
                                         Vec2(320, 240), Vec2(320, 240));
     TEST_ASSERT_EQUAL_INT(TV_POINT_INFINITE, ahead.status);
@@ -514,7 +517,7 @@ void test_swapped_views_give_the_same_point(void) {
     const Mat3 R_back = scene.R.transpose();
     const Vec3 t_back = -(R_back * scene.t);
     for (tv_triangulation method : kMethods) {
-      // The length of (X, W) that the eigenvector methods hold at 1 counts from camera 0.
+      // The eigenvector methods fix the length of (X, W) at 1, with X counted from camera 0.
       if (method == TV_TRIANGULATION_LINEAR_EIGEN) continue;
       if (method == TV_TRIANGULATION_ITERATIVE_EIGEN) continue;
       const tv_point there =

@@ -1,6 +1,6 @@
-// Triangulation against OpenCV: Linear-Eigen is its triangulatePoints, with which the other methods
-// agree without noise, and to first order in the noise; Poly corrects pixels as its correctMatches,
-// and at no more cost where that is not at the minimum.
+// Triangulation compared with OpenCV. Linear-Eigen equals its triangulatePoints, with which the
+// other methods agree without noise and to first order in the noise. Poly corrects pixels as its
+// correctMatches does, and at a cost that is not higher where correctMatches misses the minimum.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -8,7 +8,7 @@
 
 #include "base/random.h"
 #include "geometry/triangulation.h"
-// After OpenCV: unity.h takes isnan and isinf as macros.
+// unity.h comes after OpenCV: it defines isnan and isinf as macros.
 #include "unity.h"
 
 void setUp(void) {}
@@ -39,11 +39,11 @@ Vec3 triangulated_by_opencv(const Mat3& R, const Vec3& t, const Vec2& pixel0, co
   return Vec3(X.at<double>(0), X.at<double>(1), X.at<double>(2)) / X.at<double>(3);
 }
 
-// The largest difference from OpenCV over many points, in units of the depth, when the pixels are
-// off by up to noise_px.
+// The largest difference from OpenCV over many points, in units of the depth, when the pixels have
+// errors of up to noise_px.
 double largest_difference(tv_triangulation method, double noise_px) {
   const tv::Camera camera = tv::prepare_camera(kCamera);
-  Mat3 R;  // a turn of 0.1 about y
+  Mat3 R;  // a turn of 0.1 rad about y
   R << std::cos(0.1), 0, std::sin(0.1), 0, 1, 0, -std::sin(0.1), 0, std::cos(0.1);
   const Vec3 t(-0.96, 0.28, 0);
   tv::Random random = tv::random_seeded(kSeed);
@@ -68,9 +68,9 @@ double largest_difference(tv_triangulation method, double noise_px) {
   return largest;
 }
 
-// A pixel of noise moves the point itself by 1 / 500 of its depth and more. What the methods differ
-// by is of the same order in the direction off the rays (they share out the skew differently), but
-// small beside it.
+// A pixel of noise moves the point by 1 / 500 of its depth or more. The difference between methods
+// is of the same order across the rays (they distribute the distance between the rays differently),
+// but small beside that movement.
 void check(tv_triangulation method, double bound = 2e-4) {
   TEST_ASSERT_TRUE(largest_difference(method, 0) < 1e-11);
   const double at_small = largest_difference(method, 0.01);
@@ -118,8 +118,8 @@ Corrected corrected_by_us(const Mat3& R, const Vec3& t, const Vec2& pixel0, cons
   return corrected;
 }
 
-// Pixels moved, root of the sum of squares; and how far the moved pixels are from meeting, to first
-// order.
+// cost_of: the root of the sum of squared corrections in pixels. miss_of: to first order, how far
+// the corrected pixels are from satisfying the epipolar constraint.
 double cost_of(const Corrected& c, const Vec2& pixel0, const Vec2& pixel1) {
   return std::sqrt((c.pixel[0] - pixel0).squaredNorm() + (c.pixel[1] - pixel1).squaredNorm());
 }
@@ -143,12 +143,12 @@ void test_linear_eigen_is_triangulate_points(void) {
 }
 void test_iterative_eigen_agrees_with_opencv(void) { check(TV_TRIANGULATION_ITERATIVE_EIGEN); }
 void test_poly_agrees_with_opencv(void) { check(TV_TRIANGULATION_POLY); }
-// Poly-Abs leaves all of the correction to one image.
+// Poly-Abs puts the whole correction into one image.
 void test_poly_abs_agrees_with_opencv(void) { check(TV_TRIANGULATION_POLY_ABS, 4e-4); }
 
-// correctMatches solves its polynomial to a few digits only: held against 40 digits, its pixels
-// were off by 5e-3 at 3 pixels of noise, where ours were off by 1.1e-13. It is nearer with less
-// noise.
+// correctMatches solves its polynomial to a few digits only: compared with a solution of 40 digits,
+// its pixels were wrong by 5e-3 at 3 pixels of noise, ours by 1.1e-13. Its error is smaller with
+// less noise.
 void test_poly_corrects_as_correct_matches_does(void) {
   tv::Random random = tv::random_seeded(kSeed);
   const tv::Camera camera = tv::prepare_camera(kCamera);
@@ -176,7 +176,7 @@ void test_poly_corrects_as_correct_matches_does(void) {
                                          (ours.pixel[1] - theirs.pixel[1]).norm());
       largest = std::max(largest, difference);
       far += difference > 1e-6;
-      // Away from the minimum the cost's square grows with that of the distance from it.
+      // Near the minimum the cost's square grows with the square of the distance from it.
       const double cost = cost_of(ours, pixels[0], pixels[1]);
       const double their_cost = cost_of(theirs, pixels[0], pixels[1]);
       const double excess = std::max(their_cost * their_cost - cost * cost, 0.0);
@@ -204,10 +204,10 @@ void test_poly_costs_no_more_than_correct_matches_in_hard_places(void) {
             .normalized();
     const Vec3 center = R.transpose() * t;
     Vec2 pixels[2];
-    if (sideways) {  // at infinity, and both epipoles there
+    if (sideways) {  // both epipoles at infinity
       pixels[0] = Vec2(uniform(&random, 0, 640), uniform(&random, 0, 480));
       pixels[1] = pixels[0] + Vec2(uniform(&random, -1, 1), uniform(&random, -1, 1));
-    } else {  // near the epipoles
+    } else {  // pixels near the epipoles
       const double off = std::exp2(uniform(&random, -10, 5));
       const Vec3 epipoles[2] = {center / center[2], t / t[2]};
       for (int k = 0; k < 2; ++k) {
@@ -219,7 +219,7 @@ void test_poly_costs_no_more_than_correct_matches_in_hard_places(void) {
     const Corrected theirs = corrected_by_opencv(F, pixels[0], pixels[1]);
     const double ours = cost_of(corrected_by_us(R, t, pixels[0], pixels[1]), pixels[0], pixels[1]);
     const double cost = cost_of(theirs, pixels[0], pixels[1]);
-    if (!(miss_of(theirs, F) < 1e-6)) {  // not a correction
+    if (!(miss_of(theirs, F) < 1e-6)) {  // OpenCV's result does not satisfy the epipolar constraint
       ++missed;
       continue;
     }

@@ -1,5 +1,5 @@
-// Poly and Poly-Abs against a proof: branch and bound over the pencil of epipolar planes, in long
-// double, shows that no plane costs less than theirs by more than 1e-9 of it or 1e-12 pixels.
+// Poly and Poly-Abs are proved optimal: branch and bound over the pencil of epipolar planes, in
+// long double, shows that no plane has a cost below theirs by more than 1e-9 of it or 1e-12 pixels.
 //
 //   TWOVIEW_TRIANGULATION_CASES=1000000 unit_triangulation_optimal     the number of cases of each
 //
@@ -99,11 +99,11 @@ void choose_motion(tv::Random* random, Case* c) {
     case 5:  // straight ahead
       c->t = Vec3(0, 0, sign);
       break;
-    case 6:  // the epipole of image 1 at infinity, that of image 0 not
+    case 6:  // image 1's epipole at infinity, image 0's finite
       c->R = random_rotation(random, 0.5);
       c->t = Vec3(uniform(random, -1, 1), sign, 0);
       break;
-    default:  // the epipole of image 0 at infinity, that of image 1 not
+    default:  // image 0's epipole at infinity, image 1's finite
       c->R = random_rotation(random, 0.5);
       c->t = c->R * Vec3(uniform(random, -1, 1), sign, 0);
   }
@@ -119,7 +119,7 @@ Vec2 projected(const Camera& camera, const Vec3& at) {
   return Vec2(m.fx * at[0] / at[2] + m.cx, m.fy * at[1] / at[2] + m.cy);
 }
 
-// A pixel that is far outside the image is taken from the image instead.
+// Replaces a pixel that is far outside the image by a random pixel of the image.
 Vec2 kept_near(tv::Random* random, const Vec2& pixel) {
   return pixel.array().abs().maxCoeff() < 2000 ? pixel : random_pixel(random);
 }
@@ -145,7 +145,9 @@ void choose_match(tv::Random* random, Case* c) {
       pixel0 = epipole[0] + in_any_direction(random, log_uniform(random, 1e-12, 100));
       pixel1 = epipole[1] + in_any_direction(random, log_uniform(random, 1e-12, 100));
       break;
-    case 8: {  // opposite or across from each other, at equal distances: minima of equal cost
+    // on opposite sides of the epipole, or at a right angle, at equal distances: minima of equal
+    // cost
+    case 8: {
       const Vec2 off = in_any_direction(random, log_uniform(random, 1e-6, 300));
       const bool across = tv::random_below(*random, 2);
       pixel0 = epipole[0] + off;
@@ -185,8 +187,8 @@ struct Plane {
 };
 
 struct Pencil {
-  Real axis[2][2][3];  // of camera i
-  Real alpha[2][2];    // of pixel i
+  Real axis[2][2][3];  // for each camera i
+  Real alpha[2][2];    // for each pixel i
   Real step[2][2][2];  // of camera i: [axis][a pixel along x, along y]
 };
 
@@ -246,7 +248,7 @@ Pencil pencil_of(const Case& c) {
   return pencil;
 }
 
-// step^T v, whose length squared is Q(v); and alpha . v.
+// step^T v, whose squared length is Q(v), and alpha . v, at one plane v.
 struct View {
   Real gx, gy, above;
 };
@@ -257,7 +259,7 @@ View view_of(const Pencil& pencil, int i, const Plane& v) {
               pencil.alpha[i][0] * v.x + pencil.alpha[i][1] * v.y};
 }
 
-// A distance, or its square. A line at infinity is infinitely far.
+// A distance in pixels, or its square. The distance to a line at infinity is infinite.
 Real term_of(const View& view, bool squared) {
   if (view.above == 0) return 0;
   const Real sq = view.above * view.above / (view.gx * view.gx + view.gy * view.gy);
@@ -270,13 +272,13 @@ Real cost_of(const Pencil& pencil, const Plane& v, bool squared) {
 
 // ---- branch and bound ----
 
-// An upper bound of a term's second derivative along v = (1 - t) first + t last.
+// An upper bound of the second derivative of one image's cost along v = (1 - t) first + t last.
 Real curvature_bound(const View& first, const View& last, bool squared) {
   const Real A = first.gx * first.gx + first.gy * first.gy;
   const Real C = last.gx * last.gx + last.gy * last.gy;
   const Real B = first.gx * last.gx + first.gy * last.gy;
   const Real curve = A - 2 * B + C;  // Q'' / 2
-  const Real at = (A - B) / curve;   // Q's vertex
+  const Real at = (A - B) / curve;   // where Q has its vertex
   Real q_min = std::fmin(A, C);
   if (at > 0 && at < 1) q_min = std::fmax((A * C - B * B) / curve, Real(0));
   if (!(q_min > 0)) return INFINITY;
@@ -284,7 +286,8 @@ Real curvature_bound(const View& first, const View& last, bool squared) {
   const Real dq = 2 * std::fmax(std::fabs(B - A), std::fabs(C - B));
   const Real n = std::fmax(std::fabs(first.above), std::fabs(last.above));
   if (squared) {
-    // N' Q - N Q' is a polynomial of degree 2 in t: within its coefficients in Bernstein's basis.
+    // N' Q - N Q' is a polynomial of degree 2 in t, so it is bounded by its coefficients in
+    // Bernstein's basis.
     const Real s[3] = {dn * A - first.above * 2 * (B - A),
                        dn * B - (last.above * (B - A) + first.above * (C - B)),
                        dn * C - last.above * 2 * (C - B)};
@@ -297,13 +300,14 @@ Real curvature_bound(const View& first, const View& last, bool squared) {
 
 struct Search {
   bool proved;
-  Real least;  // of all planes looked at
+  Real least;  // the lowest cost over all planes examined so far
   int num_nodes;
 };
 
-// Whether every plane costs at least `target`.
+// Whether every plane costs `target` or more.
 Search prove(const Pencil& pencil, Real target, bool squared) {
-  // The arcs end at the zeros of the two terms, so that each term rises and falls at most once.
+  // The arcs end at the zeros of the two images' costs, so that each cost rises and falls at most
+  // once.
   struct Node {
     Plane first, last;
   };
@@ -319,7 +323,7 @@ Search prove(const Pencil& pencil, Real target, bool squared) {
     if (zero.y < 0 || (zero.y == 0 && zero.x < 0)) zero = Plane{-zero.x, -zero.y};
     ends[num_ends++] = zero;
   }
-  for (int i = 1; i < num_ends; ++i) {  // by angle, all in [0, pi)
+  for (int i = 1; i < num_ends; ++i) {  // sorts by angle; all angles are in [0, pi)
     for (int k = i; k > 0 && ends[k - 1].x * ends[k].y - ends[k - 1].y * ends[k].x < 0; --k) {
       std::swap(ends[k], ends[k - 1]);
     }
@@ -358,9 +362,9 @@ Search prove(const Pencil& pencil, Real target, bool squared) {
 // ---- our answer ----
 
 struct Answer {
-  Real cost;       // of the plane, in pixels
-  Real off_plane;  // of the corrected pixels, in pixels
-  Real moved;      // what the corrected pixels' own steps cost
+  Real cost;       // the cost of the plane of the corrected pixels, in pixels
+  Real off_plane;  // distance of the corrected pixels from that plane, in pixels
+  Real moved;      // the cost of the corrections themselves
 };
 
 Answer answer_of(const Case& c, const Pencil& pencil, tv_triangulation method) {
@@ -386,8 +390,8 @@ Answer answer_of(const Case& c, const Pencil& pencil, tv_triangulation method) {
     coordinates(pencil, c, i, corrected, alpha[i]);
   }
   if (squared) answer.moved = std::sqrt(answer.moved);
-  // The two corrected pixels agree on a plane, but for rounding, and but for a pixel on its
-  // epipole, which says nothing.
+  // Both corrected pixels give the same plane except for rounding. A pixel on its epipole gives
+  // none.
   answer.cost = INFINITY;
   answer.off_plane = INFINITY;
   for (int i = 0; i < 2; ++i) {

@@ -1,4 +1,5 @@
-// The rules of robust/verdict, each beside its threshold, on evidence that is written by hand.
+// Each rule of robust/verdict just below and just above its threshold, with evidence that the test
+// sets itself.
 #include <unity.h>
 
 #include <utility>
@@ -27,7 +28,8 @@ Evidence good() {
   return e;
 }
 
-// The reason that is given, and the same for swapped views; it makes the pair doubtful.
+// The evidence must give exactly these reasons, also with swapped views; any reason makes the pair
+// doubtful.
 void assert_reason(uint32_t reasons, Evidence e) {
   const tv::Judgement judgement = judge(e);
   TEST_ASSERT_EQUAL_HEX32(reasons, judgement.reasons);
@@ -53,13 +55,14 @@ void test_each_reason_has_its_threshold(void) {
   e = good();
   e.noise_px = 0.71;
   assert_reason(TV_REASON_LOW_INLIER_RATIO, e);
-  for (const double parallax : {0.0061, 0.0059}) {  // noise 0.3: 3 pixels of 0.002
+  // the limit is 3 px, 10 times the noise of 0.3 px; a pixel is 0.002 rad
+  for (const double parallax : {0.0061, 0.0059}) {
     e = good();
     e.median_parallax_rad = parallax;
     assert_reason(parallax < 0.006 ? TV_REASON_LOW_PARALLAX : 0, e);
   }
   e = good();
-  e.sigma_rad = 0.022;  // 1.26 degrees
+  e.sigma_rad = 0.022;  // 1.26 degrees, above the limit of 1.25
   assert_reason(TV_REASON_LOW_PARALLAX, e);
   e.sigma_rad = tv::kUnknown;
   assert_reason(TV_REASON_LOW_PARALLAX, e);

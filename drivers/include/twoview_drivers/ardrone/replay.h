@@ -25,7 +25,7 @@ typedef struct ardrone_replay {
   /* Origin: the recording's host time that begin_ns plays. */
   int64_t now_ns, begin_ns, origin_ns;
   int has_datagram, has_packet;
-  /* Recorded host times of what comes next. */
+  /* The recorded host times of the next datagram and the next packet. */
   int64_t datagram_ns, packet_ns;
   int64_t paced_ns;
   uint32_t paced_ms;
