@@ -23,7 +23,7 @@ RATIOS = (0.75, 0.8, 0.85, 0.87, 0.9, 0.92, 0.95, 0.98)
 
 
 def matches_by_ratio(context, data, ratios):
-    """{ratio: pipeline.match_pairs(..)}, each image's features found once."""
+    """{ratio: result of pipeline.match_pairs}; the features of each image are computed once."""
     features = {}
     original = context.extract
 
@@ -41,7 +41,7 @@ def matches_by_ratio(context, data, ratios):
 
 
 def measure(names, library, flagged, max_pairs):
-    """{"max_error_px": {value: {set: rows}}, "ratio": the same}"""
+    """Measures {"max_error_px": {value: {set: rows}}, "ratio": {value: {set: rows}}}."""
     default = library.match_options().ratio
     nearest = min(RATIOS, key=lambda r: abs(r - default))
     found = {"max_error_px": {t: {} for t in THRESHOLDS_PX}, "ratio": {r: {} for r in RATIOS}}

@@ -33,7 +33,7 @@ WIDTH, HEIGHT, FOCAL = 640, 480, 500.0
 CENTRE = np.array([320.0, 240.0])
 K = np.array([[FOCAL, 0, CENTRE[0]], [0, FOCAL, CENTRE[1]], [0, 0, 1]])
 NOISE_PX = 0.5
-SHARES = (30, 50, 80)  # per cent
+SHARES = (30, 50, 80)  # per cent of true matches
 
 
 def _direction(random):
@@ -96,7 +96,7 @@ def _poselib(**options):
 
 
 def measure(share, runners, num_problems, repeats):
-    """{name: (errors in degrees, times in ms)}"""
+    """{name: (errors in degrees, times in ms)}."""
     errors = {name: [] for name in runners}
     times = {name: [] for name in runners}
     for number in range(num_problems):
@@ -113,7 +113,7 @@ def measure(share, runners, num_problems, repeats):
 
 
 def run(library=None, num_problems=200, repeats=1, shares=SHARES, peers=True):
-    """Prints the table; True when all that must hold does."""
+    """Prints the table. Returns True if all targets are reached."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     context = twoview_ctypes.Context(twoview_ctypes.Library(library), max_width=64, max_height=64,

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One table line a set and their mean, for any options of the library.
+"""Prints one table line for each set and one for their mean, for any options of the library.
 
   scripts/python -m twoview_tools.accuracy.tune --sets kitti00_turn,tum_fr3_office --feature threshold=10 arc=9 \\
       --match ratio=0.8 --estimate max_error_px=1 --estimator twoview --max-pairs 15

@@ -1,4 +1,4 @@
-"""The arguments of `twoview colmap`."""
+"""The command line of `twoview colmap`."""
 
 import argparse
 import json
@@ -15,7 +15,7 @@ from .errors import ENDING_SIGNALS, EXIT_BAD_INPUT, EXIT_DONE, EXIT_NO_POSE, Bad
 
 
 class Parser(argparse.ArgumentParser):
-    """One line for bad arguments."""
+    """An argument parser that reports bad arguments as one line."""
 
     def error(self, message):
         raise BadInput(f"{message} (see {self.prog} --help)")
@@ -161,7 +161,7 @@ def _parser():
 
 
 class _Ended(BaseException):
-    """A signal that ends the program, after the cleaning up."""
+    """Raised by a signal that ends the program, so that temporary files are removed first."""
 
     def __init__(self, number):
         super().__init__()
@@ -184,7 +184,7 @@ def main(arguments=None):
     except (BadInput, OSError, sqlite3.Error, MemoryError) as error:
         print("twoview: " + " ".join(str(error).split()), file=sys.stderr)
         return EXIT_BAD_INPUT
-    except _Ended as ended:  # ends as the signal would have
+    except _Ended as ended:  # ends with the exit status that the signal would have given
         signal.signal(ended.number, signal.SIG_DFL)
         os.kill(os.getpid(), ended.number)
         raise

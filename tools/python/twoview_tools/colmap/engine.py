@@ -1,4 +1,4 @@
-"""The library's stages on images of any size, with one set of options."""
+"""Runs the library's stages on images of any size, with one set of options."""
 
 import numpy as np
 import twoview as tv
@@ -40,5 +40,5 @@ class Engine:
 
 
 def pixels_of(keypoints):
-    """(n, 2) float64."""
+    """The pixels of keypoints, (n, 2) float64."""
     return np.column_stack([keypoints["x"], keypoints["y"]]).astype(np.float64)

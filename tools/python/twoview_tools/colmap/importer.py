@@ -1,4 +1,4 @@
-"""COLMAP's models as reference poses, and its features and matches as input."""
+"""Imports COLMAP's models as reference poses, and its features and matches as input."""
 
 import json
 import os
@@ -6,7 +6,7 @@ import os
 import numpy as np
 import twoview as tv
 
-from ..accuracy import metrics  # the errors' definitions are those of the accuracy tables
+from ..accuracy import metrics  # so that errors are defined as in the accuracy tables
 from . import database as db
 from .cameras import read_camera, write_camera_set
 from .conventions import camera_from_colmap, pixels_from_colmap
@@ -19,7 +19,7 @@ from .trajectory import write_trajectory
 
 
 def _choose(names, pairs_file, overlap):
-    """Pairs of a file, all of whose images must be there; else of the names."""
+    """The pairs of a file, all of whose images must exist; without a file, pairs of the names."""
     if not pairs_file:
         return sequential(names, overlap) if overlap else exhaustive(names)
     pairs = read_pairs(pairs_file)
@@ -38,7 +38,7 @@ def _camera(row, name):
 
 
 def _named_cameras(model):
-    """{entry: camera} of a cameras.yaml that chooses by K."""
+    """{entry: camera} of a cameras.yaml in which K selects the entry."""
     used = sorted({image.camera_id for image in model.images.values()})
     cameras = {f"camera_{key}": _camera(model.cameras[key], f"camera {key}") for key in used}
     by_K = {}
@@ -53,13 +53,14 @@ def _named_cameras(model):
 
 
 def relative(image0, image1):
-    """R and t of cam1_from_cam0, in the model's unit."""
+    """R and t of cam1_from_cam0, in the unit of the model."""
     R = image1.R @ image0.R.T
     return R, image1.t - R @ image0.t
 
 
 def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
-    """pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model; how many pairs."""
+    """Writes pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model. Returns the
+    number of pairs."""
     cameras, cameras_text = _named_cameras(model)
     lines = []
     for pair in _choose(list(model.images), pairs_file, overlap):
@@ -79,7 +80,7 @@ def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
 
 
 class Features:
-    """What a database has: pixels and descriptors by image, matches by pair of names."""
+    """The contents of a database: pixels and descriptors by image, matches by pair of names."""
 
     def __init__(self, path, camera_files=()):
         self.path = path
@@ -106,7 +107,8 @@ class Features:
             self.matches[name0, name1] = matches
 
     def matches_of(self, name0, name1, engine):
-        """(n, 2) of the database in this order of the names; without a row for the pair, by our matcher."""
+        """The database's matches (n, 2) in this order of the names. If the database has no row for
+        the pair, our matcher makes them."""
         if (name0, name1) in self.matches:
             return self.matches[name0, name1], None
         if (name1, name0) in self.matches:
@@ -136,7 +138,8 @@ def _pair_report(name0, name1, features, engine, truth):
 
 def import_database(path, folder, pairs_file="", overlap=0, model=None, camera_files=(), match=None, estimate=None,
                     quiet=False):
-    """report.json, in the form of `twoview evaluate`, of our estimation on a database's features and matches."""
+    """Estimates from a database's features and matches, and writes report.json in the form of
+    `twoview evaluate`."""
     features = Features(path, camera_files)
     if pairs_file or overlap or not features.matches:
         pairs = _choose(list(features.pixels), pairs_file, overlap)

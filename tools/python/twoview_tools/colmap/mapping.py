@@ -1,4 +1,5 @@
-"""COLMAP's mapper, of pycolmap (4) and of Debian's `colmap` (3.8), on a database; and COLMAP's own features."""
+"""Runs COLMAP's mapper on a database, with pycolmap (4) or Debian's `colmap` (3.8), and makes
+COLMAP's own features."""
 
 import os
 import pathlib
@@ -43,7 +44,7 @@ def own_features_4(database, images, camera):
 
 
 def map_38(database, images, folder, fix_intrinsics, seed=1):
-    """The folders of the models."""
+    """Runs the mapper of COLMAP 3.8. Returns the folders of the models."""
     os.makedirs(folder, exist_ok=True)
     refine = 0 if fix_intrinsics else 1
     _run_colmap("mapper", "--database_path", database, "--image_path", images, "--output_path", folder,
@@ -53,7 +54,7 @@ def map_38(database, images, folder, fix_intrinsics, seed=1):
 
 
 def map_4(database, images, folder, fix_intrinsics, seed=1):
-    """The same of COLMAP 4."""
+    """Runs the mapper of COLMAP 4. Returns the folders of the models."""
     colmap = need_pycolmap("COLMAP 4's mapper")
     os.makedirs(folder, exist_ok=True)
     options = colmap.IncrementalPipelineOptions()

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The table of docs/colmap.md: the mapper on COLMAP's own features and on exports of twoview's, against the truth.
 
-Each step is a process of its own, whose CPU time is counted; what an output folder has already is not done again."""
+Each step runs in a process of its own, whose CPU time is measured. A step whose result is already
+in the output folder is not repeated."""
 
 import argparse
 import json
@@ -45,7 +46,7 @@ def _entry(log, function, arguments):
 
 
 def _cpu_seconds(log, function, *arguments):
-    """Of the function in a process of its own, its children included."""
+    """The CPU seconds of a function that runs in a process of its own, including its children."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     process = multiprocessing.get_context("spawn").Process(target=_entry, args=(log, function, arguments))
     process.start()
@@ -57,12 +58,12 @@ def _cpu_seconds(log, function, *arguments):
 
 
 def _measure_features(folder, data, schema, features):
-    """CPU seconds of making folder/database.db."""
+    """Makes folder/database.db. Returns the CPU seconds."""
     note = os.path.join(folder, "features.json")
     if not os.path.isfile(note):
         os.makedirs(folder, exist_ok=True)
         database = os.path.join(folder, "database.db")
-        for suffix in ("", "-wal", "-shm", "-journal"):  # of a run that was interrupted
+        for suffix in ("", "-wal", "-shm", "-journal"):  # files of an interrupted run
             if os.path.exists(database + suffix):
                 os.remove(database + suffix)
         log = os.path.join(folder, "features.log")
@@ -78,7 +79,7 @@ def _best_model(folder):
 
 
 def _measure_mapper(folder, data, schema, hold, seed):
-    """One run of the mapper: what it registered, and how far from the truth."""
+    """Runs the mapper once. Returns what it registered and its errors against the truth."""
     note = os.path.join(folder, f"mapper_{'held' if hold else 'refined'}_{seed}.json")
     if not os.path.isfile(note):
         models = note[:-len(".json")]
@@ -96,7 +97,7 @@ def _measure_mapper(folder, data, schema, hold, seed):
 
 
 def measure(output, data_dir, sets, schemas, hold, seeds):
-    """Rows of the table; each is the median over the seeds."""
+    """The rows of the table; each value is the median over the seeds."""
     for name in sets:
         data = os.path.join(data_dir, name)
         for schema in schemas:

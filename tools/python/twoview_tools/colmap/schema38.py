@@ -1,5 +1,5 @@
-"""COLMAP 3.8's database, as Debian's `colmap` makes it. Matrices are row-major doubles, matches uint32, keypoints
-float32; a pair's id is id1 * 2147483647 + id2 with id1 < id2."""
+"""Writes the database of COLMAP 3.8, Debian's `colmap`. Matrices are row-major doubles, matches
+uint32, keypoints float32. The id of a pair is id1 * 2147483647 + id2 with id1 < id2."""
 
 import contextlib
 import sqlite3
@@ -37,7 +37,7 @@ CREATE TABLE two_view_geometries (
 
 
 def prepare():
-    """SQLite is all that it takes."""
+    """Does nothing, since this schema needs only SQLite."""
 
 
 def create(path):
@@ -51,12 +51,13 @@ def pair_id(id0, id1):
 
 
 def _doubles(values, absent):
-    """COLMAP 3.8 reads every matrix of a pair: what is unknown is its own default."""
+    """The bytes of a matrix. COLMAP 3.8 reads every matrix of a pair, so an unknown one is stored
+    as COLMAP's default."""
     return np.ascontiguousarray(absent if values is None else values, np.float64).tobytes()
 
 
 class Writer:
-    """Adds rows; commit() makes them stay."""
+    """Adds rows to a database; commit() makes them permanent."""
 
     def __init__(self, path):
         self.database = sqlite3.connect(path)

@@ -1,4 +1,4 @@
-"""Two images to a COLMAP text model and a trajectory, by `tv_reconstruct`."""
+"""Reconstructs two images with `tv_reconstruct` and makes a COLMAP text model and a trajectory."""
 
 import numpy as np
 import twoview as tv
@@ -10,8 +10,9 @@ from .model import TwoViewModel
 
 
 def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
-    """(TwoView, TwoViewModel), the model None without a full pose. Its cameras are those that pose and points
-    are of: the given ones, the principal point moved where the matches want it (twoview.corrected_camera)."""
+    """(TwoView, TwoViewModel); the model is None without a full pose. Its cameras are those that
+    pose and points refer to: the given ones with the estimated shift of the principal point
+    (twoview.corrected_camera)."""
     lumas = [read_luma(path) for path in paths]
     for path, luma, camera in zip(paths, lumas, cameras):
         if (camera.height, camera.width) != luma.shape:
@@ -30,7 +31,7 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
     good = cloud.inlier_mask & (cloud.points["status"] == tv.PointStatus.OK)
     pixels = tuple(pixels_of(cloud.keypoints[i])[cloud.matches[f"idx{i}"][good]] for i in range(2))
     rgb = read_rgb(paths[0])
-    x, y = np.floor(pixels[0].T + 0.5).astype(int)  # the pixel whose square holds the point
+    x, y = np.floor(pixels[0].T + 0.5).astype(int)  # the pixel that contains the point
     colours = rgb[np.clip(y, 0, rgb.shape[0] - 1), np.clip(x, 0, rgb.shape[1] - 1)]
     points = cloud.points[good]
     cameras = tuple(tv.corrected_camera(pose, camera) for camera in cameras)
