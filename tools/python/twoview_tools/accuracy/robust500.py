@@ -13,7 +13,8 @@ defaults and to PoseLib at 1 px with its defaults and with min_iterations=50, in
 through Python in one process pinned to one core; a time is the CPU time of the best of --repeats calls. The error is
 the larger of the rotation's and the translation direction's angle.
 
-What must hold: a median error not above that of either PoseLib, in at most a third of its time.
+What must hold: our median error is not above that of either PoseLib configuration, and our time is
+at most a third of theirs.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Between twoview's conventions and COLMAP's.
+"""Conversions between twoview's conventions and COLMAP's.
 
 Pixels: twoview's (0, 0) is the centre of the top-left pixel; in COLMAP (0, 0) is its corner and
 (0.5, 0.5) its centre.

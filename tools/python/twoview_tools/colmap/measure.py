@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The table of docs/colmap.md: the mapper on COLMAP's own features and on exports of twoview's, against the truth.
+"""Makes the table of docs/colmap.md: the mapper on COLMAP's own features and on exports of
+twoview's, compared with the truth.
 
 Each step runs in a process of its own, whose CPU time is measured. A step whose result is already
 in the output folder is not repeated."""

@@ -33,7 +33,8 @@ def title(x, y, words):
 
 
 class Camera:
-    """A camera in a world with x right, y down, z forward, drawn from above and behind, to the left."""
+    """A camera in a world with x right, y down, z forward, drawn from above, behind and left of the
+    camera."""
 
     def __init__(self, centre, yaw, name):
         self.centre, self.yaw, self.name = centre, yaw, name
@@ -45,7 +46,7 @@ class Camera:
 
 
 def project(p):
-    """Oblique: x to the right, y down, z up and to the right."""
+    """An oblique projection: x to the right, y down, z up and to the right."""
     x, y, z = p
     return (60 + 105 * x + 46 * z, 330 + 95 * y - 62 * z)
 

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 
-import boards  # of test/cli
+import boards  # a module of test/cli
 import cv2
 import numpy as np
 
@@ -139,7 +139,7 @@ def main():
 
 
 def from_above(name, points, words):
-    """x to the right, z away from the camera."""
+    """A view from above: x to the right, z away from the camera."""
     low, high = np.percentile(points, 4, axis=0), np.percentile(points, 96, axis=0)
     near = points[((points >= low) & (points <= high)).all(1)]
     low, high = near.min(0), near.max(0)
@@ -155,7 +155,7 @@ def from_above(name, points, words):
 
 
 def colmap():
-    """Eleven images of a fountain, where the data set and colmap are there."""
+    """Runs the example on eleven images of a fountain, if the data set and colmap are present."""
     data = pathlib.Path(os.environ.get("TWOVIEW_DATA", ROOT / ".." / "shared" / "data")) / "strecha_fountain_P11"
     if not data.exists():
         return
@@ -176,7 +176,7 @@ def colmap():
 
 @contextlib.contextmanager
 def simulated(*options):
-    """A simulated drone's ports: commands, navdata, video, control."""
+    """A simulated drone on free ports: commands, navdata, video, control."""
     ports = [word for channel in ("at", "navdata", "video", "control", "recording") for word in (f"--{channel}-port", "0")]
     drone = subprocess.Popen([PROGRAM, "drone", "simulate", "--duration", "60", *ports, *options], stdout=subprocess.PIPE,
                              text=True)
@@ -189,7 +189,8 @@ def simulated(*options):
 
 
 def photograph(y):
-    """What the drone sees before its take-off, y metres to the right of its place: below the middle, bare floor."""
+    """What the drone's camera sees before take-off, y metres to the right of the start. The lower
+    part of the image shows only bare floor."""
     lens, folder = FOLDER / "pinhole.yaml", FOLDER / f"flight{y}"
     fx, fy, cx, _, cy = CAMERA
     lens.write_text("image_width: 640\nimage_height: 360\n"

@@ -1,4 +1,5 @@
-"""mkdocs hooks: pages that are not files of docs/, and what GitHub's Markdown has that Python-Markdown has not."""
+"""Hooks of mkdocs: add pages from files outside docs/, and support the features of GitHub's
+Markdown that Python-Markdown lacks."""
 
 import pathlib
 import posixpath
@@ -9,7 +10,7 @@ from mkdocs.structure.files import File
 from twoview_tools import ROOT
 from twoview_tools.docs import reference
 
-# Pages of the site that come from files outside docs/.
+# The pages of the site that are made from files outside docs/.
 ELSEWHERE = {"examples/README.md": "examples.md", "CHANGELOG.md": "changelog.md"}
 
 FENCE = re.compile(r"\s*(```|~~~)")
@@ -26,7 +27,7 @@ def on_config(config):
 
 
 def expand(nav, pages, listed):
-    """Patterns become the pages that no entry has named yet."""
+    """Replaces each pattern of the navigation by the pages that no entry has named yet."""
     named = set(re.findall(r"'([^'*]*\.md)'", str(nav)))
     out = []
     for entry in nav:
@@ -72,7 +73,8 @@ def on_page_markdown(markdown, page, config, files):
 
 
 def link(found, source, place):
-    """A link that leads out of docs/ leads to the page made of that file, or is only its text."""
+    """A link that leads out of docs/ is replaced by a link to the page made from that file, or else
+    by its text."""
     image, text, target, anchor = found.groups()
     if not target or re.match(r"[a-z]+:", target):
         return found.group()
@@ -90,7 +92,8 @@ def link(found, source, place):
 
 
 def with_blank_lines(markdown):
-    """Lists and tables may follow a paragraph at once on GitHub; Python-Markdown wants a blank line."""
+    """Adds the blank line that Python-Markdown, unlike GitHub, needs between a paragraph and a list
+    or table."""
     out, fenced, before = [], False, ""
     for line in markdown.split("\n"):
         if FENCE.match(line):

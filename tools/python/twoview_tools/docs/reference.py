@@ -1,4 +1,5 @@
-"""The pages of the C reference, a page a header, from Doxygen's XML (tools/docs/Doxyfile)."""
+"""Makes the pages of the C reference, one for each header, from Doxygen's XML
+(tools/docs/Doxyfile)."""
 
 import html
 import pathlib
@@ -16,7 +17,7 @@ class Reference:
     def __init__(self, xml):
         self.xml = pathlib.Path(xml)
         self.compounds = {}
-        self.place_of = {}  # symbol -> the page and the heading that describe it
+        self.place_of = {}  # symbol -> the page and heading that describe it
         for entry in ElementTree.parse(self.xml / "index.xml").getroot():
             if entry.get("kind") in ("file", "struct"):
                 compound = ElementTree.parse(self.xml / f"{entry.get('refid')}.xml").getroot()[0]
@@ -36,7 +37,8 @@ class Reference:
         return [f"reference/{name}.md" for name in LIBRARY] + [f"reference/drivers/{name}.md" for name in DRIVERS]
 
     def symbols(self, compound):
-        """(line, element) of a header's macros, types, structs and functions, in its order."""
+        """(line, element) of a header's macros, types, structs and functions, in the order of the
+        file."""
         found = []
         for member in compound.iter("memberdef"):
             found.append((int(member.find("location").get("line")), member))
@@ -46,7 +48,7 @@ class Reference:
         return sorted(found, key=lambda pair: pair[0])
 
     def pages(self):
-        """page -> its Markdown."""
+        """{page: its Markdown}."""
         return {page_name(path): self.page(path, compound) for path, compound in self.headers.items()
                 if not path.endswith("/twoview.h")}
 
@@ -88,7 +90,8 @@ class Reference:
         return lines
 
     def text(self, element):
-        """The paragraphs of a description, without its lists of parameters, as HTML in lines of Markdown."""
+        """The paragraphs of a description as HTML in lines of Markdown, without its lists of
+        parameters."""
         lines = []
         for para in element.findall("para") if element is not None else []:
             words = self.words(para)
@@ -104,7 +107,8 @@ class Reference:
             pieces.append(child.tail or "")
         words = html.escape(" ".join("".join(pieces).split()), quote=False)
         words = re.sub(r"([*|\[\]{}])", lambda found: f"&#{ord(found.group())};", words)
-        pieces = words.split("`")  # code, and what may hold the names of symbols and pages, in turn
+        # split into alternating pieces of text, which may name symbols and pages, and code
+        pieces = words.split("`")
         pieces[0::2] = [re.sub(r"docs/([\w/-]+)\.md|\w+", self.link, piece) for piece in pieces[0::2]]
         pieces[1::2] = [f"<code>{piece}</code>" for piece in pieces[1::2]]
         return "".join(pieces)

@@ -1,4 +1,5 @@
-"""Figures 1b and 4: an AR.Drone's camera from chessboards, and a view without its lens's distortion."""
+"""Figures 1b and 4: calibration of an AR.Drone's camera from chessboards, and a view with its
+distortion removed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,22 +12,22 @@ from . import drawing
 from .experiment import Experiment, Missing, Result, Table, available
 from .inputs import library, read_colour, read_json
 
-PAPER_RANGE_PX = (0.1, 0.5)  # the paper's usual error
+PAPER_RANGE_PX = (0.1, 0.5)  # the paper's usual range of the reprojection error
 
 
 @dataclass(frozen=True)
 class Boards:
-    """Pictures of one chessboard by one camera."""
+    """Pictures of one chessboard, taken by one camera."""
 
     title: str
-    folder: Callable  # Inputs -> Path
+    folder: Callable  # a function from Inputs to a Path
     pattern: str
     size: tuple  # inner corners
     square_m: float
-    shown: str  # the picture of figure 1b
+    shown: str  # the picture that figure 1b shows
 
     def calibrated(self, inputs):
-        """The folder of `twoview calibrate`, run once."""
+        """The output folder of `twoview calibrate`, which is run only once."""
         folder = Path(inputs.scratch) / self.shown
         if not (folder / "calibration.json").exists():
             inputs.program("calibrate", *sorted(self.folder(inputs).glob(self.pattern)), "--board",
@@ -45,7 +46,7 @@ def used(calibration):
 
 
 def camera_of(calibration):
-    """A twoview.Camera."""
+    """The calibrated camera as a twoview.Camera."""
     tv = library()
     i = calibration["intrinsics"]
     width, height = calibration["image_size"]
@@ -54,13 +55,13 @@ def camera_of(calibration):
 
 
 def board_points(boards):
-    """Of the corners, metres, row by row."""
+    """The positions of the board's corners in metres, row by row."""
     grid = np.mgrid[:boards.size[0], :boards.size[1]].T.reshape(-1, 2) * boards.square_m
     return np.column_stack([grid, np.zeros(len(grid))])
 
 
 def residuals(boards, calibration):
-    """{view: (n, 2) corner minus the camera's explanation}, by the library's projection."""
+    """{view: (n, 2) measured corners minus projected corners}, with the library's projection."""
     camera, found = camera_of(calibration), {}
     for view in used(calibration):
         points = board_points(boards) @ np.reshape(view["R"], (3, 3)).T + view["t"]
@@ -75,7 +76,8 @@ def rms(vectors):
 
 
 def straightness(corners, size):
-    """How far a board's corners are off the best lines of its rows and columns, px rms."""
+    """The root mean square distance, in pixels, of a board's corners from the best lines through
+    its rows and columns."""
     grid = np.reshape(corners, (size[1], size[0], 2))
     off = []
     for line in (*grid, *grid.transpose(1, 0, 2)):
@@ -89,7 +91,7 @@ def undistorted(camera, pixels):
 
 
 def draw_lines(axis, corners, size):
-    """Straight chords through the first and last corner of the outer rows and columns."""
+    """Draws straight chords between the first and last corners of the outer rows and columns."""
     grid = np.reshape(corners, (size[1], size[0], 2))
     for line in (grid[0], grid[-1], grid[:, 0], grid[:, -1]):
         axis.plot(*line[[0, -1]].T, "-", color="#ffd34d", linewidth=1.1)
@@ -97,7 +99,8 @@ def draw_lines(axis, corners, size):
 
 
 def straightened(inputs, boards, axes):
-    """Draws a view before and after; {"raw", "undistorted"}: px off straight lines, all views."""
+    """Draws a view before and after undistortion. Returns {"raw", "undistorted"}: the deviation
+    from straight lines in pixels, over all views."""
     folder = boards.calibrated(inputs)
     calibration = read_json(folder / "calibration.json")
     source = boards.folder(inputs) / boards.shown
@@ -116,7 +119,7 @@ def straightened(inputs, boards, axes):
 
 
 def pictured(inputs, boards):
-    """The same, when its pictures are here."""
+    """Returns the same Boards if their pictures are present; raises Missing otherwise."""
     boards.folder(inputs)
     return boards
 
@@ -153,7 +156,7 @@ def draw_error_by_view(axis, per_view):
 
 
 def draw_calibration(inputs, views, found, per_view):
-    """Two of the views with their corners, the residuals, the error of each view."""
+    """Draws two views with their corners, the residuals, and the error of each view."""
     sheet = drawing.pyplot.figure(figsize=(11, 3.1))
     grid = sheet.add_gridspec(1, 4, width_ratios=(1.35, 1.35, 1, 1.1))
     for place, view in enumerate(views[:4:3]):
@@ -191,7 +194,7 @@ def figure4(inputs):
 
 
 def published_error(inputs):
-    """avg_reprojection_error of the file beside the pictures."""
+    """avg_reprojection_error of the calibration file published with the pictures."""
     text = inputs.of_fixtures("chessboard_ardrone1", "ardrone_camera.yml").read_text(encoding="utf-8")
     return float(text.split("avg_reprojection_error:")[1].split()[0])
 

@@ -1,4 +1,4 @@
-"""Figure 16: the point cloud from the front and from the side, and how wrong its depth is."""
+"""Figure 16: the point cloud from the front and from the side, and the error of its depths."""
 
 import cv2
 import numpy as np
@@ -11,10 +11,12 @@ PATHS = {"unrefined": "FAST-12, SIFT, OpenCV's FM_RANSAC, its F as it is",
          "paper": "FAST-12, SIFT, eight-point RANSAC, refined",
          "default": "FAST-9, RootSIFT, five-point RANSAC, refined"}
 COLOURS = {"unrefined": drawing.GREY, "paper": drawing.ORANGE, "default": drawing.BLUE}
-# Bundle adjustment with Cauchy's loss of so many pixels: its default, and about this pair's noise.
+# The scale of the Cauchy loss of bundle adjustment, in pixels: none, the default, and about the
+# noise of this pair.
 STAGES = {"before": None, "adjusted, 1 px": 1.0, "adjusted, 0.2 px": 0.2}
 STYLES = {"before": "-", "adjusted, 1 px": "--", "adjusted, 0.2 px": ":"}
-MATCH_NOISE_PX = 0.2  # of a coordinate, about what the residuals of this pair tell
+# standard deviation of a coordinate, estimated from the residuals of this pair
+MATCH_NOISE_PX = 0.2
 
 
 def matches_of(pair, path):
@@ -24,8 +26,8 @@ def matches_of(pair, path):
 
 
 def estimated(context, pair, path, pixels0, pixels1, ratios):
-    """(R, t, inliers, covariance or None, the cameras that these are of) by the library, or by OpenCV without any
-    refinement."""
+    """(R, t, inliers, covariance or None, the cameras that these refer to), from the library, or
+    from OpenCV without any refinement."""
     tv = library()
     if path != "unrefined":
         method = tv.Solver.EIGHT_POINT if path == "paper" else tv.Solver.FIVE_POINT
@@ -43,13 +45,13 @@ def estimated(context, pair, path, pixels0, pixels1, ratios):
 
 
 def sigmas_deg(covariance):
-    """Standard deviations along the worst axis: (rotation, direction), degrees."""
+    """The standard deviations along the worst axis: (rotation, direction) in degrees."""
     return [float(np.degrees(np.sqrt(np.linalg.eigvalsh(part).max())))
             for part in (covariance[:3, :3], covariance[3:, 3:])]
 
 
 def reconstructed(pair, path):
-    """({stage: (R, t, points)}, the inliers' pixels, the pose's sigmas or None)"""
+    """({stage: (R, t, points)}, the inliers' pixels, the pose's standard deviations or None)."""
     tv = library()
     pixels0, pixels1, ratios = matches_of(pair, path)
     with tv.Context(max_matches=len(pixels0)) as context:
@@ -65,7 +67,8 @@ def reconstructed(pair, path):
 
 
 def depth_errors(pair, points, pixels0):
-    """Per cent of the true depth, signed, of the points whose true depth is known; a baseline is the unit."""
+    """The signed depth errors in per cent, for the points whose true depth is known. The unit of
+    the points is the baseline."""
     x, y = np.round(pixels0).astype(int).T
     truth = pair.depth0[y, x] / pair.baseline_m
     good = np.isfinite(truth) & (points["status"] == library().PointStatus.OK)
@@ -84,12 +87,13 @@ def numbers_of(pair, R, t, points, pixels0):
 
 
 def noise_percent(pair, depth_m):
-    """What the noise of a match does to a depth, in per cent of it, standard deviation."""
+    """The standard deviation of a depth, in per cent of it, that the noise of a match causes."""
     return 100 * MATCH_NOISE_PX * np.sqrt(2) * depth_m / (pair.cameras[0].fx * pair.baseline_m)
 
 
 def near_points(pair, points, pixels0):
-    """(positions in metres, colours) of points within the true scene's depth, for drawing."""
+    """(positions in metres, colours) of the points within the true scene's range of depth, for
+    drawing."""
     ok = (points["status"] == library().PointStatus.OK) & (points["error_px"] < 1)
     x, y = np.round(pixels0[ok]).astype(int).T
     colours = pair.colour[0][y, x, ::-1] / 255

@@ -1,7 +1,8 @@
 """Figures 5 and 6: the segment test, and how many corners it finds.
 
-E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006. Here it is read
-from the definition, one array a circle pixel, and the library is held against that."""
+E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006. The test is
+computed here from its definition, with one array for each circle pixel, and the library is compared
+with the result."""
 
 import numpy as np
 
@@ -12,11 +13,11 @@ from .inputs import grey, library, read_colour
 # The Bresenham circle of radius 3, clockwise from the top.
 CIRCLE = np.array([(0, -3), (1, -3), (2, -2), (3, -1), (3, 0), (3, 1), (2, 2), (1, 3), (0, 3),
                    (-1, 3), (-2, 2), (-3, 1), (-3, 0), (-3, -1), (-2, -2), (-1, -3)])
-ARC, THRESHOLD = 12, 20  # the paper's 12 of 16
+ARC, THRESHOLD = 12, 20  # the paper's arc: 12 of 16 pixels
 
 
 def differences(image):
-    """(16, height, width): circle pixel minus centre; a border of 3 has zeros."""
+    """(16, height, width): circle pixel minus centre pixel; 0 in a border of 3 pixels."""
     height, width = image.shape
     centre = image[3:-3, 3:-3].astype(np.int16)
     found = np.zeros((16, height, width), np.int16)
@@ -26,9 +27,10 @@ def differences(image):
 
 
 def scores(image, arc):
-    """The largest threshold at which each pixel is a corner; 0 or less: at none."""
+    """For each pixel, the largest threshold at which it is a corner; 0 or less if it never is
+    one."""
     d = differences(image)
-    around = np.concatenate([d, d])  # an arc that begins at the 16th pixel goes on at the first
+    around = np.concatenate([d, d])  # an arc may continue from the 16th pixel to the first
     contrast = np.full(image.shape, -255, np.int16)
     for start in range(16):
         on_arc = around[start:start + arc]
@@ -37,7 +39,8 @@ def scores(image, arc):
 
 
 def suppressed(score, threshold):
-    """Where a corner is stronger than its eight neighbours, (height, width) bool."""
+    """A (height, width) bool array: true where a corner has a higher score than its eight
+    neighbours."""
     score = np.where(score >= threshold, score, 0)
     padded = np.pad(score, 1)
     height, width = score.shape
@@ -47,7 +50,8 @@ def suppressed(score, threshold):
 
 
 def longest_arc(values, threshold):
-    """(first circle pixel, length, sign) of the longest run of pixels all brighter or all darker."""
+    """(first circle pixel, length, sign) of the longest run of circle pixels that are all brighter
+    or all darker."""
     best = (0, 0, 0)
     for sign in (1, -1):
         passes = sign * np.asarray(values) > threshold
@@ -60,7 +64,7 @@ def longest_arc(values, threshold):
 
 
 def detect(image, arc, threshold):
-    """The library's corners, whole pixels, nothing left out."""
+    """The library's corners in whole pixels, without a limit on their number."""
     tv = library()
     with tv.Context(max_width=image.shape[1], max_height=image.shape[0],
                     max_keypoints=65535) as context:
@@ -69,7 +73,8 @@ def detect(image, arc, threshold):
 
 
 def example_corner(image):
-    """A corner with an arc of 12 to 14 and clear contrast: one that a reader can count along."""
+    """A corner with an arc of 12 to 14 pixels and clear contrast, in which a reader can count the
+    pixels."""
     found = detect(image, ARC, THRESHOLD)
     around = differences(image)
     for k in found:  # strongest first
@@ -85,7 +90,7 @@ def example_corner(image):
 
 
 def states(corner, threshold):
-    """Per circle pixel: +1 brighter, -1 darker, 0 alike."""
+    """The state of each circle pixel: +1 brighter, -1 darker, 0 similar."""
     d = np.array(corner["circle"]) - corner["centre"]
     return np.where(d > threshold, 1, np.where(d < -threshold, -1, 0))
 
@@ -141,7 +146,7 @@ def figure5(inputs):
 
 
 def images(inputs):
-    """({name: grey image}, what is missing)"""
+    """({name: grey image}, a list of what is missing)."""
     def of_set(folder, number):
         return grey(read_colour(sorted(inputs.of_data(folder, "images").iterdir())[number]))
 
@@ -156,7 +161,8 @@ def images(inputs):
 
 
 def count(image):
-    """Corners of each arc, before and after suppression, and the library's."""
+    """The numbers of corners for each arc, before and after suppression, and the library's
+    number."""
     entry = {"width": image.shape[1], "height": image.shape[0], "threshold": THRESHOLD, "arcs": {}}
     for arc in (9, 10, 11, 12):
         score = scores(image, arc)

@@ -1,4 +1,4 @@
-"""Figures 14 and 15: epipolar lines, epipoles and camera poses of sideways and of forward motion."""
+"""Figures 14 and 15: epipolar lines, epipoles and camera poses for sideways and forward motion."""
 
 import json
 from dataclasses import dataclass, replace
@@ -11,17 +11,17 @@ from .experiment import Experiment, Missing, Result, Table, available
 from .inputs import Pair, grey, library, read_colour
 
 NUM_LINES, FLIGHTS = 14, 3
-# A camera that looks forward: its axes in the body's (forward, right, down).
+# The rotation of a camera that looks forward: from camera axes to body axes (forward, right, down).
 BODY_FROM_CAMERA = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
 
 
 @dataclass
 class Study:
-    """A pair, reconstructed with the library's defaults, and its errors."""
+    """A pair that was reconstructed with the library's defaults, and its errors."""
 
     pair: Pair
-    pose: object  # twoview.TwoView
-    pixels: tuple  # of the inliers, without distortion
+    pose: object  # a twoview.TwoView
+    pixels: tuple  # of the inliers, undistorted
     points: np.ndarray  # of the inliers, in baselines
     numbers: dict
 
@@ -31,12 +31,12 @@ def angle_deg(a, b):
 
 
 def rotation_deg(R):
-    """The angle of a rotation."""
+    """The angle of a rotation in degrees."""
     return float(np.degrees(np.linalg.norm(cv2.Rodrigues(np.asarray(R, float))[0])))
 
 
 def to_pinhole(camera, pixels):
-    """Where a camera without distortion sees the same."""
+    """The pixels at which a camera without distortion sees the same points."""
     rays, _ = library().camera_unproject_points(camera, np.ascontiguousarray(pixels, float))
     seen = rays @ camera.K.T
     return seen[:, :2] / seen[:, 2:]
@@ -53,7 +53,7 @@ def undistorted_image(camera, image):
 
 
 def epipole(K, direction):
-    """The pixel of a direction in the camera's frame, and whether it lies ahead."""
+    """The pixel of a direction in the camera's frame, and whether the direction points forward."""
     seen = K @ direction
     return seen[:2] / seen[2] if abs(seen[2]) > 1e-12 else np.sign(seen[:2]) * 1e9
 
@@ -65,7 +65,7 @@ def reconstructed(pair):
         pose, cloud = tv.reconstruct(context, pair.grey[0], pair.cameras[0], pair.grey[1], pair.cameras[1])
     if pose.R is None or pose.t is None:
         raise Missing(f"a pose of {pair.name}")
-    # Pixels, epipoles and F's lines are all of the cameras that the pose is of.
+    # The pixels, epipoles and lines of F all refer to the cameras of the pose.
     pair = replace(pair, cameras=tuple(tv.corrected_camera(pose, camera) for camera in pair.cameras))
     chosen = cloud.matches[cloud.inlier_mask]
     pixels = tuple(to_pinhole(camera, np.column_stack([keys["x"], keys["y"]])[chosen[index]])
@@ -93,14 +93,14 @@ def rotation_of_quaternion(x, y, z, w):
 
 
 def true_motion(rows):
-    """cam1_from_cam0 of two rows of the simulator's truth: R, t in metres."""
+    """cam1_from_cam0 of two rows of the simulator's truth: R, and t in metres."""
     turns = [rotation_of_quaternion(*row[5:9]) @ BODY_FROM_CAMERA for row in rows]
     return turns[1].T @ turns[0], turns[1].T @ (rows[0][2:5] - rows[1][2:5])
 
 
 def frames_apart(recorded, numbers, metres):
-    """Of the decoded pictures, by the drone's numbers: the indices of two as far apart as asked, late in the
-    flight, and their rows of the truth."""
+    """Chooses two decoded pictures with the requested distance, late in the flight. Returns their
+    indices and their rows of the truth."""
     rows = {int(row[0]): row for row in recorded.truth}
     known = [k for k, number in enumerate(numbers) if number in rows]
     last = len(known) - 5
@@ -115,10 +115,10 @@ def frames_apart(recorded, numbers, metres):
 
 
 def pair_of_flight(inputs, recorded, plan, metres):
-    """(pair with truth, result.json of the same two frames beside the IMU)"""
+    """(pair with truth, result.json of the same two frames with the IMU's values)."""
     pictures = recorded.folder.parent / "frames"
     inputs.program("drone", "replay", recorded.folder, "--frames", pictures, "--quiet")
-    files = sorted(pictures.glob("*.png"))  # named by the drone's numbers
+    files = sorted(pictures.glob("*.png"))  # named by the drone's frame numbers
     indices, rows = frames_apart(recorded, [int(f.stem) for f in files], metres)
     told = json.loads(inputs.program("reconstruct", "--recording", recorded.folder, "--frames", *indices,
                                      "--camera", recorded.camera, "--json", "-o",
@@ -137,7 +137,7 @@ def pair_of_flight(inputs, recorded, plan, metres):
 
 
 def flown_pair(inputs, plan, metres):
-    """The same; on a machine too busy for real time the drone flies again."""
+    """As pair_of_flight. If the machine was too busy for real time, the flight is repeated."""
     for attempt in range(FLIGHTS):
         try:
             return pair_of_flight(inputs, flight.fly(inputs, plan, attempt), plan, metres)
@@ -158,7 +158,7 @@ def imu_numbers(pair, told):
 # ---- drawing ----
 
 def spread(pixels, count):
-    """Indices of points far from each other."""
+    """Indices of points that are far from each other."""
     chosen = [int(np.argmin(pixels[:, 0] + pixels[:, 1]))]
     near = np.linalg.norm(pixels - pixels[chosen[0]], axis=1)
     while len(chosen) < min(count, len(pixels)):
@@ -168,7 +168,8 @@ def spread(pixels, count):
 
 
 def draw_view(axis, study, view, chosen):
-    """A picture with points of it and the epipolar lines of the other picture's."""
+    """Draws a picture with some of its points and the epipolar lines of the other picture's
+    points."""
     camera = study.pair.cameras[view]
     drawing.show(axis, grey(undistorted_image(camera, study.pair.colour[view])))
     F = study.pose.F if view == 1 else study.pose.F.T
@@ -190,10 +191,11 @@ def draw_view(axis, study, view, chosen):
 
 
 def draw_cameras(axis, study):
-    """From above: camera 0 at the origin, camera 1, and the cloud."""
+    """Draws camera 0 at the origin, camera 1 and the cloud, from above."""
     ok = study.points["status"] == library().PointStatus.OK
     points = study.points["position"][ok]
-    depth = min(np.percentile(points[:, 2], 90), 30.0)  # farther ones would hide the baseline
+    # more distant points would make the baseline too small to see
+    depth = min(np.percentile(points[:, 2], 90), 30.0)
     near = points[(points[:, 2] < 1.3 * depth)]
     axis.plot(near[:, 0], near[:, 2], ".", color=drawing.GREY, markersize=1.5)
     size = 0.16 * depth

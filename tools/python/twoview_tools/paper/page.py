@@ -1,4 +1,4 @@
-"""The page: one file that needs no network."""
+"""Makes the page: one file that needs no network."""
 
 import base64
 import datetime

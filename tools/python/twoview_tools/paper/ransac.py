@@ -1,7 +1,7 @@
-"""Figures 8 and 9: RANSAC on a line, and on the matches of two views.
+"""Figures 8 and 9: RANSAC for a line, and for the matches of two views.
 
-M. Fischler, R. Bolles, "Random sample consensus", 1981. The library has no line estimator, so the loop
-of figure 8 is written here: it shows the idea, figure 9 is the library."""
+M. Fischler, R. Bolles, "Random sample consensus", 1981. The library has no line estimator, so the
+loop of figure 8 is written here to show the principle; figure 9 uses the library."""
 
 import cv2
 import numpy as np
@@ -15,11 +15,11 @@ SIGMA_PX, THRESHOLD_PX = 1.0, 2.5
 SIZE = 640, 480
 NUM_RUNS = 1000
 CONFIDENCE = 0.9999
-DRAWN_INLIERS = 110  # about, of figure 9's
+DRAWN_INLIERS = 110  # approximate number of inliers that figure 9 draws
 
 
 def line_points(random):
-    """500 points, 300 of them on a line but for noise across it; (points, which are the 300)."""
+    """Returns (500 points, a mask of the 300 that lie on a line with perpendicular noise)."""
     angle = random.uniform(0, np.pi)
     along = np.array([np.cos(angle), np.sin(angle)])
     across = np.array([-along[1], along[0]])
@@ -32,7 +32,7 @@ def line_points(random):
 
 
 def line_through(points):
-    """(normal, offset) of the line of least squared distances: normal . x = offset."""
+    """(normal, offset) of the line with the least squared distances: normal . x = offset."""
     middle = points.mean(axis=0)
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][-1]
     return normal, float(normal @ middle)
@@ -44,7 +44,8 @@ def within(points, line):
 
 
 def ransac_line(points, random):
-    """(inliers, samples drawn): the paper's loop, two points a sample, then one fit to all inliers."""
+    """(inliers, number of samples): the paper's loop with two points a sample, then one fit to all
+    inliers."""
     best, drawn, wanted = np.zeros(len(points), bool), 0, 1000
     while drawn < wanted:
         drawn += 1
@@ -109,7 +110,7 @@ def figure8(_inputs):
 # ---- figure 9 ----
 
 def matches_of(pair, **options):
-    """(pixels0, pixels1, ratios) of 12-FAST corners with plain SIFT, the paper's front end."""
+    """(pixels0, pixels1, ratios) of FAST-12 corners with plain SIFT, the paper's front end."""
     tv = library()
     height = max(image.shape[0] for image in pair.grey)
     width = max(image.shape[1] for image in pair.grey)
@@ -123,7 +124,8 @@ def matches_of(pair, **options):
 
 
 def true_matches(pair, pixels0, pixels1):
-    """Which matches are right: at the true place where depth is known, else on the true epipolar line."""
+    """A mask of the correct matches: near the true position where the depth is known, else near the
+    true epipolar line."""
     lines = np.column_stack([pixels0, np.ones(len(pixels0))]) @ pair.true_F.T
     distance = np.abs(np.sum(lines[:, :2] * pixels1, axis=1) + lines[:, 2]) / np.hypot(*lines[:, :2].T)
     right = distance < pair.truth_px
@@ -135,12 +137,12 @@ def true_matches(pair, pixels0, pixels1):
         points = (rays * depth[:, None]) @ pair.R.T + pair.t
         seen = points @ pair.cameras[1].K.T
         off = np.linalg.norm(seen[:, :2] / seen[:, 2:] - pixels1, axis=1)
-        right &= ~(off > 2 * pair.truth_px)  # an unknown depth says nothing
+        right &= ~(off > 2 * pair.truth_px)  # an unknown depth rejects no match
     return right
 
 
 def estimates(pair, pixels0, pixels1, ratios):
-    """{name: (inliers, samples or None)}"""
+    """{name: (inliers, number of samples or None)} of each estimator."""
     tv = library()
     found = {}
     with tv.Context(max_matches=len(pixels0)) as context:
@@ -170,7 +172,7 @@ def draw_matches(axis, pair, pixels0, pixels1, inliers):
 
 
 def pairs_of_figure9(inputs):
-    """(pairs, what is missing)"""
+    """(pairs, a list of what is missing)."""
     def office():
         return inputs.listed_pair("tum_fr3_office", *first_pair(inputs, "tum_fr3_office", 20), "TUM office",
                                   truth_px=5.0)
@@ -178,13 +180,13 @@ def pairs_of_figure9(inputs):
 
 
 def first_pair(inputs, folder, index):
-    """Names of a line of the set's pairs.txt."""
+    """The names in a line of the set's pairs.txt."""
     with open(inputs.of_data(folder, "pairs.txt"), encoding="utf-8") as f:
         return [line.split()[:2] for line in f if line.strip() and not line.startswith("#")][index]
 
 
 def studied(axis, pair):
-    """(numbers, rows of the table) of a pair, drawn."""
+    """(numbers, rows of the table) of a pair, whose matches are drawn."""
     pixels0, pixels1, ratios = matches_of(pair)
     right = true_matches(pair, pixels0, pixels1)
     numbers, rows = {"matches": len(pixels0), "right": int(right.sum()), "methods": {}}, []

@@ -1,7 +1,9 @@
-"""Figure 13 and table 1: the iterated weights of Iterative-LS, and seven triangulations.
+"""Figure 13 and table 1: the weights of Iterative-LS in each iteration, and a comparison of seven
+triangulation methods.
 
-R. Hartley, P. Sturm, "Triangulation", CVIU 68(2), 1997. Iterative-LS is written here from their
-definition, with 4 x 3 equations in pixels and numpy's least squares; the library eliminates first."""
+R. Hartley, P. Sturm, "Triangulation", CVIU 68(2), 1997. Iterative-LS is computed here from their
+definition, with 4 x 3 equations in pixels and numpy's least squares; the library eliminates
+unknowns first."""
 
 import time
 from dataclasses import replace
@@ -26,8 +28,9 @@ NOISE_PX = 1.0
 # ---- scenes ----
 
 def scene(kind, num=2000, noise_px=NOISE_PX, seed=7):
-    """(pair without images, true points, noisy pixels0, pixels1): 640x480, f = 500, |t| = 1, points 4
-    to 20 baselines away; converging: two views of a place 1.2 baselines away, 45 degrees apart."""
+    """(pair without images, true points, noisy pixels0, noisy pixels1): 640x480, f = 500, |t| = 1,
+    points 4 to 20 baselines away. For kind "converging": two views of a place 1.2 baselines away,
+    45 degrees apart."""
     tv = library()
     camera = tv.Camera(640, 480, 500, 500, 319.5, 239.5)
     angle = np.pi / 4 if kind == "converging" else 0.0
@@ -47,7 +50,7 @@ def scene(kind, num=2000, noise_px=NOISE_PX, seed=7):
 
 
 def projection(pair, view):
-    """3 x 4, in pixels, for |t| = 1."""
+    """The 3 x 4 projection matrix in pixels, for |t| = 1."""
     pose = np.column_stack([np.eye(3), np.zeros(3)] if view == 0 else [pair.R, pair.t])
     return pair.cameras[view].K @ pose
 
@@ -58,7 +61,8 @@ def pixels_of(pair, view, points):
 
 
 def errors_px(pair, points, pixels0, pixels1):
-    """Root mean square of both distances, a match."""
+    """The reprojection error of each match: the root mean square of its distances in both
+    images."""
     off = [np.sum((pixels_of(pair, view, points) - pixels) ** 2, axis=1)
            for view, pixels in ((0, pixels0), (1, pixels1))]
     return np.sqrt((off[0] + off[1]) / 2)
@@ -67,8 +71,9 @@ def errors_px(pair, points, pixels0, pixels1):
 # ---- figure 13 ----
 
 def iterative_ls(pair, pixels0, pixels1, rounds=ROUNDS):
-    """(points, weights) of each round, (rounds, n, 3) and (rounds, n, 2): the equations u p3.X - p1.X and
-    v p3.X - p2.X of camera i times its weight, 1 at first and then 1 / (p3.X) of the last round's X."""
+    """(points, weights) of each iteration, (rounds, n, 3) and (rounds, n, 2). The equations u p3.X
+    - p1.X and v p3.X - p2.X of camera i are multiplied by its weight, which is 1 at first and then
+    1 / (p3.X) with X from the last iteration."""
     P = [projection(pair, view) for view in (0, 1)]
     n = len(pixels0)
     rows = np.stack([pixels[:, k, None] * P[view][2] - P[view][k]
@@ -87,8 +92,8 @@ def iterative_ls(pair, pixels0, pixels1, rounds=ROUNDS):
 
 
 def forward_pair(inputs):
-    """(pair, pixels0, pixels1): a camera that drives forward, with its inliers; the pose is the estimate's, and the
-    cameras are those that it is of."""
+    """(pair, pixels0, pixels1): the inliers of a camera that drives forward. The pose is the
+    estimated one, and the cameras are those that it refers to."""
     pair = inputs.listed_pair("kitti00_turn", "000100.png", "000104.png", "KITTI, 1.65 m forward")
     tv = library()
     pixels0, pixels1, ratios = ransac.matches_of(pair)
@@ -104,7 +109,7 @@ def forward_pair(inputs):
 
 
 def weights_study(pair, pixels0, pixels1):
-    """The numbers of figure 13 on given matches."""
+    """The numbers of figure 13 for given matches."""
     tv = library()
     points, weights = iterative_ls(pair, pixels0, pixels1)
     errors = np.array([errors_px(pair, p, pixels0, pixels1) for p in points])
@@ -121,7 +126,8 @@ def weights_study(pair, pixels0, pixels1):
 
 
 def excess_percent(numbers):
-    """How far the root mean square lies above its last value, by round."""
+    """The excess of the root mean square error over its final value, for each iteration, in per
+    cent."""
     rms = np.array(numbers["rms_px"])
     return 100 * (rms / rms[-1] - 1)
 
@@ -172,7 +178,7 @@ def figure13(inputs):
 
 
 def rounds_table(weights, errors):
-    """Of one match."""
+    """The table of the iterations of one match."""
     rows = [[str(k), *(f"{w:.6f}" for w in weights[k]), f"{errors[k]:.6f}"] for k in range(ROUNDS)]
     return Table("The match that gains most, round by round (0: Linear-LS)",
                  ["round", "weight, camera 0", "weight, camera 1", "reprojection error [px]"], rows)
@@ -181,7 +187,7 @@ def rounds_table(weights, errors):
 # ---- table 1 ----
 
 def dlt(pair, pixels0, pixels1):
-    """Linear-Eigen from its definition: the smallest singular vector, one match at a time."""
+    """Linear-Eigen from its definition: the smallest singular vector, computed for each match."""
     P = [projection(pair, view) for view in (0, 1)]
     points = []
     for a, b in zip(pixels0, pixels1):
@@ -203,7 +209,7 @@ def ours(method, pair, pixels0, pixels1):
 
 
 def run_ns(method, scenes):
-    """CPU time of one method over all scenes."""
+    """The CPU time of one method over all scenes."""
     begin = time.process_time_ns()
     for pair, _points, pixels0, pixels1 in scenes:
         if method in METHODS:
@@ -214,8 +220,8 @@ def run_ns(method, scenes):
 
 
 def times_ns(scenes, repetitions=25):
-    """{method: ns a point}: medians, methods in turn. What a call costs by itself, from Python, is measured
-    with one match and taken off."""
+    """{method: ns for one point}: medians, with the methods measured in turn. The time of a call
+    itself, measured from Python with one match, is subtracted."""
     taken = {method: [] for method in (*METHODS, OPENCV)}
     single = [(pair, points[:1], pixels0[:1].copy(), pixels1[:1].copy())
               for pair, points, pixels0, pixels1 in scenes]
@@ -227,7 +233,8 @@ def times_ns(scenes, repetitions=25):
 
 
 def through_a_lens(pair):
-    """The same pair with lenses that distort by nothing to speak of: points are then taken one by one."""
+    """The same pair with a negligible lens distortion, so that the library processes the points one
+    by one."""
     model = library().CameraModel.BROWN_CONRADY
     cameras = tuple(replace(camera, model=model, k=(1e-9, 0, 0, 0, 0)) for camera in pair.cameras)
     return replace(pair, cameras=cameras)
@@ -238,14 +245,15 @@ def relative(times):
 
 
 def accuracy(pair, truth, positions, pixels0, pixels1):
-    """Pixels (rms to the measured ones) and per cent of the distance (median, 95 %)."""
+    """The root mean square reprojection error in pixels, and the position error in per cent of the
+    distance (median, 95 %)."""
     off = 100 * np.linalg.norm(positions - truth, axis=1) / np.linalg.norm(truth, axis=1)
     return {"rms_px": float(np.sqrt((errors_px(pair, positions, pixels0, pixels1) ** 2).mean())),
             "percent_median": float(np.median(off)), "percent_p95": float(np.percentile(off, 95))}
 
 
 def motorcycle_points(pair):
-    """Right matches of the pair with their true points, in baselines."""
+    """The correct matches of the pair with their true points, in baselines."""
     pixels0, pixels1, _ = ransac.matches_of(pair)
     x, y = np.round(pixels0).astype(int).T
     depth = pair.depth0[y, x] / pair.baseline_m
@@ -255,7 +263,7 @@ def motorcycle_points(pair):
 
 
 def errors_table(scenes):
-    """{scene: {method: accuracy}}, OpenCV beside us."""
+    """{scene: {method: accuracy}}, with OpenCV for comparison."""
     found = {}
     for name, (pair, truth, pixels0, pixels1) in scenes.items():
         found[name] = {m: accuracy(pair, truth, ours(m, pair, pixels0, pixels1)["position"], pixels0, pixels1)
