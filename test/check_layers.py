@@ -157,7 +157,8 @@ def included_units(name, headers, files):
 
 
 def find_circles(files):
-    """One shortest circle of includes through each unit that lies on one; a circle is listed once."""
+    """One shortest circle of includes through each unit that lies on one; a circle is listed
+    once."""
     edges = {}
     for name, headers in files.items():
         edges.setdefault(unit_of(name), set()).update(included_units(name, headers, files))
@@ -232,13 +233,21 @@ def lies_beside(name, header, files):
     return f"{name.rsplit('/', 1)[0]}/{header}" in files
 
 
-# Circles that the check must find: of headers, through a .cc file, and of three files in two folders.
+# Circles that the check must find: of headers, through a .cc file, and of three files in two
+# folders.
 CIRCLES = [
     {"lib/src/robust/a.h": ["robust/b.h"], "lib/src/robust/b.h": ["robust/a.h"]},
-    {"lib/src/robust/refine.h": [], "lib/src/robust/refine.cc": ["robust/refine.h", "robust/gravity.h"],
-     "lib/src/robust/gravity.h": ["robust/refine.h"]},
-    {"tools/twoview/a.h": ["rooms/b.h"], "tools/twoview/rooms/b.h": ["c.h"],
-     "tools/twoview/rooms/c.h": [], "tools/twoview/rooms/c.cc": ["../a.h"]},
+    {
+        "lib/src/robust/refine.h": [],
+        "lib/src/robust/refine.cc": ["robust/refine.h", "robust/gravity.h"],
+        "lib/src/robust/gravity.h": ["robust/refine.h"],
+    },
+    {
+        "tools/twoview/a.h": ["rooms/b.h"],
+        "tools/twoview/rooms/b.h": ["c.h"],
+        "tools/twoview/rooms/c.h": [],
+        "tools/twoview/rooms/c.cc": ["../a.h"],
+    },
 ]
 
 

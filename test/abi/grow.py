@@ -1,5 +1,5 @@
-"""Copies the public headers and adds fields at the end of every struct that has struct_size, as a later release may:
-what test/abi builds the library and its callers with.
+"""Copies the public headers and adds fields at the end of every struct that has struct_size, as a
+later release may: what test/abi builds the library and its callers with.
 
 usage: grow.py INCLUDE OUTPUT"""
 
@@ -13,7 +13,9 @@ FIELDS = """  /* Fields of a later release. */
 """
 
 # One of a struct's own fields; nested braces do not occur.
-STRUCT = re.compile(r"(typedef struct (\w+) \{\n(?:(?!\n\} ).)*?uint32_t struct_size;.*?)(\} \2;)", re.S)
+STRUCT = re.compile(
+    r"(typedef struct (\w+) \{\n(?:(?!\n\} ).)*?uint32_t struct_size;.*?)(\} \2;)", re.S
+)
 
 
 def growing(text):
@@ -25,7 +27,9 @@ def main():
     source, output = map(pathlib.Path, sys.argv[1:])
     count = 0
     for header in sorted(source.rglob("*.h")):
-        text, found = STRUCT.subn(lambda match: match.group(1) + FIELDS + match.group(3), header.read_text())
+        text, found = STRUCT.subn(
+            lambda match: match.group(1) + FIELDS + match.group(3), header.read_text()
+        )
         count += found
         copy = output / header.relative_to(source)
         copy.parent.mkdir(parents=True, exist_ok=True)

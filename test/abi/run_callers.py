@@ -1,6 +1,8 @@
-"""Runs callers that were compiled with other headers than the library they run on, and compares what they print.
+"""Runs callers that were compiled with other headers than the library they run on, and compares
+what they print.
 
-usage: run_callers.py "PROGRAM ARGUMENT..." ...   The first one is what the others are compared with."""
+usage: run_callers.py "PROGRAM ARGUMENT..." ...   The first one is what the others are compared
+with."""
 
 import subprocess
 import sys

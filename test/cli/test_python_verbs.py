@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""twoview compare and twoview colmap: the hand-over to the Python programs, of the source tree or installed."""
+"""twoview compare and twoview colmap: the hand-over to the Python programs, of the source tree or
+installed."""
 import json
 import os
 import shutil

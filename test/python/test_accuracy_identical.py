@@ -1,4 +1,5 @@
-"""twoview_tools.accuracy.identical and system_python: thresholds, verdicts, cache, the subprocess."""
+"""twoview_tools.accuracy.identical and system_python: thresholds, verdicts, cache, the
+subprocess."""
 
 import tempfile
 import unittest
