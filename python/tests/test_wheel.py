@@ -30,8 +30,21 @@ def test_the_wheel_installs_and_works(tmp_path):
     kept = os.environ.get("TWOVIEW_WHEEL_BUILD")
     settings = ["--config-settings", f"build-dir={kept}"] if kept else []
     build = subprocess.run(
-        [*pip, "wheel", *settings, "--no-build-isolation", "--no-deps", "--no-index", "-w", tmp_path,
-         ROOT / "python"], capture_output=True, text=True, check=False)
+        [
+            *pip,
+            "wheel",
+            *settings,
+            "--no-build-isolation",
+            "--no-deps",
+            "--no-index",
+            "-w",
+            tmp_path,
+            ROOT / "python",
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert build.returncode == 0, build.stdout[-3000:] + build.stderr[-3000:]
     wheel, = tmp_path.glob("twoview-*.whl")
     assert "-py3-none-" in wheel.name

@@ -111,7 +111,8 @@ def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
           options: Optional[MatchOptions] = None, **keywords: Any) -> np.ndarray:
     """tv_match: mutual nearest neighbours that pass the ratio test in both directions.
 
-    descriptors: (n, 128) uint8. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq, ratio."""
+    descriptors: (n, 128) uint8. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq,
+    ratio."""
     wanted = to_struct(check_context(context).library, MatchOptions, options, keywords)
     descriptors0 = _descriptors("descriptors0", descriptors0)
     descriptors1 = _descriptors("descriptors1", descriptors1)
@@ -312,7 +313,10 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
     those of triangulate."""
     wanted = to_struct(check_context(context).library, BundleOptions, options, keywords)
     pixels0, pixels1 = _pixels(pixels0, pixels1)
-    rotation, translation = _abi.small_array("R", R, 3, 3).copy(), _abi.small_array("t", t, 3).copy()
+    rotation, translation = (
+        _abi.small_array("R", R, 3, 3).copy(),
+        _abi.small_array("t", t, 3).copy(),
+    )
     points = _abi.check_array("points", points, _abi.POINT).copy()
     if len(points) != len(pixels0):
         raise ValueError(f"{len(points)} points and {len(pixels0)} matches")
@@ -383,7 +387,9 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
     for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
         kept.append(camera_struct("camera" + name, camera))
         view = library.make(_abi.tv_view)
-        view.image, view.camera = _abi.check_image("image" + name, image), ctypes.addressof(kept[-1])
+        view.image, view.camera = _abi.check_image("image" + name, image), ctypes.addressof(
+            kept[-1]
+        )
         if mask is not None:
             kept.append(_abi.check_image("mask" + name, mask))
             view.mask = ctypes.addressof(kept[-1])

@@ -8,7 +8,8 @@
 - docs: what builds and checks the documentation (scripts/docs, test/docs).
 
 `scripts/python -m twoview_tools.accuracy.tune` runs a module of the source tree. The tests get the
-same path from test/CMakeLists.txt, and the two programs of tools/compare_colmap from their launch.py.
+same path from test/CMakeLists.txt, and the two programs of tools/compare_colmap from their
+launch.py.
 """
 
 import os

@@ -104,7 +104,9 @@ def main():
     library = twoview_ctypes.Library(arguments.lib)
     summary = means(measure(names, library, True, arguments.max_pairs))
     for option, values in summary.items():
-        tables.say(f"\n| {option} | AUC5 | AUC10 | AUC20 | matches |\n| --- | --- | --- | --- | --- |")
+        tables.say(
+            f"\n| {option} | AUC5 | AUC10 | AUC20 | matches |\n| --- | --- | --- | --- | --- |"
+        )
         for value, v in values.items():
             tables.say(f"| {value:g} | {v['5']:.1f} | {v['10']:.1f} | {v['20']:.1f} | "
                        f"{v['matches']:.0f} |")

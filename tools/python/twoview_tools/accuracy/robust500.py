@@ -2,7 +2,8 @@
 """The robust essential estimate beside PoseLib's: error and time on simulated matches, same run.
 
   scripts/accuracy --robust500                   # 200 problems a share of true matches
-  scripts/python -m twoview_tools.accuracy.robust500 --problems 50 --lib build/release/lib/libtwoview.so
+  scripts/python -m twoview_tools.accuracy.robust500 --problems 50 --lib
+  build/release/lib/libtwoview.so
 
 A problem is 500 matches in random order, without ratios, of two 640x480 pinhole views (f 500). The
 rotation turns by 1 to 12 degrees about any axis, the baseline has any direction; true matches lie
@@ -10,8 +11,8 @@ rotation turns by 1 to 12 degrees about any axis, the baseline has any direction
 both images; wrong ones pair two points spread evenly over the images. Problem k of every share is
 made by numpy's default_rng((k, share in per cent)). Each problem goes to ours at the library's
 defaults and to PoseLib at 1 px with its defaults and with min_iterations=50, in turn, all of it
-through Python in one process pinned to one core; a time is the CPU time of the best of --repeats calls. The error is
-the larger of the rotation's and the translation direction's angle.
+through Python in one process pinned to one core; a time is the CPU time of the best of --repeats
+calls. The error is the larger of the rotation's and the translation direction's angle.
 
 What must hold: our median error is not above that of either PoseLib configuration, and our time is
 at most a third of theirs.
@@ -80,7 +81,9 @@ def _ours(context):
 
     def run(pixels0, pixels1):
         result, _ = context.estimate_two_view(camera, camera, pixels0, pixels1)
-        return (np.array(result.R).reshape(3, 3), np.array(result.t)) if result.has_t else (None,) * 2
+        return (
+            (np.array(result.R).reshape(3, 3), np.array(result.t)) if result.has_t else (None,) * 2
+        )
     return run
 
 

@@ -64,11 +64,17 @@ class CameraChoice:
         camera = None if found is None else _camera(found)
         if camera is None:
             if K is None:
-                raise BadInput(f"image {name}: no camera for it (--camera, or a cameras.yaml beside the pairs file or "
-                               "the images)")
+                raise BadInput(
+                    f"image {name}: no camera for it (--camera, or a cameras.yaml beside the pairs "
+                    f"file or "
+                    "the images)"
+                )
             return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
         if (camera.width, camera.height) != (width, height):
-            raise BadInput(f"image {name} is {width}x{height}, but its camera is for {camera.width}x{camera.height}")
+            raise BadInput(
+                f"image {name} is {width}x{height}, but its camera is for "
+                f"{camera.width}x{camera.height}"
+            )
         if K is None:
             return camera
         return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], camera.model, camera.k)

@@ -50,7 +50,9 @@ def camera_to_colmap(camera):
         model, lens = "FULL_OPENCV", k
     else:
         model, lens = "OPENCV", k[:4]
-    return ColmapCamera(model, int(camera.width), int(camera.height), tuple(map(float, params + lens)))
+    return ColmapCamera(
+        model, int(camera.width), int(camera.height), tuple(map(float, params + lens))
+    )
 
 
 # For each of COLMAP's models, the indices of fx fy cx cy among its parameters, and the indices of

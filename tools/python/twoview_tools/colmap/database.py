@@ -21,7 +21,10 @@ def _columns(database):
     """{table: columns} of all tables except SQLite's own."""
     tables = [row[0] for row in database.execute(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'")]
-    return {table: [row[1] for row in database.execute(f"PRAGMA table_info('{table}')")] for table in tables}
+    return {
+        table: [row[1] for row in database.execute(f"PRAGMA table_info('{table}')")]
+        for table in tables
+    }
 
 
 def maker_of(database):
@@ -31,7 +34,11 @@ def maker_of(database):
         return "no COLMAP"
     if version >= 1000000:
         return f"COLMAP {version // 1000000}.{version // 10000 % 100}.{version // 100 % 100}"
-    return f"COLMAP {version // 1000}.{version // 100 % 10}" if version else "a COLMAP that gives no version"
+    return (
+        f"COLMAP {version // 1000}.{version // 100 % 10}"
+        if version
+        else "a COLMAP that gives no version"
+    )
 
 
 def _explain(path, error):
@@ -49,7 +56,9 @@ def reading(path):
     if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file")
     try:
-        uri = "file:" + os.path.abspath(path).replace("%", "%25").replace("?", "%3f").replace("#", "%23")
+        uri = "file:" + os.path.abspath(path).replace("%", "%25").replace("?", "%3f").replace(
+            "#", "%23"
+        )
         with contextlib.closing(sqlite3.connect(uri + "?mode=ro", uri=True, timeout=1)) as database:
             database.execute("SELECT count(*) FROM sqlite_master")
             yield database
@@ -65,7 +74,9 @@ def _require_schema(database, path, schema, folder):
     with contextlib.closing(sqlite3.connect(fresh)) as expected:
         wanted, maker = _columns(expected), maker_of(expected)
     if _columns(database) != wanted:
-        raise BadInput(f"{path}: made by {maker_of(database)}, and --schema {schema.NAME} is for {maker}")
+        raise BadInput(
+            f"{path}: made by {maker_of(database)}, and --schema {schema.NAME} is for {maker}"
+        )
 
 
 def _settle(path):
@@ -113,7 +124,9 @@ def appended_database(path, schema):
         raise BadInput(f"{path}: no such file, nothing to append to")
     schema.prepare()
     try:
-        with _scratch_folder(path) as scratch, contextlib.closing(sqlite3.connect(path, timeout=1)) as target:
+        with _scratch_folder(path) as scratch, contextlib.closing(
+            sqlite3.connect(path, timeout=1)
+        ) as target:
             made = os.path.join(scratch, "made.db")
             target.execute("BEGIN IMMEDIATE")  # fails if the database cannot be written
             target.rollback()
@@ -176,20 +189,26 @@ def _table(row, dtype, path, what):
 
 def read_keypoints(database, path, image_id):
     """Reads keypoints (n, 2), (n, 4) or (n, 6) float32, in COLMAP's pixels."""
-    row = database.execute("SELECT rows, cols, data FROM keypoints WHERE image_id = ?", (image_id,)).fetchone()
+    row = database.execute(
+        "SELECT rows, cols, data FROM keypoints WHERE image_id = ?", (image_id,)
+    ).fetchone()
     return _table(row, np.float32, path, f"keypoints of image {image_id}")
 
 
 def read_descriptors(database, path, image_id):
     """Reads descriptors (n, 128) uint8."""
-    row = database.execute("SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)).fetchone()
+    row = database.execute(
+        "SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)
+    ).fetchone()
     return _table(row, np.uint8, path, f"descriptors of image {image_id}")
 
 
 def read_matches(database, path):
     """Reads [(image_id0, image_id1, matches (n, 2) uint32)] with image_id0 < image_id1."""
     found = []
-    for pair, *row in database.execute("SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id"):
+    for pair, *row in database.execute(
+        "SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id"
+    ):
         id0, id1 = divmod(pair, schema38.MAX_IMAGES)
         found.append((id0, id1, _table(row, np.uint32, path, f"matches of images {id0} and {id1}")))
     return found
@@ -197,5 +216,7 @@ def read_matches(database, path):
 
 def read_pair_ids(database):
     """The pairs of image ids, smaller first, that have matches or a geometry."""
-    rows = database.execute("SELECT pair_id FROM matches UNION SELECT pair_id FROM two_view_geometries")
+    rows = database.execute(
+        "SELECT pair_id FROM matches UNION SELECT pair_id FROM two_view_geometries"
+    )
     return {divmod(row[0], schema38.MAX_IMAGES) for row in rows}

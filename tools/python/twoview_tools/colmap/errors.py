@@ -41,7 +41,9 @@ def need_pycolmap(what):
     try:
         import pycolmap
     except ImportError as error:
-        raise BadInput(f"{what} needs pycolmap (scripts/bootstrap bench installs it): {error}") from error
+        raise BadInput(
+            f"{what} needs pycolmap (scripts/bootstrap bench installs it): {error}"
+        ) from error
     finally:
         # pycolmap's log library has replaced them with handlers that print a crash report
         for number, handler in before.items():

@@ -10,8 +10,16 @@ import twoview as tv
 
 from . import conventions
 from .cameras import CameraChoice
-from .database import (SCHEMAS, appended_database, new_database, read_cameras, read_images, read_keypoints,
-                       read_pair_ids, reading)
+from .database import (
+    SCHEMAS,
+    appended_database,
+    new_database,
+    read_cameras,
+    read_images,
+    read_keypoints,
+    read_pair_ids,
+    reading,
+)
 from .engine import Engine, pixels_of
 from .errors import BadInput
 from .images import list_images, read_luma

@@ -17,7 +17,9 @@ def times_of(names):
         times = [float(os.path.splitext(os.path.basename(name))[0]) for name in names]
     except ValueError:
         times = []
-    return times if times and len(set(times)) == len(times) else [float(i) for i in range(len(names))]
+    return (
+        times if times and len(set(times)) == len(times) else [float(i) for i in range(len(names))]
+    )
 
 
 def write_trajectory(poses):

@@ -16,14 +16,27 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
     lumas = [read_luma(path) for path in paths]
     for path, luma, camera in zip(paths, lumas, cameras):
         if (camera.height, camera.width) != luma.shape:
-            raise BadInput(f"image {path} is {luma.shape[1]}x{luma.shape[0]}, but its camera is for "
-                           f"{camera.width}x{camera.height}")
+            raise BadInput(
+                f"image {path} is {luma.shape[1]}x{luma.shape[0]}, but its camera is for "
+                f"{camera.width}x{camera.height}"
+            )
     feature = feature or tv.FeatureOptions()
     try:
-        with tv.Context(max_width=max(luma.shape[1] for luma in lumas), max_height=max(luma.shape[0] for luma in lumas),
-                        max_keypoints=feature.max_keypoints or 2048) as context:
-            pose, cloud = tv.reconstruct(context, lumas[0], cameras[0], lumas[1], cameras[1], feature=feature,
-                                         match=match, estimate=estimate)
+        with tv.Context(
+            max_width=max(luma.shape[1] for luma in lumas),
+            max_height=max(luma.shape[0] for luma in lumas),
+            max_keypoints=feature.max_keypoints or 2048,
+        ) as context:
+            pose, cloud = tv.reconstruct(
+                context,
+                lumas[0],
+                cameras[0],
+                lumas[1],
+                cameras[1],
+                feature=feature,
+                match=match,
+                estimate=estimate,
+            )
     except tv.StatusError as error:
         raise BadInput(f"cannot reconstruct {paths[0]} and {paths[1]}: {error}") from None
     if pose.R is None or pose.t is None:
@@ -35,5 +48,13 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
     colours = rgb[np.clip(y, 0, rgb.shape[0] - 1), np.clip(x, 0, rgb.shape[1] - 1)]
     points = cloud.points[good]
     cameras = tuple(tv.corrected_camera(pose, camera) for camera in cameras)
-    return pose, TwoViewModel(tuple(names), cameras, pose.R, pose.t, pixels,
-                              points["position"].astype(np.float64), colours, points["error_px"].astype(np.float64))
+    return pose, TwoViewModel(
+        tuple(names),
+        cameras,
+        pose.R,
+        pose.t,
+        pixels,
+        points["position"].astype(np.float64),
+        colours,
+        points["error_px"].astype(np.float64),
+    )

@@ -316,8 +316,15 @@ def compare(arguments):
         if not arguments.scheduler:
             raise
         raise BadInput(f"--scheduler: {arguments.scheduler}: {error}") from error
-    run = {"versions": versions, "missing": missing, "reference_of_sets": told, "where": where,
-           "wall_seconds": time.time() - start, "pairs_run_now": num_run, "resize": {t["set"]: t["resize"] for t in tasks}}
+    run = {
+        "versions": versions,
+        "missing": missing,
+        "reference_of_sets": told,
+        "where": where,
+        "wall_seconds": time.time() - start,
+        "pairs_run_now": num_run,
+        "resize": {t["set"]: t["resize"] for t in tasks},
+    }
     report = results.make_report(arguments, run, pairs)
     results.write(folder, report, pairs, tasks)
     store.remove()

@@ -118,7 +118,9 @@ def _of_pose(matches, answer):
         return matches
     moved = np.array([[0, 0, shift[0]], [0, 0, shift[1]], [0, 0, 0]])
     cameras = [(K + moved, distortion) for K, distortion in matches.cameras]
-    return estimators.Matches(matches.pixels0, matches.pixels1, cameras, matches.sizes, matches.ratios)
+    return estimators.Matches(
+        matches.pixels0, matches.pixels1, cameras, matches.sizes, matches.ratios
+    )
 
 
 def _coded(given):

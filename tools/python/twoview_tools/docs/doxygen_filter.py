@@ -15,7 +15,10 @@ import sys
 from . import headers
 
 # A line that begins with one of these starts a paragraph of its own in a function's comment.
-SECTIONS = re.compile(r"(Time|Same input|Needs no context|The result is|A match|An image|\"No geometry\"|First order|options may|Cameras, R)\b")
+SECTIONS = re.compile(
+    r"(Time|Same input|Needs no context|The result is|A match|An image|\"No geometry\"|First "
+    r"order|options may|Cameras, R)\b"
+)
 
 
 def escape(text):

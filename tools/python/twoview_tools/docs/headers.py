@@ -192,7 +192,9 @@ def parameters(function):
         if callback:
             yield piece, callback.group(1), True
             continue
-        *words, name = [word for word in re.findall(r"\w+", re.sub(r"\[.*?\]", "", piece)) if word != "const"]
+        *words, name = [
+            word for word in re.findall(r"\w+", re.sub(r"\[.*?\]", "", piece)) if word != "const"
+        ]
         yield " ".join(words), name, "*" in piece or "[" in piece
 
 

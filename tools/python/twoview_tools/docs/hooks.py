@@ -20,7 +20,10 @@ ITEM = re.compile(r"(\s{0,3})([-*]|\d+\.) ")
 def on_config(config):
     config.reference = reference.Reference(ROOT / "out" / "reference" / "xml")
     generated = set(ELSEWHERE.values()) | set(config.reference.order())
-    known = {path.relative_to(config.docs_dir).as_posix() for path in pathlib.Path(config.docs_dir).rglob("*.md")}
+    known = {
+        path.relative_to(config.docs_dir).as_posix()
+        for path in pathlib.Path(config.docs_dir).rglob("*.md")
+    }
     listed = set()
     config.nav = expand(config.nav, config.reference.order() + sorted(known - generated), listed)
     return config
@@ -36,8 +39,13 @@ def expand(nav, pages, listed):
             inside = expand(inside, pages, listed) if isinstance(inside, list) else inside
             out += [{title: inside}] if inside else []
         elif "*" in entry:
-            found = [page for page in pages if pathlib.PurePosixPath(page).match(entry) and
-                     posixpath.dirname(page) == posixpath.dirname(entry) and page not in named | listed]
+            found = [
+                page
+                for page in pages
+                if pathlib.PurePosixPath(page).match(entry)
+                and posixpath.dirname(page) == posixpath.dirname(entry)
+                and page not in named | listed
+            ]
             out += found
             listed |= set(found)
         else:
@@ -56,9 +64,16 @@ def on_files(files, config):
 
 
 def decisions():
-    lines = ["# Decisions", "", "Why things are as they are: a page each, the alternatives, and the number that decided.", ""]
+    lines = [
+        "# Decisions",
+        "",
+        "Why things are as they are: a page each, the alternatives, and the number that decided.",
+        "",
+    ]
     for path in sorted((ROOT / "docs" / "decisions").glob("*.md")):
-        title = path.read_text().split("\n")[0].removeprefix("# ").removeprefix(f"{path.name[:4]}: ")
+        title = (
+            path.read_text().split("\n")[0].removeprefix("# ").removeprefix(f"{path.name[:4]}: ")
+        )
         lines.append(f"- {path.name[:4]}: [{title[0].upper()}{title[1:]}](decisions/{path.name})")
     return "\n".join(lines) + "\n"
 
@@ -66,7 +81,9 @@ def decisions():
 def on_page_markdown(markdown, page, config, files):
     place = page.file.src_uri
     source = {page: source for source, page in ELSEWHERE.items()}.get(place, "docs/" + place)
-    markdown = markdown.replace("{{root}}", posixpath.relpath(".", posixpath.dirname(place) or ".") + "/")
+    markdown = markdown.replace(
+        "{{root}}", posixpath.relpath(".", posixpath.dirname(place) or ".") + "/"
+    )
     markdown = re.sub(r"(!?)\[((?:[^][]|\[[^]]*\])*)\]\(([^()\s#]*)(#[^()\s]*)?\)",
                       lambda found: link(found, source, place), markdown)
     return with_blank_lines(markdown)
@@ -88,7 +105,9 @@ def link(found, source, place):
         path = path.removeprefix("docs/")
     else:
         return text
-    return f"{image}[{text}]({posixpath.relpath(path, posixpath.dirname(place) or '.')}{anchor or ''})"
+    return (
+        f"{image}[{text}]({posixpath.relpath(path, posixpath.dirname(place) or '.')}{anchor or ''})"
+    )
 
 
 def with_blank_lines(markdown):
@@ -99,7 +118,9 @@ def with_blank_lines(markdown):
         if FENCE.match(line):
             fenced = not fenced
         elif not fenced and before.strip() and not before.startswith(("    ", "\t")):
-            starts_list = ITEM.match(line) and not ITEM.match(before) and not before.startswith("  ")
+            starts_list = (
+                ITEM.match(line) and not ITEM.match(before) and not before.startswith("  ")
+            )
             starts_table = line.startswith("|") and not before.startswith("|")
             if starts_list or starts_table:
                 out.append("")

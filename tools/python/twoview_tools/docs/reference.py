@@ -6,11 +6,37 @@ import pathlib
 import re
 import xml.etree.ElementTree as ElementTree
 
-LIBRARY = ["reconstruct", "context", "image", "feature", "match", "camera", "two_view", "triangulate", "bundle", "status",
-           "version", "alloc"]
-DRIVERS = ["source", "clock", "attitude", "file_source", "h264", "status", "ardrone/session", "ardrone/sockets",
-           "ardrone/replay", "ardrone/transport", "ardrone/navdata", "ardrone/pave", "ardrone/at", "ardrone/config",
-           "ardrone/pilot"]
+LIBRARY = [
+    "reconstruct",
+    "context",
+    "image",
+    "feature",
+    "match",
+    "camera",
+    "two_view",
+    "triangulate",
+    "bundle",
+    "status",
+    "version",
+    "alloc",
+]
+DRIVERS = [
+    "source",
+    "clock",
+    "attitude",
+    "file_source",
+    "h264",
+    "status",
+    "ardrone/session",
+    "ardrone/sockets",
+    "ardrone/replay",
+    "ardrone/transport",
+    "ardrone/navdata",
+    "ardrone/pave",
+    "ardrone/at",
+    "ardrone/config",
+    "ardrone/pilot",
+]
 
 
 class Reference:
@@ -28,13 +54,18 @@ class Reference:
                 path = compound.find("location").get("file")
                 self.headers[path] = compound
                 for _, symbol in self.symbols(compound):
-                    for name in [name_of(symbol)] + [value.findtext("name") for value in symbol.findall("enumvalue")]:
+                    for name in [name_of(symbol)] + [
+                        value.findtext("name") for value in symbol.findall("enumvalue")
+                    ]:
                         self.place_of[name] = f"{page_name(path)}#{name_of(symbol)}"
-        assert {page_name(path) for path in self.headers} - {"reference/twoview.md"} == set(self.order()), \
-            "a header is missing in LIBRARY or DRIVERS of twoview_tools/docs/reference.py"
+        assert {page_name(path) for path in self.headers} - {"reference/twoview.md"} == set(
+            self.order()
+        ), "a header is missing in LIBRARY or DRIVERS of twoview_tools/docs/reference.py"
 
     def order(self):
-        return [f"reference/{name}.md" for name in LIBRARY] + [f"reference/drivers/{name}.md" for name in DRIVERS]
+        return [f"reference/{name}.md" for name in LIBRARY] + [
+            f"reference/drivers/{name}.md" for name in DRIVERS
+        ]
 
     def symbols(self, compound):
         """(line, element) of a header's macros, types, structs and functions, in the order of the
@@ -49,8 +80,11 @@ class Reference:
 
     def pages(self):
         """{page: its Markdown}."""
-        return {page_name(path): self.page(path, compound) for path, compound in self.headers.items()
-                if not path.endswith("/twoview.h")}
+        return {
+            page_name(path): self.page(path, compound)
+            for path, compound in self.headers.items()
+            if not path.endswith("/twoview.h")
+        }
 
     def page(self, path, compound):
         name = path.split("include/")[1]
@@ -67,7 +101,11 @@ class Reference:
         lines += self.parameters(symbol)
         rows = [(value.findtext("name"), (value.findtext("initializer") or "").lstrip("= "), value)
                 for value in symbol.findall("enumvalue")]
-        rows += [(field_of(field), "", field) for field in symbol.iter("memberdef") if symbol.tag == "compounddef"]
+        rows += [
+            (field_of(field), "", field)
+            for field in symbol.iter("memberdef")
+            if symbol.tag == "compounddef"
+        ]
         rows = [(title, value, "<br>".join(self.text(element.find("detaileddescription"))))
                 for title, value, element in rows]
         if rows and symbol.tag == "compounddef":
@@ -75,7 +113,10 @@ class Reference:
             lines += [f"| `{title}` | {said} |" for title, _, said in rows if said]
         elif rows:
             lines += ["", "| constant | |", "| --- | --- |"]
-            lines += [f"| `{title}` {f'= {value}' if value else ''} | {said} |" for title, value, said in rows]
+            lines += [
+                f"| `{title}` {f'= {value}' if value else ''} | {said} |"
+                for title, value, said in rows
+            ]
         return lines
 
     def parameters(self, symbol):
@@ -109,7 +150,9 @@ class Reference:
         words = re.sub(r"([*|\[\]{}])", lambda found: f"&#{ord(found.group())};", words)
         # split into alternating pieces of text, which may name symbols and pages, and code
         pieces = words.split("`")
-        pieces[0::2] = [re.sub(r"docs/([\w/-]+)\.md|\w+", self.link, piece) for piece in pieces[0::2]]
+        pieces[0::2] = [
+            re.sub(r"docs/([\w/-]+)\.md|\w+", self.link, piece) for piece in pieces[0::2]
+        ]
         pieces[1::2] = [f"<code>{piece}</code>" for piece in pieces[1::2]]
         return "".join(pieces)
 
@@ -142,7 +185,10 @@ def field_of(member):
 def declaration(symbol):
     kind, name = symbol.get("kind"), name_of(symbol)
     if kind == "function":
-        flat = f"{''.join(symbol.find('type').itertext())} {name}{symbol.findtext('argsstring')};".replace("* ", "*")
+        flat = (
+            f"{''.join(symbol.find('type').itertext())} {name}"
+            f"{symbol.findtext('argsstring')};"
+        ).replace("* ", "*")
         flat = flat.replace("static tv_", "static inline tv_")
         return flat if len(flat) <= 80 else re.sub(r"(?<=[(,]) ?(?=[a-z])", "\n    ", flat)
     if kind == "define":
@@ -153,6 +199,12 @@ def declaration(symbol):
         arguments = symbol.findtext("argsstring") or ""
         if "(*" not in symbol.findtext("definition"):
             return f"{symbol.findtext('definition')};"
-        return f"typedef {symbol.findtext('definition').split('(*')[0].replace('typedef ', '')} (*{name}{arguments};"
-    return f"typedef {kind} {name} {{ .. }} {name};" if symbol.find(".//memberdef") is not None or kind == "enum" else \
-        f"typedef {kind} {name} {name};"
+        return (
+            f"typedef {symbol.findtext('definition').split('(*')[0].replace('typedef ', '')} "
+            f"(*{name}{arguments};"
+        )
+    return (
+        f"typedef {kind} {name} {{ .. }} {name};"
+        if symbol.find(".//memberdef") is not None or kind == "enum"
+        else f"typedef {kind} {name} {name};"
+    )

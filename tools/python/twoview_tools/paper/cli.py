@@ -77,9 +77,17 @@ def write_results(folder, outcomes, version, seconds, with_pictures):
 def arguments_of(command):
     parser = argparse.ArgumentParser(prog="scripts/paper", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", dest="folder", metavar="DIR", type=Path, default=ROOT / "out" / "paper",
-                        help="folder for paper.html and paper.json (default: out/paper)")
-    parser.add_argument("--only", metavar="ID,..", help="figure8,table1 ..: these experiments alone")
+    parser.add_argument(
+        "-o",
+        dest="folder",
+        metavar="DIR",
+        type=Path,
+        default=ROOT / "out" / "paper",
+        help="folder for paper.html and paper.json (default: out/paper)",
+    )
+    parser.add_argument(
+        "--only", metavar="ID,..", help="figure8,table1 ..: these experiments alone"
+    )
     parser.add_argument("--pictures", action="store_true", help="also write each picture as a file")
     parser.add_argument("--build", metavar="DIR", type=Path, default=ROOT / "build" / "release",
                         help="build folder (default: build/release)")

@@ -31,7 +31,9 @@ def estimated(context, pair, path, pixels0, pixels1, ratios):
     tv = library()
     if path != "unrefined":
         method = tv.Solver.EIGHT_POINT if path == "paper" else tv.Solver.FIVE_POINT
-        found, inliers = tv.estimate_two_view(context, *pair.cameras, pixels0, pixels1, ratios, method=method)
+        found, inliers = tv.estimate_two_view(
+            context, *pair.cameras, pixels0, pixels1, ratios, method=method
+        )
         cameras = [tv.corrected_camera(found, camera) for camera in pair.cameras]
         return found.R, found.t, inliers, found.covariance, cameras
     cv2.setRNGSeed(1)
@@ -55,13 +57,17 @@ def reconstructed(pair, path):
     tv = library()
     pixels0, pixels1, ratios = matches_of(pair, path)
     with tv.Context(max_matches=len(pixels0)) as context:
-        R, t, inliers, covariance, cameras = estimated(context, pair, path, pixels0, pixels1, ratios)
+        R, t, inliers, covariance, cameras = estimated(
+            context, pair, path, pixels0, pixels1, ratios
+        )
         pixels = pixels0[inliers].copy(), pixels1[inliers].copy()
         points = tv.triangulate(*cameras, R, t, *pixels)
         stages = {"before": (R, t, points)}
         for stage, scale_px in STAGES.items():
             if scale_px is not None:
-                a = tv.adjust_two_view(context, *cameras, *pixels, R, t, points, loss_scale_px=scale_px)
+                a = tv.adjust_two_view(
+                    context, *cameras, *pixels, R, t, points, loss_scale_px=scale_px
+                )
                 stages[stage] = a.R, a.t, a.points
     return stages, pixels, None if covariance is None else sigmas_deg(covariance)
 
@@ -80,10 +86,15 @@ def numbers_of(pair, R, t, points, pixels0):
     ok = points["status"] == library().PointStatus.OK
     rotation = np.degrees(np.linalg.norm(cv2.Rodrigues(R @ pair.R.T)[0]))
     direction = np.degrees(np.arctan2(np.linalg.norm(np.cross(t, pair.t)), t @ pair.t))
-    return {"points": int(ok.sum()), "depth_error_median_percent": float(np.median(errors)),
-            "depth_error_p95_percent": float(np.percentile(errors, 95)), "known_depths": len(errors),
-            "reprojection_rms_px": float(np.sqrt((points["error_px"][ok].astype(float) ** 2).mean())),
-            "rotation_error_deg": float(rotation), "translation_error_deg": float(direction)}
+    return {
+        "points": int(ok.sum()),
+        "depth_error_median_percent": float(np.median(errors)),
+        "depth_error_p95_percent": float(np.percentile(errors, 95)),
+        "known_depths": len(errors),
+        "reprojection_rms_px": float(np.sqrt((points["error_px"][ok].astype(float) ** 2).mean())),
+        "rotation_error_deg": float(rotation),
+        "translation_error_deg": float(direction),
+    }
 
 
 def noise_percent(pair, depth_m):
@@ -107,7 +118,9 @@ def draw_cloud(front, side, pair, points, pixels0):
     position, colours = near_points(pair, points, pixels0)
     order = np.argsort(-position[:, 2])
     for axis, across, title in ((front, 0, "From the front"), (side, 2, "From the side")):
-        axis.scatter(position[order, across], position[order, 1], c=colours[order], s=9, linewidths=0)
+        axis.scatter(
+            position[order, across], position[order, 1], c=colours[order], s=9, linewidths=0
+        )
         axis.set_title(f"{title} [m]")
         axis.set_aspect("equal")
         axis.invert_yaxis()
@@ -141,14 +154,29 @@ def drawn(pair, results):
 
 
 def table_of(numbers):
-    rows = [[f"{PATHS[path]}; {stage}", str(n["points"]), f"{n['depth_error_median_percent']:.2f} %",
-             f"{n['depth_error_p95_percent']:.2f} %", f"{n['rotation_error_deg']:.3f}",
-             f"{n['translation_error_deg']:.2f}", f"{n['reprojection_rms_px']:.3f}"]
-            for path in PATHS for stage, n in numbers[path].items()]
+    rows = [
+        [
+            f"{PATHS[path]}; {stage}",
+            str(n["points"]),
+            f"{n['depth_error_median_percent']:.2f} %",
+            f"{n['depth_error_p95_percent']:.2f} %",
+            f"{n['rotation_error_deg']:.3f}",
+            f"{n['translation_error_deg']:.2f}",
+            f"{n['reprojection_rms_px']:.3f}",
+        ]
+        for path in PATHS
+        for stage, n in numbers[path].items()
+    ]
     head = ["path; stage", "points", "depth error, median", "95 %", "rotation error [deg]",
             "direction error [deg]", "reprojection [px rms]"]
-    return Table("Motorcycle against its true disparity map, before and after bundle adjustment; the unit is "
-                 "the true baseline, 193 mm", head, rows, list(PATHS).index("default") * len(STAGES))
+    return Table(
+        "Motorcycle against its true disparity map, before and after bundle adjustment; the unit "
+        "is "
+        "the true baseline, 193 mm",
+        head,
+        rows,
+        list(PATHS).index("default") * len(STAGES),
+    )
 
 
 def figure16(inputs):
@@ -157,25 +185,49 @@ def figure16(inputs):
     numbers = {path: {stage: numbers_of(pair, *stages[stage], pixels[0]) for stage in stages}
                for path, (stages, pixels, _) in results.items()}
     sigmas = {path: sigma for path, (_, _, sigma) in results.items() if sigma}
-    told = {path: [n["depth_error_median_percent"] for n in stages.values()] for path, stages in numbers.items()}
+    told = {
+        path: [n["depth_error_median_percent"] for n in stages.values()]
+        for path, stages in numbers.items()
+    }
     noise = noise_percent(pair, 2.4)
-    words = {"unrefined": "from a fundamental matrix that nobody refined", "paper": "by the paper's path",
-             "default": "by our default"}
+    words = {
+        "unrefined": "from a fundamental matrix that nobody refined",
+        "paper": "by the paper's path",
+        "default": "by our default",
+    }
     parts = [f"{', '.join(f'{e:.2f}' for e in told[path])} % {words[path]}" for path in PATHS]
-    found = ("Median depth error before bundle adjustment, after it with its default loss of 1 px, and with one "
-             f"of 0.2 px, about the noise: {'; '.join(parts)}. A match's noise of {MATCH_NOISE_PX} px alone is "
-             f"{noise:.2f} % at the motorcycle's 2.4 m.")
-    return Result({**numbers, "pose_sigmas_deg": sigmas, "noise_percent_at_2.4_m": float(noise)}, found,
-                  [drawn(pair, results)], [table_of(numbers)])
+    found = (
+        "Median depth error before bundle adjustment, after it with its default loss of 1 px, and "
+        "with one "
+        f"of 0.2 px, about the noise: {'; '.join(parts)}. A match's noise of {MATCH_NOISE_PX} px "
+        f"alone is "
+        f"{noise:.2f} % at the motorcycle's 2.4 m."
+    )
+    return Result(
+        {**numbers, "pose_sigmas_deg": sigmas, "noise_percent_at_2.4_m": float(noise)},
+        found,
+        [drawn(pair, results)],
+        [table_of(numbers)],
+    )
 
 
 EXPERIMENTS = [
-    Experiment("figure16", "The cloud", "Figure 16: the point cloud, and its depth",
-               "The cloud of a room from the front and from the side. Its depth is called inaccurate, without "
-               "a number, and bundle adjustment is left to future work.",
-               "Bundle adjustment mends a pose that was not refined. Ours is refined on all inliers before any "
-               "point is made, by a loss whose width follows their noise; for two views that is the same problem, "
-               "and there is nothing left to gain. A wide loss loses instead: matches that are wrong by less than "
-               "a pixel pull at the pose, and a turn of 0.03 degrees is half a pixel, 0.7 % of the depth at "
-               "2.4 m. So it is off by default (docs/decisions/0005-bundle.md).", figure16),
+    Experiment(
+        "figure16",
+        "The cloud",
+        "Figure 16: the point cloud, and its depth",
+        "The cloud of a room from the front and from the side. Its depth is called inaccurate, "
+        "without "
+        "a number, and bundle adjustment is left to future work.",
+        "Bundle adjustment mends a pose that was not refined. Ours is refined on all inliers "
+        "before any "
+        "point is made, by a loss whose width follows their noise; for two views that is the same "
+        "problem, "
+        "and there is nothing left to gain. A wide loss loses instead: matches that are wrong by "
+        "less than "
+        "a pixel pull at the pose, and a turn of 0.03 degrees is half a pixel, 0.7 % of the depth "
+        "at "
+        "2.4 m. So it is off by default (docs/decisions/0005-bundle.md).",
+        figure16,
+    )
 ]

@@ -106,9 +106,16 @@ def draw_circle(axis, image, corner):
     on_arc = {(corner["first"] + k) % 16 for k in range(corner["arc_length"])}
     for i, ((dx, dy), state) in enumerate(zip(CIRCLE, states(corner, THRESHOLD))):
         centre = reach + dx, reach + dy
-        axis.add_patch(drawing.pyplot.Rectangle((centre[0] - 0.5, centre[1] - 0.5), 1, 1, fill=False,
-                                                color=COLOURS[int(state)],
-                                                linewidth=3 if i in on_arc else 1.5))
+        axis.add_patch(
+            drawing.pyplot.Rectangle(
+                (centre[0] - 0.5, centre[1] - 0.5),
+                1,
+                1,
+                fill=False,
+                color=COLOURS[int(state)],
+                linewidth=3 if i in on_arc else 1.5,
+            )
+        )
         axis.text(*centre, str(i + 1), color=COLOURS[int(state)], ha="center", va="center",
                   fontsize=8, fontweight="bold")
     axis.plot(reach, reach, "+", color=drawing.BAD, markersize=11, markeredgewidth=2)
@@ -138,9 +145,11 @@ def figure5(inputs):
                                                fill=False, color=drawing.BAD, linewidth=2))
     draw_circle(axes[1], image, corner)
     draw_levels(axes[2], corner)
-    found = (f"At ({corner['x']}, {corner['y']}) the longest arc has {corner['arc_length']} pixels of "
-             f"the 12 that are wanted. The largest threshold at which it is still a corner, its score, "
-             f"is {corner['score']} by the definition and {corner['library_score']} by the library.")
+    found = (
+        f"At ({corner['x']}, {corner['y']}) the longest arc has {corner['arc_length']} pixels of "
+        f"the 12 that are wanted. The largest threshold at which it is still a corner, its score, "
+        f"is {corner['score']} by the definition and {corner['library_score']} by the library."
+    )
     picture = drawing.finish(sheet, "A corner, the 16 pixels of its circle and their grey levels")
     return Result(corner, found, [picture])
 
@@ -186,7 +195,9 @@ def draw_corners(name, image, thresholds, curves):
     drawing.show(axes[0], image, f"{name}: {len(found)} corners by 12-FAST, t = {THRESHOLD}")
     axes[0].plot(found["x"], found["y"], ".", color="#34d17f", markersize=3.5)
     for arc, style, colour in ((9, "o--", drawing.ORANGE), (12, "o-", drawing.BLUE)):
-        axes[1].plot(thresholds, curves[arc], style, markersize=4, label=f"{arc} of 16", color=colour)
+        axes[1].plot(
+            thresholds, curves[arc], style, markersize=4, label=f"{arc} of 16", color=colour
+        )
     axes[1].set_yscale("log")
     axes[1].set_xlabel("threshold t [grey levels]")
     axes[1].set_title("Corners left after suppression")
@@ -199,9 +210,20 @@ def counts_table(numbers):
              *(str(e["arcs"][a][key]) for a in ("9", "12") for key in ("segment_test", "library")),
              "yes" if all(a["library_equals_definition"] for a in e["arcs"].values()) else "NO"]
             for name, e in numbers.items()]
-    return Table(f"Corners at t = {THRESHOLD}: pixels that pass the test, and those left after non-maximum "
-                 "suppression", ["image", "size", "9 of 16, all", "suppressed", "12 of 16, all", "suppressed",
-                                 "equal to the definition"], rows)
+    return Table(
+        f"Corners at t = {THRESHOLD}: pixels that pass the test, and those left after non-maximum "
+        "suppression",
+        [
+            "image",
+            "size",
+            "9 of 16, all",
+            "suppressed",
+            "12 of 16, all",
+            "suppressed",
+            "equal to the definition",
+        ],
+        rows,
+    )
 
 
 def figure6(inputs):
@@ -211,25 +233,41 @@ def figure6(inputs):
     thresholds = [5, 10, 15, 20, 30, 40, 60, 80]
     curves = counts_by_threshold(image, thresholds)
     arcs = numbers[name]["arcs"]
-    equal = all(a["library_equals_definition"] for e in numbers.values() for a in e["arcs"].values())
-    found = (f"12-FAST leaves {arcs['12']['library']} corners on {name} at t = {THRESHOLD}, 9-FAST "
-             f"{arcs['9']['library']}. On {'every' if equal else 'NOT EVERY'} image and for every arc the "
-             "library's corners are, pixel for pixel, those of the definition.")
+    equal = all(
+        a["library_equals_definition"] for e in numbers.values() for a in e["arcs"].values()
+    )
+    found = (
+        f"12-FAST leaves {arcs['12']['library']} corners on {name} at t = {THRESHOLD}, 9-FAST "
+        f"{arcs['9']['library']}. On {'every' if equal else 'NOT EVERY'} image and for every arc "
+        f"the "
+        "library's corners are, pixel for pixel, those of the definition."
+    )
     by_threshold = {"image": name, "thresholds": thresholds, "arc9": curves[9], "arc12": curves[12]}
     return Result({"images": numbers, "by_threshold": by_threshold}, found,
                   [draw_corners(name, image, thresholds, curves)], [counts_table(numbers)], missing)
 
 
 EXPERIMENTS = [
-    Experiment("figure5", "FAST corners", "Figure 5: the segment test",
-               "The circle of 16 pixels around a candidate p: p is a corner when 12 contiguous ones are "
-               "all brighter than p + t, or all darker than p - t.",
-               "The test is the paper's, for arcs of 9 to 12. The score, the largest t that a corner "
-               "survives, is exact rather than searched for.", figure5),
-    Experiment("figure6", "FAST corners", "Figure 6: corners found by 12-FAST",
-               "A picture with the corners that 12-FAST finds in it, and their number.",
-               "The paper uses 12 of 16. Our default is 9 of 16 with a threshold that falls from 10 until "
-               "2048 corners are found: a tenth more matches, and on the hardest of the larger sets 3.6 points "
-               "of AUC@10 more; elsewhere the two tie (docs/decisions/0001-features.md). --arc 12 is the "
-               "paper's.", figure6),
+    Experiment(
+        "figure5",
+        "FAST corners",
+        "Figure 5: the segment test",
+        "The circle of 16 pixels around a candidate p: p is a corner when 12 contiguous ones are "
+        "all brighter than p + t, or all darker than p - t.",
+        "The test is the paper's, for arcs of 9 to 12. The score, the largest t that a corner "
+        "survives, is exact rather than searched for.",
+        figure5,
+    ),
+    Experiment(
+        "figure6",
+        "FAST corners",
+        "Figure 6: corners found by 12-FAST",
+        "A picture with the corners that 12-FAST finds in it, and their number.",
+        "The paper uses 12 of 16. Our default is 9 of 16 with a threshold that falls from 10 until "
+        "2048 corners are found: a tenth more matches, and on the hardest of the larger sets 3.6 "
+        "points "
+        "of AUC@10 more; elsewhere the two tie (docs/decisions/0001-features.md). --arc 12 is the "
+        "paper's.",
+        figure6,
+    ),
 ]

@@ -146,8 +146,16 @@ def draw_gradients(axis, samples):
     drawing.show(axis, np.clip(samples, 0, 255), "The 16 x 16 samples, turned, and their gradients")
     k = np.arange(SIDE - 1) + 0.5
     gx, gy = gradients(samples)
-    axis.quiver(k, k, gx, -gy, color="#3fb6ff", scale_units="xy", scale=np.hypot(gx, gy).max() / 1.6,
-                width=0.006)
+    axis.quiver(
+        k,
+        k,
+        gx,
+        -gy,
+        color="#3fb6ff",
+        scale_units="xy",
+        scale=np.hypot(gx, gy).max() / 1.6,
+        width=0.006,
+    )
     draw_cells(axis, 1 / STEP, (SIDE - 1) / 2 - 2 / STEP)
 
 
@@ -163,11 +171,18 @@ def draw_histograms(axis, histogram):
             for length, angle in zip(histogram[row, column] / longest, angles):
                 if length < 0.02:
                     continue  # too short for an arrow's head
-                axis.annotate("", (column + 0.5 + length * np.cos(angle), row + 0.5 - length * np.sin(angle)),
-                              (column + 0.5, row + 0.5),
-                              arrowprops={"arrowstyle": "-|>,head_width=0.1,head_length=0.16",
-                                          "color": drawing.BLUE, "shrinkA": 0, "shrinkB": 0,
-                                          "linewidth": 1.1})
+                axis.annotate(
+                    "",
+                    (column + 0.5 + length * np.cos(angle), row + 0.5 - length * np.sin(angle)),
+                    (column + 0.5, row + 0.5),
+                    arrowprops={
+                        "arrowstyle": "-|>,head_width=0.1,head_length=0.16",
+                        "color": drawing.BLUE,
+                        "shrinkA": 0,
+                        "shrinkB": 0,
+                        "linewidth": 1.1,
+                    },
+                )
     axis.set_xlim(-0.1, 4.1)
     axis.set_ylim(4.1, -0.1)
 
@@ -207,29 +222,55 @@ def figure7(inputs):
     draw_place(sheet.add_subplot(grid[0, 0]), image, keypoints[chosen])
     draw_gradients(sheet.add_subplot(grid[0, 1]), samples)
     draw_histograms(sheet.add_subplot(grid[0, 2]), histogram)
-    draw_bytes(sheet.add_subplot(grid[1, :]), described["sift"][chosen], quantised(histogram, False))
+    draw_bytes(
+        sheet.add_subplot(grid[1, :]), described["sift"][chosen], quantised(histogram, False)
+    )
     keypoint = keypoints[chosen]
-    numbers = {"keypoint": {name: float(keypoint[name]) for name in ("x", "y", "size", "angle_rad")},
-               "descriptor": described["sift"][chosen].tolist(), "keypoints_compared": len(keypoints)}
+    numbers = {
+        "keypoint": {name: float(keypoint[name]) for name in ("x", "y", "size", "angle_rad")},
+        "descriptor": described["sift"][chosen].tolist(),
+        "keypoints_compared": len(keypoints),
+    }
     for kind, difference in off.items():
-        numbers[kind] = {"median": float(np.median(difference)), "p99": float(np.percentile(difference, 99)),
-                         "greatest": int(difference.max()), "of_the_drawn": int(off[kind][chosen].max())}
-    found = (f"The descriptor at figure 5's corner, angle {np.degrees(keypoint['angle_rad']):.1f} degrees. The "
-             "histograms are computed here in floating point from the definition; clipped and scaled, they "
-             f"are the library's 128 bytes within {numbers['sift']['of_the_drawn']} of 255. Over "
-             f"{len(keypoints)} keypoints: 99 % of the bytes within {numbers['sift']['p99']:.0f}, all within "
-             f"{numbers['sift']['greatest']}.")
-    return Result(numbers, found, [drawing.finish(sheet, "A keypoint's window, gradients, histograms and "
-                                                         "bytes")])
+        numbers[kind] = {
+            "median": float(np.median(difference)),
+            "p99": float(np.percentile(difference, 99)),
+            "greatest": int(difference.max()),
+            "of_the_drawn": int(off[kind][chosen].max()),
+        }
+    found = (
+        f"The descriptor at figure 5's corner, angle {np.degrees(keypoint['angle_rad']):.1f} "
+        f"degrees. The "
+        "histograms are computed here in floating point from the definition; clipped and scaled, "
+        "they "
+        f"are the library's 128 bytes within {numbers['sift']['of_the_drawn']} of 255. Over "
+        f"{len(keypoints)} keypoints: 99 % of the bytes within {numbers['sift']['p99']:.0f}, all "
+        f"within "
+        f"{numbers['sift']['greatest']}."
+    )
+    return Result(
+        numbers,
+        found,
+        [drawing.finish(sheet, "A keypoint's window, gradients, histograms and " "bytes")],
+    )
 
 
 EXPERIMENTS = [
-    Experiment("figure7", "SIFT descriptors", "Figure 7: a descriptor's gradients and histograms",
-               "The gradients around a keypoint, and the histograms of 4 x 4 cells with 8 directions that "
-               "they are gathered into: 128 numbers.",
-               "Lowe's window and weights, but sampled on a turned grid of 16 x 16 out of one blurred image: "
-               "the number of samples no longer grows with the keypoint, and shares between directions need "
-               "no arctangent (docs/decisions/0003-patch-sift.md, 0009-descriptor-speed.md). The bytes stay "
-               "comparable with OpenCV's and COLMAP's: median cosine 0.99 with OpenCV's SIFT. Our default is "
-               "RootSIFT, the square roots of the same shares.", figure7),
+    Experiment(
+        "figure7",
+        "SIFT descriptors",
+        "Figure 7: a descriptor's gradients and histograms",
+        "The gradients around a keypoint, and the histograms of 4 x 4 cells with 8 directions that "
+        "they are gathered into: 128 numbers.",
+        "Lowe's window and weights, but sampled on a turned grid of 16 x 16 out of one blurred "
+        "image: "
+        "the number of samples no longer grows with the keypoint, and shares between directions "
+        "need "
+        "no arctangent (docs/decisions/0003-patch-sift.md, 0009-descriptor-speed.md). The bytes "
+        "stay "
+        "comparable with OpenCV's and COLMAP's: median cosine 0.99 with OpenCV's SIFT. Our default "
+        "is "
+        "RootSIFT, the square roots of the same shares.",
+        figure7,
+    )
 ]

@@ -46,4 +46,9 @@ def finish(figure, alt):
     if len(buffer.getvalue()) <= MOST_PNG_BYTES:
         return Picture(buffer.getvalue(), "png", alt, width)
     image = cv2.imdecode(np.frombuffer(buffer.getvalue(), np.uint8), cv2.IMREAD_COLOR)
-    return Picture(cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, 88])[1].tobytes(), "webp", alt, width)
+    return Picture(
+        cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, 88])[1].tobytes(),
+        "webp",
+        alt,
+        width,
+    )

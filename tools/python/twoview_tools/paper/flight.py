@@ -61,14 +61,20 @@ def free_ports(process):
     words = process.stdout.readline().replace(",", "").split()
     if len(words) < 2:
         raise Missing("the simulated drone: built without the drivers?")
-    return {name: int(words[words.index(name) + 1]) for name in ("commands", "navdata", "video", "control")}
+    return {
+        name: int(words[words.index(name) + 1])
+        for name in ("commands", "navdata", "video", "control")
+    }
 
 
 def steer(port, plan):
     """Takes off, then moves the sticks."""
     link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     begin, sequence = time.monotonic(), FIRST_SEQUENCE
-    bits = [struct.unpack("<i", struct.pack("<f", value))[0] for value in (plan.roll, plan.pitch, 0.0, 0.0)]
+    bits = [
+        struct.unpack("<i", struct.pack("<f", value))[0]
+        for value in (plan.roll, plan.pitch, 0.0, 0.0)
+    ]
     while (now := time.monotonic() - begin) < TAKE_OFF_S + STEER_S:
         commands = [f"AT*REF={sequence},290718208\r"]
         if now > TAKE_OFF_S:
@@ -106,14 +112,47 @@ def fly_anew(inputs, plan, folder, camera, truth):
         raise Missing(f"{program} is not built")
     ports = [word for channel in ("at", "navdata", "video", "control", "recording")
              for word in (f"--{channel}-port", "0")]
-    command = [program, "drone", "simulate", *ports, "--duration", "60", "--fps", "15", "--camera", camera,
-               "--start", plan.start, "--truth", truth]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as drone:
+    command = [
+        program,
+        "drone",
+        "simulate",
+        *ports,
+        "--duration",
+        "60",
+        "--fps",
+        "15",
+        "--camera",
+        camera,
+        "--start",
+        plan.start,
+        "--truth",
+        truth,
+    ]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as drone:
         try:
             port = free_ports(drone)
-            record = [program, "drone", "record", "--host", "127.0.0.1", "--at-port", port["commands"],
-                      "--navdata-port", port["navdata"], "--video-port", port["video"], "--control-port",
-                      port["control"], "--duration", "30", "--quiet", "-o", folder / "recording"]
+            record = [
+                program,
+                "drone",
+                "record",
+                "--host",
+                "127.0.0.1",
+                "--at-port",
+                port["commands"],
+                "--navdata-port",
+                port["navdata"],
+                "--video-port",
+                port["video"],
+                "--control-port",
+                port["control"],
+                "--duration",
+                "30",
+                "--quiet",
+                "-o",
+                folder / "recording",
+            ]
             with subprocess.Popen(list(map(str, record)), stdout=subprocess.DEVNULL) as recorder:
                 time.sleep(1.0)
                 steer(port["commands"], plan)

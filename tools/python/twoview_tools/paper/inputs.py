@@ -14,8 +14,8 @@ import numpy as np
 from .. import ROOT, formats
 from .experiment import Missing
 
-# Middlebury 2014's Motorcycle pair as scikit-image has it (scripts/bootstrap): rectified, so that the
-# motion is sideways and the disparity map is the depth.
+# Middlebury 2014's Motorcycle pair as scikit-image has it (scripts/bootstrap): rectified, so that
+# the motion is sideways and the disparity map is the depth.
 MOTORCYCLE = ROOT / ".cache" / "motorcycle"
 FOCAL_PX, CX, CY, BASELINE_M = 994.978, (311.193, 342.279), 254.877, 0.193001
 
@@ -80,7 +80,9 @@ class Inputs:
         done = subprocess.run([path, *map(str, words)], capture_output=True, text=True, timeout=120,
                               check=False)
         if done.returncode not in statuses:
-            raise RuntimeError(f"twoview {words[0]}: status {done.returncode}: {done.stderr.strip()}")
+            raise RuntimeError(
+                f"twoview {words[0]}: status {done.returncode}: {done.stderr.strip()}"
+            )
         return done.stdout
 
     def of_data(self, *parts):
@@ -100,7 +102,9 @@ class Inputs:
         tv = library()
         if not MOTORCYCLE.is_dir():
             raise Missing("the Motorcycle pair: run scripts/bootstrap")
-        colour = tuple(read_colour(MOTORCYCLE / f"motorcycle_{side}.png") for side in ("left", "right"))
+        colour = tuple(
+            read_colour(MOTORCYCLE / f"motorcycle_{side}.png") for side in ("left", "right")
+        )
         height, width = colour[0].shape[:2]
         with np.load(MOTORCYCLE / "motorcycle_disp.npz") as archive:
             disparity = archive[archive.files[0]].astype(float)
@@ -118,8 +122,10 @@ class Inputs:
         if pair is None:
             raise Missing(f"{name0} {name1} in {folder}/pairs.txt")
         colour = tuple(read_colour(self.of_data(folder, "images", n)) for n in (name0, name1))
-        cameras = tuple(tv.Camera(image.shape[1], image.shape[0], k[0, 0], k[1, 1], k[0, 2], k[1, 2])
-                        for image, k in zip(colour, (pair.K0, pair.K1)))
+        cameras = tuple(
+            tv.Camera(image.shape[1], image.shape[0], k[0, 0], k[1, 1], k[0, 2], k[1, 2])
+            for image, k in zip(colour, (pair.K0, pair.K1))
+        )
         baseline = float(np.linalg.norm(pair.t))
         return Pair(title or folder, colour, cameras, pair.R, pair.t / baseline, baseline,
                     truth_px=truth_px)

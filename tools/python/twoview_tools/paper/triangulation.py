@@ -39,13 +39,22 @@ def scene(kind, num=2000, noise_px=NOISE_PX, seed=7):
               "converging": (np.cos(np.pi / 8), 0, np.sin(np.pi / 8))}[kind]
     pair = Pair(kind, (), (camera, camera), R, -R @ np.array(center, float), 1.0)
     random = np.random.default_rng(seed)
-    far = random.uniform(0.9, 1.5, 8 * num) if kind == "converging" else random.uniform(4, 20, 8 * num)
+    far = (
+        random.uniform(0.9, 1.5, 8 * num)
+        if kind == "converging"
+        else random.uniform(4, 20, 8 * num)
+    )
     seen = random.uniform((0, 0), (640, 480), (8 * num, 2))
     points = np.column_stack([(seen - (319.5, 239.5)) / 500 * far[:, None], far])
     there = pixels_of(pair, 1, points)
-    inside = ((there >= 0) & (there <= (640, 480))).all(axis=1) & ((points @ R.T + pair.t)[:, 2] > 0)
+    inside = ((there >= 0) & (there <= (640, 480))).all(axis=1) & (
+        (points @ R.T + pair.t)[:, 2] > 0
+    )
     points = points[inside][:num]
-    noisy = [pixels_of(pair, view, points) + random.normal(0, noise_px, (len(points), 2)) for view in (0, 1)]
+    noisy = [
+        pixels_of(pair, view, points) + random.normal(0, noise_px, (len(points), 2))
+        for view in (0, 1)
+    ]
     return pair, points, noisy[0], noisy[1]
 
 
@@ -102,7 +111,9 @@ def forward_pair(inputs):
     if found.R is None or found.t is None:
         raise Missing("a pose of the KITTI pair")
     cameras = tuple(tv.corrected_camera(found, camera) for camera in pair.cameras)
-    points = tv.triangulate(*cameras, found.R, found.t, pixels0[inliers].copy(), pixels1[inliers].copy())
+    points = tv.triangulate(
+        *cameras, found.R, found.t, pixels0[inliers].copy(), pixels1[inliers].copy()
+    )
     good = points["status"] == tv.PointStatus.OK
     estimated = Pair(pair.name, pair.colour, cameras, found.R, found.t, 1.0)
     return estimated, pixels0[inliers][good].copy(), pixels1[inliers][good].copy()
@@ -117,11 +128,14 @@ def weights_study(pair, pixels0, pixels1):
                           tv.Triangulation.ITERATIVE_LS)
     ok = ours["status"] == tv.PointStatus.OK
     off = np.linalg.norm(ours["position"] - points[-1], axis=1) / np.linalg.norm(points[-1], axis=1)
-    numbers = {"pair": pair.name, "matches": len(pixels0),
-               "rms_px": np.sqrt((errors[:, ok] ** 2).mean(axis=1)).tolist(),
-               "weight_ratio_median": np.median(weights[:, ok, 1] / weights[:, ok, 0], axis=1).tolist(),
-               "library_rms_px": float(np.sqrt((ours["error_px"][ok].astype(float) ** 2).mean())),
-               "library_difference_p99": float(np.percentile(off[ok], 99))}
+    numbers = {
+        "pair": pair.name,
+        "matches": len(pixels0),
+        "rms_px": np.sqrt((errors[:, ok] ** 2).mean(axis=1)).tolist(),
+        "weight_ratio_median": np.median(weights[:, ok, 1] / weights[:, ok, 0], axis=1).tolist(),
+        "library_rms_px": float(np.sqrt((ours["error_px"][ok].astype(float) ** 2).mean())),
+        "library_difference_p99": float(np.percentile(off[ok], 99)),
+    }
     return numbers, points, weights, errors, ok
 
 
@@ -167,14 +181,24 @@ def figure13(inputs):
     numbers["shown"] = [{"weights": weights[:, k].tolist(), "error_px": errors[:, k].tolist()}
                         for k in shown]
     rms = numbers["rms_px"]
-    found = (f"{numbers['pair']}, {numbers['matches']} matches: the root mean square error falls from "
-             f"{rms[0]:.4f} px (Linear-LS) to {rms[1]:.4f} px after one round and {rms[-1]:.4f} px at the "
-             f"end; the library's Iterative-LS has {numbers['library_rms_px']:.4f} px, its points are these "
-             f"to within {numbers['library_difference_p99']:.0e} of their distance (99 %). With table 1's noise "
-             f"and nearer points, {drawn['rms_px'][0]:.3f} falls to {drawn['rms_px'][-1]:.3f} px. On the left "
-             "are the three matches that gain most.")
-    return Result({**numbers, "forward_scene": drawn}, found, [draw_rounds(weights, shown, numbers, drawn)],
-                  [rounds_table(weights[:, shown[0]], errors[:, shown[0]])])
+    found = (
+        f"{numbers['pair']}, {numbers['matches']} matches: the root mean square error falls from "
+        f"{rms[0]:.4f} px (Linear-LS) to {rms[1]:.4f} px after one round and {rms[-1]:.4f} px at "
+        f"the "
+        f"end; the library's Iterative-LS has {numbers['library_rms_px']:.4f} px, its points are "
+        f"these "
+        f"to within {numbers['library_difference_p99']:.0e} of their distance (99 %). With table "
+        f"1's noise "
+        f"and nearer points, {drawn['rms_px'][0]:.3f} falls to {drawn['rms_px'][-1]:.3f} px. On "
+        f"the left "
+        "are the three matches that gain most."
+    )
+    return Result(
+        {**numbers, "forward_scene": drawn},
+        found,
+        [draw_rounds(weights, shown, numbers, drawn)],
+        [rounds_table(weights[:, shown[0]], errors[:, shown[0]])],
+    )
 
 
 def rounds_table(weights, errors):
@@ -192,7 +216,9 @@ def dlt(pair, pixels0, pixels1):
     points = []
     for a, b in zip(pixels0, pixels1):
         rows = [p[k] * P[v][2] - P[v][k] for v, p in ((0, a), (1, b)) for k in (0, 1)]
-        X = np.linalg.svd(np.array(rows) / np.array([c.fx for c in pair.cameras]).repeat(2)[:, None])[2][-1]
+        X = np.linalg.svd(
+            np.array(rows) / np.array([c.fx for c in pair.cameras]).repeat(2)[:, None]
+        )[2][-1]
         points.append(X[:3] / X[3])
     return np.array(points)
 
@@ -229,7 +255,9 @@ def times_ns(scenes, repetitions=25):
     for _ in range(repetitions):
         for method, runs in taken.items():
             runs.append((run_ns(method, scenes), run_ns(method, single)))
-    return {method: float(np.subtract(*np.median(runs, axis=0))) / num for method, runs in taken.items()}
+    return {
+        method: float(np.subtract(*np.median(runs, axis=0))) / num for method, runs in taken.items()
+    }
 
 
 def through_a_lens(pair):
@@ -266,9 +294,13 @@ def errors_table(scenes):
     """{scene: {method: accuracy}}, with OpenCV for comparison."""
     found = {}
     for name, (pair, truth, pixels0, pixels1) in scenes.items():
-        found[name] = {m: accuracy(pair, truth, ours(m, pair, pixels0, pixels1)["position"], pixels0, pixels1)
-                       for m in METHODS}
-        found[name][OPENCV] = accuracy(pair, truth, opencv(pair, pixels0, pixels1), pixels0, pixels1)
+        found[name] = {
+            m: accuracy(pair, truth, ours(m, pair, pixels0, pixels1)["position"], pixels0, pixels1)
+            for m in METHODS
+        }
+        found[name][OPENCV] = accuracy(
+            pair, truth, opencv(pair, pixels0, pixels1), pixels0, pixels1
+        )
     return found
 
 
@@ -288,34 +320,70 @@ def table1(inputs):
                "points": {name: len(s[1]) for name, s in listed.items()}}
     forward = {m: f"{e['rms_px']:.3f}" for m, e in errors["forward"].items()}
     one = relative(singly)
-    found = (f"With pinhole cameras Midpoint takes {times['Midpoint']:.0f} ns a point, Iterative-LS "
-             f"{times['Iterative-LS']:.0f} and Poly {times['Poly']:.0f}. One by one, through lenses, Midpoint, "
-             f"Iterative-LS and Poly are as 2 to {one['Iterative-LS']:.1f} to {one['Poly']:.1f}. Poly has the "
-             f"least pixel error everywhere; flying forward, Poly has {forward['Poly']} px, Iterative-LS "
-             f"{forward['Iterative-LS']} and Linear-LS {forward['Linear-LS']}.")
-    return Result(numbers, found, [draw_times(relative(times), one)], [times_table(numbers)], missing)
+    found = (
+        f"With pinhole cameras Midpoint takes {times['Midpoint']:.0f} ns a point, Iterative-LS "
+        f"{times['Iterative-LS']:.0f} and Poly {times['Poly']:.0f}. One by one, through lenses, "
+        f"Midpoint, "
+        f"Iterative-LS and Poly are as 2 to {one['Iterative-LS']:.1f} to {one['Poly']:.1f}. Poly "
+        f"has the "
+        f"least pixel error everywhere; flying forward, Poly has {forward['Poly']} px, "
+        f"Iterative-LS "
+        f"{forward['Iterative-LS']} and Linear-LS {forward['Linear-LS']}."
+    )
+    return Result(
+        numbers, found, [draw_times(relative(times), one)], [times_table(numbers)], missing
+    )
 
 
 def times_table(numbers):
     errors, times = numbers["errors"], numbers["times_ns"]
-    singly = {m: f"{ratio:.1f}" for m, ratio in numbers["relative_times_one_by_one"].items() if m in METHODS}
-    rows = [[m, str(PAPER_TIMES.get(m, "–")), singly.get(m, "–"),
-             f"{numbers['relative_times'][m]:.1f}", f"{times[m]:.0f}",
-             *(f"{errors[n][m]['rms_px']:.3f}, {errors[n][m]['percent_median']:.2f}" for n in errors)]
-            for m in times]
-    caption = ("Times with Midpoint as 2; errors: rms px to the measured pixels, median per cent of the "
-               f"distance. Three drawn scenes of 2000 points with {NOISE_PX:g} px of noise, and "
-               "Motorcycle's right matches under the true pose and depth")
-    return Table(caption, ["method", "time, paper", "time, one by one", "time, pinholes", "ns a point, pinholes",
-                           *errors], rows, list(times).index("Iterative-LS"))
+    singly = {
+        m: f"{ratio:.1f}"
+        for m, ratio in numbers["relative_times_one_by_one"].items()
+        if m in METHODS
+    }
+    rows = [
+        [
+            m,
+            str(PAPER_TIMES.get(m, "–")),
+            singly.get(m, "–"),
+            f"{numbers['relative_times'][m]:.1f}",
+            f"{times[m]:.0f}",
+            *(
+                f"{errors[n][m]['rms_px']:.3f}, {errors[n][m]['percent_median']:.2f}"
+                for n in errors
+            ),
+        ]
+        for m in times
+    ]
+    caption = (
+        "Times with Midpoint as 2; errors: rms px to the measured pixels, median per cent of the "
+        f"distance. Three drawn scenes of 2000 points with {NOISE_PX:g} px of noise, and "
+        "Motorcycle's right matches under the true pose and depth"
+    )
+    return Table(
+        caption,
+        [
+            "method",
+            "time, paper",
+            "time, one by one",
+            "time, pinholes",
+            "ns a point, pinholes",
+            *errors,
+        ],
+        rows,
+        list(times).index("Iterative-LS"),
+    )
 
 
 def draw_times(pinholes, singly):
     sheet, axis = drawing.sheet(8, 3.4)
     places = np.arange(len(METHODS))
-    for shift, times, colour, label in ((-0.27, PAPER_TIMES, drawing.GREY, "paper"),
-                                        (0, singly, drawing.BLUE, "twoview, one by one"),
-                                        (0.27, pinholes, drawing.ORANGE, "twoview, pinhole cameras")):
+    for shift, times, colour, label in (
+        (-0.27, PAPER_TIMES, drawing.GREY, "paper"),
+        (0, singly, drawing.BLUE, "twoview, one by one"),
+        (0.27, pinholes, drawing.ORANGE, "twoview, pinhole cameras"),
+    ):
         axis.barh(places + shift, [times[m] for m in METHODS], 0.26, color=colour, label=label)
     axis.set_yticks(places, METHODS)
     axis.invert_yaxis()
@@ -327,20 +395,36 @@ def draw_times(pinholes, singly):
 
 
 EXPERIMENTS = [
-    Experiment("figure13", "Triangulation", "Figure 13: the iterated weights of Iterative-LS",
-               "The weights w = 1 / (P3 X) that Iterative-LS gives its equations, round by round, and how the "
-               "error falls with them.",
-               "The weights only matter where the two depths differ: in sideways flight both are equal and "
-               "Iterative-LS is Linear-LS, so the pair here drives forward. The library iterates at most ten "
-               "rounds and stops when both depths move by less than 1e-10; it eliminates the depth in closed "
-               "form, so no normal matrix is formed, whose condition would grow with the depth's square.",
-               figure13),
-    Experiment("table1", "Triangulation", "Table 1: seven triangulations, relative times and errors",
-               "Relative times 14 for Poly, 30 for Poly-Abs, 3 for Linear-Eigen, 2 for Linear-LS, 5 for "
-               "Iterative-Eigen, 3 for Iterative-LS and 2 for Midpoint; Iterative-LS is chosen.",
-               "Our Poly needs no polynomial of degree 6: one monotonic equation gives the proved minimum in "
-               "about two Newton steps, so that it costs hardly more than the iterations "
-               "(docs/algorithms/triangulation.md). With pinholes Linear-LS, Iterative-LS and Midpoint take "
-               "several points at once, and leave all others far behind. Ours also tells angle, error and status "
-               "of each point in that time. Iterative-LS is the default, as in the paper.", table1),
+    Experiment(
+        "figure13",
+        "Triangulation",
+        "Figure 13: the iterated weights of Iterative-LS",
+        "The weights w = 1 / (P3 X) that Iterative-LS gives its equations, round by round, and how "
+        "the "
+        "error falls with them.",
+        "The weights only matter where the two depths differ: in sideways flight both are equal "
+        "and "
+        "Iterative-LS is Linear-LS, so the pair here drives forward. The library iterates at most "
+        "ten "
+        "rounds and stops when both depths move by less than 1e-10; it eliminates the depth in "
+        "closed "
+        "form, so no normal matrix is formed, whose condition would grow with the depth's square.",
+        figure13,
+    ),
+    Experiment(
+        "table1",
+        "Triangulation",
+        "Table 1: seven triangulations, relative times and errors",
+        "Relative times 14 for Poly, 30 for Poly-Abs, 3 for Linear-Eigen, 2 for Linear-LS, 5 for "
+        "Iterative-Eigen, 3 for Iterative-LS and 2 for Midpoint; Iterative-LS is chosen.",
+        "Our Poly needs no polynomial of degree 6: one monotonic equation gives the proved minimum "
+        "in "
+        "about two Newton steps, so that it costs hardly more than the iterations "
+        "(docs/algorithms/triangulation.md). With pinholes Linear-LS, Iterative-LS and Midpoint "
+        "take "
+        "several points at once, and leave all others far behind. Ours also tells angle, error and "
+        "status "
+        "of each point in that time. Iterative-LS is the default, as in the paper.",
+        table1,
+    ),
 ]
