@@ -20,7 +20,7 @@ def _run(*command):
 def text_and_data(root, library):
     """KiB of text and data as `size` counts them, and the limit."""
     told = subprocess.run([os.path.join(root, "scripts", "footprint"), "--built", library],
-                          # the exit status only says whether the size is above its limit
+                          # The exit status only says whether the size is above its limit.
                           capture_output=True, text=True).stdout
     text, data, limit = re.search(r"text (\d+)  data (\d+) .* (\d+) KiB", told).groups()
     return (int(text) + int(data)) / 1024, int(limit)

@@ -171,7 +171,7 @@ class Ours:
         result = library._init_struct("tv_two_view")
         found = library._init_struct("tv_reconstruction")
 
-        # the default argument keeps the arrays alive as long as the call
+        # The default argument keeps the arrays alive as long as the call.
         def work(keep=(cameras, views, stages)):
             del keep
             library.call("tv_reconstruct", self.context._pointer, ctypes.byref(views[0]),
@@ -470,7 +470,7 @@ def pair_cases(library, pairs):
         # COLMAP is measured once against our defaults, and once against its number of keypoints
         # with its descriptor window.
         keypoints, _ = _colmap_extractor().extract_from_uint8_array(pair.images[0])
-        # a descriptor bin is 3 scales wide there and 1.5 keypoint sizes wide here
+        # A descriptor bin is 3 scales wide there and 1.5 keypoint sizes wide here.
         size = 2 * np.median([k.compute_scale() for k in keypoints])
         options = {"max_keypoints": len(keypoints), "keypoint_size": float(np.clip(size, 1, 32))}
         equal = f"{pair.name} COLMAP's number and median window"

@@ -46,7 +46,7 @@ def run_program(build, name, stage, quick):
 def python_measures(build, stages, quick):
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([os.path.join(build, "bin", "bench_export_images"), folder], check=True)
-        # imports numpy and the peers, so it must follow the environment variables
+        # Imports numpy and the peers, so it must follow the environment variables.
         import python_peers
         return python_peers.measure(os.path.join(build, "lib", "libtwoview.so"), folder, stages,
                                     quick)
@@ -75,7 +75,7 @@ def main():
     arguments = parser.parse_args()
     stages = [arguments.only] if arguments.only else list(PROGRAMS)
     if arguments.json:
-        # a path that cannot be written fails here, before the long run
+        # A path that cannot be written fails here, before the long run.
         open(arguments.json, "a", encoding="utf-8").close()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})

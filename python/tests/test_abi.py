@@ -115,7 +115,7 @@ def test_every_function_of_the_headers_is_bound_or_known_to_be_left_out():
     functions = set(re.findall(r"TV_API [^;(]*?\*?(tv_\w+)\(", header_text()))
     inside = {"tv_context_init", "tv_context_size", "tv_context_kernels", "tv_context_high_water",
               "tv_status_string"} | {f for f in functions if re.search(r"_init_sized$", f)}
-    # for one point; the functions for arrays replace them
+    # For one point; the functions for arrays replace them.
     left_out = {"tv_camera_project", "tv_camera_unproject",
                 "tv_context_set_clock", "tv_context_take_times",  # stage times
                 "tv_kernels_string", "tv_kind_string", "tv_verdict_string",

@@ -14,14 +14,14 @@ from .enums import Loss, Normalisation, Orientation, Solver
 class FeatureOptions:
     """tv_feature_options."""
 
-    #: most descriptors of an image; 0: the smaller of 2048 and the context's limit
+    #: Most descriptors of an image; 0: the smaller of 2048 and the context's limit.
     max_keypoints: int = 0
     arc: int = 9  #: required contiguous circle pixels, 9 to 12
     threshold: int = 10  #: grey levels, [1, 254]
     min_threshold: int = 3  #: lowest value to which the threshold may fall; 0: it is fixed
     levels: int = 1  #: pyramid levels, [1, 8]
     scale_factor: float = 2.0  #: between two levels, [1.1, 2]
-    #: side of the grid cells that share out the corners, pixels; 0: the strongest corners anywhere
+    #: Side of the grid cells that share out the corners, pixels; 0: the strongest corners anywhere.
     cell_px: int = 0
     subpixel: int = 1  #: 1: positions are refined to a fraction of a pixel
     orientation: int = Orientation.GRADIENT
@@ -59,7 +59,7 @@ class EstimateOptions:
     gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity in camera 0's frame
     gravity1: Sequence[float] = (0.0, 0.0, 0.0)
     gravity_sigma_rad: float = 0.0  #: standard deviation; 0: gravity is not used
-    #: standard deviation in focal lengths; 0: the principal point is exact
+    #: Standard deviation in focal lengths; 0: the principal point is exact.
     principal_point_sigma: float = 0.01
 
 

@@ -357,7 +357,7 @@ class Reconstruction:
     inlier_mask: np.ndarray  #: (m,) bool
     points: np.ndarray  #: (m,) of POINT; INVALID where the match is no inlier
     num_points: int
-    #: matches that exceed the context's max_matches; those with the highest ratios are left out
+    #: Matches that exceed the context's max_matches; those with the highest ratios are left out.
     num_matches_left_out: int
 
 

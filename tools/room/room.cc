@@ -132,8 +132,8 @@ float Room::grey_at(const Vec3& from, const Vec3& ray, const Hit& hit, double pi
   const double v = (from[v_axis] + hit.distance * ray[v_axis] - box.low[v_axis]) * kTilesPerMetre;
   int texture = box.texture;
   if (&box == &walls_ && hit.axis == 2) texture = hit.side == 1 ? kFloor : kCeiling;
-  // The side of the square patch that a pixel covers, in metres: a slanted surface stretches the
-  // patch in one direction, and this is a mean of its short and its long side.
+  // The side, in tiles, of a square with the area that a pixel covers on the surface. A slanted
+  // surface stretches this area in one direction.
   const double slant = std::max(std::abs(ray[hit.axis]), 0.05);
   const double footprint = hit.distance * pixel_angle / std::sqrt(slant) * kTilesPerMetre;
   const double light =

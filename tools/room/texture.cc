@@ -156,8 +156,8 @@ Texture Texture::planks(uint64_t seed) {
 }
 
 float Texture::sample(double u, double v, double footprint) const {
-  // The finest mip level whose texels are at most as large as the footprint; the next level gets
-  // the remaining share.
+  // The coarsest mip level whose texels are at most as large as the footprint, and the weight of
+  // the next coarser level.
   int exponent;
   const double mantissa = std::frexp(std::max(footprint * kSide, 1.0), &exponent);
   const int level = std::min(exponent - 1, static_cast<int>(levels_.size()) - 2);

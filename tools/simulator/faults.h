@@ -1,5 +1,5 @@
-// The faults of a bad radio link: datagrams are lost, repeated or reordered, each with a
-// probability that a test chooses.
+// The faults of a bad radio link: datagrams are lost, truncated, corrupted, duplicated or
+// reordered, each with a probability that a test chooses.
 #pragma once
 
 #include <cstdint>

@@ -11,7 +11,7 @@ extern "C" {
 namespace simulator {
 namespace {
 
-// one key picture in this many pictures, as in recordings of a real drone
+// One key picture in this many pictures, as in recordings of a real drone.
 constexpr int kKeyEvery = 15;
 
 // The size in bytes of the first unit in `bytes`, with its start code, if the unit has this type;

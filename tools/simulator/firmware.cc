@@ -380,7 +380,7 @@ void Firmware::fill(int64_t now_ns, ardrone_navdata* navdata) {
   navdata->euler_angles.theta_mdeg = demo.theta_mdeg;
   navdata->euler_angles.phi_mdeg = demo.phi_mdeg;
   navdata->altitude.vision_mm = static_cast<int32_t>(std::lround(height * 1000));
-  // 240 mm is the offset of the raw sonar value, measured on a real drone
+  // The raw sonar value has a measured offset of 240 mm.
   navdata->altitude.raw_mm = navdata->altitude.vision_mm + 240;
   navdata->altitude.vz_mm_s = static_cast<float>(
       1000 * noisy(-state.velocity[2] * sensors_.altitude_factor, sensors_.velocity_noise_m_s));

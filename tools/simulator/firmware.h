@@ -93,7 +93,7 @@ class Firmware {
   Sensors sensors_;
   std::string version_;  // empty: the version in the factory configuration
   std::map<std::string, std::string> configuration_;
-  // id to description, for each kind of id
+  // Id to description, for each kind of id.
   std::map<std::string, std::string> sessions_, users_, applications_;
   Ids ids_, addressed_;
   std::vector<std::string> control_texts_;

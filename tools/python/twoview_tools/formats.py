@@ -11,7 +11,7 @@ pairs.txt, PAIRS.txt. A line holds name0 name1 [rot0 rot1 [K0(9) K1(9) [T_0to1(1
 38 fields with white space between them. Blank lines and lines whose first character after white
 space is
 # are skipped; lines end with LF or CR LF; a byte order mark is skipped. `rot` are whole quarter
-# turns
+# turns.
 counter-clockwise, read modulo 4. K is [fx 0 cx 0 fy cy 0 0 1] with positive focal lengths. T is
 [R t; 0 0 0 1]; each element of R R^T is within 1e-3 of the identity's, and det R is positive. A
 file without a pair is refused. A line that is refused is named by its number.

@@ -113,7 +113,7 @@ void OutputSet::keep(const std::string& input) {
 
 bool OutputSet::is_kept(const fs::path& path) const {
   return std::any_of(kept_.begin(), kept_.end(), [&](const std::string& input) {
-    // set if one of the two files does not exist; then they are not the same file
+    // Set if one of the two files does not exist; then they are not the same file.
     std::error_code error;
     return fs::is_regular_file(path, error) && fs::equivalent(path, input, error);
   });

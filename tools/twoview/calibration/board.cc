@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kSearchSide = 1280;    // longer side of the image that is searched, pixels
 constexpr int kThumbnailSide = 400;  // longer side of a thumbnail on the contact sheet, pixels
-// in a dark image the brightest 1 % of the pixels are at most about this grey level
+// An image is dark if fewer than 1 % of its pixels are above this grey level.
 constexpr int kDarkLevel = 40;
 // The smallest part of a board that is reported.
 const cv::Size kSmallestBoard(3, 3);
@@ -30,7 +30,7 @@ const cv::Size kSmallestBoard(3, 3);
 constexpr double kMaxRisePx = 5, kMaxRiseOfMedian = 1.8;
 constexpr double kMinMoveShare = 0.015;    // as a share of the image's diagonal
 constexpr double kLargerBoardShare = 0.4;  // as a share of the contrast within the board
-// the wall-clock limit is this many times the CPU limit, for a busy machine
+// The wall-clock limit is this many times the CPU limit, for a busy machine.
 constexpr int kWallPerCpu = 8;
 
 double longer_side(cv::Size size) { return std::max(size.width, size.height); }

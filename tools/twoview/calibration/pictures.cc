@@ -67,7 +67,7 @@ std::vector<const BoardView*> shown_views(const std::vector<BoardView>& views) {
       return static_cast<int>(a->reason) < static_cast<int>(b->reason);
     });
     shown.resize(kMaxThumbnails);
-    // pointers into one vector, so that this restores the original order
+    // Pointers into one vector, so that this restores the original order.
     std::sort(shown.begin(), shown.end());
   }
   return shown;
@@ -237,7 +237,7 @@ cv::Mat residuals_picture(const std::vector<BoardView>& views, const Calibration
   put_panel(sheet, panel.place);
   cv::Mat part = sheet(panel.place);
   const Pixel origin(panel.place.tl());
-  // pixels of the sheet for one pixel of residual
+  // Pixels of the sheet for one pixel of residual.
   const double enlarged = 12 / std::max(c.rms_px, 1e-6);
   for (const ViewFit& fit : c.fits)
     for (size_t i = 0; i < fit.residuals.size(); ++i) {

@@ -18,7 +18,7 @@ constexpr int kOutlierRounds = 5;
 // The limits below which, or above which, a warning is given.
 constexpr size_t kFewViews = 10, kTiltedViews = 4;
 constexpr double kTiltedDeg = 15, kLittleCoverage = 0.6, kHighRmsPx = 0.5, kLowRmsPx = 0.1;
-// relative to fx; relative to the image width
+// Relative to fx; relative to the image width.
 constexpr double kLargeFocalSigma = 0.005, kLargeCentreSigma = 0.005;
 
 std::vector<cv::Point3f> corners_of(const Board& board) {
@@ -197,8 +197,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Marks views whose error is far above the others', the worst first, while most of the views
-// remain. Returns true if a view was marked.
+// Marks views whose error is far above the others', the worst first, while at least two thirds of
+// the first views remain. Returns true if a view was marked.
 bool reject_outliers(std::vector<BoardView>& views, Calibration& calibration, size_t num_at_first) {
   std::vector<double> errors;
   for (const ViewFit& fit : calibration.fits) errors.push_back(fit.rms_px);

@@ -33,7 +33,7 @@ struct Calibration {
   Lens lens = Lens::kBrownConrady;
   tv_camera camera{};
   std::vector<double> sigma;  // standard deviations: fx fy cx cy, then the distortion
-  // root mean square over all corners of the distance between measured and projected corner
+  // Root mean square over all corners of the distance between measured and projected corner.
   double rms_px = 0;
   std::vector<ViewFit> fits;  // of the views that are used
   double coverage = 0;        // share of the 8 x 8 cells of the image that hold a corner

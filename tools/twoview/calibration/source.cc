@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kLooksPerSecond = 4;
 constexpr int kMaxLooks = 240;
-// a container may round the number of frames that it states
+// A container may round the number of frames that it states.
 constexpr double kMinShareOfFrames = 0.9;
 constexpr int64_t kMaxFrames = 1000000;  // of a file; a larger number means an endless stream
 

@@ -36,7 +36,7 @@ int record(const Arguments& a) {
   options.decoder = decoder.get();
   std::optional<Recording> recording;
   LinkListener listener;
-  // an exception must not pass through the driver's C code, so its message is stored
+  // An exception must not pass through the driver's C code, so its message is stored.
   std::string failure;
   const auto keeping = [&failure](const auto& write) {
     if (!failure.empty()) return;

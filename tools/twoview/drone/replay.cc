@@ -29,7 +29,7 @@ int replay(const Arguments& a) {
     first_ns = std::min(first_ns, time.received_ns);
     last_ns = std::max(last_ns, time.received_ns);
   };
-  // an exception must not pass through the driver's C code, so its message is stored
+  // An exception must not pass through the driver's C code, so its message is stored.
   std::string failure;
   if (!a.frames.empty()) {
     listener.on_frame = [&](const tvs_frame& frame) {

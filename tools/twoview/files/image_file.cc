@@ -57,7 +57,7 @@ cv::Mat decode(const std::string& path) {
   try {
     const StderrSilence silence;
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U,
-                          // cv::Mat needs a non-const pointer, but imdecode only reads
+                          // imdecode only reads
                           const_cast<char*>(bytes.data()));
     pixels = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception&) {

@@ -40,7 +40,7 @@ struct Option {
   OptionGroup group;
   std::variant<int32_t*, uint64_t*, float*, double*, Choice, Direction> target;
   double low, high;
-  // whether the bound `low`, or `high`, is itself refused
+  // Whether the bound `low`, or `high`, is itself refused.
   enum Ends { kClosed, kOpenLow, kOpenHigh } ends;
   const char* help;
 };
@@ -282,7 +282,7 @@ void add_options(CLI::App& verb, Options& options, unsigned groups) {
 
 nlohmann::ordered_json options_json(const Options& options, unsigned groups) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  // the table needs a non-const reference, but it is only read here
+  // The table needs a non-const reference, but it is only read here.
   for (const Option& option : table(const_cast<Options&>(options))) {
     if (!(option.group & groups)) continue;
     std::string key = option.name;

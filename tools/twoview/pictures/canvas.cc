@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kFont = cv::FONT_HERSHEY_DUPLEX;
 constexpr double kCapital = 21;  // height of the font's capitals at scale 1, pixels
-// text is drawn this many times larger, then reduced, so that it is smooth
+// Text is drawn this many times larger, then reduced, so that it is smooth.
 constexpr int kOver = 4;
 constexpr int kShift = 4;  // fractional bits of OpenCV's drawing coordinates
 
@@ -64,7 +64,7 @@ std::string plain_letters(const std::string& text) {
       plain += static_cast<char>(character);
     else if (character >= 0xC0 && character < 0x180)
       plain += letters[character - 0xC0];
-    // a combining accent (U+0300 to U+036F) is dropped
+    // A combining accent (U+0300 to U+036F) is dropped.
     else if (character < 0x300 || character >= 0x370)
       plain += '_';
   }

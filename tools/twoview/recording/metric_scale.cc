@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kMaxGapS =
     0.25;  // longest gap in a log that is integrated, seconds; demo mode gives 15 samples a second
-// altitudes are averaged over this time before and after an instant
+// Altitudes are averaged over this time before and after an instant.
 constexpr double kAltitudeWindowS = 0.1;
 constexpr double kLayer = 0.04;  // thickness of a floor as a share of its distance below the camera
 constexpr size_t kLeastFloor = 20;    // fewest points of a floor

@@ -105,7 +105,7 @@ void RecordingInput::load(const tv_camera& camera, Session& session, const Optio
   const std::vector<int>& frames = s.options.frames;
   if (frames.empty()) {
     s.pair = choose_pair(s.options.folder, s.flight, camera, s.mount, session, options);
-    // discards the times of the choice of frames, which do not belong to the pair
+    // Discards the times of the choice of frames, which do not belong to the pair.
     session.take_times(0, true);
   } else {
     s.pair = pair_of(s.options.folder, s.flight, frames[0], frames[1]);

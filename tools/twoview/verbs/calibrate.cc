@@ -21,7 +21,7 @@ namespace {
 
 constexpr int kMinSide = 3, kMaxBoardSide = 100;  // numbers of inner corners; 3 is OpenCV's minimum
 constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // CPU time for one search
-// this many views of another board show that the given size is wrong
+// This many views of another board show that the given size is wrong.
 constexpr int kTellingViews = 2;
 
 struct Arguments {

@@ -263,7 +263,7 @@ int evaluate(Arguments& a) {
   fs::path folder;
   std::string name;
   split_output(common.output, folder, name);
-  // before the long work, so that an unwritable folder is reported at once
+  // Before the long work, so that an unwritable folder is reported at once.
   OutputSet files(folder);
   files.keep(a.pairs);
   Session session(common.options);

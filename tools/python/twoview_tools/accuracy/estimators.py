@@ -144,7 +144,7 @@ def _opengv(algorithm, nonlinear):
         unit0, unit1 = unit_rays(rays0), unit_rays(rays1)
         K0, K1 = (K for K, _ in matches.cameras)
         focal = (K0[0, 0] + K0[1, 1] + K1[0, 0] + K1[1, 1]) / 4
-        # the error is the sum of 1 - cos of both reprojection angles, as in OpenGV's own programs
+        # The error is the sum of 1 - cos of both reprojection angles, as in OpenGV's own programs.
         threshold = 2 * (1 - np.cos(np.arctan(threshold_px / focal)))
         try:
             T = pyopengv.relative_pose_ransac(unit0, unit1, algorithm, threshold,

@@ -26,8 +26,8 @@ class Estimator:
         title, self.module, _ = estimators.PEERS[kind]
         library, rest = title.split(" ", 1)
         self.name = f"{library} {version} {rest}"
-        # only the best row of each family counts in the verdict; OpenGV's rows are shown but do not
-        # count
+        # Only the best row of each family counts in the verdict; OpenGV's rows are shown but do not
+        # count.
         self.counts = self.module != "pyopengv"
 
     def run(self, list_of_matches, threshold_px, num_seeds):

@@ -76,7 +76,7 @@ def orientations(gray, points, size):
     dx = np.zeros_like(base)
     dy = np.zeros_like(base)
     dx[:, 1:-1] = base[:, 2:] - base[:, :-2]
-    # positive downwards, so that angles increase clockwise in the image
+    # Positive downwards, so that angles increase clockwise in the image.
     dy[1:-1] = base[2:] - base[:-2]
     dx[[0, -1]] = dy[[0, -1]] = dx[:, [0, -1]] = dy[:, [0, -1]] = 0
     magnitude = np.pad(np.hypot(dx, dy), radius)

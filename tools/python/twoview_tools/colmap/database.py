@@ -141,7 +141,7 @@ def appended_database(path, schema):
             if target.execute("PRAGMA data_version").fetchone() != before:
                 raise BadInput(f"{path}: changed by another program meanwhile; nothing was written")
             with contextlib.closing(sqlite3.connect(made)) as copy:
-                # without this callback, backup() would retry for ever
+                # Without this callback, backup() would retry for ever.
                 copy.backup(target, progress=_give_up_when_locked)
     except sqlite3.Error as error:
         raise _explain(path, error) from None

@@ -257,7 +257,7 @@ class Store:
         for name in os.listdir(self.folder):
             if name.endswith((".json", ".part")):
                 os.remove(os.path.join(self.folder, name))
-        # the folder may contain files that this program did not write
+        # The folder may contain files that this program did not write.
         with contextlib.suppress(OSError):
             os.rmdir(self.folder)
 
@@ -329,7 +329,7 @@ def compare(arguments):
     results.write(folder, report, pairs, tasks)
     store.remove()
     if not arguments.quiet:
-        # the report is complete even if nobody reads this output
+        # The report is complete even if nobody reads this output.
         with contextlib.suppress(BrokenPipeError):
             results.print_summary(report, folder)
             sys.stdout.flush()

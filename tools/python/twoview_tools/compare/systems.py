@@ -13,7 +13,7 @@ class System:
     id: str  # the name for --systems and in the files
     name: str  # the name on the page
     kind: str    # pipeline, solver or triangulation
-    # the module whose version is reported: twoview, cv2, pycolmap, colmap, poselib, pyopengv
+    # The module whose version is reported: twoview, cv2, pycolmap, colmap, poselib, pyopengv.
     module: str
     options: dict
     note: str = ""

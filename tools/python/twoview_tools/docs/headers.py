@@ -61,7 +61,7 @@ def statements(text, separator, offset=0):
             end = re.compile(r"\s+").match(text, position).end()
             gap = text[position:end]
             if gap.count("\n") > 1:
-                # a comment followed by a blank line describes the file, not a declaration
+                # A comment followed by a blank line describes the file, not a declaration.
                 comment = ""
             if "\n" in gap:
                 last = None
@@ -167,7 +167,7 @@ def parse(path):
         inside = list(members(parent, code, at, line_of))
         if parent.name:
             yield parent
-        # enum { NAME = 1 }: a constant that C also accepts as the size of an array
+        # enum { NAME = 1 }: a constant that C also accepts as the size of an array.
         elif len(inside) == 1:
             inside[0].comment = inside[0].comment or comment
         yield from inside

@@ -148,7 +148,7 @@ class Reference:
             pieces.append(child.tail or "")
         words = html.escape(" ".join("".join(pieces).split()), quote=False)
         words = re.sub(r"([*|\[\]{}])", lambda found: f"&#{ord(found.group())};", words)
-        # split into alternating pieces of text, which may name symbols and pages, and code
+        # Split into alternating pieces of text, which may name symbols and pages, and code.
         pieces = words.split("`")
         pieces[0::2] = [
             re.sub(r"docs/([\w/-]+)\.md|\w+", self.link, piece) for piece in pieces[0::2]

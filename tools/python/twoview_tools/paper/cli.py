@@ -22,7 +22,7 @@ from .. import ROOT
 
 def experiments():
     from . import calibration, cloud, corners, descriptor, motion, ransac, triangulation
-    # in the order of the paper
+    # In the order of the paper.
     modules = (calibration, corners, descriptor, ransac, triangulation, motion, cloud)
     return [e for module in modules for e in module.EXPERIMENTS]
 

@@ -15,7 +15,7 @@ COLOURS = {"unrefined": drawing.GREY, "paper": drawing.ORANGE, "default": drawin
 # noise of this pair.
 STAGES = {"before": None, "adjusted, 1 px": 1.0, "adjusted, 0.2 px": 0.2}
 STYLES = {"before": "-", "adjusted, 1 px": "--", "adjusted, 0.2 px": ":"}
-# standard deviation of a coordinate, estimated from the residuals of this pair
+# Standard deviation of a coordinate, estimated from the residuals of this pair.
 MATCH_NOISE_PX = 0.2
 
 

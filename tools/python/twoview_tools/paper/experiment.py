@@ -49,7 +49,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Experiment:
-    # such as "figure8"; used in the page's anchors, the pictures' names and paper.json's keys
+    # Such as "figure8"; used in the page's anchors, the pictures' names and paper.json's keys.
     id: str
     section: str
     title: str

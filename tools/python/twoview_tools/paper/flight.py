@@ -34,7 +34,7 @@ distortion_coefficients: !!opencv-matrix
    data: [ -0.5, 0.25, 0., 0., 0. ]
 """
 TAKE_OFF_S, STEER_S = 4.3, 3.2
-# higher than those of the recorder, so that the drone ignores the recorder's commands
+# Higher than those of the recorder, so that the drone ignores the recorder's commands.
 FIRST_SEQUENCE = 1000000
 
 

@@ -223,7 +223,7 @@ def draw_cameras(axis, study):
     """Draws camera 0 at the origin, camera 1 and the cloud, from above."""
     ok = study.points["status"] == library().PointStatus.OK
     points = study.points["position"][ok]
-    # more distant points would make the baseline too small to see
+    # More distant points would make the baseline too small to see.
     depth = min(np.percentile(points[:, 2], 90), 30.0)
     near = points[(points[:, 2] < 1.3 * depth)]
     axis.plot(near[:, 0], near[:, 2], ".", color=drawing.GREY, markersize=1.5)
