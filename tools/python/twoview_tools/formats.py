@@ -8,20 +8,18 @@ Numbers. A number is decimal, with an optional sign, point and exponent (`-5`, `
 It must be finite and within a double's range; hexadecimal, octal, `1_000` and `yes` are no numbers.
 
 pairs.txt, PAIRS.txt. A line holds name0 name1 [rot0 rot1 [K0(9) K1(9) [T_0to1(16)]]]: 2, 4, 22 or
-38 fields with white space between them. Blank lines and lines whose first character after white
-space is
-# are skipped; lines end with LF or CR LF; a byte order mark is skipped. `rot` are whole quarter
-# turns.
-counter-clockwise, read modulo 4. K is [fx 0 cx 0 fy cy 0 0 1] with positive focal lengths. T is
-[R t; 0 0 0 1]; each element of R R^T is within 1e-3 of the identity's, and det R is positive. A
-file without a pair is refused. A line that is refused is named by its number.
+38 fields with white space between them. Blank lines are skipped, and so are lines whose first
+character after white space is "#". Lines end with LF or CR LF; a byte order mark is skipped. `rot`
+is a number of whole quarter turns counter-clockwise, read modulo 4. K is [fx 0 cx 0 fy cy 0 0 1]
+with positive focal lengths. T is [R t; 0 0 0 1]; each element of R R^T must be within 1e-3 of the
+identity's, and det R must be positive. A file without a pair is refused. The message for a refused
+line has the line's number.
 
 Camera file. OpenCV's YAML and ROS's camera_info: image_width, image_height (whole, from 1 to 10^6),
 camera_matrix (nine numbers, or a map with data), distortion_model (absent, none, plumb_bob,
 rational_polynomial, equidistant) and distortion_coefficients (0, 4, 5 or 8 numbers; equidistant:
-4).
-Names that are not known are ignored. A lens of Brown and Conrady whose coefficients are all 0 is a
-pinhole. Where a matrix gives rows and cols, their product must be how many numbers it has.
+4). Names that are not known are ignored. A lens of Brown and Conrady whose coefficients are all 0
+is a pinhole. If a matrix gives rows and cols, their product must equal its number of values.
 
 cameras.yaml. A map from an entry's name to a map of fx fy cx cy image_width image_height, and k1 k2
 p1 p2 k3, each 0 where it is absent. Names that are not known are ignored; a file without an entry
@@ -31,12 +29,10 @@ YAML. The first document of a file is read, as a map. A name given twice and an 
 
 Which entry serves an image (choose_entry):
 1. One entry serves every image.
-2. Of several, the entry whose name begins the image's file name; the image's folders do not count,
-and
-   the longest such name wins (cam10 before cam1).
+2. Of several entries, the one whose name is a prefix of the image's file name, without its folders.
+   If there are several such names, the longest is chosen (cam10 before cam1).
 3. Else the entry whose fx and cx equal those of the pair line's K, within 1e-6 of the entry's
-value.
-   Where such entries differ in any number the choice is ambiguous, and the image is refused.
+   value. If such entries differ in any number the choice is ambiguous, and the image is refused.
 4. Else none serves it, and the image is refused.
 """
 
