@@ -13,7 +13,7 @@ MAPPING_KEYPOINTS = 8192
 # shift is not estimated.
 PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
 # Defaults that are automatic in the library have explicit values here, as in the C++ program.
-_EXPLICIT = {"max_keypoints": 2048, "method": tv.Method.FIVE_POINT}
+_EXPLICIT = {"max_keypoints": 2048, "method": tv.Solver.FIVE_POINT}
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
 
 
@@ -22,7 +22,7 @@ def _spelt(value):
 
 
 def _words(enum):
-    return [_spelt(value) for value in enum if value is not tv.Method.AUTO]
+    return [_spelt(value) for value in enum if value is not tv.Solver.AUTO]
 
 
 def _choice(enum):
