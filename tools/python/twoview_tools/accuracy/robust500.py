@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""The robust essential estimate beside PoseLib's: error and time on simulated matches, same run.
+"""Compares our robust essential estimate with PoseLib's: error and time on simulated matches.
 
-  scripts/accuracy --robust500                   # 200 problems a share of true matches
-  scripts/python -m twoview_tools.accuracy.robust500 --problems 50 --lib
-  build/release/lib/libtwoview.so
+  scripts/accuracy --robust500                   # 200 problems for each share of inliers
+  scripts/python -m twoview_tools.accuracy.robust500 --problems 50 \\
+      --lib build/release/lib/libtwoview.so
 
 A problem is 500 matches in random order, without ratios, of two 640x480 pinhole views (f 500). The
 rotation turns by 1 to 12 degrees about any axis, the baseline has any direction; true matches lie

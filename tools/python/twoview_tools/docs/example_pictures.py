@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
-"""The pictures of examples/README.md, from what the examples themselves write:
-docs/images/examples/.
-usage: PYTHONPATH=test/cli scripts/python -m twoview_tools.docs.example_pictures
-FOLDER_OF_THE_BUILT_EXAMPLES PROGRAM_twoview
+"""Makes the pictures of examples/README.md, docs/images/examples/, from the examples' output.
+usage: PYTHONPATH=test/cli scripts/python -m twoview_tools.docs.example_pictures \\
+  FOLDER_OF_THE_BUILT_EXAMPLES PROGRAM_twoview
 
-The photographs are of the simulated drone's rendered room, so that none of other people's are
-committed.
+The photographs show the simulated drone's rendered room, so that no photographs with rights of
+other people are committed.
 """
 
 import contextlib
