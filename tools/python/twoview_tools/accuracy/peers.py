@@ -135,7 +135,7 @@ def extract(gray, config):
     if config["front"] == "sift":
         sift = cv2.SIFT_create(nfeatures=CAP, contrastThreshold=config["contrast"])
         keypoints, descriptors = sift.detectAndCompute(gray, None)
-        if len(keypoints) > CAP:  # OpenCV keeps all keypoints that tie at the cap
+        if len(keypoints) > CAP:  # OpenCV exceeds its cap if scores are equal
             best = np.argsort([-k.response for k in keypoints], kind="stable")[:CAP]
             keypoints, descriptors = [keypoints[i] for i in best], descriptors[best]
     else:

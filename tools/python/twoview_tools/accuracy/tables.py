@@ -9,7 +9,7 @@ import numpy as np
 from . import metrics
 
 OURS = "twoview"
-MIN_PAIRS = 15  # smaller sets are not listed by themselves
+MIN_PAIRS = 15  # a smaller set gets no verdict of its own
 
 
 def say(text="", end="\n"):
