@@ -40,7 +40,7 @@ struct ServerOptions {
   FaultChances faults;           // faults of datagrams, in both directions
   double video_garbage = 0;      // probability of random bytes before a video packet
   double cut_video_every_s = 0;  // seconds between resets of the video connection; 0: never
-  // Seconds between stalls, which leave the connection open without data for 3 s; 0: never.
+  // Seconds between stalls of the video: it stays connected without data for 3 s; 0: never.
   double stall_video_every_s = 0;
   double reboot_every_s = 0;
   std::optional<uint32_t> first_sequence;  // first sequence number of navdata, to test the wrap

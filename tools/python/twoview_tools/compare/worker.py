@@ -289,7 +289,7 @@ def _version(module):
     try:
         if module == "twoview":
             library = twoview_context(64, 64, 8192).library
-            # The version includes a hash of the library, since a development version has many builds.
+            # The version includes a hash: a development version has many builds.
             with open(library.path, "rb") as f:
                 return {"version": library.version(),
                         "sha256": hashlib.sha256(f.read()).hexdigest()}
