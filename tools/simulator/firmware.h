@@ -42,8 +42,8 @@ class Firmware {
   // demo mode and 200 times a second in full mode.
   std::optional<std::vector<uint8_t>> next_navdata(int64_t now_ns);
 
-  // Returns once the text that the control channel must send (the configuration or the list of ids,
-  // with a terminating zero byte).
+  // Returns, only once, the text that the control channel must send (the configuration or the list
+  // of ids, with a terminating zero byte).
   std::optional<std::string> take_control_text();
 
   // Restarts the drone as after a change of its battery: it is in bootstrap mode, its sequence

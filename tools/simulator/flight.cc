@@ -9,8 +9,8 @@ namespace {
 constexpr double kGravity = 9.81;      // m/s^2
 constexpr double kStep = 0.005;        // s
 constexpr double kTiltDelay = 0.12;    // s until 63 % of the commanded angle is reached
-constexpr double kClimbDelay = 0.25;   // s
-constexpr double kTurnDelay = 0.15;    // s
+constexpr double kClimbDelay = 0.25;   // s until 63 % of the commanded climb rate is reached
+constexpr double kTurnDelay = 0.15;    // s until 63 % of the commanded turn rate is reached
 constexpr double kDrag = 0.25;         // 1/s
 constexpr double kBrake = 0.16;        // rad of tilt per m/s of speed, while hovering
 constexpr double kHoverHeight = 1.0;   // m, height at which a take-off ends
