@@ -1,4 +1,4 @@
-"""Instructions a call, which do not depend on the load of the machine.
+"""Counts the instructions of a call, which do not depend on the load of the machine.
 
 x86-64, under valgrind --tool=callgrind: each row of the benchmark programs is called once more
 after a first call; what happens inside bench_measured (bench.cc) is counted. Once with the avx2 and
@@ -25,12 +25,12 @@ ARM = (("aarch64", "aarch64-linux-gnu-gcc", "qemu-aarch64"),
        ("armv7", "arm-linux-gnueabihf-gcc", "qemu-arm"))
 ARM_STAGES = ("detect", "describe", "match", "estimate", "pair")
 ARM_SETS = ("auto", "c")
-# Where the other rows' calls would be minutes each.
+# Only these rows are run; the calls of the other rows would take minutes each.
 FILTERS = {"robust": "^robust/.*/twoview$", "match": "^match/1000x1000"}
 
 
 def _totals(folder):
-    """Instructions of each dump, in the order in which they were made."""
+    """Total instructions of each dump file, in the order in which the files were made."""
     paths = glob.glob(os.path.join(folder, "out.*"))
     dumps = []
     for path in paths:
@@ -43,7 +43,7 @@ def _totals(folder):
 
 
 def _count(build, program, stage, kernels):
-    """{name: instructions a unit} of the stage's rows."""
+    """{name: instructions for one unit} of the rows of a stage."""
     with tempfile.TemporaryDirectory() as folder:
         report = os.path.join(folder, "report.json")
         environment = dict(os.environ, TWOVIEW_BENCH_CALLS="1", TWOVIEW_KERNELS=kernels)
@@ -64,7 +64,8 @@ def _count(build, program, stage, kernels):
 
 
 def measure(build, stages, programs):
-    """Rows as dictionaries: stage, case, ours by kernel set, peer, peer_name, ratio, unit."""
+    """Returns rows as dictionaries: stage, case, ours by kernel set, peer, peer_name, ratio,
+    unit."""
     found = []
     for stage in (s for s in stages if programs[s]):
         by_set = {kernels: _count(build, programs[stage], stage, kernels) for kernels in SETS}
@@ -75,7 +76,7 @@ def measure(build, stages, programs):
             own = f"{stage}/{case}/{table.OURS}"
             alone = all(not n.startswith(f"{stage}/{case}/") or n == own for n in first)
             if system == table.OURS and not alone:
-                continue  # stands in its peers' rows
+                continue  # our row is shown beside each peer's row
             peer = None if alone else first[name]
             found.append({"stage": stage, "case": case,
                           "ours": {kernels: by_set[kernels][own] for kernels in SETS},
@@ -92,7 +93,7 @@ def _run(*command):
 
 
 def _arm_program(preset, compiler, folder):
-    """stages.c for that processor, linked statically."""
+    """Builds stages.c for an architecture, linked statically, and returns its path."""
     _run("cmake", "--preset", preset, "-S", ROOT, "-DTWOVIEW_TOOLS=OFF", "-DBUILD_TESTING=OFF",
          "-B", os.path.join(folder, preset))
     _run("cmake", "--build", os.path.join(folder, preset), "--target", "twoview_static")
@@ -104,7 +105,8 @@ def _arm_program(preset, compiler, folder):
 
 
 def arm(build):
-    """Rows as measure() gives them, without peers; an architecture that cannot run here is named and left out."""
+    """Rows as measure() returns them, without peers. An architecture that cannot run here is named
+    on stderr and omitted."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
         plugin = os.path.join(folder, "count.so")

@@ -1,4 +1,4 @@
-"""Size: bytes of the library beside the peers' closures, and of a context."""
+"""Sizes: bytes of the library, of the shared libraries that the peers load, and of a context."""
 
 import os
 import re
@@ -7,7 +7,8 @@ import subprocess
 from rows import Row
 
 CONTEXT_SIZES = [(320, 240), (640, 360), (640, 480), (1280, 720)]
-# What a user of the stages links: the shared libraries of a program that calls them are counted.
+# For each peer, the libraries to which a program with the same stages links. They and all libraries
+# that they load are counted.
 PEERS = [("OpenCV features2d + calib3d", ["libopencv_features2d.so", "libopencv_calib3d.so"]),
          ("OpenGV", ["libopengv.so"]), ("COLMAP", ["/usr/bin/colmap"])]
 
@@ -17,15 +18,16 @@ def _run(*command):
 
 
 def text_and_data(root, library):
-    """KiB of text and data, as `size` counts them, and their limit."""
+    """KiB of text and data as `size` counts them, and the limit."""
     told = subprocess.run([os.path.join(root, "scripts", "footprint"), "--built", library],
-                          capture_output=True, text=True).stdout  # its status: whether above it
+                          # The exit status only says whether the size is above its limit.
+                          capture_output=True, text=True).stdout
     text, data, limit = re.search(r"text (\d+)  data (\d+) .* (\d+) KiB", told).groups()
     return (int(text) + int(data)) / 1024, int(limit)
 
 
 def closure(path):
-    """Every shared library that the loader brings in for it, itself included."""
+    """Every shared library that the loader loads for this one, including itself."""
     files = {os.path.realpath(path)}
     for line in _run("ldd", path).splitlines():
         found = re.search(r"(/\S+) \(0x", line)

@@ -1,4 +1,5 @@
-// Simulated matches of two views, as twoview_tools.accuracy.robust500 draws them, and errors of poses.
+// Simulated matches of two views, as twoview_tools.accuracy.robust500 draws them, and errors of
+// poses.
 //
 // Two 640x480 pinhole views (f 500). The rotation turns by 1 to 12 degrees about any axis, the
 // baseline has any direction; true matches lie 2 to 8 baselines deep, wrong ones pair two points

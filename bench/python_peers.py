@@ -1,4 +1,5 @@
-"""The peers that are reached through Python, ours through ctypes in the same process and turn.
+"""The peers that are called from Python; our library is called through ctypes in the same process,
+in turn with them.
 
 OpenCV 5 (wheels), faiss, PoseLib, pycolmap. A time includes the call from Python on both sides.
 """
@@ -21,7 +22,7 @@ PAIRS = ("640x480", "1280x720")
 
 
 def _import(name):
-    """The module, or None."""
+    """The imported module, or None if it is not installed."""
     try:
         module = __import__(name)
     except ImportError:
@@ -54,17 +55,17 @@ POSELIB = POSELIB.replace("poselib", "PoseLib")
 
 
 class Case:
-    """The systems of one case; run() times them in random turn."""
+    """The systems that are measured on one case; run() times them in random order."""
 
     def __init__(self, stage, case, units=1):
         self.stage, self.case, self.units = stage, case, units
         self.systems = []   # (system, names of its cases, work, found)
         self.missing = []
-        self.round = 0      # which repetition it is, for work that takes other data each time
+        self.round = 0  # number of the repetition, for work that uses other data in each
 
     def add(self, system, work, found=lambda result: {}, cases=None):
-        """work() is timed; found(its last result) says what it gave. cases: in place of the
-        case's own name, where a system stands for another one or for several."""
+        """Adds a system. work() is timed; found(its last result) describes the result. `cases`
+        replaces the case's own name if the system belongs to another case or to several."""
         self.systems.append((system, cases or [self.case], work, found))
 
     def add_if(self, module, system, work, found=lambda result: {}):
@@ -74,7 +75,7 @@ class Case:
             self.add(system, work, found)
 
     def run(self, scale, rounds, least_seconds):
-        """Measures; scale: from seconds to the stage's unit."""
+        """Measures all systems. `scale` converts seconds to the unit of the stage."""
         times = [[] for _ in self.systems]
         results = [work() for _, _, work, _ in self.systems]
         turn = random.Random(1)
@@ -122,7 +123,8 @@ class Pair:
 
 
 class Ours:
-    """The calls that twoview_ctypes has no wrapper for, with their arrays made beforehand."""
+    """Calls for which twoview_ctypes has no wrapper, with arrays that are allocated before the
+    timing."""
 
     def __init__(self, library, pair, max_keypoints=MAX_KEYPOINTS):
         height, width = pair.images[0].shape
@@ -169,7 +171,8 @@ class Ours:
         result = library._init_struct("tv_two_view")
         found = library._init_struct("tv_reconstruction")
 
-        def work(keep=(cameras, views, stages)):  # they are to live as long as the call is made
+        # The default argument keeps the arrays alive as long as the call.
+        def work(keep=(cameras, views, stages)):
             del keep
             library.call("tv_reconstruct", self.context._pointer, ctypes.byref(views[0]),
                          ctypes.byref(views[1]), ctypes.byref(options), ctypes.byref(result),
@@ -184,7 +187,7 @@ class Ours:
 # ---- stages ------------------------------------------------------------------------------------
 
 def _threshold_for(ours, corners):
-    """The highest with at least that many."""
+    """The highest threshold that gives at least the requested number of corners."""
     enough, too_few = 1, 128
     while too_few - enough > 1:
         middle = (enough + too_few) // 2
@@ -249,7 +252,7 @@ def extract_cases(library, pairs):
 
 
 def _opencv_match(floats, matcher):
-    """As tv_match: both directions, ratio in both, one-to-one."""
+    """OpenCV matching with the rules of tv_match: ratio test in both directions, one-to-one."""
     def passing(pairs):
         return {a.queryIdx: a.trainIdx for a, b in pairs if a.distance < RATIO * b.distance}
     forward = passing(matcher.knnMatch(floats[0], floats[1], k=2))
@@ -299,7 +302,7 @@ def match_cases(library, pairs):
 
 
 def relpose_cases(library, pairs):
-    """PoseLib's solver a call a sample; ours is the native program's."""
+    """PoseLib's minimal solver, one call a sample; ours is timed by the native program."""
     del library, pairs
     samples = []
     for number in range(200):
@@ -328,7 +331,8 @@ def _opencv_essential(method):
 
 
 def robust_cases(library, pairs, batch=10):
-    """Each repetition takes the next ten problems, so that the errors are those of many."""
+    """Each repetition uses the next ten problems, so that the errors are taken over many
+    problems."""
     del pairs
     context = twoview_ctypes.Context(library, max_width=64, max_height=64, max_matches=500)
     for share in robust500.SHARES:
@@ -406,7 +410,7 @@ def _colmap_matcher():
 
 
 def _colmap_features(descriptors):
-    """Our descriptors, as its matcher takes them; positions do not matter to it."""
+    """Our descriptors in the form that COLMAP's matcher needs; it ignores the positions."""
     sides = []
     for d in descriptors:
         keypoints = [pycolmap.FeatureKeypoint(x=float(i % 640), y=float(i // 640))
@@ -434,7 +438,7 @@ def _colmap_pair(pair):
         pose = geometry.cam2_from_cam1
         R, t = pose.rotation.matrix(), np.array(pose.translation)
         inliers = np.asarray(geometry.inlier_matches, int)
-        # Its own triangulation is a call from Python a point: OpenCV's costs less.
+        # COLMAP's own triangulation needs one Python call a point; OpenCV's is faster.
         found = cv2.triangulatePoints(pair.K[0] @ np.eye(3, 4),
                                       pair.K[1] @ np.hstack([R, t[:, None]]),
                                       (points[0][inliers[:, 0]] - 0.5).T,
@@ -463,9 +467,11 @@ def pair_cases(library, pairs):
             case.missing.append(COLMAP)
             yield case
             continue
-        # COLMAP once, beside our defaults and beside its number of keypoints with its window.
+        # COLMAP is measured once against our defaults, and once against its number of keypoints
+        # with its descriptor window.
         keypoints, _ = _colmap_extractor().extract_from_uint8_array(pair.images[0])
-        size = 2 * np.median([k.compute_scale() for k in keypoints])  # bins: 3 scales, 1.5 sizes
+        # A descriptor bin is 3 scales wide there and 1.5 keypoint sizes wide here.
+        size = 2 * np.median([k.compute_scale() for k in keypoints])
         options = {"max_keypoints": len(keypoints), "keypoint_size": float(np.clip(size, 1, 32))}
         equal = f"{pair.name} COLMAP's number and median window"
         case.add(OURS, Ours(library, pair, len(keypoints)).reconstruct(options, {"ratio": RATIO}),
@@ -480,7 +486,8 @@ STAGES = {"fast": fast_cases, "describe": describe_cases, "extract": extract_cas
 
 
 def measure(library_path, folder, stages, quick):
-    """Measures of the stages that have peers here; folder: what bench_export_images wrote."""
+    """Measures of the stages that have peers in Python. `folder` holds the output of
+    bench_export_images."""
     from rows import UNITS, pyramid_apart
     library = twoview_ctypes.Library(library_path)
     pairs = [Pair(folder, name) for name in PAIRS]

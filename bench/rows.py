@@ -1,4 +1,5 @@
-"""Rows of the table: what a benchmark program or a Python peer measured, ratios, and targets."""
+"""Rows of the benchmark's table: the measures of programs and Python peers, their ratios, and the
+targets."""
 
 import dataclasses
 import re
@@ -6,7 +7,8 @@ import statistics
 
 OURS = "twoview"
 
-# The unit of a stage's time, and how many of Google Benchmark's microseconds it has.
+# The unit of each stage's time, and the factor by which Google Benchmark's microseconds are
+# divided.
 UNITS = {"fast": ("ms", 1e3), "describe": ("us/keypoint", 1), "extract": ("ms", 1e3),
          "match": ("ms", 1e3), "relpose": ("us/sample", 1), "robust": ("ms/problem", 1e3),
          "triangulate": ("us/point", 1), "pair": ("ms", 1e3)}
@@ -14,11 +16,12 @@ UNITS = {"fast": ("ms", 1e3), "describe": ("us/keypoint", 1), "extract": ("ms", 
 
 @dataclasses.dataclass
 class Measure:
-    """Times of one system on one case, in the stage's unit, and what it found."""
+    """The times of one system on one case, in the unit of the stage, and a description of its
+    result."""
     stage: str
     case: str
     system: str
-    times: list            # one a repetition; empty: the peer is missing
+    times: list  # one for each repetition; empty if the peer is missing
     found: dict = dataclasses.field(default_factory=dict)
     note: str = ""
 
@@ -26,7 +29,7 @@ class Measure:
         return statistics.median(self.times)
 
     def spread_percent(self):
-        """Half the distance between the quartiles, of the median."""
+        """Half the distance between the quartiles, in per cent of the median."""
         low, _, high = statistics.quantiles(self.times, n=4) if len(self.times) > 1 else [0, 0, 0]
         return 50 * (high - low) / self.median()
 
@@ -36,20 +39,21 @@ class Row:
     stage: str
     case: str
     ours: float
-    peer: float            # None: missing
+    peer: float  # None if the peer is missing
     peer_name: str
     ratio: float           # peer / ours
     unit: str
     target: str = ""
-    reached: bool = None   # None: no target, or nothing to compare with
+    reached: bool = None  # None without a target or without anything to compare with
     spread_percent: list = None
     found: dict = None
     peer_found: dict = None
     note: str = ""
 
 
-# (stage, case, peer, least ratio, most of ours in the stage's unit): regular expressions that match
-# from the beginning. The numbers are the targets that docs/performance.md lists.
+# The targets: (stage, case, peer, smallest ratio, longest time of ours in the stage's unit). Stage,
+# case and peer are regular expressions that match from the beginning. docs/performance.md lists the
+# same numbers.
 TARGETS = [
     ("fast", "FAST-9 ", "OpenCV", 1.5, None),
     ("fast", "FAST-12 ", "libcvd", 3, None),
@@ -71,7 +75,7 @@ TARGETS = [
 
 
 def from_google_benchmark(report):
-    """Measures of a JSON report of one of the programs."""
+    """The measures in a JSON report of a benchmark program."""
     measures = {}
     for entry in sorted(report["benchmarks"], key=lambda e: e.get("family_index", 0)):
         name = re.sub(r"/(iterations:\d+|repeats:\d+|process_time)", "", entry["name"])
@@ -92,7 +96,7 @@ def from_google_benchmark(report):
 
 
 def pyramid_apart(measures):
-    """The time of one more keypoint, from the rows of many and of few."""
+    """The time of one additional keypoint, from the rows with many and with few keypoints."""
     described = {(m.case, m.system): m for m in measures if m.stage == "describe" and m.times}
     apart = []
     for (case, system), many in described.items():
@@ -108,14 +112,14 @@ def pyramid_apart(measures):
 
 
 def make_rows(measures):
-    """A row for each peer of a case that ours ran too, with its target."""
+    """A row for each peer of a case that our library ran too, with the target."""
     ours = {(m.stage, m.case): m for m in measures if m.system == OURS}
     rows = []
     for peer in measures:
         if peer.system == OURS or (peer.stage, peer.case) not in ours:
             continue
         if peer.stage == "describe" and peer.case.endswith(" at 200"):
-            continue  # told by "pyramid apart"
+            continue  # reported under "pyramid apart"
         own = ours[peer.stage, peer.case]
         missing = not peer.times
         row = Row(peer.stage, peer.case, own.median(), None if missing else peer.median(),

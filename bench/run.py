@@ -10,7 +10,7 @@ protocol and the numbers.
 import os
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"  # before numpy
+    os.environ[_name] = "1"  # must be set before numpy is imported
 
 import argparse
 import dataclasses
@@ -25,14 +25,14 @@ import footprint
 import rows as table
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-# The stages, with the program that measures each; footprint has none.
+# The program that measures each stage; footprint needs none.
 PROGRAMS = {"fast": "bench_fast", "describe": "bench_describe", "extract": "bench_describe",
             "match": "bench_match", "relpose": "bench_relpose", "robust": "bench_robust",
             "triangulate": "bench_triangulation", "pair": "bench_pair", "footprint": None}
 
 
 def run_program(build, name, stage, quick):
-    """Google Benchmark's report of the stage's rows."""
+    """Runs a program and returns Google Benchmark's report of the stage's rows."""
     with tempfile.NamedTemporaryFile("r", suffix=".json") as out:
         command = [os.path.join(build, "bin", name), f"--benchmark_filter=^{stage}/",
                    f"--benchmark_out={out.name}", "--benchmark_out_format=json"]
@@ -46,7 +46,8 @@ def run_program(build, name, stage, quick):
 def python_measures(build, stages, quick):
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([os.path.join(build, "bin", "bench_export_images"), folder], check=True)
-        import python_peers  # numpy and the peers: after the environment is set
+        # Imports numpy and the peers, so it must follow the environment variables.
+        import python_peers
         return python_peers.measure(os.path.join(build, "lib", "libtwoview.so"), folder, stages,
                                     quick)
 
@@ -74,7 +75,8 @@ def main():
     arguments = parser.parse_args()
     stages = [arguments.only] if arguments.only else list(PROGRAMS)
     if arguments.json:
-        open(arguments.json, "a", encoding="utf-8").close()  # a bad path tells itself first
+        # A path that cannot be written fails here, before the long run.
+        open(arguments.json, "a", encoding="utf-8").close()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes what is known of the Motorcycle pair: both cameras, the motion and the depth of image 0.
+"""Writes the known truth of the Motorcycle pair: both cameras, the motion and the depth of image 0.
 
 usage: demo_truth.py motorcycle_disp.npz DIR
 DIR gets camera0.yaml, camera1.yaml (OpenCV's format), truth.yaml and depth0.pfm.
@@ -45,7 +45,8 @@ depth0: depth0.pfm
 
 
 def read_disparity(path):
-    """The only array of the .npz: float32, row-major, HEIGHT x WIDTH, infinite where unknown."""
+    """Reads the only array of the .npz: float32, row-major, HEIGHT x WIDTH, infinite where
+    unknown."""
     with zipfile.ZipFile(path) as archive:
         data = archive.read(archive.namelist()[0])
     # .npy: magic, version 1.0, u16 length of a header that is a Python dictionary, the array
@@ -61,7 +62,8 @@ def read_disparity(path):
 
 
 def write_pfm(path, pixels):
-    """Portable float map, little-endian (a negative scale says so), bottom row first."""
+    """Writes a portable float map: little-endian (which a negative scale indicates), bottom row
+    first."""
     if sys.byteorder == "big":
         pixels.byteswap()
     with open(path, "wb") as file:

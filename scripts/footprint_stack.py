@@ -15,15 +15,17 @@ FRAME = re.compile(r"(\d+) bytes \((\S+)\)")
 INDIRECT = "__indirect_call"
 SOURCES = pathlib.Path(__file__).resolve().parent.parent / "lib/src"
 KERNEL = re.compile(r"(?:tvk_)?(\w+?)(?:_(?:c|sse2|avx2|avx512|neon|neon_dot))?(?:\.\w+)*")
-# Of other libraries: memcpy and its like, sqrt, getauxval. Their frames are small and not ours.
+# Stack assumed for functions of other libraries (memcpy and similar, sqrt, getauxval), whose frames
+# are small.
 FOREIGN_BYTES = 256
-# std::sort calls itself at most twice the logarithm of the number, of at most 2^20 elements.
+# Bounds of recursion: std::sort calls itself at most twice the logarithm of the number of elements,
+# which is at most 2^20.
 SELF_CALLS = {"__introsort_loop": 40}
 
 
 class Graph:
-    """Frames and calls by a name that is one file's own for static functions: gcc writes those as
-    path:name."""
+    """The frames and calls of functions. For a static function gcc writes path:name, so that its
+    name is unique to its file."""
 
     def __init__(self):
         self.frame, self.calls, self.unbounded = {}, {}, []
@@ -45,8 +47,8 @@ class Graph:
 
 
 def kernels_of(source):
-    """The kernels that a source file may call: those it names as members of the table. A file that
-    names none, and a file outside the library, may call any."""
+    """The kernels that a source file may call: those it names as members of the kernel table. A
+    file that names none, or lies outside the library, may call any kernel."""
     if not source.exists():
         return frozenset()
     list_of_all = (SOURCES / "kernels/kernels.h").read_text()
@@ -55,8 +57,8 @@ def kernels_of(source):
 
 
 def deepest_of(graph, kernel_bytes):
-    """Bytes and chain by function; a circle is a SystemExit. kernel_bytes: of an indirect call's
-    title."""
+    """The deepest stack of each function, in bytes and as a chain of calls. Recursion ends the
+    program with an error. kernel_bytes(title) gives the bytes of an indirect call."""
     known, open_names = {}, []
 
     def visit(name):
@@ -86,8 +88,8 @@ def deepest_of(graph, kernel_bytes):
 
 
 def read_graphs(folder):
-    """Of the library outside the kernels, whose indirect calls name their file, and of the
-    kernels."""
+    """Returns two graphs: that of the library outside the kernels, in which indirect calls name
+    their file, and that of the kernels."""
     graph, kernels = Graph(), Graph()
     files = sorted(folder.rglob("*.ci"))
     if not files:
@@ -102,9 +104,9 @@ def read_graphs(folder):
 
 
 def kernel_bytes_by(kernels):
-    """Of an indirect call's title: the deepest kernel of any set that the call's file names; of
-    all, if it names none."""
-    # A call through a pointer inside a kernel would be one more kernel; there is none.
+    """Returns a function from the title of an indirect call to the stack of the deepest kernel, of
+    any set, that the call's file names; if it names none, of all kernels."""
+    # No kernel calls through a pointer, so an indirect call inside a kernel counts as 0.
     deepest = {name: bytes_ for name, (bytes_, _) in deepest_of(kernels, lambda _: 0).items()}
 
     def kernel_bytes(call):

@@ -238,10 +238,17 @@ def lies_beside(name, header, files):
 # folders.
 CIRCLES = [
     {"lib/src/robust/a.h": ["robust/b.h"], "lib/src/robust/b.h": ["robust/a.h"]},
-    {"lib/src/robust/refine.h": [], "lib/src/robust/refine.cc": ["robust/refine.h", "robust/gravity.h"],
-     "lib/src/robust/gravity.h": ["robust/refine.h"]},
-    {"tools/twoview/a.h": ["rooms/b.h"], "tools/twoview/rooms/b.h": ["c.h"],
-     "tools/twoview/rooms/c.h": [], "tools/twoview/rooms/c.cc": ["../a.h"]},
+    {
+        "lib/src/robust/refine.h": [],
+        "lib/src/robust/refine.cc": ["robust/refine.h", "robust/gravity.h"],
+        "lib/src/robust/gravity.h": ["robust/refine.h"],
+    },
+    {
+        "tools/twoview/a.h": ["rooms/b.h"],
+        "tools/twoview/rooms/b.h": ["c.h"],
+        "tools/twoview/rooms/c.h": [],
+        "tools/twoview/rooms/c.cc": ["../a.h"],
+    },
 ]
 
 

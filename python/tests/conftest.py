@@ -1,4 +1,4 @@
-"""The package as it lies in the source tree; ctest names the built library by TWOVIEW_LIBRARY."""
+"""Fixtures: the package of the source tree. ctest sets TWOVIEW_LIBRARY to the built library."""
 
 import os
 import pathlib
@@ -15,7 +15,7 @@ import twoview as tv  # noqa: E402  (after the path is set)
 
 
 class Scene:
-    """A textured wall with boxes before it, seen by two cameras that moved sideways."""
+    """A textured wall with boxes in front of it, seen by two cameras with a sideways motion."""
 
     def __init__(self):
         self.camera = tv.Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -47,7 +47,7 @@ def context():
 
 @pytest.fixture(scope="session")
 def image():
-    """Smoothed noise: corners everywhere."""
+    """An image of smoothed noise, which has corners everywhere."""
     noise = np.random.default_rng(5).integers(0, 256, (246, 326))
     total = sum(noise[y:y + 240, x:x + 320] for y in range(5) for x in range(5))
     return np.clip((total // 25 - 127) * 4 + 127, 0, 255).astype(np.uint8)

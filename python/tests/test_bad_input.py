@@ -1,4 +1,5 @@
-"""What C could not read is refused in Python; what C refuses is an exception of its status' name."""
+"""Checks that Python refuses what C could not read, and that a status of C is raised as the
+exception of its name."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The program of docs/python.md."""
+"""Runs the program in docs/python.md."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""What each function returns, on images and on points whose truth is known."""
+"""Checks the result of each function on images and points with known truth."""
 
 import threading
 import time
@@ -175,7 +175,8 @@ def test_reconstruct_is_the_stages(context, image):
 
 
 def test_other_threads_run_during_a_call():
-    """ctypes gives the interpreter's lock away: Python goes on counting while C matches."""
+    """Checks that ctypes releases the interpreter's lock: another Python thread counts while C
+    matches."""
     random = np.random.default_rng(6)
     descriptors = random.integers(0, 60, (6000, 128), dtype=np.uint8)
     context = tv.Context(max_keypoints=6000, kernels=tv.Kernels.C)

@@ -1,5 +1,6 @@
-"""The wheel, built, installed, and run by every Python here that has numpy. TWOVIEW_WHEEL_BUILD: a folder
-that keeps the build, so that the next run compiles what changed."""
+"""Builds the wheel, installs it, and runs it with every Python on this machine that has numpy. Set
+TWOVIEW_WHEEL_BUILD to a folder that keeps the build, so that the next run compiles only changed
+files."""
 
 import os
 import shutil
@@ -12,7 +13,7 @@ from conftest import ROOT
 
 
 def pythons():
-    """Interpreters with numpy: this one, and each python3 and python3.x of the PATH."""
+    """Interpreters with numpy: the present one, and each python3 and python3.x in the PATH."""
     names = ["python3"] + [f"python3.{minor}" for minor in range(9, 30)]
     found = {sys.executable}
     for name in names:
@@ -29,8 +30,21 @@ def test_the_wheel_installs_and_works(tmp_path):
     kept = os.environ.get("TWOVIEW_WHEEL_BUILD")
     settings = ["--config-settings", f"build-dir={kept}"] if kept else []
     build = subprocess.run(
-        [*pip, "wheel", *settings, "--no-build-isolation", "--no-deps", "--no-index", "-w", tmp_path,
-         ROOT / "python"], capture_output=True, text=True, check=False)
+        [
+            *pip,
+            "wheel",
+            *settings,
+            "--no-build-isolation",
+            "--no-deps",
+            "--no-index",
+            "-w",
+            tmp_path,
+            ROOT / "python",
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert build.returncode == 0, build.stdout[-3000:] + build.stderr[-3000:]
     wheel, = tmp_path.glob("twoview-*.whl")
     assert "-py3-none-" in wheel.name

@@ -1,6 +1,6 @@
 """FAST-SIFT matching and two-view geometry: poses with a verdict and a covariance.
 
-The functions have the names of the C API without tv_. Images are read where they lie; calls release
+The functions have the names of the C API without tv_. Images are read without a copy. Calls release
 the interpreter's lock. docs/python.md has an example."""
 
 from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, KEYPOINT, POINT, TV_ERR_ALIGNMENT,
@@ -20,7 +20,7 @@ from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, cor
 
 
 def version_string() -> str:
-    """tv_version_string of the library."""
+    """The version of the loaded library, from tv_version_string."""
     return default_library().version()
 
 

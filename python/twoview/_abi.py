@@ -1,4 +1,5 @@
-"""The C ABI: struct layouts and the library. python/tests compiles the headers and compares.
+"""The C ABI: struct layouts and the loading of the library. A test in python/tests compiles the
+headers and compares the layouts.
 
 ctypes releases the interpreter's lock around every call.
 """
@@ -145,8 +146,9 @@ POINT = np.dtype(tv_point)
 
 
 class StatusError(RuntimeError):
-    """A C status other than TV_OK. `status` is the Status, `function` the C function's name; each
-    status has a subclass of its C name: `except twoview.TV_ERR_LIMITS`."""
+    """A C status other than TV_OK. `status` is the Status, and `function` is the name of the C
+    function. Each status has a subclass with its C name, for example `except
+    twoview.TV_ERR_LIMITS`."""
 
     status: Status = Status.OK
     function: str = ""
@@ -204,7 +206,8 @@ ERRORS = {int(kind.status): kind for kind in StatusError.__subclasses__()}
 
 
 class Library:
-    """A loaded libtwoview.so. Programs need none: the functions use the package's own."""
+    """A loaded libtwoview.so. Programs do not need this class, since by default the functions use
+    the library inside the package."""
 
     def __init__(self, path: Union[str, os.PathLike[str]]):
         self.path = os.path.abspath(path)
@@ -218,8 +221,8 @@ class Library:
                 init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
     def make(self, struct: Any, fields: Optional[dict[str, Any]] = None) -> Any:
-        """A struct filled by its tv_..._init_sized; `fields` then replace the defaults. The library
-        may be of another release, whose structs are shorter or longer."""
+        """Returns a struct with the defaults of its tv_..._init_sized; `fields` then replaces some
+        of them. The library may be of another release whose structs are shorter or longer."""
         made = struct()
         init = getattr(self.lib, struct.__name__ + "_init_sized")
         init(ctypes.byref(made), ctypes.sizeof(struct))
@@ -241,7 +244,7 @@ class Library:
 
 
 def set_field(struct: Any, name: str, value: Any) -> None:
-    """A number, or three of them, into a field; a wrong name or type is named."""
+    """Sets a field to a number, or to three numbers. The exception names a wrong field or type."""
     kinds = dict(struct._fields_)
     if name not in kinds or name == "struct_size":
         known = ", ".join(k for k in kinds if k != "struct_size")
@@ -251,7 +254,7 @@ def set_field(struct: Any, name: str, value: Any) -> None:
         if issubclass(kind, ctypes.Array):
             value = kind(*small_array(name, value, kind._length_))
         elif kind in (c_float, c_double):
-            value = float(value + 0.0)  # a string is no number
+            value = float(value + 0.0)  # raises TypeError for a string
         else:
             value = operator.index(value)
     except TypeError:
@@ -265,7 +268,7 @@ _default: Optional[Library] = None
 
 
 def default_library() -> Library:
-    """The one that TWOVIEW_LIBRARY names, else the one in the package."""
+    """The library that TWOVIEW_LIBRARY names, else the one inside the package."""
     global _default
     if _default is None:
         beside = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libtwoview.so")
@@ -282,7 +285,8 @@ def pointer(array: Optional[np.ndarray]) -> Optional[c_void_p]:
 
 
 def check_array(name: str, array: Any, dtype: Any, *columns: int) -> np.ndarray:
-    """The caller's array as it is, never a copy; TypeError or ValueError where C could not read it."""
+    """Returns the caller's array without a copy. Raises TypeError or ValueError if C could not read
+    it."""
     if not isinstance(array, np.ndarray):
         raise TypeError(f"{name}: a numpy array is expected, not {type(array).__name__}")
     if array.dtype != dtype:
@@ -300,7 +304,7 @@ def check_array(name: str, array: Any, dtype: Any, *columns: int) -> np.ndarray:
 
 
 def small_array(name: str, values: Any, *shape: int) -> np.ndarray:
-    """Few numbers, given in any form: a contiguous copy as float64."""
+    """A contiguous float64 copy of a few numbers, which may be given in any form."""
     array = np.ascontiguousarray(values, np.float64)
     if array.shape != shape:
         raise ValueError(f"{name}: shape {shape} is expected, not {array.shape}")
@@ -308,7 +312,7 @@ def small_array(name: str, values: Any, *shape: int) -> np.ndarray:
 
 
 def check_image(name: str, pixels: Any) -> tv_image:
-    """A view on the caller's pixels, whose rows may lie apart."""
+    """A view of the caller's pixels without a copy; the rows need not be adjacent."""
     if not isinstance(pixels, np.ndarray):
         raise TypeError(f"{name}: a numpy array is expected, not {type(pixels).__name__}")
     if pixels.dtype != np.uint8:

@@ -1,4 +1,5 @@
-"""Camera models: pixels to rays and back (camera.h). Pixel (0, 0) is the centre of the top-left one."""
+"""Camera models: from pixels to rays and back (camera.h). Pixel (0, 0) is the centre of the
+top-left pixel."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from .enums import CameraModel
 
 @dataclass(frozen=True)
 class Camera:
-    """tv_camera: focal lengths and principal point in pixels; k as the model says, at most 8."""
+    """tv_camera: focal lengths and principal point in pixels; k holds the coefficients of the
+    model, at most 8."""
 
     width: int
     height: int
@@ -35,7 +37,7 @@ class Camera:
 
     @property
     def K(self) -> np.ndarray:
-        """3x3."""
+        """The 3x3 matrix of the intrinsics."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
 
@@ -48,12 +50,12 @@ def camera_struct(name: str, camera: Any) -> Any:
 
 
 def camera_check(camera: Camera) -> None:
-    """Raises TV_ERR_CAMERA for intrinsics that no function takes."""
+    """Raises TV_ERR_CAMERA for intrinsics that every function refuses."""
     _abi.default_library().call("tv_camera_check", ctypes.byref(camera_struct("camera", camera)))
 
 
 def camera_valid_angle(camera: Camera) -> float:
-    """Radians off the axis up to which the model is used."""
+    """The largest angle from the optical axis, in radians, at which the lens model is valid."""
     angle = ctypes.c_double()
     _abi.default_library().call("tv_camera_valid_angle",
                                 ctypes.byref(camera_struct("camera", camera)), ctypes.byref(angle))
@@ -72,17 +74,20 @@ def _points(function: str, camera: Camera, name: str, given: np.ndarray, columns
 
 
 def camera_project_points(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pixels (n, 2) of points (n, 3) float64 in the camera's frame, and which have one (n,) bool."""
+    """Projects points (n, 3) float64 of the camera's frame. Returns pixels (n, 2), and a (n,) bool
+    array that says which points have a pixel."""
     return _points("tv_camera_project_points", camera, "points", points, 3, 2)
 
 
 def camera_unproject_points(camera: Camera, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit rays (n, 3) of pixels (n, 2) float64, and which have one (n,) bool."""
+    """Unprojects pixels (n, 2) float64. Returns unit rays (n, 3), and a (n,) bool array that says
+    which pixels have a ray."""
     return _points("tv_camera_unproject_points", camera, "pixels", pixels, 2, 3)
 
 
 def camera_undistort(camera: Camera, pixel: Sequence[float]) -> np.ndarray:
-    """Where a camera without distortion would see what this one sees at `pixel`; 2 numbers."""
+    """The pixel (2 numbers) at which a camera without distortion sees what this camera sees at
+    `pixel`."""
     given, out = _abi.small_array("pixel", pixel, 2), np.empty(2)
     _abi.default_library().call("tv_camera_undistort",
                                 ctypes.byref(camera_struct("camera", camera)),
@@ -91,7 +96,7 @@ def camera_undistort(camera: Camera, pixel: Sequence[float]) -> np.ndarray:
 
 
 def camera_scale(camera: Camera, scale: float) -> Camera:
-    """The camera of an image scaled by `scale`."""
+    """The camera of an image that was resized by the factor `scale`."""
     scaled = _abi.tv_camera()
     _abi.default_library().call("tv_camera_scale", ctypes.byref(camera_struct("camera", camera)),
                                 ctypes.c_double(scale), ctypes.byref(scaled))

@@ -1,4 +1,4 @@
-"""The context: all memory that the library's calls use."""
+"""The context, which holds all memory that the library's calls use."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from .enums import Kernels
 class Context:
     """tv_context in memory that Python owns.
 
-    max_width, max_height: of an image, pixels; max_keypoints: descriptors an image; max_matches: an
-    estimate, 0 for max_keypoints; kernels: a Kernels; purposes: Purpose bits, the calls that it has
-    memory for, 0 for all (another call raises TV_ERR_LIMITS). Calls from several threads wait for each other;
-    use a context a thread to have them run at once. close(), or a with statement, gives the memory
-    back; later calls raise ValueError."""
+    max_width, max_height: the largest image, pixels. max_keypoints: the most descriptors of an
+    image. max_matches: the most matches of an estimate; 0 means max_keypoints. kernels: a
+    Kernels. purposes: bits of Purpose for the calls that get memory, 0 for all; another call
+    raises TV_ERR_LIMITS. Calls from several threads wait for each other; use one context for
+    each thread to run them at once. close() or a with statement frees the memory; later calls
+    raise ValueError."""
 
     def __init__(self, *, max_width: int = 640, max_height: int = 480, max_keypoints: int = 2048,
                  max_matches: int = 0, kernels: int = Kernels.AUTO,
@@ -51,7 +52,7 @@ class Context:
             self._pointer = ctypes.c_void_p()
 
     def call(self, function: str, *arguments: Any) -> None:
-        """A C function whose first argument is the context."""
+        """Calls a C function whose first argument is the context."""
         with self.lock:
             if self._memory is None:
                 raise ValueError(f"{function}: the context is closed")
@@ -59,13 +60,13 @@ class Context:
 
     @property
     def kernels(self) -> Kernels:
-        """The kernel set that runs (tv_context_kernels)."""
+        """The kernel set in use (tv_context_kernels)."""
         with self.lock:
             return Kernels(self.library.lib.tv_context_kernels(self._pointer))
 
     @property
     def high_water(self) -> int:
-        """Bytes that any call so far has used (tv_context_high_water)."""
+        """The largest number of bytes that any call so far has used (tv_context_high_water)."""
         with self.lock:
             return int(self.library.lib.tv_context_high_water(self._pointer))
 

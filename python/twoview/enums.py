@@ -1,10 +1,10 @@
-"""The C API's enums and statuses; lib/include/twoview/ says what each value means."""
+"""The enums and statuses of the C API. The headers in lib/include/twoview/ describe each value."""
 
 from enum import IntEnum, IntFlag
 
 
 class Status(IntEnum):
-    """tv_status; names as in C without TV_."""
+    """tv_status; the names are those of C without TV_."""
 
     OK = 0
     ERR_NULL = 1
@@ -124,7 +124,7 @@ class Loss(IntEnum):
     CAUCHY = 2
 
 
-# The C prefix of each.
+# The prefix of each enum's values in C.
 C_PREFIXES = {
     Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_",
     Orientation: "TV_ORIENTATION_", Normalisation: "TV_NORMALISATION_",

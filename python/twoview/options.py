@@ -1,5 +1,5 @@
-"""Options of the stages, with the C defaults. A function takes either one of these or its fields as
-keywords: twoview.detect(context, image, arc=12)."""
+"""The options of the stages, with the defaults of C. A function takes either an options object or
+its fields as keywords: twoview.detect(context, image, arc=12)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from .enums import Loss, Normalisation, Orientation, Solver
 class FeatureOptions:
     """tv_feature_options."""
 
-    max_keypoints: int = 0  #: bound on descriptors an image; 0: 2048 or the context's, the lesser
-    arc: int = 9  #: contiguous circle pixels, 9 to 12
+    #: Most descriptors of an image; 0: the smaller of 2048 and the context's limit.
+    max_keypoints: int = 0
+    arc: int = 9  #: required contiguous circle pixels, 9 to 12
     threshold: int = 10  #: grey levels, [1, 254]
-    min_threshold: int = 3  #: the threshold falls as far as this; 0: it is fixed
+    min_threshold: int = 3  #: lowest value to which the threshold may fall; 0: it is fixed
     levels: int = 1  #: pyramid levels, [1, 8]
-    scale_factor: float = 2.0  #: between levels, [1.1, 2]
-    cell_px: int = 0  #: grid cell in which corners are budgeted, pixels; 0: the best anywhere
-    subpixel: int = 1  #: 1: positions below a pixel
+    scale_factor: float = 2.0  #: between two levels, [1.1, 2]
+    #: Side of the grid cells that share out the corners, pixels; 0: the strongest corners anywhere.
+    cell_px: int = 0
+    subpixel: int = 1  #: 1: positions are refined to a fraction of a pixel
     orientation: int = Orientation.GRADIENT
     descriptor: int = Normalisation.ROOTSIFT
     keypoint_size: float = 4.0  #: diameter, pixels
@@ -31,16 +33,16 @@ class FeatureOptions:
 class MatchOptions:
     """tv_match_options."""
 
-    ratio: float = 0.92  #: nearest / second nearest distance, both directions below it
+    ratio: float = 0.92  #: upper bound of nearest / second nearest distance, in both directions
 
 
 @dataclass(frozen=True)
 class GuidedOptions:
     """tv_guided_options."""
 
-    max_error_px: float = 4.0  #: half the band's width
+    max_error_px: float = 4.0  #: half the width of the band around the epipolar line, pixels
     ratio: float = 0.87
-    max_distance: float = 180.0  #: L2 distance of descriptors
+    max_distance: float = 180.0  #: largest L2 distance of two descriptors
     neighbourhood_px: float = 4.0
 
 
@@ -48,16 +50,17 @@ class GuidedOptions:
 class EstimateOptions:
     """tv_estimate_options."""
 
-    method: int = Solver.AUTO  #: five-point with cameras, eight-point without
-    max_error_px: float = 1.0  #: inlier threshold, pixels of the images as given
+    method: int = Solver.AUTO  #: AUTO: five-point with cameras, eight-point without
+    max_error_px: float = 1.0  #: inlier threshold, in pixels of the images as given
     confidence: float = 0.9999
     max_iterations: int = 10000
-    fixed_iterations: int = 0  #: 0: adaptive stop
-    seed: Optional[int] = None  #: None: the library's constant
-    gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: "down" in camera 0
+    fixed_iterations: int = 0  #: 0: the number of iterations is adaptive
+    seed: Optional[int] = None  #: None: the library's constant default seed
+    gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity in camera 0's frame
     gravity1: Sequence[float] = (0.0, 0.0, 0.0)
-    gravity_sigma_rad: float = 0.0  #: 0: gravity is not known
-    principal_point_sigma: float = 0.01  #: in focal lengths; 0: exactly where the cameras say
+    gravity_sigma_rad: float = 0.0  #: standard deviation; 0: gravity is not used
+    #: Standard deviation in focal lengths; 0: the principal point is exact.
+    principal_point_sigma: float = 0.01
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ _STRUCTS = {FeatureOptions: _abi.tv_feature_options, MatchOptions: _abi.tv_match
 
 
 def to_struct(library: _abi.Library, kind: type, options: Any, keywords: dict[str, Any]) -> Any:
-    """The C struct of an options object, or of keywords."""
+    """The C struct of an options object, or of options given as keywords."""
     if options is not None and keywords:
         raise TypeError("options are given as an object or as keywords, not both")
     if options is None:

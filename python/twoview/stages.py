@@ -1,4 +1,5 @@
-"""The stages, by their names in C. Arrays are numpy's and the caller's images are read in place."""
+"""The stages under their C names. Arrays are numpy arrays, and the caller's images are read without
+a copy."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ def _images(image: np.ndarray, mask: Optional[np.ndarray]) -> list[Any]:
 
 
 def _room(context: Context, wanted: Any) -> int:
-    """Keypoints that a call can give at most."""
+    """The largest number of keypoints that a call can return."""
     return max(wanted.max_keypoints or context.max_keypoints, 0)
 
 
@@ -35,8 +36,9 @@ def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = Non
            options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
     """tv_detect: FAST corners, strongest first.
 
-    image: (height, width) uint8, rows may lie apart; mask: the same shape, 0 where no corner is wanted.
-    Returns (n,) of twoview.KEYPOINT: x, y (pixels), size, angle_rad, score, level."""
+    image: (height, width) uint8; the rows need not be adjacent. mask: the same shape, 0 where no
+    corner is wanted. Returns (n,) of twoview.KEYPOINT: x, y (pixels), size, angle_rad, score,
+    level."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = np.empty(_room(context, wanted), _abi.KEYPOINT)
     count = c_int32()
@@ -47,7 +49,8 @@ def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = Non
 
 def orient(context: Context, image: np.ndarray, keypoints: np.ndarray,
            options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_orient: keypoints with their angles; those with a second one appear twice."""
+    """tv_orient: keypoints with their angles. A keypoint with a second orientation appears
+    twice."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     oriented = np.empty(2 * len(keypoints), _abi.KEYPOINT)
@@ -60,7 +63,7 @@ def orient(context: Context, image: np.ndarray, keypoints: np.ndarray,
 
 def describe(context: Context, image: np.ndarray, keypoints: np.ndarray,
              options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_describe: (n, 128) uint8, UBC order, a row a keypoint."""
+    """tv_describe: descriptors (n, 128) uint8 in UBC order, one row for each keypoint."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     descriptors = np.empty((len(keypoints), _abi.DESCRIPTOR_BYTES), np.uint8)
@@ -72,7 +75,8 @@ def describe(context: Context, image: np.ndarray, keypoints: np.ndarray,
 def extract(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = None,
             options: Optional[FeatureOptions] = None,
             **keywords: Any) -> tuple[np.ndarray, np.ndarray]:
-    """tv_extract: keypoints (n,) and descriptors (n, 128), as detect, orient and describe give them."""
+    """tv_extract: keypoints (n,) and descriptors (n, 128), the same as from detect, orient and
+    describe."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     capacity = _room(context, wanted)
     keypoints = np.empty(capacity, _abi.KEYPOINT)
@@ -105,9 +109,10 @@ def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
 
 def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
           options: Optional[MatchOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_match: mutual nearest neighbours that pass the ratio test both ways.
+    """tv_match: mutual nearest neighbours that pass the ratio test in both directions.
 
-    descriptors: (n, 128) uint8. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq, ratio."""
+    descriptors: (n, 128) uint8. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq,
+    ratio."""
     wanted = to_struct(check_context(context).library, MatchOptions, options, keywords)
     descriptors0 = _descriptors("descriptors0", descriptors0)
     descriptors1 = _descriptors("descriptors1", descriptors1)
@@ -129,7 +134,8 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
                  epipolar: Sequence[Sequence[float]], keypoints0: np.ndarray,
                  descriptors0: np.ndarray, keypoints1: np.ndarray, descriptors1: np.ndarray,
                  options: Optional[GuidedOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_match_guided: matches along epipolar lines. epipolar: 3x3, E with cameras, F without."""
+    """tv_match_guided: matches along epipolar lines. `epipolar` is a 3x3 matrix: E with cameras, F
+    without."""
     wanted = to_struct(check_context(context).library, GuidedOptions, options, keywords)
     matrix = _abi.small_array("epipolar", epipolar, 3, 3)
     arguments: list[Any] = []
@@ -149,7 +155,8 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
 
 @dataclass(frozen=True)
 class TwoView:
-    """tv_two_view. cam1_from_cam0: x1 = R x0 + t, |t| = 1; what was not estimated is None."""
+    """tv_two_view, with the pose cam1_from_cam0: x1 = R x0 + t, |t| = 1. A value that was not
+    estimated is None."""
 
     kind: Kind
     verdict: Verdict
@@ -160,22 +167,23 @@ class TwoView:
     R: Optional[np.ndarray]  #: (3, 3)
     t: Optional[np.ndarray]  #: (3,)
     E: Optional[np.ndarray]  #: (3, 3), Frobenius norm 1
-    F: Optional[np.ndarray]  #: (3, 3), of undistorted pixels
-    H: Optional[np.ndarray]  #: (3, 3), undistorted pixels of image 0 to image 1
-    alternative_R: Optional[np.ndarray]  #: the second pose of a plane
+    F: Optional[np.ndarray]  #: (3, 3), for undistorted pixels
+    H: Optional[np.ndarray]  #: (3, 3), maps undistorted pixels of image 0 to image 1
+    alternative_R: Optional[np.ndarray]  #: the second pose that a planar scene permits
     alternative_t: Optional[np.ndarray]
-    covariance: Optional[np.ndarray]  #: (5, 5), radians squared, order w0 w1 w2 a b
+    covariance: Optional[np.ndarray]  #: (5, 5), radians squared, in the order w0 w1 w2 a b
     alternative_covariance: Optional[np.ndarray]
-    essential_inliers: Optional[int]  #: evidence: inliers of each model
+    essential_inliers: Optional[int]  #: the number of inliers of each model, as evidence for it
     fundamental_inliers: Optional[int]
     homography_inliers: Optional[int]
     rotation_inliers: Optional[int]
-    coverage: float  #: share of an 8x8 grid that holds an inlier
+    coverage: float  #: share of the cells of an 8x8 grid that hold an inlier
     median_parallax_rad: float
     rms_error_px: float
     noise_px: float
     seed: int
-    principal_point_shift: np.ndarray  #: (2,), pixels; all above is of cameras with cx, cy plus this
+    #: (2,), pixels to add to cx and cy; all results refer to the cameras with this shift
+    principal_point_shift: np.ndarray
 
 
 def _two_view(found: Any) -> TwoView:
@@ -201,7 +209,8 @@ def _two_view(found: Any) -> TwoView:
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:
-    """tv_corrected_camera: the camera that `found` is of, for what follows the estimate."""
+    """tv_corrected_camera: the camera that the results in `found` refer to. Use it in calls after
+    the estimate."""
     shift = found.principal_point_shift
     return replace(camera, cx=camera.cx + float(shift[0]), cy=camera.cy + float(shift[1]))
 
@@ -235,11 +244,11 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
                       ratios: Optional[np.ndarray] = None,
                       options: Optional[EstimateOptions] = None,
                       **keywords: Any) -> tuple[TwoView, np.ndarray]:
-    """tv_estimate_two_view: the geometry, and which matches agree, (n,) bool.
+    """tv_estimate_two_view: returns the geometry and the inlier mask, (n,) bool.
 
-    pixels: (n, 2) float64, as the images have them (distorted); ratios: (n,) float32, lower surer.
-    A pixel that is not finite is never an inlier. Without cameras: F and H only, and method
-    AUTO, EIGHT_POINT or SEVEN_POINT."""
+    pixels: (n, 2) float64, as in the images (distorted). ratios: (n,) float32; lower means more
+    reliable. A pixel that is not finite is never an inlier. Without cameras only F and H are
+    estimated, and the method must be AUTO, EIGHT_POINT or SEVEN_POINT."""
     found, inliers = _estimate(context, camera0, camera1, pixels0, pixels1, ratios,
                                to_struct(check_context(context).library, EstimateOptions, options,
                                          keywords))
@@ -249,8 +258,8 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
 def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
                 t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
                 method: int = Triangulation.ITERATIVE_LS) -> np.ndarray:
-    """tv_triangulate: (n,) of twoview.POINT: position (camera 0 frame, units of |t|), angle_rad,
-    error_px, status (a PointStatus). R 3x3, t 3, pixels (n, 2) float64."""
+    """tv_triangulate: (n,) of twoview.POINT: position (camera 0 frame, in units of |t|), angle_rad,
+    error_px, status (a PointStatus). R is 3x3, t has 3 numbers, pixels are (n, 2) float64."""
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     points = np.zeros(len(pixels0), _abi.POINT)
@@ -264,7 +273,8 @@ def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
 def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
                     t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
                     cost: int = Triangulation.POLY) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """tv_correct_matches: both pixels (n, 2) moved to where their rays meet, and which were, (n,) bool."""
+    """tv_correct_matches: both pixels (n, 2) moved so that their rays meet, and a (n,) bool array
+    that says which were moved."""
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     corrected0, corrected1 = np.empty_like(pixels0), np.empty_like(pixels1)
@@ -279,7 +289,7 @@ def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float
 
 @dataclass(frozen=True)
 class BundleResult:
-    """tv_bundle_result, with the pose and points that it is about."""
+    """tv_bundle_result, with the adjusted pose and points."""
 
     R: np.ndarray
     t: np.ndarray
@@ -299,10 +309,14 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
                     pixels1: np.ndarray, R: Sequence[Sequence[float]], t: Sequence[float],
                     points: np.ndarray, options: Optional[BundleOptions] = None,
                     **keywords: Any) -> BundleResult:
-    """tv_adjust_two_view: bundle adjustment from a start, which stays as it is. points: of triangulate."""
+    """tv_adjust_two_view: bundle adjustment from a given start, which is not modified. `points` are
+    those of triangulate."""
     wanted = to_struct(check_context(context).library, BundleOptions, options, keywords)
     pixels0, pixels1 = _pixels(pixels0, pixels1)
-    rotation, translation = _abi.small_array("R", R, 3, 3).copy(), _abi.small_array("t", t, 3).copy()
+    rotation, translation = (
+        _abi.small_array("R", R, 3, 3).copy(),
+        _abi.small_array("t", t, 3).copy(),
+    )
     points = _abi.check_array("points", points, _abi.POINT).copy()
     if len(points) != len(pixels0):
         raise ValueError(f"{len(points)} points and {len(pixels0)} matches")
@@ -319,7 +333,8 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
 def point_covariances(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
                       t: Sequence[float], points: np.ndarray, noise_px: float,
                       pose_covariance: Optional[Sequence[Sequence[float]]] = None) -> np.ndarray:
-    """tv_point_covariances: (n, 3, 3), camera 0 frame, the unit of t squared; zeros where unknown."""
+    """tv_point_covariances: (n, 3, 3) in camera 0's frame, in the unit of t squared; zeros where
+    unknown."""
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     points = _abi.check_array("points", points, _abi.POINT)
     given = pose_covariance
@@ -334,15 +349,16 @@ def point_covariances(camera0: Camera, camera1: Camera, R: Sequence[Sequence[flo
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """tv_reconstruction: both views' features, matches, and a point a match."""
+    """tv_reconstruction: the features of both views, the matches, and one point for each match."""
 
     keypoints: tuple[np.ndarray, np.ndarray]
     descriptors: tuple[np.ndarray, np.ndarray]
     matches: np.ndarray  #: (m,) of CORRESPONDENCE
     inlier_mask: np.ndarray  #: (m,) bool
-    points: np.ndarray  #: (m,) of POINT, INVALID where the match is no inlier
+    points: np.ndarray  #: (m,) of POINT; INVALID where the match is no inlier
     num_points: int
-    num_matches_left_out: int  #: found, but beyond the context's max_matches: of the highest ratio
+    #: Matches that exceed the context's max_matches; those with the highest ratios are left out.
+    num_matches_left_out: int
 
 
 def _copied(address: Optional[int], count: int, dtype: Any) -> np.ndarray:
@@ -358,8 +374,8 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
                 match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False) -> tuple[TwoView, Reconstruction]:
-    """tv_reconstruct: two images to a pose and points. Images are (height, width) uint8, read in place;
-    feature, match and estimate are the stages' options."""
+    """tv_reconstruct: from two images to a pose and points. Images are (height, width) uint8 and
+    are read without a copy. feature, match and estimate are the options of the stages."""
     library = check_context(context).library
     kept = [to_struct(library, kind, options, {}) for kind, options in
             ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
@@ -371,17 +387,19 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
     for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
         kept.append(camera_struct("camera" + name, camera))
         view = library.make(_abi.tv_view)
-        view.image, view.camera = _abi.check_image("image" + name, image), ctypes.addressof(kept[-1])
+        view.image, view.camera = _abi.check_image("image" + name, image), ctypes.addressof(
+            kept[-1]
+        )
         if mask is not None:
             kept.append(_abi.check_image("mask" + name, mask))
             view.mask = ctypes.addressof(kept[-1])
         views.append(view)
     found = library.make(_abi.tv_two_view)
     cloud = library.make(_abi.tv_reconstruction)
-    with context.lock:  # the arrays hold until the context's next call
+    with context.lock:  # the arrays are valid until the context's next call
         context.call("tv_reconstruct", byref(views[0]), byref(views[1]), byref(wanted),
                      byref(found), byref(cloud))
-        del kept  # the structs that the call pointed to
+        del kept  # keeps alive the structs to which the call pointed
         n, m = tuple(cloud.num_keypoints), cloud.num_matches
         first, second = (_copied(cloud.keypoints[v], n[v], _abi.KEYPOINT) for v in range(2))
         bytes0, bytes1 = (_copied(cloud.descriptors[v], n[v] * _abi.DESCRIPTOR_BYTES, np.uint8)

@@ -140,7 +140,8 @@ static void init_all(void) {
 
 static tv_context *make_context(void) {
   tv_context *context = NULL;
-  size_t size;
+  size_t size; /* of grown headers only */
+  (void)size;
   limits.it.max_width = WIDTH;
   limits.it.max_height = HEIGHT;
   limits.it.max_keypoints = CAP;

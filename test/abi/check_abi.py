@@ -32,19 +32,56 @@ CHANGES = [
     ("a removed field", "two_view.h", "  double noise_px;\n", "", True),
     ("a field of another name", "two_view.h", "double noise_px;", "double noise;", True),
     ("a field of another type", "context.h", "int32_t kernels;", "int64_t kernels;", True),
-    ("a field in the middle of a growing struct", "match.h", "  float ratio;\n} tv_match_options",
-     "  float more;\n  float ratio;\n} tv_match_options", True),
-    ("a field at the end of an array's element", "triangulate.h", "  int32_t reserved;\n",
-     "  int32_t reserved;\n  int32_t more;\n", True),
-    ("an enumerator of another value", "two_view.h", "TV_KIND_PANORAMIC = 4", "TV_KIND_PANORAMIC = 14", True),
-    ("a new enumerator", "two_view.h", "TV_KIND_NO_MOTION = 6", "TV_KIND_NO_MOTION = 6, TV_KIND_MORE = 7", False),
-    ("another parameter", "context.h", "void *memory,\n                                 size_t size_bytes)",
-     "void *memory)", True),
+    (
+        "a field in the middle of a growing struct",
+        "match.h",
+        "  float ratio;\n} tv_match_options",
+        "  float more;\n  float ratio;\n} tv_match_options",
+        True,
+    ),
+    (
+        "a field at the end of an array's element",
+        "triangulate.h",
+        "  int32_t reserved;\n",
+        "  int32_t reserved;\n  int32_t more;\n",
+        True,
+    ),
+    (
+        "an enumerator of another value",
+        "two_view.h",
+        "TV_KIND_PANORAMIC = 4",
+        "TV_KIND_PANORAMIC = 14",
+        True,
+    ),
+    (
+        "a new enumerator",
+        "two_view.h",
+        "TV_KIND_NO_MOTION = 6",
+        "TV_KIND_NO_MOTION = 6, TV_KIND_MORE = 7",
+        False,
+    ),
+    (
+        "another parameter",
+        "context.h",
+        "void *memory,\n                                 size_t size_bytes)",
+        "void *memory)",
+        True,
+    ),
     ("a removed function", "status.h", "TV_API const char *tv_version_string(void);", "", True),
-    ("a new function", "status.h", "TV_API const char *tv_version_string(void);",
-     "TV_API const char *tv_version_string(void);\nTV_API int tv_more(void);", False),
-    ("a field at the end of a growing struct", "two_view.h", "double principal_point_shift[2];",
-     "double principal_point_shift[2];\n  double more;", False),
+    (
+        "a new function",
+        "status.h",
+        "TV_API const char *tv_version_string(void);",
+        "TV_API const char *tv_version_string(void);\nTV_API int tv_more(void);",
+        False,
+    ),
+    (
+        "a field at the end of a growing struct",
+        "two_view.h",
+        "double principal_point_shift[2];",
+        "double principal_point_shift[2];\n  double more;",
+        False,
+    ),
 ]
 
 
@@ -58,9 +95,14 @@ def members(include):
     """{struct or enum: its fields or enumerators as the header writes them, without comments}"""
     text = "".join(path.read_text() for path in sorted((include / "twoview").glob("*.h")))
     text = re.sub(r"/\*.*?\*/", " ", text, flags=re.S)
-    return {name: [" ".join(part.split()) for part in re.split("[;,]" if kind == "enum" else ";", body)
-                   if part.strip()]
-            for kind, name, body in re.findall(r"typedef (struct|enum) (\w+)\s*\{(.*?)\}", text, re.S)}
+    return {
+        name: [
+            " ".join(part.split())
+            for part in re.split("[;,]" if kind == "enum" else ";", body)
+            if part.strip()
+        ]
+        for kind, name, body in re.findall(r"typedef (struct|enum) (\w+)\s*\{(.*?)\}", text, re.S)
+    }
 
 
 def broken_members(old, new, growing):
@@ -79,17 +121,39 @@ def compile_headers(cc, include, work, soname):
     """Compiles a library of empty functions, with debug information."""
     work.mkdir(parents=True, exist_ok=True)
     source, library = work / "declared.c", work / "libtwoview.so"
-    source.write_text('#include "twoview/twoview.h"\n' +
-                      "\n".join(d + " { __builtin_trap(); }" for d in declarations(include / "twoview")) + "\n")
-    subprocess.run([cc, "-std=c99", "-g", "-O0", "-shared", "-fPIC", "-fvisibility=hidden", "-w",
-                    f"-Wl,-soname,{soname}", "-I", include.resolve(), source.name, "-o", library.name], check=True,
-                   cwd=work)
+    source.write_text(
+        '#include "twoview/twoview.h"\n'
+        + "\n".join(d + " { __builtin_trap(); }" for d in declarations(include / "twoview"))
+        + "\n"
+    )
+    subprocess.run(
+        [
+            cc,
+            "-std=c99",
+            "-g",
+            "-O0",
+            "-shared",
+            "-fPIC",
+            "-fvisibility=hidden",
+            "-w",
+            f"-Wl,-soname,{soname}",
+            "-I",
+            include.resolve(),
+            source.name,
+            "-o",
+            library.name,
+        ],
+        check=True,
+        cwd=work,
+    )
     return library
 
 
 def soname_of(include):
     text = (include / "twoview" / "version.h").read_text()
-    major, minor = (re.search(rf"TV_VERSION_{part} (\d+)", text).group(1) for part in ("MAJOR", "MINOR"))
+    major, minor = (
+        re.search(rf"TV_VERSION_{part} (\d+)", text).group(1) for part in ("MAJOR", "MINOR")
+    )
     return f"libtwoview.so.{major}" + (f".{minor}" if major == "0" else "")
 
 
@@ -119,22 +183,31 @@ def main():
         return
 
     def exported(library):
-        text = subprocess.run([arguments.nm, "-D", "--defined-only", library], check=True, capture_output=True,
-                              text=True).stdout
+        text = subprocess.run(
+            [arguments.nm, "-D", "--defined-only", library],
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
         return {line.split()[-1] for line in text.splitlines() if " T " in line}
 
     if exported(present) != exported(arguments.library):
         sys.exit(f"{arguments.library} does not export what the headers declare: "
                  f"{sorted(exported(present) ^ exported(arguments.library))}")
 
-    structs = sorted({name for header in headers.rglob("*.h") for name in grow.growing(header.read_text())})
+    structs = sorted(
+        {name for header in headers.rglob("*.h") for name in grow.growing(header.read_text())}
+    )
     suppressions = work / "growth.suppr"
     suppressions.write_text(SUPPRESSIONS.format(structs="|".join(structs)))
 
     def differs(old_headers, old, new_headers, new):
         broken = list(broken_members(old_headers, new_headers, structs))
-        done = subprocess.run([arguments.abidiff, "--no-added-syms", "--suppressions", suppressions, old, new],
-                              capture_output=True, text=True)
+        done = subprocess.run(
+            [arguments.abidiff, "--no-added-syms", "--suppressions", suppressions, old, new],
+            capture_output=True,
+            text=True,
+        )
         if done.returncode & 3:
             sys.exit(f"abidiff: {done.stderr or done.stdout}")
         return bool(broken) or done.returncode != 0, "\n".join(broken) + done.stdout
@@ -151,9 +224,15 @@ def main():
         sys.exit(1)
     found, report = differs(arguments.dump.parent / "include", arguments.dump, headers, present)
     if found:
-        sys.exit(f"{report}\nThe headers break the ABI of {arguments.dump}: mend it, or give it another soname "
-                 "(lib/include/twoview/version.h) and freeze that (test/abi/freeze).")
-    print(f"compatible with {arguments.dump.parent.name}; each of {len(CHANGES)} changes judged as it should be")
+        sys.exit(
+            f"{report}\nThe headers break the ABI of {arguments.dump}: mend it, or give it another "
+            f"soname "
+            "(lib/include/twoview/version.h) and freeze that (test/abi/freeze)."
+        )
+    print(
+        f"compatible with {arguments.dump.parent.name}; each of {len(CHANGES)} changes judged as "
+        f"it should be"
+    )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,8 @@ FIELDS = """  /* Fields of a later release. */
 """
 
 # Matches a struct without nested braces; structs that may grow have none.
-STRUCT = re.compile(r"(typedef struct (\w+) \{\n(?:(?!\n\} ).)*?uint32_t struct_size;.*?)(\} \2;)", re.S)
+STRUCT = re.compile(
+    r"(typedef struct (\w+) \{\n(?:(?!\n\} ).)*?uint32_t struct_size;.*?)(\} \2;)", re.S)
 
 
 def growing(text):
@@ -25,7 +26,9 @@ def main():
     source, output = map(pathlib.Path, sys.argv[1:])
     count = 0
     for header in sorted(source.rglob("*.h")):
-        text, found = STRUCT.subn(lambda match: match.group(1) + FIELDS + match.group(3), header.read_text())
+        text, found = STRUCT.subn(
+            lambda match: match.group(1) + FIELDS + match.group(3), header.read_text()
+        )
         count += found
         copy = output / header.relative_to(source)
         copy.parent.mkdir(parents=True, exist_ok=True)

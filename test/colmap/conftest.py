@@ -36,7 +36,8 @@ def camera_pose(index):
 
 # Each plane: the position of its middle and two half sides, from far to near.
 PLANES = [((0, 0, 8), (5.5, 0, 0.8), (0, 4, 0)), ((-1.6, 0.6, 6.3), (0.9, 0, -0.5), (0, 1, 0.2)),
-          ((1.5, -0.7, 5.6), (0.8, 0.1, 0.5), (0, 0.8, 0)), ((0.2, 1.0, 5), (1, 0, 0), (0, 0.3, -0.8))]
+          ((1.5, -0.7, 5.6), (0.8, 0.1, 0.5), (0, 0.8, 0)),
+          ((0.2, 1.0, 5), (1, 0, 0), (0, 0.3, -0.8))]
 
 
 def _texture(random, cv2):
@@ -88,16 +89,19 @@ def photographs(tmp_path_factory):
 def bend(tmp_path_factory):
     """A folder with images/ and cam.yaml: a car in a bend; the camera file's principal point is off
     by about ten pixels."""
-    data = pathlib.Path(os.environ.get("TWOVIEW_DATA") or ROOT.parent / "shared" / "data") / "kitti00_turn" / "images"
+    folder = os.environ.get("TWOVIEW_DATA") or ROOT.parent / "shared" / "data"
+    data = pathlib.Path(folder) / "kitti00_turn" / "images"
     if not data.is_dir():
         pytest.skip(f"no {data}")
     folder = tmp_path_factory.mktemp("bend")
     (folder / "images").mkdir()
     for name in ("000106.png", "000110.png"):
         (folder / "images" / name).write_bytes((data / name).read_bytes())
-    (folder / "cam.yaml").write_text("image_width: 1241\nimage_height: 376\n"
-                                     "camera_matrix: {rows: 3, cols: 3, data: [718.856, 0, 607.1928, 0, 718.856, "
-                                     "185.2157, 0, 0, 1]}\ndistortion_coefficients: [0, 0, 0, 0, 0]\n")
+    (folder / "cam.yaml").write_text(
+        "image_width: 1241\nimage_height: 376\n"
+        "camera_matrix: {rows: 3, cols: 3, data: [718.856, 0, 607.1928, 0, 718.856, "
+        "185.2157, 0, 0, 1]}\ndistortion_coefficients: [0, 0, 0, 0, 0]\n"
+    )
     return folder
 
 
@@ -108,8 +112,13 @@ def relative_pose(i, j):
 
 
 def start(*arguments, **options):
-    return subprocess.Popen([sys.executable, "-B", str(SCRIPT), *map(str, arguments)], stdout=subprocess.PIPE,
-                            stderr=subprocess.PIPE, text=True, **options)
+    return subprocess.Popen(
+        [sys.executable, "-B", str(SCRIPT), *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
 
 
 def run(*arguments, status=0):
@@ -137,7 +146,9 @@ def refuse(call):
     """Runs a verb that must be refused with one line on stderr that contains these words."""
     def refused(words, *arguments):
         status, out, err = call(*arguments)
-        assert status == 2 and out == "" and err.startswith("twoview: ") and err.count("\n") == 1, err
+        assert (
+            status == 2 and out == "" and err.startswith("twoview: ") and err.count("\n") == 1
+        ), err
         for word in words if isinstance(words, tuple) else (words,):
             assert word in err
     return refused
@@ -149,6 +160,14 @@ def exported(photographs, tmp_path_factory):
     pytest.importorskip("pycolmap")
     folder = tmp_path_factory.mktemp("exported")
     for schema in ("4", "3.8"):
-        run("export", "--database", folder / f"{schema}.db", "--images", photographs / "images", "--schema", schema,
-            "--quiet")
+        run(
+            "export",
+            "--database",
+            folder / f"{schema}.db",
+            "--images",
+            photographs / "images",
+            "--schema",
+            schema,
+            "--quiet",
+        )
     return {schema: folder / f"{schema}.db" for schema in ("4", "3.8")}

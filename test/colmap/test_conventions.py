@@ -11,7 +11,10 @@ pycolmap = pytest.importorskip("pycolmap")
 LENSES = {
     "PINHOLE": (tv.CameraModel.PINHOLE, ()),
     "OPENCV": (tv.CameraModel.BROWN_CONRADY, (-0.2, 0.05, 0.001, -0.002)),
-    "FULL_OPENCV": (tv.CameraModel.BROWN_CONRADY, (-0.2, 0.05, 0.001, -0.002, 0.01, 0.02, -0.01, 0.003)),
+    "FULL_OPENCV": (
+        tv.CameraModel.BROWN_CONRADY,
+        (-0.2, 0.05, 0.001, -0.002, 0.01, 0.02, -0.01, 0.003),
+    ),
     "OPENCV_FISHEYE": (tv.CameraModel.KANNALA_BRANDT, (0.02, -0.01, 0.003, 0.001)),
 }
 
@@ -22,7 +25,9 @@ def camera_of(model):
 
 
 def pycolmap_camera(row):
-    return pycolmap.Camera(model=row.model, width=row.width, height=row.height, params=list(row.params))
+    return pycolmap.Camera(
+        model=row.model, width=row.width, height=row.height, params=list(row.params)
+    )
 
 
 @pytest.mark.parametrize("model", LENSES)
@@ -60,18 +65,29 @@ def test_colmaps_simpler_cameras_are_read(model, params):
 
 def test_other_lenses_are_named():
     with pytest.raises(ValueError, match="a.jpg: COLMAP's FOV"):
-        conventions.camera_from_colmap(conventions.ColmapCamera("FOV", 9, 9, (1, 1, 1, 1, 1)), "a.jpg")
+        conventions.camera_from_colmap(
+            conventions.ColmapCamera("FOV", 9, 9, (1, 1, 1, 1, 1)), "a.jpg"
+        )
 
 
 def test_keypoints_have_six_columns_with_colmaps_scale_and_angle():
     ours = np.zeros(3, tv.KEYPOINT)
-    ours["x"], ours["y"], ours["size"], ours["angle_rad"] = (0, 10.25, 5), (0, 7.5, 6), (4, 3, 8), (0, 0.5, -2)
+    ours["x"], ours["y"], ours["size"], ours["angle_rad"] = (
+        (0, 10.25, 5),
+        (0, 7.5, 6),
+        (4, 3, 8),
+        (0, 0.5, -2),
+    )
     rows = conventions.keypoints_to_colmap(ours)
     assert rows.dtype == np.float32 and rows.shape == (3, 6)
     theirs = pycolmap.keypoints_from_matrix(np.column_stack(
         [ours["x"] + 0.5, ours["y"] + 0.5, ours["size"] / 2, ours["angle_rad"]]).astype(np.float32))
-    np.testing.assert_allclose(rows, [[k.x, k.y, k.a11, k.a12, k.a21, k.a22] for k in theirs], atol=1e-6)
-    np.testing.assert_array_equal(conventions.pixels_from_colmap(rows)[:, 0], ours["x"].astype(float))
+    np.testing.assert_allclose(
+        rows, [[k.x, k.y, k.a11, k.a12, k.a21, k.a22] for k in theirs], atol=1e-6
+    )
+    np.testing.assert_array_equal(
+        conventions.pixels_from_colmap(rows)[:, 0], ours["x"].astype(float)
+    )
 
 
 @pytest.mark.parametrize("columns", [2, 4, 6])
@@ -108,7 +124,9 @@ CAMERA = tv.Camera(WIDTH, HEIGHT, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
 def two_views(R, t, plane=False, noise_px=0.2):
     """(pixels0, pixels1) of points that both views see."""
     random = np.random.default_rng(7)
-    points = np.column_stack([random.uniform(-1.5, 1.5, 300), random.uniform(-1, 1, 300), random.uniform(4, 8, 300)])
+    points = np.column_stack(
+        [random.uniform(-1.5, 1.5, 300), random.uniform(-1, 1, 300), random.uniform(4, 8, 300)]
+    )
     if plane:
         points[:, 2] = 6 + 0.3 * points[:, 0]
     pixels = []
@@ -157,7 +175,9 @@ def test_H_is_of_colmaps_pixels():
     assert row.config == 4
     mapped = np.column_stack([pixels[0] + 0.5, np.ones(len(pixels[0]))]) @ row.H.T
     gap = mapped[:, :2] / mapped[:, 2:] - (pixels[1] + 0.5)
-    assert np.abs(np.median(gap, axis=0)).max() < 0.05 and np.median(np.linalg.norm(gap, axis=1)) < 0.6
+    assert (
+        np.abs(np.median(gap, axis=0)).max() < 0.05 and np.median(np.linalg.norm(gap, axis=1)) < 0.6
+    )
 
 
 @pytest.mark.parametrize("plane", [False, True])
@@ -173,8 +193,11 @@ def test_swapped_images_give_the_swapped_row(plane):
         np.testing.assert_allclose(ours, theirs, atol=1e-12)
     if plane:
         np.testing.assert_allclose(swapped.H, forward.H, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(forward.swapped().H @ forward.H / (forward.swapped().H @ forward.H)[2, 2],
-                                   np.eye(3), atol=1e-9)
+        np.testing.assert_allclose(
+            forward.swapped().H @ forward.H / (forward.swapped().H @ forward.H)[2, 2],
+            np.eye(3),
+            atol=1e-9,
+        )
 
 
 def test_a_rotation_is_a_panorama_without_translation():
@@ -187,6 +210,8 @@ def test_a_rotation_is_a_panorama_without_translation():
 
 def test_no_geometry_keeps_no_match():
     random = np.random.default_rng(2)
-    found, row = estimate(*(np.ascontiguousarray(random.uniform(0, 400, (40, 2))) for _ in range(2)))
+    found, row = estimate(
+        *(np.ascontiguousarray(random.uniform(0, 400, (40, 2))) for _ in range(2))
+    )
     assert found.kind == tv.Kind.DEGENERATE
     assert row.config == 1 and row.inlier_matches.shape == (0, 2) and row.F is None

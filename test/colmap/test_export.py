@@ -35,8 +35,10 @@ def pairs_of(path):
     """Names of the pairs in a database."""
     with contextlib.closing(sqlite3.connect(path)) as database:
         names = dict(database.execute("SELECT image_id, name FROM images"))
-        return [tuple(names[i] for i in divmod(row[0], schema38.MAX_IMAGES))
-                for row in database.execute("SELECT pair_id FROM two_view_geometries ORDER BY pair_id")]
+        return [
+            tuple(names[i] for i in divmod(row[0], schema38.MAX_IMAGES))
+            for row in database.execute("SELECT pair_id FROM two_view_geometries ORDER BY pair_id")
+        ]
 
 
 def digest(path):
@@ -57,8 +59,14 @@ def test_both_schemas_hold_the_same_rows(exported, table):
         for value4, value38 in zip(row4, row38):
             if value4 is None:  # COLMAP 3.8 has zeros for what was not estimated
                 assert not any(np.frombuffer(value38))
-            elif table == "two_view_geometries" and isinstance(value4, bytes) and len(value4) in (24, 32, 72):
-                np.testing.assert_allclose(np.frombuffer(value4), np.frombuffer(value38), atol=1e-15)
+            elif (
+                table == "two_view_geometries"
+                and isinstance(value4, bytes)
+                and len(value4) in (24, 32, 72)
+            ):
+                np.testing.assert_allclose(
+                    np.frombuffer(value4), np.frombuffer(value38), atol=1e-15
+                )
             else:
                 assert value4 == value38
 
@@ -66,16 +74,33 @@ def test_both_schemas_hold_the_same_rows(exported, table):
 def test_schema_38_is_that_of_debians_colmap(exported, tmp_path):
     if not shutil.which("colmap"):
         pytest.skip("no colmap: scripts/bootstrap test installs it")
-    subprocess.run(["colmap", "database_creator", "--database_path", tmp_path / "their.db"], check=True,
-                   capture_output=True, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
+    subprocess.run(
+        ["colmap", "database_creator", "--database_path", tmp_path / "their.db"],
+        check=True,
+        capture_output=True,
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen"},
+    )
 
     def shape(path):
         with contextlib.closing(sqlite3.connect(path)) as database:
-            tables = [row[0] for row in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
-            indices = database.execute("SELECT name, tbl_name FROM sqlite_master WHERE type = 'index'").fetchall()
-            return (database.execute("PRAGMA user_version").fetchone(), sorted(indices),
-                    {t: (database.execute(f"PRAGMA table_info({t})").fetchall(),
-                         database.execute(f"PRAGMA foreign_key_list({t})").fetchall()) for t in tables})
+            tables = [
+                row[0]
+                for row in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+            ]
+            indices = database.execute(
+                "SELECT name, tbl_name FROM sqlite_master WHERE type = 'index'"
+            ).fetchall()
+            return (
+                database.execute("PRAGMA user_version").fetchone(),
+                sorted(indices),
+                {
+                    t: (
+                        database.execute(f"PRAGMA table_info({t})").fetchall(),
+                        database.execute(f"PRAGMA foreign_key_list({t})").fetchall(),
+                    )
+                    for t in tables
+                },
+            )
     assert shape(exported["3.8"]) == shape(tmp_path / "their.db")
 
 
@@ -89,12 +114,18 @@ def test_features_are_the_librarys(exported, photographs):
             with tv.Context(max_width=WIDTH, max_height=HEIGHT, max_keypoints=most) as context:
                 keypoints, descriptors = tv.extract(context, luma, max_keypoints=most)
             found = database.read_keypoints(image.image_id)
-            np.testing.assert_array_equal(found[:, :2], np.column_stack([keypoints["x"], keypoints["y"]]) + 0.5)
-            np.testing.assert_array_equal(database.read_descriptors(image.image_id).data, descriptors)
+            np.testing.assert_array_equal(
+                found[:, :2], np.column_stack([keypoints["x"], keypoints["y"]]) + 0.5
+            )
+            np.testing.assert_array_equal(
+                database.read_descriptors(image.image_id).data, descriptors
+            )
             camera = database.read_camera(image.camera_id)
             assert camera.has_prior_focal_length and camera.model.name == "PINHOLE"
             assert camera.params.tolist() == [520, 500, 330.5, 235.5]
-        assert database.num_cameras() == database.num_rigs() == 1 and database.num_frames() == len(NAMES)
+        assert database.num_cameras() == database.num_rigs() == 1 and database.num_frames() == len(
+            NAMES
+        )
 
 
 def test_geometries_are_there_and_agree_with_their_matches(exported):
@@ -106,7 +137,10 @@ def test_geometries_are_there_and_agree_with_their_matches(exported):
             matches = database.read_matches(id0, id1)
             assert row.config in (2, 4)  # calibrated, or planar where the wall is nearly all
             assert {tuple(m) for m in row.inlier_matches} <= {tuple(m) for m in matches}
-            pixels = [database.read_keypoints(i)[row.inlier_matches[:, k], :2] for k, i in enumerate((id0, id1))]
+            pixels = [
+                database.read_keypoints(i)[row.inlier_matches[:, k], :2]
+                for k, i in enumerate((id0, id1))
+            ]
             p0, p1 = (np.column_stack([p, np.ones(len(p))]) for p in pixels)
             lines = p0 @ row.F.T
             distance = np.abs((p1 * lines).sum(axis=1)) / np.linalg.norm(lines[:, :2], axis=1)
@@ -118,11 +152,27 @@ def test_a_geometry_is_of_the_databases_camera(bend, tmp_path, call, by):
     """The exported geometry belongs to the database's camera, which all pairs share, even where the
     matches would move its principal point."""
     if by == "program":
-        assert call("export", "--database", tmp_path / "x.db", "--images", bend / "images", "--camera",
-                    bend / "cam.yaml")[0] == 0
+        assert (
+            call(
+                "export",
+                "--database",
+                tmp_path / "x.db",
+                "--images",
+                bend / "images",
+                "--camera",
+                bend / "cam.yaml",
+            )[0]
+            == 0
+        )
     else:
-        exporter.export(exporter.Job(str(tmp_path / "x.db"), str(bend / "images"), cameras=(str(bend / "cam.yaml"),),
-                                     quiet=True))
+        exporter.export(
+            exporter.Job(
+                str(tmp_path / "x.db"),
+                str(bend / "images"),
+                cameras=(str(bend / "cam.yaml"),),
+                quiet=True,
+            )
+        )
     with pycolmap.Database.open(tmp_path / "x.db") as database:
         [camera], (_, [row]) = database.read_all_cameras(), database.read_two_view_geometries()
         inverse = np.linalg.inv(camera.calibration_matrix())
@@ -131,26 +181,61 @@ def test_a_geometry_is_of_the_databases_camera(bend, tmp_path, call, by):
 
 
 @pytest.mark.parametrize("schema", SCHEMAS)
-def test_a_pair_that_is_named_the_other_way_round_is_the_same_row(exported, photographs, tmp_path, schema, call):
+def test_a_pair_that_is_named_the_other_way_round_is_the_same_row(
+    exported, photographs, tmp_path, schema, call
+):
     (tmp_path / "pairs.txt").write_text("c.png a.png\nd.png b.png\na.png c.png\n")
-    assert call("export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--pairs",
-                tmp_path / "pairs.txt", "--schema", schema)[0] == 0
+    assert (
+        call(
+            "export",
+            "--database",
+            tmp_path / "x.db",
+            "--images",
+            photographs / "images",
+            "--pairs",
+            tmp_path / "pairs.txt",
+            "--schema",
+            schema,
+        )[0]
+        == 0
+    )
     assert pairs_of(tmp_path / "x.db") == [("a.png", "c.png"), ("b.png", "d.png")]
     expected = {row[0]: row for row in rows_of(exported[schema], "two_view_geometries")}
     for row in rows_of(tmp_path / "x.db", "two_view_geometries"):
         wanted = expected[row[0]]
-        assert sorted(np.frombuffer(row[3], np.uint64)) == sorted(np.frombuffer(wanted[3], np.uint64))
+        assert sorted(np.frombuffer(row[3], np.uint64)) == sorted(
+            np.frombuffer(wanted[3], np.uint64)
+        )
         assert row[4] == wanted[4]
         for mine, theirs in zip(row[5:], wanted[5:]):
             if mine is not None:
-                np.testing.assert_allclose(np.frombuffer(mine), np.frombuffer(theirs), rtol=1e-9, atol=1e-12)
+                np.testing.assert_allclose(
+                    np.frombuffer(mine), np.frombuffer(theirs), rtol=1e-9, atol=1e-12
+                )
 
 
 def test_sequential_pairs_follow_the_names(photographs, tmp_path, call):
-    assert call("export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--sequential", "2",
-                "--schema", "3.8")[0] == 0
-    assert pairs_of(tmp_path / "x.db") == [("a.png", "b.png"), ("a.png", "c.png"), ("b.png", "c.png"),
-                                           ("b.png", "d.png"), ("c.png", "d.png")]
+    assert (
+        call(
+            "export",
+            "--database",
+            tmp_path / "x.db",
+            "--images",
+            photographs / "images",
+            "--sequential",
+            "2",
+            "--schema",
+            "3.8",
+        )[0]
+        == 0
+    )
+    assert pairs_of(tmp_path / "x.db") == [
+        ("a.png", "b.png"),
+        ("a.png", "c.png"),
+        ("b.png", "c.png"),
+        ("b.png", "d.png"),
+        ("c.png", "d.png"),
+    ]
 
 
 @pytest.mark.parametrize("schema", SCHEMAS)
@@ -160,8 +245,18 @@ def test_images_that_show_different_things_are_degenerate(tmp_path, schema, call
     for seed in (1, 2):
         noise = np.random.default_rng(seed).integers(0, 256, (120, 160)).astype(np.uint8)
         cv2.imwrite(str(tmp_path / "images" / f"{seed}.png"), cv2.GaussianBlur(noise, (0, 0), 1.5))
-    (tmp_path / "cameras.yaml").write_text(CAMERA.replace(str(WIDTH), "160").replace(str(HEIGHT), "120"))
-    status, _, err = call("export", "--database", tmp_path / "x.db", "--images", tmp_path / "images", "--schema", schema)
+    (tmp_path / "cameras.yaml").write_text(
+        CAMERA.replace(str(WIDTH), "160").replace(str(HEIGHT), "120")
+    )
+    status, _, err = call(
+        "export",
+        "--database",
+        tmp_path / "x.db",
+        "--images",
+        tmp_path / "images",
+        "--schema",
+        schema,
+    )
     assert (status, err) == (3, "twoview: no pair has a geometry\n")
     [(_, rows, _, _, config, *_)] = rows_of(tmp_path / "x.db", "two_view_geometries")
     assert (rows, config) == (0, 1)
@@ -173,7 +268,15 @@ def test_images_that_show_different_things_are_degenerate(tmp_path, schema, call
 def test_append_adds_what_is_not_there(exported, photographs, tmp_path, schema, call):
     path = tmp_path / "x.db"
     (tmp_path / "pairs.txt").write_text("a.png b.png\n")
-    arguments = ("export", "--database", path, "--images", photographs / "images", "--schema", schema)
+    arguments = (
+        "export",
+        "--database",
+        path,
+        "--images",
+        photographs / "images",
+        "--schema",
+        schema,
+    )
     assert call(*arguments, "--pairs", tmp_path / "pairs.txt")[0] == 0
     assert call(*arguments, "--append")[0] == 0
     for table in SHARED_COLUMNS:
@@ -184,7 +287,16 @@ def test_append_adds_what_is_not_there(exported, photographs, tmp_path, schema, 
 def test_append_refuses_what_contradicts(exported, photographs, tmp_path, refuse):
     path = shutil.copy(exported["3.8"], tmp_path / "x.db")
     before = digest(path)
-    arguments = ("export", "--database", path, "--images", photographs / "images", "--schema", "3.8", "--append")
+    arguments = (
+        "export",
+        "--database",
+        path,
+        "--images",
+        photographs / "images",
+        "--schema",
+        "3.8",
+        "--append",
+    )
     refuse("a.png is there with other keypoints", *arguments, "--max-keypoints", 100)
     (tmp_path / "cam.yaml").write_text(CAMERA.replace("fx: 520", "fx: 521"))
     refuse("a.png is there with another camera", *arguments, "--camera", tmp_path / "cam.yaml")
@@ -199,15 +311,30 @@ def test_append_refuses_what_contradicts(exported, photographs, tmp_path, refuse
 def test_a_database_that_is_there_is_left_alone(exported, photographs, tmp_path, schema, refuse):
     path = shutil.copy(exported[schema], tmp_path / "x.db")
     before = digest(path)
-    refuse("x.db: there already (--append", "export", "--database", path, "--images", photographs / "images",
-           "--schema", schema)
+    refuse(
+        "x.db: there already (--append",
+        "export",
+        "--database",
+        path,
+        "--images",
+        photographs / "images",
+        "--schema",
+        schema,
+    )
     assert digest(path) == before
     assert_nothing_else(tmp_path, "x.db")
 
 
 def test_a_journal_of_another_database_is_refused(photographs, tmp_path, refuse):
     (tmp_path / "x.db-wal").write_bytes(b"old")
-    refuse("x.db-wal: left there", "export", "--database", tmp_path / "x.db", "--images", photographs / "images")
+    refuse(
+        "x.db-wal: left there",
+        "export",
+        "--database",
+        tmp_path / "x.db",
+        "--images",
+        photographs / "images",
+    )
     assert_nothing_else(tmp_path, "x.db-wal")
 
 
@@ -216,8 +343,17 @@ def test_a_locked_database_is_refused(exported, photographs, tmp_path, schema, r
     path = shutil.copy(exported[schema], tmp_path / "x.db")
     with contextlib.closing(sqlite3.connect(path)) as other:
         other.execute("BEGIN IMMEDIATE")
-        refuse("x.db: locked", "export", "--database", path, "--images", photographs / "images", "--schema", schema,
-               "--append")
+        refuse(
+            "x.db: locked",
+            "export",
+            "--database",
+            path,
+            "--images",
+            photographs / "images",
+            "--schema",
+            schema,
+            "--append",
+        )
     assert_nothing_else(tmp_path, "x.db")
 
 
@@ -235,8 +371,15 @@ def test_another_versions_database_is_refused(exported, photographs, tmp_path, r
     for schema, other in (("4", "3.8"), ("3.8", "4")):
         path = shutil.copy(exported[other], tmp_path / "x.db")
         before = digest(path)
-        refuse(("x.db: made by COLMAP " + other, "--schema " + schema), "export", "--database", path, "--schema", schema,
-               *arguments)
+        refuse(
+            ("x.db: made by COLMAP " + other, "--schema " + schema),
+            "export",
+            "--database",
+            path,
+            "--schema",
+            schema,
+            *arguments,
+        )
         assert digest(path) == before
     (tmp_path / "x.db").write_bytes(b"nothing that SQLite knows" * 100)
     refuse("x.db: not a database", "export", "--database", tmp_path / "x.db", *arguments)
@@ -245,12 +388,15 @@ def test_another_versions_database_is_refused(exported, photographs, tmp_path, r
 
 
 @pytest.mark.parametrize("line, words", [
-    ("a.png\n", "1 fields, not 38"), ("a.png b.png 0 0 1\n", "5 fields"), ("a.png b.png x 0\n", "'x' is no number"),
+    ("a.png\n", "1 fields, not "
+                "38"), ("a.png b.png 0 0 "
+                        "1\n", "5 fields"), ("a.png b.png x 0\n", "'x' is no number"),
     ("a.png b.png 0 nan\n", "not finite"), ("a.png a.png\n", "paired with itself"),
     ("a.png b.png 0 0 " + "1 0 0 0 1 0 0 0 2 " * 2 + "\n", "K0 is not"),
     ("a.png b.png 0 0 " + "1 0 0 0 1 0 0 0 1 " * 2 + "1 " * 16 + "\n", "no rotation"),
     ("a.png missing.png\n", "no image missing.png in"),
-    ("a.png b.png 0 0 " + "500 0 9 0 500 9 0 0 1 " * 2 + "\na.png c.png 0 0 " + "501 0 9 0 501 9 0 0 1 " * 2,
+    ("a.png b.png 0 0 "
+     "" + "500 0 9 0 500 9 0 0 1 " * 2 + "\na.png c.png 0 0 " + "501 0 9 0 501 9 0 0 1 " * 2,
      "a.png has another K"),
 ])
 def test_a_broken_line_is_named_by_its_number(photographs, tmp_path, line, words, refuse):
@@ -276,7 +422,14 @@ def test_images_and_folders_that_are_missing_or_broken(photographs, tmp_path, re
     refuse("a.png is 640x480, but its camera is for 641x480", *arguments)
     (tmp_path / "cameras.yaml").write_text(CAMERA.replace("fx: 520", "fx: wide"))
     refuse("cameras.yaml: camera: fx is no number", *arguments)
-    refuse("none: no such folder", "export", "--database", tmp_path / "none" / "x.db", "--images", images)
+    refuse(
+        "none: no such folder",
+        "export",
+        "--database",
+        tmp_path / "none" / "x.db",
+        "--images",
+        images,
+    )
     assert_nothing_else(tmp_path, "images", "cameras.yaml")
 
 
@@ -291,7 +444,10 @@ def test_bad_arguments_are_one_line(tmp_path, refuse):
 
 def test_a_package_that_is_missing_is_told(photographs, tmp_path, refuse, monkeypatch):
     arguments = ("export", "--database", tmp_path / "x.db", "--images", photographs / "images")
-    for package, schema, words in (("pycolmap", "4", "needs pycolmap (scripts/bootstrap"), ("cv2", "3.8", "cv2")):
+    for package, schema, words in (
+        ("pycolmap", "4", "needs pycolmap (scripts/bootstrap"),
+        ("cv2", "3.8", "cv2"),
+    ):
         monkeypatch.setitem(sys.modules, package, None)
         refuse(words, *arguments, "--schema", schema)
     assert_nothing_else(tmp_path)
@@ -309,7 +465,9 @@ def test_an_interrupted_run_leaves_what_was_there(exported, photographs, tmp_pat
     if append:
         shutil.copy(exported["4"], tmp_path / "x.db")
         before = digest(tmp_path / "x.db")
-    process = start("export", "--database", tmp_path / "x.db", "--images", images, *["--append"] * append)
+    process = start(
+        "export", "--database", tmp_path / "x.db", "--images", images, *["--append"] * append
+    )
     deadline = time.monotonic() + 30
     # waits until the export has begun to write
     while not any(name.startswith(".x.db.") for name in os.listdir(tmp_path)):
@@ -325,7 +483,9 @@ def test_an_interrupted_run_leaves_what_was_there(exported, photographs, tmp_pat
 
 def test_json_is_alone_on_stdout(photographs, tmp_path):
     import json
-    out = run("export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--json")
+    out = run(
+        "export", "--database", tmp_path / "x.db", "--images", photographs / "images", "--json"
+    )
     assert sum(json.loads(out)["configurations"].values()) == json.loads(out)["pairs_verified"] == 6
 
 

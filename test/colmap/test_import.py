@@ -35,7 +35,9 @@ distortion_coefficients: !!opencv-matrix
 
 def scene_points(count):
     random = np.random.default_rng(9)
-    return np.column_stack([random.uniform(-1, 1, count), random.uniform(-1, 1, count), random.uniform(4, 7, count)])
+    return np.column_stack(
+        [random.uniform(-1, 1, count), random.uniform(-1, 1, count), random.uniform(4, 7, count)]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +71,11 @@ def test_a_models_poses_are_a_pairs_files_truth(models, tmp_path, form, call):
     status, out, _ = call("import", "--model", models[form], "-o", tmp_path / "out", "--json")
     assert (status, json.loads(out)) == (0, {"images": 4, "pairs": 3})
     pairs = read_pairs(tmp_path / "out" / "pairs.txt")
-    assert [(p.name0, p.name1) for p in pairs] == [("a.png", "b.png"), ("a.png", "c.png"), ("b.png", "c.png")]
+    assert [(p.name0, p.name1) for p in pairs] == [
+        ("a.png", "b.png"),
+        ("a.png", "c.png"),
+        ("b.png", "c.png"),
+    ]
     for pair in pairs:
         R, t = relative_pose(NAMES.index(pair.name0), NAMES.index(pair.name1))
         np.testing.assert_allclose(pair.R, R, atol=1e-12)
@@ -83,9 +89,16 @@ def test_a_models_poses_are_a_pairs_files_truth(models, tmp_path, form, call):
 def test_the_choice_of_pairs(models, tmp_path, call, refuse):
     arguments = ("import", "--model", models["text"], "-o", tmp_path / "out")
     assert json.loads(call(*arguments, "--min-common-points", 10, "--json")[1])["pairs"] == 6
-    assert json.loads(call(*arguments, "--min-common-points", 0, "--sequential", 1, "--json")[1])["pairs"] == 3
+    assert (
+        json.loads(call(*arguments, "--min-common-points", 0, "--sequential", 1, "--json")[1])[
+            "pairs"
+        ]
+        == 3
+    )
     (tmp_path / "pairs.txt").write_text("d.png a.png\n")
-    assert json.loads(call(*arguments, "--pairs", tmp_path / "pairs.txt", "--json")[1])["pairs"] == 1
+    assert (
+        json.loads(call(*arguments, "--pairs", tmp_path / "pairs.txt", "--json")[1])["pairs"] == 1
+    )
     [pair] = read_pairs(tmp_path / "out" / "pairs.txt")
     np.testing.assert_allclose(pair.R, relative_pose(3, 0)[0], atol=1e-12)
     (tmp_path / "pairs.txt").write_text("a.png b.png\na.png e.png\n")
@@ -111,17 +124,39 @@ def test_our_tools_read_the_pairs(exported, photographs, tmp_path, call):
         pytest.skip("TWOVIEW_PROGRAM names no program")
     from twoview_tools.colmap import mapping
     shutil.copy(exported["4"], tmp_path / "x.db")
-    [model] = mapping.MAPPERS["4"](str(tmp_path / "x.db"), str(photographs / "images"), str(tmp_path / "m"), True)
+    [model] = mapping.MAPPERS["4"](
+        str(tmp_path / "x.db"), str(photographs / "images"), str(tmp_path / "m"), True
+    )
     assert call("import", "--model", model, "-o", tmp_path / "out")[0] == 0
-    subprocess.run([program, "evaluate", tmp_path / "out" / "pairs.txt", "--images", photographs / "images", "-o",
-                    tmp_path / "report.json", "--quiet"], check=True)
+    subprocess.run(
+        [
+            program,
+            "evaluate",
+            tmp_path / "out" / "pairs.txt",
+            "--images",
+            photographs / "images",
+            "-o",
+            tmp_path / "report.json",
+            "--quiet",
+        ],
+        check=True,
+    )
     pairs = json.loads((tmp_path / "report.json").read_text())["pairs"]
     assert len(pairs) == 6 and max(pair["rotation_error_deg"] for pair in pairs) < 0.3
 
 
 @pytest.mark.parametrize("schema", ["4", "3.8"])
 def test_a_databases_matches_are_our_input(exported, models, tmp_path, schema, call):
-    status, out, _ = call("import", "--database", exported[schema], "--model", models["text"], "-o", tmp_path, "--json")
+    status, out, _ = call(
+        "import",
+        "--database",
+        exported[schema],
+        "--model",
+        models["text"],
+        "-o",
+        tmp_path,
+        "--json",
+    )
     report = json.loads(out)
     assert status == 0 and report["num_pairs"] == 6 and report["auc"]["5"] > 85
     assert report == json.loads((tmp_path / "report.json").read_text())
@@ -133,10 +168,14 @@ def test_a_databases_matches_are_our_input(exported, models, tmp_path, schema, c
 def write_database(path, pixels, columns=6, with_matches=True, descriptors=None):
     """Writes a database with two images of one camera as pycolmap does."""
     with pycolmap.Database.open(path) as database:
-        camera = pycolmap.Camera(model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FX, FY, CX + 0.5, CY + 0.5])
+        camera = pycolmap.Camera(
+            model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FX, FY, CX + 0.5, CY + 0.5]
+        )
         camera.camera_id = database.write_camera(camera)
         for i in range(2):
-            image_id = database.write_image(pycolmap.Image(name=NAMES[i], camera_id=camera.camera_id))
+            image_id = database.write_image(
+                pycolmap.Image(name=NAMES[i], camera_id=camera.camera_id)
+            )
             rows = np.ones((len(pixels[i]), columns), np.float32)
             rows[:, :2] = pixels[i] + 0.5
             database.write_keypoints(image_id, rows)
@@ -151,13 +190,18 @@ def write_database(path, pixels, columns=6, with_matches=True, descriptors=None)
 def views_of(points):
     camera = tv.Camera(WIDTH, HEIGHT, FX, FY, CX, CY)
     R, t = relative_pose(0, 1)
-    return [tv.camera_project_points(camera, np.ascontiguousarray(p))[0] for p in (points, points @ R.T + t)]
+    return [
+        tv.camera_project_points(camera, np.ascontiguousarray(p))[0]
+        for p in (points, points @ R.T + t)
+    ]
 
 
 @pytest.mark.parametrize("columns", [2, 4, 6])
 def test_half_a_pixel_and_the_columns_of_keypoints(tmp_path, columns, call):
     write_database(tmp_path / "x.db", views_of(scene_points(80)), columns)
-    status, out, _ = call("import", "--database", tmp_path / "x.db", "-o", tmp_path / "out", "--json")
+    status, out, _ = call(
+        "import", "--database", tmp_path / "x.db", "-o", tmp_path / "out", "--json"
+    )
     [pair] = json.loads(out)["pairs"]
     R, t = relative_pose(0, 1)
     assert status == 0 and pair["num_inliers"] == 80
@@ -169,8 +213,12 @@ def test_half_a_pixel_and_the_columns_of_keypoints(tmp_path, columns, call):
 
 def test_without_matches_ours_are_made(tmp_path, call):
     descriptors = np.random.default_rng(1).integers(0, 120, (80, 128)).astype(np.uint8)
-    write_database(tmp_path / "x.db", views_of(scene_points(80)), with_matches=False, descriptors=descriptors)
-    status, out, _ = call("import", "--database", tmp_path / "x.db", "-o", tmp_path / "out", "--json")
+    write_database(
+        tmp_path / "x.db", views_of(scene_points(80)), with_matches=False, descriptors=descriptors
+    )
+    status, out, _ = call(
+        "import", "--database", tmp_path / "x.db", "-o", tmp_path / "out", "--json"
+    )
     assert status == 0 and json.loads(out)["pairs"][0]["num_inliers"] == 80
 
 
@@ -190,10 +238,19 @@ def test_a_match_without_a_keypoint_is_named(tmp_path, refuse):
     import sqlite3
     write_database(tmp_path / "x.db", views_of(scene_points(20)))
     database = sqlite3.connect(tmp_path / "x.db")
-    database.execute("UPDATE keypoints SET rows = 19, data = substr(data, 1, 19 * 24) WHERE image_id = 2")
+    database.execute(
+        "UPDATE keypoints SET rows = 19, data = substr(data, 1, 19 * 24) WHERE image_id = 2"
+    )
     database.commit()
     database.close()
-    refuse("a match of a.png and b.png has no keypoint", "import", "--database", tmp_path / "x.db", "-o", tmp_path)
+    refuse(
+        "a match of a.png and b.png has no keypoint",
+        "import",
+        "--database",
+        tmp_path / "x.db",
+        "-o",
+        tmp_path,
+    )
 
 
 # ---- results as models -------------------------------------------------------------------------
@@ -213,8 +270,21 @@ def result(photographs, tmp_path_factory):
     from twoview_tools.colmap.cli import main
     folder = tmp_path_factory.mktemp("result")
     (folder / "cam.yaml").write_text(OPENCV_CAMERA)
-    assert main(["model", str(photographs / "images" / "a.png"), str(photographs / "images" / "c.png"), "--camera",
-                 str(folder / "cam.yaml"), "-o", str(folder / "out"), "--quiet"]) == 0
+    assert (
+        main(
+            [
+                "model",
+                str(photographs / "images" / "a.png"),
+                str(photographs / "images" / "c.png"),
+                "--camera",
+                str(folder / "cam.yaml"),
+                "-o",
+                str(folder / "out"),
+                "--quiet",
+            ]
+        )
+        == 0
+    )
     return folder
 
 
@@ -228,18 +298,30 @@ def test_pycolmap_reads_a_result_and_reprojects_it(result):
     assert again < 0.5 and again == pytest.approx(stored, rel=0.5)
     pose = read_model(result / "out").images["c.png"]
     R, t = relative_pose(0, 2)
-    assert np.linalg.norm(pose.R - R) < 3e-3 and np.linalg.norm(pose.t - t / np.linalg.norm(t)) < 1e-2
+    assert (
+        np.linalg.norm(pose.R - R) < 3e-3 and np.linalg.norm(pose.t - t / np.linalg.norm(t)) < 1e-2
+    )
 
 
 def test_a_model_has_the_camera_that_its_points_are_of(bend, tmp_path, call):
     images = bend / "images"
-    status, out, _ = call("model", images / "000106.png", images / "000110.png", "--camera", bend / "cam.yaml", "-o",
-                          tmp_path, "--json")
+    status, out, _ = call(
+        "model",
+        images / "000106.png",
+        images / "000110.png",
+        "--camera",
+        bend / "cam.yaml",
+        "-o",
+        tmp_path,
+        "--json",
+    )
     shift = np.array(json.loads(out)["principal_point_shift_px"])
     assert status == 0 and -18 < shift[0] < -5 and abs(shift[1]) < 9
     found = pycolmap.Reconstruction(tmp_path)
     assert found.num_cameras() == 1
-    np.testing.assert_allclose(found.cameras[1].params[2:], np.array([607.6928, 185.7157]) + shift, atol=1e-9)
+    np.testing.assert_allclose(
+        found.cameras[1].params[2:], np.array([607.6928, 185.7157]) + shift, atol=1e-9
+    )
     found.update_point_3d_errors()
     assert np.mean([point.error for point in found.points3D.values()]) < 0.5
 
@@ -247,9 +329,19 @@ def test_a_model_has_the_camera_that_its_points_are_of(bend, tmp_path, call):
 def test_a_model_comes_back_with_half_a_pixel_more(tmp_path):
     pixels = views_of(scene_points(5))
     R, t = relative_pose(0, 1)
-    camera = tv.Camera(WIDTH, HEIGHT, FX, FY, CX, CY, tv.CameraModel.KANNALA_BRANDT, (0.1, 0.02, 0, 0))
-    model = TwoViewModel(("a.png", "b c.png".replace(" ", "_")), (tv.Camera(WIDTH, HEIGHT, FX, FY, CX, CY), camera),
-                         R, t, tuple(pixels), scene_points(5), np.full((5, 3), 7, np.uint8), np.full(5, 0.25))
+    camera = tv.Camera(
+        WIDTH, HEIGHT, FX, FY, CX, CY, tv.CameraModel.KANNALA_BRANDT, (0.1, 0.02, 0, 0)
+    )
+    model = TwoViewModel(
+        ("a.png", "b c.png".replace(" ", "_")),
+        (tv.Camera(WIDTH, HEIGHT, FX, FY, CX, CY), camera),
+        R,
+        t,
+        tuple(pixels),
+        scene_points(5),
+        np.full((5, 3), 7, np.uint8),
+        np.full(5, 0.25),
+    )
     for name, text in text_model(model).items():
         (tmp_path / name).write_text(text)
     found = pycolmap.Reconstruction(tmp_path)
@@ -260,7 +352,9 @@ def test_a_model_comes_back_with_half_a_pixel_more(tmp_path):
         back = conventions.camera_from_colmap(read_model(tmp_path).cameras[image.camera_id], name)
         assert (back.cx, back.cy, back.model) == (CX, CY, model.cameras[i].model)
     np.testing.assert_array_equal([found.points3D[i + 1].xyz for i in range(5)], scene_points(5))
-    np.testing.assert_allclose(importer.relative(*read_model(tmp_path).images.values())[0], R, atol=1e-15)
+    np.testing.assert_allclose(
+        importer.relative(*read_model(tmp_path).images.values())[0], R, atol=1e-15
+    )
 
 
 def test_the_cloud_of_reconstruct_is_the_models(result, photographs):
@@ -269,8 +363,20 @@ def test_the_cloud_of_reconstruct_is_the_models(result, photographs):
     if not os.path.isfile(program):
         pytest.skip("TWOVIEW_PROGRAM names no program")
     images = photographs / "images"
-    subprocess.run([program, "reconstruct", images / "a.png", images / "c.png", "--camera", result / "cam.yaml", "-o",
-                    result / "cloud", "--quiet"], check=True)
+    subprocess.run(
+        [
+            program,
+            "reconstruct",
+            images / "a.png",
+            images / "c.png",
+            "--camera",
+            result / "cam.yaml",
+            "-o",
+            result / "cloud",
+            "--quiet",
+        ],
+        check=True,
+    )
     cloud = read_ply(result / "cloud" / "cloud.ply")
     found = pycolmap.Reconstruction(result / "out")
     points = [found.points3D[key] for key in sorted(found.points3D)]
@@ -283,8 +389,30 @@ def test_the_cloud_of_reconstruct_is_the_models(result, photographs):
 def test_a_pair_without_a_pose_is_told(result, photographs, tmp_path, call, refuse):
     image = photographs / "images" / "a.png"
     copy = shutil.copy(image, tmp_path / "copy.png")
-    status, _, err = call("model", image, copy, "--camera", result / "cam.yaml", "-o", tmp_path / "out")
-    assert (status, err) == (3, "twoview: no full pose: no_motion\n") and not (tmp_path / "out").exists()
-    refuse("both images are called a.png", "model", image, image, "--camera", result / "cam.yaml", "-o", tmp_path)
+    status, _, err = call(
+        "model", image, copy, "--camera", result / "cam.yaml", "-o", tmp_path / "out"
+    )
+    assert (status, err) == (3, "twoview: no full pose: no_motion\n") and not (
+        tmp_path / "out"
+    ).exists()
+    refuse(
+        "both images are called a.png",
+        "model",
+        image,
+        image,
+        "--camera",
+        result / "cam.yaml",
+        "-o",
+        tmp_path,
+    )
     (tmp_path / "cam.yaml").write_text(CAMERA)
-    refuse("image_width is missing", "model", image, copy, "--camera", tmp_path / "cam.yaml", "-o", tmp_path / "out")
+    refuse(
+        "image_width is missing",
+        "model",
+        image,
+        copy,
+        "--camera",
+        tmp_path / "cam.yaml",
+        "-o",
+        tmp_path / "out",
+    )

@@ -16,10 +16,15 @@ def test_every_image_is_registered_where_it_was(exported, photographs, tmp_path,
     if schema == "3.8" and not shutil.which("colmap"):
         pytest.skip("no colmap: scripts/bootstrap test installs it")
     database = shutil.copy(exported[schema], tmp_path / "x.db")
-    [folder] = mapping.MAPPERS[schema](str(database), str(photographs / "images"), str(tmp_path / "model"), True)
+    [folder] = mapping.MAPPERS[schema](
+        str(database), str(photographs / "images"), str(tmp_path / "model"), True
+    )
     model = read_model(folder)
     assert set(model.images) == set(NAMES) and model.num_points > 300 and model.mean_error_px < 0.6
-    true = {name: (camera_pose(i)[0], -camera_pose(i)[0].T @ camera_pose(i)[1]) for i, name in enumerate(NAMES)}
+    true = {
+        name: (camera_pose(i)[0], -camera_pose(i)[0].T @ camera_pose(i)[1])
+        for i, name in enumerate(NAMES)
+    }
     _, positions, angles = truth.pose_errors(model.poses(), true)
     # neighbouring cameras are 0.8 and 8 degrees apart
     assert positions.max() < 0.01 and angles.max() < 0.1
@@ -49,6 +54,19 @@ def test_an_image_without_keypoints_is_left_out(photographs, tmp_path, schema, c
     shutil.copytree(photographs / "images", tmp_path / "images")
     cv2.imwrite(str(tmp_path / "images" / "blank.png"), np.full((480, 640), 90, np.uint8))
     shutil.copy(photographs / "cameras.yaml", tmp_path)
-    assert call("export", "--database", tmp_path / "x.db", "--images", tmp_path / "images", "--schema", schema)[0] == 0
-    [folder] = mapping.MAPPERS[schema](str(tmp_path / "x.db"), str(tmp_path / "images"), str(tmp_path / "model"), True)
+    assert (
+        call(
+            "export",
+            "--database",
+            tmp_path / "x.db",
+            "--images",
+            tmp_path / "images",
+            "--schema",
+            schema,
+        )[0]
+        == 0
+    )
+    [folder] = mapping.MAPPERS[schema](
+        str(tmp_path / "x.db"), str(tmp_path / "images"), str(tmp_path / "model"), True
+    )
     assert set(read_model(folder).images) == set(NAMES)

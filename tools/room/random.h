@@ -1,4 +1,5 @@
-// SplitMix64 (G. L. Steele, D. Lea, C. H. Flood, 2014): the same numbers for a seed everywhere.
+// The random numbers of the room and its textures: SplitMix64 (G. L. Steele, D. Lea, C. H. Flood,
+// 2014). A seed gives the same numbers on every platform.
 #pragma once
 
 #include <cmath>
@@ -18,7 +19,7 @@ class Random {
   double uniform(double low, double high) {
     return low + (high - low) * (static_cast<double>(next() >> 11) * 0x1p-53);
   }
-  // Box and Muller.
+  // A standard normal number, by the method of Box and Muller.
   double normal() {
     const double radius = std::sqrt(-2 * std::log(1 - uniform(0, 1)));
     return radius * std::cos(2 * 3.14159265358979323846 * uniform(0, 1));

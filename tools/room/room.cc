@@ -25,7 +25,7 @@ Mat3 times(const Mat3& a, const Mat3& b) {
   return product;
 }
 
-// Textures by their place in the room.
+// The index of each texture in the room's list of textures.
 enum { kWall, kFloor, kCeiling, kFurniture, kPillar, kPicture, kNumTextures };
 
 }  // namespace
@@ -97,7 +97,7 @@ Room::Hit Room::first_hit(const Vec3& from, const Vec3& ray) const {
   const Vec3 inverse = {1 / ray[0], 1 / ray[1], 1 / ray[2]};
   Hit hit{HUGE_VAL, &walls_, 0, 0};
   for (size_t k = 0; k < 3; ++k) {
-    if (ray[k] == 0) continue;  // along these two walls
+    if (ray[k] == 0) continue;  // the ray is parallel to these two sides
     const int side = ray[k] > 0 ? 1 : 0;
     const double exit = ((side == 1 ? walls_.high[k] : walls_.low[k]) - from[k]) * inverse[k];
     if (exit < hit.distance) hit = {exit, &walls_, k, side};
@@ -123,7 +123,8 @@ float Room::grey_at(const Vec3& from, const Vec3& ray, const Hit& hit, double pi
   constexpr double kTilesPerMetre = 0.45;
   const Box& box = *hit.box;
   const size_t u_axis = (hit.axis + 1) % 3, v_axis = (hit.axis + 2) % 3;
-  // So that no two sides show the same piece.
+  // The shift gives each side of a box its own piece of the texture, so that no two sides look the
+  // same.
   const double shift =
       0.37 * static_cast<double>(6 * (&box == &walls_ ? 0 : &box - &boxes_[0] + 1) +
                                  2 * static_cast<int>(hit.axis) + hit.side);
@@ -131,7 +132,8 @@ float Room::grey_at(const Vec3& from, const Vec3& ray, const Hit& hit, double pi
   const double v = (from[v_axis] + hit.distance * ray[v_axis] - box.low[v_axis]) * kTilesPerMetre;
   int texture = box.texture;
   if (&box == &walls_ && hit.axis == 2) texture = hit.side == 1 ? kFloor : kCeiling;
-  // The side of a pixel's patch: between its short side and the one that the slant draws out.
+  // The side, in tiles, of a square with the area that a pixel covers on the surface. A slanted
+  // surface stretches this area in one direction.
   const double slant = std::max(std::abs(ray[hit.axis]), 0.05);
   const double footprint = hit.distance * pixel_angle / std::sqrt(slant) * kTilesPerMetre;
   const double light =
@@ -184,7 +186,8 @@ bool Room::is_free(const Vec3& position, double radius) const {
 
 void add_sensor_noise(uint8_t* luma, int width, int height, int64_t stride_bytes, double sigma,
                       uint64_t seed) {
-  // Normal numbers by table: a draw of 4096 is as good as new ones and much cheaper.
+  // The noise is drawn from a table of 4096 normal numbers, which is much faster than drawing each
+  // one anew.
   Random random(seed);
   std::array<int8_t, 4096> noise;
   for (int8_t& value : noise) {

@@ -1,6 +1,6 @@
-// A furnished room to fly through, rendered with its true poses and depths.
-// World and body frames are those of the drivers: x forward, y right, z down; z = 0 is the floor,
-// so what lies above it has z < 0.
+// A furnished room to fly through, which is rendered with its true poses and depths. The world and
+// body frames are those of the drivers: x forward, y right, z down. The floor is z = 0, so
+// everything above the floor has z < 0.
 #pragma once
 
 #include <array>
@@ -16,35 +16,36 @@ namespace room {
 using Vec3 = std::array<double, 3>;
 using Mat3 = std::array<double, 9>;  // row-major
 
-// A camera frame (x right, y down, z forward) in the world: world = rotation camera + position.
+// The pose of a camera (x right, y down, z forward) in the world: x_world = rotation * x_camera +
+// position.
 struct CameraPose {
   Mat3 world_from_camera;
   Vec3 position;  // metres
 };
 
-// A camera fixed in the body: camera axes in the body frame. Looking forward: x of the camera is y
-// of the body, y is z, z is x.
+// The rotation from camera axes to body axes of a camera that looks forward: the camera's x axis is
+// the body's y axis, its y axis is the body's z axis, and its z axis is the body's x axis.
 extern const Mat3 kForwardCamera;
 
-// Attitude by yaw, pitch, roll (aerospace order z y x; nose up, right side down are positive), then
-// the camera in the body.
+// The rotation from body to world for yaw, pitch and roll in the aerospace order z y x. A raised
+// nose and a lowered right side are positive angles.
 Mat3 world_from_body(double yaw_rad, double pitch_rad, double roll_rad);
 CameraPose camera_pose(const Mat3& world_from_body, const Mat3& body_from_camera,
                        const Vec3& position);
 
-// cam1_from_cam0 of two poses: R row-major, t in metres.
+// Computes R (row-major) and t (metres) of cam1_from_cam0 from the poses of two cameras.
 void relative_pose(const CameraPose& cam0, const CameraPose& cam1, Mat3& R, Vec3& t);
 
-// The viewing rays of a camera's pixels, found once.
+// The viewing ray of each pixel of a camera, computed once for all renderings.
 class Eye {
  public:
   // Throws std::invalid_argument for a camera that the library refuses.
   explicit Eye(const tv_camera& camera);
   int width() const { return width_; }
   int height() const { return height_; }
-  // Unit ray, or zeros where the lens sees nothing.
+  // The unit ray of a pixel; three zeros where the lens model gives no ray.
   const float* ray(int x, int y) const { return &rays_[3 * static_cast<size_t>(y * width_ + x)]; }
-  // The angle between neighbouring pixels' rays, radians, in the middle of the image.
+  // The angle between the rays of neighbouring pixels in the middle of the image, in radians.
   double pixel_angle() const { return pixel_angle_; }
 
  private:
@@ -55,26 +56,31 @@ class Eye {
 
 class Room {
  public:
-  // 9 x 7 x 3 metres with cupboards, tables, pillars and pictures; the seed moves textures only.
+  // Builds a room of 9 x 7 x 3 metres with cupboards, tables, pillars and pictures. The seed
+  // changes only the textures.
   explicit Room(uint64_t seed = 1);
 
-  // Grey levels, row by row; depth: null, or z in the camera frame, metres, 0 where no ray goes.
+  // Renders grey levels, row by row. `depth` may be null; otherwise it receives z in the camera
+  // frame in metres, and 0 where a pixel has no ray.
   void render(const Eye& eye, const CameraPose& pose, uint8_t* luma, int64_t stride_bytes,
               float* depth = nullptr) const;
 
-  // Height of what lies under a point: what an ultrasound altimeter measures, metres.
+  // The height of a point above the floor or furniture below it, in metres. An ultrasound altimeter
+  // measures this height.
   double height_above_ground(const Vec3& position) const;
 
-  // True where a ball of this radius fits.
+  // Returns true if a ball of this radius at this position touches nothing.
   bool is_free(const Vec3& position, double radius) const;
 
  private:
-  // Sides parallel to the axes. The walls are seen from inside, all else from outside.
+  // A box whose sides are parallel to the axes. The walls of the room are seen from inside, all
+  // other boxes from outside.
   struct Box {
     Vec3 low, high;
     int texture;
   };
-  // Where a ray meets a side of a box: at a distance, a side across `axis`, low (0) or high (1).
+  // The point where a ray meets a side of a box: its distance, the axis that the side is
+  // perpendicular to, and whether it is the low (0) or the high (1) side.
   struct Hit {
     double distance;
     const Box* box;
@@ -89,7 +95,8 @@ class Room {
   Box walls_;
 };
 
-// Sensor noise of `sigma` grey levels, the same for a seed.
+// Adds Gaussian noise with a standard deviation of `sigma` grey levels. The same seed gives the
+// same noise.
 void add_sensor_noise(uint8_t* luma, int width, int height, int64_t stride_bytes, double sigma,
                       uint64_t seed);
 

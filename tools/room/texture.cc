@@ -12,7 +12,8 @@ constexpr int kSide = Texture::kSide;
 
 int wrap(int x) { return x & (kSide - 1); }
 
-// Value noise on a lattice of `cells` per side, smooth and periodic, added with an amplitude.
+// Adds smooth, periodic value noise of this amplitude to the tile. The noise has a lattice of
+// `cells` cells a side.
 void add_noise(Random& random, int cells, double amplitude, std::vector<float>& tile) {
   std::vector<float> lattice(static_cast<size_t>(cells) * cells);
   for (float& value : lattice) value = static_cast<float>(random.uniform(-amplitude, amplitude));
@@ -43,7 +44,8 @@ std::vector<float> fractal(Random& random, double grey, double amplitude) {
   return tile;
 }
 
-// A shape in a turned frame: |x| <= half_length, |y| <= half_width, or the ellipse within.
+// A shape in a rotated frame: the rectangle |x| <= half_length, |y| <= half_width, or the ellipse
+// inscribed in it.
 struct Mark {
   double x, y, cosine, sine, half_length, half_width, grey;
   bool round;
@@ -70,7 +72,7 @@ void paint(const Mark& mark, std::vector<float>& tile) {
       const double a = std::abs(mark.cosine * dx + mark.sine * dy) / mark.half_length;
       const double b = std::abs(mark.cosine * dy - mark.sine * dx) / mark.half_width;
       const double out = mark.round ? std::sqrt(a * a + b * b) : std::max(a, b);
-      // One texel of soft edge.
+      // The edge of the mark is soft over one texel.
       const double cover = std::clamp((1 - out) * mark.half_width + 0.5, 0.0, 1.0);
       if (cover == 0) continue;
       float& texel = tile[static_cast<size_t>(wrap(static_cast<int>(mark.y) + dy) * kSide +
@@ -102,7 +104,8 @@ std::vector<uint8_t> halved(const std::vector<uint8_t>& fine, int side) {
 }
 
 float bilinear(const std::vector<uint8_t>& texels, int side, double u, double v) {
-  // u, v above -kRepeats: the conversions cut off what lies behind the point of a positive number.
+  // u and v must be above -kRepeats: adding kRepeats makes them positive, so that the conversion to
+  // an integer rounds down.
   constexpr double kRepeats = 4;
   const double x = (u + kRepeats) * side - 0.5, y = (v + kRepeats) * side - 0.5;
   const int whole_x = static_cast<int>(x), whole_y = static_cast<int>(y);
@@ -131,7 +134,7 @@ Texture Texture::pattern(uint64_t seed) {
 }
 
 Texture Texture::planks(uint64_t seed) {
-  constexpr int kBoard = 64;  // texels wide
+  constexpr int kBoard = 64;  // width of a board, texels
   Random random(seed);
   std::vector<float> tile = fractal(random, 0, 14);
   for (int row = 0; row < kSide; row += kBoard) {
@@ -153,7 +156,8 @@ Texture Texture::planks(uint64_t seed) {
 }
 
 float Texture::sample(double u, double v, double footprint) const {
-  // The level whose texels are no larger than the footprint, and the share of the next.
+  // The coarsest mip level whose texels are at most as large as the footprint, and the weight of
+  // the next coarser level.
   int exponent;
   const double mantissa = std::frexp(std::max(footprint * kSide, 1.0), &exponent);
   const int level = std::min(exponent - 1, static_cast<int>(levels_.size()) - 2);

@@ -1,4 +1,5 @@
-// Textures made by the program: enough corners for features at every distance, the same for a seed.
+// Procedural textures with enough corners for features at every distance. The same seed gives the
+// same texture.
 #pragma once
 
 #include <cstdint>
@@ -6,18 +7,19 @@
 
 namespace room {
 
-// A square grey tile that repeats, with its mip levels: level k is 2^k times smaller.
+// A square grey tile that repeats in both directions, with its mip levels: level k is 2^k times
+// smaller.
 class Texture {
  public:
   static constexpr int kSide = 1024;
 
-  // Fractal noise under a scatter of discs, boxes and strokes of all sizes and greys.
+  // Fractal noise below randomly placed discs, boxes and strokes of all sizes and grey levels.
   static Texture pattern(uint64_t seed);
-  // Boards with seams, for a floor.
+  // Wooden boards with seams, used for a floor.
   static Texture planks(uint64_t seed);
 
-  // Grey level at (u, v) tiles, both above -4, seen so that one pixel covers `footprint` tiles:
-  // trilinear.
+  // The grey level at (u, v), in units of tiles; both must be above -4. A pixel covers `footprint`
+  // tiles; the interpolation is trilinear.
   float sample(double u, double v, double footprint) const;
 
  private:

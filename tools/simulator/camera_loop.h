@@ -1,5 +1,5 @@
-// The drone's camera: a thread that paints a picture at each frame time and encodes it, so that
-// slow pictures never hold up navdata.
+// The drone's camera: a thread that renders a picture at each frame time and encodes it, so that a
+// slow picture never delays the navdata.
 #pragma once
 
 #include <condition_variable>
@@ -14,7 +14,7 @@ namespace simulator {
 
 struct CodedFrame {
   FilmPacket packet;
-  FlightState truth;  // at the exposure
+  FlightState truth;  // the state at the time of exposure
   int64_t uptime_ns = 0;
   int width = 0, height = 0;
 };
@@ -24,9 +24,10 @@ class CameraLoop {
   CameraLoop(const ServerOptions& options, const room::Room& room);
   ~CameraLoop();
 
-  // What the next picture is to see. Replaces one that was not begun yet.
+  // Requests the next picture, seen from `truth`. It replaces a requested picture that the thread
+  // has not started.
   void expose(const FlightState& truth, int64_t uptime_ns, bool is_720p);
-  // Finished pictures, oldest first.
+  // Removes and returns the finished pictures, oldest first.
   std::deque<CodedFrame> take();
 
  private:

@@ -1,4 +1,5 @@
-// What a bad radio link does to datagrams, with chances that a test can choose.
+// The faults of a bad radio link: datagrams are lost, truncated, corrupted, duplicated or
+// reordered, each with a probability that a test chooses.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,7 @@
 
 namespace simulator {
 
-// Each in [0, 1]: the chance that a datagram meets this.
+// The probability, in [0, 1], that a datagram meets each fault.
 struct FaultChances {
   double lose = 0, duplicate = 0, reorder = 0, truncate = 0, corrupt = 0;
 };
@@ -18,8 +19,8 @@ class FaultyLink {
   using Bytes = std::vector<uint8_t>;
   FaultyLink(const FaultChances& chances, uint64_t seed) : chances_(chances), random_(seed) {}
 
-  // What arrives when this is sent: none, one or several datagrams, in the order of arrival. One
-  // that is overtaken waits for the next.
+  // Returns the datagrams that arrive when this one is sent: none, one or several, in their order
+  // of arrival. A datagram that is overtaken arrives with the next one.
   std::vector<Bytes> send(Bytes datagram);
 
  private:

@@ -11,10 +11,11 @@ extern "C" {
 namespace simulator {
 namespace {
 
-constexpr int kKeyEvery = 15;  // pictures, as in the captures
+// One key picture in this many pictures, as in recordings of a real drone.
+constexpr int kKeyEvery = 15;
 
-// Bytes of a unit of this type at the start of `bytes`, its start code included; 0 for another
-// type.
+// The size in bytes of the first unit in `bytes`, with its start code, if the unit has this type;
+// otherwise 0.
 size_t unit_bytes(const uint8_t* bytes, size_t size, int type) {
   const auto start_code = [&](size_t at) -> size_t {
     if (at + 3 <= size && bytes[at] == 0 && bytes[at + 1] == 0 && bytes[at + 2] == 1) return 3;
@@ -82,7 +83,7 @@ FilmPacket Film::encode(const uint8_t* luma, int64_t stride_bytes) {
     std::memcpy(e.frame->data[0] + y * e.frame->linesize[0], luma + y * stride_bytes,
                 static_cast<size_t>(width_));
   }
-  for (int plane = 1; plane < 3; ++plane) {  // grey
+  for (int plane = 1; plane < 3; ++plane) {  // a grey picture: both colour planes are constant
     std::memset(e.frame->data[plane], 128,
                 static_cast<size_t>(e.frame->linesize[plane]) * static_cast<size_t>(height_ / 2));
   }

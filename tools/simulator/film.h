@@ -1,5 +1,5 @@
-// Pictures to H.264 as the drone's encoder makes it: one packet a picture, parameter sets in each
-// key picture, no picture that waits for a later one.
+// Encodes pictures to H.264 as the drone's encoder does: one packet a picture, parameter sets in
+// each key picture, and no picture that depends on a later one.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 namespace simulator {
 
 struct FilmPacket {
-  std::vector<uint8_t> payload;  // Annex B
+  std::vector<uint8_t> payload;  // H.264 in the byte-stream format of Annex B
   bool is_key = false;
   uint8_t sps_bytes = 0, pps_bytes = 0;
 };

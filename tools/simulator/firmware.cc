@@ -17,7 +17,7 @@ constexpr int64_t kDemoPeriodNs = kSecond / 15, kFullPeriodNs = kSecond / 200;
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 const char kDefaultId[] = "00000000", kVersionKey[] = "general:num_version_soft";
 
-// The answer of a drone out of its box, about; keys that a driver asks for.
+// Approximately the configuration of a new drone, reduced to the keys that a driver requests.
 std::map<std::string, std::string> factory_configuration() {
   return {{"general:num_version_config", "1"},
           {"general:num_version_mb", "33"},
@@ -64,7 +64,8 @@ std::map<std::string, std::string> factory_configuration() {
           {"custom:profile_desc", "default"}};
 }
 
-// The arguments of a command: split at commas that stand outside quotes, which are taken away.
+// The arguments of a command. They are split at the commas outside quotes, and the quotes are
+// removed.
 std::vector<std::string> split_arguments(std::string_view text) {
   std::vector<std::string> arguments(1);
   bool quoted = false;
@@ -87,7 +88,8 @@ std::optional<int32_t> to_int(const std::string& text) {
   return static_cast<int32_t>(value);
 }
 
-// A float that was sent as the integer of its bits, where it is a fraction in [-1, 1].
+// The stick value of an argument, which is the integer with the same bits as a float. It is empty
+// unless the float is in [-1, 1].
 std::optional<double> to_stick(const std::string& text) {
   const std::optional<int32_t> bits = to_int(text);
   if (!bits) return {};
@@ -97,7 +99,8 @@ std::optional<double> to_stick(const std::string& text) {
   return value;
 }
 
-// Puts options with tags that no known firmware has before the checksum, which is the last.
+// Adds options with tags that no known firmware uses. They are placed before the checksum, which is
+// always the last option.
 void add_unknown_options(std::vector<uint8_t>& packet) {
   const std::vector<uint8_t> options = {40, 0, 12, 0, 1, 2, 3, 4, 5, 6, 7, 8, 0x32, 0x88, 4, 0};
   packet.insert(packet.end() - 8, options.begin(), options.end());
@@ -110,7 +113,8 @@ bool is_id(const std::string& text) {
   return text.size() == 8 && text.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
 }
 
-// Writing a custom id makes it current; "-<id>" forgets one, "-all" every one but the default.
+// Writing a custom id makes it the current one. Writing "-<id>" deletes one id, and "-all" deletes
+// every id except the default.
 void choose_id(const std::string& value, std::map<std::string, std::string>& known,
                std::string& current) {
   if (value == "-all") {
@@ -146,7 +150,7 @@ void Firmware::set_version(const std::string& version) {
 
 void Firmware::reboot(int64_t now_ns) {
   flight_.cut_motors();
-  flight_.advance(3);  // down from anywhere in the room
+  flight_.advance(3);  // 3 s are enough to land from any height in the room
   flight_.rearm();
   configuration_ = factory_configuration();
   if (!version_.empty()) configuration_[kVersionKey] = version_;
@@ -169,7 +173,7 @@ void Firmware::receive_commands(std::string_view datagram, int64_t now_ns) {
   while (!datagram.empty()) {
     const size_t end = datagram.find('\r');
     if (end == std::string_view::npos) {
-      ++num_refused_;  // not a whole line
+      ++num_refused_;  // an incomplete line is refused
       return;
     }
     obey(datagram.substr(0, end), now_ns);
@@ -201,7 +205,7 @@ void Firmware::obey(std::string_view line, int64_t now_ns) {
   if (name == "CONFIG_IDS" && arguments.size() == 3) {
     addressed_ = {arguments[0], arguments[1], arguments[2]};
   } else {
-    addressed_ = {};  // ids hold for the next command only
+    addressed_ = {};  // the ids apply to the next command only
   }
   if (name == "CTRL") obey_control(arguments);
   if (name == "COMWDG") watchdog_ = false;
@@ -241,7 +245,7 @@ bool Firmware::is_writable(const std::string& key) const {
 }
 
 void Firmware::obey_config(const std::vector<std::string>& arguments) {
-  if (arguments.size() != 2 || acknowledge_) return;  // one exchange at a time
+  if (arguments.size() != 2 || acknowledge_) return;  // only one exchange at a time
   const std::string &key = arguments[0], &value = arguments[1];
   acknowledge_ = true;
   bootstrap_ = false;
@@ -269,7 +273,7 @@ void Firmware::obey_control(const std::vector<std::string>& arguments) {
   if (*mode == ARDRONE_CTRL_ACKNOWLEDGE) acknowledge_ = false;
   if (*mode == ARDRONE_CTRL_SEND_CONFIG || *mode == ARDRONE_CTRL_SEND_IDS) {
     acknowledge_ = true;
-    // Asked for again before it was fetched: the same text, once.
+    // A second request before the text was fetched does not add a second copy of the text.
     control_texts_.assign(1, *mode == ARDRONE_CTRL_SEND_CONFIG ? configuration_text() : ids_text());
   }
 }
@@ -300,7 +304,7 @@ void Firmware::watch_link(int64_t now_ns) {
   if (silent_ns > kWatchdogNs) watchdog_ = true;
   if (silent_ns > static_cast<int64_t>(number("general:com_watchdog") * 1e9) && !lost_) {
     lost_ = true;
-    last_command_ = 0;  // the next controller starts at 1
+    last_command_ = 0;  // the next controller starts with sequence number 1
     emergency_level_ = false;
     flight_.land();
   }
@@ -359,7 +363,7 @@ void Firmware::fill(int64_t now_ns, ardrone_navdata* navdata) {
   demo.phi_mdeg = static_cast<float>(roll * kDegrees * 1000);
   demo.psi_mdeg = static_cast<float>(yaw * kDegrees * 1000);
   demo.altitude_mm = in_air ? static_cast<int32_t>(std::lround(height * 1000)) : 0;
-  for (size_t k = 0; k < 2; ++k) {  // z stays 0, as on the real drone
+  for (size_t k = 0; k < 2; ++k) {  // z stays 0, as a real drone reports it
     demo.velocity_mm_s[k] = in_air
                                 ? static_cast<float>(1000 * noisy(v[k] * sensors_.velocity_factor,
                                                                   sensors_.velocity_noise_m_s))
@@ -376,7 +380,8 @@ void Firmware::fill(int64_t now_ns, ardrone_navdata* navdata) {
   navdata->euler_angles.theta_mdeg = demo.theta_mdeg;
   navdata->euler_angles.phi_mdeg = demo.phi_mdeg;
   navdata->altitude.vision_mm = static_cast<int32_t>(std::lround(height * 1000));
-  navdata->altitude.raw_mm = navdata->altitude.vision_mm + 240;  // the sonar's foot, as measured
+  // The raw sonar value has a measured offset of 240 mm.
+  navdata->altitude.raw_mm = navdata->altitude.vision_mm + 240;
   navdata->altitude.vz_mm_s = static_cast<float>(
       1000 * noisy(-state.velocity[2] * sensors_.altitude_factor, sensors_.velocity_noise_m_s));
   navdata->vision.theta_rad = static_cast<float>(pitch);

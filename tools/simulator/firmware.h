@@ -1,5 +1,5 @@
-// What runs on the simulated drone: it obeys AT commands, keeps a configuration and says how it is
-// in navdata. It knows bytes and a clock, no sockets.
+// The firmware of the simulated drone: it executes AT commands, stores a configuration and reports
+// its state as navdata. It uses bytes and a clock, but no sockets.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct ardrone_navdata;
 
 namespace simulator {
 
-// How far the sensors are off: factors on the truth, and one standard deviation of noise.
+// The errors of the sensors: a factor on each true value, and the standard deviation of the noise.
 struct Sensors {
   double altitude_factor = 1.0;
   double velocity_factor = 1.0;
@@ -30,35 +30,40 @@ class Firmware {
   Firmware(const room::Room& room, const Vec3& start, double yaw_rad, const Sensors& sensors,
            int64_t now_ns);
 
-  // A datagram on the AT port, and one on the navdata port (it wakes the stream).
+  // Handles a datagram that arrived on the AT port, or on the navdata port (which starts the
+  // navdata stream).
   void receive_commands(std::string_view datagram, int64_t now_ns);
   void receive_hello(int64_t now_ns);
 
-  // Flies on and watches over the link; call it often.
+  // Advances the flight and checks the link's timeout. Call it often.
   void advance(int64_t now_ns);
 
-  // The navdata packet that is due, or nothing: 15 a second in demo mode, 200 in full.
+  // The next navdata packet if it is due, otherwise nothing. Packets are due 15 times a second in
+  // demo mode and 200 times a second in full mode.
   std::optional<std::vector<uint8_t>> next_navdata(int64_t now_ns);
 
-  // What the control channel is to send (configuration or id list, with its zero byte), once.
+  // Returns, only once, the text that the control channel must send (the configuration or the list
+  // of ids, with a terminating zero byte).
   std::optional<std::string> take_control_text();
 
-  // As when its battery was changed: bootstrap, sequence numbers from 1, on the ground where it is.
+  // Restarts the drone as after a change of its battery: it is in bootstrap mode, its sequence
+  // numbers start at 1, and it stands on the ground at its present place.
   void reboot(int64_t now_ns);
-  // As that version: it tells it, and an unknown one's navdata has options that nobody knows.
+  // Sets the reported firmware version. With a version that is not known, navdata also has options
+  // with unknown tags.
   void set_version(const std::string& version);
-  // The next packet's sequence number, to try the wrap.
+  // Sets the sequence number of the next packet, to test the wrap to 0.
   void set_sequence(uint32_t sequence) { sequence_ = sequence; }
 
-  // Time since boot: what navdata's and the video's stamps count.
+  // The time since boot, which the time stamps of navdata and video count.
   int64_t uptime_ns(int64_t now_ns) const { return now_ns - boot_ns_; }
   const FlightState& truth() const { return flight_.state(); }
   bool wants_720p() const;
   bool navdata_runs() const { return hello_; }
   int num_refused() const { return num_refused_; }
   int num_obeyed() const { return num_obeyed_; }
-  // The highest sequence number obeyed since the link began, and whether one fell without starting
-  // at 1.
+  // The highest sequence number that was executed since the link began, and whether a sequence
+  // number decreased without starting at 1 again.
   int32_t last_command() const { return last_command_; }
   int num_take_offs() const { return num_take_offs_; }
 
@@ -86,9 +91,10 @@ class Firmware {
 
   Flight flight_;
   Sensors sensors_;
-  std::string version_;  // empty: the factory's
+  std::string version_;  // empty: the version in the factory configuration
   std::map<std::string, std::string> configuration_;
-  std::map<std::string, std::string> sessions_, users_, applications_;  // id to description
+  // Id to description, for each kind of id.
+  std::map<std::string, std::string> sessions_, users_, applications_;
   Ids ids_, addressed_;
   std::vector<std::string> control_texts_;
   bool bootstrap_ = true, acknowledge_ = false, hello_ = false, watchdog_ = false, lost_ = false;

@@ -8,17 +8,17 @@ namespace {
 
 constexpr double kGravity = 9.81;      // m/s^2
 constexpr double kStep = 0.005;        // s
-constexpr double kTiltDelay = 0.12;    // s, to 63 per cent of the wanted angle
-constexpr double kClimbDelay = 0.25;   // s
-constexpr double kTurnDelay = 0.15;    // s
+constexpr double kTiltDelay = 0.12;    // s until 63 % of the commanded angle is reached
+constexpr double kClimbDelay = 0.25;   // s until 63 % of the commanded climb rate is reached
+constexpr double kTurnDelay = 0.15;    // s until 63 % of the commanded turn rate is reached
 constexpr double kDrag = 0.25;         // 1/s
-constexpr double kBrake = 0.16;        // rad of tilt against a m/s, while hovering
-constexpr double kHoverHeight = 1.0;   // m, where a take-off ends
+constexpr double kBrake = 0.16;        // rad of tilt per m/s of speed, while hovering
+constexpr double kHoverHeight = 1.0;   // m, height at which a take-off ends
 constexpr double kLandingSpeed = 0.5;  // m/s
 constexpr double kTakeOffSpeed = 0.6;  // m/s
-constexpr double kBodyRadius = 0.3;    // m, to the propellers' guards
-constexpr double kLowest = 0.3;        // m above the ground, while flying: lower, it climbs
-constexpr double kRecovery = 0.1;      // m/s
+constexpr double kBodyRadius = 0.3;    // m, from the centre to the propellers' guards
+constexpr double kLowest = 0.3;        // m above the ground; a flying drone that is lower climbs
+constexpr double kRecovery = 0.1;      // m/s, speed of that climb
 
 Vec3 rotate_back(const Mat3& m, const Vec3& v) {
   Vec3 out{};
@@ -81,7 +81,7 @@ void Flight::advance(double seconds) {
 }
 
 void Flight::step(double dt) {
-  // On level axes that turn with the yaw.
+  // The axes are horizontal and turn with the yaw.
   const double forward =
       std::cos(state_.yaw) * state_.velocity[0] + std::sin(state_.yaw) * state_.velocity[1];
   const double right =
@@ -131,8 +131,8 @@ void Flight::tilt_towards(double pitch, double roll, double turn_rad_s, double d
   state_.yaw = std::remainder(state_.yaw + state_.yaw_rate * dt, 2 * 3.14159265358979323846);
 }
 
-// The thrust holds the height: what tilt takes from it is given back, so that a level acceleration
-// of g tan(tilt) remains. Nose down, or right side down, pulls that way.
+// The thrust compensates the vertical force that a tilt removes, so that only a level acceleration
+// of g tan(tilt) remains. A lowered nose accelerates forward, a lowered right side to the right.
 void Flight::accelerate(double climb_m_s, double dt) {
   const double forward = -kGravity * std::tan(state_.pitch);
   const double right = kGravity * std::tan(state_.roll) / std::cos(state_.pitch);
@@ -155,7 +155,8 @@ void Flight::move(double dt) {
     state_.velocity = {0, 0, 0};
     if (state_.mode == FlightMode::kLanding) state_.mode = FlightMode::kLanded;
   }
-  // Furniture and walls stop it; the floor does not count: it stands on its feet.
+  // Furniture and walls stop the drone. Contact with the floor is no obstacle, since the drone
+  // stands on it.
   const Vec3 above{next[0], next[1], std::min(next[2], ground - kBodyRadius)};
   if (room_.is_free(above, kBodyRadius)) {
     state_.position = next;

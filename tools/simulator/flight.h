@@ -1,7 +1,7 @@
-// How the simulated drone flies: simple, but with the right signs and sizes. Nothing here knows of
+// A simple model of how the simulated drone flies, with correct signs and magnitudes. It uses no
 // packets, sockets or clocks.
-// Body: x forward, y right, z down. World: z down, z = 0 the floor. Angles: yaw clockwise from
-// above, pitch nose up, roll right side down are positive.
+// Body frame: x forward, y right, z down. World frame: z down, and the floor is z = 0. Positive
+// angles: yaw clockwise from above, pitch with the nose up, roll with the right side down.
 #pragma once
 
 #include "room/room.h"
@@ -11,13 +11,13 @@ namespace simulator {
 using room::Mat3;
 using room::Vec3;
 
-// Fractions of the limits, each in [-1, 1]: roll + right, pitch + backward, climb + up, turn +
-// clockwise.
+// The sticks as fractions of the limits, each in [-1, 1]. Positive: roll right, pitch backward,
+// climb up, turn clockwise.
 struct Sticks {
   double roll = 0, pitch = 0, climb = 0, turn = 0;
 };
 
-// The drone's own defaults for indoor flight.
+// The limits of flight; the defaults are the drone's own for indoor flight.
 struct FlightLimits {
   double tilt_rad = 0.21;
   double climb_m_s = 0.7;
@@ -27,7 +27,7 @@ struct FlightLimits {
 
 enum class FlightMode { kLanded, kTakingOff, kHovering, kFlying, kLanding, kMotorsCut };
 
-// The truth at one instant.
+// The true state at one instant.
 struct FlightState {
   FlightMode mode = FlightMode::kLanded;
   Vec3 position{0, 0, 0};                              // world, metres
@@ -38,30 +38,30 @@ struct FlightState {
 };
 
 Mat3 world_from_body(const FlightState& state);
-// Velocity on the body's axes: what the drone's own estimate is about.
+// The velocity on the body's axes, which the drone's own velocity estimate approximates.
 Vec3 body_velocity(const FlightState& state);
-// What an ideal accelerometer reads, body axes, m/s^2: (0, 0, -9.81) at rest.
+// The reading of an ideal accelerometer on body axes, in m/s^2: (0, 0, -9.81) at rest.
 Vec3 specific_force(const FlightState& state);
 
 class Flight {
  public:
-  // The room stops the drone where it would touch something. It must outlive the flight.
+  // The drone stops where it would touch the room, which must outlive this object.
   Flight(const room::Room& room, const Vec3& start, double yaw_rad);
 
   void set_limits(const FlightLimits& limits) { limits_ = limits; }
-  // Wishes, as the on-board computer understands them; it decides what the mode allows.
+  // Requests from the controller. The drone executes a request only if its mode allows it.
   void take_off();
   void land();
   void cut_motors();
-  // On the ground again after an emergency.
+  // Returns to the landed state after an emergency.
   void rearm();
   void hover();
   void steer(const Sticks& sticks);
 
-  // Moves on by `seconds`, in steps of at most 5 ms.
+  // Advances the flight by `seconds`, in steps of at most 5 ms.
   void advance(double seconds);
   const FlightState& state() const { return state_; }
-  // Above what lies under the drone, metres.
+  // The height above the floor or furniture below the drone, in metres.
   double height() const;
 
  private:

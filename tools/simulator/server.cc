@@ -20,8 +20,8 @@ namespace {
 
 constexpr int64_t kSecond = 1000000000;
 constexpr int64_t kStallNs = 3 * kSecond;
-constexpr int64_t kRebootNs = kSecond;    // silent for so long
-constexpr size_t kMostUnsent = 1u << 20;  // bytes that wait for a slow client
+constexpr int64_t kRebootNs = kSecond;    // the drone sends nothing for this time after a reboot
+constexpr size_t kMostUnsent = 1u << 20;  // bytes that may wait for a slow client
 
 int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -29,7 +29,7 @@ int64_t now_ns() {
       .count();
 }
 
-// Every `period_s`, the first time after one period.
+// A time that is due every `period_s` seconds, first after one period.
 class Repeated {
  public:
   Repeated(double period_s, int64_t from_ns)
@@ -77,7 +77,8 @@ class Stream {
   }
 
  private:
-  // Clients say nothing on these ports; an end of their side is told by a read of nothing.
+  // Returns true if the client has closed its side, which a read of 0 bytes shows. Clients send
+  // nothing on these ports.
   bool has_left() {
     uint8_t ignored[256];
     const ssize_t got = recv(client_.fd(), ignored, sizeof ignored, MSG_DONTWAIT);
@@ -89,7 +90,7 @@ class Stream {
   std::vector<uint8_t> unsent_;
 };
 
-// world_from_body as x y z w.
+// Converts world_from_body to a quaternion in the order x y z w.
 void quaternion(const Mat3& m, double q[4]) {
   const double trace = m[0] + m[4] + m[8];
   const double squares[4] = {1 + 2 * m[0] - trace, 1 + 2 * m[4] - trace, 1 + 2 * m[8] - trace,
@@ -151,7 +152,7 @@ struct Server::State {
   room::Random random;
   CameraLoop camera;
   std::unique_ptr<FILE, CloseFile> truth_file;
-  sockaddr_in listener{};  // who woke navdata
+  sockaddr_in listener{};  // the address from which the client started navdata
   int64_t next_exposure_ns = 0, stalled_until_ns = 0, dead_until_ns = 0;
   std::optional<Repeated> cuts, stalls, reboots;
   uint32_t frame_number = 0;
@@ -300,7 +301,7 @@ void Server::State::wait() const {
   video.add_to(polled);
   control.add_to(polled);
   recording.add_to(polled);
-  poll(polled.data(), polled.size(), 2);  // ms; navdata comes every five
+  poll(polled.data(), polled.size(), 2);  // waits at most 2 ms, since navdata is due every 5 ms
 }
 
 Server::Server(const ServerOptions& options) : state_(std::make_unique<State>(options)) {}

@@ -1,5 +1,5 @@
-// A drone on this computer's loopback: all its ports, its flight, its camera, and the faults of a
-// bad day.
+// A simulated drone on this computer's loopback interface: all its ports, its flight, its camera,
+// and simulated network faults.
 #pragma once
 
 #include <atomic>
@@ -9,7 +9,7 @@
 
 namespace simulator {
 
-// What happened, for the one who tests a driver.
+// Counts of events, for a test of a driver.
 struct ServerCounts {
   int64_t commands_obeyed = 0, commands_refused = 0, take_offs = 0, navdata_sent = 0,
           frames_sent = 0, frames_left_out = 0, video_cuts = 0, video_stalls = 0, reboots = 0;
@@ -24,10 +24,10 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   Ports ports() const;
-  // Serves until `stop` is true or the seconds are over (0: no end).
+  // Serves until `stop` is true or the time is over (0: without a limit).
   void run(const std::atomic<bool>& stop, double seconds);
   ServerCounts counts() const;
-  // Where the drone is; from any thread.
+  // The true state of the drone. It may be called from any thread.
   FlightState truth() const;
 
  private:

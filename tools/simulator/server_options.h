@@ -1,5 +1,5 @@
-// What a simulated drone is made of and where it listens: the options that its server and its
-// camera read.
+// The options of a simulated drone: its ports, camera, sensors and faults. Its server and its
+// camera read them.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +17,14 @@ struct Ports {
   uint16_t at = 5556, navdata = 5554, video = 5555, control = 5559, recording = 5553;
 };
 
-// Paints picture `index` of a size, seen from a state; what the room does by itself.
+// Renders picture number `index` at a given size, seen from a state. Set it to replace the rendered
+// room.
 using Painter = std::function<void(const FlightState& state, uint64_t index, int width, int height,
                                    uint8_t* luma)>;
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  Ports ports;  // 0: a free one, see Server::ports
+  Ports ports;  // 0: a free port, which Server::ports reports
   Vec3 start{0, 0, 0};
   double yaw_rad = 0;
   uint64_t seed = 1;
@@ -33,16 +34,18 @@ struct ServerOptions {
   double pixel_noise = 1.5;  // grey levels
   int frames_per_second = 30;
   int pave_header_bytes = 68;    // 64 or 68
-  Painter painter;               // empty: the room
+  Painter painter;               // empty: the room is rendered
   std::string truth_file;        // empty: none. A line a picture: frame number, seconds since boot,
                                  // x y z qx qy qz qw (world_from_body), vx vy vz (world)
-  FaultChances faults;           // of datagrams, both ways
-  double video_garbage = 0;      // chance of random bytes before a video packet
-  double cut_video_every_s = 0;  // 0: never; a reset of the connection
-  double stall_video_every_s = 0;  // open, and silent for 3 s
+  FaultChances faults;           // faults of datagrams, in both directions
+  double video_garbage = 0;      // probability of random bytes before a video packet
+  double cut_video_every_s = 0;  // seconds between resets of the video connection; 0: never
+  // Seconds between stalls of the video: it stays connected without data for 3 s; 0: never.
+  double stall_video_every_s = 0;
   double reboot_every_s = 0;
-  std::optional<uint32_t> first_sequence;  // of navdata, to see the wrap
-  std::string firmware;  // empty: 2.4.8; else a version that nobody knows, see Firmware
+  std::optional<uint32_t> first_sequence;  // first sequence number of navdata, to test the wrap
+  // Empty: 2.4.8; a version that is not known adds unknown options, see Firmware.
+  std::string firmware;
 };
 
 }  // namespace simulator

@@ -1,4 +1,4 @@
-// The few socket calls that the simulator needs; errors are exceptions that name the port.
+// The socket calls that the simulator needs. Errors are exceptions that name the port.
 #pragma once
 
 #include <netinet/in.h>
@@ -25,20 +25,20 @@ class Socket {
   int fd() const { return fd_; }
   bool is_open() const { return fd_ >= 0; }
   void close();
-  // So that the other side sees a reset, not an end.
+  // Closes the connection so that the other side receives a reset instead of a normal end.
   void reset();
 
  private:
   int fd_;
 };
 
-// Bound without blocking to an address like 127.0.0.1; port 0 takes a free one. Throw
-// std::runtime_error: "port 5556: Address already in use".
+// Binds a non-blocking socket to an address such as 127.0.0.1; port 0 selects a free port. Both
+// functions throw std::runtime_error: "port 5556: Address already in use".
 Socket bind_udp(const std::string& host, uint16_t port);
 Socket listen_tcp(const std::string& host, uint16_t port);
 uint16_t bound_port(const Socket& socket);
 
-// The next client, or a closed socket when there is none.
+// Accepts the next waiting client; returns a closed socket if none waits.
 Socket accept_client(const Socket& listener);
 
 }  // namespace simulator

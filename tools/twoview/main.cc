@@ -1,4 +1,4 @@
-// twoview: the command line.
+// The program twoview: parses the command line, runs the chosen verb and reports errors.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -28,7 +28,7 @@ constexpr cli::AddDroneVerb kAddSimulate = cli::add_drone_simulate;
 constexpr cli::AddDroneVerb kAddSimulate = nullptr;
 #endif
 
-// One line, whatever the message holds.
+// Prints an error as one line, even if the message has line breaks, and returns the exit status.
 int refuse(std::string message) {
   for (char& c : message)
     if (static_cast<unsigned char>(c) < ' ') c = ' ';
@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
   } catch (const cli::BadInput& e) {
     return refuse(e.what());
   }
-  // A full disk and a reader that went away come back as errors of write().
+  // With these signals ignored, write() returns an error for a full disk and for a closed pipe.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   cli::clean_up_on_signals();

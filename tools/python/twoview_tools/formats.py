@@ -1,4 +1,4 @@
-"""The one Python reader of pairs files, camera files and a data set's cameras.yaml.
+"""The only Python reader of pairs files, camera files and a data set's cameras.yaml.
 
 The program's readers are tools/twoview's pairs_file.cc, camera_file.cc and yaml_values.cc. Both
 languages read the cases of test/formats and must accept, refuse and choose alike
@@ -7,31 +7,32 @@ languages read the cases of test/formats and must accept, refuse and choose alik
 Numbers. A number is decimal, with an optional sign, point and exponent (`-5`, `.5`, `5.`, `1e-3`).
 It must be finite and within a double's range; hexadecimal, octal, `1_000` and `yes` are no numbers.
 
-pairs.txt, PAIRS.txt. A line holds name0 name1 [rot0 rot1 [K0(9) K1(9) [T_0to1(16)]]]: 2, 4, 22 or 38
-fields with white space between them. Blank lines and lines whose first character after white space is
-# are skipped; lines end with LF or CR LF; a byte order mark is skipped. `rot` are whole quarter turns
-counter-clockwise, read modulo 4. K is [fx 0 cx 0 fy cy 0 0 1] with positive focal lengths. T is
-[R t; 0 0 0 1]; each element of R R^T is within 1e-3 of the identity's, and det R is positive. A file
-without a pair is refused. A line that is refused is named by its number.
+pairs.txt, PAIRS.txt. A line holds name0 name1 [rot0 rot1 [K0(9) K1(9) [T_0to1(16)]]]: 2, 4, 22 or
+38 fields with white space between them. Blank lines are skipped, and so are lines whose first
+character after white space is "#". Lines end with LF or CR LF; a byte order mark is skipped. `rot`
+is a number of whole quarter turns counter-clockwise, read modulo 4. K is [fx 0 cx 0 fy cy 0 0 1]
+with positive focal lengths. T is [R t; 0 0 0 1]; each element of R R^T must be within 1e-3 of the
+identity's, and det R must be positive. A file without a pair is refused. The message for a refused
+line has the line's number.
 
 Camera file. OpenCV's YAML and ROS's camera_info: image_width, image_height (whole, from 1 to 10^6),
 camera_matrix (nine numbers, or a map with data), distortion_model (absent, none, plumb_bob,
-rational_polynomial, equidistant) and distortion_coefficients (0, 4, 5 or 8 numbers; equidistant: 4).
-Names that are not known are ignored. A lens of Brown and Conrady whose coefficients are all 0 is a
-pinhole. Where a matrix gives rows and cols, their product must be how many numbers it has.
+rational_polynomial, equidistant) and distortion_coefficients (0, 4, 5 or 8 numbers; equidistant:
+4). Names that are not known are ignored. A lens of Brown and Conrady whose coefficients are all 0
+is a pinhole. If a matrix gives rows and cols, their product must equal its number of values.
 
-cameras.yaml. A map from an entry's name to a map of fx fy cx cy image_width image_height, and k1 k2 p1
-p2 k3, each 0 where it is absent. Names that are not known are ignored; a file without an entry is
-refused.
+cameras.yaml. A map from an entry's name to a map of fx fy cx cy image_width image_height, and k1 k2
+p1 p2 k3, each 0 where it is absent. Names that are not known are ignored; a file without an entry
+is refused.
 
 YAML. The first document of a file is read, as a map. A name given twice and an alias are refused.
 
 Which entry serves an image (choose_entry):
 1. One entry serves every image.
-2. Of several, the entry whose name begins the image's file name; the image's folders do not count, and
-   the longest such name wins (cam10 before cam1).
-3. Else the entry whose fx and cx equal those of the pair line's K, within 1e-6 of the entry's value.
-   Where such entries differ in any number the choice is ambiguous, and the image is refused.
+2. Of several entries, the one whose name is a prefix of the image's file name, without its folders.
+   If there are several such names, the longest is chosen (cam10 before cam1).
+3. Else the entry whose fx and cx equal those of the pair line's K, within 1e-6 of the entry's
+   value. If such entries differ in any number the choice is ambiguous, and the image is refused.
 4. Else none serves it, and the image is refused.
 """
 
@@ -45,9 +46,10 @@ import numpy as np
 
 MAX_PAIRS_BYTES, MAX_CAMERA_BYTES = 64 << 20, 1 << 20
 FIELD_COUNTS = (2, 4, 22, 38)
-SAME_K = 1e-6  # how far fx and cx of a line's K may be from an entry's, as a share of the entry's
+SAME_K = 1e-6  # largest relative difference of fx and cx between a line's K and an entry
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3")
-# distortion_model of a camera file; None: the file has no such entry, or an empty one.
+# The camera model for each distortion_model of a camera file. None: the file has no such entry; "":
+# the entry is empty.
 MODELS = {None: "brown_conrady", "": "brown_conrady", "none": "pinhole",
           "plumb_bob": "brown_conrady", "rational_polynomial": "brown_conrady",
           "equidistant": "kannala_brandt"}
@@ -58,12 +60,13 @@ _BLANK = " \t\r\v\f"
 
 
 class FormatError(ValueError):
-    """A file that is refused: one line that names the file and what is wrong in it."""
+    """A file that is refused. The message is one line that names the file and the error in it."""
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera as its file has it. k is as the model says, 8 numbers at most, none for a pinhole."""
+    """A camera as its file describes it. k holds the model's coefficients, at most 8; it is empty
+    for a pinhole."""
 
     width: int
     height: int
@@ -77,12 +80,13 @@ class Camera:
 
 @dataclass(frozen=True)
 class Pair:
-    """A line of a pairs file. What the line does not have is None; its turns are then (0, 0)."""
+    """A line of a pairs file. A value that the line does not have is None, except turns, which are
+    then (0, 0)."""
 
     name0: str
     name1: str
     number: int  # of the line, from 1
-    text: str  # the line, one space between the fields
+    text: str  # the line with one space between fields
     turns: tuple = (0, 0)  # quarter turns counter-clockwise, 0 to 3
     K0: Optional[np.ndarray] = None
     K1: Optional[np.ndarray] = None
@@ -91,7 +95,7 @@ class Pair:
 
 
 def _number(text):
-    """A finite number; FormatError says why `text` is none."""
+    """Parses a finite number. FormatError gives the reason if `text` is not one."""
     if _NUMBER.fullmatch(text):
         value = float(text)
         is_zero = not re.search("[1-9]", re.split("[eE]", text)[0])
@@ -103,7 +107,8 @@ def _number(text):
 
 
 def _read_text(path, most_bytes):
-    """The file's text; bytes that are not UTF-8 survive, since they may be a name's."""
+    """The text of a file. Bytes that are not UTF-8 are preserved, since they may be part of a file
+    name."""
     with open(path, "rb") as f:
         data = f.read(most_bytes + 1)
     if len(data) > most_bytes:
@@ -151,7 +156,7 @@ def _motion(fields):
 
 
 def parse_pair(line, number=1):
-    """The pair of one line."""
+    """Parses one line into a Pair."""
     fields = re.split(f"[{_BLANK}]+", line.strip(_BLANK))
     if len(fields) not in FIELD_COUNTS:
         raise FormatError(f"{len(fields)} fields, not 38 (name0 name1 rot0 rot1 K0 K1 T_0to1)")
@@ -166,7 +171,7 @@ def parse_pair(line, number=1):
 
 
 def parse_pairs(text, name):
-    """The pairs of a file's text; `name` is for the messages."""
+    """Parses the text of a pairs file; `name` is used in messages."""
     pairs = []
     for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
         start = line.lstrip(_BLANK)
@@ -182,14 +187,16 @@ def parse_pairs(text, name):
 
 
 def read_pairs(path):
-    """The pairs of a file. FormatError names the line that is refused; OSError passes."""
+    """Reads the pairs of a file. FormatError names the line that is refused; OSError is not
+    caught."""
     return parse_pairs(_read_text(path, MAX_PAIRS_BYTES), path)
 
 
 # ---- YAML --------------------------------------------------------------------------------------
 
 def _value(node, name):
-    """None, text, a list or a dict: YAML's own numbers and words are read by _number instead."""
+    """Converts a YAML node to None, text, a list or a dict. Numbers stay text, since _number parses
+    them instead of YAML."""
     import yaml
     if isinstance(node, yaml.ScalarNode):
         is_null = node.style is None and node.value in ("", "~", "null", "Null", "NULL")
@@ -206,10 +213,10 @@ def _value(node, name):
 
 
 def _parse_yaml(text, name):
-    """The first document, a map."""
+    """Parses the first document, which must be a map."""
     import yaml
     text = text.removeprefix("\ufeff")
-    if text.startswith("%YAML:"):  # OpenCV's first line is no YAML directive
+    if text.startswith("%YAML:"):  # OpenCV's first line is not a valid YAML directive
         text = "#" + text[1:]
     try:
         for event in yaml.parse(text, yaml.BaseLoader):
@@ -267,7 +274,7 @@ def _flat(values, entry, where):
 
 
 def _numbers_at(values, entry, where):
-    """A list, a list of lists, or a map with data."""
+    """The numbers of an entry: a list, a list of lists, or a map with data."""
     node = _at(values, entry, where)
     listed = node
     if isinstance(node, dict):
@@ -305,7 +312,7 @@ def _camera_matrix(root, name):
 
 
 def _distortion(root, name):
-    """(model, coefficients)"""
+    """(model, coefficients) of a camera file."""
     word = root.get("distortion_model")
     if isinstance(word, (list, dict)):
         raise FormatError(f"{name}: distortion_model is not a word")
@@ -321,12 +328,12 @@ def _distortion(root, name):
     if len(k) not in ((4,) if is_fisheye else (0, 4, 5, 8)):
         raise FormatError(f"{name}: distortion_coefficients has {len(k)} numbers, not "
                           + ("4" if is_fisheye else "4, 5 or 8"))
-    # Four zeros of an equidistant lens do not make it a pinhole.
+    # An equidistant lens with four zero coefficients is not a pinhole.
     return (MODELS[word], tuple(k)) if is_fisheye or any(k) else ("pinhole", ())
 
 
 def parse_camera(text, name):
-    """The camera of a file's text; `name` is for the messages."""
+    """Parses the text of a camera file; `name` is used in messages."""
     return _camera_of(_parse_yaml(text, name), name)
 
 
@@ -336,12 +343,13 @@ def _camera_of(root, name):
 
 
 def read_camera(path):
-    """One camera, in OpenCV's or ROS's form. FormatError names the file; OSError passes."""
+    """Reads one camera in OpenCV's or ROS's format. FormatError names the file; OSError is not
+    caught."""
     return parse_camera(_read_text(path, MAX_CAMERA_BYTES), path)
 
 
 def parse_camera_set(text, name):
-    """{entry: Camera} of the text of a cameras.yaml, in the file's order."""
+    """Parses the text of a cameras.yaml as {entry: Camera}, in the order of the file."""
     return _camera_set_of(_parse_yaml(text, name), name)
 
 
@@ -365,13 +373,15 @@ def _camera_set_of(root, name):
 
 
 def read_camera_set(path):
-    """{entry: Camera} of a cameras.yaml. FormatError names the file; OSError passes."""
+    """Reads a cameras.yaml as {entry: Camera}. FormatError names the file; OSError is not
+    caught."""
     return parse_camera_set(_read_text(path, MAX_CAMERA_BYTES), path)
 
 
 def read_cameras_of(paths):
-    """{name: Camera} of files that are each a camera file or a cameras.yaml. A camera file's name is
-    its camera_name (ROS), else that of the file without its extension."""
+    """Reads files that are each a camera file or a cameras.yaml, as {name: Camera}. The name of
+    a camera file's camera is its camera_name (ROS), else the name of the file without its
+    extension."""
     cameras = {}
     for path in paths:
         root = _parse_yaml(_read_text(path, MAX_CAMERA_BYTES), path)
@@ -384,8 +394,8 @@ def read_cameras_of(paths):
 
 
 def choose_entry(cameras, image, K=None):
-    """The name of the entry of {name: Camera} that serves an image, None where none does. K is of the
-    pair's line, 3x3. FormatError where K fits entries that differ."""
+    """The name of the entry of {name: Camera} that serves an image, or None. K is the 3x3 matrix of
+    the pair's line. Raises FormatError if K fits entries that differ."""
     if len(cameras) == 1:
         return next(iter(cameras))
     file = image.rsplit("/", 1)[-1]
@@ -405,11 +415,14 @@ def choose_entry(cameras, image, K=None):
 
 
 def choose_camera(cameras, image, K=None):
-    """The Camera that serves an image; FormatError where none does. None without any camera."""
+    """The Camera that serves an image; None if there are no cameras. Raises FormatError if no
+    camera serves it."""
     if not cameras:
         return None
     entry = choose_entry(cameras, image, K)
     if entry is None:
-        raise FormatError(f"image {image}: none of the cameras {', '.join(cameras)} begins its name or "
-                          "has its K")
+        raise FormatError(
+            f"image {image}: none of the cameras {', '.join(cameras)} begins its name or "
+            "has its K"
+        )
     return cameras[entry]

@@ -8,17 +8,17 @@
 
 namespace cli {
 
-// Exit statuses, fixed by the interface.
+// Exit statuses, which docs/formats.md fixes.
 constexpr int kExitPose = 0;
 constexpr int kExitBadInput = 2;
 constexpr int kExitNoPose = 3;
 
-// Bad input or bad arguments. what() is the line that the user reads, without the program's name.
+// Bad input or bad arguments. what() is the line printed for the user, without the program's name.
 struct BadInput : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Throws BadInput with the library's own words unless status is TV_OK.
+// Throws BadInput with the library's message unless status is TV_OK.
 inline void check(tv_status status, const std::string& what) {
   if (status != TV_OK) throw BadInput(what + ": " + tv_status_string(status));
 }

@@ -17,9 +17,9 @@ namespace cli {
 namespace fs = std::filesystem;
 namespace {
 
-// The sets that are alive, for the thread that waits for signals. Whoever makes, renames or deletes
-// a temporary file holds the mutex, so that the thread sees every file that there is. Never freed:
-// the thread outlives main().
+// The sets that exist, for the thread that waits for signals. Hold the mutex while creating,
+// renaming or deleting a temporary file, so that the thread sees every such file. The list is never
+// freed, since the thread outlives main().
 struct Living {
   std::mutex mutex;
   std::vector<OutputSet*> sets;
@@ -31,7 +31,7 @@ Living& living() {
 
 std::string reason(int error) { return std::strerror(error); }
 
-// Closes what it holds.
+// Closes its file descriptor when it is destroyed.
 struct Descriptor {
   int fd = -1;
   ~Descriptor() {
@@ -39,16 +39,16 @@ struct Descriptor {
   }
 };
 
-// A link such as /dev/stdout, which stands for an open file whatever that file is: to rename over
-// it would take the link away from every program.
+// Whether the path is a link such as /dev/stdout, which stands for an open file of any kind.
+// Renaming a file over such a link would remove the link for every program.
 bool stands_for_open_file(const fs::path& path) {
   std::error_code error;
   const std::string link = fs::read_symlink(path, error).string();
   return !error && link.rfind("/proc/", 0) == 0;
 }
 
-// 0, or the errno of the first failure. Data are pushed to the disk, so that a full one is noticed
-// before the file gets its final name.
+// Writes all bytes. Returns 0, or the errno of the first failure. The data are flushed to the disk,
+// so that a full disk is detected before the file receives its final name.
 int write_all(int fd, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(fd, bytes.data(), bytes.size());
@@ -113,7 +113,8 @@ void OutputSet::keep(const std::string& input) {
 
 bool OutputSet::is_kept(const fs::path& path) const {
   return std::any_of(kept_.begin(), kept_.end(), [&](const std::string& input) {
-    std::error_code error;  // set where one of the two is not there: then they are not the same
+    // Set if one of the two files does not exist; then they are not the same file.
+    std::error_code error;
     return fs::is_regular_file(path, error) && fs::equivalent(path, input, error);
   });
 }
@@ -135,7 +136,8 @@ void OutputSet::add(const std::string& name, std::string_view bytes) {
   Descriptor file;
   const int flags = O_WRONLY | O_CLOEXEC | (direct ? O_APPEND : O_CREAT | O_EXCL | O_NOFOLLOW);
   {
-    // A pipe may keep open() waiting: no lock for what leaves nothing behind.
+    // open() may block on a pipe. A target that is no regular file needs no temporary file, so the
+    // mutex is not locked for it.
     std::unique_lock<std::mutex> lock(living().mutex, std::defer_lock);
     if (!direct) lock.lock();
     file.fd = ::open(path.c_str(), flags, 0666);
@@ -159,7 +161,7 @@ void OutputSet::commit() {
     if (::rename(entry.temporary.c_str(), target.c_str()) != 0)
       throw BadInput("cannot write " + target.string() + ": " + reason(errno));
     entry.temporary.clear();
-    made_.clear();  // the folders hold something that stays
+    made_.clear();  // the folders hold committed files now, so they are kept
   }
   made_.clear();
 }
@@ -187,7 +189,7 @@ std::vector<std::string> OutputSet::names() const {
   return names;
 }
 
-// Whether a signal is to set the flag before it ends the program.
+// Whether the first signal only sets the flag, before a second one ends the program.
 std::atomic<bool>& asks_first() {
   static std::atomic<bool> asks{false};
   return asks;
@@ -209,16 +211,17 @@ void clean_up_on_signals() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction action;
     if (::sigaction(signal, nullptr, &action) == 0 && action.sa_handler != SIG_IGN)
-      sigaddset(&awaited, signal);  // what nohup ignores stays ignored
+      sigaddset(&awaited, signal);  // a signal that is ignored (as nohup does) stays ignored
   }
-  // Blocked in this and every later thread; the one below takes them.
+  // The signals are blocked in this thread and in every later one; only the thread below receives
+  // them.
   ::pthread_sigmask(SIG_BLOCK, &awaited, nullptr);
   std::thread([awaited] {
     int signal = 0;
     do {
       if (::sigwait(&awaited, &signal) != 0) return;
     } while (asks_first() && !stop_flag().exchange(true));
-    living().mutex.lock();  // for good
+    living().mutex.lock();  // never unlocked: no further file may appear
     for (OutputSet* set : living().sets) set->discard();
     ::signal(signal, SIG_DFL);
     sigset_t one;

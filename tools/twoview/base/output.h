@@ -1,5 +1,5 @@
-// Output files that appear whole or not at all, what happens to them on a signal, what is printed,
-// and the reading of a whole file.
+// Output files that appear complete or not at all and are removed on a signal; printing to stdout;
+// and reading a whole file.
 #pragma once
 
 #include <atomic>
@@ -11,25 +11,27 @@
 
 namespace cli {
 
-// A set of files for one folder. Each is written to a temporary name beside its target and renamed
-// by commit(); without commit() nothing stays, not even the folder if it was made for the set.
-// A target that exists and is no regular file (a device, a pipe) is written as it is.
-// Every failure throws BadInput.
+// A set of output files for one folder. Each file is written under a temporary name beside its
+// target, and commit() renames them all. Without commit() all files are removed, also the folder if
+// this set made it. An existing target that is no regular file (a device, a pipe) is written to
+// directly. Every failure throws BadInput.
 class OutputSet {
  public:
-  // Makes the folder where it is missing and checks that it can be written to.
+  // Creates the folder if it does not exist, and checks that it is writable.
   explicit OutputSet(const std::filesystem::path& folder);
   ~OutputSet();
   OutputSet(const OutputSet&) = delete;
   OutputSet& operator=(const OutputSet&) = delete;
 
-  // A file that the run reads: add() refuses to write over it, and remove_others() leaves it.
+  // Protects an input file of the run: add() refuses to overwrite it, and remove_others() does not
+  // delete it.
   void keep(const std::string& input);
 
   void add(const std::string& name, std::string_view bytes);
   void commit();
 
-  // Deletes those of `names` in the folder that this set does not hold: what an earlier run left.
+  // Deletes the files of an earlier run: those of `names` in the folder that this set does not
+  // contain.
   void remove_others(const std::vector<std::string>& names) const;
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -39,33 +41,34 @@ class OutputSet {
   friend void clean_up_on_signals();
   struct Entry {
     std::string name;
-    std::filesystem::path temporary;  // empty: written already
+    std::filesystem::path temporary;  // empty: the file was written directly
   };
   bool is_kept(const std::filesystem::path& path) const;
   void discard() noexcept;
   void make_folder();
 
   std::filesystem::path folder_;
-  std::vector<std::filesystem::path> made_;  // folders made here, outermost first
+  std::vector<std::filesystem::path> made_;  // folders that this set made, outermost first
   std::vector<Entry> entries_;
   std::vector<std::string> kept_;
 };
 
-// From now on Ctrl-C, SIGTERM and SIGHUP end the program only after what the OutputSets have not
-// committed is gone. Call once, before any other thread starts.
+// After this call Ctrl-C, SIGTERM and SIGHUP first remove the files that no OutputSet has
+// committed, and then end the program. Call it once, before any other thread starts.
 void clean_up_on_signals();
 
-// For work that a signal ends in order (a recording, a simulation): after this call the first such
-// signal only sets the flag, and a second one ends the program as before.
+// For work that must end properly on a signal (a recording, a simulation). After this call the
+// first such signal only sets the returned flag, and a second one ends the program.
 const std::atomic<bool>& stop_flag_for_signals();
 
-// The whole of a text or image file; refuses what is missing, no file, empty, or above max_bytes.
+// Reads a whole text or image file. Throws BadInput if the file is missing, no regular file, empty,
+// or larger than max_bytes.
 std::string read_file(const std::string& path, size_t max_bytes);
 
-// Writes to stdout and flushes. A reader that has gone away is no failure; a full disk is.
+// Writes to stdout and flushes it. A closed pipe is not an error; a full disk is.
 void print(std::string_view text);
 
-// A line of a summary, its name in a column of its own.
+// Prints a line of a summary, with its name in a column of fixed width.
 template <class... T>
 std::string summary_line(const char* name, const char* format, T... values) {
   char head[32], text[512];

@@ -20,16 +20,18 @@
 namespace cli {
 namespace {
 
-constexpr int kSearchSide = 1280;    // longer side of the image that is searched
-constexpr int kThumbnailSide = 400;  // of what the contact sheet shows
-constexpr int kDarkLevel = 40;       // the brightest hundredth of a dark image is below this
-// A part of a board, as small as is worth a word.
+constexpr int kSearchSide = 1280;    // longer side of the image that is searched, pixels
+constexpr int kThumbnailSide = 400;  // longer side of a thumbnail on the contact sheet, pixels
+// An image is dark if fewer than 1 % of its pixels are above this grey level.
+constexpr int kDarkLevel = 40;
+// The smallest part of a board that is reported.
 const cv::Size kSmallestBoard(3, 3);
-// A board's edges rise within 2 to 4 px in a good picture of any size.
+// In a sharp picture of any size the board's edges rise within 2 to 4 px.
 constexpr double kMaxRisePx = 5, kMaxRiseOfMedian = 1.8;
-constexpr double kMinMoveShare = 0.015;    // of the image's diagonal
-constexpr double kLargerBoardShare = 0.4;  // of the contrast within the board
-constexpr int kWallPerCpu = 8;             // a machine so busy is waited for
+constexpr double kMinMoveShare = 0.015;    // as a share of the image's diagonal
+constexpr double kLargerBoardShare = 0.4;  // as a share of the contrast within the board
+// The wall-clock limit is this many times the CPU limit, for a busy machine.
+constexpr int kWallPerCpu = 8;
 
 double longer_side(cv::Size size) { return std::max(size.width, size.height); }
 
@@ -43,7 +45,7 @@ cv::Mat shrunk(const cv::Mat& image, int longer, double& scale) {
   return small;
 }
 
-// Corners at a row and column, whatever the storage.
+// Access to the corners by row and column, for any storage order.
 struct Grid {
   const Corners& corners;
   cv::Size inner;
@@ -58,11 +60,11 @@ double mean_around(const cv::Mat& luma, cv::Point2f place) {
   return (box & whole) == box ? cv::mean(luma(box))[0] : -1;
 }
 
-// The least step from a square to the next along a side of the grid, `squares_out` squares beyond
-// it
-// (-0.5: the first ones within). `line` gives the corners of the side, `next` those one further in.
-// Positive where they alternate with the first one darker, negative where with it brighter, 0 where
-// they do not.
+// The smallest grey-level step between neighbouring squares along a side of the grid, measured
+// `squares_out` squares outside the outermost corners (-0.5: within the first squares inside).
+// `line` holds the corners of that side, `next` the corners one row further in. The result is
+// positive if the squares alternate and the first one is darker, negative if they alternate and the
+// first one is brighter, and 0 if they do not alternate.
 double alternation(const cv::Mat& luma, const Corners& line, const Corners& next,
                    float squares_out) {
   std::vector<double> greys;
@@ -70,7 +72,7 @@ double alternation(const cv::Mat& luma, const Corners& line, const Corners& next
     const cv::Point2f middle = 0.5F * (line[i] + line[i + 1]);
     const cv::Point2f inward = 0.5F * (next[i] + next[i + 1]) - middle;
     const double grey = mean_around(luma, middle - squares_out * inward);
-    if (grey < 0) return 0;  // beyond the image
+    if (grey < 0) return 0;  // outside the image
     greys.push_back(grey);
   }
   double least = 255, most = -255;
@@ -82,8 +84,8 @@ double alternation(const cv::Mat& luma, const Corners& line, const Corners& next
   return least > 0 ? least : most < 0 ? most : 0;
 }
 
-// Whether the squares between the corners are a chessboard's. In a larger board OpenCV finds grids
-// that run askew through it, too.
+// Whether the squares between the corners alternate as on a chessboard. The check is needed because
+// in a larger board OpenCV also finds grids that run diagonally.
 bool squares_alternate(const cv::Mat& luma, const Grid& grid) {
   const auto square = [&](int r, int c) {
     return mean_around(luma, 0.25F * (grid.at(r, c) + grid.at(r, c + 1) + grid.at(r + 1, c) +
@@ -100,8 +102,8 @@ bool squares_alternate(const cv::Mat& luma, const Grid& grid) {
   return true;
 }
 
-// OpenCV finds a board within a larger one. Beyond the last inner corners a board has one more row
-// of squares; a larger one has a second.
+// Whether the grid is a part of a larger board, which OpenCV also accepts. Outside its last inner
+// corners a board has one more row of squares; a larger board has a second one.
 bool is_part_of_a_larger_board(const cv::Mat& luma, const Grid& grid) {
   const auto line = [&](bool row, int index) {
     Corners corners;
@@ -113,7 +115,7 @@ bool is_part_of_a_larger_board(const cv::Mat& luma, const Grid& grid) {
     const int last = (row ? grid.inner.height : grid.inner.width) - 1;
     for (const auto& [outer, next] : {std::pair(0, 1), std::pair(last, last - 1)}) {
       const Corners side = line(row, outer), inside = line(row, next);
-      // Two squares further out the colours are the same ones.
+      // Two squares further out the colours repeat.
       const double own = alternation(luma, side, inside, -0.5F);
       const double beyond = alternation(luma, side, inside, 1.5F);
       if (own != 0 && beyond / own > kLargerBoardShare) return true;
@@ -122,8 +124,8 @@ bool is_part_of_a_larger_board(const cv::Mat& luma, const Grid& grid) {
   return false;
 }
 
-// Half the side of cornerSubPix's window. With 0.4 of a square, corners at the border of OpenCV's
-// boards, whose outermost squares are half as wide, moved by several pixels; 0.3 is safe.
+// Half the side of cornerSubPix's search window. With 0.4 of a square, corners at the border of
+// OpenCV's boards, whose outermost squares are half as wide, moved by several pixels; 0.3 is safe.
 int refinement_reach(const Grid& grid) {
   double least = 1e9;
   for (int r = 0; r < grid.inner.height; ++r)
@@ -134,7 +136,8 @@ int refinement_reach(const Grid& grid) {
   return std::clamp(static_cast<int>(0.3 * least), 2, 11);
 }
 
-// Turned by half where that makes the first square dark; boards that look the same then stay.
+// Rotates the order of the corners by 180 degrees if this makes the first square dark. Boards
+// without this symmetry keep one order in all views.
 void begin_with_a_dark_square(const cv::Mat& luma, cv::Size inner, Corners& corners) {
   const Grid grid{corners, inner};
   const auto square = [&](int r, int c) {
@@ -147,14 +150,14 @@ void begin_with_a_dark_square(const cv::Mat& luma, cv::Size inner, Corners& corn
 }
 
 double edge_rise_px(const cv::Mat& luma, cv::Size inner, const Corners& corners) {
-  double rise = 0;  // the slower of both directions: a moving camera blurs one
+  double rise = 0;  // the slower rise of the two directions, since motion blurs only one of them
   for (const bool vertical : {false, true})
     rise = std::max(
         rise, double(cv::estimateChessboardSharpness(luma, inner, corners, 0.8F, vertical)[0]));
   return rise;
 }
 
-// What the search found, as it goes through the pipe, followed by the corners.
+// The result of the search as it is sent through the pipe; the corners follow it.
 struct Found {
   Reason reason = Reason::kNoBoard;
   int32_t seen_width = 0, seen_height = 0;
@@ -167,10 +170,10 @@ bool is_dark(const cv::Mat& image) {
   return cv::countNonZero(bright) < static_cast<int>(image.total() / 100);
 }
 
-// Which chessboard is there when it is not the one that was asked for.
+// Searches for a chessboard of another size than the requested one.
 void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
   Corners corners;
-  cv::Mat meta;  // of the board's shape, a byte a corner
+  cv::Mat meta;  // output of OpenCV that has the board's shape, one byte a corner
   if (!cv::findChessboardCornersSB(small, kSmallestBoard, corners,
                                    cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER, meta))
     return;
@@ -183,15 +186,15 @@ void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
   found.reason = holds_ours ? Reason::kOtherBoard : Reason::kPartialBoard;
 }
 
-// Its own check turns away most images without a board. In OpenCV 4.6 it takes 3 s to be sure that
-// a board of 640x480 is another one.
+// OpenCV's fast check rejects most images without a board. Without it, OpenCV 4.6 takes 3 s to
+// reject a board of another size in a 640x480 image.
 bool quick_search(const cv::Mat& small, cv::Size inner, Corners& corners) {
   return cv::findChessboardCorners(
       small, inner, corners,
       cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
 }
 
-// Stands more noise and blur.
+// A slower search that tolerates more noise and blur.
 bool thorough_search(const cv::Mat& small, cv::Size inner, Corners& corners) {
   return cv::findChessboardCornersSB(small, inner, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
 }
@@ -247,7 +250,7 @@ bool write_all(int file, const void* data, size_t size) {
 
 [[noreturn]] void search_as_child(int to_parent, const cv::Mat& luma, cv::Size inner,
                                   cv::Size likely_other, int limit_seconds) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // Ctrl-C ends the parent
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the child also dies when Ctrl-C ends the parent
   const rlim_t seconds = static_cast<rlim_t>(limit_seconds);
   const rlimit limit{seconds, seconds + 1}, no_core{0, 0};
   ::setrlimit(RLIMIT_CPU, &limit);
@@ -257,7 +260,7 @@ bool write_all(int file, const void* data, size_t size) {
   Found found;
   try {
     found = search(luma, inner, likely_other, corners);
-  } catch (const std::exception&) {  // OpenCV on an image of a few pixels
+  } catch (const std::exception&) {  // OpenCV throws for an image of a few pixels
     found = Found{};
     corners.clear();
   }
@@ -267,7 +270,7 @@ bool write_all(int file, const void* data, size_t size) {
   ::_exit(is_sent ? 0 : 1);
 }
 
-// All that comes through the pipe until its other end closes or the time is over.
+// Reads from the pipe until its other end closes or the time is over.
 std::string read_until(int from_child, std::chrono::steady_clock::time_point end) {
   std::string bytes;
   char part[4096];
@@ -285,7 +288,7 @@ std::string read_until(int from_child, std::chrono::steady_clock::time_point end
   }
 }
 
-// False when the search did not end by itself.
+// Returns false when the search was ended by its time limit or crashed.
 bool search_in_child(const cv::Mat& luma, cv::Size inner, cv::Size likely_other, int limit_seconds,
                      Found& found, Corners& corners) {
   int pipe_ends[2];
@@ -370,7 +373,8 @@ void reject_blurred(std::vector<BoardView>& views) {
     if (view.is_used()) rises.push_back(view.edge_rise_px);
   if (rises.empty()) return;
   std::nth_element(rises.begin(), rises.begin() + rises.size() / 2, rises.end());
-  // Where all are soft the median is no measure, and a sharp set may spread.
+  // If all views are blurred the median is no useful reference, hence the absolute limit; if all
+  // views are sharp they may differ by more than the ratio.
   const double limit = std::max(kMaxRisePx, kMaxRiseOfMedian * rises[rises.size() / 2]);
   for (BoardView& view : views) {
     if (!view.is_used() || view.edge_rise_px <= std::min(limit, 2 * kMaxRisePx)) continue;
@@ -409,7 +413,8 @@ void reject_surplus(std::vector<BoardView>& views, int max_views) {
   for (BoardView& view : views)
     if (view.is_used()) left.push_back(&view);
   if (static_cast<int>(left.size()) <= max_views) return;
-  // The most different ones: each next is the one farthest from all that were taken.
+  // Keeps the views that differ most: each step takes the view that is farthest from all views
+  // taken so far.
   std::vector<double> nearest(left.size(), HUGE_VAL);
   std::vector<bool> taken(left.size(), false);
   size_t next = 0;

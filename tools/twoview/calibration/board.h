@@ -1,4 +1,5 @@
-// Chessboards in pictures: found within a bound of time, and refused with a reason.
+// Detection of a chessboard in a picture within a time limit, and the reasons for which a view is
+// rejected.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -9,18 +10,18 @@ namespace cli {
 
 using Corners = std::vector<cv::Point2f>;  // row by row; (0, 0) is the centre of the first pixel
 
-// Why a view of the board is left out; kUsed: it is not.
+// The reason why a view of the board is not used; kUsed means that it is used.
 enum class Reason {
   kUsed,
-  kTooDark,       // no board, and hardly anything above black
-  kNoBoard,       // nothing like a chessboard
-  kPartialBoard,  // a chessboard, but not all of it
-  kOtherBoard,    // a chessboard of more corners
-  kTimeLimit,     // the search was ended
-  kBlurred,       // edges rise too slowly to place a corner
-  kDuplicate,     // the board stands where an earlier view has it
-  kSurplus,       // more views than --max-views
-  kOutlier        // its error is far above the others'
+  kTooDark,       // no board found, and hardly any pixel is above black
+  kNoBoard,       // no chessboard found
+  kPartialBoard,  // a chessboard of which only a part is seen
+  kOtherBoard,    // a chessboard with more corners than requested
+  kTimeLimit,     // the search reached its time limit
+  kBlurred,       // the edges rise too slowly to locate a corner
+  kDuplicate,     // the board is where an earlier view has it
+  kSurplus,       // beyond --max-views
+  kOutlier        // its error is far above that of the other views
 };
 const char* reason_name(Reason reason);   // "partial_board", as in JSON
 const char* reason_words(Reason reason);  // "only a part of the board is seen"
@@ -28,31 +29,31 @@ const char* reason_words(Reason reason);  // "only a part of the board is seen"
 struct BoardView {
   std::string name;
   Reason reason = Reason::kUsed;
-  std::string detail;       // numbers behind the reason, for people; may be empty
-  cv::Size seen;            // inner corners of the chessboard that is there instead; 0 unless known
-  Corners corners;          // of the whole board, where it was found
-  double edge_rise_px = 0;  // from 10 to 90 per cent, across the board's edges
-  cv::Mat thumbnail;        // grey
+  std::string detail;       // the numbers behind the reason, for the user; may be empty
+  cv::Size seen;            // inner corners of another chessboard that was found; 0 if none
+  Corners corners;          // of the whole board, if it was found
+  double edge_rise_px = 0;  // distance over which edges rise from 10 to 90 %, pixels
+  cv::Mat thumbnail;        // a small grey picture of the view
   double thumbnail_scale = 1;
   bool has_board() const { return !corners.empty(); }
   bool is_used() const { return reason == Reason::kUsed; }
 };
 
-// Searches an 8-bit image for the whole board in a process of its own, which ends after
-// `limit_seconds` of CPU time: OpenCV has been seen to take minutes on a dark image.
-// `likely_other`: a board that may well be there instead, looked for before the searches that take
-// seconds to be sure that ours is not; an empty size for none. The first row and column are such
-// that the square between the first four corners is dark, where the board's shape lets that be
-// chosen.
+// Searches an 8-bit image for the whole board. The search runs in a process of its own, which is
+// ended after `limit_seconds` of CPU time, since OpenCV can take minutes on a dark image.
+// `likely_other` is the size of another board that may be in the image; it is tried before the slow
+// searches, and an empty size means none. The corners are ordered so that the square between the
+// first four is dark, if the board's shape permits this choice.
 BoardView find_board(const cv::Mat& luma, const std::string& name, cv::Size inner,
                      cv::Size likely_other, int limit_seconds);
 
-// Marks views as blurred, duplicates and surplus, in the views' order.
+// Mark views as blurred, duplicate or surplus, in the order of the views.
 void reject_blurred(std::vector<BoardView>& views);
 void reject_duplicates(std::vector<BoardView>& views, cv::Size image);
 void reject_surplus(std::vector<BoardView>& views, int max_views);
 
-// Root mean square distance between the corners of two views, whichever end of the board is first.
+// The root mean square distance between the corners of two views, in the better of the two orders
+// of the corners.
 double distance_px(const Corners& a, const Corners& b);
 
 }  // namespace cli

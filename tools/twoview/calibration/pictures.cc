@@ -28,7 +28,7 @@ void put_title(cv::Mat& sheet, const std::string& text) {
   put_text(sheet, fitted(text, kText, sheet.cols - 2 * kGap), {double(kGap), 26}, kText, ink::text);
 }
 
-// The image's frame on a sheet.
+// The frame of the image on a sheet, and the scale from image to sheet.
 struct ImagePanel {
   cv::Rect place;
   double scale;
@@ -44,7 +44,8 @@ ImagePanel image_panel(const Calibration& c, cv::Point corner, int longer) {
       scale};
 }
 
-// Rows of the board joined by lines, as one reads it; the first corner ringed.
+// Draws the rows of the board as connected lines in reading order, with a ring around the first
+// corner.
 void put_board(cv::Mat& part, const BoardView& view, const Board& board, double scale) {
   const auto place = [&](size_t i) {
     return Pixel((view.corners[i].x + 0.5) * scale - 0.5, (view.corners[i].y + 0.5) * scale - 0.5);
@@ -57,7 +58,7 @@ void put_board(cv::Mat& part, const BoardView& view, const Board& board, double 
   put_ring(part, place(0), 6, {255, 255, 255});
 }
 
-// Used ones first where not all fit, then in the order in which they came.
+// The views that are drawn, in their original order. If not all fit, used views are preferred.
 std::vector<const BoardView*> shown_views(const std::vector<BoardView>& views) {
   std::vector<const BoardView*> shown;
   for (const BoardView& view : views) shown.push_back(&view);
@@ -66,17 +67,18 @@ std::vector<const BoardView*> shown_views(const std::vector<BoardView>& views) {
       return static_cast<int>(a->reason) < static_cast<int>(b->reason);
     });
     shown.resize(kMaxThumbnails);
-    std::sort(shown.begin(), shown.end());  // all lie in one vector
+    // Pointers into one vector, so that this restores the original order.
+    std::sort(shown.begin(), shown.end());
   }
   return shown;
 }
 
-// Seen from the camera, how the board's normal leans: the length is the tilt, the way is where the
-// board's face turns to.
+// Draws the tilt of the board in each view as seen from the camera: the length is the tilt angle,
+// and the direction is the one in which the board's face is turned.
 void put_tilts(cv::Mat& sheet, cv::Rect place, const Calibration& c) {
   put_panel(sheet, place);
   const Pixel middle(place.x + place.width / 2.0, place.y + place.height / 2.0);
-  constexpr double most = 60;  // degrees at the rim
+  constexpr double most = 60;  // degrees at the rim of the plot
   const double unit = (std::min(place.width, place.height) / 2.0 - 34) / most;
   for (const double ring : {15.0, 30.0, 45.0, 60.0}) {
     put_ring(sheet, middle, ring * unit, ink::grid);
@@ -114,7 +116,7 @@ void put_cells(cv::Mat& sheet, const ImagePanel& panel, const std::vector<int>& 
     }
 }
 
-// All residuals around zero; the rings are one and two times the RMS.
+// Draws all residuals around zero. The rings have radii of one and two times the RMS.
 void put_scatter(cv::Mat& sheet, cv::Rect place, const Calibration& c) {
   put_panel(sheet, place);
   const Pixel middle(place.x + place.width / 2.0, place.y + place.height / 2.0);
@@ -134,7 +136,7 @@ void put_scatter(cv::Mat& sheet, cv::Rect place, const Calibration& c) {
            Pixel(place.x + 12.0, place.y + 22.0), kText, ink::text);
 }
 
-// A bar a view; the line is the RMS of all.
+// Draws a bar for each view; the line is the RMS over all views.
 void put_bars(cv::Mat& sheet, cv::Rect place, const std::vector<BoardView>& views,
               const Calibration& c) {
   put_panel(sheet, place);
@@ -235,7 +237,8 @@ cv::Mat residuals_picture(const std::vector<BoardView>& views, const Calibration
   put_panel(sheet, panel.place);
   cv::Mat part = sheet(panel.place);
   const Pixel origin(panel.place.tl());
-  const double enlarged = 12 / std::max(c.rms_px, 1e-6);  // sheet pixels a pixel
+  // Pixels of the sheet for one pixel of residual.
+  const double enlarged = 12 / std::max(c.rms_px, 1e-6);
   for (const ViewFit& fit : c.fits)
     for (size_t i = 0; i < fit.residuals.size(); ++i) {
       const Pixel from = panel.at(views[fit.view].corners[i]) - origin;

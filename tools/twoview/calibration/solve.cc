@@ -11,13 +11,15 @@ namespace cli {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;  // of a radian
-// A view is left out above both: so many times the median, and so many pixels more.
+// A view is rejected if its error exceeds the median error both by this factor and by this number
+// of pixels.
 constexpr double kOutlierRatio = 3, kOutlierPx = 0.3;
 constexpr int kOutlierRounds = 5;
-// When to warn.
+// The limits below which, or above which, a warning is given.
 constexpr size_t kFewViews = 10, kTiltedViews = 4;
 constexpr double kTiltedDeg = 15, kLittleCoverage = 0.6, kHighRmsPx = 0.5, kLowRmsPx = 0.1;
-constexpr double kLargeFocalSigma = 0.005, kLargeCentreSigma = 0.005;  // of fx, of the width
+// Relative to fx; relative to the image width.
+constexpr double kLargeFocalSigma = 0.005, kLargeCentreSigma = 0.005;
 
 std::vector<cv::Point3f> corners_of(const Board& board) {
   std::vector<cv::Point3f> corners;
@@ -27,17 +29,18 @@ std::vector<cv::Point3f> corners_of(const Board& board) {
   return corners;
 }
 
-// OpenCV's answer as it gives it.
+// The result of OpenCV's calibration, unchanged.
 struct Answer {
   cv::Matx33d K = cv::Matx33d::eye();
   cv::Mat distortion;
   std::vector<cv::Mat> rotations, translations;
 };
 
-// Standard deviations of fx fy cx cy and the distortion. With J = [A | B], A the derivatives by the
-// camera and B by the view's own pose, the information is the sum over views of A'A - A'B (B'B)^-1
-// B'A. cv::fisheye keeps its own to itself, and calibrateCamera's are too large up to OpenCV 4.6,
-// which counts a corner as one measurement.
+// Standard deviations of fx fy cx cy and the distortion. With J = [A | B], where A holds the
+// derivatives by the camera and B those by the view's own pose, the information is the sum over
+// views of A'A - A'B (B'B)^-1 B'A. OpenCV's own values are not used: cv::fisheye does not return
+// them, and those of calibrateCamera are too large up to OpenCV 4.6, which counts a corner as one
+// measurement.
 std::vector<double> sigma_of(const std::vector<cv::Point3f>& board,
                              const std::vector<Corners>& seen, const Answer& answer, Lens lens) {
   const int shared = 4 + static_cast<int>(distortion_names(lens).size()), own = 6;
@@ -51,7 +54,7 @@ std::vector<double> sigma_of(const std::vector<cv::Point3f>& board,
     if (lens == Lens::kKannalaBrandt) {
       cv::fisheye::projectPoints(points, projected, rotation, translation, answer.K,
                                  answer.distortion, 0, J);
-      A = J.colRange(0, shared);  // then the pose, then the skew
+      A = J.colRange(0, shared);  // the columns of the pose follow, then the skew
       B = J.colRange(shared, shared + own);
     } else {
       cv::projectPoints(points, rotation, translation, answer.K, answer.distortion, projected, J);
@@ -116,8 +119,8 @@ tv_camera camera_of(const Answer& answer, cv::Size image, Lens lens) {
   return camera;
 }
 
-// Pose, tilt and residuals of one view. The projection is the library's: what OpenCV fitted must
-// fit what twoview will use.
+// The pose, tilt and residuals of one view. They are computed with the library's projection, so
+// that the reported residuals are valid for the lens model that twoview uses.
 ViewFit fit_of(const tv_camera& camera, const std::vector<cv::Point3f>& board, const Corners& seen,
                const cv::Mat& rotation, const cv::Mat& translation) {
   ViewFit fit;
@@ -194,7 +197,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Marks what is far above the others, the worst first, as long as most of the views stay.
+// Marks views whose error is far above the others', the worst first, while at least two thirds of
+// the first views remain. Returns true if a view was marked.
 bool reject_outliers(std::vector<BoardView>& views, Calibration& calibration, size_t num_at_first) {
   std::vector<double> errors;
   for (const ViewFit& fit : calibration.fits) errors.push_back(fit.rms_px);
@@ -222,7 +226,7 @@ std::string formatted(const char* format, double a, double b = 0) {
   return text;
 }
 
-// Whether every pixel of the image has a ray.
+// Returns true if every pixel of the image has a ray.
 bool reaches_the_image_corners(const tv_camera& camera) {
   for (const double x : {0.0, camera.width - 1.0})
     for (const double y : {0.0, camera.height - 1.0}) {

@@ -17,8 +17,9 @@ namespace {
 
 constexpr double kLooksPerSecond = 4;
 constexpr int kMaxLooks = 240;
-constexpr double kMinShareOfFrames = 0.9;  // containers round what they say
-constexpr int64_t kMaxFrames = 1000000;    // of a file; then it has no end
+// A container may round the number of frames that it states.
+constexpr double kMinShareOfFrames = 0.9;
+constexpr int64_t kMaxFrames = 1000000;  // of a file; a larger number means an endless stream
 
 std::string size_text(cv::Size size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
@@ -33,7 +34,7 @@ cv::Mat grey_frame(const cv::Mat& frame, const std::string& name) {
   return grey;
 }
 
-// libav's own lines would stand beside ours.
+// Without this, libav prints lines of its own on stderr.
 void silence_decoders() { ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0); }
 
 std::string frame_name(int64_t index) {

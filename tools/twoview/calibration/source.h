@@ -1,4 +1,4 @@
-// Where the pictures of a board come from: image files, a video file, or a live camera.
+// The sources of pictures of a board: image files, a video file, or a live camera.
 #pragma once
 
 #include <functional>
@@ -8,20 +8,22 @@
 
 namespace cli {
 
-// Is handed each 8-bit grey image and its name; false: enough.
+// Receives each 8-bit grey image and its name. It returns false when no further image is needed.
 using TakeFrame = std::function<bool(const cv::Mat& luma, const std::string& name)>;
 
-// All throw BadInput for what cannot be read, and for images of different sizes.
+// These functions throw BadInput for a source that cannot be read, and for images of different
+// sizes.
 void read_images(const std::vector<std::string>& paths, const TakeFrame& take);
 
-// A number or /dev/video..., or an address with "://".
+// Returns true for a live source: a number, /dev/video..., or an address that contains "://".
 bool is_live(const std::string& video);
 
-// Four frames a second of the video, at most 240 of the whole. A file that holds clearly fewer
-// frames than it says is refused.
+// Reads four frames a second, at most 240 from the whole video. Throws BadInput for a file with
+// less than 90 % of the frames that it states, which is truncated.
 void read_video_file(const std::string& path, const TakeFrame& take);
 
-// Four frames a second until `take` has enough, the time is over, or Ctrl-C.
+// Reads four frames a second until `take` returns false, the duration is over, or Ctrl-C is
+// pressed.
 void read_live(const std::string& device, double duration_s, const TakeFrame& take);
 
 }  // namespace cli

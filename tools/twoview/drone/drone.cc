@@ -1,4 +1,4 @@
-// twoview drone: talks to an AR.Drone 2.0, or is one.
+// twoview drone: communicates with an AR.Drone 2.0, or simulates one.
 
 #include "drone/drone.h"
 

@@ -1,4 +1,4 @@
-// twoview drone, and what its verbs share.
+// twoview drone: how its verbs are added, and the options that they share.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -9,24 +9,24 @@
 
 namespace cli {
 
-// Where a drone is: --host and a port option for each channel.
+// The address of a drone: the options --host and a port for each channel.
 struct DroneAddress {
   std::string host;
   int at_port = 5556, navdata_port = 5554, video_port = 5555, control_port = 5559;
 };
 void add_address(CLI::App& verb, DroneAddress& address, const std::string& host);
 
-// As CLI::Range, but it refuses "nan" too.
+// A range check like CLI::Range that also refuses "nan".
 CLI::Validator number_in(double low, double high);
 
-// --duration: seconds until the verb ends by itself, 0 for no end.
+// Adds --duration: the verb ends by itself after this number of seconds; 0 means no limit.
 void add_duration(CLI::App& verb, double& seconds);
 
 // Adds a verb to `drone`.
 using AddDroneVerb = void (*)(CLI::App& drone, Run& run);
 
-// Adds `drone` with its verbs. `add_simulate` adds the verb that needs the simulator, which a
-// program may be built without; it is then null.
+// Adds `drone` with its verbs. `add_simulate` adds the verb that needs the simulator; pass null in
+// a program that is built without the simulator.
 void add_drone(CLI::App& program, Run& run, AddDroneVerb add_simulate);
 
 void add_drone_info(CLI::App& drone, Run& run);

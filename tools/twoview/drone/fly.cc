@@ -1,4 +1,4 @@
-// twoview drone fly: by keyboard, with a dead man's rule: no key, hover.
+// twoview drone fly: control by keyboard. The drone hovers while no key is pressed.
 
 #include <memory>
 
@@ -24,7 +24,7 @@ const char kHelp[] =
     "and end\n"
     "  a movement ends when its key does\n";
 
-// What a key asks for, in words and as a movement.
+// The command of a key, in words and as a movement.
 struct Wish {
   enum Kind { kNone, kTakeOff, kLand, kHover, kMove, kCut, kRearm, kTrim, kEnd } kind = kNone;
   const char* words = "";
@@ -78,7 +78,7 @@ std::string status_line(const ardrone_session* session) {
   return line;
 }
 
-// Nothing is sent: each key says what it would ask for.
+// A dry run that sends nothing: it prints the command of each key.
 int rehearse(const Arguments& a) {
   print(std::string("dry run: nothing is sent (--live flies)\n") + kHelp);
   Keyboard keyboard;
@@ -138,8 +138,8 @@ int fly(const Arguments& a) {
         return ends || keyboard.has_ended();
       },
       stop, a.duration);
-  // However it ended, the drone is brought down before the program goes; a second Ctrl-C leaves
-  // that to the drone's own watchdog.
+  // The drone is landed before the program ends, whatever the reason. If a second Ctrl-C interrupts
+  // this, the drone's own watchdog takes over.
   ardrone_session_land(link.session());
   static const std::atomic<bool> never{false};
   link.run([&] { return !is_in_the_air(link.session()); }, never, kLandingPatienceS);

@@ -1,4 +1,4 @@
-// twoview drone info: what the drone says about itself.
+// twoview drone info: prints the drone's state and configuration.
 
 #include <memory>
 #include <optional>
@@ -10,7 +10,7 @@
 namespace cli {
 namespace {
 
-constexpr double kPatienceS = 10;  // seconds without an answer until it gives up
+constexpr double kPatienceS = 10;  // seconds without an answer after which the verb gives up
 
 struct Arguments {
   DroneAddress address;
@@ -25,7 +25,7 @@ const char* state_word(uint32_t ctrl_state) {
   return major < sizeof kWords / sizeof kWords[0] ? kWords[major] : "unknown";
 }
 
-// The settings by name, in the drone's order.
+// The configuration by name, in the order in which the drone sent it.
 nlohmann::ordered_json configuration_json(const ardrone_session* session) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   const char* text = nullptr;

@@ -9,7 +9,7 @@ Keyboard::Keyboard() : is_terminal_(::isatty(STDIN_FILENO) != 0) {
   if (!is_terminal_) return;
   ::tcgetattr(STDIN_FILENO, &before_);
   termios raw = before_;
-  raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C stays a signal
+  raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C still raises a signal
   raw.c_cc[VMIN] = 0;
   raw.c_cc[VTIME] = 0;
   ::tcsetattr(STDIN_FILENO, TCSANOW, &raw);
@@ -32,7 +32,7 @@ std::optional<int> Keyboard::read_byte() {
 std::optional<int> Keyboard::next() {
   const std::optional<int> first = read_byte();
   if (first != 27) return first;
-  // Arrows are ESC [ A..D; a lonely ESC is itself.
+  // Arrow keys send ESC [ A to ESC [ D; an ESC without "[" after it is the escape key itself.
   const std::optional<int> second = read_byte();
   if (second != '[') return 27;
   const std::optional<int> third = read_byte();

@@ -1,4 +1,4 @@
-// Single keys of a terminal, without waiting for a line.
+// Reads single keys from a terminal without waiting for the end of a line.
 #pragma once
 
 #include <termios.h>
@@ -11,13 +11,14 @@ enum Key { kKeyUp = 256, kKeyDown, kKeyRight, kKeyLeft };
 
 class Keyboard {
  public:
-  // Takes stdin out of line mode where it is a terminal, and puts it back at the end.
+  // Switches stdin out of line mode if it is a terminal; the destructor restores the mode.
   Keyboard();
   ~Keyboard();
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
   bool is_terminal() const { return is_terminal_; }
-  // A character or a Key; nothing when no key was pressed. has_ended after the input is over.
+  // Returns a character or a Key, or nothing if no key was pressed. has_ended() is true after the
+  // end of the input.
   std::optional<int> next();
   bool has_ended() const { return has_ended_; }
 

@@ -1,4 +1,5 @@
-// A session with a drone over the network, which owns its memory and is stepped for a verb.
+// A session with a drone over the network. It owns the driver's memory and runs the driver for a
+// verb.
 #pragma once
 
 #include <atomic>
@@ -14,8 +15,8 @@ namespace cli {
 // A drone on the network.
 class Link {
  public:
-  // `options` start from ardrone_session_options_init; callbacks and user are set here. Throws
-  // BadInput for an unknown host. Sends nothing yet.
+  // `options` must be initialised by ardrone_session_options_init; this class sets their callbacks
+  // and user pointer. Throws BadInput for an unknown host. The constructor sends nothing.
   Link(const DroneAddress& address, ardrone_session_options options, LinkListener listener);
   ~Link();
   Link(const Link&) = delete;
@@ -23,8 +24,8 @@ class Link {
 
   ardrone_session* session() { return session_; }
   ardrone_counters counters() const;
-  // Steps until `done` returns true, `stop` is set or the seconds are over (0: no end). `done` may
-  // be empty and is called after each step. Returns whether `done` returned true.
+  // Runs the session until `done` returns true, `stop` is set, or the time is over (0: no limit).
+  // `done` may be empty; it is called after each step. Returns true if `done` returned true.
   bool run(const std::function<bool()>& done, const std::atomic<bool>& stop, double seconds);
 
  private:

@@ -1,4 +1,4 @@
-// twoview drone record: all that the drone sends, as it came.
+// twoview drone record: stores everything that the drone sends, unchanged.
 
 #include <memory>
 #include <optional>
@@ -36,7 +36,8 @@ int record(const Arguments& a) {
   options.decoder = decoder.get();
   std::optional<Recording> recording;
   LinkListener listener;
-  std::string failure;  // exceptions do not cross the driver's C
+  // An exception must not pass through the driver's C code, so its message is stored.
+  std::string failure;
   const auto keeping = [&failure](const auto& write) {
     if (!failure.empty()) return;
     try {
@@ -61,7 +62,7 @@ int record(const Arguments& a) {
   const auto seconds = [start] { return static_cast<double>(ardrone_now_ns() - start) * 1e-9; };
   double next_word = 0;
   Link link(a.address, options, listener);
-  recording.emplace(a.output, a.frames);  // after Link has checked that the host exists
+  recording.emplace(a.output, a.frames);  // only after Link has checked that the host exists
   link.run(
       [&] {
         if (is_terminal && seconds() >= next_word) {

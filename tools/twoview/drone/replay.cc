@@ -1,4 +1,4 @@
-// twoview drone replay: a recording once more, through the same driver.
+// twoview drone replay: plays a recording through the same driver as a live drone's data.
 
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
@@ -29,7 +29,8 @@ int replay(const Arguments& a) {
     first_ns = std::min(first_ns, time.received_ns);
     last_ns = std::max(last_ns, time.received_ns);
   };
-  std::string failure;  // exceptions do not cross the driver's C
+  // An exception must not pass through the driver's C code, so its message is stored.
+  std::string failure;
   if (!a.frames.empty()) {
     listener.on_frame = [&](const tvs_frame& frame) {
       if (!failure.empty()) return;

@@ -57,7 +57,7 @@ void read_distortion(const YAML::Node& root, const std::string& file, tv_camera&
     throw BadInput(file + ": distortion_coefficients has " + std::to_string(k.size()) +
                    " numbers, not " + (equidistant ? "4" : "4, 5 or 8"));
   std::copy(k.begin(), k.end(), camera.k);
-  // An equidistant lens with four zeros is still no pinhole.
+  // An equidistant lens is no pinhole, even if its four coefficients are zero.
   const bool straight = std::all_of(k.begin(), k.end(), [](double v) { return v == 0; });
   camera.model = equidistant ? TV_CAMERA_KANNALA_BRANDT
                  : straight  ? TV_CAMERA_PINHOLE
@@ -143,7 +143,7 @@ tv_camera resized(const tv_camera& camera, int width, int height) {
 tv_camera turned(const tv_camera& camera, int quarters) {
   tv_camera result = camera;
   for (int i = 0; i < (quarters & 3); ++i) {
-    // (x, y) goes to (y, width - 1 - x); in the camera frame (X, Y) goes to (Y, -X).
+    // A pixel (x, y) moves to (y, width - 1 - x); a camera-frame point (X, Y) moves to (Y, -X).
     const tv_camera before = result;
     result.width = before.height;
     result.height = before.width;
@@ -151,7 +151,8 @@ tv_camera turned(const tv_camera& camera, int quarters) {
     result.fy = before.fx;
     result.cx = before.cy;
     result.cy = before.width - 1 - before.cx;
-    if (result.model == TV_CAMERA_BROWN_CONRADY) {  // the tangential terms turn along
+    // The tangential coefficients rotate with the image.
+    if (result.model == TV_CAMERA_BROWN_CONRADY) {
       result.k[2] = -before.k[3];
       result.k[3] = before.k[2];
     }

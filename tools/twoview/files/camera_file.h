@@ -1,5 +1,5 @@
-// Camera files, in OpenCV's YAML or ROS camera_info, and what resizing and turning an image does to
-// its camera.
+// Reading and writing camera files (OpenCV's YAML and ROS camera_info), and the camera of an image
+// that was resized or turned.
 #pragma once
 
 #include <string>
@@ -8,27 +8,27 @@
 
 namespace cli {
 
-// Reads either format. Throws BadInput that names the file and the entry that is missing, zero, not
-// finite, or of the wrong length.
+// Reads a camera file of either format. Throws BadInput that names the file and the entry that is
+// missing, zero, not finite, or of the wrong length.
 tv_camera load_camera(const std::string& path);
 
-// The same from the file's text; `name` is for the messages.
+// Parses the text of a camera file; `name` is used in messages.
 tv_camera parse_camera(const std::string& text, const std::string& name);
 
-// The text of a file in OpenCV's format that reads back to the same camera, bit for bit.
+// The text of a camera file in OpenCV's format. Reading it gives the same camera, bit for bit.
 std::string camera_yaml(const tv_camera& camera);
 
-// A pinhole whose focal length is that of 35 mm film (EXIF's FocalLengthIn35mmFilm: the same angle
-// across the diagonal, 43.27 mm there, by CIPA DCG-001), with the principal point in the image's
-// middle.
+// A pinhole camera from the focal length for 35 mm film (EXIF's FocalLengthIn35mmFilm), which is
+// defined by an equal angle across the image diagonal, 43.27 mm on film (CIPA DCG-001). The
+// principal point is the middle of the image.
 tv_camera film_camera(double focal_35mm, int width, int height);
 
-// Throws BadInput with both sizes unless the camera is for images of this size.
+// Throws BadInput that names both sizes if the camera's image size is another one.
 void require_size(const tv_camera& camera, const std::string& camera_name, int width, int height,
                   const std::string& image_name);
 
-// The camera of an image that was resized from the camera's size to width x height: per axis with
-// s = new size / old size, f' = s f and c' = s (c + 0.5) - 0.5.
+// The camera of an image that was resized to width x height. On each axis, with s = new size / old
+// size: f' = s f and c' = s (c + 0.5) - 0.5.
 tv_camera resized(const tv_camera& camera, int width, int height);
 
 // The camera of an image that was turned by quarter turns counter-clockwise.

@@ -1,4 +1,4 @@
-// cameras.yaml of a data set: its cameras by name, and which of them took an image.
+// cameras.yaml of a data set: its cameras by name, and the choice of the camera of an image.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace cli {
 
-// The cameras of a set, each with the name it has there, in the file's order.
+// The cameras of a set with their names, in the order of the file.
 using NamedCameras = std::vector<std::pair<std::string, tv_camera>>;
 NamedCameras load_camera_set(const std::string& path);
 NamedCameras parse_camera_set(const std::string& text, const std::string& name);

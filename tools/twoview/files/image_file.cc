@@ -17,8 +17,9 @@ namespace {
 
 constexpr size_t kMaxFileBytes = size_t{1} << 30;
 
-// Decoders (libpng, libjpeg, libtiff, OpenCV) write their own lines to stderr; the user gets one
-// clear line instead. While this lives, file descriptor 2 leads nowhere.
+// Decoders (libpng, libjpeg, libtiff, OpenCV) print messages to stderr, while the program must
+// print one clear line only. During the lifetime of this object stderr (file descriptor 2) is
+// discarded.
 class StderrSilence {
  public:
   StderrSilence() : saved_(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
@@ -42,7 +43,7 @@ std::string size_text(int64_t width, int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
-// Every pixel as the file has it. Throws BadInput.
+// Decodes all pixels of a file with the file's depth and channels. Throws BadInput.
 cv::Mat decode(const std::string& path) {
   const std::string bytes = read_file(path, kMaxFileBytes);
   const ImageHeader header = read_image_header(bytes);
@@ -56,7 +57,8 @@ cv::Mat decode(const std::string& path) {
   try {
     const StderrSilence silence;
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U,
-                          const_cast<char*>(bytes.data()));  // read only
+                          // imdecode only reads
+                          const_cast<char*>(bytes.data()));
     pixels = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception&) {
     pixels.release();

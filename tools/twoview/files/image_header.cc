@@ -7,7 +7,7 @@ namespace {
 
 using Bytes = std::string_view;
 
-// Little or big endian unsigned integers; 0 beyond the end.
+// Reads an unsigned integer of either byte order; 0 if it lies beyond the end.
 uint64_t number(Bytes bytes, size_t at, int count, bool big_endian) {
   uint64_t value = 0;
   if (at > bytes.size() || bytes.size() - at < static_cast<size_t>(count)) return 0;
@@ -51,7 +51,7 @@ ImageHeader read_jpeg(Bytes bytes) {
       header.height = static_cast<int64_t>(number(bytes, at + 5, 2, true));
       header.width = static_cast<int64_t>(number(bytes, at + 7, 2, true));
     }
-    if (marker == 0xda) {  // scans follow, up to the end-of-image marker
+    if (marker == 0xda) {  // compressed data follow, up to the end-of-image marker
       header.truncated = bytes.find("\xff\xd9", at) == Bytes::npos;
       return header;
     }

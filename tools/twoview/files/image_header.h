@@ -1,6 +1,6 @@
-// The size in an image file's header, and whether the file is complete. Both are read before
-// decoding: a small file must not make the decoder allocate a huge buffer, and some decoders fill
-// missing pixels with grey without an error.
+// Reads the image size from a file's header, and checks that the file is complete. Both happen
+// before decoding, because a small file must not make the decoder allocate a huge buffer, and some
+// decoders fill missing pixels with grey without reporting an error.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,12 @@
 namespace cli {
 
 struct ImageHeader {
-  int64_t width = 0, height = 0;  // 0 when the format is not one of those below
+  int64_t width = 0, height = 0;  // 0 if the format is not one that read_image_header parses
   bool truncated = false;         // the end mark that the format requires is missing
 };
 
-// Parses the headers of PNG, JPEG, BMP, PNM and TIFF. Never fails, and reads inside `bytes` only.
+// Parses the headers of PNG, JPEG, BMP, PNM and TIFF. It never fails and never reads outside
+// `bytes`.
 ImageHeader read_image_header(std::string_view bytes);
 
 }  // namespace cli

@@ -11,10 +11,10 @@ namespace cli {
 namespace {
 
 constexpr size_t kMaxFileBytes = size_t{256} << 20;
-constexpr size_t kMaxMatches = 1000000;  // the library's limit of a context, and of a sane file
+constexpr size_t kMaxMatches = 1000000;  // the library's limit of matches for a context
 constexpr const char* kColumns[4] = {"x0", "y0", "x1", "y1"};
 
-// The line's fields; a comma with nothing between it and the next makes an empty one.
+// The fields of a line; a comma directly followed by another one gives an empty field.
 std::vector<std::string_view> fields_of(std::string_view line) {
   std::vector<std::string_view> fields;
   size_t at = 0;
@@ -37,7 +37,7 @@ bool read_number(std::string_view text, double& value) {
   return result.ec == std::errc() && result.ptr == text.data() + text.size();
 }
 
-// Where the four columns are, from the line of names.
+// The indices of the columns x0, y0, x1 and y1, found in the line of names.
 std::vector<size_t> columns_of(const std::vector<std::string_view>& names) {
   std::vector<size_t> columns;
   for (const char* column : kColumns) {

@@ -1,4 +1,4 @@
-// PAIRS.txt, SuperGlue's list of image pairs with ground truth.
+// Reads PAIRS.txt, SuperGlue's list of image pairs with ground truth.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@ namespace cli {
 
 struct Pair {
   std::string name0, name1;
-  int turns0 = 0, turns1 = 0;  // quarter turns counter-clockwise, for image and K
+  int turns0 = 0, turns1 = 0;  // quarter turns counter-clockwise, applied to the image and to K
   bool has_K = false;
   std::array<double, 9> K0{}, K1{};  // row-major, of the images before they are turned
   bool has_truth = false;

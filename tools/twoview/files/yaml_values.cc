@@ -13,8 +13,8 @@
 namespace cli {
 namespace {
 
-// Strict but for a leading plus and a trailing point ("0."), which OpenCV writes; YAML's and
-// OpenCV's words for NaN and infinity are read as what they mean.
+// Parses a number. The syntax is strict except for a leading plus and a trailing point ("0."),
+// which OpenCV writes. The words of YAML and OpenCV for NaN and infinity are accepted as such.
 bool read_number(std::string text, double& value) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (!text.empty() && text[0] == '+') {
@@ -37,8 +37,8 @@ double finite(const YAML::Node& node, const std::string& entry, const std::strin
   return value;
 }
 
-// Refuses what YAML::Load lets pass: a name that a map has twice (it would take the first), and
-// aliases, with which a small file can stand for endless numbers.
+// Refuses two things that YAML::Load accepts: a name that occurs twice in a map (it would take the
+// first), and aliases, with which a small file can expand to an unlimited number of values.
 class StrictReader : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark&) override {}
@@ -70,7 +70,7 @@ class StrictReader : public YAML::EventHandler {
     std::set<std::string> names;
   };
 
-  // A map's items are a name and a value in turn.
+  // In a map, names and values alternate.
   void value(const YAML::Mark& mark, const std::string& text) {
     if (levels_.empty() || !levels_.back().is_map) return;
     Level& level = levels_.back();
@@ -108,7 +108,8 @@ void append(const YAML::Node& list, const std::string& entry, const std::string&
 YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   std::string body = text;
   if (body.compare(0, 3, "\xef\xbb\xbf") == 0) body.erase(0, 3);
-  // "%YAML:1.0" is a comment of the same length to us, so that line numbers stay.
+  // "%YAML:1.0" is replaced by a comment of the same length, so that line numbers in messages stay
+  // correct.
   if (body.compare(0, 6, "%YAML:") == 0) body[0] = '#';
   YAML::Node root;
   try {

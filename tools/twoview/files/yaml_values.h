@@ -1,4 +1,4 @@
-// Numbers out of YAML, with messages that name the file and the entry.
+// Reads numbers from YAML; messages name the file and the entry.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -9,11 +9,12 @@
 
 namespace cli {
 
-// Parses one document; OpenCV's "%YAML:1.0" line, which is no valid YAML directive, is let pass.
-// The result is a map; a name given twice and an alias are refused. Throws BadInput.
+// Parses one document, which must be a map. OpenCV's line "%YAML:1.0", which is no valid YAML
+// directive, is accepted. Throws BadInput for a name that occurs twice and for an alias.
 YAML::Node parse_yaml(const std::string& text, const std::string& file);
 
-// A finite number; BadInput names `entry` when it is missing, no number, NaN or infinite.
+// Returns a finite number. Throws BadInput that names `entry` if it is missing, no number, NaN or
+// infinite.
 double number_at(const YAML::Node& map, const std::string& entry, const std::string& file);
 
 // The width or height of an image: a whole number of pixels from 1 to 10^6.
@@ -22,8 +23,8 @@ int32_t side_at(const YAML::Node& map, const std::string& entry, const std::stri
 // Throws BadInput unless the focal length `value` is above 0.
 void require_focal(double value, const std::string& entry, const std::string& file);
 
-// The numbers of an entry: a list, a list of lists, or a map with `data` (OpenCV, ROS), whose
-// `rows` and `cols`, where it has both, must multiply to how many there are.
+// Returns the numbers of an entry: a list, a list of lists, or a map with `data` (OpenCV, ROS). If
+// the map has `rows` and `cols`, their product must equal the number of values.
 std::vector<double> numbers_at(const YAML::Node& map, const std::string& entry,
                                const std::string& file);
 

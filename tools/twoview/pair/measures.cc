@@ -7,9 +7,10 @@
 namespace cli {
 namespace {
 
-constexpr double kDegrees = 57.29577951308232;  // of a radian
+constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
 
-// The same direction, of a length whose square is neither infinite nor 0; zeros stay.
+// Scales a vector so that the square of its length neither overflows nor underflows. The direction
+// is kept; a zero vector stays zero.
 Vector3 of_medium_length(const Vector3& v) {
   const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
   return largest > 0 ? Vector3{v[0] / largest, v[1] / largest, v[2] / largest} : v;
@@ -19,7 +20,8 @@ Vector3 of_medium_length(const Vector3& v) {
 
 double rotation_error_deg(const Matrix3& R_est, const Matrix3& R_gt) {
   const Matrix3 d = product(R_est, transposed(R_gt));
-  // sin from the skew part, cos from the trace: no loss at 0 degrees, where acos has one.
+  // The sine comes from the skew part and the cosine from the trace. Unlike acos of the trace, this
+  // keeps full precision near 0 degrees.
   const double sine = norm({d[7] - d[5], d[2] - d[6], d[3] - d[1]}) / 2;
   const double cosine = (d[0] + d[4] + d[8] - 1) / 2;
   return std::atan2(sine, cosine) * kDegrees;
@@ -64,7 +66,7 @@ double match_precision(const tv_camera& camera0, const tv_camera& camera1, const
   if (reconstruction.num_matches == 0) return 0;
   const Matrix3 skew = {0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0};
   const Matrix3 E = product(skew, R);
-  // SuperGlue does not scale t, nor does the measure depend on it.
+  // SuperGlue does not normalise t; the measure does not depend on its length.
   int right = 0;
   for (int32_t i = 0; i < reconstruction.num_matches; ++i) {
     const tv_correspondence& match = reconstruction.matches[i];

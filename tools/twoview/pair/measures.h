@@ -1,4 +1,4 @@
-// How accurate a result is: pose errors, AUC, precision, percentiles.
+// Measures of the accuracy of a result: pose errors, AUC, precision, percentiles.
 #pragma once
 
 #include <vector>
@@ -8,30 +8,32 @@
 
 namespace cli {
 
-// Angle of R_est R_gt^T, degrees; exact for small angles too.
+// The angle of R_est R_gt^T in degrees; precise for small angles too.
 double rotation_error_deg(const Matrix3& R_est, const Matrix3& R_gt);
 
-// Angle between directions, degrees, [0, 180]. Infinite when either is zero.
+// The angle between two directions in degrees, [0, 180]; infinite if either is zero.
 double translation_error_signed_deg(const Vector3& t_est, const Vector3& t_gt);
 
-// SuperGlue's, sign-free: min(e, 180 - e).
+// SuperGlue's translation error, which ignores the sign: min(e, 180 - e), in degrees.
 double translation_error_deg(const Vector3& t_est, const Vector3& t_gt);
 
-// Area under recall against threshold from 0 to threshold_deg, divided by it, in per cent, by
-// SuperGlue's definition: recall runs in straight lines from (0, 0) through (e_i, i / n), and flat
-// after the last error below the threshold. A failure is infinity. 0 for an empty list.
+// SuperGlue's AUC in per cent: the area below recall as a function of the error threshold, from 0
+// to threshold_deg, divided by threshold_deg. Recall is linear between (0, 0) and the points (e_i,
+// i / n), and constant after the last error below the threshold. A failed pair has an infinite
+// error. An empty list gives 0.
 double auc_percent(std::vector<double> errors_deg, double threshold_deg);
 
-// Linear between order statistics, as numpy's default; share in [0, 1]; values not empty.
+// The percentile by linear interpolation between order statistics, as numpy's default. `share` is
+// in [0, 1]; `values` must not be empty.
 double percentile(std::vector<double> values, double share);
 
-// Share of matches whose symmetric squared epipolar distance under the true pose is below 5e-4 in
-// normalised coordinates, SuperGlue's precision; 0 without matches. A pixel outside the lens model
-// counts as wrong.
+// SuperGlue's precision: the share of matches whose symmetric squared epipolar distance under the
+// true pose is below 5e-4 in normalised coordinates. It is 0 without matches. A pixel that the lens
+// model cannot unproject counts as wrong.
 double match_precision(const tv_camera& camera0, const tv_camera& camera1, const Matrix3& R,
                        const Vector3& t, const tv_reconstruction& reconstruction);
 
-// True when the two-view result has rotation and translation: exit status 0.
+// Returns true if the result has both rotation and translation, for which the exit status is 0.
 bool has_full_pose(const tv_two_view& two_view);
 Matrix3 rotation_of(const tv_two_view& two_view);
 Vector3 translation_of(const tv_two_view& two_view);

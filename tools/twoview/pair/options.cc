@@ -14,7 +14,7 @@
 namespace cli {
 namespace {
 
-// Names of an enumeration whose values count up.
+// The names of an enumeration with consecutive values.
 using Names = std::vector<std::string>;
 
 const Names kOrientations = {"upright", "gradient"};
@@ -30,7 +30,7 @@ struct Choice {
   int32_t first = 0;  // the value of the first name
 };
 
-// Three numbers, of any length but 0.
+// A direction: three numbers that are not all zero; the length does not matter.
 struct Direction {
   double* xyz;
 };
@@ -40,7 +40,8 @@ struct Option {
   OptionGroup group;
   std::variant<int32_t*, uint64_t*, float*, double*, Choice, Direction> target;
   double low, high;
-  enum Ends { kClosed, kOpenLow, kOpenHigh } ends;  // whether low, or high, is itself refused
+  // Whether the bound `low`, or `high`, is itself refused.
+  enum Ends { kClosed, kOpenLow, kOpenHigh } ends;
   const char* help;
 };
 
@@ -117,10 +118,10 @@ std::string range_text(const Option& option) {
 bool in_range(const Option& option, double value) {
   const bool low = option.ends == Option::kOpenLow ? value > option.low : value >= option.low;
   const bool high = option.ends == Option::kOpenHigh ? value < option.high : value <= option.high;
-  return low && high;  // false for NaN
+  return low && high;  // NaN makes both comparisons false
 }
 
-// Strict: the whole text is one number.
+// Parses the whole text as one number; anything left over is an error.
 template <class T>
 bool parse_number(const std::string& text, T& value) {
   const char* const end = text.data() + text.size();
@@ -153,7 +154,8 @@ void set_direction(const std::string& flag, const Direction& direction, const st
   if (is_zero(direction)) throw CLI::ValidationError(flag, "'" + text + "' has no direction");
 }
 
-// Writes the option's target; throws CLI::ValidationError in words.
+// Parses the text and sets the option's value; throws CLI::ValidationError with a message for the
+// user.
 void set(const Option& option, const std::string& text) {
   const std::string flag = "--" + std::string(option.name);
   if (const Choice* choice = std::get_if<Choice>(&option.target)) {
@@ -180,7 +182,8 @@ void set(const Option& option, const std::string& text) {
             throw CLI::ValidationError(
                 flag, "'" + text + "' is not " + kind + " in " + range_text(option));
           }
-          // Compared as decimal text would be: 1.1f lies above 1.1.
+          // The value is compared with its bound as decimal numbers are, so that 1.1 given as a
+          // float (which is above 1.1) does not exceed a bound of 1.1.
           double compared = static_cast<double>(value);
           if constexpr (std::is_same_v<T, float>) compared = shortest(value);
           if (!in_range(option, compared))
@@ -231,13 +234,15 @@ Options::Options() {
   tv_feature_options_init(&feature);
   tv_match_options_init(&match);
   tv_estimate_options_init(&estimate);
-  // What is automatic in the library is a number and a word here, for --help and the files.
+  // Defaults that are automatic in the library have explicit values here, which --help and the
+  // output files show.
   feature.max_keypoints = 2048;
   estimate.method = TV_SOLVER_FIVE_POINT;
 }
 
 void Options::settle() {
-  // A threshold below the default floor is meant: the floor follows it, unless it was given too.
+  // A given threshold below the default min_threshold lowers min_threshold too, unless that was
+  // also given.
   if (!min_threshold_given)
     feature.min_threshold = std::min(feature.min_threshold, feature.threshold);
   if (feature.min_threshold > feature.threshold)
@@ -277,7 +282,8 @@ void add_options(CLI::App& verb, Options& options, unsigned groups) {
 
 nlohmann::ordered_json options_json(const Options& options, unsigned groups) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const Option& option : table(const_cast<Options&>(options))) {  // read only
+  // The table needs a non-const reference, but it is only read here.
+  for (const Option& option : table(const_cast<Options&>(options))) {
     if (!(option.group & groups)) continue;
     std::string key = option.name;
     std::replace(key.begin(), key.end(), '-', '_');

@@ -1,4 +1,4 @@
-// The options that verbs share: one table gives the flags, their ranges, their help, and the
+// The options that the verbs share. One table defines their flags, ranges, help texts, and the
 // "options" object of every result.
 #pragma once
 
@@ -19,16 +19,16 @@ struct Options {
   int32_t guided_matching = 0;
   int32_t bundle_adjustment = 0;
   int32_t kernels = TV_KERNELS_AUTO;
-  int32_t resize = 0;  // longer side, pixels; 0: as it is
+  int32_t resize = 0;  // longer side after resizing, pixels; 0: no resizing
   bool min_threshold_given = false;
-  double gravity_sigma_deg = 0;  // settle() hands it to `estimate`
+  double gravity_sigma_deg = 0;  // settle() copies it to `estimate`
 
   Options();
   // Checks and completes the options that depend on each other. Call it once, after parsing.
   void settle();
 };
 
-// Which part of the work an option belongs to; a verb takes those it uses.
+// The stage of the work to which an option belongs; a verb adds the groups that it uses.
 enum OptionGroup : unsigned {
   kFeature = 1,
   kMatch = 2,
@@ -36,19 +36,20 @@ enum OptionGroup : unsigned {
   kTriangulate = 8,
   kCommon = 16,
   kAllOptions = 31,
-  kGravity = 32  // of one pair
+  kGravity = 32  // gravity in both cameras of one pair
 };
 
-// Adds the flags of the groups to a verb. `options` must outlive the parsing.
+// Adds the flags of these groups to a verb. `options` must outlive the parsing.
 void add_options(CLI::App& verb, Options& options, unsigned groups);
 
-// The options as used, with _ for -.
+// The options' values as a JSON object; in names "-" becomes "_".
 nlohmann::ordered_json options_json(const Options& options, unsigned groups);
 
-// A float as JSON shows it best: the shortest decimal that reads back to the same float.
+// Converts a float to the double with the shortest decimal text that reads back to the same float,
+// for JSON.
 double shortest(float value);
 
-// "five-point" and so on, as the command line spells it.
+// The name of a solver as on the command line, such as "five-point".
 std::string method_name(int32_t method);
 
 }  // namespace cli

@@ -1,4 +1,4 @@
-// The main job: a pair of images, from pixels to pose and points.
+// Reconstructs a pair of images: from pixels to pose and points.
 #pragma once
 
 #include <cstdint>

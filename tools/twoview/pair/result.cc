@@ -8,7 +8,7 @@
 namespace cli {
 namespace {
 
-constexpr double kDegrees = 57.29577951308232;  // of a radian
+constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
 
 using Json = nlohmann::ordered_json;
 
@@ -45,7 +45,7 @@ Json reasons_json(uint32_t reasons) {
   return list;
 }
 
-// Over the points of the cloud; NaN without any.
+// The root mean square reprojection error of the cloud's points; NaN without points.
 double rms_reprojection_px(const tv_reconstruction& reconstruction) {
   double sum = 0;
   int count = 0;
@@ -58,7 +58,7 @@ double rms_reprojection_px(const tv_reconstruction& reconstruction) {
   return count ? std::sqrt(sum / count) : NAN;
 }
 
-// As nlohmann's dump(2), but a list of plain values stays on one line.
+// Writes JSON as nlohmann's dump(2) does, except that a list of plain values stays on one line.
 void append_json(std::string& text, const Json& json, size_t depth) {
   if (json.is_primitive() || json.empty()) {
     text += json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -121,12 +121,11 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size) {
     t = translation_of(outcome.two_view);
     for (double& part : t) part *= unit_of(outcome);
   }
-  // A point x of the camera's frame lies at R^T (x - t).
+  // Transforms a point x of this camera's frame to the frame of camera 0: R^T (x - t).
   const auto placed = [&](const Vector3& x) {
     return applied(transposed(R), {x[0] - t[0], x[1] - t[1], x[2] - t[2]});
   };
-  const tv_camera& lens =
-      outcome.camera[camera];  // drawn about its axis, wherever that meets the image
+  const tv_camera& lens = outcome.camera[camera];  // drawn symmetrically about the optical axis
   Frustum frustum;
   frustum.centre = placed({0, 0, 0});
   for (size_t i = 0; i < 4; ++i) {

@@ -1,4 +1,4 @@
-// A context of the library, which grows to the largest image so far, and the times of its stages.
+// A context of the library that grows with the largest image so far, and the times of its stages.
 #pragma once
 
 #include <array>
@@ -13,22 +13,22 @@
 
 namespace cli {
 
-// Nanoseconds of CLOCK_MONOTONIC.
+// The time of CLOCK_MONOTONIC in nanoseconds.
 uint64_t now_ns();
 
 class Session {
  public:
   explicit Session(const Options& options) : options_(options) {}
 
-  // A context for images up to this size. When it has to grow, the one that an earlier call
-  // returned is freed.
+  // Returns a context for images up to this size. If it must grow, the context that an earlier call
+  // returned is freed, so do not keep that pointer.
   tv_context* context(int width, int height);
   tv_context* get() const { return context_.get(); }
   size_t context_bytes() const { return context_bytes_; }
   std::string kernels() const;
 
-  // {pyramid, detect, ..., total} in milliseconds since the last call. Stages that a verb does not
-  // run are left out unless `all`.
+  // The times since the last call in milliseconds, as {pyramid, detect, ..., total}. A stage that
+  // did not run is omitted unless `all` is true.
   nlohmann::ordered_json take_times(uint64_t total_ns, bool all);
 
  private:
@@ -41,7 +41,7 @@ class Session {
   size_t context_bytes_ = 0;
 };
 
-// Keypoints with descriptors of one image, found as reconstruct_pair finds them.
+// The keypoints and descriptors of one image, extracted as reconstruct_pair does.
 struct Features {
   std::vector<tv_keypoint> keypoints;
   std::vector<uint8_t> descriptors;

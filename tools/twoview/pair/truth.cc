@@ -38,8 +38,8 @@ KnownPose read_pose(const YAML::Node& root, const std::string& path) {
   return pose;
 }
 
-// Reads the principal point's shift that `reconstruct` writes into result.json; other files need
-// not have it.
+// Reads the shift of the principal point, which `reconstruct` writes into result.json; it is
+// optional in other files.
 void read_shift(const YAML::Node& root, const std::string& path, KnownPose& pose) {
   const YAML::Node shift = root["principal_point_shift_px"];
   if (!shift || shift.IsNull()) return;
@@ -50,7 +50,8 @@ void read_shift(const YAML::Node& root, const std::string& path, KnownPose& pose
   if (!(pose.image_width > 0)) throw BadInput(path + ": image_size0 is not above 0");
 }
 
-// The depth errors of the cloud's points in per cent, each against the nearest pixel of the map.
+// The depth errors of the cloud's points in per cent. Each depth is compared with the nearest pixel
+// of the depth map.
 std::vector<double> depth_errors_percent(const Truth& truth, const Picture& picture0,
                                          const tv_reconstruction& reconstruction) {
   std::vector<double> errors;

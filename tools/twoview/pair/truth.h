@@ -1,4 +1,4 @@
-// The true pose and depths of a pair, and the errors of a reconstruction against them.
+// Reads the true pose and depths of a pair, and computes the errors of a reconstruction.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,39 +10,41 @@
 
 namespace cli {
 
-// R and t of cam1_from_cam0 from a YAML or JSON file. A result.json also holds the shift of the
-// principal point that its pose was estimated with. R is the rotation nearest to the file's nine
-// numbers, which may be rounded. Throws BadInput.
+// R and t of cam1_from_cam0, read from a YAML or JSON file. If the file is a result.json, the shift
+// of the principal point that its pose was estimated with is read too. R is replaced by the nearest
+// rotation, since the file's numbers may be rounded. Throws BadInput.
 struct KnownPose {
   Matrix3 R{};
   Vector3 t{};
-  // Pixels to add to cx and cy of a camera whose images are image_width wide; with image_width 0,
-  // of a camera of any size.
+  // The shift in pixels to add to cx and cy of a camera with images of width image_width; if
+  // image_width is 0, of a camera with images of any size.
   double principal_point_shift_px[2] = {0, 0};
   double image_width = 0;
 
-  // The camera that the pose refers to: `camera`, of any image size, with the shift added.
+  // The camera that the pose refers to: `camera`, of any image size, with the shift added to its
+  // principal point.
   tv_camera corrected(const tv_camera& camera) const;
 };
 KnownPose load_pose(const std::string& path);
 
-// A YAML file: R [9] row-major and t [3] of cam1_from_cam0; optional `baseline`, the length of t in
-// metres; optional `depth0`, the path (from the file's folder) of a float depth map of image 0, in
-// the baseline's unit, 0, negative or not finite where unknown.
+// The truth from a YAML file: R [9] row-major and t [3] of cam1_from_cam0; optional `baseline`, the
+// length of t in metres; optional `depth0`, the path (relative to the file's folder) of a float
+// depth map of image 0. Depths are in the unit of the baseline; a depth that is 0, negative or not
+// finite is unknown.
 struct Truth {
   Matrix3 R{};
   Vector3 t{};
-  double baseline = 0;  // |t| where the file gives none
-  cv::Mat depth0;       // empty: none
+  double baseline = 0;  // length of t if the file has no baseline
+  cv::Mat depth0;       // empty if there is no depth map
 };
 Truth load_truth(const std::string& path);
 
-// Errors against the truth; null where they are not known.
+// The errors of the reconstruction as JSON; an error that cannot be computed is null.
 nlohmann::ordered_json truth_json(const Truth& truth, const Picture& picture0,
                                   const tv_two_view& two_view,
                                   const tv_reconstruction& reconstruction);
 
-// Throws BadInput unless the depth map has the size of image 0's file.
+// Throws BadInput if the size of the depth map is not that of image 0's file.
 void check_truth(const Truth& truth, const Picture& picture0);
 
 }  // namespace cli

@@ -9,8 +9,9 @@ namespace {
 
 constexpr int kFont = cv::FONT_HERSHEY_DUPLEX;
 constexpr double kCapital = 21;  // height of the font's capitals at scale 1, pixels
-constexpr int kOver = 4;         // text is drawn this many times larger
-constexpr int kShift = 4;        // fractional bits of OpenCV's drawing coordinates
+// Text is drawn this many times larger, then reduced, so that it is smooth.
+constexpr int kOver = 4;
+constexpr int kShift = 4;  // fractional bits of OpenCV's drawing coordinates
 
 cv::Point fixed_point(cv::Point2d p) {
   const double unit = 1 << kShift;
@@ -25,8 +26,8 @@ void blend(cv::Vec3b& pixel, const Colour& colour, double share) {
     pixel[c] = cv::saturate_cast<uint8_t>(pixel[c] + share * (colour[c] - pixel[c]));
 }
 
-// The character at the front of `text`, of which it takes `length` bytes; -1 and one byte where
-// that is no UTF-8.
+// Decodes the first UTF-8 character of `text` and sets `length` to its number of bytes. For an
+// invalid byte it returns -1 with a length of one byte.
 int32_t front_character(const char* text, size_t size, size_t& length) {
   const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
   const uint8_t first = byte(0);
@@ -50,7 +51,7 @@ int32_t front_character(const char* text, size_t size, size_t& length) {
 }  // namespace
 
 std::string plain_letters(const std::string& text) {
-  // U+00C0 to U+017F.
+  // Replacements of the letters U+00C0 to U+017F.
   static const char letters[] =
       "AAAAAAACEEEEIIIIDNOOOOOxOUUUUYTsaaaaaaaceeeeiiiidnooooo_ouuuuyty"
       "AaAaAaCcCcCcCcDdDdEeEeEeEeEeGgGgGgGgHhHhIiIiIiIiIiIiJjKkkLlLlLlLlLlNnNnNnnNnOoOoOoOoRrRrRr"
@@ -63,7 +64,8 @@ std::string plain_letters(const std::string& text) {
       plain += static_cast<char>(character);
     else if (character >= 0xC0 && character < 0x180)
       plain += letters[character - 0xC0];
-    else if (character < 0x300 || character >= 0x370)  // not the accent of a letter before it
+    // A combining accent (U+0300 to U+036F) is dropped.
+    else if (character < 0x300 || character >= 0x370)
       plain += '_';
   }
   return plain;
@@ -121,7 +123,8 @@ void put_line(cv::Mat& sheet, cv::Point2d a, cv::Point2d b, const Colour& colour
 }
 
 void put_disc(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& colour) {
-  // By each pixel's distance: OpenCV's own small discs are diamonds.
+  // Each pixel is covered by its distance from the centre, because OpenCV draws a small disc as a
+  // diamond.
   const int left = std::max(0, static_cast<int>(std::floor(centre.x - radius - 1)));
   const int top = std::max(0, static_cast<int>(std::floor(centre.y - radius - 1)));
   const int right = std::min(sheet.cols - 1, static_cast<int>(std::ceil(centre.x + radius + 1)));

@@ -1,4 +1,4 @@
-// Drawing with OpenCV, made legible: smooth text, see-through lines, two images on one sheet.
+// Drawing on top of OpenCV: smooth text, transparent lines, and sheets with two images.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -15,20 +15,20 @@ const Colour paper(32, 24, 20), panel(44, 34, 28), grid(72, 60, 52), text(236, 2
 
 enum class Align { kLeft, kCentre, kRight };
 
-// The text in the characters that the font of the pictures has, which are ASCII's: Latin letters
-// lose their accents, and any other character becomes one underscore. Input is UTF-8; bytes that
-// are not become an underscore each.
+// Converts UTF-8 text to the ASCII characters that the font has. Latin letters lose their accents;
+// any other character, and each invalid byte, becomes one underscore.
 std::string plain_letters(const std::string& text);
 
-// Text whose capitals are `height` pixels high, its baseline at `at`; drawn large and scaled down.
+// Draws text with capitals `height` pixels high and its baseline at `at`. The text is drawn large
+// and reduced, which makes it smooth.
 void put_text(cv::Mat& sheet, const std::string& text, cv::Point2d at, double height,
               const Colour& colour, Align align = Align::kLeft);
 double text_width(const std::string& text, double height);
 
-// Cut to a width with "..." in the middle.
+// Shortens text to a width with "..." in the middle.
 std::string fitted(const std::string& text, double height, double width);
 
-// Anti-aliased to a fraction of a pixel.
+// Draws an anti-aliased line with end points of sub-pixel precision.
 void put_line(cv::Mat& sheet, cv::Point2d a, cv::Point2d b, const Colour& colour,
               int thickness = 1);
 void put_disc(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& colour);
@@ -37,25 +37,26 @@ void put_ring(cv::Mat& sheet, cv::Point2d centre, double radius, const Colour& c
 void put_arrow(cv::Mat& sheet, cv::Point2d tail, cv::Point2d tip, const Colour& colour,
                int thickness = 2);
 
-// The Turbo colour map, bright on dark; share in [0, 1].
+// The Turbo colour map for bright colours on a dark background; `share` is in [0, 1].
 Colour turbo(double share);
-// The i-th of a row of clearly different colours.
+// The i-th colour of a sequence of clearly different colours.
 Colour distinct(int index);
 
-// Two images side by side, or one above the other where that fills the sheet better, each scaled by
-// the same factor, with a caption strip below.
+// A sheet with two images and a caption strip below. The images stand side by side or one above the
+// other, whichever fills the sheet better, and are scaled by the same factor.
 class PairSheet {
  public:
-  // dim in (0, 1]: brightness of the images, which are shown in grey.
+  // The images are shown in grey with the brightness `dim`, in (0, 1].
   PairSheet(const cv::Mat& image0, const cv::Mat& image1, double dim);
-  // Sheet position of an image's pixel.
+  // The position on the sheet of a pixel of an image.
   cv::Point2d at(int image, double x, double y) const;
   cv::Rect frame(int image) const { return frame_[image]; }
   double scale() const { return scale_; }
   cv::Mat& sheet() { return sheet_; }
-  // A part of the sheet that holds one image only, sharing its pixels.
+  // The part of the sheet that holds one image. It shares the sheet's pixels, so drawing on it is
+  // clipped to the image.
   cv::Mat part(int image) { return sheet_(frame_[image]); }
-  // The names over the images and one line below.
+  // Draws the name above each image and the caption below.
   void label(const std::string& name0, const std::string& name1, const std::string& caption);
 
  private:

@@ -1,4 +1,5 @@
-// epipolar.png: the check by eye that the paper uses for sideways and forward flight.
+// epipolar.png: epipolar lines and epipoles for a check by eye, as the paper shows them for
+// sideways and forward flight.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +18,7 @@ constexpr int kNumLines = 15;
 using Pixel = cv::Point2d;
 using Curve = std::vector<Pixel>;
 
-// Two-view geometry as lines: from the pose and the lenses, or from F alone.
+// The epipolar geometry as curves in pixels, from the pose and the lens models, or from F alone.
 class Epipolar {
  public:
   explicit Epipolar(const Outcome& outcome) : outcome_(outcome) {
@@ -37,7 +38,7 @@ class Epipolar {
     }
   }
 
-  // Where the other image's pixel may be seen in image `to`.
+  // The epipolar curve in image `to` of a pixel of the other image.
   std::vector<Curve> curve(int to, const Pixel& other) const {
     const Matrix3 m = to == 1 ? matrix_ : transposed(matrix_);
     if (!by_rays_) return {straight(to, applied(m, Vector3{other.x, other.y, 1}))};
@@ -47,8 +48,8 @@ class Epipolar {
     return bent(camera_[to], applied(m, ray));
   }
 
-  // The epipole's pixel; where the lens cannot see it, the pixel of a lens without distortion, far
-  // out in the same direction. `exact` tells which.
+  // The pixel of the epipole. If the lens model cannot project it, the result is the pixel of a
+  // lens without distortion in the same direction, and `exact` is false.
   Pixel epipole(int image, bool& exact) const {
     Vector3 e = epipole_[image];
     exact = true;
@@ -88,8 +89,8 @@ class Epipolar {
     return {foot - reach * Pixel(-normal.y, normal.x), foot + reach * Pixel(-normal.y, normal.x)};
   }
 
-  // Steps along the line n . (x, y, 1) = 0 by equal angles, through the lens; pieces end where the
-  // lens cannot see.
+  // Samples the line n . (x, y, 1) = 0 at equal angles and projects it with the lens model. A new
+  // piece begins where the lens model cannot project.
   static std::vector<Curve> bent(const tv_camera& camera, const Vector3& n) {
     std::vector<Curve> pieces(1);
     const double length_sq = n[0] * n[0] + n[1] * n[1];
@@ -117,7 +118,8 @@ class Epipolar {
   Vector3 epipole_[2]{};
 };
 
-// Inliers far from each other in image 0: the surest first, then always the farthest from those.
+// Chooses inliers far from each other in image 0: first the one with the best ratio, then
+// repeatedly the one farthest from those chosen.
 std::vector<int> spread_inliers(const tv_reconstruction& r, int most) {
   std::vector<int> inliers, chosen;
   for (int i = 0; i < r.num_matches; ++i)
@@ -158,7 +160,7 @@ void draw_epipole(PairSheet& pair, int image, const cv::Mat& luma, Pixel epipole
     }
     return;
   }
-  // An arrow at the border, on the way from the middle to the epipole.
+  // Draws an arrow at the image border that points from the middle towards the epipole.
   const Pixel way = epipole - middle;
   const Pixel direction = way / std::hypot(way.x, way.y);
   const double half_width = frame.width / 2.0 - edge, half_height = frame.height / 2.0 - edge;

@@ -10,7 +10,7 @@
 namespace cli {
 namespace {
 
-constexpr int kMaxLines = 110;  // more lines than this hide what they should show
+constexpr int kMaxLines = 110;  // with more lines the picture is unreadable
 
 std::string counted(int count, const char* noun) {
   return std::to_string(count) + " " + noun +
@@ -19,7 +19,7 @@ std::string counted(int count, const char* noun) {
                                                       : "s");
 }
 
-// Every n-th of a list, spread evenly, at most `most`.
+// At most `most` elements of the list, evenly spaced.
 std::vector<int> thinned(const std::vector<int>& list, int most) {
   const int count = static_cast<int>(list.size());
   if (count <= most) return list;
@@ -42,7 +42,7 @@ cv::Mat keypoints_picture(const Picture& picture, const std::vector<tv_keypoint>
   cv::cvtColor(grey, sheet, cv::COLOR_GRAY2BGR);
   int levels = 1;
   for (const tv_keypoint& k : keypoints) levels = std::max(levels, k.level + 1);
-  // Weak ones first, so that strong ones lie on top.
+  // Weak keypoints are drawn first, so that strong ones lie on top.
   for (auto k = keypoints.rbegin(); k != keypoints.rend(); ++k) {
     const cv::Point2d at((k->x + 0.5) * scale - 0.5, (k->y + 0.5) * scale - 0.5);
     const double radius = std::max(2.0, k->size * scale / 2);

@@ -1,4 +1,4 @@
-// views.png: the cloud from the front and from the side, after the paper's figure 16.
+// views.png: the cloud from the front and from the side, like the paper's figure 16.
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,8 @@ struct Range {
   void include(double value) { low = std::min(low, value), high = std::max(high, value); }
 };
 
-// What 98 per cent of the points span, so that a few far ones do not shrink the rest to a spot.
+// The range that contains 98 % of the points, so that a few distant points do not determine the
+// scale.
 Range span_of(const std::vector<CloudPoint>& cloud, double CloudPoint::*axis) {
   std::vector<double> values;
   for (const CloudPoint& point : cloud) values.push_back(point.*axis);
@@ -28,7 +29,7 @@ Range span_of(const std::vector<CloudPoint>& cloud, double CloudPoint::*axis) {
   return {range.low - pad, range.high + pad};
 }
 
-// 1, 2 or 5 times a power of ten, so that about `wanted` steps fill the length.
+// A step of 1, 2 or 5 times a power of ten such that about `wanted` steps fill the length.
 double nice_step(double length, double wanted) {
   const double raw = length / wanted, power = std::pow(10, std::floor(std::log10(raw)));
   const double digit = raw / power;
@@ -42,13 +43,14 @@ std::string tick_text(double value, double step) {
   return text;
 }
 
-// One plot with equal scales on both axes, the second axis downwards (as the camera's y is).
+// A plot with the same scale on both axes; the second axis points down, as the camera's y axis
+// does.
 class Plot {
  public:
   Plot(cv::Mat& sheet, cv::Rect frame, Range across, Range down)
       : sheet_(sheet), frame_(frame), across_(across), down_(down) {
     scale_ = std::min(frame.width / across.length(), frame.height / down.length());
-    // The axis with room to spare shows more of the space.
+    // The axis with unused room gets a larger range.
     grow(across_, frame.width / scale_);
     grow(down_, frame.height / scale_);
   }
@@ -96,13 +98,14 @@ class Plot {
   double scale_ = 1;
 };
 
-// On the dark panel even the darkest paint must be seen.
+// Dark colours are brightened so that they are visible on the dark background.
 Colour shown(const CloudPoint& point) {
   const auto lift = [](uint8_t v) { return 52 + v * 203.0 / 255; };
   return {lift(point.blue), lift(point.green), lift(point.red)};
 }
 
-// Draws the points, the farthest from the viewer first. Returns how many lie outside.
+// Draws the points, the farthest from the viewer first. Returns the number of points outside the
+// plot.
 int draw_cloud(Plot& plot, const std::vector<CloudPoint>& cloud, double CloudPoint::*across,
                double CloudPoint::*away, double radius) {
   std::vector<size_t> order(cloud.size());
@@ -124,7 +127,7 @@ int draw_cloud(Plot& plot, const std::vector<CloudPoint>& cloud, double CloudPoi
   return outside;
 }
 
-// A camera seen along x.
+// Draws a camera as seen along the x axis.
 void draw_camera(Plot& plot, const Frustum& frustum, const Colour& colour) {
   cv::Mat part = plot.part();
   const auto at = [&](const Vector3& p) { return plot.at(p[2], p[1]); };
@@ -141,8 +144,8 @@ cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& clo
   const tv_two_view& v = outcome.two_view;
   const Range x = span_of(cloud, &CloudPoint::x), y = span_of(cloud, &CloudPoint::y);
   Range z = span_of(cloud, &CloudPoint::z);
-  // The side view shows the cameras too, unless they are so far from the cloud that it would shrink
-  // to less than half.
+  // The side view also shows the cameras, unless this would reduce the cloud to less than half of
+  // the plot.
   Range with_cameras = z;
   for (int camera = 0; camera < 2; ++camera)
     with_cameras.include(frustum_of(outcome, camera, 0).centre[2]);

@@ -8,7 +8,7 @@ namespace {
 
 LinkListener& listener_of(void* user) { return *static_cast<LinkListener*>(user); }
 
-// The session's callbacks are C functions; these call the listener's.
+// The driver's callbacks are C functions; these forward to the listener.
 void tell_event(void* user, ardrone_event event, const char* key) {
   const LinkListener& listener = listener_of(user);
   if (listener.on_event) listener.on_event(event, key != nullptr ? key : "");

@@ -1,5 +1,5 @@
-// The AR.Drone driver's session in C++: its callbacks as functions, its memory, its decoder, and
-// its refusals as BadInput. The verbs that talk to a drone and the playing of recordings share it.
+// A C++ wrapper of the AR.Drone driver's session: callbacks as functions, its memory, its decoder,
+// and its errors as BadInput. The drone's verbs and the playback of recordings share it.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace cli {
 
-// What a session reports as it is stepped. A function that is empty is not called.
+// The functions that a session calls while it runs. An empty function is not called.
 struct LinkListener {
   std::function<void(ardrone_event event, const std::string& key)> on_event;
   std::function<void(const uint8_t* bytes, size_t size, const ardrone_navdata& navdata,
@@ -23,15 +23,16 @@ struct LinkListener {
   std::function<void(const tvs_frame& frame)> on_frame;
 };
 
-// Sets the callbacks and the user pointer of `options`; the listener must outlive the session.
+// Sets the callbacks and the user pointer of `options`. The listener must outlive the session.
 void set_callbacks(LinkListener& listener, ardrone_session_options& options);
 
-// A session in `memory`, which must outlive it. Throws BadInput when the driver refuses.
+// Creates a session in `memory`, which must outlive it. Throws BadInput if the driver refuses the
+// options.
 using SessionMemory = std::vector<std::max_align_t>;
 ardrone_session* make_session(const ardrone_session_options& options,
                               const ardrone_transport& transport, SessionMemory& memory);
 
-// A decoder of H.264 to luma; closed with its owner.
+// A decoder from H.264 to luma, which the destructor closes.
 class Decoder {
  public:
   Decoder();
@@ -44,10 +45,11 @@ class Decoder {
   tvs_decoder decoder_{};
 };
 
-// frames_received, frames_decoded and so on: the keys of summary.json.
+// The counters and the duration as summary.json has them: frames_received, frames_decoded and so
+// on.
 nlohmann::ordered_json summary_json(const ardrone_counters& counters, double seconds);
 
-// Throws BadInput with the driver's own words unless status is TVS_OK.
+// Throws BadInput with the driver's message unless status is TVS_OK.
 void check_driver(tvs_status status, const std::string& what);
 
 }  // namespace cli

@@ -9,11 +9,12 @@ namespace cli {
 namespace {
 
 constexpr double kMaxGapS =
-    0.25;  // in a log that is integrated; demo mode gives 15 samples a second
-constexpr double kAltitudeWindowS = 0.1;  // altitudes are averaged over so much to each side
-constexpr double kLayer = 0.04;           // thickness of a floor, of its distance below
-constexpr size_t kLeastFloor = 20;        // points
-constexpr double kFloorShare = 0.05;      // of all points
+    0.25;  // longest gap in a log that is integrated, seconds; demo mode gives 15 samples a second
+// Altitudes are averaged over this time before and after an instant.
+constexpr double kAltitudeWindowS = 0.1;
+constexpr double kLayer = 0.04;  // thickness of a floor as a share of its distance below the camera
+constexpr size_t kLeastFloor = 20;    // fewest points of a floor
+constexpr double kFloorShare = 0.05;  // least share of all points that a floor must hold
 constexpr double kWorstShare = 0.25;
 
 Vector3 plus(const Vector3& a, const Vector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
@@ -22,7 +23,7 @@ Vector3 minus(const Vector3& a, const Vector3& b) {
 }
 Vector3 times(double s, const Vector3& a) { return {s * a[0], s * a[1], s * a[2]}; }
 
-// Halfway in rotation by s in [0, 1]: the geodesic, through the drivers' slerp.
+// Interpolates rotations by s in [0, 1] along the geodesic, with the drivers' slerp.
 void to_quaternion(const Matrix3& m, double q[4]) {
   const double trace = m[0] + m[4] + m[8];
   const double squares[4] = {1 + trace, 1 + 2 * m[0] - trace, 1 + 2 * m[4] - trace,
@@ -53,7 +54,8 @@ Matrix3 between(const Matrix3& a, const Matrix3& b, double share) {
   return to_matrix(q);
 }
 
-// The mean of the altitudes near a time, and its sigma: one error that all samples share.
+// The mean of the altitudes near a time, and its standard deviation. All samples share one error,
+// so averaging does not reduce it.
 std::optional<std::pair<double, double>> altitude_at(const FlightLog& log, double time_s) {
   double sum = 0, sigma = 0;
   int count = 0;
@@ -134,8 +136,8 @@ std::optional<MetricScale> scale_by_altitude(const FlightLog& log, double time0_
   const double climb_sigma = std::hypot(altitude0->second, altitude1->second);
   const double up = -unit_way[2];
   if (!(std::abs(climb) > 3 * climb_sigma) || !(climb * up > 0)) return {};
-  // An error of the way's direction by an angle e changes its vertical part by e times the level
-  // one.
+  // An error of angle e in the direction changes its vertical component by e times its horizontal
+  // component.
   const double level = std::sqrt(std::max(0.0, 1 - up * up));
   const double direction_sigma = std::hypot(direction_sigma_rad, at0->attitude_sigma_rad);
   const double baseline = climb / up;
@@ -153,7 +155,7 @@ std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
   struct Below {
     double depth, level_distance;
   };
-  std::vector<Below> below;  // points under the camera
+  std::vector<Below> below;  // points below the camera
   for (const Vector3& point : points) {
     const Vector3 p = applied(world_from_camera, point);
     if (p[2] > 0) below.push_back({p[2], std::hypot(p[0], p[1])});
@@ -162,7 +164,7 @@ std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
             [](const Below& a, const Below& b) { return a.depth < b.depth; });
   const size_t least =
       std::max(kLeastFloor, static_cast<size_t>(kFloorShare * static_cast<double>(points.size())));
-  // The lowest layer with enough points: windows from below.
+  // Searches upwards for the lowest layer that has enough points.
   for (size_t last = below.size(); last-- > 0;) {
     const double top = below[last].depth * (1 - kLayer);
     const auto first = std::lower_bound(below.begin(), below.end(), top,
@@ -178,7 +180,7 @@ std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
     const double height = camera_height(*at, altitude->first, mount);
     if (!(height > 3 * altitude->second)) return {};
     const double baseline = height / depth;
-    // A tilt that is wrong by an angle moves the floor by the angle times its level distance.
+    // A tilt error of some angle moves the floor by that angle times its horizontal distance.
     const double tilt = at->attitude_sigma_rad * far / depth;
     const double scatter = std::sqrt(spread / static_cast<double>(count)) / depth;
     const double relative = std::hypot(std::hypot(altitude->second / height, tilt), scatter);

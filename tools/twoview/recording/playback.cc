@@ -12,7 +12,7 @@
 namespace cli {
 namespace {
 
-// A recording's files, closed with their owner.
+// The open files of a recording, which the destructor closes.
 struct Replay {
   explicit Replay(const std::string& folder) {
     const tvs_status status = ardrone_replay_open(&files, folder.c_str(), &transport);

@@ -1,4 +1,4 @@
-// A recording of `drone record`, played through the driver as if the drone sent it again.
+// Plays a recording of `drone record` through the driver as if the drone sent the data again.
 #pragma once
 
 #include <atomic>
@@ -8,9 +8,9 @@
 
 namespace cli {
 
-// Plays a recording's folder through a session until its end or `stop`: as fast as the computer can
-// when `speed` is 0, else `speed` times as fast as it was recorded. Throws BadInput where there is
-// no recording.
+// Plays the recording in a folder until its end or until `stop` is set. Speed 0 is as fast as
+// possible; otherwise it is `speed` times the recorded speed. Throws BadInput if there is no
+// recording.
 ardrone_counters play(const std::string& folder, LinkListener listener,
                       const std::atomic<bool>& stop, double speed);
 

@@ -1,5 +1,5 @@
-// The files of `drone record`. They are written as the bytes arrive, so that everything received so
-// far can be read however the program ends.
+// Writes the files of `drone record`. Data are written as they arrive, so that everything received
+// so far is readable however the program ends.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 
 namespace cli {
 
-// A file that whole entries are appended to. An entry that cannot be written is removed from the
-// file again, and BadInput is thrown.
+// A file to which complete entries are appended. If an entry cannot be written, its bytes are
+// removed from the file and BadInput is thrown.
 class GrowingFile {
  public:
-  // Throws BadInput when it exists or cannot be made.
+  // Creates the file. Throws BadInput if it exists or cannot be created.
   explicit GrowingFile(const std::filesystem::path& path);
   ~GrowingFile();
   GrowingFile(const GrowingFile&) = delete;
@@ -32,24 +32,24 @@ class GrowingFile {
   int64_t size_ = 0;
 };
 
-// Makes a folder where it is missing. Throws BadInput.
+// Creates a folder if it does not exist. Throws BadInput.
 void make_folder(const std::filesystem::path& folder);
 
-// A decoded picture as FOLDER/<number, six digits>.png. Numbers come again after a reboot: the
-// later picture stays. Throws BadInput.
+// Writes a decoded picture as FOLDER/<number, six digits>.png. Numbers repeat after the drone
+// restarts; the later picture then replaces the earlier one. Throws BadInput.
 void write_frame(const std::filesystem::path& folder, const tvs_frame& frame);
 
 class Recording {
  public:
-  // Makes the folder; refuses one that holds a recording already.
+  // Creates the folder. Throws BadInput if it already holds a recording.
   Recording(const std::filesystem::path& folder, bool with_frames);
   ~Recording();
 
   void add_navdata(const uint8_t* bytes, size_t size, const tvs_imu& imu);
   void add_packet(const ardrone_pave_packet& packet, const tvs_time& time);
-  // A decoded picture, as frames/<number>.png.
+  // Writes a decoded picture as frames/<number>.png.
   void add_frame(const tvs_frame& frame);
-  // Written last, beside the others, under its final name or not at all.
+  // Writes the summary at the end. The file appears complete or not at all.
   void add_summary(const std::string& json);
 
  private:

@@ -28,7 +28,7 @@ void require_rotation(const std::vector<double>& r, const std::string& name) {
   if (!good || !(determinant > 0)) throw BadInput(name + " is not a rotation");
 }
 
-// The numbers of an entry that may be missing.
+// The numbers of an optional entry; empty if the entry is missing.
 std::vector<double> optional_numbers(const YAML::Node& root, const std::string& entry, size_t count,
                                      const std::string& file) {
   if (!root[entry]) return {};
@@ -39,8 +39,8 @@ std::vector<double> optional_numbers(const YAML::Node& root, const std::string& 
   return numbers;
 }
 
-// The command line's numbers, else the camera file's, else a camera at the body's origin that looks
-// forward.
+// The mount from the command line, else from the camera file, else a camera at the body's origin
+// that looks forward.
 CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
   const YAML::Node root = parse_yaml(read_file(file, kMaxFileBytes), file);
   const bool rotation_given = !options.body_from_camera.empty();
@@ -105,7 +105,8 @@ void RecordingInput::load(const tv_camera& camera, Session& session, const Optio
   const std::vector<int>& frames = s.options.frames;
   if (frames.empty()) {
     s.pair = choose_pair(s.options.folder, s.flight, camera, s.mount, session, options);
-    session.take_times(0, true);  // those of the choice are not the pair's
+    // Discards the times of the choice of frames, which do not belong to the pair.
+    session.take_times(0, true);
   } else {
     s.pair = pair_of(s.options.folder, s.flight, frames[0], frames[1]);
   }

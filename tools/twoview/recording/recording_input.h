@@ -1,6 +1,6 @@
 // The input of `reconstruct --recording`: its options, and two frames of a flight in place of two
-// image files, with the attitudes at both and the scale in metres.
-// A program built without the driver has recording_none.cc in place of recording_input.cc.
+// image files, with the attitudes at both frames and the scale in metres. A program that is built
+// without the driver contains recording_none.cc instead of recording_input.cc.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -18,27 +18,28 @@ struct RecordingOptions {
   std::vector<int> frames;                               // two indices, or none
   std::vector<double> body_from_camera, camera_in_body;  // 9 and 3 numbers, or none
 
-  // Nothing in a program without the driver.
+  // Adds the options to a verb; adds nothing in a program without the driver.
   void add_to(CLI::App& verb);
   bool given() const { return !folder.empty(); }
 };
 
 class RecordingInput {
  public:
-  // Reads the flight and the mount (the camera file's body_from_camera and camera_in_body where the
-  // options have none). Throws BadInput.
+  // Reads the flight and the mount of the camera: from the options, else from the camera file's
+  // body_from_camera and camera_in_body. Throws BadInput.
   RecordingInput(const RecordingOptions& options, const std::string& camera_file);
   ~RecordingInput();
 
-  // Puts the pictures of the pair, not resized, into outcome.picture. `camera` is their camera.
+  // Puts the two pictures, not resized, into outcome.picture. `camera` is the camera of these
+  // pictures.
   void load(const tv_camera& camera, Session& session, const Options& options, Outcome& outcome);
-  // Sets gravity at both instants as a prior, unless the caller gave one.
+  // Sets the gravity at both frames as a prior, unless the caller already gave one.
   void add_gravity(tv_estimate_options& options);
-  // Sets outcome.scale where the flight's measurements give it. Call before result_json.
+  // Sets outcome.scale if the measurements of the flight determine it. Call it before result_json.
   void add_scale(Outcome& outcome) const;
   // Adds "imu" and "recording" to outcome.json.
   void add_json(Outcome& outcome) const;
-  // Lines of the summary for people.
+  // The lines of the summary for the user.
   std::string words(const Outcome& outcome) const;
 
  private:

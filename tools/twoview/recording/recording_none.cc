@@ -1,4 +1,5 @@
-// The program without the AR.Drone driver: no option --recording.
+// Replaces recording_input.cc in a program without the AR.Drone driver: there is no option
+// --recording.
 #include "recording/recording_input.h"
 
 namespace cli {

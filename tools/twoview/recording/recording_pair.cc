@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232;
 constexpr double kAttitudeGapS = 0.25;
-constexpr size_t kCandidates = 24;  // frames that are tried
-constexpr double kFarthestS = 4;    // between two frames of a pair
+constexpr size_t kCandidates = 24;  // number of frames among which the pair is chosen
+constexpr double kFarthestS = 4;    // longest time between the two frames of a pair, seconds
 constexpr double kEnoughParallaxDeg = 3;
 
 Matrix3 matrix_of(const double q[4]) {
@@ -47,7 +47,7 @@ FlightSample sample_of(const tvs_imu& imu) {
   return sample;
 }
 
-// The pictures of some indices, by index.
+// Decodes the pictures with these indices; the keys are the indices.
 std::map<int, cv::Mat> read_pictures(const std::string& folder, const std::set<int>& wanted) {
   std::map<int, cv::Mat> pictures;
   int index = 0;
@@ -76,14 +76,14 @@ Picture picture_of(const RecordedFrame& frame, const cv::Mat& luma) {
   return picture;
 }
 
-// The attitude at a frame's time; nothing where that time or the attitude then is not known.
+// The attitude at a frame's time; empty if the time or the attitude is unknown.
 std::optional<FlightSample> sample_of(const RecordedFlight& flight, const RecordedFrame& frame) {
   if (!frame.timed) return {};
   return sample_at(flight.log, frame.time_s, kAttitudeGapS);
 }
 
-// Frames with a known attitude, evenly spread over the part of the log in which the drone moved;
-// all frames where it never did.
+// Candidate frames: those with a known attitude, evenly spread over the part of the log in which
+// the drone moved, or over all frames if it never moved.
 std::vector<RecordedFrame> candidates_of(const RecordedFlight& flight) {
   std::vector<RecordedFrame> moving, known;
   for (const RecordedFrame& frame : flight.frames) {
@@ -117,8 +117,8 @@ RecordedFlight read_flight(const std::string& folder) {
   };
   listener.on_frame = [&](const tvs_frame& frame) {
     const double time_s = static_cast<double>(frame.time.host_ns) * 1e-9;
-    // A picture can come before the attitude that follows its instant; the whole log has that one,
-    // too.
+    // A picture can arrive before the attitude sample that follows its time; the complete log
+    // contains that sample.
     const bool follows_log =
         !flight.log.empty() && time_s - flight.log.back().time_s < kAttitudeGapS;
     flight.frames.push_back({static_cast<int>(flight.frames.size()), frame.number, time_s,
@@ -226,7 +226,7 @@ nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFram
       transposed(product(at1->world_from_body, mount.body_from_camera));
   const Matrix3 by_imu =
       product(camera1_from_world, product(at0->world_from_body, mount.body_from_camera));
-  // The difference has the errors of both attitudes about each of three axes.
+  // The relative rotation has the errors of both attitudes about each of three axes.
   const double imu_sigma =
       std::sqrt(3.0) * std::hypot(at0->attitude_sigma_rad, at1->attitude_sigma_rad);
   const double* c = two_view.covariance;

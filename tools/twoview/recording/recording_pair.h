@@ -1,4 +1,5 @@
-// The choice of two frames of a recording, what the IMU measured at both, and the scale in metres.
+// Chooses two frames of a recording, and gives the IMU's measurements at both and the scale in
+// metres.
 #pragma once
 
 #include <optional>
@@ -12,10 +13,10 @@
 namespace cli {
 
 struct RecordedFrame {
-  int index = 0;        // among the decoded pictures, from 0
-  uint64_t number = 0;  // the drone's own count
+  int index = 0;        // index among the decoded pictures, from 0
+  uint64_t number = 0;  // the drone's own frame number
   double time_s = 0;    // host clock
-  bool timed = false;   // on the attitudes' clock
+  bool timed = false;   // whether its time is known on the clock of the attitudes
 };
 
 struct RecordedFlight {
@@ -26,37 +27,38 @@ struct RecordedFlight {
 // Plays the whole recording once. Throws BadInput where there is none, or no picture in it.
 RecordedFlight read_flight(const std::string& folder);
 
-// Two chosen frames, their pictures, and the reason for the choice in words.
+// Two chosen frames with their pictures, and the reason for the choice in words.
 struct RecordingPair {
   RecordedFrame frame[2];
   Picture picture[2];
   std::string why;
 };
 
-// The pictures of two indices. Throws BadInput when the recording has no such frame.
+// The pictures with these two indices. Throws BadInput if the recording has no such frame.
 RecordingPair pair_of(const std::string& folder, const RecordedFlight& flight, int index0,
                       int index1);
 
-// Chooses among frames with an attitude that are spread over the flight and at most 4 s apart: the
-// pair with the most inliers whose verdict is ok. A pair whose median parallax is below 3 degrees
-// counts for proportionally less. `camera` is of the pictures as they are; they are shrunk as
-// `options` say. Throws BadInput when no two frames give a full pose.
+// Chooses the two frames. Candidates have a known attitude, are spread over the flight, and are at
+// most 4 s apart. The pair with the most inliers and the verdict "ok" is chosen; the count of a
+// pair with a median parallax below 3 degrees is reduced in proportion. `camera` is that of the
+// pictures before resizing; they are resized as `options` say. Throws BadInput if no two frames
+// give a full pose.
 RecordingPair choose_pair(const std::string& folder, const RecordedFlight& flight,
                           const tv_camera& camera, const CameraMount& mount, Session& session,
                           const Options& options);
 
-// Directions of gravity in both cameras, from the attitudes at the frames' times, set in `options`
-// as a prior; false, and nothing set, where an attitude is not known.
+// Sets the directions of gravity in both cameras, from the attitudes at the frames' times, as a
+// prior in `options`. Returns false and sets nothing if an attitude is unknown.
 bool set_gravity(const RecordedFlight& flight, const RecordedFrame frames[2],
                  const CameraMount& mount, tv_estimate_options& options);
 
-// result.json's "imu", or null without both attitudes.
+// The entry "imu" of result.json; null unless both attitudes are known.
 nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFrame frames[2],
                                 const CameraMount& mount, const tv_two_view& two_view,
                                 bool gravity_used, const std::optional<MetricScale>& scale);
 
-// The scales by velocity, by altitude and by the floor; each is empty where it cannot be measured.
-// All need a full pose.
+// The scales by velocity, by altitude and by the floor; each is empty if it cannot be measured. The
+// result must have a full pose.
 std::vector<std::optional<MetricScale>> scales_of(const RecordedFlight& flight,
                                                   const RecordedFrame frames[2],
                                                   const CameraMount& mount, const Outcome& outcome);

@@ -31,7 +31,7 @@ std::string formatted(const char* format, double value) {
   return text;
 }
 
-// Replaces each {{name}} once; what is put in is not looked through again.
+// Replaces each {{name}} of the page once. Inserted text is not searched for further names.
 std::string filled(const std::string& page,
                    const std::vector<std::pair<std::string, std::string>>& values) {
   std::string result;
@@ -94,7 +94,7 @@ std::string leaf_text(const Json& value) {
   return escaped(value.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-// A row-major matrix in lines of its columns.
+// The text of a row-major matrix, one line a row.
 std::string matrix_text(const Json& list, size_t columns) {
   std::string text;
   for (size_t i = 0; i < list.size(); ++i) {
@@ -132,7 +132,7 @@ std::string matrix(const std::string& name, const Json& list, size_t columns) {
                          : "";
 }
 
-// R, t and what follows from them, side by side.
+// The HTML of R, t and the values derived from them, side by side.
 std::string matrices(const Json& j) {
   std::string text = matrix("R", j["R"], 3) + matrix("t", j["t"], 1) + matrix("E", j["E"], 3) +
                      matrix("F", j["F"], 3) + matrix("H", j["H"], 3);

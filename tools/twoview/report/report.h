@@ -1,4 +1,4 @@
-// report.html: one file that needs no other file and no network.
+// Makes report.html: one file that needs no other file and no network.
 #pragma once
 
 #include <string>
@@ -12,13 +12,13 @@ namespace cli {
 struct Figure {
   std::string title, caption;
   cv::Mat picture;
-  bool is_photo;  // kept as JPEG, else as PNG
+  bool is_photo;  // true: embedded as JPEG, false: as PNG
 };
 
 std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& cloud,
                         const std::vector<Figure>& figures);
 
-// RFC 4648, with padding.
+// Base64 by RFC 4648, with padding.
 std::string base64(const std::string& bytes);
 
 }  // namespace cli

@@ -48,7 +48,7 @@ const char* point_status_name(int32_t status) {
 }
 
 std::string points_csv(const std::vector<tv_point>& points) {
-  constexpr double degrees = 57.29577951308232;  // of a radian
+  constexpr double degrees = 57.29577951308232;  // degrees in a radian
   std::string text = "x,y,z,angle_deg,error_px,status\n";
   for (const tv_point& point : points) {
     for (const double value : point.position) append_number(text, value, ',');

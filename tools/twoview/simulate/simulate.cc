@@ -1,5 +1,5 @@
-// twoview drone simulate: a simulated AR.Drone 2.0 on this computer's loopback, to try drivers
-// with.
+// twoview drone simulate: runs a simulated AR.Drone 2.0 on this computer's loopback interface, for
+// tests of drivers.
 
 #include "simulate/simulate.h"
 
@@ -43,7 +43,7 @@ tv_camera usual_camera() {
   return {TV_CAMERA_BROWN_CONRADY, 640, 360, 0, 568, 567, 320, 180, {-0.52, 0.27, 0, 0, 0}};
 }
 
-// Shows the images forwards and backwards in turn, so that the film has no jump.
+// Shows the images forwards and backwards alternately, so that the film has no jump.
 simulator::Painter film_of(const std::vector<std::string>& names) {
   auto images = std::make_shared<std::vector<cv::Mat>>();
   for (const std::string& name : names) images->push_back(load_picture(name).luma);

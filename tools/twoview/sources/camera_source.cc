@@ -31,14 +31,15 @@ int64_t steady_ns() {
       .count();
 }
 
-// OpenCV prints what each of its backends thinks of a name; the user gets one line.
+// Silences OpenCV, which prints a message for each backend that fails; the program prints one line
+// instead.
 struct Silence {
   Silence() : before(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
   ~Silence() { cv::utils::logging::setLogLevel(before); }
   const cv::utils::logging::LogLevel before;
 };
 
-// A picture and when it came; number counts from 0.
+// A picture with its arrival time; `number` counts from 0.
 struct Shot {
   cv::Mat luma;
   uint64_t number = 0;
@@ -58,7 +59,7 @@ struct CameraSource::State {
   cv::VideoCapture capture;
   cv::Mat colour;
   uint64_t num_taken = 0, next_number = 0;
-  // Live: what the thread has for the reader.
+  // For a live source: the state that the filming thread shares with the reader.
   std::mutex mutex;
   Shot latest;
   bool has_latest = false, has_ended = false;
@@ -66,7 +67,7 @@ struct CameraSource::State {
   std::thread thread;
 };
 
-// The next picture of the film or the camera, which is waited for. False at its end.
+// Waits for the next picture of the file or camera. Returns false at the end.
 bool CameraSource::State::take(Shot& shot) {
   try {
     if (!capture.read(colour) || colour.empty()) return false;
@@ -76,7 +77,7 @@ bool CameraSource::State::take(Shot& shot) {
     else
       cv::cvtColor(colour, shot.luma, cv::COLOR_BGR2GRAY);
   } catch (const cv::Exception&) {
-    return false;  // a device that was pulled out
+    return false;  // the device was disconnected
   }
   if (shot.luma.depth() != CV_8U) return false;
   shot.number = num_taken++;
@@ -85,8 +86,8 @@ bool CameraSource::State::take(Shot& shot) {
     shot.time.received_ns = shot.time.host_ns = steady_ns();
     shot.time.uncertainty_ns = INT64_MAX;
   } else {
-    // OpenCV's position is this picture's in one backend and the next one's in another; the rate is
-    // the same.
+    // The time is the frame number divided by the frame rate, because OpenCV's position is that of
+    // this picture in one backend and of the next one in another.
     const double fps = capture.get(cv::CAP_PROP_FPS);
     const double seconds = fps > 0 ? static_cast<double>(shot.number) / fps
                                    : capture.get(cv::CAP_PROP_POS_MSEC) * 1e-3;

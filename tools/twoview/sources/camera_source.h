@@ -1,6 +1,6 @@
-// Any camera or film that OpenCV opens (V4L2, a file, a stream's address), as a frame source of the
-// drivers' interface. A library of its own: OpenCV's videoio brings many others with it, and a
-// program that films nothing need not load them.
+// A camera, video file or stream that OpenCV opens (V4L2, a file, an address), as a frame source of
+// the drivers' interface. It is a separate library, because OpenCV's videoio depends on many
+// others, which a program without a camera should not load.
 #pragma once
 
 #include <memory>
@@ -12,22 +12,22 @@ namespace cli {
 
 class CameraSource {
  public:
-  // A file gives each picture, whenever it is asked; times are those of its even rate, clock_id 1.
-  // A live source films in a thread of its own: the latest picture is kept, older ones are left out
-  // and make the next one's gap flag. Its host times are the steady clock's on arrival, and nobody
-  // knows how much earlier a picture was taken.
+  // A file delivers every picture; its times follow from the constant frame rate, with clock_id 1.
+  // A live source reads pictures in a thread of its own and keeps only the latest; skipped pictures
+  // set the gap flag of the next one. Its host times are those of the steady clock on arrival; the
+  // unknown delay since the exposure is not included.
   enum class Kind { kFile, kLive };
 
-  // "0", "1", ...: a camera by its number, live. Else what cv::VideoCapture takes: a file,
-  // /dev/video0, rtsp://... Throws BadInput when nothing opens.
+  // `name` is "0", "1", ... for a live camera by its number, else any name that cv::VideoCapture
+  // accepts: a file, /dev/video0, rtsp://... Throws BadInput if it cannot be opened.
   explicit CameraSource(const std::string& name);
   CameraSource(const std::string& name, Kind kind);
   ~CameraSource();
   CameraSource(const CameraSource&) = delete;
   CameraSource& operator=(const CameraSource&) = delete;
 
-  // As source.h says; any number of frames may be held at once, and outlives this object. next and
-  // release are called from one thread.
+  // The interface that source.h describes. Any number of frames may be held at once, and they may
+  // outlive this object. Call next and release from one thread only.
   tvs_frame_source frames();
 
  private:

@@ -1,4 +1,5 @@
-// twoview calibrate: a camera from pictures of a chessboard, and how far to trust it.
+// twoview calibrate: estimates a camera from pictures of a chessboard and reports how reliable it
+// is.
 
 #include <algorithm>
 #include <charconv>
@@ -18,9 +19,10 @@
 namespace cli {
 namespace {
 
-constexpr int kMinSide = 3, kMaxBoardSide = 100;     // inner corners; OpenCV's least
-constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // of CPU time, for one search
-constexpr int kTellingViews = 2;                     // of another board
+constexpr int kMinSide = 3, kMaxBoardSide = 100;  // numbers of inner corners; 3 is OpenCV's minimum
+constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // CPU time for one search
+// This many views of another board show that the given size is wrong.
+constexpr int kTellingViews = 2;
 
 struct Arguments {
   Common common;
@@ -38,7 +40,7 @@ std::string board_name(cv::Size inner) {
   return std::to_string(inner.width) + "x" + std::to_string(inner.height);
 }
 
-// "9x6"; an empty size for anything else.
+// Parses a text such as "9x6"; an empty size for anything else.
 cv::Size parse_board(const std::string& text) {
   cv::Size inner;
   const char* const end = text.data() + text.size();
@@ -61,7 +63,8 @@ size_t count_of(const std::vector<BoardView>& views, Reason reason) {
       views.begin(), views.end(), [=](const BoardView& view) { return view.reason == reason; }));
 }
 
-// "(11 no_board, 2 blurred)"; empty when all are used.
+// The number of rejected views by reason, such as "(11 no_board, 2 blurred)"; empty if all views
+// are used.
 std::string reasons_text(const std::vector<BoardView>& views) {
   std::string text;
   for (int i = 1; i <= static_cast<int>(Reason::kOutlier); ++i) {
@@ -73,7 +76,7 @@ std::string reasons_text(const std::vector<BoardView>& views) {
   return text.empty() ? text : " (" + text + ")";
 }
 
-// The board that was seen most in views that are not of the board asked for, and in how many.
+// The size of the other board that was found in most views, and the number of those views.
 std::pair<cv::Size, int> other_board(const std::vector<BoardView>& views) {
   std::map<std::pair<int, int>, int> counts;
   for (const BoardView& view : views)
@@ -84,7 +87,7 @@ std::pair<cv::Size, int> other_board(const std::vector<BoardView>& views) {
   return best;
 }
 
-// Throws BadInput that says what to do, where there are too few views for any answer.
+// Throws BadInput with advice to the user if there are too few views for a calibration.
 void require_views(const std::vector<BoardView>& views, const Arguments& a) {
   const std::string board = board_name(a.board.inner);
   const std::string what = a.video.empty() ? " images" : " frames looked at";
@@ -111,8 +114,9 @@ void require_views(const std::vector<BoardView>& views, const Arguments& a) {
                  ": at least 3 are needed, 15 are better, each tilted another way");
 }
 
-// The board that some views so far show while none shows ours; an empty size for none. It may be
-// ours with a part hidden, so that the views to come are still searched.
+// The other board that earlier views show while none shows the requested one; an empty size if
+// there is none. It may be the requested board partly hidden, so later views are still searched for
+// both.
 cv::Size likely_other_board(const std::vector<BoardView>& views) {
   const auto [seen, times] = other_board(views);
   return count_of(views, Reason::kUsed) == 0 && times >= kTellingViews ? seen : cv::Size();
@@ -129,7 +133,7 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
     image = luma.size();
     views.push_back(find_board(luma, name, a.board.inner, likely_other_board(views), seconds));
     if (!views.back().is_used() || !live) return true;
-    reject_duplicates(views, image);  // a live source goes on until there are enough
+    reject_duplicates(views, image);  // a live source continues until it has enough different views
     num_found += views.back().is_used();
     if (a.common.speaks() && views.back().is_used())
       print("view " + std::to_string(num_found) + " of " + std::to_string(a.max_views) +
@@ -166,7 +170,8 @@ std::string shortest_text(double value) {
   return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
 }
 
-// ROS's camera_info, as its camera_calibration writes it for a single camera.
+// The camera in ROS's camera_info format, as ROS's camera_calibration writes it for a single
+// camera.
 std::string camera_info_yaml(const Calibration& c) {
   const auto matrix = [](const char* name, int rows, int cols, const std::vector<double>& values) {
     std::string text = std::string(name) + ":\n  rows: " + std::to_string(rows) +
@@ -324,7 +329,7 @@ int calibrate(Arguments& a) {
   OutputSet files(a.common.output);
   for (const std::string& image : a.images) files.keep(image);
   if (!a.video.empty()) files.keep(a.video);
-  // The searches run in processes of their own, which could not wake this one's threads.
+  // The searches run in forked processes, in which OpenCV's threads would not exist.
   cv::setNumThreads(1);
   cv::Size image;
   std::vector<BoardView> views = find_views(a, image);

@@ -13,10 +13,10 @@ struct CameraOptions {
   std::string both, of[2];
 
   void add_to(CLI::App& verb);
-  // The file of each image; both are empty without cameras. Throws BadInput when only one of
-  // --camera0 and --camera1 is given.
+  // The camera file of each image; both are empty if no camera is given. Throws BadInput if only
+  // one of --camera0 and --camera1 is given.
   std::array<std::string, 2> files() const;
-  // The cameras of files(), which must not be empty. A file that serves both images is read once,
+  // Loads the cameras of files(), which must not be empty. A file for both images is read once,
   // since it may be a pipe.
   static std::array<tv_camera, 2> load(const std::array<std::string, 2>& files);
 };

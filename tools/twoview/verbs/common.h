@@ -1,5 +1,5 @@
-// What the verbs share: how a verb is added and run, --output, --json and --quiet, and the colours
-// of a terminal.
+// Shared by the verbs: how a verb is added and run, the options --output, --json and --quiet, and
+// terminal colours.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -19,7 +19,7 @@ struct Common {
   Options options;
   std::string output;
   bool json = false, quiet = false;
-  // Whether the summary for people goes to stdout.
+  // Returns true if the summary for the user is printed to stdout.
   bool speaks() const { return !json && !quiet; }
 };
 void add_common(CLI::App& verb, Common& common, unsigned groups, const std::string& output_help);

@@ -1,4 +1,4 @@
-// twoview detect IMAGE: keypoints as CSV and as a picture.
+// twoview detect IMAGE: writes keypoints as CSV and as a picture.
 
 #include <cstdio>
 #include <memory>

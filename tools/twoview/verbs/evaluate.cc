@@ -1,4 +1,5 @@
-// twoview evaluate PAIRS.txt: poses of many pairs against the truth; SuperGlue's measures.
+// twoview evaluate PAIRS.txt: estimates the poses of many pairs and reports SuperGlue's measures of
+// their errors.
 
 #include <unistd.h>
 
@@ -43,7 +44,7 @@ struct PairReport {
   Errors errors;
 };
 
-// The frame of a camera that was turned by quarter turns counter-clockwise, from the one before.
+// The rotation from the frame of a camera to its frame after quarter turns counter-clockwise.
 Matrix3 turn_matrix(int quarters) {
   Matrix3 turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   for (int i = 0; i < (quarters & 3); ++i) turn = product({0, 1, 0, -1, 0, 0, 0, 0, 1}, turn);
@@ -79,8 +80,8 @@ void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
     report.errors.translation = translation_error_deg(t, t_true);
     report.errors.translation_signed = translation_error_signed_deg(t, t_true);
   }
-  // Precision measures the matches against the true pose, which refers to the cameras as given and
-  // not to those with a shifted principal point.
+  // Precision compares the matches with the true pose, which refers to the given cameras and not to
+  // those with a shifted principal point.
   report.json["precision"] =
       match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
 }
@@ -214,8 +215,8 @@ std::string table(const Json& report) {
          cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n";
 }
 
-// Progress as one line on stderr, when that is a terminal; each line replaces the one before, and
-// the last is erased.
+// Shows progress as one line on stderr if that is a terminal. Each line replaces the last one, and
+// the final line is erased.
 class Progress {
  public:
   explicit Progress(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
@@ -232,7 +233,7 @@ class Progress {
   bool shown_;
 };
 
-// -o names a file when it ends in .json or is one already, else a folder.
+// Splits -o: it is a file if it ends in .json or is an existing file, else a folder.
 void split_output(const std::string& output, fs::path& folder, std::string& name) {
   const fs::path path(output);
   std::error_code error;
@@ -262,7 +263,8 @@ int evaluate(Arguments& a) {
   fs::path folder;
   std::string name;
   split_output(common.output, folder, name);
-  OutputSet files(folder);  // before the long work, so that an unwritable folder is told at once
+  // Before the long work, so that an unwritable folder is reported at once.
+  OutputSet files(folder);
   files.keep(a.pairs);
   Session session(common.options);
   std::vector<PairReport> reports;

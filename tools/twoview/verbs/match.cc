@@ -1,4 +1,4 @@
-// twoview match A B: matches as CSV and as a picture; no camera needed.
+// twoview match A B: writes matches as CSV and as a picture; it needs no camera.
 
 #include <cstdio>
 #include <memory>

@@ -24,9 +24,9 @@ constexpr PythonVerb kVerbs[] = {
     {"colmap", "twoview_colmap", "COLMAP databases and models, in and out"},
 };
 
-// What lies as in the source tree: the folder above this program that holds TWOVIEW_PYTHON_VERBS
-// (CMakeLists.txt), which is the source tree itself, or the installed share/twoview of such a
-// folder. The nearest is taken; the path is empty where there is none.
+// The root of the Python verbs: the nearest folder above this program that contains
+// TWOVIEW_PYTHON_VERBS (CMakeLists.txt), either itself (the source tree) or in its share/twoview
+// (an installation). Empty if there is none.
 fs::path tree_of(const fs::path& program) {
   for (fs::path folder = program.parent_path(); folder != folder.root_path();
        folder = folder.parent_path())
@@ -35,7 +35,8 @@ fs::path tree_of(const fs::path& program) {
   return {};
 }
 
-// TWOVIEW_PYTHON, else the Python that scripts/bootstrap made, else the one in the PATH.
+// The Python to run: TWOVIEW_PYTHON, else the one that scripts/bootstrap installed, else the one in
+// the PATH.
 std::string python_of(const fs::path& tree) {
   const char* const named = std::getenv("TWOVIEW_PYTHON");
   if (named && *named) return named;
@@ -43,7 +44,7 @@ std::string python_of(const fs::path& tree) {
   return access(bootstrapped.c_str(), X_OK) == 0 ? bootstrapped.string() : "python3";
 }
 
-// The package twoview runs on this program's library unless the caller named another.
+// Makes the package twoview load this program's library, unless the caller named another one.
 void name_library(const fs::path& program) {
   const fs::path prefix = program.parent_path().parent_path();
   for (const char* folder : {"lib", TWOVIEW_LIB_DIR}) {

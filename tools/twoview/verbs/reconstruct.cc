@@ -1,4 +1,5 @@
-// twoview reconstruct A B, or --recording DIR: two views to a pose, a cloud, pictures and a report.
+// twoview reconstruct A B, or --recording DIR: from two views to a pose, a cloud, pictures and a
+// report.
 
 #include <cmath>
 #include <cstdio>
@@ -31,7 +32,7 @@ struct Arguments {
   RecordingOptions recording;
 };
 
-// Throws BadInput unless there are either two images or a recording.
+// Throws BadInput unless either two images or a recording is given.
 void check_inputs(const Arguments& a) {
   if (!a.recording.given()) {
     for (int i = 0; i < 2; ++i)
@@ -45,7 +46,7 @@ void check_inputs(const Arguments& a) {
   if (a.cameras.both.empty()) throw BadInput("--recording needs --camera");
 }
 
-// The camera file of each image; both empty without cameras, which some methods can do without.
+// The camera file of each image; both are empty without cameras, which some solvers do not need.
 std::array<std::string, 2> camera_files(const Arguments& a) {
   const std::array<std::string, 2> files = a.cameras.files();
   const bool has_focal = a.focal_35mm > 0;
@@ -97,7 +98,7 @@ nlohmann::ordered_json options_of(const Arguments& a) {
   return json;
 }
 
-// Makes every output, in the order of the report.
+// Makes all output files, in the order of the report.
 void make_files(const Outcome& outcome, OutputSet& files) {
   const std::vector<CloudPoint> cloud = cloud_of(outcome);
   const tv_reconstruction& r = outcome.reconstruction;
@@ -134,8 +135,8 @@ void make_files(const Outcome& outcome, OutputSet& files) {
   files.add("report.html", report_html(outcome, cloud, figures));
 }
 
-// Standard deviations of a pose. Each is the root of the trace of its block of the covariance, so
-// that of the whole angle and not that about one axis.
+// The standard deviations of rotation and direction. Each is the square root of the trace of its
+// block of the covariance: that of the total angle, not of the angle about one axis.
 std::string uncertainty_line(const tv_two_view& v) {
   const double* c = v.covariance;
   return summary_line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
@@ -143,7 +144,7 @@ std::string uncertainty_line(const tv_two_view& v) {
                       std::sqrt(c[18] + c[24]) * 180 / M_PI);
 }
 
-// Reports the shift of the principal point; empty without a shift.
+// The line that reports the shift of the principal point; empty if there is none.
 std::string camera_line(const tv_two_view& v) {
   const double* shift = v.principal_point_shift;
   if (shift[0] == 0 && shift[1] == 0) return "";
@@ -161,7 +162,7 @@ std::string pose_lines(const Outcome& outcome) {
     text += summary_line("rotation", "%.3f deg between the views",
                          rotation_error_deg(rotation_of(v), {1, 0, 0, 0, 1, 0, 0, 0, 1}));
   if (has_full_pose(v)) {
-    // Where camera 1 stands as camera 0 sees it, which is easier to picture than t.
+    // The position of camera 1 in the frame of camera 0, which is easier to interpret than t.
     const Vector3 c = applied(transposed(rotation_of(v)), translation_of(v));
     const double unit = unit_of(outcome);
     char far[48] = "one baseline";

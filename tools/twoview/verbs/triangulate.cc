@@ -1,4 +1,4 @@
-// twoview triangulate MATCHES: points from matched pixels and a known pose.
+// twoview triangulate MATCHES: computes points from matched pixels and a known pose.
 
 #include <cmath>
 #include <cstdio>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-constexpr double kDegrees = 57.29577951308232;  // of a radian
+constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
 
 struct Arguments {
   Common common;
@@ -41,13 +41,14 @@ std::vector<tv_point> triangulated(const Arguments& a, const MatchList& matches,
   return points;
 }
 
-// What the cloud holds: in front of both cameras, and near enough to its pixels.
+// Returns true if the cloud should hold the point: it is in front of both cameras, and its
+// reprojection error is small enough.
 bool is_wanted(const tv_point& point, double max_error_px) {
   return point.status == TV_POINT_OK && static_cast<double>(point.error_px) <= max_error_px;
 }
 
 std::vector<CloudPoint> cloud(const std::vector<tv_point>& points, double max_error_px) {
-  constexpr uint8_t grey = 200;  // there is no image to take colours from
+  constexpr uint8_t grey = 200;  // no image is given, so the points are grey
   std::vector<CloudPoint> cloud;
   for (const tv_point& p : points)
     if (is_wanted(p, max_error_px))
@@ -113,7 +114,7 @@ std::string summary(const Json& json, const OutputSet& files) {
   return words + "\n";
 }
 
-// -o names a folder, or one file when it ends in .csv or .ply.
+// Adds the outputs: -o names a folder, or one file if it ends in .csv or .ply.
 void add_files(const fs::path& output, const std::string& csv, const std::string& ply,
                OutputSet& files) {
   const std::string kind = output.extension().string();

@@ -1,4 +1,5 @@
-// twoview undistort IMAGE...: the images that a camera without distortion would have taken.
+// twoview undistort IMAGE...: computes the images that a camera without distortion would have
+// taken.
 
 #include <filesystem>
 #include <memory>
@@ -26,10 +27,11 @@ struct Arguments {
   bool mask = false;
 };
 
-// Where each pixel of the new image lies in the old one, by the library's own lens models.
+// The position in the old image of each pixel of the new one, by the library's lens models.
 struct Map {
-  cv::Mat place;  // x and y, 32-bit floats
-  cv::Mat seen;   // 255 where the lens model reaches and the old image has it, else 0
+  cv::Mat place;  // x and y in the old image, 32-bit floats
+  // 255 if the lens model is valid there and the position is in the old image, else 0
+  cv::Mat seen;
 };
 
 Map map_to(const tv_camera& lens, const tv_camera& pinhole) {
@@ -58,16 +60,17 @@ Map map_to(const tv_camera& lens, const tv_camera& pinhole) {
   return map;
 }
 
-// Bicubic; at the border the nearest pixels stand in for what lies beyond it, and what was not seen
-// is black.
+// Interpolates bicubically. At the border the nearest pixels are repeated, and pixels without a
+// position in the old image are black.
 cv::Mat undistorted(const cv::Mat& image, const Map& map) {
   cv::Mat remapped, result;
   cv::remap(image, remapped, map.place, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-  remapped.copyTo(result, map.seen);  // zeros elsewhere
+  remapped.copyTo(result, map.seen);  // the other pixels stay zero
   return result;
 }
 
-// The name of each result: the image's own, as PNG. Throws BadInput when two would be one.
+// The file name of each result: that of the image, with the ending of PNG. Throws BadInput if two
+// results would have the same name.
 std::vector<std::string> result_names(const std::vector<std::string>& images, bool mask) {
   std::vector<std::string> names;
   std::set<std::string> taken;

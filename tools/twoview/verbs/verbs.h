@@ -1,4 +1,4 @@
-// The verbs that work on images and files, one source file each. Those of the drone are in drone/.
+// The verbs that work on images and files, one source file each. The drone's verbs are in drone/.
 #pragma once
 
 #include "verbs/common.h"

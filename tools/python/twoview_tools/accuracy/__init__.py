@@ -1,1 +1,1 @@
-"""Pose accuracy of twoview and of its peers on the data sets: docs/accuracy.md."""
+"""Measures the pose accuracy of twoview and its peers on the data sets: docs/accuracy.md."""

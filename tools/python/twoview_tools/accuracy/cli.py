@@ -4,7 +4,7 @@ comparison. See docs/accuracy.md."""
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one thread
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -30,7 +30,7 @@ ERRORS = ("rotation_error_deg", "translation_error_deg", "translation_error_sign
 # ---- ours --------------------------------------------------------------------------------------
 
 def run_program(program, data, extra):
-    """Rows of `twoview evaluate` on a set, and the report without its pairs."""
+    """Runs `twoview evaluate` on a set. Returns its rows, and its report without the pairs."""
     with tempfile.TemporaryDirectory() as folder:
         pairs_file = data.pair_files[0]
         if len(data.pair_files) > 1 or len(data.pairs) != len(datasets.read_measurable(pairs_file)):
@@ -65,8 +65,8 @@ def run_program(program, data, extra):
 
 
 def run_library(path, data, extra):
-    """The same through libtwoview.so, without the program (options of the command line do not
-    apply)."""
+    """The same as run_program, but through libtwoview.so. Options of the command line are not
+    applied."""
     if extra:
         sys.exit("accuracy: --ours library takes no options of the program")
     rows = pipeline.evaluate_pairs(data.dir, library=path, resize=data.resize,
@@ -96,7 +96,8 @@ def print_comparison(peer, compared, sizes):
 
 
 def verdicts(peer, compared, sizes):
-    """Sentences: where ours is worse by more than two standard errors, or its mean is lower."""
+    """Verdict sentences: where our result is worse by more than two standard errors, or its mean is
+    lower."""
     found = []
     for name, differences in compared["sets"].items():
         if sizes[name] >= MIN_PAIRS:
@@ -171,7 +172,7 @@ def compare_pipelines(arguments, sets):
 
 
 def write_report(arguments, names, extra):
-    """compare_colmap's exit status."""
+    """Writes compare_colmap's report and returns its exit status."""
     program = os.path.join(datasets.ROOT, "tools", "compare_colmap", "compare_colmap")
     lists = [os.path.join(datasets.data_dir(), name, "pairs.txt") for name in names]
     some = ["--max-pairs", str(QUICK_PAIRS)] if arguments.quick else []

@@ -7,7 +7,7 @@ docs/accuracy.md.
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one thread
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -23,7 +23,7 @@ RATIOS = (0.75, 0.8, 0.85, 0.87, 0.9, 0.92, 0.95, 0.98)
 
 
 def matches_by_ratio(context, data, ratios):
-    """{ratio: pipeline.match_pairs(..)}, each image's features found once."""
+    """{ratio: result of pipeline.match_pairs}; the features of each image are computed once."""
     features = {}
     original = context.extract
 
@@ -41,7 +41,7 @@ def matches_by_ratio(context, data, ratios):
 
 
 def measure(names, library, flagged, max_pairs):
-    """{"max_error_px": {value: {set: rows}}, "ratio": the same}"""
+    """Measures {"max_error_px": {value: {set: rows}}, "ratio": {value: {set: rows}}}."""
     default = library.match_options().ratio
     nearest = min(RATIOS, key=lambda r: abs(r - default))
     found = {"max_error_px": {t: {} for t in THRESHOLDS_PX}, "ratio": {r: {} for r in RATIOS}}
@@ -104,7 +104,9 @@ def main():
     library = twoview_ctypes.Library(arguments.lib)
     summary = means(measure(names, library, True, arguments.max_pairs))
     for option, values in summary.items():
-        tables.say(f"\n| {option} | AUC5 | AUC10 | AUC20 | matches |\n| --- | --- | --- | --- | --- |")
+        tables.say(
+            f"\n| {option} | AUC5 | AUC10 | AUC20 | matches |\n| --- | --- | --- | --- | --- |"
+        )
         for value, v in values.items():
             tables.say(f"| {value:g} | {v['5']:.1f} | {v['10']:.1f} | {v['20']:.1f} | "
                        f"{v['matches']:.0f} |")

@@ -1,4 +1,4 @@
-"""The data sets: pairs, images, cameras, as `twoview evaluate` reads them."""
+"""Reads the data sets (pairs, images, cameras) in the same way as `twoview evaluate`."""
 
 import functools
 import hashlib
@@ -8,10 +8,10 @@ import numpy as np
 
 from .. import ROOT, formats
 
-MAX_NATIVE_WIDTH = 1241  # wider images are scaled down
-RESIZE_LONG_SIDE = 640   # to this long side
-# Here the truth of pairs_flagged.txt is a calibrated gantry's; "flagged" only says that plain SIFT
-# could not confirm the pair.
+MAX_NATIVE_WIDTH = 1241  # wider images are resized
+RESIZE_LONG_SIDE = 640  # the long side of such an image after resizing
+# For these sets the truth of pairs_flagged.txt is from a calibrated gantry and is reliable;
+# "flagged" only means that plain SIFT could not confirm the pair.
 FLAGGED_SETS = ("middlebury_dinoSR", "middlebury_templeSR")
 
 
@@ -20,7 +20,7 @@ def data_dir():
 
 
 def all_sets(folder=None):
-    """Names of the sets that have a pairs.txt."""
+    """The names of the sets that have a pairs.txt."""
     folder = folder or data_dir()
     if not os.path.isdir(folder):
         return []
@@ -29,8 +29,8 @@ def all_sets(folder=None):
 
 
 def read_measurable(path, needs_truth=True):
-    """The pairs of a file, each with K and without turns, and with the truth where it is needed.
-    ValueError names the line that is not so."""
+    """The pairs of a file. Each must have K, no turns, and the truth if it is needed; otherwise a
+    ValueError names the line."""
     pairs = formats.read_pairs(path)
     for pair in pairs:
         lack = ("no K" if pair.K0 is None else "no true pose" if needs_truth and pair.R is None
@@ -41,18 +41,19 @@ def read_measurable(path, needs_truth=True):
 
 
 def read_cameras(set_dir):
-    """{entry: formats.Camera} of a set's cameras.yaml, empty where it has none."""
+    """{entry: formats.Camera} of a set's cameras.yaml; empty if the set has none."""
     path = os.path.join(set_dir, "cameras.yaml")
     return formats.read_camera_set(path) if os.path.isfile(path) else {}
 
 
 def distortion_of(camera):
-    """k1 k2 p1 p2 k3 of a formats.Camera of a cameras.yaml; zeros without one."""
+    """k1 k2 p1 p2 k3 of a formats.Camera; zeros if there is no camera."""
     return (list(camera.k) if camera else []) or [0.0] * 5
 
 
 def resized_shape(width, height, resize):
-    """(width, height) with the long side brought down to `resize`, never up; 0 or None: as is."""
+    """(width, height) with the long side reduced to `resize`; images are never enlarged. 0 or None
+    means no resizing."""
     longer = max(width, height)
     if not resize or longer <= resize:
         return width, height
@@ -60,8 +61,8 @@ def resized_shape(width, height, resize):
 
 
 def scale_K(K, scale_x, scale_y):
-    """K of a resized image; pixel (0,0) is a pixel's centre. The two factors differ a little where
-    the shorter side was rounded."""
+    """K of a resized image. Pixel (0, 0) is the centre of a pixel. The two factors can differ
+    slightly because the shorter side is rounded."""
     scale = np.array([scale_x, scale_y])
     scaled = np.array(K, float)
     scaled[:2] *= scale[:, None]
@@ -70,13 +71,14 @@ def scale_K(K, scale_x, scale_y):
 
 
 def default_resize(width):
-    """The rule of the tables: native up to MAX_NATIVE_WIDTH, else long side RESIZE_LONG_SIDE."""
+    """The default size of the tables: native up to MAX_NATIVE_WIDTH, otherwise long side
+    RESIZE_LONG_SIDE."""
     return RESIZE_LONG_SIDE if width > MAX_NATIVE_WIDTH else 0
 
 
 def undistort(points, K, distortion):
-    """Pixels (n x 2) to normalised undistorted points, Brown-Conrady, by Newton's method; NaN where
-    it does not converge."""
+    """Converts distorted pixels (n x 2) to normalised undistorted points (Brown-Conrady) by
+    Newton's method; NaN where it does not converge."""
     points = np.asarray(points, float).reshape(-1, 2)
     target = (points - K[:2, 2]) / [K[0, 0], K[1, 1]]
     if not any(distortion):
@@ -86,7 +88,7 @@ def undistort(points, K, distortion):
     for _ in range(50):
         s = x * x + y * y
         radial = 1 + s * (k1 + s * (k2 + s * k3))
-        slope = k1 + s * (2 * k2 + 3 * k3 * s)  # d radial / d s
+        slope = k1 + s * (2 * k2 + 3 * k3 * s)  # derivative of the radial factor by s
         error_x = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x) - target[:, 0]
         error_y = y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y - target[:, 1]
         xx = radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x
@@ -103,8 +105,8 @@ def undistort(points, K, distortion):
 
 
 def read_luma(path):
-    """The luma of an image file, by the program's way: colours first, so that it is the same
-    whatever the format (asked for grey, OpenCV takes a JPEG's own luma instead)."""
+    """The luma of an image file, computed from its colours as the program does, so that it does not
+    depend on the file format. (If OpenCV is asked for grey, it returns a JPEG's own luma.)"""
     import cv2
     image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
     if image is None or image.dtype != np.uint8:
@@ -116,7 +118,7 @@ def read_luma(path):
 
 
 def resized_luma(path, resize):
-    """(8-bit luma with the long side brought down to `resize`, scale in x, scale in y)"""
+    """(8-bit luma with the long side reduced to `resize`, scale in x, scale in y)."""
     import cv2
     image = read_luma(path)
     height, width = image.shape
@@ -127,11 +129,11 @@ def resized_luma(path, resize):
 
 
 class Set:
-    """A data set with its images in memory once they were read."""
+    """A data set. An image stays in memory after it was first read."""
 
     def __init__(self, set_dir, resize=None, flagged=False, max_pairs=None):
-        """resize: None is the tables' rule, 0 native, else the long side. max_pairs: that many,
-        evenly spaced."""
+        """resize: None for the default size of the tables, 0 for native, else the long side.
+        max_pairs: use this many pairs, evenly spaced."""
         self.dir = set_dir
         self.max_pairs = max_pairs
         self.name = os.path.basename(os.path.normpath(set_dir))
@@ -157,24 +159,24 @@ class Set:
 
     @functools.lru_cache(maxsize=None)
     def gray(self, name):
-        """(8-bit luma, scale in x, scale in y)"""
+        """(8-bit luma, scale in x, scale in y) of an image."""
         return resized_luma(self.path(name), self.resize)
 
     @functools.lru_cache(maxsize=None)
     def pixel_hash(self, name):
-        """Of the file and of what was decoded and resized from it."""
+        """A hash of the file and of its decoded and resized pixels."""
         digest = hashlib.sha256(self.gray(name)[0].tobytes())
         with open(self.path(name), "rb") as f:
             digest.update(f.read())
         return digest.hexdigest()
 
     def camera(self, pair, side):
-        """(K at the images' scale, distortion) of image `side` of a pair."""
+        """(K scaled to the images in use, distortion) of image `side` of a pair."""
         name, K = ((pair.name0, pair.K0), (pair.name1, pair.K1))[side]
         camera = formats.choose_camera(self.cameras, name, K)
         return scale_K(K, *self.gray(name)[1:]), distortion_of(camera)
 
     def max_size(self):
-        """(width, height) that holds every image of the pairs."""
+        """The smallest (width, height) that contains every image of the pairs."""
         shapes = [self.gray(n)[0].shape for p in self.pairs for n in (p.name0, p.name1)]
         return max(s[1] for s in shapes), max(s[0] for s in shapes)

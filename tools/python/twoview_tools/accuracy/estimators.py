@@ -1,22 +1,23 @@
-"""Robust estimators behind one call: ours, OpenCV's USAC, PoseLib's, COLMAP's and OpenGV's.
+"""Robust estimators behind one interface: ours, OpenCV's USAC, PoseLib's, COLMAP's and OpenGV's.
 
-Each peer gets undistorted pixels and pinhole cameras; ours gets the image's own pixels and the
-lens. OpenCV's takes one K, so the second view is mapped to the first K: pixels, because USAC_MAGSAC
-fed normalised points is much worse.
+Each peer gets undistorted pixels and pinhole cameras; ours gets the original pixels and the lens.
+OpenCV accepts only one K, so the pixels of the second view are mapped to the first K. USAC_MAGSAC
+gets pixels because its results on normalised points are much worse.
 """
 
 import numpy as np
 
 from . import datasets
 
-# Same bounds for all: the sampler may draw as many samples as ours by default.
+# The same bounds for all estimators; by default our sampler draws at most this many samples.
 CONFIDENCE = 0.9999
 MAX_ITERATIONS = 10000
-OPENGV_MAX_ITERATIONS = 1000  # its own default; ten times as many took longer than all other peers
+# OpenGV's own default; with ten times as many it took longer than all other peers
+OPENGV_MAX_ITERATIONS = 1000
 
 
 class Matches:
-    """Matched points of one pair, with the cameras of its two views."""
+    """The matched points of a pair, with the cameras of both views."""
 
     def __init__(self, pixels0, pixels1, cameras, sizes, ratios=None):
         self.pixels0 = np.asarray(pixels0, float).reshape(-1, 2)
@@ -30,13 +31,13 @@ class Matches:
         return len(self.pixels0)
 
     def shuffled(self, seed):
-        """The same matches in another order; those without a ray are left out."""
+        """A permutation of the matches by `seed`, without those that have no ray."""
         order = np.random.default_rng(seed).permutation(len(self))
         keep = np.isfinite(self.rays0).all(axis=1) & np.isfinite(self.rays1).all(axis=1)
         return order[keep[order]]
 
     def pinhole_pixels(self, order, one_K=False):
-        """Undistorted pixels in that order; one_K: both with the first view's K."""
+        """Undistorted pixels in the given order. one_K: both views use the first view's K."""
         (K0, _), (K1, _) = self.cameras
         K1 = K0 if one_K else K1
         return tuple(np.ascontiguousarray(rays[order] * [K[0, 0], K[1, 1]] + K[:2, 2])
@@ -53,7 +54,7 @@ def _opencv(flag):
                                        threshold_px, MAX_ITERATIONS)
         if E is None or E.shape != (3, 3):
             return None
-        # 1e9: no point is "too far" (the default drops those beyond 50 baselines)
+        # 1e9 keeps all points (the default drops points beyond 50 baselines)
         _, R, t, _, _ = cv2.recoverPose(E, points0, points1, K, distanceThresh=1e9,
                                         mask=mask.copy())
         return R, t.ravel(), int(np.count_nonzero(mask))
@@ -74,7 +75,7 @@ def _poselib(matches, order, threshold_px, seed):
 
 
 def pycolmap_module():
-    """pycolmap, told to log warnings and errors only."""
+    """The module pycolmap, set to log only warnings and errors."""
     import pycolmap
     pycolmap.logging.minloglevel = 1
     return pycolmap
@@ -114,7 +115,7 @@ def _pycolmap_calibrated(matches, order, threshold_px, seed):
     if pose is None:
         return None
     t = np.array(pose.translation)
-    if not np.linalg.norm(t) > 0:  # no pose, or rotation only
+    if not np.linalg.norm(t) > 0:  # no pose, or a pure rotation
         return None
     return pose.rotation.matrix(), t, len(geometry.inlier_matches)
 
@@ -135,15 +136,15 @@ def sampson_squared(rays0, rays1, R, t):
 
 
 def _opengv(algorithm, nonlinear):
-    """OpenGV's RANSAC; `nonlinear`: then its optimisation over the inliers, twice."""
+    """OpenGV's RANSAC; with `nonlinear`, two optimisations over the inliers follow."""
     def run(matches, order, threshold_px, seed):
-        import pyopengv  # seeds itself; the order of the matches is what `seed` changes
+        import pyopengv  # it seeds itself, so `seed` only changes the order of the matches
         del seed
         rays0, rays1 = matches.rays0[order], matches.rays1[order]
         unit0, unit1 = unit_rays(rays0), unit_rays(rays1)
         K0, K1 = (K for K, _ in matches.cameras)
         focal = (K0[0, 0] + K0[1, 1] + K1[0, 0] + K1[1, 1]) / 4
-        # the sum of 1 - cos of both reprojection errors, as OpenGV's own programs have it
+        # The error is the sum of 1 - cos of both reprojection angles, as in OpenGV's own programs.
         threshold = 2 * (1 - np.cos(np.arctan(threshold_px / focal)))
         try:
             T = pyopengv.relative_pose_ransac(unit0, unit1, algorithm, threshold,
@@ -151,7 +152,7 @@ def _opengv(algorithm, nonlinear):
         except RuntimeError:
             return None
         T = np.asarray(T, float)
-        for steps_left in (2, 1, 0) if nonlinear else (0,):  # T: camera 1 in camera 0
+        for steps_left in (2, 1, 0) if nonlinear else (0,):  # T is the pose of camera 1 in camera 0
             if T.shape != (3, 4) or not np.isfinite(T).all() or not np.any(T[:, 3]):
                 return None
             R, t = T[:, :3].T, -T[:, :3].T @ T[:, 3]
@@ -174,7 +175,8 @@ PEERS = {
     "pycolmap_tvg": ("COLMAP calibrated two-view geometry", "pycolmap", _pycolmap_calibrated),
     "opengv_refined": ("OpenGV NISTER + nonlinear", "pyopengv", _opengv("NISTER", True)),
 }
-# All that OpenGV has, for tools/compare_colmap; the tables take its best, which is above.
+# All of OpenGV's algorithms, for tools/compare_colmap. The accuracy tables use only the best one,
+# above.
 OPENGV = {f"opengv_{algorithm.lower()}{'_nonlinear' if nonlinear else ''}":
           (f"OpenGV {algorithm}{' + nonlinear' if nonlinear else ''}", "pyopengv",
            _opengv(algorithm, nonlinear))
@@ -183,7 +185,7 @@ OPENGV = {f"opengv_{algorithm.lower()}{'_nonlinear' if nonlinear else ''}":
 
 
 def module_version(module):
-    """Version of a peer's module; ImportError when it is not installed."""
+    """The version of a peer's module. Raises ImportError if it is not installed."""
     if module == "poselib":
         import poselib  # has no __version__
         from importlib import metadata
@@ -191,7 +193,7 @@ def module_version(module):
             return metadata.version("poselib")
         except metadata.PackageNotFoundError:
             return getattr(poselib, "__version__", "unknown")
-    if module == "pyopengv":  # Debian's, without a version of its own
+    if module == "pyopengv":  # Debian's package, which has no version of its own
         import pyopengv
         del pyopengv
         import subprocess
@@ -202,7 +204,7 @@ def module_version(module):
 
 
 def run_peer(kind, matches, threshold_px=1.0, seed=0):
-    """(R, t, inliers), or None for a failure, on the matches shuffled with `seed`."""
+    """(R, t, inliers) on the matches in the order given by `seed`; None for a failure."""
     order = matches.shuffled(seed)
     if len(order) < 5:
         return None
@@ -212,12 +214,13 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
     import cv2
     try:
         return function(matches, order, threshold_px, seed)
-    except cv2.error:  # OpenCV's way of saying that too few points were left
+    except cv2.error:  # OpenCV raises this if too few points remain
         return None
 
 
 def run_twoview(context, matches, options=None, seed_step=0):
-    """(R or None, t or None, inliers, tv_two_view) of ours; seed_step is added to its seed."""
+    """(R or None, t or None, inliers, tv_two_view) of our estimator; seed_step is added to its
+    seed."""
     from . import twoview_ctypes
     cameras = [twoview_ctypes.make_camera(K, *size, distortion)
                for (K, distortion), size in zip(matches.cameras, matches.sizes)]

@@ -1,5 +1,6 @@
-"""Estimators on identical matches: ours at its defaults, every peer at its best threshold of those
-given, and what the project wants of that comparison, as verdict lines. See docs/accuracy.md."""
+"""Compares estimators on identical matches: ours with its defaults, each peer with its best
+threshold among those given. Verdict lines say whether the project's targets are reached. See
+docs/accuracy.md."""
 
 import hashlib
 import json
@@ -11,21 +12,22 @@ import numpy as np
 from . import estimators, metrics, peers, pipeline, system_python, tables, twoview_ctypes
 from .tables import MIN_PAIRS, OURS, say
 
-CACHE_FORMAT = 1  # raise it when a change here or in estimators.py changes results
+CACHE_FORMAT = 1  # increase it when a change here or in estimators.py changes results
 COLUMNS = ("num_inliers", "ms", "rotation_error_deg", "translation_error_deg",
            "translation_error_signed_deg", "pose_error_deg")
 MATCHES_TITLE = {"ours": "our matches", "sift": "OpenCV's RootSIFT matches"}
 
 
 class Estimator:
-    """A peer: of this Python, or of the system's."""
+    """A peer that runs in this Python or in the system's Python."""
 
     def __init__(self, kind, version, system):
         self.kind, self.version, self.system = kind, version, system
         title, self.module, _ = estimators.PEERS[kind]
         library, rest = title.split(" ", 1)
         self.name = f"{library} {version} {rest}"
-        # the family whose best row the verdict takes: OpenGV's is shown only
+        # Only the best row of each family counts in the verdict; OpenGV's rows are shown but do not
+        # count.
         self.counts = self.module != "pyopengv"
 
     def run(self, list_of_matches, threshold_px, num_seeds):
@@ -43,7 +45,7 @@ class Estimator:
 
 
 def available(kinds=None):
-    """(Estimators that are installed, lines about those that are not)."""
+    """(estimators that are installed, a line of text about each one that is not)."""
     have, absent = [], []
     system = system_python.versions()
     for kind, (title, module, _) in estimators.PEERS.items():
@@ -76,7 +78,7 @@ def _key(matches, pair):
 
 
 def peer_rows(estimator, data, matched, thresholds, num_seeds, use_cache=True):
-    """{threshold: rows}, from .cache/accuracy where it has them."""
+    """{threshold: rows}, read from .cache/accuracy if they are stored there."""
     key = {"kind": estimator.kind, "version": estimator.version, "format": CACHE_FORMAT,
            "confidence": estimators.CONFIDENCE, "max_iterations": estimators.MAX_ITERATIONS}
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:16]
@@ -119,7 +121,7 @@ def _row(data, pair, matches, seed, line):
 
 
 def sift_matches(data, use_cache=True):
-    """OpenCV's RootSIFT matches of a set, as pipeline.match_pairs gives them."""
+    """OpenCV's RootSIFT matches of a set, in the form of pipeline.match_pairs."""
     peer = peers.Peer(peers.GROUPS["poselib"][0], use_cache=False)
     keys = [peer.pair_key(data, pair) for pair in data.pairs]
     name = hashlib.sha256("".join(keys).encode()).hexdigest()[:16]
@@ -157,28 +159,28 @@ def our_rows(library, data, matched, options, num_seeds):
 # ---- verdicts ------------------------------------------------------------------------------------
 
 def mean_auc(rows_of_sets):
-    """{threshold: mean over sets of AUC}"""
+    """{threshold: mean over the sets of the AUC}."""
     return {f"{t:g}": float(np.mean([metrics.auc_of_runs(tables.runs_of(rows), t)
                                      for rows in rows_of_sets.values()]))
             for t in metrics.THRESHOLDS_DEG}
 
 
 def best_threshold(by_threshold):
-    """The threshold of the largest mean of AUC5, 10 and 20 over all sets together; the lower on a
-    tie. by_threshold: {threshold: {set: rows}}"""
+    """The threshold with the largest mean of AUC5, 10 and 20 over all sets; the lower one on a tie.
+    by_threshold: {threshold: {set: rows}}."""
     return max(sorted(by_threshold), key=lambda t: sum(mean_auc(by_threshold[t]).values()))
 
 
 def medians(rows_of_sets, field):
-    """(median over all pairs and seeds, mean over sets of each set's median)"""
+    """(median over all pairs and seeds, mean over the sets of each set's median)."""
     values = {s: [r[field] for r in rows] for s, rows in rows_of_sets.items()}
     return (float(np.median([v for part in values.values() for v in part])),
             float(np.mean([np.median(v) for v in values.values()])))
 
 
 def judge(ours, rivals, poselib, resamples):
-    """[(reached, sentence)]: ours {set: rows}, rivals {name: {set: rows}}, poselib one of the
-    names or None."""
+    """Returns [(reached, sentence)]. ours: {set: rows}. rivals: {name: {set: rows}}. poselib: the
+    name of PoseLib's row among them, or None."""
     found = []
     runs = lambda rows_of_sets: {s: tables.runs_of(rows) for s, rows in rows_of_sets.items()}
     mine = runs(ours)

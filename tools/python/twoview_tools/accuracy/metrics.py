@@ -11,21 +11,22 @@ EPIPOLAR_LIMIT = 5e-4  # of the squared symmetric distance, in normalised coordi
 
 
 def rotation_error_deg(R_est, R_true):
-    """Angle of R_est R_true^T, from the chord: exact where the cosine has lost its digits."""
+    """The angle of R_est R_true^T, computed from the chord: precise also near 0, where the cosine
+    loses its digits."""
     chord = np.linalg.norm(np.asarray(R_est) - np.asarray(R_true))  # 2 sqrt(2) sin(angle / 2)
     return float(np.degrees(2.0 * np.arcsin(np.clip(chord / np.sqrt(8.0), 0.0, 1.0))))
 
 
 def direction_error_deg(t_est, t_true):
-    """Angle between two directions, [0, 180]."""
+    """The angle between two directions in degrees, [0, 180]."""
     t_est, t_true = np.asarray(t_est, float), np.asarray(t_true, float)
     sine = np.linalg.norm(np.cross(t_est, t_true))
     return float(np.degrees(np.arctan2(sine, float(np.dot(t_est, t_true)))))
 
 
 def pose_error(R_est, t_est, R_true, t_true):
-    """{rotation_error_deg, translation_error_deg (sign-free), .._signed_deg, pose_error_deg};
-    infinite without an estimate."""
+    """{rotation_error_deg, translation_error_deg (sign ignored), .._signed_deg, pose_error_deg};
+    all infinite without an estimate."""
     if R_est is None or t_est is None:
         rotation = signed = free = np.inf
     else:
@@ -37,9 +38,10 @@ def pose_error(R_est, t_est, R_true, t_true):
 
 
 def auc_rows(errors, threshold):
-    """Area under recall against error up to `threshold`, divided by it, in per cent, of each row.
+    """For each row, the area below recall as a function of the error, from 0 to `threshold`,
+    divided by `threshold`, in per cent.
 
-    Recall runs through (0, 0) and (e_i, i/n) in straight lines, then level from the last error
+    Recall is linear between (0, 0) and the points (e_i, i/n), and constant after the last error
     below the threshold: SuperGlue's trapezoids.
     """
     errors = np.sort(np.atleast_2d(np.asarray(errors, float)), axis=1)
@@ -57,18 +59,18 @@ def auc_rows(errors, threshold):
 
 
 def auc(errors, threshold):
-    """auc_rows of one list of errors."""
+    """The AUC of a single list of errors."""
     return float(auc_rows(errors, threshold)[0])
 
 
 def auc_of_runs(runs, threshold):
-    """Mean over seeds: runs is seeds x pairs."""
+    """The mean AUC over the seeds; `runs` is an array of seeds x pairs."""
     return float(np.mean(auc_rows(runs, threshold)))
 
 
 def precision(points0, points1, R, t):
-    """Share of matches (normalised, undistorted, n x 2) whose squared symmetric epipolar distance
-    under the true pose is below EPIPOLAR_LIMIT; 0 without matches."""
+    """The share of matches (normalised, undistorted, n x 2) whose squared symmetric epipolar
+    distance under the true pose is below EPIPOLAR_LIMIT; 0 without matches."""
     if len(points0) == 0:
         return 0.0
     tx, ty, tz = t
@@ -79,7 +81,8 @@ def precision(points0, points1, R, t):
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = product**2 * (1.0 / np.sum(line1[:, :2] ** 2, axis=1)
                                  + 1.0 / np.sum(line0[:, :2] ** 2, axis=1))
-    return float(np.mean(distance < EPIPOLAR_LIMIT))  # NaN (no ray) is not below
+    # NaN, for a pixel without a ray, counts as wrong
+    return float(np.mean(distance < EPIPOLAR_LIMIT))
 
 
 def _summary(value, samples):
@@ -90,12 +93,12 @@ def _summary(value, samples):
 
 
 def paired_bootstrap(sets, resamples=2000, seed=1):
-    """Difference of AUC, first minus second, with its spread when the pairs are drawn again.
+    """The difference of AUC, first minus second, and its spread when the pairs are resampled.
 
-    sets: {name: (first, second)}, each seeds x pairs, the columns the same pairs in both.
-    Returns {"sets": {name: {"5": summary, ..}}, "mean": {..}, "pooled": {..}}: per set; the mean
-    over sets, pairs redrawn within each set; all pairs as one set, redrawn from all.
-    `worse`: by more than two standard errors.
+    sets: {name: (first, second)}, each an array of seeds x pairs with the same pairs in the same
+    columns. Returns {"sets": {name: {"5": summary, ..}}, "mean": {..}, "pooled": {..}}: for each
+    set; for the mean over the sets, with pairs resampled within each set; and for all pairs as one
+    set. `worse` means by more than two standard errors.
     """
     random = np.random.default_rng(seed)
     result = {"sets": {}, "mean": {}, "pooled": {}}
@@ -130,7 +133,7 @@ def paired_bootstrap(sets, resamples=2000, seed=1):
 
 
 def finite(value):
-    """The same with null for each infinite or missing number, as JSON has no word for them."""
+    """The same data with null for each infinite or missing number, which JSON cannot express."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""Peers' front ends, and whole peer rows with their results kept in .cache/accuracy.
+"""Front ends of the peers, and complete rows of peers, whose results are stored in .cache/accuracy.
 
 OpenCV's FAST + SIFT is run as a user who knows it would: the cap's strongest corners, KeyPoint size
 5 (the default 7 loses 6 points of AUC5), plain SIFT, ratio 0.8 and mutual neighbours, pixel
@@ -15,15 +15,15 @@ import numpy as np
 
 from . import datasets, estimators, metrics
 
-CAP = 2048  # descriptors an image, second orientations included
+CAP = 2048  # largest number of descriptors of an image, including second orientations
 RATIO = 0.8
-CACHE_FORMAT = 2  # raise it when a change here changes results
+CACHE_FORMAT = 2  # increase it when a change here changes results
 
 CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
 
 _FAST = {"front": "fast", "threshold": 10, "size": 5, "orientation": "upright", "grid": 0,
          "descriptor": "sift"}
-# name of the group for --peers: its rows
+# The rows of each group that --peers can name.
 GROUPS = {
     "fast": [
         {**_FAST, "estimator": "magsac"},
@@ -46,7 +46,7 @@ GROUPS = {
 
 
 def describe(config, threshold_px=1.0):
-    """A row's name, with the versions of what it runs."""
+    """The name of a row, with the versions of the software that it runs."""
     version = estimators.module_version
     if config["front"] == "fast":
         front = (f"opencv{version('cv2')} FAST9 t{config['threshold']} s{config['size']} "
@@ -66,9 +66,9 @@ def describe(config, threshold_px=1.0):
 # ---- front ends -------------------------------------------------------------------------------
 
 def orientations(gray, points, size):
-    """[(index of the point, degrees clockwise from x)] after D. G. Lowe, IJCV 2004, section 5: 36
-    bins over a Gaussian window of 1.5 times the scale (size / 2), the highest peak and those above
-    80 per cent of it, with a parabola through three bins."""
+    """[(index of the point, degrees clockwise from x)] by D. G. Lowe, IJCV 2004, section 5: a
+    histogram of 36 bins under a Gaussian window of 1.5 times the scale (size / 2); the highest peak
+    and all peaks above 80 % of it, refined by a parabola through three bins."""
     import cv2
     base = cv2.GaussianBlur(gray.astype(np.float32), (0, 0), np.sqrt(1.6**2 - 0.5**2))
     sigma = 1.5 * size / 2
@@ -76,7 +76,8 @@ def orientations(gray, points, size):
     dx = np.zeros_like(base)
     dy = np.zeros_like(base)
     dx[:, 1:-1] = base[:, 2:] - base[:, :-2]
-    dy[1:-1] = base[2:] - base[:-2]  # down, so that angles run clockwise as seen
+    # Positive downwards, so that angles increase clockwise in the image.
+    dy[1:-1] = base[2:] - base[:-2]
     dx[[0, -1]] = dy[[0, -1]] = dx[:, [0, -1]] = dy[:, [0, -1]] = 0
     magnitude = np.pad(np.hypot(dx, dy), radius)
     bins = np.pad(np.round(np.degrees(np.arctan2(dy, dx)) / 10).astype(int) % 36, radius)
@@ -104,7 +105,8 @@ def orientations(gray, points, size):
 
 
 def _strongest(points, scores, grid, shape):
-    """Order of the points to keep: strongest first; with a grid, each cell's best share first."""
+    """The order of the points to keep: strongest first. With a grid, each cell's share of strongest
+    points comes first."""
     order = np.lexsort((points[:, 0], points[:, 1], -scores))
     if not grid or len(order) <= CAP:
         return order[:CAP]
@@ -125,7 +127,7 @@ def _root(descriptors):
 
 
 def extract(gray, config):
-    """(points n x 2, descriptors n x 128 float32), at most CAP."""
+    """(points n x 2, descriptors n x 128 float32), at most CAP of them."""
     if config["front"] == "pycolmap":
         return _extract_pycolmap(gray, config.get("cap", CAP))
     import cv2
@@ -133,7 +135,7 @@ def extract(gray, config):
     if config["front"] == "sift":
         sift = cv2.SIFT_create(nfeatures=CAP, contrastThreshold=config["contrast"])
         keypoints, descriptors = sift.detectAndCompute(gray, None)
-        if len(keypoints) > CAP:  # a tie at the cap keeps both
+        if len(keypoints) > CAP:  # OpenCV exceeds its cap if scores are equal
             best = np.argsort([-k.response for k in keypoints], kind="stable")[:CAP]
             keypoints, descriptors = [keypoints[i] for i in best], descriptors[best]
     else:
@@ -158,8 +160,8 @@ def extract(gray, config):
 
 
 def _extract_pycolmap(gray, cap):
-    """COLMAP's own SIFT (RootSIFT by default); its origin is the pixel's corner. The descriptors
-    stay COLMAP's objects, for its matcher."""
+    """COLMAP's own SIFT (RootSIFT by default). Its pixel origin is the corner of a pixel. The
+    descriptors stay COLMAP's objects, which its matcher needs."""
     pycolmap = estimators.pycolmap_module()
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads, options.use_gpu = 1, False
@@ -171,7 +173,8 @@ def _extract_pycolmap(gray, cap):
 
 
 def match(descriptors0, descriptors1, ratio=RATIO):
-    """(idx0, idx1, ratio): each the other's nearest, ratio test from 0 to 1."""
+    """(idx0, idx1, ratio) of mutual nearest neighbours; the ratio test is from image 0 to image
+    1."""
     if len(descriptors0) < 2 or len(descriptors1) < 2:
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
     d0, d1 = descriptors0.astype(np.float32), descriptors1.astype(np.float32)
@@ -200,7 +203,8 @@ def match_pycolmap(features0, features1):
 # ---- rows -------------------------------------------------------------------------------------
 
 class Peer:
-    """One row: a configuration over pairs, with results from the cache where it has them."""
+    """A row of the table: a configuration that is evaluated on pairs, with stored results where
+    they exist."""
 
     def __init__(self, config, num_seeds=3, threshold_px=1.0, use_cache=True):
         self.config, self.num_seeds, self.threshold_px = config, num_seeds, threshold_px
@@ -222,7 +226,7 @@ class Peer:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def run(self, data, progress=None):
-        """A list of rows as pipeline.evaluate_matches gives them, seed by seed."""
+        """A list of rows in the form of pipeline.evaluate_matches, seed by seed."""
         name = hashlib.sha256(json.dumps(self.key, sort_keys=True).encode()).hexdigest()[:16]
         path = os.path.join(CACHE_DIR, f"{data.name}-{name}.json")
         stored = {}
@@ -250,7 +254,8 @@ class Peer:
         return rows
 
     def matches(self, data, pair, features):
-        """(estimators.Matches, ms of extraction, ms of matching, mean number of keypoints)"""
+        """(estimators.Matches, ms of extraction, ms of matching, mean number of keypoints) of a
+        pair."""
         for name in (pair.name0, pair.name1):
             if name not in features:
                 start = time.perf_counter()

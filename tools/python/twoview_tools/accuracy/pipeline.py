@@ -1,4 +1,4 @@
-"""Our stages on a data set through libtwoview.so, with any option, for tuning."""
+"""Runs our stages on a data set through libtwoview.so, with any options, for tuning."""
 
 import pickle
 import time
@@ -9,7 +9,7 @@ from . import datasets, estimators, metrics, twoview_ctypes
 
 
 def make_context(library, data, feature_options=None):
-    """A context that holds the set's images and features."""
+    """A context with room for the images and features of the set."""
     width, height = data.max_size()
     limits = {"max_width": width, "max_height": height}
     cap = library.feature_options(feature_options).max_keypoints or 2048
@@ -18,8 +18,8 @@ def make_context(library, data, feature_options=None):
 
 
 def match_pairs(context, data, feature_options=None, match_options=None):
-    """[(estimators.Matches, {"extract": ms, "match": ms, "keypoints": n})] for each pair of a set;
-    an image's features are computed once and its time counted in each of its pairs."""
+    """[(estimators.Matches, {"extract": ms, "match": ms, "keypoints": n})] for each pair of a set.
+    The features of an image are computed once, and their time counts in each of its pairs."""
     features = {}
 
     def extract(name):
@@ -47,7 +47,8 @@ def match_pairs(context, data, feature_options=None, match_options=None):
 
 def evaluate_matches(data, matched, estimate_options=None, estimator="twoview", context=None,
                      num_seeds=1):
-    """A row per pair and seed: see evaluate_pairs. `matched` as match_pairs gives it."""
+    """A row for each pair and seed, as evaluate_pairs returns them. `matched` has the form of
+    match_pairs' result."""
     rows = []
     for pair, (matches, stage) in zip(data.pairs, matched):
         share = metrics.precision(matches.rays0, matches.rays1, pair.R, pair.t)
@@ -110,7 +111,7 @@ def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_o
 
 
 def summarise(rows):
-    """Numbers of one set out of its rows: mean over seeds of AUC, medians and means."""
+    """Summarises the rows of a set: mean AUC over the seeds, medians and means."""
     seeds = sorted({row["seed"] for row in rows})
     runs = [[r["pose_error_deg"] for r in rows if r["seed"] == s] for s in seeds]
     summary = {f"auc{t:g}": metrics.auc_of_runs(runs, t) for t in metrics.THRESHOLDS_DEG}

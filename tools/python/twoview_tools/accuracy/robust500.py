@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""The robust essential estimate beside PoseLib's: error and time on simulated matches, same run.
+"""Compares our robust essential estimate with PoseLib's: error and time on simulated matches.
 
-  scripts/accuracy --robust500                   # 200 problems a share of true matches
-  scripts/python -m twoview_tools.accuracy.robust500 --problems 50 --lib build/release/lib/libtwoview.so
+  scripts/accuracy --robust500                   # 200 problems for each share of inliers
+  scripts/python -m twoview_tools.accuracy.robust500 --problems 50 \\
+      --lib build/release/lib/libtwoview.so
 
 A problem is 500 matches in random order, without ratios, of two 640x480 pinhole views (f 500). The
 rotation turns by 1 to 12 degrees about any axis, the baseline has any direction; true matches lie
@@ -10,15 +11,16 @@ rotation turns by 1 to 12 degrees about any axis, the baseline has any direction
 both images; wrong ones pair two points spread evenly over the images. Problem k of every share is
 made by numpy's default_rng((k, share in per cent)). Each problem goes to ours at the library's
 defaults and to PoseLib at 1 px with its defaults and with min_iterations=50, in turn, all of it
-through Python in one process pinned to one core; a time is the CPU time of the best of --repeats calls. The error is
-the larger of the rotation's and the translation direction's angle.
+through Python in one process pinned to one core; a time is the CPU time of the best of --repeats
+calls. The error is the larger of the rotation's and the translation direction's angle.
 
-What must hold: a median error not above that of either PoseLib, in at most a third of its time.
+What must hold: our median error is not above that of either PoseLib configuration, and our time is
+at most a third of theirs.
 """
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one thread
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -33,7 +35,7 @@ WIDTH, HEIGHT, FOCAL = 640, 480, 500.0
 CENTRE = np.array([320.0, 240.0])
 K = np.array([[FOCAL, 0, CENTRE[0]], [0, FOCAL, CENTRE[1]], [0, 0, 1]])
 NOISE_PX = 0.5
-SHARES = (30, 50, 80)  # per cent
+SHARES = (30, 50, 80)  # per cent of true matches
 
 
 def _direction(random):
@@ -79,7 +81,9 @@ def _ours(context):
 
     def run(pixels0, pixels1):
         result, _ = context.estimate_two_view(camera, camera, pixels0, pixels1)
-        return (np.array(result.R).reshape(3, 3), np.array(result.t)) if result.has_t else (None,) * 2
+        return (
+            (np.array(result.R).reshape(3, 3), np.array(result.t)) if result.has_t else (None,) * 2
+        )
     return run
 
 
@@ -96,7 +100,7 @@ def _poselib(**options):
 
 
 def measure(share, runners, num_problems, repeats):
-    """{name: (errors in degrees, times in ms)}"""
+    """{name: (errors in degrees, times in ms)}."""
     errors = {name: [] for name in runners}
     times = {name: [] for name in runners}
     for number in range(num_problems):
@@ -113,7 +117,7 @@ def measure(share, runners, num_problems, repeats):
 
 
 def run(library=None, num_problems=200, repeats=1, shares=SHARES, peers=True):
-    """Prints the table; True when all that must hold does."""
+    """Prints the table. Returns True if all targets are reached."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     context = twoview_ctypes.Context(twoview_ctypes.Library(library), max_width=64, max_height=64,

@@ -1,7 +1,7 @@
-"""Estimators of the system's Python (Debian's python3-opencv and python3-opengv), through a
-subprocess: these packages are built for that Python only.
+"""Runs estimators in the system's Python (Debian's python3-opencv and python3-opengv) in a
+subprocess, because these packages are built only for that Python.
 
-Run by that Python, as a module, it is the other side: `-m twoview_tools.accuracy.system_python
+The same file is also the program of that subprocess: `-m twoview_tools.accuracy.system_python
 JOB.npz OUT.npz`.
 """
 
@@ -21,7 +21,7 @@ INTERPRETER = "/usr/bin/python3"
 
 
 def versions():
-    """{module: version} of the estimators' modules that the system's Python has."""
+    """{module: version} of the estimators' modules that are installed for the system's Python."""
     program = ("import json\n"
                "from twoview_tools.accuracy import estimators\n"
                "have = {}\n"
@@ -38,7 +38,7 @@ def versions():
 
 
 def run(kind, list_of_matches, threshold_px, num_seeds):
-    """For each of the Matches a list, seed by seed, of (R, t, inliers, ms), R None for a
+    """For each of the Matches a list, seed by seed, of (R, t, inliers, ms); R is None for a
     failure."""
     job = {"kind": np.array(kind), "threshold_px": np.array(threshold_px),
            "num_seeds": np.array(num_seeds), "count": np.array(len(list_of_matches))}

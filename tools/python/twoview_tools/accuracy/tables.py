@@ -1,4 +1,4 @@
-"""Numbers of rows, and how they are printed."""
+"""Summarises rows and prints them as tables."""
 
 import os
 import platform
@@ -9,7 +9,7 @@ import numpy as np
 from . import metrics
 
 OURS = "twoview"
-MIN_PAIRS = 15      # sets of at least so many pairs count by themselves
+MIN_PAIRS = 15  # a smaller set gets no verdict of its own
 
 
 def say(text="", end="\n"):
@@ -29,7 +29,7 @@ def time_ms(row):
 
 
 def runs_of(rows):
-    """Pose errors, seeds x pairs."""
+    """Pose errors as an array of seeds x pairs."""
     seeds = sorted({row["seed"] for row in rows})
     return np.array([[r["pose_error_deg"] for r in rows if r["seed"] == s] for s in seeds])
 
@@ -46,7 +46,7 @@ def summarise(rows):
 
 
 def mean_summary(summaries):
-    """Mean over sets, each set with the same weight."""
+    """The mean over sets, each set with the same weight."""
     keys = ("median_error_deg", "failures", "num_matches", "precision", "time_ms")
     return {"num_sets": len(summaries),
             "auc": {t: float(np.mean([s["auc"][t] for s in summaries]))

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""One table line a set and their mean, for any options of the library.
+"""Prints one table line for each set and one for their mean, for any options of the library.
 
-  scripts/python -m twoview_tools.accuracy.tune --sets kitti00_turn,tum_fr3_office --feature threshold=10 arc=9 \\
-      --match ratio=0.8 --estimate max_error_px=1 --estimator twoview --max-pairs 15
+  scripts/python -m twoview_tools.accuracy.tune --sets kitti00_turn,tum_fr3_office \\
+      --feature threshold=10 arc=9 --match ratio=0.8 --estimate max_error_px=1 \\
+      --estimator twoview --max-pairs 15
 
 Options are the fields of tv_feature_options, tv_match_options, tv_estimate_options; those not named
 keep the library's defaults. Estimators: twoview, magsac, usac, accurate, poselib, pycolmap,
@@ -11,7 +12,7 @@ pycolmap_tvg (these read max_error_px only, and get the library's own matches).
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one thread
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
     os.environ.setdefault(_name, "1")
 
 import argparse

@@ -1,5 +1,5 @@
-"""The Python package (python/twoview) as measuring and tuning want it: any library by its path, options
-as a command line has them, C structs as results."""
+"""The package python/twoview in the form that measuring and tuning need: a library by its path,
+options as text as on a command line, C structs as results."""
 
 import ctypes
 
@@ -12,7 +12,7 @@ from .. import DEFAULT_LIBRARY
 STRUCTS = {struct.__name__: struct for struct in _abi.STRUCTS}
 TwoviewError = twoview.StatusError
 
-# Options that name an enum value.
+# Options whose value is the name of an enum value.
 _ENUM_FIELDS = {
     "orientation": enums.Orientation, "descriptor": enums.Normalisation, "method": enums.Solver,
     "kernels": enums.Kernels, "verdict": enums.Verdict, "kind": enums.Kind,
@@ -20,7 +20,7 @@ _ENUM_FIELDS = {
 
 
 def enum_name(field, number):
-    """'calibrated' for ('kind', 1)."""
+    """The name of an enum value: 'calibrated' for ('kind', 1)."""
     return _ENUM_FIELDS[field](number).name.lower()
 
 
@@ -35,7 +35,8 @@ def _number(struct, field, text):
 
 
 def set_options(struct, options):
-    """Writes a dict of field: value (numbers, or strings as on a command line) into a struct."""
+    """Writes a dict {field: value} into a struct; a value is a number, or text as on a command
+    line."""
     for key, value in (options or {}).items():
         field = key.replace("-", "_")
         try:
@@ -48,7 +49,7 @@ def set_options(struct, options):
 
 
 def make_camera(K, width, height, distortion=()):
-    """A tv_camera of a 3x3 K and Brown-Conrady coefficients (none: pinhole)."""
+    """A tv_camera from a 3x3 K and Brown-Conrady coefficients; without coefficients a pinhole."""
     models = enums.CameraModel
     return twoview.Camera(width, height, K[0][0], K[1][1], K[0][2], K[1][2],
                           models.BROWN_CONRADY if any(distortion) else models.PINHOLE,
@@ -73,7 +74,7 @@ class Library(twoview.Library):
 
 
 def _keywords(struct):
-    """A struct of options as the package's functions take them."""
+    """The fields of an options struct as keywords for the package's functions."""
     return {name: getattr(struct, name) for name, _ in struct._fields_[1:]}
 
 
@@ -82,25 +83,25 @@ class Context(twoview.Context):
         super().__init__(library=library, **_keywords(library._init_struct("tv_limits", limits)))
 
     def extract(self, gray, options=None, mask=None):
-        """(keypoints of dtype KEYPOINT, descriptors n x 128 uint8)"""
+        """(keypoints of dtype KEYPOINT, descriptors n x 128 uint8) of an image."""
         return twoview.extract(self, gray, mask,
                                **_keywords(self.library.feature_options(options)))
 
     def match(self, descriptors0, descriptors1, options=None):
-        """Array of dtype CORRESPONDENCE."""
+        """The matches as an array of dtype CORRESPONDENCE."""
         return twoview.match(self, np.ascontiguousarray(descriptors0, np.uint8),
                              np.ascontiguousarray(descriptors1, np.uint8),
                              **_keywords(self.library.match_options(options)))
 
     def match_guided(self, camera0, camera1, epipolar, features0, features1, options=None):
-        """Array of dtype CORRESPONDENCE; features are (keypoints, descriptors), as extract gives
-        them, epipolar E, or F with no cameras."""
+        """The matches as an array of dtype CORRESPONDENCE. Features are (keypoints, descriptors) as
+        extract returns them; `epipolar` is E, or F without cameras."""
         wanted = _keywords(self.library._init_struct("tv_guided_options", options))
         return twoview.match_guided(self, camera0, camera1, epipolar, *features0, *features1,
                                     **wanted)
 
     def estimate_two_view(self, camera0, camera1, pixels0, pixels1, ratios=None, options=None):
-        """(tv_two_view, inlier mask as bools); pixels as the images have them (distorted)."""
+        """(tv_two_view, inlier mask as bools); pixels are as in the images (distorted)."""
         if ratios is not None:
             ratios = np.ascontiguousarray(ratios, np.float32)
         return stages._estimate(self, camera0, camera1, np.ascontiguousarray(pixels0, np.float64),

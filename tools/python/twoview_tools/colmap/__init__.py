@@ -1,1 +1,1 @@
-"""COLMAP databases and models, in and out: `twoview colmap` (docs/colmap.md)."""
+"""Imports from and exports to COLMAP databases and models: `twoview colmap` (docs/colmap.md)."""

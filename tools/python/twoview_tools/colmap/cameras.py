@@ -1,4 +1,5 @@
-"""The cameras of images: out of camera files and cameras.yaml (twoview_tools.formats), or of a pair's K."""
+"""The cameras of images: from camera files and cameras.yaml (twoview_tools.formats), or from a
+pair's K."""
 
 import os
 
@@ -9,25 +10,25 @@ from .errors import BadInput, refused
 
 
 def _camera(found):
-    """A twoview.Camera of a formats.Camera."""
+    """Converts a formats.Camera to a twoview.Camera."""
     return tv.Camera(found.width, found.height, found.fx, found.fy, found.cx, found.cy,
                      tv.CameraModel[found.model.upper()], found.k)
 
 
 def read_camera(path):
-    """One camera, in OpenCV's or ROS's form."""
+    """Reads one camera in OpenCV's or ROS's format."""
     with refused(path):
         return _camera(formats.read_camera(path))
 
 
 def read_camera_set(path):
-    """{name: camera} of a cameras.yaml."""
+    """Reads a cameras.yaml as {name: camera}."""
     with refused(path):
         return {name: _camera(found) for name, found in formats.read_camera_set(path).items()}
 
 
 def write_camera_set(cameras):
-    """The text of a cameras.yaml of {name: camera}."""
+    """The text of a cameras.yaml for {name: camera}."""
     text = ""
     for name, camera in cameras.items():
         k = list(camera.k) + [0.0] * 8
@@ -41,10 +42,11 @@ def write_camera_set(cameras):
 
 
 class CameraChoice:
-    """Whose camera an image is of."""
+    """Chooses the camera of an image."""
 
     def __init__(self, files, folders):
-        """files: of --camera; folders: where a cameras.yaml is looked for when there are none."""
+        """files: those of --camera. folders: where a cameras.yaml is searched if there are no
+        files."""
         paths = list(files)
         for folder in folders if not files else ():
             path = os.path.join(folder, "cameras.yaml")
@@ -55,18 +57,24 @@ class CameraChoice:
             self.cameras = formats.read_cameras_of(paths)
 
     def of(self, name, width, height, K=None):
-        """The camera that serves an image of this size: formats.choose_entry says which; the pair line's K replaces
-        its K."""
+        """The camera of an image of this size. formats.choose_entry defines the choice. If the
+        pair's line has K, it replaces the camera's intrinsics."""
         with refused(name):
             found = formats.choose_camera(self.cameras, name, K)
         camera = None if found is None else _camera(found)
         if camera is None:
             if K is None:
-                raise BadInput(f"image {name}: no camera for it (--camera, or a cameras.yaml beside the pairs file or "
-                               "the images)")
+                raise BadInput(
+                    f"image {name}: no camera for it (--camera, or a cameras.yaml beside the pairs "
+                    f"file or "
+                    "the images)"
+                )
             return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
         if (camera.width, camera.height) != (width, height):
-            raise BadInput(f"image {name} is {width}x{height}, but its camera is for {camera.width}x{camera.height}")
+            raise BadInput(
+                f"image {name} is {width}x{height}, but its camera is for "
+                f"{camera.width}x{camera.height}"
+            )
         if K is None:
             return camera
         return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], camera.model, camera.k)

@@ -1,4 +1,4 @@
-"""The arguments of `twoview colmap`."""
+"""The command line of `twoview colmap`."""
 
 import argparse
 import json
@@ -15,7 +15,7 @@ from .errors import ENDING_SIGNALS, EXIT_BAD_INPUT, EXIT_DONE, EXIT_NO_POSE, Bad
 
 
 class Parser(argparse.ArgumentParser):
-    """One line for bad arguments."""
+    """An argument parser that reports bad arguments as one line."""
 
     def error(self, message):
         raise BadInput(f"{message} (see {self.prog} --help)")
@@ -41,8 +41,14 @@ def _add_export(verbs):
     parser.add_argument("--database", required=True, metavar="FILE")
     parser.add_argument("--images", required=True, metavar="DIR")
     _choice_of_pairs(parser)
-    parser.add_argument("--camera", action="append", default=[], metavar="YAML",
-                        help="one camera for all images, or several, each for the files whose names begin with its own")
+    parser.add_argument(
+        "--camera",
+        action="append",
+        default=[],
+        metavar="YAML",
+        help="one camera for all images, or several, each for the files whose names begin with its "
+             "own",
+    )
     parser.add_argument("--schema", choices=("4", "3.8"), default="4",
                         help="COLMAP 4, or 3.8 as Debian has it (default: 4)")
     parser.add_argument("--append", action="store_true", help="add to a database that is there")
@@ -53,13 +59,25 @@ def _add_export(verbs):
 
 def _export(arguments):
     from .exporter import Job, export
-    job = Job(arguments.database, arguments.images, arguments.pairs, arguments.sequential,
-              tuple(arguments.camera), arguments.schema, arguments.append, arguments.quiet or arguments.json)
+    job = Job(
+        arguments.database,
+        arguments.images,
+        arguments.pairs,
+        arguments.sequential,
+        tuple(arguments.camera),
+        arguments.schema,
+        arguments.append,
+        arguments.quiet or arguments.json,
+    )
     counts = export(job, *(settings.options_of(arguments, kind) for kind in
                            (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))
     kinds = ", ".join(f"{n} {kind}" for kind, n in counts["configurations"].items())
-    _say(arguments, counts, f"{arguments.database}: {counts['images']} images ({counts['new_images']} new), "
-                            f"{counts['pairs']} pairs ({kinds or 'none new'})")
+    _say(
+        arguments,
+        counts,
+        f"{arguments.database}: {counts['images']} images ({counts['new_images']} new), "
+        f"{counts['pairs']} pairs ({kinds or 'none new'})",
+    )
     if counts["pairs"] and not counts["pairs_verified"]:
         print("twoview: no pair has a geometry", file=sys.stderr)
         return EXIT_NO_POSE
@@ -67,15 +85,34 @@ def _export(arguments):
 
 
 def _add_import(verbs):
-    parser = verbs.add_parser("import", help="a COLMAP model as reference poses, a database's matches as input")
-    parser.add_argument("--model", default="", metavar="DIR", help="cameras, images and points3D, .bin or .txt")
-    parser.add_argument("--database", default="", metavar="FILE",
-                        help="estimate from its features and matches, of COLMAP 3.8 or 4; with --model against its poses")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR",
-                        help="of pairs.txt, cameras.yaml and trajectory.tum; with --database of report.json")
+    parser = verbs.add_parser(
+        "import", help="a COLMAP model as reference poses, a database's matches as input"
+    )
+    parser.add_argument(
+        "--model", default="", metavar="DIR", help="cameras, images and points3D, .bin or .txt"
+    )
+    parser.add_argument(
+        "--database",
+        default="",
+        metavar="FILE",
+        help="estimate from its features and matches, of COLMAP 3.8 or 4; with --model against its "
+             "poses",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="DIR",
+        help="of pairs.txt, cameras.yaml and trajectory.tum; with --database of report.json",
+    )
     _choice_of_pairs(parser)
-    parser.add_argument("--min-common-points", type=int, default=30, metavar="N",
-                        help="pairs.txt has the pairs that see as many points of the model (default: 30)")
+    parser.add_argument(
+        "--min-common-points",
+        type=int,
+        default=30,
+        metavar="N",
+        help="pairs.txt has the pairs that see as many points of the model (default: 30)",
+    )
     parser.add_argument("--camera", action="append", default=[], metavar="YAML",
                         help="for all images, instead of the database's")
     settings.add_options(parser, (tv.MatchOptions, tv.EstimateOptions))
@@ -94,9 +131,17 @@ def _import(arguments):
         _say(a, {"images": len(model.images), "pairs": count},
              f"{a.output}: {len(model.images)} images, {count} pairs")
         return EXIT_DONE
-    report = import_database(a.database, a.output, a.pairs, a.sequential, model, a.camera,
-                             settings.options_of(a, tv.MatchOptions), settings.options_of(a, tv.EstimateOptions),
-                             a.quiet or a.json)
+    report = import_database(
+        a.database,
+        a.output,
+        a.pairs,
+        a.sequential,
+        model,
+        a.camera,
+        settings.options_of(a, tv.MatchOptions),
+        settings.options_of(a, tv.EstimateOptions),
+        a.quiet or a.json,
+    )
     posed = sum(row["R"] is not None and row["t"] is not None for row in report["pairs"])
     areas = ", ".join(f"{area:.1f}" for area in report["auc"].values() if area is not None)
     _say(a, report, f"{a.output}/report.json: {report['num_pairs']} pairs, {posed} with a pose"
@@ -105,10 +150,16 @@ def _import(arguments):
 
 
 def _add_model(verbs):
-    parser = verbs.add_parser("model", help="two images to a COLMAP text model and a TUM trajectory")
+    parser = verbs.add_parser(
+        "model", help="two images to a COLMAP text model and a TUM trajectory"
+    )
     parser.add_argument("images", nargs=2, metavar="IMAGE")
-    parser.add_argument("--camera", required=True, metavar="YAML", help="of both images, or of the first")
-    parser.add_argument("--camera1", default="", metavar="YAML", help="of the second, where it is another")
+    parser.add_argument(
+        "--camera", required=True, metavar="YAML", help="of both images, or of the first"
+    )
+    parser.add_argument(
+        "--camera1", default="", metavar="YAML", help="of the second, where it is another"
+    )
     parser.add_argument("-o", "--output", required=True, metavar="DIR",
                         help="of cameras.txt, images.txt, points3D.txt and trajectory.tum")
     settings.add_options(parser)
@@ -125,7 +176,10 @@ def _model(arguments):
     cameras = [read_camera(path) for path in (a.camera, a.camera1 or a.camera)]
     names = [os.path.basename(path) for path in a.images]
     if names[0] == names[1]:
-        raise BadInput(f"both images are called {names[0]}, and a COLMAP model tells images apart by their names")
+        raise BadInput(
+            f"both images are called {names[0]}, and a COLMAP model tells images apart by their "
+            f"names"
+        )
     pose, model = reconstruct(a.images, names, cameras, *(settings.options_of(a, kind) for kind in (
         tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))
     if model is None:
@@ -134,10 +188,19 @@ def _model(arguments):
     poses = {names[0]: (np.eye(3), np.zeros(3)), names[1]: (model.R, -model.R.T @ model.t)}
     write_files(a.output, {**text_model(model), "trajectory.tum": write_trajectory(poses)})
     shift = pose.principal_point_shift
-    moved = f"; principal point moved by ({shift[0]:+.1f}, {shift[1]:+.1f}) px" if shift.any() else ""
-    _say(a, {"points": len(model.points), "verdict": pose.verdict.name.lower(),
-             "principal_point_shift_px": shift.tolist()},
-         f"{a.output}: 2 images, {len(model.points)} points, verdict {pose.verdict.name.lower()}{moved}")
+    moved = (
+        f"; principal point moved by ({shift[0]:+.1f}, {shift[1]:+.1f}) px" if shift.any() else ""
+    )
+    _say(
+        a,
+        {
+            "points": len(model.points),
+            "verdict": pose.verdict.name.lower(),
+            "principal_point_shift_px": shift.tolist(),
+        },
+        f"{a.output}: 2 images, {len(model.points)} points, verdict "
+        f"{pose.verdict.name.lower()}{moved}",
+    )
     return EXIT_DONE
 
 
@@ -155,13 +218,15 @@ def _parser():
     _add_import(verbs)
     _add_model(verbs)
     for verb in verbs.choices.values():
-        verb.add_argument("--json", action="store_true", help="print the result alone, as JSON, on stdout")
+        verb.add_argument(
+            "--json", action="store_true", help="print the result alone, as JSON, on stdout"
+        )
         verb.add_argument("--quiet", action="store_true", help="print nothing on stdout")
     return parser
 
 
 class _Ended(BaseException):
-    """A signal that ends the program, after the cleaning up."""
+    """Raised by a signal that ends the program, so that temporary files are removed first."""
 
     def __init__(self, number):
         super().__init__()
@@ -179,12 +244,15 @@ def main(arguments=None):
         parsed = _parser().parse_args(arguments)
         return parsed.run(parsed)
     except ImportError as error:
-        print(f"twoview: {error} (scripts/bootstrap bench installs what colmap needs)", file=sys.stderr)
+        print(
+            f"twoview: {error} (scripts/bootstrap bench installs what colmap needs)",
+            file=sys.stderr,
+        )
         return EXIT_BAD_INPUT
     except (BadInput, OSError, sqlite3.Error, MemoryError) as error:
         print("twoview: " + " ".join(str(error).split()), file=sys.stderr)
         return EXIT_BAD_INPUT
-    except _Ended as ended:  # ends as the signal would have
+    except _Ended as ended:  # ends with the exit status that the signal would have given
         signal.signal(ended.number, signal.SIG_DFL)
         os.kill(os.getpid(), ended.number)
         raise

@@ -1,8 +1,10 @@
-"""Between twoview's conventions and COLMAP's.
+"""Conversions between twoview's conventions and COLMAP's.
 
-Pixels: twoview's (0, 0) is the centre of the top-left pixel, COLMAP's its corner, so that centre is (0.5, 0.5).
-Poses are the same: x1 = R x0 + t, quaternions w x y z in databases and text models.
-Keypoints: COLMAP's scale is SIFT's sigma, half of twoview's diameter; the angle turns x towards y in both."""
+Pixels: twoview's (0, 0) is the centre of the top-left pixel; in COLMAP (0, 0) is its corner and
+(0.5, 0.5) its centre.
+Poses are the same: x1 = R x0 + t; databases and text models store quaternions as w x y z.
+Keypoints: COLMAP's scale is SIFT's sigma, half of twoview's diameter. In both, the angle increases
+from x towards y."""
 
 from dataclasses import dataclass
 from typing import Optional
@@ -14,9 +16,10 @@ HALF_PIXEL = 0.5
 _TO_COLMAP = np.array([[1, 0, HALF_PIXEL], [0, 1, HALF_PIXEL], [0, 0, 1]])
 _FROM_COLMAP = np.array([[1, 0, -HALF_PIXEL], [0, 1, -HALF_PIXEL], [0, 0, 1]])
 
-# COLMAP's TwoViewGeometry::ConfigurationType.
+# The values of COLMAP's TwoViewGeometry::ConfigurationType.
 DEGENERATE, CALIBRATED, UNCALIBRATED, PLANAR, PANORAMIC, PLANAR_OR_PANORAMIC = 1, 2, 3, 4, 5, 6
-# No motion is a panorama whose rotation is none: its matches still join tracks.
+# A pair without motion is stored as a panorama with no rotation, so that its matches still join
+# tracks.
 CONFIGURATIONS = {
     tv.Kind.DEGENERATE: DEGENERATE, tv.Kind.CALIBRATED: CALIBRATED,
     tv.Kind.UNCALIBRATED: UNCALIBRATED, tv.Kind.PLANAR: PLANAR, tv.Kind.PANORAMIC: PANORAMIC,
@@ -25,7 +28,7 @@ CONFIGURATIONS = {
 
 @dataclass(frozen=True)
 class ColmapCamera:
-    """A row of the table cameras."""
+    """A row of the table `cameras`."""
 
     model: str
     width: int
@@ -47,10 +50,13 @@ def camera_to_colmap(camera):
         model, lens = "FULL_OPENCV", k
     else:
         model, lens = "OPENCV", k[:4]
-    return ColmapCamera(model, int(camera.width), int(camera.height), tuple(map(float, params + lens)))
+    return ColmapCamera(
+        model, int(camera.width), int(camera.height), tuple(map(float, params + lens))
+    )
 
 
-# Where each of COLMAP's models has fx fy cx cy, and which of twoview's k its other parameters are.
+# For each of COLMAP's models, the indices of fx fy cx cy among its parameters, and the indices of
+# its other parameters in twoview's k.
 _PINHOLE, _BROWN, _FISHEYE = (tv.CameraModel.PINHOLE, tv.CameraModel.BROWN_CONRADY,
                               tv.CameraModel.KANNALA_BRANDT)
 _MODELS = {
@@ -65,7 +71,8 @@ _MODELS = {
 
 
 def camera_from_colmap(camera, name):
-    """ColmapCamera to twoview.Camera; ValueError for a lens that twoview has no model of."""
+    """Converts a ColmapCamera to a twoview.Camera. Raises ValueError for a lens that twoview has no
+    model of."""
     if camera.model not in _MODELS:
         raise ValueError(f"{name}: COLMAP's {camera.model} is not one of {', '.join(_MODELS)}")
     model, places, lens = _MODELS[camera.model]
@@ -83,7 +90,8 @@ def camera_from_colmap(camera, name):
 
 
 def keypoints_to_colmap(keypoints):
-    """(n, 6) float32: x y a11 a12 a21 a22, the form that COLMAP's own extractor writes."""
+    """Keypoints as (n, 6) float32, x y a11 a12 a21 a22, the form that COLMAP's own extractor
+    writes."""
     x, y, angle = (keypoints[name].astype(np.float64) for name in ("x", "y", "angle_rad"))
     scale = keypoints["size"].astype(np.float64) / 2
     cos, sin = scale * np.cos(angle), scale * np.sin(angle)
@@ -92,19 +100,19 @@ def keypoints_to_colmap(keypoints):
 
 
 def pixels_from_colmap(keypoints):
-    """(n, 2) float64 of COLMAP's (n, 2), (n, 4) or (n, 6)."""
+    """Pixels (n, 2) float64 from COLMAP's keypoints (n, 2), (n, 4) or (n, 6)."""
     return np.ascontiguousarray(np.asarray(keypoints, np.float64)[:, :2] - HALF_PIXEL)
 
 
 def quaternion(R):
-    """w x y z with w >= 0."""
+    """The quaternion w x y z of a rotation, with w >= 0."""
     from scipy.spatial.transform import Rotation
     x, y, z, w = Rotation.from_matrix(R).as_quat(canonical=True)
     return np.array([w, x, y, z])
 
 
 def rotation(qvec):
-    """3x3 of w x y z."""
+    """The 3x3 rotation of a quaternion w x y z."""
     from scipy.spatial.transform import Rotation
     w, x, y, z = qvec
     return Rotation.from_quat([x, y, z, w]).as_matrix()
@@ -116,7 +124,7 @@ def _scaled(H):
 
 @dataclass(frozen=True)
 class PairGeometry:
-    """A row of two_view_geometries, in COLMAP's pixels; what is unknown is None."""
+    """A row of two_view_geometries, in COLMAP's pixels. An unknown value is None."""
 
     config: int
     inlier_matches: np.ndarray  #: (n, 2) uint32
@@ -127,7 +135,7 @@ class PairGeometry:
     t: Optional[np.ndarray] = None
 
     def swapped(self):
-        """The same pair named the other way round."""
+        """The same pair with its images exchanged."""
         H = R = t = None
         if self.H is not None:
             H = _scaled(np.linalg.inv(self.H))
@@ -139,7 +147,8 @@ class PairGeometry:
 
 
 def geometry_to_colmap(found, matches):
-    """A twoview.TwoView and its inlier matches (n, 2) to a row. A degenerate pair keeps no match."""
+    """Converts a twoview.TwoView and its inlier matches (n, 2) to a row. A degenerate pair gets no
+    matches."""
     config = CONFIGURATIONS[found.kind]
     if config == DEGENERATE:
         return PairGeometry(DEGENERATE, np.zeros((0, 2), np.uint32))
@@ -150,5 +159,5 @@ def geometry_to_colmap(found, matches):
         H = _scaled(_TO_COLMAP @ H @ _FROM_COLMAP)
     t = found.t
     if found.R is not None and t is None:
-        t = np.zeros(3)  # COLMAP's pose of a panorama
+        t = np.zeros(3)  # COLMAP stores a zero translation for a panorama
     return PairGeometry(config, np.ascontiguousarray(matches, np.uint32), F, found.E, H, found.R, t)

@@ -1,4 +1,5 @@
-"""A database file that appears, or grows, whole or not at all; and what is in one, by SQL that every COLMAP shares."""
+"""Writes a database file so that it appears, or grows, completely or not at all; and reads a
+database with SQL that works for every COLMAP version."""
 
 import contextlib
 import os
@@ -13,24 +14,31 @@ from .errors import BadInput
 
 SCHEMAS = {schema.NAME: schema for schema in (schema4, schema38)}
 _LEFT_BEHIND = ("-wal", "-journal", "-shm")
-_BUSY, _LOCKED = 5, 6  # SQLite's codes; Python's module names them from 3.11 on
+_BUSY, _LOCKED = 5, 6  # SQLite's error codes, which Python's module names from 3.11 on
 
 
 def _columns(database):
-    """{table: columns} of all that is no SQLite's own."""
+    """{table: columns} of all tables except SQLite's own."""
     tables = [row[0] for row in database.execute(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'")]
-    return {table: [row[1] for row in database.execute(f"PRAGMA table_info('{table}')")] for table in tables}
+    return {
+        table: [row[1] for row in database.execute(f"PRAGMA table_info('{table}')")]
+        for table in tables
+    }
 
 
 def maker_of(database):
-    """Which COLMAP a database is of, in words."""
+    """A description of the COLMAP version that made the database."""
     version = database.execute("PRAGMA user_version").fetchone()[0]
     if not {"cameras", "images", "two_view_geometries"} <= set(_columns(database)):
         return "no COLMAP"
     if version >= 1000000:
         return f"COLMAP {version // 1000000}.{version // 10000 % 100}.{version // 100 % 100}"
-    return f"COLMAP {version // 1000}.{version // 100 % 10}" if version else "a COLMAP that gives no version"
+    return (
+        f"COLMAP {version // 1000}.{version // 100 % 10}"
+        if version
+        else "a COLMAP that gives no version"
+    )
 
 
 def _explain(path, error):
@@ -44,11 +52,13 @@ def _explain(path, error):
 
 @contextlib.contextmanager
 def reading(path):
-    """An sqlite3 connection that only reads; errors in words."""
+    """An sqlite3 connection that is read-only; errors become BadInput with a clear message."""
     if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file")
     try:
-        uri = "file:" + os.path.abspath(path).replace("%", "%25").replace("?", "%3f").replace("#", "%23")
+        uri = "file:" + os.path.abspath(path).replace("%", "%25").replace("?", "%3f").replace(
+            "#", "%23"
+        )
         with contextlib.closing(sqlite3.connect(uri + "?mode=ro", uri=True, timeout=1)) as database:
             database.execute("SELECT count(*) FROM sqlite_master")
             yield database
@@ -57,27 +67,32 @@ def reading(path):
 
 
 def _require_schema(database, path, schema, folder):
-    """Refuses a database of another COLMAP: its tables are not those that this schema makes."""
+    """Refuses a database of another COLMAP version, whose tables differ from those of this
+    schema."""
     fresh = os.path.join(folder, "fresh.db")
     schema.create(fresh)
     with contextlib.closing(sqlite3.connect(fresh)) as expected:
         wanted, maker = _columns(expected), maker_of(expected)
     if _columns(database) != wanted:
-        raise BadInput(f"{path}: made by {maker_of(database)}, and --schema {schema.NAME} is for {maker}")
+        raise BadInput(
+            f"{path}: made by {maker_of(database)}, and --schema {schema.NAME} is for {maker}"
+        )
 
 
 def _settle(path):
-    """One file: what COLMAP 4 keeps in path-wal is moved in."""
+    """Moves the data that COLMAP 4 keeps in path-wal into the database file, so that one file holds
+    all."""
     with contextlib.closing(sqlite3.connect(path)) as database:
         database.execute("PRAGMA journal_mode = DELETE")
 
 
 @contextlib.contextmanager
 def new_database(path, schema):
-    """A Writer of a database that is at `path` when the block ends well; there must be none before."""
+    """A context manager with a Writer. The database appears at `path` if the block ends without an
+    exception; there must be no database before."""
     if os.path.lexists(path):
         raise BadInput(f"{path}: there already (--append adds to it)")
-    for suffix in _LEFT_BEHIND:  # SQLite would roll it into the new file
+    for suffix in _LEFT_BEHIND:  # SQLite would apply these files to the new database
         if os.path.lexists(path + suffix):
             raise BadInput(f"{path}{suffix}: left there by another database; remove it first")
     schema.prepare()
@@ -89,10 +104,10 @@ def new_database(path, schema):
             writer.commit()
         _settle(made)
         try:
-            os.link(made, path)  # never over a file that came meanwhile
+            os.link(made, path)  # this never overwrites a file that appeared in the meantime
         except FileExistsError:
             raise BadInput(f"{path}: there already (--append adds to it)") from None
-        except OSError:  # a file system without links
+        except OSError:  # the file system has no hard links
             os.rename(made, path)
 
 
@@ -103,14 +118,17 @@ def _give_up_when_locked(status, _remaining, _total):
 
 @contextlib.contextmanager
 def appended_database(path, schema):
-    """A Writer of a copy, which replaces the content of `path` in one transaction when the block ends well."""
+    """A context manager with a Writer on a copy of the database. If the block ends without an
+    exception, the copy replaces the content of `path` in one transaction."""
     if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file, nothing to append to")
     schema.prepare()
     try:
-        with _scratch_folder(path) as scratch, contextlib.closing(sqlite3.connect(path, timeout=1)) as target:
+        with _scratch_folder(path) as scratch, contextlib.closing(
+            sqlite3.connect(path, timeout=1)
+        ) as target:
             made = os.path.join(scratch, "made.db")
-            target.execute("BEGIN IMMEDIATE")  # says whether it can be written to
+            target.execute("BEGIN IMMEDIATE")  # fails if the database cannot be written
             target.rollback()
             _require_schema(target, path, schema, scratch)
             before = target.execute("PRAGMA data_version").fetchone()
@@ -123,14 +141,15 @@ def appended_database(path, schema):
             if target.execute("PRAGMA data_version").fetchone() != before:
                 raise BadInput(f"{path}: changed by another program meanwhile; nothing was written")
             with contextlib.closing(sqlite3.connect(made)) as copy:
-                copy.backup(target, progress=_give_up_when_locked)  # by itself it would try for ever
+                # Without this callback, backup() would retry for ever.
+                copy.backup(target, progress=_give_up_when_locked)
     except sqlite3.Error as error:
         raise _explain(path, error) from None
 
 
 @contextlib.contextmanager
 def _scratch_folder(path):
-    """A hidden folder beside `path`, gone at the end whatever happens."""
+    """A hidden folder beside `path`, which is removed at the end in every case."""
     folder = os.path.dirname(os.path.abspath(path))
     if not os.path.isdir(folder):
         raise BadInput(f"{folder}: no such folder")
@@ -143,7 +162,7 @@ def _scratch_folder(path):
 
 
 def read_cameras(database):
-    """{camera_id: ColmapCamera}."""
+    """Reads {camera_id: ColmapCamera}."""
     names = {number: name for name, number in MODEL_IDS.items()}
     names.update({0: "SIMPLE_PINHOLE", 2: "SIMPLE_RADIAL", 3: "RADIAL", 8: "SIMPLE_RADIAL_FISHEYE",
                   9: "RADIAL_FISHEYE"})
@@ -154,7 +173,7 @@ def read_cameras(database):
 
 
 def read_images(database):
-    """{name: (image_id, camera_id)}."""
+    """Reads {name: (image_id, camera_id)}."""
     return {name: (image_id, camera_id) for image_id, name, camera_id in
             database.execute("SELECT image_id, name, camera_id FROM images ORDER BY image_id")}
 
@@ -169,27 +188,35 @@ def _table(row, dtype, path, what):
 
 
 def read_keypoints(database, path, image_id):
-    """(n, 2), (n, 4) or (n, 6) float32, in COLMAP's pixels."""
-    row = database.execute("SELECT rows, cols, data FROM keypoints WHERE image_id = ?", (image_id,)).fetchone()
+    """Reads keypoints (n, 2), (n, 4) or (n, 6) float32, in COLMAP's pixels."""
+    row = database.execute(
+        "SELECT rows, cols, data FROM keypoints WHERE image_id = ?", (image_id,)
+    ).fetchone()
     return _table(row, np.float32, path, f"keypoints of image {image_id}")
 
 
 def read_descriptors(database, path, image_id):
-    """(n, 128) uint8."""
-    row = database.execute("SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)).fetchone()
+    """Reads descriptors (n, 128) uint8."""
+    row = database.execute(
+        "SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)
+    ).fetchone()
     return _table(row, np.uint8, path, f"descriptors of image {image_id}")
 
 
 def read_matches(database, path):
-    """[(image_id0, image_id1, (n, 2) uint32)], image_id0 < image_id1."""
+    """Reads [(image_id0, image_id1, matches (n, 2) uint32)] with image_id0 < image_id1."""
     found = []
-    for pair, *row in database.execute("SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id"):
+    for pair, *row in database.execute(
+        "SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id"
+    ):
         id0, id1 = divmod(pair, schema38.MAX_IMAGES)
         found.append((id0, id1, _table(row, np.uint32, path, f"matches of images {id0} and {id1}")))
     return found
 
 
 def read_pair_ids(database):
-    """Pairs of image ids, smaller first, that have matches or a geometry."""
-    rows = database.execute("SELECT pair_id FROM matches UNION SELECT pair_id FROM two_view_geometries")
+    """The pairs of image ids, smaller first, that have matches or a geometry."""
+    rows = database.execute(
+        "SELECT pair_id FROM matches UNION SELECT pair_id FROM two_view_geometries"
+    )
     return {divmod(row[0], schema38.MAX_IMAGES) for row in rows}

@@ -1,4 +1,4 @@
-"""The library's stages on images of any size, with one set of options."""
+"""Runs the library's stages on images of any size, with one set of options."""
 
 import numpy as np
 import twoview as tv
@@ -8,7 +8,10 @@ from .errors import BadInput
 
 class Engine:
     def __init__(self, feature=None, match=None, estimate=None, max_matches=0):
-        self.feature, self.match_options = feature or tv.FeatureOptions(), match or tv.MatchOptions()
+        self.feature, self.match_options = (
+            feature or tv.FeatureOptions(),
+            match or tv.MatchOptions(),
+        )
         self.estimate_options = estimate or tv.EstimateOptions()
         self.max_matches = max_matches
         self.width = self.height = 0
@@ -24,7 +27,9 @@ class Engine:
 
     def extract(self, luma, name):
         try:
-            return tv.extract(self._context(luma.shape[1], luma.shape[0]), luma, options=self.feature)
+            return tv.extract(
+                self._context(luma.shape[1], luma.shape[0]), luma, options=self.feature
+            )
         except tv.StatusError as error:
             raise BadInput(f"image {name}: {error}") from None
 
@@ -33,12 +38,19 @@ class Engine:
 
     def estimate(self, camera0, camera1, pixels0, pixels1, ratios=None):
         try:
-            return tv.estimate_two_view(self._context(1, 1), camera0, camera1, pixels0, pixels1, ratios,
-                                        self.estimate_options)
+            return tv.estimate_two_view(
+                self._context(1, 1),
+                camera0,
+                camera1,
+                pixels0,
+                pixels1,
+                ratios,
+                self.estimate_options,
+            )
         except tv.StatusError as error:
             raise BadInput(str(error)) from None
 
 
 def pixels_of(keypoints):
-    """(n, 2) float64."""
+    """The pixels of keypoints, (n, 2) float64."""
     return np.column_stack([keypoints["x"], keypoints["y"]]).astype(np.float64)

@@ -1,4 +1,4 @@
-"""How the program says no: one line on stderr, exit status 2."""
+"""How the program reports bad input: one line on stderr and exit status 2."""
 
 import contextlib
 import signal
@@ -13,12 +13,13 @@ EXIT_NO_POSE = 3
 
 
 class BadInput(Exception):
-    """str() is the line that the user reads."""
+    """Bad input; str() is the line that the user reads."""
 
 
 @contextlib.contextmanager
 def refused(path):
-    """What a reader of twoview_tools.formats refuses in `path`, or cannot open, becomes BadInput."""
+    """A context manager: errors of twoview_tools.formats in `path`, and errors of opening it,
+    become BadInput."""
     try:
         yield
     except FormatError as error:
@@ -31,8 +32,8 @@ ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def need_pycolmap(what):
-    """pycolmap, or the line that says how to get it. The first call comes before there is anything to clean up: a
-    signal during the import ends the program."""
+    """Imports pycolmap; if it is missing, BadInput says how to get it. Call it before any temporary
+    file exists, because a signal during the import ends the program at once."""
     if sys.modules.get("pycolmap"):
         return sys.modules["pycolmap"]
     in_main = threading.current_thread() is threading.main_thread()
@@ -40,8 +41,11 @@ def need_pycolmap(what):
     try:
         import pycolmap
     except ImportError as error:
-        raise BadInput(f"{what} needs pycolmap (scripts/bootstrap bench installs it): {error}") from error
+        raise BadInput(
+            f"{what} needs pycolmap (scripts/bootstrap bench installs it): {error}"
+        ) from error
     finally:
-        for number, handler in before.items():  # its log library has put a crash's report in their place
+        # pycolmap's log library has replaced them with handlers that print a crash report.
+        for number, handler in before.items():
             signal.signal(number, handler)
     return pycolmap

@@ -1,4 +1,5 @@
-"""Images to a COLMAP database: features, matches and verified geometry, for the mapper to go on from."""
+"""Exports images to a COLMAP database: features, matches and verified geometry, which COLMAP's
+mapper then uses."""
 
 import os
 from dataclasses import dataclass
@@ -9,8 +10,16 @@ import twoview as tv
 
 from . import conventions
 from .cameras import CameraChoice
-from .database import (SCHEMAS, appended_database, new_database, read_cameras, read_images, read_keypoints,
-                       read_pair_ids, reading)
+from .database import (
+    SCHEMAS,
+    appended_database,
+    new_database,
+    read_cameras,
+    read_images,
+    read_keypoints,
+    read_pair_ids,
+    reading,
+)
 from .engine import Engine, pixels_of
 from .errors import BadInput
 from .images import list_images, read_luma
@@ -32,8 +41,8 @@ class View:
 class Job:
     database: str
     images: str
-    pairs: str = ""  #: file; else `overlap`
-    overlap: int = 0  #: of --sequential; 0: all pairs
+    pairs: str = ""  #: a pairs file; if empty, `overlap` is used
+    overlap: int = 0  #: the value of --sequential; 0: all pairs
     cameras: tuple = ()
     schema: str = "4"
     append: bool = False
@@ -41,7 +50,7 @@ class Job:
 
 
 def choose_pairs(job):
-    """[Pair] over images that exist, each pair once."""
+    """The [Pair] to match, each pair once; all images must exist."""
     if not job.pairs:
         names = list_images(job.images)
         if len(names) < 2:
@@ -59,7 +68,8 @@ def choose_pairs(job):
 
 
 def _intrinsics(job, pairs):
-    """{name: K or None} in the names' order; an image has one K in all of its lines."""
+    """{name: K or None} in the order of the names. An image must have the same K in all of its
+    lines."""
     given = {}
     for pair in pairs:
         for name, K in ((pair.name0, pair.K0), (pair.name1, pair.K1)):
@@ -82,7 +92,7 @@ def _describe_images(job, pairs, engine):
 
 
 class _Known:
-    """What the database of an --append holds already."""
+    """What the database already holds in a run with --append."""
 
     def __init__(self, job):
         self.path, self.cameras, self.images, self.pairs = job.database, {}, {}, set()
@@ -95,7 +105,8 @@ class _Known:
         return next((key for key, known in self.cameras.items() if known == camera), None)
 
     def check_image(self, name, camera, keypoints):
-        """An image that is there must be as this run has it, else its matches would point elsewhere."""
+        """Refuses an image in the database that differs from this run's, since its matches would
+        refer to other keypoints."""
         image_id, camera_id = self.images[name]
         if self.cameras.get(camera_id) != camera:
             raise BadInput(f"{self.path}: image {name} is there with another camera")
@@ -107,7 +118,7 @@ class _Known:
 
 
 def _write_images(writer, known, views):
-    """{name: image_id}."""
+    """Writes the images. Returns {name: image_id}."""
     ids = {}
     for name, view in views.items():
         camera = conventions.camera_to_colmap(view.camera)
@@ -125,15 +136,17 @@ def _write_images(writer, known, views):
 
 
 def one_keypoint_a_place(keypoints):
-    """(n,): for each keypoint the first that lies at its place. A corner with two orientations is two keypoints; the
-    mapper would make two tracks of it, each with half of the corner's matches."""
+    """(n,): for each keypoint, the index of the first keypoint at the same position. A corner with
+    two orientations is two keypoints; without this the mapper would make two tracks of it, each
+    with half of the corner's matches."""
     places = np.column_stack([keypoints["x"], keypoints["y"]])
     _, first, inverse = np.unique(places, axis=0, return_index=True, return_inverse=True)
     return first[inverse.reshape(-1)]
 
 
 def one_to_one(matches, order):
-    """Indices of the matches, best of `order` first, that share no keypoint with a better one."""
+    """The indices of the matches that share no keypoint with a better match; `order` lists the
+    matches, best first."""
     used, kept = (set(), set()), []
     for k in order:
         idx0, idx1 = matches[k]
@@ -145,7 +158,7 @@ def one_to_one(matches, order):
 
 
 def two_view(engine, view0, view1):
-    """(matches (n, 2), TwoView, inliers (n,) bool), with one keypoint a corner."""
+    """(matches (n, 2), TwoView, inliers (n,) bool), with one keypoint for each corner."""
     found = engine.match(view0.descriptors, view1.descriptors)
     matches = np.column_stack([found["idx0"], found["idx1"]]).astype(np.uint32)
     result, inliers = engine.estimate(
@@ -158,7 +171,7 @@ def two_view(engine, view0, view1):
 
 
 def export(job, feature=None, match=None, estimate=None):
-    """{what: how many}; the database is whole, or as it was before."""
+    """Exports, and returns {what: how many}. On failure the database is as it was before."""
     schema = SCHEMAS[job.schema]
     engine = Engine(feature, match, estimate or
                     tv.EstimateOptions(principal_point_sigma=PRINCIPAL_POINT_SIGMA_OF_A_DATABASE))

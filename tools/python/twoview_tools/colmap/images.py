@@ -1,4 +1,4 @@
-"""Image files as `twoview` reads them."""
+"""Reads image files in the same way as the program `twoview`."""
 
 import os
 
@@ -10,7 +10,7 @@ EXTENSIONS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", 
 
 
 def list_images(folder):
-    """Names below a folder, sorted, with / between folders as COLMAP has them."""
+    """The names of the images below a folder, sorted; as in COLMAP, / separates folders."""
     if not os.path.isdir(folder):
         raise BadInput(f"{folder}: no such folder")
     names = [os.path.relpath(os.path.join(root, file), folder)
@@ -20,8 +20,9 @@ def list_images(folder):
 
 
 def _decode(path):
-    """8 bits, 1, 3 (BGR) or 4 (BGRA) channels, the pixels as they are stored."""
-    os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")  # read when it is imported: the line is ours
+    """Decodes to 8 bits and 1, 3 (BGR) or 4 (BGRA) channels, with the pixels as they are stored."""
+    # OpenCV reads it when it is imported; only our own line is printed
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
     import cv2
     if not os.path.isfile(path):
         raise BadInput(f"image {path}: no such file")
@@ -31,7 +32,7 @@ def _decode(path):
         image = None
     if image is None:
         raise BadInput(f"image {path}: not an image that OpenCV reads")
-    if image.dtype == np.uint16:  # rounded
+    if image.dtype == np.uint16:  # 16-bit samples are divided by 257 and rounded
         image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
     if image.dtype != np.uint8:
         raise BadInput(f"image {path}: samples of {image.dtype}, not of 8 or 16 bits")
@@ -41,7 +42,7 @@ def _decode(path):
 
 
 def read_luma(path):
-    """(height, width) uint8: 0.299 R + 0.587 G + 0.114 B."""
+    """The luma, (height, width) uint8: 0.299 R + 0.587 G + 0.114 B."""
     image = _decode(path)
     if image.ndim == 3:
         import cv2
@@ -50,6 +51,6 @@ def read_luma(path):
 
 
 def read_rgb(path):
-    """(height, width, 3) uint8."""
+    """The colours, (height, width, 3) uint8."""
     image = _decode(path)
     return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image[..., 2::-1]

@@ -1,4 +1,4 @@
-"""COLMAP's models as reference poses, and its features and matches as input."""
+"""Imports COLMAP's models as reference poses, and its features and matches as input."""
 
 import json
 import os
@@ -6,7 +6,7 @@ import os
 import numpy as np
 import twoview as tv
 
-from ..accuracy import metrics  # the errors' definitions are those of the accuracy tables
+from ..accuracy import metrics  # errors are defined as in the accuracy tables
 from . import database as db
 from .cameras import read_camera, write_camera_set
 from .conventions import camera_from_colmap, pixels_from_colmap
@@ -19,14 +19,16 @@ from .trajectory import write_trajectory
 
 
 def _choose(names, pairs_file, overlap):
-    """Pairs of a file, all of whose images must be there; else of the names."""
+    """The pairs of a file, all of whose images must exist; without a file, pairs of the names."""
     if not pairs_file:
         return sequential(names, overlap) if overlap else exhaustive(names)
     pairs = read_pairs(pairs_file)
     for pair in pairs:
         for name in (pair.name0, pair.name1):
             if name not in names:
-                raise BadInput(f"{pairs_file}: line {pair.number}: {name} is not in the model or database")
+                raise BadInput(
+                    f"{pairs_file}: line {pair.number}: {name} is not in the model or database"
+                )
     return pairs
 
 
@@ -38,14 +40,21 @@ def _camera(row, name):
 
 
 def _named_cameras(model):
-    """{entry: camera} of a cameras.yaml that chooses by K."""
+    """{entry: camera} of a cameras.yaml in which K selects the entry."""
     used = sorted({image.camera_id for image in model.images.values()})
     cameras = {f"camera_{key}": _camera(model.cameras[key], f"camera {key}") for key in used}
     by_K = {}
     for name, camera in cameras.items():
         same = by_K.setdefault((camera.fx, camera.cx), camera)
-        if (same.width, same.height, tuple(same.k)) != (camera.width, camera.height, tuple(camera.k)):
-            raise BadInput(f"{name}: another camera has its fx and cx, and a pairs file could not tell them apart")
+        if (same.width, same.height, tuple(same.k)) != (
+            camera.width,
+            camera.height,
+            tuple(camera.k),
+        ):
+            raise BadInput(
+                f"{name}: another camera has its fx and cx, and a pairs file could not tell them "
+                f"apart"
+            )
     try:
         return cameras, write_camera_set(cameras)
     except ValueError as error:
@@ -53,13 +62,14 @@ def _named_cameras(model):
 
 
 def relative(image0, image1):
-    """R and t of cam1_from_cam0, in the model's unit."""
+    """R and t of cam1_from_cam0, in the unit of the model."""
     R = image1.R @ image0.R.T
     return R, image1.t - R @ image0.t
 
 
 def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
-    """pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model; how many pairs."""
+    """Writes pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model. Returns the
+    number of pairs."""
     cameras, cameras_text = _named_cameras(model)
     lines = []
     for pair in _choose(list(model.images), pairs_file, overlap):
@@ -69,7 +79,10 @@ def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
         K0, K1 = (cameras[f"camera_{image.camera_id}"].K for image in (image0, image1))
         lines.append(write_pair(pair.name0, pair.name1, K0, K1, *relative(image0, image1)))
     if not lines:
-        raise BadInput(f"no two images of the model have {min_common_points} points in common (--min-common-points)")
+        raise BadInput(
+            f"no two images of the model have {min_common_points} points in common "
+            f"(--min-common-points)"
+        )
     if any(any(c.isspace() for c in name) for name in model.images):
         raise BadInput("an image's name has a space in it, which a pairs file cannot hold")
     head = "# name0 name1 rot0 rot1 K0 K1 T_0to1; the truth is a COLMAP model's, in its unit\n"
@@ -79,7 +92,7 @@ def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
 
 
 class Features:
-    """What a database has: pixels and descriptors by image, matches by pair of names."""
+    """The contents of a database: pixels and descriptors by image, matches by pair of names."""
 
     def __init__(self, path, camera_files=()):
         self.path = path
@@ -101,12 +114,18 @@ class Features:
             self.descriptors[name] = db.read_descriptors(database, self.path, image_id)
         for id0, id1, matches in db.read_matches(database, self.path):
             name0, name1 = names[id0], names[id1]
-            if len(matches) and (matches.max(axis=0) >= [len(self.pixels[name0]), len(self.pixels[name1])]).any():
+            if (
+                len(matches)
+                and (
+                    matches.max(axis=0) >= [len(self.pixels[name0]), len(self.pixels[name1])]
+                ).any()
+            ):
                 raise BadInput(f"{self.path}: a match of {name0} and {name1} has no keypoint")
             self.matches[name0, name1] = matches
 
     def matches_of(self, name0, name1, engine):
-        """(n, 2) of the database in this order of the names; without a row for the pair, by our matcher."""
+        """The database's matches (n, 2) in this order of the names. If the database has no row for
+        the pair, our matcher makes them."""
         if (name0, name1) in self.matches:
             return self.matches[name0, name1], None
         if (name1, name0) in self.matches:
@@ -123,20 +142,48 @@ def _pair_report(name0, name1, features, engine, truth):
         features.cameras[name0], features.cameras[name1], features.pixels[name0][matches[:, 0]],
         features.pixels[name1][matches[:, 1]], ratios)
     row = {"name0": name0, "name1": name1}
-    errors = metrics.pose_error(result.R, result.t, *truth) if truth else dict.fromkeys(
-        ("rotation_error_deg", "translation_error_deg", "translation_error_signed_deg", "pose_error_deg"))
+    errors = (
+        metrics.pose_error(result.R, result.t, *truth)
+        if truth
+        else dict.fromkeys(
+            (
+                "rotation_error_deg",
+                "translation_error_deg",
+                "translation_error_signed_deg",
+                "pose_error_deg",
+            )
+        )
+    )
     row.update(errors)
-    row.update({"num_matches": len(matches), "num_inliers": int(inliers.sum()), "precision": None,
-                "config": result.kind.name.lower(), "verdict": result.verdict.name.lower(), "time_ms": None})
+    row.update(
+        {
+            "num_matches": len(matches),
+            "num_inliers": int(inliers.sum()),
+            "precision": None,
+            "config": result.kind.name.lower(),
+            "verdict": result.verdict.name.lower(),
+            "time_ms": None,
+        }
+    )
     row.update({key: None if value is None else np.ravel(value).tolist()
                 for key, value in (("R", result.R), ("t", result.t),
                                    ("principal_point_shift_px", result.principal_point_shift))})
     return row
 
 
-def import_database(path, folder, pairs_file="", overlap=0, model=None, camera_files=(), match=None, estimate=None,
-                    quiet=False):
-    """report.json, in the form of `twoview evaluate`, of our estimation on a database's features and matches."""
+def import_database(
+    path,
+    folder,
+    pairs_file="",
+    overlap=0,
+    model=None,
+    camera_files=(),
+    match=None,
+    estimate=None,
+    quiet=False,
+):
+    """Estimates from a database's features and matches, and writes report.json in the form of
+    `twoview evaluate`."""
     features = Features(path, camera_files)
     if pairs_file or overlap or not features.matches:
         pairs = _choose(list(features.pixels), pairs_file, overlap)
@@ -152,8 +199,13 @@ def import_database(path, folder, pairs_file="", overlap=0, model=None, camera_f
         if model and pair.name0 in model.images and pair.name1 in model.images:
             truth = relative(model.images[pair.name0], model.images[pair.name1])
         rows.append(_pair_report(pair.name0, pair.name1, features, engine, truth))
-    report = {key: {f"{limit:g}": _auc(rows, error, limit) for limit in metrics.THRESHOLDS_DEG}
-              for key, error in (("auc", "translation_error_deg"), ("auc_signed", "translation_error_signed_deg"))}
+    report = {
+        key: {f"{limit:g}": _auc(rows, error, limit) for limit in metrics.THRESHOLDS_DEG}
+        for key, error in (
+            ("auc", "translation_error_deg"),
+            ("auc_signed", "translation_error_signed_deg"),
+        )
+    }
     report.update(num_pairs=len(rows), pairs=rows, options={"database": os.path.basename(path)},
                   seed=(estimate or tv.EstimateOptions()).seed, version=tv.version_string())
     write_files(folder, {"report.json": json.dumps(metrics.finite(report), indent=1) + "\n"})

@@ -1,4 +1,5 @@
-"""COLMAP's mapper, of pycolmap (4) and of Debian's `colmap` (3.8), on a database; and COLMAP's own features."""
+"""Runs COLMAP's mapper on a database, with pycolmap (4) or Debian's `colmap` (3.8), and makes
+COLMAP's own features."""
 
 import os
 import pathlib
@@ -12,8 +13,13 @@ def _run_colmap(verb, *arguments):
     program = shutil.which("colmap")
     if not program:
         raise BadInput("no colmap in the PATH (scripts/bootstrap bench installs it)")
-    done = subprocess.run([program, verb, *map(str, arguments)], capture_output=True, text=True, check=False,
-                          env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
+    done = subprocess.run(
+        [program, verb, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen"},
+    )
     if done.returncode:
         last = (done.stderr or done.stdout).strip().split("\n")[-1]
         raise BadInput(f"colmap {verb}: status {done.returncode}: {last}")
@@ -32,28 +38,52 @@ def own_features_38(database, images, camera):
 def own_features_4(database, images, camera):
     colmap = need_pycolmap("COLMAP 4's features")
     row = camera_to_colmap(camera)
-    reader = colmap.ImageReaderOptions(camera_model=row.model, camera_params=",".join(map(repr, row.params)))
+    reader = colmap.ImageReaderOptions(
+        camera_model=row.model, camera_params=",".join(map(repr, row.params))
+    )
     extraction, matching = colmap.FeatureExtractionOptions(), colmap.FeatureMatchingOptions()
     extraction.num_threads = matching.num_threads = 1
     extraction.use_gpu = matching.use_gpu = False
     colmap.set_random_seed(1)
-    colmap.extract_features(database, images, camera_mode=colmap.CameraMode.SINGLE, reader_options=reader,
-                            extraction_options=extraction, device=colmap.Device.cpu)
+    colmap.extract_features(
+        database,
+        images,
+        camera_mode=colmap.CameraMode.SINGLE,
+        reader_options=reader,
+        extraction_options=extraction,
+        device=colmap.Device.cpu,
+    )
     colmap.match_exhaustive(database, matching_options=matching, device=colmap.Device.cpu)
 
 
 def map_38(database, images, folder, fix_intrinsics, seed=1):
-    """The folders of the models."""
+    """Runs the mapper of COLMAP 3.8. Returns the folders of the models."""
     os.makedirs(folder, exist_ok=True)
     refine = 0 if fix_intrinsics else 1
-    _run_colmap("mapper", "--database_path", database, "--image_path", images, "--output_path", folder,
-                "--random_seed", seed, "--Mapper.num_threads", 1, "--Mapper.ba_refine_focal_length", refine,
-                "--Mapper.ba_refine_extra_params", refine, "--Mapper.extract_colors", 0)
+    _run_colmap(
+        "mapper",
+        "--database_path",
+        database,
+        "--image_path",
+        images,
+        "--output_path",
+        folder,
+        "--random_seed",
+        seed,
+        "--Mapper.num_threads",
+        1,
+        "--Mapper.ba_refine_focal_length",
+        refine,
+        "--Mapper.ba_refine_extra_params",
+        refine,
+        "--Mapper.extract_colors",
+        0,
+    )
     return sorted(str(path) for path in pathlib.Path(folder).iterdir() if path.is_dir())
 
 
 def map_4(database, images, folder, fix_intrinsics, seed=1):
-    """The same of COLMAP 4."""
+    """Runs the mapper of COLMAP 4. Returns the folders of the models."""
     colmap = need_pycolmap("COLMAP 4's mapper")
     os.makedirs(folder, exist_ok=True)
     options = colmap.IncrementalPipelineOptions()

@@ -1,4 +1,4 @@
-"""COLMAP models, text or binary, of any version that pycolmap reads; and text models of ours."""
+"""Reads COLMAP models, text or binary, of any version that pycolmap reads; writes text models."""
 
 import os
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ class ModelImage:
     camera_id: int
     R: np.ndarray  #: (3, 3), camera from world
     t: np.ndarray
-    point_ids: frozenset = frozenset()  #: 3D points that it sees
+    point_ids: frozenset = frozenset()  #: the 3D points that the image sees
 
     @property
     def centre(self):
@@ -24,49 +24,62 @@ class ModelImage:
 @dataclass(frozen=True)
 class Model:
     cameras: dict  #: {camera_id: ColmapCamera}
-    images: dict  #: {name: ModelImage}, those that are registered
+    images: dict  #: {name: ModelImage} of the registered images
     num_points: int = 0
     mean_error_px: float = 0.0
 
     def poses(self):
-        """{name: (R, centre)}."""
+        """{name: (R, centre)} of the registered images."""
         return {name: (image.R, image.centre) for name, image in self.images.items()}
 
 
 def read_model(folder):
-    """A folder with cameras, images and points3D, .txt or .bin."""
+    """Reads a folder with cameras, images and points3D, .txt or .bin."""
     colmap = need_pycolmap("reading a model")
     for suffix in (".bin", ".txt"):
-        if all(os.path.isfile(os.path.join(folder, stem + suffix)) for stem in ("cameras", "images", "points3D")):
+        if all(
+            os.path.isfile(os.path.join(folder, stem + suffix))
+            for stem in ("cameras", "images", "points3D")
+        ):
             break
     else:
-        raise BadInput(f"{folder}: no COLMAP model in it (cameras, images and points3D, .bin or .txt)")
+        raise BadInput(
+            f"{folder}: no COLMAP model in it (cameras, images and points3D, .bin or .txt)"
+        )
     try:
         found = colmap.Reconstruction(folder)
     except (RuntimeError, ValueError, IndexError) as error:
-        raise BadInput(f"{folder}: not a COLMAP model: {' '.join(str(error).split())[:200]}") from None
-    cameras = {key: ColmapCamera(camera.model.name, camera.width, camera.height, tuple(camera.params.tolist()))
-               for key, camera in found.cameras.items()}
+        raise BadInput(
+            f"{folder}: not a COLMAP model: {' '.join(str(error).split())[:200]}"
+        ) from None
+    cameras = {
+        key: ColmapCamera(
+            camera.model.name, camera.width, camera.height, tuple(camera.params.tolist())
+        )
+        for key, camera in found.cameras.items()
+    }
     images = {}
     for image in sorted(found.images.values(), key=lambda image: image.name):
         if image.has_pose:
             pose = image.cam_from_world().matrix()
             seen = frozenset(point.point3D_id for point in image.get_observation_points2D())
-            images[image.name] = ModelImage(image.camera_id, pose[:, :3].copy(), pose[:, 3].copy(), seen)
+            images[image.name] = ModelImage(
+                image.camera_id, pose[:, :3].copy(), pose[:, 3].copy(), seen
+            )
     error = found.compute_mean_reprojection_error() if found.num_points3D() else 0.0
     return Model(cameras, images, found.num_points3D(), error)
 
 
 @dataclass
 class TwoViewModel:
-    """Two images, the first at the origin, and the points that both see."""
+    """A model of two images, the first at the origin, and the points that both see."""
 
     names: tuple
-    cameras: tuple  #: twoview.Camera of each
+    cameras: tuple  #: a twoview.Camera for each image
     R: np.ndarray
     t: np.ndarray
-    pixels: tuple  #: (n, 2) of each image, twoview's
-    points: np.ndarray  #: (n, 3), the first camera's frame
+    pixels: tuple  #: (n, 2) of each image, in twoview's convention
+    points: np.ndarray  #: (n, 3), in the first camera's frame
     colours: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.uint8))
     errors_px: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
@@ -76,14 +89,22 @@ def _line(*values):
 
 
 def text_model(model):
-    """{file name: text} of COLMAP's text model, which 3.8 and 4 read."""
+    """{file name: text} of a model in COLMAP's text format, which 3.8 and 4 read."""
     rows = [camera_to_colmap(camera) for camera in model.cameras]
     shared = rows[0] == rows[1]
     cameras = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n" + "".join(
-        _line(i + 1, row.model, row.width, row.height, *row.params) for i, row in enumerate(rows[:1 if shared else 2]))
+        _line(i + 1, row.model, row.width, row.height, *row.params)
+        for i, row in enumerate(rows[: 1 if shared else 2])
+    )
     images = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then POINTS2D[] as X Y POINT3D_ID\n"
     for i, (R, t) in enumerate(((np.eye(3), np.zeros(3)), (model.R, model.t))):
-        images += _line(i + 1, *map(float, quaternion(R)), *map(float, t), 1 if shared else i + 1, model.names[i])
+        images += _line(
+            i + 1,
+            *map(float, quaternion(R)),
+            *map(float, t),
+            1 if shared else i + 1,
+            model.names[i],
+        )
         images += " ".join(f"{x:.17g} {y:.17g} {k + 1}"
                            for k, (x, y) in enumerate(model.pixels[i] + HALF_PIXEL)) + "\n"
     colours = model.colours if len(model.colours) else np.zeros((len(model.points), 3), np.uint8)

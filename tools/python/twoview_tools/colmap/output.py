@@ -1,4 +1,4 @@
-"""Files of a folder that appear whole or not at all."""
+"""Writes files so that they appear complete or not at all."""
 
 import os
 
@@ -6,7 +6,8 @@ from .errors import BadInput
 
 
 def write_files(folder, texts):
-    """{name: text} into `folder`, made where it is missing. Each is written under another name first."""
+    """Writes {name: text} into `folder`, which is created if necessary. Each file is first written
+    under a temporary name."""
     temporary = {}
     try:
         os.makedirs(folder, exist_ok=True)

@@ -1,4 +1,5 @@
-"""Which pairs: those of a pairs file (twoview_tools.formats), all, or each image with its next ones."""
+"""The choice of pairs: those of a pairs file (twoview_tools.formats), all pairs, or each image with
+the next ones."""
 
 import numpy as np
 
@@ -8,7 +9,8 @@ from .errors import BadInput, refused
 
 
 def read_pairs(path):
-    """The pairs of a file; a broken line, or one that pairs an image with itself, is named by its number."""
+    """Reads the pairs of a file. The error for a wrong line, or for a line that pairs an image with
+    itself, has the line's number."""
     with refused(path):
         pairs = formats.read_pairs(path)
     for pair in pairs:
@@ -22,12 +24,12 @@ def exhaustive(names):
 
 
 def sequential(names, overlap):
-    """Each image with the `overlap` next ones, in the names' order."""
+    """Pairs each image with the next `overlap` ones, in the order of the names."""
     return [Pair(a, b, 0, "") for i, a in enumerate(names) for b in names[i + 1:i + 1 + overlap]]
 
 
 def write_pair(name0, name1, K0, K1, R, t):
-    """A whole line; 17 digits, so that reading gives the same numbers."""
+    """A complete line of a pairs file; 17 digits, so that reading it gives the same numbers."""
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R, t
     numbers = np.concatenate([np.ravel(K0), np.ravel(K1), np.ravel(T)])

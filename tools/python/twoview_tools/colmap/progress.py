@@ -1,4 +1,4 @@
-"""How far long work is: a line on a terminal, nothing elsewhere."""
+"""Shows the progress of long work as a line on a terminal, and nothing elsewhere."""
 
 import sys
 

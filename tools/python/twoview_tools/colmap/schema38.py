@@ -1,5 +1,5 @@
-"""COLMAP 3.8's database, as Debian's `colmap` makes it. Matrices are row-major doubles, matches uint32, keypoints
-float32; a pair's id is id1 * 2147483647 + id2 with id1 < id2."""
+"""Writes the database of COLMAP 3.8, Debian's `colmap`. Matrices are row-major doubles, matches
+uint32, keypoints float32. The id of a pair is id1 * 2147483647 + id2 with id1 < id2."""
 
 import contextlib
 import sqlite3
@@ -14,11 +14,14 @@ MAX_IMAGES = 2147483647
 
 _TABLES = """
 CREATE TABLE cameras (
-  camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, model INTEGER NOT NULL, width INTEGER NOT NULL,
+  camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, model INTEGER NOT NULL, width INTEGER NOT \
+NULL,
   height INTEGER NOT NULL, params BLOB, prior_focal_length INTEGER NOT NULL);
 CREATE TABLE images (
-  image_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, name TEXT NOT NULL UNIQUE, camera_id INTEGER NOT NULL,
-  prior_qw REAL, prior_qx REAL, prior_qy REAL, prior_qz REAL, prior_tx REAL, prior_ty REAL, prior_tz REAL,
+  image_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, name TEXT NOT NULL UNIQUE, camera_id \
+INTEGER NOT NULL,
+  prior_qw REAL, prior_qx REAL, prior_qy REAL, prior_qz REAL, prior_tx REAL, prior_ty REAL, \
+prior_tz REAL,
   CONSTRAINT image_id_check CHECK(image_id >= 0 and image_id < 2147483647),
   FOREIGN KEY(camera_id) REFERENCES cameras(camera_id));
 CREATE UNIQUE INDEX index_name ON images(name);
@@ -37,7 +40,7 @@ CREATE TABLE two_view_geometries (
 
 
 def prepare():
-    """SQLite is all that it takes."""
+    """Does nothing, since this schema needs only SQLite."""
 
 
 def create(path):
@@ -51,12 +54,13 @@ def pair_id(id0, id1):
 
 
 def _doubles(values, absent):
-    """COLMAP 3.8 reads every matrix of a pair: what is unknown is its own default."""
+    """The bytes of a matrix. COLMAP 3.8 reads every matrix of a pair, so an unknown one is stored
+    as COLMAP's default."""
     return np.ascontiguousarray(absent if values is None else values, np.float64).tobytes()
 
 
 class Writer:
-    """Adds rows; commit() makes them stay."""
+    """Adds rows to a database; commit() makes them permanent."""
 
     def __init__(self, path):
         self.database = sqlite3.connect(path)
@@ -74,7 +78,8 @@ class Writer:
     def add_camera(self, camera):
         params = np.array(camera.params, np.float64).tobytes()
         return self.database.execute(
-            "INSERT INTO cameras (model, width, height, params, prior_focal_length) VALUES (?, ?, ?, ?, 1)",
+            "INSERT INTO cameras (model, width, height, params, prior_focal_length) VALUES (?, ?, "
+            "?, ?, 1)",
             (MODEL_IDS[camera.model], camera.width, camera.height, params)).lastrowid
 
     def add_image(self, name, camera_id):
@@ -83,7 +88,8 @@ class Writer:
 
     def add_features(self, image_id, keypoints, descriptors):
         for table, rows in (("keypoints", keypoints), ("descriptors", descriptors)):
-            self.database.execute(f"INSERT INTO {table} (image_id, rows, cols, data) VALUES (?, ?, ?, ?)",
+            self.database.execute(f"INSERT INTO {table} (image_id, rows, cols, data) VALUES (?, ?, "
+                                  f"?, ?)",
                                   (image_id, *rows.shape, rows.tobytes()))
 
     def add_pair(self, id0, id1, matches, geometry):
@@ -95,8 +101,10 @@ class Writer:
         g = geometry
         qvec = None if g.R is None else quaternion(g.R)
         self.database.execute(
-            "INSERT INTO two_view_geometries (pair_id, rows, cols, data, config, F, E, H, qvec, tvec) "
+            "INSERT INTO two_view_geometries (pair_id, rows, cols, data, config, F, E, H, qvec, "
+            "tvec) "
             "VALUES (?, ?, 2, ?, ?, ?, ?, ?, ?, ?)",
             (pair_id(id0, id1), len(g.inlier_matches), g.inlier_matches.tobytes(), g.config,
-             *(_doubles(m, np.zeros((3, 3))) for m in (g.F, g.E, g.H)), _doubles(qvec, [1, 0, 0, 0]),
+             *(_doubles(m, np.zeros((3, 3))) for m in (g.F, g.E, g.H)),
+             _doubles(qvec, [1, 0, 0, 0]),
              _doubles(g.t, np.zeros(3))))

@@ -1,4 +1,4 @@
-"""COLMAP 4's database, written by pycolmap's own Database class."""
+"""Writes the database of COLMAP 4 with pycolmap's own Database class."""
 
 from .errors import need_pycolmap
 
@@ -6,7 +6,7 @@ NAME = "4"
 
 
 def prepare():
-    """Whether databases can be written at all."""
+    """Raises BadInput if databases cannot be written because pycolmap is missing."""
     need_pycolmap("--schema 4")
 
 
@@ -15,7 +15,8 @@ def create(path):
 
 
 class Writer:
-    """Adds rows; commit() makes them stay. A camera has a rig, and an image a frame, of its own."""
+    """Adds rows to a database; commit() makes them permanent. Each camera has a rig of its own, and
+    each image a frame of its own."""
 
     def __init__(self, path):
         self.colmap = need_pycolmap("--schema 4")
@@ -29,7 +30,7 @@ class Writer:
         return self
 
     def __exit__(self, *_):
-        self.commit()  # COLMAP's class knows no way back; the file is one that can be thrown away
+        self.commit()  # pycolmap's Database has no rollback; the caller deletes the file instead
         self.database.close()
 
     def commit(self):

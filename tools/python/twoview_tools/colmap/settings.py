@@ -1,4 +1,4 @@
-"""The stages' options as flags, by the names of docs/formats.md, and the stages run with them."""
+"""The options of the stages as command-line flags, with the names of docs/formats.md."""
 
 import dataclasses
 
@@ -6,11 +6,13 @@ import twoview as tv
 
 _CHOICES = {"orientation": tv.Orientation, "descriptor": tv.Normalisation, "method": tv.Solver}
 _KINDS = (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)
-# For a mapper, which has time and gains by long tracks: as many as COLMAP's own extractor (docs/colmap.md).
+# The default for a mapper, which is not time-critical and benefits from long tracks: as many
+# keypoints as COLMAP's own extractor (docs/colmap.md).
 MAPPING_KEYPOINTS = 8192
-# For a database, whose pairs share its cameras: a pair's geometry is of those, none is moved for one pair.
+# The pairs of a database share its cameras, so no pair may have a principal point of its own: the
+# shift is not estimated.
 PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
-# What is automatic in the library is a number and a word here, as in the C++ program.
+# Defaults that are automatic in the library have explicit values here, as in the C++ program.
 _EXPLICIT = {"max_keypoints": 2048, "method": tv.Solver.FIVE_POINT}
 _NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
 
@@ -34,7 +36,8 @@ def _choice(enum):
 
 
 def add_options(parser, kinds=_KINDS, **defaults):
-    """A flag for each field of the options; defaults: those that are not the library's."""
+    """Adds a flag for each field of the options. `defaults` are those that differ from the
+    library's."""
     group = parser.add_argument_group("options of the stages (docs/cli.md)")
     for kind in kinds:
         for field in dataclasses.fields(kind):
@@ -54,6 +57,6 @@ def add_options(parser, kinds=_KINDS, **defaults):
 
 
 def options_of(arguments, kind):
-    """The options object that the flags name."""
+    """The options object with the values of the flags."""
     return kind(**{field.name: getattr(arguments, field.name) for field in dataclasses.fields(kind)
                    if hasattr(arguments, field.name)})

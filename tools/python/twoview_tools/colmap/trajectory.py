@@ -1,4 +1,4 @@
-"""TUM trajectories: `time tx ty tz qx qy qz qw`, world from camera."""
+"""Reads and writes TUM trajectories: lines `time tx ty tz qx qy qz qw`, world from camera."""
 
 import os
 
@@ -11,16 +11,19 @@ HEADER = "# time tx ty tz qx qy qz qw, world from camera (x right, y down, z for
 
 
 def times_of(names):
-    """The numbers that the files are named by, where all are and no two are equal; else 0, 1, ..."""
+    """The times of the images: the numbers in their file names if all have one and no two are
+    equal, else 0, 1, ..."""
     try:
         times = [float(os.path.splitext(os.path.basename(name))[0]) for name in names]
     except ValueError:
         times = []
-    return times if times and len(set(times)) == len(times) else [float(i) for i in range(len(names))]
+    return (
+        times if times and len(set(times)) == len(times) else [float(i) for i in range(len(names))]
+    )
 
 
 def write_trajectory(poses):
-    """The text of {name: (R, centre)}, R camera from world."""
+    """The text of the trajectory {name: (R, centre)}; R is camera from world."""
     text = HEADER
     for time, (R, centre) in zip(times_of(list(poses)), poses.values()):
         w, x, y, z = quaternion(np.asarray(R).T)
@@ -29,7 +32,7 @@ def write_trajectory(poses):
 
 
 def read_trajectory(path):
-    """[(time, R, centre)], R camera from world."""
+    """Reads [(time, R, centre)]; R is camera from world."""
     poses = []
     with open(path, encoding="utf-8") as file:
         for number, line in enumerate(file, 1):

@@ -1,4 +1,5 @@
-"""A model's poses beside the truth: aligned by the similarity that fits the camera centres best."""
+"""Compares a model's poses with the truth, aligned by the similarity that fits the camera centres
+best."""
 
 import os
 
@@ -8,7 +9,8 @@ from .conventions import rotation
 
 
 def read_truth(folder):
-    """{image: (R, centre)} of a data set, camera from world: groundtruth.txt (TUM, world from camera), frames.txt."""
+    """{image: (R, centre)} of a data set; R is camera from world. Read from groundtruth.txt (TUM,
+    world from camera) and frames.txt."""
     with open(os.path.join(folder, "groundtruth.txt"), encoding="utf-8") as file:
         rows = [line.split() for line in file if line.strip() and not line.startswith("#")]
     poses = {row[0]: np.array(row[1:], float) for row in rows}
@@ -23,7 +25,8 @@ def read_truth(folder):
 
 
 def align(source, target):
-    """(scale, R, t) with target = scale R source + t in the least squares' sense; S. Umeyama, PAMI 1991."""
+    """(scale, R, t) that minimise the squared errors of target = scale R source + t; S. Umeyama,
+    PAMI 1991."""
     mean0, mean1 = source.mean(axis=0), target.mean(axis=0)
     a, b = source - mean0, target - mean1
     U, S, Vt = np.linalg.svd(b.T @ a)
@@ -34,11 +37,11 @@ def align(source, target):
 
 
 def pose_errors(model, truth):
-    """(names, position errors in the truth's unit, rotation errors in degrees) of {image: (R, centre)}, for the
-    images that both have; at least three.
+    """(names, position errors in the truth's unit, rotation errors in degrees) of {image: (R,
+    centre)}, for the images that both have; at least three.
 
-    Centres on a line leave the turn about it open, so the rotations have an alignment of their own: the world's
-    turn that makes them fit best."""
+    If the centres lie on a line, they do not determine the rotation about it. Therefore the
+    rotations are aligned separately, by the rotation of the world that fits them best."""
     names = sorted(set(model) & set(truth))
     if len(names) < 3:
         return names, np.full(len(names), np.inf), np.full(len(names), np.inf)

@@ -1,1 +1,1 @@
-"""The same pairs through twoview, COLMAP, OpenGV, OpenCV and PoseLib: docs/compare.md."""
+"""Runs the same pairs through twoview, COLMAP, OpenGV, OpenCV and PoseLib: docs/compare.md."""

@@ -1,4 +1,5 @@
-"""The parent's side of worker.py: a child a thread and interpreter, started again when it died."""
+"""The parent's side of worker.py: one child process for each thread and interpreter, restarted
+after a crash."""
 
 import atexit
 import json
@@ -12,11 +13,11 @@ from multiprocessing.connection import Pipe
 from .. import environment
 
 WORKER = "twoview_tools.compare.worker"
-TRACE = (" ", "***", "PC: ")  # of the stack that glog prints last
+TRACE = (" ", "***", "PC: ")  # beginnings of the lines of the stack trace that glog prints last
 
 
 class ChildError(Exception):
-    """What went wrong: `status` is failed, crashed or timed_out, the text says it in words."""
+    """A failed call. `status` is failed, crashed or timed_out; the text describes it."""
 
     def __init__(self, status, text):
         super().__init__(text)
@@ -24,13 +25,13 @@ class ChildError(Exception):
 
 
 class Child:
-    """A running worker.py."""
+    """A running worker.py process."""
 
     def __init__(self, python):
         self.connection, theirs = Pipe()
         self.errors, self.matches = tempfile.TemporaryFile(), None
-        # A session of its own: killing it takes what it started along (the colmap program), and
-        # Ctrl-C reaches the parent alone.
+        # The child has a session of its own: killing it also kills the programs that it started
+        # (colmap), and Ctrl-C reaches only the parent.
         self.process = subprocess.Popen(
             [python, "-m", WORKER, str(theirs.fileno())], pass_fds=[theirs.fileno()],
             env=environment(),
@@ -39,8 +40,8 @@ class Child:
         theirs.close()
 
     def call(self, request, timeout_s, matches):
-        """(answer, seconds of CPU). matches: bytes that are sent once for the requests that share
-        them."""
+        """Returns (answer, seconds of CPU). `matches` are bytes that are sent only once for all
+        requests that share them."""
         try:
             is_new = matches is not None and matches is not self.matches
             self.connection.send_bytes(json.dumps({**request, "has_matches": is_new}).encode())
@@ -58,7 +59,7 @@ class Child:
         return reply["ok"], reply["cpu_seconds"]
 
     def _epitaph(self):
-        """How it ended, and its last line."""
+        """How the child ended, and its last line of output."""
         try:
             code = self.process.wait(5)
         except subprocess.TimeoutExpired:
@@ -87,11 +88,12 @@ class Child:
 
 
 _children = {}  # (thread, interpreter): Child
-_closed = threading.Event()  # threads in the middle of a pair start no other child then
+_closed = threading.Event()  # once set, threads that are still working on a pair start no new child
 
 
 def call(python, request, timeout_s, matches=None):
-    """(the worker's answer, its seconds of CPU), in this thread's child of that interpreter."""
+    """Calls this thread's child of that interpreter. Returns (the worker's answer, its seconds of
+    CPU)."""
     if _closed.is_set():
         raise ChildError("failed", "interrupted")
     key = threading.get_ident(), python

@@ -1,4 +1,4 @@
-"""compare_colmap: the command line, the run over all pairs, and what it leaves behind."""
+"""compare_colmap: the command line, the run over all pairs, and the files that it writes."""
 
 import argparse
 import contextlib
@@ -15,14 +15,14 @@ from .. import formats
 from ..accuracy import datasets
 from . import cluster, results, systems
 
-FORMAT = 1  # raise it when a change here changes what is stored of a pair
+FORMAT = 1  # increase it when a change here changes the stored result of a pair
 REFERENCE_TIMEOUT_S = 3600
 DESCRIPTION = """Runs twoview, COLMAP, OpenGV, OpenCV and PoseLib on the same image pairs and writes
 a report: index.html, pairs.csv, report.json. See docs/compare.md."""
 
 
 class BadInput(Exception):
-    """One clear line for the user; exit status 2."""
+    """Bad input: one line for the user and exit status 2."""
 
 
 # ---- what is asked for -------------------------------------------------------------------------
@@ -80,7 +80,8 @@ def parse(words):
 
 
 def unique_names(paths):
-    """A name for each list: its folder's, or its own where that is not enough."""
+    """A unique name for each list: that of its folder, or its own name if the folders' names are
+    not unique."""
     folders = [os.path.basename(os.path.dirname(os.path.abspath(p))) for p in paths]
     stems = [os.path.splitext(os.path.basename(p))[0] for p in paths]
     names = [f if folders.count(f) == 1 else f"{f}/{s}" for f, s in zip(folders, stems)]
@@ -90,7 +91,8 @@ def unique_names(paths):
 
 
 def read_lists(arguments):
-    """The pairs of every list as tasks, without reference; BadInput for what cannot be read."""
+    """The pairs of every list as tasks, without a reference. Raises BadInput for a list that cannot
+    be read."""
     tasks = []
     for path, name in zip(arguments.pairs, unique_names(arguments.pairs)):
         try:
@@ -124,13 +126,13 @@ def make_task(arguments, name, folder, pair, cameras):
 
 
 def library_path():
-    """libtwoview.so for every worker, wherever it runs."""
+    """The path of libtwoview.so, which is the same for every worker."""
     from ..accuracy import twoview_ctypes
     return os.path.abspath(os.environ.get("TWOVIEW_LIBRARY") or twoview_ctypes.DEFAULT_LIBRARY)
 
 
 def thin_out(tasks, most):
-    """At most so many pairs of each list, evenly spaced."""
+    """At most this many pairs of each list, evenly spaced."""
     found = []
     for name in dict.fromkeys(t["set"] for t in tasks):
         part = [t for t in tasks if t["set"] == name]
@@ -142,8 +144,9 @@ def thin_out(tasks, most):
 
 
 def check_images(tasks, default_resize):
-    """Every image is read once: its size settles `resize`, its hash tells a changed file.
-    Returns {path: hash}; BadInput names the first that is missing, and how many are."""
+    """Reads every image once: its size determines `resize`, and its hash detects a changed file.
+    Returns {path: hash}. BadInput names the first missing image and the number of missing
+    images."""
     hashes, bad, resize = {}, [], {}
     for task in tasks:
         for view in task["views"]:
@@ -169,7 +172,8 @@ def check_images(tasks, default_resize):
 # ---- the reference -----------------------------------------------------------------------------
 
 def set_references(arguments, tasks, workers, store, hashes):
-    """Each task's "reference": the true pose, or COLMAP's. Returns what the report says of it."""
+    """Sets each task's "reference": the true pose, or COLMAP's. Returns the report's description of
+    the reference."""
     if arguments.reference == "truth":
         for task in tasks:
             task["reference"] = task["truth"]
@@ -206,7 +210,7 @@ def _reconstruct(arguments, part, workers, store, hashes):
 
 
 def relative_pose(models, name0, name1):
-    """cam1_from_cam0 of two images of one model, |t| = 1; None where they share none."""
+    """cam1_from_cam0 of two images of one model, with |t| = 1; None if no model contains both."""
     for model in models:
         if name0 in model and name1 in model and name0 != name1:
             (R0, t0), (R1, t1) = ((np.array(model[n]["R"]), np.array(model[n]["t"]))
@@ -226,7 +230,8 @@ def digest(*parts):
 
 
 class Store:
-    """Results of pairs in a folder beside the report, each whole or not there."""
+    """The results of pairs, stored in a folder beside the report so that an interrupted run can
+    continue. Each result is stored completely or not at all."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -252,13 +257,14 @@ class Store:
         for name in os.listdir(self.folder):
             if name.endswith((".json", ".part")):
                 os.remove(os.path.join(self.folder, name))
-        with contextlib.suppress(OSError):  # something of somebody else's in it
+        # The folder may contain files that this program did not write.
+        with contextlib.suppress(OSError):
             os.rmdir(self.folder)
 
 
 def run_pairs(tasks, keys, workers, store, quiet):
-    """(the pairs' results in the tasks' order, how many were run now); those that the store has are
-    not run again."""
+    """Returns (the results in the order of the tasks, the number of pairs run now). Pairs with a
+    stored result are not run again."""
     from tqdm import tqdm
     found = [store.get(key) for key in keys]
     todo = [i for i, result in enumerate(found) if result is None]
@@ -310,13 +316,21 @@ def compare(arguments):
         if not arguments.scheduler:
             raise
         raise BadInput(f"--scheduler: {arguments.scheduler}: {error}") from error
-    run = {"versions": versions, "missing": missing, "reference_of_sets": told, "where": where,
-           "wall_seconds": time.time() - start, "pairs_run_now": num_run, "resize": {t["set"]: t["resize"] for t in tasks}}
+    run = {
+        "versions": versions,
+        "missing": missing,
+        "reference_of_sets": told,
+        "where": where,
+        "wall_seconds": time.time() - start,
+        "pairs_run_now": num_run,
+        "resize": {t["set"]: t["resize"] for t in tasks},
+    }
     report = results.make_report(arguments, run, pairs)
     results.write(folder, report, pairs, tasks)
     store.remove()
     if not arguments.quiet:
-        with contextlib.suppress(BrokenPipeError):  # the report is there, whoever reads this
+        # The report is complete even if nobody reads this output.
+        with contextlib.suppress(BrokenPipeError):
             results.print_summary(report, folder)
             sys.stdout.flush()
 

@@ -1,6 +1,6 @@
-"""Who does the work: threads of this process, each with worker processes, or a dask cluster.
+"""Runs tasks in threads of this process, each with worker processes, or on a dask cluster.
 
-A worker of a cluster has this tree and the images under the same paths."""
+The workers of a cluster must have this source tree and the images under the same paths."""
 
 import concurrent.futures
 import contextlib
@@ -12,8 +12,9 @@ LAUNCH = str(PARENT.parent / "compare_colmap" / "launch.py")
 
 
 def _remote_worker():
-    """The function that does a task in a worker of a cluster. It is an inner one, which dask sends
-    by value: the worker cannot import this package before launch.py has set its path."""
+    """Returns the function that runs a task in a worker of a cluster. It is an inner function
+    because dask sends such functions by value: the worker cannot import this package before
+    launch.py has set its path."""
     launch = LAUNCH
 
     def work(task):
@@ -30,7 +31,7 @@ class Local:
         self.pool = concurrent.futures.ThreadPoolExecutor(jobs)
 
     def run(self, tasks):
-        """(index, result) as they are done."""
+        """Yields (index, result) in the order in which the tasks finish."""
         futures = {self.pool.submit(pair_run.work, task): i for i, task in enumerate(tasks)}
         for future in concurrent.futures.as_completed(futures):
             yield futures[future], future.result()
@@ -60,7 +61,7 @@ class Dask:
 
 @contextlib.contextmanager
 def workers(jobs, scheduler):
-    """A Local or Dask, closed at the end."""
+    """Yields a Local or a Dask, and closes it at the end."""
     made = Dask(scheduler) if scheduler else Local(jobs)
     try:
         yield made

@@ -1,4 +1,5 @@
-"""Debian's `colmap` on one pair: features and matches by its commands, the database read."""
+"""Runs Debian's `colmap` on one pair: features and matches by its commands, then reads the
+database."""
 
 import os
 import re
@@ -17,7 +18,7 @@ NAMES = "0.png", "1.png"
 
 
 def version():
-    """Of the program in the PATH; ImportError without it."""
+    """The version of the program in the PATH. Raises ImportError if it is not installed."""
     if shutil.which(PROGRAM) is None:
         raise ImportError(f"no program {PROGRAM} in the PATH (Debian's package colmap)")
     told = _run("help").stdout
@@ -38,7 +39,7 @@ def _run(*arguments):
 
 
 def camera_arguments(size, K, distortion):
-    """COLMAP's model and its parameters, comma between them."""
+    """The name of COLMAP's camera model and its parameters, separated by commas."""
     camera = conventions.camera_to_colmap(twoview.Camera(
         *map(int, size), K[0, 0], K[1, 1], K[0, 2], K[1, 2], twoview.CameraModel.BROWN_CONRADY,
         distortion))
@@ -46,7 +47,7 @@ def camera_arguments(size, K, distortion):
 
 
 def run(views, cap, max_error_px, seed, watch):
-    """{"R", "t", "num_inliers", "num_keypoints", "pixels"} of the two views; R None without a
+    """{"R", "t", "num_inliers", "num_keypoints", "pixels"} of the two views; R is None without a
     pose."""
     import cv2
     with tempfile.TemporaryDirectory() as folder:
@@ -100,7 +101,7 @@ def _pose(geometry, is_swapped):
     if not geometry or not geometry[0] or geometry[1] is None:
         return None, None, 0
     t = np.frombuffer(geometry[2], np.float64)
-    if not np.linalg.norm(t) > 0:  # no pose, or rotation only
+    if not np.linalg.norm(t) > 0:  # no pose, or a pure rotation
         return None, None, geometry[0]
     R = conventions.rotation(np.frombuffer(geometry[1], np.float64))
     return (R.T, -R.T @ t, geometry[0]) if is_swapped else (R, t, geometry[0])

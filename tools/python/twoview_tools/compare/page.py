@@ -1,4 +1,4 @@
-"""The page: one file with tables, plots and every pair, that needs no network."""
+"""Makes the report's page: one file with tables, plots and every pair, which needs no network."""
 
 import base64
 import json
@@ -18,8 +18,8 @@ THUMBNAIL_PX, THUMBNAIL_QUALITY = 420, 55
 
 
 def thumbnails(tasks):
-    """({(set, name): index}, [{"src", "width", "height"}]): width and height are the images' own at
-    the scale that the systems saw."""
+    """Returns ({(set, name): index}, [{"src", "width", "height"}]). width and height are those of
+    the image at the scale that the systems used."""
     index, images = {}, []
     for task in tasks:
         for view in task["views"]:
@@ -37,7 +37,7 @@ def thumbnails(tasks):
 
 
 def short(value, digits=4):
-    """A number with so many digits, for the page's data."""
+    """A number rounded to this many significant digits, for the data of the page."""
     return None if value is None else float(f"{value:.{digits}g}")
 
 
@@ -46,7 +46,7 @@ def flat(rows):
 
 
 def pair_data(pair, index, names):
-    """What the script draws a pair from."""
+    """The data from which the page's script draws a pair."""
     rows = []
     for kind in ("pipeline", "solver"):
         for name, row in pair["rows"][kind].items():
@@ -79,7 +79,7 @@ def pair_data(pair, index, names):
 
 
 def cells(system):
-    """A system's row of a table: for all pairs, or one set's part of it."""
+    """The cells of a system's row in a table: for all pairs, or for one set."""
     return {key: system[key] for key in ("auc", "median_error_deg", "median_rotation_error_deg",
                                          "median_translation_error_deg", "time_ms", "failures",
                                          "num_pairs", "num_scored", "num_matches", "num_inliers",
@@ -87,7 +87,7 @@ def cells(system):
 
 
 def table_groups(report):
-    """[(title, kind, [(name of the set, pairs, [(system, its cells)])])]"""
+    """[(title, kind, [(name of the set, number of pairs, [(system, its cells)])])]."""
     groups = []
     for kind, title in (("pipeline", "Whole pipelines, each from its own features"),
                         ("solver",
@@ -104,7 +104,7 @@ def table_groups(report):
 
 
 def script_text(value):
-    """JSON that cannot end a script element."""
+    """JSON text that cannot end a script element."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
 
 
@@ -118,7 +118,8 @@ def read(*path):
 
 
 def program_style():
-    """The style of the program's own report: in the source tree, or installed beside page.css."""
+    """The style sheet of the program's own report: in the source tree, or beside page.css in an
+    installation."""
     tree = os.path.join(ROOT, "tools", "twoview", "report", "style.css")
     return read(tree) if os.path.isfile(tree) else read(PARTS, "style.css")
 

@@ -1,4 +1,4 @@
-"""One pair through every system: what a process of --jobs, or a worker of a cluster, does."""
+"""Runs one pair through every system, in a process of --jobs or in a worker of a cluster."""
 
 import json
 
@@ -7,12 +7,13 @@ import numpy as np
 from ..accuracy import estimators, metrics
 from . import children, systems
 
-OVERLAY_INLIERS, OVERLAY_OUTLIERS = 60, 25  # matches of a pipeline that the page can draw
+OVERLAY_INLIERS, OVERLAY_OUTLIERS = 60, 25  # number of matches of a pipeline that the page can draw
 HISTOGRAM_EDGES_PX = np.array([0, .25, .5, .75, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])
 
 
 def work(task):
-    """A task's result; by "what": the systems' versions, COLMAP's reconstruction, or a pair."""
+    """The result of a task. task["what"] selects it: the versions of the systems, COLMAP's
+    reconstruction, or a pair."""
     if task["what"] == "versions":
         return probe(task)
     if task["what"] == "reference":
@@ -22,7 +23,7 @@ def work(task):
 
 
 def probe(task):
-    """{module: {"version"} or {"missing"}}"""
+    """{module: {"version"} or {"missing"}} of each module."""
     found = {}
     for python in dict.fromkeys(s.python for s in systems.SYSTEMS):
         modules = sorted({s.module for s in systems.SYSTEMS if s.python == python})
@@ -36,14 +37,14 @@ def probe(task):
 
 
 class Run:
-    """The systems on one pair, and the seconds of CPU that each took."""
+    """Runs systems on one pair and sums the seconds of CPU of each."""
 
     def __init__(self, task):
         self.task, self.seconds = task, {}
         self.request = {k: v for k, v in task.items() if k not in ("missing", "systems")}
 
     def call(self, system, request, matches=None):
-        """(worker's answer or None, status, message)"""
+        """Returns (the worker's answer or None, status, message)."""
         missing = self.task["missing"].get(system.module)
         if missing:
             return None, "missing", missing
@@ -56,8 +57,8 @@ class Run:
         return reply, "ok", ""
 
     def read_images(self):
-        """Before any system, as the first would be charged with it. A pipeline tells what is wrong
-        with an image."""
+        """Reads the images before any system runs, so that the time of reading is not charged to
+        the first one. Errors are reported by the pipelines."""
         try:
             children.call(systems.sys.executable, {"call": "images", "task": self.request},
                           self.task["timeout_s"])
@@ -66,7 +67,7 @@ class Run:
 
 
 def run_pair(task):
-    """{"rows": {kind: {id: row}}, "overlays", "seconds", ..}, plain numbers all through."""
+    """{"rows": {kind: {id: row}}, "overlays", "seconds", ..}, which contains only plain numbers."""
     run = Run(task)
     run.read_images()
     rows = {kind: {} for kind in systems.KINDS}
@@ -104,18 +105,22 @@ def _given(answer):
 
 
 def _shift(answer):
-    """What a pose's own cameras have added to cx and cy, [0, 0] for all but ours."""
+    """The pixels that an answer's pose needs added to cx and cy; [0, 0] for all systems but
+    ours."""
     return answer.get("principal_point_shift_px", [0.0, 0.0])
 
 
 def _of_pose(matches, answer):
-    """The matches with the cameras that a system's pose is of: lines and points must be of those."""
+    """The matches with the cameras that a system's pose refers to, which epipolar lines and points
+    must use."""
     shift = _shift(answer)
     if not any(shift):
         return matches
     moved = np.array([[0, 0, shift[0]], [0, 0, shift[1]], [0, 0, 0]])
     cameras = [(K + moved, distortion) for K, distortion in matches.cameras]
-    return estimators.Matches(matches.pixels0, matches.pixels1, cameras, matches.sizes, matches.ratios)
+    return estimators.Matches(
+        matches.pixels0, matches.pixels1, cameras, matches.sizes, matches.ratios
+    )
 
 
 def _coded(given):
@@ -134,7 +139,7 @@ def _run_solvers(run, rows, source, wanted):
 
 
 def _row(task, answer, status, message, matches):
-    """A system's figures on the pair; None where there are none."""
+    """The measures of a system on the pair; None where they are not known."""
     R = answer and answer["R"]
     t = answer and answer["t"]
     if status == "ok" and R is None:
@@ -168,7 +173,7 @@ def _rounded(ms):
 
 
 def epipolar_error_px(matches, R, t):
-    """Sampson distance under a pose, in pixels of the mean focal length."""
+    """The Sampson distance under a pose, in pixels of the mean focal length."""
     focal = np.mean([(K[0, 0], K[1, 1]) for K, _ in matches.cameras])
     unit = np.asarray(t, float) / max(np.linalg.norm(t), 1e-300)
     with np.errstate(invalid="ignore"):
@@ -177,7 +182,7 @@ def epipolar_error_px(matches, R, t):
 
 
 def overlay(matches, answer, task):
-    """Some inliers and outliers of a pipeline's own pose, evenly out of all, for the page."""
+    """Evenly spaced inliers and outliers of a pipeline's own pose, for the page."""
     inlier = np.zeros(len(matches), bool)
     if answer["R"] is not None:
         inlier = epipolar_error_px(matches, answer["R"], answer["t"]) < task["max_error_px"]
@@ -194,8 +199,8 @@ def overlay(matches, answer, task):
 # ---- triangulations ----------------------------------------------------------------------------
 
 def _triangulate(run, rows, source, wanted):
-    """Every triangulation on the reference's pose, else on the source's own; the inliers of that
-    pose. Returns whose pose it was."""
+    """Runs every triangulation on the reference's pose, else on the source pipeline's own pose,
+    with the inliers of that pose. Returns whose pose was used."""
     chosen = systems.of_kind("triangulation", wanted)
     if not chosen:
         return None
@@ -232,8 +237,8 @@ def _triangulate(run, rows, source, wanted):
 
 
 def _points_row(status, message, found=None, matches=None, pose=None):
-    """Points in front of both cameras and their reprojection errors, undistorted pixels, root of
-    the mean of the two squares."""
+    """The number of points in front of both cameras and their reprojection errors: the root of the
+    mean of the two squares, in undistorted pixels."""
     row = {"status": status, "message": message, "num_points": None, "num_in_front": None,
            "median_error_px": None, "p95_error_px": None, "time_us_per_point": None}
     if not found:

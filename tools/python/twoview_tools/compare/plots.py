@@ -1,4 +1,4 @@
-"""Plotly's figures, as plain dicts that the page's script hands to it."""
+"""Makes the figures for Plotly as plain dicts, which the page's script draws."""
 
 import json
 
@@ -15,7 +15,7 @@ MAX_ERROR_DEG, MIN_ERROR_DEG = 20.0, 0.01
 
 
 def colour(system):
-    """A library's, the same on every plot."""
+    """The colour of a system's library, the same in every plot."""
     return PALETTE[FAMILIES[system.module]]
 
 
@@ -44,7 +44,7 @@ def _known(pairs):
 
 
 def recall(report, pairs, kind):
-    """Share of the pairs below an error."""
+    """The share of pairs whose error is below a threshold, as a curve."""
     listed, known = _listed(report, kind), _known(pairs)
     traces = []
     for system in listed:
@@ -78,7 +78,7 @@ def time_against_accuracy(report):
 
 
 def scatter(report, pairs):
-    """Each pair's error of a pipeline against twoview's; a failure stands at the rim."""
+    """The error of a pipeline against twoview's for each pair. A failure is drawn at the border."""
     known = _known(pairs)
     listed = [s for s in _listed(report, "pipeline") if s.id != "twoview"]
     if "twoview" not in {s.id for s in _listed(report, "pipeline")} or not known:
@@ -103,7 +103,7 @@ def scatter(report, pairs):
 
 
 def rotation_and_translation(report, pairs):
-    """Error scatter of every pipeline by itself."""
+    """The rotation and translation errors of every pipeline as a scatter plot."""
     known = _known(pairs)
     traces = []
     for i, system in enumerate(_listed(report, "pipeline")):
@@ -121,7 +121,7 @@ def rotation_and_translation(report, pairs):
 
 
 def inlier_histogram(report, pairs):
-    """How many pairs have which share of inliers."""
+    """A histogram of the pairs' inlier shares."""
     traces = []
     edges = np.linspace(0, 1, 21)
     for system in _listed(report, "pipeline"):
@@ -139,7 +139,7 @@ def inlier_histogram(report, pairs):
 
 
 def epipolar_histogram(report, pairs, kind):
-    """All matches of all pairs by their Sampson distance under a system's pose."""
+    """A histogram of the Sampson distances of all matches of all pairs under a system's pose."""
     listed = _listed(report, kind)
     edges = np.array(report["histogram_edges_px"])
     traces = []
@@ -160,7 +160,7 @@ def epipolar_histogram(report, pairs, kind):
 
 
 def all_plots(report, pairs):
-    """[{"title", "hint", "figure"}]"""
+    """All plots: [{"title", "hint", "figure"}]."""
     is_known = bool(_known(pairs))
     has = {kind: bool(_listed(report, kind)) for kind in ("pipeline", "solver")}
     found = []

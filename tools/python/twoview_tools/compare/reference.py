@@ -1,5 +1,5 @@
-"""COLMAP's own reconstruction of a list of images, as the reference where there is no ground
-truth. Runs in a worker."""
+"""COLMAP's own reconstruction of a list of images, which is the reference if there is no ground
+truth. It runs in a worker."""
 
 import os
 import tempfile
@@ -11,7 +11,8 @@ from . import colmap_program
 
 
 def reconstruct(task):
-    """[{image name: {"R", "t"}}], cam_from_world, a dict a model, the largest first.
+    """Returns [{image name: {"R", "t"}}] with cam_from_world, one dict for each model, the largest
+    first.
 
     task: "images" {name: {"path", "K", "distortion"}}, "resize", "pairs" [[name0, name1]], "seed",
     "threads". Intrinsics stay as given.

@@ -1,4 +1,4 @@
-"""Numbers over pairs, and the three files of a report."""
+"""Summarises results over pairs, and writes the three files of a report."""
 
 import csv
 import io
@@ -16,7 +16,7 @@ ERROR_KEYS = ("rotation_error_deg", "translation_error_deg", "translation_error_
 
 
 def reference_words(arguments, run, pairs):
-    """What the errors are against, for every table."""
+    """A description of the reference that the errors refer to, for every table."""
     known = sum(p["reference"] is not None for p in pairs)
     if arguments.reference == "colmap":
         words = ("Reference: COLMAP's own reconstruction of these images (pycolmap "
@@ -30,13 +30,13 @@ def reference_words(arguments, run, pairs):
 
 
 def errors_of(rows):
-    """Pose errors where there is a reference; without a pose infinite."""
+    """The pose errors of the pairs with a reference; infinite without a pose."""
     return np.array([np.inf if row["pose_error_deg"] is None else row["pose_error_deg"]
                      for row in rows], float)
 
 
 def summarise(rows, has_reference):
-    """A system's numbers over pairs. rows: its rows; has_reference: a flag each."""
+    """Summarises a system over pairs. rows: its rows. has_reference: a flag for each row."""
     scored = [row for row, known in zip(rows, has_reference) if known]
     errors = errors_of(scored)
     signed = np.array([np.inf if r["pose_error_deg"] is None else
@@ -89,7 +89,7 @@ def _middle(values):
 
 
 def time_shares(pairs):
-    """Seconds of CPU of each module's systems over all pairs."""
+    """The seconds of CPU of each module's systems over all pairs."""
     modules = {f"{s.kind} {s.id}": s.module for s in systems.SYSTEMS}
     seconds = {}
     for pair in pairs:
@@ -166,7 +166,8 @@ def csv_text(pairs):
 
 
 def write(folder, report, pairs, tasks):
-    """The three files, each whole or not there; the page last, as it names the others."""
+    """Writes the three files, each completely or not at all. The page is written last because it
+    refers to the others."""
     texts = {"report.json": json.dumps(metrics.finite(report), allow_nan=False),
              "pairs.csv": csv_text(pairs),
              "index.html": page.render(report, pairs, tasks)}

@@ -1,25 +1,26 @@
-"""What is compared: each system's name, what runs it and with which options."""
+"""The systems that are compared: the name of each, the code that runs it, and its options."""
 
 import dataclasses
 import sys
 
 from ..accuracy import estimators, peers
 
-COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0  # as COLMAP comes
+COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0  # COLMAP's defaults
 
 
 @dataclasses.dataclass(frozen=True)
 class System:
-    id: str      # what --systems and the files call it
-    name: str    # what the page calls it
+    id: str  # the name for --systems and in the files
+    name: str  # the name on the page
     kind: str    # pipeline, solver or triangulation
-    module: str  # whose version counts: twoview, cv2, pycolmap, colmap, poselib, pyopengv
+    # The module whose version is reported: twoview, cv2, pycolmap, colmap, poselib, pyopengv.
+    module: str
     options: dict
     note: str = ""
 
     @property
     def python(self):
-        """The interpreter that has it: Debian's OpenGV is built for Debian's Python."""
+        """The interpreter that has the module: Debian's OpenGV is built for Debian's Python."""
         return "/usr/bin/python3" if self.module == "pyopengv" else sys.executable
 
 
@@ -81,7 +82,8 @@ def of_kind(kind, ids=None):
 
 
 def chosen(text):
-    """The ids of a list as --systems has it: ids, kinds, or modules' families (colmap, opengv)."""
+    """The ids that a --systems list selects: by id, by kind, or by family of modules (colmap,
+    opengv)."""
     if not text:
         return [s.id for s in SYSTEMS]
     found = []

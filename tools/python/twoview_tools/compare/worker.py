@@ -1,12 +1,13 @@
-"""The child process: runs one system on one pair at a time and may die doing so.
+"""The child process, which runs one system on one pair at a time. A crash of a system ends only
+this process.
 
-`PYTHON -m twoview_tools.compare.worker FD`: requests and answers are JSON on that connection (numpy's pickles of the two
-Pythons do not fit each other).
+`PYTHON -m twoview_tools.compare.worker FD`: requests and answers are JSON on that connection,
+because numpy's pickles differ between the two Pythons.
 """
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one thread
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
     os.environ.setdefault(_name, "1")
 
 import functools
@@ -23,21 +24,21 @@ from ..accuracy import datasets, estimators
 from . import systems
 
 
-GRAVITY_SIGMA_RAD = np.radians(0.5)  # the references are no better
+GRAVITY_SIGMA_RAD = np.radians(0.5)  # the references are not more accurate than this
 
 
 class Failed(Exception):
-    """A system's own way of saying that it found nothing; the text says it in words."""
+    """A system reports that it found nothing; the text describes the reason."""
 
 
 class Stopwatch:
-    """Milliseconds of each stage."""
+    """The milliseconds of each stage."""
 
     def __init__(self):
         self.ms, self.last = {}, time.perf_counter()
 
     def lap(self, stage=None):
-        """What passed since the last lap belongs to `stage`; None: to nobody."""
+        """Adds the time since the last lap to `stage`; with None it is not counted."""
         now = time.perf_counter()
         if stage:
             self.ms[stage] = self.ms.get(stage, 0) + 1e3 * (now - self.last)
@@ -50,7 +51,7 @@ def luma(path, resize):
 
 
 class Views:
-    """The two images of a task and their cameras at the images' scale."""
+    """The two images of a task, and their cameras at the scale of the images."""
 
     def __init__(self, task):
         self.gray, self.cameras = [], []
@@ -99,8 +100,8 @@ def run_twoview(views, options, task):
 
 @functools.lru_cache(maxsize=48)
 def peer_features(path, resize, front):
-    """(points, descriptors, milliseconds): an image's are found once, their time counts in each of
-    its pairs."""
+    """(points, descriptors, milliseconds). The features of an image are computed once, and their
+    time counts in each of its pairs."""
     from ..accuracy import peers
     gray = luma(path, resize)[0]
     start = time.perf_counter()
@@ -110,8 +111,8 @@ def peer_features(path, resize, front):
 
 @functools.lru_cache(maxsize=4)
 def peer_matches(path0, path1, resize, front):
-    """(pixels0, pixels1, ratios or None, numbers of keypoints, ms): systems that differ in their
-    estimator alone share them."""
+    """(pixels0, pixels1, ratios or None, numbers of keypoints, ms). Systems that differ only in
+    their estimator share these matches."""
     from ..accuracy import peers
     (points0, d0, ms0), (points1, d1, ms1) = (peer_features(path, resize, front)
                                               for path in (path0, path1))
@@ -146,7 +147,8 @@ def run_colmap_program(views, options, task):
 
 
 def pose_answer(R, t, inliers, found=None):
-    """found: our library's tv_two_view, whose pose may be of cameras with another principal point."""
+    """The answer with a pose. `found` is our library's tv_two_view, whose pose may refer to cameras
+    with a shifted principal point."""
     if R is None or t is None:
         return {"R": None, "t": None, "num_inliers": int(inliers or 0)}
     answer = {"R": np.asarray(R).tolist(), "t": np.ravel(t).tolist(), "num_inliers": int(inliers)}
@@ -173,7 +175,7 @@ def pipeline(system, task, _):
 # ---- solvers on identical matches --------------------------------------------------------------
 
 def given_matches(given):
-    """estimators.Matches of what a pipeline answered."""
+    """The estimators.Matches from a pipeline's answer."""
     cameras = [(np.array(K), d) for K, d in given["cameras"]]
     ratios = None if given["ratios"] is None else np.array(given["ratios"], np.float32)
     return estimators.Matches(given["pixels0"], given["pixels1"], cameras,
@@ -204,7 +206,7 @@ def solver(system, task, matches):
 # ---- triangulations on an identical pose -------------------------------------------------------
 
 def triangulation(system, task, matches):
-    """Points in the first camera's frame; NaN where the system says that there is none."""
+    """Points in the first camera's frame; NaN where the system reports no point."""
     R, t = np.array(task["pose"]["R"]), np.array(task["pose"]["t"])
     run = {"twoview": triangulate_twoview, "cv2": triangulate_opencv,
            "pycolmap": triangulate_pycolmap, "pyopengv": triangulate_opengv}[system.module]
@@ -213,7 +215,8 @@ def triangulation(system, task, matches):
 
 
 def timed(work):
-    """(result, least seconds of three runs: one run of a few microseconds says nothing)"""
+    """(result, shortest of three times in seconds); a single run of a few microseconds is not
+    reliable."""
     seconds = []
     for _ in range(3):
         start = time.perf_counter()
@@ -269,7 +272,7 @@ def triangulate_opengv(matches, R, t, options):
     import pyopengv
     unit0, unit1 = (estimators.unit_rays(rays) for rays in (matches.rays0, matches.rays1))
     function = getattr(pyopengv, options["function"])
-    # OpenGV's pose is camera 1 in camera 0.
+    # OpenGV's pose is that of camera 1 in camera 0.
     position, rotation = -R.T @ t, np.ascontiguousarray(R.T)
     found, seconds = timed(lambda: function(unit0, unit1, position, rotation))
     return np.asarray(found, float).reshape(-1, 3), seconds
@@ -278,7 +281,7 @@ def triangulate_opengv(matches, R, t, options):
 # ---- what is here ------------------------------------------------------------------------------
 
 def versions(modules):
-    """{module: its version, or what is missing}"""
+    """{module: its version, or a message about what is missing}."""
     return {module: _version(module) for module in modules}
 
 
@@ -286,7 +289,8 @@ def _version(module):
     try:
         if module == "twoview":
             library = twoview_context(64, 64, 8192).library
-            with open(library.path, "rb") as f:  # a development version has many builds
+            # The version includes a hash: a development version has many builds.
+            with open(library.path, "rb") as f:
                 return {"version": library.version(),
                         "sha256": hashlib.sha256(f.read()).hexdigest()}
         if module == "colmap":
@@ -303,7 +307,7 @@ def answer(request, matches):
         os.environ["TWOVIEW_LIBRARY"] = task["library"]
     if call == "versions":
         return versions(task["modules"])
-    if call == "images":  # so that reading them is nobody's time
+    if call == "images":  # so that the time of reading them is not counted
         return len(Views(task).gray)
     if call == "reference":
         from . import reference
@@ -315,13 +319,14 @@ def answer(request, matches):
 
 
 def cpu_seconds():
-    """Of this process and of the programs that it ran."""
+    """The CPU time of this process and of the programs that it ran."""
     programs = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + programs.ru_utime + programs.ru_stime
 
 
 def serve(connection):
-    """A request may be followed by matches, which later requests share."""
+    """Answers requests until the connection closes. Matches may follow a request; later requests
+    then share them."""
     matches = None
     while True:
         try:
@@ -333,7 +338,8 @@ def serve(connection):
         start = cpu_seconds()
         try:
             reply = {"ok": answer(request, matches)}
-        except Exception as error:  # pylint: disable=broad-except  (a row says it, the run goes on)
+        # pylint: disable=broad-except  (the row reports it and the run continues)
+        except Exception as error:
             reply = {"error": f"{type(error).__name__}: {error}" if not isinstance(error, Failed)
                      else str(error)}
         reply["cpu_seconds"] = cpu_seconds() - start

@@ -1,1 +1,1 @@
-"""What builds the site of docs/ and checks what is written there: scripts/docs and test/docs."""
+"""Builds the site of docs/ and checks its pages: scripts/docs and test/docs."""

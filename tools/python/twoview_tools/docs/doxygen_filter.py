@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Doxygen's input filter: a public header in the form that Doxygen reads. usage: doxygen_filter.py HEADER
+"""Doxygen's input filter: converts a public header to the form that Doxygen reads. usage:
+doxygen_filter.py HEADER
 
-Doxygen wants marked comments, one declaration a name, and @param; the headers are written for people. Of each symbol
-that headers.py finds this prints the comment and the declaration. In a function's comment a line "name: ..." becomes
-@param, and one that begins with "Returns" or "Statuses" @return, up to the next line of such a kind.
+Doxygen needs marked comments, one declaration for each name, and @param; the headers are written
+for people and have none of these. For each symbol that headers.py finds, the filter prints the
+comment and the declaration. In a function's comment a line "name: ..." becomes @param, and a line
+that begins with "Returns" or "Statuses" becomes @return, up to the next line of such a kind.
 """
 
 import pathlib
@@ -12,8 +14,11 @@ import sys
 
 from . import headers
 
-# These begin a paragraph of their own in the comments of functions.
-SECTIONS = re.compile(r"(Time|Same input|Needs no context|The result is|A match|An image|\"No geometry\"|First order|options may|Cameras, R)\b")
+# A line that begins with one of these starts a paragraph of its own in a function's comment.
+SECTIONS = re.compile(
+    r"(Time|Same input|Needs no context|The result is|A match|An image|\"No geometry\"|First "
+    r"order|options may|Cameras, R)\b"
+)
 
 
 def escape(text):
@@ -38,7 +43,7 @@ def body(symbol):
 
 
 def declaration(symbol):
-    """Of one name, where the header's statement may have several."""
+    """The declaration of one name; the statement in the header may declare several."""
     if symbol.kind == "field" and "(*" not in symbol.code:
         first, *others = symbol.code.rstrip(";").split(",")
         base = re.match(r"(.*?)\**\s*\w+(\[[^]]*\])*$", first).group(1)
@@ -73,7 +78,7 @@ def normalised(path):
                     yield declaration(member)
             yield f"}} {symbol.name};"
         elif symbol.name not in seen and not (symbol.parent and symbol.parent.name):
-            seen.add(symbol.name)  # a macro of #if and of #else counts once
+            seen.add(symbol.name)  # a macro that both branches of an #if define is printed once
             yield comment_of(symbol)
             yield declaration(symbol)
 

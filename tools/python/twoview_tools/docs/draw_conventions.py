@@ -10,17 +10,26 @@ out = []
 
 
 def text(x, y, words, size=15, colour=INK, anchor="start", style=""):
-    out.append(f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" fill="{colour}" text-anchor="{anchor}"{style}>{words}</text>')
+    out.append(
+        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" fill="{colour}" '
+        f'text-anchor="{anchor}"{style}>{words}</text>'
+    )
 
 
 def line(a, b, colour=INK, width=1.5, dash="", arrow=False):
     end = f' marker-end="url(#{colour[1:]})"' if arrow else ""
-    out.append(f'<line x1="{a[0]:.1f}" y1="{a[1]:.1f}" x2="{b[0]:.1f}" y2="{b[1]:.1f}" stroke="{colour}" '
-               f'stroke-width="{width}"{f" stroke-dasharray={chr(34)}{dash}{chr(34)}" if dash else ""}{end}/>')
+    out.append(
+        f'<line x1="{a[0]:.1f}" y1="{a[1]:.1f}" x2="{b[0]:.1f}" y2="{b[1]:.1f}" stroke="{colour}" '
+        f'stroke-width="{width}"'
+        f'{f" stroke-dasharray={chr(34)}{dash}{chr(34)}" if dash else ""}{end}/>'
+    )
 
 
 def dot(p, radius=4, colour=INK, fill=None):
-    out.append(f'<circle cx="{p[0]:.1f}" cy="{p[1]:.1f}" r="{radius}" fill="{fill or colour}" stroke="{colour}" stroke-width="1.5"/>')
+    out.append(
+        f'<circle cx="{p[0]:.1f}" cy="{p[1]:.1f}" r="{radius}" fill="{fill or colour}" '
+        f'stroke="{colour}" stroke-width="1.5"/>'
+    )
 
 
 def polygon(points, fill, stroke=INK, opacity=1.0):
@@ -33,7 +42,8 @@ def title(x, y, words):
 
 
 class Camera:
-    """A camera in a world with x right, y down, z forward, drawn from above and behind, to the left."""
+    """A camera in a world with x right, y down, z forward, drawn from above, behind and left of the
+    camera."""
 
     def __init__(self, centre, yaw, name):
         self.centre, self.yaw, self.name = centre, yaw, name
@@ -45,18 +55,25 @@ class Camera:
 
 
 def project(p):
-    """Oblique: x to the right, y down, z up and to the right."""
+    """An oblique projection: x to the right, y down, z up and to the right."""
     x, y, z = p
     return (60 + 105 * x + 46 * z, 330 + 95 * y - 62 * z)
 
 
 def camera(c, offsets):
     origin = project(c.centre)
-    corners = [project(c.world((x, y, 0.8))) for x, y in ((-.42, -.3), (.42, -.3), (.42, .3), (-.42, .3))]
+    corners = [
+        project(c.world((x, y, 0.8)))
+        for x, y in ((-0.42, -0.3), (0.42, -0.3), (0.42, 0.3), (-0.42, 0.3))
+    ]
     for corner in corners:
         line(origin, corner, GREY, 1)
     polygon(corners, "#e8f0fe", GREY, 0.7)
-    for axis, colour, name in (((0.9, 0, 0), RED, "x"), ((0, 0.8, 0), GREEN, "y"), ((0, 0, 1.5), BLUE, "z")):
+    for axis, colour, name in (
+        ((0.9, 0, 0), RED, "x"),
+        ((0, 0.8, 0), GREEN, "y"),
+        ((0, 0, 1.5), BLUE, "z"),
+    ):
         tip = project(c.world(axis))
         line(origin, tip, colour, 2.5, arrow=True)
         dx, dy = offsets[name]
@@ -117,7 +134,10 @@ def body():
     for dx, dy in ((-34, -28), (34, -28), (-34, 28), (34, 28)):
         line((cx, cy), (cx + dx, cy + dy), GREY, 5)
         out.append(f'<circle cx="{cx + dx}" cy="{cy + dy}" r="16" fill="#f1f3f4" stroke="{GREY}"/>')
-    out.append(f'<rect x="{cx - 12}" y="{cy - 20}" width="24" height="40" rx="8" fill="#fff" stroke="{INK}"/>')
+    out.append(
+        f'<rect x="{cx - 12}" y="{cy - 20}" width="24" height="40" rx="8" fill="#fff" '
+        f'stroke="{INK}"/>'
+    )
     line((cx, cy), (cx, cy - 58), RED, 2.5, arrow=True)
     line((cx, cy), (cx + 92, cy), GREEN, 2.5, arrow=True)
     dot((cx, cy), 7, BLUE, "#fff")
@@ -126,11 +146,22 @@ def body():
     text(cx + 10, cy - 46, "x forward", 14, RED)
     text(cx + 72, cy + 22, "y right", 14, GREEN)
     text(cx - 76, cy + 5, "z down", 14, BLUE)
-    for k, words in enumerate(("world: z down, x along the body's x at start", "quaternions: w x y z, world_from_body",
-                               "roll right, pitch up, yaw clockwise: positive")):
+    for k, words in enumerate(
+        (
+            "world: z down, x along the body's x at start",
+            "quaternions: w x y z, world_from_body",
+            "roll right, pitch up, yaw clockwise: positive",
+        )
+    ):
         text(300, 520 + 24 * k, words, 14)
     text(300, 600, "a camera that looks forward:", 14)
-    text(500, 600, "x_cam = y_body   y_cam = z_body   z_cam = x_body", 14, style=' font-family="monospace"')
+    text(
+        500,
+        600,
+        "x_cam = y_body   y_cam = z_body   z_cam = x_body",
+        14,
+        style=' font-family="monospace"',
+    )
 
 
 def main():
@@ -140,13 +171,20 @@ def main():
     line((615, 20), (615, 436), GREY, 1)
     body()
     markers = "".join(
-        f'<marker id="{colour[1:]}" viewBox="0 0 10 10" refX="8" refY="5" markerWidth="6" markerHeight="6" '
-        f'orient="auto"><path d="M0,0 L10,5 L0,10 z" fill="{colour}"/></marker>' for colour in (RED, GREEN, BLUE, TEAL))
+        f'<marker id="{colour[1:]}" viewBox="0 0 10 10" refX="8" refY="5" markerWidth="6" '
+        f'markerHeight="6" '
+        f'orient="auto"><path d="M0,0 L10,5 L0,10 z" fill="{colour}"/></marker>'
+        for colour in (RED, GREEN, BLUE, TEAL)
+    )
     with open(sys.argv[1], "w") as file:
-        file.write(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
-                   'font-family="Helvetica, Arial, sans-serif" role="img">'
-                   "<title>Frames, R, t, pixel zero, rays and the body frame of twoview</title>"
-                   f'<defs>{markers}</defs><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>\n' + "\n".join(out) + "\n</svg>\n")
+        file.write(
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
+            'font-family="Helvetica, Arial, sans-serif" role="img">'
+            "<title>Frames, R, t, pixel zero, rays and the body frame of twoview</title>"
+            f'<defs>{markers}</defs><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>\n'
+            + "\n".join(out)
+            + "\n</svg>\n"
+        )
 
 
 main()

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""The pictures of examples/README.md, from what the examples themselves write: docs/images/examples/.
-usage: PYTHONPATH=test/cli scripts/python -m twoview_tools.docs.example_pictures FOLDER_OF_THE_BUILT_EXAMPLES PROGRAM_twoview
+"""Makes the pictures of examples/README.md, docs/images/examples/, from the examples' output.
+usage: PYTHONPATH=test/cli scripts/python -m twoview_tools.docs.example_pictures \\
+  FOLDER_OF_THE_BUILT_EXAMPLES PROGRAM_twoview
 
-The photographs are of the simulated drone's rendered room, so that none of other people's are committed.
+The photographs show the simulated drone's rendered room, so that no photographs with rights of
+other people are committed.
 """
 
 import contextlib
@@ -13,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 
-import boards  # of test/cli
+import boards  # a module of test/cli
 import cv2
 import numpy as np
 
@@ -27,14 +29,20 @@ GREEN, RED, WHITE = (80, 200, 80), (60, 60, 230), (240, 240, 240)
 
 
 def run(name, *arguments):
-    done = subprocess.run([str(BIN / name), *map(str, arguments)], capture_output=True, text=True, cwd=FOLDER)
+    done = subprocess.run(
+        [str(BIN / name), *map(str, arguments)], capture_output=True, text=True, cwd=FOLDER
+    )
     return done.stdout
 
 
 def save(name, picture):
     height = round(picture.shape[0] * WIDTH / picture.shape[1])
     small = cv2.resize(picture, (WIDTH, height), interpolation=cv2.INTER_AREA)
-    cv2.imwrite(str(OUT / f"{name}.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, 72, cv2.IMWRITE_JPEG_OPTIMIZE, 1])
+    cv2.imwrite(
+        str(OUT / f"{name}.jpg"),
+        small,
+        [cv2.IMWRITE_JPEG_QUALITY, 72, cv2.IMWRITE_JPEG_OPTIMIZE, 1],
+    )
 
 
 def terminal(name, text, columns=58):
@@ -42,8 +50,16 @@ def terminal(name, text, columns=58):
     picture = np.full((2 * (18 * len(lines) + 14), 2 * (columns * 7 + 20), 3), 32, np.uint8)
     for k, line in enumerate(lines):
         for column, letter in enumerate(line):
-            cv2.putText(picture, letter, (20 + 14 * column, 2 * (18 * k + 22)), cv2.FONT_HERSHEY_DUPLEX, 0.62, WHITE, 1,
-                        cv2.LINE_AA)
+            cv2.putText(
+                picture,
+                letter,
+                (20 + 14 * column, 2 * (18 * k + 22)),
+                cv2.FONT_HERSHEY_DUPLEX,
+                0.62,
+                WHITE,
+                1,
+                cv2.LINE_AA,
+            )
     save(name, picture)
 
 
@@ -83,7 +99,9 @@ def detect(image):
 
 def match_lines(rows, colour, picture, shift):
     for x0, y0, x1, y1, *_ in rows:
-        cv2.line(picture, (round(x0), round(y0)), (round(x1), round(y1 + shift)), colour, 1, cv2.LINE_AA)
+        cv2.line(
+            picture, (round(x0), round(y0)), (round(x1), round(y1 + shift)), colour, 1, cv2.LINE_AA
+        )
 
 
 def main():
@@ -100,7 +118,9 @@ def main():
     matches.write_text(run("04_match", *image))
     rows = np.loadtxt(matches)
     shift = colour[0].shape[0] + 6
-    picture = np.vstack([colour[0] // 2 + 60, np.full((6, 640, 3), 255, np.uint8), colour[1] // 2 + 60])
+    picture = np.vstack(
+        [colour[0] // 2 + 60, np.full((6, 640, 3), 255, np.uint8), colour[1] // 2 + 60]
+    )
     match_lines(rows[::24], GREEN, picture, shift)
     save("04", picture)
 
@@ -120,7 +140,12 @@ def main():
     picture = colour[1] // 2 + 60
     for k in range(0, len(rows), 60):
         a, b, c = line1[k]
-        shade = tuple(int(v) for v in cv2.cvtColor(np.uint8([[[k * 180 // len(rows), 200, 255]]]), cv2.COLOR_HSV2BGR)[0, 0])
+        shade = tuple(
+            int(v)
+            for v in cv2.cvtColor(
+                np.uint8([[[k * 180 // len(rows), 200, 255]]]), cv2.COLOR_HSV2BGR
+            )[0, 0]
+        )
         ends = [(x, round(-(a * x + c) / b)) for x in (0, picture.shape[1])]
         cv2.line(picture, *ends, shade, 1, cv2.LINE_AA)
         cv2.circle(picture, (round(rows[k, 2]), round(rows[k, 3])), 5, shade, 2, cv2.LINE_AA)
@@ -130,8 +155,12 @@ def main():
     terminal("08", run("08_triangulate", matches, *CAMERA), 44)
 
     run("09_reconstruct", *image, FOLDER / "cloud.ply", *CAMERA)
-    points = np.array([[float(v) for v in line.split()[:3]]
-                       for line in (FOLDER / "cloud.ply").read_text().split("end_header\n")[1].splitlines()])
+    points = np.array(
+        [
+            [float(v) for v in line.split()[:3]]
+            for line in (FOLDER / "cloud.ply").read_text().split("end_header\n")[1].splitlines()
+        ]
+    )
     from_above("09", points, f"{len(points)} points, from above")
     terminal("10", re.sub(r"(.{58,}?) ", r"\1\n", run("10_static_memory")), 72)
     drone()
@@ -139,7 +168,7 @@ def main():
 
 
 def from_above(name, points, words):
-    """x to the right, z away from the camera."""
+    """A view from above: x to the right, z away from the camera."""
     low, high = np.percentile(points, 4, axis=0), np.percentile(points, 96, axis=0)
     near = points[((points >= low) & (points <= high)).all(1)]
     low, high = near.min(0), near.max(0)
@@ -149,14 +178,24 @@ def from_above(name, points, words):
         shade = np.clip((y - low[1]) / (high[1] - low[1]), 0, 1)
         place = (round(370 + scale * (x - (low[0] + high[0]) / 2)),
                  round(270 - scale * (z - (low[2] + high[2]) / 2)))
-        cv2.circle(picture, place, 3, (int(250 - 130 * shade), 190, int(110 + 140 * shade)), -1, cv2.LINE_AA)
+        cv2.circle(
+            picture,
+            place,
+            3,
+            (int(250 - 130 * shade), 190, int(110 + 140 * shade)),
+            -1,
+            cv2.LINE_AA,
+        )
     cv2.putText(picture, words, (16, 36), cv2.FONT_HERSHEY_DUPLEX, 0.9, WHITE, 1, cv2.LINE_AA)
     save(name, picture)
 
 
 def colmap():
-    """Eleven images of a fountain, where the data set and colmap are there."""
-    data = pathlib.Path(os.environ.get("TWOVIEW_DATA", ROOT / ".." / "shared" / "data")) / "strecha_fountain_P11"
+    """Runs the example on eleven images of a fountain, if the data set and colmap are present."""
+    data = (
+        pathlib.Path(os.environ.get("TWOVIEW_DATA", ROOT / ".." / "shared" / "data"))
+        / "strecha_fountain_P11"
+    )
     if not data.exists():
         return
     import pycolmap
@@ -166,9 +205,22 @@ def colmap():
     (FOLDER / "camera.yaml").write_text(yaml.safe_dump({
         "image_width": camera["image_width"], "image_height": camera["image_height"],
         "camera_matrix": {"rows": 3, "cols": 3, "data": [float(k) for k in K]}}))
-    environment = dict(os.environ, PATH=f"{os.path.dirname(PROGRAM)}:{os.environ['PATH']}", TWOVIEW_PYTHON=sys.executable)
-    subprocess.run([ROOT / "examples" / "12_colmap.sh", data / "images", FOLDER / "camera.yaml", FOLDER / "model"], check=True,
-                   env=environment, capture_output=True)
+    environment = dict(
+        os.environ,
+        PATH=f"{os.path.dirname(PROGRAM)}:{os.environ['PATH']}",
+        TWOVIEW_PYTHON=sys.executable,
+    )
+    subprocess.run(
+        [
+            ROOT / "examples" / "12_colmap.sh",
+            data / "images",
+            FOLDER / "camera.yaml",
+            FOLDER / "model",
+        ],
+        check=True,
+        env=environment,
+        capture_output=True,
+    )
     model = pycolmap.Reconstruction(str(next((FOLDER / "model").rglob("points3D.*")).parent))
     points = np.array([point.xyz for point in model.points3D.values()])
     from_above("12", points, f"{model.num_reg_images()} images, {len(points)} points, from above")
@@ -176,10 +228,17 @@ def colmap():
 
 @contextlib.contextmanager
 def simulated(*options):
-    """A simulated drone's ports: commands, navdata, video, control."""
-    ports = [word for channel in ("at", "navdata", "video", "control", "recording") for word in (f"--{channel}-port", "0")]
-    drone = subprocess.Popen([PROGRAM, "drone", "simulate", "--duration", "60", *ports, *options], stdout=subprocess.PIPE,
-                             text=True)
+    """A simulated drone on free ports: commands, navdata, video, control."""
+    ports = [
+        word
+        for channel in ("at", "navdata", "video", "control", "recording")
+        for word in (f"--{channel}-port", "0")
+    ]
+    drone = subprocess.Popen(
+        [PROGRAM, "drone", "simulate", "--duration", "60", *ports, *options],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     try:
         words = drone.stdout.readline().replace(",", "").split()
         yield [words[words.index(name) + 1] for name in ("commands", "navdata", "video", "control")]
@@ -189,16 +248,47 @@ def simulated(*options):
 
 
 def photograph(y):
-    """What the drone sees before its take-off, y metres to the right of its place: below the middle, bare floor."""
+    """What the drone's camera sees before take-off, y metres to the right of the start. The lower
+    part of the image shows only bare floor."""
     lens, folder = FOLDER / "pinhole.yaml", FOLDER / f"flight{y}"
     fx, fy, cx, _, cy = CAMERA
-    lens.write_text("image_width: 640\nimage_height: 360\n"
-                    f"camera_matrix: {{rows: 3, cols: 3, data: [{fx}, 0, {cx}, 0, {fy}, {cy}, 0, 0, 1.0]}}\n")
-    with simulated("--start", f"0,{y}", "--camera", str(lens), "--pixel-noise", "1") as (at, navdata, video, control):
-        subprocess.run([PROGRAM, "drone", "record", "--host", "127.0.0.1", "--at-port", at, "--navdata-port", navdata,
-                        "--video-port", video, "--control-port", control, "--duration", "4", "--frames", "--quiet", "-o",
-                        str(folder)], check=True)
-    return cv2.imread(str(max((folder / "frames").glob("*.png"), key=lambda path: int(path.stem))))[:180]
+    lens.write_text(
+        "image_width: 640\nimage_height: 360\n"
+        f"camera_matrix: {{rows: 3, cols: 3, data: [{fx}, 0, {cx}, 0, {fy}, {cy}, 0, 0, 1.0]}}\n"
+    )
+    with simulated("--start", f"0,{y}", "--camera", str(lens), "--pixel-noise", "1") as (
+        at,
+        navdata,
+        video,
+        control,
+    ):
+        subprocess.run(
+            [
+                PROGRAM,
+                "drone",
+                "record",
+                "--host",
+                "127.0.0.1",
+                "--at-port",
+                at,
+                "--navdata-port",
+                navdata,
+                "--video-port",
+                video,
+                "--control-port",
+                control,
+                "--duration",
+                "4",
+                "--frames",
+                "--quiet",
+                "-o",
+                str(folder),
+            ],
+            check=True,
+        )
+    return cv2.imread(str(max((folder / "frames").glob("*.png"), key=lambda path: int(path.stem))))[
+        :180
+    ]
 
 
 def drone():

@@ -1,8 +1,9 @@
-"""What the public C headers declare, each symbol with its comment.
+"""Parses the public C headers: each declared symbol with its comment.
 
-The headers' own form is read, not C at large: a comment stands in front of what it says something about, or
-behind it on the same line (and goes on below); a `typedef struct` or `enum` has its name at both ends; one
-comment serves all names of one statement (`float x, y;`).
+The parser relies on the style of these headers and does not parse C in general. A comment stands
+before the declaration that it describes, or after it on the same line (and may continue below). A
+`typedef struct` or `enum` has its name at both ends. One comment describes all names of one
+statement (`float x, y;`).
 """
 
 import dataclasses
@@ -35,7 +36,8 @@ def public_headers():
 
 
 def plain(comment):
-    """A comment's text: without its marks, and without what indents its further lines alike."""
+    """The text of a comment, without comment marks and without the common indentation of its
+    further lines."""
     lines = comment[2:-2].strip().split("\n")
     indents = [len(line) - len(line.lstrip()) for line in lines[1:] if line.strip()]
     common = min(indents, default=0)
@@ -43,8 +45,9 @@ def plain(comment):
 
 
 def statements(text, separator, offset=0):
-    """Yields (code, comment, offset of the code) of each declaration in a scope. A code is a directive, or what ends
-    with the separator, or with the brace of a function's body."""
+    """Yields (code, comment, offset of the code) of each declaration in a scope. A code is a
+    directive, or a statement up to the separator, or up to the opening brace of a function's
+    body."""
     comment, position, last = "", 0, None
     pending = []
 
@@ -58,7 +61,8 @@ def statements(text, separator, offset=0):
             end = re.compile(r"\s+").match(text, position).end()
             gap = text[position:end]
             if gap.count("\n") > 1:
-                comment = ""  # a comment that stands alone is about the whole
+                # A comment followed by a blank line describes the file, not a declaration.
+                comment = ""
             if "\n" in gap:
                 last = None
             position = end
@@ -90,7 +94,7 @@ def statement_end(text, position, separator):
         found = COMMENT.match(text, position)
         if found:
             if separator == "," and depth == 0 and not text[found.end():].strip():
-                return position  # behind the last constant, which has no comma
+                return position  # the last constant has no comma behind it
             position = found.end()
             continue
         character = text[position]
@@ -107,7 +111,7 @@ def strip_comments(code):
 
 
 def members(parent, code, offset, line_of):
-    """Fields of a struct, constants of an enum."""
+    """The fields of a struct, or the constants of an enum."""
     begin, end = code.index("{") + 1, code.rindex("}")
     kind, separator = ("constant", ",") if parent.kind == "enum" else ("field", ";")
     for part, comment, at in statements(code[begin:end], separator, offset + begin):
@@ -130,7 +134,7 @@ def names_of(code, kind):
 
 
 def parse(path):
-    """The symbols of a header, in its order."""
+    """The symbols of a header, in the order of the file."""
     text = path.read_text()
     line_of = lambda offset: text.count("\n", 0, offset) + 1
     about = COMMENT.match(text)
@@ -163,13 +167,14 @@ def parse(path):
         inside = list(members(parent, code, at, line_of))
         if parent.name:
             yield parent
-        elif len(inside) == 1:  # enum { NAME = 1 }: a constant in a form that C takes as an array's size
+        # enum { NAME = 1 }: a constant that C also accepts as the size of an array.
+        elif len(inside) == 1:
             inside[0].comment = inside[0].comment or comment
         yield from inside
 
 
 def parameters(function):
-    """(type, name, is a pointer) of each parameter."""
+    """(type, name, whether it is a pointer) of each parameter."""
     inside = function.code[function.code.index(function.name) + len(function.name):]
     inside = inside[inside.index("(") + 1:inside.rindex(")")]
     depth, piece, pieces = 0, "", []
@@ -187,7 +192,9 @@ def parameters(function):
         if callback:
             yield piece, callback.group(1), True
             continue
-        *words, name = [word for word in re.findall(r"\w+", re.sub(r"\[.*?\]", "", piece)) if word != "const"]
+        *words, name = [
+            word for word in re.findall(r"\w+", re.sub(r"\[.*?\]", "", piece)) if word != "const"
+        ]
         yield " ".join(words), name, "*" in piece or "[" in piece
 
 

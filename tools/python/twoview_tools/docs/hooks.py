@@ -1,4 +1,5 @@
-"""mkdocs hooks: pages that are not files of docs/, and what GitHub's Markdown has that Python-Markdown has not."""
+"""Hooks of mkdocs: add pages from files outside docs/, and support the features of GitHub's
+Markdown that Python-Markdown lacks."""
 
 import pathlib
 import posixpath
@@ -9,7 +10,7 @@ from mkdocs.structure.files import File
 from twoview_tools import ROOT
 from twoview_tools.docs import reference
 
-# Pages of the site that come from files outside docs/.
+# The pages of the site that are made from files outside docs/.
 ELSEWHERE = {"examples/README.md": "examples.md", "CHANGELOG.md": "changelog.md"}
 
 FENCE = re.compile(r"\s*(```|~~~)")
@@ -19,14 +20,17 @@ ITEM = re.compile(r"(\s{0,3})([-*]|\d+\.) ")
 def on_config(config):
     config.reference = reference.Reference(ROOT / "out" / "reference" / "xml")
     generated = set(ELSEWHERE.values()) | set(config.reference.order())
-    known = {path.relative_to(config.docs_dir).as_posix() for path in pathlib.Path(config.docs_dir).rglob("*.md")}
+    known = {
+        path.relative_to(config.docs_dir).as_posix()
+        for path in pathlib.Path(config.docs_dir).rglob("*.md")
+    }
     listed = set()
     config.nav = expand(config.nav, config.reference.order() + sorted(known - generated), listed)
     return config
 
 
 def expand(nav, pages, listed):
-    """Patterns become the pages that no entry has named yet."""
+    """Replaces each pattern of the navigation by the pages that no entry has named yet."""
     named = set(re.findall(r"'([^'*]*\.md)'", str(nav)))
     out = []
     for entry in nav:
@@ -35,8 +39,13 @@ def expand(nav, pages, listed):
             inside = expand(inside, pages, listed) if isinstance(inside, list) else inside
             out += [{title: inside}] if inside else []
         elif "*" in entry:
-            found = [page for page in pages if pathlib.PurePosixPath(page).match(entry) and
-                     posixpath.dirname(page) == posixpath.dirname(entry) and page not in named | listed]
+            found = [
+                page
+                for page in pages
+                if pathlib.PurePosixPath(page).match(entry)
+                and posixpath.dirname(page) == posixpath.dirname(entry)
+                and page not in named | listed
+            ]
             out += found
             listed |= set(found)
         else:
@@ -55,9 +64,16 @@ def on_files(files, config):
 
 
 def decisions():
-    lines = ["# Decisions", "", "Why things are as they are: a page each, the alternatives, and the number that decided.", ""]
+    lines = [
+        "# Decisions",
+        "",
+        "Why things are as they are: a page each, the alternatives, and the number that decided.",
+        "",
+    ]
     for path in sorted((ROOT / "docs" / "decisions").glob("*.md")):
-        title = path.read_text().split("\n")[0].removeprefix("# ").removeprefix(f"{path.name[:4]}: ")
+        title = (
+            path.read_text().split("\n")[0].removeprefix("# ").removeprefix(f"{path.name[:4]}: ")
+        )
         lines.append(f"- {path.name[:4]}: [{title[0].upper()}{title[1:]}](decisions/{path.name})")
     return "\n".join(lines) + "\n"
 
@@ -65,14 +81,17 @@ def decisions():
 def on_page_markdown(markdown, page, config, files):
     place = page.file.src_uri
     source = {page: source for source, page in ELSEWHERE.items()}.get(place, "docs/" + place)
-    markdown = markdown.replace("{{root}}", posixpath.relpath(".", posixpath.dirname(place) or ".") + "/")
+    markdown = markdown.replace(
+        "{{root}}", posixpath.relpath(".", posixpath.dirname(place) or ".") + "/"
+    )
     markdown = re.sub(r"(!?)\[((?:[^][]|\[[^]]*\])*)\]\(([^()\s#]*)(#[^()\s]*)?\)",
                       lambda found: link(found, source, place), markdown)
     return with_blank_lines(markdown)
 
 
 def link(found, source, place):
-    """A link that leads out of docs/ leads to the page made of that file, or is only its text."""
+    """A link that leads out of docs/ is replaced by a link to the page made from that file, or else
+    by its text."""
     image, text, target, anchor = found.groups()
     if not target or re.match(r"[a-z]+:", target):
         return found.group()
@@ -86,17 +105,22 @@ def link(found, source, place):
         path = path.removeprefix("docs/")
     else:
         return text
-    return f"{image}[{text}]({posixpath.relpath(path, posixpath.dirname(place) or '.')}{anchor or ''})"
+    return (
+        f"{image}[{text}]({posixpath.relpath(path, posixpath.dirname(place) or '.')}{anchor or ''})"
+    )
 
 
 def with_blank_lines(markdown):
-    """Lists and tables may follow a paragraph at once on GitHub; Python-Markdown wants a blank line."""
+    """Adds the blank line that Python-Markdown, unlike GitHub, needs between a paragraph and a list
+    or table."""
     out, fenced, before = [], False, ""
     for line in markdown.split("\n"):
         if FENCE.match(line):
             fenced = not fenced
         elif not fenced and before.strip() and not before.startswith(("    ", "\t")):
-            starts_list = ITEM.match(line) and not ITEM.match(before) and not before.startswith("  ")
+            starts_list = (
+                ITEM.match(line) and not ITEM.match(before) and not before.startswith("  ")
+            )
             starts_table = line.startswith("|") and not before.startswith("|")
             if starts_list or starts_table:
                 out.append("")

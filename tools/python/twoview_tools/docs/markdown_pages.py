@@ -1,4 +1,4 @@
-"""What the pages are made of: links, headings, code. For the tests of docs/."""
+"""Parses Markdown pages into links, headings and code, for the tests of docs/."""
 
 import re
 
@@ -11,7 +11,8 @@ def pages():
 
 
 class Page:
-    """prose: the lines outside code blocks, with their numbers; blocks: (language, line, lines before, text)."""
+    """A page. prose: the lines outside code blocks, with their numbers. blocks: (language, line,
+    lines before, text)."""
 
     def __init__(self, path):
         self.path, self.prose, self.blocks = path, [], []
@@ -32,7 +33,8 @@ class Page:
         return self.path.relative_to(ROOT).as_posix()
 
     def before(self, line):
-        """The HTML comment in front of the block that begins at a line, without its marks; else empty."""
+        """The text of the HTML comment directly before the block that begins at a line; empty if
+        there is none."""
         text = "\n".join(self.path.read_text().split("\n")[:line - 1]).rstrip()
         found = re.search(r"<!--((?:(?!<!--).)*)-->$", text, re.S)
         return found[1].strip() if found else ""
@@ -47,7 +49,7 @@ class Page:
         return set(found)
 
     def links(self):
-        """(line, target, anchor) of each link and picture that leads to a file."""
+        """(line, target, anchor) of each link or picture that refers to a file."""
         for number, line in self.prose:
             line = re.sub(r"`[^`]*`", "", line)
             for target in re.findall(r"\]\(([^()\s]+)\)", line):
@@ -55,13 +57,13 @@ class Page:
                     yield (number, *(target.split("#") + [""])[:2])
 
     def code(self):
-        """(line, text) of each `code` in the prose."""
+        """(line, text) of each `code` span in the prose."""
         for number, line in self.prose:
             for text in re.findall(r"`([^`]+)`", line):
                 yield number, text
 
 
 def slug(heading):
-    """An anchor's name, as GitHub and the site make it."""
+    """The anchor of a heading, as GitHub and the site form it."""
     heading = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading).lower()
     return re.sub(r"[^\w\- ]", "", heading).strip().replace(" ", "-")

@@ -1,22 +1,49 @@
-"""The pages of the C reference, a page a header, from Doxygen's XML (tools/docs/Doxyfile)."""
+"""Makes the pages of the C reference, one for each header, from Doxygen's XML
+(tools/docs/Doxyfile)."""
 
 import html
 import pathlib
 import re
 import xml.etree.ElementTree as ElementTree
 
-LIBRARY = ["reconstruct", "context", "image", "feature", "match", "camera", "two_view", "triangulate", "bundle", "status",
-           "version", "alloc"]
-DRIVERS = ["source", "clock", "attitude", "file_source", "h264", "status", "ardrone/session", "ardrone/sockets",
-           "ardrone/replay", "ardrone/transport", "ardrone/navdata", "ardrone/pave", "ardrone/at", "ardrone/config",
-           "ardrone/pilot"]
+LIBRARY = [
+    "reconstruct",
+    "context",
+    "image",
+    "feature",
+    "match",
+    "camera",
+    "two_view",
+    "triangulate",
+    "bundle",
+    "status",
+    "version",
+    "alloc",
+]
+DRIVERS = [
+    "source",
+    "clock",
+    "attitude",
+    "file_source",
+    "h264",
+    "status",
+    "ardrone/session",
+    "ardrone/sockets",
+    "ardrone/replay",
+    "ardrone/transport",
+    "ardrone/navdata",
+    "ardrone/pave",
+    "ardrone/at",
+    "ardrone/config",
+    "ardrone/pilot",
+]
 
 
 class Reference:
     def __init__(self, xml):
         self.xml = pathlib.Path(xml)
         self.compounds = {}
-        self.place_of = {}  # symbol -> the page and the heading that describe it
+        self.place_of = {}  # symbol -> the page and heading that describe it
         for entry in ElementTree.parse(self.xml / "index.xml").getroot():
             if entry.get("kind") in ("file", "struct"):
                 compound = ElementTree.parse(self.xml / f"{entry.get('refid')}.xml").getroot()[0]
@@ -27,16 +54,22 @@ class Reference:
                 path = compound.find("location").get("file")
                 self.headers[path] = compound
                 for _, symbol in self.symbols(compound):
-                    for name in [name_of(symbol)] + [value.findtext("name") for value in symbol.findall("enumvalue")]:
+                    for name in [name_of(symbol)] + [
+                        value.findtext("name") for value in symbol.findall("enumvalue")
+                    ]:
                         self.place_of[name] = f"{page_name(path)}#{name_of(symbol)}"
-        assert {page_name(path) for path in self.headers} - {"reference/twoview.md"} == set(self.order()), \
-            "a header is missing in LIBRARY or DRIVERS of twoview_tools/docs/reference.py"
+        assert {page_name(path) for path in self.headers} - {"reference/twoview.md"} == set(
+            self.order()
+        ), "a header is missing in LIBRARY or DRIVERS of twoview_tools/docs/reference.py"
 
     def order(self):
-        return [f"reference/{name}.md" for name in LIBRARY] + [f"reference/drivers/{name}.md" for name in DRIVERS]
+        return [f"reference/{name}.md" for name in LIBRARY] + [
+            f"reference/drivers/{name}.md" for name in DRIVERS
+        ]
 
     def symbols(self, compound):
-        """(line, element) of a header's macros, types, structs and functions, in its order."""
+        """(line, element) of a header's macros, types, structs and functions, in the order of the
+        file."""
         found = []
         for member in compound.iter("memberdef"):
             found.append((int(member.find("location").get("line")), member))
@@ -46,9 +79,12 @@ class Reference:
         return sorted(found, key=lambda pair: pair[0])
 
     def pages(self):
-        """page -> its Markdown."""
-        return {page_name(path): self.page(path, compound) for path, compound in self.headers.items()
-                if not path.endswith("/twoview.h")}
+        """{page: its Markdown}."""
+        return {
+            page_name(path): self.page(path, compound)
+            for path, compound in self.headers.items()
+            if not path.endswith("/twoview.h")
+        }
 
     def page(self, path, compound):
         name = path.split("include/")[1]
@@ -65,7 +101,11 @@ class Reference:
         lines += self.parameters(symbol)
         rows = [(value.findtext("name"), (value.findtext("initializer") or "").lstrip("= "), value)
                 for value in symbol.findall("enumvalue")]
-        rows += [(field_of(field), "", field) for field in symbol.iter("memberdef") if symbol.tag == "compounddef"]
+        rows += [
+            (field_of(field), "", field)
+            for field in symbol.iter("memberdef")
+            if symbol.tag == "compounddef"
+        ]
         rows = [(title, value, "<br>".join(self.text(element.find("detaileddescription"))))
                 for title, value, element in rows]
         if rows and symbol.tag == "compounddef":
@@ -73,7 +113,10 @@ class Reference:
             lines += [f"| `{title}` | {said} |" for title, _, said in rows if said]
         elif rows:
             lines += ["", "| constant | |", "| --- | --- |"]
-            lines += [f"| `{title}` {f'= {value}' if value else ''} | {said} |" for title, value, said in rows]
+            lines += [
+                f"| `{title}` {f'= {value}' if value else ''} | {said} |"
+                for title, value, said in rows
+            ]
         return lines
 
     def parameters(self, symbol):
@@ -88,7 +131,8 @@ class Reference:
         return lines
 
     def text(self, element):
-        """The paragraphs of a description, without its lists of parameters, as HTML in lines of Markdown."""
+        """The paragraphs of a description as HTML in lines of Markdown, without its lists of
+        parameters."""
         lines = []
         for para in element.findall("para") if element is not None else []:
             words = self.words(para)
@@ -104,8 +148,11 @@ class Reference:
             pieces.append(child.tail or "")
         words = html.escape(" ".join("".join(pieces).split()), quote=False)
         words = re.sub(r"([*|\[\]{}])", lambda found: f"&#{ord(found.group())};", words)
-        pieces = words.split("`")  # code, and what may hold the names of symbols and pages, in turn
-        pieces[0::2] = [re.sub(r"docs/([\w/-]+)\.md|\w+", self.link, piece) for piece in pieces[0::2]]
+        # Split into alternating pieces of text, which may name symbols and pages, and code.
+        pieces = words.split("`")
+        pieces[0::2] = [
+            re.sub(r"docs/([\w/-]+)\.md|\w+", self.link, piece) for piece in pieces[0::2]
+        ]
         pieces[1::2] = [f"<code>{piece}</code>" for piece in pieces[1::2]]
         return "".join(pieces)
 
@@ -138,7 +185,10 @@ def field_of(member):
 def declaration(symbol):
     kind, name = symbol.get("kind"), name_of(symbol)
     if kind == "function":
-        flat = f"{''.join(symbol.find('type').itertext())} {name}{symbol.findtext('argsstring')};".replace("* ", "*")
+        flat = (
+            f"{''.join(symbol.find('type').itertext())} {name}"
+            f"{symbol.findtext('argsstring')};"
+        ).replace("* ", "*")
         flat = flat.replace("static tv_", "static inline tv_")
         return flat if len(flat) <= 80 else re.sub(r"(?<=[(,]) ?(?=[a-z])", "\n    ", flat)
     if kind == "define":
@@ -149,6 +199,12 @@ def declaration(symbol):
         arguments = symbol.findtext("argsstring") or ""
         if "(*" not in symbol.findtext("definition"):
             return f"{symbol.findtext('definition')};"
-        return f"typedef {symbol.findtext('definition').split('(*')[0].replace('typedef ', '')} (*{name}{arguments};"
-    return f"typedef {kind} {name} {{ .. }} {name};" if symbol.find(".//memberdef") is not None or kind == "enum" else \
-        f"typedef {kind} {name} {name};"
+        return (
+            f"typedef {symbol.findtext('definition').split('(*')[0].replace('typedef ', '')} "
+            f"(*{name}{arguments};"
+        )
+    return (
+        f"typedef {kind} {name} {{ .. }} {name};"
+        if symbol.find(".//memberdef") is not None or kind == "enum"
+        else f"typedef {kind} {name} {name};"
+    )

@@ -1,1 +1,1 @@
-"""The paper's figures and tables, remade from real data: docs/paper.md."""
+"""Reproduces the paper's figures and tables from real data: docs/paper.md."""

@@ -1,4 +1,5 @@
-"""Figures 1b and 4: an AR.Drone's camera from chessboards, and a view without its lens's distortion."""
+"""Figures 1b and 4: calibration of an AR.Drone's camera from chessboards, and a view with its
+distortion removed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,33 +12,54 @@ from . import drawing
 from .experiment import Experiment, Missing, Result, Table, available
 from .inputs import library, read_colour, read_json
 
-PAPER_RANGE_PX = (0.1, 0.5)  # the paper's usual error
+PAPER_RANGE_PX = (0.1, 0.5)  # the paper's usual range of the reprojection error
 
 
 @dataclass(frozen=True)
 class Boards:
-    """Pictures of one chessboard by one camera."""
+    """Pictures of one chessboard, taken by one camera."""
 
     title: str
-    folder: Callable  # Inputs -> Path
+    folder: Callable  # a function from Inputs to a Path
     pattern: str
     size: tuple  # inner corners
     square_m: float
-    shown: str  # the picture of figure 1b
+    shown: str  # the picture that figure 1b shows
 
     def calibrated(self, inputs):
-        """The folder of `twoview calibrate`, run once."""
+        """The output folder of `twoview calibrate`, which is run only once."""
         folder = Path(inputs.scratch) / self.shown
         if not (folder / "calibration.json").exists():
-            inputs.program("calibrate", *sorted(self.folder(inputs).glob(self.pattern)), "--board",
-                           "x".join(map(str, self.size)), "--square", self.square_m, "--quiet", "-o", folder)
+            inputs.program(
+                "calibrate",
+                *sorted(self.folder(inputs).glob(self.pattern)),
+                "--board",
+                "x".join(map(str, self.size)),
+                "--square",
+                self.square_m,
+                "--quiet",
+                "-o",
+                folder,
+            )
         return folder
 
 
-ARDRONE = Boards("AR.Drone 1", lambda inputs: inputs.of_fixtures("chessboard_ardrone1"), "image_*.png",
-                 (8, 6), 0.02485, "image_000004.png")
-OPENCV = Boards("OpenCV's sample camera", lambda inputs: inputs.of_data("chessboard_opencv", "images"),
-                "left*.jpg", (9, 6), 0.025, "left12.jpg")
+ARDRONE = Boards(
+    "AR.Drone 1",
+    lambda inputs: inputs.of_fixtures("chessboard_ardrone1"),
+    "image_*.png",
+    (8, 6),
+    0.02485,
+    "image_000004.png",
+)
+OPENCV = Boards(
+    "OpenCV's sample camera",
+    lambda inputs: inputs.of_data("chessboard_opencv", "images"),
+    "left*.jpg",
+    (9, 6),
+    0.025,
+    "left12.jpg",
+)
 
 
 def used(calibration):
@@ -45,22 +67,30 @@ def used(calibration):
 
 
 def camera_of(calibration):
-    """A twoview.Camera."""
+    """The calibrated camera as a twoview.Camera."""
     tv = library()
     i = calibration["intrinsics"]
     width, height = calibration["image_size"]
-    return tv.Camera(width, height, i["fx"], i["fy"], i["cx"], i["cy"], tv.CameraModel.BROWN_CONRADY,
-                     [i[name] for name in ("k1", "k2", "p1", "p2", "k3")])
+    return tv.Camera(
+        width,
+        height,
+        i["fx"],
+        i["fy"],
+        i["cx"],
+        i["cy"],
+        tv.CameraModel.BROWN_CONRADY,
+        [i[name] for name in ("k1", "k2", "p1", "p2", "k3")],
+    )
 
 
 def board_points(boards):
-    """Of the corners, metres, row by row."""
+    """The positions of the board's corners in metres, row by row."""
     grid = np.mgrid[:boards.size[0], :boards.size[1]].T.reshape(-1, 2) * boards.square_m
     return np.column_stack([grid, np.zeros(len(grid))])
 
 
 def residuals(boards, calibration):
-    """{view: (n, 2) corner minus the camera's explanation}, by the library's projection."""
+    """{view: (n, 2) measured corners minus projected corners}, with the library's projection."""
     camera, found = camera_of(calibration), {}
     for view in used(calibration):
         points = board_points(boards) @ np.reshape(view["R"], (3, 3)).T + view["t"]
@@ -75,7 +105,8 @@ def rms(vectors):
 
 
 def straightness(corners, size):
-    """How far a board's corners are off the best lines of its rows and columns, px rms."""
+    """The root mean square distance, in pixels, of a board's corners from the best lines through
+    its rows and columns."""
     grid = np.reshape(corners, (size[1], size[0], 2))
     off = []
     for line in (*grid, *grid.transpose(1, 0, 2)):
@@ -89,7 +120,7 @@ def undistorted(camera, pixels):
 
 
 def draw_lines(axis, corners, size):
-    """Straight chords through the first and last corner of the outer rows and columns."""
+    """Draws straight chords between the first and last corners of the outer rows and columns."""
     grid = np.reshape(corners, (size[1], size[0], 2))
     for line in (grid[0], grid[-1], grid[:, 0], grid[:, -1]):
         axis.plot(*line[[0, -1]].T, "-", color="#ffd34d", linewidth=1.1)
@@ -97,26 +128,41 @@ def draw_lines(axis, corners, size):
 
 
 def straightened(inputs, boards, axes):
-    """Draws a view before and after; {"raw", "undistorted"}: px off straight lines, all views."""
+    """Draws a view before and after undistortion. Returns {"raw", "undistorted"}: the deviation
+    from straight lines in pixels, over all views."""
     folder = boards.calibrated(inputs)
     calibration = read_json(folder / "calibration.json")
     source = boards.folder(inputs) / boards.shown
-    inputs.program("undistort", source, "--camera", folder / "camera.yaml", "--quiet", "-o", folder / "flat")
+    inputs.program(
+        "undistort", source, "--camera", folder / "camera.yaml", "--quiet", "-o", folder / "flat"
+    )
     flat = next((folder / "flat").glob(Path(boards.shown).stem + ".*"))
     camera = camera_of(calibration)
     moves = {"raw": lambda p: np.array(p), "undistorted": lambda p: undistorted(camera, p)}
     view = next(v for v in used(calibration) if v["name"] == boards.shown)
     for axis, image, (name, move) in zip(axes, (source, flat), moves.items()):
         corners = move(view["corners"])
-        drawing.show(axis, read_colour(image),
-                     f"{boards.title}, {name}: {straightness(corners, boards.size):.2f} px off straight lines")
+        drawing.show(
+            axis,
+            read_colour(image),
+            f"{boards.title}, {name}: {straightness(corners, boards.size):.2f} px off straight "
+            f"lines",
+        )
         draw_lines(axis, corners, boards.size)
-    return {name: float(np.sqrt(np.mean([straightness(move(v["corners"]), boards.size) ** 2
-                                         for v in used(calibration)]))) for name, move in moves.items()}
+    return {
+        name: float(
+            np.sqrt(
+                np.mean(
+                    [straightness(move(v["corners"]), boards.size) ** 2 for v in used(calibration)]
+                )
+            )
+        )
+        for name, move in moves.items()
+    }
 
 
 def pictured(inputs, boards):
-    """The same, when its pictures are here."""
+    """Returns the same Boards if their pictures are present; raises Missing otherwise."""
     boards.folder(inputs)
     return boards
 
@@ -125,11 +171,26 @@ def figure1b(inputs):
     listed, missing = available(*(lambda b=b: pictured(inputs, b) for b in (ARDRONE, OPENCV)))
     sheet, axes = drawing.sheet(9.5, 3.85 * len(listed), len(listed), 2, squeeze=False)
     off = {boards.title: straightened(inputs, boards, row) for boards, row in zip(listed, axes)}
-    words = [f"{title} {e['raw']:.2f} px before and {e['undistorted']:.2f} px after" for title, e in off.items()]
-    found = f"Rows and columns of the boards' corners off straight lines, rms over all views: {'; '.join(words)}."
-    return Result({"off_straight_px": off}, found,
-                  [drawing.finish(sheet, "Raw and undistorted views of chessboards, with straight lines through "
-                                         "the corners")], missing=missing)
+    words = [
+        f"{title} {e['raw']:.2f} px before and {e['undistorted']:.2f} px after"
+        for title, e in off.items()
+    ]
+    found = (
+        "Rows and columns of the boards' corners off straight lines, rms over all views: "
+        f"{'; '.join(words)}."
+    )
+    return Result(
+        {"off_straight_px": off},
+        found,
+        [
+            drawing.finish(
+                sheet,
+                "Raw and undistorted views of chessboards, with straight lines through "
+                "the corners",
+            )
+        ],
+        missing=missing,
+    )
 
 
 def draw_residuals(axis, found):
@@ -153,7 +214,7 @@ def draw_error_by_view(axis, per_view):
 
 
 def draw_calibration(inputs, views, found, per_view):
-    """Two of the views with their corners, the residuals, the error of each view."""
+    """Draws two views with their corners, the residuals, and the error of each view."""
     sheet = drawing.pyplot.figure(figsize=(11, 3.1))
     grid = sheet.add_gridspec(1, 4, width_ratios=(1.35, 1.35, 1, 1.1))
     for place, view in enumerate(views[:4:3]):
@@ -176,9 +237,13 @@ def figure4(inputs):
                "intrinsics": calibration["intrinsics"], "sigma": calibration["sigma"],
                "published_rms_px": published, "paper_range_px": list(PAPER_RANGE_PX),
                "opencv_board_rms_px": None}
-    text = (f"twoview calibrate on {len(found)} pictures of an AR.Drone 1 (320 x 240): {overall:.3f} px "
-            f"rms; the paper's range is {PAPER_RANGE_PX[0]} to {PAPER_RANGE_PX[1]} px. Those who took the "
-            f"pictures published {published:.2f} px for the same ones.")
+    text = (
+        f"twoview calibrate on {len(found)} pictures of an AR.Drone 1 (320 x 240): {overall:.3f} "
+        f"px "
+        f"rms; the paper's range is {PAPER_RANGE_PX[0]} to {PAPER_RANGE_PX[1]} px. Those who took "
+        f"the "
+        f"pictures published {published:.2f} px for the same ones."
+    )
     missing = []
     try:
         other = read_json(OPENCV.calibrated(inputs) / "calibration.json")["rms_px"]
@@ -191,8 +256,10 @@ def figure4(inputs):
 
 
 def published_error(inputs):
-    """avg_reprojection_error of the file beside the pictures."""
-    text = inputs.of_fixtures("chessboard_ardrone1", "ardrone_camera.yml").read_text(encoding="utf-8")
+    """avg_reprojection_error of the calibration file published with the pictures."""
+    text = inputs.of_fixtures("chessboard_ardrone1", "ardrone_camera.yml").read_text(
+        encoding="utf-8"
+    )
     return float(text.split("avg_reprojection_error:")[1].split()[0])
 
 
@@ -204,14 +271,27 @@ def intrinsics_table(calibration):
 
 
 EXPERIMENTS = [
-    Experiment("figure1b", "Camera calibration", "Figure 1b: a raw and an undistorted view",
-               "A picture of the drone's camera as it comes, and the same after undistortion.",
-               "Undistortion goes through the lens model by Newton steps, with a known radius up to which the "
-               "model holds. Estimation needs no undistorted image: matches become rays, and thresholds stay "
-               "pixels of the image as it is.", figure1b),
-    Experiment("figure4", "Camera calibration", "Figure 4: chessboards and the calibration's error",
-               "The chessboard calibration, by Zhang's method; its error is usually 0.1 to 0.5 px.",
-               "The mathematics is the paper's (Zhang, by OpenCV). twoview calibrate leaves out blurred, "
-               "partial and duplicate views, tells standard deviations, and warns when the answer is not to be "
-               "trusted (docs/calibrate.md).", figure4),
+    Experiment(
+        "figure1b",
+        "Camera calibration",
+        "Figure 1b: a raw and an undistorted view",
+        "A picture of the drone's camera as it comes, and the same after undistortion.",
+        "Undistortion goes through the lens model by Newton steps, with a known radius up to which "
+        "the "
+        "model holds. Estimation needs no undistorted image: matches become rays, and thresholds "
+        "stay "
+        "pixels of the image as it is.",
+        figure1b,
+    ),
+    Experiment(
+        "figure4",
+        "Camera calibration",
+        "Figure 4: chessboards and the calibration's error",
+        "The chessboard calibration, by Zhang's method; its error is usually 0.1 to 0.5 px.",
+        "The mathematics is the paper's (Zhang, by OpenCV). twoview calibrate leaves out blurred, "
+        "partial and duplicate views, tells standard deviations, and warns when the answer is not "
+        "to be "
+        "trusted (docs/calibrate.md).",
+        figure4,
+    ),
 ]

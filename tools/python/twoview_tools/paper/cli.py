@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The paper's figures and tables, remade from real data into one page.
+"""Reproduces the paper's figures and tables from real data, on one page.
 
-DIR/paper.html is self-contained; DIR/paper.json has the numbers. An experiment that lacks data or fails
-says so on the page, the others go on, and the exit status is 1."""
+DIR/paper.html is self-contained; DIR/paper.json has the numbers. If an experiment lacks data or
+fails, the page reports it, the other experiments still run, and the exit status is 1."""
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # before numpy: one thread
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -22,7 +22,8 @@ from .. import ROOT
 
 def experiments():
     from . import calibration, cloud, corners, descriptor, motion, ransac, triangulation
-    modules = (calibration, corners, descriptor, ransac, triangulation, motion, cloud)  # the paper's order
+    # In the order of the paper.
+    modules = (calibration, corners, descriptor, ransac, triangulation, motion, cloud)
     return [e for module in modules for e in module.EXPERIMENTS]
 
 
@@ -34,7 +35,7 @@ def run(experiment, inputs):
         outcome["result"] = experiment.run(inputs)
     except Missing as missing:
         outcome["problem"] = f"missing: {missing}"
-    except Exception as error:  # one that fails shall not take the others with it
+    except Exception as error:  # a failed experiment must not end the others
         traceback.print_exc()
         outcome["problem"] = f"failed: {type(error).__name__}: {error}"
     outcome["seconds"] = time.monotonic() - begin
@@ -55,7 +56,7 @@ def is_whole(outcome):
 
 
 def write(path, data):
-    """Under its name only when whole."""
+    """Writes a file so that it appears under its name only when it is complete."""
     temporary = path.with_name(path.name + ".part")
     temporary.write_bytes(data)
     temporary.replace(path)
@@ -76,9 +77,17 @@ def write_results(folder, outcomes, version, seconds, with_pictures):
 def arguments_of(command):
     parser = argparse.ArgumentParser(prog="scripts/paper", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", dest="folder", metavar="DIR", type=Path, default=ROOT / "out" / "paper",
-                        help="folder for paper.html and paper.json (default: out/paper)")
-    parser.add_argument("--only", metavar="ID,..", help="figure8,table1 ..: these experiments alone")
+    parser.add_argument(
+        "-o",
+        dest="folder",
+        metavar="DIR",
+        type=Path,
+        default=ROOT / "out" / "paper",
+        help="folder for paper.html and paper.json (default: out/paper)",
+    )
+    parser.add_argument(
+        "--only", metavar="ID,..", help="figure8,table1 ..: these experiments alone"
+    )
     parser.add_argument("--pictures", action="store_true", help="also write each picture as a file")
     parser.add_argument("--build", metavar="DIR", type=Path, default=ROOT / "build" / "release",
                         help="build folder (default: build/release)")

@@ -1,7 +1,8 @@
 """Figures 5 and 6: the segment test, and how many corners it finds.
 
-E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006. Here it is read
-from the definition, one array a circle pixel, and the library is held against that."""
+E. Rosten, T. Drummond, "Machine learning for high-speed corner detection", ECCV 2006. The test is
+computed here from its definition, with one array for each circle pixel, and the library is compared
+with the result."""
 
 import numpy as np
 
@@ -12,11 +13,11 @@ from .inputs import grey, library, read_colour
 # The Bresenham circle of radius 3, clockwise from the top.
 CIRCLE = np.array([(0, -3), (1, -3), (2, -2), (3, -1), (3, 0), (3, 1), (2, 2), (1, 3), (0, 3),
                    (-1, 3), (-2, 2), (-3, 1), (-3, 0), (-3, -1), (-2, -2), (-1, -3)])
-ARC, THRESHOLD = 12, 20  # the paper's 12 of 16
+ARC, THRESHOLD = 12, 20  # the paper's arc: 12 of 16 pixels
 
 
 def differences(image):
-    """(16, height, width): circle pixel minus centre; a border of 3 has zeros."""
+    """(16, height, width): circle pixel minus centre pixel; 0 in a border of 3 pixels."""
     height, width = image.shape
     centre = image[3:-3, 3:-3].astype(np.int16)
     found = np.zeros((16, height, width), np.int16)
@@ -26,9 +27,10 @@ def differences(image):
 
 
 def scores(image, arc):
-    """The largest threshold at which each pixel is a corner; 0 or less: at none."""
+    """For each pixel, the largest threshold at which it is a corner; 0 or less if it never is
+    one."""
     d = differences(image)
-    around = np.concatenate([d, d])  # an arc that begins at the 16th pixel goes on at the first
+    around = np.concatenate([d, d])  # an arc may continue from the 16th pixel to the first
     contrast = np.full(image.shape, -255, np.int16)
     for start in range(16):
         on_arc = around[start:start + arc]
@@ -37,7 +39,8 @@ def scores(image, arc):
 
 
 def suppressed(score, threshold):
-    """Where a corner is stronger than its eight neighbours, (height, width) bool."""
+    """A (height, width) bool array: true where a corner has a higher score than its eight
+    neighbours."""
     score = np.where(score >= threshold, score, 0)
     padded = np.pad(score, 1)
     height, width = score.shape
@@ -47,7 +50,8 @@ def suppressed(score, threshold):
 
 
 def longest_arc(values, threshold):
-    """(first circle pixel, length, sign) of the longest run of pixels all brighter or all darker."""
+    """(first circle pixel, length, sign) of the longest run of circle pixels that are all brighter
+    or all darker."""
     best = (0, 0, 0)
     for sign in (1, -1):
         passes = sign * np.asarray(values) > threshold
@@ -60,7 +64,7 @@ def longest_arc(values, threshold):
 
 
 def detect(image, arc, threshold):
-    """The library's corners, whole pixels, nothing left out."""
+    """The library's corners in whole pixels, without a limit on their number."""
     tv = library()
     with tv.Context(max_width=image.shape[1], max_height=image.shape[0],
                     max_keypoints=65535) as context:
@@ -69,7 +73,8 @@ def detect(image, arc, threshold):
 
 
 def example_corner(image):
-    """A corner with an arc of 12 to 14 and clear contrast: one that a reader can count along."""
+    """A corner with an arc of 12 to 14 pixels and clear contrast, in which a reader can count the
+    pixels."""
     found = detect(image, ARC, THRESHOLD)
     around = differences(image)
     for k in found:  # strongest first
@@ -85,7 +90,7 @@ def example_corner(image):
 
 
 def states(corner, threshold):
-    """Per circle pixel: +1 brighter, -1 darker, 0 alike."""
+    """The state of each circle pixel: +1 brighter, -1 darker, 0 similar."""
     d = np.array(corner["circle"]) - corner["centre"]
     return np.where(d > threshold, 1, np.where(d < -threshold, -1, 0))
 
@@ -101,9 +106,16 @@ def draw_circle(axis, image, corner):
     on_arc = {(corner["first"] + k) % 16 for k in range(corner["arc_length"])}
     for i, ((dx, dy), state) in enumerate(zip(CIRCLE, states(corner, THRESHOLD))):
         centre = reach + dx, reach + dy
-        axis.add_patch(drawing.pyplot.Rectangle((centre[0] - 0.5, centre[1] - 0.5), 1, 1, fill=False,
-                                                color=COLOURS[int(state)],
-                                                linewidth=3 if i in on_arc else 1.5))
+        axis.add_patch(
+            drawing.pyplot.Rectangle(
+                (centre[0] - 0.5, centre[1] - 0.5),
+                1,
+                1,
+                fill=False,
+                color=COLOURS[int(state)],
+                linewidth=3 if i in on_arc else 1.5,
+            )
+        )
         axis.text(*centre, str(i + 1), color=COLOURS[int(state)], ha="center", va="center",
                   fontsize=8, fontweight="bold")
     axis.plot(reach, reach, "+", color=drawing.BAD, markersize=11, markeredgewidth=2)
@@ -133,15 +145,17 @@ def figure5(inputs):
                                                fill=False, color=drawing.BAD, linewidth=2))
     draw_circle(axes[1], image, corner)
     draw_levels(axes[2], corner)
-    found = (f"At ({corner['x']}, {corner['y']}) the longest arc has {corner['arc_length']} pixels of "
-             f"the 12 that are wanted. The largest threshold at which it is still a corner, its score, "
-             f"is {corner['score']} by the definition and {corner['library_score']} by the library.")
+    found = (
+        f"At ({corner['x']}, {corner['y']}) the longest arc has {corner['arc_length']} pixels of "
+        f"the 12 that are wanted. The largest threshold at which it is still a corner, its score, "
+        f"is {corner['score']} by the definition and {corner['library_score']} by the library."
+    )
     picture = drawing.finish(sheet, "A corner, the 16 pixels of its circle and their grey levels")
     return Result(corner, found, [picture])
 
 
 def images(inputs):
-    """({name: grey image}, what is missing)"""
+    """({name: grey image}, a list of what is missing)."""
     def of_set(folder, number):
         return grey(read_colour(sorted(inputs.of_data(folder, "images").iterdir())[number]))
 
@@ -156,7 +170,8 @@ def images(inputs):
 
 
 def count(image):
-    """Corners of each arc, before and after suppression, and the library's."""
+    """The numbers of corners for each arc, before and after suppression, and the library's
+    number."""
     entry = {"width": image.shape[1], "height": image.shape[0], "threshold": THRESHOLD, "arcs": {}}
     for arc in (9, 10, 11, 12):
         score = scores(image, arc)
@@ -180,7 +195,9 @@ def draw_corners(name, image, thresholds, curves):
     drawing.show(axes[0], image, f"{name}: {len(found)} corners by 12-FAST, t = {THRESHOLD}")
     axes[0].plot(found["x"], found["y"], ".", color="#34d17f", markersize=3.5)
     for arc, style, colour in ((9, "o--", drawing.ORANGE), (12, "o-", drawing.BLUE)):
-        axes[1].plot(thresholds, curves[arc], style, markersize=4, label=f"{arc} of 16", color=colour)
+        axes[1].plot(
+            thresholds, curves[arc], style, markersize=4, label=f"{arc} of 16", color=colour
+        )
     axes[1].set_yscale("log")
     axes[1].set_xlabel("threshold t [grey levels]")
     axes[1].set_title("Corners left after suppression")
@@ -193,9 +210,20 @@ def counts_table(numbers):
              *(str(e["arcs"][a][key]) for a in ("9", "12") for key in ("segment_test", "library")),
              "yes" if all(a["library_equals_definition"] for a in e["arcs"].values()) else "NO"]
             for name, e in numbers.items()]
-    return Table(f"Corners at t = {THRESHOLD}: pixels that pass the test, and those left after non-maximum "
-                 "suppression", ["image", "size", "9 of 16, all", "suppressed", "12 of 16, all", "suppressed",
-                                 "equal to the definition"], rows)
+    return Table(
+        f"Corners at t = {THRESHOLD}: pixels that pass the test, and those left after non-maximum "
+        "suppression",
+        [
+            "image",
+            "size",
+            "9 of 16, all",
+            "suppressed",
+            "12 of 16, all",
+            "suppressed",
+            "equal to the definition",
+        ],
+        rows,
+    )
 
 
 def figure6(inputs):
@@ -205,25 +233,41 @@ def figure6(inputs):
     thresholds = [5, 10, 15, 20, 30, 40, 60, 80]
     curves = counts_by_threshold(image, thresholds)
     arcs = numbers[name]["arcs"]
-    equal = all(a["library_equals_definition"] for e in numbers.values() for a in e["arcs"].values())
-    found = (f"12-FAST leaves {arcs['12']['library']} corners on {name} at t = {THRESHOLD}, 9-FAST "
-             f"{arcs['9']['library']}. On {'every' if equal else 'NOT EVERY'} image and for every arc the "
-             "library's corners are, pixel for pixel, those of the definition.")
+    equal = all(
+        a["library_equals_definition"] for e in numbers.values() for a in e["arcs"].values()
+    )
+    found = (
+        f"12-FAST leaves {arcs['12']['library']} corners on {name} at t = {THRESHOLD}, 9-FAST "
+        f"{arcs['9']['library']}. On {'every' if equal else 'NOT EVERY'} image and for every arc "
+        f"the "
+        "library's corners are, pixel for pixel, those of the definition."
+    )
     by_threshold = {"image": name, "thresholds": thresholds, "arc9": curves[9], "arc12": curves[12]}
     return Result({"images": numbers, "by_threshold": by_threshold}, found,
                   [draw_corners(name, image, thresholds, curves)], [counts_table(numbers)], missing)
 
 
 EXPERIMENTS = [
-    Experiment("figure5", "FAST corners", "Figure 5: the segment test",
-               "The circle of 16 pixels around a candidate p: p is a corner when 12 contiguous ones are "
-               "all brighter than p + t, or all darker than p - t.",
-               "The test is the paper's, for arcs of 9 to 12. The score, the largest t that a corner "
-               "survives, is exact rather than searched for.", figure5),
-    Experiment("figure6", "FAST corners", "Figure 6: corners found by 12-FAST",
-               "A picture with the corners that 12-FAST finds in it, and their number.",
-               "The paper uses 12 of 16. Our default is 9 of 16 with a threshold that falls from 10 until "
-               "2048 corners are found: a tenth more matches, and on the hardest of the larger sets 3.6 points "
-               "of AUC@10 more; elsewhere the two tie (docs/decisions/0001-features.md). --arc 12 is the "
-               "paper's.", figure6),
+    Experiment(
+        "figure5",
+        "FAST corners",
+        "Figure 5: the segment test",
+        "The circle of 16 pixels around a candidate p: p is a corner when 12 contiguous ones are "
+        "all brighter than p + t, or all darker than p - t.",
+        "The test is the paper's, for arcs of 9 to 12. The score, the largest t that a corner "
+        "survives, is exact rather than searched for.",
+        figure5,
+    ),
+    Experiment(
+        "figure6",
+        "FAST corners",
+        "Figure 6: corners found by 12-FAST",
+        "A picture with the corners that 12-FAST finds in it, and their number.",
+        "The paper uses 12 of 16. Our default is 9 of 16 with a threshold that falls from 10 until "
+        "2048 corners are found: a tenth more matches, and on the hardest of the larger sets 3.6 "
+        "points "
+        "of AUC@10 more; elsewhere the two tie (docs/decisions/0001-features.md). --arc 12 is the "
+        "paper's.",
+        figure6,
+    ),
 ]

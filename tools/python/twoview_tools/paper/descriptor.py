@@ -1,7 +1,8 @@
 """Figure 7: a SIFT descriptor's gradients and histograms.
 
 D. G. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, section 6, as
-docs/algorithms/sift.md puts it, in floating point with angles: nothing of the library's integers."""
+described in docs/algorithms/sift.md. It is computed here in floating point with angles,
+independently of the library's integer code."""
 
 import numpy as np
 
@@ -9,14 +10,14 @@ from . import corners, drawing
 from .experiment import Experiment, Missing, Result
 from .inputs import library
 
-SIDE = 16  # samples of a patch; 15 gradients
-STEP = 0.28  # of a cell, between samples
-CELL_SIZE = 1.5  # of a keypoint's diameter
-MAX_STEP = 2.24  # pixels of the octave
+SIDE = 16  # samples along a side of a patch, which give 15 gradients
+STEP = 0.28  # distance between samples, as a share of a cell
+CELL_SIZE = 1.5  # side of a cell, as a multiple of the keypoint's diameter
+MAX_STEP = 2.24  # largest distance between samples, in pixels of the octave
 
 
 def octave(image, size):
-    """(image halved as often as the keypoint's size asks and blurred, its scale)."""
+    """(the image, halved as often as the keypoint's size requires and blurred; its scale)."""
     pixels, scale = image.astype(int), 1
     while size * CELL_SIZE * STEP / scale >= MAX_STEP:
         height, width = pixels.shape[0] // 2, pixels.shape[1] // 2
@@ -38,7 +39,7 @@ def bilinear(image, x, y):
 
 
 def patch(image, keypoint):
-    """16 x 16 samples around the keypoint, turned by its angle."""
+    """16 x 16 samples around the keypoint, rotated by its angle."""
     blurred, scale = octave(image, keypoint["size"])
     step = keypoint["size"] * CELL_SIZE * STEP / scale
     u, v = np.meshgrid(*2 * [(np.arange(SIDE) - (SIDE - 1) / 2) * step])
@@ -48,22 +49,22 @@ def patch(image, keypoint):
 
 
 def gradients(samples):
-    """(15, 15) along x and along y (down), from the diagonals of four samples."""
+    """The gradients (15, 15) along x and along y (down), from the diagonals of four samples."""
     u = samples[1:, 1:] - samples[:-1, :-1]
     v = samples[:-1, 1:] - samples[1:, :-1]
     return (u + v) / np.sqrt(2), (u - v) / np.sqrt(2)
 
 
 def cell_weights():
-    """(4, 15): what gradient k gives to cell c along one axis."""
+    """(4, 15): the weight of gradient k in cell c along one axis."""
     p = STEP * (np.arange(SIDE - 1) - (SIDE - 2) / 2)
     c = np.arange(4)[:, None]
     return np.exp(-p ** 2 / 8) * np.maximum(0, 1 - np.abs(p + 1.5 - c))
 
 
 def direction_shares(gx, gy):
-    """(8, 15, 15): each gradient as the sum of a vector along each of the two nearest of 8 directions,
-    counter-clockwise as seen."""
+    """(8, 15, 15): each gradient as the sum of two vectors along the nearest of 8 directions, which
+    are counter-clockwise in the image."""
     length, angle = np.hypot(gx, gy), np.arctan2(-gy, gx) % (2 * np.pi)
     eighth = np.pi / 4
     low = (angle // eighth).astype(int) % 8
@@ -76,13 +77,14 @@ def direction_shares(gx, gy):
 
 
 def histograms(samples):
-    """(4, 4, 8): cell row, cell column, direction."""
+    """The histograms (4, 4, 8): cell row, cell column, direction."""
     weights = cell_weights()
     return np.einsum("ay,bx,kyx->abk", weights, weights, direction_shares(*gradients(samples)))
 
 
 def quantised(histogram, root):
-    """128 bytes: clipped at 0.2 of the norm, then SIFT's norm of 512 or RootSIFT."""
+    """The 128 bytes of the descriptor: clipped at 0.2 of the norm, then with SIFT's norm of 512 or
+    as RootSIFT."""
     values = histogram.ravel()
     values = np.minimum(values, 0.2 * np.linalg.norm(values))
     if not values.any():
@@ -92,7 +94,7 @@ def quantised(histogram, root):
 
 
 def describe(image, keypoint, root):
-    """The descriptor by the definition."""
+    """The descriptor of a keypoint, computed from the definition."""
     return quantised(histograms(patch(image, keypoint)), root)
 
 
@@ -108,7 +110,8 @@ def described_keypoints(image, count):
 
 
 def differences(image, keypoints, described):
-    """{kind: (n, 128) absolute differences of our bytes and the definition's}"""
+    """{kind: (n, 128) absolute differences between the library's bytes and those of the
+    definition}."""
     found = {}
     for kind, bytes_ in described.items():
         own = np.array([describe(image, k, kind == "rootsift") for k in keypoints])
@@ -143,8 +146,16 @@ def draw_gradients(axis, samples):
     drawing.show(axis, np.clip(samples, 0, 255), "The 16 x 16 samples, turned, and their gradients")
     k = np.arange(SIDE - 1) + 0.5
     gx, gy = gradients(samples)
-    axis.quiver(k, k, gx, -gy, color="#3fb6ff", scale_units="xy", scale=np.hypot(gx, gy).max() / 1.6,
-                width=0.006)
+    axis.quiver(
+        k,
+        k,
+        gx,
+        -gy,
+        color="#3fb6ff",
+        scale_units="xy",
+        scale=np.hypot(gx, gy).max() / 1.6,
+        width=0.006,
+    )
     draw_cells(axis, 1 / STEP, (SIDE - 1) / 2 - 2 / STEP)
 
 
@@ -159,12 +170,19 @@ def draw_histograms(axis, histogram):
         for column in range(4):
             for length, angle in zip(histogram[row, column] / longest, angles):
                 if length < 0.02:
-                    continue  # an arrow's head would be longer
-                axis.annotate("", (column + 0.5 + length * np.cos(angle), row + 0.5 - length * np.sin(angle)),
-                              (column + 0.5, row + 0.5),
-                              arrowprops={"arrowstyle": "-|>,head_width=0.1,head_length=0.16",
-                                          "color": drawing.BLUE, "shrinkA": 0, "shrinkB": 0,
-                                          "linewidth": 1.1})
+                    continue  # too short for an arrow's head
+                axis.annotate(
+                    "",
+                    (column + 0.5 + length * np.cos(angle), row + 0.5 - length * np.sin(angle)),
+                    (column + 0.5, row + 0.5),
+                    arrowprops={
+                        "arrowstyle": "-|>,head_width=0.1,head_length=0.16",
+                        "color": drawing.BLUE,
+                        "shrinkA": 0,
+                        "shrinkB": 0,
+                        "linewidth": 1.1,
+                    },
+                )
     axis.set_xlim(-0.1, 4.1)
     axis.set_ylim(4.1, -0.1)
 
@@ -184,7 +202,7 @@ def draw_bytes(axis, ours, definition):
 
 
 def example(image, keypoints):
-    """The keypoint at figure 5's corner."""
+    """The keypoint at the corner that figure 5 shows."""
     corner = corners.example_corner(image)
     off = np.hypot(keypoints["x"] - corner["x"], keypoints["y"] - corner["y"])
     if off.min() > 1.5:
@@ -204,29 +222,55 @@ def figure7(inputs):
     draw_place(sheet.add_subplot(grid[0, 0]), image, keypoints[chosen])
     draw_gradients(sheet.add_subplot(grid[0, 1]), samples)
     draw_histograms(sheet.add_subplot(grid[0, 2]), histogram)
-    draw_bytes(sheet.add_subplot(grid[1, :]), described["sift"][chosen], quantised(histogram, False))
+    draw_bytes(
+        sheet.add_subplot(grid[1, :]), described["sift"][chosen], quantised(histogram, False)
+    )
     keypoint = keypoints[chosen]
-    numbers = {"keypoint": {name: float(keypoint[name]) for name in ("x", "y", "size", "angle_rad")},
-               "descriptor": described["sift"][chosen].tolist(), "keypoints_compared": len(keypoints)}
+    numbers = {
+        "keypoint": {name: float(keypoint[name]) for name in ("x", "y", "size", "angle_rad")},
+        "descriptor": described["sift"][chosen].tolist(),
+        "keypoints_compared": len(keypoints),
+    }
     for kind, difference in off.items():
-        numbers[kind] = {"median": float(np.median(difference)), "p99": float(np.percentile(difference, 99)),
-                         "greatest": int(difference.max()), "of_the_drawn": int(off[kind][chosen].max())}
-    found = (f"The descriptor at figure 5's corner, angle {np.degrees(keypoint['angle_rad']):.1f} degrees. The "
-             "histograms are computed here in floating point from the definition; clipped and scaled, they "
-             f"are the library's 128 bytes within {numbers['sift']['of_the_drawn']} of 255. Over "
-             f"{len(keypoints)} keypoints: 99 % of the bytes within {numbers['sift']['p99']:.0f}, all within "
-             f"{numbers['sift']['greatest']}.")
-    return Result(numbers, found, [drawing.finish(sheet, "A keypoint's window, gradients, histograms and "
-                                                         "bytes")])
+        numbers[kind] = {
+            "median": float(np.median(difference)),
+            "p99": float(np.percentile(difference, 99)),
+            "greatest": int(difference.max()),
+            "of_the_drawn": int(off[kind][chosen].max()),
+        }
+    found = (
+        f"The descriptor at figure 5's corner, angle {np.degrees(keypoint['angle_rad']):.1f} "
+        f"degrees. The "
+        "histograms are computed here in floating point from the definition; clipped and scaled, "
+        "they "
+        f"are the library's 128 bytes within {numbers['sift']['of_the_drawn']} of 255. Over "
+        f"{len(keypoints)} keypoints: 99 % of the bytes within {numbers['sift']['p99']:.0f}, all "
+        f"within "
+        f"{numbers['sift']['greatest']}."
+    )
+    return Result(
+        numbers,
+        found,
+        [drawing.finish(sheet, "A keypoint's window, gradients, histograms and " "bytes")],
+    )
 
 
 EXPERIMENTS = [
-    Experiment("figure7", "SIFT descriptors", "Figure 7: a descriptor's gradients and histograms",
-               "The gradients around a keypoint, and the histograms of 4 x 4 cells with 8 directions that "
-               "they are gathered into: 128 numbers.",
-               "Lowe's window and weights, but sampled on a turned grid of 16 x 16 out of one blurred image: "
-               "the number of samples no longer grows with the keypoint, and shares between directions need "
-               "no arctangent (docs/decisions/0003-patch-sift.md, 0009-descriptor-speed.md). The bytes stay "
-               "comparable with OpenCV's and COLMAP's: median cosine 0.99 with OpenCV's SIFT. Our default is "
-               "RootSIFT, the square roots of the same shares.", figure7),
+    Experiment(
+        "figure7",
+        "SIFT descriptors",
+        "Figure 7: a descriptor's gradients and histograms",
+        "The gradients around a keypoint, and the histograms of 4 x 4 cells with 8 directions that "
+        "they are gathered into: 128 numbers.",
+        "Lowe's window and weights, but sampled on a turned grid of 16 x 16 out of one blurred "
+        "image: "
+        "the number of samples no longer grows with the keypoint, and shares between directions "
+        "need "
+        "no arctangent (docs/decisions/0003-patch-sift.md, 0009-descriptor-speed.md). The bytes "
+        "stay "
+        "comparable with OpenCV's and COLMAP's: median cosine 0.99 with OpenCV's SIFT. Our default "
+        "is "
+        "RootSIFT, the square roots of the same shares.",
+        figure7,
+    )
 ]

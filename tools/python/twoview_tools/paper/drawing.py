@@ -1,4 +1,4 @@
-"""Matplotlib, set up once: the same look for every figure."""
+"""Sets up Matplotlib once, so that all figures look the same."""
 
 import io
 
@@ -22,12 +22,12 @@ pyplot.rcParams.update({
 
 
 def sheet(width, height, *rows_columns, **options):
-    """A figure of so many inches and its axes."""
+    """A figure of this size in inches, and its axes."""
     return pyplot.subplots(*rows_columns, figsize=(width, height), **options)
 
 
 def show(axis, image, title=""):
-    """An image, grey or BGR, without axes; pixel (0, 0) is the centre of the first."""
+    """Shows an image, grey or BGR, without axes. Pixel (0, 0) is the centre of the first pixel."""
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
     axis.imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
@@ -38,7 +38,7 @@ def show(axis, image, title=""):
 
 
 def finish(figure, alt):
-    """A PNG, or WebP where photographs make that too large."""
+    """Encodes the figure as PNG, or as WebP if photographs make the PNG too large."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
     pyplot.close(figure)
@@ -46,4 +46,9 @@ def finish(figure, alt):
     if len(buffer.getvalue()) <= MOST_PNG_BYTES:
         return Picture(buffer.getvalue(), "png", alt, width)
     image = cv2.imdecode(np.frombuffer(buffer.getvalue(), np.uint8), cv2.IMREAD_COLOR)
-    return Picture(cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, 88])[1].tobytes(), "webp", alt, width)
+    return Picture(
+        cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, 88])[1].tobytes(),
+        "webp",
+        alt,
+        width,
+    )

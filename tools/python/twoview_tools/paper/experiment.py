@@ -1,15 +1,16 @@
-"""An experiment of the paper: what it shows there, what comes of it here."""
+"""An experiment of the paper: what the paper shows, and our result."""
 
 from dataclasses import dataclass, field
 from typing import Callable, Optional
 
 
 class Missing(Exception):
-    """Data or a program that an experiment needs and that is not here."""
+    """Raised if data or a program that an experiment needs is not present."""
 
 
 def available(*makers):
-    """(what the makers give, why some give nothing, in words); Missing where none does."""
+    """Returns (the results of the makers, the reasons why some gave none). Raises Missing if none
+    gave a result."""
     found, missing = [], []
     for make in makers:
         try:
@@ -25,8 +26,8 @@ def available(*makers):
 class Table:
     caption: str
     head: list
-    rows: list  # of cells, text; the first cell of a row is its heading
-    marked: Optional[int] = None  # the row that is the default, or the paper's choice
+    rows: list  # lists of cells, which are text; the first cell of a row is its heading
+    marked: Optional[int] = None  # index of the row with the default, or with the paper's choice
 
 
 @dataclass
@@ -34,23 +35,24 @@ class Picture:
     data: bytes
     kind: str  # "png" or "webp"
     alt: str
-    width: int  # pixels at which it is drawn at most
+    width: int  # largest width at which it is shown, pixels
 
 
 @dataclass
 class Result:
-    numbers: dict  # goes into paper.json as it is
-    found: str  # sentences with the numbers
+    numbers: dict  # copied to paper.json
+    found: str  # sentences that report the numbers
     pictures: list = field(default_factory=list)
     tables: list = field(default_factory=list)
-    missing: list = field(default_factory=list)  # in words, what it had to do without
+    missing: list = field(default_factory=list)  # sentences about missing inputs
 
 
 @dataclass(frozen=True)
 class Experiment:
-    id: str  # "figure8"; of the page's anchors, the pictures' names and paper.json's keys
+    # Such as "figure8"; used in the page's anchors, the pictures' names and paper.json's keys.
+    id: str
     section: str
     title: str
     paper: str  # what the paper's figure shows
-    differs: str  # where ours is another, and why; may be empty
-    run: Callable  # Inputs -> Result
+    differs: str  # how and why our figure differs; may be empty
+    run: Callable  # a function from Inputs to a Result

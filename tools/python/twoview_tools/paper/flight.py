@@ -1,7 +1,9 @@
-"""A flight of the simulated AR.Drone through its rendered room, recorded as a real one would be.
+"""Records a flight of the simulated AR.Drone through its rendered room, as a real flight is
+recorded.
 
-`twoview drone simulate` is the drone, `twoview drone record` the recorder; the sticks are moved here, by
-AT commands over UDP. In real time: nine seconds, of which four are the take-off."""
+`twoview drone simulate` is the drone, and `twoview drone record` records it. This module moves the
+sticks with AT commands over UDP. It runs in real time: nine seconds, of which the take-off takes
+four."""
 
 import signal
 import socket
@@ -15,7 +17,7 @@ import numpy as np
 
 from .experiment import Missing
 
-# The AR.Drone 2's front lens, about.
+# Approximately the lens of the AR.Drone 2's front camera.
 CAMERA = """%YAML:1.0
 ---
 image_width: 640
@@ -32,14 +34,15 @@ distortion_coefficients: !!opencv-matrix
    data: [ -0.5, 0.25, 0., 0., 0. ]
 """
 TAKE_OFF_S, STEER_S = 4.3, 3.2
-FIRST_SEQUENCE = 1000000  # above the recorder's own commands, which the drone then leaves out
+# Higher than those of the recorder, so that the drone ignores the recorder's commands.
+FIRST_SEQUENCE = 1000000
 
 
 @dataclass(frozen=True)
 class Plan:
     name: str
     start: str  # x,y in the room, metres
-    roll: float = 0.0  # sticks: right, backward
+    roll: float = 0.0  # sticks: positive is right, backward
     pitch: float = 0.0
 
 
@@ -49,23 +52,29 @@ FORWARD = Plan("forward", "-1.5,0", pitch=-0.25)
 
 @dataclass(frozen=True)
 class Recorded:
-    folder: Path  # of drone record
+    folder: Path  # the output folder of `drone record`
     camera: Path
-    truth: np.ndarray  # a row a picture: number, seconds, x y z, qx qy qz qw, vx vy vz
+    truth: np.ndarray  # one row for each picture: number, seconds, x y z, qx qy qz qw, vx vy vz
 
 
 def free_ports(process):
     words = process.stdout.readline().replace(",", "").split()
     if len(words) < 2:
         raise Missing("the simulated drone: built without the drivers?")
-    return {name: int(words[words.index(name) + 1]) for name in ("commands", "navdata", "video", "control")}
+    return {
+        name: int(words[words.index(name) + 1])
+        for name in ("commands", "navdata", "video", "control")
+    }
 
 
 def steer(port, plan):
-    """Take-off, then the sticks."""
+    """Takes off, then moves the sticks."""
     link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     begin, sequence = time.monotonic(), FIRST_SEQUENCE
-    bits = [struct.unpack("<i", struct.pack("<f", value))[0] for value in (plan.roll, plan.pitch, 0.0, 0.0)]
+    bits = [
+        struct.unpack("<i", struct.pack("<f", value))[0]
+        for value in (plan.roll, plan.pitch, 0.0, 0.0)
+    ]
     while (now := time.monotonic() - begin) < TAKE_OFF_S + STEER_S:
         commands = [f"AT*REF={sequence},290718208\r"]
         if now > TAKE_OFF_S:
@@ -103,14 +112,47 @@ def fly_anew(inputs, plan, folder, camera, truth):
         raise Missing(f"{program} is not built")
     ports = [word for channel in ("at", "navdata", "video", "control", "recording")
              for word in (f"--{channel}-port", "0")]
-    command = [program, "drone", "simulate", *ports, "--duration", "60", "--fps", "15", "--camera", camera,
-               "--start", plan.start, "--truth", truth]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as drone:
+    command = [
+        program,
+        "drone",
+        "simulate",
+        *ports,
+        "--duration",
+        "60",
+        "--fps",
+        "15",
+        "--camera",
+        camera,
+        "--start",
+        plan.start,
+        "--truth",
+        truth,
+    ]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as drone:
         try:
             port = free_ports(drone)
-            record = [program, "drone", "record", "--host", "127.0.0.1", "--at-port", port["commands"],
-                      "--navdata-port", port["navdata"], "--video-port", port["video"], "--control-port",
-                      port["control"], "--duration", "30", "--quiet", "-o", folder / "recording"]
+            record = [
+                program,
+                "drone",
+                "record",
+                "--host",
+                "127.0.0.1",
+                "--at-port",
+                port["commands"],
+                "--navdata-port",
+                port["navdata"],
+                "--video-port",
+                port["video"],
+                "--control-port",
+                port["control"],
+                "--duration",
+                "30",
+                "--quiet",
+                "-o",
+                folder / "recording",
+            ]
             with subprocess.Popen(list(map(str, record)), stdout=subprocess.DEVNULL) as recorder:
                 time.sleep(1.0)
                 steer(port["commands"], plan)

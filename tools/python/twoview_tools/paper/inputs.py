@@ -1,4 +1,4 @@
-"""What the experiments are made from, and where it lies."""
+"""The input data of the experiments and their locations."""
 
 import json
 import os
@@ -14,20 +14,21 @@ import numpy as np
 from .. import ROOT, formats
 from .experiment import Missing
 
-# Middlebury 2014's Motorcycle pair as scikit-image has it (scripts/bootstrap): rectified, so that the
-# motion is sideways and the disparity map is the depth.
+# Middlebury 2014's Motorcycle pair as scikit-image has it (scripts/bootstrap): rectified, so that
+# the motion is sideways and the disparity map is the depth.
 MOTORCYCLE = ROOT / ".cache" / "motorcycle"
 FOCAL_PX, CX, CY, BASELINE_M = 994.978, (311.193, 342.279), 254.877, 0.193001
 
 
 def library():
-    """The package twoview, of this source tree, on the library that TWOVIEW_LIBRARY names."""
+    """The package twoview of this source tree, which loads the library that TWOVIEW_LIBRARY
+    names."""
     import twoview
     return twoview
 
 
 def read_colour(path):
-    """BGR."""
+    """Reads an image as BGR."""
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
         raise Missing(f"{path} is no image")
@@ -35,22 +36,22 @@ def read_colour(path):
 
 
 def grey(colour):
-    """The luma that the program uses."""
+    """The luma of an image, computed as the program does."""
     return cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY)
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two images with their cameras and what is known of them: x1 = R x0 + t, |t| = 1."""
+    """Two images with their cameras and what is known of their truth: x1 = R x0 + t, |t| = 1."""
 
     name: str
-    colour: tuple  # of BGR images
-    cameras: tuple  # of twoview.Camera
+    colour: tuple  # two BGR images
+    cameras: tuple  # two twoview.Camera
     R: np.ndarray
     t: np.ndarray
     baseline_m: float
-    depth0: Optional[np.ndarray] = None  # metres, not finite where unknown
-    truth_px: float = 2.0  # a right match lies as near to the true epipolar line
+    depth0: Optional[np.ndarray] = None  # metres; not finite where unknown
+    truth_px: float = 2.0  # largest distance of a correct match from the true epipolar line, pixels
 
     @cached_property
     def grey(self):
@@ -58,7 +59,7 @@ class Pair:
 
     @property
     def true_F(self):
-        """Of pixels, Frobenius norm 1."""
+        """The true F for pixels, with Frobenius norm 1."""
         E = np.cross(np.eye(3), self.t) @ self.R  # [t]x R
         F = np.linalg.inv(self.cameras[1].K).T @ E @ np.linalg.inv(self.cameras[0].K)
         return F / np.linalg.norm(F)
@@ -66,20 +67,22 @@ class Pair:
 
 @dataclass(frozen=True)
 class Inputs:
-    build: Path  # the build folder: bin/twoview, lib/libtwoview.so
-    data: Optional[Path]  # TWOVIEW_DATA
-    fixtures: Optional[Path]  # TWOVIEW_ARDRONE_FIXTURES
-    scratch: Path  # a folder that ends with the run
+    build: Path  # the build folder with bin/twoview and lib/libtwoview.so
+    data: Optional[Path]  # the folder that TWOVIEW_DATA names
+    fixtures: Optional[Path]  # the folder that TWOVIEW_ARDRONE_FIXTURES names
+    scratch: Path  # a temporary folder, which is deleted at the end of the run
 
     def program(self, *words, statuses=(0,)):
-        """Runs `twoview WORDS...`; what it wrote to stdout."""
+        """Runs `twoview WORDS...`. Returns its stdout."""
         path = self.build / "bin" / "twoview"
         if not path.is_file():
             raise Missing(f"{path} is not built")
         done = subprocess.run([path, *map(str, words)], capture_output=True, text=True, timeout=120,
                               check=False)
         if done.returncode not in statuses:
-            raise RuntimeError(f"twoview {words[0]}: status {done.returncode}: {done.stderr.strip()}")
+            raise RuntimeError(
+                f"twoview {words[0]}: status {done.returncode}: {done.stderr.strip()}"
+            )
         return done.stdout
 
     def of_data(self, *parts):
@@ -99,7 +102,9 @@ class Inputs:
         tv = library()
         if not MOTORCYCLE.is_dir():
             raise Missing("the Motorcycle pair: run scripts/bootstrap")
-        colour = tuple(read_colour(MOTORCYCLE / f"motorcycle_{side}.png") for side in ("left", "right"))
+        colour = tuple(
+            read_colour(MOTORCYCLE / f"motorcycle_{side}.png") for side in ("left", "right")
+        )
         height, width = colour[0].shape[:2]
         with np.load(MOTORCYCLE / "motorcycle_disp.npz") as archive:
             disparity = archive[archive.files[0]].astype(float)
@@ -110,15 +115,17 @@ class Inputs:
                     BASELINE_M, depth)
 
     def listed_pair(self, folder, name0, name1, title="", truth_px=2.0):
-        """A pair of a set's pairs.txt, of a set without distortion."""
+        """A pair of a set's pairs.txt; the set's cameras must have no distortion."""
         tv = library()
         listed = formats.read_pairs(str(self.of_data(folder, "pairs.txt")))
         pair = next((p for p in listed if (p.name0, p.name1) == (name0, name1)), None)
         if pair is None:
             raise Missing(f"{name0} {name1} in {folder}/pairs.txt")
         colour = tuple(read_colour(self.of_data(folder, "images", n)) for n in (name0, name1))
-        cameras = tuple(tv.Camera(image.shape[1], image.shape[0], k[0, 0], k[1, 1], k[0, 2], k[1, 2])
-                        for image, k in zip(colour, (pair.K0, pair.K1)))
+        cameras = tuple(
+            tv.Camera(image.shape[1], image.shape[0], k[0, 0], k[1, 1], k[0, 2], k[1, 2])
+            for image, k in zip(colour, (pair.K0, pair.K1))
+        )
         baseline = float(np.linalg.norm(pair.t))
         return Pair(title or folder, colour, cameras, pair.R, pair.t / baseline, baseline,
                     truth_px=truth_px)
@@ -133,7 +140,7 @@ def from_environment(build, scratch):
 
 
 def machine():
-    """The processor's name."""
+    """The name of the processor."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as f:
             return next(line.split(":")[1].strip() for line in f if line.startswith("model name"))

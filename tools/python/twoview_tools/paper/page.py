@@ -1,4 +1,4 @@
-"""The page: one file that needs no network."""
+"""Makes the page: one file that needs no network."""
 
 import base64
 import datetime
@@ -26,7 +26,9 @@ def render(outcomes, version, seconds):
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True,
                                      undefined=jinja2.StrictUndefined)
     environment.filters["base64"] = lambda data: base64.b64encode(data).decode()
-    style = PROGRAM_STYLE.read_text(encoding="utf-8") + (PARTS / "page.css").read_text(encoding="utf-8")
+    style = PROGRAM_STYLE.read_text(encoding="utf-8") + (PARTS / "page.css").read_text(
+        encoding="utf-8"
+    )
     return environment.from_string((PARTS / "page.html").read_text(encoding="utf-8")).render(
         sections=sections(outcomes), style=style, version=version, seconds=seconds,
         missing=[o for o in outcomes if o["problem"]],
