@@ -9,7 +9,9 @@
 
 namespace tv {
 
-inline double dot(const double a[3], const double b[3]) {
+// Inlined even where the compiler optimises for size: as a call, it adds 4 % to the instructions of
+// the bundle adjustment.
+__attribute__((always_inline)) inline double dot(const double a[3], const double b[3]) {
   return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 
