@@ -20,7 +20,7 @@ using Counters = std::map<std::string, double>;
 struct Row {
   std::string name;
   std::function<void()> work;       // timed; called once untimed beforehand
-  std::function<Counters()> found;  // what the last call gave: counts, errors
+  std::function<Counters()> found;  // counts and errors of the last call's results
   double units = 1;                 // keypoints, points, samples .. that one call works on
 };
 
@@ -43,8 +43,8 @@ Context make_context(int width, int height, int max_keypoints, int max_matches =
 // Ends the program where a call that cannot fail has failed.
 void require(tv_status status, const char* what);
 
-// Runs all rows. Arguments are Google Benchmark's; its defaults here are 15 repetitions in random
-// turn.
+// Runs all rows. Arguments are Google Benchmark's; its defaults here are 15 repetitions, which
+// are run in random order with those of the other rows.
 int run(int argc, char** argv);
 
 }  // namespace bench

@@ -32,7 +32,7 @@ struct Options {
   }
 };
 
-// The process's time, as all times here.
+// The CPU time of the process, which all times in this file are.
 uint64_t now_ns(void*) {
   timespec time;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);

@@ -23,7 +23,9 @@ constexpr int kNumSamples = 200;
 static_assert(kNumSamples % TVK_WIDTH == 0, "whole groups");
 
 struct Samples {
-  std::vector<double> rays[2], essentials;  // 15 and 15 numbers a sample, the true matrix's 9
+  // Of each sample: five unit rays of each view (15 numbers a view), and the true essential matrix
+  // (9 numbers).
+  std::vector<double> rays[2], essentials;
   Solutions solutions = Solutions(kNumSamples);
 };
 

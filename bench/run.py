@@ -3,8 +3,8 @@
 
 Runs the programs of bench/ (OpenCV of the system, OpenGV, libcvd) and the peers that are reached
 through Python (OpenCV 5, faiss, PoseLib, pycolmap). One thread; a time is the process's CPU time,
-the median of the repetitions, all systems of a program in random turn. docs/performance.md has the
-protocol and the numbers.
+the median of the repetitions, which a program runs in random order over all its systems.
+docs/performance.md has the protocol and the numbers.
 """
 
 import os

@@ -128,10 +128,13 @@ void triangulate(int method, const Scene& scene, std::vector<tv_point>* points) 
 }
 
 struct Errors {
-  double cost_px;   // root mean square distance to the given pixels, of points before both cameras
-  double truth_px;  // and to those without noise
-  double percent_50, percent_95;  // the error in space, of the distance from camera 0, of all
-  double percent_behind;          // points that a camera does not see
+  // Root mean square distances between the projections of the points that both cameras see and the
+  // given pixels (cost_px), or the pixels without noise (truth_px).
+  double cost_px;
+  double truth_px;
+  // Quantiles over all points: the error of the position in per cent of the distance from camera 0.
+  double percent_50, percent_95;
+  double percent_behind;  // points that a camera does not see
 };
 
 Errors errors_of(const Scene& scene, const std::vector<tv_point>& points) {

@@ -39,7 +39,7 @@ static int load_header(ardrone_replay *replay, ardrone_pave_header *header) {
   status = ardrone_pave_decode(replay->header, ARDRONE_PAVE_MIN_HEADER, header);
   size = ardrone_get16(replay->header + 6);
   if (status == TVS_NONE) {
-    const size_t more = size - ARDRONE_PAVE_MIN_HEADER; /* up to ARDRONE_PAVE_MAX_HEADER in all */
+    const size_t more = size - ARDRONE_PAVE_MIN_HEADER; /* size <= ARDRONE_PAVE_MAX_HEADER */
     if (fread(replay->header + ARDRONE_PAVE_MIN_HEADER, 1, more, file) != more) return 0;
     status = ardrone_pave_decode(replay->header, size, header);
   }

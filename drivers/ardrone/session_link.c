@@ -38,7 +38,7 @@ static void take_time(ardrone_session *session, tvs_time *time) {
                     session->now_ns, time);
 }
 
-/* The yaw that becomes 0: the first one of each run of the drone's clock. */
+/* Takes the first yaw of each run of the drone's clock as the zero of the yaws that follow. */
 static void take_psi0(ardrone_session *session, uint32_t clock_id) {
   const double radian_per_mdeg = 1.7453292519943295e-5;
   const float psi = session->navdata.demo.psi_mdeg;

@@ -56,8 +56,8 @@ static int64_t uncertainty_at(const tvs_clock *clock, int64_t host_ns) {
          drift_over(clock, host_ns - clock->offset_host_ns);
 }
 
-/* host - device: the least delay is somewhere between 0 and what the options say, so half of
-   that is taken off. */
+/* Host time minus device time. The least delay is between 0 and options.least_delay_ns, so half
+   of that is subtracted. */
 static int64_t shift_of(const tvs_clock *clock) {
   return clock->offset_ns - clock->options.least_delay_ns / 2;
 }

@@ -434,7 +434,7 @@ class Surroundings(cli.CliTest):
                 while not any("matches.png" in name for name in self.listing()):
                     self.assertLess(time.monotonic(), deadline)
                     time.sleep(0.01)
-                # the run had begun to write temporary files
+                # Temporary files exist now, and the signal must make the program remove them.
                 self.assertGreater(len(self.listing()), 3)
                 run.send_signal(number)
                 self.assertEqual(run.wait(timeout=60), -number)

@@ -98,7 +98,8 @@ double angle_deg(double cosine) {
 }
 
 void test_a_ray_along_an_axis_hits_something() {
-  // the middle column and row have rays parallel to an axis plane
+  // The rays of the middle column and of the middle row have a component of 0, and the renderer
+  // divides by the components. Each pixel must still have a finite depth.
   const Film level = film(pose(0, 0, 0, {0, 0, -1.2}));
   for (const float depth : level.depth) TEST_ASSERT_TRUE(depth > 0 && depth < 20);
 }

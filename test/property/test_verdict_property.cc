@@ -173,7 +173,7 @@ void test_degenerate_points_end_and_give_no_pose(void) {
       const double x = scene::uniform(&random, 0, 600), y = scene::uniform(&random, 0, 470);
       double p[4] = {x, y, x, y};                          // 0: the same image twice
       if (kind == 1) p[0] = p[1] = p[2] = p[3] = 100;      // one point
-      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;  // on a line, shifted
+      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;  // on a line, all moved by 3 px
       if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;      // on a line, in reverse order
       // all matches share their point of view 0
       if (kind == 4) p[0] = p[1] = 10;

@@ -81,7 +81,7 @@ struct Soak {
   // For each run of the world frame: the yaw that is its zero, and the number of the drone's boot.
   std::map<uint32_t, double> psi0;
   std::map<uint32_t, int> boot_of;
-  bool may_restart = true;  // whether the next command may have the number 1
+  bool may_restart = true;  // true if numbering may start again at 1 with the next command
   long last_command = 0;
   int num_falls = 0, num_take_offs_asked = 0;
 

@@ -42,9 +42,9 @@ typedef struct tvs_clock {
   uint32_t id_step;
   /* In this run of the clock. */
   int64_t num_observed;
-  /* The latest so far. */
+  /* The latest time of the device so far, unwrapped. */
   int64_t last_device_ns;
-  /* When that arrived. */
+  /* When that time was received. */
   int64_t last_host_ns;
   /* Host = device + offset, by the least delay. */
   int64_t offset_ns;

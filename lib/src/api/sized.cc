@@ -6,7 +6,7 @@
 namespace tv {
 namespace {
 
-constexpr uint32_t kLargest = 4096;  // bytes; a larger number was never a sizeof
+constexpr uint32_t kLargest = 4096;  // bytes; no struct is larger, so the field was not set
 
 // struct_size is the first field of every struct that grows.
 uint32_t size_of(const void* object) {
@@ -51,7 +51,8 @@ tv_status read_sized(const void* object, size_t known_size, void* checked) {
   const size_t size = smaller(known_size, size_of(object));
   const uint32_t own = static_cast<uint32_t>(known_size);
   std::memcpy(checked, object, size);
-  std::memcpy(checked, &own, sizeof own);  // *checked may be passed to another call
+  // struct_size becomes that of this library, so that *checked may be passed to another call.
+  std::memcpy(checked, &own, sizeof own);
   return TV_OK;
 }
 

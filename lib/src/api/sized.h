@@ -17,10 +17,10 @@ inline void init_zeros(void* object, size_t struct_size) {
   init_sized(object, struct_size, object, 0);
 }
 
-// Whether struct_size can be that of a struct of any release.
+// TV_OK if struct_size can be that of a struct of any release, else TV_ERR_STRUCT_SIZE.
 tv_status check_sized(const void* object);
 
-// The same, and whether all bytes beyond known_size are zero.
+// Like check_sized; TV_ERR_STRUCT_SIZE also if a byte beyond known_size is not zero.
 tv_status check_sized_input(const void* object, size_t known_size);
 
 // Copies an input over the defaults that *checked holds; a null input keeps the defaults. On an

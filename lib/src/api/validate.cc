@@ -10,7 +10,7 @@ bool within(int32_t value, int32_t low, int32_t high) { return value >= low && v
 // Written so that NaN is not within.
 bool within(float value, float low, float high) { return value >= low && value <= high; }
 
-// Bounded so that no row's offset overflows.
+// True if the stride is at least the width, and so small that no row's offset overflows.
 bool is_stride(int64_t stride_bytes, int32_t width) {
   return stride_bytes >= width && stride_bytes <= INT64_MAX / 65536;
 }

@@ -11,7 +11,7 @@ namespace tv {
 
 using Vec2 = Eigen::Matrix<double, 2, 1>;
 using Vec3 = Eigen::Matrix<double, 3, 1>;
-using Mat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;  // as the C API stores it
+using Mat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;  // row-major, as in the C API
 using Mat23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 using Mat32 = Eigen::Matrix<double, 3, 2>;
 

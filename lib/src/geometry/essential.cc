@@ -91,8 +91,9 @@ DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, dou
   DepthSigns d;
   d.depth0 = af * ft - ff * at;
   d.depth1 = aa * ft - af * at;
-  // depth0 / (ff |a|) = -(unit a's part across f1) . t: turning a by angle_rad moves it by at most
-  // angle_rad times the length of t's part across f1; likewise depth1.
+  // depth0 / (ff |a|) = -p . t, where p is the component of a / |a| perpendicular to ray1. A turn
+  // of a by angle_rad changes it by at most angle_rad times the length of the component of t
+  // perpendicular to ray1. The same holds for depth1 with a and ray1 exchanged.
   const double turn = angle_rad * angle_rad * aa * ff;
   d.tolerance0_sq = turn * (ff - ft * ft);
   d.tolerance1_sq = turn * (aa - at * at);

@@ -21,7 +21,7 @@ struct RobustLoss {
   double scale_px;
 };
 
-// Least squares: the truncated loss, with a scale that no residual reaches.
+// Plain least squares, written as a truncated loss: no residual reaches this scale.
 inline constexpr RobustLoss kLeastSquares{Loss::kTruncated, 1e140};
 
 // Normal equations of sum rho(r_i^2) over the listed matches for a model matrix M with at most nine

@@ -156,7 +156,7 @@ tvk_triangulate_pair kernel_pair(const TriangulationPair& pair) {
 bool kernel_leaves_some(tv_triangulation method, const TriangulationPair& pair,
                         const double* pixels0, const double* pixels1, size_t num,
                         tv_point* points) {
-  constexpr size_t kAtOnce = size_t{1} << 30;  // the kernel counts in 32 bits
+  constexpr size_t kAtOnce = size_t{1} << 30;  // matches a call: the kernel's count is an int32_t
   const tvk_table* kernels = tvk_select(TV_KERNELS_AUTO);
   const tvk_triangulate_pair p = kernel_pair(pair);
   bool leaves = false;
@@ -196,7 +196,8 @@ TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& cam
   set_pencil_axes(pair.center1, R, &pair.pencil);
   pair.has_steps = has_image_plane(camera0) && has_image_plane(camera1);
   if (pair.has_steps) {
-    const Vec3 ahead(0.0, 0.0, 1.0);  // the steps of an image plane are the same everywhere
+    // On an image plane the steps are the same for all rays, so that any ray may be given here.
+    const Vec3 ahead(0.0, 0.0, 1.0);
     set_pencil_steps(frame_of(camera0, ahead), frame_of(camera1, ahead), &pair.pencil);
   }
   return pair;

@@ -26,8 +26,9 @@ bool is_triangulation_method(int method);
 Correction correct_match(tv_triangulation method, const TriangulationPair& pair,
                          const RayFrame& frame0, const RayFrame& frame1);
 
-// The same for pixels, through the lens and back. False: a pixel has no ray, or the lens does not
-// see the corrected one; corrected is untouched.
+// Corrects a match like correct_match, but from pixels to pixels. Returns false, and leaves
+// `corrected` as it was, if a pixel has no ray, if the lens does not see a corrected ray, or if the
+// correction is not finite.
 bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
                     const Vec2& pixel1, Vec2 corrected[2]);
 

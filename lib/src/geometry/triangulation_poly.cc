@@ -412,7 +412,8 @@ double search_arc(const Arc& arc, double* best) {
   return best_t;
 }
 
-// A plane v, with its gradient and its numerator |alpha . v| in each image.
+// A plane v of the pencil. It cuts image i in a line, which is above[i] / |gradient[i]| pixels away
+// from the point alpha[i] of the match.
 struct Plane {
   V2 v;
   V2 gradient[2];

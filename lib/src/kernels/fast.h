@@ -15,7 +15,7 @@ static const int8_t fast_circle_column[16] = {0, 1,  2,  3,  3,  3,  2,  1,
    the two cases. It is not inlined because it is long and called from two places. */
 #define BEST_ARC(name, lesser, greater)                                                            \
   static TVK_NOINLINE byte_lanes name(const byte_lanes p[16], int32_t arc) {                       \
-    byte_lanes run2[8], run4[8], least[8], best; /* runs start at pixel 2i + 1 */                  \
+    byte_lanes run2[8], run4[8], least[8], best; /* [i]: of the run from pixel 2i + 1 on */        \
     int32_t i;                                                                                     \
     for (i = 0; i < 8; ++i) run2[i] = lesser(p[2 * i + 1], p[(2 * i + 2) & 15]);                   \
     for (i = 0; i < 8; ++i) run4[i] = lesser(run2[i], run2[(i + 1) & 7]);                          \
@@ -98,7 +98,7 @@ static void fast_score_row(const uint8_t *const rows[7], int32_t width, int32_t 
     rows = copies;
     out = narrow_scores;
   }
-  for (x = RIM; x < end; x += TVK_BYTES) { /* the last may overlap the one before */
+  for (x = RIM; x < end; x += TVK_BYTES) { /* the last block may overlap its predecessor */
     const int32_t at = x < last ? x : last;
     bytes_store(out + at, fast_scores(rows, at, arc, threshold));
   }
@@ -169,7 +169,7 @@ static int32_t suppress_row(const uint8_t *prev, const uint8_t *cur, const uint8
     }
     return count;
   }
-  for (x = 1; x < end; x += TVK_BYTES) { /* the last may overlap the one before */
+  for (x = 1; x < end; x += TVK_BYTES) { /* the last block may overlap its predecessor */
     const int32_t at = x < last ? x : last;
     uint64_t kept = suppress(prev, cur, next, at) & ~(uint64_t)0 << (x - at) * TVK_BYTES_BITS;
     for (; kept != 0; kept &= kept - 1) {

@@ -27,7 +27,7 @@ typedef struct tvk_nearest {
   int32_t best, second, idx;
 } tvk_nearest;
 
-#define TVK_CIRCLE_RADIUS 3 /* in pixels, of the segment test */
+#define TVK_CIRCLE_RADIUS 3 /* radius of the segment test's circle, in pixels */
 
 #define TVK_PATCH_SIDE 16  /* samples along each side of a descriptor's patch: 15 gradients */
 #define TVK_ORIENT_SIDE 12 /* samples along each side of the orientation's patch */

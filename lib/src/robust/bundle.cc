@@ -57,8 +57,9 @@ LossAt loss_at(const tv_bundle_options& options, double s) {
 struct Sums {
   double cost, sum_sq;
   double gradient[5];
-  double upper[15];   // of sum rho' a a': positive semidefinite
-  double newton[15];  // of sum (rho' + 2 rho'' r^2) a a': the loss's own curvature
+  // Upper triangles of two approximations of the Hessian.
+  double upper[15];   // sum rho' a a': positive semidefinite
+  double newton[15];  // sum (rho' + 2 rho'' r^2) a a': with the loss's second derivative
 };
 
 void add_match(const tv_bundle_options& options, const BundleMatch& match, const Elimination& e,

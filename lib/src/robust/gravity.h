@@ -12,8 +12,8 @@ struct GravityPrior {
   double weight = 1;     // (0, 1]: less where the points contradict it (gravity_weight)
 };
 
-// The prior of a caller's vectors of any length; not known when sigma_rad is 0 or when a vector has
-// no direction.
+// Makes the prior of the caller's two gravity vectors, which need not be unit vectors. The prior
+// has known = false if sigma_rad is 0, or if a vector is zero or not finite.
 GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], double sigma_rad);
 
 // Adds the prior's rows to the normal equations of PoseModel. With h = R down0, the term weight

@@ -13,7 +13,7 @@ namespace tv {
 // many have one at a place where a lattice has none, which is the number expected by chance.
 struct Lattice {
   double share;   // of the neighbours, after this subtraction; a full lattice has nearly 1
-  double sigmas;  // the difference in standard deviations of a count of chance
+  double sigmas;  // the same difference, divided by its standard deviation for random points
 };
 
 // xy: num x 2. listed: null, or the indices of the points whose neighbours are examined. Of a list

@@ -205,7 +205,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
     const Coordinates c = coordinates(problem, i);
     const double sum =
         (std::fabs(c.v[0]) + std::fabs(c.v[1])) + (std::fabs(c.v[2]) + std::fabs(c.v[3]));
-    if (!(sum < kMaxCoordinates)) continue;  // NaN, infinite, or outside any image
+    if (!(sum < kMaxCoordinates)) continue;  // drops NaN, infinities, huge values
     PixelRay ray;
     bool usable = true;
     for (int v = 0; v < 2 && usable && problem.calibrated; ++v) {

@@ -28,9 +28,10 @@ struct Matches {
   int num_all = 0;
   int num_unique() const { return pairs.num; }
   int32_t* order = nullptr;  // pairs' k-th match is the caller's order[k]
-  Mat3 intrinsics[2];        // from the rays' plane to pixels (undistorted): K of the view, or,
-                             // uncalibrated, of the pinhole that normalises its points
-  double area_px = 1;        // px^2, of image 1, or, uncalibrated, of the box around its points
+  // Of each view, the map from the plane of the rays to undistorted pixels: K of the camera, or,
+  // for uncalibrated views, K of the pinhole that normalises the points.
+  Mat3 intrinsics[2];
+  double area_px = 1;  // px^2, of image 1, or, uncalibrated, of the box around its points
 };
 
 size_t matches_bytes(int max_matches);

@@ -15,7 +15,7 @@ namespace {
 constexpr int kMostSamples = 400;
 constexpr double kConfidence = 0.95;
 constexpr int kFewestInliers = 12;
-constexpr int kMaxLeft = 512;  // of more matches, this many are searched, evenly spaced
+constexpr int kMaxLeft = 512;  // if more matches remain, this many, evenly spaced, are searched
 
 // A copy of the listed matches alone.
 Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena& arena) {

@@ -24,7 +24,8 @@ constexpr int kSearchSide = 1280;    // longer side of the image that is searche
 constexpr int kThumbnailSide = 400;  // longer side of a thumbnail on the contact sheet, pixels
 // An image is dark if fewer than 1 % of its pixels are above this grey level.
 constexpr int kDarkLevel = 40;
-// The smallest part of a board that is reported.
+// A chessboard that is not the requested one, or a part of the requested one, is reported only if
+// at least this many inner corners are seen in each direction.
 const cv::Size kSmallestBoard(3, 3);
 // In a sharp picture of any size the board's edges rise within 2 to 4 px.
 constexpr double kMaxRisePx = 5, kMaxRiseOfMedian = 1.8;

@@ -23,8 +23,8 @@ enum class Reason {
   kSurplus,       // beyond --max-views
   kOutlier        // its error is far above that of the other views
 };
-const char* reason_name(Reason reason);   // "partial_board", as in JSON
-const char* reason_words(Reason reason);  // "only a part of the board is seen"
+const char* reason_name(Reason reason);   // for JSON: "partial_board" and so on
+const char* reason_words(Reason reason);  // for people: "only a part of the board is seen"
 
 struct BoardView {
   std::string name;

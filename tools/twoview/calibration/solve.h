@@ -21,7 +21,7 @@ std::vector<std::string> distortion_names(Lens lens);
 
 // The estimated pose and the residuals of one view.
 struct ViewFit {
-  size_t view = 0;  // index among the views
+  size_t view = 0;  // index of its BoardView among all views
   double rms_px = 0;
   double tilt_deg = 0;  // between the board's normal and the line of sight to its middle
   cv::Matx33d R;        // camera_from_board

@@ -141,7 +141,7 @@ typedef enum ardrone_legacy {
   ARDRONE_AFLIGHT,
   /* 22 arguments: a pose measured from outside. */
   ARDRONE_VICON,
-  /* How many there are. */
+  /* The number of these commands. */
   ARDRONE_NUM_LEGACY
 } ardrone_legacy;
 

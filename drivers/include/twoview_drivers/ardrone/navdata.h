@@ -241,7 +241,7 @@ typedef struct ardrone_phys_measures {
 
 /* ARDRONE_TAG_GYROS_OFFSETS. */
 typedef struct ardrone_gyros_offsets {
-  /* What the gyroscopes say at rest, raw units. */
+  /* The gyroscopes' readings at rest, raw units. */
   float offset[3];
 } ardrone_gyros_offsets;
 
@@ -259,9 +259,9 @@ typedef struct ardrone_references {
   float vx, vy, theta_mod, phi_mod, k_vx, k_vy;
   /* Which gains. */
   uint32_t k_mode;
-  /* The controller's wish; their units are not documented. */
+  /* What a command of the controller requests; the units are not documented. */
   float ui_time, ui_theta, ui_phi, ui_psi, ui_psi_accuracy;
-  /* The number of the command that it came by. */
+  /* The sequence number of that command. */
   int32_t ui_sequence;
 } ardrone_references;
 
@@ -307,11 +307,11 @@ typedef struct ardrone_altitude {
   int32_t reference_mm, raw_mm;
   /* The observer's state; units m and s. */
   float observed_accel_z, observed_altitude, observed_x[3];
-  /* The mode of what computes it. */
+  /* The observer's mode, raw. */
   uint32_t observed_state;
   /* Its units are m and s. */
   float estimated_v[2];
-  /* The mode of what computes it. */
+  /* The velocity estimator's mode, raw. */
   uint32_t estimated_state;
 } ardrone_altitude;
 
@@ -329,7 +329,7 @@ typedef struct ardrone_vision_flow {
 
 /* ARDRONE_TAG_VISION. */
 typedef struct ardrone_vision {
-  /* The mode of what computes it. */
+  /* The on-board vision's mode, raw. */
   uint32_t state;
   /* Raw. */
   int32_t misc;
@@ -345,15 +345,15 @@ typedef struct ardrone_vision {
   uint32_t capture_ms;
   /* Body; turns since the picture before, radians. */
   float velocity_mm_s[3], delta_phi, delta_theta, delta_psi;
-  /* A place to hold: there is one; it was set anew. */
+  /* The place to hold: whether there is one; whether it was set anew. */
   uint32_t gold_defined, gold_reset;
-  /* Where it is; its unit is not documented. */
+  /* The position of the place to hold; its unit is not documented. */
   float gold_x, gold_y;
 } ardrone_vision;
 
 /* ARDRONE_TAG_VISION_PERF. */
 typedef struct ardrone_vision_perf {
-  /* Times; its unit is not documented. */
+  /* Times; their unit is not documented. */
   float size, corners, compute, tracking, translation, update, custom[20];
 } ardrone_vision_perf;
 
@@ -426,14 +426,13 @@ typedef struct ardrone_pressure {
 typedef struct ardrone_magneto {
   /* As converted. */
   int16_t raw[3];
-  /* Along the body's axes, milligauss: the field, the same rectified, and the offset, all in
-     that unit. */
+  /* Along the body's axes, in milligauss: the field, the rectified field, the offset. */
   float field_mg[3], rectified[3], offset[3];
   /* By the magnetometer, the gyroscope, both. */
   float heading_deg, heading_gyro_deg, heading_fusion_deg;
   /* 1: yes. */
   uint8_t calibrated;
-  /* The mode of what computes it. */
+  /* The magnetometer's mode, raw. */
   uint32_t state;
   /* Of the calibration's sphere; their units are not documented. */
   float radius, error_mean, error_variance;
@@ -459,7 +458,7 @@ typedef struct ardrone_kalman_pressure {
   uint32_t rejects_ultrasound;
   /* Their units are not documented. */
   float multisinus, climb_altitude;
-  /* Of an identification flight. */
+  /* Raw; of a flight that identifies the drone's dynamics. */
   uint32_t multisinus_flag, multisinus_start;
 } ardrone_kalman_pressure;
 

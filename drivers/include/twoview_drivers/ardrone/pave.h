@@ -42,7 +42,7 @@ typedef enum ardrone_pave_codec {
 
 /* What the payload holds. */
 typedef enum ardrone_pave_type {
-  /* The header does not say. */
+  /* The header does not name the picture's type. */
   ARDRONE_PAVE_TYPE_UNKNOWN,
   /* An IDR picture with its parameter sets: decoding can begin here. */
   ARDRONE_PAVE_IDR,

@@ -69,8 +69,8 @@ typedef struct ardrone_session_options {
      itself (ardrone_pave_skip_to_latest), which keeps the latency low. 0: take every packet, as a
      recorder does. */
   int skip_to_latest;
-  /* 1: set keys under ids made from `name` (the drone's multi-configuration). A video_codec implies
-     it. */
+  /* 1: set each key for session, profile and application ids that are made from `name` (the drone's
+     multi-configuration). A video_codec implies it. */
   int use_ids;
   /* 1: send nothing but the wake-up, as a replay needs. Default 0. */
   int listen_only;

@@ -19,7 +19,8 @@ from .trajectory import write_trajectory
 
 
 def _choose(names, pairs_file, overlap):
-    """The pairs of a file, all of whose images must exist; without a file, pairs of the names."""
+    """The pairs to import: those of pairs_file, whose images must all be among `names`. Without a
+    file: each image with the next `overlap` images, or all pairs if overlap is 0."""
     if not pairs_file:
         return sequential(names, overlap) if overlap else exhaustive(names)
     pairs = read_pairs(pairs_file)

@@ -36,7 +36,7 @@ def rotation_deg(R):
 
 
 def to_pinhole(camera, pixels):
-    """The pixels at which a camera without distortion sees the same points."""
+    """Moves each pixel to where a pinhole camera of the same K sees the same scene point."""
     rays, _ = library().camera_unproject_points(camera, np.ascontiguousarray(pixels, float))
     seen = rays @ camera.K.T
     return seen[:, :2] / seen[:, 2:]
