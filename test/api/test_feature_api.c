@@ -160,6 +160,7 @@ static void test_options_out_of_range_are_refused(void) {
 static void test_output_pointers_are_checked(void) {
   tv_keypoint point = {50, 50, 4, 0, 1, 0};
   int32_t count = -7;
+  const tv_image other = api_image(mask_pixels, WIDTH, HEIGHT, WIDTH);
   tv_context *c = a.context;
   const tv_image *v = &image;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_detect(c, v, NULL, NULL, keypoints, CAP, NULL));
@@ -188,6 +189,16 @@ static void test_output_pointers_are_checked(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_describe(c, v, NULL, keypoints, 2, (uint8_t *)keypoints));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(c, v, NULL, NULL, 0, NULL));
+  /* no output overlaps the image or the mask */
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_detect(c, &other, v, NULL, (tv_keypoint *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, tv_extract(c, v, NULL, NULL, (tv_keypoint *)v->data, descriptors, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_extract(c, &other, v, NULL, keypoints, (uint8_t *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_orient(c, v, NULL, &point, 1, (tv_keypoint *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_describe(c, v, NULL, &point, 1, (uint8_t *)v->data));
   TEST_ASSERT_EQUAL_INT(-7, count);
   TEST_ASSERT_TRUE(api_is_pattern(keypoints, sizeof keypoints));
   TEST_ASSERT_TRUE(api_is_pattern(descriptors, sizeof descriptors));
