@@ -214,6 +214,9 @@ static int run_stages(tv_context *context, const tv_camera *camera) {
          (int)features[0].it.num, (int)features[1].it.num, (int)num_matches, (int)num_guided,
          tv_kind_string((tv_kind)pose.it.kind), tv_verdict_string((tv_verdict)pose.it.verdict),
          (int)pose.it.num_inliers, pose.it.t[0], pose.it.t[1], pose.it.t[2], adjusted.it.rms_px);
+  REFUSES_UNKNOWN(bundle.it,
+                  tv_adjust_two_view(context, &corrected, &corrected, &pairs.it, &bundle.it,
+                                     pose.it.R, pose.it.t, points, &adjusted.it));
   memset(times, PATTERN, sizeof times);
   CHECK(tv_context_take_times(context, times, TV_NUM_STAGES + 1) == TV_OK);
   CHECK(times[TV_NUM_STAGES] == 0 && is_pattern((uint8_t *)&times[TV_NUM_STAGES + 1], 8));

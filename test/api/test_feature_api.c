@@ -160,6 +160,7 @@ static void test_options_out_of_range_are_refused(void) {
 static void test_output_pointers_are_checked(void) {
   tv_keypoint point = {50, 50, 4, 0, 1, 0};
   int32_t count = -7;
+  const tv_image other = api_image(mask_pixels, WIDTH, HEIGHT, WIDTH);
   tv_context *c = a.context;
   const tv_image *v = &image;
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_detect(c, v, NULL, NULL, keypoints, CAP, NULL));
@@ -188,6 +189,16 @@ static void test_output_pointers_are_checked(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_describe(c, v, NULL, keypoints, 2, (uint8_t *)keypoints));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(c, v, NULL, NULL, 0, NULL));
+  /* no output overlaps the image or the mask */
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_detect(c, &other, v, NULL, (tv_keypoint *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_OVERLAP, tv_extract(c, v, NULL, NULL, (tv_keypoint *)v->data, descriptors, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_extract(c, &other, v, NULL, keypoints, (uint8_t *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_orient(c, v, NULL, &point, 1, (tv_keypoint *)v->data, 1, &count));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_describe(c, v, NULL, &point, 1, (uint8_t *)v->data));
   TEST_ASSERT_EQUAL_INT(-7, count);
   TEST_ASSERT_TRUE(api_is_pattern(keypoints, sizeof keypoints));
   TEST_ASSERT_TRUE(api_is_pattern(descriptors, sizeof descriptors));
@@ -370,6 +381,22 @@ static void test_a_blank_or_tiny_image_has_no_corners(void) {
   TEST_ASSERT_TRUE(api_is_pattern(keypoints, sizeof keypoints));
 }
 
+/* A corner of level 7 with the largest keypoint_size has a size of 4096 pixels. An image of one row
+   has no octave but the first, so that the patch reaches far beyond it. */
+static void test_the_largest_size_is_described_in_any_image(void) {
+  const tv_keypoint points[3] = {
+      {0, 0, 4096, 0.8f, 1, 0}, {WIDTH, 0, 4096, -2.4f, 1, 0}, {9e4f, -9e4f, 4096, 2, 1, 0}};
+  const int32_t sizes[3][2] = {{WIDTH, HEIGHT}, {WIDTH, 1}, {1, HEIGHT}};
+  int32_t count = 0, k;
+  for (k = 0; k < 3; ++k) {
+    image = api_image(pixels, sizes[k][0], sizes[k][1], WIDTH);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(a.context, &image, &options, points, 3, descriptors));
+    TEST_ASSERT_EQUAL_INT(
+        TV_OK, tv_orient(a.context, &image, &options, points, 3, keypoints, CAP, &count));
+    TEST_ASSERT_TRUE(count >= 3);
+  }
+}
+
 static void test_any_point_of_a_1x1_image_is_described(void) {
   const tv_keypoint points[3] = {
       {0, 0, 4, 0, 1, 0}, {-300, 9e4f, 512, 3, 1, 0}, {0, 0, 1e-30f, 1, 1, 0}};
@@ -541,6 +568,7 @@ int main(void) {
   RUN_TEST(test_padding_is_never_read);
   RUN_TEST(test_the_mask_keeps_corners_where_it_is_not_zero);
   RUN_TEST(test_a_blank_or_tiny_image_has_no_corners);
+  RUN_TEST(test_the_largest_size_is_described_in_any_image);
   RUN_TEST(test_any_point_of_a_1x1_image_is_described);
   RUN_TEST(test_a_grid_spreads_the_corners);
   RUN_TEST(test_the_threshold_adapts);

@@ -83,6 +83,19 @@ size_t image_bytes(const tv_image& image) {
 
 size_t bytes_of(int32_t count, size_t element) { return static_cast<size_t>(count) * element; }
 
+Bytes bytes_of(const tv_keypoint* keypoints, int32_t count) {
+  return {keypoints, bytes_of(count, sizeof(tv_keypoint))};
+}
+
+// Whether an output shares a byte with the other array, the image, or the mask, which may be null.
+// Not inlined, for size.
+__attribute__((noinline)) bool overlaps_any(Bytes out, Bytes other, const tv_image* image,
+                                            const tv_image* mask) {
+  return overlap(out.data, out.size, other.data, other.size) ||
+         overlap(out.data, out.size, image->data, image_bytes(*image)) ||
+         (mask != nullptr && overlap(out.data, out.size, mask->data, image_bytes(*mask)));
+}
+
 }  // namespace
 }  // namespace tv
 
@@ -101,8 +114,7 @@ tv_status tv_detect(tv_context* context, const tv_image* image, const tv_image* 
   if (request.status != TV_OK) return request.status;
   if (num_keypoints == nullptr || (keypoints == nullptr && cap_keypoints > 0)) return TV_ERR_NULL;
   if (cap_keypoints < 0) return TV_ERR_ARGUMENT;
-  if (tv::overlap(image->data, tv::image_bytes(*image), keypoints,
-                  tv::bytes_of(cap_keypoints, sizeof(tv_keypoint)))) {
+  if (tv::overlaps_any(tv::bytes_of(keypoints, cap_keypoints), {}, image, mask)) {
     return TV_ERR_OVERLAP;
   }
   tv::ArenaScope scope(context->arena);
@@ -125,9 +137,8 @@ tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature
     return TV_ERR_NULL;
   }
   if (num_keypoints < 0 || cap_oriented < 0) return TV_ERR_ARGUMENT;
-  const size_t keypoint = sizeof(tv_keypoint);
-  if (tv::overlap(keypoints, tv::bytes_of(num_keypoints, keypoint), oriented,
-                  tv::bytes_of(cap_oriented, keypoint))) {
+  if (tv::overlaps_any(tv::bytes_of(oriented, cap_oriented), tv::bytes_of(keypoints, num_keypoints),
+                       image, nullptr)) {
     return TV_ERR_OVERLAP;
   }
   const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
@@ -152,8 +163,8 @@ tv_status tv_describe(tv_context* context, const tv_image* image, const tv_featu
   if (num_keypoints < 0) return TV_ERR_ARGUMENT;
   if (num_keypoints == 0) return TV_OK;
   if (keypoints == nullptr || descriptors == nullptr) return TV_ERR_NULL;
-  if (tv::overlap(keypoints, tv::bytes_of(num_keypoints, sizeof(tv_keypoint)), descriptors,
-                  tv::bytes_of(num_keypoints, TV_DESCRIPTOR_BYTES))) {
+  const tv::Bytes out = {descriptors, tv::bytes_of(num_keypoints, TV_DESCRIPTOR_BYTES)};
+  if (tv::overlaps_any(out, tv::bytes_of(keypoints, num_keypoints), image, nullptr)) {
     return TV_ERR_OVERLAP;
   }
   const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
@@ -178,8 +189,9 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
     return TV_ERR_NULL;
   }
   if (cap_keypoints < 0) return TV_ERR_ARGUMENT;
-  if (tv::overlap(keypoints, tv::bytes_of(cap_keypoints, sizeof(tv_keypoint)), descriptors,
-                  tv::bytes_of(cap_keypoints, TV_DESCRIPTOR_BYTES))) {
+  const tv::Bytes out = {descriptors, tv::bytes_of(cap_keypoints, TV_DESCRIPTOR_BYTES)};
+  const tv::Bytes keypoints_out = tv::bytes_of(keypoints, cap_keypoints);
+  if (tv::overlaps_any(keypoints_out, out, image, mask) || tv::overlaps_any(out, {}, image, mask)) {
     return TV_ERR_OVERLAP;
   }
   tv::ArenaScope scope(context->arena);

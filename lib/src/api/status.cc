@@ -12,10 +12,10 @@ const char *tv_status_string(tv_status status) {
     case TV_ERR_NULL: return "a required pointer is null";
     case TV_ERR_ARGUMENT: return "an argument is out of its range";
     case TV_ERR_NOT_FINITE: return "a number is not finite";
-    case TV_ERR_STRUCT_SIZE: return "struct_size is not that of a known version";
+    case TV_ERR_STRUCT_SIZE: return "struct_size was not set, or a field is of a newer version";
     case TV_ERR_ALIGNMENT: return "memory is not aligned";
     case TV_ERR_MEMORY: return "memory is too small";
-    case TV_ERR_LIMITS: return "above the limits of the context";
+    case TV_ERR_LIMITS: return "above the limits or the purposes of the context";
     case TV_ERR_CAPACITY: return "an output array is too small";
     case TV_ERR_OVERLAP: return "an output array overlaps another argument";
     case TV_ERR_CAMERA: return "camera intrinsics are invalid";

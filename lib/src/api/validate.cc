@@ -16,7 +16,7 @@ bool is_stride(int64_t stride_bytes, int32_t width) {
 }
 
 constexpr int32_t kAutoKeypoints = 2048;
-constexpr float kMaxKeypointSize = 512.0f;
+constexpr float kMaxKeypointSize = 4096.0f;  // the largest keypoint_size, on level 7
 constexpr float kMaxCoordinate = 1e5f;
 constexpr double kRotationTolerance = 1e-6;
 

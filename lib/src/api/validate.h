@@ -31,7 +31,7 @@ tv_status read_features(const tv_context& context, const tv_features* given, uin
 // Copies the matched pixels' struct after checking it.
 tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 
-// Whether each keypoint is finite, with coordinates within 1e5 pixels, a size in (0, 512] pixels
+// Whether each keypoint is finite, with coordinates within 1e5 pixels, a size in (0, 4096] pixels
 // and an angle within 1000 radians.
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);
 

@@ -30,8 +30,12 @@ const Octave& octave_for(const Octaves& octaves, const tv_keypoint& keypoint) {
 
 // In pixels of the octave. A keypoint farther outside the image is moved to this distance; its
 // samples are border pixels either way. This keeps the positions of all samples within 32 bits for
-// images up to 16384 pixels and keypoints up to 512 pixels.
+// images up to 16384 pixels and steps of at most kLargestStep.
 constexpr double kMaxOutside = 8192.0;
+
+// In pixels of the octave. Only keypoints above 512 pixels in images that are too thin for octaves
+// have a larger step, which is replaced by this one.
+constexpr double kLargestStep = 256.0;
 
 int32_t to_q16(double x) {
   const double scaled = x * 65536.0;
@@ -46,7 +50,8 @@ double near_image(double x, int32_t side) {
 // points along angle_rad.
 void sample_around(const tvk_table& kernels, const Octave& octave, const tv_keypoint& keypoint,
                    double angle_rad, double step_per_size, int32_t side, int16_t* patch) {
-  const double step = keypoint.size * step_per_size / octave.scale;
+  const double wanted = keypoint.size * step_per_size / octave.scale;
+  const double step = wanted < kLargestStep ? wanted : kLargestStep;
   double sine = 0.0, cosine = 1.0;
   if (angle_rad != 0.0) sincos(angle_rad, &sine, &cosine);
   const int32_t du_x = to_q16(step * cosine), du_y = to_q16(step * sine);
