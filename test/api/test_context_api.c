@@ -170,6 +170,8 @@ static void test_a_context_pays_for_its_purposes_alone(void) {
     TEST_ASSERT_TRUE(size_for(purposes) <= all);
     TEST_ASSERT_TRUE(size_for(purposes) >= size_for(one));
     TEST_ASSERT_TRUE((purposes & 8) != 0 || size_for(purposes) < whole);
+    /* The bit that names reconstruction brings the purposes that it needs. */
+    TEST_ASSERT_TRUE((purposes & 8) == 0 || size_for(purposes) == size_for(purposes | 7));
   }
 }
 

@@ -137,6 +137,18 @@ static void test_structs_of_another_size_are_refused(void) {
   refused(TV_ERR_STRUCT_SIZE, NULL);
 }
 
+static void test_results_that_overlap_are_refused(void) {
+  union {
+    tv_two_view two_view;
+    tv_reconstruction reconstruction;
+  } both;
+  tv_view view0 = view_of(api_image(drawn[0], WIDTH, HEIGHT, WIDTH), &camera, NULL);
+  tv_view view1 = view_of(api_image(drawn[1], WIDTH, HEIGHT, WIDTH), &camera, NULL);
+  tv_reconstruction_init(&both.reconstruction);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_reconstruct(a.context, &view0, &view1, NULL,
+                                                       &both.two_view, &both.reconstruction));
+}
+
 static void test_what_the_stages_refuse_is_refused(void) {
   stage_options o;
   tv_camera bad = camera;
@@ -427,6 +439,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_null_pointers_are_refused);
   RUN_TEST(test_structs_of_another_size_are_refused);
+  RUN_TEST(test_results_that_overlap_are_refused);
   RUN_TEST(test_what_the_stages_refuse_is_refused);
   RUN_TEST(test_one_camera_alone_is_refused);
   RUN_TEST(test_the_result_is_whole_and_lies_in_the_context);

@@ -380,6 +380,21 @@ static void test_the_mask_may_not_lie_over_an_input(void) {
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
 }
 
+/* The structs that describe the inputs are inputs, too. */
+static void test_outputs_may_not_lie_over_a_struct_of_the_call(void) {
+  tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, NULL, 4);
+  const tv_pixel_pairs pairs_before = pairs;
+  const tv_estimate_options options_before = options;
+  uint8_t *const over[] = {(uint8_t *)&pairs + 4, (uint8_t *)&options + 8, (uint8_t *)&camera0};
+  size_t k;
+  for (k = 0; k < sizeof over / sizeof over[0]; ++k) {
+    TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_estimate_two_view(api.context, &camera0, &camera1,
+                                                               &pairs, &options, &result, over[k]));
+  }
+  TEST_ASSERT_EQUAL_MEMORY(&pairs_before, &pairs, sizeof pairs);
+  TEST_ASSERT_EQUAL_MEMORY(&options_before, &options, sizeof options);
+}
+
 /* With exact true matches and a fifth of wrong ones every solver finds the motion. */
 static void test_every_method_finds_an_exact_motion(void) {
   int method;
@@ -628,6 +643,7 @@ int main(void) {
   RUN_TEST(test_more_or_fewer_matches_than_there_can_be_are_refused);
   RUN_TEST(test_cameras_are_checked);
   RUN_TEST(test_the_mask_may_not_lie_over_an_input);
+  RUN_TEST(test_outputs_may_not_lie_over_a_struct_of_the_call);
   RUN_TEST(test_every_method_finds_an_exact_motion);
   RUN_TEST(test_a_pinhole_and_a_fisheye_make_a_pair);
   RUN_TEST(test_without_cameras_f_holds_for_the_pixels);

@@ -102,7 +102,7 @@ TV_API void tv_bundle_result_init_sized(tv_bundle_result *result, size_t struct_
    matches is the order in which sums are formed.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the count, R, t or an option),
    TV_ERR_NOT_FINITE (R, t or an option), TV_ERR_CAMERA, TV_ERR_LIMITS (more points than the
-   context's max_matches), TV_ERR_OVERLAP.
+   context's max_matches, or a context without TV_PURPOSE_ADJUST), TV_ERR_OVERLAP.
    Time: at most max_iterations passes over the points. Memory: from the context. */
 TV_API tv_status tv_adjust_two_view(tv_context *context, const tv_camera *camera0,
                                     const tv_camera *camera1, const tv_pixel_pairs *pairs,

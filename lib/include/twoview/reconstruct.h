@@ -112,6 +112,7 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
    bit.
    options: null means the defaults.
    two_view: initialised by tv_two_view_init; reconstruction: initialised by tv_reconstruction_init.
+   They do not overlap (TV_ERR_OVERLAP).
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, or a reserved field that is
    not 0), and the statuses of the stages. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,

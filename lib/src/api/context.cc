@@ -33,6 +33,9 @@ tv_status read_limits(const tv_limits* given, tv_limits* limits) {
   }
   if (limits->max_matches == 0) limits->max_matches = limits->max_keypoints;
   if (limits->purposes == 0) limits->purposes = kAllPurposes;
+  if ((limits->purposes & TV_PURPOSE_RECONSTRUCT & ~7u) != 0) {  // the bit that names it
+    limits->purposes |= TV_PURPOSE_RECONSTRUCT;
+  }
   return TV_OK;
 }
 

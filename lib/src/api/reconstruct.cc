@@ -273,6 +273,9 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   if (status == TV_OK) status = tv::read_reconstruct_options(options, &checked);
   if (status != TV_OK) return status;
   if (views[0].reserved != 0 || views[1].reserved != 0) return TV_ERR_ARGUMENT;
+  if (tv::overlap(two_view, two_view->struct_size, reconstruction, reconstruction->struct_size)) {
+    return TV_ERR_OVERLAP;
+  }
   tv_feature_options features;
   status = tv::read_feature_options(*context, checked.feature, &features);
   if (status != TV_OK) return status;

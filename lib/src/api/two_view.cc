@@ -272,12 +272,16 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     if (status != TV_OK) return status;
   }
   const size_t n = static_cast<size_t>(num_matches);
-  const tv::Bytes arrays[5] = {{inlier_mask, n},
+  const tv::Bytes arrays[9] = {{inlier_mask, n},
+                               {result, result->struct_size},
                                {pixels0, 16 * n},
                                {pixels1, 16 * n},
                                {ratios, 4 * n},
-                               {result, result->struct_size}};
-  if (tv::outputs_overlap(arrays, 1, 5)) return TV_ERR_OVERLAP;
+                               {pairs, pairs->struct_size},
+                               {options, options != nullptr ? options->struct_size : 0},
+                               {camera0, sizeof(tv_camera)},
+                               {camera1, sizeof(tv_camera)}};
+  if (tv::outputs_overlap(arrays, 2, 9)) return TV_ERR_OVERLAP;
   tv::ArenaScope scope(context->arena);
   tv::Matches matches{};
   tv::TwoViewModel model{};

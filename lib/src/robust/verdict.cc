@@ -107,10 +107,12 @@ Judgement judge(const Evidence& e) {
 // Guided matching finds matches where the first estimate has their epipolar lines: their agreement
 // with it is no evidence for it, and so the verdict and the reasons stay those of the first. The
 // second estimate is the more accurate one and replaces the first, unless it is of another kind,
-// has fewer inliers or is judged worse: then the matches that were added contradict it.
+// has fewer inliers, is judged worse, or has a second motion of the plane where the first has none
+// (or the reverse): then the matches that were added contradict it.
 bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again) {
   if (again->has_R == 0 || again->has_t == 0 || again->kind != first.kind ||
-      again->verdict < first.verdict || again->num_inliers < first.num_inliers) {
+      again->has_alternative != first.has_alternative || again->verdict < first.verdict ||
+      again->num_inliers < first.num_inliers) {
     return false;
   }
   again->verdict = first.verdict;

@@ -149,8 +149,7 @@ TV_API tv_status tv_orient(tv_context *context, const tv_image *image,
    that angle_rad turns; directions count counter-clockwise from x as seen in the image. This is the
    UBC order, which OpenCV and COLMAP use, too. Beyond the image's border, the nearest pixels of the
    border are repeated. A patch of one grey level gives a descriptor of zeros. Returns TV_ERR_NULL,
-   TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS (the image), TV_ERR_NOT_FINITE,
-   TV_ERR_OVERLAP. */
+   TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. */
 TV_API tv_status tv_describe(tv_context *context, const tv_image *image,
                              const tv_feature_options *options, const tv_keypoint *keypoints,
                              int32_t num_keypoints, uint8_t *descriptors);

@@ -71,8 +71,9 @@ typedef struct tv_reconstruction {
   /* How many keypoints view 0 and view 1 have, second orientations included. */
   int32_t num_keypoints[2];
   /* How many matches were found beyond the context's max_matches and left out: those of the highest
-     ratio and, among equal ratios, those of the weaker keypoints. If the second
-     estimate of guided matching was taken, the matches of both passes are counted. */
+     ratio and, among equal ratios, those of the weaker keypoints. If the second estimate of guided
+     matching was taken, they are counted among the matches that it chose from: those that the first
+     estimate used, and those of guided matching that share no keypoint with them. */
   int32_t num_matches_left_out;
   /* The keypoints of view 0 and of view 1, num_keypoints[0] and num_keypoints[1] of them. */
   const tv_keypoint *keypoints[2];
@@ -111,6 +112,7 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
    bit.
    options: null means the defaults.
    two_view: initialised by tv_two_view_init; reconstruction: initialised by tv_reconstruction_init.
+   They do not overlap (TV_ERR_OVERLAP).
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, or a reserved field that is
    not 0), and the statuses of the stages. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
