@@ -4,7 +4,7 @@
 
 #include "recording/metric_scale.h"
 
-#include <unity.h>  // last, since it defines isnan and isinf as macros
+#include <unity.h>  // comes last, since unity.h defines isnan and isinf as macros
 
 using namespace cli;
 

@@ -20,7 +20,7 @@
 #include "simulator/film.h"
 #include "simulator/firmware.h"
 
-#include <unity.h>  // last, since it defines isnan and isinf as macros
+#include <unity.h>  // comes last, since unity.h defines isnan and isinf as macros
 
 using namespace cli;
 using simulator::FlightState;

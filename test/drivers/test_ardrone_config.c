@@ -114,7 +114,7 @@ static void test_ids_are_crc_32(void) {
   char id[ARDRONE_ID_BYTES];
   ardrone_make_id("123456789", id); /* the usual check of a CRC-32: these digits give cbf43926 */
   TEST_ASSERT_EQUAL_STRING("cbf43926", id);
-  ardrone_make_id("", id); /* CRC 0 would name the default configuration */
+  ardrone_make_id("", id); /* its CRC 0 is the default configuration's id */
   TEST_ASSERT_EQUAL_STRING("00000001", id);
 }
 

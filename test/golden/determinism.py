@@ -130,7 +130,7 @@ def digests(program, architecture, pairs):
         for line in run(*command, program, *pairs).splitlines():
             pair, kernels, part, digest = line.split()
             if suffix and kernels == "c":
-                continue  # the C set was digested by the run without a suffix
+                continue  # the run without a suffix has the digests of set "c"
             found.setdefault(kernels + (suffix if kernels == "neon" else ""), []).append(
                 (f"{pair}/{part}", digest))
     missing = SETS[architecture] - set(found)

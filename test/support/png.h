@@ -107,7 +107,7 @@ static inline int png_inflate(const uint8_t *bytes, size_t size, uint8_t *out, s
   static const uint16_t distance_bases[30] = {
       1,   2,   3,   4,   5,   7,    9,    13,   17,   25,   33,   49,   65,    97,    129,
       193, 257, 385, 513, 769, 1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
-  png_bits in = {bytes, size, 2, 0, 0, 0}; /* 2: behind the zlib header */
+  png_bits in = {bytes, size, 2, 0, 0, 0}; /* skips 2 bytes of zlib header */
   size_t at = 0;
   int last = 0;
   while (!last && !in.failed) {
