@@ -16,7 +16,7 @@ from pathlib import Path
 COLUMNS = 100
 SKIP_CODE = 77
 C_ENDINGS = (".c", ".cc", ".h")
-CLANG_FORMAT_VERSION = "14"  # another version formats other code
+CLANG_FORMAT_VERSION = "14"  # other versions of clang-format format differently
 NOT_OURS = {"build", "out", "__pycache__"}
 
 

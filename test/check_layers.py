@@ -7,7 +7,7 @@ import re
 import sys
 from pathlib import Path
 
-# For each layer, the layers that it may include.
+# LAYERS[layer]: the layers whose headers the files of this layer may include.
 LAYERS = {
     "base": set(),
     "kernels": {"base"},
@@ -29,10 +29,11 @@ BANNED = {
     "cstdlib", "stdlib.h", "stdexcept", "exception", "thread", "mutex", "future", "chrono", "ctime",
     "time.h", "random", "regex", "locale", "any", "typeinfo",
 }
-OUTSIDE = ("drivers", "examples", "tools", "python", "bench")  # may include the public headers only
+# These folders may include only the public headers of the library.
+OUTSIDE = ("drivers", "examples", "tools", "python", "bench")
 # The five-point solver is timed beside its peers', and no function of the public API.
 EXCEPT = {("bench/relpose.cc", "kernels/kernels.h")}
-# The AR.Drone's codecs: bytes in, structs out.
+# The AR.Drone's codecs, which only translate between bytes and structs.
 CODECS = {f"drivers/ardrone/{stem}" for stem in (
     "at.c", "bytes.h", "config.c", "encode.c", "exchange.c", "navdata.c", "navdata_layout.c",
     "navdata_layout.h", "pave.c", "pilot.c")}
@@ -180,7 +181,7 @@ def find_circles(files):
 
 
 def room_offences(files):
-    """The includes in tools/twoview that ROOMS does not allow."""
+    """Yields each file of tools/twoview outside the rooms and each include that ROOMS forbids."""
     folder = "tools/twoview/"
     for name, headers in files.items():
         if not name.startswith(folder):

@@ -10,14 +10,14 @@ import sys
 
 # All symbols that the library may need from other libraries. Whoever adds a name says why.
 ALLOWED = {
-    "memcpy", "memmove", "memset", "memcmp",  # the compiler writes these calls itself
-    "sqrt", "sqrtf",  # exact by IEEE 754, so the same everywhere; the only libm functions
-    "getauxval",  # from libc on ARM: returns the CPU's features as the kernel reports them
-    # needed where the compiler protects the stack by default
+    "memcpy", "memmove", "memset", "memcmp",  # the compiler inserts these calls by itself
+    "sqrt", "sqrtf",  # the only libm functions: IEEE 754 fixes their every bit
+    "getauxval",  # libc on ARM: reports the CPU's features
+    # needed by compilers that protect the stack by default
     "__stack_chk_fail", "__stack_chk_guard",
     "_GLOBAL_OFFSET_TABLE_",
-    "__popcountdi2",  # from libgcc, linked into the program or the .so: integers only
-    # ARM's names of the functions above
+    "__popcountdi2",  # in libgcc, which is linked statically: counts bits
+    # ARM's names of memcpy, memmove and memset
     "__aeabi_memcpy", "__aeabi_memmove", "__aeabi_memset", "__aeabi_memclr",
 }
 # Weak references that the compiler's start files put into every shared object.
@@ -26,7 +26,7 @@ STARTUP = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable",
 # Sections that must be empty in the object files. The .so is not checked for these: the compiler's
 # start files have constructors there.
 CONSTRUCTORS = re.compile(r"\.(init_array|fini_array|ctors|dtors)\b")
-# .data.rel.ro is made read-only at load
+# Sections that stay writable. .data.rel.ro does not: the loader makes it read-only.
 WRITABLE = re.compile(r"\.(data|bss|tdata|tbss)\b(?!\.rel\.ro)")
 SECTION = re.compile(
     r"^\s*\[\s*\d+\]\s+(\.\S+)\s+\S+\s+[0-9a-f]+\s+[0-9a-f]+\s+([0-9a-f]+)\s", re.M
@@ -39,7 +39,7 @@ def run(*command):
 
 
 def names(nm_output):
-    """Symbol names of `nm --format=posix`, without version suffixes."""
+    """The symbol names in the output of `nm --format=posix`, without version suffixes."""
     return {line.split()[0].split("@")[0] for line in nm_output.splitlines()
             if line.strip() and not line.endswith(":")}
 

@@ -21,7 +21,8 @@ enum { WIDTH = 320, HEIGHT = 240, CAP = 500, GUARD = 256, PATTERN = 0x5A };
     }                                                            \
   } while (0)
 
-/* A struct between guard bytes. */
+/* A struct type whose member `it` lies between guard bytes; they show a call that wrote outside it.
+ */
 #define GUARDED(type)      \
   struct {                 \
     uint8_t before[GUARD]; \
@@ -140,7 +141,7 @@ static void init_all(void) {
 
 static tv_context *make_context(void) {
   tv_context *context = NULL;
-  size_t size; /* of grown headers only */
+  size_t size; /* used only with grown headers */
   (void)size;
   limits.it.max_width = WIDTH;
   limits.it.max_height = HEIGHT;

@@ -32,7 +32,7 @@ def main():
         count += found
         copy = output / header.relative_to(source)
         copy.parent.mkdir(parents=True, exist_ok=True)
-        # an unchanged file keeps its time, so that nothing is compiled again
+        # An unchanged header is not written: its time stays, and make compiles nothing again.
         if not copy.exists() or copy.read_text() != text:
             copy.write_text(text)
     if count < 13:

@@ -1,4 +1,4 @@
-/* tv_adjust_two_view and tv_point_covariances: the statuses and outputs that the header
+/* Tests of tv_adjust_two_view and tv_point_covariances: the statuses and outputs that the header
    promises. */
 #include <math.h>
 #include <string.h>
@@ -178,7 +178,7 @@ static void test_poses_cameras_and_counts_are_checked(void) {
   t[1] = start_t[1] = INFINITY, expect_refusal(TV_ERR_NOT_FINITE);
   memset(t, 0, sizeof t), memset(start_t, 0, sizeof t), expect_refusal(TV_ERR_ARGUMENT);
   t[0] = t[1] = t[2] = start_t[0] = start_t[1] = start_t[2] = 1.5e308;
-  expect_refusal(TV_ERR_ARGUMENT); /* its length overflows to infinity */
+  expect_refusal(TV_ERR_ARGUMENT); /* the length of t overflows to infinity */
   t[0] = start_t[0] = -1e-300, t[1] = t[2] = start_t[1] = start_t[2] = 0;
   camera1.fx = 0, expect_refusal(TV_ERR_CAMERA), camera1 = good;
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
@@ -244,7 +244,7 @@ static void test_points_that_are_not_ok_have_zero_covariance(void) {
   points[1].status = TV_POINT_INFINITE;
   points[2].status = TV_POINT_INVALID;
   points[3].position[0] = NAN;
-  points[4].position[2] = -1; /* behind the camera */
+  points[4].position[2] = -1; /* a depth below 0: behind camera 0 */
   for (i = 0; i < 3; ++i) points[5].position[i] = (i == 0 ? 2 : i == 2 ? -0.5 : 0) * 3;
   for (i = 0; i < 3; ++i) points[6].position[i] = 0;
   for (i = 0; i < 3; ++i) points[7].position[i] *= 1e200;

@@ -179,7 +179,7 @@ static void test_undistort_gives_the_pinhole_pixel_of_the_same_ray(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_undistort(&camera, pixel, straight));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, camera.fx * ray[0] / ray[2] + camera.cx, straight[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, camera.fy * ray[1] / ray[2] + camera.cy, straight[1]);
-  /* barrel distortion had moved it towards the centre */
+  /* barrel distortion moves pixels towards the centre, so undistortion moves them outwards */
   TEST_ASSERT_TRUE(straight[0] < pixel[0] - 10);
 }
 
@@ -189,7 +189,8 @@ static void test_undistort_refuses_rays_beside_a_fisheye(void) {
   memset(camera.k, 0, sizeof camera.k);
   camera.model = TV_CAMERA_KANNALA_BRANDT;
   memcpy(out, marks, sizeof out);
-  pixel[0] = camera.cx + camera.fx * 1.6, pixel[1] = camera.cy; /* 1.6 rad is more than pi / 2 */
+  /* The ray is at 1.6 rad from the optical axis, more than pi / 2. */
+  pixel[0] = camera.cx + camera.fx * 1.6, pixel[1] = camera.cy;
   TEST_ASSERT_EQUAL_INT(TV_ERR_OUTSIDE, tv_camera_undistort(&camera, pixel, out));
   assert_marks(out, 6);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_unproject(&camera, pixel, out, NULL));
@@ -214,7 +215,7 @@ static void test_scale_keeps_pixel_centres(void) {
   const double point[3] = {0.2, -0.1, 1};
   double full[2], half[2];
   tv_camera scaled = camera;
-  /* input and output may be the same */
+  /* the input camera may also be the output */
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_scale(&scaled, 0.5, &scaled));
   TEST_ASSERT_EQUAL_INT(320, scaled.width);
   TEST_ASSERT_EQUAL_INT(180, scaled.height);
@@ -324,7 +325,7 @@ static void test_many_pixels_have_the_rays_of_each_one(void) {
       TEST_ASSERT_EQUAL_MEMORY(ray, rays + 3 * i, sizeof ray);
     }
     TEST_ASSERT_TRUE(inside[0] == 1 && inside[2] == 0);
-    /* it lies beyond the valid angle of barrel distortion */
+    /* pixel 3 lies beyond the valid angle of camera 1, which has barrel distortion */
     if (c == 1) TEST_ASSERT_EQUAL_INT(0, inside[3]);
     TEST_ASSERT_EQUAL_INT(0x5A, inside[5]);
   }

@@ -81,7 +81,7 @@ static void test_an_older_callers_missing_fields_have_their_defaults(void) {
   size_t all = 0, older = 0;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &all));
   limits.struct_size = (uint32_t)before_kernels;
-  /* it lies behind the caller's struct_size, so the library must not read it */
+  /* the field kernels lies behind the caller's struct_size, so the library must not read it */
   limits.kernels = -1;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &older));
   TEST_ASSERT_EQUAL_UINT64(all, older);
@@ -144,7 +144,7 @@ static void test_the_extreme_limits_have_a_size(void) {
 static void test_a_vga_context_is_within_8_mib(void) {
   tv_limits limits;
   size_t size = 0;
-  tv_limits_init(&limits); /* the defaults: 640 x 480, 2048 keypoints */
+  tv_limits_init(&limits); /* the default limits: 640 x 480 pixels, 2048 keypoints */
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &size));
   TEST_ASSERT_TRUE(size <= (size_t)8 << 20);
 }
@@ -192,7 +192,7 @@ static void test_memory_larger_than_needed_is_left_alone(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, a.memory, SIZE_MAX));
   TEST_ASSERT_EQUAL_PTR(a.memory, context);
   a.context = context;
-  api_release(&a); /* checks the guard bytes behind the size that was returned */
+  api_release(&a); /* api_release fails if bytes behind the context's own size were changed */
 }
 
 static void test_the_size_never_falls_when_a_limit_rises(void) {
@@ -256,7 +256,7 @@ static void test_a_kernel_set_is_what_was_asked_for_or_refused(void) {
       free(a.block);
     }
   }
-  TEST_ASSERT_TRUE(refused > 0); /* no CPU has both AVX2 and NEON */
+  TEST_ASSERT_TRUE(refused > 0); /* every CPU refuses some set, since none has both AVX2 and NEON */
 }
 
 static void test_a_null_context_is_answered(void) {

@@ -1,5 +1,5 @@
-/* tv_detect, tv_orient, tv_describe, tv_extract: every status of feature.h, outputs that stay
-   untouched on errors, what the options promise, memory, and determinism. */
+/* Tests of tv_detect, tv_orient, tv_describe, tv_extract: every status of feature.h, outputs that
+   stay untouched on errors, what the options promise, memory, and determinism. */
 
 #include <math.h>
 #include <unity.h>
@@ -262,7 +262,7 @@ static void test_capacity_is_told_and_nothing_is_written(void) {
 }
 
 static void test_keypoints_are_in_order_and_inside(void) {
-  const float sizes[4] = {4.0f, 5.2f, 6.76f, 8.788f}; /* each level multiplies the size by 1.3 */
+  const float sizes[4] = {4.0f, 5.2f, 6.76f, 8.788f}; /* px; a level is 1.3 times larger */
   int32_t count, k;
   options.levels = 4;
   options.scale_factor = 1.3f;
@@ -294,7 +294,7 @@ static void test_extract_is_detect_orient_describe(void) {
         TV_OK, tv_orient(a.context, &image, &options, keypoints, corners, others, CAP, &oriented));
     TEST_ASSERT_EQUAL_INT(
         TV_OK, tv_describe(a.context, &image, &options, others, oriented, other_descriptors));
-    options.max_keypoints = CAP; /* room for every second orientation too */
+    options.max_keypoints = CAP; /* so many that no second orientation is left out */
     options.arc = 12;
     options.min_threshold = 0;
     corners = detect(a.context, keypoints);

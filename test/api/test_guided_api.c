@@ -1,4 +1,4 @@
-/* tv_match_guided: every status of match.h, outputs that stay untouched on errors, and
+/* Tests of tv_match_guided: every status of match.h, outputs that stay untouched on errors, and
    determinism. The matches themselves are checked in test/unit/test_guided.c. */
 
 #include <math.h>
@@ -14,7 +14,7 @@ static uint8_t descriptors0[(COUNT + 1) * TV_DESCRIPTOR_BYTES];
 static uint8_t descriptors1[(COUNT + 1) * TV_DESCRIPTOR_BYTES];
 static tv_correspondence found[COUNT];
 static tv_camera camera;
-static double sideways[9]; /* the E of a sideways motion: the epipolar lines are the rows */
+static double sideways[9]; /* E of a sideways motion: epipolar lines are image rows */
 static api_context a;
 
 static tv_limits small_limits(void) {
@@ -231,7 +231,7 @@ static void test_a_full_context_matches_in_its_memory(void) {
   int32_t count = 0, k;
   tv_guided_options_init(&options);
   options.max_distance = 3000;
-  options.max_error_px = 1000; /* every pair of keypoints is a candidate */
+  options.max_error_px = 1000; /* 1000 px: every pair of keypoints is a candidate */
   c.options = &options;
   TEST_ASSERT_EQUAL_INT(TV_OK, run(&c, &count));
   TEST_ASSERT_EQUAL_INT(COUNT, count);

@@ -17,7 +17,7 @@ enum { MAX_MATCHES = 100000, MANY = 1000 };
 static const double max_seconds = 60;
 
 static tv_context *context;
-static tv_camera lenses[3]; /* pinhole, Brown-Conrady, Kannala-Brandt */
+static tv_camera lenses[3]; /* one pinhole, one Brown-Conrady, one Kannala-Brandt */
 static tv_estimate_options options;
 static tv_two_view result;
 static double pixels[2][2 * MAX_MATCHES];
@@ -28,7 +28,8 @@ static uint64_t seed;
 
 static double uniform(double low, double high) { return low + (high - low) * random_unit(&seed); }
 
-static double normal(void) { /* Approximately normal: a sum of 12 uniform numbers. */
+/* Returns an approximately standard normal number: the sum of 12 uniform ones, less 6. */
+static double normal(void) {
   double sum = -6;
   int k;
   for (k = 0; k < 12; ++k) sum += random_unit(&seed);
@@ -71,7 +72,7 @@ static int all_finite(const double *values, int count) {
   return count == 0;
 }
 
-/* The conditions that hold for every result. */
+/* Fails unless `result` fulfils the conditions that hold for every result of the library. */
 static void expect_sound(int count) {
   int i, inliers = 0;
   TEST_ASSERT_TRUE(result.kind >= TV_KIND_DEGENERATE && result.kind <= TV_KIND_NO_MOTION);
@@ -293,7 +294,7 @@ static void test_opencv_8032_points_beyond_fifty_baselines_count(void) {
   }
 }
 
-/* OpenGV 73: the rotation-only problem crashed. */
+/* OpenGV's issue 73: it crashed on the rotation-only problem. */
 static void test_opengv_73_rotation_only_gives_the_rotation(void) {
   static const int counts[7] = {2, 3, 5, 10, 50, 300, 1000};
   static const double none[3] = {0, 0, 0};
@@ -324,7 +325,7 @@ static void test_equal_points_are_refused(void) {
 
 static void test_a_thousand_copies_of_one_match_are_refused(void) {
   int count, i;
-  for (count = 1; count <= 8; ++count) { /* `count` different matches, the rest are copies */
+  for (count = 1; count <= 8; ++count) { /* `count` different matches; all others repeat them */
     for (i = 0; i < count; ++i) {
       set_match(i, uniform(0, 640), uniform(0, 480), uniform(0, 640), uniform(0, 480));
     }
@@ -348,7 +349,8 @@ static void test_points_on_a_line_are_not_ok(void) {
     }
     TEST_ASSERT_TRUE(estimate_every_way(MANY).verdict != TV_VERDICT_OK);
   }
-  for (i = 0; i < MANY; ++i) { /* matches on a line in each image that no motion explains */
+  /* Pixels on one line in each image, in an order that no motion explains. */
+  for (i = 0; i < MANY; ++i) {
     const double s = uniform(0, 600);
     set_match(i, s, 200 + 0.1 * s, 600 - s, 300);
   }
@@ -365,7 +367,7 @@ static void test_points_on_a_conic_of_a_plane_have_a_verdict(void) {
     i += see(&lenses[0], R, t, p, i % 2 == 0 ? 0 : 0.3, i);
   }
   estimate_every_way(MANY);
-  for (i = 0; i < MANY; ++i) { /* points on a conic in view 0, with random pixels in view 1 */
+  for (i = 0; i < MANY; ++i) { /* pixels on a conic in view 0 and random pixels in view 1 */
     set_match(i, 320 + 200 * cos(0.01 * i), 240 + 200 * sin(0.01 * i), uniform(0, 640),
               uniform(0, 480));
   }
@@ -419,7 +421,7 @@ static void test_rays_of_no_length_and_turned_rays_are_told(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
                         tv_triangulate(TV_TRIANGULATION_MIDPOINT, &lenses[0], &lenses[0], still,
                                        zero, pixels[0], pixels[1], 1, points));
-  for (i = 0; i < 100; ++i) { /* t has the wrong sign: the rays meet behind both cameras */
+  for (i = 0; i < 100; ++i) { /* the sign of t is wrong, so the rays meet behind both cameras */
     const double x = uniform(220, 420), y = uniform(140, 340);
     set_match(i, x, y, x + uniform(10, 50), y);
   }
@@ -448,7 +450,7 @@ static void test_a_hundred_thousand_matches_end_in_bounded_time(void) {
   }
   estimate(&lenses[0], MAX_MATCHES);
   TEST_ASSERT_TRUE(result.has_t && direction_error_deg(result.t, t) < 1);
-  for (i = 0; i < MAX_MATCHES; ++i) { /* unrelated matches: the loop runs to max_iterations */
+  for (i = 0; i < MAX_MATCHES; ++i) { /* only wrong matches: sampling runs to max_iterations */
     set_match(i, uniform(0, 640), uniform(0, 480), uniform(0, 640), uniform(0, 480));
   }
   options.max_iterations = 200;
@@ -472,9 +474,9 @@ static void test_thresholds_of_nothing_are_refused_and_of_everything_conclude_no
     TEST_ASSERT_TRUE(estimate_pixels(context, &lenses[0], &lenses[0], pixels[0], pixels[1], ratios,
                                      300, &options, &result, mask) != TV_OK);
   }
-  options.max_error_px = 1e9; /* every model fits every match */
+  options.max_error_px = 1e9; /* at this threshold every model fits every match */
   TEST_ASSERT_TRUE(estimate_every_way(300).verdict != TV_VERDICT_OK);
-  options.max_error_px = 1e-9; /* a model fits only the matches of its sample */
+  options.max_error_px = 1e-9; /* at this threshold a model fits only its own sample */
   TEST_ASSERT_TRUE(estimate_every_way(300).verdict != TV_VERDICT_OK);
   options.max_error_px = 5e-324;
   TEST_ASSERT_TRUE(estimate_every_way(300).verdict != TV_VERDICT_OK);

@@ -130,7 +130,8 @@ static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
     api_context all = make(CAP, CAP, 0);
     outcome full;
     options.guided_matching = guided;
-    /* swaps the halves of the image, so that corners of equal score come in another order */
+    /* The upper and lower halves of the image are swapped, so that corners of equal score come in
+       another order. */
     if (guided == 0) {
       memcpy(drawn[1], drawn[0] + sizeof drawn[0] / 2, sizeof drawn[0] / 2);
       memcpy(drawn[1] + sizeof drawn[0] / 2, drawn[0], sizeof drawn[0] / 2);
@@ -207,7 +208,7 @@ typedef struct stage_results {
   double R[9], t[3];
 } stage_results;
 
-/* The outputs of every call that takes options. */
+/* Runs every call that takes options, and collects the outputs. */
 static void run_stages(tv_context *context, const tv_camera *lens, int initialised,
                        stage_results *r) {
   enum { ROOM = 2100 };

@@ -1,5 +1,5 @@
-/* tv_match: every status of match.h, outputs that stay untouched on errors, and determinism. The
-   matches themselves are checked in test/unit/test_match.c. */
+/* Tests of tv_match: every status of match.h, outputs that stay untouched on errors, and
+   determinism. The matches themselves are checked in test/unit/test_match.c. */
 
 #include <math.h>
 #include <unity.h>

@@ -12,7 +12,7 @@ extern void *__libc_calloc(size_t count, size_t size);
 extern void *__libc_realloc(void *block, size_t size);
 extern void __libc_free(void *block);
 
-/* volatile, since the compiler assumes that malloc does not read these */
+/* `volatile`, since the compiler assumes that malloc does not read these variables */
 static volatile int watching;
 static volatile long allocations;
 
@@ -50,7 +50,7 @@ void setUp(void) {
   limits.max_keypoints = MOST;
   context = api_make(&limits);
   api_draw(3, pixels[0], WIDTH, HEIGHT);
-  for (y = 0; y < HEIGHT; ++y) { /* the same image, moved 5 pixels to the left */
+  for (y = 0; y < HEIGHT; ++y) { /* image 1 is image 0, moved 5 pixels to the left */
     memmove(pixels[1] + y * WIDTH, pixels[0] + y * WIDTH + 5, WIDTH - 5);
   }
 }

@@ -1,5 +1,5 @@
-/* tv_reconstruct: every status of reconstruct.h, outputs that stay untouched on errors, where
-   its arrays lie, and determinism. Other tests check how accurate the poses are. */
+/* Tests of tv_reconstruct: every status of reconstruct.h, outputs that stay untouched on errors,
+   where its arrays lie, and determinism. Other tests check how accurate the poses are. */
 
 #include <math.h>
 #include <stdio.h>
@@ -81,7 +81,7 @@ static void refused(tv_status expected, const tv_reconstruct_options *options) {
   TEST_ASSERT_TRUE(api_is_pattern((uint8_t *)&reconstruction + skip, sizeof reconstruction - skip));
 }
 
-/* The options of every stage, at their defaults. */
+/* The options of every stage of a reconstruction. */
 typedef struct stage_options {
   tv_feature_options feature;
   tv_match_options match;
@@ -254,7 +254,7 @@ static uint64_t hash_of_result(void) {
                {r->matches, n * sizeof(tv_correspondence)},
                {r->inlier_mask, n},
                {r->points, n * sizeof(tv_point)}};
-  uint64_t hash = 14695981039346656037u; /* FNV-1a */
+  uint64_t hash = 14695981039346656037u; /* FNV-1a's start value */
   size_t p, k;
   for (p = 0; p < sizeof parts / sizeof parts[0]; ++p) {
     for (k = 0; k < parts[p].bytes; ++k) {
@@ -272,7 +272,7 @@ static void test_the_same_call_gives_the_same_bytes(void) {
   first = hash_of_result();
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
   TEST_ASSERT_TRUE(first == hash_of_result());
-  draw_pair(82); /* reconstructs another pair in between, in another context and in this one */
+  draw_pair(82); /* another pair is reconstructed in between, in both contexts */
   TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
   TEST_ASSERT_TRUE(first != hash_of_result());
@@ -294,7 +294,8 @@ static void test_a_full_call_uses_most_of_the_memory(void) {
 
 static void view_real_pair(const real_pair *pair) {
   int v;
-  camera = camera_of(pair->width, pair->height); /* setUp sets the drawn pair's camera again */
+  /* The next test's setUp sets the camera of the drawn pair again. */
+  camera = camera_of(pair->width, pair->height);
   for (v = 0; v < 2; ++v) {
     views[v].image = api_image(pair->luma[v], pair->width, pair->height, pair->width);
     views[v].camera = &camera;

@@ -1,4 +1,4 @@
-/* tv_triangulate: the statuses and outputs that the header promises. */
+/* Tests of tv_triangulate: the statuses and outputs that the header promises. */
 #include <math.h>
 #include <string.h>
 
@@ -102,7 +102,7 @@ static void test_r_is_a_rotation_to_a_millionth(void) {
   const double c = cos(0.3), s = sin(0.3);
   R[0] = 1 + 1e-5, expect_refusal(TV_ERR_ARGUMENT), setUp();
   R[1] = 1e-5, expect_refusal(TV_ERR_ARGUMENT), setUp();
-  R[0] = R[4] = R[8] = -1, expect_refusal(TV_ERR_ARGUMENT), setUp(); /* a reflection */
+  R[0] = R[4] = R[8] = -1, expect_refusal(TV_ERR_ARGUMENT), setUp(); /* det R = -1: a reflection */
   R[8] = -1, expect_refusal(TV_ERR_ARGUMENT), setUp();
   memset(R, 0, sizeof R), expect_refusal(TV_ERR_ARGUMENT), setUp();
   R[0] = 1e200, expect_refusal(TV_ERR_ARGUMENT), setUp();

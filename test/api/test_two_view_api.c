@@ -1,5 +1,5 @@
-/* tv_estimate_two_view: the statuses and outputs that the header promises, and the kinds of
-   pairs. */
+/* Tests of tv_estimate_two_view: the statuses and outputs that the header promises, and the kinds
+   of pairs. */
 #include <math.h>
 #include <string.h>
 
@@ -142,12 +142,12 @@ static void expect_e_and_f_of_pose(int cameras_given) {
   for (k = 0; k < 9; ++k) E[k] /= scale;
   TEST_ASSERT_TRUE(distance(E, result.E, 9) < 1e-14);
   if (!cameras_given) return;
-  for (k = 0; k < 3; ++k) { /* times K0^-1 */
+  for (k = 0; k < 3; ++k) { /* F = E K0^-1, row by row */
     F[3 * k] = E[3 * k] / camera0.fx;
     F[3 * k + 1] = E[3 * k + 1] / camera0.fy;
     F[3 * k + 2] = E[3 * k + 2] - F[3 * k] * camera0.cx - F[3 * k + 1] * camera0.cy;
   }
-  for (k = 0; k < 3; ++k) { /* K1^-T times */
+  for (k = 0; k < 3; ++k) { /* F = K1^-T F, column by column */
     F[k] /= camera1.fx;
     F[3 + k] /= camera1.fy;
     F[6 + k] -= F[k] * camera1.cx + F[3 + k] * camera1.cy;
@@ -171,14 +171,14 @@ static void expect_covariance(void) {
 }
 
 static const uint8_t has_by_config[7][5] = {
-    /* R  t  E  F  H */
-    {0, 0, 0, 0, 0}, /* degenerate */
-    {1, 1, 1, 1, 0}, /* calibrated */
-    {0, 0, 0, 1, 0}, /* uncalibrated */
-    {1, 1, 1, 1, 1}, /* planar */
-    {1, 0, 0, 0, 0}, /* panoramic */
-    {0, 0, 0, 0, 1}, /* planar or panoramic */
-    {1, 0, 0, 0, 0}, /* no motion */
+    /* 1: a pair of this kind has R, t, E, F, H */
+    {0, 0, 0, 0, 0}, /* TV_KIND_DEGENERATE */
+    {1, 1, 1, 1, 0}, /* TV_KIND_CALIBRATED */
+    {0, 0, 0, 1, 0}, /* TV_KIND_UNCALIBRATED */
+    {1, 1, 1, 1, 1}, /* TV_KIND_PLANAR */
+    {1, 0, 0, 0, 0}, /* TV_KIND_PANORAMIC */
+    {0, 0, 0, 0, 1}, /* TV_KIND_PLANAR_OR_PANORAMIC */
+    {1, 0, 0, 0, 0}, /* TV_KIND_NO_MOTION */
 };
 
 static void expect_sound(int count, int cameras_given) {
@@ -355,7 +355,8 @@ static void test_cameras_are_checked(void) {
   tv_camera bad = camera0;
   expect_refusal(TV_ERR_ARGUMENT, &camera0, NULL, 10);
   expect_refusal(TV_ERR_ARGUMENT, NULL, &camera1, 10);
-  options.method = TV_SOLVER_FIVE_POINT; /* this solver needs cameras, and none are given */
+  /* The five-point solver needs cameras, and none are given. */
+  options.method = TV_SOLVER_FIVE_POINT;
   expect_refusal(TV_ERR_ARGUMENT, NULL, NULL, 10);
   bad.fx = 0;
   expect_refusal(TV_ERR_CAMERA, &bad, &camera1, 10);
@@ -380,7 +381,7 @@ static void test_the_mask_may_not_lie_over_an_input(void) {
   TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
 }
 
-/* The structs that describe the inputs are inputs, too. */
+/* Cameras, options and similar structs are inputs too: an output may not overlap them. */
 static void test_outputs_may_not_lie_over_a_struct_of_the_call(void) {
   tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, NULL, 4);
   const tv_pixel_pairs pairs_before = pairs;
@@ -435,7 +436,8 @@ static void test_without_cameras_f_holds_for_the_pixels(void) {
       const double x1[3] = {pixels1[2 * i], pixels1[2 * i + 1], 1};
       const double line[3] = {dot3(F, x0), dot3(F + 3, x0), dot3(F + 6, x0)};
       TEST_ASSERT_EQUAL_INT(1, mask[i]);
-      TEST_ASSERT_TRUE(fabs(dot3(x1, line)) < 0.1 * norm(line, 2)); /* a tenth of a pixel */
+      /* The pixel is within 0.1 px of its epipolar line. */
+      TEST_ASSERT_TRUE(fabs(dot3(x1, line)) < 0.1 * norm(line, 2));
     }
   }
 }

@@ -7,7 +7,7 @@ import numpy as np
 INNER = (9, 6)
 SQUARE = 0.03
 SIZE = (640, 480)
-OVER = 3  # samples per pixel along each axis
+OVER = 3  # rendered samples per pixel along each axis
 
 MILD = ("brown-conrady", (620.0, 617.0, 327.3, 234.6), (-0.28, 0.09, 0.001, -0.0005, 0.0))
 WIDE = ("brown-conrady", (380.0, 381.0, 315.2, 243.9), (-0.25, 0.06, 0.0008, -0.0004, -0.006))
@@ -117,7 +117,7 @@ def render(rays, R, t, rng, blur=0.8, noise=3.0):
     lens."""
     H = np.linalg.inv(np.stack([R[:, 0], R[:, 1], t], 1))
     samples = np.full(rays.shape[:2], 110, np.float32)
-    step = 24  # a coarse pass first finds the part of the image that the board covers
+    step = 24  # samples: each 24th is tested first, to find the board's part of the image
     rows, columns = np.nonzero(within(*meet(H, rays[::step, ::step]), 3))
     if len(rows):
         part = tuple(
@@ -127,7 +127,7 @@ def render(rays, R, t, rng, blur=0.8, noise=3.0):
         samples[part][within(X, Y, 1)] = 205
         even = (np.floor(X).astype(np.int32) + np.floor(Y).astype(np.int32)) % 2 == 0
         samples[part][within(X, Y, 0) & even] = 45
-    # each pixel is the mean of OVER x OVER samples
+    # A pixel of the image is the mean of OVER x OVER samples.
     image = cv2.resize(samples, SIZE, interpolation=cv2.INTER_AREA)
     image = cv2.GaussianBlur(image, (0, 0), blur)
     return np.clip(np.rint(image + rng.normal(0, noise, image.shape)), 0, 255).astype(np.uint8)
@@ -138,7 +138,7 @@ def poses(lens, count, rng, max_tilt_deg=42):
     outline = np.array([[-2, -2], [9.0, -2], [10, 2], [10, 7], [3, 7], [-2, 7], [-2, 2], [4, -2]])
     outline = np.c_[outline, np.zeros(len(outline))] * SQUARE
     middle = np.array([4, 2.5, 0]) * SQUARE
-    # the half extent of the field of view on the plane z = 1, at most 1.2
+    # Half the width and height of the field of view on the plane z = 1, each at most 1.2.
     reach = np.minimum(1.2, np.array(SIZE) / (2 * np.array(lens[1][:2])))
     found = []
     while len(found) < count:

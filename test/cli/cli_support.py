@@ -34,7 +34,7 @@ def program():
 
 
 def main():
-    """Calls unittest.main; the program may be the first argument."""
+    """Runs the tests of the calling file; argument 1 may be the path of the twoview program."""
     if len(sys.argv) > 1 and os.path.isfile(sys.argv[1]):
         os.environ["TWOVIEW_PROGRAM"] = os.path.abspath(sys.argv.pop(1))
     program()
@@ -118,7 +118,7 @@ SHIFTS = (24, 6, 15, 10, 20)
 
 
 def stereo_pair(seed=7):
-    """The two images as flat bytes, row by row."""
+    """A pair of textured images, left and right, each as bytes row by row."""
     wide = texture(WIDTH + max(SHIFTS), HEIGHT, seed)
     left, right = bytearray(), bytearray()
     for y, row in enumerate(wide):
@@ -181,7 +181,7 @@ class CliTest(unittest.TestCase):
         return path
 
     def run_program(self, *arguments, before=(), **options):
-        """before: words put in front of the program, a command that runs it."""
+        """Runs twoview. before: the words of a command, such as setpriv, that starts twoview."""
         options.setdefault("timeout", 300)
         return subprocess.run(
             [*before, program(), *map(str, arguments)],
@@ -228,5 +228,5 @@ class CliTest(unittest.TestCase):
         return json.loads(((out or self.out) / "result.json").read_text())
 
     def listing(self, folder=None):
-        """Every name in the folder, hidden files included."""
+        """The names of all entries of the folder, hidden files included."""
         return sorted(os.listdir(folder or self.out))

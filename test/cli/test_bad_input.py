@@ -14,7 +14,7 @@ from pathlib import Path
 import cli_support as cli
 from cli_support import HEIGHT, WIDTH, camera_yaml, png
 
-# A 16x16 grey gradient.
+# A JPEG file: a grey gradient of 16 x 16 pixels.
 JPEG = base64.b64decode(
     "/9j/4AAQSkZJRgABAQAAAQABAAD/2wBDABQODxIPDRQSEBIXFRQYHjIhHhwcHj0sLiQySUBMS0dARkVQWnNiUFVt"
     "VkVGZIhlbXd7gYKBTmCNl4x9lnN+gXz/wAALCAAQABABAREA/8QAFQABAQAAAAAAAAAAAAAAAAAABQL/xAAXEAEA"
@@ -70,7 +70,7 @@ class Images(cli.CliTest):
         self.assert_refused(self.run_program("detect", cut, "-o", self.out), "cut.pgm", "truncated")
 
     def test_headers_that_claim_huge_images_are_refused_before_decoding(self):
-        def limit():  # the limit of memory, in which none of these images can be decoded
+        def limit():  # 1 GiB of memory, too little to decode any of these images
             resource.setrlimit(resource.RLIMIT_DATA, (1 << 30, 1 << 30))
 
         is_asan = b"__asan" in Path(cli.program()).read_bytes()
@@ -349,7 +349,7 @@ class Surroundings(cli.CliTest):
         closed = self.folder / "closed"
         closed.mkdir(mode=0o555)
         before = []
-        if os.geteuid() == 0:  # root may write everywhere, unless that capability was removed
+        if os.geteuid() == 0:  # root may write everywhere, so setpriv takes that capability away
             before = ["setpriv", "--bounding-set", "-dac_override,-dac_read_search"]
         done = self.reconstruct(out=closed / "out", before=before)
         self.assert_refused(done, "Permission", out=closed / "out")

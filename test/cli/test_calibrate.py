@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""twoview calibrate: real boards, boards rendered with known cameras, and input that is refused."""
+"""Tests of twoview calibrate: real boards, boards rendered with known cameras, and input that is
+refused."""
 import json
 import os
 import sys
@@ -194,7 +195,7 @@ class KnownCameras(CalibrateTest):
 
 
 class Views(CalibrateTest):
-    """Views that are left out, and warnings."""
+    """Tests of views that calibrate leaves out, and of its warnings."""
 
     lens = boards.MILD
 
@@ -307,7 +308,7 @@ class Views(CalibrateTest):
         self.assertEqual(list(status_of(result).values()).count("duplicate"), 8)
         self.assertAlmostEqual(result["intrinsics"]["fx"] / self.lens[1][0], 1, delta=0.01)
 
-    # Bad input.
+    # The tests from here on give bad input, which calibrate must refuse.
 
     def refuse(self, *arguments, words, seconds=30, **options):
         start = time.monotonic()

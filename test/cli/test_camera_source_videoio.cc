@@ -57,7 +57,8 @@ void test_a_film_gives_each_picture_with_its_time() {
   while (source.next(source.user, &frame) == TVS_OK) held.push_back(frame);
   TEST_ASSERT_EQUAL_INT(kFrames, static_cast<int>(held.size()));
   TEST_ASSERT_EQUAL_INT(TVS_END, source.next(source.user, &frame));
-  for (size_t k = 0; k < held.size(); ++k) {  // all frames are held at the same time
+  // No frame was released yet: all are held at the same time.
+  for (size_t k = 0; k < held.size(); ++k) {
     check_picture(held[k]);
     TEST_ASSERT_EQUAL_UINT64(k, held[k].number);
     TEST_ASSERT_FALSE(held[k].flags & (TVS_FRAME_GAP | TVS_FRAME_HAS_ATTITUDE));

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview detect and twoview match."""
+"""Tests of twoview detect and twoview match."""
 import csv
 import json
 import unittest

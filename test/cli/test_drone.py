@@ -1,4 +1,4 @@
-"""twoview drone against `drone simulate`, over real sockets."""
+"""Tests of twoview drone over real sockets, with the drone of `twoview drone simulate`."""
 
 import json
 import os

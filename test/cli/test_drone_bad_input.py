@@ -1,5 +1,5 @@
-"""twoview drone with bad hosts, ports, options, firmware and disks: docs/contract.md lists each
-mistake with its test."""
+"""Tests of twoview drone with bad hosts, ports, options, firmware and disks: docs/contract.md lists
+each mistake with its test."""
 
 import json
 import os

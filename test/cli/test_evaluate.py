@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""twoview evaluate: its report, SuperGlue's measures, and data sets with broken entries."""
+"""Tests of twoview evaluate: its report, SuperGlue's measures, and data sets with broken
+entries."""
 import json
 import math
 import os
@@ -22,7 +23,7 @@ def pair_line(name0="a.png", name1="b.png", K0=None, K1=None, T=None, turns=(0, 
 
 
 def auc(errors, threshold):
-    """SuperGlue's pose_auc in per cent, written independently."""
+    """The area under the curve as SuperGlue's pose_auc defines it, in per cent; written anew."""
     errors = sorted(errors)
     points = [(0.0, 0.0)] + [
         (e, (i + 1) / len(errors)) for i, e in enumerate(errors) if e < threshold
@@ -171,10 +172,10 @@ class Evaluate(cli.CliTest):
         self.assertLess(straight, 1e-3)
         self.write("set/cameras.yaml", entry("cam", 0.4))
         self.assertGreater(error(), 1e-2)
-        # Of several entries the one is chosen whose name begins the image file's name, ...
+        # Of several entries, evaluate takes the one whose name the image file's name begins with.
         self.write("set/cameras.yaml", entry("z", 0.4) + entry("a", 0) + entry("b", 0))
         self.assertEqual(error(), straight)
-        # ... and if there is none, the one whose fx and cx are those of the line.
+        # If no entry's name fits, evaluate takes the entry with the fx and cx of the pair's line.
         self.write("set/cameras.yaml", entry("y", 0.4, 999) + entry("z", 0))
         self.assertEqual(error(), straight)
         self.write("set/cameras.yaml", entry("y", 0, 999) + entry("z", 0, 998))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview reconstruct with a direction of gravity in both views."""
+"""Tests of twoview reconstruct with a direction of gravity in both views."""
 import math
 
 import cli_support as cli

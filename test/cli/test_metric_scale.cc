@@ -4,7 +4,7 @@
 
 #include "recording/metric_scale.h"
 
-#include <unity.h>  // last, since it defines isnan and isinf as macros
+#include <unity.h>  // comes last, since unity.h defines isnan and isinf as macros
 
 using namespace cli;
 
@@ -60,7 +60,7 @@ FlightLog climb() {
 void test_velocity_is_integrated_along_the_turns() {
   const auto scale = scale_by_velocity(circle(), 10.005, 11.995, CameraMount());
   TEST_ASSERT_TRUE(scale.has_value());
-  // The chord of the arc.
+  // The baseline is the chord of the arc that was flown, not the length of the arc.
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, 2 * std::sin(1.99 * kPi / 8), scale->baseline_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.02 * 1.99, scale->sigma_m);
   TEST_ASSERT_EQUAL_STRING("velocity", scale->source.c_str());
@@ -125,7 +125,7 @@ std::vector<Vector3> floor_points(double pitch, const CameraMount& mount) {
   std::vector<Vector3> points;
   const Matrix3 camera_from_world = transposed(product(pitch_of(pitch), mount.body_from_camera));
   for (int k = 0; k < 300; ++k) {
-    const double height = k % 3 == 0 ? 0 : 0.004 * k;  // a third of the points lie on the floor
+    const double height = k % 3 == 0 ? 0 : 0.004 * k;  // every third is on the floor
     const Vector3 world = {1.5 + 0.01 * k, -1 + 0.007 * k, 1.5 - height};
     const Vector3 p = applied(camera_from_world, world);
     points.push_back({p[0] / 0.25, p[1] / 0.25, p[2] / 0.25});
@@ -141,7 +141,7 @@ void test_a_seen_floor_gives_the_scale() {
                                },
                                [](double) { return 1.5; });
   std::vector<Vector3> points = floor_points(-0.15, mount);
-  points.push_back({0, 40, 40});  // wrong points far below the floor
+  points.push_back({0, 40, 40});  // two wrong points far below the floor
   points.push_back({1, 44, 40});
   const auto scale = scale_by_floor(log, 11, points, mount);
   TEST_ASSERT_TRUE(scale.has_value());

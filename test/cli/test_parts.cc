@@ -181,8 +181,8 @@ void test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size() {
     return false;
   };
   const std::array<double, 9>* const none = nullptr;
-  TEST_ASSERT_TRUE(is_refused(cameras, 9, &K));  // the entries are for another image size
-  TEST_ASSERT_TRUE(is_refused({}, 8, none));     // there is neither an entry nor K
+  TEST_ASSERT_TRUE(is_refused(cameras, 9, &K));  // no camera has this image size
+  TEST_ASSERT_TRUE(is_refused({}, 8, none));     // no camera and no K is given
 }
 
 // The number of pairs that a text holds, or minus the length of the message that refuses it.

@@ -23,7 +23,7 @@ CAMERA = dict(width=1241, height=376, fx=F, fy=F, cx=CX, cy=CY)
 
 
 def cloud(path):
-    """The positions of cloud.ply."""
+    """Reads the positions (x, y, z) of the points in a cloud.ply."""
     data = path.read_bytes()
     body = data[data.index(b"end_header\n") + len(b"end_header\n"):]
     return [row[:3] for row in struct.iter_unpack("<fffBBBff", body)]

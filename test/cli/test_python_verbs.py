@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""twoview compare and twoview colmap: how twoview starts the Python programs, from the source tree
-and installed."""
+"""Tests of twoview compare and twoview colmap: how twoview starts the Python programs, from the
+source tree and installed."""
 import json
 import os
 import shutil

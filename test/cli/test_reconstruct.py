@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview reconstruct: from two images to its output files."""
+"""Tests of twoview reconstruct: from two images to its output files."""
 import json
 import math
 import os

@@ -1,5 +1,5 @@
-// reconstruct --recording: flights of the simulated drone through the room, compared with the
-// simulator's truth.
+// Tests of reconstruct --recording: flights of the simulated drone through the room, compared with
+// the simulator's truth.
 #include <unistd.h>
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@
 #include "simulator/film.h"
 #include "simulator/firmware.h"
 
-#include <unity.h>  // last, since it defines isnan and isinf as macros
+#include <unity.h>  // comes last, since unity.h defines isnan and isinf as macros
 
 using namespace cli;
 using simulator::FlightState;
@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 constexpr int64_t kMs = 1000000;
 constexpr double kDegrees = 57.29577951308232;
 constexpr int kWidth = 640, kHeight = 360;
-// Approximately the AR.Drone's front lens.
+// A lens similar to that of the AR.Drone's front camera.
 const tv_camera kCamera{TV_CAMERA_BROWN_CONRADY, kWidth, kHeight, 0, 560, 560, 320, 180,
                         {-0.5, 0.25, 0, 0, 0}};
 const char kFly[] = "290718208";
@@ -56,7 +56,8 @@ simulator::Sensors sensors(double altitude_factor, double velocity_factor) {
 const Plan kSideways{"sideways", {0, -2, 0}, 0.25F, 0, 0, 0, sensors(1, 1.02)};
 const Plan kForward{"forward", {-1.5, 0, 0}, 0, -0.25F, 0, 0.1F, sensors(1.01, 1.02)};
 const Plan kClimbing{"climbing", {0, 1, 0}, 0, 0, 0.6F, 0, sensors(1.01, 1)};
-// As over the loopback: a picture arrives before the attitude sample that follows its instant.
+// Pictures arrive without delay, as over the loopback: each arrives before the attitude sample that
+// follows its instant.
 const Plan kPrompt{"prompt", {0, -2, 0}, 0.25F, 0, 0, 0, sensors(1, 1), 0};
 
 int32_t bits(float value) {
@@ -68,7 +69,7 @@ int32_t bits(float value) {
 // A drone that flies a plan; its pictures and packets are recorded as `drone record` does.
 struct Flown {
   fs::path folder;
-  std::vector<FlightState> truth;  // for each picture
+  std::vector<FlightState> truth;  // the drone's true state at each picture
 };
 
 const room::Room& the_room() {
@@ -112,7 +113,7 @@ class Flyer {
     send("PCMD", arguments);
   }
   void record_navdata(const std::vector<uint8_t>& packet) {
-    tvs_imu imu{};  // not used: the reader decodes the packet itself
+    tvs_imu imu{};  // only its time is set: the reader decodes the packet itself
     imu.time.received_ns = now_ + 3 * kMs;
     recording_.add_navdata(packet.data(), packet.size(), imu);
   }
@@ -346,10 +347,10 @@ void test_a_frame_that_is_not_there_is_refused() {
 
 struct Ran {
   int status;
-  std::string text;  // stdout and stderr together
+  std::string text;  // what the program printed, stdout and stderr together
 };
 
-// Runs the twoview program.
+// Runs the twoview program with these arguments and waits for its end.
 Ran run(const std::string& arguments) {
   const std::string command =
       std::string(std::getenv("TWOVIEW_PROGRAM")) + " reconstruct " + arguments + " 2>&1";

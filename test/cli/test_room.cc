@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kWidth = 640, kHeight = 360;
 
-// Approximately the AR.Drone's front lens.
+// A lens similar to that of the AR.Drone's front camera.
 const tv_camera camera{TV_CAMERA_BROWN_CONRADY, kWidth, kHeight, 0, 560, 560, 320, 180,
                        {-0.5, 0.25, 0, 0, 0}};
 
@@ -83,7 +83,7 @@ void test_a_view_is_the_other_one_carried_by_depth_and_pose() {
       if (!carry(eye().ray(x, y), film0.depth[i], R, t, pixel, &depth1)) continue;
       const size_t j = static_cast<size_t>(static_cast<int>(pixel[1] + 0.5) * kWidth +
                                            static_cast<int>(pixel[0] + 0.5));
-      // the point is hidden in view 1
+      // View 1 shows another depth at this pixel: a nearer object hides the point.
       if (std::abs(film1.depth[j] - depth1) > 0.02 * depth1) continue;
       ++seen;
       alike += std::abs(bilinear(film1, pixel) - static_cast<float>(film0.luma[i])) < 16;
@@ -146,9 +146,9 @@ void test_a_reconstruction_finds_the_true_motion() {
 void test_axes_are_forward_right_down() {
   // Nose up: the camera looks above the horizon, so its z axis has a negative world z.
   TEST_ASSERT_TRUE(pose(0, 0.1, 0, {0, 0, -1}).world_from_camera[8] < -0.09);
-  // Yaw to the right: the camera looks towards +y.
+  // A positive yaw turns the nose to the right, so the camera looks towards +y.
   TEST_ASSERT_TRUE(pose(0.1, 0, 0, {0, 0, -1}).world_from_camera[5] > 0.09);
-  // Right side down: the camera's x axis points down.
+  // A positive roll lowers the right side, so the camera's x axis points down.
   TEST_ASSERT_TRUE(pose(0, 0, 0.1, {0, 0, -1}).world_from_camera[6] > 0.09);
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview triangulate: points from matched pixels and a known pose."""
+"""Tests of twoview triangulate: points from matched pixels and a known pose."""
 import csv
 import json
 import struct

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""twoview undistort: images without the lens's distortion, and their camera."""
+"""Tests of twoview undistort: images without the lens's distortion, and their camera."""
 import json
 import math
 import os
@@ -185,7 +185,7 @@ class Undistort(cli.CliTest):
         done = self.run_program("undistort", "d.png", "--camera", "camera.yaml", "-o", self.folder)
         self.assertEqual(done.returncode, 2)
         self.one_line(done, "d.png", "read by this run")
-        # the result is e.png, and camera.yaml is still found and read
+        # The image written would be e.png, but the camera file written would replace the one read.
         image.rename(self.folder / "e.jpg")
         done = self.run_program("undistort", "e.jpg", "--camera", "camera.yaml", "-o", ".")
         self.assertEqual(done.returncode, 2)

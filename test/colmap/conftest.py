@@ -131,7 +131,7 @@ def run(*arguments, status=0):
 
 @pytest.fixture
 def call(capfd):
-    """Runs a verb in this process: (status, stdout, stderr)."""
+    """A function that runs a verb in this process and returns (exit status, stdout, stderr)."""
     from twoview_tools.colmap.cli import main
 
     def called(*arguments):

@@ -122,7 +122,7 @@ CAMERA = tv.Camera(WIDTH, HEIGHT, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
 
 
 def two_views(R, t, plane=False, noise_px=0.2):
-    """(pixels0, pixels1) of points that both views see."""
+    """(pixels0, pixels1): the pixels of random points that both views see."""
     random = np.random.default_rng(7)
     points = np.column_stack(
         [random.uniform(-1.5, 1.5, 300), random.uniform(-1, 1, 300), random.uniform(4, 8, 300)]

@@ -1,4 +1,5 @@
-"""twoview colmap export: both schemas, the choice of pairs, --append, bad input, interruption."""
+"""Tests of twoview colmap export: both schemas, the choice of pairs, --append, bad input,
+interruption."""
 
 import contextlib
 import hashlib
@@ -32,7 +33,7 @@ def rows_of(path, table):
 
 
 def pairs_of(path):
-    """Names of the pairs in a database."""
+    """The pairs of a database, as pairs of image names."""
     with contextlib.closing(sqlite3.connect(path)) as database:
         names = dict(database.execute("SELECT image_id, name FROM images"))
         return [
@@ -49,7 +50,7 @@ def assert_nothing_else(folder, *names):
     assert sorted(os.listdir(folder)) == sorted(names)
 
 
-# ---- the database's content --------------------------------------------------------------------
+# ---- tests of the database's content -----------------------------------------------------------
 
 @pytest.mark.parametrize("table", SHARED_COLUMNS)
 def test_both_schemas_hold_the_same_rows(exported, table):
@@ -57,7 +58,7 @@ def test_both_schemas_hold_the_same_rows(exported, table):
     assert len(ours) == len(theirs) > 0
     for row4, row38 in zip(ours, theirs):
         for value4, value38 in zip(row4, row38):
-            if value4 is None:  # COLMAP 3.8 has zeros for what was not estimated
+            if value4 is None:  # where schema 4 has NULL, that of 3.8 has zeros
                 assert not any(np.frombuffer(value38))
             elif (
                 table == "two_view_geometries"
@@ -135,7 +136,7 @@ def test_geometries_are_there_and_agree_with_their_matches(exported):
         for pair, row in zip(ids, rows):
             id0, id1 = pycolmap.pair_id_to_image_pair(pair)
             matches = database.read_matches(id0, id1)
-            assert row.config in (2, 4)  # calibrated, or planar where the wall is nearly all
+            assert row.config in (2, 4)  # COLMAP's numbers: 2 calibrated, 4 planar (mostly wall)
             assert {tuple(m) for m in row.inlier_matches} <= {tuple(m) for m in matches}
             pixels = [
                 database.read_keypoints(i)[row.inlier_matches[:, k], :2]
@@ -262,7 +263,7 @@ def test_images_that_show_different_things_are_degenerate(tmp_path, schema, call
     assert (rows, config) == (0, 1)
 
 
-# ---- --append ----------------------------------------------------------------------------------
+# ---- tests of the option --append --------------------------------------------------------------
 
 @pytest.mark.parametrize("schema", SCHEMAS)
 def test_append_adds_what_is_not_there(exported, photographs, tmp_path, schema, call):
@@ -305,7 +306,7 @@ def test_append_refuses_what_contradicts(exported, photographs, tmp_path, refuse
     assert_nothing_else(tmp_path, "x.db", "cam.yaml")
 
 
-# ---- bad input ---------------------------------------------------------------------------------
+# ---- tests with bad input, which export must refuse --------------------------------------------
 
 @pytest.mark.parametrize("schema", SCHEMAS)
 def test_a_database_that_is_there_is_left_alone(exported, photographs, tmp_path, schema, refuse):
@@ -469,7 +470,7 @@ def test_an_interrupted_run_leaves_what_was_there(exported, photographs, tmp_pat
         "export", "--database", tmp_path / "x.db", "--images", images, *["--append"] * append
     )
     deadline = time.monotonic() + 30
-    # waits until the export has begun to write
+    # The file .x.db.* shows that the export has begun to write.
     while not any(name.startswith(".x.db.") for name in os.listdir(tmp_path)):
         assert process.poll() is None and time.monotonic() < deadline
         time.sleep(0.02)
@@ -489,7 +490,7 @@ def test_json_is_alone_on_stdout(photographs, tmp_path):
     assert sum(json.loads(out)["configurations"].values()) == json.loads(out)["pairs_verified"] == 6
 
 
-# ---- one keypoint a corner ---------------------------------------------------------------------
+# ---- tests that a corner is exported as one keypoint -------------------------------------------
 
 def test_a_corner_with_two_orientations_is_one_keypoint_to_the_mapper():
     keypoints = np.zeros(5, tv.KEYPOINT)

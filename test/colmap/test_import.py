@@ -1,5 +1,5 @@
-"""twoview colmap import and model: models as reference poses, databases as input, and results
-written as models."""
+"""Tests of twoview colmap import and model: models as reference poses, databases as input, and
+results written as models."""
 
 import json
 import os
@@ -80,7 +80,7 @@ def test_a_models_poses_are_a_pairs_files_truth(models, tmp_path, form, call):
         R, t = relative_pose(NAMES.index(pair.name0), NAMES.index(pair.name1))
         np.testing.assert_allclose(pair.R, R, atol=1e-12)
         np.testing.assert_allclose(pair.t, t, atol=1e-12)
-        # COLMAP's principal point less half a pixel
+        # The importer subtracts half a pixel from COLMAP's principal point.
         np.testing.assert_allclose(pair.K0, K, rtol=1e-15)
     camera = read_camera_set(tmp_path / "out" / "cameras.yaml")["camera_1"]
     assert (camera.cx, camera.cy, tuple(camera.k[:5])) == (CX, CY, (-0.1, 0.01, 0.001, 0, 0))
@@ -253,7 +253,7 @@ def test_a_match_without_a_keypoint_is_named(tmp_path, refuse):
     )
 
 
-# ---- results as models -------------------------------------------------------------------------
+# ---- tests of results written as COLMAP models -------------------------------------------------
 
 def read_ply(path):
     """The vertices of a binary PLY: x y z, colour, angle, error."""

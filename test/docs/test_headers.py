@@ -35,7 +35,7 @@ def undocumented(symbols):
     documented = {symbol.name for symbol in symbols if symbol.comment}
     for symbol in symbols:
         private = symbol.kind == "field" and "rivate" in symbol.parent.comment
-        # a macro that #if and #else define twice needs one comment
+        # Of a macro that is defined in both #if and #else, one definition needs a comment.
         either = symbol.kind == "macro" and symbol.name in documented
         if not symbol.comment and not private and not either:
             yield symbol
@@ -140,7 +140,7 @@ class TestHeaders(unittest.TestCase):
                 self.assertIn("docs/drivers.md", pages, path)
         algorithms = {path.stem for path in (headers.ROOT / "docs" / "algorithms").glob("*.md")} - {
             "math"
-        }  # internal macros need no comment
+        }  # docs/algorithms/math.md is about internal code, so no public header names it
         self.assertEqual(algorithms - named, set())
 
     def test_every_quantity_has_a_unit(self):

@@ -25,7 +25,7 @@ PROGRAM = os.environ.get("TWOVIEW_PROGRAM", "")
 
 
 def braces(path):
-    """Expands braces: a/{b,c}.{h,cc} gives four paths."""
+    """The paths that a path with braces stands for: a/{b,c}.{h,cc} gives four."""
     pieces = re.split(r"\{([^}]*)\}", path)
     choices = [piece.split(",") if k % 2 else [piece] for k, piece in enumerate(pieces)]
     return ["".join(choice) for choice in itertools.product(*choices)]
@@ -72,7 +72,7 @@ class TestPages(unittest.TestCase):
         wrong = []
         for page in self.pages.values():
             if page.path.name == "CHANGELOG.md":
-                continue  # the CHANGELOG may name files that are gone
+                continue  # the CHANGELOG may name files that no longer exist
             texts = itertools.chain(page.code(), ((line, text) for _, line, text in page.blocks))
             for line, text in itertools.chain(texts, page.prose):
                 for path in re.findall(
@@ -149,8 +149,8 @@ class TestPages(unittest.TestCase):
                         wrong.append(f"{page}:{first}: twoview {verb}")
                         continue
                     if verb in ("compare", "colmap"):
-                        # verbs in Python: python/compare_* and python/colmap_* run the commands of
-                        # their pages
+                        # These verbs are Python programs. The tests python/compare_* and
+                        # python/colmap_* run the commands of their pages.
                         continue
                     path = [verb] + (
                         [rest[0]]

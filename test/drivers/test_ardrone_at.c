@@ -139,7 +139,7 @@ static void test_the_sequence_starts_again_before_it_overflows(void) {
   check_text(&at, "AT*COMWDG=1\r");
 }
 
-/* ---- pilot ---- */
+/* ---- tests of the pilot, which repeats the flight commands ---- */
 
 #define MS INT64_C(1000000)
 static ardrone_pilot pilot;
@@ -199,7 +199,7 @@ static void take_off_and_fly(void) {
 
 static void test_take_off_is_level_and_land_ends_it(void) {
   begin_pilot();
-  /* the drone's state is not known yet */
+  /* no navdata yet, so take-off is refused */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_pilot_take_off(&pilot, now));
   take_off_and_fly();
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_land(&pilot));
@@ -210,7 +210,7 @@ static void test_take_off_is_level_and_land_ends_it(void) {
 static void test_a_drone_that_came_down_is_not_sent_up_again(void) {
   begin_pilot();
   take_off_and_fly();
-  tick(READY); /* the drone landed by itself */
+  tick(READY); /* not flying any more: the drone landed by itself */
   TEST_ASSERT_EQUAL_INT(LAND, ref_value());
   begin_pilot();
   take_off_and_fly();
@@ -222,7 +222,7 @@ static void test_a_drone_that_came_down_is_not_sent_up_again(void) {
   take_off_and_fly();
   tick(READY | ARDRONE_STATE_FLYING | ARDRONE_STATE_EMERGENCY);
   TEST_ASSERT_EQUAL_INT(LAND, ref_value());
-  tick(READY); /* the drone was re-armed */
+  tick(READY); /* no emergency any more: the drone was re-armed */
   TEST_ASSERT_EQUAL_INT(LAND, ref_value());
 }
 
@@ -273,7 +273,8 @@ static void test_the_emergency_bit_is_an_edge(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
   tick(READY | ARDRONE_STATE_FLYING);
   TEST_ASSERT_EQUAL_INT(LAND | EMERGENCY_BIT, ref_value());
-  /* the drone reports the emergency: the bit falls at once and does not rise again */
+  /* The drone reports the emergency, so the pilot clears the bit at once and does not set it
+     again. */
   tick(READY | ARDRONE_STATE_EMERGENCY);
   TEST_ASSERT_EQUAL_INT(0, count_edges(200, READY | ARDRONE_STATE_EMERGENCY));
   TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_pilot_take_off(&pilot, now));
@@ -281,7 +282,7 @@ static void test_the_emergency_bit_is_an_edge(void) {
   tick(READY | ARDRONE_STATE_EMERGENCY);
   TEST_ASSERT_EQUAL_INT(LAND | EMERGENCY_BIT, ref_value());
   TEST_ASSERT_EQUAL_INT(0, count_edges(200, READY));
-  /* there is no emergency to clear */
+  /* The drone reports no emergency, so rearm sends no pulse of the bit. */
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_rearm(&pilot, now));
   TEST_ASSERT_EQUAL_INT(0, count_edges(50, READY));
 }
@@ -291,7 +292,7 @@ static void test_a_lost_pulse_is_repeated_while_the_drone_says_so(void) {
   begin_pilot();
   take_off_and_fly();
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
-  /* five pulses within 3 s */
+  /* The drone flies on, so the pilot repeats the pulse: five times within 3 s. */
   TEST_ASSERT_EQUAL_INT(5, count_edges(200, READY | ARDRONE_STATE_FLYING));
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pilot_cut_motors(&pilot, now));
   for (k = 0; k < 200;
@@ -332,7 +333,7 @@ static void test_flat_trim_only_on_the_ground(void) {
 }
 
 int main(void) {
-  setlocale(LC_ALL, "de_DE.UTF-8"); /* has a decimal comma; used where it is installed */
+  setlocale(LC_ALL, "de_DE.UTF-8"); /* writes a decimal comma; ignored if not installed */
   UNITY_BEGIN();
   RUN_TEST(test_each_command_has_its_text);
   RUN_TEST(test_floats_are_their_bits);

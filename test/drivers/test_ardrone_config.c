@@ -112,13 +112,13 @@ static void test_numbers_have_a_dot_whatever_the_locale(void) {
 
 static void test_ids_are_crc_32(void) {
   char id[ARDRONE_ID_BYTES];
-  ardrone_make_id("123456789", id); /* the check value of this CRC */
+  ardrone_make_id("123456789", id); /* the usual check of a CRC-32: these digits give cbf43926 */
   TEST_ASSERT_EQUAL_STRING("cbf43926", id);
-  ardrone_make_id("", id); /* its CRC is 0, which would name the default configuration */
+  ardrone_make_id("", id); /* its CRC 0 is the default configuration's id */
   TEST_ASSERT_EQUAL_STRING("00000001", id);
 }
 
-/* ---- handshake ---- */
+/* ---- tests of the handshake that sets one configuration value ---- */
 
 #define MS INT64_C(1000000)
 
@@ -171,7 +171,7 @@ static void test_the_handshake_completes_whatever_single_message_is_lost(void) {
     for (lost = 0; lost < 8; ++lost) {
       mock drone = {0};
       ardrone_exchange exchange;
-      drone.acknowledged = old_bit; /* the bit may still be set by an earlier client */
+      drone.acknowledged = old_bit; /* an earlier client may have left the bit set */
       drone.lost = 1u << lost;
       begin_set(&exchange);
       TEST_ASSERT_EQUAL_INT(ARDRONE_EXCHANGE_DONE, run_exchange(&exchange, &drone));
@@ -193,7 +193,7 @@ static void test_a_good_link_takes_two_messages(void) {
     memset(&at, 0, sizeof at);
     begin_set(&exchange);
     TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_exchange_tick(&exchange, &at, 0));
-    /* nothing is sent before the drone has reported whether the bit is set */
+    /* The exchange sends nothing before the drone has reported its acknowledgement bit. */
     TEST_ASSERT_EQUAL_UINT64(0, at.size);
     TEST_ASSERT_EQUAL_INT(ARDRONE_EXCHANGE_DONE, run_exchange(&exchange, &drone));
     TEST_ASSERT_EQUAL_INT(2 + old_bit, drone.num_messages);
@@ -215,7 +215,7 @@ static void test_ids_and_command_share_a_datagram(void) {
   memset(&at, 0, sizeof at);
   begin_set(&exchange);
   ardrone_exchange_navdata(&exchange, 0, 0);
-  at.size = 950; /* the datagram has no room for ids and command together */
+  at.size = 950; /* too full for the ids and the command together */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_CAPACITY, ardrone_exchange_tick(&exchange, &at, 0));
   TEST_ASSERT_EQUAL_UINT64(950, at.size);
   TEST_ASSERT_EQUAL_INT32(0, at.sequence);

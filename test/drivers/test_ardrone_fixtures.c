@@ -161,13 +161,13 @@ static void test_every_flipped_byte_is_noticed(void) {
   free(bytes);
 }
 
-/* ---- video ---- */
+/* ---- tests of the captured video ---- */
 
 typedef struct stream_facts {
   int packets, idr, p, gaps;
   uint64_t skipped;
   uint32_t first_number, last_number;
-  uint64_t digest; /* of every header field and payload byte, in order */
+  uint64_t digest; /* a hash of every header field and payload byte, in order */
 } stream_facts;
 
 static void digest(uint64_t *sum, const void *bytes, size_t size) {

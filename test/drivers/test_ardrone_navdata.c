@@ -67,7 +67,7 @@ static void test_unknown_tags_and_sizes_are_passed_over(void) {
   size_t k;
   begin(0x55667788);
   for (k = 0; k < 4; ++k) add_option(tags[k], 10 + (unsigned)k, 1);
-  add_option(27, 100, 1); /* a GPS option of another firmware's size */
+  add_option(27, 100, 1); /* a GPS option with the size of no known firmware */
   add_option(26, 8, 3);
   end_packet();
   TEST_ASSERT_EQUAL_INT(TVS_OK, decode());
@@ -85,14 +85,14 @@ static void test_option_sizes_below_4_are_refused(void) {
     end_packet();
     memset(&navdata, 0x5a, sizeof navdata);
     TEST_ASSERT_EQUAL_INT(TVS_ERR_DATA, decode());
-    TEST_ASSERT_EACH_EQUAL_HEX8(0x5a, &navdata, sizeof navdata); /* the output is untouched */
+    TEST_ASSERT_EACH_EQUAL_HEX8(0x5a, &navdata, sizeof navdata); /* navdata was not written */
   }
 }
 
 static void test_longer_options_give_what_is_known_shorter_ones_nothing(void) {
   begin(0x55667788);
   add_option(1, 12, 0x21);
-  add_option(9, 75, 1); /* the option is one byte too short */
+  add_option(9, 75, 1); /* option 9, one byte too short */
   end_packet();
   TEST_ASSERT_EQUAL_INT(TVS_OK, decode());
   TEST_ASSERT_EQUAL_HEX32(1u << 1, navdata.present);
@@ -140,7 +140,7 @@ static void test_a_wrong_checksum_is_refused_and_nothing_used(void) {
   TEST_ASSERT_EQUAL_UINT32(0, navdata.sequence);
 }
 
-/* The sum exceeds what one 16-bit lane holds. */
+/* The checksum is larger than a 16-bit number can be. */
 static void test_a_packet_of_ones_has_its_sum(void) {
   begin(0x55667788);
   add_option(200, 4000, 0xff);
@@ -169,7 +169,7 @@ static void test_a_short_packet_after_a_long_one_holds_nothing_of_it(void) {
   TEST_ASSERT_EQUAL_UINT32(0, navdata.demo.battery_percent);
 }
 
-/* ---- sequence ---- */
+/* ---- tests of the order of packets by their sequence numbers ---- */
 
 static ardrone_order check(ardrone_sequence *sequence, uint32_t number, uint32_t state) {
   navdata.sequence = number;
@@ -183,12 +183,12 @@ static void test_order_gap_late_wrap_and_reboot(void) {
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 0xfffffffe, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_NEXT, check(&s, 0xffffffff, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_NEXT, check(&s, 0, 0));
-  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 0, 0)); /* the same packet again */
+  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 0, 0)); /* number 0 comes twice */
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_GAP, check(&s, 3, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 2, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 1, ARDRONE_STATE_COM_WATCHDOG));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_GAP, check(&s, 300711, 0));
-  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 1, 0)); /* the drone rebooted */
+  TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 1, 0)); /* far back: the drone rebooted */
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_GAP, check(&s, 500, 0));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_RESTART, check(&s, 1, ARDRONE_STATE_BOOTSTRAP));
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_LATE, check(&s, 0, ARDRONE_STATE_BOOTSTRAP));
@@ -198,7 +198,7 @@ static void test_order_gap_late_wrap_and_reboot(void) {
   TEST_ASSERT_EQUAL_INT(ARDRONE_ORDER_NEXT, check(&s, 9, 0));
 }
 
-/* ---- SI units ---- */
+/* ---- tests of the conversion to SI units ---- */
 
 static tvs_imu imu;
 
@@ -216,7 +216,7 @@ static void test_units_frames_and_signs(void) {
   navdata.demo.altitude_mm = 1234;
   navdata.demo.velocity_mm_s[0] = 1500;
   navdata.demo.velocity_mm_s[1] = -200;
-  navdata.altitude.vz_mm_s = 300; /* up */
+  navdata.altitude.vz_mm_s = 300; /* positive is up */
   navdata.phys_measures.acceleration_mg[2] = -1000;
   navdata.phys_measures.rate_deg_s[1] = 90;
   navdata.pressure.pressure_pa = 101586;

@@ -81,7 +81,7 @@ static void test_header_survives_encoding(void) {
   TEST_ASSERT_EQUAL_UINT64(73, size);
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_pave_decode(stream, size, &back));
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&back, payload, stream + 100, 100, &size));
-  /* decoding and encoding keep every field's bytes */
+  /* Decoding and encoding again gives the same bytes. */
   TEST_ASSERT_EQUAL_MEMORY(stream, stream + 100, 73);
   TEST_ASSERT_EQUAL_UINT32(42, back.frame_number);
   TEST_ASSERT_EQUAL_UINT(14, back.sps_size);
@@ -119,16 +119,16 @@ static void test_absurd_sizes_are_refused(void) {
   ardrone_pave_header h = header_of(1, ARDRONE_PAVE_IDR, 10), back;
   const uint8_t payload[10] = {0};
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, payload, stream, sizeof stream, &size));
-  stream[6] = 63; /* header_size */
+  stream[6] = 63; /* header_size 63 is too small */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_DATA, ardrone_pave_decode(stream, size, &back));
   stream[6] = 1;
-  stream[7] = 1; /* 257 */
+  stream[7] = 1; /* header_size 257 is too large */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_DATA, ardrone_pave_decode(stream, size, &back));
-  stream[6] = 0; /* header_size is 256, for which more bytes are needed */
+  stream[6] = 0; /* header_size 256 is allowed, but more bytes are needed */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, ardrone_pave_decode(stream, size, &back));
   stream[6] = 64;
   stream[7] = 0;
-  stream[10] = 0x20; /* a payload of 2 MiB */
+  stream[10] = 0x20; /* payload_size of 2 MiB is too large */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_DATA, ardrone_pave_decode(stream, size, &back));
 }
 
@@ -137,7 +137,7 @@ static void test_an_advertisement_carries_no_payload(void) {
   size_t written;
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, NULL, stream, sizeof stream, &written));
   stream[31] = ARDRONE_PAVE_ADVERTISEMENT;
-  stream[8] = 77; /* in an advertisement: the size of a packet to come */
+  stream[8] = 77; /* payload_size, which here is that of a packet to come */
   size = written;
   add(2, ARDRONE_PAVE_IDR, 100);
   feed(stream, size);
@@ -160,7 +160,7 @@ static void test_the_buffer_turns_over(void) {
     expect(k);
   }
   size = 0;
-  /* does not fit into the buffer: the parser skips it and does not wait for its end */
+  /* Packet 1000 does not fit into the buffer: the parser skips it and does not wait for its end. */
   add(1000, ARDRONE_PAVE_P, 4090);
   feed(stream, 100);
   expect_none();
@@ -178,7 +178,7 @@ static void test_the_latency_rule_keeps_the_last_idr(void) {
   feed(stream, size);
   size = 0;
   add(5, ARDRONE_PAVE_IDR, 50);
-  feed(stream, size / 2); /* the packet is incomplete, so the parser does not skip to it */
+  feed(stream, size / 2); /* packet 5 is incomplete: no skipping to it */
   TEST_ASSERT_EQUAL_INT(2, ardrone_pave_skip_to_latest(&parser));
   expect(3);
   expect(4);
@@ -203,11 +203,11 @@ static void test_the_gate_opens_on_idr_and_shuts_on_a_gap(void) {
   TEST_ASSERT_EQUAL_INT(0, gate(&g, 7, ARDRONE_PAVE_P, 100));
   TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_DECODE | ARDRONE_PAVE_RESET,
                         gate(&g, 8, ARDRONE_PAVE_IDR, 100));
-  /* the same packet a second time */
+  /* Packet 8 comes a second time. */
   TEST_ASSERT_EQUAL_INT(ARDRONE_PAVE_GAP, gate(&g, 8, ARDRONE_PAVE_P, 100));
   g.is_open = 1;
   h = header_of(9, ARDRONE_PAVE_P, 100);
-  h.stream_id = 2; /* the stream changes to 720p */
+  h.stream_id = 2; /* another stream: the size of the video changed to 720p */
   TEST_ASSERT_EQUAL_INT(0, ardrone_pave_gate_check(&g, &h));
   h = header_of(10, ARDRONE_PAVE_IDR, 100);
   h.stream_id = 2;

@@ -11,7 +11,7 @@ static char folder[] = "/tmp/ardrone_replay_XXXXXX";
 static FILE *navdata_log, *video_pave, *frames_txt;
 static int64_t now;
 static int num_recorded_packets, num_recorded_navdata;
-static int num_undecodable; /* packets before the first at which decoding can begin */
+static int num_undecodable; /* packets before the first IDR picture, where decoding begins */
 static int num_navdata, num_frames, num_gaps;
 
 void setUp(void) {}
@@ -205,7 +205,7 @@ static void test_a_recording_cut_at_any_byte(void) {
   int frames_before = num_recorded_packets, navdata_before = num_recorded_navdata;
   int k;
   for (k = 0; k < 150 && video > 0; ++k) {
-    video -= k < 70 ? 1 : 1567; /* small steps cut through a header and the end of a packet */
+    video -= k < 70 ? 1 : 1567; /* steps of 1 byte cut everywhere in a packet */
     navdata -= k < 70 ? 3 : 1001;
     if (video < 0) video = 0;
     if (navdata < 0) navdata = 0;

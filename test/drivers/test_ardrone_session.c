@@ -106,9 +106,9 @@ static void test_it_ends_the_bootstrap_and_asks_for_nothing_else(void) {
   TEST_ASSERT_EQUAL_INT(0, drone.acknowledged);
   TEST_ASSERT_EQUAL_INT(2, drone.num_configs);
   TEST_ASSERT_EQUAL_STRING("general:navdata_options", drone.last_key);
-  /* no flight was requested, so no command of movement was sent */
+  /* No flight was requested, so the session sent no command of flight. */
   TEST_ASSERT_EQUAL_INT(0, drone.num_refs + drone.num_pcmds);
-  /* the watchdog is cleared all the same */
+  /* Yet the session sends the commands that clear the drone's watchdog. */
   TEST_ASSERT_TRUE(drone.num_commands > 30);
   TEST_ASSERT_NOT_NULL(ardrone_session_navdata(session));
   TEST_ASSERT_EQUAL_UINT32(77, ardrone_session_navdata(session)->demo.battery_percent);
@@ -179,7 +179,7 @@ static void test_take_off_is_dropped_when_the_link_is_lost(void) {
   run_ms(2500);
   TEST_ASSERT_EQUAL_INT(1, num_events[ARDRONE_EVENT_LINK_LOST]);
   TEST_ASSERT_EQUAL_INT(1, drone.num_restarts);
-  TEST_ASSERT_FALSE(drone.flies); /* the session sent the command to land */
+  TEST_ASSERT_FALSE(drone.flies); /* on losing the link the session landed the drone */
   TEST_ASSERT_EQUAL_INT(TVS_ERR_STATE, ardrone_session_take_off(session));
   drone.num_take_offs = 0;
   drone.navdata_off = 0;
@@ -233,7 +233,7 @@ static void test_video_returns_after_a_cut_and_after_silence(void) {
     run_ms(700 + 37 * k);
   }
   for (k = 0; k < 20; ++k) {
-    drone.video_half_open = 1; /* the connection stays open, but no byte arrives through it */
+    drone.video_half_open = 1; /* the video connection is open, but no byte arrives */
     run_ms(40);
     TEST_ASSERT_TRUE(wait_for_picture(3000) < 2000 - 40);
     run_ms(700 + 41 * k);
@@ -282,9 +282,9 @@ static void test_the_latency_rule_drops_what_piled_up(void) {
   TEST_ASSERT_EQUAL_INT(0, own_decoder.num_refused);
 }
 
-/* ---- the long run ---- */
+/* ---- the long run, with many faults ---- */
 
-/* The conditions that every picture fulfils in any run. */
+/* What check_frame counts while it tests the conditions that every picture must fulfil. */
 typedef struct frame_check {
   int num, with_attitude, num_gaps;
   uint64_t last_number;
@@ -352,7 +352,8 @@ static void test_ten_minutes_of_a_bad_link(void) {
       (unsigned long long)counters.navdata_late, (unsigned long long)counters.navdata_missing);
   TEST_ASSERT_TRUE(c.num > 17500);
   TEST_ASSERT_TRUE(c.with_attitude > 0.98 * c.num);
-  /* at 1 rad/s: time stamps have steps of 1 ms, samples are 5 ms apart */
+  /* The drone turns at 1 rad/s, so 0.005 rad are 5 ms: samples are 5 ms apart, and their time
+     stamps have steps of 1 ms. */
   TEST_ASSERT_TRUE(c.worst_error < 0.005);
   TEST_ASSERT_EQUAL_INT(0, own_decoder.num_refused);
   TEST_ASSERT_EQUAL_UINT64(2, counters.reboots);

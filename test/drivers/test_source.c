@@ -42,7 +42,7 @@ static void test_unwrapped_and_mapped_within_its_uncertainty(void) {
     if (t > 1000 * S && t < 4000 * S) continue;
     seed = seed * 1664525u + 1013904223u;
     delay = 1 * MS + (int64_t)(-20e6 * log((seed / 2 + 1.0) / 2147483650.0));
-    host = 77 * S + t + t / 20000; /* the host's clock runs faster */
+    host = 77 * S + t + t / 20000; /* the host's clock runs 50 ppm faster */
     time = observe(&clock, device0 + t, host + delay);
     TEST_ASSERT_EQUAL_INT64(device0 + t, time.device_ns);
     TEST_ASSERT_EQUAL_UINT32(1, time.clock_id);
@@ -58,11 +58,11 @@ static void test_a_late_packet_keeps_its_time(void) {
   tvs_time time;
   observe(&clock, 10 * S, 100 * S);
   observe(&clock, 11 * S, 101 * S);
-  time = observe(&clock, 12 * S, 117 * S); /* the packet was delayed by 15 s */
+  time = observe(&clock, 12 * S, 117 * S); /* this packet arrives 15 s late */
   TEST_ASSERT_EQUAL_INT64(12 * S, time.device_ns);
   TEST_ASSERT_EQUAL_UINT32(1, time.clock_id);
   TEST_ASSERT_TRUE(llabs(time.host_ns - 102 * S) < 10 * MS);
-  /* the packet was overtaken by a later one */
+  /* This packet was sent before the last one, but arrives after it. */
   time = observe(&clock, 11 * S + 500 * MS, 117 * S + 1);
   TEST_ASSERT_EQUAL_INT64(11 * S + 500 * MS, time.device_ns);
   TEST_ASSERT_EQUAL_UINT32(1, time.clock_id);
@@ -74,13 +74,13 @@ static void test_a_reboot_or_jump_is_another_clock(void) {
   uint32_t id;
   int64_t uncertainty;
   observe(&clock, 500 * S, 100 * S);
-  /* the device's clock went back: a new clock id */
+  /* The device's time went back by 498 s, so it has a new clock id. */
   TEST_ASSERT_EQUAL_UINT32(3, observe(&clock, 2 * S, 101 * S).clock_id);
-  /* the device's clock jumped ahead of what is possible: a new clock id */
+  /* The device's time went on by 58 s within 1 s, which is impossible, so it has a new clock id. */
   TEST_ASSERT_EQUAL_UINT32(5, observe(&clock, 60 * S, 102 * S).clock_id);
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_clock_to_host(&clock, 3, 2 * S, &host, &uncertainty));
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_clock_to_host(&clock, 5, 61 * S, &host, &uncertainty));
-  TEST_ASSERT_EQUAL_INT64(103 * S - 1 * MS, host); /* half of the least delay is subtracted */
+  TEST_ASSERT_EQUAL_INT64(103 * S - 1 * MS, host); /* less half of the least delay */
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_clock_to_device(&clock, host, &id, &device, &uncertainty));
   TEST_ASSERT_EQUAL_INT64(61 * S, device);
   tvs_clock_restart(&clock);
@@ -101,7 +101,7 @@ static void test_stamps_outside_the_period_are_refused(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, tvs_clock_init(&clock, &options, 1, 1));
 }
 
-/* ---- attitudes ---- */
+/* ---- tests of the history of attitudes ---- */
 
 static tvs_attitude yaw(double radians, uint32_t id) {
   tvs_attitude a;
@@ -130,20 +130,20 @@ static void test_attitude_between_neighbours_or_unknown(void) {
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 125, 100, &a));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, 2 * atan2(a.world_from_body[3], a.world_from_body[0]));
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.018, a.sigma_rad);
-  /* the instant is that of a sample */
+  /* At the instant of a sample, the attitude is that sample. */
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 900, 100, &a));
   TEST_ASSERT_EQUAL_INT(TVS_OK, tvs_attitudes_at(&history, 1, 200, 100, &a));
-  /* the gap between the samples is too large */
+  /* No attitude: the samples around the instant are more than 100 ns apart. */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 201, 100, &a));
-  /* the instant is in the future */
+  /* No attitude: the instant is after the last sample or before the first. */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 901, 100, &a));
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, -1, 100, &a));
-  /* the samples belong to another clock */
+  /* No attitude: the samples have clock id 1, and the instant has 2. */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 2, 125, 100, &a));
-  add(0.0, 50, 3); /* the drone was restarted */
+  add(0.0, 50, 3); /* clock id 3: the drone was restarted */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_at(&history, 1, 125, 100, &a));
   a = yaw(0, 3);
-  /* not newer than the last sample */
+  /* A sample that is not newer than the last one is ignored. */
   TEST_ASSERT_EQUAL_INT(TVS_NONE, tvs_attitudes_add(&history, 50, &a));
 }
 
@@ -178,7 +178,8 @@ static void test_slerp(void) {
   size_t k;
   for (k = 0; k < 5; ++k) {
     const double a[4] = {cos(0.2), sin(0.2), 0, 0};
-    const double b[4] = {-cos(0.2 + angles[k] / 2), -sin(0.2 + angles[k] / 2), 0, 0}; /* -q = q */
+    /* -q is the same rotation as q. */
+    const double b[4] = {-cos(0.2 + angles[k] / 2), -sin(0.2 + angles[k] / 2), 0, 0};
     double q[4];
     tvs_slerp(a, b, 0.25, q);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.4 + angles[k] / 4, 2 * atan2(q[1], q[0]));
@@ -191,11 +192,11 @@ static void test_euler_angles_turn_as_documented(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -sin(0.3), 2 * (q[1] * q[3] - q[0] * q[2]));
   tvs_quaternion_from_euler(0, 0, 0.3, q); /* right side down: the body's y points to +z */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, sin(0.3), 2 * (q[2] * q[3] + q[0] * q[1]));
-  tvs_quaternion_from_euler(0.3, 0, 0, q); /* clockwise from above: x turns towards y */
+  tvs_quaternion_from_euler(0.3, 0, 0, q); /* clockwise from above: x turns to y */
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, sin(0.3), 2 * (q[1] * q[2] + q[0] * q[3]));
 }
 
-/* ---- file source ---- */
+/* ---- tests of the source that reads files ---- */
 
 static uint8_t pixels[12];
 static int num_released, imu_index;

@@ -16,7 +16,7 @@ SOURCE, BUILD, CMAKE, CC = sys.argv[1:5]
 EXAMPLES = pathlib.Path(SOURCE, "examples")
 PROGRAM = pathlib.Path(BUILD, "bin", "twoview")
 SKIP_CODE = 77
-# fx fy cx0 cx1 cy of the Motorcycle pair in the cache
+# The Motorcycle pair's fx, fy, cx of image 0, cx of image 1, and cy, in pixels.
 CAMERA = ["994.978", "994.978", "311.193", "342.279", "254.877"]
 
 try:
@@ -143,7 +143,8 @@ class Examples(unittest.TestCase):
 
     def test_epipolar(self):
         text = self.example("06_epipolar", self.matches, 741, 500)
-        self.assertEqual(text.count("outside"), 2, text)  # the camera moved sideways
+        # The camera moved sideways, so both epipoles are outside their images.
+        self.assertEqual(text.count("outside"), 2, text)
         self.assertEqual(text.count("-> line"), 5)
 
     def test_imu(self):

@@ -59,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   for (size_t at = 0; at < size;) at += whole.feed(data + at, size - at);
   for (size_t at = 0; at < size;) {
-    // all whole packets were taken, so this must skip nothing
+    // feed() has taken all whole packets, so skip_to_latest must skip none.
     if (skips) ardrone_pave_skip_to_latest(&split.parser);
     at += split.feed(data + at, size - at < piece ? size - at : piece);
   }

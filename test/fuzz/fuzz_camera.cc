@@ -1,4 +1,4 @@
-// tv_camera_*: any camera, any point, any pixel.
+// Fuzzes the functions tv_camera_* with any camera, point and pixel.
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

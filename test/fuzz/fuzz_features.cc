@@ -1,4 +1,4 @@
-// tv_extract and tv_match: small images of any content, any options.
+// Fuzzes tv_extract and tv_match with small images of any content and any options.
 #include <algorithm>
 #include <vector>
 

@@ -1,4 +1,4 @@
-// tv_triangulate: any pose, any pixels, every method.
+// Fuzzes tv_triangulate with any pose, any pixels and every method.
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -7,7 +7,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const bool lens = bytes.whole(0, 3) == 0;
   const tv_camera camera0 = lens ? fuzz::camera(bytes) : plain;
   const tv_camera camera1 = lens ? fuzz::camera(bytes) : plain;
-  // A rotation from a quaternion, or any nine numbers.
+  // R is a rotation, made from a quaternion, or in 1 of 16 inputs any nine numbers.
   double R[9], q[4], norm = 0;
   for (double& value : q) value = bytes.between(-1, 1), norm += value * value;
   norm = std::sqrt(norm > 0 ? norm : 1);

@@ -1,4 +1,4 @@
-// tv_estimate_two_view: any matches and any options; the views are swapped as well.
+// Fuzzes tv_estimate_two_view with any matches and any options, in both orders of the views.
 #include "fuzz.h"
 #include "support/calls.h"
 
@@ -83,7 +83,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         estimate_pixels(context, given[swap], given[1 - swap], pixels[swap], pixels[1 - swap],
                         ratios, count, &options, &result[swap], mask[swap]);
     if (status[swap] == TV_OK) require_sound(result[swap], mask[swap], count);
-    // not compared: a gravity belongs to one view and would have to be swapped too
+    // With gravity the two orders are not compared: the views' gravities would have to be swapped.
     if (options.gravity_sigma_rad != 0) return 0;
   }
   FUZZ_REQUIRE(status[0] == status[1]);

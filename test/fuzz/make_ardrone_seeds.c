@@ -23,7 +23,7 @@ static size_t make_navdata(ardrone_gps_form form, uint8_t *to, size_t capacity) 
   navdata.sequence = 1000;
   navdata.present = 0x0fffffff;
   navdata.gps_form = form;
-  to[0] = 0; /* the target's own first byte; below 240 the target corrects the checksum */
+  to[0] = 0; /* read by the fuzz target: below 240 it corrects the checksum */
   ardrone_encode_navdata(&navdata, to + 1, capacity - 1, &size);
   return size + 1;
 }

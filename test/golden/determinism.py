@@ -33,13 +33,13 @@ QUICK = [("x86-64", "gcc", "O2"), ("x86-64", "clang", "O0"), ("aarch64", "gcc", 
          ("armv7", "gcc", "O2")]
 
 
-SKIP_CODE = 77  # TWOVIEW_SKIP_CODE
+SKIP_CODE = 77  # ctest reports this exit status (TWOVIEW_SKIP_CODE) as skipped
 NEEDED = ("cmake", "ninja", "gcc", "clang", "aarch64-linux-gnu-gcc", "arm-linux-gnueabihf-gcc",
           "qemu-aarch64", "qemu-arm")
 
 
 class Failure(Exception):
-    """A build or a run that failed."""
+    """Raised when a build or a run fails."""
 
 
 def run(*command):
@@ -82,7 +82,7 @@ def write_pairs(folder, data):
 
 
 def read_set(folder):
-    """The first pair of a data set."""
+    """Reads the first pair of a data set."""
     import yaml
 
     words = next(line for line in (folder / "pairs.txt").read_text().splitlines()
@@ -130,7 +130,7 @@ def digests(program, architecture, pairs):
         for line in run(*command, program, *pairs).splitlines():
             pair, kernels, part, digest = line.split()
             if suffix and kernels == "c":
-                continue  # the first run is not compared with itself
+                continue  # the run without a suffix has the digests of set "c"
             found.setdefault(kernels + (suffix if kernels == "neon" else ""), []).append(
                 (f"{pair}/{part}", digest))
     missing = SETS[architecture] - set(found)

@@ -52,7 +52,7 @@ static void must(const char *what, tv_status status) {
   if (status != TV_OK) fail(what, status);
 }
 
-/* FNV-1a, 64 bits. */
+/* The hash (FNV-1a, 64 bits) of all bytes added since start(). */
 static uint64_t digest;
 
 static void start(void) { digest = 14695981039346656037u; }
@@ -106,7 +106,7 @@ static void add_two_view(const tv_two_view *r) {
   add_int(r->reasons);
   add_int(r->num_matches);
   add_int(r->num_inliers);
-  add_bytes(&r->has_R, 8); /* the eight flags */
+  add_bytes(&r->has_R, 8); /* the eight flags from has_R on */
   add_int(r->num_iterations);
   add_doubles(r->R, 9);
   add_doubles(r->t, 3);
@@ -158,7 +158,7 @@ static void add_camera(const tv_camera *camera) {
   tv_camera scaled;
   double angle;
   int k;
-  for (k = 0; k < 64; ++k) { /* from beyond one corner of the image to beyond the opposite one */
+  for (k = 0; k < 64; ++k) { /* a grid of 8 x 8 pixels that reaches beyond the image */
     pixels[k][0] = camera->width * (0.16 * (k % 8) - 0.05);
     pixels[k][1] = camera->height * (0.16 * (k / 8) - 0.05);
   }
@@ -297,7 +297,8 @@ static double uniform(uint64_t *seed, double low, double high) {
    this. First a pinhole, then a lens with distortion. */
 static void digest_principal_point(const pair *p, tv_context *context) {
   static matched m;
-  const double cosine = 0.96 / 1.04, sine = 0.4 / 1.04; /* t = 0.2 in (1 - t^2, 2 t) / (1 + t^2) */
+  /* With u = 0.2: cosine = (1 - u^2) / (1 + u^2), sine = 2 u / (1 + u^2). */
+  const double cosine = 0.96 / 1.04, sine = 0.4 / 1.04;
   tv_camera camera = p->camera[0];
   tv_two_view moved;
   uint64_t seed = 1;
@@ -353,7 +354,7 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   }
   tv_estimate_options_init(&options);
   options.fixed_iterations = 40;
-  /* gravity as a prior, and for this pair a wrong one */
+  /* Gravity is used as a prior, with directions that are wrong for this pair. */
   options.gravity0[1] = options.gravity1[1] = 1;
   options.gravity0[0] = 0.1;
   options.gravity_sigma_rad = 0.05;
@@ -439,7 +440,7 @@ static void digest_bundle(const pair *p, tv_context *context, const matched *m,
   print(p, context, "bundle");
 }
 
-/* tv_reconstruct, with the options that are off by default switched on. */
+/* Digests tv_reconstruct with the options switched on that are off by default. */
 static void digest_reconstruct(const pair *p, tv_context *context) {
   tv_reconstruct_options options;
   tv_feature_options feature;

@@ -46,7 +46,7 @@ def run(*command):
 
 
 def computed(scene_program, digest_program, folder):
-    """The digests of this build: {kernel set: {stage: digest}}."""
+    """Runs this build's digest program; returns {kernel set: {stage: digest}}."""
     folder.mkdir(parents=True, exist_ok=True)
     run(scene_program, folder / "scene")
     parts = {}

@@ -5,7 +5,7 @@
 
    check_kernels          runs the checks
    check_kernels --time   prints nanoseconds per call of typical size, a column per set */
-#define _POSIX_C_SOURCE 199309L /* for clock_gettime */
+#define _POSIX_C_SOURCE 199309L /* declares clock_gettime */
 
 #include <math.h>
 #include <stdio.h>
@@ -32,7 +32,7 @@ typedef struct trial {
   const tvk_table *set;
   uint64_t seed;
   int typical;   /* 1: use the sizes of a 640 x 480 image, for --time */
-  int64_t calls; /* how often the kernel is called on the same input */
+  int64_t calls; /* number of calls of the kernel on the same input */
   block blocks[MAX_BLOCKS];
   int num_blocks;
 } trial;
@@ -136,7 +136,7 @@ static void case_suppress_row(trial *t) {
   found = OUTPUT(t, int32_t, 1);
   REPEAT(t, *found = t->set->suppress_row(rows[0], rows[1], rows[2], width, xs));
   TEST_ASSERT_TRUE(*found >= 0 && *found <= room);
-  /* the kernel may use the rest as scratch */
+  /* xs behind the columns found may hold anything, so it is not compared. */
   memset(xs + *found, PATTERN, (size_t)(room - *found) * sizeof xs[0]);
 }
 
@@ -169,7 +169,7 @@ static void case_average_columns(trial *t) {
     weights[3 * x + 2] = 256 - weights[3 * x] - weights[3 * x + 1];
     if (first[x] + used > width) width = first[x] + used;
   }
-  sums = INPUT(t, uint16_t, width); /* ends with the last element that has a weight */
+  sums = INPUT(t, uint16_t, width); /* no element behind the last one with a weight */
   for (x = 0; x < width; ++x) {
     const int32_t noise = random_int(&t->seed, 0, 65280);
     sums[x] = (uint16_t)(random_int(&t->seed, 0, 3) == 0 ? 65280 : noise);
@@ -205,7 +205,7 @@ static void case_sample_patch(trial *t) {
   static const int32_t heights[4] = {TVK_PATCH_SIDE, TVK_ORIENT_SIDE, 1, 7};
   const int32_t width = pick(t, 1, 90, 640), height = pick(t, 1, 90, 480);
   const int32_t num_rows = t->typical ? TVK_PATCH_SIDE : heights[random_int(&t->seed, 0, 3)];
-  const int32_t num_pairs = height * (width + 1); /* nothing may be read behind the last pair */
+  const int32_t num_pairs = height * (width + 1); /* reading behind them is an error */
   /* Steps from zero to far beyond the image. Whole steps from a whole position end exactly on
      the last column or row. */
   const int32_t whole = random_int(&t->seed, 0, 3) == 0;
@@ -226,7 +226,7 @@ static void case_sample_patch(trial *t) {
   REPEAT(t, t->set->sample_patch(pairs, width, height, x, y, du_x, du_y, num_rows, patch));
 }
 
-/* Samples as sample_patch makes them, from -LOWEST_SAMPLE to LARGEST_SAMPLE. */
+/* The range of the samples that sample_patch makes: -LOWEST_SAMPLE to LARGEST_SAMPLE. */
 enum {
   LOWEST_SAMPLE = 8065,
   LARGEST_SAMPLE = 8001,
@@ -477,7 +477,7 @@ static void case_relpose_5pt(trial *t) {
     }
   }
   REPEAT(t, t->set->relpose_5pt(rays, num_samples, essentials, counts));
-  for (s = 0; s < TVK_WIDTH; ++s) { /* lanes beyond the solutions are scratch */
+  for (s = 0; s < TVK_WIDTH; ++s) { /* outputs beyond the models found are not compared */
     const int32_t count = s < num_samples ? counts[s] : 0;
     TEST_ASSERT_TRUE(count >= 0 && count <= TVK_RELPOSE_MODELS);
     if (s >= num_samples) counts[s] = 0;
@@ -611,7 +611,7 @@ static double time_per_call(const tvk_table *set, void (*run)(trial *)) {
   int repeat = 0;
   while (repeat < 9) {
     trial t = make_trial(set, 1, 1, 1);
-    double setup, total; /* setup is the time of the inputs and one call */
+    double setup, total; /* ns; setup: making the inputs, and one call */
     const double start = now_ns();
     run(&t);
     setup = now_ns() - start;

@@ -24,7 +24,7 @@ namespace {
 constexpr double kChiSq95[6] = {0, 3.8415, 5.9915, 7.8147, 9.4877, 11.0705};
 constexpr double kNoise = 0.5;
 
-// d' C^-1 d by Cholesky; negative where C is not positive definite.
+// Returns d' C^-1 d (by Cholesky), or a negative number if C is not positive definite.
 template <int N>
 double mahalanobis_sq(const double* C, const double* d) {
   double L[N][N] = {}, y[N], sum = 0;

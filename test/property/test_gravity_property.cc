@@ -21,7 +21,7 @@ using tv::Vec3;
 constexpr int kPairs = 200, kWrongPairs = 40, kMatches = 150, kSigmas = 4;
 constexpr double kSigmasDeg[kSigmas] = {0.1, 0.5, 1, 2};
 constexpr double kRadians = tv::kPi / 180;
-// degrees: a pair without a pose counts as this error, and larger errors are reduced to it
+// The largest error that counts, in degrees; a pair without a pose has this error.
 constexpr double kMostDeg = 10;
 
 api_context api;
@@ -103,10 +103,10 @@ struct Sum {
   }
 };
 
-// Indexed by sigma, then by method: five-point, upright.
+// The sums over all pairs. Arrays are indexed by sigma, then by method: five-point, upright.
 struct Statistics {
   Sum base_pose, base_rotation;
-  // against the five-point solver without gravity
+  // The gain in accuracy over the five-point solver without gravity.
   Sum pose_gain[kSigmas][2], rotation_gain[kSigmas][2];
   int base_covered = 0, covered[kSigmas][2] = {};
   int64_t base_samples = 0, samples[kSigmas][2] = {};

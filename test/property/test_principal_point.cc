@@ -159,7 +159,7 @@ void test_swapped_views_give_the_same_shift(void) {
     for (int i = 0; i < 9; ++i) TEST_ASSERT_TRUE(forward.R[i] == backward.R[i % 3 * 3 + i / 3]);
     shifts += has_shift(forward);
   }
-  // some pairs have a shift, else equal shifts would prove nothing; also for two cameras below
+  // At least one pair must have a shift, since equal shifts of 0 would prove nothing.
   TEST_ASSERT_TRUE(shifts > 0);
 }
 
@@ -196,7 +196,7 @@ void test_matrices_are_of_the_corrected_camera(void) {
       rms[which] += value * value / lines * to_px * to_px / pair.options.num;
     }
   }
-  for (double sq : rms) TEST_ASSERT_TRUE(std::sqrt(sq) < 0.35);  // the noise is 0.3 px
+  for (double sq : rms) TEST_ASSERT_TRUE(std::sqrt(sq) < 0.35);  // px; the noise is 0.3 px
 }
 
 // The gradient is compared with differences of the cost, for cameras whose principal point is

@@ -39,7 +39,7 @@ struct Kind {
   Motion motion;
   bool planar;
   int num;
-  double outliers;  // the share of wrong matches
+  double outliers;  // the share of wrong matches, 0 to 1
   double noise_px;
   bool with_ratios;
   tv_camera camera;
@@ -51,17 +51,17 @@ struct Scene {
   int num;
   double pixels[2][2 * kMaxMatches];
   float ratios[kMaxMatches];
-  Mat5 information;  // the inverse of the bound C
+  Mat5 information;  // the inverse of C, the lower bound of the pose's covariance
 };
 
-Scene scene, other;  // static, since they are large
+Scene scene, other;  // not on the stack, since they are large
 uint8_t mask[kMaxMatches], other_mask[kMaxMatches];
 
 double uniform(tv::Random* random, double low, double high) {
   return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
 }
 
-double normal(tv::Random* random) {  // approximately normal: a sum of 12 uniform numbers
+double normal(tv::Random* random) {  // approximately standard normal
   double sum = -6;
   for (int i = 0; i < 12; ++i) sum += uniform(random, 0, 1);
   return sum;
@@ -188,7 +188,7 @@ Vec5 pose_error(const double R[9], const double t[3]) {
   const Vec3 found(t[0], t[1], t[2]);
   Vec3 b[2];
   tv::tangent_basis(scene.pose.t, &b[0], &b[1]);
-  // the opposite direction counts as a large error
+  // An estimate of t with the wrong sign counts as a large error.
   const double away = found.dot(scene.pose.t) < 0 ? 10 : 0;
   Vec5 e;
   e << (turn(2, 1) - turn(1, 2)) / 2, (turn(0, 2) - turn(2, 0)) / 2, (turn(1, 0) - turn(0, 1)) / 2,
@@ -306,7 +306,8 @@ void test_the_covariance_is_near_the_bound(void) {
     const tv_two_view r = estimate(scene, k, options_of(k), false, mask);
     TEST_ASSERT_EQUAL_INT(1, r.has_covariance);
     const Mat5 bound = scene.information.inverse();
-    // rotation only: the basis (b1, b2) may differ between estimate and truth
+    // Only the rotation's 3 variances: the basis (b1, b2) of t may differ between estimate and
+    // truth.
     for (int p = 0; p < 3; ++p) {
       const double ratio = r.covariance[6 * p] / bound(p, p);
       TEST_ASSERT_TRUE(ratio > 0.8 && ratio < 1.65);

@@ -171,15 +171,15 @@ void test_degenerate_points_end_and_give_no_pose(void) {
   for (int kind = 0; kind < 7; ++kind) {
     for (int i = 0; i < 1000; ++i) {
       const double x = scene::uniform(&random, 0, 600), y = scene::uniform(&random, 0, 470);
-      double p[4] = {x, y, x, y};                          // 0: the same image twice
-      if (kind == 1) p[0] = p[1] = p[2] = p[3] = 100;      // one point
-      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;  // on a line, all moved by 3 px
-      if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;      // on a line, in reverse order
-      // all matches share their point of view 0
+      double p[4] = {x, y, x, y};                          // kind 0: the same image twice
+      if (kind == 1) p[0] = p[1] = p[2] = p[3] = 100;      // all matches are one point
+      if (kind == 2) p[1] = p[3] = 0.5 * x, p[2] = x + 3;  // pixels on a line, moved by 3 px
+      if (kind == 3) p[1] = p[3] = 7, p[2] = 600 - x;      // pixels on a line, in reverse order
+      // all matches have the same pixel in view 0
       if (kind == 4) p[0] = p[1] = 10;
-      // eight different matches, repeated
+      // eight different matches, each repeated many times
       if (kind == 5) p[0] = i % 4 * 50, p[1] = p[3] = i % 2, p[2] = p[0] + 4;
-      if (kind == 6) p[2] = x + 2;  // all shifted alike: a plane, or points far away
+      if (kind == 6) p[2] = x + 2;  // all pixels move by 2 px: a plane, or far points
       for (int k = 0; k < 2; ++k) a[2 * i + k] = p[k], b[2 * i + k] = p[2 + k];
     }
     for (int c = 0; c < 3; ++c) {
@@ -214,7 +214,7 @@ void test_covariance_covers_the_error(void) {
     e << 0.5 * (d(2, 1) - d(1, 2)), 0.5 * (d(0, 2) - d(2, 0)), 0.5 * (d(1, 0) - d(0, 1)),
         b1.dot(pair.t) / t.dot(pair.t), b2.dot(pair.t) / t.dot(pair.t);
     const Mat5 information = Mat5(Eigen::Map<const Mat5>(r.covariance)).inverse();
-    inside += e.dot(information * e) < 9.236;  // chi-square, 5 degrees of freedom
+    inside += e.dot(information * e) < 9.236;  // 90 per cent quantile of chi-square with 5 dof
     ++total;
   }
   TEST_ASSERT_GREATER_THAN_INT(50, total);

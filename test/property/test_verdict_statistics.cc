@@ -33,7 +33,7 @@ uint32_t other_reasons(const tv_two_view& r, uint32_t expected) {
 bool named_right(const tv_two_view& r) {
   switch (pair.kind) {
     case pair_kinds::kGeneral: return r.kind == TV_KIND_CALIBRATED && other_reasons(r, 0) == 0;
-    case pair_kinds::kPlanar:  // a plane may have low parallax all the same
+    case pair_kinds::kPlanar:  // a plane may also have low parallax
       return r.kind == TV_KIND_PLANAR && other_reasons(r, TV_REASON_LOW_PARALLAX) == 0;
     case pair_kinds::kPureRotation: return r.kind == TV_KIND_PANORAMIC;
     case pair_kinds::kNoMotion: return r.kind == TV_KIND_NO_MOTION;

@@ -23,7 +23,7 @@ using tv::Mat3;
 using tv::Vec2;
 using tv::Vec3;
 
-constexpr int kNum = 200, kNumTrue = 140;  // 30 per cent outliers
+constexpr int kNum = 200, kNumTrue = 140;  // 60 of 200 matches are wrong
 constexpr double kNoisePx = 0.5;
 constexpr int kMaxPairs = 100000;
 constexpr int kThresholdsDeg[3] = {1, 5, 10};
@@ -42,7 +42,8 @@ const tv_camera kCameras[kNumCameras] = {
     {TV_CAMERA_PINHOLE, 640, 360, 0, 560, 560, 319.5, 179.5, {}}};
 tv::Camera cameras[kNumCameras];
 
-// Which camera takes the pictures, and over whose image the points are spread.
+// A view is the camera that takes the pictures, and the camera over whose image the points are
+// spread.
 enum { kLensView, kPinholeOwn, kPinholeSame, kNumViews };
 struct View {
   const char* name;
@@ -54,13 +55,13 @@ const View kViews[kNumViews] = {{"lens", kLens, kLens},
 
 struct Pair {
   Mat3 R;
-  Vec3 t, plane;  // t unit; the points have plane X = distance
+  Vec3 t, plane;  // t has length 1; the points X lie on plane' X = distance
   double distance;
   double pixels[2][2 * kNum];
 };
 Pair pair;
 
-// Which pose is judged: the primary one, or the nearer one of a plane's two.
+// The pose whose error counts: the primary one, or of a plane's two the one nearer to the truth.
 enum { kPrimary, kNearer, kNumRules };
 double errors[kNumViews][kNumRules][kMaxPairs];
 
@@ -106,7 +107,7 @@ void make_matches(uint64_t matches_seed, const View& view) {
   for (int i = 0; i < kNum; ++i) {
     while (!see(&random, view.points, points)) {
     }
-    if (i >= kNumTrue) {  // a wrong match: the second pixel is anywhere
+    if (i >= kNumTrue) {  // a wrong match: its pixel in view 1 is random
       const double x = scene::uniform(&random, 0, 639);
       const Vec2 pixel(x, scene::uniform(&random, 0, 359));
       TEST_ASSERT_TRUE(tv::unproject(cameras[view.points], pixel, &points[1], nullptr));
@@ -185,8 +186,8 @@ void test_a_wide_lens_is_as_good_as_a_pinhole(void) {
   for (int rule = 0; rule < kNumRules; ++rule) {
     for (int view = 0; view < kNumViews; ++view) sum_up(view, rule, auc[rule][view]);
   }
-  // Which one of a plane's two poses comes first is chance, separately for the lens and for the
-  // pinhole, so the nearer pose is compared. Fewer pairs than 1000 are only a sample.
+  // Chance decides which of a plane's two poses is the primary one, separately for the lens and for
+  // the pinhole, so the nearer pose is compared. Fewer pairs than 1000 are only a sample.
   const double chance = num_pairs < 1000 ? 2 * 30 / std::sqrt(num_pairs) : 0;
   for (int k = 0; k < 3; ++k) {
     const double lens = auc[kNearer][kLensView][k];

@@ -1,4 +1,4 @@
-"""Helpers of the tests of compare_colmap."""
+"""Functions that several tests of compare_colmap use."""
 
 import importlib.util
 import os

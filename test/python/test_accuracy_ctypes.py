@@ -1,4 +1,5 @@
-"""twoview_tools.accuracy.twoview_ctypes: options given as text, and a library given by its path."""
+"""Tests of twoview_tools.accuracy.twoview_ctypes: options given as text, and a library given by its
+path."""
 
 import os
 import unittest

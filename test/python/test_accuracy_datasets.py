@@ -1,4 +1,4 @@
-"""twoview_tools.accuracy.datasets: which pairs are measured, resizing, undistortion."""
+"""Tests of twoview_tools.accuracy.datasets: which pairs are measured, resizing, undistortion."""
 
 import os
 import tempfile
@@ -76,7 +76,8 @@ class TestMeasurable(unittest.TestCase):
 class TestUndistort(unittest.TestCase):
     def setUp(self):
         self.K = np.array([[520.9, 0, 325.1], [0, 521.0, 249.7], [0, 0, 1]])
-        self.k = [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]  # TUM freiburg2
+        # k1 k2 p1 p2 k3 of TUM freiburg2's lens
+        self.k = [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]
 
     def test_inverts_the_lens(self):
         random = np.random.default_rng(3)
@@ -95,7 +96,7 @@ class TestUndistort(unittest.TestCase):
                                    [[0.0, 1.0]])
 
     def test_marks_a_pixel_that_no_ray_meets(self):
-        # x (1 - x^2 / 2) is never above 0.5443, so pixels beyond have no ray
+        # With k1 = -0.5, x (1 - x^2 / 2) is at most 0.5443: a pixel at 0.6 has no ray.
         barrel = [-0.5, 0, 0, 0, 0]
         found = datasets.undistort([[325.1 + 520.9 * 0.6, 249.7]], self.K, barrel)
         self.assertTrue(np.isnan(found).all())

@@ -1,5 +1,5 @@
-"""twoview_tools.accuracy.identical and system_python: thresholds, verdicts, the cache, and the
-subprocess that runs the system's Python."""
+"""Tests of twoview_tools.accuracy.identical and system_python: thresholds, verdicts, the cache, and
+the subprocess that runs the system's Python."""
 
 import tempfile
 import unittest
@@ -52,14 +52,14 @@ class TestVerdicts(unittest.TestCase):
         base = random.uniform(1, 4, 20)
         good, bad = {"a": rows(base), "b": rows(base)}, {"a": rows(base + 2), "b": rows(base + 2)}
         reached, _ = identical.judge(good, {"PoseLib": bad}, "PoseLib", 200)
-        self.assertEqual(len(reached), 3 + 2 + 2)  # means, sets, medians
+        self.assertEqual(len(reached), 3 + 2 + 2)  # sentences: 3 of means, 2 of sets, 2 of medians
         self.assertTrue(all(r for r, _ in reached))
         failed, _ = identical.judge(bad, {"PoseLib": good}, "PoseLib", 200)
         self.assertFalse(any(r for r, _ in failed))
         mixed, _ = identical.judge(good, {"worse": bad, "better": {"a": rows(base - 0.9),
                                                                    "b": rows(base + 3)}}, None, 200)
         sentences = {text.split(":")[0]: ok for ok, text in mixed}
-        self.assertFalse(sentences["a"])  # each set has its own best peer: on set a it beats ours
+        self.assertFalse(sentences["a"])  # the best peer on set a beats ours
         self.assertTrue(sentences["b"])
 
     def test_small_sets_do_not_count_by_themselves(self):

@@ -1,4 +1,4 @@
-"""twoview_tools.accuracy.metrics on cases that were computed by hand."""
+"""Tests of twoview_tools.accuracy.metrics on cases that were computed by hand."""
 
 import math
 import unittest
@@ -37,7 +37,7 @@ class TestAuc(unittest.TestCase):
         self.assertAlmostEqual(metrics.auc([3.0, 1.0, math.inf], 5.0), 50.0)
 
     def test_leaves_out_errors_at_and_above_the_threshold(self):
-        # recall is 1/2 at 2 and stays level to 5: 1/2 + 3/2 = 2, of 5
+        # Recall rises to 1/2 at error 2 and stays there to 5: the area is 1/2 + 3/2 = 2 of 5.
         self.assertAlmostEqual(metrics.auc([2.0, 5.0], 5.0), 40.0)
 
     def test_is_100_for_exact_poses_and_0_for_failures(self):

@@ -1,4 +1,4 @@
-"""twoview_tools.accuracy.peers and estimators: the peers get the input that they need."""
+"""Tests of twoview_tools.accuracy.peers and estimators: the peers get the input that they need."""
 
 import os
 import tempfile
@@ -27,7 +27,7 @@ def texture(seed, size=160):
 
 class TestFrontEnd(unittest.TestCase):
     def test_orientation_runs_clockwise_from_x(self):
-        ramp = np.tile(np.arange(64, dtype=np.uint8) * 3, (64, 1))  # brighter to the right
+        ramp = np.tile(np.arange(64, dtype=np.uint8) * 3, (64, 1))  # grey levels rise to the right
         for turns, degrees in ((0, 0), (1, 270), (2, 180), (3, 90)):
             gray = np.ascontiguousarray(np.rot90(ramp, turns))
             (_, found), = peers.orientations(gray, np.array([[32.0, 32.0]]), 5)
@@ -56,7 +56,7 @@ class TestFrontEnd(unittest.TestCase):
 
     def test_a_grid_spreads_what_is_kept(self):
         points = np.array([[x, y] for y in range(0, 128) for x in range(0, 128)], float)
-        scores = np.where(points[:, 0] < 64, 100.0, 1.0)  # the left half is stronger
+        scores = np.where(points[:, 0] < 64, 100.0, 1.0)  # the left half has the stronger corners
         share = lambda grid: np.mean(
             points[peers._strongest(points, scores, grid, (128, 128))][:, 0] < 64)
         self.assertEqual(share(0), 1.0)
@@ -133,7 +133,7 @@ class TestCache(unittest.TestCase):
             peers.extract = None  # calling None would fail, so the result must come from the cache
             self.assertEqual(peer.run(datasets.Set(folder)), first)
             cv2.imwrite(os.path.join(images, "b.png"), np.roll(gray, 5, axis=1))
-            with self.assertRaises(TypeError):  # another image is not in the cache
+            with self.assertRaises(TypeError):  # a changed image is not in the cache
                 peer.run(datasets.Set(folder))
 
 

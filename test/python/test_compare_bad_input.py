@@ -1,4 +1,4 @@
-"""compare_colmap: broken lists, missing images, and systems that die."""
+"""Tests of compare_colmap: broken lists, missing images, and systems that die."""
 
 import json
 import os

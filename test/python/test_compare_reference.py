@@ -1,4 +1,5 @@
-"""compare_colmap: COLMAP's reconstruction as reference, and a dask cluster for the work."""
+"""Tests of compare_colmap: COLMAP's reconstruction as reference, and a dask cluster for the
+work."""
 
 import json
 import os

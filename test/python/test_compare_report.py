@@ -1,5 +1,5 @@
-"""compare_colmap: a whole report, in which every system is within a degree of the truth on an easy
-pair."""
+"""Tests of compare_colmap: a whole report, in which every system is within a degree of the truth on
+an easy pair."""
 
 import csv
 import json
@@ -66,7 +66,7 @@ class TestReport(unittest.TestCase):
                 # program draws other samples in each run (COLMAP 3.8 had 1.04 degrees on one of the
                 # two).
                 if system.module == "pyopengv":
-                    continue  # OpenGV has a test of its own
+                    continue  # another test checks OpenGV
                 if system.id == "twoview":
                     self.assertLess(max(errors), 1.0, told)
                 else:

@@ -1,4 +1,5 @@
-"""compare_colmap: solvers and triangulations on simulated matches, each with its own convention."""
+"""Tests of compare_colmap: solvers and triangulations on simulated matches, each with its own
+convention."""
 
 import json
 import unittest
@@ -118,7 +119,7 @@ class TestShift(unittest.TestCase):
             np.median(pair_run.epipolar_error_px(matches, answer["R"], answer["t"])), 0.2
         )
         row = pair_run._row(self.task, {**answer, "ms": {}}, "ok", "", matches)
-        self.assertGreater(row["error_px_histogram"][0], 350)  # errors below a quarter of a pixel
+        self.assertGreater(row["error_px_histogram"][0], 350)  # matches with errors below 0.25 px
         self.assertEqual(row["principal_point_shift_px"], answer["principal_point_shift_px"])
 
     def test_points_on_our_own_pose_are_of_that_camera(self):

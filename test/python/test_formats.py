@@ -7,7 +7,7 @@ import unittest
 
 try:
     import numpy as np
-    import yaml  # noqa: F401  (the reader's)
+    import yaml  # noqa: F401  (twoview_tools.formats needs yaml)
 except ImportError as missing:
     raise unittest.SkipTest(f"{missing}: run scripts/bootstrap test")
 
@@ -17,7 +17,7 @@ FOLDER = pathlib.Path(__file__).resolve().parents[1] / "formats"
 
 
 def cases(name):
-    """The cases of a file, each with its text."""
+    """Yields the cases of formats/NAME.json, each with its text."""
     content = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     for case in content["cases"]:
         text = "".join(line + "\n" for line in case.get("text", ()))

@@ -1,5 +1,6 @@
-"""twoview_tools.paper: the numbers behind the figures, compared with independent references.
-scripts/paper also makes the drone's flights, which take long; this test makes everything else."""
+"""Tests of twoview_tools.paper: the numbers behind the figures, compared with independent
+references. scripts/paper also makes the drone's flights, which take long; this test makes
+everything else."""
 
 import contextlib
 import io
@@ -16,8 +17,8 @@ os.environ.setdefault("TWOVIEW_LIBRARY", str(BUILD / "lib" / "libtwoview.so"))
 
 try:
     import cv2
-    import jinja2  # noqa: F401  (the page's)
-    import matplotlib  # noqa: F401
+    import jinja2  # noqa: F401  (needed to write the page)
+    import matplotlib  # noqa: F401  (needed to draw the figures)
     import numpy as np
     from skimage.feature import corner_fast
 except ImportError as missing:
@@ -74,7 +75,7 @@ class Figures1bAnd4(Case):
     def test_straightness_is_the_distance_from_a_line(self):
         grid = np.array([(x, y) for y in range(3) for x in range(3)], float)
         self.assertAlmostEqual(calibration.straightness(grid, (3, 3)), 0)
-        # moves the middle corner: its row deviates by 0.1 0.2 0.1, its column stays straight
+        # The middle corner moves along its column: its row deviates by 0.1 0.2 0.1 from a line.
         grid[4] += (0, 0.3)
         self.assertAlmostEqual(
             calibration.straightness(grid, (3, 3)), np.sqrt(0.06 / 18), delta=1e-3
@@ -87,7 +88,7 @@ class Figures5And6(Case):
         self.assertEqual({(x, y) for x in reach for y in reach if round(np.hypot(x, y)) == 3},
                          {tuple(p) for p in corners.CIRCLE.tolist()})
         turns = np.diff(np.unwrap(np.arctan2(corners.CIRCLE[:, 1], corners.CIRCLE[:, 0])))
-        # clockwise in an image: positive angles
+        # The circle runs clockwise in the image (y is down), so each angle is positive.
         self.assertTrue((turns > 0).all() and (turns < 0.5).all())
 
     def test_the_drawn_corner_is_one_up_to_its_score(self):
@@ -129,7 +130,7 @@ class Figure7(Case):
         keypoints, described = descriptor.described_keypoints(image, 150)
         for kind, off in descriptor.differences(image, keypoints, described).items():
             self.assertLessEqual(np.median(off), 1, kind)
-            # of 255: a weight of 0.5 is 127, and sums are truncated
+            # 8 of 255 grey levels may differ: a weight of 0.5 becomes 127, and sums are truncated.
             self.assertLessEqual(np.percentile(off, 99), 8, kind)
             own = described[kind] + 0.0
             cosine = (own * (own - off)).sum() / (np.linalg.norm(own) * np.linalg.norm(own - off))
@@ -146,7 +147,7 @@ class Figure7(Case):
 class Figure8(Case):
     def test_as_many_are_found_as_the_noise_lets(self):
         runs = [ransac.line_run(seed) for seed in range(60)]
-        expected = 300 * 0.98758  # the share of a normal distribution within 2.5 deviations
+        expected = 300 * 0.98758  # 98.758 per cent of normal errors are below 2.5 sigma
         self.assertAlmostEqual(np.mean([r["right"] for r in runs]), expected, delta=2.0)
         for run in runs:
             # The best fit to those 300 points that are known to belong to the line.
@@ -155,7 +156,7 @@ class Figure8(Case):
             across = np.array([-direction[1], direction[0]])
             oracle = int((np.abs((x - x.mean(axis=0)) @ across) < 2.5).sum())
             self.assertLessEqual(abs(run["right"] - oracle), 8)
-            # of 200 points over the image, 1 to 2 per cent lie this near by chance
+            # By chance, 1 to 2 per cent of the 200 wrong points lie this near to the line.
             self.assertLessEqual(run["wrong"], 15)
             self.assertEqual(int(run["found"].sum()), run["right"] + run["wrong"])
             self.assertEqual(int(run["truth"].sum()), 300)
@@ -188,19 +189,19 @@ class Figures14And15(Case):
         self.assertLess(
             np.abs(motion.epipole(pair.cameras[0].K, [0, 0, 1]) - (319.5, 239.5)).max(), 1e-9
         )
-        null = np.linalg.svd(pair.true_F)[2][-1]  # F e0 = 0
+        null = np.linalg.svd(pair.true_F)[2][-1]  # the epipole e0 of image 0, since F e0 = 0
         center1 = -pair.R.T @ pair.t
         self.assertLess(
             np.abs(null[:2] / null[2] - motion.epipole(pair.cameras[0].K, center1)).max(), 1e-6
         )
 
     def test_a_drones_step_to_the_right_is_the_cameras_x(self):
-        # number, seconds, place, quaternion x y z w, velocity
+        # A state of the drone: number, seconds, place x y z, quaternion x y z w, velocity x y z.
         level = [0, 0, 0, 0, -1, 0, 0, 0, 1, 0, 0, 0]
         right = [1, 1, 0, 2, -1, 0, 0, 0, 1, 0, 0, 0]
         R, t = motion.true_motion([np.array(level, float), np.array(right, float)])
         self.assertTrue(np.allclose(R, np.eye(3)) and np.allclose(t, [-2, 0, 0]))
-        half = np.sqrt(0.5)  # turned clockwise by 90 degrees: what was to the right is ahead
+        half = np.sqrt(0.5)  # after a turn by 90 degrees clockwise, the former right is ahead
         turned = [1, 1, 0, 0, -1, 0, 0, half, half, 0, 0, 0]
         R, t = motion.true_motion([np.array(level, float), np.array(turned, float)])
         self.assertTrue(np.allclose(R @ [1, 0, 0], [0, 0, 1]) and np.allclose(t, 0))
@@ -214,7 +215,7 @@ class Figure13(Case):
     def test_each_weight_is_one_over_the_last_rounds_depth(self):
         self.assertTrue((self.weights[0] == 1).all())
         for before, weights in zip(self.points, self.weights[1:]):
-            # p3 . X of K [R t]
+            # The depth of X in each view is p3 . X, where p3 is the last row of K [R t].
             depths = before[:, 2], (before @ self.scene.R.T + self.scene.t)[:, 2]
             for view in (0, 1):
                 self.assertLess(np.abs(weights[:, view] * depths[view] - 1).max(), 1e-9)

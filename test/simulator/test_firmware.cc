@@ -179,7 +179,7 @@ void test_emergency_acts_on_its_edge() {
   b.send("REF", kEmergency);
   TEST_ASSERT_TRUE(b.drone.truth().mode == FlightMode::kMotorsCut);
   b.wait(1500);
-  b.send("REF", kEmergency);  // the bit is still set, so there is no rising edge
+  b.send("REF", kEmergency);  // the bit is set already, so there is no rising edge
   TEST_ASSERT_TRUE(b.drone.truth().mode == FlightMode::kMotorsCut);
   TEST_ASSERT_TRUE(b.navdata().state & ARDRONE_STATE_EMERGENCY);
   b.send("REF", kLand);
@@ -225,9 +225,9 @@ void test_navdata_tells_the_truth_in_its_units() {
   Bench b;
   b.start("FALSE");
   b.keep(kFly, 6000);
-  for (int k = 0; k < 25; ++k) {  // forward and to the right, turning
+  for (int k = 0; k < 25; ++k) {  // flies forward and to the right, and turns
     b.send("REF", kFly);
-    b.send("PCMD", "1,1045220557,-1097229926,0,1045220557");  // 0.2 -0.4 0 0.2
+    b.send("PCMD", "1,1045220557,-1097229926,0,1045220557");  // the sticks 0.2 -0.4 0 0.2
     b.wait(30);
   }
   const simulator::FlightState truth = b.drone.truth();

@@ -82,7 +82,8 @@ void test_tilt_accelerates_by_gravity_as_in_the_flight_log() {
 }
 
 void test_body_axes_turn_with_the_drone() {
-  Flight flight = in_the_air(1.5707963267948966);  // it looks along the world's y
+  // The yaw is 90 degrees: the nose points along the world's y.
+  Flight flight = in_the_air(1.5707963267948966);
   flight.steer(sticks(0, -0.6, 0, 0));
   flight.advance(0.8);
   const FlightState& state = flight.state();
@@ -114,7 +115,7 @@ void test_cut_motors_fall_and_need_arming() {
   flight.cut_motors();
   flight.advance(0.2);
   TEST_ASSERT_TRUE(flight.state().velocity[2] > 1.5);
-  flight.rearm();  // refused in the air
+  flight.rearm();  // must be refused, since the drone is in the air
   TEST_ASSERT_TRUE(flight.state().mode == FlightMode::kMotorsCut);
   flight.advance(2);
   flight.take_off();

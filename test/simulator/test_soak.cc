@@ -33,7 +33,7 @@ double soak_seconds() {
   return text != nullptr ? std::max(40.0, std::atof(text)) : 60;
 }
 
-// Resident pages of this process.
+// The resident memory of this process, in kB.
 long resident_kb() {
   long size = 0, resident = 0;
   FILE* file = std::fopen("/proc/self/statm", "r");
@@ -43,7 +43,7 @@ long resident_kb() {
   return resident * (sysconf(_SC_PAGESIZE) / 1024);
 }
 
-// libavcodec's decoder; measures its time and counts the pictures that are not released.
+// Wraps libavcodec's decoder: measures its time and counts the pictures that are not released.
 struct TimedDecoder {
   tvs_decoder inner{};
   double seconds = 0;
@@ -81,7 +81,7 @@ struct Soak {
   // For each run of the world frame: the yaw that is its zero, and the number of the drone's boot.
   std::map<uint32_t, double> psi0;
   std::map<uint32_t, int> boot_of;
-  bool may_restart = true;  // true if numbering may start again at 1 with the next command
+  bool may_restart = true;  // whether the next command's number may be 1 again
   long last_command = 0;
   int num_falls = 0, num_take_offs_asked = 0;
 
@@ -280,7 +280,7 @@ void test_minutes_of_a_bad_link() {
   TEST_ASSERT_EQUAL_INT(0, soak->num_wrong_pictures);
   TEST_ASSERT_EQUAL_INT(0, soak->num_stale);
   TEST_ASSERT_EQUAL_INT(0, soak->num_beyond_5_sigma);
-  // noise of 0.002 rad on each axis, and 15 ms at 1 rad/s
+  // The attitudes have noise of 0.002 rad on each axis; 0.015 rad are 15 ms of a turn at 1 rad/s.
   TEST_ASSERT_TRUE(soak->worst_rad < 0.015);
   TEST_ASSERT_TRUE(soak->num_with_attitude > 0.95 * soak->num_frames);
   TEST_ASSERT_TRUE(soak->worst_back_s[0] < 1 && soak->worst_back_s[1] < 1);

@@ -16,7 +16,7 @@ static inline void fixtures_need(void) {
   exit(TWOVIEW_SKIP_CODE);
 }
 
-/* The bytes of a capture; the caller frees them. */
+/* Reads all bytes of a captured file; the caller frees them. */
 static inline uint8_t *fixture_read(const char *name, size_t *size) {
   char path[4096];
   FILE *file;

@@ -27,8 +27,8 @@ typedef struct mock_drone {
   uint64_t seed;
   int64_t now_ns, boot_ns;
   int32_t lose_permille, double_permille, reorder_permille;
-  int navdata_off, video_off, video_refused, deaf; /* faults that last until the test clears them */
-  /* PaVE stamps count from another start than navdata's */
+  int navdata_off, video_off, video_refused, deaf; /* each 1 is a fault that is on */
+  /* 1: the clock of the video's time stamps starts at another time than that of navdata */
   int clocks_differ;
   int64_t video_latency_ns;
 
@@ -37,8 +37,7 @@ typedef struct mock_drone {
   int64_t next_navdata_ns, next_frame_ns;
   mock_datagram queue[MOCK_DATAGRAMS];
 
-  int video_open, video_ended,
-      video_half_open; /* 1: half open, no byte comes through this connection */
+  int video_open, video_ended, video_half_open; /* half open: no byte arrives */
   uint32_t frame_number;
   uint8_t stream[MOCK_STREAM];
   size_t stream_begin, stream_end;
@@ -48,9 +47,9 @@ typedef struct mock_drone {
   const char *control_text;
   size_t control_size;
 
-  /* what the drone received */
+  /* the commands that the drone received */
   int32_t last_command;
-  /* how often the command number went back to 1, and to another lower number */
+  /* how often the command number fell to 1, and how often to another lower number */
   int num_restarts, num_falls;
   int num_commands, num_refs, num_take_offs, num_pcmds, num_configs;
   char last_key[64], last_value[64];
@@ -85,7 +84,7 @@ static inline void mock_boot(mock_drone *d) {
 }
 
 static inline double mock_device_s(const mock_drone *d) {
-  return (double)(d->now_ns - d->boot_ns) * 1e-9 + 2040; /* wraps after 8 s */
+  return (double)(d->now_ns - d->boot_ns) * 1e-9 + 2040; /* the clock wraps at 2048 s */
 }
 
 static inline void mock_post(mock_drone *d, const uint8_t *bytes, size_t size) {
@@ -147,7 +146,7 @@ static inline void mock_send_frame(mock_drone *d) {
     memmove(d->stream, d->stream + d->stream_begin, d->stream_end - d->stream_begin);
     d->stream_end -= d->stream_begin;
     d->stream_begin = 0;
-    /* the client does not read its stream */
+    /* The client has not read: the buffer is full, and this picture is dropped. */
     if (d->stream_end + MOCK_PAYLOAD + 68 > MOCK_STREAM) return;
   }
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, payload, d->stream + d->stream_end,
@@ -168,7 +167,7 @@ static inline void mock_advance(mock_drone *d, int64_t now_ns) {
   }
 }
 
-/* ---- the drone's side of the transport ---- */
+/* ---- the mock drone's side of the connection ---- */
 
 static inline void mock_obey(mock_drone *d, char *line) {
   char *comma = strchr(line, ',');
@@ -285,7 +284,7 @@ static inline ardrone_transport mock_transport(mock_drone *d) {
   return t;
 }
 
-/* ---- decoder ---- */
+/* ---- a mock video decoder ---- */
 
 typedef struct mock_decoder {
   uint32_t last;

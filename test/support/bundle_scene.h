@@ -25,7 +25,7 @@ struct Options {
   int num = 500;
   double noise_px = 0.5;
   double outlier_share = 0;
-  // the angle by which the start's rotation and direction of t differ from the truth
+  // The rotation and the direction of t at the start of the adjustment are wrong by this angle.
   double start_off_rad = 0.01;
   double baseline = 1;
   tv_camera camera[2] = {scene::pinhole(), scene::pinhole()};
@@ -57,7 +57,7 @@ inline Vec2 noisy(tv::Random* random, const Vec2& pixel, double noise_px) {
   return pixel + Vec2(x, y);
 }
 
-// Points at depths of 2 to 8 baselines.
+// Makes match i, from a point at a depth of 2 to 8 baselines.
 inline void make_match(tv::Random* random, const tv::Camera cameras[2], int i, Scene* s) {
   const Options& o = s->options;
   for (int tries = 0;; ++tries) {

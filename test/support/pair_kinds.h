@@ -23,15 +23,17 @@ enum Kind {
   kPlanar,        // a plane 2 to 8 baselines away, tilted by up to 50 degrees
   kPureRotation,  // the camera turns by 1 to 20 degrees
   kNoMotion,
-  kLowParallax,   // general, with a median parallax of 5 to 8 times the noise
-  kTooFew,        // general, 0 to 12 matches in all
-  kSecondMotion,  // general; 30 per cent of the true matches lie on an object that moves by itself
-  kLattice,       // general, with a wall of equal cells; half of the wall is matched one or two
+  kLowParallax,   // as kGeneral, with a median parallax of 5 to 8 times the noise
+  kTooFew,        // as kGeneral, but only 0 to 12 matches in all
+  kSecondMotion,  // as kGeneral, but 30 per cent of the true matches lie on an object that moves by
+                  // itself
+  kLattice,       // as kGeneral, with a wall of equal cells; half of the wall is matched one or two
                   // cells off, away from the epipolar lines: along these lines two views cannot
                   // show that a match is wrong
   // Two kinds that no verdict names, in which a view shows the scene smaller than the other:
   kForwardMove,  // a move along the optical axis, which makes the scene 1.5 to 8 times as large
-  kScaleChange,  // a change by 2: half of the distance, or twice the focal length
+  kScaleChange,  // one view shows the scene twice as large: half of the distance, or twice the
+                 // focal length
 };
 constexpr int kNumKinds = 8;  // the kinds that a verdict names
 constexpr int kNumAllKinds = 10;
@@ -44,7 +46,7 @@ inline const char* name_of(int kind) {
 }
 
 struct Ranges {
-  int fewest = 100, most = 500;  // matches, wrong ones included
+  int fewest = 100, most = 500;  // number of matches, wrong ones included
   double most_wrong = 0.5;       // the share of wrong matches is drawn from 0 to this
   double least_noise_px = 0.2, most_noise_px = 0.6;
   double most_rotation_deg = 20;
@@ -54,7 +56,7 @@ struct Pair {
   Kind kind;
   tv_camera camera[2];
   Mat3 R;
-  Vec3 t;  // unit, or zero
+  Vec3 t;  // length 1, or 0 if the camera does not move
   int num;
   double pixels[2][2 * kMaxMatches];
   double noise_px;
@@ -124,7 +126,8 @@ struct Maker {
     }
   }
 
-  bool put_general(int count, double scale) {  // at depths of 2 to 10 baselines, times scale
+  // Adds matches of points at depths of `scale` times 2 to 10 baselines.
+  bool put_general(int count, double scale) {
     for (int i = 0, tries = 0; i < count; ++tries) {
       if (tries > 40 * count + 200) return false;
       Vec2 p0;
@@ -202,7 +205,8 @@ struct Maker {
         Vec3(uniform(&random, -0.6, 0.6), uniform(&random, -0.3, 0.3), 1).normalized();
     const double distance = uniform(&random, 3, 8);
     const Vec3 u = Vec3(0, 1, 0).cross(normal_of_wall).normalized(), v = normal_of_wall.cross(u);
-    const double cell = distance * uniform(&random, 14, 40) / pair->camera[0].fx;  // in pixels
+    // A cell is 14 to 40 px wide in the image.
+    const double cell = distance * uniform(&random, 14, 40) / pair->camera[0].fx;
     const int shift_u = tv::random_below(random, 2) == 0 ? 1 : 2;
     const int shift_v = static_cast<int>(tv::random_below(random, 3)) - 1;
     const Vec3 middle = distance / normal_of_wall[2] * Vec3(0, 0, 1);
@@ -335,7 +339,8 @@ struct Maker {
         break;
       case kLattice: made = put_lattice(num_true / 2 + 20) && put_general(num_true / 2, 1); break;
       case kForwardMove: {
-        const double zoom = uniform(&random, 1.5, 8), left = 1 / (zoom - 1);  // after the move
+        // left: the depth after the move, which has length 1.
+        const double zoom = uniform(&random, 1.5, 8), left = 1 / (zoom - 1);
         made = put_layer(num_true, 1 + left, 0.3 * left);
         break;
       }

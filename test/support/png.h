@@ -97,7 +97,7 @@ static inline void png_read_codes(png_bits *in, int kind, png_code *literals, pn
   png_make_code(lengths + num_literals, num_distances, distances);
 }
 
-/* Inflates into out; returns whether exactly out_size bytes came. */
+/* Decompresses (inflate) into out. Returns 1 if the result has exactly out_size bytes, else 0. */
 static inline int png_inflate(const uint8_t *bytes, size_t size, uint8_t *out, size_t out_size) {
   static const uint16_t bases[29] = {3,  4,  5,  6,   7,   8,   9,   10,  11, 13,
                                      15, 17, 19, 23,  27,  31,  35,  43,  51, 59,
@@ -107,7 +107,7 @@ static inline int png_inflate(const uint8_t *bytes, size_t size, uint8_t *out, s
   static const uint16_t distance_bases[30] = {
       1,   2,   3,   4,   5,   7,    9,    13,   17,   25,   33,   49,   65,    97,    129,
       193, 257, 385, 513, 769, 1025, 1537, 2049, 3073, 4097, 6145, 8193, 12289, 16385, 24577};
-  png_bits in = {bytes, size, 2, 0, 0, 0}; /* skips the two bytes of the zlib header */
+  png_bits in = {bytes, size, 2, 0, 0, 0}; /* skips 2 bytes of zlib header */
   size_t at = 0;
   int last = 0;
   while (!last && !in.failed) {
@@ -204,7 +204,7 @@ static inline size_t png_join_data(uint8_t *bytes, size_t size) {
   return joined;
 }
 
-/* 8-bit luma from malloc, or null. */
+/* Returns the image as 8-bit luma, which the caller frees, or null if it cannot be read. */
 static inline uint8_t *png_load_luma(const char *path, int32_t *width, int32_t *height) {
   size_t size = 0, joined, k, count;
   int channels, row_bytes;

@@ -13,13 +13,13 @@ static inline uint64_t random_u64(uint64_t *state) {
   return z ^ (z >> 31);
 }
 
-/* Uniform in [low, high]. */
+/* Returns an integer that is uniform in [low, high], both ends included. */
 static inline int32_t random_int(uint64_t *state, int32_t low, int32_t high) {
   const uint64_t span = (uint64_t)((int64_t)high - low + 1);
   return (int32_t)(low + (int64_t)(random_u64(state) % span));
 }
 
-/* Uniform in [0, 1). */
+/* Returns a number that is uniform in [0, 1). */
 static inline double random_unit(uint64_t *state) {
   return (double)(random_u64(state) >> 11) / 9007199254740992.0;
 }

@@ -9,7 +9,7 @@
 #include "support/png.h"
 
 typedef struct real_pair {
-  uint8_t *luma[2]; /* rows without padding; allocated by malloc */
+  uint8_t *luma[2]; /* the two images, rows without padding; allocated by malloc */
   int32_t width, height;
 } real_pair;
 

@@ -32,7 +32,7 @@ def finish(run, failed, skipped):
 
 
 class Program(unittest.TestProgram):
-    """unittest.main that ends with the exit status above."""
+    """unittest.main with the exit status that this file's first lines describe."""
 
     def runTests(self):
         wanted, self.exit = self.exit, False

@@ -27,7 +27,7 @@ inline double uniform(tv::Random* random, double low, double high) {
   return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
 }
 
-// Approximately normal: a sum of 12 uniform numbers.
+// Returns an approximately standard normal number, the sum of 12 uniform ones less 6.
 inline double normal(tv::Random* random) {
   double sum = -6;
   for (int i = 0; i < 12; ++i) sum += uniform(random, 0, 1);
@@ -45,7 +45,7 @@ inline tv_camera pinhole() {
   return tv_camera{TV_CAMERA_PINHOLE, 640, 480, 0, 500, 505, 321, 238, {}};
 }
 
-inline tv_camera distorted() {  // the lens of EuRoC's camera
+inline tv_camera distorted() {  // the lens of the EuRoC data set's camera
   return tv_camera{TV_CAMERA_BROWN_CONRADY,
                    752,
                    480,
@@ -76,7 +76,7 @@ struct Options {
 struct Scene {
   Options options;
   Mat3 R;
-  Vec3 t;  // unit, or zero
+  Vec3 t;  // length 1, or 0 if the camera does not move
   double pixels[2][2 * kMaxMatches];
   float ratios[kMaxMatches];
   uint8_t inlier[kMaxMatches];
@@ -127,7 +127,7 @@ inline void make(const Options& options, Scene* s) {
     if (s->inlier[i]) {
       int tries = 0;
       while (tries < 1000 && !true_match(&random, cameras, plane, s, &p[0], &p[1])) ++tries;
-      if (tries == 1000) {  // too few points are seen by both views
+      if (tries == 1000) {  // this motion leaves too few points in both views
         TEST_ASSERT_TRUE(++restarts < 100);
         choose_motion(&random, s);
         i = -1;
@@ -148,7 +148,7 @@ inline void make(const Options& options, Scene* s) {
 
 inline double degrees(double rad) { return rad * 180 / tv::kPi; }
 
-// The angle of R_est R_gt', the rotation error.
+// The rotation error in degrees: the angle of R truth'.
 inline double rotation_error_deg(const double R[9], const Mat3& truth) {
   Mat3 estimate;
   for (int k = 0; k < 9; ++k) estimate(k / 3, k % 3) = R[k];
@@ -157,7 +157,7 @@ inline double rotation_error_deg(const double R[9], const Mat3& truth) {
   return degrees(tv::atan2(axis.norm(), d.trace() - 1));
 }
 
-// The angle between two directions, whose signs count.
+// The angle between t and truth in degrees, 0 to 180: opposite directions give 180.
 inline double translation_error_deg(const double t[3], const Vec3& truth) {
   const Vec3 estimate(t[0], t[1], t[2]);
   return degrees(tv::atan2(estimate.cross(truth).norm(), estimate.dot(truth)));

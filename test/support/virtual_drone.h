@@ -75,7 +75,7 @@ class VirtualDrone {
   const Firmware& firmware() const { return firmware_; }
   const Exposure& exposure(uint64_t index) const { return exposures_[index % exposures_.size()]; }
 
-  // The number that a decoded picture shows.
+  // Reads the picture number that is drawn as black and white blocks into a decoded picture.
   static uint64_t number_of(const tv_image& image) {
     uint64_t number = 0;
     for (int bit = 0; bit < kBits; ++bit) {
@@ -174,7 +174,7 @@ class VirtualDrone {
     if (channel == ARDRONE_CHANNEL_NAVDATA) {
       if (d.navdata_.empty()) return TVS_NONE;
       *size = std::min(capacity, d.navdata_.front().size());
-      // the link may have cut the whole packet
+      // The faulty link may have cut the packet to 0 bytes.
       if (*size > 0) std::memcpy(to, d.navdata_.front().data(), *size);
       d.navdata_.pop_front();
       return TVS_OK;
@@ -203,7 +203,7 @@ class VirtualDrone {
   Film film_;
   std::vector<uint8_t> luma_;
   uint64_t num_exposed_ = 0;
-  std::vector<Exposure> exposures_;  // a ring, so that the memory does not grow
+  std::vector<Exposure> exposures_;  // a ring buffer of the latest pictures
   std::deque<FaultyLink::Bytes> navdata_;
   std::deque<Sending> video_;
   bool is_open_ = false, is_cut_ = false;

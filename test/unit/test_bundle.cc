@@ -53,7 +53,7 @@ tv_status adjust(const tv_bundle_options& bundle) {
                        pair.pixels[1], pair.options.num, &bundle, R, t, points, &result);
 }
 
-// ---- one match ----
+// ---- tests of one match ----
 
 struct OneMatch {
   tv::Camera cameras[2];
@@ -116,7 +116,7 @@ struct Derivatives {
   Eigen::Matrix<double, 4, 5> pose;
 };
 
-// The Jacobian by central differences.
+// The Jacobian of the residuals of one match, by central differences.
 Derivatives derivatives(const OneMatch& m) {
   const double zero3[3] = {}, zero5[5] = {}, h = 1e-6;
   Derivatives d;
@@ -180,7 +180,7 @@ void check_elimination(const OneMatch& m) {
   const Elimination e = tv::eliminate(tv::bundle_frame(m.pose), linearised(m));
   const Eigen::HouseholderQR<Eigen::Matrix<double, 4, 3>> qr(d.point);
   const Eigen::Matrix4d Q = qr.householderQ();
-  const Vec4 n = Q.col(3);  // the residuals' one direction that no step of the point changes
+  const Vec4 n = Q.col(3);  // no step of the point moves the residuals along n
   Eigen::Matrix<double, 5, 1> a;
   for (int k = 0; k < 5; ++k) a[k] = e.a[k];
   const Eigen::Matrix<double, 5, 1> expected = d.pose.transpose() * n;
@@ -204,7 +204,7 @@ void test_the_basis_of_the_sphere_is_orthonormal() {
   }
 }
 
-// ---- whole pairs ----
+// ---- tests of whole pairs of images ----
 
 void test_exact_pixels_give_the_exact_pose_and_points() {
   for (Geometry geometry : {Geometry::kGeneral, Geometry::kSideways, Geometry::kForward}) {
@@ -334,7 +334,7 @@ void test_holding_the_pose_gives_each_point_its_least_error() {
     if (points[i].status != TV_POINT_OK) continue;
     TEST_ASSERT_TRUE(points[i].error_px <= pair.start[i].error_px + 1e-6f);
     const Vec3 X(points[i].position[0], points[i].position[1], points[i].position[2]);
-    for (int trial = 0; trial < 10; ++trial) {  // no point nearby has a smaller error
+    for (int trial = 0; trial < 10; ++trial) {  // nearby points must have larger errors
       const Vec3 other = X + 1e-4 * X.norm() * scene::direction(&random);
       Vec2 p[2];
       TEST_ASSERT_TRUE(tv::project(cameras[0], other, &p[0], nullptr));
@@ -398,13 +398,13 @@ void test_degenerate_pairs_end_without_a_nan() {
         options.seed = ++seed;
         bundle_scene::make(options, &pair);
         for (int i = 1; i < options.num; ++i) {
-          if (kind == 4) {  // copies of one match
+          if (kind == 4) {  // kind 4: copies of one match
             for (int v = 0; v < 2; ++v) {
               std::memcpy(pair.pixels[v] + 2 * i, pair.pixels[v], 2 * sizeof(double));
             }
-          } else if (kind == 5) {  // equal pixels: no motion
+          } else if (kind == 5) {  // kind 5: equal pixels, no motion
             std::memcpy(pair.pixels[1] + 2 * i, pair.pixels[0] + 2 * i, 2 * sizeof(double));
-          } else if (kind == 6) {  // unrelated matches
+          } else if (kind == 6) {  // kind 6: only wrong matches
             tv::Random random = tv::random_seeded(seed * 1000 + static_cast<uint64_t>(i));
             const Vec2 p = scene::random_pixel(&random, options.camera[1]);
             pair.pixels[1][2 * i] = p[0], pair.pixels[1][2 * i + 1] = p[1];

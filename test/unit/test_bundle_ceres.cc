@@ -60,7 +60,7 @@ bool is_ahead(const tv_camera& camera, const T& z) {
   return camera.model == TV_CAMERA_KANNALA_BRANDT || z > 0.0;
 }
 
-// Whether the point takes part in the adjustment.
+// Whether point i takes part in the adjustment: it is OK and in front of the cameras at the start.
 bool is_seen(const Scene& s, int i) {
   if (s.start[i].status != TV_POINT_OK) return false;
   const double* X = s.start[i].position;
@@ -131,11 +131,12 @@ ceres::LossFunction* loss_of(const tv_bundle_options& options) {
   return nullptr;
 }
 
-// tight: converges to rounding error; otherwise Ceres's own tolerances are used, to compare times.
+// With `tight`, Ceres converges to rounding error; else it uses its default tolerances, for a fair
+// comparison of times.
 Answer solve_ceres(const Scene& s, const Start& start, const tv_bundle_options& options,
                    bool tight) {
   double q[4], t[3], R[9];
-  for (int i = 0; i < 9; ++i) R[3 * (i % 3) + i / 3] = start.R[i];  // Ceres: column-major
+  for (int i = 0; i < 9; ++i) R[3 * (i % 3) + i / 3] = start.R[i];  // for Ceres R is column-major
   ceres::RotationMatrixToQuaternion(R, q);
   const double length =
       std::sqrt(start.t[0] * start.t[0] + start.t[1] * start.t[1] + start.t[2] * start.t[2]);

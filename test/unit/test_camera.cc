@@ -65,7 +65,7 @@ const Named kCameras[] = {
       161.275943,
       123.723408,
       {0.160828, -0.280969, 0.000044, 0.001607, 0}},
-     29},  // its r (1 + k1 r^2 + k2 r^4) is never above 0.88, and the corners are at 0.97
+     29},  // r (1 + k1 r^2 + k2 r^4) is at most 0.88, and the image's corners are at 0.97
     {"euroc cam0",
      {TV_CAMERA_BROWN_CONRADY,
       752,
@@ -237,7 +237,7 @@ void test_the_two_jacobians_are_inverse_to_each_other(void) {
 }
 
 void test_valid_region_ends_at_the_derivatives_first_zero(void) {
-  // The edge: 1 + 3 k1 r^2 = 0.
+  // The valid region ends where 1 + 3 k1 r^2 = 0.
   const Camera barrel = prepared(brown(-0.3, 0, 0, 0, 0));
   TEST_ASSERT_DOUBLE_WITHIN(2e-6, std::sqrt(1 / 0.9), barrel.valid_radius_undistorted);
   TEST_ASSERT_DOUBLE_WITHIN(2e-6, std::atan(std::sqrt(1 / 0.9)), barrel.valid_angle_rad);
@@ -266,7 +266,7 @@ void test_a_dip_of_the_derivative_between_samples_is_found(void) {
 
 void test_a_pole_of_the_rational_factor_ends_the_valid_region(void) {
   tv_camera model = brown(0, 0, 0, 0, 0);
-  model.k[5] = -1.0;  // denominator 1 - r^2
+  model.k[5] = -1.0;  // the rational factor's denominator is 1 - r^2
   const Camera camera = prepared(model);
   TEST_ASSERT_TRUE(camera.valid_radius_undistorted > 0.99);
   TEST_ASSERT_TRUE(camera.valid_radius_undistorted <= 1.0);
@@ -294,11 +294,11 @@ void test_the_map_is_one_to_one_in_the_valid_disc_with_strong_tangential_terms(v
       Vec2 pixel, again;
       Vec3 ray;
       if (!tv::project(camera, point, &pixel, nullptr)) {
-        TEST_ASSERT_TRUE(i == 0);  // allowed only where r rounds beyond the edge
+        TEST_ASSERT_TRUE(i == 0);  // allowed only at the edge, where r may round beyond it
         continue;
       }
       if (!tv::unproject(camera, pixel, &ray, nullptr)) {
-        TEST_ASSERT_TRUE(i < 20);  // allowed only very near the edge
+        TEST_ASSERT_TRUE(i < 20);  // allowed only within 2e-6 of the edge
         continue;
       }
       TEST_ASSERT_TRUE((ray - point.normalized()).norm() < (i < 20 ? 1e-6 : 1e-8));
@@ -348,7 +348,7 @@ void test_outside_is_refused_and_outputs_stay(void) {
   TEST_ASSERT_FALSE(tv::project(fisheye, Vec3(0, 0, -1), &pixel, nullptr));
   TEST_ASSERT_FALSE(tv::unproject(fisheye, Vec2(399.5 + 220 * 3.15, 399.5), &ray, nullptr));
   tv_camera folding = kCameras[8].camera;
-  folding.k[0] = -0.1;  // valid to theta = 1.8257
+  folding.k[0] = -0.1;  // the valid region ends at theta = 1.8257 rad
   TEST_ASSERT_FALSE(
       tv::project(prepared(folding), Vec3(std::sin(1.83), 0, std::cos(1.83)), &pixel, nullptr));
   TEST_ASSERT_TRUE(pixel == Vec2(-7, -7) && ray == Vec3(-7, -7, -7));

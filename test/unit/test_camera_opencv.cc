@@ -83,7 +83,7 @@ void project_by_opencv(const tv_camera& camera, const Vec3& point, double pixel[
   if (camera.model == TV_CAMERA_KANNALA_BRANDT) {
     cv::fisheye::projectPoints(object, image, zero, zero, matrix_of(camera),
                                coefficients_of(camera), 0, d);
-    first = 11;  // the column of the translation: f 2, c 2, k 4, rotation 3, translation 3, skew 1
+    first = 11;  // d's columns: f 2, c 2, k 4, rotation 3, translation 3, skew 1
   } else {
     cv::projectPoints(object, zero, zero, matrix_of(camera), coefficients_of(camera), image, d);
   }

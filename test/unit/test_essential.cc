@@ -51,7 +51,7 @@ void test_decomposition_refuses_what_is_no_epipolar_matrix(void) {
   Mat3 R[2], bad = Mat3::Zero();
   Vec3 t;
   TEST_ASSERT_FALSE(tv::decompose_essential(bad, R, &t));
-  bad(0, 0) = 1;  // rank one
+  bad(0, 0) = 1;  // a matrix of rank 1
   TEST_ASSERT_FALSE(tv::decompose_essential(bad, R, &t));
   bad(1, 1) = NAN;
   TEST_ASSERT_FALSE(tv::decompose_essential(bad, R, &t));
@@ -75,10 +75,10 @@ void test_steps_are_rotations_and_agree_with_the_exponential(void) {
 void test_the_tangent_basis_is_the_stated_one(void) {
   const Vec3 tie = Vec3(1, -1, 1).normalized();
   Vec3 b1, b2;
-  tv::tangent_basis(tie, &b1, &b2);  // all components have the same size: b1 is along e_0 x t
+  tv::tangent_basis(tie, &b1, &b2);  // sizes are equal: b1 is along e_0 x t
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, (b1 - Vec3(0, -1, -1).normalized()).norm());
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, (b2 - tie.cross(b1)).norm());
-  tv::tangent_basis(Vec3(0.6, 0.8, 0), &b1, &b2);  // b1 is along e_2 x t
+  tv::tangent_basis(Vec3(0.6, 0.8, 0), &b1, &b2);  // t[2] is the smallest: b1 is along e_2 x t
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, (b1 - Vec3(-0.8, 0.6, 0)).norm());
 }
 

@@ -140,7 +140,7 @@ void check_corners(const tvk_table& kernels, const tv_image& image, int arc, int
     const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
     TEST_ASSERT_TRUE(p.x == x && p.y == y && is_peak(x, y, threshold));
     TEST_ASSERT_EQUAL_INT(expected_scores[y][x], static_cast<int>(p.score));
-    if (k == 0) continue;  // strictly ordered, so no corner is there twice
+    if (k == 0) continue;  // the order is strict, so no corner is repeated
     const tv_keypoint& q = keypoints[k - 1];
     TEST_ASSERT_TRUE(q.score > p.score ||
                      (q.score == p.score && (q.y < p.y || (q.y == p.y && q.x < p.x))));
@@ -241,7 +241,8 @@ int soft_squares(int x, int y) { return (x % 16 < 8 && y % 16 < 8 ? x * 37 + y *
 
 void test_corners_equal_the_definition_on_a_real_image() {
 #ifdef __SANITIZE_ADDRESS__
-  // every row gives the sanitizers the same accesses, so a part is enough
+  // Sanitizers are slow, and every row makes the same memory accesses: a fifth of the rows is
+  // enough.
   const int32_t height = real.height / 5;
 #else
   const int32_t height = real.height;

@@ -1,4 +1,4 @@
-// Eight- and seven-point solvers, null spaces and singular values.
+// Tests the eight- and seven-point solvers, null spaces and singular values.
 #include <cmath>
 
 #include "geometry/fundamental_7pt.h"
@@ -47,7 +47,7 @@ void test_eight_exact_points_give_the_matrix(void) {
     TEST_ASSERT_TRUE(tv::fundamental_8pt(s.rays0, s.rays1, &M));
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, M.norm());
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, M.determinant());
-    // nearly critical samples lose digits, so a few may miss
+    // Samples near a critical configuration lose digits, so a few may miss the tolerance.
     missed += distance(M, s.truth) > 1e-7;
   }
   TEST_ASSERT_LESS_OR_EQUAL_INT(5, missed);

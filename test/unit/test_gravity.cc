@@ -158,7 +158,7 @@ void test_gravity_that_disagrees_pulls_less_the_farther_it_is(void) {
   }
   const double chord = 2 * std::sin(0.1 / 2), z_sq = chord * chord / (2 * kSigma * kSigma);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, (9.21 / z_sq) * (9.21 / z_sq), weight_at(0.1, 0));
-  // the weight is also small for exactly opposite directions
+  // The weight is small where measured and predicted gravity are opposite.
   TEST_ASSERT_TRUE(weight_at(tv::kPi, 0) < 1e-4);
   const double down[3] = {0, 0, 1}, up[3] = {0, 0, -1}, covariance[25] = {};
   const GravityPrior opposite = tv::gravity_prior(down, up, kSigma);
@@ -176,7 +176,7 @@ void test_information_of_gravity_is_added_to_that_of_the_points(void) {
     Matrix5 C;
     for (int k = 0; k < 25; ++k) C(k / 5, k % 5) = 2 * kSigma * uniform(&random, -1, 1);
     C = (C * C.transpose() + 1e-6 * Matrix5::Identity()).eval();
-    // scale and noise are 1: J'J over gravity's variance
+    // With scale 1 and noise 1, the rows are J'J divided by gravity's variance.
     const Rows rows = rows_at(prior, pose.R, 1, 1);
     Matrix5 information = C.inverse();
     int slot = 0;

@@ -52,7 +52,7 @@ static tv_camera make_camera(int model) {
   return camera;
 }
 
-/* [t]x R */
+/* E = [t]x R */
 static void make_essential(double E[9]) {
   const double *t = translation;
   const double skew[9] = {0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0};
@@ -262,13 +262,13 @@ static void test_matches_equal_the_definition_and_swap_with_the_views(void) {
       int k;
       make_scene(&state, &camera0, &camera1, MAX_POINTS);
       fill_descriptors(&state, 12);
-      if (round % 2 == 1) { /* few values, so that many distances are equal */
+      if (round % 2 == 1) { /* only 0 and 1, so that many distances are equal */
         for (k = 0; k < (int)sizeof descriptors0; ++k) {
           descriptors0[k] = (uint8_t)(k % SIZE < 4 ? descriptors0[k] & 1 : 0);
           descriptors1[k] = (uint8_t)(k % SIZE < 4 ? descriptors1[k] & 1 : 0);
         }
       }
-      /* a third lie anywhere, some of them outside the lens's valid region */
+      /* A third of image 1's keypoints lie anywhere, some outside the lens's valid region. */
       for (k = 0; k < MAX_POINTS; k += 3) {
         set_pixel(&keypoints1[k], random_double(&state, -900, 1500), random_double(&state, 0, 480));
       }
@@ -362,7 +362,7 @@ static void test_what_lies_beside_the_nearest_is_no_rival(void) {
   TEST_ASSERT_EQUAL_FLOAT(20.0f / 180.0f, found[0].ratio);
   p.options.neighbourhood_px = 2;
   TEST_ASSERT_EQUAL_INT(0, check(&p));
-  set_pixel(&keypoints1[1], 283, 230); /* outside the band */
+  set_pixel(&keypoints1[1], 283, 230); /* 30 px off the epipolar line */
   TEST_ASSERT_EQUAL_INT(1, check(&p));
 }
 
@@ -386,7 +386,7 @@ static void test_a_keypoint_outside_the_lens_is_not_matched(void) {
   tv_camera camera = make_camera(TV_CAMERA_BROWN_CONRADY);
   const double E[9] = {0, 0, 0, 0, 0, -1, 0, 1, 0};
   problem p;
-  /* the polynomial turns back at 520 pixels from the centre */
+  /* With k1 alone, the lens's valid region ends 520 pixels from the centre. */
   camera.k[1] = camera.k[2] = camera.k[3] = 0;
   camera.cy = 0; /* both pixels lie on the same epipolar line, the row y = 0 */
   p = make_problem(&camera, &camera, E);

@@ -18,7 +18,7 @@ constexpr uint64_t kSeed = 4;
 
 struct Plane {
   Mat3 R, H;
-  Vec3 t, normal;  // t / distance
+  Vec3 t, normal;  // t is divided by the plane's distance
   Vec3 rays0[4], rays1[4];
 };
 
@@ -76,7 +76,7 @@ void test_one_of_the_two_motions_is_the_true_one(void) {
     TEST_ASSERT_EQUAL_INT(2, count);
     double best = 10;
     for (int k = 0; k < 2; ++k) {
-      // Both motions explain H: it is R + t n' / d for each.
+      // Each of the two motions explains H: H = R + t n' / d.
       const Mat3 rebuilt = poses[k].pose.R + poses[k].baseline_over_depth * poses[k].pose.t *
                                                  poses[k].normal.transpose();
       TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0, (rebuilt - p.H).norm());

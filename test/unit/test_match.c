@@ -112,15 +112,15 @@ static void fill(uint64_t *state, int kind) {
   random_bytes(state, descriptors0, sizeof descriptors0);
   random_bytes(state, descriptors1, sizeof descriptors1);
   for (k = 0; k < (int)sizeof descriptors0; ++k) {
-    if (kind == 1) { /* few values, so that many distances are equal */
+    if (kind == 1) { /* only 0 and 1, so that many distances are equal */
       descriptors0[k] = (uint8_t)(k % SIZE < 4 ? descriptors0[k] & 1 : 0);
       descriptors1[k] = (uint8_t)(k % SIZE < 4 ? descriptors1[k] & 1 : 0);
-    } else if (kind == 2) { /* most rows of image 1 are rows of image 0 with noise */
+    } else if (kind == 2) { /* 4 of 5 descriptors of image 1 are noisy ones of image 0 */
       const int noise = random_int(state, -9, 9) + descriptors0[k];
       if (k / SIZE % 5 != 0) {
         descriptors1[k] = (uint8_t)(noise < 0 ? 0 : noise > 255 ? 255 : noise);
       }
-    } else if (kind == 3) { /* the extremes 0 and 255 */
+    } else if (kind == 3) { /* only 0 and 255 */
       descriptors0[k] = descriptors0[k] < 128 ? 0 : 255;
       descriptors1[k] = descriptors1[k] < 200 ? 0 : 255;
     }
@@ -181,7 +181,7 @@ static void test_equal_distances_are_rejected(void) {
   uint64_t state = 13;
   fill(&state, 0);
   memcpy(descriptors1, descriptors0, sizeof descriptors0);
-  /* rows 0 and 1 have the same distance from query 0 */
+  /* Descriptors 0 and 1 of image 1 are equally distant from descriptor 0 of image 0. */
   memcpy(descriptors1 + SIZE, descriptors1, SIZE);
   TEST_ASSERT_EQUAL_INT(8, run(&contexts[0], descriptors0, 10, descriptors1, 10, 1.0f, found));
   TEST_ASSERT_EQUAL_INT(2, found[0].idx0);

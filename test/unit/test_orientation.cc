@@ -38,7 +38,7 @@ void render(double angle, Pattern pattern) {
 // Brightness rises along u, so the gradient's direction is the frame's angle.
 double ramp(double u, double) { return 128 + 100 * std::tanh(u / 6); }
 
-// As `ramp`, with gradient directions spread evenly to both sides as in real patches.
+// Like `ramp`, but with gradient directions spread evenly to both sides, as in real patches.
 double bent_ramp(double u, double v) { return 128 + 100 * std::tanh((u - 0.03 * v * v) / 6); }
 
 // One half of the patch rises along u; the other along v, `share` times as steeply.
@@ -87,17 +87,17 @@ void check_rotation(double (*pattern)(double, double), double max_mean_degrees,
 
 void test_the_angle_follows_the_rotation() {
   check_rotation(ramp, 0.5, 1.0);
-  check_rotation(bent_ramp, 0.4, 2.0);  // the bend shifts the peak
+  check_rotation(bent_ramp, 0.4, 2.0);  // up to 2 degrees: the bend shifts the histogram's peak
 }
 
 // An angle of 0 points along x, to the right; a quarter turn along y, downwards. So angles grow
 // clockwise as seen.
 void test_the_sign_is_clockwise_as_seen() {
   float angles_rad[2];
-  render(0, [](double u, double) { return 100 + 3 * u; });  // brighter to the right
+  render(0, [](double u, double) { return 100 + 3 * u; });  // grey levels rise to the right
   angles_of(middle, angles_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0, angles_rad[0]);
-  render(0, [](double, double v) { return 100 + 3 * v; });  // brighter downwards
+  render(0, [](double, double v) { return 100 + 3 * v; });  // grey levels rise downwards
   angles_of(middle, angles_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, kPi / 2, angles_rad[0]);
 }
@@ -185,7 +185,7 @@ void test_the_order_is_ubcs() {
     for (int k = 0; k < 8; ++k) {
       TEST_ASSERT_TRUE(k == direction || last_cell[k] < last_cell[direction]);
     }
-    // the first cell has no gradient
+    // The first cell of the patch has no gradient, so its 8 values are 0.
     for (int k = 0; k < 8; ++k) TEST_ASSERT_EQUAL_INT(0, descriptor[k]);
   }
 }

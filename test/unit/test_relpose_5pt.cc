@@ -18,7 +18,7 @@ constexpr uint64_t kSeed = 5;
 
 struct Sample {
   Vec3 rays0[5], rays1[5];
-  Mat3 truth;  // E, norm 1
+  Mat3 truth;  // the true E, with norm 1
 };
 
 Sample make_sample(tv::Random* random, const Mat3& R, const Vec3& t) {
@@ -26,7 +26,7 @@ Sample make_sample(tv::Random* random, const Mat3& R, const Vec3& t) {
   for (int k = 0; k < 5; ++k) {
     const Vec3 point(uniform(random, -2, 2), uniform(random, -2, 2), uniform(random, 2, 8));
     s.rays0[k] = point.normalized();
-    s.rays1[k] = R * point + t;  // rays need not have unit length
+    s.rays1[k] = R * point + t;  // rays of any length are allowed
   }
   s.truth = tv::essential_from_pose({R, t}).normalized();
   return s;
@@ -70,7 +70,7 @@ void test_the_true_motion_is_among_the_models(void) {
     total += count;
     missed += nearest_model(s, models, count) > 1e-6;
   }
-  // a double root, which is rare, loses half the digits
+  // A double root loses half of the digits; it is rare, so 1 of 500 trials may miss the tolerance.
   TEST_ASSERT_LESS_OR_EQUAL_INT(kTrials / 500, missed);
   TEST_ASSERT_GREATER_THAN_INT(3 * kTrials, total);
 }
@@ -81,7 +81,7 @@ void test_every_model_satisfies_the_constraints(void) {
   for (int trial = 0; trial < 1000; ++trial) {
     const Mat3 R = tv::rotation_about(scene::direction(&random), uniform(&random, 0, 0.8));
     Sample s = make_sample(&random, R, scene::direction(&random));
-    if (trial % 2 == 1) {  // five unrelated matches
+    if (trial % 2 == 1) {  // five wrong matches
       for (int k = 0; k < 5; ++k) s.rays1[k] = scene::direction(&random);
     }
     Mat3 models[tv::kMaxRelpose5pt];
@@ -122,9 +122,9 @@ void test_degenerate_samples_give_finite_models_or_none(void) {
     Sample s = make_sample(&random, Mat3::Identity(), Vec3(1, 0, 0));
     for (int k = 0; k < 5; ++k) {
       if (kind == 0) s.rays0[k] = s.rays0[0], s.rays1[k] = s.rays1[0];  // five copies of one match
-      if (kind == 1) s.rays1[k] = s.rays0[k];                           // no motion
+      if (kind == 1) s.rays1[k] = s.rays0[k];                           // equal rays: no motion
       if (kind == 2) s.rays0[k] = s.rays1[k] = Vec3::Zero();
-      // all rays of a view lie in one plane
+      // All rays of a view lie in one plane.
       if (kind == 3) s.rays0[k] = s.rays1[k] = Vec3(0.1 * k, 0.2 * k, 1);
       if (kind == 4 && k == 4) s.rays0[4] = s.rays0[3], s.rays1[4] = s.rays1[3];
     }
@@ -140,11 +140,11 @@ void test_roots_of_known_polynomials_are_found(void) {
   const double wanted[6] = {-1000, -2.5, -0.125, 0.5, 3, 4e4};
   double p[11] = {1};
   int degree = 0;
-  for (double root : wanted) {  // multiplies by (z - root)
+  for (double root : wanted) {  // multiplies p by (z - root)
     for (int i = ++degree; i > 0; --i) p[i] = p[i - 1] - root * p[i];
     p[0] *= -root;
   }
-  for (int k = 0; k < 2; ++k) {  // multiplies by (z^2 + z + 1), which has no real root
+  for (int k = 0; k < 2; ++k) {  // multiplies p by z^2 + z + 1, which has no real root
     for (int i = degree += 2; i >= 0; --i) {
       p[i] = p[i] + (i > 0 ? p[i - 1] : 0) + (i > 1 ? p[i - 2] : 0);
     }
@@ -165,7 +165,7 @@ void test_polynomials_without_a_leading_coefficient_have_no_roots(void) {
 }
 
 void test_a_repeated_root_ends_the_search(void) {
-  const double p[4] = {-1, 3, -3, 1};  // (z - 1)^3
+  const double p[4] = {-1, 3, -3, 1};  // (z - 1)^3, with a triple root at 1
   double roots[3];
   const int count = tv::real_roots<3>(p, roots);
   TEST_ASSERT_LESS_OR_EQUAL_INT(3, count);

@@ -1,4 +1,4 @@
-// The three-point solver with gravity, checked against its definition.
+// Tests the three-point solver with known gravity against its definition.
 #include <cmath>
 
 #include "geometry/relpose_upright_3pt.h"
@@ -27,7 +27,7 @@ Sample make_sample(tv::Random* random, const Mat3& R, const Vec3& t, const Vec3&
   for (int k = 0; k < 3; ++k) {
     const Vec3 point(uniform(random, -2, 2), uniform(random, -2, 2), uniform(random, 2, 8));
     s.rays0[k] = point.normalized();
-    s.rays1[k] = R * point + t;  // rays need not have unit length
+    s.rays1[k] = R * point + t;  // rays of any length are allowed
   }
   s.down0 = down0;
   s.down1 = (R * down0).normalized();
@@ -72,7 +72,7 @@ void test_level_frames_have_gravity_along_z(void) {
   tv::Random random = tv::random_seeded(kSeed);
   for (int trial = 0; trial < 1000; ++trial) {
     Vec3 down = scene::direction(&random);
-    if (trial < 6) {  // a translation along an axis, in both directions
+    if (trial < 6) {  // gravity along each axis, in both directions
       down = Vec3::Zero();
       down[trial / 2] = trial % 2 == 0 ? 1 : -1;
     }
@@ -168,12 +168,12 @@ void test_degenerate_samples_give_finite_poses_or_none(void) {
       for (int k = 0; k < 3; ++k) {
         // three copies of one match
         if (kind == 0) s.rays0[k] = s.rays0[0], s.rays1[k] = s.rays1[0];
-        if (kind == 1) s.rays1[k] = R * s.rays0[k];                 // pure rotation
-        if (kind == 2) s.rays1[k] = s.rays0[k], s.down1 = s.down0;  // no motion
+        if (kind == 1) s.rays1[k] = R * s.rays0[k];  // a rotation without translation
+        if (kind == 2) s.rays1[k] = s.rays0[k], s.down1 = s.down0;  // equal rays: no motion
         if (kind == 3) s.rays0[k] = s.rays1[k] = Vec3::Zero();
-        if (kind == 4) s.rays0[k] = s.down0;  // rays along gravity
+        if (kind == 4) s.rays0[k] = s.down0;  // all rays of view 0 are along gravity
         if (kind == 5) s.rays0[k] = s.down0, s.rays1[k] = -s.down1;
-        // all rays of a view lie in one plane
+        // All rays of a view lie in one plane.
         if (kind == 6) s.rays0[k] = s.rays1[k] = Vec3(0.1 * k, 0.2 * k, 1);
         if (kind == 7 && k == 2) s.rays0[2] = s.rays0[1], s.rays1[2] = s.rays1[1];
         if (kind == 8) s.rays1[k][k] = nan;

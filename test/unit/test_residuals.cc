@@ -72,7 +72,8 @@ void test_sampson_of_a_pinhole_is_the_textbooks(void) {
   }
 }
 
-// c's derivatives by pixel, through the lens, from central differences of the camera model itself.
+// The reference is |c| / |gradient of c|, where c = f1' E f0, and the gradient by the pixels comes
+// from central differences through the camera model.
 void test_sampson_is_in_pixels_of_the_image_for_every_lens(void) {
   const tv_camera lenses[3] = {scene::pinhole(), scene::distorted(), scene::fisheye()};
   for (int a = 0; a < 3; ++a) {
@@ -83,7 +84,9 @@ void test_sampson_is_in_pixels_of_the_image_for_every_lens(void) {
     TEST_ASSERT_TRUE(matches.pairs.num > 150);
     for (int i = 0; i < matches.pairs.num; ++i) {
       const int k = matches.order[i];
-      if (!pair.inlier[k]) continue;  // far from the model the scale of the rays matters
+      // Wrong matches are skipped: far from the model the residual depends on the scale of the
+      // rays.
+      if (!pair.inlier[k]) continue;
       double gradient_sq = 0, c = 0;
       for (int v = 0; v < 2; ++v) {
         for (int d = 0; d < 2; ++d) {
@@ -277,7 +280,7 @@ void test_slopes_of_a_rotation_agree_with_differences(void) {
     scene::Options options = with_cameras(lenses[a], lenses[1 - a], 60 + a);
     options.kind = scene::Kind::kRotation;
     options.inlier_share = 1;
-    // the weights (I + DD')^-1 are taken as constant, which is exact at residual 0
+    // The slopes take the weights (I + DD')^-1 as constant, which is exact only at residual 0.
     options.noise_px = 0;
     prepare(options);
     const Mat3 R = tv::rotation_step(Vec3(1e-4, -2e-4, 1e-4)) * pair.R;

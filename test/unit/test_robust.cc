@@ -59,7 +59,7 @@ void test_progressive_samples_start_with_the_surest_and_end_with_all(void) {
   for (int k = 0; k < static_cast<int>(3 * kNum * tv::kProsacSamples); ++k) {
     int32_t sample[5];
     tv::draw_sample(sampler, sample);
-    if (k % 2 == 1) {  // half of the samples are uniform
+    if (k % 2 == 1) {  // every second sample is uniform
       expect_distinct(sample, 5, kNum);
       continue;
     }
@@ -178,7 +178,7 @@ void test_covariance_of_the_inverse_follows_a_step_of_the_pose(void) {
     if (p < 3) w[p] = kStep;
     const Mat3 R = tv::rotation_step(w) * pose.R;
     const Vec3 t = (pose.t + (p == 3 ? kStep : 0) * b1 + (p == 4 ? kStep : 0) * b2).normalized();
-    // the inverse's rotation after the step, relative to before
+    // The rotation of the inverse pose after the step, relative to that before the step.
     const Mat3 turn = R.transpose() * pose.R;
     const Vec3 moved = -(R.transpose() * t);
     step[0] = 0.5 * (turn(2, 1) - turn(1, 2)) / kStep;

@@ -48,7 +48,7 @@ static void test_the_fastest_is_that_of_the_cpu_named(void) {
 int main(int argc, char **argv) {
   UNITY_BEGIN();
   RUN_TEST(test_the_sets_are_those_that_the_compiler_finds);
-  if (argc == 2) { /* the caller names the set of the CPU that is emulated */
+  if (argc == 2) { /* argv[1]: the fastest kernel set of the emulated CPU */
     fastest_known = atoi(argv[1]);
     RUN_TEST(test_the_fastest_is_that_of_the_cpu_named);
   }

@@ -272,7 +272,7 @@ void test_iterative_ls_is_the_fixed_point_of_its_weights(void) {
         linear_ls_by_qr(pinhole(), pinhole(), scene.R, scene.t, pixel0, pixel1, 1, 1);
     moved = std::max(moved, (linear - at).norm());
   }
-  TEST_ASSERT_TRUE(moved > 1e-5);  // the weights have had an effect
+  TEST_ASSERT_TRUE(moved > 1e-5);  // the weights changed some point
 }
 
 void test_linear_eigen_is_the_smallest_singular_vector(void) {
@@ -459,7 +459,7 @@ void test_rays_that_meet_behind_say_so_and_where(void) {
 
 void test_a_point_behind_one_camera_only_is_behind(void) {
   const Camera camera = tv::prepare_camera(pinhole());
-  const Vec3 forward(0, 0, -5);  // camera 1 is 5 in front of camera 0
+  const Vec3 forward(0, 0, -5);  // t: camera 1 is at (0, 0, 5), in front of camera 0
   const Vec3 point0(0.3, 0.2, 2);
   for (tv_triangulation method : kMethods) {
     const tv_point point = triangulated(method, camera, camera, kIdentity, forward,

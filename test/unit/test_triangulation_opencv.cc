@@ -43,7 +43,7 @@ Vec3 triangulated_by_opencv(const Mat3& R, const Vec3& t, const Vec2& pixel0, co
 // errors of up to noise_px.
 double largest_difference(tv_triangulation method, double noise_px) {
   const tv::Camera camera = tv::prepare_camera(kCamera);
-  Mat3 R;  // a turn of 0.1 rad about y
+  Mat3 R;  // a rotation by 0.1 rad about the y axis
   R << std::cos(0.1), 0, std::sin(0.1), 0, 1, 0, -std::sin(0.1), 0, std::cos(0.1);
   const Vec3 t(-0.96, 0.28, 0);
   tv::Random random = tv::random_seeded(kSeed);
@@ -143,7 +143,7 @@ void test_linear_eigen_is_triangulate_points(void) {
 }
 void test_iterative_eigen_agrees_with_opencv(void) { check(TV_TRIANGULATION_ITERATIVE_EIGEN); }
 void test_poly_agrees_with_opencv(void) { check(TV_TRIANGULATION_POLY); }
-// Poly-Abs puts the whole correction into one image.
+// Poly-Abs moves the pixel of one image only, by the whole correction.
 void test_poly_abs_agrees_with_opencv(void) { check(TV_TRIANGULATION_POLY_ABS, 4e-4); }
 
 // correctMatches solves its polynomial to a few digits only: compared with a solution of 40 digits,
@@ -204,10 +204,10 @@ void test_poly_costs_no_more_than_correct_matches_in_hard_places(void) {
             .normalized();
     const Vec3 center = R.transpose() * t;
     Vec2 pixels[2];
-    if (sideways) {  // both epipoles at infinity
+    if (sideways) {  // both epipoles are at infinity
       pixels[0] = Vec2(uniform(&random, 0, 640), uniform(&random, 0, 480));
       pixels[1] = pixels[0] + Vec2(uniform(&random, -1, 1), uniform(&random, -1, 1));
-    } else {  // pixels near the epipoles
+    } else {  // both pixels are near their epipoles
       const double off = std::exp2(uniform(&random, -10, 5));
       const Vec3 epipoles[2] = {center / center[2], t / t[2]};
       for (int k = 0; k < 2; ++k) {

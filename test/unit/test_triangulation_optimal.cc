@@ -29,8 +29,9 @@ using Real = long double;
 
 constexpr uint64_t kSeed = 23;
 constexpr Real kRelativeGap = 1e-9L, kAbsoluteGapPx = 1e-12L;
-constexpr Real kOffPlanePx = 3e-12L;  // a dozen roundings of a pixel
-// Poly-Abs missed this one's minimum: beside it the line in image 0 goes to infinity.
+constexpr Real kOffPlanePx = 3e-12L;  // about 12 roundings of a pixel's coordinate
+// The number of a case whose minimum Poly-Abs once missed: beside the minimum, the line in image 0
+// goes to infinity. The case is always run.
 constexpr int kOnceMissed = 696735;
 constexpr int kMaxNodes = 400000;
 
@@ -47,7 +48,7 @@ Vec2 in_any_direction(tv::Random* random, double length) {
   return Vec2(length * std::cos(angle), length * std::sin(angle));
 }
 
-// ---- the cases ----
+// ---- the random cases ----
 
 struct Case {
   Camera camera[2];
@@ -77,33 +78,33 @@ void choose_motion(tv::Random* random, Case* c) {
   const double tiny = log_uniform(random, 1e-12, 0.1);
   c->R = Mat3::Identity();
   switch (c->motion) {
-    case 0:  // general
+    case 0:  // a general motion
       c->R = random_rotation(random, 1.0);
       c->t = Vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
       break;
-    case 1:  // sideways, both epipoles far or at infinity
+    case 1:  // sideways: both epipoles are far away or at infinity
       c->R = random_rotation(random, tiny);
       c->t = Vec3(sign, uniform(random, -1, 1), sign * log_uniform(random, 1e-12, 0.1));
       break;
-    case 2:  // forward, epipoles in the images
+    case 2:  // forward: both epipoles are in the images
       c->R = random_rotation(random, 0.2);
       c->t = Vec3(uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), sign);
       break;
-    case 3:  // converging
+    case 3:  // the two optical axes converge
       c->R = Eigen::AngleAxisd(uniform(random, 0.2, 1.2), Vec3::UnitY()).toRotationMatrix();
       c->t = Vec3(-1, uniform(random, -0.1, 0.1), uniform(random, 0, 1));
       break;
-    case 4:  // a rectified pair: both epipoles and the planes' lines at infinity
+    case 4:  // a rectified pair: both epipoles and lines of planes are at infinity
       c->t = Vec3(sign, tv::random_below(*random, 2) ? 0 : uniform(random, -1, 1), 0);
       break;
-    case 5:  // straight ahead
+    case 5:  // straight ahead, without rotation
       c->t = Vec3(0, 0, sign);
       break;
-    case 6:  // image 1's epipole at infinity, image 0's finite
+    case 6:  // the epipole of image 1 is at infinity, that of image 0 is finite
       c->R = random_rotation(random, 0.5);
       c->t = Vec3(uniform(random, -1, 1), sign, 0);
       break;
-    default:  // image 0's epipole at infinity, image 1's finite
+    default:  // the epipole of image 0 is at infinity, that of image 1 is finite
       c->R = random_rotation(random, 0.5);
       c->t = c->R * Vec3(uniform(random, -1, 1), sign, 0);
   }
@@ -135,8 +136,8 @@ void choose_match(tv::Random* random, Case* c) {
   Vec2 pixel1 = projected(c->camera[1], c->R * point0 + c->t);
   switch (c->match) {
     case 0: break;
-    case 1: pixel1 = projected(c->camera[1], c->R * point0); break;  // at infinity
-    case 2: pixel1 = random_pixel(random); break;                    // unrelated
+    case 1: pixel1 = projected(c->camera[1], c->R * point0); break;  // a point at infinity
+    case 2: pixel1 = random_pixel(random); break;                    // a wrong match
     case 3: pixel0 = epipole[0]; break;
     case 4: pixel1 = epipole[1]; break;
     case 5: pixel0 = epipole[0] + in_any_direction(random, log_uniform(random, 1e-12, 100)); break;
@@ -145,8 +146,8 @@ void choose_match(tv::Random* random, Case* c) {
       pixel0 = epipole[0] + in_any_direction(random, log_uniform(random, 1e-12, 100));
       pixel1 = epipole[1] + in_any_direction(random, log_uniform(random, 1e-12, 100));
       break;
-    // on opposite sides of the epipole, or at a right angle, at equal distances: minima of equal
-    // cost
+    // Both pixels are equally far from their epipoles, in opposite directions or at a right angle:
+    // the cost has several equal minima.
     case 8: {
       const Vec2 off = in_any_direction(random, log_uniform(random, 1e-6, 300));
       const bool across = tv::random_below(*random, 2);
@@ -187,9 +188,9 @@ struct Plane {
 };
 
 struct Pencil {
-  Real axis[2][2][3];  // for each camera i
-  Real alpha[2][2];    // for each pixel i
-  Real step[2][2][2];  // of camera i: [axis][a pixel along x, along y]
+  Real axis[2][2][3];  // axis[i]: the two axes of the pencil, in camera i
+  Real alpha[2][2];    // alpha[i]: pixel i in these axes
+  Real step[2][2][2];  // step[i][axis]: change of alpha by a pixel along x and y
 };
 
 void cross3(const Real* a, const Real* b, Real* out) {
@@ -248,7 +249,7 @@ Pencil pencil_of(const Case& c) {
   return pencil;
 }
 
-// step^T v, whose squared length is Q(v), and alpha . v, at one plane v.
+// (gx, gy) is step^T v, whose squared length is Q(v), and `above` is alpha . v, for a plane v.
 struct View {
   Real gx, gy, above;
 };
@@ -270,15 +271,15 @@ Real cost_of(const Pencil& pencil, const Plane& v, bool squared) {
   return term_of(view_of(pencil, 0, v), squared) + term_of(view_of(pencil, 1, v), squared);
 }
 
-// ---- branch and bound ----
+// ---- the proof by branch and bound ----
 
 // An upper bound of the second derivative of one image's cost along v = (1 - t) first + t last.
 Real curvature_bound(const View& first, const View& last, bool squared) {
   const Real A = first.gx * first.gx + first.gy * first.gy;
   const Real C = last.gx * last.gx + last.gy * last.gy;
   const Real B = first.gx * last.gx + first.gy * last.gy;
-  const Real curve = A - 2 * B + C;  // Q'' / 2
-  const Real at = (A - B) / curve;   // where Q has its vertex
+  const Real curve = A - 2 * B + C;  // half of the second derivative of Q
+  const Real at = (A - B) / curve;   // the t at which Q is least
   Real q_min = std::fmin(A, C);
   if (at > 0 && at < 1) q_min = std::fmax((A * C - B * B) / curve, Real(0));
   if (!(q_min > 0)) return INFINITY;
@@ -300,11 +301,11 @@ Real curvature_bound(const View& first, const View& last, bool squared) {
 
 struct Search {
   bool proved;
-  Real least;  // the lowest cost over all planes examined so far
+  Real least;  // the lowest cost of the planes examined so far
   int num_nodes;
 };
 
-// Whether every plane costs `target` or more.
+// Proves that every plane costs `target` or more, if that is so.
 Search prove(const Pencil& pencil, Real target, bool squared) {
   // The arcs end at the zeros of the two images' costs, so that each cost rises and falls at most
   // once.
@@ -323,7 +324,7 @@ Search prove(const Pencil& pencil, Real target, bool squared) {
     if (zero.y < 0 || (zero.y == 0 && zero.x < 0)) zero = Plane{-zero.x, -zero.y};
     ends[num_ends++] = zero;
   }
-  for (int i = 1; i < num_ends; ++i) {  // sorts by angle; all angles are in [0, pi)
+  for (int i = 1; i < num_ends; ++i) {  // sorts the planes by angle, in [0, pi)
     for (int k = i; k > 0 && ends[k - 1].x * ends[k].y - ends[k - 1].y * ends[k].x < 0; --k) {
       std::swap(ends[k], ends[k - 1]);
     }
@@ -359,12 +360,12 @@ Search prove(const Pencil& pencil, Real target, bool squared) {
   return search;
 }
 
-// ---- our answer ----
+// ---- the library's answer ----
 
 struct Answer {
-  Real cost;       // the cost of the plane of the corrected pixels, in pixels
-  Real off_plane;  // distance of the corrected pixels from that plane, in pixels
-  Real moved;      // the cost of the corrections themselves
+  Real cost;       // the cost of the plane through the corrected pixels, in pixels
+  Real off_plane;  // how far the corrected pixels are from that plane, in pixels
+  Real moved;      // the cost of the corrections themselves, in pixels
 };
 
 Answer answer_of(const Case& c, const Pencil& pencil, tv_triangulation method) {

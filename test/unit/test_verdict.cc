@@ -55,14 +55,14 @@ void test_each_reason_has_its_threshold(void) {
   e = good();
   e.noise_px = 0.71;
   assert_reason(TV_REASON_LOW_INLIER_RATIO, e);
-  // the limit is 3 px, 10 times the noise of 0.3 px; a pixel is 0.002 rad
+  // Low parallax is below 3 px (10 times the noise of 0.3 px), and a pixel is 0.002 rad.
   for (const double parallax : {0.0061, 0.0059}) {
     e = good();
     e.median_parallax_rad = parallax;
     assert_reason(parallax < 0.006 ? TV_REASON_LOW_PARALLAX : 0, e);
   }
   e = good();
-  e.sigma_rad = 0.022;  // 1.26 degrees, above the limit of 1.25
+  e.sigma_rad = 0.022;  // 1.26 degrees, while the limit is 1.25 degrees
   assert_reason(TV_REASON_LOW_PARALLAX, e);
   e.sigma_rad = tv::kUnknown;
   assert_reason(TV_REASON_LOW_PARALLAX, e);
