@@ -12,7 +12,7 @@ namespace bench {
 
 inline constexpr char kOpengvName[] = "OpenGV 1.0";
 
-enum class OpengvSolver { kStewenius, kNister, kKneip };  // kKneip gives R, not E
+enum class OpengvSolver { kStewenius, kNister, kKneip };  // kKneip gives rotations, the others E
 enum class OpengvTriangulation { kLinear, kMidpoint };    // OpenGV's triangulate and triangulate2
 
 // The matches of a pair in OpenGV's types. The constructor copies the rays.

@@ -69,7 +69,7 @@ def test_every_struct_and_its_fields_are_the_headers():
 def test_enums_are_the_headers(tmp_path):
     expected = {prefix + member.name: member.value
                 for kind, prefix in enums.C_PREFIXES.items()
-                for member in kind.__members__.values()}  # also the flags that combine other flags
+                for member in kind.__members__.values()}  # __members__ has combined flags, too
     lines = [print_number(name, name) for name in expected]
     assert compiled(tmp_path, lines) == expected
     declared = set()

@@ -173,7 +173,7 @@ void Firmware::receive_commands(std::string_view datagram, int64_t now_ns) {
   while (!datagram.empty()) {
     const size_t end = datagram.find('\r');
     if (end == std::string_view::npos) {
-      ++num_refused_;  // refuses a command without the final '\r'
+      ++num_refused_;  // a command without a final '\r' is refused
       return;
     }
     obey(datagram.substr(0, end), now_ns);

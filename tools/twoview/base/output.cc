@@ -208,10 +208,11 @@ const std::atomic<bool>& stop_flag_for_signals() {
 void clean_up_on_signals() {
   sigset_t awaited;
   sigemptyset(&awaited);
+  // A signal that is ignored when the program starts, as SIGHUP under nohup, stays ignored.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction action;
     if (::sigaction(signal, nullptr, &action) == 0 && action.sa_handler != SIG_IGN)
-      sigaddset(&awaited, signal);  // a signal ignored by nohup is not awaited
+      sigaddset(&awaited, signal);
   }
   // The signals are blocked in this thread and in every later one; only the thread below receives
   // them.

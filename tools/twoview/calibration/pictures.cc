@@ -88,7 +88,7 @@ void put_tilts(cv::Mat& sheet, cv::Rect place, const Calibration& c) {
   put_line(sheet, middle - Pixel(0, most * unit), middle + Pixel(0, most * unit), ink::grid);
   for (const ViewFit& fit : c.fits) {
     cv::Vec3d normal(fit.R(0, 2), fit.R(1, 2), fit.R(2, 2));
-    if (normal.dot(fit.t) > 0) normal = -normal;  // so that it points to the camera
+    if (normal.dot(fit.t) > 0) normal = -normal;  // the normal must point to the camera
     const double across = std::hypot(normal[0], normal[1]);
     const double reach = std::min(fit.tilt_deg, most) * unit;
     const Pixel way = across > 0 ? Pixel(normal[0], normal[1]) / across : Pixel(0, 0);

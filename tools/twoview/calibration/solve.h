@@ -35,7 +35,7 @@ struct Calibration {
   std::vector<double> sigma;  // standard deviations of fx fy cx cy and the distortion
   // Root mean square over all corners of the distance between measured and projected corner.
   double rms_px = 0;
-  std::vector<ViewFit> fits;  // one for each used view
+  std::vector<ViewFit> fits;  // one ViewFit for each used view
   double coverage = 0;        // share of the 8 x 8 cells of the image that hold a corner
 };
 

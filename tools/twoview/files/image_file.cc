@@ -57,7 +57,7 @@ cv::Mat decode(const std::string& path) {
   try {
     const StderrSilence silence;
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U,
-                          // imdecode does not write to `encoded`
+                          // The cast is safe, since imdecode does not write.
                           const_cast<char*>(bytes.data()));
     pixels = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception&) {

@@ -110,7 +110,7 @@ ImageHeader read_tiff(Bytes bytes) {
   for (uint64_t i = 0; i < count; ++i) {
     const size_t at = directory + 2 + static_cast<size_t>(i) * 12;
     const uint64_t tag = number(bytes, at, 2, big);
-    const int width = number(bytes, at + 2, 2, big) == 3 ? 2 : 4;  // bytes of a SHORT or LONG
+    const int width = number(bytes, at + 2, 2, big) == 3 ? 2 : 4;  // SHORT: 2 bytes, LONG: 4
     const auto value = static_cast<int64_t>(number(bytes, at + 8, width, big));
     if (tag == 256) header.width = value;
     if (tag == 257) header.height = value;

@@ -10,7 +10,7 @@
 namespace cli {
 namespace {
 
-constexpr int kMaxLines = 110;  // of matches; more would make the picture unreadable
+constexpr int kMaxLines = 110;  // most matches drawn; more are unreadable
 
 std::string counted(int count, const char* noun) {
   return std::to_string(count) + " " + noun +

@@ -8,8 +8,9 @@
 namespace cli {
 namespace {
 
-constexpr double kMaxGapS =
-    0.25;  // longest gap in the log of velocities, seconds; demo mode gives 15 samples a second
+// The longest gap in the flight log over which attitudes are interpolated and velocities
+// integrated, seconds. Demo mode gives 15 samples a second.
+constexpr double kMaxGapS = 0.25;
 // Altitudes are averaged over this time before and after an instant.
 constexpr double kAltitudeWindowS = 0.1;
 constexpr double kLayer = 0.04;  // thickness of a floor as a share of its distance below the camera

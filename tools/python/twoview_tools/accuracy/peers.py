@@ -17,7 +17,7 @@ from . import datasets, estimators, metrics
 
 CAP = 2048  # most descriptors of an image; a keypoint with two orientations has two
 RATIO = 0.8
-CACHE_FORMAT = 2  # of cached results; increase it if a change here changes them
+CACHE_FORMAT = 2  # increase it if a change here changes the cached results
 
 CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
 

@@ -35,7 +35,7 @@ WIDTH, HEIGHT, FOCAL = 640, 480, 500.0
 CENTRE = np.array([320.0, 240.0])
 K = np.array([[FOCAL, 0, CENTRE[0]], [0, FOCAL, CENTRE[1]], [0, 0, 1]])
 NOISE_PX = 0.5
-SHARES = (30, 50, 80)  # of correct matches among all matches, per cent
+SHARES = (30, 50, 80)  # correct matches among all matches, per cent
 
 
 def _direction(random):

@@ -15,7 +15,7 @@ from .. import formats
 from ..accuracy import datasets
 from . import cluster, results, systems
 
-FORMAT = 1  # of stored results of pairs; increase it if a change here changes them
+FORMAT = 1  # increase it if a change here changes the stored result of a pair
 REFERENCE_TIMEOUT_S = 3600
 DESCRIPTION = """Runs twoview, COLMAP, OpenGV, OpenCV and PoseLib on the same image pairs and writes
 a report: index.html, pairs.csv, report.json. See docs/compare.md."""
