@@ -9,7 +9,7 @@
 
 #include "twoview/alloc.h"
 
-// Has a C name and is not inlined, so that callgrind can be told to count what happens inside it.
+// The timed work. It has a C name and is not inlined, so that callgrind can count its instructions.
 extern "C" [[gnu::noinline]] void bench_measured(const std::function<void()>& work) { work(); }
 
 namespace bench {
@@ -27,7 +27,8 @@ tv_kernels kernels_asked_for() {
   std::exit(2);
 }
 
-// TWOVIEW_BENCH_CALLS=N: N calls a row, for counting instructions and for a look with a profiler.
+// The value N of TWOVIEW_BENCH_CALLS: each row makes exactly N calls, for instruction counts and
+// for profilers. 0 if it is not set.
 int calls_asked_for() {
   const char* text = std::getenv("TWOVIEW_BENCH_CALLS");
   return text ? std::atoi(text) : 0;
@@ -70,7 +71,7 @@ void add(Row row) {
     state.counters["units"] = row.units;
   };
   auto* registered = benchmark::RegisterBenchmark(row.name.c_str(), measure);
-  // The process's time, so that a thread which a peer starts is not free.
+  // The CPU time of the process, which includes the threads that a peer starts.
   registered->MeasureProcessCPUTime()->Unit(benchmark::kMicrosecond);
   if (const int calls = calls_asked_for()) registered->Iterations(calls)->Repetitions(1);
 }

@@ -1,9 +1,10 @@
-// What the benchmark programs share: rows with a name, one timed call each, and main.
+// Shared by the benchmark programs: rows, each with a name and a timed call, and their main
+// program.
 //
 // A row's name is stage/case/system; the system is "twoview", or the peer with its version. The
-// rows of a case are to do the same work, and their counters say how much of it each has found. All
+// rows of a case do the same work, and their counters report what each system found. All
 // rows of a program run in random order, so that a change of the machine's speed affects all
-// systems alike. scripts/bench reads the JSON and divides.
+// systems alike. scripts/bench reads the JSON output and computes the ratios peer / ours.
 #pragma once
 
 #include <functional>
@@ -19,17 +20,17 @@ using Counters = std::map<std::string, double>;
 
 struct Row {
   std::string name;
-  std::function<void()> work;       // timed; called once untimed beforehand
-  std::function<Counters()> found;  // counts and errors of the last call's results
-  double units = 1;                 // keypoints, points, samples .. that one call works on
+  std::function<void()> work;       // the timed call; it is called once before the timing
+  std::function<Counters()> found;  // counts and errors of the results of the last call of work()
+  double units = 1;                 // number of keypoints, points or samples in one call of work()
 };
 
 void add(Row row);
 
-// A peer that this machine lacks: a row that says so.
+// Adds a row which reports that the peer is not installed on this machine.
 void add_missing(const std::string& name);
 
-// stage/case/twoview, with the kernel set where TWOVIEW_KERNELS asks for one.
+// The name of our row of a case: stage/case/twoview.
 std::string ours(const std::string& stage_case);
 
 tv_kernels kernels_in_use();
@@ -40,11 +41,11 @@ struct FreeContext {
 using Context = std::unique_ptr<tv_context, FreeContext>;
 Context make_context(int width, int height, int max_keypoints, int max_matches = 0);
 
-// Ends the program where a call that cannot fail has failed.
+// Ends the program with an error message if status is not TV_OK.
 void require(tv_status status, const char* what);
 
-// Runs all rows. Arguments are Google Benchmark's; its defaults here are 15 repetitions, which
-// are run in random order with those of the other rows.
+// Runs all rows. The arguments are those of Google Benchmark. By default each row is repeated 15
+// times, in random order among the repetitions of the other rows.
 int run(int argc, char** argv);
 
 }  // namespace bench

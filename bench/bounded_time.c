@@ -1,8 +1,12 @@
-/* The whole pair's time over images made to be slow, beside natural ones, in fixed-iteration mode.
+/* The time of tv_reconstruct on images made to be slow and on natural images, with a fixed number
+   of iterations.
+
    usage: bounded_time A0.pgm B0.pgm [A1.pgm B1.pgm ...]     natural pairs, 640x480, binary PGM
-   Each time is the least of five, of the process's clock. Status 1 when the worst is more than 1.5
-   times the median over the natural pairs. Run by scripts/bounded_time. */
-#define _POSIX_C_SOURCE 199309L /* clock_gettime */
+
+   Each time is the least of five CPU times of the process. The exit status is 1 if the largest time
+   is more than 1.5 times the median over the natural pairs. scripts/bounded_time runs this program.
+ */
+#define _POSIX_C_SOURCE 199309L /* declares clock_gettime */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -76,7 +76,7 @@ def measure(build, stages, programs):
             own = f"{stage}/{case}/{table.OURS}"
             alone = all(not n.startswith(f"{stage}/{case}/") or n == own for n in first)
             if system == table.OURS and not alone:
-                continue  # our row is shown beside each peer's row
+                continue  # each peer's row already contains our count
             peer = None if alone else first[name]
             found.append({"stage": stage, "case": case,
                           "ours": {kernels: by_set[kernels][own] for kernels in SETS},

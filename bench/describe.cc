@@ -1,9 +1,10 @@
-// SIFT descriptors at our own corners, and all of SIFT, beside OpenCV's.
+// SIFT descriptors at our corners, and detection with description, compared with OpenCV's SIFT.
 //
-// At given points both describe the same keypoints and angles, with the same window: a spatial bin
-// is 1.5 keypoint sizes on both sides. The rows of many and of few keypoints differ by the
-// descriptors alone; scripts/bench takes the pyramid apart by that. The agreement is the median
-// cosine of the two descriptors: ours is smoothed a little less than OpenCV's.
+// At given points both libraries describe the same keypoints and angles, with the same window: a
+// spatial bin is 1.5 keypoint sizes wide in both. Rows with many and with few keypoints differ only
+// in the time of the descriptors; from them scripts/bench computes the time without the pyramid.
+// The agreement is the median cosine of the two descriptors: ours is smoothed slightly less than
+// OpenCV's.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/features2d.hpp>
@@ -26,8 +27,8 @@ tv_feature_options options_of(float size) {
   return options;
 }
 
-// Keypoints with their angles, spread over the image: every n-th of the best corners that lie so
-// far from the border that OpenCV describes them whole.
+// `count` keypoints with their angles: every n-th of the best corners whose distance from the
+// border is more than 6 keypoint sizes, so that OpenCV's window lies inside the image.
 std::vector<tv_keypoint> keypoints_of(const cv::Mat& pixels, float size, int count) {
   const bench::Context context = bench::make_context(pixels.cols, pixels.rows, kMaxKeypoints);
   const tv_feature_options options = options_of(size);
@@ -104,8 +105,8 @@ void add_describe(const bench::Pair& pair, float size, int count) {
        1.0 * num});
 }
 
-// All of SIFT: OpenCV's detector and descriptor beside ours, at OpenCV's number of keypoints and at
-// our defaults.
+// Detection and description: OpenCV's SIFT, and our tv_extract with OpenCV's number of keypoints
+// and with our default options.
 void add_extract(const bench::Pair& pair) {
   const cv::Mat pixels = pair.image[0];
   const auto opencvs = std::make_shared<bench::OpencvFeatures>();

@@ -1,4 +1,5 @@
-// Writes the pairs of images.h for the Python half of the benchmarks: bench_export_images DIR
+// Writes the image pairs of images.h to a folder, where bench/python_peers.py reads them.
+// usage: bench_export_images DIR
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 

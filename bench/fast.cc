@@ -1,6 +1,6 @@
-// FAST corners with suppression, at the thresholds that give about 1000 and 4000: ours beside
-// OpenCV's FAST-9 and libcvd's FAST-12. No budget and no sub-pixel position on either side; ours
-// also sorts.
+// FAST corners with non-maximum suppression, at the thresholds that give about 1000 and 4000
+// corners: ours, OpenCV's FAST-9 and libcvd's FAST-12. No system limits the number of corners or
+// computes sub-pixel positions; only ours sorts the corners by score.
 #include <opencv2/features2d.hpp>
 
 #ifdef BENCH_HAS_CVD
@@ -29,7 +29,7 @@ tv_feature_options options_of(int arc, int threshold) {
   return options;
 }
 
-// A context and room for corners, kept alive by the rows that use them.
+// A context and the memory for its corners, which the rows that use them keep alive.
 struct Detector {
   bench::Context context;
   tv_image image;
@@ -46,7 +46,7 @@ struct Detector {
   }
 };
 
-// The highest threshold with at least this many corners, of which there are fewer at higher ones.
+// The highest threshold that gives at least `corners` corners; a higher threshold gives fewer.
 int threshold_for(Detector* detector, int arc, int corners) {
   int enough = 1, too_few = 128;
   while (too_few - enough > 1) {

@@ -31,7 +31,8 @@ tv_camera pinhole(const cv::Mat& image, const double K[9]) {
 
 cv::Mat read_luma(const std::string& path) { return cv::imread(path, cv::IMREAD_GRAYSCALE); }
 
-// The pair's line of pairs.txt: names, quarter turns, K0, K1, and the 4x4 transform.
+// Reads the pair from its line of pairs.txt: names, quarter turns, K0, K1, 4x4 transform. Returns
+// false if the file has no such line or the images are turned.
 bool read_line(const Source& source, double K[2][9], Pair* pair) {
   std::ifstream file(data_folder() + "/" + source.folder + "/pairs.txt");
   for (std::string text; std::getline(file, text);) {
@@ -66,7 +67,8 @@ bool read_from_data(const Source& source, Pair* pair) {
   return true;
 }
 
-// A rectified pair: the cameras differ in cx alone (scripts/demo_truth.py).
+// Reads Middlebury's Motorcycle, a rectified pair: its cameras differ only in cx
+// (scripts/demo_truth.py). Returns false if the images are missing.
 bool read_motorcycle(Pair* pair) {
   const char* const names[2] = {"motorcycle_left.png", "motorcycle_right.png"};
   const double cx[2] = {311.193, 342.279};
@@ -83,7 +85,7 @@ bool read_motorcycle(Pair* pair) {
   return true;
 }
 
-// Scales the image so that it covers width x height, then cuts that out of the middle.
+// Scales both images to cover width x height pixels, then cuts this size out of their middle.
 void fit(Pair* pair, int width, int height) {
   for (int v = 0; v < 2; ++v) {
     cv::Mat& image = pair->image[v];

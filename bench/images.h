@@ -13,16 +13,16 @@
 namespace bench {
 
 struct Pair {
-  std::string name;  // "640x480", "1280x720"
-  cv::Mat image[2];  // 8-bit luma
+  std::string name;  // the size of the images: "640x480" or "1280x720"
+  cv::Mat image[2];  // 8-bit grey
   tv_camera camera[2];
   bool has_truth;
-  double R[9], t[3];  // where has_truth
+  double R[9], t[3];  // true pose x1 = R x0 + t; only valid if has_truth
 };
 
 enum class Size { kVga, kHd };
 
-// Ends the program with one line on stderr where there are no images.
+// The pair of this size. Ends the program with one line on stderr if the images are missing.
 const Pair& pair_of(Size size);
 
 tv_image view_of(const cv::Mat& image);

@@ -1,6 +1,6 @@
-// Two nearest neighbours with ratio and one-to-one, over descriptors of real images, beside
-// OpenCV's BFMatcher: both directions, which gives the same matches, and its one knnMatch alone,
-// which is half of the work.
+// Matching of descriptors of real images: mutual nearest neighbours that pass the ratio test, ours
+// and by OpenCV's BFMatcher. OpenCV has two rows: knnMatch in both directions, which gives the same
+// matches, and one knnMatch, which is half of the work.
 #include <opencv2/features2d.hpp>
 #include <set>
 
@@ -16,7 +16,7 @@ constexpr float kRatio = 0.8f;
 
 struct Side {
   std::vector<uint8_t> bytes;
-  cv::Mat floats;  // the same numbers
+  cv::Mat floats;  // the descriptors in `bytes` as float, for OpenCV
   int count = 0;
 };
 

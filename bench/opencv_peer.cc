@@ -64,7 +64,7 @@ IndexPairs opencv_match(const cv::Mat& descriptors0, const cv::Mat& descriptors1
 OpencvPose opencv_estimate(const std::vector<cv::Point2d>& pixels0,
                            const std::vector<cv::Point2d>& pixels1, const tv_camera cameras[2],
                            int method, double confidence, double max_error_px) {
-  // One K for both: the second view's pixels as the first camera would have them.
+  // findEssentialMat takes one K: the second view's pixels are converted to the first camera's.
   const tv_camera &a = cameras[0], &b = cameras[1];
   std::vector<cv::Point2d> moved1 = pixels1;
   for (cv::Point2d& p : moved1) {
@@ -75,7 +75,7 @@ OpencvPose opencv_estimate(const std::vector<cv::Point2d>& pixels0,
   const cv::Mat E = cv::findEssentialMat(pixels0, moved1, K, method, confidence, max_error_px,
                                          10000, pose.inlier_mask);
   if (E.rows != 3 || E.cols != 3) return pose;
-  // Without a limit on depth: the default drops what lies beyond 50 baselines.
+  // 1e9 removes the limit of the depth: by default points beyond 50 baselines are no inliers.
   cv::recoverPose(E, pixels0, moved1, K, pose.R, pose.t, 1e9, pose.inlier_mask);
   return pose;
 }

@@ -1,4 +1,4 @@
-// OpenCV's part of the work, as its user would write it; each function stands for a stage of ours.
+// OpenCV's counterparts of our stages, written as a user of OpenCV would write them.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -11,35 +11,37 @@ namespace bench {
 
 struct OpencvFeatures {
   std::vector<cv::KeyPoint> keypoints;
-  cv::Mat descriptors;  // float, 128 columns
+  cv::Mat descriptors;  // one row of 128 floats for each keypoint
 };
 
-// Keypoints on octave 0, layer 0, so that SIFT::compute builds one octave and describes at `size`.
+// Converts our keypoints to OpenCV's, on octave 0 and layer 0, so that SIFT::compute builds only
+// one octave and describes each keypoint at its own size.
 std::vector<cv::KeyPoint> opencv_keypoints(const tv_keypoint* keypoints, int count);
 
-// FAST-9 with suppression, the best max_keypoints, and upright SIFT descriptors of that size.
+// FAST-9 with non-maximum suppression, the max_keypoints strongest corners, and their upright SIFT
+// descriptors with keypoint diameter `size` in pixels.
 OpencvFeatures opencv_fast_sift(const cv::Mat& image, int threshold, int max_keypoints, float size);
 OpencvFeatures opencv_sift(const cv::Mat& image, int max_keypoints);
 
 using IndexPairs = std::vector<std::pair<int, int>>;
 
-// Two nearest neighbours by BFMatcher in both directions; a pair is kept where each is the other's
-// nearest and both pass the ratio test: what tv_match gives.
+// Matches like tv_match: BFMatcher finds the two nearest neighbours in both directions, and a pair
+// is a match if each is the other's nearest neighbour and both pass the ratio test.
 IndexPairs opencv_match(const cv::Mat& descriptors0, const cv::Mat& descriptors1, float ratio);
 
 struct OpencvPose {
-  cv::Mat R, t, inlier_mask;  // R empty: no pose
+  cv::Mat R, t, inlier_mask;  // R is empty if no pose was found
 };
 OpencvPose opencv_estimate(const std::vector<cv::Point2d>& pixels0,
                            const std::vector<cv::Point2d>& pixels1, const tv_camera cameras[2],
                            int method, double confidence, double max_error_px);
 
-// All of it: images to pose and points.
+// The result of matching, estimation and triangulation of a pair.
 struct OpencvPair {
   OpencvPose pose;
   size_t num_keypoints[2], num_matches;
   int num_inliers;
-  cv::Mat points;  // 4 x inliers
+  cv::Mat points;  // homogeneous, a column of 4 for each inlier
 };
 OpencvPair opencv_reconstruct(const OpencvFeatures features[2], const tv_camera cameras[2],
                               float ratio);

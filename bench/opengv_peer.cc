@@ -28,7 +28,7 @@ void append(const Matrices& matrices, std::vector<double>* out) {
   }
 }
 
-// OpenGV gives camera 1 in camera 0, [R' | -R' t].
+// Converts OpenGV's pose of camera 1 in camera 0, [R' | -R' t], to ours: x1 = R x0 + t, |t| = 1.
 void store_pose(const opengv::transformation_t& camera1, double R[9], double t[3]) {
   const Eigen::Matrix3d rotation = camera1.leftCols<3>().transpose();
   const Eigen::Vector3d translation = -(rotation * camera1.col(3)).normalized();
@@ -78,7 +78,7 @@ bool OpengvMatches::estimate(double max_error_rad, double confidence, int max_it
                              bool refine, double R[9], double t[3]) {
   opengv::sac::Ransac<Problem> ransac;
   ransac.sac_model_ = std::make_shared<Problem>(data_->adapter, Problem::NISTER, false);
-  // The sum of 1 - cos of both reprojection errors, as OpenGV's own programs have it.
+  // OpenGV's residual is the sum of 1 - cos(angular error) over both views, as in its own programs.
   ransac.threshold_ = 2 * (1 - std::cos(max_error_rad));
   ransac.probability_ = confidence;
   ransac.max_iterations_ = max_iterations;

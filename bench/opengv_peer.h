@@ -1,7 +1,8 @@
-// OpenGV's part of the work, behind plain doubles: a shared library of its own, for OpenGV's Eigen
-// is compiled with vectors and ours without, and neither may run the other's inline functions.
+// OpenGV's counterparts of our stages, with an interface of plain doubles. They are a shared
+// library: OpenGV's Eigen is compiled with vector instructions and ours without, and neither
+// program part may run the other's inline functions.
 //
-// Rays are unit, 3 numbers each; R and t are ours (x1 = R x0 + t).
+// Each ray is a unit vector of 3 numbers. R and t follow our convention: x1 = R x0 + t.
 #pragma once
 
 #include <memory>
@@ -11,21 +12,21 @@ namespace bench {
 
 inline constexpr char kOpengvName[] = "OpenGV 1.0";
 
-enum class OpengvSolver { kStewenius, kNister, kKneip };  // kKneip: rotations, not matrices
-enum class OpengvTriangulation { kLinear, kMidpoint };    // triangulate, triangulate2
+enum class OpengvSolver { kStewenius, kNister, kKneip };  // kKneip gives rotations, the others E
+enum class OpengvTriangulation { kLinear, kMidpoint };    // OpenGV's triangulate and triangulate2
 
-// Matches, copied once.
+// The matches of a pair in OpenGV's types. The constructor copies the rays.
 class [[gnu::visibility("default")]] OpengvMatches {
  public:
   OpengvMatches(const std::vector<double>& rays0, const std::vector<double>& rays1);
   ~OpengvMatches();
-  void set_pose(const double R[9], const double t[3]);  // for triangulate
+  void set_pose(const double R[9], const double t[3]);  // call before triangulate()
 
-  // Of five consecutive matches from `first`: 9 numbers a solution, appended.
+  // Solves the five consecutive matches from `first`. Appends 9 numbers for each solution.
   void solve_five_point(OpengvSolver solver, int first, std::vector<double>* solutions) const;
 
-  // RANSAC with Nister's solver, then OpenGV's refinement on the inliers where `refine` is set.
-  // false: no pose.
+  // RANSAC with Nister's solver, then, if `refine` is true, OpenGV's refinement over the inliers.
+  // Returns false if no pose was found.
   bool estimate(double max_error_rad, double confidence, int max_iterations, bool refine,
                 double R[9], double t[3]);
 

@@ -1,11 +1,11 @@
-// A whole pair, images in memory to pose and points, ours beside OpenCV's stages as its user would
-// chain them. Also the program to profile: bench_pair --benchmark_filter=defaults/twoview.
+// A whole pair, from images in memory to pose and points: tv_reconstruct, and OpenCV's stages as a
+// user of OpenCV would call them. To profile the library, run this program with
+// --benchmark_filter=defaults/twoview. There are three cases:
 //
-//   same work   FAST-9 at a fixed threshold, the same corners on both sides, upright descriptors
-//   with the
-//               same window, the same ratio; for full SIFT its number of keypoints and median size
-//   defaults    the library's defaults beside OpenCV's: FAST at 20 with cv::KeyPoint's usual size
-//   7, SIFT
+//   same corners           FAST-9 at threshold 20, upright descriptors with the same window
+//   SIFT's number and      OpenCV's SIFT; ours with the same number of keypoints and SIFT's
+//   median window          median keypoint size
+//   defaults               our default options; OpenCV's FAST at 20 with keypoint size 7, and SIFT
 //
 // OpenCV: BFMatcher both ways with ratio 0.8, USAC_MAGSAC at 1 px, recoverPose, triangulatePoints.
 #include <ctime>
@@ -21,7 +21,8 @@ using bench::Counters;
 using bench::Pair;
 
 constexpr int kMaxKeypoints = 2048;
-constexpr float kRatio = 0.8f;  // of the peer, and of ours where the work is to be the same
+// The largest ratio of distances of a match: OpenCV's, and ours except in the case "defaults".
+constexpr float kRatio = 0.8f;
 
 struct Options {
   tv_feature_options feature;
@@ -32,7 +33,7 @@ struct Options {
   }
 };
 
-// The CPU time of the process, which all times in this file are.
+// The clock of all times in this file: the CPU time of the process in nanoseconds.
 uint64_t now_ns(void*) {
   timespec time;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
@@ -63,7 +64,7 @@ class Ours {
                    "tv_reconstruct");
   }
 
-  // Reports what was found, and the time of each stage of one more call.
+  // Reports counts and errors of the result, and runs once more to measure the time of each stage.
   Counters counters() {
     static const char* const stages[TV_NUM_STAGES] = {"pyramid_us",    "detect_us",   "describe_us",
                                                       "match_us",      "estimate_us", "refine_us",
@@ -98,7 +99,7 @@ void add_ours(const std::string& name, const Pair& pair, const Options& options)
   bench::add({bench::ours(name), [=] { ours->run(); }, [=] { return ours->counters(); }});
 }
 
-// extract: the features of an image.
+// Adds a row that reconstructs the pair with OpenCV. extract(image) returns an image's features.
 template <typename Extract>
 void add_opencv(const std::string& name, const Pair& pair, Extract extract) {
   const auto found = std::make_shared<bench::OpencvPair>();

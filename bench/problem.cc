@@ -38,7 +38,7 @@ struct Maker {
     p[0] = uniform(5, camera.width - 6), p[1] = uniform(5, camera.height - 6);
   }
 
-  // Returns false where the second view does not see the point.
+  // Draws a point and its pixels in both views. Returns false if the second view does not see it.
   bool true_match(const Problem& problem, double p0[2], double p1[2]) {
     const tv_camera& camera = problem.camera;
     pixel(camera, p0);
@@ -82,7 +82,7 @@ Problem make_problem(uint64_t seed, int num, int num_true, double noise_px) {
   maker.direction(problem.t);
   std::vector<double> drawn[2];
   for (int tries = 0; static_cast<int>(drawn[0].size()) < 2 * num; ++tries) {
-    if (tries == 100 * num) {  // after this motion the views have too few points in common
+    if (tries == 100 * num) {  // the views overlap too little: draw another motion
       maker.rotation(problem.R);
       maker.direction(problem.t);
       drawn[0].clear(), drawn[1].clear();

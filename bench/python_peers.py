@@ -59,9 +59,9 @@ class Case:
 
     def __init__(self, stage, case, units=1):
         self.stage, self.case, self.units = stage, case, units
-        self.systems = []   # (system, names of its cases, work, found)
+        self.systems = []   # tuples: (system, names of its cases, work, found)
         self.missing = []
-        self.round = 0  # number of the repetition, for work that uses other data in each
+        self.round = 0  # number of the repetition; work() may choose its data by it
 
     def add(self, system, work, found=lambda result: {}, cases=None):
         """Adds a system. work() is timed; found(its last result) describes the result. `cases`

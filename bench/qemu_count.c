@@ -6,7 +6,7 @@
 #include <stdio.h>
 
 typedef uint64_t qemu_plugin_id_t;
-struct qemu_plugin_tb; /* a translated block */
+struct qemu_plugin_tb; /* a block of translated instructions */
 enum qemu_plugin_op { QEMU_PLUGIN_INLINE_ADD_U64 };
 
 void qemu_plugin_register_vcpu_tb_trans_cb(qemu_plugin_id_t id,

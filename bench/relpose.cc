@@ -1,8 +1,8 @@
-// Five-point solvers on exact samples: essential matrices of five matched rays, ours beside
-// OpenGV's three and OpenCV's. The error is the median over samples of the distance from the true
-// matrix to the nearest solution. Ours solves eight samples a call, as the robust loop asks for;
-// one a call stands beside it. OpenGV's and OpenCV's copies of the matches are made outside of the
-// timed work.
+// Five-point solvers on samples without noise: essential matrices from five matched rays, by our
+// solver, OpenGV's three and OpenCV's. The error is the median over samples of the distance from
+// the true matrix to the nearest solution. Our solver has two rows: eight samples a call, as the
+// robust estimate calls it, and one sample a call. OpenGV's and OpenCV's copies of the matches are
+// made outside of the timed work.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
@@ -17,13 +17,13 @@
 namespace {
 
 using bench::Counters;
-using Solutions = std::vector<std::vector<double>>;  // of each sample, 9 numbers a solution
+using Solutions = std::vector<std::vector<double>>;  // [sample]: 9 numbers for each solution
 
 constexpr int kNumSamples = 200;
 static_assert(kNumSamples % TVK_WIDTH == 0, "whole groups");
 
 struct Samples {
-  // Of each sample: five unit rays of each view (15 numbers a view), and the true essential matrix
+  // For each sample, five unit rays in each view (15 numbers a view), and the true essential matrix
   // (9 numbers).
   std::vector<double> rays[2], essentials;
   Solutions solutions = Solutions(kNumSamples);
@@ -48,7 +48,8 @@ std::shared_ptr<Samples> make_samples() {
   return samples;
 }
 
-// Between matrices scaled to norm 1, of either sign and either order of the views.
+// The distance between two matrices scaled to norm 1: the smallest over both signs of `m` and over
+// `truth` and its transpose, since a solver may exchange the views.
 double distance(const double* m, const double* truth) {
   double norm = 0, true_norm = 0;
   for (int k = 0; k < 9; ++k) norm += m[k] * m[k], true_norm += truth[k] * truth[k];
@@ -88,7 +89,7 @@ void add_ours(const std::string& name, const std::shared_ptr<Samples>& samples, 
     int32_t counts[TVK_WIDTH];
     for (int s = 0; s < TVK_WIDTH; ++s) {
       const int sample = first + s % at_once;
-      for (int k = 0; k < 30; ++k) {  // match k / 6, view k / 3 % 2, entry k % 3
+      for (int k = 0; k < 30; ++k) {  // k: match k / 6, view k / 3 % 2, coordinate k % 3
         rays[TVK_WIDTH * k + s] =
             samples->rays[k / 3 % 2][static_cast<size_t>(15 * sample + k / 6 * 3 + k % 3)];
       }

@@ -21,7 +21,7 @@ class Measure:
     stage: str
     case: str
     system: str
-    times: list  # one for each repetition; empty if the peer is missing
+    times: list  # one time for each repetition; empty if the peer is missing
     found: dict = dataclasses.field(default_factory=dict)
     note: str = ""
 
@@ -39,12 +39,12 @@ class Row:
     stage: str
     case: str
     ours: float
-    peer: float  # None if the peer is missing
+    peer: float  # median time of the peer; None if it is missing
     peer_name: str
-    ratio: float           # peer / ours
+    ratio: float           # time of the peer / time of ours
     unit: str
     target: str = ""
-    reached: bool = None  # None without a target or without anything to compare with
+    reached: bool = None  # None if there is no target or no peer
     spread_percent: list = None
     found: dict = None
     peer_found: dict = None
@@ -119,7 +119,7 @@ def make_rows(measures):
         if peer.system == OURS or (peer.stage, peer.case) not in ours:
             continue
         if peer.stage == "describe" and peer.case.endswith(" at 200"):
-            continue  # reported under "pyramid apart"
+            continue  # this case is reported in the row "pyramid apart"
         own = ours[peer.stage, peer.case]
         missing = not peer.times
         row = Row(peer.stage, peer.case, own.median(), None if missing else peer.median(),
@@ -153,7 +153,7 @@ def set_target(row):
 
 
 def _short(found):
-    """'1039 corners, 0.15 deg'"""
+    """Formats the counters of a row, such as '1039 corners, 0.15 deg'."""
     words = {"error_deg": "deg", "cost_px": "px", "above_5deg": "above 5 deg"}
     skip = re.compile(r".*_us$|threshold|units|nearest")
     parts = []

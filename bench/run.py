@@ -10,7 +10,7 @@ docs/performance.md has the protocol and the numbers.
 import os
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"  # must be set before numpy is imported
+    os.environ[_name] = "1"  # one thread; set before importing numpy
 
 import argparse
 import dataclasses
@@ -25,7 +25,7 @@ import footprint
 import rows as table
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-# The program that measures each stage; footprint needs none.
+# {stage: the C++ program that measures it}; footprint needs no program.
 PROGRAMS = {"fast": "bench_fast", "describe": "bench_describe", "extract": "bench_describe",
             "match": "bench_match", "relpose": "bench_relpose", "robust": "bench_robust",
             "triangulate": "bench_triangulation", "pair": "bench_pair", "footprint": None}

@@ -1,10 +1,9 @@
-/* One stage, called so many times, with nothing but the library and libc: for counting instructions
-   on processors that have no OpenCV at hand (counts.py, with qemu). Options are the library's
-   defaults.
+/* Calls one stage CALLS times with the library's default options. The program needs only the
+   library and libc, so that bench/counts.py can count its instructions in qemu without OpenCV.
 
      stages A.pgm B.pgm fx fy cx cy STAGE CALLS [KERNELS]
 
-   STAGE: detect, describe, match, estimate, pair. What comes before a stage is done once. */
+   STAGE: detect, describe, match, estimate, pair. The stages before STAGE are called once. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

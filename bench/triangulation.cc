@@ -1,11 +1,11 @@
-// Table 1 of the paper again: the seven methods of triangulation over noise and three geometries,
-// beside OpenCV and OpenGV. Times as the other benchmarks; errors, of ours and OpenCV's, as
-// Markdown with
+// Table 1 of the paper, repeated: the seven methods of triangulation over levels of noise and three
+// geometries, and OpenCV's and OpenGV's. Without arguments the times are measured, as in the other
+// benchmarks. The errors of our methods and OpenCV's are printed as Markdown by
 //
 //   bench_triangulation --errors [POINTS]
 //
-// Ours takes pixels through the camera model and computes angle, error and status of each point as
-// well; the peers take rays, or pixels and projection matrices, and compute the point only.
+// Our functions take pixels and the camera model and also compute angle, error and status of each
+// point; the peers take rays, or pixels and projection matrices, and compute only the point.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -25,7 +25,7 @@ namespace {
 
 struct Method {
   const char* name;
-  int method;  // a tv_triangulation, or one of the peers below
+  int method;  // a value of tv_triangulation or of Peer
 };
 
 enum Peer { kPeerLinear = 100, kPeerOptimal };
@@ -47,14 +47,15 @@ const char* const kGeometries[] = {"sideways", "forward", "converging"};
 struct Scene {
   tv_camera camera;
   double R[9], t[3];
-  std::vector<double> points;    // truth, in camera 0
-  std::vector<double> exact[2];  // pixels without noise
+  std::vector<double> points;    // true positions in camera 0's frame
+  std::vector<double> exact[2];  // x y of each point without noise
   std::vector<double> pixels[2];
   int size() const { return static_cast<int>(points.size() / 3); }
 };
 
-// 640x480, f = 500, |t| = 1. Sideways and forward: 4 to 20 baselines away. Converging: cameras that
-// look at the same place 1.2 baselines away from 45 degrees apart.
+// Cameras of 640x480 pixels with f = 500 and |t| = 1. Sideways and forward: the points are 4 to 20
+// baselines away. Converging: both cameras look at one place, 1.2 baselines away, from directions
+// 45 degrees apart.
 Scene make_scene(int geometry, double noise_px, int num_points) {
   Scene scene{};
   scene.camera.model = TV_CAMERA_PINHOLE;
@@ -134,7 +135,7 @@ struct Errors {
   double truth_px;
   // Quantiles over all points: the error of the position in per cent of the distance from camera 0.
   double percent_50, percent_95;
-  double percent_behind;  // points that a camera does not see
+  double percent_behind;  // share of the points that are behind a camera, per cent
 };
 
 Errors errors_of(const Scene& scene, const std::vector<tv_point>& points) {
@@ -172,7 +173,7 @@ Errors errors_of(const Scene& scene, const std::vector<tv_point>& points) {
                 100 * (n - seen) / n};
 }
 
-// Markdown.
+// Prints a table of errors in Markdown for each geometry.
 void print_errors(int num_points) {
   std::vector<tv_point> points(static_cast<size_t>(num_points));
   for (int g = 0; g < 3; ++g) {
@@ -197,11 +198,11 @@ void print_errors(int num_points) {
   }
 }
 
-constexpr int kTimedPoints = 1000;  // of each geometry
+constexpr int kTimedPoints = 1000;  // number of points in each geometry
 
 using Scenes = std::shared_ptr<std::vector<Scene>>;
 
-// The error of the sideways scene says that a point was found.
+// Adds a timed row. It reports the error in the sideways scene, as a check of the result.
 void add_method(const std::string& name, const Scenes& scenes, int method) {
   const auto points = std::make_shared<std::vector<tv_point>>(kTimedPoints);
   bench::add({name,

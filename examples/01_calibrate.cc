@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const cv::Size inner(std::atoi(argv[2]), std::atoi(argv[3]));
-  std::vector<cv::Point3f> board;  // in squares: intrinsics do not depend on their size
+  std::vector<cv::Point3f> board;  // unit: a square's side; its size does not affect K
   for (int y = 0; y < inner.height; ++y)
     for (int x = 0; x < inner.width; ++x) board.emplace_back(float(x), float(y), 0.0F);
   std::vector<std::vector<cv::Point2f>> seen;

@@ -53,7 +53,7 @@ int main(int argc, char **argv) {
   options.max_keypoints = MOST;
   options.arc = argc > 3 ? atoi(argv[3]) : 12;
   options.threshold = argc > 4 ? atoi(argv[4]) : 20;
-  options.min_threshold = 0; /* keeps the threshold, however few corners there are */
+  options.min_threshold = 0; /* 0: never lower the threshold to get more corners */
   status = tv_detect(context, &image, NULL, &options, corner, MOST, &count);
   if (status != TV_OK) return fail(tv_status_string(status));
   printf("FAST-%d at threshold %d: %d corners\n", options.arc, options.threshold, count);
@@ -62,7 +62,7 @@ int main(int argc, char **argv) {
   out = fopen(argv[2], "wb");
   if (!marked || !out) return fail("cannot write");
   for (k = 0; k < count; ++k) {
-    for (x = -2; x <= 2; ++x) { /* a cross; corners lie at least three pixels from the border */
+    for (x = -2; x <= 2; ++x) { /* draw a cross; corners are >= 3 px from the border */
       const int column = (int)lround(corner[k].x), row = (int)lround(corner[k].y);
       marked[row * image.width + column + x] = marked[(row + x) * image.width + column] = 1;
     }

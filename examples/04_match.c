@@ -28,7 +28,7 @@ static int fail(const char *what) {
   return 2;
 }
 
-/* a corner has one orientation or two, and a keypoint for each */
+/* A corner has one or two orientations, and one keypoint for each orientation. */
 enum { CORNERS = 2048, MOST = 2 * CORNERS };
 
 int main(int argc, char **argv) {
@@ -54,7 +54,7 @@ int main(int argc, char **argv) {
   }
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
-  for (v = 0; v < 2; ++v) { /* tv_extract detects, orients and describes over one pyramid */
+  for (v = 0; v < 2; ++v) { /* tv_extract: tv_detect, tv_orient, tv_describe in one */
     status = tv_detect(context, &image[v], NULL, NULL, corner, CORNERS, &corners);
     if (status == TV_OK)
       status = tv_orient(context, &image[v], NULL, corner, corners, keypoint[v], MOST, &count[v]);

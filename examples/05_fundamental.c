@@ -40,7 +40,7 @@ int main(int argc, char **argv) {
   if (argc < 2) return fail("usage: 05_fundamental MATCHES.txt [max_error_px]");
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   tv_limits_init(&limits);
-  limits.purposes = TV_PURPOSE_ESTIMATE; /* the context pays for no image */
+  limits.purposes = TV_PURPOSE_ESTIMATE; /* no memory for images */
   limits.max_matches = MOST;
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
@@ -60,7 +60,7 @@ int main(int argc, char **argv) {
   for (r = 0; r < 3 && found.has_F; ++r)
     printf("  % .6e % .6e % .6e\n", found.F[3 * r], found.F[3 * r + 1], found.F[3 * r + 2]);
   for (k = 0; k < n && found.has_F; ++k) {
-    /* x1^T F x0 is 0 for a perfect match. */
+    /* The residual x1^T F x0 is 0 for a match without error. */
     const double *a = pixels[0] + 2 * k, *b = pixels[1] + 2 * k, *F = found.F;
     const double e = b[0] * (F[0] * a[0] + F[1] * a[1] + F[2]) +
                      b[1] * (F[3] * a[0] + F[4] * a[1] + F[5]) + F[6] * a[0] + F[7] * a[1] + F[8];

@@ -28,7 +28,7 @@ static int fail(const char *what) {
   return 2;
 }
 
-/* world_from_camera, row-major; its columns are the camera's axes right, down and forward. */
+/* Converts a quaternion w x y z of world_from_body to the matrix world_from_camera (row-major). */
 static void rotation_of(char **q, double R[9]) {
   const double w = atof(q[0]), x = atof(q[1]), y = atof(q[2]), z = atof(q[3]);
   const double body[9] = {
@@ -36,7 +36,7 @@ static void rotation_of(char **q, double R[9]) {
       2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
       2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
   int r;
-  for (r = 0; r < 3; ++r) { /* camera right = body y, down = z, forward = x */
+  for (r = 0; r < 3; ++r) { /* camera x, y, z = body y, z, x */
     R[3 * r] = body[3 * r + 1];
     R[3 * r + 1] = body[3 * r + 2];
     R[3 * r + 2] = body[3 * r];
@@ -61,7 +61,7 @@ int main(int argc, char **argv) {
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
   camera.cy = atof(argv[5]);
-  /* about the true size; the verdict's test against chance needs the image's area */
+  /* The principal point is near the image's middle. The verdict needs the image's area. */
   camera.width = (int)(2 * camera.cx);
   camera.height = (int)(2 * camera.cy);
   rotation_of(argv + 6, world[0]);
@@ -72,7 +72,7 @@ int main(int argc, char **argv) {
   status = tv_context_new(&context, &limits);
   if (status != TV_OK) return fail(tv_status_string(status));
   tv_estimate_options_init(&options);
-  memcpy(options.gravity0, world[0] + 6, sizeof options.gravity0); /* down, in each camera */
+  memcpy(options.gravity0, world[0] + 6, sizeof options.gravity0); /* down, in the camera frame */
   memcpy(options.gravity1, world[1] + 6, sizeof options.gravity1);
   options.gravity_sigma_rad = atof(argv[14]) / DEGREES;
   tv_two_view_init(&pose);
@@ -84,7 +84,7 @@ int main(int argc, char **argv) {
   status = tv_estimate_two_view(context, &camera, &camera, &pairs, &options, &pose, NULL);
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R) return fail("no rotation");
-  for (i = 0; i < 9; ++i) /* trace of R_imu^T R, with R_imu = world1^T world0 */
+  for (i = 0; i < 9; ++i) /* trace of R_imu^T R; R_imu = world1^T world0 */
     for (k = 0; k < 3; ++k) trace += world[1][3 * k + i / 3] * world[0][3 * k + i % 3] * pose.R[i];
   printf("%s (%s), %d of %d matches agree\n", tv_kind_string(pose.kind),
          tv_verdict_string(pose.verdict), pose.num_inliers, n);

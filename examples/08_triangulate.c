@@ -45,7 +45,7 @@ int main(int argc, char **argv) {
   n = read_matches(argv[1], pixels[0], pixels[1], ratios);
   for (v = 0; v < 2; ++v) {
     camera[v].model = TV_CAMERA_PINHOLE;
-    camera[v].width = camera[v].height = 1; /* no image is read, so the size does not matter */
+    camera[v].width = camera[v].height = 1; /* any size: no image is used */
     camera[v].fx = atof(argv[2]);
     camera[v].fy = atof(argv[3]);
     camera[v].cx = atof(argv[4 + v]);
@@ -66,8 +66,8 @@ int main(int argc, char **argv) {
   if (status != TV_OK) return fail(tv_status_string(status));
   if (!pose.has_R || !pose.has_t) return fail("no full pose");
   for (v = 0; v < 2; ++v)
-    tv_corrected_camera(&pose, &camera[v], &camera[v]); /* the camera that the pose belongs to */
-  for (k = 0; k < n; ++k) {                             /* keeps the inliers only, in place */
+    tv_corrected_camera(&pose, &camera[v], &camera[v]); /* adds the estimated shift of cx, cy */
+  for (k = 0; k < n; ++k) {                             /* moves the inliers to the front */
     if (!inlier[k]) continue;
     for (v = 0; v < 2; ++v) {
       pixels[v][2 * kept] = pixels[v][2 * k];

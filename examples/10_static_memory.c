@@ -45,7 +45,7 @@ int main(void) {
   tv_status status;
   size_t needed;
   int v;
-  tv_limits_init(&limits); /* the defaults: 640 x 480, 2048 keypoints */
+  tv_limits_init(&limits); /* defaults: 640 x 480 px, 2048 keypoints */
   status = tv_context_size(&limits, &needed);
   if (status == TV_OK) status = tv_context_init(&context, &limits, memory, sizeof memory);
   if (status != TV_OK) {

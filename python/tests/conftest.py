@@ -11,7 +11,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
 os.environ.setdefault("TWOVIEW_LIBRARY", str(ROOT / "build" / "release" / "lib" / "libtwoview.so"))
 
-import twoview as tv  # noqa: E402  (after the path is set)
+import twoview as tv  # noqa: E402  (sys.path must be extended before)
 
 
 class Scene:

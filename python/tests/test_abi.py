@@ -69,7 +69,7 @@ def test_every_struct_and_its_fields_are_the_headers():
 def test_enums_are_the_headers(tmp_path):
     expected = {prefix + member.name: member.value
                 for kind, prefix in enums.C_PREFIXES.items()
-                for member in kind.__members__.values()}  # composed flags, too
+                for member in kind.__members__.values()}  # __members__ has combined flags, too
     lines = [print_number(name, name) for name in expected]
     assert compiled(tmp_path, lines) == expected
     declared = set()
@@ -116,11 +116,12 @@ def test_every_function_of_the_headers_is_bound_or_known_to_be_left_out():
     functions = set(re.findall(r"TV_API [^;(]*?\*?(tv_\w+)\(", header_text()))
     inside = {"tv_context_init", "tv_context_size", "tv_context_kernels", "tv_context_high_water",
               "tv_status_string"} | {f for f in functions if re.search(r"_init_sized$", f)}
-    # For one point; the functions for arrays replace them.
+    # C functions without a Python function. The first two take one point; Python has those that
+    # take arrays.
     left_out = {"tv_camera_project", "tv_camera_unproject",
-                "tv_context_set_clock", "tv_context_take_times",  # stage times
+                "tv_context_set_clock", "tv_context_take_times",  # measure stage times
                 "tv_kernels_string", "tv_kind_string", "tv_verdict_string",
-                "tv_reason_string"}  # the Python enums have names
+                "tv_reason_string"}  # Python uses the names of its enums
     bound = {f for f in functions if hasattr(tv, f[len("tv_"):])}
     assert functions - bound - inside == left_out
 

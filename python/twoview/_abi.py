@@ -254,7 +254,7 @@ def set_field(struct: Any, name: str, value: Any) -> None:
         if issubclass(kind, ctypes.Array):
             value = kind(*small_array(name, value, kind._length_))
         elif kind in (c_float, c_double):
-            value = float(value + 0.0)  # raises TypeError for a string
+            value = float(value + 0.0)  # adding 0.0 raises TypeError for a string
         else:
             value = operator.index(value)
     except TypeError:

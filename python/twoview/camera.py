@@ -37,7 +37,7 @@ class Camera:
 
     @property
     def K(self) -> np.ndarray:
-        """The 3x3 matrix of the intrinsics."""
+        """The 3x3 matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
 

@@ -60,7 +60,7 @@ class Context:
 
     @property
     def kernels(self) -> Kernels:
-        """The kernel set in use (tv_context_kernels)."""
+        """The instruction-set kernels that this context uses (tv_context_kernels)."""
         with self.lock:
             return Kernels(self.library.lib.tv_context_kernels(self._pointer))
 

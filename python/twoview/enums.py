@@ -124,7 +124,7 @@ class Loss(IntEnum):
     CAUCHY = 2
 
 
-# The prefix of each enum's values in C.
+# {enum: the prefix of its values' names in C}.
 C_PREFIXES = {
     Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_",
     Orientation: "TV_ORIENTATION_", Normalisation: "TV_NORMALISATION_",

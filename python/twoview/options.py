@@ -12,60 +12,60 @@ from .enums import Loss, Normalisation, Orientation, Solver
 
 @dataclass(frozen=True)
 class FeatureOptions:
-    """tv_feature_options."""
+    """The options of detection, orientation and description, as in tv_feature_options."""
 
     #: Most descriptors of an image; 0: the smaller of 2048 and the context's limit.
     max_keypoints: int = 0
-    arc: int = 9  #: required contiguous circle pixels, 9 to 12
-    threshold: int = 10  #: grey levels, [1, 254]
+    arc: int = 9  #: contiguous pixels of the circle of 16 that a corner needs, 9 to 12
+    threshold: int = 10  #: contrast that a corner needs, grey levels, [1, 254]
     min_threshold: int = 3  #: lowest value to which the threshold may fall; 0: it is fixed
-    levels: int = 1  #: pyramid levels, [1, 8]
-    scale_factor: float = 2.0  #: between two levels, [1.1, 2]
+    levels: int = 1  #: number of pyramid levels, [1, 8]
+    scale_factor: float = 2.0  #: ratio of sizes of neighbouring pyramid levels, [1.1, 2]
     #: Side of the grid cells that share out the corners, pixels; 0: the strongest corners anywhere.
     cell_px: int = 0
     subpixel: int = 1  #: 1: positions are refined to a fraction of a pixel
     orientation: int = Orientation.GRADIENT
     descriptor: int = Normalisation.ROOTSIFT
-    keypoint_size: float = 4.0  #: diameter, pixels
+    keypoint_size: float = 4.0  #: diameter of a keypoint at level 0, pixels
 
 
 @dataclass(frozen=True)
 class MatchOptions:
-    """tv_match_options."""
+    """The options of matching, as in tv_match_options."""
 
     ratio: float = 0.92  #: upper bound of nearest / second nearest distance, in both directions
 
 
 @dataclass(frozen=True)
 class GuidedOptions:
-    """tv_guided_options."""
+    """The options of matching along epipolar lines, as in tv_guided_options."""
 
     max_error_px: float = 4.0  #: half the width of the band around the epipolar line, pixels
     ratio: float = 0.87
-    max_distance: float = 180.0  #: largest L2 distance of two descriptors
+    max_distance: float = 180.0  #: largest L2 distance of the descriptors of a match
     neighbourhood_px: float = 4.0
 
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """tv_estimate_options."""
+    """The options of the two-view estimate, as in tv_estimate_options."""
 
-    method: int = Solver.AUTO  #: AUTO: five-point with cameras, eight-point without
-    max_error_px: float = 1.0  #: inlier threshold, in pixels of the images as given
+    method: int = Solver.AUTO  #: AUTO: five-point with cameras, else eight-point
+    max_error_px: float = 1.0  #: inlier threshold, pixels of the given images
     confidence: float = 0.9999
     max_iterations: int = 10000
-    fixed_iterations: int = 0  #: 0: the number of iterations is adaptive
-    seed: Optional[int] = None  #: None: the library's constant default seed
+    fixed_iterations: int = 0  #: number of iterations; 0: it is adaptive
+    seed: Optional[int] = None  #: seed of the sampler; None: the library's constant
     gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity in camera 0's frame
     gravity1: Sequence[float] = (0.0, 0.0, 0.0)
-    gravity_sigma_rad: float = 0.0  #: standard deviation; 0: gravity is not used
+    gravity_sigma_rad: float = 0.0  #: standard deviation of gravity; 0: it is not used
     #: Standard deviation in focal lengths; 0: the principal point is exact.
     principal_point_sigma: float = 0.01
 
 
 @dataclass(frozen=True)
 class BundleOptions:
-    """tv_bundle_options."""
+    """The options of bundle adjustment, as in tv_bundle_options."""
 
     loss: int = Loss.CAUCHY
     loss_scale_px: float = 1.0

@@ -164,10 +164,10 @@ class TwoView:
     num_matches: int
     num_inliers: int
     num_iterations: int
-    R: Optional[np.ndarray]  #: (3, 3)
-    t: Optional[np.ndarray]  #: (3,)
-    E: Optional[np.ndarray]  #: (3, 3), Frobenius norm 1
-    F: Optional[np.ndarray]  #: (3, 3), for undistorted pixels
+    R: Optional[np.ndarray]  #: (3, 3), rotation
+    t: Optional[np.ndarray]  #: (3,), unit translation
+    E: Optional[np.ndarray]  #: (3, 3), essential matrix, Frobenius norm 1
+    F: Optional[np.ndarray]  #: (3, 3), fundamental matrix for undistorted pixels
     H: Optional[np.ndarray]  #: (3, 3), maps undistorted pixels of image 0 to image 1
     alternative_R: Optional[np.ndarray]  #: the second pose that a planar scene permits
     alternative_t: Optional[np.ndarray]
@@ -289,7 +289,7 @@ def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float
 
 @dataclass(frozen=True)
 class BundleResult:
-    """tv_bundle_result, with the adjusted pose and points."""
+    """The result of bundle adjustment: tv_bundle_result with the adjusted pose and points."""
 
     R: np.ndarray
     t: np.ndarray
@@ -301,7 +301,7 @@ class BundleResult:
     final_cost: float
     initial_rms_px: float
     rms_px: float
-    covariance: Optional[np.ndarray]  #: (5, 5), radians squared
+    covariance: Optional[np.ndarray]  #: (5, 5) of the pose, radians squared
     noise_px: float
 
 
@@ -353,8 +353,8 @@ class Reconstruction:
 
     keypoints: tuple[np.ndarray, np.ndarray]
     descriptors: tuple[np.ndarray, np.ndarray]
-    matches: np.ndarray  #: (m,) of CORRESPONDENCE
-    inlier_mask: np.ndarray  #: (m,) bool
+    matches: np.ndarray  #: (m,) of dtype CORRESPONDENCE
+    inlier_mask: np.ndarray  #: (m,) bool, True for an inlier
     points: np.ndarray  #: (m,) of POINT; INVALID where the match is no inlier
     num_points: int
     #: Matches that exceed the context's max_matches; those with the highest ratios are left out.
@@ -396,10 +396,10 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
         views.append(view)
     found = library.make(_abi.tv_two_view)
     cloud = library.make(_abi.tv_reconstruction)
-    with context.lock:  # the arrays are valid until the context's next call
+    with context.lock:  # the context's next call overwrites the arrays, so copy here
         context.call("tv_reconstruct", byref(views[0]), byref(views[1]), byref(wanted),
                      byref(found), byref(cloud))
-        del kept  # keeps alive the structs to which the call pointed
+        del kept  # the call pointed into `kept`, which may be freed only now
         n, m = tuple(cloud.num_keypoints), cloud.num_matches
         first, second = (_copied(cloud.keypoints[v], n[v], _abi.KEYPOINT) for v in range(2))
         bytes0, bytes1 = (_copied(cloud.descriptors[v], n[v] * _abi.DESCRIPTOR_BYTES, np.uint8)

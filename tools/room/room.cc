@@ -76,12 +76,12 @@ Room::Room(uint64_t seed)
           {{5.6, -3.4, -2.0}, {6.4, -1.6, 0}, kFurniture},   // cupboard, far left
           {{5.9, 1.2, -0.9}, {6.9, 3.2, 0}, kFurniture},     // sideboard, far right
           {{3.2, 2.2, -0.75}, {4.6, 3.3, 0}, kFurniture},    // table on the right
-          {{3.6, 2.5, -1.15}, {4.0, 2.9, -0.75}, kPillar},   // a box on it
+          {{3.6, 2.5, -1.15}, {4.0, 2.9, -0.75}, kPillar},   // box on the table
           {{2.6, -3.4, -1.2}, {3.6, -2.5, 0}, kFurniture},   // shelf on the left
-          {{4.3, -1.9, -3.0}, {4.6, -1.6, 0}, kPillar},      // pillars
+          {{4.3, -1.9, -3.0}, {4.6, -1.6, 0}, kPillar},      // pillar, left of the middle
           {{5.0, 0.9, -3.0}, {5.25, 1.15, 0}, kPillar},
-          {{6.1, -0.6, -0.5}, {6.7, 0.2, 0}, kPillar},       // a crate ahead
-          {{6.9, -0.9, -2.3}, {6.98, 0.6, -1.2}, kPicture},  // pictures on the far wall
+          {{6.1, -0.6, -0.5}, {6.7, 0.2, 0}, kPillar},       // crate straight ahead
+          {{6.9, -0.9, -2.3}, {6.98, 0.6, -1.2}, kPicture},  // picture on the far wall
           {{6.9, 1.4, -2.4}, {6.98, 2.4, -1.4}, kPicture},
       },
       walls_{{-2, -3.5, -3}, {7, 3.5, 0}, kWall} {
@@ -97,7 +97,7 @@ Room::Hit Room::first_hit(const Vec3& from, const Vec3& ray) const {
   const Vec3 inverse = {1 / ray[0], 1 / ray[1], 1 / ray[2]};
   Hit hit{HUGE_VAL, &walls_, 0, 0};
   for (size_t k = 0; k < 3; ++k) {
-    if (ray[k] == 0) continue;  // the ray is parallel to these two sides
+    if (ray[k] == 0) continue;  // parallel to both walls across axis k
     const int side = ray[k] > 0 ? 1 : 0;
     const double exit = ((side == 1 ? walls_.high[k] : walls_.low[k]) - from[k]) * inverse[k];
     if (exit < hit.distance) hit = {exit, &walls_, k, side};

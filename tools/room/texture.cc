@@ -134,7 +134,7 @@ Texture Texture::pattern(uint64_t seed) {
 }
 
 Texture Texture::planks(uint64_t seed) {
-  constexpr int kBoard = 64;  // width of a board, texels
+  constexpr int kBoard = 64;  // width of a wooden board, texels
   Random random(seed);
   std::vector<float> tile = fractal(random, 0, 14);
   for (int row = 0; row < kSide; row += kBoard) {

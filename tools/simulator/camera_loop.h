@@ -14,7 +14,7 @@ namespace simulator {
 
 struct CodedFrame {
   FilmPacket packet;
-  FlightState truth;  // the state at the time of exposure
+  FlightState truth;  // the drone's state when the picture was exposed
   int64_t uptime_ns = 0;
   int width = 0, height = 0;
 };
@@ -27,7 +27,7 @@ class CameraLoop {
   // Requests the next picture, seen from `truth`. It replaces a requested picture that the thread
   // has not started.
   void expose(const FlightState& truth, int64_t uptime_ns, bool is_720p);
-  // Removes and returns the finished pictures, oldest first.
+  // Returns the encoded pictures, oldest first, and removes them from the queue.
   std::deque<CodedFrame> take();
 
  private:

@@ -83,7 +83,7 @@ FilmPacket Film::encode(const uint8_t* luma, int64_t stride_bytes) {
     std::memcpy(e.frame->data[0] + y * e.frame->linesize[0], luma + y * stride_bytes,
                 static_cast<size_t>(width_));
   }
-  for (int plane = 1; plane < 3; ++plane) {  // a grey picture: both colour planes are constant
+  for (int plane = 1; plane < 3; ++plane) {  // colour planes: 128, grey
     std::memset(e.frame->data[plane], 128,
                 static_cast<size_t>(e.frame->linesize[plane]) * static_cast<size_t>(height_ / 2));
   }

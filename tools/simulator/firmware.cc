@@ -173,7 +173,7 @@ void Firmware::receive_commands(std::string_view datagram, int64_t now_ns) {
   while (!datagram.empty()) {
     const size_t end = datagram.find('\r');
     if (end == std::string_view::npos) {
-      ++num_refused_;  // an incomplete line is refused
+      ++num_refused_;  // a command without a final '\r' is refused
       return;
     }
     obey(datagram.substr(0, end), now_ns);
@@ -205,7 +205,7 @@ void Firmware::obey(std::string_view line, int64_t now_ns) {
   if (name == "CONFIG_IDS" && arguments.size() == 3) {
     addressed_ = {arguments[0], arguments[1], arguments[2]};
   } else {
-    addressed_ = {};  // the ids apply to the next command only
+    addressed_ = {};  // CONFIG_IDS applies only to the command after it
   }
   if (name == "CTRL") obey_control(arguments);
   if (name == "COMWDG") watchdog_ = false;
@@ -245,7 +245,7 @@ bool Firmware::is_writable(const std::string& key) const {
 }
 
 void Firmware::obey_config(const std::vector<std::string>& arguments) {
-  if (arguments.size() != 2 || acknowledge_) return;  // only one exchange at a time
+  if (arguments.size() != 2 || acknowledge_) return;  // the last CONFIG is not yet acknowledged
   const std::string &key = arguments[0], &value = arguments[1];
   acknowledge_ = true;
   bootstrap_ = false;
@@ -363,7 +363,7 @@ void Firmware::fill(int64_t now_ns, ardrone_navdata* navdata) {
   demo.phi_mdeg = static_cast<float>(roll * kDegrees * 1000);
   demo.psi_mdeg = static_cast<float>(yaw * kDegrees * 1000);
   demo.altitude_mm = in_air ? static_cast<int32_t>(std::lround(height * 1000)) : 0;
-  for (size_t k = 0; k < 2; ++k) {  // z stays 0, as a real drone reports it
+  for (size_t k = 0; k < 2; ++k) {  // sets x and y; a real drone reports z = 0
     demo.velocity_mm_s[k] = in_air
                                 ? static_cast<float>(1000 * noisy(v[k] * sensors_.velocity_factor,
                                                                   sensors_.velocity_noise_m_s))

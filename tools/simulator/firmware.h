@@ -91,9 +91,9 @@ class Firmware {
 
   Flight flight_;
   Sensors sensors_;
-  std::string version_;  // empty: the version in the factory configuration
+  std::string version_;  // empty: use the factory configuration's version
   std::map<std::string, std::string> configuration_;
-  // Id to description, for each kind of id.
+  // For each kind of id, {id: its description}.
   std::map<std::string, std::string> sessions_, users_, applications_;
   Ids ids_, addressed_;
   std::vector<std::string> control_texts_;

@@ -7,18 +7,18 @@ namespace simulator {
 namespace {
 
 constexpr double kGravity = 9.81;      // m/s^2
-constexpr double kStep = 0.005;        // s
+constexpr double kStep = 0.005;        // s, longest time step of the integration
 constexpr double kTiltDelay = 0.12;    // s until 63 % of the commanded angle is reached
 constexpr double kClimbDelay = 0.25;   // s until 63 % of the commanded climb rate is reached
 constexpr double kTurnDelay = 0.15;    // s until 63 % of the commanded turn rate is reached
-constexpr double kDrag = 0.25;         // 1/s
+constexpr double kDrag = 0.25;         // 1/s, deceleration by air drag for each m/s
 constexpr double kBrake = 0.16;        // rad of tilt per m/s of speed, while hovering
 constexpr double kHoverHeight = 1.0;   // m, height at which a take-off ends
 constexpr double kLandingSpeed = 0.5;  // m/s
 constexpr double kTakeOffSpeed = 0.6;  // m/s
-constexpr double kBodyRadius = 0.3;    // m, from the centre to the propellers' guards
+constexpr double kBodyRadius = 0.3;    // m, from the drone's centre to the propellers' guards
 constexpr double kLowest = 0.3;        // m above the ground; a flying drone that is lower climbs
-constexpr double kRecovery = 0.1;      // m/s, speed of that climb
+constexpr double kRecovery = 0.1;      // m/s, climb rate below kLowest
 
 Vec3 rotate_back(const Mat3& m, const Vec3& v) {
   Vec3 out{};
@@ -81,7 +81,7 @@ void Flight::advance(double seconds) {
 }
 
 void Flight::step(double dt) {
-  // The axes are horizontal and turn with the yaw.
+  // The velocity along horizontal axes that turn with the yaw: forward and right.
   const double forward =
       std::cos(state_.yaw) * state_.velocity[0] + std::sin(state_.yaw) * state_.velocity[1];
   const double right =

@@ -27,12 +27,12 @@ struct FlightLimits {
 
 enum class FlightMode { kLanded, kTakingOff, kHovering, kFlying, kLanding, kMotorsCut };
 
-// The true state at one instant.
+// The true state of the drone at one instant.
 struct FlightState {
   FlightMode mode = FlightMode::kLanded;
-  Vec3 position{0, 0, 0};                              // world, metres
-  Vec3 velocity{0, 0, 0};                              // world, m/s
-  Vec3 acceleration{0, 0, 0};                          // world, m/s^2, without gravity
+  Vec3 position{0, 0, 0};                              // in the world frame, metres
+  Vec3 velocity{0, 0, 0};                              // in the world frame, m/s
+  Vec3 acceleration{0, 0, 0};                          // in the world frame, m/s^2, without gravity
   double yaw = 0, pitch = 0, roll = 0;                 // radians
   double yaw_rate = 0, pitch_rate = 0, roll_rate = 0;  // rad/s
 };
@@ -53,7 +53,7 @@ class Flight {
   void take_off();
   void land();
   void cut_motors();
-  // Returns to the landed state after an emergency.
+  // Ends an emergency: the drone returns from kMotorsCut to kLanded if it is on the ground.
   void rearm();
   void hover();
   void steer(const Sticks& sticks);

@@ -21,7 +21,7 @@ namespace {
 constexpr int64_t kSecond = 1000000000;
 constexpr int64_t kStallNs = 3 * kSecond;
 constexpr int64_t kRebootNs = kSecond;    // the drone sends nothing for this time after a reboot
-constexpr size_t kMostUnsent = 1u << 20;  // bytes that may wait for a slow client
+constexpr size_t kMostUnsent = 1u << 20;  // most bytes that wait for a slow client
 
 int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(

@@ -9,7 +9,7 @@
 
 namespace simulator {
 
-// Counts of events, for a test of a driver.
+// Counts of the server's events, which a test compares with those of a driver.
 struct ServerCounts {
   int64_t commands_obeyed = 0, commands_refused = 0, take_offs = 0, navdata_sent = 0,
           frames_sent = 0, frames_left_out = 0, video_cuts = 0, video_stalls = 0, reboots = 0;
@@ -17,7 +17,7 @@ struct ServerCounts {
 
 class Server {
  public:
-  // Binds every port. Throws std::runtime_error.
+  // Binds every port. Throws std::runtime_error if a port cannot be bound.
   explicit Server(const ServerOptions& options);
   ~Server();
   Server(const Server&) = delete;

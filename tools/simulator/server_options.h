@@ -24,20 +24,21 @@ using Painter = std::function<void(const FlightState& state, uint64_t index, int
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  Ports ports;  // 0: a free port, which Server::ports reports
+  Ports ports;  // port 0: the system chooses a free port; see Server::ports
   Vec3 start{0, 0, 0};
   double yaw_rad = 0;
   uint64_t seed = 1;
   Sensors sensors;
   tv_camera camera{};        // 640 x 360; its lens is also that of 1280 x 720, scaled
-  Mat3 body_from_camera{};   // room::kForwardCamera unless set
-  double pixel_noise = 1.5;  // grey levels
+  Mat3 body_from_camera{};   // must be set, such as room::kForwardCamera
+  double pixel_noise = 1.5;  // standard deviation, grey levels
   int frames_per_second = 30;
-  int pave_header_bytes = 68;    // 64 or 68
-  Painter painter;               // empty: the room is rendered
-  std::string truth_file;        // empty: none. A line a picture: frame number, seconds since boot,
-                                 // x y z qx qy qz qw (world_from_body), vx vy vz (world)
-  FaultChances faults;           // faults of datagrams, in both directions
+  int pave_header_bytes = 68;  // size of the PaVE header: 64 or 68 bytes
+  Painter painter;             // draws the pictures; empty: the room is rendered
+  std::string truth_file;  // path of the output with the true states; empty: no file. It has a line
+                           // for each picture: frame number, seconds since boot, x y z qx qy qz qw
+                           // (world_from_body), vx vy vz (world)
+  FaultChances faults;     // probabilities of faults of datagrams in both directions
   double video_garbage = 0;      // probability of random bytes before a video packet
   double cut_video_every_s = 0;  // seconds between resets of the video connection; 0: never
   // Seconds between stalls of the video: it stays connected without data for 3 s; 0: never.

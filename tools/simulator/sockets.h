@@ -9,7 +9,7 @@
 
 namespace simulator {
 
-// A file descriptor that closes itself.
+// A file descriptor that the destructor closes.
 class Socket {
  public:
   explicit Socket(int fd = -1) : fd_(fd) {}

@@ -63,7 +63,7 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::CallForVersion& e) {
     cli::print(std::string(e.what()) + "\n");
     return 0;
-  } catch (const CLI::Success&) {  // --help
+  } catch (const CLI::Success&) {  // thrown for --help
     const CLI::App* chosen = &program;
     std::string path;
     while (!chosen->get_subcommands().empty()) {

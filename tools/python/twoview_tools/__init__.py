@@ -31,4 +31,4 @@ def environment():
     """The environment for a child process that imports twoview_tools and twoview."""
     folders = [*FOLDERS, *filter(None, [os.environ.get("PYTHONPATH")])]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(folders),
-            "PYTHONSAFEPATH": "1"}  # a module in the user's folder must not hide one of ours
+            "PYTHONSAFEPATH": "1"}  # no import from the current folder

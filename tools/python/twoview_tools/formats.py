@@ -46,7 +46,7 @@ import numpy as np
 
 MAX_PAIRS_BYTES, MAX_CAMERA_BYTES = 64 << 20, 1 << 20
 FIELD_COUNTS = (2, 4, 22, 38)
-SAME_K = 1e-6  # largest relative difference of fx and cx between a line's K and an entry
+SAME_K = 1e-6  # relative; a larger difference means that K and a camera are not the same
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3")
 # The camera model for each distortion_model of a camera file. None: the file has no such entry; "":
 # the entry is empty.
@@ -74,7 +74,7 @@ class Camera:
     fy: float
     cx: float
     cy: float
-    model: str = "pinhole"  # or brown_conrady, kannala_brandt
+    model: str = "pinhole"  # the lens: pinhole, brown_conrady or kannala_brandt
     k: tuple = ()
 
 
@@ -85,12 +85,12 @@ class Pair:
 
     name0: str
     name1: str
-    number: int  # of the line, from 1
-    text: str  # the line with one space between fields
-    turns: tuple = (0, 0)  # quarter turns counter-clockwise, 0 to 3
+    number: int  # the line's number in the file, from 1
+    text: str  # the line's fields, joined by one space
+    turns: tuple = (0, 0)  # quarter turns of image 0 and 1 counter-clockwise, 0 to 3
     K0: Optional[np.ndarray] = None
     K1: Optional[np.ndarray] = None
-    R: Optional[np.ndarray] = None  # the truth, x1 = R x0 + t
+    R: Optional[np.ndarray] = None  # true pose: x1 = R x0 + t
     t: Optional[np.ndarray] = None
 
 
@@ -156,7 +156,7 @@ def _motion(fields):
 
 
 def parse_pair(line, number=1):
-    """Parses one line into a Pair."""
+    """Parses a line of a pairs file. `number` is the line's number in the file."""
     fields = re.split(f"[{_BLANK}]+", line.strip(_BLANK))
     if len(fields) not in FIELD_COUNTS:
         raise FormatError(f"{len(fields)} fields, not 38 (name0 name1 rot0 rot1 K0 K1 T_0to1)")
@@ -213,10 +213,10 @@ def _value(node, name):
 
 
 def _parse_yaml(text, name):
-    """Parses the first document, which must be a map."""
+    """Parses the first document of a YAML text; FormatError if it is no map."""
     import yaml
     text = text.removeprefix("\ufeff")
-    if text.startswith("%YAML:"):  # OpenCV's first line is not a valid YAML directive
+    if text.startswith("%YAML:"):  # '%YAML:1.0', OpenCV's first line, is no valid YAML
         text = "#" + text[1:]
     try:
         for event in yaml.parse(text, yaml.BaseLoader):
@@ -312,7 +312,7 @@ def _camera_matrix(root, name):
 
 
 def _distortion(root, name):
-    """(model, coefficients) of a camera file."""
+    """Returns (lens model, distortion coefficients) of a parsed camera file."""
     word = root.get("distortion_model")
     if isinstance(word, (list, dict)):
         raise FormatError(f"{name}: distortion_model is not a word")

@@ -8,7 +8,7 @@
 
 namespace cli {
 
-// Exit statuses, which docs/formats.md fixes.
+// The exit statuses of the program. docs/formats.md promises them to users; do not change them.
 constexpr int kExitPose = 0;
 constexpr int kExitBadInput = 2;
 constexpr int kExitNoPose = 3;

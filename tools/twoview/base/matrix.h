@@ -10,7 +10,7 @@ using Vector3 = std::array<double, 3>;
 
 Matrix3 product(const Matrix3& a, const Matrix3& b);
 Matrix3 transposed(const Matrix3& a);
-Vector3 applied(const Matrix3& a, const Vector3& v);  // a v
+Vector3 applied(const Matrix3& a, const Vector3& v);  // the product a v
 Vector3 cross(const Vector3& a, const Vector3& b);
 double dot(const Vector3& a, const Vector3& b);
 double norm(const Vector3& v);

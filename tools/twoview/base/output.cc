@@ -143,7 +143,7 @@ void OutputSet::add(const std::string& name, std::string_view bytes) {
     file.fd = ::open(path.c_str(), flags, 0666);
     if (file.fd < 0) throw BadInput("cannot write " + target.string() + ": " + reason(errno));
     if (direct) lock.lock();
-    entries_.push_back(entry);  // from here on discard() removes the temporary file
+    entries_.push_back(entry);  // discard() removes the files of entries_
   }
   int error = write_all(file.fd, bytes);
   if (error == 0 && !direct) error = sync(file.fd);
@@ -161,7 +161,7 @@ void OutputSet::commit() {
     if (::rename(entry.temporary.c_str(), target.c_str()) != 0)
       throw BadInput("cannot write " + target.string() + ": " + reason(errno));
     entry.temporary.clear();
-    made_.clear();  // the folders hold committed files now, so they are kept
+    made_.clear();  // folders with committed files are not removed
   }
   made_.clear();
 }
@@ -208,10 +208,11 @@ const std::atomic<bool>& stop_flag_for_signals() {
 void clean_up_on_signals() {
   sigset_t awaited;
   sigemptyset(&awaited);
+  // A signal that is ignored when the program starts, as SIGHUP under nohup, stays ignored.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction action;
     if (::sigaction(signal, nullptr, &action) == 0 && action.sa_handler != SIG_IGN)
-      sigaddset(&awaited, signal);  // a signal that is ignored (as nohup does) stays ignored
+      sigaddset(&awaited, signal);
   }
   // The signals are blocked in this thread and in every later one; only the thread below receives
   // them.
@@ -221,7 +222,7 @@ void clean_up_on_signals() {
     do {
       if (::sigwait(&awaited, &signal) != 0) return;
     } while (asks_first() && !stop_flag().exchange(true));
-    living().mutex.lock();  // never unlocked: no further file may appear
+    living().mutex.lock();  // stays locked: no thread may write another file
     for (OutputSet* set : living().sets) set->discard();
     ::signal(signal, SIG_DFL);
     sigset_t one;

@@ -41,14 +41,14 @@ class OutputSet {
   friend void clean_up_on_signals();
   struct Entry {
     std::string name;
-    std::filesystem::path temporary;  // empty: the file was written directly
+    std::filesystem::path temporary;  // path; empty: the target was written directly
   };
   bool is_kept(const std::filesystem::path& path) const;
   void discard() noexcept;
   void make_folder();
 
   std::filesystem::path folder_;
-  std::vector<std::filesystem::path> made_;  // folders that this set made, outermost first
+  std::vector<std::filesystem::path> made_;  // created folders, outermost first
   std::vector<Entry> entries_;
   std::vector<std::string> kept_;
 };

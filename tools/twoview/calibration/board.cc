@@ -29,8 +29,11 @@ constexpr int kDarkLevel = 40;
 const cv::Size kSmallestBoard(3, 3);
 // In a sharp picture of any size the board's edges rise within 2 to 4 px.
 constexpr double kMaxRisePx = 5, kMaxRiseOfMedian = 1.8;
-constexpr double kMinMoveShare = 0.015;    // as a share of the image's diagonal
-constexpr double kLargerBoardShare = 0.4;  // as a share of the contrast within the board
+// Two views are duplicates if their distance_px is below this share of the image's diagonal.
+constexpr double kMinMoveShare = 0.015;
+// A grid is a part of a larger board if the second row of squares outside its corners has more than
+// this share of the contrast of the row inside them.
+constexpr double kLargerBoardShare = 0.4;
 // The wall-clock limit is this many times the CPU limit, for a busy machine.
 constexpr int kWallPerCpu = 8;
 
@@ -73,7 +76,7 @@ double alternation(const cv::Mat& luma, const Corners& line, const Corners& next
     const cv::Point2f middle = 0.5F * (line[i] + line[i + 1]);
     const cv::Point2f inward = 0.5F * (next[i] + next[i + 1]) - middle;
     const double grey = mean_around(luma, middle - squares_out * inward);
-    if (grey < 0) return 0;  // outside the image
+    if (grey < 0) return 0;  // the position is outside the image
     greys.push_back(grey);
   }
   double least = 255, most = -255;
@@ -116,7 +119,8 @@ bool is_part_of_a_larger_board(const cv::Mat& luma, const Grid& grid) {
     const int last = (row ? grid.inner.height : grid.inner.width) - 1;
     for (const auto& [outer, next] : {std::pair(0, 1), std::pair(last, last - 1)}) {
       const Corners side = line(row, outer), inside = line(row, next);
-      // Two squares further out the colours repeat.
+      // Rows of squares alternate with period two: compare the row inside the outermost corners
+      // with the second row outside them, which only a larger board has.
       const double own = alternation(luma, side, inside, -0.5F);
       const double beyond = alternation(luma, side, inside, 1.5F);
       if (own != 0 && beyond / own > kLargerBoardShare) return true;
@@ -151,7 +155,7 @@ void begin_with_a_dark_square(const cv::Mat& luma, cv::Size inner, Corners& corn
 }
 
 double edge_rise_px(const cv::Mat& luma, cv::Size inner, const Corners& corners) {
-  double rise = 0;  // the slower rise of the two directions, since motion blurs only one of them
+  double rise = 0;  // the larger of both directions: motion blurs one
   for (const bool vertical : {false, true})
     rise = std::max(
         rise, double(cv::estimateChessboardSharpness(luma, inner, corners, 0.8F, vertical)[0]));
@@ -174,7 +178,7 @@ bool is_dark(const cv::Mat& image) {
 // Searches for a chessboard of another size than the requested one.
 void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
   Corners corners;
-  cv::Mat meta;  // output of OpenCV that has the board's shape, one byte a corner
+  cv::Mat meta;  // output of OpenCV: its size is the number of corners
   if (!cv::findChessboardCornersSB(small, kSmallestBoard, corners,
                                    cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER, meta))
     return;
@@ -195,7 +199,7 @@ bool quick_search(const cv::Mat& small, cv::Size inner, Corners& corners) {
       cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
 }
 
-// A slower search that tolerates more noise and blur.
+// Searches with findChessboardCornersSB, which is slower and tolerates more noise and blur.
 bool thorough_search(const cv::Mat& small, cv::Size inner, Corners& corners) {
   return cv::findChessboardCornersSB(small, inner, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
 }
@@ -251,7 +255,7 @@ bool write_all(int file, const void* data, size_t size) {
 
 [[noreturn]] void search_as_child(int to_parent, const cv::Mat& luma, cv::Size inner,
                                   cv::Size likely_other, int limit_seconds) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the child also dies when Ctrl-C ends the parent
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the kernel kills this child if the parent ends
   const rlim_t seconds = static_cast<rlim_t>(limit_seconds);
   const rlimit limit{seconds, seconds + 1}, no_core{0, 0};
   ::setrlimit(RLIMIT_CPU, &limit);
@@ -261,7 +265,7 @@ bool write_all(int file, const void* data, size_t size) {
   Found found;
   try {
     found = search(luma, inner, likely_other, corners);
-  } catch (const std::exception&) {  // OpenCV throws for an image of a few pixels
+  } catch (const std::exception&) {  // thrown by OpenCV for an image of a few pixels
     found = Found{};
     corners.clear();
   }

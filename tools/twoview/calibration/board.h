@@ -8,7 +8,7 @@
 
 namespace cli {
 
-using Corners = std::vector<cv::Point2f>;  // row by row; (0, 0) is the centre of the first pixel
+using Corners = std::vector<cv::Point2f>;  // row by row; pixels, (0, 0): the centre of the first
 
 // The reason why a view of the board is not used; kUsed means that it is used.
 enum class Reason {
@@ -19,19 +19,19 @@ enum class Reason {
   kOtherBoard,    // a chessboard with more corners than requested
   kTimeLimit,     // the search reached its time limit
   kBlurred,       // the edges rise too slowly to locate a corner
-  kDuplicate,     // the board is where an earlier view has it
-  kSurplus,       // beyond --max-views
-  kOutlier        // its error is far above that of the other views
+  kDuplicate,     // the board has the position of an earlier view
+  kSurplus,       // --max-views other views are used
+  kOutlier        // its reprojection error is far above the median
 };
-const char* reason_name(Reason reason);   // for JSON: "partial_board" and so on
-const char* reason_words(Reason reason);  // for people: "only a part of the board is seen"
+const char* reason_name(Reason reason);   // for JSON, such as "partial_board"
+const char* reason_words(Reason reason);  // for people, such as "only a part of the board is seen"
 
 struct BoardView {
   std::string name;
   Reason reason = Reason::kUsed;
-  std::string detail;       // the numbers behind the reason, for the user; may be empty
+  std::string detail;       // the measured numbers that explain the reason; may be empty
   cv::Size seen;            // inner corners of another chessboard that was found; 0 if none
-  Corners corners;          // of the whole board, if it was found
+  Corners corners;          // of the requested board; empty if it was not found
   double edge_rise_px = 0;  // distance over which edges rise from 10 to 90 %, pixels
   cv::Mat thumbnail;        // a small grey picture of the view
   double thumbnail_scale = 1;

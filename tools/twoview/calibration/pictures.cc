@@ -78,7 +78,7 @@ std::vector<const BoardView*> shown_views(const std::vector<BoardView>& views) {
 void put_tilts(cv::Mat& sheet, cv::Rect place, const Calibration& c) {
   put_panel(sheet, place);
   const Pixel middle(place.x + place.width / 2.0, place.y + place.height / 2.0);
-  constexpr double most = 60;  // degrees at the rim of the plot
+  constexpr double most = 60;  // tilt at the rim of the plot, degrees
   const double unit = (std::min(place.width, place.height) / 2.0 - 34) / most;
   for (const double ring : {15.0, 30.0, 45.0, 60.0}) {
     put_ring(sheet, middle, ring * unit, ink::grid);
@@ -88,7 +88,7 @@ void put_tilts(cv::Mat& sheet, cv::Rect place, const Calibration& c) {
   put_line(sheet, middle - Pixel(0, most * unit), middle + Pixel(0, most * unit), ink::grid);
   for (const ViewFit& fit : c.fits) {
     cv::Vec3d normal(fit.R(0, 2), fit.R(1, 2), fit.R(2, 2));
-    if (normal.dot(fit.t) > 0) normal = -normal;  // towards the camera
+    if (normal.dot(fit.t) > 0) normal = -normal;  // the normal must point to the camera
     const double across = std::hypot(normal[0], normal[1]);
     const double reach = std::min(fit.tilt_deg, most) * unit;
     const Pixel way = across > 0 ? Pixel(normal[0], normal[1]) / across : Pixel(0, 0);
@@ -237,7 +237,7 @@ cv::Mat residuals_picture(const std::vector<BoardView>& views, const Calibration
   put_panel(sheet, panel.place);
   cv::Mat part = sheet(panel.place);
   const Pixel origin(panel.place.tl());
-  // Pixels of the sheet for one pixel of residual.
+  // Residuals are drawn enlarged by this factor: their root mean square is 12 pixels of the sheet.
   const double enlarged = 12 / std::max(c.rms_px, 1e-6);
   for (const ViewFit& fit : c.fits)
     for (size_t i = 0; i < fit.residuals.size(); ++i) {

@@ -10,7 +10,7 @@
 namespace cli {
 namespace {
 
-constexpr double kDegrees = 57.29577951308232;  // of a radian
+constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
 // A view is rejected if its error exceeds the median error both by this factor and by this number
 // of pixels.
 constexpr double kOutlierRatio = 3, kOutlierPx = 0.3;
@@ -18,7 +18,8 @@ constexpr int kOutlierRounds = 5;
 // The limits below which, or above which, a warning is given.
 constexpr size_t kFewViews = 10, kTiltedViews = 4;
 constexpr double kTiltedDeg = 15, kLittleCoverage = 0.6, kHighRmsPx = 0.5, kLowRmsPx = 0.1;
-// Relative to fx; relative to the image width.
+// A larger standard deviation gives a warning: that of fx as a share of fx, and that of the
+// principal point as a share of the image width.
 constexpr double kLargeFocalSigma = 0.005, kLargeCentreSigma = 0.005;
 
 std::vector<cv::Point3f> corners_of(const Board& board) {
@@ -29,7 +30,7 @@ std::vector<cv::Point3f> corners_of(const Board& board) {
   return corners;
 }
 
-// The result of OpenCV's calibration, unchanged.
+// The output of OpenCV's calibration functions.
 struct Answer {
   cv::Matx33d K = cv::Matx33d::eye();
   cv::Mat distortion;
@@ -54,7 +55,7 @@ std::vector<double> sigma_of(const std::vector<cv::Point3f>& board,
     if (lens == Lens::kKannalaBrandt) {
       cv::fisheye::projectPoints(points, projected, rotation, translation, answer.K,
                                  answer.distortion, 0, J);
-      A = J.colRange(0, shared);  // the columns of the pose follow, then the skew
+      A = J.colRange(0, shared);  // columns of J: camera, pose, skew
       B = J.colRange(shared, shared + own);
     } else {
       cv::projectPoints(points, rotation, translation, answer.K, answer.distortion, projected, J);

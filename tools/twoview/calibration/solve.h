@@ -21,21 +21,21 @@ std::vector<std::string> distortion_names(Lens lens);
 
 // The estimated pose and the residuals of one view.
 struct ViewFit {
-  size_t view = 0;  // index of its BoardView among all views
+  size_t view = 0;  // index of the view in the list of BoardViews
   double rms_px = 0;
-  double tilt_deg = 0;  // between the board's normal and the line of sight to its middle
-  cv::Matx33d R;        // camera_from_board
-  cv::Vec3d t;          // metres
-  std::vector<cv::Point2d> residuals;  // measured minus projected, pixels
+  double tilt_deg = 0;                 // angle of the board's normal to the line of sight
+  cv::Matx33d R;                       // rotation camera_from_board
+  cv::Vec3d t;                         // translation camera_from_board, metres
+  std::vector<cv::Point2d> residuals;  // measured minus projected corners, pixels
 };
 
 struct Calibration {
   Lens lens = Lens::kBrownConrady;
   tv_camera camera{};
-  std::vector<double> sigma;  // standard deviations: fx fy cx cy, then the distortion
+  std::vector<double> sigma;  // standard deviations of fx fy cx cy and the distortion
   // Root mean square over all corners of the distance between measured and projected corner.
   double rms_px = 0;
-  std::vector<ViewFit> fits;  // of the views that are used
+  std::vector<ViewFit> fits;  // one ViewFit for each used view
   double coverage = 0;        // share of the 8 x 8 cells of the image that hold a corner
 };
 
@@ -49,8 +49,8 @@ Calibration calibrate_camera(std::vector<BoardView>& views, const Board& board, 
 
 // A reason why the estimated camera may be unreliable.
 struct Warning {
-  std::string name;   // "few_views"
-  std::string words;  // for the user, with the number and what to do
+  std::string name;   // the key in JSON, such as "few_views"
+  std::string words;  // a sentence with the measured number and advice
 };
 std::vector<Warning> warnings_of(const Calibration& calibration);
 

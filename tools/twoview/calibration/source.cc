@@ -19,7 +19,7 @@ constexpr double kLooksPerSecond = 4;
 constexpr int kMaxLooks = 240;
 // A container may round the number of frames that it states.
 constexpr double kMinShareOfFrames = 0.9;
-constexpr int64_t kMaxFrames = 1000000;  // of a file; a larger number means an endless stream
+constexpr int64_t kMaxFrames = 1000000;  // most frames that are read; an endless stream has more
 
 std::string size_text(cv::Size size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);

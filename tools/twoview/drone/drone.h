@@ -22,7 +22,7 @@ CLI::Validator number_in(double low, double high);
 // Adds --duration: the verb ends by itself after this number of seconds; 0 means no limit.
 void add_duration(CLI::App& verb, double& seconds);
 
-// Adds a verb to `drone`.
+// A function that adds a verb to the command `drone`; `run` receives the work of the chosen verb.
 using AddDroneVerb = void (*)(CLI::App& drone, Run& run);
 
 // Adds `drone` with its verbs. `add_simulate` adds the verb that needs the simulator; pass null in

@@ -9,7 +9,7 @@ Keyboard::Keyboard() : is_terminal_(::isatty(STDIN_FILENO) != 0) {
   if (!is_terminal_) return;
   ::tcgetattr(STDIN_FILENO, &before_);
   termios raw = before_;
-  raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C still raises a signal
+  raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // ISIG stays: Ctrl-C raises SIGINT
   raw.c_cc[VMIN] = 0;
   raw.c_cc[VTIME] = 0;
   ::tcsetattr(STDIN_FILENO, TCSANOW, &raw);

@@ -12,7 +12,7 @@
 
 namespace cli {
 
-// A drone on the network.
+// The connection to a drone on the network.
 class Link {
  public:
   // `options` must be initialised by ardrone_session_options_init; this class sets their callbacks

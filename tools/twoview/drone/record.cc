@@ -62,7 +62,7 @@ int record(const Arguments& a) {
   const auto seconds = [start] { return static_cast<double>(ardrone_now_ns() - start) * 1e-9; };
   double next_word = 0;
   Link link(a.address, options, listener);
-  recording.emplace(a.output, a.frames);  // only after Link has checked that the host exists
+  recording.emplace(a.output, a.frames);  // makes the folder after Link has checked the host
   link.run(
       [&] {
         if (is_terminal && seconds() >= next_word) {

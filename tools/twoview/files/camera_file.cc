@@ -151,7 +151,7 @@ tv_camera turned(const tv_camera& camera, int quarters) {
     result.fy = before.fx;
     result.cx = before.cy;
     result.cy = before.width - 1 - before.cx;
-    // The tangential coefficients rotate with the image.
+    // The tangential coefficients p1 and p2, k[2] and k[3], rotate with the image.
     if (result.model == TV_CAMERA_BROWN_CONRADY) {
       result.k[2] = -before.k[3];
       result.k[3] = before.k[2];

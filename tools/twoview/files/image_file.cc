@@ -57,7 +57,7 @@ cv::Mat decode(const std::string& path) {
   try {
     const StderrSilence silence;
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U,
-                          // imdecode only reads
+                          // The cast is safe, since imdecode does not write.
                           const_cast<char*>(bytes.data()));
     pixels = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception&) {
@@ -71,7 +71,7 @@ cv::Mat decode(const std::string& path) {
   return pixels;
 }
 
-// round(v / 257): 0 to 0 and 65535 to 255, exactly.
+// Converts 16-bit samples v to round(v / 257), which maps 0 to 0 and 65535 to 255.
 cv::Mat to_8_bits(const cv::Mat& pixels) {
   cv::Mat result(pixels.size(), CV_MAKETYPE(CV_8U, pixels.channels()));
   const int count = pixels.cols * pixels.channels();

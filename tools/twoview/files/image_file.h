@@ -8,15 +8,15 @@
 
 namespace cli {
 
-constexpr int kMaxSide = 16384;  // pixels, the library's limit
+constexpr int kMaxSide = 16384;  // largest width or height, pixels: the library's limit
 
 // An image in the forms that the library and the pictures of the report need.
 struct Picture {
   std::string path;
-  std::string name;                     // without the folder
-  cv::Mat luma;                         // 8 bits
-  cv::Mat colour;                       // 8-bit BGR, of the same size
-  int file_width = 0, file_height = 0;  // before resizing
+  std::string name;                     // the file name without the folder
+  cv::Mat luma;                         // 8-bit grey
+  cv::Mat colour;                       // 8-bit BGR, of the size of luma
+  int file_width = 0, file_height = 0;  // pixels, before resizing
 
   tv_image view() const;
   // The number of pixels of this image for one pixel of the file: 1 unless it was resized.
@@ -39,7 +39,7 @@ cv::Mat load_pixels(const std::string& path);
 // enlarges; 0 means no resizing.
 void shrink(Picture& picture, int longer);
 
-// Turns the image by quarter turns counter-clockwise.
+// Rotates the image counter-clockwise by this number of quarter turns.
 void turn(Picture& picture, int quarters);
 
 // Reads a depth map: one 32-bit float a pixel (TIFF or PFM). Throws BadInput.

@@ -25,7 +25,7 @@ ImageHeader read_png(Bytes bytes) {
   header.width = static_cast<int64_t>(number(bytes, 16, 4, true));
   header.height = static_cast<int64_t>(number(bytes, 20, 4, true));
   header.truncated = true;
-  for (size_t at = 8; at + 12 <= bytes.size();) {  // chunks: length, type, data, checksum
+  for (size_t at = 8; at + 12 <= bytes.size();) {  // PNG chunk: length, type, data, checksum
     const uint64_t length = number(bytes, at, 4, true);
     if (length > bytes.size() - at - 12) break;
     if (bytes.substr(at + 4, 4) == "IEND") header.truncated = false;
@@ -41,7 +41,7 @@ ImageHeader read_jpeg(Bytes bytes) {
   while (at + 4 <= bytes.size()) {
     if (bytes[at] != '\xff') return header;
     const auto marker = static_cast<uint8_t>(bytes[at + 1]);
-    if (marker == 0xff) {  // fill byte
+    if (marker == 0xff) {  // 0xff before a marker is a fill byte
       ++at;
       continue;
     }
@@ -51,7 +51,7 @@ ImageHeader read_jpeg(Bytes bytes) {
       header.height = static_cast<int64_t>(number(bytes, at + 5, 2, true));
       header.width = static_cast<int64_t>(number(bytes, at + 7, 2, true));
     }
-    if (marker == 0xda) {  // compressed data follow, up to the end-of-image marker
+    if (marker == 0xda) {  // start of scan: compressed data follow
       header.truncated = bytes.find("\xff\xd9", at) == Bytes::npos;
       return header;
     }
@@ -74,7 +74,7 @@ ImageHeader read_bmp(Bytes bytes) {
 ImageHeader read_pnm(Bytes bytes) {
   ImageHeader header;
   size_t at = 2;
-  int64_t values[3] = {0, 0, 1};  // width, height, largest sample
+  int64_t values[3] = {0, 0, 1};  // PNM header: width, height, largest sample
   const char kind = bytes[1];
   const int count = kind == '1' || kind == '4' ? 2 : 3;
   for (int i = 0; i < count; ++i) {
@@ -110,7 +110,7 @@ ImageHeader read_tiff(Bytes bytes) {
   for (uint64_t i = 0; i < count; ++i) {
     const size_t at = directory + 2 + static_cast<size_t>(i) * 12;
     const uint64_t tag = number(bytes, at, 2, big);
-    const int width = number(bytes, at + 2, 2, big) == 3 ? 2 : 4;  // SHORT or LONG
+    const int width = number(bytes, at + 2, 2, big) == 3 ? 2 : 4;  // SHORT: 2 bytes, LONG: 4
     const auto value = static_cast<int64_t>(number(bytes, at + 8, width, big));
     if (tag == 256) header.width = value;
     if (tag == 257) header.height = value;

@@ -10,7 +10,7 @@ namespace cli {
 
 struct ImageHeader {
   int64_t width = 0, height = 0;  // 0 if the format is not one that read_image_header parses
-  bool truncated = false;         // the end mark that the format requires is missing
+  bool truncated = false;         // the format's end mark is missing
 };
 
 // Parses the headers of PNG, JPEG, BMP, PNM and TIFF. It never fails and never reads outside

@@ -11,7 +11,7 @@ namespace cli {
 namespace {
 
 constexpr size_t kMaxFileBytes = size_t{256} << 20;
-constexpr size_t kMaxMatches = 1000000;  // the library's limit of matches for a context
+constexpr size_t kMaxMatches = 1000000;  // the library's limit of max_matches of a context
 constexpr const char* kColumns[4] = {"x0", "y0", "x1", "y1"};
 
 // The fields of a line; a comma directly followed by another one gives an empty field.

@@ -7,7 +7,7 @@
 namespace cli {
 
 struct MatchList {
-  std::vector<double> pixels[2];  // x y of each match
+  std::vector<double> pixels[2];  // [image]: x y of each match
   size_t size() const { return pixels[0].size() / 2; }
 };
 

@@ -9,11 +9,11 @@ namespace cli {
 
 struct Pair {
   std::string name0, name1;
-  int turns0 = 0, turns1 = 0;  // quarter turns counter-clockwise, applied to the image and to K
+  int turns0 = 0, turns1 = 0;  // counter-clockwise quarter turns of the image and K
   bool has_K = false;
-  std::array<double, 9> K0{}, K1{};  // row-major, of the images before they are turned
+  std::array<double, 9> K0{}, K1{};  // row-major, for the images before they are turned
   bool has_truth = false;
-  std::array<double, 9> R{};  // x1 = R x0 + t, before the images are turned
+  std::array<double, 9> R{};  // true pose x1 = R x0 + t before the images are turned
   std::array<double, 3> t{};
 };
 

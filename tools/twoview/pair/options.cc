@@ -14,7 +14,7 @@
 namespace cli {
 namespace {
 
-// The names of an enumeration with consecutive values.
+// The names of an enumeration's values on the command line; the values are consecutive.
 using Names = std::vector<std::string>;
 
 const Names kOrientations = {"upright", "gradient"};
@@ -27,7 +27,7 @@ const Names kTriangulations = {
 struct Choice {
   int32_t* value;
   const Names* names;
-  int32_t first = 0;  // the value of the first name
+  int32_t first = 0;  // the enumeration value of names[0]
 };
 
 // A direction: three numbers that are not all zero; the length does not matter.
@@ -40,7 +40,7 @@ struct Option {
   OptionGroup group;
   std::variant<int32_t*, uint64_t*, float*, double*, Choice, Direction> target;
   double low, high;
-  // Whether the bound `low`, or `high`, is itself refused.
+  // The interval of accepted values: closed, or without the bound `low`, or without `high`.
   enum Ends { kClosed, kOpenLow, kOpenHigh } ends;
   const char* help;
 };
@@ -118,7 +118,7 @@ std::string range_text(const Option& option) {
 bool in_range(const Option& option, double value) {
   const bool low = option.ends == Option::kOpenLow ? value > option.low : value >= option.low;
   const bool high = option.ends == Option::kOpenHigh ? value < option.high : value <= option.high;
-  return low && high;  // NaN makes both comparisons false
+  return low && high;  // NaN is refused: its comparisons are false
 }
 
 // Parses the whole text as one number; anything left over is an error.

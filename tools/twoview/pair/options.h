@@ -19,9 +19,9 @@ struct Options {
   int32_t guided_matching = 0;
   int32_t bundle_adjustment = 0;
   int32_t kernels = TV_KERNELS_AUTO;
-  int32_t resize = 0;  // longer side after resizing, pixels; 0: no resizing
+  int32_t resize = 0;  // longer side of the resized images, pixels; 0: not resized
   bool min_threshold_given = false;
-  double gravity_sigma_deg = 0;  // settle() copies it to `estimate`
+  double gravity_sigma_deg = 0;  // settle() copies it, in radians, to `estimate`
 
   Options();
   // Checks and completes the options that depend on each other. Call it once, after parsing.
@@ -36,7 +36,7 @@ enum OptionGroup : unsigned {
   kTriangulate = 8,
   kCommon = 16,
   kAllOptions = 31,
-  kGravity = 32  // gravity in both cameras of one pair
+  kGravity = 32  // --gravity0 and so on, for verbs with one pair
 };
 
 // Adds the flags of these groups to a verb. `options` must outlive the parsing.

@@ -16,7 +16,7 @@ namespace cli {
 
 // The distance between the two camera positions, and the measurement that gave it.
 struct MetricScale {
-  std::string source;  // "velocity", "altitude", "floor"
+  std::string source;  // the measurement: "velocity", "altitude" or "floor"
   double baseline_m = 0, sigma_m = 0;
 };
 
@@ -27,9 +27,9 @@ struct Outcome {
   // The cameras of the images as used: those of the camera files, scaled if the image was resized.
   tv_camera camera[2]{};
   tv_two_view two_view{};
-  tv_reconstruction reconstruction{};  // its arrays lie in the context
-  std::optional<MetricScale> scale;    // if set, outputs are in metres, else in baselines
-  nlohmann::ordered_json json;         // result.json
+  tv_reconstruction reconstruction{};  // its arrays are valid until the context's next call
+  std::optional<MetricScale> scale;    // empty: outputs are in baselines, else in metres
+  nlohmann::ordered_json json;         // the content of result.json
 };
 
 // The camera that pose and points refer to: the camera file's, with the estimated shift added to
@@ -42,7 +42,7 @@ double unit_of(const Outcome& outcome);
 
 // A point of the cloud with its colour in image 0.
 struct CloudPoint {
-  double x, y, z;  // camera 0 frame, metres or baselines
+  double x, y, z;  // in camera 0's frame, in metres or baselines (unit_of)
   uint8_t red, green, blue;
   float angle_deg, error_px;
 };
@@ -52,11 +52,12 @@ std::vector<CloudPoint> cloud_of(const Outcome& outcome);
 // must have a full pose.
 struct Frustum {
   Vector3 centre;
-  std::array<Vector3, 4> corners;  // the corners of the image, in order around it
+  std::array<Vector3, 4> corners;  // the image's corners, in order around it
 };
 Frustum frustum_of(const Outcome& outcome, int camera, double size);
 
-// result.json without the entries `truth`, `timings_ms`, `context_bytes`, `options` and `kernels`.
+// Makes the content of result.json except `truth`, `timings_ms`, `context_bytes`, `options` and
+// `kernels`, which the caller adds.
 nlohmann::ordered_json result_json(const Outcome& outcome);
 
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.

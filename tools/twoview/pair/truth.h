@@ -34,8 +34,8 @@ KnownPose load_pose(const std::string& path);
 struct Truth {
   Matrix3 R{};
   Vector3 t{};
-  double baseline = 0;  // length of t if the file has no baseline
-  cv::Mat depth0;       // empty if there is no depth map
+  double baseline = 0;  // the entry `baseline` in metres; without it |t|
+  cv::Mat depth0;       // depths of image 0; empty if there is no depth map
 };
 Truth load_truth(const std::string& path);
 

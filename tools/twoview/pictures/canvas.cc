@@ -51,7 +51,7 @@ int32_t front_character(const char* text, size_t size, size_t& length) {
 }  // namespace
 
 std::string plain_letters(const std::string& text) {
-  // Replacements of the letters U+00C0 to U+017F.
+  // The ASCII replacement of each letter from U+00C0 to U+017F, in order.
   static const char letters[] =
       "AAAAAAACEEEEIIIIDNOOOOOxOUUUUYTsaaaaaaaceeeeiiiidnooooo_ouuuuyty"
       "AaAaAaCcCcCcCcDdDdEeEeEeEeEeGgGgGgGgHhHhIiIiIiIiIiIiJjKkkLlLlLlLlLlNnNnNnnNnOoOoOoOoRrRrRr"

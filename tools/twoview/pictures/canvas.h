@@ -6,7 +6,7 @@
 
 namespace cli {
 
-using Colour = cv::Scalar;  // blue green red
+using Colour = cv::Scalar;  // in the order blue, green, red
 
 namespace ink {
 const Colour paper(32, 24, 20), panel(44, 34, 28), grid(72, 60, 52), text(236, 230, 226),
@@ -25,7 +25,7 @@ void put_text(cv::Mat& sheet, const std::string& text, cv::Point2d at, double he
               const Colour& colour, Align align = Align::kLeft);
 double text_width(const std::string& text, double height);
 
-// Shortens text to a width with "..." in the middle.
+// Returns the text, shortened by "..." in its middle if it is wider than `width` pixels.
 std::string fitted(const std::string& text, double height, double width);
 
 // Draws an anti-aliased line with end points of sub-pixel precision.

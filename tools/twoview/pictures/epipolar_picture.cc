@@ -114,7 +114,7 @@ class Epipolar {
   const Outcome& outcome_;
   bool by_rays_ = false;
   tv_camera camera_[2]{};
-  Matrix3 matrix_{};  // E or F
+  Matrix3 matrix_{};  // E for rays (by_rays_), else F for pixels
   Vector3 epipole_[2]{};
 };
 
@@ -197,7 +197,7 @@ cv::Mat epipolar_picture(const Outcome& outcome) {
   PairSheet pair(outcome.picture[0].luma, outcome.picture[1].luma, 0.8);
   const std::vector<int> chosen = spread_inliers(r, kNumLines);
   for (int image = 0; image < 2; ++image) {
-    cv::Mat part = pair.part(image);  // clips the lines to the image
+    cv::Mat part = pair.part(image);  // drawing in `part` clips at the image's border
     const cv::Point2d corner = pair.frame(image).tl();
     cv::Mat layer = part.clone();
     for (size_t i = 0; i < chosen.size(); ++i) {

@@ -10,7 +10,7 @@
 namespace cli {
 namespace {
 
-constexpr int kMaxLines = 110;  // with more lines the picture is unreadable
+constexpr int kMaxLines = 110;  // most matches drawn; more are unreadable
 
 std::string counted(int count, const char* noun) {
   return std::to_string(count) + " " + noun +
@@ -19,7 +19,7 @@ std::string counted(int count, const char* noun) {
                                                       : "s");
 }
 
-// At most `most` elements of the list, evenly spaced.
+// Returns the list, or `most` evenly spaced elements if it has more.
 std::vector<int> thinned(const std::vector<int>& list, int most) {
   const int count = static_cast<int>(list.size());
   if (count <= most) return list;

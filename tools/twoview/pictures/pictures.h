@@ -1,4 +1,4 @@
-// The pictures that a run writes, each 8-bit BGR.
+// The pictures that the verbs write. Each function returns an 8-bit BGR image.
 #pragma once
 
 #include <opencv2/core/mat.hpp>

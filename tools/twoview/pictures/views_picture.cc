@@ -50,12 +50,12 @@ class Plot {
   Plot(cv::Mat& sheet, cv::Rect frame, Range across, Range down)
       : sheet_(sheet), frame_(frame), across_(across), down_(down) {
     scale_ = std::min(frame.width / across.length(), frame.height / down.length());
-    // The axis with unused room gets a larger range.
+    // The scale fits the longer axis; the range of the other one grows until it fills the frame.
     grow(across_, frame.width / scale_);
     grow(down_, frame.height / scale_);
   }
 
-  cv::Point2d at(double a, double d) const {  // within the frame
+  cv::Point2d at(double a, double d) const {  // pixels from the frame's top left corner
     return {(a - across_.low) * scale_, (d - down_.low) * scale_};
   }
   bool holds(double a, double d) const {
@@ -127,7 +127,7 @@ int draw_cloud(Plot& plot, const std::vector<CloudPoint>& cloud, double CloudPoi
   return outside;
 }
 
-// Draws a camera as seen along the x axis.
+// Draws the frustum of a camera, seen along the x axis of camera 0.
 void draw_camera(Plot& plot, const Frustum& frustum, const Colour& colour) {
   cv::Mat part = plot.part();
   const auto at = [&](const Vector3& p) { return plot.at(p[2], p[1]); };

@@ -8,12 +8,13 @@
 namespace cli {
 namespace {
 
-constexpr double kMaxGapS =
-    0.25;  // longest gap in a log that is integrated, seconds; demo mode gives 15 samples a second
+// The longest gap in the flight log over which attitudes are interpolated and velocities
+// integrated, seconds. Demo mode gives 15 samples a second.
+constexpr double kMaxGapS = 0.25;
 // Altitudes are averaged over this time before and after an instant.
 constexpr double kAltitudeWindowS = 0.1;
 constexpr double kLayer = 0.04;  // thickness of a floor as a share of its distance below the camera
-constexpr size_t kLeastFloor = 20;    // fewest points of a floor
+constexpr size_t kLeastFloor = 20;    // least number of points of a floor
 constexpr double kFloorShare = 0.05;  // least share of all points that a floor must hold
 constexpr double kWorstShare = 0.25;
 
@@ -155,7 +156,7 @@ std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
   struct Below {
     double depth, level_distance;
   };
-  std::vector<Below> below;  // points below the camera
+  std::vector<Below> below;  // the points that lie below the camera
   for (const Vector3& point : points) {
     const Vector3 p = applied(world_from_camera, point);
     if (p[2] > 0) below.push_back({p[2], std::hypot(p[0], p[1])});

@@ -18,17 +18,17 @@ struct FlightSample {
   uint32_t run = 0;
   Matrix3 world_from_body{};
   double attitude_sigma_rad = 0;
-  std::optional<Vector3> velocity_m_s;  // body axes
-  double velocity_sigma = 0;            // of each component; one error that all samples share
-  std::optional<double> altitude_m;     // above the ground below, up is positive
+  std::optional<Vector3> velocity_m_s;  // in body axes
+  double velocity_sigma = 0;            // m/s, of each component; all samples share one error
+  std::optional<double> altitude_m;     // height above the ground below the drone
   double altitude_sigma = 0;
 };
-using FlightLog = std::vector<FlightSample>;  // sorted by time
+using FlightLog = std::vector<FlightSample>;  // samples sorted by time
 
-// The pose of the camera in the body.
+// The pose of the camera in the frame of the drone's body.
 struct CameraMount {
-  Matrix3 body_from_camera{0, 0, 1, 1, 0, 0, 0, 1, 0};  // default: the camera looks forward
-  Vector3 position{0, 0, 0};                            // metres, body axes
+  Matrix3 body_from_camera{0, 0, 1, 1, 0, 0, 0, 1, 0};  // default: a camera that looks forward
+  Vector3 position{0, 0, 0};                            // in body axes, metres
 };
 
 // The attitude at a time, interpolated between samples of one run that are at most max_gap_s apart;

@@ -43,7 +43,7 @@ void GrowingFile::append(const void* bytes, size_t size) {
     if (written <= 0) {
       const std::string why = reason();
       if (::ftruncate(descriptor_, size_) != 0) {
-      }  // if the truncation fails too, readers stop at the last complete entry
+      }  // a failed truncation is ignored: readers stop at the last complete entry
       throw BadInput("cannot write " + name_ + ": " + why + "; what was recorded before is kept");
     }
     at += written;

@@ -15,8 +15,8 @@ namespace cli {
 
 struct RecordingOptions {
   std::string folder;
-  std::vector<int> frames;                               // two indices, or none
-  std::vector<double> body_from_camera, camera_in_body;  // 9 and 3 numbers, or none
+  std::vector<int> frames;  // indices of two pictures; empty: the pair is chosen
+  std::vector<double> body_from_camera, camera_in_body;  // 9 and 3 numbers; empty: not given
 
   // Adds the options to a verb; adds nothing in a program without the driver.
   void add_to(CLI::App& verb);
@@ -37,9 +37,9 @@ class RecordingInput {
   void add_gravity(tv_estimate_options& options);
   // Sets outcome.scale if the measurements of the flight determine it. Call it before result_json.
   void add_scale(Outcome& outcome) const;
-  // Adds "imu" and "recording" to outcome.json.
+  // Adds the entries "imu" and "recording" to the member `json` of outcome.
   void add_json(Outcome& outcome) const;
-  // The lines of the summary for the user.
+  // The lines on the recording in the summary that is printed for the user.
   std::string words(const Outcome& outcome) const;
 
  private:

@@ -15,8 +15,8 @@ namespace cli {
 struct RecordedFrame {
   int index = 0;        // index among the decoded pictures, from 0
   uint64_t number = 0;  // the drone's own frame number
-  double time_s = 0;    // host clock
-  bool timed = false;   // whether its time is known on the clock of the attitudes
+  double time_s = 0;    // time of the picture on the host's clock, seconds
+  bool timed = false;   // whether time_s is known on the attitudes' clock
 };
 
 struct RecordedFlight {

@@ -174,7 +174,7 @@
   document.getElementById("view-side").addEventListener("click", () => look(Math.PI / 2, 0));
   document.getElementById("view-top").addEventListener("click", () => look(0, 1.57));
 
-  // A slow swing until someone takes hold of it.
+  // The cloud swings slowly to the left and right until the user moves it.
   let began = 0;
   function swing(now) {
     if (!turning) return;

@@ -12,13 +12,13 @@ namespace cli {
 struct Figure {
   std::string title, caption;
   cv::Mat picture;
-  bool is_photo;  // true: embedded as JPEG, false: as PNG
+  bool is_photo;  // the page embeds a photo as JPEG, else as PNG
 };
 
 std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& cloud,
                         const std::vector<Figure>& figures);
 
-// Base64 by RFC 4648, with padding.
+// Encodes bytes as Base64 (RFC 4648) with padding.
 std::string base64(const std::string& bytes);
 
 }  // namespace cli

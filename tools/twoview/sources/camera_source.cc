@@ -77,7 +77,7 @@ bool CameraSource::State::take(Shot& shot) {
     else
       cv::cvtColor(colour, shot.luma, cv::COLOR_BGR2GRAY);
   } catch (const cv::Exception&) {
-    return false;  // the device was disconnected
+    return false;  // OpenCV throws if the device was disconnected
   }
   if (shot.luma.depth() != CV_8U) return false;
   shot.number = num_taken++;

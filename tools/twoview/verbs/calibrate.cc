@@ -19,8 +19,8 @@
 namespace cli {
 namespace {
 
-constexpr int kMinSide = 3, kMaxBoardSide = 100;  // numbers of inner corners; 3 is OpenCV's minimum
-constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // CPU time for one search
+constexpr int kMinSide = 3, kMaxBoardSide = 100;     // inner corners in a row; 3: OpenCV's minimum
+constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // CPU limit of one search
 // This many views of another board show that the given size is wrong.
 constexpr int kTellingViews = 2;
 
@@ -133,7 +133,7 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
     image = luma.size();
     views.push_back(find_board(luma, name, a.board.inner, likely_other_board(views), seconds));
     if (!views.back().is_used() || !live) return true;
-    reject_duplicates(views, image);  // a live source continues until it has enough different views
+    reject_duplicates(views, image);  // of a live source only different views count
     num_found += views.back().is_used();
     if (a.common.speaks() && views.back().is_used())
       print("view " + std::to_string(num_found) + " of " + std::to_string(a.max_views) +

@@ -48,7 +48,7 @@ bool is_wanted(const tv_point& point, double max_error_px) {
 }
 
 std::vector<CloudPoint> cloud(const std::vector<tv_point>& points, double max_error_px) {
-  constexpr uint8_t grey = 200;  // no image is given, so the points are grey
+  constexpr uint8_t grey = 200;  // grey level of all points: there is no image
   std::vector<CloudPoint> cloud;
   for (const tv_point& p : points)
     if (is_wanted(p, max_error_px))

@@ -29,7 +29,7 @@ struct Arguments {
 
 // The position in the old image of each pixel of the new one, by the library's lens models.
 struct Map {
-  cv::Mat place;  // x and y in the old image, 32-bit floats
+  cv::Mat place;  // for each new pixel x y in the old image, 32-bit floats
   // 255 if the lens model is valid there and the position is in the old image, else 0
   cv::Mat seen;
 };
@@ -65,7 +65,7 @@ Map map_to(const tv_camera& lens, const tv_camera& pinhole) {
 cv::Mat undistorted(const cv::Mat& image, const Map& map) {
   cv::Mat remapped, result;
   cv::remap(image, remapped, map.place, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-  remapped.copyTo(result, map.seen);  // the other pixels stay zero
+  remapped.copyTo(result, map.seen);  // pixels without a position stay 0
   return result;
 }
 

@@ -4,7 +4,7 @@ comparison. See docs/accuracy.md."""
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before importing numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -27,7 +27,7 @@ ERRORS = ("rotation_error_deg", "translation_error_deg", "translation_error_sign
           "pose_error_deg")
 
 
-# ---- ours --------------------------------------------------------------------------------------
+# ---- twoview's own rows ------------------------------------------------------------------------
 
 def run_program(program, data, extra):
     """Runs `twoview evaluate` on a set. Returns its rows, and its report without the pairs."""
@@ -65,8 +65,8 @@ def run_program(program, data, extra):
 
 
 def run_library(path, data, extra):
-    """The same as run_program, but through libtwoview.so. Options of the command line are not
-    applied."""
+    """Evaluates a set through libtwoview.so. Returns its rows and an empty report. `extra`, options
+    of `twoview evaluate`, must be empty."""
     if extra:
         sys.exit("accuracy: --ours library takes no options of the program")
     rows = pipeline.evaluate_pairs(data.dir, library=path, resize=data.resize,
@@ -74,7 +74,7 @@ def run_library(path, data, extra):
     return rows, {}
 
 
-# ---- the paired comparison ----------------------------------------------------------------------
+# ---- the paired comparison ---------------------------------------------------------------------
 
 def print_comparison(peer, compared, sizes):
     say(f"\n{OURS} minus {peer}: difference of AUC, standard error, 95 % interval")
@@ -172,7 +172,7 @@ def compare_pipelines(arguments, sets):
 
 
 def write_report(arguments, names, extra):
-    """Writes compare_colmap's report and returns its exit status."""
+    """Runs compare_colmap, which writes its report, and returns its exit status."""
     program = os.path.join(datasets.ROOT, "tools", "compare_colmap", "compare_colmap")
     lists = [os.path.join(datasets.data_dir(), name, "pairs.txt") for name in names]
     some = ["--max-pairs", str(QUICK_PAIRS)] if arguments.quick else []

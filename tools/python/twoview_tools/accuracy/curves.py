@@ -7,7 +7,7 @@ docs/accuracy.md.
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before importing numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -41,7 +41,8 @@ def matches_by_ratio(context, data, ratios):
 
 
 def measure(names, library, flagged, max_pairs):
-    """Measures {"max_error_px": {value: {set: rows}}, "ratio": {value: {set: rows}}}."""
+    """Evaluates the sets at each inlier threshold and at each ratio. Returns
+    {"max_error_px": {threshold: {set: rows}}, "ratio": {ratio: {set: rows}}}."""
     default = library.match_options().ratio
     nearest = min(RATIOS, key=lambda r: abs(r - default))
     found = {"max_error_px": {t: {} for t in THRESHOLDS_PX}, "ratio": {r: {} for r in RATIOS}}

@@ -8,8 +8,8 @@ import numpy as np
 
 from .. import ROOT, formats
 
-MAX_NATIVE_WIDTH = 1241  # wider images are resized
-RESIZE_LONG_SIDE = 640  # the long side of such an image after resizing
+MAX_NATIVE_WIDTH = 1241  # pixels; by default a set of wider images is resized
+RESIZE_LONG_SIDE = 640  # pixels, the long side of an image after resizing
 # For these sets the truth of pairs_flagged.txt is from a calibrated gantry and is reliable;
 # "flagged" only means that plain SIFT could not confirm the pair.
 FLAGGED_SETS = ("middlebury_dinoSR", "middlebury_templeSR")
@@ -47,7 +47,7 @@ def read_cameras(set_dir):
 
 
 def distortion_of(camera):
-    """k1 k2 p1 p2 k3 of a formats.Camera; zeros if there is no camera."""
+    """The distortion coefficients k1 k2 p1 p2 k3 of a formats.Camera; zeros if there is none."""
     return (list(camera.k) if camera else []) or [0.0] * 5
 
 
@@ -88,7 +88,7 @@ def undistort(points, K, distortion):
     for _ in range(50):
         s = x * x + y * y
         radial = 1 + s * (k1 + s * (k2 + s * k3))
-        slope = k1 + s * (2 * k2 + 3 * k3 * s)  # derivative of the radial factor by s
+        slope = k1 + s * (2 * k2 + 3 * k3 * s)  # d radial / d s
         error_x = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x) - target[:, 0]
         error_y = y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y - target[:, 1]
         xx = radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x
@@ -132,7 +132,7 @@ class Set:
     """A data set. An image stays in memory after it was first read."""
 
     def __init__(self, set_dir, resize=None, flagged=False, max_pairs=None):
-        """resize: None for the default size of the tables, 0 for native, else the long side.
+        """resize: the long side in pixels, 0 for the native size, None for the size of the tables.
         max_pairs: use this many pairs, evenly spaced."""
         self.dir = set_dir
         self.max_pairs = max_pairs

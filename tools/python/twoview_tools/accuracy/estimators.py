@@ -9,7 +9,7 @@ import numpy as np
 
 from . import datasets
 
-# The same bounds for all estimators; by default our sampler draws at most this many samples.
+# The confidence of every estimator, and the most samples that each but OpenGV may draw.
 CONFIDENCE = 0.9999
 MAX_ITERATIONS = 10000
 # OpenGV's own default; with ten times as many it took longer than all other peers
@@ -22,7 +22,7 @@ class Matches:
     def __init__(self, pixels0, pixels1, cameras, sizes, ratios=None):
         self.pixels0 = np.asarray(pixels0, float).reshape(-1, 2)
         self.pixels1 = np.asarray(pixels1, float).reshape(-1, 2)
-        self.cameras, self.sizes = cameras, sizes  # ((K, distortion) x 2), ((width, height) x 2)
+        self.cameras, self.sizes = cameras, sizes  # each a pair: (K, distortion), (width, height)
         self.ratios = ratios
         self.rays0 = datasets.undistort(self.pixels0, *cameras[0])
         self.rays1 = datasets.undistort(self.pixels1, *cameras[1])
@@ -115,7 +115,7 @@ def _pycolmap_calibrated(matches, order, threshold_px, seed):
     if pose is None:
         return None
     t = np.array(pose.translation)
-    if not np.linalg.norm(t) > 0:  # no pose, or a pure rotation
+    if not np.linalg.norm(t) > 0:  # t = 0: no pose was found, or a pure rotation
         return None
     return pose.rotation.matrix(), t, len(geometry.inlier_matches)
 
@@ -126,7 +126,7 @@ def unit_rays(rays):
 
 
 def sampson_squared(rays0, rays1, R, t):
-    """Squared Sampson distance of normalised points."""
+    """The squared Sampson distance of each match, from normalised points (n x 2) and the pose."""
     tx, ty, tz = t
     E = np.array([[0, -tz, ty], [tz, 0, -tx], [-ty, tx, 0]]) @ R
     p0, p1 = (np.column_stack([p, np.ones(len(p))]) for p in (rays0, rays1))
@@ -138,7 +138,7 @@ def sampson_squared(rays0, rays1, R, t):
 def _opengv(algorithm, nonlinear):
     """OpenGV's RANSAC; with `nonlinear`, two optimisations over the inliers follow."""
     def run(matches, order, threshold_px, seed):
-        import pyopengv  # it seeds itself, so `seed` only changes the order of the matches
+        import pyopengv  # seeds its sampler itself; `seed` only changes the order of the matches
         del seed
         rays0, rays1 = matches.rays0[order], matches.rays1[order]
         unit0, unit1 = unit_rays(rays0), unit_rays(rays1)
@@ -187,13 +187,13 @@ OPENGV = {f"opengv_{algorithm.lower()}{'_nonlinear' if nonlinear else ''}":
 def module_version(module):
     """The version of a peer's module. Raises ImportError if it is not installed."""
     if module == "poselib":
-        import poselib  # has no __version__
+        import poselib  # some versions have no __version__
         from importlib import metadata
         try:
             return metadata.version("poselib")
         except metadata.PackageNotFoundError:
             return getattr(poselib, "__version__", "unknown")
-    if module == "pyopengv":  # Debian's package, which has no version of its own
+    if module == "pyopengv":  # the module has no __version__; its Debian package does
         import pyopengv
         del pyopengv
         import subprocess
@@ -214,7 +214,7 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
     import cv2
     try:
         return function(matches, order, threshold_px, seed)
-    except cv2.error:  # OpenCV raises this if too few points remain
+    except cv2.error:  # raised by OpenCV if too few matches remain for a model
         return None
 
 

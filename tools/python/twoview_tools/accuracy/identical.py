@@ -12,7 +12,7 @@ import numpy as np
 from . import estimators, metrics, peers, pipeline, system_python, tables, twoview_ctypes
 from .tables import MIN_PAIRS, OURS, say
 
-CACHE_FORMAT = 1  # increase it when a change here or in estimators.py changes results
+CACHE_FORMAT = 1  # increase it if a change here or in estimators.py changes results
 COLUMNS = ("num_inliers", "ms", "rotation_error_deg", "translation_error_deg",
            "translation_error_signed_deg", "pose_error_deg")
 MATCHES_TITLE = {"ours": "our matches", "sift": "OpenCV's RootSIFT matches"}
@@ -159,7 +159,7 @@ def our_rows(library, data, matched, options, num_seeds):
 # ---- verdicts ------------------------------------------------------------------------------------
 
 def mean_auc(rows_of_sets):
-    """{threshold: mean over the sets of the AUC}."""
+    """Returns {threshold in degrees: mean of the AUC over the sets}."""
     return {f"{t:g}": float(np.mean([metrics.auc_of_runs(tables.runs_of(rows), t)
                                      for rows in rows_of_sets.values()]))
             for t in metrics.THRESHOLDS_DEG}
@@ -249,7 +249,7 @@ def compare(arguments, sets):
 
 
 def compare_source(arguments, sets, library, systems, source):
-    ours, theirs = {}, {}  # {set: rows}; {name: {threshold: {set: rows}}}
+    ours, theirs = {}, {}  # {set: rows}; {system: {threshold: {set: rows}}}
     options = dict(item.split("=", 1) for item in arguments.options or [])
     for data in sets:
         if source == "ours":

@@ -7,7 +7,7 @@ that fails has an infinite error.
 import numpy as np
 
 THRESHOLDS_DEG = (5.0, 10.0, 20.0)
-EPIPOLAR_LIMIT = 5e-4  # of the squared symmetric distance, in normalised coordinates
+EPIPOLAR_LIMIT = 5e-4  # of a correct match: largest squared symmetric distance, normalised
 
 
 def rotation_error_deg(R_est, R_true):
@@ -51,7 +51,7 @@ def auc_rows(errors, threshold):
     inside = errors < threshold
     e = np.where(inside, errors, 0.0)
     before = np.concatenate([np.zeros((rows, 1)), e[:, :-1]], axis=1)
-    middle = (np.arange(num) + 0.5) / num  # mean recall between neighbouring errors
+    middle = (np.arange(num) + 0.5) / num  # mean recall between two neighbouring errors
     area = np.sum(np.where(inside, (e - before) * middle, 0.0), axis=1)
     count = inside.sum(axis=1)
     last = e.max(axis=1)
@@ -59,7 +59,7 @@ def auc_rows(errors, threshold):
 
 
 def auc(errors, threshold):
-    """The AUC of a single list of errors."""
+    """The area under the recall curve (auc_rows) of one list of errors, in per cent."""
     return float(auc_rows(errors, threshold)[0])
 
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from . import datasets, estimators, metrics
 
-CAP = 2048  # largest number of descriptors of an image, including second orientations
+CAP = 2048  # most descriptors of an image; a keypoint with two orientations has two
 RATIO = 0.8
-CACHE_FORMAT = 2  # increase it when a change here changes results
+CACHE_FORMAT = 2  # increase it if a change here changes the cached results
 
 CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
 
@@ -63,7 +63,7 @@ def describe(config, threshold_px=1.0):
     return f"{front} + {title} {threshold_px:.1f}"
 
 
-# ---- front ends -------------------------------------------------------------------------------
+# ---- keypoints and descriptors of the peers ---------------------------------------------------
 
 def orientations(gray, points, size):
     """[(index of the point, degrees clockwise from x)] by D. G. Lowe, IJCV 2004, section 5: a
@@ -135,7 +135,7 @@ def extract(gray, config):
     if config["front"] == "sift":
         sift = cv2.SIFT_create(nfeatures=CAP, contrastThreshold=config["contrast"])
         keypoints, descriptors = sift.detectAndCompute(gray, None)
-        if len(keypoints) > CAP:  # OpenCV exceeds its cap if scores are equal
+        if len(keypoints) > CAP:  # OpenCV returns more than CAP if scores are equal
             best = np.argsort([-k.response for k in keypoints], kind="stable")[:CAP]
             keypoints, descriptors = [keypoints[i] for i in best], descriptors[best]
     else:

@@ -20,7 +20,7 @@ at most a third of theirs.
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before importing numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -35,7 +35,7 @@ WIDTH, HEIGHT, FOCAL = 640, 480, 500.0
 CENTRE = np.array([320.0, 240.0])
 K = np.array([[FOCAL, 0, CENTRE[0]], [0, FOCAL, CENTRE[1]], [0, 0, 1]])
 NOISE_PX = 0.5
-SHARES = (30, 50, 80)  # per cent of true matches
+SHARES = (30, 50, 80)  # correct matches among all matches, per cent
 
 
 def _direction(random):
@@ -100,7 +100,8 @@ def _poselib(**options):
 
 
 def measure(share, runners, num_problems, repeats):
-    """{name: (errors in degrees, times in ms)}."""
+    """Returns {estimator: (errors in degrees, times in ms)} of its runs on problems with this share
+    of correct matches."""
     errors = {name: [] for name in runners}
     times = {name: [] for name in runners}
     for number in range(num_problems):

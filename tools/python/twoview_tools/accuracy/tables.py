@@ -9,7 +9,7 @@ import numpy as np
 from . import metrics
 
 OURS = "twoview"
-MIN_PAIRS = 15  # a smaller set gets no verdict of its own
+MIN_PAIRS = 15  # a set with fewer pairs counts only in the mean over the sets
 
 
 def say(text="", end="\n"):
@@ -29,7 +29,7 @@ def time_ms(row):
 
 
 def runs_of(rows):
-    """Pose errors as an array of seeds x pairs."""
+    """The pose errors of the rows in degrees, as an array of seeds x pairs."""
     seeds = sorted({row["seed"] for row in rows})
     return np.array([[r["pose_error_deg"] for r in rows if r["seed"] == s] for s in seeds])
 

@@ -12,7 +12,7 @@ pycolmap_tvg (these read max_error_px only, and get the library's own matches).
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before importing numpy
     os.environ.setdefault(_name, "1")
 
 import argparse

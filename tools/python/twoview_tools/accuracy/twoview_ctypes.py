@@ -88,7 +88,7 @@ class Context(twoview.Context):
                                **_keywords(self.library.feature_options(options)))
 
     def match(self, descriptors0, descriptors1, options=None):
-        """The matches as an array of dtype CORRESPONDENCE."""
+        """Matches two sets of descriptors. Returns an array of dtype CORRESPONDENCE."""
         return twoview.match(self, np.ascontiguousarray(descriptors0, np.uint8),
                              np.ascontiguousarray(descriptors1, np.uint8),
                              **_keywords(self.library.match_options(options)))

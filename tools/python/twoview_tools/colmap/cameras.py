@@ -28,7 +28,7 @@ def read_camera_set(path):
 
 
 def write_camera_set(cameras):
-    """The text of a cameras.yaml for {name: camera}."""
+    """Formats {name: camera} as the text of a cameras.yaml."""
     text = ""
     for name, camera in cameras.items():
         k = list(camera.k) + [0.0] * 8
@@ -42,11 +42,11 @@ def write_camera_set(cameras):
 
 
 class CameraChoice:
-    """Chooses the camera of an image."""
+    """Chooses the camera of an image from the given or found camera files."""
 
     def __init__(self, files, folders):
-        """files: those of --camera. folders: where a cameras.yaml is searched if there are no
-        files."""
+        """files: the camera files of --camera. folders: if `files` is empty, the first cameras.yaml
+        in these folders is read."""
         paths = list(files)
         for folder in folders if not files else ():
             path = os.path.join(folder, "cameras.yaml")

@@ -252,7 +252,7 @@ def main(arguments=None):
     except (BadInput, OSError, sqlite3.Error, MemoryError) as error:
         print("twoview: " + " ".join(str(error).split()), file=sys.stderr)
         return EXIT_BAD_INPUT
-    except _Ended as ended:  # ends with the exit status that the signal would have given
+    except _Ended as ended:  # ends this process by the signal that it received
         signal.signal(ended.number, signal.SIG_DFL)
         os.kill(os.getpid(), ended.number)
         raise

@@ -28,7 +28,7 @@ CONFIGURATIONS = {
 
 @dataclass(frozen=True)
 class ColmapCamera:
-    """A row of the table `cameras`."""
+    """A camera as a row of the table `cameras` of COLMAP's database."""
 
     model: str
     width: int
@@ -127,7 +127,7 @@ class PairGeometry:
     """A row of two_view_geometries, in COLMAP's pixels. An unknown value is None."""
 
     config: int
-    inlier_matches: np.ndarray  #: (n, 2) uint32
+    inlier_matches: np.ndarray  #: (n, 2) uint32, indices of the keypoints of both images
     F: Optional[np.ndarray] = None
     E: Optional[np.ndarray] = None
     H: Optional[np.ndarray] = None
@@ -135,7 +135,7 @@ class PairGeometry:
     t: Optional[np.ndarray] = None
 
     def swapped(self):
-        """The same pair with its images exchanged."""
+        """The geometry of the pair with image 0 and image 1 exchanged."""
         H = R = t = None
         if self.H is not None:
             H = _scaled(np.linalg.inv(self.H))
@@ -159,5 +159,5 @@ def geometry_to_colmap(found, matches):
         H = _scaled(_TO_COLMAP @ H @ _FROM_COLMAP)
     t = found.t
     if found.R is not None and t is None:
-        t = np.zeros(3)  # COLMAP stores a zero translation for a panorama
+        t = np.zeros(3)  # COLMAP stores t = 0 for a pure rotation (panorama)
     return PairGeometry(config, np.ascontiguousarray(matches, np.uint32), F, found.E, H, found.R, t)

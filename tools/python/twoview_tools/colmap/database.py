@@ -18,7 +18,7 @@ _BUSY, _LOCKED = 5, 6  # SQLite's error codes, which Python's module names from 
 
 
 def _columns(database):
-    """{table: columns} of all tables except SQLite's own."""
+    """Returns {table: columns} of all tables of the database except SQLite's own."""
     tables = [row[0] for row in database.execute(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'")]
     return {
@@ -92,7 +92,7 @@ def new_database(path, schema):
     exception; there must be no database before."""
     if os.path.lexists(path):
         raise BadInput(f"{path}: there already (--append adds to it)")
-    for suffix in _LEFT_BEHIND:  # SQLite would apply these files to the new database
+    for suffix in _LEFT_BEHIND:  # SQLite would apply an old journal to the new database
         if os.path.lexists(path + suffix):
             raise BadInput(f"{path}{suffix}: left there by another database; remove it first")
     schema.prepare()
@@ -104,10 +104,10 @@ def new_database(path, schema):
             writer.commit()
         _settle(made)
         try:
-            os.link(made, path)  # this never overwrites a file that appeared in the meantime
+            os.link(made, path)  # unlike rename, link never overwrites an existing file
         except FileExistsError:
             raise BadInput(f"{path}: there already (--append adds to it)") from None
-        except OSError:  # the file system has no hard links
+        except OSError:  # raised by a file system without hard links
             os.rename(made, path)
 
 
@@ -128,7 +128,7 @@ def appended_database(path, schema):
             sqlite3.connect(path, timeout=1)
         ) as target:
             made = os.path.join(scratch, "made.db")
-            target.execute("BEGIN IMMEDIATE")  # fails if the database cannot be written
+            target.execute("BEGIN IMMEDIATE")  # raises sqlite3.Error if it cannot be written
             target.rollback()
             _require_schema(target, path, schema, scratch)
             before = target.execute("PRAGMA data_version").fetchone()
@@ -162,7 +162,7 @@ def _scratch_folder(path):
 
 
 def read_cameras(database):
-    """Reads {camera_id: ColmapCamera}."""
+    """Reads the table `cameras` as {camera_id: ColmapCamera}."""
     names = {number: name for name, number in MODEL_IDS.items()}
     names.update({0: "SIMPLE_PINHOLE", 2: "SIMPLE_RADIAL", 3: "RADIAL", 8: "SIMPLE_RADIAL_FISHEYE",
                   9: "RADIAL_FISHEYE"})
@@ -173,7 +173,7 @@ def read_cameras(database):
 
 
 def read_images(database):
-    """Reads {name: (image_id, camera_id)}."""
+    """Reads the table `images` as {name: (image_id, camera_id)}."""
     return {name: (image_id, camera_id) for image_id, name, camera_id in
             database.execute("SELECT image_id, name, camera_id FROM images ORDER BY image_id")}
 
@@ -196,7 +196,7 @@ def read_keypoints(database, path, image_id):
 
 
 def read_descriptors(database, path, image_id):
-    """Reads descriptors (n, 128) uint8."""
+    """Reads the descriptors of an image as an array (n, 128) of uint8."""
     row = database.execute(
         "SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)
     ).fetchone()

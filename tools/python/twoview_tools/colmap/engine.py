@@ -52,5 +52,5 @@ class Engine:
 
 
 def pixels_of(keypoints):
-    """The pixels of keypoints, (n, 2) float64."""
+    """The positions x, y of keypoints in pixels, (n, 2) float64."""
     return np.column_stack([keypoints["x"], keypoints["y"]]).astype(np.float64)

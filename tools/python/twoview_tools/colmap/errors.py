@@ -45,7 +45,7 @@ def need_pycolmap(what):
             f"{what} needs pycolmap (scripts/bootstrap bench installs it): {error}"
         ) from error
     finally:
-        # pycolmap's log library has replaced them with handlers that print a crash report.
+        # Restores the signal handlers: pycolmap's log library replaced them when it was imported.
         for number, handler in before.items():
             signal.signal(number, handler)
     return pycolmap

@@ -30,7 +30,7 @@ from .settings import PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
 
 @dataclass(frozen=True)
 class View:
-    """An image with its features."""
+    """An image to be exported, with its keypoints and descriptors."""
 
     camera: Any
     keypoints: np.ndarray
@@ -41,8 +41,8 @@ class View:
 class Job:
     database: str
     images: str
-    pairs: str = ""  #: a pairs file; if empty, `overlap` is used
-    overlap: int = 0  #: the value of --sequential; 0: all pairs
+    pairs: str = ""  #: path of a pairs file; if empty, `overlap` chooses the pairs
+    overlap: int = 0  #: of --sequential: pairs each image with this many next ones; 0: all pairs
     cameras: tuple = ()
     schema: str = "4"
     append: bool = False

@@ -51,6 +51,6 @@ def read_luma(path):
 
 
 def read_rgb(path):
-    """The colours, (height, width, 3) uint8."""
+    """Reads an image as RGB, (height, width, 3) uint8."""
     image = _decode(path)
     return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image[..., 2::-1]

@@ -6,7 +6,7 @@ import os
 import numpy as np
 import twoview as tv
 
-from ..accuracy import metrics  # errors are defined as in the accuracy tables
+from ..accuracy import metrics  # pose errors have the definition of the accuracy tables
 from . import database as db
 from .cameras import read_camera, write_camera_set
 from .conventions import camera_from_colmap, pixels_from_colmap

@@ -64,12 +64,12 @@ def _cpu_seconds(log, function, *arguments):
 
 
 def _measure_features(folder, data, schema, features):
-    """Makes folder/database.db. Returns the CPU seconds."""
+    """Makes folder/database.db with features and matches. Returns the CPU time in seconds."""
     note = os.path.join(folder, "features.json")
     if not os.path.isfile(note):
         os.makedirs(folder, exist_ok=True)
         database = os.path.join(folder, "database.db")
-        for suffix in ("", "-wal", "-shm", "-journal"):  # files of an interrupted run
+        for suffix in ("", "-wal", "-shm", "-journal"):  # deletes the files of an interrupted run
             if os.path.exists(database + suffix):
                 os.remove(database + suffix)
         log = os.path.join(folder, "features.log")

@@ -12,9 +12,9 @@ from .errors import BadInput, need_pycolmap
 @dataclass(frozen=True)
 class ModelImage:
     camera_id: int
-    R: np.ndarray  #: (3, 3), camera from world
+    R: np.ndarray  #: (3, 3), x_camera = R x_world + t
     t: np.ndarray
-    point_ids: frozenset = frozenset()  #: the 3D points that the image sees
+    point_ids: frozenset = frozenset()  #: ids of the 3D points that the image sees
 
     @property
     def centre(self):
@@ -29,7 +29,7 @@ class Model:
     mean_error_px: float = 0.0
 
     def poses(self):
-        """{name: (R, centre)} of the registered images."""
+        """Returns {name: (R, centre)} of the registered images, the centre in the world frame."""
         return {name: (image.R, image.centre) for name, image in self.images.items()}
 
 
@@ -78,8 +78,8 @@ class TwoViewModel:
     cameras: tuple  #: a twoview.Camera for each image
     R: np.ndarray
     t: np.ndarray
-    pixels: tuple  #: (n, 2) of each image, in twoview's convention
-    points: np.ndarray  #: (n, 3), in the first camera's frame
+    pixels: tuple  #: for each image (n, 2); (0, 0) is the centre of the first pixel
+    points: np.ndarray  #: (n, 3), positions in the first camera's frame
     colours: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.uint8))
     errors_px: np.ndarray = field(default_factory=lambda: np.zeros(0))
 

@@ -40,7 +40,7 @@ CREATE TABLE two_view_geometries (
 
 
 def prepare():
-    """Does nothing, since this schema needs only SQLite."""
+    """Does nothing: this schema needs only SQLite, which Python always has."""
 
 
 def create(path):
@@ -60,7 +60,7 @@ def _doubles(values, absent):
 
 
 class Writer:
-    """Adds rows to a database; commit() makes them permanent."""
+    """Adds rows to a COLMAP 3.8 database; commit() makes them permanent."""
 
     def __init__(self, path):
         self.database = sqlite3.connect(path)

@@ -30,7 +30,7 @@ class Writer:
         return self
 
     def __exit__(self, *_):
-        self.commit()  # pycolmap's Database has no rollback; the caller deletes the file instead
+        self.commit()  # also after an error: pycolmap has no rollback; the caller deletes the file
         self.database.close()
 
     def commit(self):

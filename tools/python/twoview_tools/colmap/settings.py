@@ -57,6 +57,6 @@ def add_options(parser, kinds=_KINDS, **defaults):
 
 
 def options_of(arguments, kind):
-    """The options object with the values of the flags."""
+    """Makes an options object of class `kind` from the values of the command line's flags."""
     return kind(**{field.name: getattr(arguments, field.name) for field in dataclasses.fields(kind)
                    if hasattr(arguments, field.name)})

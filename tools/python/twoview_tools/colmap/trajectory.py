@@ -32,7 +32,7 @@ def write_trajectory(poses):
 
 
 def read_trajectory(path):
-    """Reads [(time, R, centre)]; R is camera from world."""
+    """Reads a trajectory as [(time, R, centre)]: x_camera = R (x_world - centre)."""
     poses = []
     with open(path, encoding="utf-8") as file:
         for number, line in enumerate(file, 1):

@@ -44,7 +44,7 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
     good = cloud.inlier_mask & (cloud.points["status"] == tv.PointStatus.OK)
     pixels = tuple(pixels_of(cloud.keypoints[i])[cloud.matches[f"idx{i}"][good]] for i in range(2))
     rgb = read_rgb(paths[0])
-    x, y = np.floor(pixels[0].T + 0.5).astype(int)  # the pixel that contains the point
+    x, y = np.floor(pixels[0].T + 0.5).astype(int)  # the pixel that contains the keypoint
     colours = rgb[np.clip(y, 0, rgb.shape[0] - 1), np.clip(x, 0, rgb.shape[1] - 1)]
     points = cloud.points[good]
     cameras = tuple(tv.corrected_camera(pose, camera) for camera in cameras)

@@ -13,7 +13,7 @@ from multiprocessing.connection import Pipe
 from .. import environment
 
 WORKER = "twoview_tools.compare.worker"
-TRACE = (" ", "***", "PC: ")  # beginnings of the lines of the stack trace that glog prints last
+TRACE = (" ", "***", "PC: ")  # each line of glog's stack trace begins with one of these
 
 
 class ChildError(Exception):
@@ -25,7 +25,7 @@ class ChildError(Exception):
 
 
 class Child:
-    """A running worker.py process."""
+    """A running process of worker.py, which answers calls."""
 
     def __init__(self, python):
         self.connection, theirs = Pipe()
@@ -87,8 +87,8 @@ class Child:
         self.connection.close()
 
 
-_children = {}  # (thread, interpreter): Child
-_closed = threading.Event()  # once set, threads that are still working on a pair start no new child
+_children = {}  # {(thread, interpreter): Child}
+_closed = threading.Event()  # set at the end of the run: no thread may start a new child
 
 
 def call(python, request, timeout_s, matches=None):

@@ -15,7 +15,7 @@ from .. import formats
 from ..accuracy import datasets
 from . import cluster, results, systems
 
-FORMAT = 1  # increase it when a change here changes the stored result of a pair
+FORMAT = 1  # increase it if a change here changes the stored result of a pair
 REFERENCE_TIMEOUT_S = 3600
 DESCRIPTION = """Runs twoview, COLMAP, OpenGV, OpenCV and PoseLib on the same image pairs and writes
 a report: index.html, pairs.csv, report.json. See docs/compare.md."""
@@ -25,7 +25,7 @@ class BadInput(Exception):
     """Bad input: one line for the user and exit status 2."""
 
 
-# ---- what is asked for -------------------------------------------------------------------------
+# ---- the command line --------------------------------------------------------------------------
 
 def parse(words):
     parser = argparse.ArgumentParser(
@@ -210,7 +210,8 @@ def _reconstruct(arguments, part, workers, store, hashes):
 
 
 def relative_pose(models, name0, name1):
-    """cam1_from_cam0 of two images of one model, with |t| = 1; None if no model contains both."""
+    """The pose cam1_from_cam0 of two images, with |t| = 1, from a model that contains both; None
+    if there is no such model."""
     for model in models:
         if name0 in model and name1 in model and name0 != name1:
             (R0, t0), (R1, t1) = ((np.array(model[n]["R"]), np.array(model[n]["t"]))

@@ -77,7 +77,7 @@ def run(views, cap, max_error_px, seed, watch):
              "--SiftMatching.use_gpu", 0, "--SiftMatching.num_threads", 1,
              "--SiftMatching.max_error", max_error_px, "--SiftMatching.compute_relative_pose", 1,
              "--random_seed", seed)
-        watch.lap("match + estimate")  # one command does both
+        watch.lap("match + estimate")  # matches_importer matches and estimates
         return _read(database)
 
 
@@ -101,7 +101,7 @@ def _pose(geometry, is_swapped):
     if not geometry or not geometry[0] or geometry[1] is None:
         return None, None, 0
     t = np.frombuffer(geometry[2], np.float64)
-    if not np.linalg.norm(t) > 0:  # no pose, or a pure rotation
+    if not np.linalg.norm(t) > 0:  # t = 0: no pose was found, or a pure rotation
         return None, None, geometry[0]
     R = conventions.rotation(np.frombuffer(geometry[1], np.float64))
     return (R.T, -R.T @ t, geometry[0]) if is_swapped else (R, t, geometry[0])

@@ -104,7 +104,7 @@ def table_groups(report):
 
 
 def script_text(value):
-    """JSON text that cannot end a script element."""
+    """Encodes a value as JSON that contains no '</', so that it cannot end a script element."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ..accuracy import estimators, metrics
 from . import children, systems
 
-OVERLAY_INLIERS, OVERLAY_OUTLIERS = 60, 25  # number of matches of a pipeline that the page can draw
+OVERLAY_INLIERS, OVERLAY_OUTLIERS = 60, 25  # most matches of a pipeline that the page draws
 HISTOGRAM_EDGES_PX = np.array([0, .25, .5, .75, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])
 
 
@@ -23,7 +23,7 @@ def work(task):
 
 
 def probe(task):
-    """{module: {"version"} or {"missing"}} of each module."""
+    """Returns {module: {"version": ..} or {"missing": reason}} for the systems' modules."""
     found = {}
     for python in dict.fromkeys(s.python for s in systems.SYSTEMS):
         modules = sorted({s.module for s in systems.SYSTEMS if s.python == python})

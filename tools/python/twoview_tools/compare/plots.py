@@ -121,7 +121,7 @@ def rotation_and_translation(report, pairs):
 
 
 def inlier_histogram(report, pairs):
-    """A histogram of the pairs' inlier shares."""
+    """A histogram over the pairs of the share of inliers among the matches."""
     traces = []
     edges = np.linspace(0, 1, 21)
     for system in _listed(report, "pipeline"):
@@ -160,7 +160,7 @@ def epipolar_histogram(report, pairs, kind):
 
 
 def all_plots(report, pairs):
-    """All plots: [{"title", "hint", "figure"}]."""
+    """Makes all plots of the page as a list of {"title", "hint", "figure"}."""
     is_known = bool(_known(pairs))
     has = {kind: bool(_listed(report, kind)) for kind in ("pipeline", "solver")}
     found = []

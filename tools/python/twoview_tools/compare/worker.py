@@ -7,7 +7,7 @@ because numpy's pickles differ between the two Pythons.
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before importing numpy
     os.environ.setdefault(_name, "1")
 
 import functools
@@ -24,7 +24,7 @@ from ..accuracy import datasets, estimators
 from . import systems
 
 
-GRAVITY_SIGMA_RAD = np.radians(0.5)  # the references are not more accurate than this
+GRAVITY_SIGMA_RAD = np.radians(0.5)  # error of the gravity taken from a reference pose
 
 
 class Failed(Exception):
@@ -32,7 +32,7 @@ class Failed(Exception):
 
 
 class Stopwatch:
-    """The milliseconds of each stage."""
+    """Measures the wall-clock time of each stage in milliseconds."""
 
     def __init__(self):
         self.ms, self.last = {}, time.perf_counter()
@@ -175,7 +175,7 @@ def pipeline(system, task, _):
 # ---- solvers on identical matches --------------------------------------------------------------
 
 def given_matches(given):
-    """The estimators.Matches from a pipeline's answer."""
+    """Converts the matches in a pipeline's answer to estimators.Matches."""
     cameras = [(np.array(K), d) for K, d in given["cameras"]]
     ratios = None if given["ratios"] is None else np.array(given["ratios"], np.float32)
     return estimators.Matches(given["pixels0"], given["pixels1"], cameras,
@@ -278,7 +278,7 @@ def triangulate_opengv(matches, R, t, options):
     return np.asarray(found, float).reshape(-1, 3), seconds
 
 
-# ---- what is here ------------------------------------------------------------------------------
+# ---- the versions of the modules ---------------------------------------------------------------
 
 def versions(modules):
     """{module: its version, or a message about what is missing}."""
@@ -307,7 +307,7 @@ def answer(request, matches):
         os.environ["TWOVIEW_LIBRARY"] = task["library"]
     if call == "versions":
         return versions(task["modules"])
-    if call == "images":  # so that the time of reading them is not counted
+    if call == "images":  # reads the images before the timed calls
         return len(Views(task).gray)
     if call == "reference":
         from . import reference
@@ -338,7 +338,7 @@ def serve(connection):
         start = cpu_seconds()
         try:
             reply = {"ok": answer(request, matches)}
-        # pylint: disable=broad-except  (the row reports it and the run continues)
+        # pylint: disable=broad-except  (any error goes to the reply, and the worker continues)
         except Exception as error:
             reply = {"error": f"{type(error).__name__}: {error}" if not isinstance(error, Failed)
                      else str(error)}

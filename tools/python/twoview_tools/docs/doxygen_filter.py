@@ -78,7 +78,7 @@ def normalised(path):
                     yield declaration(member)
             yield f"}} {symbol.name};"
         elif symbol.name not in seen and not (symbol.parent and symbol.parent.name):
-            seen.add(symbol.name)  # a macro that both branches of an #if define is printed once
+            seen.add(symbol.name)  # prints a macro once if both branches of an #if define it
             yield comment_of(symbol)
             yield declaration(symbol)
 

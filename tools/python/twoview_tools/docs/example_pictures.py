@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 
-import boards  # a module of test/cli
+import boards  # test/cli/boards.py draws chessboards
 import cv2
 import numpy as np
 

@@ -20,7 +20,7 @@ ALONE = re.compile(r"(?:TV_BEGIN_DECLS|TV_END_DECLS|extern \"C\" \{|\})(?=\s|$)"
 
 @dataclasses.dataclass
 class Symbol:
-    kind: str  # file function struct opaque enum type macro field constant
+    kind: str  # one of: file function struct opaque enum type macro field constant
     name: str
     comment: str
     code: str
@@ -94,7 +94,7 @@ def statement_end(text, position, separator):
         found = COMMENT.match(text, position)
         if found:
             if separator == "," and depth == 0 and not text[found.end():].strip():
-                return position  # the last constant has no comma behind it
+                return position  # the last constant of an enum ends here, without a comma
             position = found.end()
             continue
         character = text[position]
@@ -167,7 +167,7 @@ def parse(path):
         inside = list(members(parent, code, at, line_of))
         if parent.name:
             yield parent
-        # enum { NAME = 1 }: a constant that C also accepts as the size of an array.
+        # An unnamed enum with one constant, enum { NAME = 1 }, is listed as a constant.
         elif len(inside) == 1:
             inside[0].comment = inside[0].comment or comment
         yield from inside

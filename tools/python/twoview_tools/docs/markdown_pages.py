@@ -57,7 +57,7 @@ class Page:
                     yield (number, *(target.split("#") + [""])[:2])
 
     def code(self):
-        """(line, text) of each `code` span in the prose."""
+        """Yields (line number, text) of each `code` span in the prose."""
         for number, line in self.prose:
             for text in re.findall(r"`([^`]+)`", line):
                 yield number, text

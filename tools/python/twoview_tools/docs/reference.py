@@ -43,7 +43,7 @@ class Reference:
     def __init__(self, xml):
         self.xml = pathlib.Path(xml)
         self.compounds = {}
-        self.place_of = {}  # symbol -> the page and heading that describe it
+        self.place_of = {}  # {symbol: (page, heading) that describe it}
         for entry in ElementTree.parse(self.xml / "index.xml").getroot():
             if entry.get("kind") in ("file", "struct"):
                 compound = ElementTree.parse(self.xml / f"{entry.get('refid')}.xml").getroot()[0]
@@ -79,7 +79,7 @@ class Reference:
         return sorted(found, key=lambda pair: pair[0])
 
     def pages(self):
-        """{page: its Markdown}."""
+        """Returns {page: its text in Markdown} for all pages of the reference."""
         return {
             page_name(path): self.page(path, compound)
             for path, compound in self.headers.items()

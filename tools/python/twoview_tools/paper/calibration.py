@@ -20,11 +20,11 @@ class Boards:
     """Pictures of one chessboard, taken by one camera."""
 
     title: str
-    folder: Callable  # a function from Inputs to a Path
+    folder: Callable  # folder(inputs) is the Path of the folder of the pictures
     pattern: str
-    size: tuple  # inner corners
+    size: tuple  # inner corners in a row and in a column
     square_m: float
-    shown: str  # the picture that figure 1b shows
+    shown: str  # the name of the picture that figure 1b shows
 
     def calibrated(self, inputs):
         """The output folder of `twoview calibrate`, which is run only once."""
@@ -67,7 +67,7 @@ def used(calibration):
 
 
 def camera_of(calibration):
-    """The calibrated camera as a twoview.Camera."""
+    """Converts the camera of a calibration.json to a twoview.Camera."""
     tv = library()
     i = calibration["intrinsics"]
     width, height = calibration["image_size"]

@@ -6,7 +6,7 @@ fails, the page reports it, the other experiments still run, and the exit status
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before numpy
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before importing numpy
     os.environ.setdefault(_name, "1")
 
 import argparse
@@ -22,7 +22,7 @@ from .. import ROOT
 
 def experiments():
     from . import calibration, cloud, corners, descriptor, motion, ransac, triangulation
-    # In the order of the paper.
+    # The experiments, in the order of the paper's figures.
     modules = (calibration, corners, descriptor, ransac, triangulation, motion, cloud)
     return [e for module in modules for e in module.EXPERIMENTS]
 

@@ -13,7 +13,7 @@ from .inputs import grey, library, read_colour
 # The Bresenham circle of radius 3, clockwise from the top.
 CIRCLE = np.array([(0, -3), (1, -3), (2, -2), (3, -1), (3, 0), (3, 1), (2, 2), (1, 3), (0, 3),
                    (-1, 3), (-2, 2), (-3, 1), (-3, 0), (-3, -1), (-2, -2), (-1, -3)])
-ARC, THRESHOLD = 12, 20  # the paper's arc: 12 of 16 pixels
+ARC, THRESHOLD = 12, 20  # 12 of 16 circle pixels, as in the paper; grey levels
 
 
 def differences(image):
@@ -77,7 +77,7 @@ def example_corner(image):
     pixels."""
     found = detect(image, ARC, THRESHOLD)
     around = differences(image)
-    for k in found:  # strongest first
+    for k in found:  # keypoints, strongest first
         x, y = int(k["x"]), int(k["y"])
         start, length, sign = longest_arc(around[:, y, x], THRESHOLD)
         if 12 <= length <= 13 and 40 < x < image.shape[1] - 40 and 40 < y < image.shape[0] - 40:
@@ -155,7 +155,7 @@ def figure5(inputs):
 
 
 def images(inputs):
-    """({name: grey image}, a list of what is missing)."""
+    """Returns ({name: grey image}, a list of sentences about missing images)."""
     def of_set(folder, number):
         return grey(read_colour(sorted(inputs.of_data(folder, "images").iterdir())[number]))
 

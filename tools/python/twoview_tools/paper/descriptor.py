@@ -11,7 +11,7 @@ from .experiment import Experiment, Missing, Result
 from .inputs import library
 
 SIDE = 16  # samples along a side of a patch, which give 15 gradients
-STEP = 0.28  # distance between samples, as a share of a cell
+STEP = 0.28  # distance between samples, as a share of a cell's side
 CELL_SIZE = 1.5  # side of a cell, as a multiple of the keypoint's diameter
 MAX_STEP = 2.24  # largest distance between samples, in pixels of the octave
 
@@ -99,7 +99,7 @@ def describe(image, keypoint, root):
 
 
 def described_keypoints(image, count):
-    """The library's keypoints and both kinds of its descriptors."""
+    """Detects at most `count` keypoints. Returns them with their SIFT and RootSIFT descriptors."""
     tv = library()
     with tv.Context(max_width=image.shape[1], max_height=image.shape[0]) as context:
         keypoints = tv.orient(context, image, tv.detect(context, image, arc=12))[:count]
@@ -170,7 +170,7 @@ def draw_histograms(axis, histogram):
         for column in range(4):
             for length, angle in zip(histogram[row, column] / longest, angles):
                 if length < 0.02:
-                    continue  # too short for an arrow's head
+                    continue  # an arrow this short has no room for its head
                 axis.annotate(
                     "",
                     (column + 0.5 + length * np.cos(angle), row + 0.5 - length * np.sin(angle)),

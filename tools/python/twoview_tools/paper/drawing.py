@@ -7,7 +7,7 @@ import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (after the backend)
+from matplotlib import pyplot  # noqa: E402  (the backend must be chosen before)
 
 from .experiment import Picture  # noqa: E402
 

@@ -26,25 +26,25 @@ def available(*makers):
 class Table:
     caption: str
     head: list
-    rows: list  # lists of cells, which are text; the first cell of a row is its heading
-    marked: Optional[int] = None  # index of the row with the default, or with the paper's choice
+    rows: list  # each a list of texts; the first text is the row's heading
+    marked: Optional[int] = None  # index of the row to highlight: the default's, or the paper's
 
 
 @dataclass
 class Picture:
     data: bytes
-    kind: str  # "png" or "webp"
+    kind: str  # the format of `data`: "png" or "webp"
     alt: str
-    width: int  # largest width at which it is shown, pixels
+    width: int  # largest width at which the page shows the picture, pixels
 
 
 @dataclass
 class Result:
-    numbers: dict  # copied to paper.json
-    found: str  # sentences that report the numbers
+    numbers: dict  # measured numbers, which are copied to paper.json
+    found: str  # sentences for the page that report the numbers
     pictures: list = field(default_factory=list)
     tables: list = field(default_factory=list)
-    missing: list = field(default_factory=list)  # sentences about missing inputs
+    missing: list = field(default_factory=list)  # sentences for the page about missing inputs
 
 
 @dataclass(frozen=True)
@@ -55,4 +55,4 @@ class Experiment:
     title: str
     paper: str  # what the paper's figure shows
     differs: str  # how and why our figure differs; may be empty
-    run: Callable  # a function from Inputs to a Result
+    run: Callable  # run(inputs) measures and returns a Result

@@ -41,8 +41,8 @@ FIRST_SEQUENCE = 1000000
 @dataclass(frozen=True)
 class Plan:
     name: str
-    start: str  # x,y in the room, metres
-    roll: float = 0.0  # sticks: positive is right, backward
+    start: str  # "x,y", the start position in the room, metres
+    roll: float = 0.0  # roll: right is positive; pitch: backward is positive; [-1, 1]
     pitch: float = 0.0
 
 
@@ -54,7 +54,7 @@ FORWARD = Plan("forward", "-1.5,0", pitch=-0.25)
 class Recorded:
     folder: Path  # the output folder of `drone record`
     camera: Path
-    truth: np.ndarray  # one row for each picture: number, seconds, x y z, qx qy qz qw, vx vy vz
+    truth: np.ndarray  # a row a picture: number, seconds, x y z, qx qy qz qw, vx vy vz
 
 
 def free_ports(process):
@@ -68,7 +68,7 @@ def free_ports(process):
 
 
 def steer(port, plan):
-    """Takes off, then moves the sticks."""
+    """Flies the plan: commands the take-off, then holds the plan's roll and pitch."""
     link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     begin, sequence = time.monotonic(), FIRST_SEQUENCE
     bits = [

@@ -28,7 +28,7 @@ def library():
 
 
 def read_colour(path):
-    """Reads an image as BGR."""
+    """Reads an image file as 8-bit BGR."""
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
         raise Missing(f"{path} is no image")
@@ -46,12 +46,12 @@ class Pair:
 
     name: str
     colour: tuple  # two BGR images
-    cameras: tuple  # two twoview.Camera
+    cameras: tuple  # two twoview.Camera, one for each image
     R: np.ndarray
     t: np.ndarray
     baseline_m: float
-    depth0: Optional[np.ndarray] = None  # metres; not finite where unknown
-    truth_px: float = 2.0  # largest distance of a correct match from the true epipolar line, pixels
+    depth0: Optional[np.ndarray] = None  # depth in image 0, metres; not finite where unknown
+    truth_px: float = 2.0  # a correct match is at most this far from the true epipolar line
 
     @cached_property
     def grey(self):
@@ -59,8 +59,8 @@ class Pair:
 
     @property
     def true_F(self):
-        """The true F for pixels, with Frobenius norm 1."""
-        E = np.cross(np.eye(3), self.t) @ self.R  # [t]x R
+        """The true fundamental matrix for pixels, with Frobenius norm 1."""
+        E = np.cross(np.eye(3), self.t) @ self.R  # E = [t]x R
         F = np.linalg.inv(self.cameras[1].K).T @ E @ np.linalg.inv(self.cameras[0].K)
         return F / np.linalg.norm(F)
 
@@ -73,7 +73,7 @@ class Inputs:
     scratch: Path  # a temporary folder, which is deleted at the end of the run
 
     def program(self, *words, statuses=(0,)):
-        """Runs `twoview WORDS...`. Returns its stdout."""
+        """Runs `twoview WORDS...`. Returns its stdout; its exit status must be in `statuses`."""
         path = self.build / "bin" / "twoview"
         if not path.is_file():
             raise Missing(f"{path} is not built")
@@ -140,7 +140,7 @@ def from_environment(build, scratch):
 
 
 def machine():
-    """The name of the processor."""
+    """The name of this computer's processor."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as f:
             return next(line.split(":")[1].strip() for line in f if line.startswith("model name"))

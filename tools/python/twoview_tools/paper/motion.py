@@ -20,9 +20,9 @@ class Study:
     """A pair that was reconstructed with the library's defaults, and its errors."""
 
     pair: Pair
-    pose: object  # a twoview.TwoView
-    pixels: tuple  # of the inliers, undistorted
-    points: np.ndarray  # of the inliers, in baselines
+    pose: object  # the result of the estimate, a twoview.TwoView
+    pixels: tuple  # for each image the undistorted pixels of the inliers
+    points: np.ndarray  # positions of the inliers in camera 0's frame, in baselines
     numbers: dict
 
 
@@ -104,7 +104,7 @@ def rotation_of_quaternion(x, y, z, w):
 
 
 def true_motion(rows):
-    """cam1_from_cam0 of two rows of the simulator's truth: R, and t in metres."""
+    """The pose cam1_from_cam0 from two rows of the simulator's truth: R, and t in metres."""
     turns = [rotation_of_quaternion(*row[5:9]) @ BODY_FROM_CAMERA for row in rows]
     return turns[1].T @ turns[0], turns[1].T @ (rows[0][2:5] - rows[1][2:5])
 
@@ -129,7 +129,7 @@ def pair_of_flight(inputs, recorded, plan, metres):
     """(pair with truth, result.json of the same two frames with the IMU's values)."""
     pictures = recorded.folder.parent / "frames"
     inputs.program("drone", "replay", recorded.folder, "--frames", pictures, "--quiet")
-    files = sorted(pictures.glob("*.png"))  # named by the drone's frame numbers
+    files = sorted(pictures.glob("*.png"))  # a file's name is the drone's frame number
     indices, rows = frames_apart(recorded, [int(f.stem) for f in files], metres)
     told = json.loads(
         inputs.program(
@@ -164,7 +164,8 @@ def pair_of_flight(inputs, recorded, plan, metres):
 
 
 def flown_pair(inputs, plan, metres):
-    """As pair_of_flight. If the machine was too busy for real time, the flight is repeated."""
+    """Flies the plan and returns pair_of_flight of the recording. A flight is repeated if the
+    machine was too busy for real time."""
     for attempt in range(FLIGHTS):
         try:
             return pair_of_flight(inputs, flight.fly(inputs, plan, attempt), plan, metres)
@@ -185,7 +186,7 @@ def imu_numbers(pair, told):
 # ---- drawing ----
 
 def spread(pixels, count):
-    """Indices of points that are far from each other."""
+    """Indices of at most `count` points that are far from each other."""
     chosen = [int(np.argmin(pixels[:, 0] + pixels[:, 1]))]
     near = np.linalg.norm(pixels - pixels[chosen[0]], axis=1)
     while len(chosen) < min(count, len(pixels)):

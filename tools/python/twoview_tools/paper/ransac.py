@@ -10,12 +10,12 @@ from . import drawing
 from .experiment import Experiment, Result, Table, available
 from .inputs import library
 
-NUM_POINTS, NUM_INLIERS = 500, 300  # the paper's figure 8
+NUM_POINTS, NUM_INLIERS = 500, 300  # of a simulated line, as in the paper's figure 8
 SIGMA_PX, THRESHOLD_PX = 1.0, 2.5
 SIZE = 640, 480
 NUM_RUNS = 1000
 CONFIDENCE = 0.9999
-DRAWN_INLIERS = 110  # approximate number of inliers that figure 9 draws
+DRAWN_INLIERS = 110  # figure 9 draws about this many inliers
 
 
 def line_points(random):
@@ -159,7 +159,7 @@ def true_matches(pair, pixels0, pixels1):
         points = (rays * depth[:, None]) @ pair.R.T + pair.t
         seen = points @ pair.cameras[1].K.T
         off = np.linalg.norm(seen[:, :2] / seen[:, 2:] - pixels1, axis=1)
-        right &= ~(off > 2 * pair.truth_px)  # an unknown depth rejects no match
+        right &= ~(off > 2 * pair.truth_px)  # NaN, an unknown depth, compares false: no rejection
     return right
 
 
@@ -198,7 +198,7 @@ def draw_matches(axis, pair, pixels0, pixels1, inliers):
 
 
 def pairs_of_figure9(inputs):
-    """(pairs, a list of what is missing)."""
+    """Returns (pairs, a list of sentences about missing pairs)."""
     def office():
         return inputs.listed_pair(
             "tum_fr3_office", *first_pair(inputs, "tum_fr3_office", 20), "TUM office", truth_px=5.0
@@ -207,7 +207,7 @@ def pairs_of_figure9(inputs):
 
 
 def first_pair(inputs, folder, index):
-    """The names in a line of the set's pairs.txt."""
+    """The two image names in line `index` of the pairs.txt in `folder`."""
     with open(inputs.of_data(folder, "pairs.txt"), encoding="utf-8") as f:
         return [line.split()[:2] for line in f if line.strip() and not line.startswith("#")][index]
 

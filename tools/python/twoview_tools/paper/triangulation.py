@@ -20,7 +20,7 @@ METHODS = {"Poly": "POLY", "Poly-Abs": "POLY_ABS", "Linear-Eigen": "LINEAR_EIGEN
            "Iterative-LS": "ITERATIVE_LS", "Midpoint": "MIDPOINT"}
 OPENCV = "OpenCV triangulatePoints"
 PAPER_TIMES = {"Poly": 14, "Poly-Abs": 30, "Linear-Eigen": 3, "Linear-LS": 2, "Iterative-Eigen": 5,
-               "Iterative-LS": 3, "Midpoint": 2}  # the paper's table 1
+               "Iterative-LS": 3, "Midpoint": 2}  # as in the paper's table 1
 ROUNDS = 6
 NOISE_PX = 1.0
 
@@ -120,7 +120,7 @@ def forward_pair(inputs):
 
 
 def weights_study(pair, pixels0, pixels1):
-    """The numbers of figure 13 for given matches."""
+    """Measures figure 13, the weights of Iterative-LS, for matches given as pixels."""
     tv = library()
     points, weights = iterative_ls(pair, pixels0, pixels1)
     errors = np.array([errors_px(pair, p, pixels0, pixels1) for p in points])
@@ -202,7 +202,7 @@ def figure13(inputs):
 
 
 def rounds_table(weights, errors):
-    """The table of the iterations of one match."""
+    """Makes a Table with the weights and the error after each iteration for one match."""
     rows = [[str(k), *(f"{w:.6f}" for w in weights[k]), f"{errors[k]:.6f}"] for k in range(ROUNDS)]
     return Table("The match that gains most, round by round (0: Linear-LS)",
                  ["round", "weight, camera 0", "weight, camera 1", "reprojection error [px]"], rows)
@@ -235,7 +235,7 @@ def ours(method, pair, pixels0, pixels1):
 
 
 def run_ns(method, scenes):
-    """The CPU time of one method over all scenes."""
+    """The CPU time in ns that a method takes to triangulate the points of all scenes."""
     begin = time.process_time_ns()
     for pair, _points, pixels0, pixels1 in scenes:
         if method in METHODS:
@@ -261,8 +261,8 @@ def times_ns(scenes, repetitions=25):
 
 
 def through_a_lens(pair):
-    """The same pair with a negligible lens distortion, so that the library processes the points one
-    by one."""
+    """Returns the pair with cameras of negligible lens distortion, with which the library
+    triangulates the points one by one."""
     model = library().CameraModel.BROWN_CONRADY
     cameras = tuple(replace(camera, model=model, k=(1e-9, 0, 0, 0, 0)) for camera in pair.cameras)
     return replace(pair, cameras=cameras)
@@ -291,7 +291,7 @@ def motorcycle_points(pair):
 
 
 def errors_table(scenes):
-    """{scene: {method: accuracy}}, with OpenCV for comparison."""
+    """Returns {scene: {method: accuracy}} for the library's methods and OpenCV."""
     found = {}
     for name, (pair, truth, pixels0, pixels1) in scenes.items():
         found[name] = {

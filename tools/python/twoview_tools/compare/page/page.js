@@ -17,7 +17,9 @@ function shown(value, unit = "") {
 
 // ---- tables and plots -------------------------------------------------------------------------
 
-function markBest() { // of each table, the largest of AUC and precision, the least of errors; who is given more does not count
+// Marks the best system in each column of each table: the largest AUC or precision, the least
+// error. Systems that get more input than the others (data-given) are not compared.
+function markBest() {
   const LESS = new Set([4, 5, 6]), MORE = new Set([1, 2, 3, 10]);
   for (const table of document.querySelectorAll(".systems")) {
     if (table.rows[0].cells.length !== 12) continue;
@@ -90,7 +92,8 @@ function essential([r0, r1, r2, r3, r4, r5, r6, r7, r8, t0, t1, t2]) {
   const cross = [[0, -t2, t1], [t2, 0, -t0], [-t1, t0, 0]];
   return cross.map(row => [0, 1, 2].map(c => row[0] * R[0][c] + row[1] * R[1][c] + row[2] * R[2][c]));
 }
-function epipolarCurve(E, isSecond, point, camera, size) { // pixels of the line of a ray of the other view
+// The epipolar line of `point`, a ray of the other view, as pixels of this view.
+function epipolarCurve(E, isSecond, point, camera, size) {
   const [a, b, c] = isSecond ? E.map(row => row[0] * point[0] + row[1] * point[1] + row[2])
     : [0, 1, 2].map(i => E[0][i] * point[0] + E[1][i] * point[1] + E[2][i]);
   const norm = a * a + b * b;
@@ -152,7 +155,8 @@ async function drawMatches(canvas, pair, picture) {
   }
 }
 
-function moved([fx, fy, cx, cy, ...lens], [dx, dy]) { // the camera that a pose is of
+// The camera with its principal point moved by the shift that was estimated with the pose.
+function moved([fx, fy, cx, cy, ...lens], [dx, dy]) {
   return [fx, fy, cx + dx, cy + dy, ...lens];
 }
 
@@ -188,7 +192,8 @@ async function drawLines(canvas, pair, picture, points) {
   });
 }
 
-function commonPoints(pair) { // eight matches for the lines, of our inliers where there are any
+// At most eight matches whose epipolar lines are drawn: inliers of twoview, else of another system.
+function commonPoints(pair) {
   const pictures = Object.entries(pair.pictures).sort(([a], [b]) => (+b === ours) - (+a === ours));
   for (const [, picture] of pictures) {
     const count = picture.in.length / 4;
@@ -313,7 +318,7 @@ function showMore(count) {
 function showPairs() {
   const set = setChoice ? setChoice.value : "all", words = filter.value.toLowerCase();
   listed = data.pairs.filter(p => (set === "all" || p.set === set) && (p.set + " " + p.names.join(" ")).toLowerCase().includes(words));
-  if (ORDERS[order.value]) { // a reference first, then by the order
+  if (ORDERS[order.value]) { // pairs that have a reference come first, sorted
     const known = listed.filter(p => p.reference).sort(ORDERS[order.value]);
     listed = known.concat(listed.filter(p => !p.reference));
   }
@@ -350,5 +355,6 @@ filter.addEventListener("input", showPairs);
 more.addEventListener("click", () => showMore(100));
 document.querySelector("noscript")?.remove();
 showPairs();
-const linked = /^#pair-(\d+)$/.exec(location.hash); // index.html#pair-1 opens the first of pairs.csv
+// The address index.html#pair-1 opens the first pair of pairs.csv.
+const linked = /^#pair-(\d+)$/.exec(location.hash);
 if (linked && data.pairs[linked[1] - 1]) openPair(linked[1] - 1);
