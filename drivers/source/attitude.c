@@ -85,7 +85,7 @@ tvs_status tvs_attitudes_at(const tvs_attitudes *attitudes, uint32_t clock_id, i
       device_ns > attitudes->entries[slot(attitudes, high)].device_ns) {
     return TVS_NONE;
   }
-  while (high - low > 1) { /* the time lies between those of items low and high */
+  while (high - low > 1) { /* device_ns lies between the times of items low and high */
     const int32_t middle = low + (high - low) / 2;
     if (attitudes->entries[slot(attitudes, middle)].device_ns <= device_ns) {
       low = middle;

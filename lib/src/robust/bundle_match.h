@@ -65,9 +65,8 @@ struct Elimination {
   double r;
   double a[5];      // derivatives of r by the pose parameters (w, a, b) of PoseModel
   double B[2][2];   // d pixel 1 / d direction
-  double along[2];  // unit: the direction in image 1 in which the projection moves with the inverse
-                    // distance
-  double length;    // speed of the projection in this direction; 0 for a point on the baseline
+  double along[2];  // unit vector: how the projection in image 1 moves with the inverse distance
+  double length;    // speed of the projection along this vector; 0 for a point on the baseline
   double k[2];      // the part of the residual across `along` that image 0 can take
 };
 Elimination eliminate(const BundleFrame& frame, const BundleMatch& match);

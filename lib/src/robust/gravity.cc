@@ -67,13 +67,13 @@ void turn_tangent_basis(const Vec3& old_t, const Vec3& t, double covariance[25])
   tangent_basis(t, &to[0], &to[1]);
   const double turn[2][2] = {{to[0].dot(from[0]), to[0].dot(from[1])},
                              {to[1].dot(from[0]), to[1].dot(from[1])}};
-  for (int i = 0; i < 5; ++i) {  // multiplies by T' from the right
+  for (int i = 0; i < 5; ++i) {  // covariance becomes covariance turn'
     double* row = covariance + 5 * i;
     const double a = row[3], b = row[4];
     row[3] = turn[0][0] * a + turn[0][1] * b;
     row[4] = turn[1][0] * a + turn[1][1] * b;
   }
-  for (int i = 0; i < 5; ++i) {  // multiplies by T from the left
+  for (int i = 0; i < 5; ++i) {  // covariance becomes turn covariance
     const double a = covariance[15 + i], b = covariance[20 + i];
     covariance[15 + i] = turn[0][0] * a + turn[0][1] * b;
     covariance[20 + i] = turn[1][0] * a + turn[1][1] * b;

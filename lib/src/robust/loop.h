@@ -32,8 +32,9 @@ inline constexpr int kMostForFewInliers = 1000;
 struct LoopOptions {
   double confidence;
   int min_iterations, max_iterations;
-  int fixed_iterations;        // how many are made; 0: the stop is adaptive
-  int few_inliers_iterations;  // at least this number / inliers are made, up to kMostForFewInliers
+  int fixed_iterations;        // number of iterations; 0: the stop is adaptive
+  int few_inliers_iterations;  // the least number of iterations is this / inliers, up to
+                               // kMostForFewInliers
   int least_inliers = 0;       // a model whose cost excludes so many inliers is not refined
 };
 

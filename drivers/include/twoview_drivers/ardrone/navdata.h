@@ -242,13 +242,13 @@ typedef struct ardrone_phys_measures {
   uint32_t supply_3v3, vref_epson, vref_idg;
 } ardrone_phys_measures;
 
-/* The option ARDRONE_TAG_GYROS_OFFSETS. */
+/* The option ARDRONE_TAG_GYROS_OFFSETS: the gyroscopes' readings at rest. */
 typedef struct ardrone_gyros_offsets {
   /* The gyroscopes' readings at rest, raw units. */
   float offset[3];
 } ardrone_gyros_offsets;
 
-/* The option ARDRONE_TAG_EULER_ANGLES. */
+/* The option ARDRONE_TAG_EULER_ANGLES: pitch and roll by the accelerometer alone. */
 typedef struct ardrone_euler_angles {
   /* Pitch and roll by the accelerometer alone, 0.001 degrees. */
   float theta_mdeg, phi_mdeg;
@@ -268,13 +268,13 @@ typedef struct ardrone_references {
   int32_t ui_sequence;
 } ardrone_references;
 
-/* The option ARDRONE_TAG_TRIMS. */
+/* The option ARDRONE_TAG_TRIMS: the trims of yaw rate, pitch and roll. */
 typedef struct ardrone_trims {
   /* The yaw rate, pitch and roll of the flat trim; their units are not documented. */
   float yaw_rate, theta, phi;
 } ardrone_trims;
 
-/* The option ARDRONE_TAG_RC_REFERENCES. */
+/* The option ARDRONE_TAG_RC_REFERENCES: the movement that the controller requested. */
 typedef struct ardrone_rc_references {
   /* The movement that the controller sent, raw. */
   int32_t pitch, roll, yaw, climb, ag;
@@ -318,13 +318,13 @@ typedef struct ardrone_altitude {
   uint32_t estimated_state;
 } ardrone_altitude;
 
-/* The option ARDRONE_TAG_VISION_RAW. */
+/* The option ARDRONE_TAG_VISION_RAW: the translation of the picture between two frames. */
 typedef struct ardrone_vision_raw {
   /* The translation of the picture between two frames; its unit is not documented. */
   float translation[3];
 } ardrone_vision_raw;
 
-/* The option ARDRONE_TAG_VISION_FLOW. */
+/* The option ARDRONE_TAG_VISION_FLOW: the optical flow in five parts of the picture. */
 typedef struct ardrone_vision_flow {
   /* Motion in five parts of the picture, pixels. */
   float dx[5], dy[5];
@@ -354,7 +354,7 @@ typedef struct ardrone_vision {
   float gold_x, gold_y;
 } ardrone_vision;
 
-/* The option ARDRONE_TAG_VISION_PERF. */
+/* The option ARDRONE_TAG_VISION_PERF: the on-board vision's computing times. */
 typedef struct ardrone_vision_perf {
   /* The computing times of the on-board vision's steps; their unit is not documented. */
   float size, corners, compute, tracking, translation, update, custom[20];
@@ -380,13 +380,13 @@ typedef struct ardrone_vision_detect {
   uint32_t camera[4];
 } ardrone_vision_detect;
 
-/* The option ARDRONE_TAG_WATCHDOG. */
+/* The option ARDRONE_TAG_WATCHDOG: the counter of a watchdog. */
 typedef struct ardrone_watchdog {
   /* The watchdog's counter. */
   int32_t value;
 } ardrone_watchdog;
 
-/* The option ARDRONE_TAG_ADC_DATA. */
+/* The option ARDRONE_TAG_ADC_DATA: the raw bytes of the sensor board. */
 typedef struct ardrone_adc_data {
   /* The version of the sensor board. */
   uint32_t version;
@@ -411,7 +411,7 @@ typedef struct ardrone_video_stream {
   uint32_t tcp_queue, fifo_queue;
 } ardrone_video_stream;
 
-/* The option ARDRONE_TAG_GAMES. */
+/* The option ARDRONE_TAG_GAMES: the counters of Parrot's games. */
 typedef struct ardrone_games {
   /* The numbers of double taps and of finish lines. */
   uint32_t double_taps, finish_lines;
@@ -444,7 +444,7 @@ typedef struct ardrone_magneto {
   float radius, error_mean, error_variance;
 } ardrone_magneto;
 
-/* The option ARDRONE_TAG_WIND. */
+/* The option ARDRONE_TAG_WIND: the wind's estimate and its estimator's state. */
 typedef struct ardrone_wind {
   /* Speed of the wind, m/s; its direction and the angles that hold against it, radians; the
      estimator's internal state. */
@@ -476,7 +476,7 @@ typedef struct ardrone_hd_video {
   uint32_t state, fifo_packets, fifo_size, usb_size_kb, usb_free_kb, frame_number, remaining_s;
 } ardrone_hd_video;
 
-/* The option ARDRONE_TAG_WIFI. */
+/* The option ARDRONE_TAG_WIFI: the quality of the radio link. */
 typedef struct ardrone_wifi {
   /* The drone's own measure of the link's quality, raw. */
   uint32_t link_quality;
@@ -549,59 +549,60 @@ typedef struct ardrone_navdata {
   uint32_t num_short;
   /* Whether the option ARDRONE_TAG_GPS filled gps or zimmu. */
   ardrone_gps_form gps_form;
-  /* The option ARDRONE_TAG_DEMO, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_DEMO of the packet; zeros when the packet does not have it. */
   ardrone_demo demo;
-  /* The option ARDRONE_TAG_TIME, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_TIME of the packet; zeros when the packet does not have it. */
   ardrone_time time;
-  /* The option ARDRONE_TAG_RAW_MEASURES, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_RAW_MEASURES of the packet; zeros when the packet does not have it. */
   ardrone_raw_measures raw_measures;
-  /* The option ARDRONE_TAG_PHYS_MEASURES, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_PHYS_MEASURES of the packet; zeros when the packet does not have it. */
   ardrone_phys_measures phys_measures;
-  /* The option ARDRONE_TAG_GYROS_OFFSETS, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_GYROS_OFFSETS of the packet; zeros when the packet does not have it. */
   ardrone_gyros_offsets gyros_offsets;
-  /* The option ARDRONE_TAG_EULER_ANGLES, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_EULER_ANGLES of the packet; zeros when the packet does not have it. */
   ardrone_euler_angles euler_angles;
-  /* The option ARDRONE_TAG_REFERENCES, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_REFERENCES of the packet; zeros when the packet does not have it. */
   ardrone_references references;
-  /* The option ARDRONE_TAG_TRIMS, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_TRIMS of the packet; zeros when the packet does not have it. */
   ardrone_trims trims;
-  /* The option ARDRONE_TAG_RC_REFERENCES, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_RC_REFERENCES of the packet; zeros when the packet does not have it. */
   ardrone_rc_references rc_references;
-  /* The option ARDRONE_TAG_PWM, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_PWM of the packet; zeros when the packet does not have it. */
   ardrone_pwm pwm;
-  /* The option ARDRONE_TAG_ALTITUDE, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_ALTITUDE of the packet; zeros when the packet does not have it. */
   ardrone_altitude altitude;
-  /* The option ARDRONE_TAG_VISION_RAW, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_VISION_RAW of the packet; zeros when the packet does not have it. */
   ardrone_vision_raw vision_raw;
-  /* The option ARDRONE_TAG_VISION_FLOW, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_VISION_FLOW of the packet; zeros when the packet does not have it. */
   ardrone_vision_flow vision_flow;
-  /* The option ARDRONE_TAG_VISION, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_VISION of the packet; zeros when the packet does not have it. */
   ardrone_vision vision;
-  /* The option ARDRONE_TAG_VISION_PERF, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_VISION_PERF of the packet; zeros when the packet does not have it. */
   ardrone_vision_perf vision_perf;
-  /* The option ARDRONE_TAG_TRACKERS, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_TRACKERS of the packet; zeros when the packet does not have it. */
   ardrone_trackers trackers;
-  /* The option ARDRONE_TAG_VISION_DETECT, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_VISION_DETECT of the packet; zeros when the packet does not have it. */
   ardrone_vision_detect vision_detect;
-  /* The option ARDRONE_TAG_WATCHDOG, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_WATCHDOG of the packet; zeros when the packet does not have it. */
   ardrone_watchdog watchdog;
-  /* The option ARDRONE_TAG_ADC_DATA, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_ADC_DATA of the packet; zeros when the packet does not have it. */
   ardrone_adc_data adc_data;
-  /* The option ARDRONE_TAG_VIDEO_STREAM, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_VIDEO_STREAM of the packet; zeros when the packet does not have it. */
   ardrone_video_stream video_stream;
-  /* The option ARDRONE_TAG_GAMES, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_GAMES of the packet; zeros when the packet does not have it. */
   ardrone_games games;
-  /* The option ARDRONE_TAG_PRESSURE, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_PRESSURE of the packet; zeros when the packet does not have it. */
   ardrone_pressure pressure;
-  /* The option ARDRONE_TAG_MAGNETO, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_MAGNETO of the packet; zeros when the packet does not have it. */
   ardrone_magneto magneto;
-  /* The option ARDRONE_TAG_WIND, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_WIND of the packet; zeros when the packet does not have it. */
   ardrone_wind wind;
-  /* The option ARDRONE_TAG_KALMAN_PRESSURE, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_KALMAN_PRESSURE of the packet; zeros when the packet does not have
+     it. */
   ardrone_kalman_pressure kalman_pressure;
-  /* The option ARDRONE_TAG_HD_VIDEO, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_HD_VIDEO of the packet; zeros when the packet does not have it. */
   ardrone_hd_video hd_video;
-  /* The option ARDRONE_TAG_WIFI, or zeros when it is missing. */
+  /* The option ARDRONE_TAG_WIFI of the packet; zeros when the packet does not have it. */
   ardrone_wifi wifi;
   /* The option ARDRONE_TAG_GPS in the forms ARDRONE_GPS_247 and ARDRONE_GPS_248, or zeros. */
   ardrone_gps gps;
