@@ -43,7 +43,7 @@ if(TARGET twoview_unity AND NOT TARGET twoview_unity_end)
 endif()
 
 # tv_add_test(name LABEL label SOURCES file... [LIBS library...])
-# Builds and registers a Unity test.
+# Builds a Unity test and registers it as the test label/name.
 function(tv_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "LABEL" "SOURCES;LIBS")
   set(target ${arg_LABEL}_${name})

@@ -54,7 +54,7 @@ else()
       URL https://github.com/ThrowTheSwitch/Unity/archive/refs/tags/v2.6.1.tar.gz
       URL_HASH SHA256=b41a66d45a6b99758fb3202ace6178177014d52fc524bf1f72687d93e9867292
       DOWNLOAD_EXTRACT_TIMESTAMP OFF
-      SOURCE_SUBDIR none) # only its sources are used, because its own build exports and installs
+      SOURCE_SUBDIR none) # Unity's own build is left out, because it exports and installs
     FetchContent_MakeAvailable(unity)
     tv_build_unity(${unity_SOURCE_DIR}/src)
   endif()

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* The bits of REF that are always set. */
+/* The bits of the command REF that are always set. */
 static const int32_t REF_BASE = (1 << 18) | (1 << 20) | (1 << 22) | (1 << 24) | (1 << 28);
 static const int32_t REF_TAKE_OFF = 1 << 9, REF_EMERGENCY = 1 << 8;
 

@@ -89,7 +89,7 @@ tvs_status ardrone_ids_next(const char *text, size_t size, size_t *offset, ardro
   return TVS_END;
 }
 
-/* ---- keys ---- */
+/* ---- the known keys and their ranges ---- */
 
 typedef enum key_kind {
   KEY_BOOL,
@@ -213,7 +213,7 @@ static int obeys(const key_rule *rule, const char *value) {
     case KEY_REAL:
       return parse_number(value, rule->kind == KEY_REAL, &number) && number >= rule->low &&
              number <= rule->high;
-    case KEY_GPS: /* the drone's value for "not valid" */
+    case KEY_GPS: /* the drone's number for "not valid" */
       return parse_number(value, 1, &number) &&
              ((number >= rule->low && number <= rule->high) || number == 500);
     case KEY_TEXT: return 1;
@@ -242,7 +242,7 @@ int ardrone_config_needs_ids(const char *key) {
   return rule && rule->needs_ids;
 }
 
-/* ---- values ---- */
+/* ---- texts of values and ids ---- */
 
 tvs_status ardrone_format_number(double value, int digits, char *text, size_t cap_text) {
   char reversed[40];
@@ -279,7 +279,7 @@ tvs_status ardrone_format_led(int animation, float hertz, int seconds, char *tex
     return TVS_ERR_ARGUMENT;
   }
   for (k = 0; k < 3; ++k) {
-    uint64_t left = (uint64_t)parts[k]; /* bits of a positive float are a positive number */
+    uint64_t left = (uint64_t)parts[k]; /* the bits of a positive float are a positive number */
     char digits[20];
     size_t num = 0;
     do digits[num++] = (char)('0' + left % 10);
@@ -301,7 +301,7 @@ void ardrone_make_id(const char *name, char id[ARDRONE_ID_BYTES]) {
     for (bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1 ? 0xEDB88320u : 0);
   }
   crc = ~crc;
-  if (crc == 0) crc = 1; /* 00000000 is the drone's default configuration */
+  if (crc == 0) crc = 1; /* the id 00000000 names the drone's default configuration */
   for (k = 0; k < 8; ++k) id[k] = "0123456789abcdef"[crc >> (28 - 4 * k) & 15];
   id[8] = '\0';
 }

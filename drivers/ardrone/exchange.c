@@ -44,7 +44,7 @@ tvs_status ardrone_exchange_begin(ardrone_exchange *exchange, ardrone_exchange_k
   memset(exchange, 0, sizeof *exchange);
   exchange->kind = kind;
   if (kind == ARDRONE_EXCHANGE_SET) {
-    strcpy(exchange->key, key); /* lengths were checked */
+    strcpy(exchange->key, key); /* ardrone_exchange_begin has checked the lengths */
     strcpy(exchange->value, value);
   }
   if (ids) {
@@ -85,7 +85,7 @@ void ardrone_exchange_text(ardrone_exchange *exchange, int64_t now_ns) {
   }
 }
 
-/* Ids and command in one datagram, or neither. */
+/* Writes the ids and the command into the same datagram; when they do not fit, writes nothing. */
 static tvs_status write_command(const ardrone_exchange *exchange, ardrone_at *at) {
   const size_t size = at->size;
   const int32_t sequence = at->sequence;
@@ -135,7 +135,7 @@ tvs_status ardrone_exchange_tick(ardrone_exchange *exchange, ardrone_at *at, int
     return TVS_OK;
   }
   status = write_command(exchange, at);
-  if (status != TVS_OK) return status; /* no room in this datagram: the next one */
+  if (status != TVS_OK) return status; /* without room here, the next datagram gets it */
   ++exchange->num_sent;
   enter(exchange, ARDRONE_EXCHANGE_WAITING, now_ns);
   return TVS_OK;

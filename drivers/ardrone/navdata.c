@@ -45,7 +45,7 @@ static tvs_status check_packet(const uint8_t *bytes, size_t size) {
     }
     at += option_bytes;
   }
-  return TVS_ERR_DATA; /* it ends before the checksum */
+  return TVS_ERR_DATA; /* the datagram ends before the checksum */
 }
 
 static const uint8_t *read_run(const uint8_t *from, const navdata_run *run, uint8_t *to) {
@@ -186,7 +186,7 @@ static void take_motion(const ardrone_navdata *navdata, tvs_imu *sample) {
   const ardrone_demo *demo = &navdata->demo;
   const float *v = demo->velocity_mm_s;
   if ((navdata->state & ARDRONE_STATE_FLYING) == 0)
-    return; /* on the ground the drone reports values that it did not measure */
+    return; /* on the ground the drone reports velocity and altitude without measuring them */
   if (demo->altitude_mm > 0 && demo->altitude_mm < 200000) {
     sample->altitude_m = demo->altitude_mm * 1e-3;
     sample->altitude_sigma = 0.02 + 0.01 * sample->altitude_m;

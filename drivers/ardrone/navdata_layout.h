@@ -11,15 +11,15 @@ enum { NAVDATA_HEADER_BYTES = 16, NAVDATA_OPTION_BYTES = 4, NAVDATA_CHECKSUM_BYT
 static const uint32_t NAVDATA_MAGIC = 0x55667788u, NAVDATA_MAGIC_EXTRA = 0x55667789u;
 
 typedef struct navdata_run {
-  uint16_t offset; /* in ardrone_navdata */
-  uint8_t width;   /* bytes of a value: 1, 2, 4 or 8 */
+  uint16_t offset; /* where the values begin in ardrone_navdata, bytes */
+  uint8_t width;   /* bytes of one value: 1, 2, 4 or 8 */
   uint8_t count;
 } navdata_run;
 
 typedef struct navdata_layout {
   const navdata_run *runs;
   int num_runs;
-  uint16_t bytes; /* on the wire, with tag and size */
+  uint16_t bytes; /* size of the option on the wire, tag and size fields included */
 } navdata_layout;
 
 /* The layout of a tag; tag 27 has several, and `size` decides which one it is. Null when there is

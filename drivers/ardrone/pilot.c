@@ -10,7 +10,8 @@ static const int64_t TAKE_OFF_TIMEOUT_NS = 20000 * MS;
    pause after it is longer than the drone needs to report the new state. */
 static const int64_t PULSE_NS = 150 * MS, PULSE_PERIOD_NS = 600 * MS, EMERGENCY_NS = 3000 * MS;
 static const int64_t FRESH_NS = 200 * MS;
-enum { NUM_TRIMS = 10 }; /* the drone does not acknowledge it */
+/* The flat trim is sent several times, because the drone does not acknowledge it. */
+enum { NUM_TRIMS = 10 };
 enum { CUT = 1, REARM = 2 };
 
 void ardrone_pilot_init(ardrone_pilot *pilot) {
@@ -59,8 +60,8 @@ void ardrone_pilot_state(ardrone_pilot *pilot, uint32_t state, int64_t now_ns) {
   } else if (is_flying(pilot)) {
     pilot->was_flying = 1;
   } else if (pilot->was_flying || now_ns - pilot->take_off_ns > TAKE_OFF_TIMEOUT_NS) {
-    end_flight(pilot); /* it landed by itself; bit 9 of REF, if it stayed set, would make it take
-                          off again */
+    end_flight(pilot); /* the drone landed by itself; if bit 9 of REF stayed set, the drone would
+                          take off again */
   }
 }
 

@@ -9,7 +9,7 @@
 enum { RECORD_BYTES = 12, MAX_FOLDER_BYTES = 4000 };
 static const int64_t TAKEN_LATER_NS = 10 * MS;
 
-/* ---- files ---- */
+/* ---- reading the recorded files ---- */
 
 /* Reads the next whole record of a navdata.log. A record with an impossible length ends the log. */
 static int read_record(FILE *file, int64_t *host_ns, uint8_t *bytes, size_t capacity,
@@ -39,7 +39,8 @@ static int load_header(ardrone_replay *replay, ardrone_pave_header *header) {
   status = ardrone_pave_decode(replay->header, ARDRONE_PAVE_MIN_HEADER, header);
   size = ardrone_get16(replay->header + 6);
   if (status == TVS_NONE) {
-    const size_t more = size - ARDRONE_PAVE_MIN_HEADER; /* size <= ARDRONE_PAVE_MAX_HEADER */
+    /* TVS_NONE means that size is at most ARDRONE_PAVE_MAX_HEADER. */
+    const size_t more = size - ARDRONE_PAVE_MIN_HEADER;
     if (fread(replay->header + ARDRONE_PAVE_MIN_HEADER, 1, more, file) != more) return 0;
     status = ardrone_pave_decode(replay->header, size, header);
   }
@@ -73,7 +74,7 @@ static void load_packet(ardrone_replay *replay) {
   replay->paced_ms = header.timestamp_ms;
 }
 
-/* ---- transport ---- */
+/* ---- the recording as a transport ---- */
 
 static int64_t due(const ardrone_replay *replay, int64_t recorded_ns) {
   return recorded_ns - replay->origin_ns + replay->begin_ns;
@@ -117,7 +118,8 @@ static tvs_status receive_video(ardrone_replay *replay, void *bytes, size_t capa
     *size = replay->payload_left < capacity ? replay->payload_left : capacity;
     *size = fread(bytes, 1, *size, replay->video);
     replay->payload_left -= *size;
-    if (*size == 0) replay->payload_left = 0; /* cut off: the parser drops the part that came */
+    /* Where the file ends within a payload, the parser drops the incomplete packet. */
+    if (*size == 0) replay->payload_left = 0;
   }
   if (replay->header_sent == replay->header_size && replay->payload_left == 0) {
     load_packet(replay);

@@ -60,7 +60,7 @@ static void init_clocks(ardrone_session *session) {
   tvs_clock_options_init(&options);
   options.period_ns = ARDRONE_TIME_PERIOD_NS;
   tvs_clock_init(&session->navdata_clock, &options, 1, 2);
-  options.period_ns = INT64_C(4294967296) * MS; /* 32 bits of milliseconds */
+  options.period_ns = INT64_C(4294967296) * MS; /* the stamp is a 32-bit count of milliseconds */
   options.least_delay_ns =
       300 * MS; /* the delay of exposure, encoder and queues, which cannot be observed here */
   tvs_clock_init(&session->video_clock, &options, 2, 2);
@@ -185,7 +185,7 @@ tvs_status ardrone_session_imu(ardrone_session *session, tvs_imu_source *source)
   return TVS_OK;
 }
 
-/* ---- requests ---- */
+/* ---- the caller's requests ---- */
 
 tvs_status ardrone_session_take_off(ardrone_session *session) {
   if (!session) return TVS_ERR_NULL;
@@ -235,7 +235,7 @@ tvs_status ardrone_session_set(ardrone_session *session, const char *key, const 
   if (ardrone_config_needs_ids(key) && !session->options.use_ids) return TVS_ERR_ARGUMENT;
   r = add_request(session, ARDRONE_EXCHANGE_SET);
   if (!r) return TVS_ERR_CAPACITY;
-  strcpy(r->key, key); /* lengths were checked */
+  strcpy(r->key, key); /* ardrone_config_check has checked the lengths */
   strcpy(r->value, value);
   return TVS_OK;
 }
@@ -257,7 +257,7 @@ tvs_status ardrone_session_set_gps(ardrone_session *session, double latitude_deg
   char values[3][32];
   int k;
   if (!session) return TVS_ERR_NULL;
-  for (k = 0; k < 3; ++k) { /* all or none */
+  for (k = 0; k < 3; ++k) { /* all three values are checked before any is queued */
     tvs_status status = ardrone_format_number(numbers[k], 9, values[k], sizeof values[k]);
     if (status == TVS_OK) status = ardrone_config_check(keys[k], values[k]);
     if (status != TVS_OK) return status;

@@ -6,7 +6,7 @@
 static void add_setup(ardrone_session *session, const char *key, const char *value) {
   request *r = &session->setup[session->num_setup++];
   r->kind = ARDRONE_EXCHANGE_SET;
-  strcpy(r->key, key); /* own texts, short */
+  strcpy(r->key, key); /* key and value are short texts of this file */
   strcpy(r->value, value);
 }
 
@@ -21,8 +21,8 @@ static int is_idle(const ardrone_exchange *exchange) {
          exchange->state == ARDRONE_EXCHANGE_FAILED;
 }
 
-/* navdata_demo comes first, since it ends the bootstrap. A request that was under way begins again
-   after the set-up. */
+/* Begins the set-up of a new link. The key navdata_demo comes first, since it ends the bootstrap. A
+   request that was under way begins again after the set-up. */
 void ardrone_exchanges_new_link(ardrone_session *session) {
   const ardrone_session_options *o = &session->options;
   session->exchange.state = ARDRONE_EXCHANGE_IDLE;
@@ -89,7 +89,7 @@ static void finish_exchange(ardrone_session *session) {
 static void complete_setup(ardrone_session *session) {
   if (session->num_setup > 0 &&
       (session->navdata.state &
-       ARDRONE_STATE_BOOTSTRAP)) { /* the drone did not accept it: begin again */
+       ARDRONE_STATE_BOOTSTRAP)) { /* still in bootstrap: repeat the set-up */
     session->idx_setup = 0;
     return;
   }

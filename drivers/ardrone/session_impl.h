@@ -39,18 +39,18 @@ struct ardrone_session {
   tvs_decoder decoder;
   int64_t now_ns;
   ardrone_counters counters;
-  char ids[3][ARDRONE_ID_BYTES]; /* session, user, application */
+  char ids[3][ARDRONE_ID_BYTES]; /* ids of session, user and application */
 
-  /* link */
+  /* link to the drone */
   int is_open, has_link, is_up;
   int64_t open_retry_ns, wake_ns, heard_ns;
   ardrone_sequence sequence;
-  uint32_t last_number; /* kept through a silence, so that a reboot is recognised */
+  uint32_t last_number; /* of navdata; kept through a silence, so that a reboot is recognised */
   int was_heard;
   ardrone_navdata navdata;
   ardrone_pilot pilot;
 
-  /* exchanges: the set-up first, then the caller's */
+  /* exchanges: first those of the set-up, then those that the caller requested */
   ardrone_exchange exchange;
   request setup[MAX_SETUP];
   int num_setup, idx_setup;
@@ -61,8 +61,8 @@ struct ardrone_session {
   size_t text_size;
   int has_text;
 
-  /* time and attitude */
-  tvs_clock navdata_clock, video_clock; /* odd and even clock ids */
+  /* clocks, attitudes and IMU samples */
+  tvs_clock navdata_clock, video_clock; /* navdata has odd clock ids, video even ones */
   tvs_attitudes attitudes;
   int has_psi0;
   uint32_t psi0_clock_id;
@@ -70,10 +70,10 @@ struct ardrone_session {
   tvs_imu imu[QUEUE_IMU];
   int first_imu, num_imu;
 
-  /* pictures */
+  /* video streams and decoded pictures */
   stream video, recording;
   ardrone_pave_gate gate;
-  int gap, new_stream; /* the flags of the next picture */
+  int gap, new_stream; /* whether the next picture gets TVS_FRAME_GAP and TVS_FRAME_NEW_STREAM */
   tvs_frame frames[QUEUE_FRAMES];
   int first_frame, num_frames;
 };

@@ -82,7 +82,8 @@ static void make_link(ardrone_session *session) {
 static void begin_anew(ardrone_session *session) {
   ++session->counters.reboots;
   if (session->has_link) lose_link(session);
-  session->sequence.has_last = 1; /* the session's state is that of this packet already */
+  /* The packet that revealed the reboot is the last one of the sequence. */
+  session->sequence.has_last = 1;
   session->has_psi0 = 0;
   tvs_clock_restart(&session->navdata_clock);
   ardrone_video_reboot(session);
@@ -142,7 +143,7 @@ void ardrone_link_receive(ardrone_session *session) {
     const tvs_status status =
         t->receive(t->user, ARDRONE_CHANNEL_NAVDATA, bytes, sizeof bytes, &size);
     if (status != TVS_OK)
-      return; /* a socket that failed receives nothing, and 2 s without navdata reopen it */
+      return; /* a failed socket receives nothing; 2 s without navdata reopen it */
     take_datagram(session, bytes, size);
   }
 }

@@ -65,12 +65,12 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
   return total;
 }
 
-/* ---- time of a picture ---- */
+/* ---- the time and attitude of a picture ---- */
 
-/* Where both stamps count from the drone's start, the picture's own stamp names an instant of the
-   navdata clock. The arrival
-   times show whether that is so: the picture is then at most 1.5 s late (the least delay
-   subtracted). Two unrelated clocks agree so well by chance once in 1200 times. */
+/* When the stamps of the pictures and of navdata both count from the drone's start, a picture's
+   stamp names an instant of the navdata clock. The arrival times show whether that is so: the
+   picture is then at most 1.5 s late (the least delay subtracted). Two unrelated clocks agree so
+   well by chance once in 1200 times. */
 typedef enum clock_relation { UNRELATED, BY_ARRIVAL, BY_STAMP } clock_relation;
 
 static clock_relation to_navdata_clock(const ardrone_session *session, const tvs_time *time,
@@ -86,7 +86,7 @@ static clock_relation to_navdata_clock(const ardrone_session *session, const tvs
   if (late < -ARDRONE_TIME_PERIOD_NS / 2) late += ARDRONE_TIME_PERIOD_NS;
   if (late > -250 * MS && late < 1500 * MS) {
     *device_ns = by_host - late;
-    *uncertainty_ns = 1 * MS; /* the stamp's own step */
+    *uncertainty_ns = 1 * MS; /* the stamp counts whole milliseconds */
     return BY_STAMP;
   }
   *device_ns = by_host;
@@ -147,7 +147,7 @@ tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs
   return TVS_OK;
 }
 
-/* ---- pictures ---- */
+/* ---- the queue of pictures ---- */
 
 static void give_back(ardrone_session *session, tvs_frame *frame) {
   tvs_picture picture;
@@ -216,7 +216,7 @@ static void decode_packet(ardrone_session *session, const ardrone_pave_packet *p
     session->gap = 1;
     if (status != TVS_NONE) {
       ++session->counters.frames_failed;
-      session->gate.is_open = 0; /* the following pictures refer to one that is missing */
+      session->gate.is_open = 0; /* the next pictures refer to this one, which did not decode */
     }
   }
 }

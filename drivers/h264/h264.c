@@ -9,7 +9,7 @@ enum { MAX_BYTES = 1 << 24 };
 typedef struct h264 {
   AVCodecContext *context;
   AVPacket *packet;
-  AVFrame *frame; /* what libav decodes into; it is then moved to the picture's own frame */
+  AVFrame *frame; /* libav decodes into it; the result is then moved to the picture's own frame */
 } h264;
 
 static int is_luma_first(int format) {
@@ -93,7 +93,7 @@ tvs_status tvs_h264_open(tvs_decoder *decoder) {
     free_all(own);
     return TVS_ERR_CAPACITY;
   }
-  own->context->thread_count = 1; /* with more threads pictures would come later */
+  own->context->thread_count = 1; /* with more threads libav would deliver each picture later */
   own->context->flags |= AV_CODEC_FLAG_LOW_DELAY;
   own->context->err_recognition = AV_EF_EXPLODE;
   if (avcodec_open2(own->context, codec, NULL) < 0) {

@@ -17,7 +17,7 @@ void tvs_slerp(const double a[4], const double b[4], double s, double q[4]) {
   double dot = 0, sign = 1, weight_a = 1 - s, weight_b = s, norm_sq = 0, norm;
   int k;
   for (k = 0; k < 4; ++k) dot += a[k] * b[k];
-  if (dot < 0) { /* q and -q are the same attitude; the nearer of the two is used */
+  if (dot < 0) { /* q and -q are the same attitude; of b and -b the one nearer to a is used */
     dot = -dot;
     sign = -1;
   }
@@ -85,7 +85,7 @@ tvs_status tvs_attitudes_at(const tvs_attitudes *attitudes, uint32_t clock_id, i
       device_ns > attitudes->entries[slot(attitudes, high)].device_ns) {
     return TVS_NONE;
   }
-  while (high - low > 1) { /* the time lies in [low, high] */
+  while (high - low > 1) { /* device_ns lies between the times of items low and high */
     const int32_t middle = low + (high - low) / 2;
     if (attitudes->entries[slot(attitudes, middle)].device_ns <= device_ns) {
       low = middle;

@@ -7,7 +7,7 @@
 #include <stddef.h>
 
 enum { SECOND = 1000000000 };
-/* Longer than TCP delays bytes that it still delivers. */
+/* TCP does not deliver bytes that are delayed by more than this, ns. */
 static const int64_t LATEST_DELAY_NS = 30LL * SECOND;
 static const int64_t JUMP_NS = SECOND;
 /* About 73 years: sums and differences of such times do not overflow. */
@@ -75,7 +75,7 @@ static int64_t unwrap(int64_t stamp_ns, int64_t period_ns, int64_t expected_ns) 
 
 static void begin_run(tvs_clock *clock, int64_t stamp_ns, int64_t received_ns) {
   clock->clock_id += clock->id_step;
-  if (clock->clock_id == 0) clock->clock_id += clock->id_step; /* 0 means "no clock" */
+  if (clock->clock_id == 0) clock->clock_id += clock->id_step; /* the id 0 means "no clock" */
   clock->num_observed = 1;
   clock->last_device_ns = stamp_ns;
   clock->last_host_ns = clock->offset_host_ns = received_ns;
@@ -91,7 +91,8 @@ static int continues_run(const tvs_clock *clock, int64_t stamp_ns, int64_t recei
   *device_ns = unwrap(stamp_ns, clock->options.period_ns, expected);
   if (*device_ns < clock->last_device_ns - JUMP_NS) return 0;
   if (*device_ns - expected < -LATEST_DELAY_NS) return 0;
-  ahead = *device_ns + clock->offset_ns - received_ns; /* smaller than the least delay so far */
+  /* By so many ns the delay of this stamp is smaller than the least one so far. */
+  ahead = *device_ns + clock->offset_ns - received_ns;
   return ahead <= JUMP_NS + drift_over(clock, received_ns - clock->offset_host_ns);
 }
 

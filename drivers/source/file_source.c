@@ -6,10 +6,10 @@
 
 struct tvs_file_source {
   tvs_file_options options;
-  uint64_t index; /* of the next picture */
-  int gap;        /* one was left out since the last frame */
+  uint64_t index; /* number of the next picture to read */
+  int gap;        /* whether a picture was left out since the last frame */
   int imu_ended;
-  int64_t imu_device_ns; /* of the newest attitude read */
+  int64_t imu_device_ns; /* time of the newest attitude that was read from options.imu, ns */
   tvs_attitudes attitudes;
 };
 

@@ -21,7 +21,7 @@ typedef struct tvs_attitudes {
   } entries[TVS_ATTITUDES_CAPACITY];
 } tvs_attitudes;
 
-/* Empties the list. Null is allowed. */
+/* Empties the list of attitudes, which may be null. */
 TV_API void tvs_attitudes_init(tvs_attitudes *attitudes);
 
 /* Adds an attitude that was measured at device_ns of the clock that attitude->clock_id names. Where

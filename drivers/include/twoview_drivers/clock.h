@@ -30,25 +30,25 @@ typedef struct tvs_clock_options {
   int32_t drift_ppm;
 } tvs_clock_options;
 
-/* Writes the defaults; period_ns is 0. Null is allowed. */
+/* Writes the defaults, with period_ns 0, to options, which may be null. */
 TV_API void tvs_clock_options_init(tvs_clock_options *options);
 
 /* Private: a caller owns it and does not read its fields. */
 typedef struct tvs_clock {
   tvs_clock_options options;
-  /* 0 before the first observation. */
+  /* The id of the clock's present run; 0 before the first observation. */
   uint32_t clock_id;
-  /* Distance of successive ids. */
+  /* The difference between the ids of successive runs. */
   uint32_t id_step;
-  /* In this run of the clock. */
+  /* How many stamps were observed in this run of the clock. */
   int64_t num_observed;
-  /* The latest time of the device so far, unwrapped. */
+  /* The latest time of the device so far, unwrapped, ns. */
   int64_t last_device_ns;
-  /* When that time was received. */
+  /* Host time at which the latest time of the device was received, ns. */
   int64_t last_host_ns;
-  /* Host = device + offset, by the least delay. */
+  /* The offset by the least delay: host time = device time + offset_ns. */
   int64_t offset_ns;
-  /* When that offset was last confirmed. */
+  /* Host time at which the offset was last confirmed, ns. */
   int64_t offset_host_ns;
 } tvs_clock;
 

@@ -9,9 +9,9 @@ TV_BEGIN_DECLS
 /* How the pictures are read and timed. Frames' times are times of the files, not of this computer's
    clock. */
 typedef struct tvs_file_options {
-  /* tvs_file_options_init sets it. */
+  /* The size of this struct, which tvs_file_options_init sets. */
   uint32_t struct_size;
-  /* The first argument of the functions. */
+  /* The first argument of `read` and `release`. */
   void *user;
   /* Opens or decodes picture `index` (0, 1, ...), fills *picture and, where the file has a time,
      writes *device_ns, which holds index / frames_per_second before the call. TVS_END after the
@@ -24,7 +24,7 @@ typedef struct tvs_file_options {
   double frames_per_second;
   /* The clock_id of the frames' times, at least 1, default 1. */
   uint32_t clock_id;
-  /* 0. */
+  /* A reserved field that is 0. */
   uint32_t reserved;
   /* A source of attitudes in the same clock; each frame then carries the attitude at its time.
      Samples are read ahead as far as a frame needs. Null: frames carry no attitude. */
@@ -34,7 +34,7 @@ typedef struct tvs_file_options {
   int64_t max_gap_ns;
 } tvs_file_options;
 
-/* Writes the defaults and struct_size. Null is allowed. */
+/* Writes the defaults and struct_size to options, which may be null. */
 TV_API void tvs_file_options_init(tvs_file_options *options);
 
 /* A file source in the caller's memory, about 75 kB, nearly all of it attitudes. Private. */

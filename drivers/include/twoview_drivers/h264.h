@@ -14,7 +14,7 @@ TV_BEGIN_DECLS
    memory). */
 TV_API tvs_status tvs_h264_open(tvs_decoder *decoder);
 
-/* Closes what tvs_h264_open opened. Null is allowed. */
+/* Closes a decoder that tvs_h264_open opened; null is allowed. */
 TV_API void tvs_h264_close(tvs_decoder *decoder);
 
 TV_END_DECLS

@@ -21,7 +21,7 @@ TV_BEGIN_DECLS
 /* When something was measured. Host times are nanoseconds of one monotonic clock of this computer;
    file_source.h and ardrone/session.h say which clock that is. */
 typedef struct tvs_time {
-  /* Host time at which the bytes arrived, ns. */
+  /* Host time at which the measurement's bytes arrived, ns. */
   int64_t received_ns;
   /* Host time of the measurement, as well as it is known, ns; received_ns where nothing
      better is. */
@@ -34,23 +34,23 @@ typedef struct tvs_time {
      its clock jumps. Compare device times and attitudes of equal ids only. 0: there is no
      device time. */
   uint32_t clock_id;
-  /* Is 0. */
+  /* A reserved field that is 0. */
   uint32_t reserved;
 } tvs_time;
 
 /* An attitude and its uncertainty. */
 typedef struct tvs_attitude {
-  /* Unit quaternion, w x y z. */
+  /* The attitude as a unit quaternion, w x y z. */
   double world_from_body[4];
   /* Standard deviation of the rotation about any axis, radians; above 0. */
   double sigma_rad;
   /* The run of the world frame that this attitude belongs to (tvs_time.clock_id). */
   uint32_t clock_id;
-  /* Is 0. */
+  /* A reserved field that is 0. */
   uint32_t reserved;
 } tvs_attitude;
 
-/* Bits of a frame's flags. */
+/* The bits of tvs_frame.flags. */
 enum {
   /* The frame can be decoded without any frame before it. */
   TVS_FRAME_KEY = 1,
@@ -64,17 +64,17 @@ enum {
 
 /* One picture. Its pixels belong to the source and are valid until release is called. */
 typedef struct tvs_frame {
-  /* The caller sets it to sizeof(tvs_frame). */
+  /* sizeof(tvs_frame), which the caller sets before the call. */
   uint32_t struct_size;
-  /* TVS_FRAME_ bits. */
+  /* The TVS_FRAME_ bits of this frame. */
   uint32_t flags;
   /* 8-bit luma: pointer, width, height, stride. It can be handed to tv_extract as it is. */
   tv_image image;
   /* The device's own frame number where it has one, else a count from 0. */
   uint64_t number;
-  /* When the frame was exposed. */
+  /* The time at which the frame was exposed. */
   tvs_time time;
-  /* The attitude at the exposure, where flags has TVS_FRAME_HAS_ATTITUDE. */
+  /* The attitude at the exposure; valid where flags has TVS_FRAME_HAS_ATTITUDE. */
   tvs_attitude attitude;
   /* For the source's own use; leave it as it is. */
   void *handle;
@@ -83,9 +83,9 @@ typedef struct tvs_frame {
 /* Where frames come from. A driver fills it; its pointers are valid as long as that driver's
    session or memory. */
 typedef struct tvs_frame_source {
-  /* sizeof(tvs_frame_source). */
+  /* sizeof(tvs_frame_source), which the driver sets. */
   uint32_t struct_size;
-  /* The first argument of the functions. */
+  /* The first argument of `next` and `release`. */
   void *user;
   /* Gets the next frame and never waits. TVS_OK: *frame is filled, and the caller calls release
      when it no longer needs the pixels. TVS_NONE: no frame has come yet. TVS_END: no further frame
@@ -98,31 +98,32 @@ typedef struct tvs_frame_source {
 
 /* Bits of a sample's `valid`: which fields were measured. A field without its bit is 0. */
 enum {
-  /* attitude. */
+  /* The sample has an attitude. */
   TVS_IMU_ATTITUDE = 1,
-  /* rate_rad_s. */
+  /* The sample has an angular rate, rate_rad_s. */
   TVS_IMU_RATE = 2,
-  /* acceleration_m_s2. */
+  /* The sample has a specific force, acceleration_m_s2. */
   TVS_IMU_ACCELERATION = 4,
-  /* velocity_m_s[0] and velocity_m_s[1]. */
+  /* The sample has the velocity along the body's x and y axes, velocity_m_s[0] and
+     velocity_m_s[1]. */
   TVS_IMU_VELOCITY_XY = 8,
-  /* velocity_m_s[2]. */
+  /* The sample has the velocity along the body's z axis, velocity_m_s[2]. */
   TVS_IMU_VELOCITY_Z = 16,
-  /* altitude_m. */
+  /* The sample has a height, altitude_m. */
   TVS_IMU_ALTITUDE = 32,
-  /* pressure_pa. */
+  /* The sample has a pressure of the air, pressure_pa. */
   TVS_IMU_PRESSURE = 64
 };
 
 /* One sample. A sigma is one standard deviation of each component, as the source states it. */
 typedef struct tvs_imu {
-  /* The caller sets it to sizeof(tvs_imu). */
+  /* sizeof(tvs_imu), which the caller sets before the call. */
   uint32_t struct_size;
-  /* TVS_IMU_ bits. */
+  /* The TVS_IMU_ bits of the fields that were measured. */
   uint32_t valid;
-  /* When it was measured. */
+  /* The time at which the sample was measured. */
   tvs_time time;
-  /* The attitude, with its own sigma. */
+  /* The attitude with its standard deviation. */
   tvs_attitude attitude;
   /* Angular rate about the body's axes, radians per second, and its sigma. */
   double rate_rad_s[3], rate_sigma;
@@ -138,16 +139,16 @@ typedef struct tvs_imu {
 
 /* Where IMU samples come from. A driver fills it, as it fills a tvs_frame_source. */
 typedef struct tvs_imu_source {
-  /* sizeof(tvs_imu_source). */
+  /* sizeof(tvs_imu_source), which the driver sets. */
   uint32_t struct_size;
-  /* The first argument of the function. */
+  /* The first argument of `next`. */
   void *user;
   /* Gets the next sample, with the statuses of tvs_frame_source.next. There is nothing to
      release. */
   tvs_status (*next)(void *user, tvs_imu *sample);
 } tvs_imu_source;
 
-/* A decoded picture. */
+/* A picture that a tvs_decoder has decoded. */
 typedef struct tvs_picture {
   /* Lies in the decoder's memory and is valid until release is called. */
   tv_image image;
@@ -157,9 +158,9 @@ typedef struct tvs_picture {
 
 /* Turns one compressed picture into luma. h264.h makes one from libavcodec. */
 typedef struct tvs_decoder {
-  /* sizeof(tvs_decoder). */
+  /* sizeof(tvs_decoder), which the decoder's driver sets. */
   uint32_t struct_size;
-  /* The first argument of the functions. */
+  /* The first argument of `decode`, `release` and `reset`. */
   void *user;
   /* Decodes `size` bytes. TVS_OK: *picture is filled; release it later. TVS_NONE: these bytes
      give no picture. TVS_ERR_DATA: they do not decode. Pictures that were not released stay
@@ -167,7 +168,7 @@ typedef struct tvs_decoder {
   tvs_status (*decode)(void *user, const uint8_t *bytes, size_t size, tvs_picture *picture);
   /* Gives the picture's pixels back to the decoder. */
   void (*release)(void *user, tvs_picture *picture);
-  /* Another stream begins: the decoder forgets all earlier bytes. */
+  /* Call it where another stream begins: the decoder forgets all earlier bytes. */
   void (*reset)(void *user);
 } tvs_decoder;
 

@@ -9,7 +9,7 @@ TV_BEGIN_DECLS
 /* What every function of the drivers returns. TVS_NONE and TVS_END are answers, not errors. On an
    error the outputs are unchanged, except for a size that the function documents as written. */
 typedef enum tvs_status {
-  /* Done. */
+  /* The call succeeded, and the outputs are written. */
   TVS_OK = 0,
   /* There is nothing yet, or it is not known; call again later. */
   TVS_NONE = 1,
@@ -19,13 +19,13 @@ typedef enum tvs_status {
   TVS_ERR_NULL = 16,
   /* A value is out of its documented range. */
   TVS_ERR_ARGUMENT = 17,
-  /* struct_size was not set, or is that of another header. */
+  /* struct_size was not set, or it is the size in another version of the header. */
   TVS_ERR_STRUCT_SIZE = 18,
   /* The caller's buffer or a queue is too small for this. */
   TVS_ERR_CAPACITY = 19,
-  /* Bytes that are malformed. */
+  /* The bytes that were read are malformed. */
   TVS_ERR_DATA = 20,
-  /* Well-formed bytes whose checksum is wrong. */
+  /* The bytes that were read are well formed, and their checksum is wrong. */
   TVS_ERR_CHECKSUM = 21,
   /* A socket, file or device failed. */
   TVS_ERR_IO = 22,

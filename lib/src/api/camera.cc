@@ -177,7 +177,7 @@ tv_status tv_camera_scale(const tv_camera *camera, double scale, tv_camera *scal
   result.cy = scale * (camera->cy + 0.5) - 0.5;
   result.width = scaled_size(camera->width, scale);
   result.height = scaled_size(camera->height, scale);
-  if (tv_camera_check(&result) != TV_OK) return TV_ERR_ARGUMENT;  // over- or underflow
+  if (tv_camera_check(&result) != TV_OK) return TV_ERR_ARGUMENT;  // the scale over- or underflows
   *scaled = result;
   return TV_OK;
 }

@@ -33,7 +33,7 @@ tv_status read_limits(const tv_limits* given, tv_limits* limits) {
   }
   if (limits->max_matches == 0) limits->max_matches = limits->max_keypoints;
   if (limits->purposes == 0) limits->purposes = kAllPurposes;
-  if ((limits->purposes & TV_PURPOSE_RECONSTRUCT & ~7u) != 0) {  // the bit that names it
+  if ((limits->purposes & TV_PURPOSE_RECONSTRUCT & ~7u) != 0) {  // tv_reconstruct's own bit
     limits->purposes |= TV_PURPOSE_RECONSTRUCT;
   }
   return TV_OK;

@@ -7,7 +7,7 @@
 #include "twoview/context.h"
 
 struct tv_context {
-  tv_limits limits;  // max_matches and purposes resolved, never 0
+  tv_limits limits;  // max_matches and purposes are resolved, never 0
   const tvk_table* kernels;
   tv::Arena arena;  // scratch of the running call; after tv_reconstruct its front holds the results
   tv_clock clock;

@@ -21,7 +21,7 @@ struct Request {
   tv_status status;
 };
 
-// The checks that all entry points begin with.
+// Makes the checks that all entry points of this file begin with.
 Request check_request(const tv_context* context, const tv_image* image, const tv_image* mask,
                       const tv_feature_options* options) {
   Request request{};

@@ -34,7 +34,7 @@ size_t rays_bytes(int32_t max_keypoints) {
   return arena_bytes<double>(3 * n) + arena_bytes<double>(6 * n) + arena_bytes<uint8_t>(n);
 }
 
-// camera may be null: the ray of a pixel is then (x, y, 1).
+// Reads the keypoints of one view. Without a camera (null) the ray of a pixel is (x, y, 1).
 GuidedView make_view(const tv_camera* camera, const tv_features& features, Arena& arena) {
   const tv_keypoint* const keypoints = features.keypoints;
   const size_t n = static_cast<size_t>(features.num);

@@ -25,9 +25,10 @@ struct Results {
   float* ratios;
   uint8_t* inlier_mask;
   tv_point* points;
-  tv_correspondence* more_matches;  // those of tv_match and guided matching together
+  tv_correspondence* more_matches;  // the matches of tv_match and of guided matching together
   uint8_t* more_inlier_mask;
-  tv_camera cameras[2];  // of the two views, as the present estimate corrects them; full poses only
+  // The cameras of the two views, corrected by the present estimate; set for full poses only.
+  tv_camera cameras[2];
 };
 
 Results alloc_results(Arena& arena, int32_t max_keypoints) {
@@ -77,7 +78,8 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
     if (used[2 * m.idx0] == 0 && used[2 * m.idx1 + 1] == 0) found[num_new++] = m;
   }
   int32_t a = num_matches - 1, b = num_new - 1;
-  for (int32_t k = num_matches + num_new - 1; a >= 0; --k) {  // from the end: in place
+  // From the end, because `found` also receives the result.
+  for (int32_t k = num_matches + num_new - 1; a >= 0; --k) {
     found[k] = b >= 0 && found[b].idx0 > matches[a].idx0 ? found[b--] : matches[a--];
   }
   return num_matches + num_new;
@@ -87,7 +89,7 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
 // views give the same rank. Only (i, j) and (j, i) with the same ratio have equal ranks.
 uint64_t rank_of(const tv_correspondence& m) {
   uint32_t ratio;
-  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // not negative: ordered as the numbers are
+  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // ratio >= 0: its bits have its order
   const bool ascending = m.idx0 < m.idx1;
   const uint32_t low = static_cast<uint32_t>(ascending ? m.idx0 : m.idx1);
   const uint32_t high = static_cast<uint32_t>(ascending ? m.idx1 : m.idx0);
@@ -99,7 +101,7 @@ uint64_t rank_of(const tv_correspondence& m) {
 int32_t keep_best(tv_correspondence* matches, int32_t most, int32_t* num_matches) {
   const int32_t num = *num_matches;
   if (num <= most) return 0;
-  uint64_t limit = 0;  // the largest with at most `most` ranks below it, bit by bit
+  uint64_t limit = 0;  // the largest rank with at most `most` ranks below it, found bit by bit
   for (int bit = 62;; --bit) {
     const bool last = bit < 0;
     const uint64_t trial = last ? limit : limit | uint64_t{1} << bit;

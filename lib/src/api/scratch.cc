@@ -28,7 +28,7 @@ size_t scratch_bytes(const tv_limits& limits) {
   const size_t of_purpose[] = {extract_scratch_bytes(limits),
                                match_bytes(limits.max_keypoints),
                                two_view_scratch_bytes(limits.max_matches),
-                               0,  // tv_reconstruct: its results are added below
+                               0,  // tv_reconstruct: the bytes of its results are added below
                                guided_scratch_bytes(limits),
                                bundle_scratch_bytes(limits.max_matches)};
   size_t stage = 0;

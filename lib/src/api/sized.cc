@@ -6,9 +6,9 @@
 namespace tv {
 namespace {
 
-constexpr uint32_t kLargest = 4096;  // bytes; no struct is larger, so the field was not set
+constexpr uint32_t kLargest = 4096;  // bytes; a larger struct_size was not set by the caller
 
-// struct_size is the first field of every struct that grows.
+// Reads struct_size, the first field of every struct that grows.
 uint32_t size_of(const void* object) {
   uint32_t size;
   std::memcpy(&size, object, sizeof size);

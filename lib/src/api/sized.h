@@ -12,7 +12,7 @@ namespace tv {
 // struct_size itself; never more than struct_size bytes. Null is allowed.
 void init_sized(void* object, size_t struct_size, const void* defaults, size_t known_size);
 
-// The same with zeros alone.
+// Writes struct_size and zeros into a struct, as init_sized does. Null is allowed.
 inline void init_zeros(void* object, size_t struct_size) {
   init_sized(object, struct_size, object, 0);
 }

@@ -15,7 +15,7 @@
 namespace tv {
 namespace {
 
-constexpr uint64_t kDefaultSeed = 20130814;  // any constant would do
+constexpr uint64_t kDefaultSeed = 20130814;  // any other constant would do as well
 
 constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            TV_SOLVER_AUTO,
@@ -239,7 +239,7 @@ tv_status tv_corrected_camera(const tv_two_view* result, const tv_camera* camera
   *corrected = *camera;
   const double* const shift = result->principal_point_shift;
   if (result->struct_size < offsetof(tv_two_view, principal_point_shift) + sizeof(double[2])) {
-    return TV_OK;  // a struct of an older header, without the field
+    return TV_OK;  // the struct of an older header does not have the field
   }
   corrected->cx += shift[0];
   corrected->cy += shift[1];

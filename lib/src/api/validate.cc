@@ -7,7 +7,7 @@ namespace {
 
 bool within(int32_t value, int32_t low, int32_t high) { return value >= low && value <= high; }
 
-// Written so that NaN is not within.
+// False for a NaN.
 bool within(float value, float low, float high) { return value >= low && value <= high; }
 
 // True if the stride is at least the width, and so small that no row's offset overflows.
@@ -16,7 +16,8 @@ bool is_stride(int64_t stride_bytes, int32_t width) {
 }
 
 constexpr int32_t kAutoKeypoints = 2048;
-constexpr float kMaxKeypointSize = 4096.0f;  // the largest keypoint_size, on level 7
+// The size of a keypoint on level 7 with the largest option keypoint_size.
+constexpr float kMaxKeypointSize = 4096.0f;
 constexpr float kMaxCoordinate = 1e5f;
 constexpr double kRotationTolerance = 1e-6;
 

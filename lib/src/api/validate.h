@@ -28,7 +28,7 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
 tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
                         const void* out, size_t out_bytes, tv_features* features);
 
-// Copies the matched pixels' struct after checking it.
+// Checks the caller's struct of matched pixels and copies it to *pairs.
 tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 
 // Whether each keypoint is finite, with coordinates within 1e5 pixels, a size in (0, 4096] pixels
@@ -45,7 +45,7 @@ inline bool overlap(const void* a, size_t a_bytes, const void* b, size_t b_bytes
 }
 
 struct Bytes {
-  const void* data;  // or null, for an array that is absent
+  const void* data;  // null for an array that is absent
   size_t size;
 };
 

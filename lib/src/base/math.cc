@@ -199,7 +199,7 @@ void sincos(double angle_rad, double* sine, double* cosine) {
   double r = angle_rad;
   double low = 0.0;
   if (quadrant != 0) {
-    const double first = angle_rad - quadrant * kHalfPi1;  // exact
+    const double first = angle_rad - quadrant * kHalfPi1;  // this difference is exact
     const Pair second = exact_sum(first, -(quadrant * kHalfPi2));
     const double tail = second.low - quadrant * kHalfPi3;
     r = second.high + tail;
@@ -225,7 +225,8 @@ double atan2(double y, double x) {
   if (y != y || x != x) return kNaN;
   double size_y = y < 0 ? -y : y;
   double size_x = x < 0 ? -x : x;
-  if (size_y == kInfinity || size_x == kInfinity) {  // finite sizes count as 0
+  // Beside an infinite size, a finite one counts as 0.
+  if (size_y == kInfinity || size_x == kInfinity) {
     size_y = size_y == kInfinity ? 1.0 : 0.0;
     size_x = size_x == kInfinity ? 1.0 : 0.0;
   }
@@ -261,14 +262,14 @@ double exp(double x) {
   if (x > 709.79) return kInfinity;
   if (x < -745.2) return 0.0;
   const int exponent = nearest_int(x * kOneOverLn2);
-  const double head = x - exponent * kLn2High;  // exact
+  const double head = x - exponent * kLn2High;  // this difference is exact
   const double tail = exponent * kLn2Low;
   const double r = head - tail;
   const double low = (head - r) - tail;
   const double value = 1.0 + (r + (low * (1.0 + r) + exp_series_beyond_second(r)));
   if (exponent > 1022) return value * power_of_two(exponent - 1) * 2.0;
   if (exponent >= -1021) return value * power_of_two(exponent);
-  return value * power_of_two(exponent + 100) * 0x1p-100;  // subnormal: rounded only here
+  return value * power_of_two(exponent + 100) * 0x1p-100;  // a subnormal is rounded only here
 }
 
 double log(double x) {

@@ -28,7 +28,7 @@ size_t candidate_capacity(int32_t width, int32_t height) {
 }
 
 struct Workspace {
-  uint8_t* scores[3];  // row y is in scores[y % 3]
+  uint8_t* scores[3];  // the scores of three rows; row y is in scores[y % 3]
   uint16_t* xs;
   Corner* candidates;
   Corner* sorted;
@@ -76,7 +76,7 @@ int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image*
   const int32_t rim = TVK_CIRCLE_RADIUS;
   histogram = Histogram{};
   if (level.width <= 2 * rim || level.height <= 2 * rim) return 0;
-  int32_t count = 0, below = 0;  // candidates, and those of them below the threshold
+  int32_t count = 0, below = 0;  // the candidates, and how many of them are below the threshold
   memset(work.scores[(rim - 1) % 3], 0, static_cast<size_t>(level.width));
   for (int32_t y = rim; y <= level.height - rim; ++y) {
     uint8_t* row = work.scores[y % 3];
@@ -105,7 +105,7 @@ int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image*
 // limited to [lowest, highest]. Returns the number of corners kept.
 int32_t sort_by_score(const Corner* corners, int32_t count, const Histogram& histogram,
                       int32_t lowest, int32_t highest, int32_t wanted, Corner* sorted) {
-  int32_t starts[256];  // where the next corner of a score goes
+  int32_t starts[256];  // for each score, the place of its next corner in `sorted`
   int32_t cutoff = 255, kept = 0;
   while (cutoff > lowest && (cutoff > highest || kept < wanted)) {
     starts[--cutoff] = kept;

@@ -24,7 +24,7 @@ constexpr double kTan44p5Degrees = 0.98269726101190570;
 // The tolerance of the region's edge: a pixel that was projected from a ray just within the region
 // is not rejected because of rounding.
 constexpr double kEdgeSlack = 1.0 + 1e-9;
-constexpr double kConverged = 1e-11;  // quadratic: the next step is below the last bit
+constexpr double kConverged = 1e-11;  // convergence is quadratic: a step after this one rounds to 0
 
 constexpr int kMaxBisections = 80;
 constexpr int kMaxThirds = 40;
@@ -218,7 +218,7 @@ bool project_kannala(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23
   const double x = point[0], y = point[1], z = point[2];
   const double r_sq = x * x + y * y;
   const double r = std::sqrt(r_sq);
-  if (r == 0.0 && !(z > 0.0)) return false;  // straight behind: no azimuth
+  if (r == 0.0 && !(z > 0.0)) return false;  // a point straight behind has no azimuth
   const double theta = atan2(r, z);
   if (!(theta <= camera.valid_angle_rad)) return false;
   double derivative;
@@ -352,7 +352,7 @@ bool unproject_central(const Camera& camera, const Point2& target, Vec3* ray, Ma
   if (!(target_sq <= limit * limit)) return false;
   Point2 p = target;
   if (model.model == TV_CAMERA_BROWN_CONRADY) {
-    // Both results lie within the valid disc, but for a last step of 1e-11.
+    // The results of both inversions lie within the valid disc, up to a last step of 1e-11.
     if (!brown_invert_fast(camera, target, target_sq, &p) &&
         !brown_invert_safe(camera, target, target_sq, &p)) {
       return false;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>  // cross()
+#include <Eigen/Geometry>  // for cross() of two Vec3
 
 #include "twoview/camera.h"
 
@@ -17,10 +17,10 @@ using Mat32 = Eigen::Matrix<double, 3, 2>;
 
 // A checked camera with the bounds of its valid region, which prepare_camera computes once.
 struct Camera {
-  tv_camera model;                  // a Brown-Conrady without any distortion is a pinhole here
-  double valid_angle_rad;           // rays beyond it are outside
-  double valid_radius_undistorted;  // the same as a radius on the plane z = 1 (Brown-Conrady)
-  double valid_radius_distorted;    // a bound after distortion; unproject rejects more
+  tv_camera model;                  // a Brown-Conrady model without distortion is a pinhole here
+  double valid_angle_rad;           // rays at a larger angle from the optical axis are invalid
+  double valid_radius_undistorted;  // valid_angle_rad as a radius on z = 1 (Brown-Conrady)
+  double valid_radius_distorted;    // a bound on distorted radii; unproject rejects more pixels
 };
 
 // K and its inverse: the plane z = 1 to the undistorted image, in pixels, and back. K may also be
@@ -28,11 +28,11 @@ struct Camera {
 Mat3 intrinsics_of(const tv_camera& camera);
 Mat3 inverse_intrinsics(const Mat3& K);
 
-// The camera must have passed tv_camera_check.
+// Computes the bounds of a camera that has passed tv_camera_check.
 Camera prepare_camera(const tv_camera& camera);
 
-// Both return false, and leave the outputs as they were, for a point or a pixel beyond the valid
-// angle or behind the camera. jacobian may be null.
+// project and unproject return false, and leave the outputs as they were, for a point or a pixel
+// beyond the valid angle or behind the camera. jacobian may be null.
 bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobian);
 bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobian);
 

@@ -56,7 +56,7 @@ Mat3 rotation_about(const Vec3& unit_axis, double angle_rad) {
 bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t) {
   const double norm_sq = E.squaredNorm();
   if (!(norm_sq > 1e-300) || !(norm_sq < 1e300)) return false;
-  const Mat3 unit = E * std::sqrt(2.0 / norm_sq);  // singular values 1, 1, 0
+  const Mat3 unit = E * std::sqrt(2.0 / norm_sq);  // its singular values are 1, 1 and 0
   // Rows of cof(E) are cross products of E's rows; cof(E) = t t' R.
   const Vec3 r0 = unit.row(0), r1 = unit.row(1), r2 = unit.row(2);
   Mat3 cofactors;

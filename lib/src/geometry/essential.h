@@ -21,7 +21,8 @@ Mat3 rotation_step(const Vec3& w);
 // rotations accumulate.
 Mat3 orthonormalised(const Mat3& R);
 
-// b1 = normalise(e_k x t), k the index of the smallest |t_k| (the lowest on a tie), b2 = t x b1.
+// Two unit vectors across t: b1 = normalise(e_k x t), k the index of the smallest |t_k| (the lowest
+// on a tie), and b2 = t x b1.
 void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);
 
 // The rotation that turns by `angle_rad` about a unit axis.
@@ -38,7 +39,8 @@ bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 // midpoint; their denominator is positive), for rays of any length.
 struct DepthSigns {
   double depth0, depth1;
-  double tolerance0_sq, tolerance1_sq;  // squares of their changes when a ray turns by angle_rad
+  // The squared changes of depth0 and depth1 when a ray turns by angle_rad.
+  double tolerance0_sq, tolerance1_sq;
 };
 DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, double angle_rad);
 

@@ -1,4 +1,4 @@
-// Fundamental matrices of seven matched rays.
+// The solver for fundamental matrices from seven matched rays.
 #pragma once
 
 #include "geometry/camera.h"

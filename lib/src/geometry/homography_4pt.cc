@@ -30,7 +30,8 @@ bool homography_4pt(const Vec3 rays0[4], const Vec3 rays1[4], Mat3* H) {
 int decompose_homography(const Mat3& H, const Vec3& mean_ray0, PlanarPose poses[2]) {
   const Svd3 svd = svd3(H);
   if (!(svd.s[2] > 1e-9 * svd.s[0])) return 0;
-  const double s1 = svd.s[0] / svd.s[1], s3 = svd.s[2] / svd.s[1];  // in units of the middle one
+  // The outer singular values in units of the middle one.
+  const double s1 = svd.s[0] / svd.s[1], s3 = svd.s[2] / svd.s[1];
   if (!(s1 - s3 > 1e-9)) return 0;
   const Mat3 unit = H / svd.s[1];
   const Vec3 v1 = svd.V.col(0), v2 = svd.V.col(1), v3 = svd.V.col(2);

@@ -31,7 +31,8 @@ double sampson_normal_equations(const RayPairs& pairs, const int32_t* indices, i
                                 const Mat3& M, const Mat3* columns, int num_parameters,
                                 const RobustLoss& loss, double* upper, double* gradient);
 
-// The same for the transfer residual of a matrix H; columns null: H's nine entries themselves.
+// Like sampson_normal_equations, for the transfer residual of a matrix H. columns null: the
+// parameters are H's nine entries.
 double transfer_normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
                                  const Mat3& H, const Mat3* columns, int num_parameters,
                                  const RobustLoss& loss, double* upper, double* gradient);

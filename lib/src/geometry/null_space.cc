@@ -28,7 +28,7 @@ bool rotate_columns(Mat3& A, Mat3& V, int p, int q) {
   return true;
 }
 
-// Swaps two columns, negating one: V stays a rotation.
+// Swaps two columns of A and of V and negates one of them, so that V stays a rotation.
 void swap_columns(Mat3& A, Mat3& V, int p, int q) {
   for (int i = 0; i < 3; ++i) {
     const double x = A(i, p);
@@ -64,7 +64,7 @@ Svd3 svd3(const Mat3& M) {
   if (s1 > 1e-300 && s1 > 1e-15 * s0) {
     u1 = A.col(1) / s1;
     u1 = (u1 - u1.dot(u0) * u0).normalized();
-  } else {  // any direction orthogonal to u0
+  } else {  // u1 may be any direction orthogonal to u0
     const int k = std::fabs(u0[0]) < 0.6 ? 0 : 1;
     Vec3 axis = Vec3::Zero();
     axis[k] = 1;

@@ -18,7 +18,7 @@ void direction_noise(const RayPairs& pairs, const int32_t* indices, int count, c
                      double block[3]) {
   Vec3 b[2];
   tangent_basis(pose.t, &b[0], &b[1]);
-  double along[3][3];  // b[0], b[1] and t
+  double along[3][3];  // its rows are b[0], b[1] and t
   for (int i = 0; i < 3; ++i) {
     along[0][i] = b[0][i];
     along[1][i] = b[1][i];
@@ -28,7 +28,7 @@ void direction_noise(const RayPairs& pairs, const int32_t* indices, int count, c
   for (int k = 0; k < count; ++k) {
     const int i = indices[k];
     const double f1[3] = {pairs.ray[1][0][i], pairs.ray[1][1][i], pairs.ray[1][2][i]};
-    double f0[3], g[3][4];  // g: gradients of along . (f0 x f1) by the four pixels
+    double f0[3], g[3][4];  // g[a]: gradient of along[a] . (f0 x f1) by the four pixel coordinates
     turn_ray0(pairs, i, pose.R, f0);
     for (int c = 0; c < 4; ++c) {
       double* const* J = pairs.jacobian[c / 2];

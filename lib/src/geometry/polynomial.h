@@ -11,12 +11,12 @@ namespace tv {
 // of polynomial equations", Graphics Gems, 1990, with the quotients in place of the polynomials.)
 template <int kDegree>
 struct SturmChain {
-  int length;  // links; shorter than the degree for a polynomial with repeated roots
+  int length;  // number of links; fewer than the degree where roots are repeated
   double slope[kDegree + 1], offset[kDegree + 1], scale[kDegree + 1];
-  double last;  // sign of the chain's end
+  double last;  // sign of the chain's last polynomial, a constant
 };
 
-// p: coefficients, lowest power first, p[kDegree] != 0.
+// p holds the coefficients, the lowest power first; p[kDegree] is not 0.
 template <int kDegree>
 SturmChain<kDegree> sturm_chain(const double* p) {
   double previous[kDegree + 1], current[kDegree + 1];
@@ -27,7 +27,7 @@ SturmChain<kDegree> sturm_chain(const double* p) {
   SturmChain<kDegree> chain;
   chain.length = 0;
   chain.last = sign;
-  // current has degree d and leading coefficient +-1 throughout.
+  // The polynomial `current` has degree d and leading coefficient +-1 throughout.
   for (int d = kDegree - 1; d >= 0; --d) {
     const double lead = current[d];  // 1 or -1
     const double slope = previous[d + 1] * lead;
@@ -88,7 +88,7 @@ double bracketed_root(const double* p, double low, double high) {
   const double at_low = polynomial_value<kDegree>(p, low, &slope);
   const double at_high = polynomial_value<kDegree>(p, high, &slope);
   const bool low_negative = at_low < 0;
-  if (low_negative == (at_high < 0)) {  // the root is an end of the bracket, within rounding
+  if (low_negative == (at_high < 0)) {  // within rounding, the root is an end of the bracket
     return std::fabs(at_low) < std::fabs(at_high) ? low : high;
   }
   double z = 0.5 * (low + high);
@@ -147,7 +147,7 @@ int real_roots(const double* p, double* roots) {
       middle = 0;
     } else if (width <= 2) {
       middle = 0.5 * (interval.low + interval.high);
-    } else {  // a geometric mean: roots are spread evenly over angles
+    } else {  // the geometric mean, since roots are spread evenly over angles
       const double low = interval.low < 0 ? -interval.high : interval.low;
       const double high = interval.low < 0 ? -interval.low : interval.high;
       const double size_middle =

@@ -25,7 +25,7 @@ struct RayPairs {
   int num;
   bool on_plane;  // all rays have z = 1, so the third rows of the Jacobians are zero
   double* ray[2][3];
-  double* jacobian[2][6];  // row-major 3x2
+  double* jacobian[2][6];  // d ray / d pixel, row-major 3x2
   double* pixel_angle;     // The angle, in radians, between the two rays that noise of one pixel in
                            // each image makes.
   // For scoring only: single precision, padded with zeros to a multiple of kScoreBlock, in an order
@@ -51,7 +51,7 @@ inline Mat32 jacobian_of(const RayPairs& pairs, int view, int i) {
   for (int k = 0; k < 6; ++k) jacobian(k / 2, k % 2) = pairs.jacobian[view][k][i];
   return jacobian;
 }
-// R times the ray of view 0.
+// Writes R times the ray of match i in view 0.
 inline void turn_ray0(const RayPairs& pairs, int i, const Mat3& R, double turned[3]) {
   const double x = pairs.ray[0][0][i], y = pairs.ray[0][1][i], z = pairs.ray[0][2][i];
   for (int r = 0; r < 3; ++r) turned[r] = (R(r, 0) * x + R(r, 1) * y) + R(r, 2) * z;

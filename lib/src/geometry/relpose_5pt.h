@@ -7,7 +7,7 @@
 namespace tv {
 
 inline constexpr int kMaxRelpose5pt = TVK_RELPOSE_MODELS;
-inline constexpr int kSamples5 = TVK_WIDTH;  // solved at once
+inline constexpr int kSamples5 = TVK_WIDTH;  // samples that one call solves
 
 // Five pairs of rays, of any positive length, of each sample.
 struct Samples5 {
@@ -33,8 +33,8 @@ struct Essentials {
 void relpose_5pt(const tvk_table& kernels, const Samples5& samples, int num_samples,
                  Essentials* models);
 
-// The same for one sample, with the portable kernel. essentials: room for kMaxRelpose5pt. Returns
-// how many there are.
+// Like relpose_5pt above, for one sample and with the portable kernel. essentials has room for
+// kMaxRelpose5pt matrices. Returns how many were written.
 int relpose_5pt(const Vec3 rays0[5], const Vec3 rays1[5], Mat3 essentials[kMaxRelpose5pt]);
 
 }  // namespace tv

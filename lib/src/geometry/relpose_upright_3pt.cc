@@ -19,7 +19,7 @@
 namespace tv {
 namespace {
 
-// c cos + s sin + cc cos^2 + ss sin^2 + cs cos sin
+// The function c cos + s sin + cc cos^2 + ss sin^2 + cs cos sin of the yaw.
 struct YawPolynomial {
   double c, s, cc, ss, cs;
 };
@@ -49,7 +49,7 @@ YawPolynomial yaw_polynomial(const Vec3 p[3], const Vec3 q[3]) {
   return f;
 }
 
-// The polynomial of yaw - offset.
+// Returns f as a function of yaw - offset, given the offset's cosine and sine.
 YawPolynomial turned(const YawPolynomial& f, double cosine, double sine) {
   const double c2 = cosine * cosine, s2 = sine * sine, product = cosine * sine;
   return YawPolynomial{f.c * cosine + f.s * sine, f.s * cosine - f.c * sine,

@@ -10,9 +10,10 @@ inline constexpr int kMaxRelposeUpright3pt = 4;
 // The rotation into a frame whose z axis is the unit vector `down`.
 Mat3 level_from_camera(const Vec3& down);
 
-// rays0, rays1: three each, of any positive length; level0, level1: level_from_camera of each view.
-// poses: room for kMaxRelposeUpright3pt; R maps one gravity onto the other, t is unit, of either
-// sign. Returns how many there are; 0 for a degenerate sample.
+// Finds the poses of three matches with known gravity. rays0, rays1: three rays each, of any
+// positive length; level0, level1: level_from_camera of each view. poses has room for
+// kMaxRelposeUpright3pt; R maps one gravity onto the other, and t is a unit vector of either sign.
+// Returns the number of poses; 0 for a degenerate sample.
 int relpose_upright_3pt(const Vec3 rays0[3], const Vec3 rays1[3], const Mat3& level0,
                         const Mat3& level1, Pose poses[kMaxRelposeUpright3pt]);
 

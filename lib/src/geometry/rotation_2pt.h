@@ -1,4 +1,4 @@
-// The pure rotation of two matched rays.
+// The solver for a pure rotation from two matched rays.
 #pragma once
 
 #include "geometry/camera.h"

@@ -12,9 +12,9 @@ constexpr int kFirstBlocks = 2;
 
 struct Epipolar {
   Vec3 f0, f1;
-  Vec3 line1, line0;    // M f0, M' f1
-  double c, n;          // f1' M f0, and the sum under the root
-  double s0[2], s1[2];  // J0' M' f1, J1' M f0
+  Vec3 line1, line0;    // the epipolar lines M f0 and M' f1
+  double c, n;          // c = f1' M f0, n = |s0|^2 + |s1|^2: the residual is c / sqrt(n)
+  double s0[2], s1[2];  // s0 = J0' M' f1, s1 = J1' M f0
 };
 
 inline void epipolar(const RayPairs& p, int i, const Mat3& M, Epipolar* e) {

@@ -28,18 +28,18 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 struct SampsonSlopes {
   double residual, by_entry[9], by_point[2];
 };
-// False where both rays lie at the epipoles.
+// Returns false where both rays of the match lie at the epipoles.
 bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
                     SampsonSlopes* slopes);
 
-// sampson_sq of the matches first .. first + count - 1, or of those listed.
+// Computes sampson_sq of the matches first .. first + count - 1, or of those listed.
 void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares);
 void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& M,
                      double* squares);
 
-// The same for the essential matrix of a pose that is required to have the matches in front of both
-// cameras: +inf also for a match whose point lies behind one of them by more than scale_px pixels
-// (depth_vote in geometry/essential.h).
+// Like sampson_squares, for the essential matrix of a pose that is required to have the matches in
+// front of both cameras: +inf also for a match whose point lies behind one of them by more than
+// scale_px pixels (depth_vote in geometry/essential.h).
 void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose, double scale_px,
                   double* squares);
 

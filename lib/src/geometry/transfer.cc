@@ -12,7 +12,7 @@ struct Transfer {
   double f0[3];
   double d[2];
   double slope[2][3];
-  double weight[3];  // (I + D D')^-1: 00, 01, 11
+  double weight[3];  // entries 00, 01 and 11 of (I + D D')^-1
 };
 
 inline void left_inverse(const RayPairs& pairs, int i, double P[2][3], double m[3]) {
@@ -44,7 +44,7 @@ inline void left_inverse(const RayPairs& pairs, int i, double P[2][3], double m[
   }
 }
 
-// False when H sends the ray behind view 1.
+// Returns false when H sends the ray behind view 1.
 bool transfer(const RayPairs& pairs, int i, const Mat3& H, Transfer* t) {
   double P[2][3], m[3], h[3], moved[3][2];  // moved = H J0
   left_inverse(pairs, i, P, m);

@@ -14,15 +14,15 @@
 
 namespace tv {
 
-// Both are +inf where H sends the ray behind view 1. A homography is known up to sign: the caller's
-// H has the sign that sends points in front.
+// Both fields are +inf where H sends the ray behind view 1. A homography is known up to sign: the
+// caller's H has the sign that sends points in front.
 struct TransferResidual {
   double r_sq;
-  double d_sq;  // |d|^2
+  double d_sq;  // |d|^2, d the displacement in view 1
 };
 TransferResidual transfer_residual(const RayPairs& pairs, int i, const Mat3& H);
 
-// r_sq alone of the matches first .. first + count - 1, or of those listed.
+// Computes r_sq alone of the matches first .. first + count - 1, or of those listed.
 void transfer_squares(const RayPairs& pairs, int first, int count, const Mat3& H, double* squares);
 void transfer_squares(const RayPairs& pairs, const int32_t* indices, int count, const Mat3& H,
                       double* squares);

@@ -72,7 +72,7 @@ double error_sq_px(const Camera& camera, const Vec3& ray, const Vec2& pixel, con
   return angle * angle * camera.model.fx * camera.model.fy;
 }
 
-// A match with its rays.
+// The two pixels of a match and their rays.
 struct Match {
   Vec3 ray0, ray1;
   Vec2 pixel0, pixel1;

@@ -14,7 +14,7 @@ namespace tv {
 // depth is the baseline divided by this sine, so that below 16 * 2^-52 the depth is not determined.
 inline constexpr double kParallelSine = 0x1p-48;
 
-// R is a rotation, t not zero.
+// R must be a rotation, and t must not be zero.
 TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& camera1, const Mat3& R,
                                         const Vec3& t);
 
@@ -41,7 +41,8 @@ void triangulate_point(tv_triangulation method, const TriangulationPair& pair, c
 void triangulate_points(tv_triangulation method, const TriangulationPair& pair,
                         const double* pixels0, const double* pixels1, size_t num, tv_point* points);
 
-// The same for unit rays that the caller has already (ray i in camera i's frame, through pixel i).
+// Like triangulate_point, for unit rays that the caller has already (ray i in camera i's frame,
+// through pixel i).
 void triangulate_rays(tv_triangulation method, const TriangulationPair& pair, const Vec3& ray0,
                       const Vec3& ray1, const Vec2& pixel0, const Vec2& pixel1, tv_point* point);
 

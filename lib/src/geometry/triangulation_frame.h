@@ -43,14 +43,14 @@ inline void complete_basis(const Vec3& axis, Vec3* u, Vec3* v) {
 // sees beyond a half space and has no such plane, the plane that touches the viewing sphere at the
 // ray, where a pixel is 1 / sqrt(fx fy) wide and high.
 struct RayFrame {
-  Vec3 ray;         // of depth 1: z = 1 on the image plane, a unit vector on the sphere
+  Vec3 ray;         // scaled to depth 1: z = 1 on the image plane, unit length on the sphere
   Vec3 rows[2];     // the vectors n of the two equations n . ray = 0
-  Vec3 basis[2];    // of the plane of equal depth: -rows[i] . basis[j] = (i == j)
-  Vec3 depth;       // depth of X is depth . X
-  double pixel[2];  // a pixel's length along basis[i]
+  Vec3 basis[2];    // spans the plane of equal depth: -rows[i] . basis[j] = (i == j)
+  Vec3 depth;       // the depth of a point X is depth . X
+  double pixel[2];  // length of a pixel along basis[i]
 };
 
-// The ray is a unit vector.
+// ray must be a unit vector.
 RayFrame frame_of(const Camera& camera, const Vec3& ray);
 
 inline bool has_image_plane(const Camera& camera) {

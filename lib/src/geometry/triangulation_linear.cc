@@ -19,8 +19,8 @@ constexpr double kSettled = 1e-10;    // relative change of both depths that end
 // system does not. LinearSystem holds camera 1's two equations in these unknowns.
 struct LinearSystem {
   double A[2][2], m[2], b[2];
-  double cov0[3], cov1[3];  // xx, xy, yy of the residuals' covariance at unit weights
-  Vec3 depth1_of;           // depth in camera 1 = depth1_of . X + depth1_of_t
+  double cov0[3], cov1[3];  // entries xx, xy, yy of the residuals' covariance at unit weights
+  Vec3 depth1_of;           // the depth in camera 1 is depth1_of . X + depth1_of_t
   double depth1_of_t;
 };
 

@@ -15,7 +15,7 @@ struct TriangulationPair {
   Vec3 center1;     // camera 1's centre in camera 0's frame, for |t| = 1
   double baseline;  // |t|
   EpipolarPencil pencil;
-  bool has_steps;  // of the pencil: the same for every match when both cameras have an image plane
+  bool has_steps;  // the pencil's steps hold for all matches: both cameras have an image plane
 };
 
 }  // namespace tv

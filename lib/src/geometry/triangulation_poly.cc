@@ -8,7 +8,7 @@ struct V2 {
   double x, y;
 };
 
-using tv::dot;  // dot of Vec3, which the one of V2 would hide
+using tv::dot;  // keeps the dot of Vec3 visible beside that of V2
 double dot(V2 a, V2 b) { return a.x * b.x + a.y * b.y; }
 double cross(V2 a, V2 b) { return a.x * b.y - a.y * b.x; }
 V2 normal_of(V2 a) { return V2{-a.y, a.x}; }
@@ -67,15 +67,15 @@ void diagonalise(const double M[2][2], V2* turn_u, V2* turn_v, double s[2]) {
 //   r_i = 1 / (1 + mu m_i),        |mu| < 1 / s0,
 // and the constraint's derivative -sum b_i^2 r_i^3 has one sign there: a single root.
 struct Secular {
-  double c;  // >= 0
+  double c;  // not negative
   double b_sq[4];
-  double m[4];  // m[0] = -singular[0] is the one that bounds mu
+  double m[4];  // m[0] = -singular[0] limits the range of mu
   double sum_sq;
 };
 
 // Newton's method from mu = 0. False when mu leaves the lower half of its range.
 bool solve_small(const Secular& s, double* mu) {
-  const double largest = -0.5 / s.m[0];  // infinite when both epipoles are
+  const double largest = -0.5 / s.m[0];  // infinite when both epipoles are at infinity
   double at = s.c / s.sum_sq;
   for (int i = 0; i < 12; ++i) {
     if (!(at >= 0.0 && at <= largest)) return false;
@@ -103,7 +103,7 @@ bool solve_small(const Secular& s, double* mu) {
 // a bracket. Returns e.
 double solve_near_bound(const Secular& s, const double s0) {
   const double ratio = std::fabs(s.m[2]) / s0;           // m[2] <= 0, m[3] = -m[2]
-  double low = std::sqrt(s.b_sq[0] / (4.0 * s0 * s.c));  // the constraint is <= 0
+  double low = std::sqrt(s.b_sq[0] / (4.0 * s0 * s.c));  // there the constraint is <= 0
   if (!(low < 0.5)) low = 0.5;
   double high = 1.0;
   double e = low > 0.25 ? 0.7 : 2.0 * low;
@@ -134,7 +134,7 @@ double solve_near_bound(const Secular& s, const double s0) {
   return e;
 }
 
-// mu, and 1 + mu m along the two directions with a negative m.
+// The multiplier mu, and 1 + mu m for the two negative eigenvalues m.
 struct Multiplier {
   double mu, low0, low1;
 };
@@ -160,7 +160,7 @@ double size_sq(const double step[2][2]) {
          (step[1][0] * step[1][0] + step[1][1] * step[1][1]);
 }
 
-// The plane of the least sum of squares.
+// The plane with the least sum of the squared distances from the two pixels.
 V2 plane_of_least_squares(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
   const double c = cross(alpha0, alpha1);
   // The multiplier has the sign of the constraint. Both are made positive by `sign`, which also
@@ -169,7 +169,7 @@ V2 plane_of_least_squares(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) {
   // eigenvalue.
   const double sign = c < 0.0 ? -1.0 : 1.0;
   const double side[2] = {-sign, pencil.singular[1] < 0.0 ? sign : -sign};
-  double low[2], high[2];  // b times sqrt 2
+  double low[2], high[2];  // gradient b along the eigenvectors, times sqrt 2
   for (int k = 0; k < 2; ++k) {
     const double g0 = sign * cross(column(pencil.turned[0], k), alpha1);
     const double g1 = sign * cross(alpha0, column(pencil.turned[1], k));
@@ -241,14 +241,15 @@ double distance(const Arc& arc, int i, double t) {
 
 double cost(const Arc& arc, double t) { return distance(arc, 0, t) + distance(arc, 1, t); }
 
-// The derivative of the cost, times a positive factor.
+// The derivative of `cost` by t, times a positive factor.
 double slope(const Arc& arc, double t) {
   const double q0 = form(arc, 0, t), q1 = form(arc, 1, t);
   return linear(arc, 0, t) * (q1 * std::sqrt(q1)) + linear(arc, 1, t) * (q0 * std::sqrt(q0));
 }
 
-// w Q0 Q1 + 3 J L0 L1, in Bernstein's basis: the zeros of the derivative of log(L0 / L1) + 3/2
-// log(Q1 / Q0), w the determinant of (L0, L1) and 2 J the Jacobian of (Q0, Q1).
+// The quartic w Q0 Q1 + 3 J L0 L1, in Bernstein's basis. Its zeros are those of the derivative of
+// log(L0 / L1) + 3/2 log(Q1 / Q0), with w the determinant of (L0, L1) and 2 J the Jacobian of (Q0,
+// Q1).
 void critical_quartic(const Arc& arc, double p[5]) {
   const double l0[2] = {linear(arc, 0, 0.0), linear(arc, 0, 1.0)};
   const double l1[2] = {linear(arc, 1, 0.0), linear(arc, 1, 1.0)};
@@ -417,7 +418,7 @@ double search_arc(const Arc& arc, double* best) {
 struct Plane {
   V2 v;
   V2 gradient[2];
-  double above[2];  // |alpha . v|
+  double above[2];  // above[i] = |alpha[i] . v|
 };
 
 double distance(const Plane& plane, int i) {

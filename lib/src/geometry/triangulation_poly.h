@@ -13,10 +13,10 @@ namespace tv {
 // alpha1 = 0, and a step d (in pixels along the frame's basis) moves alpha by step d. The line v is
 // |alpha . v| / sqrt(v step step^T v) pixels away.
 struct EpipolarPencil {
-  Vec3 axis[2][2];         // of camera i, in its own frame
-  double step[2][2][2];    // of camera i: d alpha[axis] / d (pixels along basis)
-  double turned[2][2][2];  // the same after the turns that make step0^T [0 1; -1 0] step1 diagonal
-  double singular[2];      // that diagonal, |singular[1]| <= singular[0]
+  Vec3 axis[2][2];         // the axes of camera i, in its own frame
+  double step[2][2][2];    // for camera i: d alpha[axis] / d (pixels along basis)
+  double turned[2][2][2];  // `step` after the turns that make step0^T [0 1; -1 0] step1 diagonal
+  double singular[2];      // entries of the diagonal matrix above, |singular[1]| <= singular[0]
 };
 
 // Sets `axis` alone. center1: the centre of camera 1, as a unit vector in camera 0's frame.
@@ -27,8 +27,8 @@ void set_pencil_axes(const Vec3& center1, const Mat3& cam1_from_cam0_R, Epipolar
 void set_pencil_steps(const RayFrame& frame0, const RayFrame& frame1, EpipolarPencil* pencil);
 
 struct Correction {
-  Vec3 ray[2];        // on a common epipolar plane within rounding; depth 1, not unit vectors
-  double step[2][2];  // of each image's pixel, in pixels along the frame's basis
+  Vec3 ray[2];        // rays on a common epipolar plane within rounding; depth 1, not unit vectors
+  double step[2][2];  // the step of each image's pixel, in pixels along the frame's basis
 };
 
 enum class PixelCost { kSumOfSquares, kSumOfDistances };

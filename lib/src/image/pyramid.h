@@ -21,7 +21,7 @@ struct Level {
   const uint8_t* data;
   int32_t width, height;
   int64_t stride;
-  double scale;  // full-image pixels in one of its pixels
+  double scale;  // the side of a pixel of this level, in pixels of the full image
 };
 
 inline Level full_level(const tv_image& image) {
@@ -57,7 +57,7 @@ bool next_level(const tvk_table& kernels, const Level& level, double factor, int
 struct Octave {
   const uint16_t* pairs;
   int32_t width, height;
-  double scale;  // full-image pixels in one of its pixels
+  double scale;  // the side of a pixel of this octave, in pixels of the full image
 };
 
 struct Octaves {

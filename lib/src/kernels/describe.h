@@ -41,7 +41,7 @@ static inline words reflect(words x, words mask, int16_t span) {
 }
 
 typedef struct direction_shares {
-  words bin;       /* 0..31, clockwise in the image from x */
+  words bin;       /* number of the direction's bin, 0..31, clockwise in the image from x */
   words low, high; /* the weighted shares of `bin` and of the next bin */
 } direction_shares;
 
@@ -53,7 +53,8 @@ static direction_shares share_directions(words u, words v, words weights) {
   const words left = u<words_of(0), up = v> words_of(0), steep = av > au;
   words big = words_max(au, av), small = words_min(au, av), bin, is_odd, a, b;
   const words root_half = words_of((int16_t)46341);
-  const words cosine = words_of((int16_t)60547), sine = words_of(25080); /* 22.5 degrees, * 65536 */
+  /* The cosine and sine of 22.5 degrees, times 65536. */
+  const words cosine = words_of((int16_t)60547), sine = words_of(25080);
   const words big45 = words_scale(big + small, root_half);
   const words small45 = words_scale(big - small, root_half);
   const words over22 = small45 < small;

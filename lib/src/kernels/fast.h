@@ -46,7 +46,7 @@ static inline arc_bounds bounds_of_arcs(const byte_lanes p[16], int32_t first, i
   arc_bounds bounds;
   bounds.brightest = bytes_min(bytes_max(a, c), bytes_max(b, d));
   bounds.darkest = bytes_max(bytes_min(a, c), bytes_min(b, d));
-  if (arc == 12) { /* second smallest and second largest of the four */
+  if (arc == 12) { /* the bounds are the second smallest and second largest of the four pixels */
     const byte_lanes brightest = bounds.brightest;
     bounds.brightest = bytes_min(brightest, bounds.darkest);
     bounds.darkest = bytes_max(brightest, bounds.darkest);

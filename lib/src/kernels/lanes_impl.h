@@ -19,7 +19,7 @@ TVK_MATCH_LIST(TVK_DECLARE)
 /* clang-format off */
 #include "kernels/relpose_5pt.h"
 #include "kernels/sampson.h"
-#if !defined(TVK_AVX512) /* AVX-512 uses AVX2's */
+#if !defined(TVK_AVX512) /* the AVX-512 set uses the transfer kernels of the AVX2 set */
 #include "kernels/transfer.h"
 #endif
 #include "kernels/triangulate.h"

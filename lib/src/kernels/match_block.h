@@ -26,7 +26,8 @@ static inline lanes load_lanes(const double *array, const int32_t *index, int32_
 
 static TVK_INLINE void load_arrays(const double *const *arrays, const int32_t *index, int32_t first,
                                    int on_plane, sampson_block *b) {
-  const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6; /* those that are not 1 or 0 */
+  /* How many entries of a ray and of a Jacobian are not constant. */
+  const int rays = on_plane ? 2 : 3, slopes = on_plane ? 4 : 6;
   int k;
   for (k = 0; k < rays; ++k) {
     b->f0[k] = load_lanes(arrays[k], index, first);

@@ -57,7 +57,7 @@ static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b)
 #include "kernels/nearest_c.h"
 #endif
 
-#if !defined(TVK_AVX2) /* for the tiles that do not use its result */
+#if !defined(TVK_AVX2) /* only the tiles of AVX2 use the largest byte */
 static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
   (void)bytes;
   (void)count;

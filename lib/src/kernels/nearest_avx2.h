@@ -19,7 +19,7 @@ enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4, NEAREST_MOST_STEPS = 2 * NEARES
 typedef struct nearest_rows {
   uint8_t bytes[NEAREST_MOST_STEPS][NEAREST_QUERIES][8];
   int32_t places[NEAREST_MOST_STEPS], num_steps;
-  int32_t starts[NEAREST_QUERIES]; /* -c (sum of the bytes of row a) */
+  int32_t starts[NEAREST_QUERIES]; /* -c times the sum of the bytes of row a */
   int32_t norms[NEAREST_QUERIES], terms[NEAREST_QUERIES];
   int32_t best[NEAREST_QUERIES * NEAREST_LANES], second[NEAREST_QUERIES * NEAREST_LANES];
 } nearest_rows;

@@ -16,7 +16,7 @@ typedef struct nearest_rows {
 typedef struct nearest_block {
   uint8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
-  int32_t starts[NEAREST_COLUMNS]; /* -127 (sum of the bytes of b) */
+  int32_t starts[NEAREST_COLUMNS]; /* -127 times the sum of the bytes of column b */
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 

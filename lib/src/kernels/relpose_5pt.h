@@ -186,7 +186,7 @@ typedef struct z_matrix {
 
 static inline void z_matrix_of(const lanes rows[10][20], z_matrix *b) {
   int k;
-  for (k = 0; k < 3; ++k) { /* row 4 + 2k - z * the next row */
+  for (k = 0; k < 3; ++k) { /* row k of the matrix: row 4 + 2k - z times row 5 + 2k */
     const lanes *e = rows[4 + 2 * k], *f = rows[5 + 2 * k];
     b->x[k][0] = e[12];
     b->x[k][1] = e[11] - f[12];
@@ -284,7 +284,7 @@ static TVK_NOINLINE void make_sturm_chain(const lanes p[11], sturm_chain *chain)
    the number of distinct roots between them. */
 static TVK_NOINLINE lane_mask sign_changes(const sturm_chain *chain, double z) {
   lanes next = {0}, current = chain->last;
-  lane_mask changes = {0}; /* counts down, because a set mask is -1 */
+  lane_mask changes = {0}; /* the negative count, because a set mask is -1 */
   int k;
   TVK_UNROLL
   for (k = 9; k >= 0; --k) {

@@ -11,7 +11,7 @@
 enum { POINT_WORDS = 5 };
 typedef char triangulate_words_fit[sizeof(tv_point) == 8 * POINT_WORDS ? 1 : -1];
 
-/* Rays (x, y, 1). */
+/* The rays (x, y, 1), one per lane. */
 typedef struct ray_lanes {
   lanes x, y;
 } ray_lanes;
@@ -67,7 +67,7 @@ static inline float_lanes angle_of(float_lanes sine, float_lanes cosine) {
   const float_mask steep = sine > size;
   const float_lanes small = floats_select(steep, size, sine);
   const float_lanes large = floats_select(steep, sine, size);
-  const float_mask turned = small > 0.41421356f * large; /* beyond 22.5 degrees */
+  const float_mask turned = small > 0.41421356f * large; /* the angle is above 22.5 degrees */
   const float_lanes t =
       floats_select(turned, small - large, small) / floats_select(turned, small + large, large);
   const float_lanes s = t * t;

@@ -19,8 +19,8 @@ struct Side {
   GuidedView view;
   double* lines;           // 3 per keypoint: its epipolar line in the other view, M ray0 or M' ray1
   double* coordinates[3];  // x, y, z of the rays, for quick_test; padded to kBlock
-  double* line_norms;      // squared lengths of `lines`; padded
-  double* slope_norms;     // squared Frobenius norms of the view's slopes; padded
+  double* line_norms;      // squared lengths of `lines`; padded to kBlock
+  double* slope_norms;     // squared Frobenius norms of the view's slopes; padded to kBlock
 };
 
 // The number of keypoints that one call of quick_test tests.

@@ -14,8 +14,8 @@ namespace tv {
 struct GuidedView {
   const tv_keypoint* keypoints;
   const uint8_t* descriptors;
-  const double* rays;    // 3 per keypoint
-  const double* slopes;  // 6 per keypoint
+  const double* rays;    // 3 numbers per keypoint
+  const double* slopes;  // 6 numbers per keypoint
   const uint8_t* valid;
   int32_t num;
 };

@@ -27,8 +27,8 @@ int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0,
   for (int32_t i = 0; i < num0; ++i) {
     const tvk_nearest& row = rows[i];
     if (row.idx < 0) continue;
-    // row.second is the smaller of the two directions' second distances, so this is the larger of
-    // their two ratios.
+    // `worse` is the larger of the two directions' ratios, because row.second is the smaller of
+    // their second distances.
     const float worse = static_cast<float>(
         std::sqrt(static_cast<double>(row.best) / static_cast<double>(row.second)));
     if (worse >= ratio) continue;

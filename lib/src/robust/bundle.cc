@@ -21,9 +21,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMaxFloat = std::numeric_limits<float>::max();
 constexpr double kMaxPixel = 1e6;
-constexpr double kNearChange = 0.1;     // a smaller relative change of the cost: Newton takes over
-constexpr double kSmallChange = 1e-10;  // a smaller relative change of the cost: converged
-constexpr double kNoErrorSq = 1e-20;    // px^2 for each match: errors this small count as none
+constexpr double kNearChange = 0.1;     // below this relative change of the cost, Newton takes over
+constexpr double kSmallChange = 1e-10;  // below this relative change of the cost: converged
+constexpr double kNoErrorSq = 1e-20;    // px^2 for each match; smaller errors count as none
 constexpr double kFirstDamping = 1e-4, kMinDamping = 1e-10, kMaxDamping = 1e8;
 // With more damping, a small change of the cost is no evidence for a minimum.
 constexpr double kHonestDamping = 1.0;
@@ -101,11 +101,11 @@ bool solve_step(const Sums& sums, double damping, bool newton, double step[5]) {
   return false;
 }
 
-// The state of one adjustment.
+// The points and the buffers of one run of adjust_two_view.
 struct Adjustment {
   const BundleProblem& problem;
-  int num;         // how many points take part
-  int32_t* index;  // which points these are
+  int num;         // number of points that take part
+  int32_t* index;  // indices of the points that take part
   BundleMatch* now;
   BundleMatch* next;
 };

@@ -11,7 +11,7 @@ namespace tv {
 struct BundleOutcome {
   Pose pose;
   int num_points, num_iterations;
-  bool moved;  // the pose is another than at the start
+  bool moved;  // whether the pose differs from the one at the start
   bool converged, has_covariance;
   double initial_cost, final_cost, initial_sum_sq, final_sum_sq;
   double covariance[25];
@@ -21,7 +21,7 @@ struct BundleOutcome {
 // How many bytes of arena one adjustment takes.
 size_t bundle_scratch_bytes(int max_points);
 
-// points: in units of `baseline`; those that take part are updated.
+// The points are in units of `baseline`; those that take part are updated.
 void adjust_two_view(const BundleProblem& problem, const Pose& start, double baseline, Arena& arena,
                      tv_point* points, BundleOutcome* outcome);
 

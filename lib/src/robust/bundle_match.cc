@@ -99,7 +99,7 @@ Elimination eliminate(const BundleFrame& frame, const BundleMatch& match) {
     c[i] = dot(row, frame.t.data());
   }
   e.length = std::sqrt(c[0] * c[0] + c[1] * c[1]);
-  if (!(e.length > 0.0)) {  // on the baseline: any direction of the error is one along it
+  if (!(e.length > 0.0)) {  // a point on the baseline, where any direction of the error is along it
     e.r = e.along[0] = e.along[1] = e.k[0] = e.k[1] = 0.0;
     for (double& a : e.a) a = 0.0;
     return e;

@@ -46,12 +46,12 @@ BundlePoint moved_point(const BundlePoint& point, const double move[3]);
 // A point, the errors of its projections, and how the projections move with it.
 struct BundleMatch {
   BundlePoint point;
-  double error[2][2];        // of each image: projection - pixel
-  double from_pixel0[2][2];  // pixels of image 0 to steps along sphere_basis
+  double error[2][2];        // projection - pixel in each image, pixels
+  double from_pixel0[2][2];  // turns pixels of image 0 into steps along sphere_basis
   double jacobian1[2][3];    // d pixel 1 / d point in camera 1
 };
 
-// False where a camera does not see the point.
+// Returns false where a camera does not see the point.
 bool linearise(const Camera cameras[2], const BundleFrame& frame, const BundlePoint& point,
                const Vec2& pixel0, const Vec2& pixel1, BundleMatch* match);
 
@@ -63,11 +63,10 @@ double error_sq(const BundleMatch& match);
 // of the match's block is a a', a = dr / dpose.
 struct Elimination {
   double r;
-  double a[5];      // for the pose parameters (w, a, b) of PoseModel
+  double a[5];      // derivatives of r by the pose parameters (w, a, b) of PoseModel
   double B[2][2];   // d pixel 1 / d direction
-  double along[2];  // unit: the direction in image 1 in which the projection moves with the inverse
-                    // distance
-  double length;    // the speed of this motion; 0 for a point on the baseline
+  double along[2];  // unit vector: how the projection in image 1 moves with the inverse distance
+  double length;    // speed of the projection along this vector; 0 for a point on the baseline
   double k[2];      // the part of the residual across `along` that image 0 can take
 };
 Elimination eliminate(const BundleFrame& frame, const BundleMatch& match);

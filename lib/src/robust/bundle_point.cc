@@ -13,12 +13,12 @@ constexpr double kMaxPointStep = 0.5;  // of a direction, radians; of a point's 
 // px^2; beyond that the point's error is minimised at the new pose.
 constexpr double kGrowth = 2.0, kGrowthSq = 0.01;
 constexpr int kMaxPolishes = 4;
-constexpr int kMaxTrials = 30;         // steps of one point at a fixed pose
-constexpr double kSettledGain = 1e-6;  // a smaller relative gain ends these
+constexpr int kMaxTrials = 30;         // most steps of one point at a fixed pose
+constexpr double kSettledGain = 1e-6;  // a smaller relative gain ends the steps
 constexpr double kFirstDamping = 1e-4, kMaxDamping = 1e8;
 
-// linear_step, shortened to where the linearisation holds: near the baseline the step of the depth
-// has no bound.
+// The step of linear_step, shortened to where the linearisation holds: near the baseline the step
+// of the depth has no bound.
 void point_step(const BundleFrame& frame, const BundleMatch& match, const double step[5],
                 double move[3]) {
   linear_step(frame, match, eliminate(frame, match), step, move);

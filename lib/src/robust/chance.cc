@@ -11,7 +11,7 @@ namespace tv {
 namespace {
 
 constexpr double kInfinity = __builtin_inf();
-constexpr int kChunk = 64;  // matches at a time, on the stack
+constexpr int kChunk = 64;  // matches that are handled at a time, on the stack
 
 double log_factorial(int n) {
   if (n < 16) {
@@ -44,7 +44,7 @@ struct WrongPairs {
   explicit WrongPairs(const RayPairs& pairs) : arrays(pairs) {
     for (int k = 0; k < 18; ++k) array(k) = storage[k];
   }
-  double*& array(int k) {  // the rays' entries, then the Jacobians'
+  double*& array(int k) {  // an entry of the rays (k < 6) or of the Jacobians
     return k < 6 ? arrays.ray[k / 3][k % 3] : arrays.jacobian[k / 6 - 1][k % 6];
   }
   int count_agreeing(const RayPairs& pairs, const int listed[2][kChunk], const Mat3& M,

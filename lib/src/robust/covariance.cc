@@ -18,8 +18,8 @@ namespace {
 // kPlaneScale for the plane's).
 constexpr double kVarianceOfCauchy = 1.1484187788317, kVarianceOnPlane = 1.0919;
 
-constexpr double kLeastResidual = 0.05;  // of the loss's scale
-constexpr int kChunk = 64;               // matches at a time, on the stack
+constexpr double kLeastResidual = 0.05;  // least deviation of a residual, in scales of the loss
+constexpr int kChunk = 64;               // matches that are handled at a time, on the stack
 
 // Sums over the matches of psi^2, psi' and psi'^2.
 struct LossSums {
@@ -146,7 +146,8 @@ void invert_covariance(const Pose& pose, const Pose& inverse, const double covar
   tangent_basis(inverse.t, &c1, &c2);
   double J[5][5] = {};
   for (int k = 0; k < 5; ++k) {
-    Vec3 w = Vec3::Zero(), move = Vec3::Zero();  // of the inverse, for a unit step of parameter k
+    // The steps of the inverse pose's rotation and translation for a unit step of parameter k.
+    Vec3 w = Vec3::Zero(), move = Vec3::Zero();
     if (k < 3) {
       Vec3 axis = Vec3::Zero();
       axis[k] = 1;

@@ -9,7 +9,7 @@ namespace tv {
 struct PoseUncertainty {
   double covariance[25];  // in the parameters (w, a, b) of PoseModel
   double noise_px;        // standard deviation of a pixel's coordinate
-  double variance_px;     // of the M-estimate, for a residual: C = variance_px (J' J)^-1, px^2
+  double variance_px;  // variance of the M-estimate for a residual: C = variance_px (J' J)^-1, px^2
 };
 
 // The covariance of the M-estimate that minimises Cauchy's loss with scale_px over the listed
@@ -25,9 +25,9 @@ struct PoseUncertainty {
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                       double scale_px, double limit_px, PoseUncertainty* uncertainty);
 
-// The same for a pose that is fitted together with a plane (PlaneModel), whose residuals have two
-// dimensions: with w the loss's weight, E[psi'] is the mean of w^2.
-inline constexpr double kPlaneScale = 2;  // of the loss, in standard deviations of the noise
+// Like pose_uncertainty, for a pose that is fitted together with a plane (PlaneModel). Its
+// residuals have two dimensions: with w the loss's weight, E[psi'] is the mean of w^2.
+inline constexpr double kPlaneScale = 2;  // scale of the loss, in standard deviations of the noise
 bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
                        const PlaneModel& model, double scale_px, PoseUncertainty* uncertainty);
 

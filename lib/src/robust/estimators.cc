@@ -37,7 +37,8 @@ void for_each_square(const RayPairs& pairs, int count, const Mat3& M, Use use) {
   }
 }
 
-// The same of a pose, r^2 infinite for a match that is behind by more than the threshold.
+// Calls use(i, r^2) for a pose; r^2 is infinite for a match that lies behind a camera by more than
+// the threshold.
 template <typename Use>
 void for_each_square(const RayPairs& pairs, int count, const Pose& pose, double threshold_px,
                      Use use) {

@@ -25,7 +25,7 @@ struct PoseBatch {
   Essentials models;
 };
 
-// A pose from five rays.
+// Estimates a pose from samples of five matches.
 struct PoseEstimator {
   using Model = Pose;
   static constexpr int kSampleSize = 5;
@@ -33,8 +33,8 @@ struct PoseEstimator {
   static constexpr int kBatch = kSamples5;
   const RayPairs& pairs;  // the matches that take part
   double threshold_px;
-  int32_t* indices;  // scratch, as many as matches
-  PoseBatch* batch;  // scratch, null where no samples are solved
+  int32_t* indices;  // scratch, one entry a match
+  PoseBatch* batch;  // scratch; null where no samples are solved
   void generate(const int32_t samples[][5], int num_samples) const;
   int count(int s) const { return batch->models.count[s]; }
   int64_t fast_cost(int s, int k, int64_t bound) const;
@@ -44,7 +44,7 @@ struct PoseEstimator {
   void refine_model(Model* model) const;
 };
 
-// A fundamental matrix (on rays) from eight or seven.
+// Estimates a fundamental matrix (on rays) from samples of eight or seven matches.
 template <int kPoints>
 struct FundamentalEstimator {
   using Model = Mat3;
@@ -103,8 +103,8 @@ struct RotationEstimator : TransferEstimator {
 int near_matches(const RayPairs& pairs, int count, const Mat3& M, double limit_px,
                  int32_t* indices);
 
-// The same for a pose, without the matches whose point lies behind a camera by more than
-// threshold_px of parallax.
+// Like near_matches above, for a pose. Matches whose point lies behind a camera by more than
+// threshold_px of parallax are left out.
 int near_matches(const RayPairs& pairs, int count, const Pose& pose, double limit_px,
                  double threshold_px, int32_t* indices);
 

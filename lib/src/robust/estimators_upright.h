@@ -15,8 +15,8 @@ struct UprightEstimator : PoseEstimator {
   static constexpr int kMaxModels = kMaxRelposeUpright3pt;
   static constexpr int kBatch = 1;
   const GravityPrior& gravity;
-  Mat3 level0, level1;  // level_from_camera of gravity.down
-  double width_first;   // the first threshold of local optimisation, in thresholds
+  Mat3 level0, level1;  // level_from_camera of each view's gravity.down
+  double width_first;   // the first threshold of local optimisation, in units of threshold_px
   int generate_models(const int32_t* sample, Pose* models) const;
   void refine_model(Pose* model) const;
 };

@@ -33,7 +33,7 @@ constexpr int kParallaxSample = 128;  // matches that the quantile is computed f
 // was chosen for being small is biased low. docs/decisions/0002-robust-loop.md has the
 // measurements.
 constexpr double kScales[] = {1, 1.5, 2, 3};
-constexpr double kLargestScale = 2;  // in thresholds
+constexpr double kLargestScale = 2;  // largest scale of the loss, in thresholds
 constexpr double kMostStretch = 1.5;
 
 // The relative gain of the cost at which each round stops. The pose of the first round only serves
@@ -139,7 +139,7 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
 // thousand pairs with a correct principal point exceeds it.
 constexpr double kShiftEvidence = 13.815510557964274;
 
-// ---- On a plane ----
+// ---- a pose and a plane ----
 
 // Writes the matches that the plane explains to f.indices; returns how many.
 int near_plane(const PoseRefiner& f, const Mat3& H) {
@@ -152,7 +152,7 @@ int near_plane(const PoseRefiner& f, const Mat3& H) {
   return near;
 }
 
-// Two-dimensional residuals: half of them lie within 1.1774 deviations.
+// The loss for two-dimensional residuals, half of which lie within 1.1774 deviations.
 RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
   transfer_squares(f.matches.pairs, f.indices, count, H, f.values);
   double* middle = f.values + count / 2;

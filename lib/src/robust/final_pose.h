@@ -15,9 +15,9 @@ struct PoseRefiner {
   Matches& matches;
   double threshold_px;
   GravityPrior gravity;
-  PrincipalPoint principal_point;  // that the matches' rays were computed with
-  int32_t* indices;                // scratch, as many as matches
-  double* values;                  // the same
+  PrincipalPoint principal_point;  // the one that the matches' rays were computed with
+  int32_t* indices;                // scratch, one entry a match
+  double* values;                  // scratch, one entry a match
 };
 
 // The pose that minimises Cauchy's loss over the matches near the epipolar lines, with gravity as a
@@ -42,7 +42,7 @@ bool uncertainty_of(const PoseRefiner& refiner, const Pose& pose, PoseUncertaint
 // of each; returns how many.
 struct PlaneFit {
   Pose pose[2];
-  bool certain[2];  // whether there is an uncertainty
+  bool certain[2];  // whether the pose's uncertainty is known
   PoseUncertainty uncertainty[2];
 };
 int refine_on_plane(const PoseRefiner& refiner, const Mat3& H, const Vec3& mean_ray0,

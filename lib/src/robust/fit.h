@@ -9,13 +9,13 @@ namespace tv {
 
 struct Fit {
   const TwoViewProblem& problem;
-  const Matches& matches;  // the refiner may move their rays, and nothing else does
+  const Matches& matches;  // only the refiner may change the matches, and only their rays
   double threshold;
-  int32_t* indices;  // scratch
-  double* values;    // scratch
-  int32_t* support;  // the different inliers of the epipolar model
+  int32_t* indices;  // scratch, one entry a match
+  double* values;    // scratch, one entry a match
+  int32_t* support;  // indices of the different inliers of the epipolar model
   int num_support;
-  PoseRefiner refiner;  // of the same matches and scratch
+  PoseRefiner refiner;  // works on these matches and this scratch
   TwoViewOutcome* out;
 };
 

@@ -16,8 +16,8 @@ constexpr double kAgreementSq = 9.21;
 // covariance C: the derivatives of (b[0], b[1]) . (w x h) by w are the rows H = h x b.
 struct TangentRows {
   Vec3 b[2];
-  double across[2][5];  // H C
-  double S[3];          // H C H': 00, 01, 11
+  double across[2][5];  // the product H C of the derivatives and the covariance
+  double S[3];          // entries 00, 01 and 11 of H C H'
 };
 
 TangentRows tangent_rows(const Vec3& h, const double covariance[25]) {
@@ -40,7 +40,7 @@ TangentRows tangent_rows(const Vec3& h, const double covariance[25]) {
   return rows;
 }
 
-// h - down1 in h's tangent plane, scaled to the length of h - down1.
+// Writes e = h - down1, projected into h's tangent plane and scaled to the length of h - down1.
 void tangent_residual(const GravityPrior& prior, const Mat3& R, const TangentRows& rows,
                       double e[2]) {
   const double chord = (R * prior.down[0] - prior.down[1]).norm();
@@ -50,11 +50,11 @@ void tangent_residual(const GravityPrior& prior, const Mat3& R, const TangentRow
     e[0] *= chord / length;
     e[1] *= chord / length;
   } else {
-    e[0] = chord;  // 0, or opposite
+    e[0] = chord;  // down1 is h or its opposite
   }
 }
 
-// (S + variance I)^-1, symmetric: a, b; b, c.
+// The symmetric matrix (S + variance I)^-1 with the rows (a, b) and (b, c).
 struct Inverse2 {
   double a, b, c;
 };
@@ -67,13 +67,13 @@ void turn_tangent_basis(const Vec3& old_t, const Vec3& t, double covariance[25])
   tangent_basis(t, &to[0], &to[1]);
   const double turn[2][2] = {{to[0].dot(from[0]), to[0].dot(from[1])},
                              {to[1].dot(from[0]), to[1].dot(from[1])}};
-  for (int i = 0; i < 5; ++i) {  // C T'
+  for (int i = 0; i < 5; ++i) {  // covariance becomes covariance turn'
     double* row = covariance + 5 * i;
     const double a = row[3], b = row[4];
     row[3] = turn[0][0] * a + turn[0][1] * b;
     row[4] = turn[1][0] * a + turn[1][1] * b;
   }
-  for (int i = 0; i < 5; ++i) {  // T C
+  for (int i = 0; i < 5; ++i) {  // covariance becomes turn covariance
     const double a = covariance[15 + i], b = covariance[20 + i];
     covariance[15 + i] = turn[0][0] * a + turn[0][1] * b;
     covariance[20 + i] = turn[1][0] * a + turn[1][1] * b;
@@ -105,7 +105,7 @@ GravityPrior gravity_prior(const double gravity0[3], const double gravity1[3], d
       if (size > largest) largest = size;
       sum += 0.25 * size;
     }
-    if (!(largest > 0) || !(sum - sum == 0.0)) return prior;  // zero; infinite or no number
+    if (!(largest > 0) || !(sum - sum == 0.0)) return prior;  // zero, infinite or not a number
     const Vec3 scaled(gravity[v][0] / largest, gravity[v][1] / largest, gravity[v][2] / largest);
     prior.down[v] = scaled.normalized();
   }
@@ -127,7 +127,7 @@ double add_gravity_prior(const GravityPrior& prior, const Mat3& R, double noise_
   for (int p = 0; p < 3; ++p) {
     gradient[p] += weight * slope[p];
     for (int r = p; r < 3; ++r) upper[slot++] += weight * ((p == r ? 1.0 : 0.0) - h[p] * h[r]);
-    slot += 2;  // the columns of t
+    slot += 2;  // skips the columns of t
   }
   return weight * (h - prior.down[1]).squaredNorm() / (scale_px * scale_px);
 }

@@ -9,7 +9,7 @@ struct GravityPrior {
   bool known = false;
   Vec3 down[2] = {Vec3::Zero(), Vec3::Zero()};  // unit vectors, each in its camera's frame
   double sigma_rad = 0;  // standard deviation of each direction, about each axis across it
-  double weight = 1;     // (0, 1]: less where the points contradict it (gravity_weight)
+  double weight = 1;     // in (0, 1]; less where the points contradict gravity (gravity_weight)
 };
 
 // Makes the prior of the caller's two gravity vectors, which need not be unit vectors. The prior

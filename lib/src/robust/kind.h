@@ -10,7 +10,7 @@ namespace tv {
 // inliers, or of all matches where there is no epipolar model.
 inline constexpr double kRivalShare = 0.7, kRivalShareAlone = 0.5;
 
-// sample_size: of the solver that found the epipolar model.
+// Chooses the kind of the pair. sample_size is that of the solver that found the epipolar model.
 tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size);
 
 }  // namespace tv

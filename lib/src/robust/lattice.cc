@@ -14,7 +14,7 @@ constexpr int kMostSide = 64, kNeighbours = 6, kMostSeen = 64;
 constexpr int kMostAsked = 512, kMostListed = 64;
 constexpr double kOpposite = 0.14;  // the tolerated distance from the opposite place, as a part of
                                     // the neighbour's distance
-constexpr double kNearestPx = 8;    // nearer neighbours cannot be distinguished from noise
+constexpr double kNearestPx = 8;    // nearer neighbours (pixels) cannot be distinguished from noise
 // The count that chance explains is taken at a place where no usual lattice has a point: the
 // neighbour's place after a turn by 146 degrees instead of 180.
 constexpr double kControlCosine = -0.829, kControlSine = 0.559;

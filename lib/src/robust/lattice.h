@@ -12,8 +12,8 @@ namespace tv {
 // For each point's nearest neighbours: how many have another point at the opposite place, minus how
 // many have one at a place where a lattice has none, which is the number expected by chance.
 struct Lattice {
-  double share;   // of the neighbours, after this subtraction; a full lattice has nearly 1
-  double sigmas;  // the same difference, divided by its standard deviation for random points
+  double share;   // difference of the counts as a share of the neighbours; nearly 1 on a lattice
+  double sigmas;  // difference of the counts over its standard deviation for random points
 };
 
 // xy: num x 2. listed: null, or the indices of the points whose neighbours are examined. Of a list

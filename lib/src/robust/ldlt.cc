@@ -64,7 +64,7 @@ bool invert_symmetric(int num, const double* upper, double* inverse) {
     solve_factorised(num, A, D, x);
     for (int r = 0; r < num; ++r) inverse[num * r + c] = x[r];
   }
-  for (int r = 0; r < num; ++r) {  // exactly symmetric
+  for (int r = 0; r < num; ++r) {  // makes the inverse exactly symmetric
     for (int c = 0; c < r; ++c) inverse[num * r + c] = inverse[num * c + r];
   }
   return true;

@@ -6,7 +6,7 @@
 
 namespace tv {
 
-inline constexpr int kMostParameters = 9;  // rows of A
+inline constexpr int kMostParameters = 9;  // the most rows that A may have
 
 // Solves (A + lambda (diag(A) + 1e-9 d I)) step = -gradient, where d is the largest entry of
 // diag(A). False when this matrix is not positive definite.

@@ -32,15 +32,16 @@ inline constexpr int kMostForFewInliers = 1000;
 struct LoopOptions {
   double confidence;
   int min_iterations, max_iterations;
-  int fixed_iterations;        // 0: adaptive stop
-  int few_inliers_iterations;  // at least this many / inliers, up to kMostForFewInliers
+  int fixed_iterations;        // number of iterations; 0: the stop is adaptive
+  int few_inliers_iterations;  // the least number of iterations is this / inliers, up to
+                               // kMostForFewInliers
   int least_inliers = 0;       // a model whose cost excludes so many inliers is not refined
 };
 
 template <typename Model>
 struct LoopResult {
   bool found = false;
-  Model model;  // when found
+  Model model;  // valid when `found` is true
   int64_t cost = INT64_MAX;
   int num_inliers = 0;
   int num_iterations = 0;
@@ -90,7 +91,7 @@ struct Solver {
   using Model = typename Estimator::Model;
   Model models[Estimator::kMaxModels];
 
-  // Returns how many candidates the next sample has.
+  // Draws the next sample and returns how many candidate models it has.
   int next(Estimator& estimator, Sampler& sampler) {
     int32_t sample[Estimator::kSampleSize];
     draw_sample(sampler, sample);
@@ -142,7 +143,7 @@ LoopResult<typename Estimator::Model> robust_loop(Estimator& estimator, Sampler&
   int wanted = most;
   int window_iterations = 0;
   const int64_t worth_optimising = int64_t{kCostOne} * (sampler.num - options.least_inliers);
-  int64_t best_sampled = INT64_MAX, window_cost = INT64_MAX;  // before local optimisation
+  int64_t best_sampled = INT64_MAX, window_cost = INT64_MAX;  // costs before local optimisation
   Model window_model, model;
   Solver<Estimator> solver;
   while (best.num_iterations < wanted) {

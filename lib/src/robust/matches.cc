@@ -59,7 +59,7 @@ bool sorts_before(const TwoViewProblem& p, const SortKey& a, const SortKey& b) {
   for (int k = 0; k < 4; ++k) {
     if (ca.v[k] != cb.v[k]) return ca.v[k] < cb.v[k];
   }
-  return a.index < b.index;  // equal matches: which is which makes no difference
+  return a.index < b.index;  // the matches are equal, so that their order makes no difference
 }
 
 // Keeps the first of equal matches in order[0 ..), the others behind them. Returns how many differ.
@@ -235,7 +235,7 @@ bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const 
                    int view, int k, double curvature[9]) {
   if (camera.model.model == TV_CAMERA_PINHOLE && matches.pairs.on_plane) return false;
   const double* pixel = problem.pixels[view] + 2 * matches.order[k];
-  for (int along = 0; along < 2; ++along) {  // differences of the Jacobian over one pixel
+  for (int along = 0; along < 2; ++along) {  // the difference of the Jacobian over one pixel
     const double beside[2] = {pixel[0] + (along == 0), pixel[1] + (along == 1)};
     PixelRay p;
     const bool known = ray_of_pixel(camera, beside, matches.pairs.on_plane, &p) && sane(p);

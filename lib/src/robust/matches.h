@@ -10,13 +10,13 @@ namespace tv {
 
 struct TwoViewProblem {
   bool calibrated;
-  bool one_camera;          // both views are of the same
-  Camera camera[2];         // calibrated only
+  bool one_camera;          // whether both views are of the same camera
+  Camera camera[2];         // valid for calibrated views only
   const double* pixels[2];  // num x 2
-  const float* ratios;      // or null
+  const float* ratios;      // null when the matches have no ratios
   int num;
   tv_estimate_options options;
-  const tvk_table* kernels;  // null: those of the base ISA
+  const tvk_table* kernels;  // null: the kernels of the base ISA
 };
 
 struct Matches {
@@ -27,11 +27,11 @@ struct Matches {
   RayPairs pairs = {};
   int num_all = 0;
   int num_unique() const { return pairs.num; }
-  int32_t* order = nullptr;  // pairs' k-th match is the caller's order[k]
-  // Of each view, the map from the plane of the rays to undistorted pixels: K of the camera, or,
+  int32_t* order = nullptr;  // match k of `pairs` is the caller's match order[k]
+  // For each view, the map from the plane of the rays to undistorted pixels: K of the camera, or,
   // for uncalibrated views, K of the pinhole that normalises the points.
   Mat3 intrinsics[2];
-  double area_px = 1;  // px^2, of image 1, or, uncalibrated, of the box around its points
+  double area_px = 1;  // area of image 1 or, uncalibrated, of the box around its points, px^2
 };
 
 size_t matches_bytes(int max_matches);
@@ -40,8 +40,8 @@ size_t matches_bytes(int max_matches);
 // repeated matches last: a match that is given five times is evidence once.
 void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches);
 
-// d^2 ray / d pixel^2 of the k-th match in a view of that camera, 3 x (xx, xy, yy). False, and
-// nothing is written, for a pinhole on the plane, where the derivative is 0.
+// The second derivative d^2 ray / d pixel^2 of the k-th match in a view of that camera, 3 x (xx,
+// xy, yy). False, and nothing is written, for a pinhole on the plane, where the derivative is 0.
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
                    int view, int k, double curvature[9]);
 

@@ -46,7 +46,7 @@ struct HomographyModel {
   HomographyModel stepped(const double* step) const;
 };
 
-// A rotation. Transfer residual.
+// A rotation. The residual is the transfer residual.
 struct RotationModel {
   static constexpr int kParameters = 3;
   Mat3 R;

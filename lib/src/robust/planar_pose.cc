@@ -35,7 +35,7 @@ void choose_planar_pose(Fit& f, const Rivals& rivals) {
   out.epipolar.M = essential_from_pose(poses[best]);
   collect_support(f);
   int other = -1;
-  double farthest = 1e-4;  // a squared distance, about half a degree
+  double farthest = 1e-4;  // squared distance, about half a degree; nearer poses count as one
   for (int k = 0; k < num_poses; ++k) {
     const double turned =
         (poses[k].R - poses[best].R).squaredNorm() + (poses[k].t - poses[best].t).squaredNorm();

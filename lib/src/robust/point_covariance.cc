@@ -44,7 +44,7 @@ bool point_covariance(const Camera cameras[2], const BundleFrame& frame, double 
       parameters[i][j] = parameters[j][i] = sum;
     }
   }
-  // position = baseline direction / rho.
+  // The position is baseline direction / rho.
   const double* d = at.direction;
   const double distance = baseline / at.inverse_distance;
   double basis[3][3];

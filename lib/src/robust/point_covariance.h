@@ -6,8 +6,8 @@
 
 namespace tv {
 
-// As tv_point_covariances for one point. pose_covariance: null for an exact pose, or 5x5. False,
-// and zeros, where the covariance is not known.
+// Computes what tv_point_covariances computes, for one point. pose_covariance: null for an exact
+// pose, or 5x5. Returns false, and writes zeros, where the covariance is not known.
 bool point_covariance(const Camera cameras[2], const BundleFrame& frame, double baseline,
                       const double* pose_covariance, double noise_px, const tv_point& point,
                       double covariance[9]);

@@ -8,9 +8,9 @@
 namespace tv {
 
 struct PrincipalPoint {
-  double shift_px[2] = {0, 0};  // that of the rays, less that of the calibration
-  double sigma_px[2] = {0, 0};  // of the calibration
-  bool is_free = false;         // refined with the pose
+  double shift_px[2] = {0, 0};  // principal point of the rays minus that of the calibration
+  double sigma_px[2] = {0, 0};  // standard deviation of the calibration's principal point
+  bool is_free = false;         // whether the principal point is refined with the pose
 };
 
 // The parameters of PoseModel, then the step of the principal point in x and y, in pixels.

@@ -10,7 +10,7 @@
 namespace tv {
 namespace {
 
-constexpr int kChunk = 64;  // matches at a time, on the stack
+constexpr int kChunk = 64;  // matches that are handled at a time, on the stack
 
 // Few samples suffice, since only a rival that explains most of the support matters, and few
 // matches suffice to compare models. A model that explains least_share of them is missed once in

@@ -9,7 +9,7 @@ namespace tv {
 // The rivals, found among the epipolar model's inliers, and counted over all different matches.
 struct Rivals {
   bool has_rotation, has_homography;
-  Mat3 R = Mat3::Identity(), H = Mat3::Zero();  // on rays
+  Mat3 R = Mat3::Identity(), H = Mat3::Zero();  // both map rays of view 0 to rays of view 1
   int rotation_inliers, homography_inliers, identity_inliers;
 };
 

@@ -3,7 +3,7 @@
 namespace tv {
 namespace {
 
-// `count` different numbers below `bound`, into sample[0 ..].
+// Draws `count` different numbers below `bound` into sample[0 ..].
 void draw_distinct(Random& random, int bound, int count, int32_t* sample) {
   for (int k = 0; k < count; ++k) {
     // The j-th of the numbers not drawn yet: step over the drawn ones in ascending order.

@@ -1,4 +1,4 @@
-// Which matches the robust loop tries next.
+// The sampler, which chooses the matches that the robust loop tries next.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@ namespace tv {
 // structure.
 struct Sampler {
   Random random;
-  int num, size;  // matches, and how many a sample takes
+  int num, size;  // number of matches, and how many of them a sample takes
   bool progressive;
   int pool;             // samples come from the first `pool` matches
-  double average;       // T_n of the paper for the pool
-  int64_t next_growth;  // T'_n: the draw at which the pool grows
-  int64_t drawn;        // from the pool
+  double average;       // T_n of the PROSAC paper for the present pool
+  int64_t next_growth;  // T'_n of the PROSAC paper: the draw at which the pool grows
+  int64_t drawn;        // number of samples drawn from the pool
   bool uniform_next;
 };
 
@@ -28,7 +28,7 @@ inline constexpr double kProsacSamples = 10;
 
 Sampler make_sampler(uint64_t seed, int num, int size, bool progressive);
 
-// `size` different indices. num >= size.
+// Writes `size` different indices of matches. num >= size.
 void draw_sample(Sampler& sampler, int32_t* sample);
 
 }  // namespace tv

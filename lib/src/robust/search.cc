@@ -72,8 +72,8 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
   if (!result.found) return;
   epipolar.M = result.model;
   if (!problem.calibrated) return;
-  // As in the FAST-SIFT paper: the essential matrix nearest to M, and its pose with most points in
-  // front of both cameras.
+  // The pose is found as in the FAST-SIFT paper: of the essential matrix nearest to M, it is the
+  // pose with most points in front of both cameras.
   const int count = near_matches(pairs, pairs.num, epipolar.M, threshold, indices);
   Svd3 svd = svd3(epipolar.M);
   const Mat3 essential =

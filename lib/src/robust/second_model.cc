@@ -17,7 +17,7 @@ constexpr double kConfidence = 0.95;
 constexpr int kFewestInliers = 12;
 constexpr int kMaxLeft = 512;  // if more matches remain, this many, evenly spaced, are searched
 
-// A copy of the listed matches alone.
+// Copies the listed matches alone.
 Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena& arena) {
   Matches part = matches;
   part.pairs = alloc_ray_pairs(arena, count, matches.pairs.on_plane);

@@ -13,10 +13,10 @@ struct EpipolarModel {
   bool found = false;
   bool has_pose = false;
   Pose pose;
-  Mat3 M = Mat3::Zero();  // E = [t]x R, or the uncalibrated matrix
+  Mat3 M = Mat3::Zero();  // E = [t]x R or, without calibration, the fundamental matrix
 };
 
-// The result of the search.
+// The result of search_two_view.
 struct TwoViewModel {
   EpipolarModel epipolar;
   int num_iterations = 0;
@@ -25,7 +25,7 @@ struct TwoViewModel {
 // All that the entry point writes to the caller's result: models on rays, and the views in the
 // canonical order that api/two_view.cc chooses.
 struct TwoViewOutcome {
-  Evidence evidence;  // includes the kind
+  Evidence evidence;  // what the verdict is based on, with the pair's kind
   Judgement judgement;
   EpipolarModel epipolar;
   bool has_R = false, has_t = false, has_H = false, has_covariance = false,
@@ -35,21 +35,22 @@ struct TwoViewOutcome {
   double covariance[25] = {}, alternative_covariance[25] = {};
   int essential_inliers = -1, fundamental_inliers = -1, homography_inliers = -1,
       rotation_inliers = -1;
-  double principal_point_shift_px[2] = {0, 0};  // models and poses refer to shifted cameras
+  // Models and poses refer to cameras whose principal points are shifted by this.
+  double principal_point_shift_px[2] = {0, 0};
   double rms_error_px = 0;
-  uint8_t* inlier = nullptr;  // of all matches, repeats included
+  uint8_t* inlier = nullptr;  // one flag for each match, repeats included
 };
 
 // How many bytes of arena one estimate takes.
 size_t two_view_scratch_bytes(int max_matches);
-size_t search_bytes(int max_matches);  // the part of it that the search takes
+size_t search_bytes(int max_matches);  // the part of these bytes that the search takes
 
 // What both halves read from the options. least_matches: the degrees of freedom of the solver's
 // model; 5 for an upright pose, too, since its refinement frees all five.
 int least_matches(int method);
 GravityPrior gravity_of(const TwoViewProblem& problem);
 
-// The robust loop (TV_STAGE_ESTIMATE).
+// Runs the robust loop, which is the stage TV_STAGE_ESTIMATE.
 void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
                      TwoViewModel* model);
 

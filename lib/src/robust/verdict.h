@@ -20,11 +20,11 @@ struct Evidence {
   // of their own (second_model.h), and how far the points lie as on a lattice (lattice.h).
   bool has_second_model = false;
   double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
-  // Of a full pose (calibrated or planar).
+  // The fields from here on are measured of a full pose (calibrated or planar).
   bool has_alternative = false;    // whether a second motion of the plane fits
-  double noise_px = 0;             // of a matched pixel; 0 where there is no covariance
+  double noise_px = 0;             // noise of a matched pixel; 0 where there is no covariance
   double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
-  double median_parallax_rad = 0;  // of the inliers
+  double median_parallax_rad = 0;  // median parallax of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
   // The root mean square distance of the inliers from the line nearest to them, in each image.
   double line_distance_px[2] = {kUnknown, kUnknown};

@@ -26,9 +26,9 @@ enum { ARDRONE_AT_MAX_BYTES = 1024 };
    room for any command. After the sequence number INT32_MAX - 1 the numbers start again at 1, as
    the drone allows. */
 typedef struct ardrone_at {
-  /* The commands so far. */
+  /* The text of the commands written so far. */
   char text[ARDRONE_AT_MAX_BYTES];
-  /* Bytes of text in use; no terminating zero. */
+  /* The number of bytes of text in use; there is no terminating zero. */
   size_t size;
   /* The sequence number of the last command. */
   int32_t sequence;
@@ -42,11 +42,11 @@ TV_API tvs_status ardrone_at_ref(ardrone_at *at, int take_off, int emergency);
 /* How to move, as fractions of the configured limits. Positive are roll to the right, pitch
    backward (nose up), climb upwards and turn clockwise from above. */
 typedef struct ardrone_move {
-  /* Each in [-1, 1]. */
+  /* Each component is in [-1, 1]. */
   float roll, pitch, climb, turn;
 } ardrone_move;
 
-/* Flags of ardrone_at_pcmd. */
+/* The flags that ardrone_at_pcmd accepts. */
 enum {
   /* Turn and roll together fly a curve. */
   ARDRONE_PCMD_COMBINED_YAW = 2,
@@ -83,15 +83,15 @@ TV_API tvs_status ardrone_at_config(ardrone_at *at, const char *key, const char 
 TV_API tvs_status ardrone_at_config_ids(ardrone_at *at, const char *session, const char *user,
                                         const char *application);
 
-/* What ardrone_at_ctrl requests. */
+/* The requests that ardrone_at_ctrl can make. */
 typedef enum ardrone_control_mode {
-  /* Nothing. */
+  /* The drone does nothing. */
   ARDRONE_CTRL_NONE = 0,
-  /* Send the configuration on TCP 5559. */
+  /* The drone sends the configuration on TCP 5559. */
   ARDRONE_CTRL_SEND_CONFIG = 4,
-  /* Clear the state's acknowledge bit. */
+  /* The drone clears the acknowledge bit of its state word. */
   ARDRONE_CTRL_ACKNOWLEDGE = 5,
-  /* Send the lists of ids on TCP 5559. */
+  /* The drone sends the lists of ids on TCP 5559. */
   ARDRONE_CTRL_SEND_IDS = 6
 } ardrone_control_mode;
 
@@ -117,36 +117,37 @@ TV_API tvs_status ardrone_at_led(ardrone_at *at, int animation, float hertz, int
 /* Commands of old firmware and of Parrot's own tools. The meaning of their arguments is not
    documented; this driver writes them unchanged. */
 typedef enum ardrone_legacy {
-  /* 1 argument. */
+  /* The command has 1 argument. */
   ARDRONE_PMODE,
-  /* 4 arguments. */
+  /* The command has 4 arguments. */
   ARDRONE_MISC,
-  /* 13 arguments: the control loops' gains. */
+  /* The command has 13 arguments: the gains of the control loops. */
   ARDRONE_GAIN,
-  /* 9 arguments: parameters of the on-board vision. */
+  /* The command has 9 arguments: parameters of the on-board vision. */
   ARDRONE_VISP,
-  /* 1 argument: its options. */
+  /* The command has 1 argument: options of the on-board vision. */
   ARDRONE_VISO,
-  /* 2 arguments: raw or compressed video. */
+  /* The command has 2 arguments, which choose raw or compressed video. */
   ARDRONE_CAP,
-  /* 1 argument: which camera is sent; the present form is the key video:video_channel. */
+  /* The command has 1 argument: which camera is sent; the present form is the key
+     video:video_channel. */
   ARDRONE_ZAP,
-  /* 2 arguments: which tags are looked for. */
+  /* The command has 2 arguments: which tags are looked for. */
   ARDRONE_CAD,
-  /* 3 arguments: trim by hand. */
+  /* The command has 3 arguments: a trim by hand. */
   ARDRONE_MTRIM,
-  /* 5 arguments: polaris, tags for positions. */
+  /* The command has 5 arguments for "polaris", positions by tags. */
   ARDRONE_POL,
-  /* 1 argument: flight by itself. */
+  /* The command has 1 argument for autonomous flight. */
   ARDRONE_AFLIGHT,
-  /* 22 arguments: a pose measured from outside. */
+  /* The command has 22 arguments: a pose measured from outside. */
   ARDRONE_VICON,
-  /* The number of these commands. */
+  /* The number of the commands above. */
   ARDRONE_NUM_LEGACY
 } ardrone_legacy;
 
-/* Appends one of these commands. arguments holds num_arguments numbers, which is as many as the
-   command has. Statuses as of every command (ardrone_at). */
+/* Appends a command of ardrone_legacy. arguments holds num_arguments numbers, which is as many as
+   the command has. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_legacy(ardrone_at *at, ardrone_legacy command,
                                     const int32_t *arguments, int num_arguments);
 

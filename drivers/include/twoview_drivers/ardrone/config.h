@@ -8,21 +8,21 @@
 
 TV_BEGIN_DECLS
 
-/* The longest texts in bytes, with their terminating zeros. */
+/* The lengths in bytes of the longest texts, with their terminating zeros. */
 enum {
-  /* "section:name". */
+  /* The longest key, "section:name". */
   ARDRONE_KEY_BYTES = 65,
-  /* A value. */
+  /* The longest value of a key. */
   ARDRONE_VALUE_BYTES = 257,
-  /* 8 hexadecimal digits. */
+  /* An id: 8 hexadecimal digits. */
   ARDRONE_ID_BYTES = 9
 };
 
-/* A piece of the caller's text; not zero-terminated. */
+/* A piece of the caller's text without a terminating zero. */
 typedef struct ardrone_span {
-  /* Its first character, within the caller's text. */
+  /* The first character of the piece, within the caller's text. */
   const char *text;
-  /* Bytes. */
+  /* The length of the piece, bytes. */
   size_t size;
 } ardrone_span;
 
@@ -37,13 +37,13 @@ TV_API tvs_status ardrone_config_next(const char *text, size_t size, size_t *off
 TV_API tvs_status ardrone_config_find(const char *text, size_t size, const char *key, char *value,
                                       size_t cap_value);
 
-/* Whose settings an id names. */
+/* Whether an id names a program, a user or a flight. */
 typedef enum ardrone_id_kind {
-  /* A program. */
+  /* The id names a program. */
   ARDRONE_ID_APPLICATION,
-  /* A user. */
+  /* The id names a user. */
   ARDRONE_ID_PROFILE,
-  /* A flight. */
+  /* The id names a flight. */
   ARDRONE_ID_SESSION
 } ardrone_id_kind;
 
@@ -77,50 +77,50 @@ TV_API tvs_status ardrone_format_led(int animation, float hertz, int seconds, ch
 /* Makes an id from a name: its CRC-32 in 8 hexadecimal digits, never 00000000. */
 TV_API void ardrone_make_id(const char *name, char id[ARDRONE_ID_BYTES]);
 
-/* Values of video:video_codec. */
+/* The values that the key video:video_codec may have. */
 typedef enum ardrone_video_codec {
-  /* 640x360 live. */
+  /* 640x360 on the live stream. */
   ARDRONE_VIDEO_H264_360P = 129,
-  /* And 1280x720 on the recording stream. */
+  /* 640x360 on the live stream and 1280x720 on the recording stream. */
   ARDRONE_VIDEO_H264_360P_RECORD_720P = 130,
-  /* 1280x720 live; needs ids. */
+  /* 1280x720 on the live stream; the key is accepted only under ids. */
   ARDRONE_VIDEO_H264_720P = 131,
-  /* 640x360 on both. */
+  /* 640x360 on the live stream and on the recording stream. */
   ARDRONE_VIDEO_H264_360P_RECORD_360P = 136
 } ardrone_video_codec;
 
 /* ---- The handshake: one exchange at a time, over a lossy link ----------------------------------
    clear the acknowledge bit -> send -> wait for the bit -> CTRL 5 until it is clear -> done. */
 
-/* What an exchange is for. */
+/* The purpose of an exchange. */
 typedef enum ardrone_exchange_kind {
-  /* One key. */
+  /* The exchange sets one key. */
   ARDRONE_EXCHANGE_SET,
-  /* CTRL 4: the text comes on TCP 5559. */
+  /* The exchange requests the configuration with CTRL 4; its text comes on TCP 5559. */
   ARDRONE_EXCHANGE_READ_CONFIG,
-  /* CTRL 6. */
+  /* The exchange requests the lists of ids with CTRL 6; their text comes on TCP 5559. */
   ARDRONE_EXCHANGE_READ_IDS
 } ardrone_exchange_kind;
 
-/* Where an exchange stands. */
+/* The step that an exchange has reached. */
 typedef enum ardrone_exchange_state {
-  /* None was begun. */
+  /* No exchange was begun. */
   ARDRONE_EXCHANGE_IDLE,
   /* An old acknowledge bit is still set; it is being cleared. */
   ARDRONE_EXCHANGE_CLEARING,
-  /* The command is due. */
+  /* The command is to be sent at the next tick. */
   ARDRONE_EXCHANGE_SENDING,
   /* The command was sent; the bit, or the text, has not come yet. */
   ARDRONE_EXCHANGE_WAITING,
   /* The bit came; CTRL 5 is sent until it is clear. */
   ARDRONE_EXCHANGE_RELEASING,
-  /* Acknowledged, or the text has come. */
+  /* The drone acknowledged the command, or the whole text has come. */
   ARDRONE_EXCHANGE_DONE,
-  /* It was not done within ARDRONE_EXCHANGE_TIMEOUT_NS. */
+  /* The exchange was not done within ARDRONE_EXCHANGE_TIMEOUT_NS. */
   ARDRONE_EXCHANGE_FAILED
 } ardrone_exchange_state;
 
-/* The caller owns it. Private except for `state`. */
+/* An exchange in the caller's memory. Its fields are private except for `state`. */
 typedef struct ardrone_exchange {
   ardrone_exchange_state state;
   ardrone_exchange_kind kind;
@@ -132,7 +132,7 @@ typedef struct ardrone_exchange {
 
 /* How long a step waits before its command is sent again with a new sequence number, ns. */
 #define ARDRONE_EXCHANGE_STEP_NS INT64_C(500000000)
-/* How long an exchange may take in all, ns. */
+/* The longest time that a whole exchange may take, ns. */
 #define ARDRONE_EXCHANGE_TIMEOUT_NS INT64_C(5000000000)
 
 /* Begins an exchange. key and value are read for ARDRONE_EXCHANGE_SET only. ids is null, or

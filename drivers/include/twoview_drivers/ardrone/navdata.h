@@ -17,20 +17,20 @@
 
 TV_BEGIN_DECLS
 
-/* The drone sends no longer datagram. */
+/* No datagram of the drone is longer than this, in bytes. */
 enum { ARDRONE_NAVDATA_MAX_BYTES = 4096 };
 
-/* Bits of the state word: ardrone_navdata.state. */
+/* The macros ARDRONE_STATE_ are the bits of the state word, ardrone_navdata.state. */
 
-/* In the air; 0: landed. */
+/* 1: the drone is in the air; 0: it has landed. */
 #define ARDRONE_STATE_FLYING (UINT32_C(1) << 0)
-/* Video is on. */
+/* The drone's video is on. */
 #define ARDRONE_STATE_VIDEO (UINT32_C(1) << 1)
 /* The on-board vision is on. */
 #define ARDRONE_STATE_VISION (UINT32_C(1) << 2)
-/* Angular rates are controlled; 0: angles. */
+/* 1: the drone controls its angular rates; 0: its angles. */
 #define ARDRONE_STATE_RATE_CONTROL (UINT32_C(1) << 3)
-/* Altitude is controlled. */
+/* The drone controls its altitude. */
 #define ARDRONE_STATE_ALTITUDE_CONTROL (UINT32_C(1) << 4)
 /* The start button was pressed. */
 #define ARDRONE_STATE_START_BUTTON (UINT32_C(1) << 5)
@@ -39,13 +39,13 @@ enum { ARDRONE_NAVDATA_MAX_BYTES = 4096 };
 #define ARDRONE_STATE_ACKNOWLEDGE (UINT32_C(1) << 6)
 /* The camera is ready. */
 #define ARDRONE_STATE_CAMERA_READY (UINT32_C(1) << 7)
-/* Travelling is on. */
+/* Parrot's "travelling" mode is on; Parrot does not document what it does. */
 #define ARDRONE_STATE_TRAVELLING (UINT32_C(1) << 8)
-/* A USB stick is there. */
+/* A USB stick is plugged into the drone. */
 #define ARDRONE_STATE_USB_READY (UINT32_C(1) << 9)
-/* Navdata has the short form. */
+/* Navdata has the short ("demo") form. */
 #define ARDRONE_STATE_DEMO (UINT32_C(1) << 10)
-/* Navdata has no options yet. */
+/* This is a bootstrap packet: navdata has no options yet. */
 #define ARDRONE_STATE_BOOTSTRAP (UINT32_C(1) << 11)
 /* A motor is stuck or does not answer. */
 #define ARDRONE_STATE_MOTOR_PROBLEM (UINT32_C(1) << 12)
@@ -55,33 +55,33 @@ enum { ARDRONE_NAVDATA_MAX_BYTES = 4096 };
 #define ARDRONE_STATE_SOFTWARE_FAULT (UINT32_C(1) << 14)
 /* The battery is low: the drone will land by itself. */
 #define ARDRONE_STATE_BATTERY_LOW (UINT32_C(1) << 15)
-/* The emergency was requested by a command. */
+/* A command requested the emergency. */
 #define ARDRONE_STATE_USER_EMERGENCY (UINT32_C(1) << 16)
-/* A timer ran out. */
+/* A timer of the drone ran out; Parrot does not document which one. */
 #define ARDRONE_STATE_TIMER_ELAPSED (UINT32_C(1) << 17)
-/* The magnetometer is to be calibrated. */
+/* The magnetometer needs a calibration. */
 #define ARDRONE_STATE_MAGNETO_CALIBRATION (UINT32_C(1) << 18)
-/* An angle was too large: the motors were cut. */
+/* The drone cut its motors because an angle was too large. */
 #define ARDRONE_STATE_ANGLES_OUT_OF_RANGE (UINT32_C(1) << 19)
-/* Too much wind. */
+/* There is too much wind. */
 #define ARDRONE_STATE_WIND (UINT32_C(1) << 20)
 /* The ultrasound receives no echo. */
 #define ARDRONE_STATE_ULTRASOUND_DEAF (UINT32_C(1) << 21)
-/* The motors were cut. */
+/* The drone cut its motors. */
 #define ARDRONE_STATE_CUT_OUT (UINT32_C(1) << 22)
 /* The sensor board's version is right. */
 #define ARDRONE_STATE_PIC_VERSION_OK (UINT32_C(1) << 23)
-/* Commands are read. */
+/* The drone's thread that reads commands is running. */
 #define ARDRONE_STATE_AT_THREAD (UINT32_C(1) << 24)
-/* Navdata are sent. */
+/* The drone's thread that sends navdata is running. */
 #define ARDRONE_STATE_NAVDATA_THREAD (UINT32_C(1) << 25)
-/* Video is sent. */
+/* The drone's thread that sends video is running. */
 #define ARDRONE_STATE_VIDEO_THREAD (UINT32_C(1) << 26)
-/* Sensors are read. */
+/* The drone's thread that reads the sensors is running. */
 #define ARDRONE_STATE_ACQUISITION_THREAD (UINT32_C(1) << 27)
-/* The control loop was over 5 ms late. */
+/* The drone's control loop was over 5 ms late. */
 #define ARDRONE_STATE_CONTROL_LATE (UINT32_C(1) << 28)
-/* The sensor board was over 5 ms late. */
+/* The drone's sensor board was over 5 ms late. */
 #define ARDRONE_STATE_ADC_LATE (UINT32_C(1) << 29)
 /* No command came for 50 ms. The bit is set at times on a good link, too. */
 #define ARDRONE_STATE_COM_WATCHDOG (UINT32_C(1) << 30)
@@ -90,31 +90,31 @@ enum { ARDRONE_NAVDATA_MAX_BYTES = 4096 };
 
 /* Tags. Bit `tag` of ardrone_navdata.present and of the key general:navdata_options. */
 typedef enum ardrone_tag {
-  /* Attitude, height, velocity, battery. */
+  /* Attitude, height, velocity and battery. */
   ARDRONE_TAG_DEMO = 0,
-  /* The time stamp. */
+  /* The drone's time stamp. */
   ARDRONE_TAG_TIME = 1,
-  /* Sensors as converted. */
+  /* The sensors' raw readings. */
   ARDRONE_TAG_RAW_MEASURES = 2,
-  /* Sensors in physical units. */
+  /* The sensors' readings in physical units. */
   ARDRONE_TAG_PHYS_MEASURES = 3,
-  /* The gyroscopes' zeros. */
+  /* The gyroscopes' readings at rest. */
   ARDRONE_TAG_GYROS_OFFSETS = 4,
-  /* Angles of the accelerometer alone. */
+  /* Pitch and roll by the accelerometer alone. */
   ARDRONE_TAG_EULER_ANGLES = 5,
-  /* Set points. */
+  /* The set points of the control loops. */
   ARDRONE_TAG_REFERENCES = 6,
-  /* Trims. */
+  /* The trims of yaw rate, pitch and roll. */
   ARDRONE_TAG_TRIMS = 7,
-  /* What the controller requested. */
+  /* The movement that the controller requested. */
   ARDRONE_TAG_RC_REFERENCES = 8,
-  /* Motors. */
+  /* The motors' commands and the parts they are made of. */
   ARDRONE_TAG_PWM = 9,
-  /* Height. */
+  /* The height and its estimators. */
   ARDRONE_TAG_ALTITUDE = 10,
-  /* Translation in the picture. */
+  /* The translation of the picture between two frames. */
   ARDRONE_TAG_VISION_RAW = 11,
-  /* Optical flow. */
+  /* The optical flow in five parts of the picture. */
   ARDRONE_TAG_VISION_FLOW = 12,
   /* The on-board vision's velocity. */
   ARDRONE_TAG_VISION = 13,
@@ -122,31 +122,31 @@ typedef enum ardrone_tag {
   ARDRONE_TAG_VISION_PERF = 14,
   /* The on-board vision's tracked points. */
   ARDRONE_TAG_TRACKERS = 15,
-  /* Tags and shells seen. */
+  /* The tags and shells that the on-board vision saw. */
   ARDRONE_TAG_VISION_DETECT = 16,
-  /* A counter. */
+  /* The counter of a watchdog. */
   ARDRONE_TAG_WATCHDOG = 17,
-  /* The sensor board's bytes. */
+  /* The raw bytes of the sensor board. */
   ARDRONE_TAG_ADC_DATA = 18,
-  /* The live stream. */
+  /* The state of the live video stream. */
   ARDRONE_TAG_VIDEO_STREAM = 19,
-  /* Counters of games. */
+  /* The counters of Parrot's games. */
   ARDRONE_TAG_GAMES = 20,
-  /* Barometer. */
+  /* The barometer's readings. */
   ARDRONE_TAG_PRESSURE = 21,
-  /* Magnetometer. */
+  /* The magnetometer's readings and heading. */
   ARDRONE_TAG_MAGNETO = 22,
-  /* Wind and its estimator. */
+  /* The wind's estimate and its estimator's state. */
   ARDRONE_TAG_WIND = 23,
-  /* The height's estimator. */
+  /* The state of the height's estimator. */
   ARDRONE_TAG_KALMAN_PRESSURE = 24,
-  /* The recording stream. */
+  /* The state of the recording stream and of the USB stick. */
   ARDRONE_TAG_HD_VIDEO = 25,
-  /* The radio link. */
+  /* The quality of the radio link. */
   ARDRONE_TAG_WIFI = 26,
-  /* One of three layouts, which differ in size: ardrone_gps_form. */
+  /* The GPS receiver, in one of three layouts of different size (ardrone_gps_form). */
   ARDRONE_TAG_GPS = 27,
-  /* How many there are. */
+  /* The number of the tags above. */
   ARDRONE_NUM_TAGS = 28,
   /* The last one: the sum of all bytes before it. */
   ARDRONE_TAG_CHECKSUM = 0xffff
@@ -156,194 +156,197 @@ typedef enum ardrone_tag {
 
 /* Major part (upper 16 bits) of ctrl_state; 3 and 7 both mean flying. */
 typedef enum ardrone_control_state {
-  /* None yet. */
+  /* The drone has no control state yet. */
   ARDRONE_CONTROL_DEFAULT,
-  /* Starting up. */
+  /* The drone starts up. */
   ARDRONE_CONTROL_INIT,
-  /* Motors off. */
+  /* The drone has landed, and its motors are off. */
   ARDRONE_CONTROL_LANDED,
-  /* Under command. */
+  /* The drone flies under command. */
   ARDRONE_CONTROL_FLYING,
-  /* Holds its place. */
+  /* The drone hovers: it holds its place. */
   ARDRONE_CONTROL_HOVERING,
-  /* A self-test. */
+  /* The drone runs a self-test. */
   ARDRONE_CONTROL_TEST,
-  /* Until it hovers. */
+  /* The drone takes off; this state lasts until it hovers. */
   ARDRONE_CONTROL_TAKING_OFF,
-  /* Flies to a place; counts as flying. */
+  /* The drone flies to a place; this state counts as flying. */
   ARDRONE_CONTROL_GO_TO_FIX,
-  /* Until the motors are off. */
+  /* The drone lands; this state lasts until the motors are off. */
   ARDRONE_CONTROL_LANDING,
-  /* A flip. */
+  /* The drone makes a flip. */
   ARDRONE_CONTROL_LOOPING
 } ardrone_control_state;
 
 /* The options. Fields are in the order of the wire, with the names of Parrot's headers made
    clearer. "Raw" and "unit not documented" mean that those headers do not say more. */
 
-/* ARDRONE_TAG_DEMO. */
+/* The option ARDRONE_TAG_DEMO: attitude, height, velocity and battery. */
 typedef struct ardrone_demo {
   /* The upper 16 bits of ctrl_state are an ardrone_control_state. battery_percent is in [0,
      100]. */
   uint32_t ctrl_state, battery_percent;
   /* Pitch (nose up), roll (right side down) and yaw (clockwise from above), 0.001 degrees. */
   float theta_mdeg, phi_mdeg, psi_mdeg;
-  /* 0 on the ground. */
+  /* The height, millimetres; 0 on the ground. */
   int32_t altitude_mm;
-  /* Along the body's axes. z is always 0 on this drone; ardrone_altitude has the vertical speed. */
+  /* Velocity along the body's axes. z is always 0 on this drone; ardrone_altitude has the vertical
+     speed. */
   float velocity_mm_s[3];
-  /* Of the on-board vision. */
+  /* The on-board vision's count of frames. */
   uint32_t num_frames;
-  /* Of a tag in the camera's frame; its unit is not documented. */
+  /* Rotation (3x3) and translation of a detected tag in the camera's frame; the translation's unit
+     is not documented. */
   float detection_rotation[9], detection_translation[3];
-  /* Which tag, which detector. */
+  /* Which tag was detected, and which detector found it. */
   uint32_t detection_tag, detection_type;
-  /* Of the camera in the body; unit not documented, often 0. */
+  /* Rotation (3x3) and translation of the camera in the body's frame, often 0; the translation's
+     unit is not documented. */
   float camera_rotation[9], camera_translation[3];
 } ardrone_demo;
 
-/* ARDRONE_TAG_TIME. */
+/* The option ARDRONE_TAG_TIME: the drone's time stamp. */
 typedef struct ardrone_time {
-  /* 11 bits of s, 21 of us: wraps at 2048 s. */
+  /* The upper 11 bits are seconds, the lower 21 are microseconds: the stamp wraps at 2048 s. */
   uint32_t stamp;
 } ardrone_time;
 
-/* ARDRONE_TAG_RAW_MEASURES. */
+/* The option ARDRONE_TAG_RAW_MEASURES: the sensors' raw readings. */
 typedef struct ardrone_raw_measures {
-  /* Raw, as converted. */
+  /* The accelerometer's readings, raw. */
   uint16_t accelerometer[3];
-  /* Raw; gyro_110 has a range of 110 degrees a second. */
+  /* The gyroscopes' readings, raw; gyro_110 has a range of 110 degrees a second. */
   int16_t gyro[3], gyro_110[2];
-  /* Millivolts. */
+  /* The battery's voltage, millivolts. */
   uint32_t battery_mv;
   /* The ultrasound's echoes, raw. */
   uint16_t echo_start, echo_end, echo_association, echo_distance, curve_time, curve_value,
       curve_ref, echo_flag, num_echoes;
-  /* Raw. */
+  /* The sum of the ultrasound's echoes, raw. */
   uint32_t sum_echo;
-  /* Ultrasound. */
+  /* The height by ultrasound, millimetres. */
   int32_t altitude_mm;
-  /* Raw. */
+  /* A raw number; its meaning is not documented. */
   int16_t gradient;
 } ardrone_raw_measures;
 
-/* ARDRONE_TAG_PHYS_MEASURES. */
+/* The option ARDRONE_TAG_PHYS_MEASURES: the sensors' readings in physical units. */
 typedef struct ardrone_phys_measures {
-  /* The sensor's temperature. */
+  /* The accelerometer's temperature. */
   float accelerometer_celsius;
-  /* Raw. */
+  /* The gyroscopes' temperature, raw. */
   uint16_t gyro_temperature;
-  /* Body; at rest z is -1000 mg. */
+  /* Acceleration and angular rate along the body's axes; at rest acceleration_mg[2] is -1000. */
   float acceleration_mg[3], rate_deg_s[3];
-  /* Voltages, raw. */
+  /* The 3.3 V supply and two reference voltages, raw. */
   uint32_t supply_3v3, vref_epson, vref_idg;
 } ardrone_phys_measures;
 
-/* ARDRONE_TAG_GYROS_OFFSETS. */
+/* The option ARDRONE_TAG_GYROS_OFFSETS: the gyroscopes' readings at rest. */
 typedef struct ardrone_gyros_offsets {
   /* The gyroscopes' readings at rest, raw units. */
   float offset[3];
 } ardrone_gyros_offsets;
 
-/* ARDRONE_TAG_EULER_ANGLES. */
+/* The option ARDRONE_TAG_EULER_ANGLES: pitch and roll by the accelerometer alone. */
 typedef struct ardrone_euler_angles {
-  /* Of the accelerometer alone, 0.001 degrees. */
+  /* Pitch and roll by the accelerometer alone, 0.001 degrees. */
   float theta_mdeg, phi_mdeg;
 } ardrone_euler_angles;
 
-/* ARDRONE_TAG_REFERENCES: the control loops' set points. */
+/* The option ARDRONE_TAG_REFERENCES: the control loops' set points. */
 typedef struct ardrone_references {
-  /* Angles and integrals, raw. */
+  /* Set points of angles and of their integrals, raw. */
   int32_t theta, phi, theta_i, phi_i, pitch, roll, yaw, psi;
-  /* Velocities, corrections and gains; their units are not documented. */
+  /* Set points of velocities, corrections of angles, and gains; their units are not documented. */
   float vx, vy, theta_mod, phi_mod, k_vx, k_vy;
-  /* Which gains. */
+  /* Which gains are in use, raw. */
   uint32_t k_mode;
   /* What a command of the controller requests; the units are not documented. */
   float ui_time, ui_theta, ui_phi, ui_psi, ui_psi_accuracy;
-  /* The sequence number of that command. */
+  /* The sequence number of the controller's command. */
   int32_t ui_sequence;
 } ardrone_references;
 
-/* ARDRONE_TAG_TRIMS. */
+/* The option ARDRONE_TAG_TRIMS: the trims of yaw rate, pitch and roll. */
 typedef struct ardrone_trims {
-  /* Of the flat trim; their units are not documented. */
+  /* The yaw rate, pitch and roll of the flat trim; their units are not documented. */
   float yaw_rate, theta, phi;
 } ardrone_trims;
 
-/* ARDRONE_TAG_RC_REFERENCES. */
+/* The option ARDRONE_TAG_RC_REFERENCES: the movement that the controller requested. */
 typedef struct ardrone_rc_references {
-  /* As the controller sent them, raw. */
+  /* The movement that the controller sent, raw. */
   int32_t pitch, roll, yaw, climb, ag;
 } ardrone_rc_references;
 
-/* ARDRONE_TAG_PWM. */
+/* The option ARDRONE_TAG_PWM: the motors' commands and their parts. */
 typedef struct ardrone_pwm {
-  /* [0, 255]: each motor; the same after saturation. */
+  /* The command of each motor in [0, 255], and the same after saturation. */
   uint8_t motor[4], saturated[4];
   /* Parts of the throttle; their units are not documented. */
   float climb_feed_forward, climb_altitude, altitude_integral, vz_ref;
-  /* Parts of the motors' sum, raw. */
+  /* The parts of pitch, roll and yaw in the motors' commands, raw. */
   int32_t pitch, roll, yaw;
-  /* Its unit is not documented. */
+  /* The integral part of yaw; its unit is not documented. */
   float yaw_integral;
-  /* Before saturation, raw. */
+  /* The parts of pitch, roll and yaw before saturation, raw. */
   int32_t pitch_planned, roll_planned, yaw_planned;
-  /* Its unit is not documented. */
+  /* The planned climb; its unit is not documented. */
   float climb_planned;
-  /* Of each motor, raw. */
+  /* The current of each motor, raw. */
   uint16_t current[4];
   /* Parts of the throttle; their units are not documented. */
   float altitude_proportional, altitude_derivative;
 } ardrone_pwm;
 
-/* ARDRONE_TAG_ALTITUDE. */
+/* The option ARDRONE_TAG_ALTITUDE: the height and its estimators. */
 typedef struct ardrone_altitude {
-  /* The fused height. */
+  /* The fused height, millimetres. */
   int32_t vision_mm;
-  /* Up is positive. */
+  /* The vertical speed, mm/s; up is positive. */
   float vz_mm_s;
-  /* The set point; raw: ultrasound, not 0 on the ground. */
+  /* The set point of the height, and the height by ultrasound, which is not 0 on the ground. */
   int32_t reference_mm, raw_mm;
-  /* The observer's state; units m and s. */
+  /* The height observer's acceleration, height and state, in units of m and s. */
   float observed_accel_z, observed_altitude, observed_x[3];
-  /* The observer's mode, raw. */
+  /* The height observer's mode, raw. */
   uint32_t observed_state;
-  /* Its units are m and s. */
+  /* The estimated velocity, in units of m and s. */
   float estimated_v[2];
   /* The velocity estimator's mode, raw. */
   uint32_t estimated_state;
 } ardrone_altitude;
 
-/* ARDRONE_TAG_VISION_RAW. */
+/* The option ARDRONE_TAG_VISION_RAW: the translation of the picture between two frames. */
 typedef struct ardrone_vision_raw {
-  /* Of the picture between two frames; its unit is not documented. */
+  /* The translation of the picture between two frames; its unit is not documented. */
   float translation[3];
 } ardrone_vision_raw;
 
-/* ARDRONE_TAG_VISION_FLOW. */
+/* The option ARDRONE_TAG_VISION_FLOW: the optical flow in five parts of the picture. */
 typedef struct ardrone_vision_flow {
   /* Motion in five parts of the picture, pixels. */
   float dx[5], dy[5];
 } ardrone_vision_flow;
 
-/* ARDRONE_TAG_VISION. */
+/* The option ARDRONE_TAG_VISION: the on-board vision's velocity. */
 typedef struct ardrone_vision {
   /* The on-board vision's mode, raw. */
   uint32_t state;
-  /* Raw. */
+  /* A raw number; its meaning is not documented. */
   int32_t misc;
-  /* Their units are not documented. */
+  /* Trims and references of roll and pitch; their units are not documented. */
   float phi_trim, phi_reference, theta_trim, theta_reference;
   /* 1: this packet belongs to a new picture. */
   int32_t new_picture;
-  /* At the capture of the on-board vision's picture. */
+  /* Pitch, roll and yaw when the on-board vision's picture was captured, radians. */
   float theta_rad, phi_rad, psi_rad;
-  /* At the capture. */
+  /* The height when the on-board vision's picture was captured, millimetres. */
   int32_t altitude_mm;
-  /* Milliseconds of the same clock as time.stamp. */
+  /* When the picture was captured: milliseconds of the clock of ARDRONE_TAG_TIME. */
   uint32_t capture_ms;
-  /* Body; turns since the picture before, radians. */
+  /* Velocity along the body's axes, and the turns since the picture before, radians. */
   float velocity_mm_s[3], delta_phi, delta_theta, delta_psi;
   /* The place to hold: whether there is one; whether it was set anew. */
   uint32_t gold_defined, gold_reset;
@@ -351,181 +354,185 @@ typedef struct ardrone_vision {
   float gold_x, gold_y;
 } ardrone_vision;
 
-/* ARDRONE_TAG_VISION_PERF. */
+/* The option ARDRONE_TAG_VISION_PERF: the on-board vision's computing times. */
 typedef struct ardrone_vision_perf {
-  /* Times; their unit is not documented. */
+  /* The computing times of the on-board vision's steps; their unit is not documented. */
   float size, corners, compute, tracking, translation, update, custom[20];
 } ardrone_vision_perf;
 
-/* ARDRONE_TAG_TRACKERS. */
+/* The option ARDRONE_TAG_TRACKERS: the points that the on-board vision tracks. */
 typedef struct ardrone_trackers {
-  /* Of 5 x 6 trackers: 1 when locked; x y, pixels. */
+  /* For each of 5 x 6 trackers: locked is 1 when it is locked on a point; points has x and y,
+     pixels. */
   int32_t locked[30], points[60];
 } ardrone_trackers;
 
-/* ARDRONE_TAG_VISION_DETECT: up to four tags. */
+/* The option ARDRONE_TAG_VISION_DETECT: up to four tags that the on-board vision saw. */
 typedef struct ardrone_vision_detect {
-  /* How many; which; places in 0..1000 of the picture. */
+  /* The number of tags; for each, its type, and its place and size in 0..1000 of the picture. */
   uint32_t count, type[4], x[4], y[4], width[4], height[4];
-  /* From the camera. */
+  /* The distance of each tag from the camera, centimetres. */
   uint32_t distance_cm[4];
-  /* In the picture; 3x3 and 3 each; its unit is not documented. */
+  /* For each tag: its orientation in the picture, its rotation (3x3) and its translation (3), whose
+     unit is not documented. */
   float orientation_deg[4], rotation[36], translation[12];
-  /* Which camera saw it. */
+  /* Which camera saw each tag. */
   uint32_t camera[4];
 } ardrone_vision_detect;
 
-/* ARDRONE_TAG_WATCHDOG. */
+/* The option ARDRONE_TAG_WATCHDOG: the counter of a watchdog. */
 typedef struct ardrone_watchdog {
-  /* Counts. */
+  /* The watchdog's counter. */
   int32_t value;
 } ardrone_watchdog;
 
-/* ARDRONE_TAG_ADC_DATA. */
+/* The option ARDRONE_TAG_ADC_DATA: the raw bytes of the sensor board. */
 typedef struct ardrone_adc_data {
-  /* Of the sensor board. */
+  /* The version of the sensor board. */
   uint32_t version;
-  /* Its packet. */
+  /* The sensor board's packet. */
   uint8_t data[32];
 } ardrone_adc_data;
 
-/* ARDRONE_TAG_VIDEO_STREAM. */
+/* The option ARDRONE_TAG_VIDEO_STREAM: the state of the live stream. */
 typedef struct ardrone_video_stream {
-  /* Of the picture. */
+  /* The quantiser of the picture. */
   uint8_t quantiser;
   /* Bytes of the picture; its number; the last command's number; the mean time between two
      commands. */
   uint32_t frame_size, frame_number, at_sequence, at_mean_gap_ms;
   /* The variance of the time between two commands; its unit is not documented. */
   float at_gap_variance;
-  /* Of the link, raw; their units are not documented. */
+  /* The link's quality and bit rates, raw; their units are not documented. */
   uint32_t at_quality, bitrate, desired_bitrate;
-  /* Raw. */
+  /* Raw numbers; their meaning is not documented. */
   int32_t data[5];
-  /* How much waits to be sent, raw. */
+  /* How much data waits to be sent in the TCP queue and in the FIFO, raw. */
   uint32_t tcp_queue, fifo_queue;
 } ardrone_video_stream;
 
-/* ARDRONE_TAG_GAMES. */
+/* The option ARDRONE_TAG_GAMES: the counters of Parrot's games. */
 typedef struct ardrone_games {
-  /* How many. */
+  /* The numbers of double taps and of finish lines. */
   uint32_t double_taps, finish_lines;
 } ardrone_games;
 
-/* ARDRONE_TAG_PRESSURE. */
+/* The option ARDRONE_TAG_PRESSURE: the barometer's readings. */
 typedef struct ardrone_pressure {
   /* The barometer's raw pressure. */
   int32_t up;
   /* The barometer's raw temperature. */
   int16_t ut;
-  /* 0.1 degrees Celsius; Pa. */
+  /* The temperature in 0.1 degrees Celsius, and the pressure in Pa. */
   int32_t temperature_dc, pressure_pa;
 } ardrone_pressure;
 
-/* ARDRONE_TAG_MAGNETO. */
+/* The option ARDRONE_TAG_MAGNETO: the magnetometer's readings and heading. */
 typedef struct ardrone_magneto {
-  /* As converted. */
+  /* The magnetometer's readings, raw. */
   int16_t raw[3];
   /* Along the body's axes, in milligauss: the field, the rectified field, the offset. */
   float field_mg[3], rectified[3], offset[3];
-  /* By the magnetometer, the gyroscope, both. */
+  /* The heading by the magnetometer, by the gyroscope, and by both. */
   float heading_deg, heading_gyro_deg, heading_fusion_deg;
-  /* 1: yes. */
+  /* 1: the magnetometer is calibrated. */
   uint8_t calibrated;
   /* The magnetometer's mode, raw. */
   uint32_t state;
-  /* Of the calibration's sphere; their units are not documented. */
+  /* Radius of the calibration's sphere, and mean and variance of its error; their units are not
+     documented. */
   float radius, error_mean, error_variance;
 } ardrone_magneto;
 
-/* ARDRONE_TAG_WIND. */
+/* The option ARDRONE_TAG_WIND: the wind's estimate and its estimator's state. */
 typedef struct ardrone_wind {
   /* Speed of the wind, m/s; its direction and the angles that hold against it, radians; the
      estimator's internal state. */
   float speed_m_s, angle, theta_rad, phi_rad, state[6], debug[3];
 } ardrone_wind;
 
-/* ARDRONE_TAG_KALMAN_PRESSURE: the height's estimator. */
+/* The option ARDRONE_TAG_KALMAN_PRESSURE: the height's estimator. */
 typedef struct ardrone_kalman_pressure {
   /* The estimator's state and variances; their units are not documented. */
   float offset_pa, z, vz, bias_pwm, bias_pressure, offset_ultrasound, prediction_ultrasound,
       variance_altitude, variance_pwm, variance_speed;
-  /* 1: near the ground. */
+  /* 1: the drone is near the ground. */
   uint32_t ground_effect;
-  /* Its unit is not documented. */
+  /* The sum of the estimator's innovations; its unit is not documented. */
   float innovation_sum;
-  /* How many echoes were rejected. */
+  /* How many ultrasound echoes were rejected. */
   uint32_t rejects_ultrasound;
-  /* Their units are not documented. */
+  /* The signal of a flight that identifies the drone's dynamics, and a part of the throttle; their
+     units are not documented. */
   float multisinus, climb_altitude;
-  /* Raw; of a flight that identifies the drone's dynamics. */
+  /* Flags of a flight that identifies the drone's dynamics, raw. */
   uint32_t multisinus_flag, multisinus_start;
 } ardrone_kalman_pressure;
 
-/* ARDRONE_TAG_HD_VIDEO: the recording stream. */
+/* The option ARDRONE_TAG_HD_VIDEO: the recording stream. */
 typedef struct ardrone_hd_video {
   /* State; packets and bytes that wait; size and free space of the USB stick; number of the last
      picture; seconds of recording that fit in the free space. */
   uint32_t state, fifo_packets, fifo_size, usb_size_kb, usb_free_kb, frame_number, remaining_s;
 } ardrone_hd_video;
 
-/* ARDRONE_TAG_WIFI. */
+/* The option ARDRONE_TAG_WIFI: the quality of the radio link. */
 typedef struct ardrone_wifi {
   /* The drone's own measure of the link's quality, raw. */
   uint32_t link_quality;
 } ardrone_wifi;
 
-/* ARDRONE_TAG_GPS of firmware 2.4.8; of 2.4.7's only the first four are known. */
+/* The option ARDRONE_TAG_GPS of firmware 2.4.8; of 2.4.7's only the first four fields are known. */
 typedef struct ardrone_gps {
   /* Position in WGS 84; horizontal dilution of precision, a factor. */
   double latitude_deg, longitude_deg, elevation_m, hdop;
-  /* 1: yes. */
+  /* Each is 1 for yes: data are available; the start position and the waypoint are validated. */
   uint32_t data_available, zero_validated, waypoint_validated;
   /* The position at the start, and that fused with the IMU, degrees. */
   double latitude0, longitude0, latitude_fused, longitude_fused;
-  /* Of the receiver. */
+  /* The receiver's state, raw. */
   uint32_t state;
   /* The flight to a waypoint and its control loop; their units are not documented. */
   float x_trajectory, x_reference, y_trajectory, y_reference, theta_p, phi_p, theta_i, phi_i,
       theta_d, phi_d;
-  /* Dilution of precision, a factor each. */
+  /* Vertical and positional dilution of precision, a factor each. */
   double vdop, pdop;
-  /* Speed over ground; its values suggest m/s. */
+  /* Speed over ground; its values suggest that the unit is m/s. */
   float speed;
-  /* Of the receiver's last answer. */
+  /* The stamp of the receiver's last answer, raw. */
   uint32_t last_frame_stamp;
   /* Course, degrees; errors, m and m/s; signal to noise, dB Hz: these units are what the
      values suggest. */
   float degree, degree_magnetic, ehpe, ehve, c_n0;
-  /* In use. */
+  /* The number of satellites in use. */
   uint32_t num_satellites;
-  /* 12 times satellite, signal. */
+  /* For each of 12 channels: satellite and signal. */
   uint8_t channels[24];
-  /* 1: the receiver is there; has its ephemeris. */
+  /* Each is 1 for yes: the receiver is plugged in; it has its ephemeris. */
   uint32_t plugged, ephemeris;
-  /* Their units are not documented. */
+  /* The velocity of the flight to a waypoint; its unit is not documented. */
   float vx_trajectory, vy_trajectory;
-  /* Of the receiver. */
+  /* The receiver's firmware, raw. */
   uint32_t firmware;
 } ardrone_gps;
 
-/* ARDRONE_TAG_GPS of firmware of 2012, which holds no GPS position. */
+/* The option ARDRONE_TAG_GPS of firmware of 2012, which holds no GPS position. */
 typedef struct ardrone_zimmu {
-  /* Raw. */
+  /* The vertical speed, raw. */
   int32_t vz_lsb;
   /* Vertical speed; its unit is not documented. */
   float vz;
 } ardrone_zimmu;
 
-/* Which layout tag 27 had. */
+/* The layout of the option ARDRONE_TAG_GPS in a packet. */
 typedef enum ardrone_gps_form {
-  /* There was no such option. */
+  /* The packet has no option ARDRONE_TAG_GPS. */
   ARDRONE_GPS_NONE = 0,
-  /* 12 bytes, firmware of 2012: `zimmu`. */
+  /* The layout has 12 bytes (firmware of 2012) and fills `zimmu`. */
   ARDRONE_GPS_ZIMMU = 1,
-  /* 480 bytes: `gps`, its first four fields, which may be garbage. */
+  /* The layout has 480 bytes and fills the first four fields of `gps`, which may be garbage. */
   ARDRONE_GPS_247 = 2,
-  /* 216 bytes: `gps`. */
+  /* The layout has 216 bytes and fills `gps`. */
   ARDRONE_GPS_248 = 3
 } ardrone_gps_form;
 
@@ -540,65 +547,66 @@ typedef struct ardrone_navdata {
   uint32_t num_unknown;
   /* How many options were skipped since they are shorter than known. */
   uint32_t num_short;
-  /* Which of gps and zimmu ARDRONE_TAG_GPS filled. */
+  /* Whether the option ARDRONE_TAG_GPS filled gps or zimmu. */
   ardrone_gps_form gps_form;
-  /* ARDRONE_TAG_DEMO. */
+  /* The option ARDRONE_TAG_DEMO of the packet; zeros when the packet does not have it. */
   ardrone_demo demo;
-  /* ARDRONE_TAG_TIME. */
+  /* The option ARDRONE_TAG_TIME of the packet; zeros when the packet does not have it. */
   ardrone_time time;
-  /* ARDRONE_TAG_RAW_MEASURES. */
+  /* The option ARDRONE_TAG_RAW_MEASURES of the packet; zeros when the packet does not have it. */
   ardrone_raw_measures raw_measures;
-  /* ARDRONE_TAG_PHYS_MEASURES. */
+  /* The option ARDRONE_TAG_PHYS_MEASURES of the packet; zeros when the packet does not have it. */
   ardrone_phys_measures phys_measures;
-  /* ARDRONE_TAG_GYROS_OFFSETS. */
+  /* The option ARDRONE_TAG_GYROS_OFFSETS of the packet; zeros when the packet does not have it. */
   ardrone_gyros_offsets gyros_offsets;
-  /* ARDRONE_TAG_EULER_ANGLES. */
+  /* The option ARDRONE_TAG_EULER_ANGLES of the packet; zeros when the packet does not have it. */
   ardrone_euler_angles euler_angles;
-  /* ARDRONE_TAG_REFERENCES. */
+  /* The option ARDRONE_TAG_REFERENCES of the packet; zeros when the packet does not have it. */
   ardrone_references references;
-  /* ARDRONE_TAG_TRIMS. */
+  /* The option ARDRONE_TAG_TRIMS of the packet; zeros when the packet does not have it. */
   ardrone_trims trims;
-  /* ARDRONE_TAG_RC_REFERENCES. */
+  /* The option ARDRONE_TAG_RC_REFERENCES of the packet; zeros when the packet does not have it. */
   ardrone_rc_references rc_references;
-  /* ARDRONE_TAG_PWM. */
+  /* The option ARDRONE_TAG_PWM of the packet; zeros when the packet does not have it. */
   ardrone_pwm pwm;
-  /* ARDRONE_TAG_ALTITUDE. */
+  /* The option ARDRONE_TAG_ALTITUDE of the packet; zeros when the packet does not have it. */
   ardrone_altitude altitude;
-  /* ARDRONE_TAG_VISION_RAW. */
+  /* The option ARDRONE_TAG_VISION_RAW of the packet; zeros when the packet does not have it. */
   ardrone_vision_raw vision_raw;
-  /* ARDRONE_TAG_VISION_FLOW. */
+  /* The option ARDRONE_TAG_VISION_FLOW of the packet; zeros when the packet does not have it. */
   ardrone_vision_flow vision_flow;
-  /* ARDRONE_TAG_VISION. */
+  /* The option ARDRONE_TAG_VISION of the packet; zeros when the packet does not have it. */
   ardrone_vision vision;
-  /* ARDRONE_TAG_VISION_PERF. */
+  /* The option ARDRONE_TAG_VISION_PERF of the packet; zeros when the packet does not have it. */
   ardrone_vision_perf vision_perf;
-  /* ARDRONE_TAG_TRACKERS. */
+  /* The option ARDRONE_TAG_TRACKERS of the packet; zeros when the packet does not have it. */
   ardrone_trackers trackers;
-  /* ARDRONE_TAG_VISION_DETECT. */
+  /* The option ARDRONE_TAG_VISION_DETECT of the packet; zeros when the packet does not have it. */
   ardrone_vision_detect vision_detect;
-  /* ARDRONE_TAG_WATCHDOG. */
+  /* The option ARDRONE_TAG_WATCHDOG of the packet; zeros when the packet does not have it. */
   ardrone_watchdog watchdog;
-  /* ARDRONE_TAG_ADC_DATA. */
+  /* The option ARDRONE_TAG_ADC_DATA of the packet; zeros when the packet does not have it. */
   ardrone_adc_data adc_data;
-  /* ARDRONE_TAG_VIDEO_STREAM. */
+  /* The option ARDRONE_TAG_VIDEO_STREAM of the packet; zeros when the packet does not have it. */
   ardrone_video_stream video_stream;
-  /* ARDRONE_TAG_GAMES. */
+  /* The option ARDRONE_TAG_GAMES of the packet; zeros when the packet does not have it. */
   ardrone_games games;
-  /* ARDRONE_TAG_PRESSURE. */
+  /* The option ARDRONE_TAG_PRESSURE of the packet; zeros when the packet does not have it. */
   ardrone_pressure pressure;
-  /* ARDRONE_TAG_MAGNETO. */
+  /* The option ARDRONE_TAG_MAGNETO of the packet; zeros when the packet does not have it. */
   ardrone_magneto magneto;
-  /* ARDRONE_TAG_WIND. */
+  /* The option ARDRONE_TAG_WIND of the packet; zeros when the packet does not have it. */
   ardrone_wind wind;
-  /* ARDRONE_TAG_KALMAN_PRESSURE. */
+  /* The option ARDRONE_TAG_KALMAN_PRESSURE of the packet; zeros when the packet does not have
+     it. */
   ardrone_kalman_pressure kalman_pressure;
-  /* ARDRONE_TAG_HD_VIDEO. */
+  /* The option ARDRONE_TAG_HD_VIDEO of the packet; zeros when the packet does not have it. */
   ardrone_hd_video hd_video;
-  /* ARDRONE_TAG_WIFI. */
+  /* The option ARDRONE_TAG_WIFI of the packet; zeros when the packet does not have it. */
   ardrone_wifi wifi;
-  /* ARDRONE_TAG_GPS, the other two forms. */
+  /* The option ARDRONE_TAG_GPS in the forms ARDRONE_GPS_247 and ARDRONE_GPS_248, or zeros. */
   ardrone_gps gps;
-  /* ARDRONE_TAG_GPS, ARDRONE_GPS_ZIMMU. */
+  /* The option ARDRONE_TAG_GPS in the form ARDRONE_GPS_ZIMMU, or zeros. */
   ardrone_zimmu zimmu;
 } ardrone_navdata;
 
@@ -619,7 +627,7 @@ typedef struct ardrone_sequence {
   int num_late;
 } ardrone_sequence;
 
-/* What ardrone_sequence_check returns. */
+/* The place of a packet in the stream, as ardrone_sequence_check finds it. */
 typedef enum ardrone_order {
   /* The packet follows the last one. Use it. */
   ARDRONE_ORDER_NEXT,
@@ -639,10 +647,10 @@ typedef enum ardrone_order {
 TV_API ardrone_order ardrone_sequence_check(ardrone_sequence *sequence,
                                             const ardrone_navdata *navdata);
 
-/* The period of the drone's stamp, ns. */
+/* The drone's time stamp begins again at 0 after this time, ns. */
 #define ARDRONE_TIME_PERIOD_NS INT64_C(2048000000000)
 
-/* Converts the drone's stamp to nanoseconds in [0, ARDRONE_TIME_PERIOD_NS). */
+/* Converts the drone's time stamp to nanoseconds in [0, ARDRONE_TIME_PERIOD_NS). */
 TV_API int64_t ardrone_time_ns(ardrone_time time);
 
 /* Writes the packet to *sample in SI units and in the frames of source.h, without its time.

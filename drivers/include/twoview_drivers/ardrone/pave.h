@@ -14,33 +14,33 @@
 
 TV_BEGIN_DECLS
 
-/* Bytes of a packet's parts. */
+/* The limits of the parts of a packet, bytes. */
 enum {
-  /* Bytes with a shorter header are no packet. */
+  /* The shortest header of a packet; bytes with a shorter one are no packet. */
   ARDRONE_PAVE_MIN_HEADER = 64,
-  /* Bytes with a longer header are no packet. */
+  /* The longest header of a packet; bytes with a longer one are no packet. */
   ARDRONE_PAVE_MAX_HEADER = 256,
-  /* Bytes with a larger payload are no packet. */
+  /* The largest payload of a packet; bytes with a larger one are no packet. */
   ARDRONE_PAVE_MAX_PAYLOAD = 1 << 20,
   /* A payload of exactly this many bytes repeats the last picture. */
   ARDRONE_PAVE_SKIP_PAYLOAD = 7
 };
 
-/* How the payload is compressed. */
+/* The compression of the payload. */
 typedef enum ardrone_pave_codec {
-  /* The header does not say. */
+  /* The header does not name the codec. */
   ARDRONE_PAVE_UNKNOWN,
   /* A codec of the first AR.Drone. */
   ARDRONE_PAVE_VLIB,
   /* A codec of the first AR.Drone. */
   ARDRONE_PAVE_P264,
-  /* MPEG-4 part 2. */
+  /* The codec is MPEG-4 part 2. */
   ARDRONE_PAVE_MPEG4,
-  /* H.264 baseline, Annex B: what this drone sends. */
+  /* The codec is H.264 baseline, Annex B, which the AR.Drone 2.0 sends. */
   ARDRONE_PAVE_H264
 } ardrone_pave_codec;
 
-/* What the payload holds. */
+/* The kind of picture that the payload holds. */
 typedef enum ardrone_pave_type {
   /* The header does not name the picture's type. */
   ARDRONE_PAVE_TYPE_UNKNOWN,
@@ -48,9 +48,9 @@ typedef enum ardrone_pave_type {
   ARDRONE_PAVE_IDR,
   /* An intra picture; later pictures may refer to pictures before it. */
   ARDRONE_PAVE_I,
-  /* A picture predicted from earlier ones. */
+  /* A picture that is predicted from earlier ones. */
   ARDRONE_PAVE_P,
-  /* Parameter sets alone, no picture. */
+  /* Parameter sets without a picture. */
   ARDRONE_PAVE_HEADERS
 } ardrone_pave_type;
 
@@ -58,23 +58,24 @@ typedef enum ardrone_pave_type {
 enum {
   /* Announces a picture of advertised_size bytes, and has no payload. */
   ARDRONE_PAVE_ADVERTISEMENT = 1,
-  /* The stream ends. */
+  /* The packet is the last one of the stream. */
   ARDRONE_PAVE_LAST_FRAME = 2
 };
 
-/* A packet's header, little-endian on the wire. */
+/* The header of a packet, which is little-endian on the wire. */
 typedef struct ardrone_pave_header {
   /* version is 2; codec is an ardrone_pave_codec. */
   uint8_t version, codec;
-  /* Bytes of this header. */
+  /* The length of this header, bytes. */
   uint16_t header_size;
-  /* Bytes of the payload. */
+  /* The length of the payload, bytes. */
   uint32_t payload_size;
   /* Pixels as encoded and as shown: 368 and 360 rows, for example. */
   uint16_t encoded_width, encoded_height, display_width, display_height;
   /* The picture's number, which counts up, and its time in milliseconds, which wraps at 2^32. */
   uint32_t frame_number, timestamp_ms;
-  /* frame_type: an ardrone_pave_type. */
+  /* frame_type is an ardrone_pave_type; control has the bits ARDRONE_PAVE_ADVERTISEMENT and
+     ARDRONE_PAVE_LAST_FRAME. */
   uint8_t total_chunks, chunk_index, frame_type, control;
   /* Place in the stream, bytes: lower and upper 32 bits. */
   uint32_t position_low, position_high;
@@ -82,7 +83,7 @@ typedef struct ardrone_pave_header {
   uint16_t stream_id;
   /* Slices of the picture; bytes of the parameter sets where the payload begins with them. */
   uint8_t total_slices, slice_index, sps_size, pps_size;
-  /* Bytes of the picture that an advertisement announces. */
+  /* The length of the picture that an advertisement announces, bytes. */
   uint32_t advertised_size;
   /* In the 68-byte form only; its meaning is not documented. */
   uint32_t extra;
@@ -99,11 +100,11 @@ TV_API tvs_status ardrone_pave_decode(const uint8_t *bytes, size_t size,
 /* A packet in the parser's buffer. Valid until the next call of ardrone_pave_next,
    ardrone_pave_space or ardrone_pave_clear. */
 typedef struct ardrone_pave_packet {
-  /* The header, decoded. */
+  /* The packet's decoded header. */
   ardrone_pave_header header;
   /* Where the header and the payload begin in the parser's buffer. */
   const uint8_t *bytes, *payload;
-  /* Bytes of header and payload together. */
+  /* The length of header and payload together, bytes. */
   size_t size;
 } ardrone_pave_packet;
 
@@ -112,7 +113,7 @@ typedef struct ardrone_pave_packet {
 typedef struct ardrone_pave_parser {
   uint8_t *buffer;
   size_t capacity, begin, end;
-  /* Bytes that belonged to no packet. */
+  /* How many bytes of the stream belonged to no packet. */
   uint64_t bytes_skipped;
   uint64_t num_packets;
 } ardrone_pave_parser;
@@ -139,8 +140,7 @@ TV_API void ardrone_pave_filled(ardrone_pave_parser *parser, size_t size);
    its way. Bytes that are no packet are skipped up to the next signature. */
 TV_API tvs_status ardrone_pave_next(ardrone_pave_parser *parser, ardrone_pave_packet *packet);
 
-/* Keeps the latency of the live stream low: of the whole packets in the buffer it drops those
-   before the last one that decoding can begin with. Returns how many it dropped. */
+/* Call it with the number of bytes that were written where ardrone_pave_space pointed. */
 TV_API int ardrone_pave_skip_to_latest(ardrone_pave_parser *parser);
 
 /* Decides what to do with each packet, so that only pictures without errors are shown. Start with
@@ -151,15 +151,15 @@ typedef struct ardrone_pave_gate {
   uint16_t stream_id, encoded_width, encoded_height;
 } ardrone_pave_gate;
 
-/* Bits that ardrone_pave_gate_check returns. */
+/* The bits that ardrone_pave_gate_check returns. */
 enum {
-  /* Give the payload to the decoder. */
+  /* The caller gives this packet's payload to the decoder. */
   ARDRONE_PAVE_DECODE = 1,
   /* The packet repeats the last picture: there is nothing to decode. */
   ARDRONE_PAVE_REPEAT = 2,
-  /* Packets before this one are missing. */
+  /* Packets between the last one and this one are missing. */
   ARDRONE_PAVE_GAP = 4,
-  /* Another stream begins: reset the decoder first. */
+  /* Another stream begins with this packet: reset the decoder before it decodes the payload. */
   ARDRONE_PAVE_RESET = 8
 };
 

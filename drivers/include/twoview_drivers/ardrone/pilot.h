@@ -23,16 +23,16 @@ TV_BEGIN_DECLS
 
 /* The caller owns it. Private: only tests read its fields. */
 typedef struct ardrone_pilot {
-  /* The datagram under way, and the link's sequence number. */
+  /* The datagram being written, and the link's sequence number. */
   ardrone_at at;
-  /* When the next datagram is due; INT64_MIN: at once. */
+  /* When the next datagram is due, ns of the caller's clock; INT64_MIN: at once. */
   int64_t next_tick_ns;
-  /* The drone's latest state word. */
+  /* The latest state word of the drone. */
   uint32_t state;
   int has_state;
-  /* When that state word came. */
+  /* When the latest state word came, ns of the caller's clock. */
   int64_t state_ns;
-  /* A flight call was made. */
+  /* 1 after the first take-off, landing, cutting or re-arming was requested. */
   int active;
   int wants_flight;
   int was_flying;
@@ -40,7 +40,7 @@ typedef struct ardrone_pilot {
   int moves;
   ardrone_move move;
   int64_t move_until_ns;
-  /* 0 no, 1 cut the motors, 2 re-arm them. */
+  /* The emergency request: 0: none; 1: cut the motors; 2: re-arm them. */
   int emergency;
   int64_t pulse_start_ns, emergency_until_ns;
   int trims_left;
@@ -63,7 +63,7 @@ TV_API tvs_status ardrone_pilot_take_off(ardrone_pilot *pilot, int64_t now_ns);
 /* Ends the request to fly: the pilot sends "land". Returns TVS_ERR_NULL. */
 TV_API tvs_status ardrone_pilot_land(ardrone_pilot *pilot);
 
-/* Ends a movement: the pilot sends "hover". Returns TVS_ERR_NULL. */
+/* Ends the movement: the pilot sends "hover". Returns TVS_ERR_NULL. */
 TV_API tvs_status ardrone_pilot_hover(ardrone_pilot *pilot);
 
 /* Moves for ARDRONE_MOVE_HOLD_NS. Returns TVS_ERR_NULL; TVS_ERR_ARGUMENT: a component outside [-1,

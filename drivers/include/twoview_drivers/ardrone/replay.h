@@ -18,11 +18,12 @@
 
 TV_BEGIN_DECLS
 
-/* The caller owns it. Private. */
+/* A replay in the caller's memory. Its fields are private. */
 typedef struct ardrone_replay {
-  /* FILE. */
+  /* The open files, each a FILE pointer or null. */
   void *navdata, *video, *frames;
-  /* Origin: the recording's host time that begin_ns plays. */
+  /* now_ns is the caller's latest time; the recording's host time origin_ns is played at
+     begin_ns. */
   int64_t now_ns, begin_ns, origin_ns;
   int has_datagram, has_packet;
   /* The recorded host times of the next datagram and the next packet. */
@@ -39,7 +40,7 @@ typedef struct ardrone_replay {
 TV_API tvs_status ardrone_replay_open(ardrone_replay *replay, const char *folder,
                                       ardrone_transport *transport);
 
-/* Closes the files. Null is allowed. */
+/* Closes the files of a replay, which may be null. */
 TV_API void ardrone_replay_close(ardrone_replay *replay);
 
 /* Hand over the time of the caller's clock before each step; the first call starts the playing. Any
@@ -55,7 +56,7 @@ TV_API int64_t ardrone_replay_host_ns(const ardrone_replay *replay, int64_t now_
 
 /* Reads a navdata.log as an IMU source. The caller owns it. Private. */
 typedef struct ardrone_log {
-  /* FILE. */
+  /* The open file, a FILE pointer. */
   void *file;
   tvs_clock clock;
   ardrone_sequence sequence;
@@ -69,7 +70,7 @@ typedef struct ardrone_log {
    clock_id is 1, and another one after each reboot. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not
    open). */
 TV_API tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *source);
-/* Closes the file; null is allowed. */
+/* Closes the file of a log, which may be null. */
 TV_API void ardrone_log_close(ardrone_log *log);
 
 TV_END_DECLS

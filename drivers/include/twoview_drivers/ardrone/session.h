@@ -25,16 +25,16 @@ TV_BEGIN_DECLS
 /* A session lies in the caller's memory: ardrone_session_size, ardrone_session_init. Private. */
 typedef struct ardrone_session ardrone_session;
 
-/* What on_event reports. */
+/* The events that on_event reports. */
 typedef enum ardrone_event {
-  /* Navdata flows, and the drone is set up. */
+  /* Navdata comes, and the drone is set up. */
   ARDRONE_EVENT_LINK_UP,
   /* No navdata came for 2 s, or the drone started again. It is also reported for a link that was
      not yet up. */
   ARDRONE_EVENT_LINK_LOST,
   /* The drone started again: its sequence numbers, times, attitudes and world frame begin again. */
   ARDRONE_EVENT_REBOOT,
-  /* The first bytes of a video connection came. */
+  /* The first bytes of a video connection have come. */
   ARDRONE_EVENT_VIDEO_OPEN,
   /* The video connection closed, broke or was silent; it is being opened again. */
   ARDRONE_EVENT_VIDEO_CLOSED,
@@ -50,20 +50,20 @@ typedef enum ardrone_event {
   ARDRONE_EVENT_READ_FAILED
 } ardrone_event;
 
-/* What a session does. Filled by ardrone_session_options_init. */
+/* The options of a session. ardrone_session_options_init fills them. */
 typedef struct ardrone_session_options {
-  /* ardrone_session_options_init sets it. */
+  /* The size of this struct, which ardrone_session_options_init sets. */
   uint32_t struct_size;
   /* Which options navdata is to hold: bits 1 << ardrone_tag. Default: DEMO, TIME, PHYS_MEASURES,
      ALTITUDE, PRESSURE, VISION_DETECT. 0: the drone's own choice. */
   uint32_t navdata_options;
   /* 1 (default): navdata at 200 Hz; 0: at 15 Hz. */
   int full_navdata;
-  /* 1 (default): open the live stream. */
+  /* 1 (default): the session opens the live stream. */
   int video;
-  /* 1: open the recording stream too; default 0. */
+  /* 1: the session opens the recording stream, too; default 0. */
   int recording;
-  /* An ardrone_video_codec; 0 (default): leave as it is. */
+  /* The ardrone_video_codec that is set; 0 (default): the drone keeps its codec. */
   int video_codec;
   /* 1 (default): where several whole packets wait, begin with the last one that can be decoded by
      itself (ardrone_pave_skip_to_latest), which keeps the latency low. 0: take every packet, as a
@@ -98,13 +98,13 @@ typedef struct ardrone_session_options {
   /* Reports every packet of the live stream; gate has ARDRONE_PAVE_ bits
      (ardrone_pave_gate_check). */
   void (*on_packet)(void *user, const ardrone_pave_packet *packet, const tvs_time *time, int gate);
-  /* Reports every packet of the recording stream. */
+  /* Reports every packet of the recording stream and the host time at which it came. */
   void (*on_recording)(void *user, const ardrone_pave_packet *packet, int64_t received_ns);
   /* Reports every picture before it enters the queue. */
   void (*on_frame)(void *user, const tvs_frame *frame);
 } ardrone_session_options;
 
-/* Writes the defaults and struct_size. Null is allowed. */
+/* Writes the defaults and struct_size to options, which may be null. */
 TV_API void ardrone_session_options_init(ardrone_session_options *options);
 
 /* Writes to *size_bytes what a session with these options needs: about 1.4 MB, of which 1 MB is one
@@ -150,7 +150,7 @@ TV_API tvs_status ardrone_session_text(const ardrone_session *session, const cha
 TV_API tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs_time *time,
                                               tvs_attitude *attitude);
 
-/* What was received, sent and lost since ardrone_session_init. */
+/* Counts of what was received, sent and lost since ardrone_session_init. */
 typedef struct ardrone_counters {
   /* Navdata packets that came, and how many of them are malformed or have a wrong checksum. */
   uint64_t navdata_received, navdata_rejected;
@@ -168,7 +168,7 @@ typedef struct ardrone_counters {
   uint64_t commands_sent, links, reboots, video_connections;
 } ardrone_counters;
 
-/* Copies the counters. */
+/* Copies the session's counters to *counters. */
 TV_API void ardrone_session_counters(const ardrone_session *session, ardrone_counters *counters);
 
 /* Fills a frame source of source.h, which the steps supply. The caller may hold as many frames as
@@ -182,17 +182,17 @@ TV_API tvs_status ardrone_session_imu(ardrone_session *session, tvs_imu_source *
 /* This function and the next six call the pilot's function of the same name with the last step's
    time. Statuses as ardrone_pilot_take_off; also TVS_ERR_STATE without a link. */
 TV_API tvs_status ardrone_session_take_off(ardrone_session *session);
-/* Statuses as ardrone_pilot_land. */
+/* Calls ardrone_pilot_land and returns its status. */
 TV_API tvs_status ardrone_session_land(ardrone_session *session);
-/* Statuses as ardrone_pilot_hover. */
+/* Calls ardrone_pilot_hover and returns its status. */
 TV_API tvs_status ardrone_session_hover(ardrone_session *session);
-/* Statuses as ardrone_pilot_move. */
+/* Calls ardrone_pilot_move with the last step's time and returns its status. */
 TV_API tvs_status ardrone_session_move(ardrone_session *session, const ardrone_move *move);
-/* The drone falls. Statuses as ardrone_pilot_cut_motors. */
+/* Calls ardrone_pilot_cut_motors: the drone falls. Returns its status. */
 TV_API tvs_status ardrone_session_cut_motors(ardrone_session *session);
-/* Statuses as ardrone_pilot_rearm. */
+/* Calls ardrone_pilot_rearm with the last step's time and returns its status. */
 TV_API tvs_status ardrone_session_rearm(ardrone_session *session);
-/* Statuses as ardrone_pilot_flat_trim. */
+/* Calls ardrone_pilot_flat_trim and returns its status. */
 TV_API tvs_status ardrone_session_flat_trim(ardrone_session *session);
 
 /* Queues an exchange of ardrone/config.h that sets key to value; both are copied. The answer is
@@ -200,9 +200,11 @@ TV_API tvs_status ardrone_session_flat_trim(ardrone_session *session);
    them. At most 16 exchanges wait. Returns TVS_ERR_NULL; TVS_ERR_ARGUMENT: ardrone_config_check
    refuses the value, or the key needs ids; TVS_ERR_CAPACITY: the queue is full. */
 TV_API tvs_status ardrone_session_set(ardrone_session *session, const char *key, const char *value);
-/* Queues reading the configuration: ARDRONE_EVENT_CONFIG. TVS_ERR_NULL, TVS_ERR_CAPACITY. */
+/* Queues an exchange that reads the configuration; ARDRONE_EVENT_CONFIG reports the text. Returns
+   TVS_ERR_NULL; TVS_ERR_CAPACITY: the queue is full. */
 TV_API tvs_status ardrone_session_read_config(ardrone_session *session);
-/* Queues reading the lists of ids: ARDRONE_EVENT_IDS. TVS_ERR_NULL, TVS_ERR_CAPACITY. */
+/* Queues an exchange that reads the lists of ids; ARDRONE_EVENT_IDS reports the text. Returns
+   TVS_ERR_NULL; TVS_ERR_CAPACITY: the queue is full. */
 TV_API tvs_status ardrone_session_read_ids(ardrone_session *session);
 
 /* Queues gps:latitude, gps:longitude and gps:altitude, the controller's place in degrees and

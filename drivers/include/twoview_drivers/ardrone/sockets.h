@@ -9,9 +9,9 @@ TV_BEGIN_DECLS
 /* The drone's address in the network that it opens. */
 #define ARDRONE_DEFAULT_HOST "192.168.1.1"
 
-/* The caller owns it. Private except for `port`. */
+/* A transport by sockets in the caller's memory. Its fields are private except for `port`. */
 typedef struct ardrone_sockets {
-  /* IPv4, network order. */
+  /* The drone's IPv4 address in network byte order. */
   uint32_t address;
   uint16_t port[ARDRONE_NUM_CHANNELS];
   int descriptor[ARDRONE_NUM_CHANNELS];
@@ -25,7 +25,7 @@ typedef struct ardrone_sockets {
 TV_API tvs_status ardrone_sockets_init(ardrone_sockets *sockets, const char *host,
                                        ardrone_transport *transport);
 
-/* The time of CLOCK_MONOTONIC, ns. */
+/* Returns the present time of CLOCK_MONOTONIC, ns. */
 TV_API int64_t ardrone_now_ns(void);
 
 /* Waits until bytes arrive, the next step is due, or until_ns has come. A signal ends the wait. */

@@ -14,25 +14,25 @@ TV_BEGIN_DECLS
 
 /* The five channels between a session and its drone. */
 typedef enum ardrone_channel {
-  /* UDP 5556, to the drone. */
+  /* Commands to the drone, UDP 5556. */
   ARDRONE_CHANNEL_AT,
-  /* UDP 5554, both ways. */
+  /* Navdata from the drone and the session's wake-up to it, UDP 5554. */
   ARDRONE_CHANNEL_NAVDATA,
-  /* TCP 5555, from the drone. */
+  /* The live video stream from the drone, TCP 5555. */
   ARDRONE_CHANNEL_VIDEO,
-  /* TCP 5559, from the drone. */
+  /* The configuration and the lists of ids from the drone, TCP 5559. */
   ARDRONE_CHANNEL_CONTROL,
-  /* TCP 5553, from the drone. */
+  /* The recording stream from the drone, TCP 5553. */
   ARDRONE_CHANNEL_RECORDING,
-  /* How many there are. */
+  /* The number of channels. */
   ARDRONE_NUM_CHANNELS
 } ardrone_channel;
 
 /* The functions of a transport. The transport fills it, and the session calls it. */
 typedef struct ardrone_transport {
-  /* sizeof(ardrone_transport). */
+  /* sizeof(ardrone_transport), which the transport sets. */
   uint32_t struct_size;
-  /* The first argument of the functions. */
+  /* The first argument of each function below. */
   void *user;
   /* Begins to open a channel; one that is open is closed first. TVS_OK: opening is under way or
      done. TVS_ERR_IO: the channel cannot be opened. */
