@@ -135,6 +135,19 @@ void correct_cameras(const tv_two_view& estimate, const tv_view& view0, const tv
   tv_corrected_camera(&estimate, view1.camera, &r.cameras[1]);
 }
 
+// The guided matches of an estimate. Not inlined, so that what it holds on the stack does not lie
+// below the second estimate.
+__attribute__((noinline)) tv_status match_guided(tv_context* context,
+                                                 const int32_t num_keypoints[2],
+                                                 const tv_two_view& estimate, Results& r,
+                                                 int32_t* count) {
+  const tv_features features[2] = {features_of(r, num_keypoints, 0),
+                                   features_of(r, num_keypoints, 1)};
+  return tv_match_guided(context, &r.cameras[0], &r.cameras[1], estimate.E, &features[0],
+                         &features[1], nullptr, r.more_matches, context->limits.max_keypoints,
+                         count);
+}
+
 // Matches again along the epipolar lines of `estimate`, and estimates from all matches. If
 // takes_guided_estimate accepts the second estimate, *num_matches, *num_left_out, *estimate and r's
 // matches, pixels and mask become those of the second pass; else they stay. Not inlined, like the
@@ -145,11 +158,7 @@ __attribute__((noinline)) tv_status match_along_lines(
     tv_two_view* estimate) {
   const tv_limits& limits = context->limits;
   int32_t count = 0;
-  const tv_features features[2] = {features_of(r, num_keypoints, 0),
-                                   features_of(r, num_keypoints, 1)};
-  tv_status status =
-      tv_match_guided(context, &r.cameras[0], &r.cameras[1], estimate->E, &features[0],
-                      &features[1], nullptr, r.more_matches, limits.max_keypoints, &count);
+  tv_status status = match_guided(context, num_keypoints, *estimate, r, &count);
   if (status != TV_OK) return status;
   count = join_matches(r.matches, *num_matches, context->arena, limits.max_keypoints,
                        r.more_matches, count);
@@ -246,6 +255,46 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
+// The keypoints of both views and their matches. Not inlined, so that what it holds on the stack
+// does not lie below the estimate.
+__attribute__((noinline)) tv_status extract_and_match(tv_context* context, const tv_view views[2],
+                                                      const tv_reconstruct_options& options,
+                                                      Results& r, int32_t num_keypoints[2],
+                                                      int32_t* num_matches) {
+  const int32_t capacity = context->limits.max_keypoints;
+  tv_feature_options features;
+  tv_status status = read_feature_options(*context, options.feature, &features);
+  if (status != TV_OK) return status;
+  for (int v = 0; v < 2; ++v) {
+    status = tv_extract(context, &views[v].image, views[v].mask, &features, r.keypoints[v],
+                        r.descriptors[v], capacity, &num_keypoints[v]);
+    if (status != TV_OK) return status;
+  }
+  const tv_features found[2] = {features_of(r, num_keypoints, 0), features_of(r, num_keypoints, 1)};
+  return tv_match(context, &found[0], &found[1], options.match, r.matches, capacity, num_matches);
+}
+
+// Not inlined, for the same reason.
+__attribute__((noinline)) void write_reconstruction(const Results& r,
+                                                    const int32_t num_keypoints[2],
+                                                    int32_t num_matches, int32_t num_left_out,
+                                                    int32_t num_points,
+                                                    tv_reconstruction* reconstruction) {
+  tv_reconstruction packed{};
+  for (int v = 0; v < 2; ++v) {
+    packed.num_keypoints[v] = num_keypoints[v];
+    packed.keypoints[v] = r.keypoints[v];
+    packed.descriptors[v] = r.descriptors[v];
+  }
+  packed.num_matches_left_out = num_left_out;
+  packed.num_matches = num_matches;
+  packed.num_points = num_points;
+  packed.matches = r.matches;
+  packed.inlier_mask = r.inlier_mask;
+  packed.points = r.points;
+  write_sized(packed, reconstruction);
+}
+
 }  // namespace
 }  // namespace tv
 
@@ -278,26 +327,14 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   if (tv::overlap(two_view, two_view->struct_size, reconstruction, reconstruction->struct_size)) {
     return TV_ERR_OVERLAP;
   }
-  tv_feature_options features;
-  status = tv::read_feature_options(*context, checked.feature, &features);
-  if (status != TV_OK) return status;
   const uint32_t purposes = TV_PURPOSE_RECONSTRUCT |
                             (checked.guided_matching != 0 ? TV_PURPOSE_MATCH_GUIDED : 0) |
                             (checked.bundle_adjustment != 0 ? TV_PURPOSE_ADJUST : 0);
   if (!tv::made_for(*context, purposes)) return TV_ERR_LIMITS;
   tv::ArenaScope scope(context->arena);
   tv::Results r = tv::alloc_results(context->arena, context->limits.max_keypoints);
-  const int32_t capacity = context->limits.max_keypoints;
   int32_t num_keypoints[2] = {0, 0}, num_matches = 0, num_points = 0;
-  for (int v = 0; v < 2; ++v) {
-    status = tv_extract(context, &views[v].image, views[v].mask, &features, r.keypoints[v],
-                        r.descriptors[v], capacity, &num_keypoints[v]);
-    if (status != TV_OK) return status;
-  }
-  const tv_features found[2] = {tv::features_of(r, num_keypoints, 0),
-                                tv::features_of(r, num_keypoints, 1)};
-  status =
-      tv_match(context, &found[0], &found[1], checked.match, r.matches, capacity, &num_matches);
+  status = tv::extract_and_match(context, views, checked, r, num_keypoints, &num_matches);
   if (status != TV_OK) return status;
   int32_t num_left_out = tv::keep_best(r.matches, context->limits.max_matches, &num_matches);
   tv::gather_pixels(r, r.matches, num_matches);
@@ -320,19 +357,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
     status = tv::adjust(context, num_matches, r, &estimate, &num_points);
     if (status != TV_OK) return status;
   }
-  tv_reconstruction packed{};
-  for (int v = 0; v < 2; ++v) {
-    packed.num_keypoints[v] = num_keypoints[v];
-    packed.keypoints[v] = r.keypoints[v];
-    packed.descriptors[v] = r.descriptors[v];
-  }
-  packed.num_matches_left_out = num_left_out;
-  packed.num_matches = num_matches;
-  packed.num_points = num_points;
-  packed.matches = r.matches;
-  packed.inlier_mask = r.inlier_mask;
-  packed.points = r.points;
   tv::write_sized(estimate, two_view);
-  tv::write_sized(packed, reconstruction);
+  tv::write_reconstruction(r, num_keypoints, num_matches, num_left_out, num_points, reconstruction);
   return TV_OK;
 }
