@@ -15,13 +15,6 @@ struct Corner {
   uint8_t score;
 };
 
-// The keypoints of one level, best first.
-struct LevelCorners {
-  Level level;
-  tv_keypoint* keypoints;
-  int32_t count;
-};
-
 size_t candidate_capacity(int32_t width, int32_t height) {
   // Non-maximum suppression never keeps two neighbours, so each 2x2 block holds at most one corner.
   return static_cast<size_t>((width + 1) / 2) * static_cast<size_t>((height + 1) / 2);
