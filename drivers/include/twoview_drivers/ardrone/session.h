@@ -182,17 +182,17 @@ TV_API tvs_status ardrone_session_imu(ardrone_session *session, tvs_imu_source *
 /* This function and the next six call the pilot's function of the same name with the last step's
    time. Statuses as ardrone_pilot_take_off; also TVS_ERR_STATE without a link. */
 TV_API tvs_status ardrone_session_take_off(ardrone_session *session);
-/* Calls ardrone_pilot_land and returns its status. */
+/* Calls ardrone_pilot_land. Statuses as ardrone_pilot_land. */
 TV_API tvs_status ardrone_session_land(ardrone_session *session);
-/* Calls ardrone_pilot_hover and returns its status. */
+/* Calls ardrone_pilot_hover. Statuses as ardrone_pilot_hover. */
 TV_API tvs_status ardrone_session_hover(ardrone_session *session);
-/* Calls ardrone_pilot_move with the last step's time and returns its status. */
+/* Calls ardrone_pilot_move with the last step's time. Statuses as ardrone_pilot_move. */
 TV_API tvs_status ardrone_session_move(ardrone_session *session, const ardrone_move *move);
-/* Calls ardrone_pilot_cut_motors: the drone falls. Returns its status. */
+/* Calls ardrone_pilot_cut_motors: the drone falls. Statuses as ardrone_pilot_cut_motors. */
 TV_API tvs_status ardrone_session_cut_motors(ardrone_session *session);
-/* Calls ardrone_pilot_rearm with the last step's time and returns its status. */
+/* Calls ardrone_pilot_rearm with the last step's time. Statuses as ardrone_pilot_rearm. */
 TV_API tvs_status ardrone_session_rearm(ardrone_session *session);
-/* Calls ardrone_pilot_flat_trim and returns its status. */
+/* Calls ardrone_pilot_flat_trim. Statuses as ardrone_pilot_flat_trim. */
 TV_API tvs_status ardrone_session_flat_trim(ardrone_session *session);
 
 /* Queues an exchange of ardrone/config.h that sets key to value; both are copied. The answer is
