@@ -122,7 +122,7 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
   problem.num = num_points;
   tv::BundleOutcome outcome;
   tv::adjust_two_view(problem, pose, baseline, context->arena, points, &outcome);
-  if (outcome.moved) {  // without a move R and t keep their bits
+  if (outcome.moved) {  // if the pose has not changed, R and t keep their bits
     for (int i = 0; i < 9; ++i) R[i] = outcome.pose.R(i / 3, i % 3);
     for (int i = 0; i < 3; ++i) t[i] = baseline * outcome.pose.t[i];
   }

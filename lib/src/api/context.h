@@ -17,7 +17,7 @@ struct tv_context {
 
 namespace tv {
 
-// Whether the context has the memory of a call of this purpose.
+// Whether the context has the memory for calls of all these purposes (TV_PURPOSE_ bits).
 inline bool made_for(const tv_context& context, uint32_t purposes) {
   return (context.limits.purposes & purposes) == purposes;
 }

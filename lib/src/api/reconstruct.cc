@@ -135,8 +135,8 @@ void correct_cameras(const tv_two_view& estimate, const tv_view& view0, const tv
   tv_corrected_camera(&estimate, view1.camera, &r.cameras[1]);
 }
 
-// The guided matches of an estimate. Not inlined, so that what it holds on the stack does not lie
-// below the second estimate.
+// Writes the guided matches of an estimate to r.more_matches. Not inlined, so that its stack frame
+// is not in use during the second estimate.
 __attribute__((noinline)) tv_status match_guided(tv_context* context,
                                                  const int32_t num_keypoints[2],
                                                  const tv_two_view& estimate, Results& r,
@@ -151,7 +151,7 @@ __attribute__((noinline)) tv_status match_guided(tv_context* context,
 // Matches again along the epipolar lines of `estimate`, and estimates from all matches. If
 // takes_guided_estimate accepts the second estimate, *num_matches, *num_left_out, *estimate and r's
 // matches, pixels and mask become those of the second pass; else they stay. Not inlined, like the
-// two stages below, so that their stack frames are not in use during the search.
+// two stages below, so that its stack frame is not in use during the first estimate.
 __attribute__((noinline)) tv_status match_along_lines(
     tv_context* context, const tv_view& view0, const tv_view& view1, const int32_t num_keypoints[2],
     const tv_estimate_options* options, Results& r, int32_t* num_matches, int32_t* num_left_out,
@@ -255,8 +255,8 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-// The keypoints of both views and their matches. Not inlined, so that what it holds on the stack
-// does not lie below the estimate.
+// Extracts the keypoints of both views and matches them. Not inlined, so that its stack frame is
+// not in use during the estimate.
 __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const tv_view views[2],
                                                       const tv_reconstruct_options& options,
                                                       Results& r, int32_t num_keypoints[2],
@@ -274,7 +274,7 @@ __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const
   return tv_match(context, &found[0], &found[1], options.match, r.matches, capacity, num_matches);
 }
 
-// Not inlined, for the same reason.
+// Not inlined, so that its stack frame is not in use during the estimate.
 __attribute__((noinline)) void write_reconstruction(const Results& r,
                                                     const int32_t num_keypoints[2],
                                                     int32_t num_matches, int32_t num_left_out,

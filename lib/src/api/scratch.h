@@ -1,5 +1,5 @@
-// How many bytes of arena the calls of one context need. tv_context_size reports them, and the
-// context itself.
+// How many bytes of arena the calls with one context need. tv_context_size reports this number plus
+// the bytes of the tv_context itself.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,8 @@
 
 namespace tv {
 
-// limits.max_matches and limits.purposes are resolved (not 0).
+// In all of these functions limits.max_matches and limits.purposes must already be resolved (not
+// 0).
 size_t scratch_bytes(const tv_limits& limits);
 
 // Parts of it: the scratch of tv_extract and of tv_match_guided, and the results of tv_reconstruct.

@@ -8,8 +8,9 @@
 
 namespace tv {
 
-// Writes `defaults` of known_size bytes into a struct of struct_size bytes, zeros behind them, and
-// struct_size itself; never more than struct_size bytes. Null is allowed.
+// Writes the known_size bytes of `defaults` into a struct of struct_size bytes, zeros into the
+// bytes after them, and struct_size into the first field; never more than struct_size bytes. Null
+// is allowed.
 void init_sized(void* object, size_t struct_size, const void* defaults, size_t known_size);
 
 // Writes struct_size and zeros into a struct, as init_sized does. Null is allowed.

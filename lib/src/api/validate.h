@@ -13,7 +13,8 @@
 
 namespace tv {
 
-// Whether an image is valid and within the context's limits.
+// Whether an image is valid and within the context's limits, and the context was made for
+// TV_PURPOSE_EXTRACT.
 tv_status check_image(const tv_context& context, const tv_image* image);
 
 // Whether a mask is null or a valid image of the same size.

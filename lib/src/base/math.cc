@@ -289,7 +289,8 @@ double log(double x) {
     m *= 0.5;
     exponent += 1;
   }
-  // log(1 + f) = f - (f^2/2 - s (f^2/2 + R)), s = f / (2 + f). The small terms are added first.
+  // log(1 + f) = f - (f^2/2 - s (f^2/2 + R)), s = f / (2 + f), R = log_series(s^2). The small terms
+  // are added first.
   const double f = m - 1.0;
   const double s = f / (2.0 + f);
   const double half_square = 0.5 * f * f;

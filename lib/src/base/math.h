@@ -1,6 +1,6 @@
 // Elementary functions whose results have the same bits on every CPU. They use only + - * /, sqrt
-// and integer operations in a written order, and are compiled without contraction. The library
-// calls them instead of libm's, of which it uses only sqrt.
+// and integer operations in a fixed order, and are compiled without contraction
+// (-ffp-contract=off). The library calls them instead of libm's, of which it uses only sqrt.
 //
 // Errors are below 1 ulp (atan2 below 1.5; asin, acos and tan below 2.5). A NaN argument gives NaN.
 // Formulas, bounds and tests: docs/algorithms/math.md.

@@ -1,8 +1,8 @@
 // Camera models. Brown-Conrady: D. C. Brown, "Close-range camera calibration", 1971, with OpenCV's
 // rational factor (k4..k6). Kannala-Brandt: J. Kannala, S. Brandt, PAMI 2006, four coefficients.
 //
-// Both are used only where they can be inverted, and there the inverse is exact: the region is
-// found once per camera, and Newton's method within it. Derivations: docs/algorithms/camera.md;
+// Both are used only where they can be inverted: this region is found once per camera, and within
+// it Newton's method computes the inverse to rounding. Derivations: docs/algorithms/camera.md;
 // test: test/unit/test_camera.cc, test_camera_opencv.cc.
 #include "geometry/camera.h"
 
@@ -21,10 +21,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMinDerivative = 1e-6;
 constexpr double kTan89Degrees = 57.289961630759425;
 constexpr double kTan44p5Degrees = 0.98269726101190570;
-// The tolerance of the region's edge: a pixel that was projected from a ray just within the region
-// is not rejected because of rounding.
+// The tolerance of the region's edge, a factor on the distorted radius: a pixel that was projected
+// from a ray just within the region is not rejected because of rounding.
 constexpr double kEdgeSlack = 1.0 + 1e-9;
-constexpr double kConverged = 1e-11;  // convergence is quadratic: a step after this one rounds to 0
+// The relative size of a Newton step that ends the iteration: convergence is quadratic, so the next
+// step would round to 0.
+constexpr double kConverged = 1e-11;
 
 constexpr int kMaxBisections = 80;
 constexpr int kMaxThirds = 40;
@@ -73,9 +75,9 @@ Point2 brown_distort(const double k[8], const Point2& p, Symmetric2* jacobian) {
   return {s * p.x + p2 * u, s * p.y + p1 * u};
 }
 
-// Above 0 when the Jacobian is positive definite at every point of the circle of radius r. Its
-// radial part has the eigenvalues s and d(r s)/dr, the tangential part none below
-// -6 r |(p1, p2)|.
+// A lower bound of the eigenvalues of the distortion's Jacobian on the circle of radius r, less
+// kMinDerivative; -1 where it is not a number. The Jacobian's radial part has the eigenvalues s and
+// d(r s)/dr, its tangential part none below -6 r |(p1, p2)|. `tangential` is |(p1, p2)|.
 double brown_margin(const double k[8], double tangential, double r) {
   const double u = r * r;
   const Radial radial = brown_radial(k, u);

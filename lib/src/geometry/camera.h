@@ -17,22 +17,27 @@ using Mat32 = Eigen::Matrix<double, 3, 2>;
 
 // A checked camera with the bounds of its valid region, which prepare_camera computes once.
 struct Camera {
-  tv_camera model;                  // a Brown-Conrady model without distortion is a pinhole here
-  double valid_angle_rad;           // rays at a larger angle from the optical axis are invalid
-  double valid_radius_undistorted;  // valid_angle_rad as a radius on z = 1 (Brown-Conrady)
-  double valid_radius_distorted;    // a bound on distorted radii; unproject rejects more pixels
+  tv_camera model;         // a Brown-Conrady model without distortion is a pinhole here
+  double valid_angle_rad;  // rays at a larger angle from the optical axis are invalid
+  // Brown-Conrady: valid_angle_rad as a radius on the plane z = 1; the other models: infinity.
+  double valid_radius_undistorted;
+  // The largest valid radius of a distorted point, in focal lengths; infinity for a pinhole. For
+  // Brown-Conrady it is only an upper bound, and unproject rejects further pixels.
+  double valid_radius_distorted;
 };
 
-// K and its inverse: the plane z = 1 to the undistorted image, in pixels, and back. K may also be
-// any other matrix with the same zeros.
+// K and its inverse. K maps a point (x, y, 1) of the plane z = 1 to its pixel in the undistorted
+// image. inverse_intrinsics accepts any invertible matrix of the form [a 0 c; 0 b d; 0 0 1].
 Mat3 intrinsics_of(const tv_camera& camera);
 Mat3 inverse_intrinsics(const Mat3& K);
 
 // Computes the bounds of a camera that has passed tv_camera_check.
 Camera prepare_camera(const tv_camera& camera);
 
-// project and unproject return false, and leave the outputs as they were, for a point or a pixel
-// beyond the valid angle or behind the camera. jacobian may be null.
+// project maps a point of the camera's frame to its pixel, unproject a pixel to its unit ray. Both
+// return false, and leave the outputs as they were, where the lens model has no answer: beyond the
+// valid angle; z <= 0 (only a Kannala-Brandt camera may see such points); a point at the origin or
+// not finite; a result that overflows. jacobian (d pixel / d point, d ray / d pixel) may be null.
 bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobian);
 bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobian);
 

@@ -63,7 +63,7 @@ bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t) {
   cofactors.row(0) = r1.cross(r2).transpose();
   cofactors.row(1) = r2.cross(r0).transpose();
   cofactors.row(2) = r0.cross(r1).transpose();
-  // t is E's left null vector: the longest cross product of two columns.
+  // t is E's left null vector: the longest cross product of two columns, at unit length.
   const Vec3 c0 = unit.col(0), c1 = unit.col(1), c2 = unit.col(2);
   const Vec3 candidates[3] = {c1.cross(c2), c2.cross(c0), c0.cross(c1)};
   int best = 0;

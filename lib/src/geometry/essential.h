@@ -21,8 +21,8 @@ Mat3 rotation_step(const Vec3& w);
 // rotations accumulate.
 Mat3 orthonormalised(const Mat3& R);
 
-// Two unit vectors across t: b1 = normalise(e_k x t), k the index of the smallest |t_k| (the lowest
-// on a tie), and b2 = t x b1.
+// Two unit vectors perpendicular to the unit vector t and to each other: b1 = normalise(e_k x t), k
+// the index of the smallest |t_k| (the lowest on a tie), and b2 = t x b1.
 void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);
 
 // The rotation that turns by `angle_rad` about a unit axis.
@@ -30,8 +30,8 @@ Mat3 rotation_about(const Vec3& unit_axis, double angle_rad);
 
 // R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1, in closed form (B. K. P. Horn, "Recovering
 // baseline and orientation from essential matrix", 1990). R0 and R1 are rotations only as exactly
-// as E is an essential matrix: call orthonormalised for the one that is kept. False when E is zero
-// or not finite.
+// as E is an essential matrix: call orthonormalised for the one that is kept. False when E is zero,
+// of rank one, or not finite.
 bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 
 // On which side of each camera two rays meet. depth0 and depth1, of which only the signs matter,
@@ -39,13 +39,14 @@ bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 // midpoint; their denominator is positive), for rays of any length.
 struct DepthSigns {
   double depth0, depth1;
-  // The squared changes of depth0 and depth1 when a ray turns by angle_rad.
+  // Bounds of the squared changes of depth0 and depth1 when a ray turns by angle_rad.
   double tolerance0_sq, tolerance1_sq;
 };
 DepthSigns depth_signs(const Pose& pose, const Vec3& ray0, const Vec3& ray1, double angle_rad);
 
-// +1 in front of both cameras, -1 behind one, 0 when the parallax is within angle_rad: a point so
-// far away is no evidence for either.
+// +1 when the rays meet in front of both cameras, -1 when they meet behind at least one. 0 when a
+// turn of one ray by the angle_rad of depth_signs could change the sign that decides: so little
+// parallax is evidence for neither.
 inline int depth_vote(const DepthSigns& d) {
   const bool clear0 = d.depth0 * d.depth0 > d.tolerance0_sq;
   const bool clear1 = d.depth1 * d.depth1 > d.tolerance1_sq;

@@ -1,6 +1,6 @@
 // R. Hartley, "In defense of the eight-point algorithm", PAMI 1997. Eight equations determine M
-// linearly; normalising each view's points matters for the projection to rank 2, which moves the
-// entries least in the normalised frame.
+// linearly, up to its scale. Each view's points are normalised for the step after that: the matrix
+// of rank 2 nearest to M is sought in the normalised frames.
 #include "geometry/fundamental_8pt.h"
 
 #include "geometry/null_space.h"
@@ -8,8 +8,9 @@
 namespace tv {
 namespace {
 
-// Centroid to the origin, mean squared distance to 2. The identity when a ray has z <= 0.1
-// (fisheye), because distances on the plane z = 1 mean little there.
+// The map of the plane z = 1 that moves the points' centroid to the origin and scales their mean
+// squared distance from it to 2. The identity when a ray has z <= 0.1 (fisheye), because distances
+// on that plane mean little there.
 Mat3 hartley_normalisation(const Vec3 rays[8]) {
   Vec2 sum = Vec2::Zero();
   for (int k = 0; k < 8; ++k) {

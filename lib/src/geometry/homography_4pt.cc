@@ -12,7 +12,7 @@ namespace tv {
 bool homography_4pt(const Vec3 rays0[4], const Vec3 rays1[4], Mat3* H) {
   double rows[8][9], basis[1][9];
   for (int k = 0; k < 4; ++k) {
-    // Two directions across f1: each is orthogonal to H f0.
+    // Two directions orthogonal to f1: each is orthogonal to H f0, too, which gives an equation.
     const Vec3 f0 = rays0[k].normalized();
     Vec3 across, other;
     tangent_basis(rays1[k].normalized(), &across, &other);

@@ -8,7 +8,8 @@
 namespace tv {
 
 // An orthonormal basis of the vectors orthogonal to kRows vectors of nine entries, by Householder
-// reflections. Destroys `rows`. False when they are dependent.
+// reflections. Destroys `rows`. False when they are linearly dependent (within 1e-10 of the longest
+// row's length).
 template <int kRows>
 bool null_space(double rows[kRows][9], double basis[9 - kRows][9]) {
   double largest = 0;
@@ -54,8 +55,8 @@ inline void epipolar_row(const Vec3& ray0, const Vec3& ray1, double row[9]) {
   }
 }
 
-// M = U diag(s) V', s descending, U and V rotations (the last singular value takes the sign).
-// One-sided Jacobi: M V has orthogonal columns.
+// M = U diag(s) V', |s| descending, U and V rotations, so s[2] is negative where det M is; s[0] and
+// s[1] are not. One-sided Jacobi: M V has orthogonal columns.
 struct Svd3 {
   Mat3 U, V;
   Vec3 s;

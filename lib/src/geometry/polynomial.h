@@ -55,7 +55,8 @@ SturmChain<kDegree> sturm_chain(const double* p) {
   return chain;
 }
 
-// How often the chain's sign changes at z.
+// How often the chain's sign changes at z. The number of distinct real roots in (low, high] is
+// sign_changes at low less that at high.
 template <int kDegree>
 int sign_changes(const SturmChain<kDegree>& chain, double z) {
   double next = 0, current = chain.last;
@@ -147,7 +148,7 @@ int real_roots(const double* p, double* roots) {
       middle = 0;
     } else if (width <= 2) {
       middle = 0.5 * (interval.low + interval.high);
-    } else {  // the geometric mean, since roots are spread evenly over angles
+    } else {  // the geometric mean: roots are like tangents of evenly spread angles
       const double low = interval.low < 0 ? -interval.high : interval.low;
       const double high = interval.low < 0 ? -interval.low : interval.high;
       const double size_middle =

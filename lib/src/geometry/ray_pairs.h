@@ -26,10 +26,11 @@ struct RayPairs {
   bool on_plane;  // all rays have z = 1, so the third rows of the Jacobians are zero
   double* ray[2][3];
   double* jacobian[2][6];  // d ray / d pixel, row-major 3x2
-  double* pixel_angle;     // The angle, in radians, between the two rays that noise of one pixel in
-                           // each image makes.
+  // The standard deviation of the angle between the two rays, in radians, under noise of one pixel
+  // in each coordinate of both images.
+  double* pixel_angle;
   // For scoring only: single precision, padded with zeros to a multiple of kScoreBlock, in an order
-  // of their own whose first few matches are a fair sample of all.
+  // of their own in which the first few matches are spread evenly over all.
   // On the plane: x0 y0 x1 y1, then J J' of view 0 and of view 1 (xx, xy, yy).
   // Otherwise: the rays (6) and the Jacobians (12).
   float* fast[18];

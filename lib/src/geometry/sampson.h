@@ -23,8 +23,8 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 
 // Sampson's distance with its sign; its slopes by the entries of M, row by row; and its slopes by x
 // and y of the principal point that both views share, in pixels. A principal point that moves by d
-// moves every ray by -J d, and the Jacobians by the lens's curvature. curvature: null, or d^2 ray /
-// d pixel^2 of each view, 3 x (xx, xy, yy), row by row.
+// moves every ray by -J d, and the Jacobians by the lens's curvature. curvature: d^2 ray / d
+// pixel^2 of each view, 3 x (xx, xy, yy), row by row; null counts as zeros.
 struct SampsonSlopes {
   double residual, by_entry[9], by_point[2];
 };
@@ -38,16 +38,17 @@ void sampson_squares(const RayPairs& pairs, const int32_t* indices, int count, c
                      double* squares);
 
 // Like sampson_squares, for the essential matrix of a pose that is required to have the matches in
-// front of both cameras: +inf also for a match whose point lies behind one of them by more than
-// scale_px pixels (depth_vote in geometry/essential.h).
+// front of both cameras: +inf also for a match whose depth_vote (geometry/essential.h) is -1, at an
+// angle_rad of scale_px times its pixel_angle: its point lies behind a camera by more than noise of
+// scale_px pixels explains.
 void pose_squares(const RayPairs& pairs, int first, int count, const Pose& pose, double scale_px,
                   double* squares);
 
 // Sum over the matches for scoring (pairs.num of them) of min(r^2 / T^2, 1), T the threshold, each
 // truncated to a multiple of 1/kCostOne: an integer, so that neither order nor vector width
-// matters. A sum above `bound` is returned as any number above `bound`. About one model in fifty
-// whose sum is just below `bound` is also returned as above it, since its first few matches cost
-// too much.
+// matters. Where the sum is above `bound`, any number above `bound` may be returned. The same
+// happens to about one model in fifty whose sum is just below `bound`: the summation is given up
+// when its first matches cost too much.
 int64_t msac_cost_fast(const RayPairs& pairs, const Mat3& M, double threshold_px, int64_t bound);
 
 }  // namespace tv

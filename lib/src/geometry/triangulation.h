@@ -21,8 +21,9 @@ TriangulationPair prepare_triangulation(const Camera& camera0, const Camera& cam
 // Whether the number is a tv_triangulation that this release has.
 bool is_triangulation_method(int method);
 
-// The match moved to where its rays meet, at the least cost of POLY_ABS, or of POLY for any other
-// method. The frames are those of the pixels' rays.
+// Moves both pixels of a match so that their rays meet: with the least sum of the distances moved
+// for POLY_ABS, of the squared distances for any other method. frame0 and frame1: frame_of the
+// pixels' rays.
 Correction correct_match(tv_triangulation method, const TriangulationPair& pair,
                          const RayFrame& frame0, const RayFrame& frame1);
 
@@ -36,8 +37,9 @@ bool correct_pixels(tv_triangulation method, const TriangulationPair& pair, cons
 void triangulate_point(tv_triangulation method, const TriangulationPair& pair, const Vec2& pixel0,
                        const Vec2& pixel1, tv_point* point);
 
-// Many matches at once, pixels num x 2: the same points but for rounding. They are computed several
-// at once where both lenses are pinholes and the method has a closed form.
+// Like triangulate_point for num matches, pixels num x 2: the points are the same but for rounding.
+// A kernel computes several at a time where both lenses are pinholes and the method is Midpoint,
+// Linear-LS or Iterative-LS.
 void triangulate_points(tv_triangulation method, const TriangulationPair& pair,
                         const double* pixels0, const double* pixels1, size_t num, tv_point* points);
 

@@ -1,5 +1,5 @@
-// What the methods of triangulation share: products of vectors with sums in a written order, a
-// basis across an axis, and the plane on which a camera's pixel errors are measured.
+// What the methods of triangulation share: products of vectors that add in a fixed order, two unit
+// vectors perpendicular to an axis, and the plane on which a camera's pixel errors are measured.
 #pragma once
 
 #include <cmath>

@@ -17,7 +17,8 @@ V2 coordinates(const EpipolarPencil& pencil, int i, const Vec3& ray) {
   return V2{dot(pencil.axis[i][0], ray), dot(pencil.axis[i][1], ray)};
 }
 
-// step^T v: how far a step of one pixel along each direction moves the pixel across the line v.
+// step^T v: by how much a step of one pixel along each direction of the basis changes alpha . v
+// (see EpipolarPencil).
 V2 gradient(const double step[2][2], V2 v) {
   return V2{step[0][0] * v.x + step[1][0] * v.y, step[0][1] * v.x + step[1][1] * v.y};
 }
@@ -37,8 +38,10 @@ V2 unit_or_one(double x, double y, double* length) {
   return *length > 0.0 ? V2{x / *length, y / *length} : V2{1.0, 0.0};
 }
 
-// M = U diag(s) V^T with turns U and V: as complex numbers, M is the sum of a turn (E, H) and a
-// mirrored turn (F, G), whose angles are half the difference and half the sum of those of U and V.
+// M = U diag(s) V^T with rotations U and V of the plane. M is the sum of a scaled rotation and a
+// scaled reflection. Written as complex numbers (z_turn and z_mirror times their lengths), their
+// angles are the difference and the sum of those of U and V, and their lengths half the sum and
+// half the difference of s[0] and s[1].
 void diagonalise(const double M[2][2], V2* turn_u, V2* turn_v, double s[2]) {
   double turn, mirror;
   const V2 z_turn = unit_or_one(0.5 * (M[0][0] + M[1][1]), 0.5 * (M[1][0] - M[0][1]), &turn);
@@ -73,7 +76,7 @@ struct Secular {
   double sum_sq;
 };
 
-// Newton's method from mu = 0. False when mu leaves the lower half of its range.
+// Newton's method from mu = 0. False when mu leaves the lower half of its range, or after 12 steps.
 bool solve_small(const Secular& s, double* mu) {
   const double largest = -0.5 / s.m[0];  // infinite when both epipoles are at infinity
   double at = s.c / s.sum_sq;

@@ -7,11 +7,13 @@
 
 namespace tv {
 
-// The planes through the baseline, n = v[0] axis[0] + v[1] axis[1], and how a pixel's step changes
-// the distances from them. A point with ray x of an image has the coordinates alpha = (axis[0] . x,
-// axis[1] . x); it is on the plane v where alpha . v = 0, two points correspond where alpha0 x
-// alpha1 = 0, and a step d (in pixels along the frame's basis) moves alpha by step d. The line v is
-// |alpha . v| / sqrt(v step step^T v) pixels away.
+// The pencil of epipolar planes, which are all planes that contain the baseline, and how a step of
+// a pixel changes its distance from them. A plane is written as v: its normal is v[0] axis[0] +
+// v[1] axis[1]. A pixel with the ray x has the coordinates alpha = (axis[0] . x, axis[1] . x). It
+// lies on the plane v where alpha . v = 0, and two pixels lie on a common plane where alpha0 x
+// alpha1 = 0. A step d (in pixels along the basis of RayFrame) moves alpha by step d. The pixel's
+// distance from the line in which the plane v cuts the image is |alpha . v| / sqrt(v^T step step^T
+// v) pixels.
 struct EpipolarPencil {
   Vec3 axis[2][2];         // the axes of camera i, in its own frame
   double step[2][2][2];    // for camera i: d alpha[axis] / d (pixels along basis)

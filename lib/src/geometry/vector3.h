@@ -1,6 +1,6 @@
-// Products of vectors that are plain arrays of three doubles, with sums in a written order: for the
-// loops over matches, which are shorter without Eigen's types where the compiler optimises for
-// size. Formulas: none but the definitions. Tests: those of the files that include this one.
+// Products of vectors that are plain arrays of three doubles, with sums in a fixed order. The loops
+// over matches use them, because their code is smaller without Eigen's types where the compiler
+// optimises for size. Tests: those of the files that include this one.
 #pragma once
 
 #include <cmath>

@@ -13,7 +13,7 @@ namespace tv {
 
 inline constexpr int32_t kMaxLevels = 8;
 inline constexpr int32_t kMaxOctaves = 8;
-inline constexpr int32_t kMinLevelSide = 24;  // pixels; smaller levels are not worth describing
+inline constexpr int32_t kMinLevelSide = 24;  // pixels; no image is reduced to a shorter side
 
 // A reduced image. Its pixel (x, y) is the average of scale x scale pixels of the full image around
 // ((x + 0.5) scale - 0.5, (y + 0.5) scale - 0.5).
@@ -67,8 +67,9 @@ struct Octaves {
 
 size_t octaves_bytes(int32_t max_width, int32_t max_height);
 
-// Makes the octaves `first` to `last` and leaves those before `first` unfilled. If the image is too
-// small for `last`, `count` is smaller; the octave count - 1 is always filled in.
+// Makes the octaves `first` to `last`; those before `first` are left unfilled. `count` is last + 1,
+// or less where the image is too small for `last` (kMinLevelSide) or `last` is not below
+// kMaxOctaves. The octave count - 1 is always filled, even if it comes before `first`.
 Octaves make_octaves(const tvk_table& kernels, const tv_image& image, int32_t first, int32_t last,
                      Arena& arena);
 

@@ -26,7 +26,8 @@ struct Evidence {
   double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
   double median_parallax_rad = 0;  // median parallax of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
-  // The root mean square distance of the inliers from the line nearest to them, in each image.
+  // For each image, the root mean square distance in pixels of the inliers from the one line that
+  // is fitted to all of them (in rays: from a plane through the camera's centre).
   double line_distance_px[2] = {kUnknown, kUnknown};
 };
 
