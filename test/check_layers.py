@@ -31,7 +31,7 @@ BANNED = {
 }
 # These folders may include only the public headers of the library.
 OUTSIDE = ("drivers", "examples", "tools", "python", "bench")
-# The five-point solver is timed beside its peers', and no function of the public API.
+# bench/relpose.cc times the five-point solver, which no function of the public API calls alone.
 EXCEPT = {("bench/relpose.cc", "kernels/kernels.h")}
 # The AR.Drone's codecs, which only translate between bytes and structs.
 CODECS = {f"drivers/ardrone/{stem}" for stem in (

@@ -1,9 +1,10 @@
 /* A program on the public headers, compiled with those of one release and run on a library of
-   another. It uses every struct that may grow, checks that the library writes nothing behind a
+   another. It uses every struct that may grow, checks that the library writes nothing beyond a
    struct's end, and prints results that must be equal for all headers and libraries.
 
-   usage: caller [known|unknown]   compiled with TWOVIEW_ABI_GROWN (the headers of grow.py): whether
-   the library knows the new fields, too */
+   usage: caller                 compiled with the headers of a release
+          caller known|unknown   compiled with those of grow.py (TWOVIEW_ABI_GROWN): whether the
+                                 library knows the fields that grow.py adds */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,8 +22,7 @@ enum { WIDTH = 320, HEIGHT = 240, CAP = 500, GUARD = 256, PATTERN = 0x5A };
     }                                                            \
   } while (0)
 
-/* A struct type whose member `it` lies between guard bytes; they show a call that wrote outside it.
- */
+/* A struct type whose member `it` lies between guard bytes, which a write outside it changes. */
 #define GUARDED(type)      \
   struct {                 \
     uint8_t before[GUARD]; \

@@ -106,9 +106,9 @@ def members(include):
 
 
 def broken_members(old, new, growing):
-    """Structs and enums whose members break the release's: abidiff, with the option that allows
-    growth, does not report them. The release's members must come first and unchanged; only
-    structs that may grow and enums may have further ones."""
+    """Yields the structs and enums whose new members are not compatible with those of the release
+    (old). abidiff does not report these when its option allows growth. The release's members must
+    come first and unchanged; only structs that may grow and enums may have further ones."""
     before, after = members(old), members(new)
     for name, parts in before.items():
         found = after.get(name, [])

@@ -81,7 +81,7 @@ static void test_an_older_callers_missing_fields_have_their_defaults(void) {
   size_t all = 0, older = 0;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &all));
   limits.struct_size = (uint32_t)before_kernels;
-  /* the field kernels lies behind the caller's struct_size, so the library must not read it */
+  /* the field kernels lies beyond the caller's struct_size, so the library must not read it */
   limits.kernels = -1;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_size(&limits, &older));
   TEST_ASSERT_EQUAL_UINT64(all, older);
@@ -192,7 +192,7 @@ static void test_memory_larger_than_needed_is_left_alone(void) {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_context_init(&context, &limits, a.memory, SIZE_MAX));
   TEST_ASSERT_EQUAL_PTR(a.memory, context);
   a.context = context;
-  api_release(&a); /* api_release fails if bytes behind the context's own size were changed */
+  api_release(&a); /* api_release fails if bytes beyond the context's own size were changed */
 }
 
 static void test_the_size_never_falls_when_a_limit_rises(void) {

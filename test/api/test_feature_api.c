@@ -469,8 +469,8 @@ static void test_interleaved_contexts_give_the_bytes_of_separate_ones(void) {
 }
 
 /* All combinations of levels, factors, cells and odd sizes; mainly for the sanitizers. The
-   context is made for exactly the image's size, so that a write beyond the image's share is
-   seen. */
+   context is made for exactly the image's size and the image is a heap block of its own, so that
+   the sanitizers and api_release report an access beyond either. */
 static void test_options_work_in_all_combinations(void) {
   static const float factors[] = {1.1f, 1.2345f, 1.5f, 1.99f, 2.0f};
   static const int32_t cells[] = {0, 8, 31, 16384}, levels[] = {1, 2, 5, 8};

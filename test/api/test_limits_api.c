@@ -1,5 +1,5 @@
-/* Limits: a call that the context was not made for is refused, of more matches than fit the best
-   by ratio are kept, and null options mean the same as initialised ones. */
+/* Limits: a call for which the context was not made is refused; if there are more matches than
+   fit, those of the lowest ratio are kept; and null options mean the same as initialised ones. */
 
 #include <unity.h>
 

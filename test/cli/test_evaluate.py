@@ -23,7 +23,8 @@ def pair_line(name0="a.png", name1="b.png", K0=None, K1=None, T=None, turns=(0, 
 
 
 def auc(errors, threshold):
-    """The area under the curve as SuperGlue's pose_auc defines it, in per cent; written anew."""
+    """The area under the curve as SuperGlue's pose_auc defines it, in per cent; a second
+    implementation, to compare evaluate's with."""
     errors = sorted(errors)
     points = [(0.0, 0.0)] + [
         (e, (i + 1) / len(errors)) for i, e in enumerate(errors) if e < threshold

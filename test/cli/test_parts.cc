@@ -140,7 +140,8 @@ void test_camera_files_give_the_numbers_and_the_model() {
   TEST_ASSERT_EQUAL_INT(TV_CAMERA_KANNALA_BRANDT, fisheye.model);
 }
 
-// The fx of the entry that is chosen; 0 when none is.
+// The fx of the entry of a cameras.yaml that is chosen for an image and the fx and cx of its pair's
+// line; 0 when none is.
 double chosen_fx(const char* image, double fx, double cx) {
   const NamedCameras cameras = parse_camera_set(
       "cam: {image_width: 8, image_height: 8, fx: 1, fy: 1, cx: 1, cy: 1}\n"

@@ -58,8 +58,8 @@ class Reconstruct(cli.CliTest):
                          {"essential", "fundamental", "homography", "rotation", "coverage"})
 
     def test_a_plane_flown_at_has_a_second_pose_with_its_covariance(self):
-        # The wall fills the image. One motion goes towards it and sideways; the other straight
-        # towards a tilted wall.
+        # The wall fills the image. Two motions explain the pair: towards this wall and sideways, or
+        # straight towards a tilted wall.
         rows = cli.texture(WIDTH, HEIGHT)
         xs = [
             min(max(round(WIDTH / 2 + (x - WIDTH / 2) / 1.1 + 12), 0), WIDTH - 1)

@@ -27,7 +27,7 @@ CAMERA = f"""camera:
 
 
 def camera_pose(index):
-    """R, t (camera from world) of camera k, on an arc around the scene."""
+    """R, t (camera from world) of the camera with this index, on an arc around the scene."""
     angle = np.radians(-12 + 8 * index)
     R = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     centre = np.array([6 * np.sin(-angle), 0.15 * (index % 2), 6 - 6 * np.cos(angle)])

@@ -1,10 +1,9 @@
 """Every code block of README.md, examples/README.md and docs/ is sound.
 
 - A block names its language: c, sh, python, yaml, json, or text for what is none.
-- C with a main function compiles as it is, as C99 without warnings. Other C is the inside of a
-function, behind all
-  public headers and the declarations of the HTML comment in front of the block: `<!-- given:
-  tv_two_view pose; -->`.
+- C with a main function compiles as it is, as C99 without warnings. Other C compiles as the body of
+  a function, after the includes of all public headers and the declarations that an HTML comment
+  before the block gives: `<!-- given: tv_two_view pose; -->`.
 - Shell passes `bash -n`; Python compiles; YAML and JSON are read.
 """
 

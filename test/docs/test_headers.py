@@ -1,8 +1,8 @@
 """Every public symbol is documented, by rules that a program can check.
 
-- A header, type, struct, field, enum, constant, macro and function has a comment of its own, in
-  front of it or behind it; one comment serves the names of one statement. Fields of a struct whose
-  comment says "Private" need none.
+- A header, type, struct, field, enum, constant, macro and function has a comment of its own, before
+  it or after it on its line; one comment serves the names of one statement. Fields of a struct
+  whose comment says "Private" need none.
 - A function's comment names each pointer parameter, unless its type says what it is
   (`tv_camera *camera0`), or it is the object that the function works on (its first parameter).
 - The comment of a function that returns a status says which statuses it returns.

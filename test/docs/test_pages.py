@@ -5,7 +5,7 @@
   a test. `{a,b}` names several; a path with a star or in capitals is a pattern.
 - A test in docs/contract.md is one that ctest knows, or a file of test/fuzz; a test function is
   found in some source file.
-- The word behind `twoview` is a verb of the program, and an option behind it is an option of that
+- The word after `twoview` is a verb of the program, and an option after it is an option of that
   verb.
 - A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test.
 """

@@ -11,7 +11,8 @@ void tearDown(void) {}
 
 static uint8_t video_buffer[ARDRONE_PAVE_BUFFER_BYTES];
 
-/* Returns 1 for a picture, 0 for a packet that the gate leaves out. */
+/* Decodes a packet. Returns 1 for a picture, 0 for a packet that ardrone_pave_gate_check leaves
+   out because it cannot be decoded. */
 static int decode_packet(tvs_decoder *decoder, ardrone_pave_gate *gate,
                          const ardrone_pave_packet *packet) {
   const int answer = ardrone_pave_gate_check(gate, &packet->header);

@@ -1,5 +1,6 @@
-/* Streams made by the encoder: resynchronisation, the latency rule, and the gate that leaves out
-   packets which cannot be decoded. */
+/* Streams made by the encoder: resynchronisation, the latency rule (ardrone_pave_skip_to_latest
+   drops all packets before the last IDR picture), and the gate (ardrone_pave_gate_check leaves
+   out packets that cannot be decoded). */
 #include <string.h>
 #include <unity.h>
 
@@ -178,7 +179,7 @@ static void test_the_latency_rule_keeps_the_last_idr(void) {
   feed(stream, size);
   size = 0;
   add(5, ARDRONE_PAVE_IDR, 50);
-  feed(stream, size / 2); /* packet 5 is incomplete: no skipping to it */
+  feed(stream, size / 2); /* packet 5 is incomplete, so the rule keeps packets 3 and 4 */
   TEST_ASSERT_EQUAL_INT(2, ardrone_pave_skip_to_latest(&parser));
   expect(3);
   expect(4);

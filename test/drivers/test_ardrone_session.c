@@ -260,7 +260,7 @@ static void test_reading_too_slowly_drops_the_oldest_and_says_so(void) {
 }
 
 /* The caller does not step for two seconds; of the pictures that have piled up only the last
-   group is delivered. */
+   group, from its IDR picture on, is delivered. */
 static void test_the_latency_rule_drops_what_piled_up(void) {
   ardrone_session_options options = default_options();
   ardrone_counters counters;

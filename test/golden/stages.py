@@ -2,16 +2,14 @@
 with the committed one.
 
 test/golden/digests.txt has a line `stage digest` for each stage. The test golden/stages fails
-- where a stage's output differs from the bytes that the file was made from, with any kernel set of
-this CPU;
+- where the digest of a stage's output differs from that of the file, with any kernel set of this
+  CPU;
 - where CHANGELOG.md does not announce the file's digest: under a heading "Results", the newest
-mention of
-  `STAGE DIGITS`, DIGITS being the first eight of the digest, must be the file's.
-So nobody changes a result without writing it down. To announce a change that is meant:
-  cmake --build build/release --target golden_update     rewrites digests.txt, prints the line for
-  CHANGELOG.md
-and add what that prints, and why the result changed, under Results of CHANGELOG.md's newest
-section."""
+  mention of `STAGE DIGITS`, DIGITS being the first eight of the digest, must be the file's.
+So nobody changes a result without writing it down. To announce an intended change, run
+  cmake --build build/release --target golden_update
+which rewrites digests.txt and prints a line, and add this line, and why the result changed, under
+Results of CHANGELOG.md's newest section."""
 import argparse
 import re
 import subprocess

@@ -136,7 +136,7 @@ static void case_suppress_row(trial *t) {
   found = OUTPUT(t, int32_t, 1);
   REPEAT(t, *found = t->set->suppress_row(rows[0], rows[1], rows[2], width, xs));
   TEST_ASSERT_TRUE(*found >= 0 && *found <= room);
-  /* xs behind the columns found may hold anything, so it is not compared. */
+  /* The entries of xs after the columns found may hold anything, so they are not compared. */
   memset(xs + *found, PATTERN, (size_t)(room - *found) * sizeof xs[0]);
 }
 
@@ -169,7 +169,9 @@ static void case_average_columns(trial *t) {
     weights[3 * x + 2] = 256 - weights[3 * x] - weights[3 * x + 1];
     if (first[x] + used > width) width = first[x] + used;
   }
-  sums = INPUT(t, uint16_t, width); /* no element behind the last one with a weight */
+  /* The block ends with the last element that has a weight, so that the address sanitizer reports
+     a kernel that reads further ones. */
+  sums = INPUT(t, uint16_t, width);
   for (x = 0; x < width; ++x) {
     const int32_t noise = random_int(&t->seed, 0, 65280);
     sums[x] = (uint16_t)(random_int(&t->seed, 0, 3) == 0 ? 65280 : noise);
@@ -205,7 +207,7 @@ static void case_sample_patch(trial *t) {
   static const int32_t heights[4] = {TVK_PATCH_SIDE, TVK_ORIENT_SIDE, 1, 7};
   const int32_t width = pick(t, 1, 90, 640), height = pick(t, 1, 90, 480);
   const int32_t num_rows = t->typical ? TVK_PATCH_SIDE : heights[random_int(&t->seed, 0, 3)];
-  const int32_t num_pairs = height * (width + 1); /* reading behind them is an error */
+  const int32_t num_pairs = height * (width + 1); /* a kernel must not read further ones */
   /* Steps from zero to far beyond the image. Whole steps from a whole position end exactly on
      the last column or row. */
   const int32_t whole = random_int(&t->seed, 0, 3) == 0;
@@ -604,7 +606,8 @@ static double now_ns(void) {
   return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
 }
 
-/* The shortest of several runs of about a millisecond each. */
+/* Returns the nanoseconds of a call of the kernel: the least of nine runs, each of as many calls
+   as take a millisecond or more. */
 static double time_per_call(const tvk_table *set, void (*run)(trial *)) {
   double best = 1e30;
   int64_t calls = 1;

@@ -78,8 +78,9 @@ void test_a_principal_point_as_told_stays(void) {
     shifts += has_shift(estimated(scene::pinhole()));
   }
   std::printf("as told: %d of %d moved\n", shifts, 5 * num_pairs);
-  // By design one pair in a thousand moves. With the share that the approximation adds, nine of
-  // 1000 have a probability of 2e-7.
+  // By design the estimate moves a right principal point in one pair in a thousand, and the
+  // approximation in its test adds to that share; nine of 1000 pairs then have a probability of
+  // 2e-7.
   TEST_ASSERT_TRUE(shifts < 2 + 5 * num_pairs * 7 / 1000);
 }
 
@@ -199,9 +200,9 @@ void test_matrices_are_of_the_corrected_camera(void) {
   for (double sq : rms) TEST_ASSERT_TRUE(std::sqrt(sq) < 0.35);  // px; the noise is 0.3 px
 }
 
-// The gradient is compared with differences of the cost, for cameras whose principal point is
-// really moved; a fisheye's rays are unit vectors. The loss is plain least squares, so there are no
-// weights.
+// The gradient is compared with finite differences of the cost, for cameras whose principal point
+// is really moved; a fisheye's rays are unit vectors. The loss is plain least squares, so there are
+// no weights.
 void test_the_gradient_follows_differences(void) {
   constexpr int kNum = 60;
   static uint8_t memory[1 << 20] __attribute__((aligned(64)));

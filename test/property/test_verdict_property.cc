@@ -121,8 +121,8 @@ void test_each_kind_has_what_it_promises(void) {
   }
 }
 
-// The test against chance accepts random matches with a probability of 0.01 a pair; of 72 pairs
-// more than two are very unlikely.
+// The test against chance accepts random matches with a probability of at most 0.01. Each of 72
+// pairs is estimated by three solvers; three of these 216 estimates may be accepted.
 void test_random_matches_are_degenerate(void) {
   const int num[9] = {5, 6, 7, 8, 10, 20, 50, 100, 500};
   const int methods[3] = {TV_SOLVER_FIVE_POINT, TV_SOLVER_SEVEN_POINT, TV_SOLVER_EIGHT_POINT};

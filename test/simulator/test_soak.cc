@@ -78,7 +78,8 @@ struct Soak {
   tvs_frame_source frames{};
   int64_t now = 1000 * kMs;
 
-  // For each run of the world frame: the yaw that is its zero, and the number of the drone's boot.
+  // For each clock id, which changes whenever the world frame of the attitudes does: the drone's
+  // own yaw (rad) that is 0 in that frame, and the number of the drone's boot.
   std::map<uint32_t, double> psi0;
   std::map<uint32_t, int> boot_of;
   bool may_restart = true;  // whether the next command's number may be 1 again

@@ -57,7 +57,7 @@ inline Vec2 noisy(tv::Random* random, const Vec2& pixel, double noise_px) {
   return pixel + Vec2(x, y);
 }
 
-// Makes match i, from a point at a depth of 2 to 8 baselines.
+// Makes match i, from a point at a distance of 2 to 8 baselines from camera 0.
 inline void make_match(tv::Random* random, const tv::Camera cameras[2], int i, Scene* s) {
   const Options& o = s->options;
   for (int tries = 0;; ++tries) {

@@ -60,8 +60,8 @@ struct Pair {
   int num;
   double pixels[2][2 * kMaxMatches];
   double noise_px;
-  // For kPlanar: the plane n . X = 1 in camera 0, and whether the plane's other motion puts a tenth
-  // of the points or more behind a camera, so that the matches exclude that motion.
+  // For kPlanar: the plane n . X = 1 in camera 0, and whether the plane's other motion puts more
+  // than an eighth of the points behind a camera, so that the matches exclude that motion.
   Vec3 plane;
   bool other_motion_excluded;
 };
@@ -198,8 +198,10 @@ struct Maker {
     return std::fabs(n.dot(seen_there)) * pair->camera[1].fx;
   }
 
-  // Adds the corners of a wall's cells. At least six tenths of them are found, and half of the
-  // found ones are matched one or two cells off.
+  // Adds the corners of a wall's cells. 60 to 100 per cent of the corners are found, and 40 to 60
+  // per cent of the found ones are matched to a corner one or two cells off. False where too few
+  // corners are in both views, or where more than a quarter of these wrong matches lie within 4
+  // pixels of their epipolar lines.
   bool put_lattice(int count) {
     const Vec3 normal_of_wall =
         Vec3(uniform(&random, -0.6, 0.6), uniform(&random, -0.3, 0.3), 1).normalized();
@@ -249,7 +251,7 @@ struct Maker {
     pair->plane = tv::rotation_about(axis, tilt) * Vec3(0, 0, 1) / uniform(&random, 2, 8);
   }
 
-  // The number of pixels by which the baseline moves a typical point.
+  // The median over the points of the number of pixels by which the baseline moves a point.
   double median_parallax_px() const {
     static double values[kMaxMatches];
     for (int i = 0; i < pair->num; ++i) {

@@ -1,7 +1,7 @@
-// The simulated drone in virtual time: its firmware, flight, film and bad link behind the driver's
-// transport instead of sockets, so that ten minutes of flight take one. Each picture shows its own
-// number, and the true state at each number is kept, so that the driver's report on a picture can
-// be compared with the truth.
+// The simulated drone in virtual time: its firmware, flight, film and bad link are the other side
+// of the driver's transport, in place of sockets, so that ten minutes of flight take one. Each
+// picture shows its own number, and the true state at each number is kept, so that the driver's
+// report on a picture can be compared with the truth.
 #pragma once
 
 #include <algorithm>

@@ -57,8 +57,8 @@ void test_vectors_of_any_length_give_unit_directions(void) {
   TEST_ASSERT_TRUE(tv::gravity_prior(up, up, 1e-300).sigma_rad > 1e-9);
 }
 
-// The cost is |R down0 - down1|^2 / (2 sigma^2) in units of (scale / noise)^2; the gradient is half
-// the cost's derivative times scale^2.
+// The cost is weight |R down0 - down1|^2 / (2 sigma^2) times (noise / scale)^2; the gradient is
+// half the cost's derivative times scale^2.
 void test_gradient_follows_differences_of_the_cost(void) {
   tv::Random random = tv::random_seeded(21);
   constexpr double kStep = 1e-6, kNoise = 0.4, kScale = 1.5;
@@ -123,7 +123,8 @@ void test_rows_are_added_to_what_is_there(void) {
   for (int k = 0; k < 5; ++k) TEST_ASSERT_DOUBLE_WITHIN(1e-9, -k + alone.gradient[k], gradient[k]);
 }
 
-// A pose whose tilt differs by `angle` from gravity's and has a standard deviation of sigma_pose.
+// Returns the weight of gravity beside a pose whose tilt differs from gravity's by `angle` and has
+// a standard deviation of sigma_pose, both in radians.
 double weight_at(double angle, double sigma_pose) {
   tv::Random random = tv::random_seeded(24);
   const Pose pose = any_pose(&random);

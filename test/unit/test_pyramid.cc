@@ -72,7 +72,8 @@ void check_level(const tvk_table& kernels, uint64_t* seed, int width, int height
       sum_error += error;
     }
   }
-  // The mean drifts only by the rounding of halves upwards: 3/16 for quarters of black and white.
+  // The mean error comes only from the rounding of halves upwards: 3/16 of a grey level where a new
+  // pixel is the average of four that are black or white.
   TEST_ASSERT_DOUBLE_WITHIN(0.2, 0.0, sum_error / (next.width * next.height));
 }
 

@@ -1,9 +1,9 @@
 // Plain SIFT compared with OpenCV's at the same keypoints, angles, level and blur.
 //
 // Our octave 0 is the image blurred by the 3x3 binomial, whose variance is 0.5 square pixels.
-// OpenCV takes an image to have a blur of 0.5 pixel already (variance 0.25) and adds up to `sigma`,
-// so that sigma = sqrt(0.25 + 0.5) makes its octave 0, layer 0 the same image but for the
-// Gaussian's shape.
+// OpenCV takes an image to have a blur of 0.5 pixel already (variance 0.25) and blurs it further,
+// to `sigma` pixels in all, so that sigma = sqrt(0.25 + 0.5) makes its octave 0, layer 0 the same
+// image but for the Gaussian's shape.
 
 #include <stdlib.h>
 #include <string.h>

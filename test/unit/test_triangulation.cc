@@ -240,8 +240,9 @@ void test_linear_ls_of_a_fisheye_equals_equations_on_the_viewing_sphere(void) {
     Vec3 ray0, ray1;
     TEST_ASSERT_TRUE(tv::unproject(camera, pixel0, &ray0, nullptr));
     TEST_ASSERT_TRUE(tv::unproject(camera, pixel1, &ray1, nullptr));
-    // The distances from the two lines; I - d d^T does not depend on the basis of the tangent
-    // plane.
+    // Reference: the point X of the least sum of squared distances from the two lines of sight,
+    // solved by QR. (I - d d^T) (X - centre) is the vector from a line with direction d to X,
+    // whatever basis the method uses.
     Eigen::Matrix<double, 6, 3> A;
     Eigen::Matrix<double, 6, 1> b;
     A << kIdentity - ray0 * ray0.transpose(), (kIdentity - ray1 * ray1.transpose()) * R;

@@ -1,5 +1,6 @@
-// Poly and Poly-Abs are proved optimal: branch and bound over the pencil of epipolar planes, in
-// long double, shows that no plane has a cost below theirs by more than 1e-9 of it or 1e-12 pixels.
+// Poly and Poly-Abs are proved optimal: branch and bound over the pencil of epipolar planes (all
+// planes that contain the baseline), in long double, shows that no plane has a cost below theirs by
+// more than 1e-9 of it or 1e-12 pixels.
 //
 //   TWOVIEW_TRIANGULATION_CASES=1000000 unit_triangulation_optimal     the number of cases of each
 //
@@ -181,7 +182,7 @@ Case random_case(tv::Random* random, int index) {
   return c;
 }
 
-// ---- the pencil of planes, from the case's own numbers ----
+// ---- the pencil of epipolar planes, computed from R, t and the pixels, not by the library ----
 
 struct Plane {
   Real x, y;
