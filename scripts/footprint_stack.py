@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""The deepest stack of each public function, from what gcc writes with -fcallgraph-info=su.
+"""Computes the deepest stack of each public function from what gcc writes with -fcallgraph-info=su.
 usage: footprint_stack.py FOLDER [--limit BYTES] [--all]
   FOLDER  where the library's .ci files lie, below object folders as ninja leaves them
-Prints the deepest chain; status 1 where a function's frame has no bound (alloca, an array of
-variable length), where functions call each other in a circle, or above the limit."""
+  --all   also prints a line for each public function
+Prints the deepest chain of calls. Status 1 where a function's frame has no bound (alloca, an array
+of variable length), where functions call each other in a circle, or where a public function needs
+more than BYTES (32768 by default)."""
 import argparse
 import pathlib
 import re
@@ -57,8 +59,8 @@ def kernels_of(source):
 
 
 def deepest_of(graph, kernel_bytes):
-    """The deepest stack of each function, in bytes and as a chain of calls. Recursion ends the
-    program with an error. kernel_bytes(title) gives the bytes of an indirect call."""
+    """{function: (its deepest stack in bytes, the chain of calls)}. Recursion ends the program with
+    an error. kernel_bytes(title) gives the bytes of an indirect call."""
     known, open_names = {}, []
 
     def visit(name):
