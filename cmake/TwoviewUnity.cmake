@@ -1,6 +1,6 @@
-# Provides the test framework Unity as the target twoview_unity. It is, in this order: the folder
-# named by TWOVIEW_UNITY_DIR, an installed Unity that has doubles, the copy that scripts/bootstrap
-# took from the source package of Debian's cjson, or upstream's release.
+# Provides the test framework Unity as the target twoview_unity. It is the first of these that is
+# found: the folder named by TWOVIEW_UNITY_DIR, an installed Unity that has doubles, the copy that
+# scripts/bootstrap took from the source package of Debian's cjson. Else it is upstream's release.
 
 set(TWOVIEW_UNITY_DIR "" CACHE PATH "Folder with unity.c, unity.h and unity_internals.h")
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Keeps the layers of docs/contributing.md: which folder of lib/src may include which, who may see
 Eigen, pixels, the heap and the internals at all, that no files include one another in a circle, and
-that the rooms of tools/twoview depend one way. Reads the #include lines; prints each offence."""
+that the rooms (folders) of tools/twoview include one another only as ROOMS allows. Reads the
+#include lines; prints each offence."""
 import posixpath
 import re
 import sys
@@ -33,7 +34,8 @@ BANNED = {
 OUTSIDE = ("drivers", "examples", "tools", "python", "bench")
 # bench/relpose.cc times the five-point solver, which no function of the public API calls alone.
 EXCEPT = {("bench/relpose.cc", "kernels/kernels.h")}
-# The AR.Drone's codecs, which only translate between bytes and structs.
+# The AR.Drone's codecs, which only translate between bytes and structs, and so may not include the
+# headers of CODEC_BANNED.
 CODECS = {f"drivers/ardrone/{stem}" for stem in (
     "at.c", "bytes.h", "config.c", "encode.c", "exchange.c", "navdata.c", "navdata_layout.c",
     "navdata_layout.h", "pave.c", "pilot.c")}

@@ -189,7 +189,7 @@ static void test_output_pointers_are_checked(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_describe(c, v, NULL, keypoints, 2, (uint8_t *)keypoints));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_describe(c, v, NULL, NULL, 0, NULL));
-  /* no output overlaps the image or the mask */
+  /* an output that overlaps the image or the mask is refused */
   TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
                         tv_detect(c, &other, v, NULL, (tv_keypoint *)v->data, 1, &count));
   TEST_ASSERT_EQUAL_INT(

@@ -123,7 +123,8 @@ static best estimate_every_way(int count) {
   return b;
 }
 
-/* Triangulates the first matches by all methods; no point may hold a NaN. */
+/* Triangulates the first `count` matches by all methods. No point may hold a NaN, and each must
+   have expected_status (any if that is negative). */
 static void expect_sound_points(const tv_camera *camera, const double R[9], const double t[3],
                                 int count, int expected_status) {
   int method, i;
@@ -145,8 +146,8 @@ static void turn_about_y(double angle_rad, double R[9]) {
   memcpy(R, turn, sizeof turn);
 }
 
-/* Sets match i to a point's pixels in both views; false when the first lens does not see it in
-   both. */
+/* Sets match i to the pixels of point p in both views, with noise; false if the camera does not
+   see the point in both. */
 static int see(const tv_camera *camera, const double R[9], const double t[3], const double p[3],
                double noise_px, int i) {
   double moved[3], at[2][2];
@@ -164,8 +165,8 @@ static int see(const tv_camera *camera, const double R[9], const double t[3], co
   return 1;
 }
 
-/* Fills the matches with points at depths from low to high baselines, over the whole image of
-   the pinhole. */
+/* Makes `count` matches of points at depths from `low` to `high`, over the whole image of the
+   pinhole. */
 static void make_scene(int count, double low, double high, double noise_px, const double R[9],
                        const double t[3]) {
   int i;

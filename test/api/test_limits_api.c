@@ -119,7 +119,8 @@ static void test_a_context_serves_its_purposes_alone(void) {
   }
 }
 
-/* Compares with a reconstruction in a context that has room for all matches. */
+/* In a context with room for few matches, both orders of the views must keep the same matches,
+   and these must be the best of those that a context with room for all finds. */
 static void test_the_best_matches_are_kept_whichever_view_is_first(void) {
   static const int32_t rooms[] = {1, 2, 7, 20, 50, 299};
   tv_reconstruct_options options;

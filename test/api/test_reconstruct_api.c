@@ -389,7 +389,7 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
   free(pair.luma[1]);
 }
 
-/* The sum of squared errors over the points whose status is TV_POINT_OK in both arrays. */
+/* The sum of error_px^2 of `points`, over those whose status is TV_POINT_OK in both arrays. */
 static double sum_sq(const tv_point *points, const tv_point *others, int32_t count) {
   double sum = 0;
   int32_t k;

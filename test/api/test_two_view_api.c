@@ -43,8 +43,8 @@ static int see(const double point[3], double baseline, int i) {
          tv_camera_project(&camera1, moved, pixels1 + 2 * i, NULL) == TV_OK;
 }
 
-/* Points in a field of view of about 60 degrees. flatness 0 gives depths of 4 to 12, flatness 1
-   a slanted plane. */
+/* Makes matches of points in a field of view of about 60 degrees. flatness 0 gives depths of 4
+   to 12 in the unit of `baseline`, flatness 1 a slanted plane. */
 static void make_scene(int count, double flatness, double baseline) {
   int i;
   for (i = 0; i < count; ++i) {

@@ -166,8 +166,8 @@ class KnownCameras(CalibrateTest):
         return result
 
     def refitted(self, lens, R, t, seen, exact):
-        """The board projected with the estimated camera, its pose fitted by Gauss-Newton from the
-        true pose."""
+        """The board's corners projected with the lens `lens`, the board's pose fitted to the pixels
+        `seen` by Gauss-Newton from the pose R, t."""
         points = boards.board_points()
         if np.linalg.norm(boards.project(lens, R, t, points)[0] - seen[0]) > 30:
             points = points[::-1]

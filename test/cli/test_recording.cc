@@ -52,7 +52,8 @@ simulator::Sensors sensors(double altitude_factor, double velocity_factor) {
   return s;
 }
 
-// The velocity of the sideways flight is 2 per cent wrong, the altitude of the climb 1 per cent.
+// The velocity of the sideways flight is 2 per cent too large, the altitude of the climb 1 per
+// cent; the flight forward has both errors.
 const Plan kSideways{"sideways", {0, -2, 0}, 0.25F, 0, 0, 0, sensors(1, 1.02)};
 const Plan kForward{"forward", {-1.5, 0, 0}, 0, -0.25F, 0, 0.1F, sensors(1.01, 1.02)};
 const Plan kClimbing{"climbing", {0, 1, 0}, 0, 0, 0.6F, 0, sensors(1.01, 1)};

@@ -46,7 +46,8 @@ Film film(const CameraPose& at) {
   return film;
 }
 
-// Projects a pixel of view 0 with its depth into view 1; also gives its depth there.
+// Projects the point of a pixel of view 0, given by its ray and depth, into view 1, and writes its
+// depth there. False where view 1 does not see it.
 bool carry(const float* ray, float depth, const room::Mat3& R, const Vec3& t, double pixel[2],
            double* depth1) {
   const double scale = depth / ray[2];

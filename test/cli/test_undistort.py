@@ -43,8 +43,8 @@ def kannala_brandt(k):
 
 
 def straightened(distort, x, y):
-    """The inverse of the distortion, by Newton's method with differences; None where it does not
-    converge."""
+    """The inverse of the distortion, by Newton's method with finite differences; None where it does
+    not converge."""
     sx, sy = x, y
     for _ in range(50):
         dx, dy = distort(sx, sy)

@@ -152,7 +152,8 @@ def epipolar_distances(F, pixels0, pixels1):
 
 
 def test_F_is_of_colmaps_pixels():
-    # With a rotation about the optical axis, a wrong half pixel does not cancel.
+    # COLMAP's coordinates are half a pixel larger than twoview's. With a rotation about the optical
+    # axis, this half pixel does not cancel in an epipolar distance.
     R = pycolmap.Rotation3d(np.array([0, 0, np.sin(0.5), np.cos(0.5)])).matrix()
     pixels = two_views(R, np.array([0.5, 0.1, 0.2]), noise_px=0.02)
     found, row = estimate(*pixels)

@@ -136,7 +136,7 @@ def test_geometries_are_there_and_agree_with_their_matches(exported):
         for pair, row in zip(ids, rows):
             id0, id1 = pycolmap.pair_id_to_image_pair(pair)
             matches = database.read_matches(id0, id1)
-            assert row.config in (2, 4)  # COLMAP's numbers: 2 calibrated, 4 planar (mostly wall)
+            assert row.config in (2, 4)  # COLMAP: 2 calibrated, 4 planar (most matches on the wall)
             assert {tuple(m) for m in row.inlier_matches} <= {tuple(m) for m in matches}
             pixels = [
                 database.read_keypoints(i)[row.inlier_matches[:, k], :2]

@@ -153,7 +153,7 @@ static int holds(const char *part) {
   return strstr(text, part) != NULL;
 }
 
-/* The value of the tick's REF command, or 0 when there is none. */
+/* The value of the REF command that the last tick wrote, or 0 when it wrote none. */
 static long ref_value(void) {
   char text[ARDRONE_AT_MAX_BYTES + 1];
   const char *found;

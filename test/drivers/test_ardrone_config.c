@@ -114,7 +114,7 @@ static void test_ids_are_crc_32(void) {
   char id[ARDRONE_ID_BYTES];
   ardrone_make_id("123456789", id); /* the usual check of a CRC-32: these digits give cbf43926 */
   TEST_ASSERT_EQUAL_STRING("cbf43926", id);
-  ardrone_make_id("", id); /* its CRC 0 is the default configuration's id */
+  ardrone_make_id("", id); /* its CRC is 0, the default configuration's id, so 1 is used */
   TEST_ASSERT_EQUAL_STRING("00000001", id);
 }
 
@@ -122,7 +122,8 @@ static void test_ids_are_crc_32(void) {
 
 #define MS INT64_C(1000000)
 
-/* A drone with one acknowledge bit. It loses the messages whose numbers are bits of `lost`. */
+/* A drone with one acknowledge bit. It loses message k (0 to 31, and again from 32 on) if bit k
+   of `lost` is set. */
 typedef struct mock {
   int acknowledged, num_config, num_messages;
   uint32_t lost;

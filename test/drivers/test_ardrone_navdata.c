@@ -140,7 +140,7 @@ static void test_a_wrong_checksum_is_refused_and_nothing_used(void) {
   TEST_ASSERT_EQUAL_UINT32(0, navdata.sequence);
 }
 
-/* The checksum is larger than a 16-bit number can be. */
+/* The checksum of this packet is too large for a 16-bit number. */
 static void test_a_packet_of_ones_has_its_sum(void) {
   begin(0x55667788);
   add_option(200, 4000, 0xff);
@@ -233,7 +233,8 @@ static void test_units_frames_and_signs(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 101586, imu.pressure_pa);
 }
 
-/* In level flight with the nose up, a climbing velocity has a component along the body's x. */
+/* With pitch and roll, a climb has components along all three axes of the body: the body's
+   velocity must have the measured vertical component in the world. */
 static void test_vertical_velocity_is_turned_into_the_body(void) {
   const double degree = 0.017453292519943295;
   navdata.state = ARDRONE_STATE_FLYING;

@@ -51,8 +51,8 @@ static void record_packet(void *user, const ardrone_pave_packet *packet, const t
   ++num_recorded_packets;
 }
 
-/* Makes a recording of four seconds. From its second second on, `silent_ms` of it have no video,
-   and the last 250 ms of these no navdata. */
+/* Makes a recording of four seconds. It has no video for `silent_ms` from the end of its first
+   second on, and no navdata in the last 250 ms of this silence. */
 static void make_recording(int64_t silent_ms) {
   ardrone_session_options options;
   const ardrone_transport transport = mock_transport(&drone);

@@ -30,8 +30,9 @@ static tvs_time observe(tvs_clock *clock, int64_t device, int64_t host) {
   return time;
 }
 
-/* Two hours of packets with random delays and a drift of 50 ppm, over three wraps and a silence
-   of 50 minutes: the host time is right within the reported uncertainty. */
+/* Two hours of packets with random delays and a drift of 50 ppm, over four wraps of the device's
+   counter (2048 s) and a silence of 50 minutes: the host time is right within the reported
+   uncertainty. */
 static void test_unwrapped_and_mapped_within_its_uncertainty(void) {
   tvs_clock clock = mapper();
   uint32_t seed = 12345;
@@ -171,8 +172,8 @@ static void test_bad_attitudes_are_refused(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_ARGUMENT, tvs_attitudes_add(&history, 0, &a));
 }
 
-/* Slerp takes the shorter arc and halves the angle, also between nearly equal and nearly
-   opposite quaternions. */
+/* Slerp takes the shorter arc and divides its angle in the given proportion (here a quarter),
+   also between nearly equal and nearly opposite quaternions. */
 static void test_slerp(void) {
   const double angles[] = {1e-9, 1e-5, 0.1, 1.0, 3.0};
   size_t k;

@@ -21,7 +21,7 @@ using tv::Vec3;
 constexpr int kPairs = 200, kWrongPairs = 40, kMatches = 150, kSigmas = 4;
 constexpr double kSigmasDeg[kSigmas] = {0.1, 0.5, 1, 2};
 constexpr double kRadians = tv::kPi / 180;
-// The largest error that counts, in degrees; a pair without a pose has this error.
+// Larger errors count as this one, in degrees; a pair without a pose has this error.
 constexpr double kMostDeg = 10;
 
 api_context api;

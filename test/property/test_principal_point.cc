@@ -117,7 +117,7 @@ void compare(const char* title, const tv_camera& right, double most_error_px, do
   TEST_ASSERT_TRUE(within > 0.9 * shifts);
 }
 
-// The camera is wrong by as much as the default sigma allows.
+// The camera's principal point is wrong by normal errors of the default sigma, 0.01 focal lengths.
 void test_a_principal_point_off_is_found_and_the_pose_gains(void) {
   compare("pinhole", scene::pinhole(), 4, 0.85);
   compare("Brown-Conrady", scene::distorted(), 4, 0.85);

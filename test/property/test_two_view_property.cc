@@ -104,7 +104,8 @@ bool inside(const double pixel[2]) {
   return pixel[0] > 0 && pixel[0] < 639 && pixel[1] > 0 && pixel[1] < 359;
 }
 
-// Adds the information of a true match about the error (w, a, b).
+// Adds what a true match contributes to the information matrix of the pose's error (w, a, b), whose
+// parameters are those of the covariance (two_view.h).
 void add_information(const Kind& k, const double pixel0[2], const double pixel1[2]) {
   double j0[6], j1[6];
   Vec3 f0, f1;

@@ -1,7 +1,8 @@
 // How often the verdict names the kind of a simulated pair (support/pair_kinds.h has the kinds and
 // their ranges), how often a solvable pair gets its "ok", and how often an "ok" is wrong.
 // TWOVIEW_PAIRS: pairs of each kind, default 100; scripts/statistics takes 10000. TWOVIEW_SEED
-// selects other pairs. TWOVIEW_VERBOSE=1 prints each pair that is misnamed, and each wrong "ok".
+// selects other pairs. TWOVIEW_KIND=K takes pairs of kind number K only. TWOVIEW_VERBOSE=1 prints
+// each pair that is misnamed, each solvable one without "ok", and each wrong "ok".
 #include <cstdlib>
 
 #include "support/calls.h"

@@ -187,7 +187,8 @@ void test_a_wide_lens_is_as_good_as_a_pinhole(void) {
     for (int view = 0; view < kNumViews; ++view) sum_up(view, rule, auc[rule][view]);
   }
   // Chance decides which of a plane's two poses is the primary one, separately for the lens and for
-  // the pinhole, so the nearer pose is compared. Fewer pairs than 1000 are only a sample.
+  // the pinhole, so the nearer pose is compared. With fewer than 1000 pairs two standard errors are
+  // allowed for chance, at a standard deviation of 30 points a pair.
   const double chance = num_pairs < 1000 ? 2 * 30 / std::sqrt(num_pairs) : 0;
   for (int k = 0; k < 3; ++k) {
     const double lens = auc[kNearer][kLensView][k];

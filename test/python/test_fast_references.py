@@ -22,7 +22,7 @@ from twoview_tools.accuracy import twoview_ctypes as tv
 
 LEFT = os.path.join(ROOT, ".cache", "motorcycle", "motorcycle_left.png")
 SIDE = 260
-# The folder of the test programs' build, beside the program that ctest names.
+# The library of the same build as the program that ctest names; else the default build's.
 PROGRAM = os.environ.get("TWOVIEW_PROGRAM")
 LIBRARY = (os.path.join(os.path.dirname(os.path.dirname(PROGRAM)), "lib", "libtwoview.so")
            if PROGRAM else tv.DEFAULT_LIBRARY)

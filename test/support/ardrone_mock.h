@@ -84,7 +84,8 @@ static inline void mock_boot(mock_drone *d) {
 }
 
 static inline double mock_device_s(const mock_drone *d) {
-  return (double)(d->now_ns - d->boot_ns) * 1e-9 + 2040; /* the clock wraps at 2048 s */
+  /* The clock starts at 2040 s, so that it soon wraps, at 2048 s. */
+  return (double)(d->now_ns - d->boot_ns) * 1e-9 + 2040;
 }
 
 static inline void mock_post(mock_drone *d, const uint8_t *bytes, size_t size) {

@@ -111,7 +111,8 @@ struct Maker {
     ++pair->num;
   }
 
-  // Adds a point at `depth` along the ray, seen by view 1 after (R, t).
+  // Adds the match of a point X: its pixel p0 in view 0, and its projection in view 1, at R X + t.
+  // False where view 1 does not see it.
   bool put_point(const Vec3& X, const Vec2& p0, const Mat3& R, const Vec3& t) {
     Vec2 p1;
     if (!seen(1, R * X + t, &p1)) return false;

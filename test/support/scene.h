@@ -1,5 +1,5 @@
-// Synthetic pairs for tests of the geometry, drawn again until they are well conditioned. Static
-// storage throughout, since a failing Unity test leaves by longjmp.
+// Synthetic pairs for tests of the geometry; a motion is drawn again if both views see too few
+// common points. Static storage throughout, since a failing Unity test leaves by longjmp.
 #ifndef TEST_SUPPORT_SCENE_H
 #define TEST_SUPPORT_SCENE_H
 

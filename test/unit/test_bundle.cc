@@ -1,5 +1,5 @@
-// The parts of two-view bundle adjustment: derivatives against differences, the elimination against
-// the plain normal equations, points at and beyond infinity, points that cannot take part.
+// The parts of two-view bundle adjustment: derivatives against finite differences, the elimination
+// against the plain normal equations, points at and beyond infinity, points that cannot take part.
 #include <Eigen/Dense>
 #include <cstring>
 

@@ -1,5 +1,5 @@
-// The gravity prior: its rows of the normal equations against differences, its weight, and a model
-// that includes it.
+// The gravity prior: its rows of the normal equations against finite differences, its weight, and
+// how a pose and its covariance change by it.
 #include <cmath>
 #include <limits>
 
@@ -82,7 +82,7 @@ void test_gradient_follows_differences_of_the_cost(void) {
   }
 }
 
-// The matrix is J'J of the residual R down0 - down1, with J by differences.
+// The matrix is J'J of the residual R down0 - down1, with J by finite differences.
 void test_matrix_follows_differences_of_the_residual(void) {
   tv::Random random = tv::random_seeded(22);
   constexpr double kStep = 1e-6, kNoise = 0.4;
@@ -199,7 +199,8 @@ void test_information_of_gravity_is_added_to_that_of_the_points(void) {
   }
 }
 
-// The estimate must be the minimum of the sum of both squared distances: its gradient is zero.
+// The pose that add_gravity returns must be at the minimum of the sum of two costs: the squared
+// Mahalanobis distance from the pose before, and gravity's. There the sum's gradient is zero.
 void test_a_pose_with_a_covariance_moves_to_where_both_agree_best(void) {
   using Vector5 = Eigen::Matrix<double, 5, 1>;
   using Matrix5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
@@ -231,7 +232,7 @@ void test_a_pose_with_a_covariance_moves_to_where_both_agree_best(void) {
     const double size = gradient.norm();
     for (int p = 0; p < 5; ++p) gradient[p] += rows.gradient[p];
     TEST_ASSERT_TRUE(gradient.norm() < 1e-3 * size);
-    // The covariance must be that of the sum, in the basis at the new pose.
+    // The covariance must be that of the sum of both costs, in the basis at the new pose.
     tv::add_gravity_information(prior, pose.R, expected);
     Matrix5 basis = Matrix5::Identity();
     basis.block<2, 2>(3, 3) << c1.dot(b1), c1.dot(b2), c2.dot(b1), c2.dot(b2);

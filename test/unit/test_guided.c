@@ -342,8 +342,9 @@ static void test_repeated_structure_is_matched_along_the_lines(void) {
   TEST_ASSERT_TRUE(count - right < right / 10);
 }
 
-/* For a sideways motion the epipolar lines are the rows. Two keypoints of image 1 lie in the
-   band of image 0's only keypoint, one of them 3 pixels off the line. */
+/* For a sideways motion the epipolar lines are the rows. Two keypoints of image 1 lie on the
+   line of image 0's only keypoint, 3 pixels from each other. The farther descriptor is no rival
+   of the nearest one while it lies within neighbourhood_px (4, then 2) of it. */
 static void test_what_lies_beside_the_nearest_is_no_rival(void) {
   const tv_camera camera = make_camera(TV_CAMERA_PINHOLE);
   const double E[9] = {0, 0, 0, 0, 0, -1, 0, 1, 0};

@@ -40,7 +40,7 @@ double nearest_model(const Sample& s, const Mat3* models, int count) {
   return best;
 }
 
-// The ten cubic and five linear constraints, in extended precision, at |E| = 1.
+// The largest residual of the ten cubic and five linear constraints, in long double, at |E| = 1.
 double residual(const Sample& s, const Mat3& E) {
   using Long3 = Eigen::Matrix<long double, 3, 3>;
   const Long3 e = E.cast<long double>();

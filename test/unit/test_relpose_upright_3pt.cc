@@ -56,7 +56,7 @@ double nearest_pose(const Sample& s, const Pose* poses, int count) {
   return best;
 }
 
-// The epipolar constraints of unit rays, the gravity constraint, and R R' = I, |t| = 1.
+// The largest residual of the constraints: epipolar (unit rays), gravity, R R' = I, and |t| = 1.
 double residual(const Sample& s, const Pose& pose) {
   const Mat3 E = tv::essential_from_pose(pose);
   double worst = (pose.R * s.down0 - s.down1).norm();
@@ -128,7 +128,7 @@ void test_matches_that_no_motion_made_satisfy_the_constraints(void) {
   TEST_ASSERT_GREATER_THAN_INT(10000, total);
 }
 
-// At half a turn the tangent of half the yaw is infinite.
+// The tangent of half the yaw is infinite at half a turn; the solver avoids it by an offset.
 void test_quarter_turns_and_half_turns_of_yaw_are_found(void) {
   tv::Random random = tv::random_seeded(kSeed + 3);
   for (int quarter = 0; quarter < 4; ++quarter) {

@@ -1,5 +1,5 @@
 // Residuals in pixels, compared with textbook formulas and with each other; their derivatives
-// compared with differences.
+// compared with finite differences.
 #include <cmath>
 #include <cstdlib>
 

@@ -50,7 +50,7 @@ double uniform(tv::Random* random, double low, double high) {
   return low + (high - low) * (tv::random_next(*random) * 0x1p-32);
 }
 
-// Approximately normal with the given deviation: a sum of 4 uniform numbers.
+// Approximately normal with the standard deviation sigma: a sum of 4 uniform numbers.
 double noise(tv::Random* random, double sigma) {
   double sum = 0;
   for (int i = 0; i < 4; ++i) sum += uniform(random, -1, 1);

@@ -306,10 +306,10 @@ struct Search {
   int num_nodes;
 };
 
-// Proves that every plane costs `target` or more, if that is so.
+// Tries to prove that every plane costs `target` or more; Search::proved says whether it could.
 Search prove(const Pencil& pencil, Real target, bool squared) {
-  // The arcs end at the zeros of the two images' costs, so that each cost rises and falls at most
-  // once.
+  // The pencil is cut into arcs at four fixed planes and at the zeros of the two images' costs, so
+  // that within an arc each cost rises and falls at most once.
   struct Node {
     Plane first, last;
   };
