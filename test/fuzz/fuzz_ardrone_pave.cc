@@ -30,7 +30,7 @@ struct Parser {
     }
   }
 
-  // Feeds as many bytes as the parser has room for.
+  // Feeds as many of the bytes as the parser has room for, and returns how many these were.
   size_t feed(const uint8_t* bytes, size_t size) {
     size_t room;
     uint8_t* to = ardrone_pave_space(&parser, &room);

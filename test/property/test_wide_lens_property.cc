@@ -33,7 +33,8 @@ tv_context* context;
 uint64_t seed = 360;
 int num_pairs = 100;
 
-// AUC@1/5/10 of the pinhole less that of the lens at the bound, with the lens's points: see above
+// AUC@1/5/10, in points, by which the Cramer-Rao bound puts the pinhole above the lens where both
+// see the lens's points (see above).
 constexpr double kBoundLoss[3] = {8.5, 2.5, 1.2};
 
 enum { kLens, kPinhole, kNumCameras };

@@ -139,7 +139,7 @@ struct Maker {
     return true;
   }
 
-  // Adds points that are `distance` baselines away, plus or minus `spread` baselines.
+  // Adds matches of points at depths of `distance`, plus or minus `spread`, in baselines.
   bool put_layer(int count, double distance, double spread) {
     for (int i = 0, tries = 0; i < count; ++tries) {
       if (tries > 100 * count + 200) return false;

@@ -1,4 +1,5 @@
-// Tests the three-point solver with known gravity against its definition.
+// Tests that the three-point solver with known gravity finds the true pose, and that its poses
+// satisfy the constraints.
 #include <cmath>
 
 #include "geometry/relpose_upright_3pt.h"

@@ -177,7 +177,8 @@ tv_status tv_camera_scale(const tv_camera *camera, double scale, tv_camera *scal
   result.cy = scale * (camera->cy + 0.5) - 0.5;
   result.width = scaled_size(camera->width, scale);
   result.height = scaled_size(camera->height, scale);
-  if (tv_camera_check(&result) != TV_OK) return TV_ERR_ARGUMENT;  // the scale over- or underflows
+  // A product may overflow, or a focal length become 0.
+  if (tv_camera_check(&result) != TV_OK) return TV_ERR_ARGUMENT;
   *scaled = result;
   return TV_OK;
 }

@@ -6,7 +6,7 @@
 namespace tv {
 namespace {
 
-constexpr uint32_t kLargest = 4096;  // bytes; a larger struct_size was not set by the caller
+constexpr uint32_t kLargest = 4096;  // bytes; a larger struct_size is taken as not initialised
 
 // Reads struct_size, the first field of every struct that grows.
 uint32_t size_of(const void* object) {

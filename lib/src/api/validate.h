@@ -36,7 +36,7 @@ tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 // and an angle within 1000 radians.
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);
 
-// R R' = I to 1e-6 and det R > 0.
+// Whether every entry of R R' is within 1e-6 of that of I, and det R > 0.
 bool is_rotation(const double R[9]);
 
 // Whether two arrays share a byte. An array of no bytes shares none.

@@ -28,10 +28,10 @@ void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);
 // The rotation that turns by `angle_rad` about a unit axis.
 Mat3 rotation_about(const Vec3& unit_axis, double angle_rad);
 
-// R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1, in closed form (B. K. P. Horn, "Recovering
-// baseline and orientation from essential matrix", 1990). R0 and R1 are rotations only as exactly
-// as E is an essential matrix: call orthonormalised for the one that is kept. False when E is zero,
-// of rank one, or not finite.
+// R0, R1 and t such that E ~ [t]x R0 ~ [-t]x R1 (~: equal up to a positive factor), in closed form
+// (B. K. P. Horn, "Recovering baseline and orientation from essential matrix", 1990). R0 and R1 are
+// rotations only as exactly as E is an essential matrix: call orthonormalised for the one that is
+// kept. False when E is zero, of rank one, or not finite.
 bool decompose_essential(const Mat3& E, Mat3 R[2], Vec3* t);
 
 // On which side of each camera two rays meet. depth0 and depth1, of which only the signs matter,

@@ -30,7 +30,7 @@ bool homography_4pt(const Vec3 rays0[4], const Vec3 rays1[4], Mat3* H) {
 int decompose_homography(const Mat3& H, const Vec3& mean_ray0, PlanarPose poses[2]) {
   const Svd3 svd = svd3(H);
   if (!(svd.s[2] > 1e-9 * svd.s[0])) return 0;
-  // The outer singular values in units of the middle one.
+  // The largest and the smallest singular value, in units of the middle one.
   const double s1 = svd.s[0] / svd.s[1], s3 = svd.s[2] / svd.s[1];
   if (!(s1 - s3 > 1e-9)) return 0;
   const Mat3 unit = H / svd.s[1];
@@ -40,7 +40,7 @@ int decompose_homography(const Mat3& H, const Vec3& mean_ray0, PlanarPose poses[
                length = std::sqrt((s1 - s3) * (s1 + s3));
   int count = 0;
   for (int k = 0; k < 2; ++k) {
-    // v2 and u span the plane of the vectors whose length H keeps.
+    // v2 and u span a plane of vectors whose length `unit` keeps.
     const Vec3 u = (p * v1 + (k == 0 ? q : -q) * v3) / length;
     Vec3 normal = v2.cross(u);
     Mat3 before, after;

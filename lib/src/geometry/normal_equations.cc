@@ -13,10 +13,10 @@ inline double over_lanes(const double* x) {
 using SumsKernel = void (*)(const double* const*, const int32_t*, int32_t, int32_t, int32_t,
                             const double*, double, int32_t, double*);
 
-// Calls the kernel for all matches and adds its lanes together. totals: the kernel's num_sums sums
-// without the last two, which give the loss that is returned. The logarithms of Cauchy's loss are
-// taken of products of at most kFactors factors, each at most 1 + TVK_LARGEST_LOSS, so that no
-// product overflows.
+// Calls the kernel for all matches and adds its lanes together. totals receives all of the kernel's
+// num_sums sums but the last two; these give the loss, which is returned. The logarithms of
+// Cauchy's loss are taken of products of at most kFactors factors, each at most 1 +
+// TVK_LARGEST_LOSS, so that no product overflows.
 double add_up(SumsKernel kernel, int num_sums, const RayPairs& pairs, const int32_t* indices,
               int count, const Mat3& M, const RobustLoss& loss, double* totals) {
   constexpr int kFactors = 64;

@@ -18,7 +18,7 @@ bool null_space(double rows[kRows][9], double basis[9 - kRows][9]) {
     for (int i = 0; i < 9; ++i) sum += rows[k][i] * rows[k][i];
     if (sum > largest) largest = sum;
   }
-  double scale[kRows];  // 2 / |v|^2 of the reflector v kept in rows[k][k..8]
+  double scale[kRows];  // 2 / |v|^2; v, Householder's vector, is in rows[k][k..8]
   for (int k = 0; k < kRows; ++k) {
     double* v = rows[k];
     double sum = 0;

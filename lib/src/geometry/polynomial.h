@@ -82,7 +82,7 @@ double polynomial_value(const double* p, double z, double* derivative) {
   return value;
 }
 
-// The one root in (low, high]: Newton's steps, kept within the bracket by bisection.
+// The one root in (low, high], by Newton's method with bisection where a step leaves the bracket.
 template <int kDegree>
 double bracketed_root(const double* p, double low, double high) {
   double slope;
@@ -148,7 +148,7 @@ int real_roots(const double* p, double* roots) {
       middle = 0;
     } else if (width <= 2) {
       middle = 0.5 * (interval.low + interval.high);
-    } else {  // the geometric mean: roots are like tangents of evenly spread angles
+    } else {  // about the geometric mean: roots are like tangents of evenly spread angles
       const double low = interval.low < 0 ? -interval.high : interval.low;
       const double high = interval.low < 0 ? -interval.low : interval.high;
       const double size_middle =

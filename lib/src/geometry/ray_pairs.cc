@@ -25,8 +25,9 @@ double pixel_angle(const RayPairs& pairs, int i) {
   return std::sqrt(0.5 * sum);
 }
 
-// A number without a common factor with n, near n times the golden ratio. The places k step mod n
-// for k = 0, 1, .. visit all of 0 .. n - 1, and any first few of them are spread evenly.
+// A step near 0.618 n (the golden section) that has no common factor with n. The places (k step)
+// mod n for k = 0, 1, .. then visit all of 0 .. n - 1, and the first few of them, however many, are
+// spread evenly.
 int even_step(int n) {
   int step = static_cast<int>(0.6180339887498949 * n);
   for (;; ++step) {

@@ -60,8 +60,9 @@ inline void turn_ray0(const RayPairs& pairs, int i, const Mat3& R, double turned
 
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian);
 void set_ray(RayPairs& pairs, int view, int i, const double ray[3], const double jacobian[6]);
-// Call this after the last set_ray: it computes pixel_angle and `fast` from the rays. Only the
-// first num_scored matches take part in scoring; without num_scored, all do.
+// Call this after the last set_ray: it computes pixel_angle and `fast` from the rays. `fast` gets
+// the first num_scored matches, without num_scored all. msac_cost_fast scores pairs.num matches, so
+// pairs.num must be num_scored when it is called.
 void finish_rays(RayPairs& pairs);
 void finish_rays(RayPairs& pairs, int num_scored);
 

@@ -37,9 +37,9 @@ inline void epipolar(const RayPairs& p, int i, const Mat3& M, Epipolar* e) {
 }
 
 // If the cost of all matches is `bound` and the first `num` of `all` are drawn at random without
-// replacement, the cost of these is at most the returned sum with a probability of 98 per cent:
-// their mean plus two standard deviations, each at most that of a variable in [0, 1] with this
-// mean.
+// replacement, the cost of these is at most the returned sum with a probability of 98 per cent: the
+// expected sum plus two standard deviations, for which the largest is taken that costs in [0, 1]
+// with this mean can have.
 int64_t bound_of_first(int64_t bound, int num, int all) {
   const double mean = static_cast<double>(bound) / (static_cast<double>(all) * kCostOne);
   if (mean >= 1) return INT64_MAX;

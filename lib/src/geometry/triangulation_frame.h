@@ -44,7 +44,7 @@ inline void complete_basis(const Vec3& axis, Vec3* u, Vec3* v) {
 // ray, where a pixel is 1 / sqrt(fx fy) wide and high.
 struct RayFrame {
   Vec3 ray;         // scaled to depth 1: z = 1 on the image plane, unit length on the sphere
-  Vec3 rows[2];     // the vectors n of the two equations n . ray = 0
+  Vec3 rows[2];     // two vectors n orthogonal to the ray: n . X = 0 for its points X
   Vec3 basis[2];    // spans the plane of equal depth: -rows[i] . basis[j] = (i == j)
   Vec3 depth;       // the depth of a point X is depth . X
   double pixel[2];  // length of a pixel along basis[i]

@@ -70,13 +70,14 @@ void diagonalise(const double M[2][2], V2* turn_u, V2* turn_v, double s[2]) {
 //   r_i = 1 / (1 + mu m_i),        |mu| < 1 / s0,
 // and the constraint's derivative -sum b_i^2 r_i^3 has one sign there: a single root.
 struct Secular {
-  double c;  // not negative
+  double c;  // the constraint at the two pixels, with the sign that makes it positive or 0
   double b_sq[4];
   double m[4];  // m[0] = -singular[0] limits the range of mu
   double sum_sq;
 };
 
-// Newton's method from mu = 0. False when mu leaves the lower half of its range, or after 12 steps.
+// Newton's method from mu = 0. False when mu leaves the lower half of its range, [0, 1 / (2 s0)],
+// or after 12 steps.
 bool solve_small(const Secular& s, double* mu) {
   const double largest = -0.5 / s.m[0];  // infinite when both epipoles are at infinity
   double at = s.c / s.sum_sq;
@@ -504,7 +505,8 @@ V2 plane_of_least_distances(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) 
   };
   Plane middle = scaled_plane(pencil, alpha, normal_of(V2{along(0), along(1)}));
   for (int i = 0; i < 2; ++i) {
-    // Between own[1 - i] and the middle, the distance in image i is at least that at the middle.
+    // Between own[1 - i] and the middle, the distance in image i is at least that at the middle, so
+    // this half of the arc holds no better plane.
     if (distance(middle, i) >= best) continue;
     if (inner_product(own[1 - i], middle) < 0.0) turn_round(&middle);
     improve(own[1 - i], middle, arc_between(own[1 - i], middle), &best, &v);

@@ -17,7 +17,7 @@ namespace tv {
 struct EpipolarPencil {
   Vec3 axis[2][2];         // the axes of camera i, in its own frame
   double step[2][2][2];    // for camera i: d alpha[axis] / d (pixels along basis)
-  double turned[2][2][2];  // `step` after the turns that make step0^T [0 1; -1 0] step1 diagonal
+  double turned[2][2][2];  // `step` in bases turned so that step0^T [0 1; -1 0] step1 is diagonal
   double singular[2];      // entries of the diagonal matrix above, |singular[1]| <= singular[0]
 };
 

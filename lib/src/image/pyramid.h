@@ -37,7 +37,7 @@ inline double to_level(const Level& level, double x) { return to_level(level.sca
 // that made it.
 struct LevelBuffers {
   uint8_t* pixels[2];
-  uint16_t* sums;           // for each source column: the weighted sum of up to three pixels
+  uint16_t* sums;           // for each source column: its weighted sum over up to three rows
   int32_t* first;           // for each new column: its first source column
   int32_t* column_weights;  // for each new column: the weights of three source columns
 };
@@ -53,7 +53,8 @@ bool next_level(const tvk_table& kernels, const Level& level, double factor, int
 
 // The image halved zero or more times and blurred by the 3x3 binomial filter. Its rows are stored
 // in pairs: pairs[y (width + 1) + x] holds pixel (x, y) in the low byte and the pixel below it in
-// the high byte, each less 128 (kernel pair_rows).
+// the high byte, each less 128 (kernel pair_rows). The last row is paired with itself, and column
+// `width` repeats the one before it.
 struct Octave {
   const uint16_t* pairs;
   int32_t width, height;
