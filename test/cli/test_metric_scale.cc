@@ -78,7 +78,7 @@ void test_a_camera_before_the_body_moves_when_it_turns() {
   mount.position = {0.2, 0, 0};
   const auto scale = scale_by_velocity(circle(), 10, 12, mount);
   TEST_ASSERT_TRUE(scale.has_value());
-  // The camera moves from (0.2, 0) to (1, 1) + (0, 0.2).
+  // The camera, 0.2 m ahead of the drone's middle, moves from (0.2, 0) to (1, 1) + (0, 0.2).
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, std::hypot(0.8, 1.2), scale->baseline_m);
 }
 

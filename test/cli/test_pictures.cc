@@ -1,6 +1,6 @@
-// The pictures of a pair whose principal point the estimate corrected. Objects with destructors are
-// used only inside functions that return plain values, since Unity leaves a failing test by
-// longjmp, which skips destructors.
+// Where the estimate corrects the principal point, the program must draw the pair's pictures with
+// the corrected camera. Objects with destructors are used only inside functions that return plain
+// values, since Unity leaves a failing test by longjmp, which skips destructors.
 
 #include <array>
 #include <cmath>

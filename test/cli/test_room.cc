@@ -1,4 +1,4 @@
-// The rendered room: its pictures and depths agree with its poses.
+// The rendered room (tools/room): its pictures and depths must agree with its poses.
 #include <unity.h>
 
 #include <cmath>

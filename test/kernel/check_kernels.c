@@ -652,7 +652,8 @@ static int print_all_times(void) {
   return 0;
 }
 
-/* Checks every set that this machine runs, C first, and what tvk_select returns for each number. */
+/* tvk_nth lists the sets that this machine runs, C first and the fastest last; tvk_select
+   returns the fastest for TV_KERNELS_AUTO, a set by its number, or null. */
 static void test_the_sets_are_those_of_this_cpu(void) {
   int32_t n, set;
   const tvk_table *fastest = NULL;

@@ -1,6 +1,6 @@
 // Pairs for the tests of bundle adjustment: up to 5000 points, a start pose that differs from the
-// true one, and points triangulated with the start pose. Static storage throughout: a failing Unity
-// test leaves by longjmp.
+// true one, and points triangulated with the start pose. Storage is static throughout, since a
+// failing Unity test leaves by longjmp, which skips destructors.
 #ifndef TEST_SUPPORT_BUNDLE_SCENE_H
 #define TEST_SUPPORT_BUNDLE_SCENE_H
 

@@ -1,5 +1,6 @@
 // Helpers of the tests over many simulated pairs: a context for estimation alone, the number of
-// pairs, and the seed. Static storage: a failing Unity test leaves by longjmp.
+// pairs, and the seed. Storage is static, since a failing Unity test leaves by longjmp, which skips
+// destructors.
 #ifndef TEST_SUPPORT_ESTIMATOR_H
 #define TEST_SUPPORT_ESTIMATOR_H
 

@@ -1,5 +1,6 @@
 // Synthetic pairs for tests of the geometry; a motion is drawn again if both views see too few
-// common points. Static storage throughout, since a failing Unity test leaves by longjmp.
+// common points. Storage is static throughout, since a failing Unity test leaves by longjmp, which
+// skips destructors.
 #ifndef TEST_SUPPORT_SCENE_H
 #define TEST_SUPPORT_SCENE_H
 

@@ -1,4 +1,5 @@
-// Poses from essential matrices, essential matrices from poses, and cheirality.
+// Tests of geometry/essential.h: poses from essential matrices and back, bases, and the signs of
+// depths.
 #include <cmath>
 
 #include "geometry/essential.h"

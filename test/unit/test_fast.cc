@@ -71,7 +71,8 @@ void check_score_map(const tvk_table& kernels, const tv_image& image, int arc, i
   }
 }
 
-// The contrast continues the score below 0: the pixel is a corner at every t below its contrast.
+// The kernel fast_contrasts: a pixel is a corner at every threshold t below its contrast, and at no
+// other. Unlike the score (contrast - 1), a contrast may be 0 or negative.
 void check_contrasts(const tvk_table& kernels, const tv_image& image, int arc) {
   for (int y = 4; y < image.height - 4; y += 3) {
     for (int x = 4; x < image.width - 4; x += 3) {

@@ -82,7 +82,8 @@ void test_gradient_follows_differences_of_the_cost(void) {
   }
 }
 
-// The matrix is J'J of the residual R down0 - down1, with J by finite differences.
+// The matrix is noise^2 / (2 sigma^2) J'J, J the derivative of the residual R down0 - down1 by
+// finite differences.
 void test_matrix_follows_differences_of_the_residual(void) {
   tv::Random random = tv::random_seeded(22);
   constexpr double kStep = 1e-6, kNoise = 0.4;

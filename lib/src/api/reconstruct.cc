@@ -89,7 +89,7 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
 // views give the same rank. Only (i, j) and (j, i) with the same ratio have equal ranks.
 uint64_t rank_of(const tv_correspondence& m) {
   uint32_t ratio;
-  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // ratio >= 0: its bits have its order
+  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // ratios >= 0 have the order of their bits
   const bool ascending = m.idx0 < m.idx1;
   const uint32_t low = static_cast<uint32_t>(ascending ? m.idx0 : m.idx1);
   const uint32_t high = static_cast<uint32_t>(ascending ? m.idx1 : m.idx0);

@@ -122,7 +122,7 @@ Vec3 solve(tv_triangulation method, const TriangulationPair& pair, const Match& 
   }
 }
 
-// Whether the kernel supports this method and these cameras.
+// Whether the kernel `triangulate` supports this method and these cameras.
 bool in_lanes(tv_triangulation method, const TriangulationPair& pair) {
   return (method == TV_TRIANGULATION_MIDPOINT || method == TV_TRIANGULATION_LINEAR_LS ||
           method == TV_TRIANGULATION_ITERATIVE_LS) &&
