@@ -40,9 +40,10 @@ tv::Level noise_image(uint64_t* seed, int width, int height, int stride) {
   return tv::Level{pixels, width, height, stride, 1.0};
 }
 
-// The weights are multiples of 1/256 along each axis. The weights of a pixel sum to 1 and each is
-// wrong by at most 1/256, so an axis adds at most 255/256 (with three pixels one weight is rounded
-// by 0.5/256 twice); rounding the result adds 0.5.
+// In grey levels. The weights are multiples of 1/256 along each axis, and those of a pixel sum to
+// 1. Rounding them moves at most 1/256 of the weight (0.5/256 twice with three pixels) from one
+// pixel to others, whose grey levels differ by at most 255: an error of up to 255/256 for each
+// axis. Rounding the result adds 0.5.
 constexpr double kMaxAverageError = 2 * 255.0 / 256.0 + 0.5;
 
 void check_level(const tvk_table& kernels, uint64_t* seed, int width, int height, double factor) {

@@ -78,7 +78,7 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
     if (used[2 * m.idx0] == 0 && used[2 * m.idx1 + 1] == 0) found[num_new++] = m;
   }
   int32_t a = num_matches - 1, b = num_new - 1;
-  // From the end, because `found` also receives the result.
+  // The merge runs from the end, because `found` is an input and receives the result.
   for (int32_t k = num_matches + num_new - 1; a >= 0; --k) {
     found[k] = b >= 0 && found[b].idx0 > matches[a].idx0 ? found[b--] : matches[a--];
   }

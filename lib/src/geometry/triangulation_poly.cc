@@ -505,8 +505,8 @@ V2 plane_of_least_distances(const EpipolarPencil& pencil, V2 alpha0, V2 alpha1) 
   };
   Plane middle = scaled_plane(pencil, alpha, normal_of(V2{along(0), along(1)}));
   for (int i = 0; i < 2; ++i) {
-    // Between own[1 - i] and the middle, the distance in image i is at least that at the middle, so
-    // this half of the arc holds no better plane.
+    // Between the plane of pixel 1 - i and the middle, the distance in image i is at least that at
+    // the middle. If this is `best` or more, that half of the arc holds no better plane.
     if (distance(middle, i) >= best) continue;
     if (inner_product(own[1 - i], middle) < 0.0) turn_round(&middle);
     improve(own[1 - i], middle, arc_between(own[1 - i], middle), &best, &v);
