@@ -98,7 +98,7 @@ double difference(const cv::Mat& a, const cv::Mat& b) {
   return static_cast<double>(cv::countNonZero(samples > 60)) / static_cast<double>(samples.total());
 }
 
-// How much the picture drawn from cameras differs from the one drawn from F.
+// `difference` of the picture drawn from cameras and the one drawn from F: a share from 0 to 1.
 double difference_from(double cx, double cy) { return difference(by_rays(), by_F(cx, cy)); }
 
 void test_epipolar_lines_and_epipoles_are_of_the_corrected_camera() {

@@ -194,8 +194,8 @@ void test_degenerate_points_end_and_give_no_pose(void) {
   }
 }
 
-// The share of poses, over scenes with fresh noise, that lie within the covariance's 90 %
-// ellipsoid.
+// Over scenes with fresh noise, more than seven true poses in ten must lie within the 90 %
+// ellipsoid of the estimate's covariance.
 void test_covariance_covers_the_error(void) {
   using Mat5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
   int inside = 0, total = 0;

@@ -27,7 +27,7 @@ enum Kind {
   kTooFew,        // as kGeneral, but only 0 to 12 matches in all
   kSecondMotion,  // as kGeneral, but 30 per cent of the true matches lie on an object that moves by
                   // itself
-  kLattice,       // as kGeneral, with a wall of equal cells; half of the wall is matched one or two
+  kLattice,       // as kGeneral, with a wall of equal cells, about half of it matched one or two
                   // cells off, away from the epipolar lines: along these lines two views cannot
                   // show that a match is wrong
   // Two kinds that no verdict names, in which a view shows the scene smaller than the other:
