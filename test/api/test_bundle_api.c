@@ -17,8 +17,8 @@ static tv_bundle_result result, start_result;
 static double covariances[9 * NUM_POINTS + 1];
 static api_context a;
 
-/* Twenty points at depths of 2 to 5, with a baseline of 2; pixels are rounded to multiples of
-   0.5, which is the noise. */
+/* Twenty points at depths of 4 to 10, which are about 2 to 5 baselines; pixels are rounded down
+   to multiples of 0.5, which is the noise. */
 void setUp(void) {
   uint64_t seed = 1;
   int i, k;

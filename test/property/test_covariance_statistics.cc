@@ -1,8 +1,8 @@
 // The share of simulated pairs whose true pose lies within the covariance's 95 per cent ellipsoid,
-// for each class of motion. Noise of 0.5 px, 100 to 400 matches, up to 30 per cent
-// of them wrong, three lenses (support/pair_kinds.h).
-// TWOVIEW_PAIRS: pairs of each class, default 300; scripts/statistics takes 10000. TWOVIEW_SEED
-// selects other pairs.
+// for each class of motion. Noise of 0.5 px, 100 to 400 matches, up to 30 per cent of them wrong,
+// three lenses (support/pair_kinds.h). TWOVIEW_PAIRS: pairs of each class, default 300;
+// scripts/statistics takes 10000. TWOVIEW_SEED selects other pairs, TWOVIEW_KIND=K takes class
+// number K only.
 #include <Eigen/Cholesky>
 #include <cstdlib>
 

@@ -25,8 +25,8 @@ int num_pairs = 300;
 api_context api;
 scene::Scene pair;
 
-// Pairs whose turn and parallax determine the principal point: a turn of 0.2 to 0.5 rad, depths of
-// 2 to 8 baselines.
+// Pairs with a turn of 0.02 to 0.2 rad and distances of 2 to 8 baselines (support/scene.h); the
+// larger turns determine the principal point.
 void make_pair(int k, int num, const tv_camera& camera0, const tv_camera& camera1) {
   scene::Options options;
   options.num = num;

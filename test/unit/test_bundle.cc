@@ -246,8 +246,8 @@ void test_the_cost_never_rises_and_the_answer_is_closer() {
   }
 }
 
-// Half of the points are so far away that noise decides whether their two rays converge or diverge
-// (meet behind the cameras).
+// Half of the points are at infinity, so that noise decides whether their two rays converge or
+// diverge (meet behind the cameras).
 void test_points_at_and_beyond_infinity_take_part() {
   Options options;
   options.seed = ++seed;

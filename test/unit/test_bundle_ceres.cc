@@ -60,7 +60,8 @@ bool is_ahead(const tv_camera& camera, const T& z) {
   return camera.model == TV_CAMERA_KANNALA_BRANDT || z > 0.0;
 }
 
-// Whether point i takes part in the adjustment: it is OK and in front of the cameras at the start.
+// Whether point i takes part in the adjustment: its status is OK and both cameras see it at the
+// start.
 bool is_seen(const Scene& s, int i) {
   if (s.start[i].status != TV_POINT_OK) return false;
   const double* X = s.start[i].position;

@@ -387,7 +387,7 @@ static void test_a_keypoint_outside_the_lens_is_not_matched(void) {
   tv_camera camera = make_camera(TV_CAMERA_BROWN_CONRADY);
   const double E[9] = {0, 0, 0, 0, 0, -1, 0, 1, 0};
   problem p;
-  /* With k1 alone, the lens's valid region ends 520 pixels from the centre. */
+  /* With k1 alone, the lens's valid region ends 346 pixels from the centre (520 undistorted). */
   camera.k[1] = camera.k[2] = camera.k[3] = 0;
   camera.cy = 0; /* both pixels lie on the same epipolar line, the row y = 0 */
   p = make_problem(&camera, &camera, E);
