@@ -198,8 +198,8 @@ static void test_a_log_is_an_imu_source(void) {
   TEST_ASSERT_EQUAL_INT(TVS_ERR_IO, ardrone_log_open(&log, "/nowhere/at/all", &source));
 }
 
-/* The recording is cut shorter and shorter: the counts never exceed those of the whole, and the
-   decoder refuses no picture. */
+/* The recording is cut shorter and shorter: the counts never rise from one cut to the next, and
+   the decoder refuses no picture. */
 static void test_a_recording_cut_at_any_byte(void) {
   long video = length_of("video.pave"), navdata = length_of("navdata.log");
   int frames_before = num_recorded_packets, navdata_before = num_recorded_navdata;

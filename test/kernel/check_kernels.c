@@ -340,8 +340,9 @@ static void case_squared_distances(trial *t) {
   REPEAT(t, t->set->squared_distances(query, rows, indices, count, out));
 }
 
-/* Rays near the axis, with slopes of a lens whose focal length is about 500 pixels; in a few
-   trials one match is extreme. */
+/* Rays near the axis, with slopes of a lens whose focal length is about 500 pixels. In three of
+   four trials entries are extreme: one of each array is 1e60 times as large, or one of each is
+   0, or all are 0. */
 static void fill_matches(trial *t, double *const *arrays, int32_t n, int32_t on_plane) {
   const int32_t extreme = random_int(&t->seed, 0, 3);
   int32_t a, i;
