@@ -296,8 +296,8 @@ void test_few_matches_give_a_pose_of_the_right_size_of_error(void) {
 }
 
 // Cauchy's loss at 1.5 sigma has a variance of 1.15 times the bound, and chance may add another 5
-// per cent. The scatter of 300 residuals is 0.1; the limits below are four times
-// that away.
+// per cent: the ratio is near 1.2. With 300 residuals it scatters by 0.1; the limits below are four
+// times 0.1 away from it.
 void test_the_covariance_is_near_the_bound(void) {
   tv::Random random = tv::random_seeded(kSeed);
   Kind k = kind(kGeneral);
