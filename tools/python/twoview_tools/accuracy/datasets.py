@@ -218,3 +218,10 @@ class Set:
         """The smallest (width, height) that contains every image of the pairs."""
         shapes = [self.gray(n)[0].shape for p in self.pairs for n in (p.name0, p.name1)]
         return max(s[1] for s in shapes), max(s[0] for s in shapes)
+
+
+@functools.lru_cache(maxsize=2)
+def load(set_dir, flagged, max_pairs):
+    """A Set, the last two of which stay in memory with their images: for a process that gets one
+    piece of work after another."""
+    return Set(set_dir, flagged=flagged, max_pairs=max_pairs)

@@ -28,7 +28,6 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set bef
     os.environ.setdefault(_name, "1")
 
 import argparse
-import concurrent.futures
 import functools
 import hashlib
 import itertools
@@ -37,7 +36,8 @@ import sys
 
 import numpy as np
 
-from . import datasets, leaveout, metrics, peers, pipeline, tables, twoview_ctypes
+from . import (datasets, leaveout, metrics, parallel, peers, pipeline, tables,
+               twoview_ctypes)
 
 STAGES = ("feature", "match", "estimate")
 CACHE_FORMAT = 1  # increase it if a change here or in pipeline.py changes results
@@ -125,11 +125,6 @@ def file_hash(path):
         return hashlib.sha256(f.read()).hexdigest()
 
 
-@functools.lru_cache(maxsize=2)
-def _set(path, flagged, max_pairs):
-    return datasets.Set(path, flagged=flagged, max_pairs=max_pairs)
-
-
 @functools.lru_cache(maxsize=1)
 def _library(path):
     library = twoview_ctypes.Library(path)
@@ -208,7 +203,7 @@ def evaluate_points(data, library, library_hash, points, folder, use_cache=True)
 
 def _run(job):
     path, flagged, max_pairs, library_path, points, folder, use_cache = job
-    data = _set(path, flagged, max_pairs)
+    data = datasets.load(path, flagged, max_pairs)
     library, library_hash = _library(library_path)
     try:
         rows = evaluate_points(data, library, library_hash, points, folder, use_cache)
@@ -236,11 +231,7 @@ def evaluate(names, points, library_path=None, flagged=True, max_pairs=None, job
                 found[name][i] = part
             report(done, len(work))
 
-    if jobs > 1:
-        with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
-            collect(pool.map(_run, work))
-    else:
-        collect(map(_run, work))
+    collect(parallel.run(_run, work, jobs))
     return found
 
 

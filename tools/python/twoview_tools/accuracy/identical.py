@@ -122,14 +122,14 @@ def _row(data, pair, matches, seed, line):
 
 def sift_matches(data, use_cache=True):
     """OpenCV's RootSIFT matches of a set, in the form of pipeline.match_pairs."""
-    peer = peers.Peer(peers.GROUPS["poselib"][0], use_cache=False)
+    peer = peers.Peer({**peers.SIFT, "estimator": "poselib"}, use_cache=False)
     keys = [peer.pair_key(data, pair) for pair in data.pairs]
     name = hashlib.sha256("".join(keys).encode()).hexdigest()[:16]
     path = os.path.join(peers.CACHE_DIR, f"matches-{data.name}-{name}.npz")
     if not (use_cache and os.path.isfile(path)):
-        arrays, features = {}, {}
+        arrays, shared = {}, {}
         for i, pair in enumerate(data.pairs):
-            m, extract_ms, match_ms, keypoints = peer.matches(data, pair, features)
+            m, extract_ms, match_ms, keypoints = peer.matches(data, pair, shared)
             arrays.update({f"{i}_0": m.pixels0, f"{i}_1": m.pixels1, f"{i}_ratios": m.ratios,
                            f"{i}_stage": np.array([extract_ms, match_ms, keypoints])})
         os.makedirs(peers.CACHE_DIR, exist_ok=True)

@@ -34,10 +34,11 @@ def match_features(context, features0, features1, match_options=None):
     return links, 1e3 * (time.perf_counter() - start)
 
 
-def linked_pixels(features0, features1, links):
-    """The matched pixels of both images, each n x 2."""
-    return [np.column_stack([f[0]["x"], f[0]["y"]])[links[i]].astype(float)
-            for f, i in ((features0, "idx0"), (features1, "idx1"))]
+def make_matches(features0, features1, links, cameras, sizes):
+    """The estimators.Matches of two images' (keypoints, descriptors, ms)."""
+    pixels = [np.column_stack([f[0]["x"], f[0]["y"]])[links[i]].astype(float)
+              for f, i in ((features0, "idx0"), (features1, "idx1"))]
+    return estimators.Matches(*pixels, cameras, sizes, links["ratio"].copy())
 
 
 def match_pairs(context, data, feature_options=None, match_options=None, features=None):
@@ -52,9 +53,7 @@ def match_pairs(context, data, feature_options=None, match_options=None, feature
         both = features[pair.name0], features[pair.name1]
         links, match_ms = match_features(context, *both, match_options)
         sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
-        matches = estimators.Matches(*linked_pixels(*both, links),
-                                     (data.camera(pair, 0), data.camera(pair, 1)), sizes,
-                                     links["ratio"].copy())
+        matches = make_matches(*both, links, (data.camera(pair, 0), data.camera(pair, 1)), sizes)
         found.append((matches, {"extract": both[0][2] + both[1][2], "match": match_ms,
                                 "keypoints": (len(both[0][0]) + len(both[1][0])) / 2}))
     return found
