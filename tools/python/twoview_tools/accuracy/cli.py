@@ -18,8 +18,8 @@ import numpy as np
 
 from . import (datasets, estimators, grid, homography, identical, metrics, peers, pipeline,
                robust500, targets, verdicts)
-from .tables import (MIN_PAIRS, OURS, machine, mean_summary, print_table, progress, runs_of, say,
-                    summarise)
+from .tables import (MIN_PAIRS, OURS, machine, mean_summary, print_means, print_table, progress,
+                    runs_of, say, summarise)
 
 PROGRAM = os.path.join(datasets.ROOT, "build", "release", "bin", "twoview")
 PEERS = "sift,poselib,colmap"
@@ -103,18 +103,6 @@ def print_comparison(peer, compared, sizes):
 
 # ---- whole pipelines ---------------------------------------------------------------------------
 
-def print_means(sets, summaries, names):
-    """Prints and returns the tables of each group, and of the mean of the groups."""
-    groups = datasets.by_group([data.name for data in sets])
-    means = {group: {n: mean_summary([summaries[member][n] for member in members])
-                     for n in names} for group, members in groups.items()}
-    for group, members in groups.items():
-        print_table(f"group {group}: mean over {len(members)} sets", means[group])
-    means["mean"] = {n: mean_summary([means[group][n] for group in groups]) for n in names}
-    print_table("mean of the groups " + " and ".join(groups), means["mean"])
-    return means
-
-
 def compare_pipelines(arguments, sets):
     families = [name for name in arguments.peers.split(",") if name]
     for name in families:
@@ -151,7 +139,7 @@ def compare_pipelines(arguments, sets):
                     say(f"  note: the program's own AUC{t} is "
                         f"{reports[data.name]['auc'][t]:.3f}, from its pairs {value:.3f}")
     names = [OURS] + [peer.name for peer in systems]
-    means = print_means(sets, summaries, names)
+    means = print_means(summaries, names)
     say("\nmatches: mean; ms: median of a pair, one thread; fail: pairs without a pose.\n"
         f"Peers: mean over {arguments.seeds} seeds that shuffle the matches; their gradient "
         "orientation and\nmatching run in numpy, so their ms are no measure of OpenCV's speed: "
@@ -172,7 +160,9 @@ def compare_pipelines(arguments, sets):
     say()
     for reached, sentence in judged:
         say(f"{'' if reached is None else 'reached' if reached else 'NOT REACHED':<12}{sentence}")
-    return {"mode": "pipelines", "sets": summaries, "means": means, "comparisons": comparisons,
+    return {"mode": "pipelines", "sets": summaries, "means": means,
+            "mean": {n: mean_summary([summaries[d.name][n] for d in sets]) for n in names},
+            "comparisons": comparisons,
             "targets": judged, "worse": [text for ok, text in judged if ok is False],
             "reports": reports, "pairs": rows, "chosen": chosen,
             "peers": {peer.name: peer.key for peer in systems}}

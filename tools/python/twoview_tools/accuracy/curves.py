@@ -74,7 +74,7 @@ def draw(summary, picture):
             axis.minorticks_off()
         else:
             axis.set_xticks([0.75, 0.8, 0.85, 0.9, 0.95])
-    axes[0].set_ylabel("mean over sets")
+    axes[0].set_ylabel("mean of the groups")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     figure.savefig(picture, dpi=120)
 
