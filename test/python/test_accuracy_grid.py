@@ -1,5 +1,5 @@
-"""Tests of twoview_tools.accuracy.leaveout and grid: the choice never sees the set that is left out,
-and a grid evaluates every point once."""
+"""Tests of twoview_tools.accuracy.leaveout and grid: the choice never sees the set that is left
+out, and a grid evaluates every point once."""
 
 import copy
 import tempfile

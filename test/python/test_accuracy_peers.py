@@ -74,6 +74,24 @@ class TestFrontEnd(unittest.TestCase):
         self.assertTrue((ratios < peers.RATIO).all())
 
 
+    def test_colmaps_matches_at_any_ratio_are_those_of_its_own_matcher(self):
+        try:
+            estimators.module_version("pycolmap")
+        except ImportError:
+            self.skipTest("no pycolmap")
+        gray = texture(9, 240)
+        other = cv2.addWeighted(np.roll(gray, 5, axis=1), 0.7, texture(10, 240), 0.3, 0)
+        f0, f1 = (peers.extract(g, peers.COLMAP)[1] for g in (gray, other))
+        index0, index1, ratios = peers.match_angles(f0, f1)
+        counts = []
+        for ratio in (0.7, 0.8, 0.9):
+            i0, i1, _ = peers.match_pycolmap(f0, f1, ratio)
+            keep = ratios < ratio
+            self.assertEqual(set(zip(index0[keep], index1[keep])), set(zip(i0, i1)))
+            counts.append(len(i0))
+        self.assertTrue(20 < counts[0] < counts[1] < counts[2], counts)
+
+
 class TestEstimators(unittest.TestCase):
     def test_every_installed_peer_finds_an_exact_pose_through_two_lenses(self):
         random = np.random.default_rng(4)

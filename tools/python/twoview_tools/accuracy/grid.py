@@ -274,8 +274,8 @@ def print_left_out(points, table, sizes, found):
     say = tables.say
     width = max([len(name) for name in table] + [18])
     say("\nleave one set out: AUC5 / 10 / 20")
-    say(f"  {'':<{width}} {'n':>4}  {'left out':<18}  {'tuned':<18}  {'change':>6}  point chosen on "
-        "the other sets")
+    say(f"  {'':<{width}} {'n':>4}  {'left out':<18}  {'tuned':<18}  {'change':>6}  "
+        "point chosen on the other sets")
     for name, s in found["sets"].items():
         change = float(np.mean(s["left_out"] - s["tuned"]))
         say(f"  {name:<{width}} {sizes[name]:>4}  {three(s['left_out'])}  {three(s['tuned'])}  "

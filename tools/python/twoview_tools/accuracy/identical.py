@@ -299,4 +299,5 @@ def compare_source(arguments, sets, library, systems, source):
                 for d in c["group_mean"].values()))
     mean = {n: tables.mean_summary([part[n] for part in summaries.values()])
             for n in summaries[sets[0].name]}
-    return {"mean": mean, "means": means, "best_px": best, "verdicts": verdicts, "comparisons": compared}
+    return {"mean": mean, "means": means, "best_px": best, "verdicts": verdicts,
+            "comparisons": compared}

@@ -1,7 +1,7 @@
 """Leave-one-set-out: for each set the options are chosen by their scores on the other sets.
 
-A table is {set: array of points x AUC5, AUC10, AUC20}; a point is one choice of all options. Nothing
-here reads an image, so that the choice itself can be tested on made-up scores.
+A table is {set: array of points x AUC5, AUC10, AUC20}; a point is one choice of all options.
+Nothing here reads an image, so that the choice itself can be tested on made-up scores.
 """
 
 import numpy as np
@@ -30,8 +30,8 @@ def choose(table, sets=None):
 
 
 def leave_one_out(table):
-    """Returns {"tuned": the point chosen on all sets, "sets": {set: {"point", "left_out", "tuned"}},
-    "left_out_mean", "tuned_mean": the AUC by mean_of_groups, "difference": the mean of the three
+    """Returns {"tuned": the point chosen on all sets,
+    "sets": {set: {"point", "left_out", "tuned"}}, "left_out_mean", "tuned_mean": the AUC by mean_of_groups, "difference": the mean of the three
     AUC, left out minus tuned, "worst": the set that loses most}. A set's own scores are not read
     when its point is chosen. At least two sets."""
     if len(table) < 2:

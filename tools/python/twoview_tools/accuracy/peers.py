@@ -202,6 +202,25 @@ def match_pycolmap(features0, features1, ratio=RATIO):
     return found[:, 0], found[:, 1], None
 
 
+def match_angles(features0, features1):
+    """(idx0, idx1, ratio) as COLMAP's matcher finds them, but for the ratio test: mutual nearest
+    neighbours by the angle between descriptors, at most 0.7 rad; the ratio is the larger of both
+    directions'. Those with a ratio below r are what match_pycolmap returns for r, in a tenth of its
+    time (a test compares both)."""
+    d0, d1 = (np.asarray(f[1].data).astype(np.float32) for f in (features0, features1))
+    if len(d0) < 2 or len(d1) < 2:
+        return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
+    angles = np.arccos(np.clip((d0 @ d1.T) / np.float32(512.0**2), 0, 1))
+    nearest, back = angles.argmin(axis=1), angles.argmin(axis=0)
+    index = np.nonzero(back[nearest] == np.arange(len(d0)))[0]
+    other = nearest[index]
+    first = angles[index, other]
+    angles[index, other] = np.inf  # of a mutual pair, the nearest in its row and in its column
+    second = np.minimum(angles[index].min(axis=1), angles[:, other].min(axis=0))
+    keep = first <= 0.7
+    return index[keep], other[keep], (first / np.maximum(second, 1e-30))[keep]
+
+
 # ---- rows -------------------------------------------------------------------------------------
 
 class Peer:
@@ -269,15 +288,13 @@ class Peer:
         ((points0, d0), ms0), ((points1, d1), ms1) = features[pair.name0], features[pair.name1]
         colmap = self.config["front"] == "pycolmap"
         links = shared.setdefault("links", {})
-        key = (pair.text, self.ratio if colmap else None)
-        if key not in links:  # ours are found once without a ratio test, and serve every ratio
+        if pair.text not in links:  # found once without a ratio test; they serve every ratio
             start = time.perf_counter()
-            found = match_pycolmap(d0, d1, self.ratio) if colmap else match(d0, d1, 1.0)
-            links[key] = found, 1e3 * (time.perf_counter() - start)
-        (index0, index1, ratios), match_ms = links[key]
-        if ratios is not None:
-            keep = ratios < self.ratio
-            index0, index1, ratios = index0[keep], index1[keep], ratios[keep]
+            found = match_angles(d0, d1) if colmap else match(d0, d1, 1.0)
+            links[pair.text] = found, 1e3 * (time.perf_counter() - start)
+        (index0, index1, ratios), match_ms = links[pair.text]
+        keep = ratios < self.ratio
+        index0, index1, ratios = index0[keep], index1[keep], ratios[keep]
         sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
         found = estimators.Matches(points0[index0], points1[index1],
                                    (data.camera(pair, 0), data.camera(pair, 1)), sizes, ratios)
@@ -300,7 +317,7 @@ class Peer:
         return rows
 
 
-# ---- the best options of a peer --------------------------------------------------------------------
+# ---- the best options of a peer ------------------------------------------------------------------
 
 def options_of(family, best, cap=CAP):
     """[(config, ratio, threshold_px)] of a family; only the usual options unless `best`."""
