@@ -223,7 +223,7 @@ def evaluate(names, points, library_path=None, flagged=True, max_pairs=None, job
     work = [(os.path.join(datasets.data_dir(), name), flagged, max_pairs, library_path, part,
              folder, use_cache) for name in names for part in by_feature.values()]
     found = {name: [None] * len(points) for name in names}
-    report = tables.progress("grid")
+    report = tables.progress("grid", log=True)
 
     def collect(results):
         for done, (name, rows) in enumerate(results, 1):

@@ -351,7 +351,7 @@ def evaluate(options, sets, num_seeds, use_cache=True, jobs=1):
                          [options[i] for i in indices]))
             places.append((data.name, indices))
     found = [{} for _ in options]
-    report = tables.progress("peers")
+    report = tables.progress(options[0][0]["estimator"], log=True)
     for done, ((name, indices), parts) in enumerate(
             zip(places, parallel.run(_run_front, work, jobs)), 1):
         for i, rows in zip(indices, parts):

@@ -16,11 +16,15 @@ def say(text="", end="\n"):
     print(text, end=end, flush=True)
 
 
-def progress(name):
+def progress(name, log=False):
+    """A function of (done, total) that shows a counter on a terminal. log: where stderr is a file
+    it gets a line at every tenth."""
     def report(done, total):
         if sys.stderr.isatty():
             print(f"\r  {name}: {done}/{total}  ", end="" if done < total else "\r\033[K",
                   file=sys.stderr, flush=True)
+        elif log and 10 * done // total > 10 * (done - 1) // total:
+            print(f"{name}: {done}/{total}", file=sys.stderr, flush=True)
     return report
 
 

@@ -127,7 +127,7 @@ def _run_related(job):
 
 
 def _gather(function, work, jobs, title):
-    rows, report = [], tables.progress(title)
+    rows, report = [], tables.progress(title, log=True)
     for done, part in enumerate(parallel.run(function, work, jobs), 1):
         rows += part
         report(done, len(work))
