@@ -297,6 +297,19 @@ def print_left_out(points, table, sizes, found):
     return reached
 
 
+def print_gain(points, rows, chosen):
+    """Prints the chosen point minus the first one, with the standard error of a paired
+    bootstrap. These are tuned scores."""
+    errors = lambda name, point: [[r["pose_error_deg"] for r in rows[name][point]]]
+    compared = metrics.paired_bootstrap(
+        {name: (errors(name, chosen), errors(name, 0)) for name in rows},
+        groups=datasets.by_group(list(rows)))
+    tables.say(f"\npoint {chosen} minus point 0 ({title(points[0])}), tuned: AUC5, AUC10, AUC20")
+    for name, differences in [*compared["groups"].items(), ("mean", compared["group_mean"])]:
+        tables.say(f"  {name:<8} " + "  ".join(
+            f"{d['difference']:+6.2f} ±{d['standard_error']:5.2f}" for d in differences.values()))
+
+
 # ---- the command ---------------------------------------------------------------------------------
 
 def main(argv=None):
@@ -347,6 +360,8 @@ def main(argv=None):
     if len(names) > 1:
         found = leaveout.leave_one_out(table)
         reached = print_left_out(points, table, sizes, found)
+        if found["tuned"]:
+            print_gain(points, rows, found["tuned"])
         result["left_out"] = {
             **found, "left_out_mean": found["left_out_mean"].tolist(),
             "tuned_mean": found["tuned_mean"].tolist(),
