@@ -39,9 +39,23 @@ class TestResize(unittest.TestCase):
         self.assertEqual(datasets.resized_shape(1536, 1024, 0), (1536, 1024))
 
     def test_leaves_kitti_alone_and_shrinks_strecha_and_bicycle(self):
-        self.assertEqual(datasets.default_resize(1241), 0)
-        self.assertEqual(datasets.default_resize(1536), 640)
-        self.assertEqual(datasets.default_resize(1426), 640)
+        self.assertEqual(datasets.default_resize(1241, 376), 0)
+        self.assertEqual(datasets.default_resize(1536, 1024), 640)
+        self.assertEqual(datasets.default_resize(1426, 1000), 640)
+
+    def test_shrinks_tall_images_too(self):
+        self.assertEqual(datasets.default_resize(720, 1280), 640)  # fox_wall
+        self.assertEqual(datasets.default_resize(1280, 720), 640)
+        self.assertEqual(datasets.default_resize(376, 1241), 0)
+
+
+class TestGroups(unittest.TestCase):
+    def test_the_wide_sets_are_named_and_every_other_set_is_narrow(self):
+        names = ["tankard", "kitti00_turn", "middlebury_dinoSR", "middlebury_bicycle", "another"]
+        self.assertEqual(datasets.by_group(names),
+                         {"narrow": ["kitti00_turn", "middlebury_bicycle", "another"],
+                          "wide": ["tankard", "middlebury_dinoSR"]})
+        self.assertEqual(datasets.by_group(["pc_room"]), {"wide": ["pc_room"]})
 
 
 class TestMeasurable(unittest.TestCase):

@@ -129,6 +129,26 @@ class TestBootstrap(unittest.TestCase):
         self.assertAlmostEqual(found["mean"]["5"]["difference"], 50.0)
         self.assertAlmostEqual(found["pooled"]["5"]["difference"], 10.0)
 
+    def test_groups_weigh_the_same_whatever_their_sizes(self):
+        exact, failed = [[0.0] * 4], [[math.inf] * 4]
+        sets = {"a": (exact, failed), "b": (exact, exact), "c": (exact, exact),
+                "d": (failed, exact)}
+        found = metrics.paired_bootstrap(sets, 100, groups={"x": ["a"], "y": ["b", "c", "d"]})
+        self.assertAlmostEqual(found["groups"]["x"]["5"]["difference"], 100.0)
+        self.assertAlmostEqual(found["groups"]["y"]["5"]["difference"], -100.0 / 3)
+        self.assertAlmostEqual(found["group_mean"]["5"]["difference"], 100.0 / 3)
+        self.assertAlmostEqual(found["mean"]["5"]["difference"], 0.0)
+
+    def test_a_group_has_the_standard_error_of_the_mean_of_its_sets(self):
+        # As above, 5 for each of two independent sets: 5 / sqrt(2) for their mean.
+        num = 100
+        half = [0.0 if i % 2 else math.inf for i in range(num)]
+        sets = {name: ([[math.inf] * num], [half]) for name in "ab"}
+        found = metrics.paired_bootstrap(sets, 4000, groups={"x": ["a", "b"]})
+        summary = found["groups"]["x"]["10"]
+        self.assertAlmostEqual(summary["difference"], -50.0)
+        self.assertAlmostEqual(summary["standard_error"], 5.0 / math.sqrt(2), delta=0.2)
+
     def test_averages_over_the_peers_seeds(self):
         found = metrics.paired_bootstrap({"a": ([[0.0] * 4], [[0.0] * 4, [math.inf] * 4])}, 100)
         self.assertAlmostEqual(found["sets"]["a"]["20"]["difference"], 50.0)

@@ -3,6 +3,7 @@
 import os
 import tempfile
 import unittest
+from unittest import mock
 
 try:
     import cv2
@@ -38,7 +39,7 @@ class TestFrontEnd(unittest.TestCase):
         turned = np.ascontiguousarray(np.rot90(gray))  # (x, y) moves to (y, width - 1 - x)
         shares = {}
         for orientation in ("upright", "gradient"):
-            config = {**peers.GROUPS["fast"][0], "orientation": orientation}
+            config = {**peers.FAST, "orientation": orientation}
             (p0, d0), (p1, d1) = (peers.extract(g, config) for g in (gray, turned))
             i0, i1, _ = peers.match(d0, d1)
             where = np.column_stack([p0[i0, 1], gray.shape[1] - 1 - p0[i0, 0]])
@@ -71,6 +72,24 @@ class TestFrontEnd(unittest.TestCase):
         self.assertEqual(list(i0), list(range(1, 10)))
         self.assertEqual(list(i1), list(range(1, 10)))
         self.assertTrue((ratios < peers.RATIO).all())
+
+
+    def test_colmaps_matches_at_any_ratio_are_those_of_its_own_matcher(self):
+        try:
+            estimators.module_version("pycolmap")
+        except ImportError:
+            self.skipTest("no pycolmap")
+        gray = texture(9, 240)
+        other = cv2.addWeighted(np.roll(gray, 5, axis=1), 0.7, texture(10, 240), 0.3, 0)
+        f0, f1 = (peers.extract(g, peers.COLMAP)[1] for g in (gray, other))
+        index0, index1, ratios = peers.match_angles(f0, f1)
+        counts = []
+        for ratio in (0.7, 0.8, 0.9):
+            i0, i1, _ = peers.match_pycolmap(f0, f1, ratio)
+            keep = ratios < ratio
+            self.assertEqual(set(zip(index0[keep], index1[keep])), set(zip(i0, i1)))
+            counts.append(len(i0))
+        self.assertTrue(20 < counts[0] < counts[1] < counts[2], counts)
 
 
 class TestEstimators(unittest.TestCase):
@@ -125,7 +144,7 @@ class TestCache(unittest.TestCase):
                 f.write(f"a.png b.png 0 0 {K} {K} 1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1\n")
             kept, peers.CACHE_DIR = peers.CACHE_DIR, os.path.join(folder, "cache")
             self.addCleanup(setattr, peers, "CACHE_DIR", kept)
-            peer = peers.Peer(peers.GROUPS["fast"][0], num_seeds=2)
+            peer = peers.Peer({**peers.FAST, "estimator": "magsac"}, num_seeds=2)
             first = peer.run(datasets.Set(folder))
             self.assertEqual(len(first), 2)
             original = peers.extract
@@ -135,6 +154,49 @@ class TestCache(unittest.TestCase):
             cv2.imwrite(os.path.join(images, "b.png"), np.roll(gray, 5, axis=1))
             with self.assertRaises(TypeError):  # a changed image is not in the cache
                 peer.run(datasets.Set(folder))
+
+
+class TestBestOptions(unittest.TestCase):
+    def test_every_combination_is_tried_and_the_usual_one_is_among_them(self):
+        options = peers.options_of("poselib", True)
+        self.assertEqual(len(options), 2 * len(peers.RATIOS) * len(peers.THRESHOLDS_PX))
+        usual, = peers.options_of("poselib", False)
+        self.assertEqual(options.count(usual), 1)
+        self.assertEqual(usual, ({**peers.SIFT, "estimator": "poselib"}, 0.8, 1.0))
+        self.assertEqual(peers.options_of("colmap", False, 4096)[0][0]["cap"], 4096)
+
+    def test_the_best_is_chosen_over_both_groups_alike(self):
+        rows = lambda error: [{"seed": 0, "pose_error_deg": error}]
+        found = [{"kitti00_turn": rows(1.0), "pc_room": rows(9.0), "tankard": rows(9.0)},
+                 {"kitti00_turn": rows(6.0), "pc_room": rows(6.0), "tankard": rows(6.0)},
+                 {"kitti00_turn": rows(1.0), "pc_room": rows(8.0), "tankard": rows(8.0)}]
+        best, scores = peers.best_options(["a", "b", "c"], found)
+        self.assertEqual(best, 2)
+        self.assertEqual(len(scores), 3)
+
+    def test_features_and_matches_are_shared_and_a_ratio_is_a_cut(self):
+        K = np.array([[200.0, 0, 80], [0, 200, 80], [0, 0, 1]])
+        gray = texture(7)
+        grays = {"a": gray, "b": np.roll(gray, 4, axis=1)}
+        data = mock.Mock()
+        data.gray = lambda name: (grays[name], 1.0, 1.0)
+        data.camera = lambda pair, side: (K, [0.0] * 5)
+        pair = mock.Mock(text="a b", name0="a", name1="b")
+        config = {**peers.FAST, "estimator": "magsac"}
+        shared, calls = {}, []
+        for name in ("extract", "match"):
+            function = getattr(peers, name)
+            patch = mock.patch.object(peers, name, side_effect=lambda *a, f=function, n=name:
+                                      calls.append(n) or f(*a))
+            patch.start()
+            self.addCleanup(patch.stop)
+        found = {ratio: peers.Peer(config, ratio=ratio).matches(data, pair, shared)[0]
+                 for ratio in (0.9, 0.6)}
+        self.assertEqual(calls, ["extract", "extract", "match"])
+        for ratio, matches in found.items():
+            i0, i1, _ = peers.match(*(peers.extract(g, config)[1] for g in grays.values()), ratio)
+            self.assertEqual(len(matches), len(i0))
+        self.assertLess(len(found[0.6]), len(found[0.9]))
 
 
 if __name__ == "__main__":

@@ -16,11 +16,13 @@ import tempfile
 
 import numpy as np
 
-from . import datasets, estimators, identical, metrics, peers, pipeline, robust500
-from .tables import (MIN_PAIRS, OURS, machine, mean_summary, print_table, progress, runs_of, say,
-                    summarise)
+from . import (datasets, estimators, grid, homography, identical, metrics, peers, pipeline,
+               robust500, targets, verdicts)
+from .tables import (MIN_PAIRS, OURS, machine, mean_summary, print_means, print_table, progress,
+                    runs_of, say, summarise)
 
 PROGRAM = os.path.join(datasets.ROOT, "build", "release", "bin", "twoview")
+PEERS = "sift,poselib,colmap"
 QUICK_PAIRS = 8
 QUICK_RESAMPLES = 1000
 ERRORS = ("rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
@@ -64,12 +66,13 @@ def run_program(program, data, extra):
     return rows, report
 
 
-def run_library(path, data, extra):
+def run_library(path, data, extra, cap):
     """Evaluates a set through libtwoview.so. Returns its rows and an empty report. `extra`, options
     of `twoview evaluate`, must be empty."""
     if extra:
         sys.exit("accuracy: --ours library takes no options of the program")
-    rows = pipeline.evaluate_pairs(data.dir, library=path, resize=data.resize,
+    options = {"max_keypoints": cap} if cap != peers.CAP else None
+    rows = pipeline.evaluate_pairs(data.dir, options, library=path, resize=data.resize,
                                    flagged=len(data.pair_files) > 1, max_pairs=data.max_pairs)
     return rows, {}
 
@@ -78,7 +81,7 @@ def run_library(path, data, extra):
 
 def print_comparison(peer, compared, sizes):
     say(f"\n{OURS} minus {peer}: difference of AUC, standard error, 95 % interval")
-    width = max([len(name) for name in sizes] + [14])
+    width = max([len(name) for name in sizes] + [18])
 
     def row(title, count, differences, counts):
         cells = []
@@ -91,83 +94,77 @@ def print_comparison(peer, compared, sizes):
     say(f"  {'':<{width}} {'n':>4}  {'AUC5':<28}  {'AUC10':<28}  {'AUC20':<28}")
     for name, differences in compared["sets"].items():
         row(name, sizes[name], differences, sizes[name] >= MIN_PAIRS)
-    row("mean over sets", len(sizes), compared["mean"], True)
+    members = datasets.by_group(list(sizes))
+    for group, differences in compared["groups"].items():
+        row(f"group {group}", len(members[group]), differences, True)
+    row("mean of the groups", len(members), compared["group_mean"], True)
     row("all pairs", sum(sizes.values()), compared["pooled"], True)
-
-
-def verdicts(peer, compared, sizes):
-    """Verdict sentences: where our result is worse by more than two standard errors, or its mean is
-    lower."""
-    found = []
-    for name, differences in compared["sets"].items():
-        if sizes[name] >= MIN_PAIRS:
-            found += [f"{name}: AUC{t} worse by {-d['difference']:.1f} "
-                      f"(standard error {d['standard_error']:.1f}) than {peer}"
-                      for t, d in differences.items() if d["worse"]]
-    for t, d in compared["mean"].items():
-        if d["difference"] < 0:
-            found.append(f"mean over sets: AUC{t} lower by {-d['difference']:.1f} "
-                         f"(standard error {d['standard_error']:.1f}) than {peer}")
-    return found
 
 
 # ---- whole pipelines ---------------------------------------------------------------------------
 
 def compare_pipelines(arguments, sets):
-    groups = [g for g in arguments.peers.split(",") if g]
-    for group in groups:
-        if group not in peers.GROUPS:
-            sys.exit(f"accuracy: no peers {group!r}; there are {', '.join(peers.GROUPS)}")
-    systems = [peers.Peer(config, arguments.seeds, use_cache=not arguments.no_cache)
-               for group in groups for config in peers.GROUPS[group]]
-    rows, summaries, reports = {}, {}, {}
+    families = [name for name in arguments.peers.split(",") if name]
+    for name in families:
+        if name not in peers.FAMILIES:
+            sys.exit(f"accuracy: no peer {name!r}; there are {', '.join(peers.FAMILIES)}")
+    use_cache = not arguments.no_cache
+    rows = {data.name: {} for data in sets}
+    summaries, reports, systems, chosen = {}, {}, [], {}
     for data in sets:
         if arguments.ours == "program":
-            ours, report = run_program(arguments.program, data, arguments.extra)
+            capped = ["--max-keypoints", str(arguments.cap)] if arguments.cap != peers.CAP else []
+            ours, report = run_program(arguments.program, data, capped + arguments.extra)
         else:
-            ours, report = run_library(arguments.lib, data, arguments.extra)
-        reports[data.name] = report
-        rows[data.name] = {OURS: ours}
-        for peer in systems:
-            rows[data.name][peer.name] = peer.run(data, progress(f"{data.name}, {peer.name}"))
+            ours, report = run_library(arguments.lib, data, arguments.extra, arguments.cap)
+        rows[data.name][OURS], reports[data.name] = ours, report
+        progress("twoview")(len(reports), len(sets))
+    for family in families:
+        peer, found, text = peers.choose(family, sets, arguments.seeds,
+                                         arguments.peer_options == "best", use_cache,
+                                         arguments.jobs, arguments.cap)
+        systems.append(peer)
+        chosen[peer.name] = text
+        say(f"{family}: {peer.name}, {text}")
+        for name, part in found.items():
+            rows[name][peer.name] = part
+    for data in sets:
         summaries[data.name] = {name: summarise(r) for name, r in rows[data.name].items()}
         size = f"long side {data.resize}" if data.resize else "native size"
-        print_table(f"{data.name}: {len(data.pairs)} pairs, {size}", summaries[data.name])
-        if report.get("auc"):
+        print_table(f"{data.name} ({datasets.group_of(data.name)}): {len(data.pairs)} pairs, "
+                    f"{size}", summaries[data.name])
+        if reports[data.name].get("auc"):
             for t, value in summaries[data.name][OURS]["auc"].items():
-                if abs(report["auc"][t] - value) > 0.01:
-                    say(f"  note: the program's own AUC{t} is {report['auc'][t]:.3f}, "
-                        f"from its pairs {value:.3f}")
+                if abs(reports[data.name]["auc"][t] - value) > 0.01:
+                    say(f"  note: the program's own AUC{t} is "
+                        f"{reports[data.name]['auc'][t]:.3f}, from its pairs {value:.3f}")
     names = [OURS] + [peer.name for peer in systems]
-    mean = {n: mean_summary([summaries[d.name][n] for d in sets]) for n in names}
-    print_table(f"mean over {len(sets)} sets", mean)
+    means = print_means(summaries, names)
     say("\nmatches: mean; ms: median of a pair, one thread; fail: pairs without a pose.\n"
         f"Peers: mean over {arguments.seeds} seeds that shuffle the matches; their gradient "
         "orientation and\nmatching run in numpy, so their ms are no measure of OpenCV's speed: "
         "scripts/bench is.")
     sizes = {data.name: len(data.pairs) for data in sets}
-    comparisons, sentences = {}, []
+    comparisons = {}
     for peer in systems:
-        compared = metrics.paired_bootstrap(
+        comparisons[peer.name] = metrics.paired_bootstrap(
             {d.name: (runs_of(rows[d.name][OURS]), runs_of(rows[d.name][peer.name]))
-             for d in sets}, arguments.resamples)
-        comparisons[peer.name] = compared
-        print_comparison(peer.name, compared, sizes)
-        sentences += verdicts(peer.name, compared, sizes)
+             for d in sets}, arguments.resamples, groups=datasets.by_group(list(sizes)))
+        print_comparison(peer.name, comparisons[peer.name], sizes)
     if systems:
         say(f"\n*: worse by more than two standard errors (sets of {MIN_PAIRS} pairs or more, and "
-            "the two last lines)")
-        say()
-        for name, comparison in comparisons.items():
-            differences = comparison["mean"].values()
-            reached = all(d["difference"] >= 0 for d in differences)
-            say(f"{'reached' if reached else 'NOT REACHED':<12}mean over sets ahead of {name}: "
-                + ", ".join(f"{d['difference']:+.1f} ± {d['standard_error']:.1f}"
-                            for d in differences))
-        say("\n" + ("\n".join(sentences) if sentences else
-                    "no mean lower than a peer's, no set worse by more than two standard errors"))
-    return {"mode": "pipelines", "sets": summaries, "mean": mean, "comparisons": comparisons,
-            "worse": sentences, "reports": reports, "pairs": rows,
+            "the last lines)")
+    judged = targets.judge({d.name: rows[d.name][OURS] for d in sets},
+                           {peer.name: {d.name: rows[d.name][peer.name] for d in sets}
+                            for peer in systems}, comparisons)
+    say()
+    for reached, sentence in judged:
+        say(f"{'' if reached is None else 'reached' if reached else 'NOT REACHED':<12}{sentence}")
+    return {"mode": "pipelines", "sets": summaries, "means": means,
+            "mean": {n: mean_summary([summaries[d.name][n] for d in sets]) for n in names},
+            "comparisons": comparisons,
+            "targets": judged, "worse": [text for ok, text in judged if ok is False],
+            "reports": reports, "pairs": rows, "chosen": chosen,
             "peers": {peer.name: peer.key for peer in systems}}
 
 
@@ -183,27 +180,42 @@ def write_report(arguments, names, extra):
 
 def main():
     own, extra = sys.argv[1:], []
+    # Commands of their own, each with its own --help.
+    if "--grid" in own:
+        return grid.main(own)
+    for flag, command in (("--homography", homography.main), ("--verdicts", verdicts.main)):
+        if flag in own:
+            return command([word for word in own if word != flag])
     if "--" in own:
         own, extra = own[:own.index("--")], own[own.index("--") + 1:]
     parser = argparse.ArgumentParser(
         prog="scripts/accuracy", description=__doc__,
-        epilog="Options after -- go to `twoview evaluate`, with --report to compare_colmap.")
+        epilog="Options after -- go to `twoview evaluate`, with --report to compare_colmap. "
+               "Commands of their own, each with --help: --grid FILE (options chosen by leaving "
+               "one set out), --homography (matches of planar pairs), --verdicts (unrelated "
+               "pictures, and the verdict against the error).")
     parser.add_argument("--json", metavar="F", help="write everything, every pair included")
     parser.add_argument("--sets", help="names, separated by commas (default: all with pairs)")
+    parser.add_argument("--groups", help="only the sets of the group narrow, or wide")
     parser.add_argument("--quick", action="store_true",
                         help=f"at most {QUICK_PAIRS} pairs a set, evenly spaced")
     parser.add_argument("--flagged", action=argparse.BooleanOptionalAction, default=True,
                         help="also pairs_flagged.txt of " + " and ".join(datasets.FLAGGED_SETS)
                         + " (default; --no-flagged leaves them out)")
-    parser.add_argument("--peers", default="fast",
-                        help=f"of {','.join(peers.GROUPS)} (default: fast; empty: none)")
+    parser.add_argument("--peers", default=PEERS,
+                        help=f"of {','.join(peers.FAMILIES)} (default: {PEERS}; empty: none)")
+    parser.add_argument("--peer-options", choices=("best", "usual"), default="best",
+                        help="each peer at its best front end, ratio and threshold over all sets "
+                             "(default), or at the usual ones")
+    parser.add_argument("--cap", type=int, default=peers.CAP, metavar="N",
+                        help=f"descriptors of an image, ours and the peers' (default {peers.CAP})")
+    parser.add_argument("--jobs", type=int, default=1, help="processes of the peers (default 1)")
     parser.add_argument("--seeds", type=int, default=5, help="of the peers (default 5)")
     parser.add_argument("--resamples", type=int, help="of the bootstrap (default 2000)")
     parser.add_argument("--no-cache", action="store_true",
                         help="run the peers again (.cache/accuracy keeps their results)")
     parser.add_argument("--check", action="store_true",
-                        help="exit status 1 when a mean is lower than a peer's or a set is worse "
-                             "by more than two standard errors")
+                        help="exit status 1 when one of the last lines says NOT REACHED")
     parser.add_argument("--program", default=PROGRAM)
     parser.add_argument("--ours", choices=("program", "library"), default="program")
     parser.add_argument("--lib", help="libtwoview.so (default: of build/release)")
@@ -231,13 +243,10 @@ def main():
     if not arguments.resamples:
         arguments.resamples = QUICK_RESAMPLES if arguments.quick else 2000
 
-    names = arguments.sets.split(",") if arguments.sets else datasets.all_sets()
-    if not names:
-        sys.exit(f"accuracy: no sets with pairs in {datasets.data_dir()}; set TWOVIEW_DATA")
-    missing = set(names) - set(datasets.all_sets())
-    if missing:
-        sys.exit(f"accuracy: no pairs.txt in {', '.join(sorted(missing))}; there are "
-                 f"{', '.join(datasets.all_sets())}")
+    try:
+        names = datasets.select_sets(arguments.sets, arguments.groups)
+    except ValueError as error:
+        sys.exit(f"accuracy: {error}")
     if arguments.report:
         sys.exit(write_report(arguments, names, extra))
     if not arguments.estimators and arguments.ours == "program":
@@ -248,7 +257,7 @@ def main():
     result = (identical.compare if arguments.estimators else compare_pipelines)(arguments, sets)
     result["machine"] = machine()
     result["protocol"] = {
-        "cap": peers.CAP, "ratio": peers.RATIO, "seeds": arguments.seeds,
+        "cap": arguments.cap, "peer_options": arguments.peer_options, "seeds": arguments.seeds,
         "resamples": arguments.resamples, "flagged": arguments.flagged,
         "quick": arguments.quick, "resize": {d.name: d.resize for d in sets}}
     if arguments.json:

@@ -24,20 +24,9 @@ RATIOS = (0.75, 0.8, 0.85, 0.87, 0.9, 0.92, 0.95, 0.98)
 
 def matches_by_ratio(context, data, ratios):
     """{ratio: result of pipeline.match_pairs}; the features of each image are computed once."""
-    features = {}
-    original = context.extract
-
-    def extract_once(gray, options=None):
-        key = gray.ctypes.data
-        if key not in features:
-            features[key] = original(gray, options)
-        return features[key]
-
-    context.extract = extract_once
-    try:
-        return {r: pipeline.match_pairs(context, data, None, {"ratio": r}) for r in ratios}
-    finally:
-        context.extract = original
+    names = dict.fromkeys(n for p in data.pairs for n in (p.name0, p.name1))
+    features = pipeline.extract_images(context, data, names)
+    return {r: pipeline.match_pairs(context, data, None, {"ratio": r}, features) for r in ratios}
 
 
 def measure(names, library, flagged, max_pairs):
@@ -85,7 +74,7 @@ def draw(summary, picture):
             axis.minorticks_off()
         else:
             axis.set_xticks([0.75, 0.8, 0.85, 0.9, 0.95])
-    axes[0].set_ylabel("mean over sets")
+    axes[0].set_ylabel("mean of the groups")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     figure.savefig(picture, dpi=120)
 

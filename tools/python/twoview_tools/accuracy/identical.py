@@ -9,7 +9,8 @@ import time
 
 import numpy as np
 
-from . import estimators, metrics, peers, pipeline, system_python, tables, twoview_ctypes
+from . import (datasets, estimators, leaveout, metrics, peers, pipeline, system_python, tables,
+               twoview_ctypes)
 from .tables import MIN_PAIRS, OURS, say
 
 CACHE_FORMAT = 1  # increase it if a change here or in estimators.py changes results
@@ -122,14 +123,14 @@ def _row(data, pair, matches, seed, line):
 
 def sift_matches(data, use_cache=True):
     """OpenCV's RootSIFT matches of a set, in the form of pipeline.match_pairs."""
-    peer = peers.Peer(peers.GROUPS["poselib"][0], use_cache=False)
+    peer = peers.Peer({**peers.SIFT, "estimator": "poselib"}, use_cache=False)
     keys = [peer.pair_key(data, pair) for pair in data.pairs]
     name = hashlib.sha256("".join(keys).encode()).hexdigest()[:16]
     path = os.path.join(peers.CACHE_DIR, f"matches-{data.name}-{name}.npz")
     if not (use_cache and os.path.isfile(path)):
-        arrays, features = {}, {}
+        arrays, shared = {}, {}
         for i, pair in enumerate(data.pairs):
-            m, extract_ms, match_ms, keypoints = peer.matches(data, pair, features)
+            m, extract_ms, match_ms, keypoints = peer.matches(data, pair, shared)
             arrays.update({f"{i}_0": m.pixels0, f"{i}_1": m.pixels1, f"{i}_ratios": m.ratios,
                            f"{i}_stage": np.array([extract_ms, match_ms, keypoints])})
         os.makedirs(peers.CACHE_DIR, exist_ok=True)
@@ -159,9 +160,9 @@ def our_rows(library, data, matched, options, num_seeds):
 # ---- verdicts ------------------------------------------------------------------------------------
 
 def mean_auc(rows_of_sets):
-    """Returns {threshold in degrees: mean of the AUC over the sets}."""
-    return {f"{t:g}": float(np.mean([metrics.auc_of_runs(tables.runs_of(rows), t)
-                                     for rows in rows_of_sets.values()]))
+    """{threshold in degrees: AUC, averaged over the sets of each group, then over the groups}."""
+    return {f"{t:g}": float(leaveout.mean_of_groups(
+        {s: metrics.auc_of_runs(tables.runs_of(rows), t) for s, rows in rows_of_sets.items()}))
             for t in metrics.THRESHOLDS_DEG}
 
 
@@ -188,16 +189,20 @@ def judge(ours, rivals, poselib, resamples):
     for name, theirs in rivals.items():
         other = runs(theirs)
         compared[name] = metrics.paired_bootstrap({s: (mine[s], other[s]) for s in mine},
-                                                  resamples)
-    for t in metrics.THRESHOLDS_DEG:
-        key = f"{t:g}"
-        value = {name: mean_auc(rows)[key] for name, rows in rivals.items()}
-        best = max(value, key=value.get)
-        d = compared[best]["mean"][key]
-        found.append((d["difference"] >= 0,
-                      f"mean AUC{key} {mean_auc(ours)[key]:.1f}, the best peer "
-                      f"{value[best]:.1f} ({best}): {d['difference']:+.2f} "
-                      f"± {d['standard_error']:.2f}"))
+                                                  resamples,
+                                                  groups=datasets.by_group(list(mine)))
+    groups = datasets.by_group(list(ours))
+    for group, members in groups.items():
+        within = lambda rows_of_sets, members=members: {s: rows_of_sets[s] for s in members}
+        for t in metrics.THRESHOLDS_DEG:
+            key = f"{t:g}"
+            value = {name: mean_auc(within(rows))[key] for name, rows in rivals.items()}
+            best = max(value, key=value.get)
+            d = compared[best]["groups"][group][key]
+            found.append((d["difference"] >= 0,
+                          f"group {group}, mean AUC{key} {mean_auc(within(ours))[key]:.1f}, the "
+                          f"best peer {value[best]:.1f} ({best}): {d['difference']:+.2f} "
+                          f"± {d['standard_error']:.2f}"))
     for s in ours:
         if mine[s].shape[1] < MIN_PAIRS:
             continue
@@ -273,22 +278,26 @@ def compare_source(arguments, sets, library, systems, source):
             f"{data.name}: {len(data.pairs)} pairs, {MATCHES_TITLE[source]}",
             {OURS: tables.summarise(ours[data.name]),
              **{title[n]: tables.summarise(rows[data.name]) for n, rows in chosen.items()}})
-    summaries = {OURS: tables.mean_summary([tables.summarise(r) for r in ours.values()])}
+    summaries = {data.name: {OURS: tables.summarise(ours[data.name])} for data in sets}
     for name, parts in theirs.items():
         for threshold, rows in parts.items():
             label = f"{name} {threshold:g} px{' *' if threshold == best[name] else ''}"
-            summaries[label] = tables.mean_summary([tables.summarise(r) for r in rows.values()])
-    tables.print_table(f"mean over {len(sets)} sets, {MATCHES_TITLE[source]} (*: the best of that "
-                       "peer)", summaries)
+            for data in sets:
+                summaries[data.name][label] = tables.summarise(rows[data.name])
+    means = tables.print_means(summaries, list(summaries[sets[0].name]),
+                               f", {MATCHES_TITLE[source]} (*: the best of that peer)")
     counting = {title[s.name]: chosen[s.name] for s in systems if s.counts}
     poselib = next((title[s.name] for s in systems if s.module == "poselib"), None)
     verdicts, compared = [], {}
     if counting:
         verdicts, compared = judge(ours, counting, poselib, arguments.resamples)
     if compared:
-        say(f"\n{OURS} minus each peer at its best, mean over sets: AUC5, AUC10, AUC20")
+        say(f"\n{OURS} minus each peer at its best, mean of the groups: AUC5, AUC10, AUC20")
         for name, c in compared.items():
             say(f"  {name:<58} " + "  ".join(
                 f"{d['difference']:+6.2f} ±{d['standard_error']:5.2f}"
-                for d in c["mean"].values()))
-    return {"mean": summaries, "best_px": best, "verdicts": verdicts, "comparisons": compared}
+                for d in c["group_mean"].values()))
+    mean = {n: tables.mean_summary([part[n] for part in summaries.values()])
+            for n in summaries[sets[0].name]}
+    return {"mean": mean, "means": means, "best_px": best, "verdicts": verdicts,
+            "comparisons": compared}

@@ -92,13 +92,15 @@ def _summary(value, samples):
             "high": float(high), "worse": bool(value < -2.0 * error)}
 
 
-def paired_bootstrap(sets, resamples=2000, seed=1):
+def paired_bootstrap(sets, resamples=2000, seed=1, groups=None):
     """The difference of AUC, first minus second, and its spread when the pairs are resampled.
 
     sets: {name: (first, second)}, each an array of seeds x pairs with the same pairs in the same
     columns. Returns {"sets": {name: {"5": summary, ..}}, "mean": {..}, "pooled": {..}}: for each
     set; for the mean over the sets, with pairs resampled within each set; and for all pairs as one
-    set. `worse` means by more than two standard errors.
+    set. `worse` means by more than two standard errors. groups: {group: names of sets} adds
+    "groups": {group: {"5": summary, ..}}, the mean over each group's sets, and "group_mean", the
+    mean of the groups.
     """
     random = np.random.default_rng(seed)
     result = {"sets": {}, "mean": {}, "pooled": {}}
@@ -126,6 +128,15 @@ def paired_bootstrap(sets, resamples=2000, seed=1):
     for t in THRESHOLDS_DEG:
         result["mean"][f"{t:g}"] = _summary(np.mean([m[t][0] for m in per_set.values()]),
                                             np.mean([m[t][1] for m in per_set.values()], axis=0))
+    if groups:
+        result["groups"], result["group_mean"] = {group: {} for group in groups}, {}
+    for t in THRESHOLDS_DEG if groups else ():
+        means = {group: [np.mean([per_set[name][t][part] for name in members], axis=0)
+                         for part in (0, 1)] for group, members in groups.items()}
+        for group, mean in means.items():
+            result["groups"][group][f"{t:g}"] = _summary(*mean)
+        result["group_mean"][f"{t:g}"] = _summary(
+            *(np.mean([mean[part] for mean in means.values()], axis=0) for part in (0, 1)))
     pooled = measure(*(np.concatenate([runs[side] for runs in arrays.values()], axis=1)
                        for side in (0, 1)))
     result["pooled"] = {f"{t:g}": _summary(*pooled[t]) for t in THRESHOLDS_DEG}

@@ -13,54 +13,54 @@ import time
 
 import numpy as np
 
-from . import datasets, estimators, metrics
+from . import datasets, estimators, leaveout, metrics, parallel, tables
 
 CAP = 2048  # most descriptors of an image; a keypoint with two orientations has two
 RATIO = 0.8
-CACHE_FORMAT = 2  # increase it if a change here changes the cached results
+CACHE_FORMAT = 3  # increase it if a change here changes the cached results
 
 CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
 
-_FAST = {"front": "fast", "threshold": 10, "size": 5, "orientation": "upright", "grid": 0,
-         "descriptor": "sift"}
-# The rows of each group that --peers can name.
-GROUPS = {
-    "fast": [
-        {**_FAST, "estimator": "magsac"},
-        {**_FAST, "size": 4, "estimator": "magsac"},
-        {**_FAST, "orientation": "gradient", "estimator": "magsac"},
-        {**_FAST, "threshold": 5, "orientation": "gradient", "grid": 64, "estimator": "magsac"},
-    ],
-    "sift": [
-        {"front": "sift", "contrast": 0.02, "descriptor": "rootsift", "estimator": "magsac"},
-    ],
-    "poselib": [
-        {"front": "sift", "contrast": 0.02, "descriptor": "rootsift", "estimator": "poselib"},
-        {**_FAST, "estimator": "poselib"},
-    ],
-    "pycolmap": [
-        {"front": "pycolmap", "estimator": "pycolmap"},
-        {"front": "pycolmap", "estimator": "pycolmap_tvg"},
-    ],
+FAST = {"front": "fast", "threshold": 10, "size": 5, "orientation": "upright", "grid": 0,
+        "descriptor": "sift"}
+SIFT = {"front": "sift", "contrast": 0.02, "descriptor": "rootsift"}
+COLMAP = {"front": "pycolmap"}
+_FASTS = [FAST, {**FAST, "size": 4}, {**FAST, "orientation": "gradient"},
+          {**FAST, "threshold": 5, "orientation": "gradient", "grid": 64}]
+_SIFTS = [SIFT, {**SIFT, "contrast": 0.04}, {**SIFT, "descriptor": "sift"},
+          {**SIFT, "contrast": 0.04, "descriptor": "sift"}]
+# The peers that --peers can name: an estimator, and the front ends among which it may choose. Each
+# counts at its best front end, ratio and inlier threshold over all sets together. The first front
+# end, RATIO and 1 px are "the usual options".
+FAMILIES = {
+    "fast": ("magsac", _FASTS),
+    "fast_poselib": ("poselib", _FASTS),
+    "sift": ("magsac", _SIFTS),
+    "poselib": ("poselib", _SIFTS[:2]),
+    "colmap": ("poselib", [COLMAP]),
+    "pycolmap": ("pycolmap", [COLMAP]),
+    "pycolmap_tvg": ("pycolmap_tvg", [COLMAP]),
 }
+RATIOS = (0.75, 0.8, 0.85, 0.9)
+THRESHOLDS_PX = (0.5, 1.0, 2.0)
 
 
-def describe(config, threshold_px=1.0):
+def describe(config, threshold_px=1.0, ratio=RATIO):
     """The name of a row, with the versions of the software that it runs."""
     version = estimators.module_version
     if config["front"] == "fast":
-        front = (f"opencv{version('cv2')} FAST9 t{config['threshold']} s{config['size']} "
+        front = (f"OpenCV {version('cv2')} FAST9 t{config['threshold']} s{config['size']} "
                  f"{config['orientation']}{' grid' if config['grid'] else ''}")
     elif config["front"] == "sift":
         kind = {"sift": "SIFT", "rootsift": "RootSIFT"}[config["descriptor"]]
-        front = f"opencv{version('cv2')} {kind} c{config['contrast']:g}"
+        front = f"OpenCV {version('cv2')} {kind} c{config['contrast']:g}"
     else:
-        front = f"pycolmap{version('pycolmap')} SIFT"
+        front = f"COLMAP {version('pycolmap')} SIFT"
     title, module, _ = estimators.PEERS[config["estimator"]]
     title = title.replace("OpenCV ", "")
     if module == "poselib":
         title = title.replace("PoseLib", f"PoseLib {version(module)}")
-    return f"{front} + {title} {threshold_px:.1f}"
+    return f"{front} r{ratio:g} + {title} {threshold_px:.1f}"
 
 
 # ---- keypoints and descriptors of the peers ---------------------------------------------------
@@ -104,21 +104,21 @@ def orientations(gray, points, size):
     return found
 
 
-def _strongest(points, scores, grid, shape):
+def _strongest(points, scores, grid, shape, cap=CAP):
     """The order of the points to keep: strongest first. With a grid, each cell's share of strongest
     points comes first."""
     order = np.lexsort((points[:, 0], points[:, 1], -scores))
-    if not grid or len(order) <= CAP:
-        return order[:CAP]
+    if not grid or len(order) <= cap:
+        return order[:cap]
     cells_x = -(-shape[1] // grid)
     cells = (points[:, 1] // grid).astype(int) * cells_x + (points[:, 0] // grid).astype(int)
-    share = -(-CAP // (cells_x * -(-shape[0] // grid)))
+    share = -(-cap // (cells_x * -(-shape[0] // grid)))
     sorted_cells = cells[order]
     by_cell = np.argsort(sorted_cells, kind="stable")
     starts = np.searchsorted(sorted_cells[by_cell], sorted_cells[by_cell])
     rank = np.empty(len(order), int)
     rank[by_cell] = np.arange(len(order)) - starts
-    return np.concatenate([order[rank < share], order[rank >= share]])[:CAP]
+    return np.concatenate([order[rank < share], order[rank >= share]])[:cap]
 
 
 def _root(descriptors):
@@ -127,16 +127,17 @@ def _root(descriptors):
 
 
 def extract(gray, config):
-    """(points n x 2, descriptors n x 128 float32), at most CAP of them."""
+    """(points n x 2, descriptors n x 128 float32), at most config["cap"] (default CAP) of them."""
+    cap = config.get("cap", CAP)
     if config["front"] == "pycolmap":
-        return _extract_pycolmap(gray, config.get("cap", CAP))
+        return _extract_pycolmap(gray, cap)
     import cv2
     cv2.setNumThreads(1)
     if config["front"] == "sift":
-        sift = cv2.SIFT_create(nfeatures=CAP, contrastThreshold=config["contrast"])
+        sift = cv2.SIFT_create(nfeatures=cap, contrastThreshold=config["contrast"])
         keypoints, descriptors = sift.detectAndCompute(gray, None)
-        if len(keypoints) > CAP:  # OpenCV returns more than CAP if scores are equal
-            best = np.argsort([-k.response for k in keypoints], kind="stable")[:CAP]
+        if len(keypoints) > cap:  # OpenCV returns more than cap if scores are equal
+            best = np.argsort([-k.response for k in keypoints], kind="stable")[:cap]
             keypoints, descriptors = [keypoints[i] for i in best], descriptors[best]
     else:
         detector = cv2.FastFeatureDetector_create(config["threshold"], True,
@@ -144,9 +145,9 @@ def extract(gray, config):
         corners = detector.detect(gray, None)
         points = np.array([k.pt for k in corners], float).reshape(-1, 2)
         scores = np.array([k.response for k in corners], float)
-        points = points[_strongest(points, scores, config["grid"], gray.shape)]
+        points = points[_strongest(points, scores, config["grid"], gray.shape, cap)]
         if config["orientation"] == "gradient":
-            oriented = orientations(gray, points, config["size"])[:CAP]
+            oriented = orientations(gray, points, config["size"])[:cap]
         else:
             oriented = [(i, 0.0) for i in range(len(points))]
         keypoints = [cv2.KeyPoint(float(points[i][0]), float(points[i][1]), float(config["size"]),
@@ -190,14 +191,34 @@ def match(descriptors0, descriptors1, ratio=RATIO):
             np.sqrt(first[keep] / np.maximum(second[keep], 1e-30)))
 
 
-def match_pycolmap(features0, features1):
-    """COLMAP's matcher with its defaults (ratio 0.8, distance 0.7, mutual)."""
+def match_pycolmap(features0, features1, ratio=RATIO):
+    """COLMAP's matcher with its defaults (ratio 0.8, distance 0.7, mutual), or another ratio."""
     pycolmap = estimators.pycolmap_module()
     options = pycolmap.FeatureMatchingOptions()
+    options.sift.max_ratio = ratio
     options.num_threads, options.use_gpu = 1, False
     matcher = pycolmap.FeatureMatcher.create(options, pycolmap.Device.cpu)
     found = np.asarray(matcher.match(*features0, *features1), int).reshape(-1, 2)
     return found[:, 0], found[:, 1], None
+
+
+def match_angles(features0, features1):
+    """(idx0, idx1, ratio) as COLMAP's matcher finds them, but for the ratio test: mutual nearest
+    neighbours by the angle between descriptors, at most 0.7 rad; the ratio is the larger of both
+    directions'. Those with a ratio below r are what match_pycolmap returns for r, in a tenth of its
+    time (a test compares both)."""
+    d0, d1 = (np.asarray(f[1].data).astype(np.float32) for f in (features0, features1))
+    if len(d0) < 2 or len(d1) < 2:
+        return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
+    angles = np.arccos(np.clip((d0 @ d1.T) / np.float32(512.0**2), 0, 1))
+    nearest, back = angles.argmin(axis=1), angles.argmin(axis=0)
+    index = np.nonzero(back[nearest] == np.arange(len(d0)))[0]
+    other = nearest[index]
+    first = angles[index, other]
+    angles[index, other] = np.inf  # of a mutual pair, the nearest in its row and in its column
+    second = np.minimum(angles[index].min(axis=1), angles[:, other].min(axis=0))
+    keep = first <= 0.7
+    return index[keep], other[keep], (first / np.maximum(second, 1e-30))[keep]
 
 
 # ---- rows -------------------------------------------------------------------------------------
@@ -206,13 +227,13 @@ class Peer:
     """A row of the table: a configuration that is evaluated on pairs, with stored results where
     they exist."""
 
-    def __init__(self, config, num_seeds=3, threshold_px=1.0, use_cache=True):
+    def __init__(self, config, num_seeds=3, threshold_px=1.0, use_cache=True, ratio=RATIO):
         self.config, self.num_seeds, self.threshold_px = config, num_seeds, threshold_px
-        self.name = describe(config, threshold_px)
-        self.use_cache = use_cache
+        self.ratio, self.use_cache = ratio, use_cache
+        self.name = describe(config, threshold_px, ratio)
         modules = {"cv2", {"pycolmap": "pycolmap"}.get(config["front"], "cv2"),
                    estimators.PEERS[config["estimator"]][1]}
-        self.key = {"config": config, "threshold_px": threshold_px, "cap": CAP, "ratio": RATIO,
+        self.key = {"config": config, "threshold_px": threshold_px, "cap": CAP, "ratio": ratio,
                     "confidence": estimators.CONFIDENCE,
                     "max_iterations": estimators.MAX_ITERATIONS, "format": CACHE_FORMAT,
                     "numpy": np.__version__,
@@ -225,20 +246,22 @@ class Peer:
                            [[K.tolist(), list(d)] for K, d in cameras]], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def run(self, data, progress=None):
-        """A list of rows in the form of pipeline.evaluate_matches, seed by seed."""
+    def run(self, data, progress=None, shared=None):
+        """A list of rows in the form of pipeline.evaluate_matches, seed by seed. `shared`: a dict
+        in which peers with the same front end keep features and matches of this set."""
+        shared = {} if shared is None else shared
         name = hashlib.sha256(json.dumps(self.key, sort_keys=True).encode()).hexdigest()[:16]
         path = os.path.join(CACHE_DIR, f"{data.name}-{name}.json")
         stored = {}
         if self.use_cache and os.path.isfile(path):
             with open(path, encoding="utf-8") as f:
                 stored = json.load(f)
-        features, rows, changed = {}, [], False
+        rows, changed = [], False
         for number, pair in enumerate(data.pairs):
             key = self.pair_key(data, pair)
             have = stored.get(key, [])
             if len(have) < self.num_seeds:
-                have = self._run_pair(data, pair, features)
+                have = self._run_pair(data, pair, shared)
                 stored[key], changed = have, True
             rows += [{**row, "set": data.name, "name0": pair.name0, "name1": pair.name1,
                       **{k: np.inf if row[k] is None else row[k] for k in row
@@ -253,26 +276,32 @@ class Peer:
             os.replace(path + ".part", path)
         return rows
 
-    def matches(self, data, pair, features):
+    def matches(self, data, pair, shared):
         """(estimators.Matches, ms of extraction, ms of matching, mean number of keypoints) of a
-        pair."""
+        pair. `shared`: as in run."""
+        features = shared.setdefault("features", {})
         for name in (pair.name0, pair.name1):
             if name not in features:
                 start = time.perf_counter()
                 found = extract(data.gray(name)[0], self.config)
                 features[name] = found, 1e3 * (time.perf_counter() - start)
         ((points0, d0), ms0), ((points1, d1), ms1) = features[pair.name0], features[pair.name1]
-        start = time.perf_counter()
-        find = match_pycolmap if self.config["front"] == "pycolmap" else match
-        index0, index1, ratios = find(d0, d1)
-        match_ms = 1e3 * (time.perf_counter() - start)
+        colmap = self.config["front"] == "pycolmap"
+        links = shared.setdefault("links", {})
+        if pair.text not in links:  # found once without a ratio test; they serve every ratio
+            start = time.perf_counter()
+            found = match_angles(d0, d1) if colmap else match(d0, d1, 1.0)
+            links[pair.text] = found, 1e3 * (time.perf_counter() - start)
+        (index0, index1, ratios), match_ms = links[pair.text]
+        keep = ratios < self.ratio
+        index0, index1, ratios = index0[keep], index1[keep], ratios[keep]
         sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
         found = estimators.Matches(points0[index0], points1[index1],
                                    (data.camera(pair, 0), data.camera(pair, 1)), sizes, ratios)
         return found, ms0 + ms1, match_ms, (len(points0) + len(points1)) / 2
 
-    def _run_pair(self, data, pair, features):
-        matches, extract_ms, match_ms, num_keypoints = self.matches(data, pair, features)
+    def _run_pair(self, data, pair, shared):
+        matches, extract_ms, match_ms, num_keypoints = self.matches(data, pair, shared)
         share = metrics.precision(matches.rays0, matches.rays1, pair.R, pair.t)
         rows = []
         for seed in range(self.num_seeds):
@@ -286,3 +315,70 @@ class Peer:
                  "ms": {"extract": extract_ms, "match": match_ms, "estimate": estimate_ms},
                  **metrics.pose_error(R, t, pair.R, pair.t)}))
         return rows
+
+
+# ---- the best options of a peer ------------------------------------------------------------------
+
+def options_of(family, best, cap=CAP):
+    """[(config, ratio, threshold_px)] of a family; only the usual options unless `best`."""
+    estimator, fronts = FAMILIES[family]
+    capped = {} if cap == CAP else {"cap": cap}
+    if not best:
+        return [({**fronts[0], **capped, "estimator": estimator}, RATIO, 1.0)]
+    return [({**front, **capped, "estimator": estimator}, ratio, threshold)
+            for front in fronts for ratio in RATIOS for threshold in THRESHOLDS_PX]
+
+
+def _run_front(job):
+    set_dir, flagged, max_pairs, num_seeds, use_cache, options = job
+    data = datasets.load(set_dir, flagged, max_pairs)
+    shared = {}
+    return [Peer(config, num_seeds, threshold, use_cache, ratio).run(data, shared=shared)
+            for config, ratio, threshold in options]
+
+
+def evaluate(options, sets, num_seeds, use_cache=True, jobs=1):
+    """[{set: rows}], one for each of options_of's options. The features of an image and the matches
+    of a pair are computed once for all options with the same front end."""
+    by_front = {}
+    for index, (config, _, _) in enumerate(options):
+        front = {k: v for k, v in config.items() if k != "estimator"}
+        by_front.setdefault(json.dumps(front, sort_keys=True), []).append(index)
+    work, places = [], []
+    for data in sets:
+        for indices in by_front.values():
+            work.append((data.dir, len(data.pair_files) > 1, data.max_pairs, num_seeds, use_cache,
+                         [options[i] for i in indices]))
+            places.append((data.name, indices))
+    found = [{} for _ in options]
+    report = tables.progress(options[0][0]["estimator"], log=True)
+    for done, ((name, indices), parts) in enumerate(
+            zip(places, parallel.run(_run_front, work, jobs)), 1):
+        for i, rows in zip(indices, parts):
+            found[i][name] = rows
+        report(done, len(work))
+    return found
+
+
+def best_options(options, rows):
+    """The index of the options with the best mean of AUC5, 10 and 20 over both groups
+    (leaveout.criterion), and that mean for each option. rows: of evaluate."""
+    table = {name: np.array([[metrics.auc_of_runs(tables.runs_of(part[name]), t)
+                              for t in metrics.THRESHOLDS_DEG] for part in rows])
+             for name in rows[0]}
+    return leaveout.choose(table), leaveout.criterion(table)
+
+
+def choose(family, sets, num_seeds, best=True, use_cache=True, jobs=1, cap=CAP):
+    """(the family's Peer at its best options, {set: rows}, text that says how it was chosen). The
+    choice is made with one seed."""
+    options = options_of(family, best, cap)
+    index, text = 0, "the usual options"
+    if len(options) > 1:
+        index, scores = best_options(options, evaluate(options, sets, 1, use_cache, jobs))
+        usual = options.index(options_of(family, False, cap)[0])
+        text = (f"best of {len(options)} options, {scores[index]:.1f} "
+                f"(usual options {scores[usual]:.1f}, worst {scores.min():.1f})")
+    config, ratio, threshold = options[index]
+    rows, = evaluate([options[index]], sets, num_seeds, use_cache, jobs)
+    return Peer(config, num_seeds, threshold, use_cache, ratio), rows, text

@@ -17,31 +17,45 @@ def make_context(library, data, feature_options=None):
     return twoview_ctypes.Context(library, **limits)
 
 
-def match_pairs(context, data, feature_options=None, match_options=None):
-    """[(estimators.Matches, {"extract": ms, "match": ms, "keypoints": n})] for each pair of a set.
-    The features of an image are computed once, and their time counts in each of its pairs."""
+def extract_images(context, data, names, feature_options=None):
+    """{name: (keypoints, descriptors, ms)} of images of a set."""
     features = {}
+    for name in names:
+        start = time.perf_counter()
+        keypoints, descriptors = context.extract(data.gray(name)[0], feature_options)
+        features[name] = keypoints, descriptors, 1e3 * (time.perf_counter() - start)
+    return features
 
-    def extract(name):
-        if name not in features:
-            start = time.perf_counter()
-            keypoints, descriptors = context.extract(data.gray(name)[0], feature_options)
-            features[name] = keypoints, descriptors, 1e3 * (time.perf_counter() - start)
-        return features[name]
 
+def match_features(context, features0, features1, match_options=None):
+    """(array of dtype CORRESPONDENCE, ms) of two images' (keypoints, descriptors, ms)."""
+    start = time.perf_counter()
+    links = context.match(features0[1], features1[1], match_options)
+    return links, 1e3 * (time.perf_counter() - start)
+
+
+def make_matches(features0, features1, links, cameras, sizes):
+    """The estimators.Matches of two images' (keypoints, descriptors, ms)."""
+    pixels = [np.column_stack([f[0]["x"], f[0]["y"]])[links[i]].astype(float)
+              for f, i in ((features0, "idx0"), (features1, "idx1"))]
+    return estimators.Matches(*pixels, cameras, sizes, links["ratio"].copy())
+
+
+def match_pairs(context, data, feature_options=None, match_options=None, features=None):
+    """[(estimators.Matches, {"extract": ms, "match": ms, "keypoints": n})] for each pair of a set.
+    The features of an image are computed once, and their time counts in each of its pairs;
+    `features` are those of extract_images if they exist already."""
+    if features is None:
+        names = dict.fromkeys(n for p in data.pairs for n in (p.name0, p.name1))
+        features = extract_images(context, data, names, feature_options)
     found = []
     for pair in data.pairs:
-        (kp0, d0, ms0), (kp1, d1, ms1) = extract(pair.name0), extract(pair.name1)
-        start = time.perf_counter()
-        links = context.match(d0, d1, match_options)
-        match_ms = 1e3 * (time.perf_counter() - start)
-        pixels = [np.column_stack([k["x"], k["y"]])[links[i]].astype(float)
-                  for k, i in ((kp0, "idx0"), (kp1, "idx1"))]
+        both = features[pair.name0], features[pair.name1]
+        links, match_ms = match_features(context, *both, match_options)
         sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
-        matches = estimators.Matches(*pixels, (data.camera(pair, 0), data.camera(pair, 1)), sizes,
-                                     links["ratio"].copy())
-        found.append((matches, {"extract": ms0 + ms1, "match": match_ms,
-                                "keypoints": (len(kp0) + len(kp1)) / 2}))
+        matches = make_matches(*both, links, (data.camera(pair, 0), data.camera(pair, 1)), sizes)
+        found.append((matches, {"extract": both[0][2] + both[1][2], "match": match_ms,
+                                "keypoints": (len(both[0][0]) + len(both[1][0])) / 2}))
     return found
 
 

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from . import metrics
+from . import datasets, metrics
 
 OURS = "twoview"
 MIN_PAIRS = 15  # a set with fewer pairs counts only in the mean over the sets
@@ -16,11 +16,15 @@ def say(text="", end="\n"):
     print(text, end=end, flush=True)
 
 
-def progress(name):
+def progress(name, log=False):
+    """A function of (done, total) that shows a counter on a terminal. log: where stderr is a file
+    it gets a line at every tenth."""
     def report(done, total):
         if sys.stderr.isatty():
             print(f"\r  {name}: {done}/{total}  ", end="" if done < total else "\r\033[K",
                   file=sys.stderr, flush=True)
+        elif log and 10 * done // total > 10 * (done - 1) // total:
+            print(f"{name}: {done}/{total}", file=sys.stderr, flush=True)
     return report
 
 
@@ -68,6 +72,20 @@ def print_table(title, summaries):
         f"{'matches':>8} {'prec%':>6} {'ms':>8}")
     for name, summary in summaries.items():
         say(table_line(name, summary, width))
+
+
+def print_means(summaries, names, note=""):
+    """Prints and returns the tables of each group, and that of the mean of the groups.
+    summaries: {set: {name: summary}}."""
+    groups = datasets.by_group(list(summaries))
+    means = {group: {n: mean_summary([summaries[member][n] for member in members])
+                     for n in names} for group, members in groups.items()}
+    for group, members in groups.items():
+        print_table(f"group {group}: mean over {len(members)} sets{note}", means[group])
+    means["mean"] = {n: mean_summary([means[group][n] for group in groups]) for n in names}
+    if len(groups) > 1:
+        print_table(f"mean of the groups {' and '.join(groups)}{note}", means["mean"])
+    return means
 
 
 def machine():

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Prints one table line for each set and one for their mean, for any options of the library.
+"""Prints one table line for each set, each group and the mean of the groups, for any options of the
+library.
 
   scripts/python -m twoview_tools.accuracy.tune --sets kitti00_turn,tum_fr3_office \\
       --feature threshold=10 arc=9 --match ratio=0.8 --estimate max_error_px=1 \\
@@ -60,6 +61,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sets", help="names, separated by commas (default: all)")
+    parser.add_argument("--groups", help="only the sets of the group narrow, or wide")
     for name in ("feature", "match", "estimate"):
         parser.add_argument("--" + name, nargs="+", action="append", metavar="KEY=VALUE")
     parser.add_argument("--estimator", default="twoview")
@@ -74,9 +76,10 @@ def main():
     parser.add_argument("--json", help="write summaries and rows")
     arguments = parser.parse_args()
 
-    names = arguments.sets.split(",") if arguments.sets else datasets.all_sets()
-    if not names:
-        sys.exit(f"no sets in {datasets.data_dir()}: set TWOVIEW_DATA")
+    try:
+        names = datasets.select_sets(arguments.sets, arguments.groups)
+    except ValueError as error:
+        sys.exit(f"tune: {error}")
     if arguments.save:
         os.makedirs(arguments.save, exist_ok=True)
 
@@ -103,6 +106,11 @@ def main():
         print(line(name, summary), flush=True)
         summaries.append(summary)
         everything += rows
+    means = []
+    for group, members in datasets.by_group(names).items():
+        means.append(mean_of([summaries[names.index(name)] for name in members]))
+        print(line(f"group {group}", means[-1]))
+    print(line("mean of the groups", mean_of(means)))
     print(line("mean over sets", mean_of(summaries)))
     if arguments.json:
         with open(arguments.json, "w", encoding="utf-8") as f:

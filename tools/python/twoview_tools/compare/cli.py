@@ -50,8 +50,8 @@ def parse(words):
                         help="inlier threshold of every system that takes one (default 1)")
     parser.add_argument("--resize", type=int, metavar="L",
                         help="long side of the images; 0: as they are (default: "
-                             f"{datasets.RESIZE_LONG_SIDE} for those wider than "
-                             f"{datasets.MAX_NATIVE_WIDTH})")
+                             f"{datasets.RESIZE_LONG_SIDE} for those with a longer "
+                             f"side than {datasets.MAX_NATIVE_SIDE})")
     parser.add_argument("--seed", type=int, default=0, metavar="N")
     parser.add_argument("--max-pairs", type=int, default=0, metavar="N",
                         help="at most N pairs of each list, evenly spaced")
@@ -156,9 +156,9 @@ def check_images(tasks, default_resize):
             try:
                 with open(path, "rb") as f:
                     content = hashlib.sha256(f.read()).hexdigest()
-                width = datasets.read_luma(path).shape[1]
+                height, width = datasets.read_luma(path).shape
                 if default_resize and task["set"] not in resize:
-                    resize[task["set"]] = datasets.default_resize(width)
+                    resize[task["set"]] = datasets.default_resize(width, height)
                 hashes[path] = content
             except (OSError, ValueError):
                 bad.append(path)

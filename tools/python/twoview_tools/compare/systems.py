@@ -25,8 +25,7 @@ class System:
 
 
 def _pipelines():
-    fast, = (c for c in peers.GROUPS["fast"][:1])
-    sift, = peers.GROUPS["sift"]
+    fast, sift = ({**front, "estimator": "magsac"} for front in (peers.FAST, peers.SIFT))
     colmap = {"front": "pycolmap", "cap": COLMAP_CAP, "estimator": "pycolmap_tvg"}
     capped = f"at most {peers.CAP} features, the common threshold"
     colmaps = f"at most {COLMAP_CAP} features"
