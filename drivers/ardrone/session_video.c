@@ -68,9 +68,9 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
 /* ---- the time and attitude of a picture ---- */
 
 /* When the stamps of the pictures and of navdata both count from the drone's start, a picture's
-   stamp names an instant of the navdata clock. The arrival times show whether that is so: the
-   picture is then at most 1.5 s late (the least delay subtracted). Two unrelated clocks agree so
-   well by chance once in 1200 times. */
+   stamp names an instant of the navdata clock. The arrival times show whether that is so: measured
+   on that clock, the picture then came between 250 ms before and 1.5 s after its stamp (the least
+   delay subtracted). The chance that two unrelated clocks agree so well is 1 in 1200. */
 typedef enum clock_relation { UNRELATED, BY_ARRIVAL, BY_STAMP } clock_relation;
 
 static clock_relation to_navdata_clock(const ardrone_session *session, const tvs_time *time,

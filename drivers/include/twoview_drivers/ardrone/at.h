@@ -63,8 +63,8 @@ TV_API tvs_status ardrone_at_pcmd(ardrone_at *at, const ardrone_move *move, int 
 TV_API tvs_status ardrone_at_pcmd_mag(ardrone_at *at, const ardrone_move *move, int flags,
                                       float heading, float accuracy);
 
-/* Flat trim: send it while the drone stands level on the ground; its attitude becomes level.
-   Statuses as of every command (ardrone_at). */
+/* Flat trim: send it while the drone stands level on the ground; the drone takes its present
+   attitude as level from then on. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_ftrim(ardrone_at *at);
 
 /* Calibrates a device in flight. Device 0 is the magnetometer; the drone turns about its axis.

@@ -90,7 +90,8 @@ typedef enum ardrone_video_codec {
 } ardrone_video_codec;
 
 /* ---- The handshake: one exchange at a time, over a lossy link ----------------------------------
-   clear the acknowledge bit -> send -> wait for the bit -> CTRL 5 until it is clear -> done. */
+   clear the acknowledge bit -> send -> wait for the bit, or for the whole text that was requested
+   -> CTRL 5 until the bit is clear -> done. */
 
 /* The purpose of an exchange. */
 typedef enum ardrone_exchange_kind {
@@ -112,7 +113,7 @@ typedef enum ardrone_exchange_state {
   ARDRONE_EXCHANGE_SENDING,
   /* The command was sent; the bit, or the text, has not come yet. */
   ARDRONE_EXCHANGE_WAITING,
-  /* The bit came; CTRL 5 is sent until it is clear. */
+  /* The bit, or the text, came; CTRL 5 is sent while the bit is set. */
   ARDRONE_EXCHANGE_RELEASING,
   /* The drone acknowledged the command, or the whole text has come. */
   ARDRONE_EXCHANGE_DONE,
@@ -136,8 +137,10 @@ typedef struct ardrone_exchange {
 #define ARDRONE_EXCHANGE_TIMEOUT_NS INT64_C(5000000000)
 
 /* Begins an exchange. key and value are read for ARDRONE_EXCHANGE_SET only. ids is null, or
-   {session, user, application}, which are sent before the command. TVS_ERR_STATE: an exchange is
-   under way; TVS_ERR_ARGUMENT: ardrone_config_check refuses the value. */
+   {session, user, application}, which are sent before the command. now_ns, here and below, is the
+   time of one clock of the caller. TVS_ERR_NULL: key or value of a SET is null; TVS_ERR_STATE: an
+   exchange is under way; TVS_ERR_ARGUMENT: ardrone_config_check refuses the value, an id is not 8
+   hexadecimal digits, or kind is none of the above. */
 TV_API tvs_status ardrone_exchange_begin(ardrone_exchange *exchange, ardrone_exchange_kind kind,
                                          const char *key, const char *value,
                                          const char *const ids[3], int64_t now_ns);

@@ -390,7 +390,7 @@ typedef struct ardrone_watchdog {
 typedef struct ardrone_adc_data {
   /* The version of the sensor board. */
   uint32_t version;
-  /* The sensor board's packet. */
+  /* The sensor board's packet, raw: its layout is not documented. */
   uint8_t data[32];
 } ardrone_adc_data;
 
@@ -538,8 +538,9 @@ typedef enum ardrone_gps_form {
 
 /* One packet. An option whose bit in `present` is 0 is filled with zeros. */
 typedef struct ardrone_navdata {
-  /* magic is 0x55667788; state has ARDRONE_STATE_ bits; sequence is the packet's number;
-     vision_defined is 1 when the on-board vision runs; checksum is as it was sent. */
+  /* magic is 0x55667788, or 0x55667789, which is also accepted; state has ARDRONE_STATE_ bits;
+     sequence is the packet's number; vision_defined is 1 when the on-board vision runs; checksum is
+     as it was sent. */
   uint32_t magic, state, sequence, vision_defined, checksum;
   /* Bit 1 << tag for each ardrone_tag whose option came whole. */
   uint32_t present;
@@ -611,10 +612,11 @@ typedef struct ardrone_navdata {
 } ardrone_navdata;
 
 /* Decodes one datagram. The whole datagram is checked first, so that an error leaves *navdata as it
-   was. Of an option that is longer than known (newer firmware), the known part is decoded. It reads
-   no byte outside [bytes, bytes + size). A full packet takes about 1 us. Returns TVS_ERR_NULL;
-   TVS_ERR_DATA: the magic number is wrong, the datagram is truncated, an option has size 0 to 3 or
-   reaches beyond the end, or the last option is no checksum; TVS_ERR_CHECKSUM. */
+   was. Of an option that is longer than known (newer firmware), the known part is decoded;
+   ARDRONE_TAG_GPS is decoded in its three sizes only. It reads no byte outside [bytes, bytes +
+   size). A full packet takes about 1 us. Returns TVS_ERR_NULL; TVS_ERR_DATA: the magic number is
+   wrong, the datagram is truncated, an option has size 0 to 3 or reaches beyond the end, or the
+   last option is no checksum; TVS_ERR_CHECKSUM. */
 TV_API tvs_status ardrone_navdata_decode(const uint8_t *bytes, size_t size,
                                          ardrone_navdata *navdata);
 
@@ -640,10 +642,11 @@ typedef enum ardrone_order {
 } ardrone_order;
 
 /* Compares the packet's sequence number with the last one, modulo 2^32. A larger number is a newer
-   packet. It is a restart when the number is smaller by at least 1000, when a bootstrap packet with
-   a smaller number follows one that was no bootstrap packet, or when 8 packets in a row have
-   smaller numbers and are in order among themselves. After a silence of the stream set has_last to
-   0; the next packet is then accepted whatever its number is. */
+   packet. It is a restart when the number is smaller by at least 1000, when a bootstrap packet
+   whose number is not larger follows one that was no bootstrap packet, or when 8 packets in a row
+   have numbers that are not larger and are in order among themselves; otherwise a number that is
+   not larger is ARDRONE_ORDER_LATE. The first packet is a restart. After a silence of the stream
+   set has_last to 0; the next packet is then accepted whatever its number is. */
 TV_API ardrone_order ardrone_sequence_check(ardrone_sequence *sequence,
                                             const ardrone_navdata *navdata);
 

@@ -133,14 +133,16 @@ TV_API void ardrone_pave_clear(ardrone_pave_parser *parser);
    returned TVS_NONE. */
 TV_API uint8_t *ardrone_pave_space(ardrone_pave_parser *parser, size_t *room);
 
-/* Call it with the number of bytes that were written there. */
+/* Call it with the number of bytes that were written where ardrone_pave_space pointed. */
 TV_API void ardrone_pave_filled(ardrone_pave_parser *parser, size_t size);
 
 /* Gets the next whole packet, or TVS_NONE. The packets do not depend on how the stream was split on
    its way. Bytes that are no packet are skipped up to the next signature. */
 TV_API tvs_status ardrone_pave_next(ardrone_pave_parser *parser, ardrone_pave_packet *packet);
 
-/* Call it with the number of bytes that were written where ardrone_pave_space pointed. */
+/* Keeps the latency of the live stream low; call it after ardrone_pave_filled. Of the whole packets
+   at the front of the buffer it drops those before the last one that can be decoded by itself (the
+   first slice of an IDR picture). Returns how many it dropped: 0 if there is no such packet. */
 TV_API int ardrone_pave_skip_to_latest(ardrone_pave_parser *parser);
 
 /* Decides what to do with each packet, so that only pictures without errors are shown. Start with
@@ -159,13 +161,15 @@ enum {
   ARDRONE_PAVE_REPEAT = 2,
   /* Packets between the last one and this one are missing. */
   ARDRONE_PAVE_GAP = 4,
-  /* Another stream begins with this packet: reset the decoder before it decodes the payload. */
+  /* Decoding begins, or begins again after a gap or with another stream, with this packet: reset
+     the decoder before it decodes the payload. */
   ARDRONE_PAVE_RESET = 8
 };
 
 /* Returns the ARDRONE_PAVE_ bits above for the next packet. Without ARDRONE_PAVE_DECODE and
-   ARDRONE_PAVE_REPEAT leave the packet out: an earlier one is missing, and the stream goes on with
-   the next picture that can be decoded by itself. */
+   ARDRONE_PAVE_REPEAT leave the packet out: it only announces a picture
+   (ARDRONE_PAVE_ADVERTISEMENT), or a packet before it is missing or belongs to another stream. The
+   bits come again with the next picture that can be decoded by itself. */
 TV_API int ardrone_pave_gate_check(ardrone_pave_gate *gate, const ardrone_pave_header *header);
 
 TV_END_DECLS
