@@ -65,7 +65,7 @@ const std::atomic<bool>& stop_flag_for_signals();
 // or larger than max_bytes.
 std::string read_file(const std::string& path, size_t max_bytes);
 
-// Writes to stdout and flushes it. A closed pipe is not an error; a full disk is.
+// Writes to stdout at once, without a buffer. A closed pipe is not an error; a full disk is.
 void print(std::string_view text);
 
 // Prints a line of a summary, with its name in a column of fixed width.

@@ -141,8 +141,9 @@ int refinement_reach(const Grid& grid) {
   return std::clamp(static_cast<int>(0.3 * least), 2, 11);
 }
 
-// Rotates the order of the corners by 180 degrees if this makes the first square dark. Boards
-// without this symmetry keep one order in all views.
+// Reverses the order of the corners (a rotation of the board by 180 degrees) if this makes the
+// first square dark. A board whose columns plus rows of inner corners are odd then has one order in
+// all views; other boards look the same after that rotation, and keep OpenCV's order.
 void begin_with_a_dark_square(const cv::Mat& luma, cv::Size inner, Corners& corners) {
   const Grid grid{corners, inner};
   const auto square = [&](int r, int c) {

@@ -199,7 +199,7 @@ double median(std::vector<double> values) {
 }
 
 // Marks views whose error is far above the others', the worst first, while at least two thirds of
-// the first views remain. Returns true if a view was marked.
+// the first views, and kMinViews, remain. Returns true if a view was marked.
 bool reject_outliers(std::vector<BoardView>& views, Calibration& calibration, size_t num_at_first) {
   std::vector<double> errors;
   for (const ViewFit& fit : calibration.fits) errors.push_back(fit.rms_px);
@@ -227,7 +227,7 @@ std::string formatted(const char* format, double a, double b = 0) {
   return text;
 }
 
-// Returns true if every pixel of the image has a ray.
+// Returns true if the four corner pixels of the image have rays.
 bool reaches_the_image_corners(const tv_camera& camera) {
   for (const double x : {0.0, camera.width - 1.0})
     for (const double y : {0.0, camera.height - 1.0}) {

@@ -15,8 +15,9 @@ const Colour paper(32, 24, 20), panel(44, 34, 28), grid(72, 60, 52), text(236, 2
 
 enum class Align { kLeft, kCentre, kRight };
 
-// Converts UTF-8 text to the ASCII characters that the font has. Latin letters lose their accents;
-// any other character, and each invalid byte, becomes one underscore.
+// Converts UTF-8 text to the ASCII characters that the font has. Latin letters lose their accents,
+// and combining accents are dropped; any other character, and each invalid byte, becomes one
+// underscore.
 std::string plain_letters(const std::string& text);
 
 // Draws text with capitals `height` pixels high and its baseline at `at`. The text is drawn large

@@ -82,8 +82,9 @@ std::optional<FlightSample> sample_of(const RecordedFlight& flight, const Record
   return sample_at(flight.log, frame.time_s, kAttitudeGapS);
 }
 
-// Candidate frames: those with a known attitude, evenly spread over the part of the log in which
-// the drone moved, or over all frames if it never moved.
+// At most kCandidates frames, evenly spread: over the frames with a known attitude in which the
+// drone moved faster than 0.05 m/s; if there are fewer than two, over those with a known attitude;
+// if there are fewer than two of these, over all frames.
 std::vector<RecordedFrame> candidates_of(const RecordedFlight& flight) {
   std::vector<RecordedFrame> moving, known;
   for (const RecordedFrame& frame : flight.frames) {

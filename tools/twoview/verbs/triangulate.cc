@@ -42,7 +42,7 @@ std::vector<tv_point> triangulated(const Arguments& a, const MatchList& matches,
 }
 
 // Returns true if the cloud should hold the point: it is in front of both cameras, and its
-// reprojection error is small enough.
+// reprojection error is at most max_error_px.
 bool is_wanted(const tv_point& point, double max_error_px) {
   return point.status == TV_POINT_OK && static_cast<double>(point.error_px) <= max_error_px;
 }

@@ -41,7 +41,9 @@ def _camera(row, name):
 
 
 def _named_cameras(model):
-    """{entry: camera} of a cameras.yaml in which K selects the entry."""
+    """Returns ({entry: camera}, the text of a cameras.yaml with these entries). In a pairs file fx
+    and cx of K select the entry, so BadInput if cameras with equal fx and cx differ in image size
+    or lens."""
     used = sorted({image.camera_id for image in model.images.values()})
     cameras = {f"camera_{key}": _camera(model.cameras[key], f"camera {key}") for key in used}
     by_K = {}
@@ -125,8 +127,9 @@ class Features:
             self.matches[name0, name1] = matches
 
     def matches_of(self, name0, name1, engine):
-        """The database's matches (n, 2) in this order of the names. If the database has no row for
-        the pair, our matcher makes them."""
+        """(matches (n, 2), their ratios or None) in this order of the names. The database's matches
+        have no ratios. If the database has no row for the pair, our matcher makes the matches from
+        its descriptors; there are none if the descriptors do not have 128 bytes."""
         if (name0, name1) in self.matches:
             return self.matches[name0, name1], None
         if (name1, name0) in self.matches:

@@ -132,7 +132,7 @@ def library_path():
 
 
 def thin_out(tasks, most):
-    """At most this many pairs of each list, evenly spaced."""
+    """At most `most` pairs of each list, evenly spaced; all of them if `most` is 0."""
     found = []
     for name in dict.fromkeys(t["set"] for t in tasks):
         part = [t for t in tasks if t["set"] == name]
@@ -144,8 +144,9 @@ def thin_out(tasks, most):
 
 
 def check_images(tasks, default_resize):
-    """Reads every image once: its size determines `resize`, and its hash detects a changed file.
-    Returns {path: hash}. BadInput names the first missing image and the number of missing
+    """Reads every image once; its hash shows in a later run whether the file has changed. Sets each
+    task's "resize": with default_resize the value for the width of its list's first image. Returns
+    {path: hash}. BadInput names the first image that cannot be read and the number of such
     images."""
     hashes, bad, resize = {}, [], {}
     for task in tasks:

@@ -200,7 +200,8 @@ def overlay(matches, answer, task):
 
 def _triangulate(run, rows, source, wanted):
     """Runs every triangulation on the reference's pose, else on the source pipeline's own pose,
-    with the inliers of that pose. Returns whose pose was used."""
+    with the source's matches that lie within 2 max_error_px of that pose's epipolar lines. Returns
+    whose pose was used; None if there is none."""
     chosen = systems.of_kind("triangulation", wanted)
     if not chosen:
         return None

@@ -139,7 +139,8 @@ def inlier_histogram(report, pairs):
 
 
 def epipolar_histogram(report, pairs, kind):
-    """A histogram of the Sampson distances of all matches of all pairs under a system's pose."""
+    """The share of a system's matches, over all pairs, whose Sampson distance under its own pose is
+    below a threshold, as a curve."""
     listed = _listed(report, kind)
     edges = np.array(report["histogram_edges_px"])
     traces = []

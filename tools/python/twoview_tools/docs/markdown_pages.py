@@ -11,8 +11,8 @@ def pages():
 
 
 class Page:
-    """A page. prose: the lines outside code blocks, with their numbers. blocks: (language, line,
-    lines before, text)."""
+    """A page. prose: (line number, text) of each line outside code blocks. blocks: (language, line
+    number of the opening fence, text) of each code block."""
 
     def __init__(self, path):
         self.path, self.prose, self.blocks = path, [], []

@@ -11,8 +11,8 @@ PATHS = {"unrefined": "FAST-12, SIFT, OpenCV's FM_RANSAC, its F as it is",
          "paper": "FAST-12, SIFT, eight-point RANSAC, refined",
          "default": "FAST-9, RootSIFT, five-point RANSAC, refined"}
 COLOURS = {"unrefined": drawing.GREY, "paper": drawing.ORANGE, "default": drawing.BLUE}
-# The scale of the Cauchy loss of bundle adjustment, in pixels: none, the default, and about the
-# noise of this pair.
+# The scale of the Cauchy loss of bundle adjustment, in pixels. None: before the adjustment; 1 px:
+# the default; 0.2 px: about the noise of this pair.
 STAGES = {"before": None, "adjusted, 1 px": 1.0, "adjusted, 0.2 px": 0.2}
 STYLES = {"before": "-", "adjusted, 1 px": "--", "adjusted, 0.2 px": ":"}
 # Standard deviation of a coordinate, estimated from the residuals of this pair.

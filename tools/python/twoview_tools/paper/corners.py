@@ -73,8 +73,8 @@ def detect(image, arc, threshold):
 
 
 def example_corner(image):
-    """A corner with an arc of 12 to 14 pixels and clear contrast, in which a reader can count the
-    pixels."""
+    """A corner with an arc of 12 or 13 pixels, more than 40 pixels from the border, in which a
+    reader can count the pixels: the strongest such corner."""
     found = detect(image, ARC, THRESHOLD)
     around = differences(image)
     for k in found:  # keypoints, strongest first
