@@ -44,7 +44,7 @@ def _totals(folder):
 
 
 def _count(build, program, stage, kernels):
-    """{name: instructions for one unit} of the rows of a stage."""
+    """{name: instructions for one unit (keypoint, sample, ...)} of the rows of a stage."""
     with tempfile.TemporaryDirectory() as folder:
         report = os.path.join(folder, "report.json")
         environment = dict(os.environ, TWOVIEW_BENCH_CALLS="1", TWOVIEW_KERNELS=kernels)

@@ -82,7 +82,7 @@ static void make_link(ardrone_session *session) {
 static void begin_anew(ardrone_session *session) {
   ++session->counters.reboots;
   if (session->has_link) lose_link(session);
-  /* The packet that revealed the reboot is the last one of the sequence. */
+  /* The packet that revealed the reboot counts as the latest one of session->sequence. */
   session->sequence.has_last = 1;
   session->has_psi0 = 0;
   tvs_clock_restart(&session->navdata_clock);

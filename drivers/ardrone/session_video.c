@@ -1,4 +1,4 @@
-/* The streams, and the pictures' way from a packet to the queue. */
+/* Receives the video streams, and decodes the live stream's packets to pictures in the queue. */
 #include <math.h>
 #include <string.h>
 
@@ -53,7 +53,7 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
     if (status == TVS_NONE) return total;
     if (status != TVS_OK || size == 0) {
       /* The bytes before the end of the stream are still valid: they are cut into packets before
-   the next receive returns the end. */
+         the next receive returns the end. */
       if (total == 0) close_stream(session, s);
       return total;
     }
@@ -263,7 +263,8 @@ static void step_live(ardrone_session *session) {
   session->counters.bytes_skipped = session->video.parser.bytes_skipped;
 }
 
-/* Every packet of the recording is reported: without the gate and without skip_to_latest. */
+/* Reports every packet of the recording. ardrone_pave_gate_check and skip_to_latest are not
+   used. */
 static void step_recording(ardrone_session *session) {
   size_t total = 0, size;
   do {

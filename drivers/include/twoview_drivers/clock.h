@@ -18,8 +18,8 @@ typedef struct tvs_clock_options {
   /* The counter wraps to 0 after this long, ns: at least 60 s, or 0 for a counter that never
      wraps. */
   int64_t period_ns;
-  /* The delay that even the quickest packet may have, ns. It cannot be observed, so half of it is
-     subtracted and half of it is added to the uncertainty. Default 2 ms. */
+  /* An upper bound on the delay of the quickest packet, ns. The delay itself cannot be observed, so
+     half of this bound is subtracted and half of it is added to the uncertainty. Default 2 ms. */
   int64_t least_delay_ns;
   /* The mean delay of a packet beyond the least one, ns. The quickest of n packets is then taken to
      be late by less than 4 jitter_ns / n, which holds in 98 % of cases for exponential delays.

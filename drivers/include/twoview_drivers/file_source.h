@@ -20,7 +20,7 @@ typedef struct tvs_file_options {
   tvs_status (*read)(void *user, uint64_t index, tvs_picture *picture, int64_t *device_ns);
   /* Gives a picture back. Null when there is nothing to release. */
   void (*release)(void *user, tvs_picture *picture);
-  /* Frames a second, (0, 10000], default 30; used where `read` writes no time. */
+  /* Frames per second, (0, 10000], default 30; used where `read` writes no time. */
   double frames_per_second;
   /* The clock_id of the frames' times, at least 1, default 1. */
   uint32_t clock_id;

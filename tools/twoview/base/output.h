@@ -68,7 +68,7 @@ std::string read_file(const std::string& path, size_t max_bytes);
 // Writes to stdout at once, without a buffer. A closed pipe is not an error; a full disk is.
 void print(std::string_view text);
 
-// Prints a line of a summary, with its name in a column of fixed width.
+// Returns a line of a summary, with its name in a column of fixed width.
 template <class... T>
 std::string summary_line(const char* name, const char* format, T... values) {
   char head[32], text[512];

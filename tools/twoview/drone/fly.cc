@@ -1,4 +1,5 @@
-// twoview drone fly: control by keyboard. The drone hovers while no key is pressed.
+// twoview drone fly: control by keyboard. A movement ends 0.5 s after the last repeat of its
+// key; then the drone hovers. Without --live nothing is sent.
 
 #include <memory>
 

@@ -227,7 +227,7 @@ nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFram
       transposed(product(at1->world_from_body, mount.body_from_camera));
   const Matrix3 by_imu =
       product(camera1_from_world, product(at0->world_from_body, mount.body_from_camera));
-  // The relative rotation has the errors of both attitudes about each of three axes.
+  // The standard deviation of the angle: both attitudes have errors about each of three axes.
   const double imu_sigma =
       std::sqrt(3.0) * std::hypot(at0->attitude_sigma_rad, at1->attitude_sigma_rad);
   const double* c = two_view.covariance;

@@ -88,7 +88,8 @@ enum { ARDRONE_NAVDATA_MAX_BYTES = 4096 };
 /* The motors are cut until they are re-armed. */
 #define ARDRONE_STATE_EMERGENCY (UINT32_C(1) << 31)
 
-/* Tags. Bit `tag` of ardrone_navdata.present and of the key general:navdata_options. */
+/* Tags of the options. An option is bit 1 << tag in ardrone_navdata.present and in the value of the
+   key general:navdata_options. */
 typedef enum ardrone_tag {
   /* Attitude, height, velocity and battery. */
   ARDRONE_TAG_DEMO = 0,
@@ -148,7 +149,7 @@ typedef enum ardrone_tag {
   ARDRONE_TAG_GPS = 27,
   /* The number of the tags above. */
   ARDRONE_NUM_TAGS = 28,
-  /* The last one: the sum of all bytes before it. */
+  /* The last option of each packet: the sum of all bytes before it. */
   ARDRONE_TAG_CHECKSUM = 0xffff
 } ardrone_tag;
 /* 1 when the packet has the option of this tag. */
@@ -346,7 +347,8 @@ typedef struct ardrone_vision {
   int32_t altitude_mm;
   /* When the picture was captured: milliseconds of the clock of ARDRONE_TAG_TIME. */
   uint32_t capture_ms;
-  /* Velocity along the body's axes, and the turns since the picture before, radians. */
+  /* Velocity along the body's axes; changes of roll, pitch and yaw since the picture before,
+     radians. */
   float velocity_mm_s[3], delta_phi, delta_theta, delta_psi;
   /* The place to hold: whether there is one; whether it was set anew. */
   uint32_t gold_defined, gold_reset;
@@ -446,8 +448,8 @@ typedef struct ardrone_magneto {
 
 /* The option ARDRONE_TAG_WIND: the wind's estimate and its estimator's state. */
 typedef struct ardrone_wind {
-  /* Speed of the wind, m/s; its direction and the angles that hold against it, radians; the
-     estimator's internal state. */
+  /* Speed of the wind, m/s; its direction, and the pitch and roll with which the drone leans
+     against it, radians; the estimator's internal state. */
   float speed_m_s, angle, theta_rad, phi_rad, state[6], debug[3];
 } ardrone_wind;
 

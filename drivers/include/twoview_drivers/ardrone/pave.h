@@ -81,7 +81,8 @@ typedef struct ardrone_pave_header {
   uint32_t position_low, position_high;
   /* When it changes, another stream begins that refers to nothing before it. */
   uint16_t stream_id;
-  /* Slices of the picture; bytes of the parameter sets where the payload begins with them. */
+  /* The number of slices of the picture and this one's index; bytes of the parameter sets (sps,
+     pps) where the payload begins with them. */
   uint8_t total_slices, slice_index, sps_size, pps_size;
   /* The length of the picture that an advertisement announces, bytes. */
   uint32_t advertised_size;

@@ -47,8 +47,8 @@ TV_API void ardrone_replay_close(ardrone_replay *replay);
    clock serves. To play as fast as possible, advance to ardrone_replay_next_ns each time. */
 TV_API void ardrone_replay_advance(ardrone_replay *replay, int64_t now_ns);
 
-/* When the next bytes are due by that clock; always later than the last advance. Bytes that were
-   due and not received are due again after 10 ms. INT64_MAX when all has been played. */
+/* When the next bytes are due, ns of the caller's clock; always later than the last advance. Bytes
+   that were due and not received are due again after 10 ms. INT64_MAX when all has been played. */
 TV_API int64_t ardrone_replay_next_ns(const ardrone_replay *replay);
 
 /* Converts an instant of the caller's clock to the recorded host time that is played then. */

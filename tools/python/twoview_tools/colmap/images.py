@@ -21,7 +21,8 @@ def list_images(folder):
 
 def _decode(path):
     """Decodes to 8 bits and 1, 3 (BGR) or 4 (BGRA) channels, with the pixels as they are stored."""
-    # OpenCV reads it when it is imported; only our own line is printed
+    # OpenCV reads this variable when it is imported: OFF, so that only our own error line is
+    # printed.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
     import cv2
     if not os.path.isfile(path):

@@ -37,7 +37,7 @@ def probe(task):
 
 
 class Run:
-    """Runs systems on one pair and sums the seconds of CPU of each."""
+    """Runs systems on one pair and records the seconds of CPU of each."""
 
     def __init__(self, task):
         self.task, self.seconds = task, {}

@@ -161,7 +161,7 @@ def epipolar_histogram(report, pairs, kind):
 
 
 def all_plots(report, pairs):
-    """Makes all plots of the page as a list of {"title", "hint", "figure"}."""
+    """Makes all plots of the page as a list of {"title", "hint", "figure", "reference"}."""
     is_known = bool(_known(pairs))
     has = {kind: bool(_listed(report, kind)) for kind in ("pipeline", "solver")}
     found = []
