@@ -178,7 +178,7 @@ class TwoView:
     fundamental_inliers: Optional[int]
     homography_inliers: Optional[int]
     rotation_inliers: Optional[int]
-    coverage: float  #: share of an 8x8 grid's cells with an inlier, the larger of the two
+    coverage: float  #: share of 8x8 cells with an inlier, the larger of the two images'
     median_parallax_rad: float
     rms_error_px: float
     noise_px: float

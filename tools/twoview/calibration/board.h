@@ -8,7 +8,8 @@
 
 namespace cli {
 
-using Corners = std::vector<cv::Point2f>;  // row by row; pixels, (0, 0): the centre of the first
+// Corners row by row, in pixels; (0, 0) is the centre of the first pixel.
+using Corners = std::vector<cv::Point2f>;
 
 // The reason why a view of the board is not used; kUsed means that it is used.
 enum class Reason {

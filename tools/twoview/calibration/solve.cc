@@ -11,8 +11,8 @@ namespace cli {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
-// A view is rejected if its error exceeds the median error both by this factor and by this number
-// of pixels.
+// A view is rejected if its error is above kOutlierRatio times the median error and is also more
+// than kOutlierPx pixels above it.
 constexpr double kOutlierRatio = 3, kOutlierPx = 0.3;
 constexpr int kOutlierRounds = 5;
 // The limits below which, or above which, a warning is given.
@@ -198,8 +198,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Marks views whose error is far above the others', the worst first, while at least two thirds of
-// the first views, and kMinViews, remain. Returns true if a view was marked.
+// Marks views whose error is above the limit of kOutlierRatio and kOutlierPx, the worst first, as
+// long as kMinViews and two thirds of num_at_first views remain. Returns true if a view was marked.
 bool reject_outliers(std::vector<BoardView>& views, Calibration& calibration, size_t num_at_first) {
   std::vector<double> errors;
   for (const ViewFit& fit : calibration.fits) errors.push_back(fit.rms_px);

@@ -132,11 +132,11 @@ typedef enum ardrone_legacy {
   /* The command has 1 argument: which camera is sent; the present form is the key
      video:video_channel. */
   ARDRONE_ZAP,
-  /* The command has 2 arguments: which tags are looked for. */
+  /* The command has 2 arguments: which printed tags are looked for. */
   ARDRONE_CAD,
   /* The command has 3 arguments: a trim by hand. */
   ARDRONE_MTRIM,
-  /* The command has 5 arguments for "polaris", positions by tags. */
+  /* The command has 5 arguments for "polaris", positions by printed tags. */
   ARDRONE_POL,
   /* The command has 1 argument for autonomous flight. */
   ARDRONE_AFLIGHT,

@@ -123,7 +123,7 @@ typedef enum ardrone_tag {
   ARDRONE_TAG_VISION_PERF = 14,
   /* The on-board vision's tracked points. */
   ARDRONE_TAG_TRACKERS = 15,
-  /* The tags and shells that the on-board vision saw. */
+  /* The markers (printed tags, shells of other drones) that the on-board vision saw. */
   ARDRONE_TAG_VISION_DETECT = 16,
   /* The counter of a watchdog. */
   ARDRONE_TAG_WATCHDOG = 17,
@@ -196,10 +196,10 @@ typedef struct ardrone_demo {
   float velocity_mm_s[3];
   /* The on-board vision's count of frames. */
   uint32_t num_frames;
-  /* Rotation (3x3) and translation of a detected tag in the camera's frame; the translation's unit
-     is not documented. */
+  /* Rotation (3x3) and translation of a detected marker in the camera's frame; the translation's
+     unit is not documented. */
   float detection_rotation[9], detection_translation[3];
-  /* Which tag was detected, and which detector found it. */
+  /* Which marker was detected, and which detector found it. */
   uint32_t detection_tag, detection_type;
   /* Rotation (3x3) and translation of the camera in the body's frame, often 0; the translation's
      unit is not documented. */
@@ -369,16 +369,17 @@ typedef struct ardrone_trackers {
   int32_t locked[30], points[60];
 } ardrone_trackers;
 
-/* The option ARDRONE_TAG_VISION_DETECT: up to four tags that the on-board vision saw. */
+/* The option ARDRONE_TAG_VISION_DETECT: up to four markers that the on-board vision saw. */
 typedef struct ardrone_vision_detect {
-  /* The number of tags; for each, its type, and its place and size in 0..1000 of the picture. */
+  /* The number of markers; for each, its type, and its place and size in thousandths of the
+     picture's width and height. */
   uint32_t count, type[4], x[4], y[4], width[4], height[4];
-  /* The distance of each tag from the camera, centimetres. */
+  /* The distance of each marker from the camera, centimetres. */
   uint32_t distance_cm[4];
-  /* For each tag: its orientation in the picture, its rotation (3x3) and its translation (3), whose
-     unit is not documented. */
+  /* For each marker: its orientation in the picture, its rotation (3x3) and its translation (3),
+     whose unit is not documented. */
   float orientation_deg[4], rotation[36], translation[12];
-  /* Which camera saw each tag. */
+  /* Which camera saw each marker. */
   uint32_t camera[4];
 } ardrone_vision_detect;
 
