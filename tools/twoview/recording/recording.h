@@ -41,7 +41,7 @@ void write_frame(const std::filesystem::path& folder, const tvs_frame& frame);
 
 class Recording {
  public:
-  // Creates the folder. Throws BadInput if it already holds a recording.
+  // Creates the folder if it does not exist. Throws BadInput if it already holds a recording.
   Recording(const std::filesystem::path& folder, bool with_frames);
   ~Recording();
 

@@ -80,8 +80,8 @@ def parse(words):
 
 
 def unique_names(paths):
-    """A unique name for each list: that of its folder, or its own name if the folders' names are
-    not unique."""
+    """A unique name for each list: that of its folder, with the list's own name after it where
+    several lists have that folder name. Raises BadInput for two equal names."""
     folders = [os.path.basename(os.path.dirname(os.path.abspath(p))) for p in paths]
     stems = [os.path.splitext(os.path.basename(p))[0] for p in paths]
     names = [f if folders.count(f) == 1 else f"{f}/{s}" for f, s in zip(folders, stems)]
