@@ -169,7 +169,7 @@ void ardrone_link_supervise(ardrone_session *session) {
 
 /* With a link, a datagram goes out at each tick and keeps the link alive. Without a link one goes
    out only after the caller's first flight request (pilot->active); it says "land", since a lost
-   link ends the request to fly. */
+   link ends the request to fly. With listen_only none goes out. */
 void ardrone_link_send(ardrone_session *session) {
   const ardrone_transport *t = &session->transport;
   ardrone_pilot *pilot = &session->pilot;

@@ -16,8 +16,8 @@ constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
 constexpr double kOutlierRatio = 3, kOutlierPx = 0.3;
 constexpr int kOutlierRounds = 5;
 // A warning is given for fewer views than kFewViews, for fewer than kTiltedViews views that are
-// tilted by at least kTiltedDeg, for corners in a smaller share of the 8 x 8 cells of the image than
-// kLittleCoverage, and for an RMS outside the last two limits.
+// tilted by at least kTiltedDeg, for corners in a smaller share of the 8 x 8 cells of the image
+// than kLittleCoverage, and for an RMS outside the last two limits.
 constexpr size_t kFewViews = 10, kTiltedViews = 4;
 constexpr double kTiltedDeg = 15, kLittleCoverage = 0.6, kHighRmsPx = 0.5, kLowRmsPx = 0.1;
 // A larger standard deviation gives a warning: that of fx as a share of fx, and that of the

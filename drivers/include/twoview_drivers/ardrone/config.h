@@ -49,7 +49,7 @@ typedef enum ardrone_id_kind {
 
 /* Gets the next entry of an id list, which has sections [applis], [profiles], [sessions] and lines
    `id,description`. *kind is the entry's section; hand the same variable to each call. text and
-     offset as ardrone_config_next. TVS_END after the last one. */
+   offset as ardrone_config_next. TVS_END after the last one. */
 TV_API tvs_status ardrone_ids_next(const char *text, size_t size, size_t *offset,
                                    ardrone_id_kind *kind, ardrone_span *id,
                                    ardrone_span *description);
