@@ -18,7 +18,7 @@ enum class Reason {
   kNoBoard,       // no chessboard found
   kPartialBoard,  // a chessboard with fewer inner corners than requested
   kOtherBoard,    // a chessboard with more inner corners, or a part of a larger one
-  kTimeLimit,     // the search reached its time limit
+  kTimeLimit,     // the search reached its time limit, or crashed
   kBlurred,       // the edges rise too slowly to locate a corner
   kDuplicate,     // the board has the position of an earlier view
   kSurplus,       // --max-views other views are used
@@ -42,9 +42,10 @@ struct BoardView {
 
 // Searches an 8-bit image for the whole board. The search runs in a process of its own, which is
 // ended after `limit_seconds` of CPU time (or 8 times as long by the clock), since OpenCV can take
-// minutes on a dark image. `likely_other` is the size of another board that may be in the image; it
-// is tried before the slow searches, and an empty size means none. The corners are ordered so that
-// the square at the first corner is dark, if columns plus rows of inner corners are odd.
+// minutes on a dark image. `likely_other` is the size of another board that may be in the image: if
+// that one is found and not the requested one, the search ends early. An empty size means none. The
+// corners are ordered so that the square at the first corner is dark, if columns plus rows of inner
+// corners are odd.
 BoardView find_board(const cv::Mat& luma, const std::string& name, cv::Size inner,
                      cv::Size likely_other, int limit_seconds);
 

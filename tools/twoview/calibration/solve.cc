@@ -20,8 +20,8 @@ constexpr int kOutlierRounds = 5;
 // than kLittleCoverage, and for an RMS outside the last two limits.
 constexpr size_t kFewViews = 10, kTiltedViews = 4;
 constexpr double kTiltedDeg = 15, kLittleCoverage = 0.6, kHighRmsPx = 0.5, kLowRmsPx = 0.1;
-// A larger standard deviation gives a warning: that of fx as a share of fx, and that of the
-// principal point as a share of the image width.
+// A larger standard deviation gives a warning: those of fx and fy as a share of these, and those of
+// cx and cy as a share of the image width.
 constexpr double kLargeFocalSigma = 0.005, kLargeCentreSigma = 0.005;
 
 std::vector<cv::Point3f> corners_of(const Board& board) {

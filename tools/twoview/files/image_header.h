@@ -9,7 +9,7 @@
 namespace cli {
 
 struct ImageHeader {
-  int64_t width = 0, height = 0;  // 0 if the format is not one that read_image_header parses
+  int64_t width = 0, height = 0;  // 0 if unknown: another format, or cut within the header
   bool truncated = false;         // the file ends early: PNG, JPEG, binary PNM
 };
 

@@ -43,10 +43,10 @@ std::optional<FlightSample> sample_at(const FlightLog& log, double time_s, doubl
 std::optional<MetricScale> scale_by_velocity(const FlightLog& log, double time0_s, double time1_s,
                                              const CameraMount& mount);
 
-// Scale by altitude: the camera's change of height divided by the vertical component of unit_way,
-// the unit vector in the world from camera 0 to camera 1. direction_sigma_rad is the standard
-// deviation of that vector. Empty if an altitude or attitude is unknown, if the change is at most 3
-// sigma, or if its sign is not that of the vertical component.
+// Scale by altitude: the camera's climb divided by the upward component of unit_way, the unit
+// vector in the world from camera 0 to camera 1. direction_sigma_rad is the standard deviation of
+// its direction. Empty if an altitude or attitude is unknown, if the instants belong to two runs,
+// if the climb is at most 3 sigma, or if its sign is not that of the upward component.
 std::optional<MetricScale> scale_by_altitude(const FlightLog& log, double time0_s, double time1_s,
                                              const Vector3& unit_way, double direction_sigma_rad,
                                              const CameraMount& mount);

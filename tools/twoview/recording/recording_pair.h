@@ -16,7 +16,7 @@ struct RecordedFrame {
   int index = 0;        // index among the decoded pictures, from 0
   uint64_t number = 0;  // the drone's own frame number
   double time_s = 0;    // time of the picture on the host's clock, seconds
-  bool timed = false;   // whether time_s is known on the attitudes' clock
+  bool timed = false;   // false: no attitude came less than 0.25 s before it
 };
 
 struct RecordedFlight {
