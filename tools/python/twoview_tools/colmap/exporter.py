@@ -30,7 +30,7 @@ from .settings import PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
 
 @dataclass(frozen=True)
 class View:
-    """An image to be exported, with its keypoints and descriptors."""
+    """An image to be exported: its camera, keypoints and descriptors."""
 
     camera: Any
     keypoints: np.ndarray

@@ -10,7 +10,8 @@ EXTENSIONS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", 
 
 
 def list_images(folder):
-    """The names of the images below a folder, sorted; as in COLMAP, / separates folders."""
+    """The names of the files with one of EXTENSIONS below a folder, sorted, without hidden ones; as
+    in COLMAP, / separates folders."""
     if not os.path.isdir(folder):
         raise BadInput(f"{folder}: no such folder")
     names = [os.path.relpath(os.path.join(root, file), folder)

@@ -71,7 +71,8 @@ def relative(image0, image1):
 
 
 def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
-    """Writes pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model. Returns the
+    """Writes pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model. Without a
+    pairs file, pairs with fewer than min_common_points points in common are left out. Returns the
     number of pairs."""
     cameras, cameras_text = _named_cameras(model)
     lines = []
@@ -187,7 +188,9 @@ def import_database(
     quiet=False,
 ):
     """Estimates from a database's features and matches, and writes report.json in the form of
-    `twoview evaluate`."""
+    `twoview evaluate`. Without a pairs file and an overlap it takes the pairs that have matches in
+    the database, or all pairs if none has. The truth is that of `model`, else that of the pairs
+    file."""
     features = Features(path, camera_files)
     if pairs_file or overlap or not features.matches:
         pairs = _choose(list(features.pixels), pairs_file, overlap)

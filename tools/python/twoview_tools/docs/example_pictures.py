@@ -191,7 +191,8 @@ def from_above(name, points, words):
 
 
 def colmap():
-    """Runs the example on eleven images of a fountain, if the data set and colmap are present."""
+    """Runs the example on eleven images of a fountain, if the data set is present. It needs colmap
+    and pycolmap."""
     data = (
         pathlib.Path(os.environ.get("TWOVIEW_DATA", ROOT / ".." / "shared" / "data"))
         / "strecha_fountain_P11"

@@ -49,7 +49,8 @@ class Page:
         return set(found)
 
     def links(self):
-        """(line, target, anchor) of each link or picture that refers to a file."""
+        """(line, target, anchor) of each link or picture without a scheme such as https:. The
+        target is empty for an anchor of the same page."""
         for number, line in self.prose:
             line = re.sub(r"`[^`]*`", "", line)
             for target in re.findall(r"\]\(([^()\s]+)\)", line):

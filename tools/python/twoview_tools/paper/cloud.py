@@ -103,8 +103,8 @@ def noise_percent(pair, depth_m):
 
 
 def near_points(pair, points, pixels0):
-    """(positions in metres, colours) of the points within the true scene's range of depth, for
-    drawing."""
+    """(positions in metres, colours) of the points within the true scene's range of depth and with
+    a reprojection error below 1 px, for drawing."""
     ok = (points["status"] == library().PointStatus.OK) & (points["error_px"] < 1)
     x, y = np.round(pixels0[ok]).astype(int).T
     colours = pair.colour[0][y, x, ::-1] / 255

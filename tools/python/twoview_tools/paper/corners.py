@@ -64,7 +64,7 @@ def longest_arc(values, threshold):
 
 
 def detect(image, arc, threshold):
-    """The library's corners in whole pixels, without a limit on their number."""
+    """The library's corners in whole pixels, at most 65535 of them."""
     tv = library()
     with tv.Context(max_width=image.shape[1], max_height=image.shape[0],
                     max_keypoints=65535) as context:

@@ -203,7 +203,8 @@ def draw_bytes(axis, ours, definition):
 
 
 def example(image, keypoints):
-    """The keypoint at the corner that figure 5 shows."""
+    """The index of the keypoint at the corner that figure 5 shows. Raises Missing if there is
+    none."""
     corner = corners.example_corner(image)
     off = np.hypot(keypoints["x"] - corner["x"], keypoints["y"] - corner["y"])
     if off.min() > 1.5:
