@@ -146,8 +146,8 @@ def thin_out(tasks, most):
 def check_images(tasks, default_resize):
     """Reads every image once; its hash shows in a later run whether the file has changed. Sets each
     task's "resize": with default_resize the value for the width of the first image of its list that
-    no earlier list has (0 before there is one). Returns {path: hash}. BadInput names the first image
-    that cannot be read and the number of the others."""
+    no earlier list has (0 before there is one). Returns {path: hash}. BadInput names the first
+    image that cannot be read and the number of the others."""
     hashes, bad, resize = {}, [], {}
     for task in tasks:
         for view in task["views"]:
