@@ -142,7 +142,7 @@ ardrone_order ardrone_sequence_check(ardrone_sequence *sequence, const ardrone_n
     return accept(sequence, navdata, ARDRONE_ORDER_RESTART);
   }
   /* A packet that was overtaken comes alone. A drone whose count started again sends many packets
-   in order, so several late ones in order are a restart. */
+     in order, so several late ones in order are a restart. */
   if (sequence->num_late > 0 && navdata->sequence != sequence->late_last + 1) {
     sequence->num_late = 0;
   }

@@ -136,7 +136,7 @@ tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs
   status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns, gap_ns, &found);
   if (status != TVS_OK) return status;
   /* An uncertain instant makes the attitude uncertain: the angle that the drone turned within that
-   uncertainty is added to sigma. */
+     uncertainty is added to sigma as an independent error. */
   if (uncertainty_ns > 0) {
     status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns - uncertainty_ns, gap_ns,
                               &earlier);

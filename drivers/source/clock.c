@@ -121,7 +121,7 @@ tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t receive
     begin_run(clock, stamp_ns, received_ns);
   } else {
     /* After a silence in which the clocks may have drifted by more than a packet's jitter, the old
-   packets bound the offset no better than a new one does. */
+       packets bound the offset no better than a new one does. */
     ++clock->num_observed;
     if (drift_over(clock, received_ns - clock->last_host_ns) > clock->options.jitter_ns) {
       clock->num_observed = 1;

@@ -39,15 +39,16 @@ class Firmware {
   void advance(int64_t now_ns);
 
   // The next navdata packet if it is due, otherwise nothing. Packets are due 15 times a second in
-  // demo mode and 200 times a second in full mode.
+  // bootstrap and in demo mode, and 200 times a second in full mode.
   std::optional<std::vector<uint8_t>> next_navdata(int64_t now_ns);
 
   // Returns, only once, the text that the control channel must send (the configuration or the list
   // of ids, with a terminating zero byte).
   std::optional<std::string> take_control_text();
 
-  // Restarts the drone as after a change of its battery: it is in bootstrap mode, its sequence
-  // numbers start at 1, and it stands on the ground at its present place.
+  // Restarts the drone as after a change of its battery: it is in bootstrap mode with the factory
+  // configuration, its sequence numbers start at 1, and it stands on the ground at its present
+  // place.
   void reboot(int64_t now_ns);
   // Sets the reported firmware version. From then on navdata also has options with tags that no
   // known firmware uses.

@@ -21,10 +21,10 @@ enum { ARDRONE_AT_MAX_BYTES = 1024 };
 /* One datagram being written. Start with zeros; set `size` to 0 for the next datagram and
    `sequence` to 0 for another link. Every function below appends one command. On an error it
    appends nothing and uses no number. The errors are TVS_ERR_NULL; TVS_ERR_ARGUMENT: an argument
-   out of range (NaN included), or text with a quote, a control character, or a comma where none may
-   be; TVS_ERR_CAPACITY: the command does not fit in the rest of the datagram. An empty datagram has
-   room for any command. After the sequence number INT32_MAX - 1 the numbers start again at 1, as
-   the drone allows. */
+   out of range (NaN included), a key without a section, or text with a quote, a control character,
+   or a comma or blank where none may be; TVS_ERR_CAPACITY: the command does not fit in the rest of
+   the datagram. An empty datagram has room for any command. After the sequence number INT32_MAX - 1
+   the numbers start again at 1, as the drone allows. */
 typedef struct ardrone_at {
   /* The text of the commands written so far. */
   char text[ARDRONE_AT_MAX_BYTES];

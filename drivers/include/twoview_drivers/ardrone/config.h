@@ -64,9 +64,9 @@ TV_API tvs_status ardrone_config_check(const char *key, const char *value);
 TV_API int ardrone_config_needs_ids(const char *key);
 
 /* Writes a number to `text` as the drone reads it: with a dot in every locale and `digits` digits
-   after it. Use six digits, and nine for the degrees of the GPS keys. |value| < 10^9. text has
-   cap_text bytes, the terminating zero included. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT,
-   TVS_ERR_CAPACITY. */
+   after it. Use six digits, and nine for the degrees of the GPS keys. digits is in [0, 9], |value|
+   < 10^9. text has cap_text bytes, the terminating zero included. Returns TVS_ERR_NULL,
+   TVS_ERR_ARGUMENT, TVS_ERR_CAPACITY. */
 TV_API tvs_status ardrone_format_number(double value, int digits, char *text, size_t cap_text);
 
 /* Writes the value of leds:leds_anim: animation, hertz as float bits, seconds. text, cap_text and
@@ -107,7 +107,7 @@ typedef enum ardrone_exchange_kind {
 typedef enum ardrone_exchange_state {
   /* No exchange was begun. */
   ARDRONE_EXCHANGE_IDLE,
-  /* An old acknowledge bit is still set; it is being cleared. */
+  /* Waits until navdata shows that no old acknowledge bit is set; clears one that is. */
   ARDRONE_EXCHANGE_CLEARING,
   /* The command is to be sent at the next tick. */
   ARDRONE_EXCHANGE_SENDING,
@@ -138,9 +138,9 @@ typedef struct ardrone_exchange {
 
 /* Begins an exchange. key and value are read for ARDRONE_EXCHANGE_SET only. ids is null, or
    {session, user, application}, which are sent before the command. now_ns, here and below, is the
-   time of one clock of the caller. TVS_ERR_NULL: key or value of a SET is null; TVS_ERR_STATE: an
-   exchange is under way; TVS_ERR_ARGUMENT: ardrone_config_check refuses the value, an id is not 8
-   hexadecimal digits, or kind is none of the above. */
+   time of one clock of the caller. TVS_ERR_NULL: the exchange, an id, or key or value of a SET is
+   null; TVS_ERR_STATE: an exchange is under way; TVS_ERR_ARGUMENT: ardrone_config_check refuses the
+   value, an id is not 8 hexadecimal digits, or kind is none of the above. */
 TV_API tvs_status ardrone_exchange_begin(ardrone_exchange *exchange, ardrone_exchange_kind kind,
                                          const char *key, const char *value,
                                          const char *const ids[3], int64_t now_ns);

@@ -64,7 +64,7 @@ enum {
 
 /* The header of a packet, which is little-endian on the wire. */
 typedef struct ardrone_pave_header {
-  /* version is 2; codec is an ardrone_pave_codec. */
+  /* version is 2 (1 to 3 are accepted); codec is an ardrone_pave_codec. */
   uint8_t version, codec;
   /* The length of this header, bytes. */
   uint16_t header_size;
@@ -86,15 +86,16 @@ typedef struct ardrone_pave_header {
   uint8_t total_slices, slice_index, sps_size, pps_size;
   /* The length of the picture that an advertisement announces, bytes. */
   uint32_t advertised_size;
-  /* In the 68-byte form only; its meaning is not documented. */
+  /* In headers of at least 68 bytes, else 0; its meaning is not documented. */
   uint32_t extra;
-  /* In the 68-byte form only; their meaning is not documented. In two captures they agree with
-     theta, phi and psi in radians at this frame. Compare them with navdata before you use them. */
+  /* In headers of at least 68 bytes, else 0; their meaning is not documented. In two captures they
+     agree with theta, phi and psi in radians at this frame. Compare them with navdata before you
+     use them. */
   float angles[3];
 } ardrone_pave_header;
 
 /* Decodes the header at the start of `bytes`. TVS_NONE: more bytes are needed. TVS_ERR_DATA: these
-   bytes are no header (signature, a size or a kind out of range). */
+   bytes are no header (signature, version, a size or a kind out of range). */
 TV_API tvs_status ardrone_pave_decode(const uint8_t *bytes, size_t size,
                                       ardrone_pave_header *header);
 
@@ -114,7 +115,7 @@ typedef struct ardrone_pave_packet {
 typedef struct ardrone_pave_parser {
   uint8_t *buffer;
   size_t capacity, begin, end;
-  /* How many bytes of the stream belonged to no packet. */
+  /* How many bytes of the stream belonged to no whole packet. */
   uint64_t bytes_skipped;
   uint64_t num_packets;
 } ardrone_pave_parser;

@@ -3,8 +3,8 @@
    keeps these safety rules:
    - until the first flight call it sends keep-alives, and requested flat trims, only;
    - it sends a take-off only after ardrone_pilot_take_off. That request ends, and the pilot sends
-     "land" from then on, when the drone lands by itself, at an emergency, when the link is lost,
-   and after 20 s without leaving the ground;
+     "land" from then on, when the drone lands by itself, at an emergency or a request for one, when
+     the link is lost, and after 20 s without leaving the ground;
    - a movement that is not renewed ends after ARDRONE_MOVE_HOLD_NS and becomes "hover";
    - the drone acts when the emergency bit rises, so the pilot sends it in pulses until the drone's
      state is the one that was requested, for at most 3 s. */

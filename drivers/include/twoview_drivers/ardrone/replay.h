@@ -67,8 +67,8 @@ typedef struct ardrone_log {
 
 /* Opens the file at `path` and fills *source, for file_source.h. The samples' device times are the
    recording's host times; the drone's own stamps remove the network's jitter from them. Their
-   clock_id is 1, and a larger one after each reboot; a packet without ARDRONE_TAG_TIME gives 0.
-   Returns TVS_ERR_NULL, TVS_ERR_IO (it does not open). */
+   clock_id is 1, and a larger one after each reboot or jump of the clock; a packet without
+   ARDRONE_TAG_TIME gives 0. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not open). */
 TV_API tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *source);
 /* Closes the file of a log, which may be null. */
 TV_API void ardrone_log_close(ardrone_log *log);
