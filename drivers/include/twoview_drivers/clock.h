@@ -40,7 +40,8 @@ typedef struct tvs_clock {
   uint32_t clock_id;
   /* The difference between the ids of successive runs. */
   uint32_t id_step;
-  /* How many stamps were observed in this run of the clock. */
+  /* How many stamps bound the offset: those of this run, or those since a silence in which the
+     clocks may have drifted by more than jitter_ns. 0: the next stamp begins a run. */
   int64_t num_observed;
   /* The latest time of the device so far, unwrapped, ns. */
   int64_t last_device_ns;

@@ -118,7 +118,8 @@ class _Known:
 
 
 def _write_images(writer, known, views):
-    """Writes the images. Returns {name: image_id}."""
+    """Writes the images that the database does not hold yet, and checks the others. Returns
+    {name: image_id}."""
     ids = {}
     for name, view in views.items():
         camera = conventions.camera_to_colmap(view.camera)

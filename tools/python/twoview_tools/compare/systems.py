@@ -5,7 +5,8 @@ import sys
 
 from ..accuracy import estimators, peers
 
-COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0  # COLMAP's defaults: most keypoints of an image; pixels
+# COLMAP's defaults: the most keypoints of an image, and the inlier threshold in pixels.
+COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0
 
 
 @dataclasses.dataclass(frozen=True)
