@@ -39,7 +39,7 @@ void navdata_decode(benchmark::State& state) {
 }
 BENCHMARK(navdata_decode)->Arg(0xfffffff)->Arg(1 << 16 | 1);
 
-// Parses a video frame of 10 kB, given to the parser in one piece.
+// Parses a video frame of 10 kB, which arrives in pieces of at most 1448 bytes, as from TCP.
 void pave_parse(benchmark::State& state) {
   ardrone_pave_header header{};
   std::vector<uint8_t> payload(10000), bytes(11000), buffer(ARDRONE_PAVE_BUFFER_BYTES);

@@ -22,7 +22,7 @@ struct Row {
   std::string name;
   std::function<void()> work;       // the timed call; it is called once before the timing
   std::function<Counters()> found;  // counts and errors of the results of the last call of work()
-  double units = 1;                 // number of keypoints, points or samples in one call of work()
+  double units = 1;                 // keypoints, points or samples in a call; rows.py divides by it
 };
 
 void add(Row row);

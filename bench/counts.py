@@ -1,12 +1,13 @@
 """Counts the instructions of a call, which do not depend on the load of the machine.
 
-x86-64, under valgrind --tool=callgrind: each row of the benchmark programs is called once more
-after a first call; what happens inside bench_measured (bench.cc) is counted. Once with the avx2 and
-once with the c kernel set; valgrind 3.19 hides AVX-512, so OpenCV too runs its AVX2 code.
+x86-64, under valgrind --tool=callgrind: each row of the benchmark programs (for the stages in
+FILTERS, each row that the filter names) is called once, and then once more within bench_measured
+(bench.cc); only the instructions within bench_measured are counted. This is done with the kernel
+sets avx2 and c. valgrind 3.19 hides AVX-512, so OpenCV too runs its AVX2 code.
 
-ARM, under qemu-user with the plugin qemu_count.c: stages.c, built by the cross compiler with the
-library of the presets aarch64 and armv7; a call is the difference between one call and none.
-"""
+ARM, under qemu-user with the plugin qemu_count.c: stages.c, built by the cross compiler and linked
+with the library that the presets aarch64 and armv7 build. The count of a call is the count of a
+run with one call minus that of a run without any."""
 
 import glob
 import json
@@ -43,7 +44,7 @@ def _totals(folder):
 
 
 def _count(build, program, stage, kernels):
-    """{name: instructions for one unit} of the rows of a stage."""
+    """{name: instructions for one unit (keypoint, sample, ...)} of the rows of a stage."""
     with tempfile.TemporaryDirectory() as folder:
         report = os.path.join(folder, "report.json")
         environment = dict(os.environ, TWOVIEW_BENCH_CALLS="1", TWOVIEW_KERNELS=kernels)

@@ -67,8 +67,8 @@ bool read_from_data(const Source& source, Pair* pair) {
   return true;
 }
 
-// Reads Middlebury's Motorcycle, a rectified pair: its cameras differ only in cx
-// (scripts/demo_truth.py). Returns false if the images are missing.
+// Reads Middlebury's Motorcycle, a rectified pair: its cameras differ only in cx (the numbers are
+// those of scripts/demo_truth.py). Returns false if the images are missing.
 bool read_motorcycle(Pair* pair) {
   const char* const names[2] = {"motorcycle_left.png", "motorcycle_right.png"};
   const double cx[2] = {311.193, 342.279};

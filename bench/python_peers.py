@@ -171,7 +171,7 @@ class Ours:
         result = library._init_struct("tv_two_view")
         found = library._init_struct("tv_reconstruction")
 
-        # The default argument keeps the arrays alive as long as the call.
+        # The default argument keeps the arrays alive as long as `work` exists.
         def work(keep=(cameras, views, stages)):
             del keep
             library.call("tv_reconstruct", self.context._pointer, ctypes.byref(views[0]),
@@ -467,10 +467,11 @@ def pair_cases(library, pairs):
             case.missing.append(COLMAP)
             yield case
             continue
-        # COLMAP is measured once against our defaults, and once against its number of keypoints
-        # with its descriptor window.
+        # COLMAP is measured once. Its row is reported in two cases: beside our default options, and
+        # beside ours with COLMAP's number of keypoints and COLMAP's descriptor window.
         keypoints, _ = _colmap_extractor().extract_from_uint8_array(pair.images[0])
-        # A descriptor bin is 3 scales wide there and 1.5 keypoint sizes wide here.
+        # A descriptor bin is 3 scales wide in COLMAP and 1.5 keypoint sizes wide in twoview, so the
+        # same window needs a keypoint size of 2 scales.
         size = 2 * np.median([k.compute_scale() for k in keypoints])
         options = {"max_keypoints": len(keypoints), "keypoint_size": float(np.clip(size, 1, 32))}
         equal = f"{pair.name} COLMAP's number and median window"

@@ -96,7 +96,8 @@ def from_google_benchmark(report):
 
 
 def pyramid_apart(measures):
-    """The time of one additional keypoint, from the rows with many and with few keypoints."""
+    """Measures of the time of one additional keypoint, i.e. without the pyramid, from the rows with
+    many and with few keypoints."""
     described = {(m.case, m.system): m for m in measures if m.stage == "describe" and m.times}
     apart = []
     for (case, system), many in described.items():

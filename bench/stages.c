@@ -3,7 +3,8 @@
 
      stages A.pgm B.pgm fx fy cx cy STAGE CALLS [KERNELS]
 
-   STAGE: detect, describe, match, estimate, pair. The stages before STAGE are called once. */
+   STAGE: detect, describe, match, estimate, pair. Before these calls the features of both images
+   are extracted and matched once, whatever STAGE is; a run with CALLS 0 does only this. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,7 @@
-// Table 1 of the paper, repeated: the seven methods of triangulation over levels of noise and three
-// geometries, and OpenCV's and OpenGV's. Without arguments the times are measured, as in the other
-// benchmarks. The errors of our methods and OpenCV's are printed as Markdown by
+// Repeats table 1 of the paper (docs/paper.md): the seven methods of triangulation over levels of
+// noise and three geometries, and beside them OpenCV's and OpenGV's. Without arguments the times
+// are measured, as in the other benchmarks. The errors of our methods and OpenCV's are printed as
+// Markdown by
 //
 //   bench_triangulation --errors [POINTS]
 //
@@ -53,9 +54,9 @@ struct Scene {
   int size() const { return static_cast<int>(points.size() / 3); }
 };
 
-// Cameras of 640x480 pixels with f = 500 and |t| = 1. Sideways and forward: the points are 4 to 20
-// baselines away. Converging: both cameras look at one place, 1.2 baselines away, from directions
-// 45 degrees apart.
+// Cameras of 640x480 pixels with f = 500 and |t| = 1. Sideways and forward: the points have depths
+// of 4 to 20 baselines in camera 0. Converging: the optical axes cross 1.31 baselines away at an
+// angle of 45 degrees, and the points have depths of 0.9 to 1.5 baselines.
 Scene make_scene(int geometry, double noise_px, int num_points) {
   Scene scene{};
   scene.camera.model = TV_CAMERA_PINHOLE;

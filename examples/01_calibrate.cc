@@ -1,4 +1,5 @@
-// A camera from pictures of a chessboard, by OpenCV, written as OpenCV's YAML that twoview reads.
+// Calibrates a camera from pictures of a chessboard with OpenCV, and writes it as OpenCV's YAML,
+// which twoview reads.
 // usage: 01_calibrate OUT.yaml COLUMNS ROWS IMAGE...     (inner corners of the board)
 #include <cstdio>
 #include <cstdlib>

@@ -1,4 +1,5 @@
-/* Removes a lens's distortion from an image, using the camera model only: figure 1b of the paper.
+/* Removes a lens's distortion from an image, using the camera model only: figure 1b of the paper
+   (docs/paper.md).
    usage: 02_undistort IN.pgm OUT.pgm fx fy cx cy k1 k2 p1 p2 k3 */
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,5 @@
-/* FAST corners of an image, the paper's 12 of 16 by default: its figure 6.
+/* Detects FAST corners in an image and draws them, as in figure 6 of the paper. An arc of 12 of 16
+   pixels, the default, is the paper's.
    usage: 03_detect IMAGE.pgm OUT.ppm [arc 9..12] [threshold] */
 #include <math.h>
 #include <stdio.h>

@@ -61,7 +61,8 @@ int main(int argc, char **argv) {
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
   camera.cy = atof(argv[5]);
-  /* The principal point is near the image's middle. The verdict needs the image's area. */
+  /* The size of the image follows from the assumption that the principal point is its middle. The
+     verdict needs the image's area. */
   camera.width = (int)(2 * camera.cx);
   camera.height = (int)(2 * camera.cy);
   rotation_of(argv + 6, world[0]);

@@ -16,7 +16,8 @@ static unsigned next_random(void) {
   return state >> 8;
 }
 
-/* Blocks of random grey. Those of the lower half are nearer, so they move three times as far. */
+/* Blocks of random grey. Those of the lower half are nearer, so they move about three times as
+   far. */
 static void paint(void) {
   int k, x, y;
   for (k = 0; k < 6000; ++k) {

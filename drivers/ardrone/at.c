@@ -8,7 +8,8 @@ static const int32_t REF_TAKE_OFF = 1 << 9, REF_EMERGENCY = 1 << 8;
 
 enum { MAX_KEY_BYTES = 64, MAX_VALUE_BYTES = 256, ID_BYTES = 8 };
 
-/* A command is written behind the text; `size` grows only when the whole command fits. */
+/* A command is written after the text that the datagram already holds. at->size grows only when the
+   whole command fits. */
 typedef struct writer {
   ardrone_at *at;
   size_t size;

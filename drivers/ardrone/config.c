@@ -198,7 +198,7 @@ static int parse_number(const char *text, int allow_fraction, double *value) {
   return num_digits > 0;
 }
 
-/* An id, "-" and an id (forget it), or "-all". */
+/* An id; or "-" and an id, which deletes that id; or "-all", which deletes all ids. */
 static int is_id_value(const char *value) {
   if (strcmp(value, "-all") == 0) return 1;
   if (*value == '-') ++value;
@@ -213,7 +213,7 @@ static int obeys(const key_rule *rule, const char *value) {
     case KEY_REAL:
       return parse_number(value, rule->kind == KEY_REAL, &number) && number >= rule->low &&
              number <= rule->high;
-    case KEY_GPS: /* the drone's number for "not valid" */
+    case KEY_GPS: /* 500 is the drone's number for "not valid" */
       return parse_number(value, 1, &number) &&
              ((number >= rule->low && number <= rule->high) || number == 500);
     case KEY_TEXT: return 1;

@@ -1,6 +1,6 @@
-/* The acknowledge handshake of ardrone/config.h. The drone sets its
-   acknowledge bit when it has accepted a value and keeps it set until CTRL 5 clears it. Each of the
-   four messages may be lost over UDP, so each step is repeated. */
+/* The handshake of ardrone/config.h. The drone sets its acknowledge bit when it has accepted a
+   value, and keeps the bit set until CTRL 5 clears it. UDP may lose any message of the handshake,
+   so each step is repeated until the exchange is done or ARDRONE_EXCHANGE_TIMEOUT_NS is over. */
 #include <string.h>
 
 #include "twoview_drivers/ardrone/config.h"
@@ -44,7 +44,7 @@ tvs_status ardrone_exchange_begin(ardrone_exchange *exchange, ardrone_exchange_k
   memset(exchange, 0, sizeof *exchange);
   exchange->kind = kind;
   if (kind == ARDRONE_EXCHANGE_SET) {
-    strcpy(exchange->key, key); /* ardrone_exchange_begin has checked the lengths */
+    strcpy(exchange->key, key); /* check() has checked the lengths */
     strcpy(exchange->value, value);
   }
   if (ids) {
@@ -135,7 +135,7 @@ tvs_status ardrone_exchange_tick(ardrone_exchange *exchange, ardrone_at *at, int
     return TVS_OK;
   }
   status = write_command(exchange, at);
-  if (status != TVS_OK) return status; /* without room here, the next datagram gets it */
+  if (status != TVS_OK) return status; /* no room: it goes into the next datagram */
   ++exchange->num_sent;
   enter(exchange, ARDRONE_EXCHANGE_WAITING, now_ns);
   return TVS_OK;

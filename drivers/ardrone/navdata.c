@@ -28,7 +28,7 @@ static uint32_t sum_bytes(const uint8_t *p, size_t size) {
   return sum;
 }
 
-/* Whether headers and checksum are those of a whole packet. */
+/* Returns TVS_OK if the headers and the checksum are those of a whole packet. */
 static tvs_status check_packet(const uint8_t *bytes, size_t size) {
   size_t at = NAVDATA_HEADER_BYTES;
   uint32_t magic;
@@ -142,7 +142,7 @@ ardrone_order ardrone_sequence_check(ardrone_sequence *sequence, const ardrone_n
     return accept(sequence, navdata, ARDRONE_ORDER_RESTART);
   }
   /* A packet that was overtaken comes alone. A drone whose count started again sends many packets
-   in order, so several late ones in order are a restart. */
+     in order, so several late ones in order are a restart. */
   if (sequence->num_late > 0 && navdata->sequence != sequence->late_last + 1) {
     sequence->num_late = 0;
   }
@@ -199,8 +199,8 @@ static void take_motion(const ardrone_navdata *navdata, tvs_imu *sample) {
   sample->valid |= TVS_IMU_VELOCITY_XY;
   if (ARDRONE_HAS(navdata, ARDRONE_TAG_ALTITUDE) && is_within(navdata->altitude.vz_mm_s, 20e3) &&
       (sample->valid & TVS_IMU_ATTITUDE)) {
-    /* World's down velocity is the third row of the rotation times the body velocity; solved
-       for z. */
+    /* The velocity downwards in the world is the third row of the rotation times the body
+       velocity; this is solved for the body's z. */
     const double theta = demo->theta_mdeg * 1e-3 * DEGREE, phi = demo->phi_mdeg * 1e-3 * DEGREE;
     const double down = cos(theta) * cos(phi);
     if (down > 0.5) {

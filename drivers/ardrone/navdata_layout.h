@@ -22,8 +22,8 @@ typedef struct navdata_layout {
   uint16_t bytes; /* size of the option on the wire, tag and size fields included */
 } navdata_layout;
 
-/* The layout of a tag; tag 27 has several, and `size` decides which one it is. Null when there is
- * none. */
+/* The layout of an option with this tag, or null when there is none. `bytes`, the option's size on
+   the wire, is used for tag 27 only, which has three layouts. */
 const navdata_layout *ardrone_navdata_layout(uint32_t tag, size_t bytes);
 
 #endif

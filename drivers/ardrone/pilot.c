@@ -140,7 +140,7 @@ static int emergency_bit(ardrone_pilot *pilot, int64_t now_ns) {
   }
   since_ns = now_ns - pilot->pulse_start_ns;
   /* The bit toggles the state: send another pulse only if a state word after the last pulse shows
-   that it had no effect. */
+     that it had no effect. */
   if (since_ns >= PULSE_PERIOD_NS && (!pilot->has_state || now_ns - pilot->state_ns > FRESH_NS)) {
     return 0;
   }

@@ -11,7 +11,8 @@ static const int64_t TAKEN_LATER_NS = 10 * MS;
 
 /* ---- reading the recorded files ---- */
 
-/* Reads the next whole record of a navdata.log. A record with an impossible length ends the log. */
+/* Reads the next whole record of a navdata.log. A record with an impossible time or length ends the
+   log. */
 static int read_record(FILE *file, int64_t *host_ns, uint8_t *bytes, size_t capacity,
                        size_t *size) {
   uint8_t header[RECORD_BYTES];
@@ -30,7 +31,8 @@ static void load_datagram(ardrone_replay *replay) {
                                      sizeof replay->datagram, &replay->datagram_size);
 }
 
-/* Reads the header into the buffer: first its fixed part, which holds the length of the whole. */
+/* Reads the next packet's header into the buffer: first its fixed part, which holds the length of
+   the whole header, and then the rest. */
 static int load_header(ardrone_replay *replay, ardrone_pave_header *header) {
   tvs_status status;
   FILE *file = replay->video;
@@ -63,8 +65,8 @@ static void load_packet(ardrone_replay *replay) {
   replay->header_sent = 0;
   replay->payload_left = header.payload_size;
   if (!read_frame_line(replay->frames, header.frame_number, &replay->packet_ns)) {
-    /* From here on the packets' stamps give the times. Where a stamp jumps, the wait is at
-       most 1 s. */
+    /* frames.txt is missing, at its end or not in step: from here on the packets' stamps give the
+       times. Where a stamp goes back or jumps by more than 1 s, the packet comes after 33 ms. */
     const uint32_t step_ms = header.timestamp_ms - replay->paced_ms;
     replay->packet_ns = replay->paced_ns + (step_ms > 1000 ? 33 : step_ms) * MS;
     if (replay->frames) fclose(replay->frames);
@@ -194,8 +196,8 @@ int64_t ardrone_replay_next_ns(const ardrone_replay *replay) {
   if (replay->has_packet && due(replay, replay->packet_ns) < next_ns) {
     next_ns = due(replay, replay->packet_ns);
   }
-  /* Bytes are due that the session does not receive: it has closed that channel, and opens it again
-   when its clock has advanced. */
+  /* If bytes are due already, the session is not receiving them: it has closed their channel, and
+     opens it again after its clock has advanced. Ask again in 10 ms. */
   return next_ns > replay->now_ns ? next_ns : replay->now_ns + TAKEN_LATER_NS;
 }
 

@@ -66,8 +66,8 @@ static void init_clocks(ardrone_session *session) {
   tvs_clock_init(&session->video_clock, &options, 2, 2);
 }
 
-/* The session's id differs each time; the ids of the user and the application are made from
-   the name. */
+/* The ids of the user and the application are made from the name; the session's id is made from the
+   name and the time of the first step, so that it differs each time. */
 static void make_ids(ardrone_session *session) {
   char text[MAX_NAME_BYTES + 24];
   const size_t length = strlen(session->options.name);

@@ -115,7 +115,8 @@ static int is_reading(const ardrone_session *session) {
          session->exchange.kind != ARDRONE_EXCHANGE_SET;
 }
 
-/* The text ends with a zero byte. Text that does not fit is no configuration. */
+/* Receives the text of a read, which the drone ends with a zero byte. An empty text is dropped, and
+   so is one that does not fit in TEXT_BYTES; the exchange then requests it again. */
 void ardrone_exchanges_receive(ardrone_session *session) {
   const ardrone_transport *t = &session->transport;
   while (is_reading(session) && session->exchange.state != ARDRONE_EXCHANGE_RELEASING) {

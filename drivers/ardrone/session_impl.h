@@ -24,8 +24,7 @@ typedef struct request {
   char key[ARDRONE_KEY_BYTES], value[ARDRONE_VALUE_BYTES];
 } request;
 
-/* One TCP stream of PaVE packets. Each stream is opened again by itself when it closes or is
-   silent. */
+/* One TCP stream of PaVE packets. When a stream closes or is silent, it alone is opened again. */
 typedef struct stream {
   ardrone_channel channel;
   int is_open, has_bytes, num_connections;

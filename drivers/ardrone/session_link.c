@@ -82,7 +82,7 @@ static void make_link(ardrone_session *session) {
 static void begin_anew(ardrone_session *session) {
   ++session->counters.reboots;
   if (session->has_link) lose_link(session);
-  /* The packet that revealed the reboot is the last one of the sequence. */
+  /* The packet that revealed the reboot counts as the latest one of session->sequence. */
   session->sequence.has_last = 1;
   session->has_psi0 = 0;
   tvs_clock_restart(&session->navdata_clock);
@@ -167,8 +167,9 @@ void ardrone_link_supervise(ardrone_session *session) {
   }
 }
 
-/* With a link, datagrams go out to keep it alive. Without one they go out only if the drone was
-   flying, and say "land". */
+/* With a link, a datagram goes out at each tick and keeps the link alive. Without a link one goes
+   out only after the caller's first flight request (pilot->active); it says "land", since a lost
+   link ends the request to fly. With listen_only none goes out. */
 void ardrone_link_send(ardrone_session *session) {
   const ardrone_transport *t = &session->transport;
   ardrone_pilot *pilot = &session->pilot;

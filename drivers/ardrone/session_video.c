@@ -1,4 +1,4 @@
-/* The streams, and the pictures' way from a packet to the queue. */
+/* Receives the video streams, and decodes the live stream's packets to pictures in the queue. */
 #include <math.h>
 #include <string.h>
 
@@ -53,7 +53,7 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
     if (status == TVS_NONE) return total;
     if (status != TVS_OK || size == 0) {
       /* The bytes before the end of the stream are still valid: they are cut into packets before
-   the next receive returns the end. */
+         the next receive returns the end. */
       if (total == 0) close_stream(session, s);
       return total;
     }
@@ -68,9 +68,9 @@ static size_t receive_stream(ardrone_session *session, stream *s) {
 /* ---- the time and attitude of a picture ---- */
 
 /* When the stamps of the pictures and of navdata both count from the drone's start, a picture's
-   stamp names an instant of the navdata clock. The arrival times show whether that is so: the
-   picture is then at most 1.5 s late (the least delay subtracted). Two unrelated clocks agree so
-   well by chance once in 1200 times. */
+   stamp names an instant of the navdata clock. The arrival times show whether that is so: measured
+   on that clock, the picture then came between 250 ms before and 1.5 s after its stamp (the least
+   delay subtracted). The chance that two unrelated clocks agree so well is 1 in 1200. */
 typedef enum clock_relation { UNRELATED, BY_ARRIVAL, BY_STAMP } clock_relation;
 
 static clock_relation to_navdata_clock(const ardrone_session *session, const tvs_time *time,
@@ -136,7 +136,7 @@ tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs
   status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns, gap_ns, &found);
   if (status != TVS_OK) return status;
   /* An uncertain instant makes the attitude uncertain: the angle that the drone turned within that
-   uncertainty is added to sigma. */
+     uncertainty is added to sigma as an independent error. */
   if (uncertainty_ns > 0) {
     status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns - uncertainty_ns, gap_ns,
                               &earlier);
@@ -263,7 +263,8 @@ static void step_live(ardrone_session *session) {
   session->counters.bytes_skipped = session->video.parser.bytes_skipped;
 }
 
-/* Every packet of the recording is reported: without the gate and without skip_to_latest. */
+/* Reports every packet of the recording. ardrone_pave_gate_check and skip_to_latest are not
+   used. */
 static void step_recording(ardrone_session *session) {
   size_t total = 0, size;
   do {

@@ -77,7 +77,7 @@ static tvs_status why_nothing(void) {
              : TVS_ERR_IO;
 }
 
-/* Datagrams from other addresses are dropped, up to a bound for each call. */
+/* Datagrams from other addresses are dropped, at most 64 in one call. */
 static tvs_status receive_datagram(ardrone_sockets *sockets, ardrone_channel channel, void *bytes,
                                    size_t capacity, size_t *size) {
   int k;

@@ -19,7 +19,7 @@ static int is_luma_first(int format) {
          format == AV_PIX_FMT_YUVJ444P;
 }
 
-/* The newest picture that is ready. One access unit gives at most one. */
+/* Takes the next decoded picture, if there is one. One access unit gives at most one. */
 static tvs_status take_picture(h264 *own, tvs_picture *picture) {
   AVFrame *held;
   const int result = avcodec_receive_frame(own->context, own->frame);
@@ -52,7 +52,7 @@ static tvs_status decode(void *user, const uint8_t *bytes, size_t size, tvs_pict
   if (!bytes || !picture) return TVS_ERR_NULL;
   if (size == 0 || size > MAX_BYTES) return TVS_ERR_ARGUMENT;
   /* The bytes are copied into a packet of libav's own, since libav reads beyond the end of a packet
-   and requires padding there. */
+     and requires padding there. */
   if (av_new_packet(own->packet, (int)size) < 0) return TVS_ERR_CAPACITY;
   memcpy(own->packet->data, bytes, size);
   result = avcodec_send_packet(own->context, own->packet);

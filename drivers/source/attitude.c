@@ -21,7 +21,8 @@ void tvs_slerp(const double a[4], const double b[4], double s, double q[4]) {
     dot = -dot;
     sign = -1;
   }
-  /* Nearer to 1, sin is too small to divide by, and linear weights are exact to rounding. */
+  /* Where dot is within 1e-9 of 1, sin is too small to divide by; the linear weights are then exact
+     to rounding. */
   if (dot < 1 - 1e-9) {
     const double angle = acos(dot);
     weight_a = sin((1 - s) * angle) / sin(angle);

@@ -1,13 +1,14 @@
-/* The least delay: received - device is the offset plus a delay that is never negative, so the
-   least of it over many packets is the offset plus the least delay. The clocks drift, so the
-   least of old packets may have become too small or too large: the offset may rise with the largest
-   drift until a packet confirms it. */
+/* The least delay: received_ns - device_ns is the clocks' offset plus a delay that is never
+   negative, so its minimum over many packets is the offset plus the least delay. The clocks drift,
+   so the minimum of old packets may have become too small or too large: a new packet replaces it if
+   its own difference is smaller than the minimum plus the largest drift since then. */
 #include "twoview_drivers/clock.h"
 
 #include <stddef.h>
 
 enum { SECOND = 1000000000 };
-/* TCP does not deliver bytes that are delayed by more than this, ns. */
+/* A stamp that lies further than this behind its expected time begins a new run of the clock, ns.
+   TCP does not deliver bytes that are delayed for longer. */
 static const int64_t LATEST_DELAY_NS = 30LL * SECOND;
 static const int64_t JUMP_NS = SECOND;
 /* About 73 years: sums and differences of such times do not overflow. */
@@ -62,7 +63,8 @@ static int64_t shift_of(const tvs_clock *clock) {
   return clock->offset_ns - clock->options.least_delay_ns / 2;
 }
 
-/* The time of this stamp nearest to the one expected. */
+/* The unwrapped time of a stamp: of stamp_ns plus whole periods, the value nearest to
+   expected_ns. */
 static int64_t unwrap(int64_t stamp_ns, int64_t period_ns, int64_t expected_ns) {
   int64_t turns, device_ns;
   if (period_ns == 0) return stamp_ns;
@@ -119,7 +121,7 @@ tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t receive
     begin_run(clock, stamp_ns, received_ns);
   } else {
     /* After a silence in which the clocks may have drifted by more than a packet's jitter, the old
-   packets bound the offset no better than a new one does. */
+       packets bound the offset no better than a new one does. */
     ++clock->num_observed;
     if (drift_over(clock, received_ns - clock->last_host_ns) > clock->options.jitter_ns) {
       clock->num_observed = 1;

@@ -63,7 +63,8 @@ def orient(context: Context, image: np.ndarray, keypoints: np.ndarray,
 
 def describe(context: Context, image: np.ndarray, keypoints: np.ndarray,
              options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_describe: descriptors (n, 128) uint8 in UBC order, one row for each keypoint."""
+    """tv_describe: descriptors (n, 128) uint8, one row for each keypoint, in the byte order that
+    OpenCV and COLMAP use (UBC order)."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     descriptors = np.empty((len(keypoints), _abi.DESCRIPTOR_BYTES), np.uint8)
@@ -171,13 +172,13 @@ class TwoView:
     H: Optional[np.ndarray]  #: (3, 3), maps undistorted pixels of image 0 to image 1
     alternative_R: Optional[np.ndarray]  #: the second pose that a planar scene permits
     alternative_t: Optional[np.ndarray]
-    covariance: Optional[np.ndarray]  #: (5, 5), radians squared, in the order w0 w1 w2 a b
+    covariance: Optional[np.ndarray]  #: (5, 5), radians squared: w0 w1 w2 a b of two_view.h
     alternative_covariance: Optional[np.ndarray]
     essential_inliers: Optional[int]  #: the number of inliers of each model, as evidence for it
     fundamental_inliers: Optional[int]
     homography_inliers: Optional[int]
     rotation_inliers: Optional[int]
-    coverage: float  #: share of the cells of an 8x8 grid that hold an inlier
+    coverage: float  #: share of 8x8 cells with an inlier, the larger of the two images'
     median_parallax_rad: float
     rms_error_px: float
     noise_px: float
@@ -258,8 +259,9 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
 def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
                 t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
                 method: int = Triangulation.ITERATIVE_LS) -> np.ndarray:
-    """tv_triangulate: (n,) of twoview.POINT: position (camera 0 frame, in units of |t|), angle_rad,
-    error_px, status (a PointStatus). R is 3x3, t has 3 numbers, pixels are (n, 2) float64."""
+    """tv_triangulate: (n,) of twoview.POINT: position (in camera 0's frame, in the unit of t),
+    angle_rad, error_px, status (a PointStatus). R is 3x3, t has 3 numbers, pixels are (n, 2)
+    float64."""
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     points = np.zeros(len(pixels0), _abi.POINT)

@@ -1,5 +1,6 @@
 // The random numbers of the room and its textures: SplitMix64 (G. L. Steele, D. Lea, C. H. Flood,
-// 2014). A seed gives the same numbers on every platform.
+// 2014). A seed gives the same next() and uniform() on every platform; normal() uses the platform's
+// log and cos.
 #pragma once
 
 #include <cmath>

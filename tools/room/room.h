@@ -16,8 +16,8 @@ namespace room {
 using Vec3 = std::array<double, 3>;
 using Mat3 = std::array<double, 9>;  // row-major
 
-// The pose of a camera (x right, y down, z forward) in the world: x_world = rotation * x_camera +
-// position.
+// The pose of a camera (x right, y down, z forward) in the world: x_world = world_from_camera *
+// x_camera + position.
 struct CameraPose {
   Mat3 world_from_camera;
   Vec3 position;  // metres

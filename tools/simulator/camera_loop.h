@@ -1,5 +1,5 @@
-// The drone's camera: a thread that renders a picture at each frame time and encodes it, so that a
-// slow picture never delays the navdata.
+// The drone's camera: a thread that renders and encodes each requested picture, so that a slow
+// picture never delays the navdata.
 #pragma once
 
 #include <condition_variable>

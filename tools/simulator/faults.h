@@ -20,7 +20,7 @@ class FaultyLink {
   FaultyLink(const FaultChances& chances, uint64_t seed) : chances_(chances), random_(seed) {}
 
   // Returns the datagrams that arrive when this one is sent: none, one or several, in their order
-  // of arrival. A datagram that is overtaken arrives with the next one.
+  // of arrival. A datagram that is overtaken arrives after the next one that is not lost.
   std::vector<Bytes> send(Bytes datagram);
 
  private:

@@ -16,7 +16,7 @@ struct FilmPacket {
 
 class Film {
  public:
-  // Throws std::runtime_error where this libavcodec has no H.264 encoder.
+  // Throws std::runtime_error where this libavcodec has no libx264, or cannot encode this size.
   Film(int width, int height, int frames_per_second, int kbit_per_second);
   ~Film();
   Film(const Film&) = delete;

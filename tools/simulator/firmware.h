@@ -39,18 +39,19 @@ class Firmware {
   void advance(int64_t now_ns);
 
   // The next navdata packet if it is due, otherwise nothing. Packets are due 15 times a second in
-  // demo mode and 200 times a second in full mode.
+  // bootstrap and in demo mode, and 200 times a second in full mode.
   std::optional<std::vector<uint8_t>> next_navdata(int64_t now_ns);
 
   // Returns, only once, the text that the control channel must send (the configuration or the list
   // of ids, with a terminating zero byte).
   std::optional<std::string> take_control_text();
 
-  // Restarts the drone as after a change of its battery: it is in bootstrap mode, its sequence
-  // numbers start at 1, and it stands on the ground at its present place.
+  // Restarts the drone as after a change of its battery: it is in bootstrap mode with the factory
+  // configuration, its sequence numbers start at 1, and it stands on the ground at its present
+  // place.
   void reboot(int64_t now_ns);
-  // Sets the reported firmware version. With a version that is not known, navdata also has options
-  // with unknown tags.
+  // Sets the reported firmware version. From then on navdata also has options with tags that no
+  // known firmware uses.
   void set_version(const std::string& version);
   // Sets the sequence number of the next packet, to test the wrap to 0.
   void set_sequence(uint32_t sequence) { sequence_ = sequence; }
@@ -62,8 +63,8 @@ class Firmware {
   bool navdata_runs() const { return hello_; }
   int num_refused() const { return num_refused_; }
   int num_obeyed() const { return num_obeyed_; }
-  // The highest sequence number that was executed since the link began, and whether a sequence
-  // number decreased without starting at 1 again.
+  // The sequence number of the last executed command; 0 after a lost link or a reboot. The number
+  // of take-offs so far.
   int32_t last_command() const { return last_command_; }
   int num_take_offs() const { return num_take_offs_; }
 

@@ -40,7 +40,7 @@ struct FlightState {
 Mat3 world_from_body(const FlightState& state);
 // The velocity on the body's axes, which the drone's own velocity estimate approximates.
 Vec3 body_velocity(const FlightState& state);
-// The reading of an ideal accelerometer on body axes, in m/s^2: (0, 0, -9.81) at rest.
+// The reading of an ideal accelerometer on body axes, in m/s^2: (0, 0, -9.81) at rest and level.
 Vec3 specific_force(const FlightState& state);
 
 class Flight {

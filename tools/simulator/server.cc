@@ -29,7 +29,7 @@ int64_t now_ns() {
       .count();
 }
 
-// A time that is due every `period_s` seconds, first after one period.
+// A time that is due every `period_s` seconds, first after one period; never if period_s is 0.
 class Repeated {
  public:
   Repeated(double period_s, int64_t from_ns)

@@ -45,7 +45,8 @@ struct ServerOptions {
   double stall_video_every_s = 0;
   double reboot_every_s = 0;
   std::optional<uint32_t> first_sequence;  // first sequence number of navdata, to test the wrap
-  // Empty: 2.4.8; a version that is not known adds unknown options, see Firmware.
+  // The reported firmware version; empty: 2.4.8. With a version, navdata also has options with tags
+  // that no known firmware uses (Firmware::set_version).
   std::string firmware;
 };
 

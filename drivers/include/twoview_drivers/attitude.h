@@ -27,7 +27,7 @@ TV_API void tvs_attitudes_init(tvs_attitudes *attitudes);
 /* Adds an attitude that was measured at device_ns of the clock that attitude->clock_id names. Where
    there is no room the oldest is dropped. A new clock_id drops all earlier ones. An attitude that
    is not newer than the newest is not added (TVS_NONE). Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT
-   (clock_id 0, not a unit quaternion to 1e-6, sigma not above 0). */
+   (clock_id 0, not a unit quaternion to 1e-6, sigma not in (0, 1000)). */
 TV_API tvs_status tvs_attitudes_add(tvs_attitudes *attitudes, int64_t device_ns,
                                     const tvs_attitude *attitude);
 

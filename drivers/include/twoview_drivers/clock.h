@@ -18,8 +18,8 @@ typedef struct tvs_clock_options {
   /* The counter wraps to 0 after this long, ns: at least 60 s, or 0 for a counter that never
      wraps. */
   int64_t period_ns;
-  /* The delay that even the quickest packet may have, ns. It cannot be observed, so half of it is
-     subtracted and half of it is added to the uncertainty. Default 2 ms. */
+  /* An upper bound on the delay of the quickest packet, ns. The delay itself cannot be observed, so
+     half of this bound is subtracted and half of it is added to the uncertainty. Default 2 ms. */
   int64_t least_delay_ns;
   /* The mean delay of a packet beyond the least one, ns. The quickest of n packets is then taken to
      be late by less than 4 jitter_ns / n, which holds in 98 % of cases for exponential delays.
@@ -36,11 +36,12 @@ TV_API void tvs_clock_options_init(tvs_clock_options *options);
 /* Private: a caller owns it and does not read its fields. */
 typedef struct tvs_clock {
   tvs_clock_options options;
-  /* The id of the clock's present run; 0 before the first observation. */
+  /* The id of the clock's present run; before the first observation first_id - id_step. */
   uint32_t clock_id;
   /* The difference between the ids of successive runs. */
   uint32_t id_step;
-  /* How many stamps were observed in this run of the clock. */
+  /* How many stamps bound the offset: those of this run, or those since a silence in which the
+     clocks may have drifted by more than jitter_ns. 0: the next stamp begins a run. */
   int64_t num_observed;
   /* The latest time of the device so far, unwrapped, ns. */
   int64_t last_device_ns;
@@ -52,10 +53,10 @@ typedef struct tvs_clock {
   int64_t offset_host_ns;
 } tvs_clock;
 
-/* Starts a clock. The clock_id of the first run is first_id, at least 1; the next runs have
-   first_id + id_step, first_id + 2 id_step and so on. The first_ids 1 to n with an id_step of n
-   give n clocks ids that are never equal. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT. options may be
-   null. */
+/* Starts a clock. The clock_id of the first run is first_id, the next runs have first_id + id_step,
+   first_id + 2 id_step and so on. The first_ids 1 to n with an id_step of n give n clocks ids that
+   are never equal. first_id and id_step are at least 1. options may be null. Returns TVS_ERR_NULL,
+   TVS_ERR_ARGUMENT. */
 TV_API tvs_status tvs_clock_init(tvs_clock *clock, const tvs_clock_options *options,
                                  uint32_t first_id, uint32_t id_step);
 
@@ -64,7 +65,8 @@ TV_API tvs_status tvs_clock_init(tvs_clock *clock, const tvs_clock_options *opti
    A stamp that is more than 1 s older than the latest, or more than 1 s ahead of what the host's
    clock allows, means that the clock jumped or the device started again: it gets a new clock_id.
    Packets may be up to 30 s late. A stamp that is at most 1 s older than the latest keeps its own
-   time. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (a stamp outside the period). */
+   time. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (a stamp outside the period, a time beyond 73
+   years). */
 TV_API tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t received_ns,
                                     tvs_time *time);
 
@@ -72,7 +74,7 @@ TV_API tvs_status tvs_clock_observe(tvs_clock *clock, int64_t stamp_ns, int64_t 
 TV_API void tvs_clock_restart(tvs_clock *clock);
 
 /* Converts an instant of the device's clock to the host's: *host_ns, with an error of at most
-     uncertainty_ns. TVS_NONE when clock_id is not the current run. Returns TVS_ERR_NULL,
+   *uncertainty_ns. TVS_NONE when clock_id is not the current run. Returns TVS_ERR_NULL,
    TVS_ERR_ARGUMENT (an instant out of range). */
 TV_API tvs_status tvs_clock_to_host(const tvs_clock *clock, uint32_t clock_id, int64_t device_ns,
                                     int64_t *host_ns, int64_t *uncertainty_ns);

@@ -20,14 +20,15 @@ typedef struct tvs_file_options {
   tvs_status (*read)(void *user, uint64_t index, tvs_picture *picture, int64_t *device_ns);
   /* Gives a picture back. Null when there is nothing to release. */
   void (*release)(void *user, tvs_picture *picture);
-  /* Frames a second, (0, 10000], default 30; used where `read` writes no time. */
+  /* Frames per second, (0, 10000], default 30; used where `read` writes no time. */
   double frames_per_second;
   /* The clock_id of the frames' times, at least 1, default 1. */
   uint32_t clock_id;
   /* A reserved field that is 0. */
   uint32_t reserved;
-  /* A source of attitudes in the same clock; each frame then carries the attitude at its time.
-     Samples are read ahead as far as a frame needs. Null: frames carry no attitude. */
+  /* A source of attitudes in the clock `clock_id`; each frame then carries the attitude at its
+     time. Samples of another clock_id are left out. Samples are read ahead as far as a frame needs.
+     Null: frames carry no attitude. */
   const tvs_imu_source *imu;
   /* The largest time between the two neighbours that an attitude is interpolated from (attitude.h),
      ns, default 100 ms. */
@@ -37,7 +38,7 @@ typedef struct tvs_file_options {
 /* Writes the defaults and struct_size to options, which may be null. */
 TV_API void tvs_file_options_init(tvs_file_options *options);
 
-/* A file source in the caller's memory, about 75 kB, nearly all of it attitudes. Private. */
+/* A file source in the caller's memory, about 57 kB, nearly all of it attitudes. Private. */
 typedef struct tvs_file_source tvs_file_source;
 
 /* The bytes of a tvs_file_source, whose memory is to be aligned as malloc aligns it. */

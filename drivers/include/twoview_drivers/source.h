@@ -56,7 +56,7 @@ enum {
   TVS_FRAME_KEY = 1,
   /* At least one frame between the last one delivered and this one was lost or left out. */
   TVS_FRAME_GAP = 2,
-  /* The frame's attitude was measured; without this bit it holds nothing. */
+  /* The frame's attitude was measured; without this bit the field attitude holds nothing. */
   TVS_FRAME_HAS_ATTITUDE = 4,
   /* This is the first frame of a connection; do not relate it to the frames before it. */
   TVS_FRAME_NEW_STREAM = 8

@@ -31,8 +31,8 @@ Which entry serves an image (choose_entry):
 1. One entry serves every image.
 2. Of several entries, the one whose name is a prefix of the image's file name, without its folders.
    If there are several such names, the longest is chosen (cam10 before cam1).
-3. Else the entry whose fx and cx equal those of the pair line's K, within 1e-6 of the entry's
-   value. If such entries differ in any number the choice is ambiguous, and the image is refused.
+3. Else the entry whose fx and cx equal those of the pair line's K to a relative error of 1e-6. If
+   such entries differ in any number the choice is ambiguous, and the image is refused.
 4. Else none serves it, and the image is refused.
 """
 

@@ -47,8 +47,7 @@ bool stands_for_open_file(const fs::path& path) {
   return !error && link.rfind("/proc/", 0) == 0;
 }
 
-// Writes all bytes. Returns 0, or the errno of the first failure. The data are flushed to the disk,
-// so that a full disk is detected before the file receives its final name.
+// Writes all bytes. Returns 0, or the errno of the first failure.
 int write_all(int fd, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(fd, bytes.data(), bytes.size());
@@ -59,6 +58,8 @@ int write_all(int fd, std::string_view bytes) {
   return 0;
 }
 
+// Flushes the data to the disk, so that a full disk is detected before the file receives its final
+// name. Returns 0, or an errno. A file system that cannot flush is not an error.
 int sync(int fd) {
   if (::fsync(fd) == 0 || errno == EINVAL || errno == ENOTSUP || errno == EROFS) return 0;
   return errno;

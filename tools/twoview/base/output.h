@@ -12,8 +12,8 @@
 namespace cli {
 
 // A set of output files for one folder. Each file is written under a temporary name beside its
-// target, and commit() renames them all. Without commit() all files are removed, also the folder if
-// this set made it. An existing target that is no regular file (a device, a pipe) is written to
+// target, and commit() renames them all. Without commit() these files and the folders that this set
+// made are removed. An existing target that is no regular file (a device, a pipe) is written to
 // directly. Every failure throws BadInput.
 class OutputSet {
  public:
@@ -61,14 +61,14 @@ void clean_up_on_signals();
 // first such signal only sets the returned flag, and a second one ends the program.
 const std::atomic<bool>& stop_flag_for_signals();
 
-// Reads a whole text or image file. Throws BadInput if the file is missing, no regular file, empty,
-// or larger than max_bytes.
+// Reads a whole text or image file, or a pipe to its end. Throws BadInput if it is missing, of
+// another kind, empty, or larger than max_bytes.
 std::string read_file(const std::string& path, size_t max_bytes);
 
-// Writes to stdout and flushes it. A closed pipe is not an error; a full disk is.
+// Writes to stdout at once, without a buffer. A closed pipe is not an error; a full disk is.
 void print(std::string_view text);
 
-// Prints a line of a summary, with its name in a column of fixed width.
+// Returns a line of a summary, with its name in a column of fixed width.
 template <class... T>
 std::string summary_line(const char* name, const char* format, T... values) {
   char head[32], text[512];

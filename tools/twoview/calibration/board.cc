@@ -141,8 +141,9 @@ int refinement_reach(const Grid& grid) {
   return std::clamp(static_cast<int>(0.3 * least), 2, 11);
 }
 
-// Rotates the order of the corners by 180 degrees if this makes the first square dark. Boards
-// without this symmetry keep one order in all views.
+// Reverses the order of the corners (a rotation of the board by 180 degrees) if this makes the
+// first square dark. A board whose columns plus rows of inner corners are odd then has one order in
+// all views; other boards look the same after that rotation, and keep OpenCV's order.
 void begin_with_a_dark_square(const cv::Mat& luma, cv::Size inner, Corners& corners) {
   const Grid grid{corners, inner};
   const auto square = [&](int r, int c) {
@@ -378,8 +379,9 @@ void reject_blurred(std::vector<BoardView>& views) {
     if (view.is_used()) rises.push_back(view.edge_rise_px);
   if (rises.empty()) return;
   std::nth_element(rises.begin(), rises.begin() + rises.size() / 2, rises.end());
-  // If all views are blurred the median is no useful reference, hence the absolute limit; if all
-  // views are sharp they may differ by more than the ratio.
+  // A view is blurred above kMaxRiseOfMedian times the median: but not up to kMaxRisePx, since
+  // sharp views may differ by more than that ratio; and always above twice kMaxRisePx, since all
+  // views may be blurred.
   const double limit = std::max(kMaxRisePx, kMaxRiseOfMedian * rises[rises.size() / 2]);
   for (BoardView& view : views) {
     if (!view.is_used() || view.edge_rise_px <= std::min(limit, 2 * kMaxRisePx)) continue;

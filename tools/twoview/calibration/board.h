@@ -8,23 +8,24 @@
 
 namespace cli {
 
-using Corners = std::vector<cv::Point2f>;  // row by row; pixels, (0, 0): the centre of the first
+// Corners row by row, in pixels; (0, 0) is the centre of the first pixel.
+using Corners = std::vector<cv::Point2f>;
 
 // The reason why a view of the board is not used; kUsed means that it is used.
 enum class Reason {
   kUsed,
   kTooDark,       // no board found, and hardly any pixel is above black
   kNoBoard,       // no chessboard found
-  kPartialBoard,  // a chessboard of which only a part is seen
-  kOtherBoard,    // a chessboard with more corners than requested
-  kTimeLimit,     // the search reached its time limit
+  kPartialBoard,  // a chessboard with fewer inner corners than requested
+  kOtherBoard,    // a chessboard with more inner corners, or a part of a larger one
+  kTimeLimit,     // the search reached its time limit, or crashed
   kBlurred,       // the edges rise too slowly to locate a corner
   kDuplicate,     // the board has the position of an earlier view
   kSurplus,       // --max-views other views are used
   kOutlier        // its reprojection error is far above the median
 };
 const char* reason_name(Reason reason);   // for JSON, such as "partial_board"
-const char* reason_words(Reason reason);  // for people, such as "only a part of the board is seen"
+const char* reason_words(Reason reason);  // for people, such as "a part of the board"
 
 struct BoardView {
   std::string name;
@@ -40,10 +41,11 @@ struct BoardView {
 };
 
 // Searches an 8-bit image for the whole board. The search runs in a process of its own, which is
-// ended after `limit_seconds` of CPU time, since OpenCV can take minutes on a dark image.
-// `likely_other` is the size of another board that may be in the image; it is tried before the slow
-// searches, and an empty size means none. The corners are ordered so that the square between the
-// first four is dark, if the board's shape permits this choice.
+// ended after `limit_seconds` of CPU time (or 8 times as long by the clock), since OpenCV can take
+// minutes on a dark image. `likely_other` is the size of another board that may be in the image: if
+// that one is found and not the requested one, the search ends early. An empty size means none. The
+// corners are ordered so that the square at the first corner is dark, if columns plus rows of inner
+// corners are odd.
 BoardView find_board(const cv::Mat& luma, const std::string& name, cv::Size inner,
                      cv::Size likely_other, int limit_seconds);
 

@@ -11,15 +11,17 @@ namespace cli {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
-// A view is rejected if its error exceeds the median error both by this factor and by this number
-// of pixels.
+// A view is rejected if its error is above kOutlierRatio times the median error and is also more
+// than kOutlierPx pixels above it.
 constexpr double kOutlierRatio = 3, kOutlierPx = 0.3;
 constexpr int kOutlierRounds = 5;
-// The limits below which, or above which, a warning is given.
+// A warning is given for fewer views than kFewViews, for fewer than kTiltedViews views that are
+// tilted by at least kTiltedDeg, for corners in a smaller share of the 8 x 8 cells of the image
+// than kLittleCoverage, and for an RMS outside the last two limits.
 constexpr size_t kFewViews = 10, kTiltedViews = 4;
 constexpr double kTiltedDeg = 15, kLittleCoverage = 0.6, kHighRmsPx = 0.5, kLowRmsPx = 0.1;
-// A larger standard deviation gives a warning: that of fx as a share of fx, and that of the
-// principal point as a share of the image width.
+// A larger standard deviation gives a warning: those of fx and fy as a share of these, and those of
+// cx and cy as a share of the image width.
 constexpr double kLargeFocalSigma = 0.005, kLargeCentreSigma = 0.005;
 
 std::vector<cv::Point3f> corners_of(const Board& board) {
@@ -198,8 +200,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Marks views whose error is far above the others', the worst first, while at least two thirds of
-// the first views remain. Returns true if a view was marked.
+// Marks views whose error is above the limit of kOutlierRatio and kOutlierPx, the worst first, as
+// long as kMinViews and two thirds of num_at_first views remain. Returns true if a view was marked.
 bool reject_outliers(std::vector<BoardView>& views, Calibration& calibration, size_t num_at_first) {
   std::vector<double> errors;
   for (const ViewFit& fit : calibration.fits) errors.push_back(fit.rms_px);
@@ -227,7 +229,7 @@ std::string formatted(const char* format, double a, double b = 0) {
   return text;
 }
 
-// Returns true if every pixel of the image has a ray.
+// Returns true if the four corner pixels of the image have rays.
 bool reaches_the_image_corners(const tv_camera& camera) {
   for (const double x : {0.0, camera.width - 1.0})
     for (const double y : {0.0, camera.height - 1.0}) {

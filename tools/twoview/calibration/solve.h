@@ -43,7 +43,8 @@ constexpr int kMinViews = 3, kCells = 8;
 
 // Estimates the camera from the used views. It repeats the estimate without the views whose error
 // is far above that of the others, which it marks as outliers. Residuals are those of the library's
-// lens models. Throws BadInput if OpenCV finds no camera.
+// lens models. Throws BadInput if OpenCV finds no camera, if tv_camera_check refuses the camera, or
+// if its lens does not reach a corner of the board.
 Calibration calibrate_camera(std::vector<BoardView>& views, const Board& board, cv::Size image,
                              Lens lens);
 

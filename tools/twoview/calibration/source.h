@@ -15,11 +15,13 @@ using TakeFrame = std::function<bool(const cv::Mat& luma, const std::string& nam
 // sizes.
 void read_images(const std::vector<std::string>& paths, const TakeFrame& take);
 
-// Returns true for a live source: a number, /dev/video..., or an address that contains "://".
+// Returns true for a live source: a number of at most three digits that names no file, a path that
+// begins with /dev/, or an address that contains "://".
 bool is_live(const std::string& video);
 
-// Reads four frames a second, at most 240 from the whole video. Throws BadInput for a file with
-// less than 90 % of the frames that it states, which is truncated.
+// Reads four frames a second (every sixth frame if the rate is unknown), or 240 spread over a
+// longer video. Throws BadInput for a file with less than 90 % of the frames that it states, which
+// is truncated.
 void read_video_file(const std::string& path, const TakeFrame& take);
 
 // Reads four frames a second until `take` returns false, the duration is over, or Ctrl-C is

@@ -1,4 +1,5 @@
-// twoview drone fly: control by keyboard. The drone hovers while no key is pressed.
+// twoview drone fly: control by keyboard. A movement ends 0.5 s after the last repeat of its
+// key; then the drone hovers. Without --live nothing is sent.
 
 #include <memory>
 
@@ -138,8 +139,8 @@ int fly(const Arguments& a) {
         return ends || keyboard.has_ended();
       },
       stop, a.duration);
-  // The drone is landed before the program ends, whatever the reason. If a second Ctrl-C interrupts
-  // this, the drone's own watchdog takes over.
+  // The drone is landed before the program ends, whatever ended the loop; this waits at most
+  // kLandingPatienceS. If a second Ctrl-C interrupts it, the drone's own watchdog takes over.
   ardrone_session_land(link.session());
   static const std::atomic<bool> never{false};
   link.run([&] { return !is_in_the_air(link.session()); }, never, kLandingPatienceS);

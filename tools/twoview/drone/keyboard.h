@@ -17,8 +17,8 @@ class Keyboard {
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;
   bool is_terminal() const { return is_terminal_; }
-  // Returns a character or a Key, or nothing if no key was pressed. has_ended() is true after the
-  // end of the input.
+  // Returns a character or a Key, or nothing if no key or an unknown one was pressed. has_ended()
+  // is true after the end of the input.
   std::optional<int> next();
   bool has_ended() const { return has_ended_; }
 

@@ -1,4 +1,4 @@
-// twoview drone record: stores everything that the drone sends, unchanged.
+// twoview drone record: stores the drone's navdata and live video packets, unchanged.
 
 #include <memory>
 #include <optional>

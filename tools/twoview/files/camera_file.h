@@ -15,7 +15,8 @@ tv_camera load_camera(const std::string& path);
 // Parses the text of a camera file; `name` is used in messages.
 tv_camera parse_camera(const std::string& text, const std::string& name);
 
-// The text of a camera file in OpenCV's format. Reading it gives the same camera, bit for bit.
+// The text of a camera file in OpenCV's format. Reading it gives the same camera, bit for bit,
+// except that a Brown-Conrady lens whose coefficients are all 0 is read as a pinhole.
 std::string camera_yaml(const tv_camera& camera);
 
 // A pinhole camera from the focal length for 35 mm film (EXIF's FocalLengthIn35mmFilm), which is

@@ -27,8 +27,8 @@ struct Picture {
 // Reads and decodes an image. Luma is OpenCV's BGR2GRAY, 0.299 R + 0.587 G + 0.114 B. 16-bit
 // samples are divided by 257 and rounded; alpha is dropped. An EXIF orientation is ignored, since
 // intrinsics refer to the pixels as they are stored. Throws BadInput for a file that is missing,
-// empty, no image, truncated, of another depth, or larger than kMaxSide on a side (checked in the
-// header where the format is known).
+// empty, no image, truncated, of another depth or number of channels, or larger than kMaxSide on a
+// side (checked in the header where the format is known).
 Picture load_picture(const std::string& path);
 
 // Decodes all pixels without conversion: 8 or 16 bits, 1, 3 (BGR) or 4 (BGRA) channels. Throws

@@ -1,6 +1,6 @@
-// Reads the image size from a file's header, and checks that the file is complete. Both happen
-// before decoding, because a small file must not make the decoder allocate a huge buffer, and some
-// decoders fill missing pixels with grey without reporting an error.
+// Reads the image size from a file's header, and finds truncated PNG, JPEG and binary PNM files.
+// Both happen before decoding, because a small file must not make the decoder allocate a huge
+// buffer, and some decoders fill missing pixels with grey without reporting an error.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 namespace cli {
 
 struct ImageHeader {
-  int64_t width = 0, height = 0;  // 0 if the format is not one that read_image_header parses
-  bool truncated = false;         // the format's end mark is missing
+  int64_t width = 0, height = 0;  // 0 if unknown: another format, or cut within the header
+  bool truncated = false;         // the file ends early: PNG, JPEG, binary PNM
 };
 
 // Parses the headers of PNG, JPEG, BMP, PNM and TIFF. It never fails and never reads outside

@@ -9,7 +9,7 @@ namespace cli {
 
 struct Pair {
   std::string name0, name1;
-  int turns0 = 0, turns1 = 0;  // counter-clockwise quarter turns of the image and K
+  int turns0 = 0, turns1 = 0;  // quarter turns of the image and of K, counter-clockwise
   bool has_K = false;
   std::array<double, 9> K0{}, K1{};  // row-major, for the images before they are turned
   bool has_truth = false;

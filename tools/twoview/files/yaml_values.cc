@@ -70,8 +70,8 @@ class StrictReader : public YAML::EventHandler {
     std::set<std::string> names;
   };
 
-  // Called for each scalar. In a map names and values alternate; a name that is given twice is
-  // refused.
+  // Called for each scalar and at the start of each list and map. In a map names and values
+  // alternate; a name that is given twice is refused.
   void value(const YAML::Mark& mark, const std::string& text) {
     if (levels_.empty() || !levels_.back().is_map) return;
     Level& level = levels_.back();

@@ -28,8 +28,8 @@ double auc_percent(std::vector<double> errors_deg, double threshold_deg);
 double percentile(std::vector<double> values, double share);
 
 // SuperGlue's precision: the share of matches whose symmetric squared epipolar distance under the
-// true pose is below 5e-4 in normalised coordinates. It is 0 without matches. A pixel that the lens
-// model cannot unproject counts as wrong.
+// true pose is below 5e-4 in normalised coordinates. It is 0 without matches. A pixel whose ray the
+// lens model cannot compute, or whose ray points backward, counts as wrong.
 double match_precision(const tv_camera& camera0, const tv_camera& camera1, const Matrix3& R,
                        const Vector3& t, const tv_reconstruction& reconstruction);
 

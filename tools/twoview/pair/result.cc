@@ -125,7 +125,7 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size) {
   const auto placed = [&](const Vector3& x) {
     return applied(transposed(R), {x[0] - t[0], x[1] - t[1], x[2] - t[2]});
   };
-  const tv_camera& lens = outcome.camera[camera];  // centred: its cx and cy are ignored
+  const tv_camera& lens = outcome.camera[camera];  // drawn as if cx, cy were its centre
   Frustum frustum;
   frustum.centre = placed({0, 0, 0});
   for (size_t i = 0; i < 4; ++i) {

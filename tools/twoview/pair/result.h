@@ -56,8 +56,8 @@ struct Frustum {
 };
 Frustum frustum_of(const Outcome& outcome, int camera, double size);
 
-// Makes the content of result.json except `truth`, `timings_ms`, `context_bytes`, `options` and
-// `kernels`, which the caller adds.
+// Makes the content of result.json except `imu` and `truth`, which are null, and `recording`,
+// `timings_ms`, `context_bytes`, `options` and `kernels`: the caller adds these.
 nlohmann::ordered_json result_json(const Outcome& outcome);
 
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.

@@ -27,8 +27,8 @@ class Session {
   size_t context_bytes() const { return context_bytes_; }
   std::string kernels() const;
 
-  // The times since the last call in milliseconds, as {pyramid, detect, ..., total}. A stage that
-  // did not run is omitted unless `all` is true.
+  // The times since the last call in milliseconds, as {pyramid, detect, ..., total}; total is
+  // total_ns. A stage that did not run is omitted unless `all` is true.
   nlohmann::ordered_json take_times(uint64_t total_ns, bool all);
 
  private:

@@ -1,4 +1,4 @@
-// Drawing on top of OpenCV: smooth text, transparent lines, and sheets with two images.
+// Drawing on top of OpenCV: smooth text and lines, and sheets with two images.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -15,8 +15,9 @@ const Colour paper(32, 24, 20), panel(44, 34, 28), grid(72, 60, 52), text(236, 2
 
 enum class Align { kLeft, kCentre, kRight };
 
-// Converts UTF-8 text to the ASCII characters that the font has. Latin letters lose their accents;
-// any other character, and each invalid byte, becomes one underscore.
+// Converts UTF-8 text to the ASCII characters that the font has. Latin letters lose their accents,
+// and combining accents are dropped; any other character, and each invalid byte, becomes one
+// underscore.
 std::string plain_letters(const std::string& text);
 
 // Draws text with capitals `height` pixels high and its baseline at `at`. The text is drawn large
@@ -39,11 +40,11 @@ void put_arrow(cv::Mat& sheet, cv::Point2d tail, cv::Point2d tip, const Colour& 
 
 // The Turbo colour map for bright colours on a dark background; `share` is in [0, 1].
 Colour turbo(double share);
-// The i-th colour of a sequence of clearly different colours.
+// The i-th of 15 clearly different colours, which repeat.
 Colour distinct(int index);
 
-// A sheet with two images and a caption strip below. The images stand side by side or one above the
-// other, whichever fills the sheet better, and are scaled by the same factor.
+// A sheet with two images and a caption strip below. The images stand side by side, or one above
+// the other if they are very wide, and are scaled by the same factor.
 class PairSheet {
  public:
   // The images are shown in grey with the brightness `dim`, in (0, 1].

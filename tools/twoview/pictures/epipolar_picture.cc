@@ -49,7 +49,8 @@ class Epipolar {
   }
 
   // The pixel of the epipole. If the lens model cannot project it, the result is the pixel of a
-  // lens without distortion in the same direction, and `exact` is false.
+  // lens without distortion in the same direction, and `exact` is false (for a pinhole camera
+  // true).
   Pixel epipole(int image, bool& exact) const {
     Vector3 e = epipole_[image];
     exact = true;

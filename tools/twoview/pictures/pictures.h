@@ -23,7 +23,7 @@ cv::Mat epipolar_picture(const Outcome& outcome);
 bool has_epipolar_geometry(const Outcome& outcome);
 
 // The cloud from the front, as camera 0 sees it, and from the side. The axes are in metres, or in
-// baselines. The cloud must not be empty.
+// baselines. The outcome must have a full pose, and the cloud must not be empty.
 cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& cloud);
 
 }  // namespace cli

@@ -24,7 +24,7 @@ Vector3 minus(const Vector3& a, const Vector3& b) {
 }
 Vector3 times(double s, const Vector3& a) { return {s * a[0], s * a[1], s * a[2]}; }
 
-// Interpolates rotations by s in [0, 1] along the geodesic, with the drivers' slerp.
+// The quaternion w x y z of a rotation matrix.
 void to_quaternion(const Matrix3& m, double q[4]) {
   const double trace = m[0] + m[4] + m[8];
   const double squares[4] = {1 + trace, 1 + 2 * m[0] - trace, 1 + 2 * m[4] - trace,
@@ -47,6 +47,7 @@ Matrix3 to_matrix(const double q[4]) {
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
+// Interpolates rotations by share in [0, 1] along the geodesic, with the drivers' slerp.
 Matrix3 between(const Matrix3& a, const Matrix3& b, double share) {
   double qa[4], qb[4], q[4];
   to_quaternion(a, qa);

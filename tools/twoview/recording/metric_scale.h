@@ -31,26 +31,30 @@ struct CameraMount {
   Vector3 position{0, 0, 0};                            // in body axes, metres
 };
 
-// The attitude at a time, interpolated between samples of one run that are at most max_gap_s apart;
-// empty if there are none.
+// The sample at a time between two samples of one run that are at most max_gap_s apart: attitude
+// and velocity are interpolated, the altitude is that of the nearer sample. Empty if there are no
+// such samples.
 std::optional<FlightSample> sample_at(const FlightLog& log, double time_s, double max_gap_s);
 
 // Scale by velocity: the body velocity is rotated to the world and integrated (trapezoids) from
 // time0 to time1, and the motion of the camera relative to the body is added. Empty if the log has
-// a gap or the distance is less than 3 sigma.
+// a gap of more than 0.25 s, a sample without velocity or two runs, or if the distance is at most 3
+// sigma.
 std::optional<MetricScale> scale_by_velocity(const FlightLog& log, double time0_s, double time1_s,
                                              const CameraMount& mount);
 
-// Scale by altitude: the change of altitude divided by the vertical component of the unit vector
-// from camera 0 to camera 1 in the world. Empty if the change is less than 3 sigma or an altitude
-// is unknown. direction_sigma_rad is the standard deviation of that unit vector.
+// Scale by altitude: the camera's climb divided by the upward component of unit_way, the unit
+// vector in the world from camera 0 to camera 1. direction_sigma_rad is the standard deviation of
+// its direction. Empty if an altitude or attitude is unknown, if the instants belong to two runs,
+// if the climb is at most 3 sigma, or if its sign is not that of the upward component.
 std::optional<MetricScale> scale_by_altitude(const FlightLog& log, double time0_s, double time1_s,
                                              const Vector3& unit_way, double direction_sigma_rad,
                                              const CameraMount& mount);
 
-// Scale by floor: the measured altitude divided by the height of the camera above the floor in the
-// cloud, in baselines. The floor is the lowest horizontal layer of the points (in camera 0's frame)
-// that holds enough of them; empty without such a layer.
+// Scale by floor: the camera's measured height above the floor in metres, divided by its height
+// above the floor in the cloud, which is in baselines. The floor is the lowest horizontal layer of
+// the points (in camera 0's frame) that holds enough of them. Empty without such a layer, if the
+// altitude or attitude at time0 is unknown, or if the measured height is at most 3 sigma.
 std::optional<MetricScale> scale_by_floor(const FlightLog& log, double time0_s,
                                           const std::vector<Vector3>& points,
                                           const CameraMount& mount);

@@ -41,13 +41,13 @@ void write_frame(const std::filesystem::path& folder, const tvs_frame& frame);
 
 class Recording {
  public:
-  // Creates the folder. Throws BadInput if it already holds a recording.
+  // Creates the folder if it does not exist. Throws BadInput if it already holds a recording.
   Recording(const std::filesystem::path& folder, bool with_frames);
   ~Recording();
 
   void add_navdata(const uint8_t* bytes, size_t size, const tvs_imu& imu);
   void add_packet(const ardrone_pave_packet& packet, const tvs_time& time);
-  // Writes a decoded picture as frames/<number>.png.
+  // Writes a decoded picture as frames/<number>.png, if with_frames was given.
   void add_frame(const tvs_frame& frame);
   // Writes the summary at the end. The file appears complete or not at all.
   void add_summary(const std::string& json);

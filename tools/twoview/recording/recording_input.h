@@ -30,10 +30,11 @@ class RecordingInput {
   RecordingInput(const RecordingOptions& options, const std::string& camera_file);
   ~RecordingInput();
 
-  // Puts the two pictures, not resized, into outcome.picture. `camera` is the camera of these
-  // pictures.
+  // Puts the two pictures, not resized, into outcome.picture; chooses them if the options name
+  // none. `camera` is the camera of these pictures.
   void load(const tv_camera& camera, Session& session, const Options& options, Outcome& outcome);
-  // Sets the gravity at both frames as a prior, unless the caller already gave one.
+  // Sets the gravity at both frames as a prior. Does nothing if the caller already gave one, or if
+  // an attitude is unknown.
   void add_gravity(tv_estimate_options& options);
   // Sets outcome.scale if the measurements of the flight determine it. Call it before result_json.
   void add_scale(Outcome& outcome) const;

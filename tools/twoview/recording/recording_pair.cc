@@ -82,8 +82,9 @@ std::optional<FlightSample> sample_of(const RecordedFlight& flight, const Record
   return sample_at(flight.log, frame.time_s, kAttitudeGapS);
 }
 
-// Candidate frames: those with a known attitude, evenly spread over the part of the log in which
-// the drone moved, or over all frames if it never moved.
+// At most kCandidates frames, evenly spread: over the frames with a known attitude in which the
+// drone moved faster than 0.05 m/s; if there are fewer than two, over those with a known attitude;
+// if there are fewer than two of these, over all frames.
 std::vector<RecordedFrame> candidates_of(const RecordedFlight& flight) {
   std::vector<RecordedFrame> moving, known;
   for (const RecordedFrame& frame : flight.frames) {
@@ -226,7 +227,7 @@ nlohmann::ordered_json imu_json(const RecordedFlight& flight, const RecordedFram
       transposed(product(at1->world_from_body, mount.body_from_camera));
   const Matrix3 by_imu =
       product(camera1_from_world, product(at0->world_from_body, mount.body_from_camera));
-  // The relative rotation has the errors of both attitudes about each of three axes.
+  // The standard deviation of the angle: both attitudes have errors about each of three axes.
   const double imu_sigma =
       std::sqrt(3.0) * std::hypot(at0->attitude_sigma_rad, at1->attitude_sigma_rad);
   const double* c = two_view.covariance;

@@ -1,5 +1,6 @@
-// A point cloud that turns under the mouse. Plain canvas: no library, no network, no GPU needed.
-// The page gives an element #cloud-data with JSON {points, colours: base64, cameras, unit}.
+// An interactive view of a point cloud: dragging rotates it. Plain canvas: no library, no network,
+// no GPU needed. The page gives an element #cloud-data with JSON {points, colours, cameras}; points
+// and colours are base64.
 (function () {
   "use strict";
   const data = JSON.parse(document.getElementById("cloud-data").textContent);
@@ -13,7 +14,8 @@
   const canvas = document.getElementById("cloud");
   const context = canvas.getContext("2d");
 
-  // The middle and the size of what most points span: a few far points must not decide.
+  // The centre and half the extent of the central 94 % of the points on each axis, so that a few
+  // distant points do not determine the view.
   const middle = [0, 1, 2].map((axis) => (share(axis, 0.03) + share(axis, 0.97)) / 2);
   let radius = 0;
   for (let axis = 0; axis < 3; ++axis)
@@ -26,7 +28,8 @@
     return values[Math.min(count - 1, Math.floor(part * count))];
   }
 
-  // Yaw turns about the image's vertical, pitch about its horizontal; 0, 0 looks as camera 0 does.
+  // Yaw rotates the view about the image's vertical axis, pitch about its horizontal axis, in
+  // radians; with both 0 it looks in camera 0's direction.
   const start = { yaw: -0.45, pitch: 0.22, zoom: 1, x: 0, y: 0 };
   let pose = Object.assign({}, start);
   let turning = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -99,7 +102,7 @@
     axes();
   }
 
-  // Small axes in the corner, by the directions of the camera's frame.
+  // Draws small axes in the lower left corner, along x, y and z of camera 0's frame.
   function axes() {
     const ratio = window.devicePixelRatio || 1, length = 34 * ratio;
     const at = [56 * ratio, canvas.height - 56 * ratio];

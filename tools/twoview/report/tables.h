@@ -15,9 +15,10 @@ std::string keypoints_csv(const tv_keypoint* keypoints, size_t count);
 std::string matches_csv(const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
                         const tv_correspondence* matches, size_t count);
 
-// The columns are x,y,z,angle_deg,error_px,status, one row a match in the order of the matches. The
-// status is ok, infinite (x y z is then the direction), behind or invalid (x y z are then zeros).
+// The word for a tv_point_status: ok, infinite, behind or invalid.
 const char* point_status_name(int32_t status);
+// The columns are x,y,z,angle_deg,error_px,status, one row a match in the order of the matches. For
+// the status infinite x y z is the direction, for invalid x y z are zeros.
 std::string points_csv(const std::vector<tv_point>& points);
 
 // The cloud as binary little-endian PLY: x y z float, red green blue uchar, angle_deg float,

@@ -12,14 +12,16 @@ namespace cli {
 
 class CameraSource {
  public:
-  // A file delivers every picture; its times follow from the constant frame rate, with clock_id 1.
+  // A file delivers every picture; its times follow from the constant frame rate (else from
+  // OpenCV's position), with clock_id 1.
   // A live source reads pictures in a thread of its own and keeps only the latest; skipped pictures
   // set the gap flag of the next one. Its host times are those of the steady clock on arrival; the
   // unknown delay since the exposure is not included.
   enum class Kind { kFile, kLive };
 
   // `name` is "0", "1", ... for a live camera by its number, else any name that cv::VideoCapture
-  // accepts: a file, /dev/video0, rtsp://... Throws BadInput if it cannot be opened.
+  // accepts; it is live if it begins with /dev/ or contains "://", and otherwise a file. Throws
+  // BadInput if it cannot be opened.
   explicit CameraSource(const std::string& name);
   CameraSource(const std::string& name, Kind kind);
   ~CameraSource();

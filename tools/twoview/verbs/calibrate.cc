@@ -21,7 +21,8 @@ namespace {
 
 constexpr int kMinSide = 3, kMaxBoardSide = 100;     // inner corners in a row; 3: OpenCV's minimum
 constexpr int kImageSeconds = 5, kFrameSeconds = 2;  // CPU limit of one search
-// This many views of another board show that the given size is wrong.
+// So many views of another board, and none of the requested one, suggest that the given size is
+// wrong.
 constexpr int kTellingViews = 2;
 
 struct Arguments {
@@ -114,9 +115,9 @@ void require_views(const std::vector<BoardView>& views, const Arguments& a) {
                  ": at least 3 are needed, 15 are better, each tilted another way");
 }
 
-// The other board that earlier views show while none shows the requested one; an empty size if
-// there is none. It may be the requested board partly hidden, so later views are still searched for
-// both.
+// The other board that at least kTellingViews views show while none shows the requested one; an
+// empty size if there is none. It may be the requested board partly hidden, so later views are
+// still searched for both.
 cv::Size likely_other_board(const std::vector<BoardView>& views) {
   const auto [seen, times] = other_board(views);
   return count_of(views, Reason::kUsed) == 0 && times >= kTellingViews ? seen : cv::Size();

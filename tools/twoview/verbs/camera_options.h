@@ -14,7 +14,7 @@ struct CameraOptions {
 
   void add_to(CLI::App& verb);
   // The camera file of each image; both are empty if no camera is given. Throws BadInput if only
-  // one of --camera0 and --camera1 is given.
+  // one of --camera0 and --camera1 is given, or either beside --camera.
   std::array<std::string, 2> files() const;
   // Loads the cameras of files(), which must not be empty. A file for both images is read once,
   // since it may be a pipe.

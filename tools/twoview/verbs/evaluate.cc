@@ -44,7 +44,7 @@ struct PairReport {
   Errors errors;
 };
 
-// The rotation from the frame of a camera to its frame after quarter turns counter-clockwise.
+// The rotation from a camera's frame to its frame after its image is turned counter-clockwise.
 Matrix3 turn_matrix(int quarters) {
   Matrix3 turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   for (int i = 0; i < (quarters & 3); ++i) turn = product({0, 1, 0, -1, 0, 0, 0, 0, 1}, turn);
@@ -233,7 +233,8 @@ class Progress {
   bool shown_;
 };
 
-// Splits -o: it is a file if it ends in .json or is an existing file, else a folder.
+// Splits -o: an existing folder is a folder; otherwise a path that ends in .json or exists is a
+// file, and any other path is a folder.
 void split_output(const std::string& output, fs::path& folder, std::string& name) {
   const fs::path path(output);
   std::error_code error;

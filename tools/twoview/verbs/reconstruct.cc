@@ -32,7 +32,7 @@ struct Arguments {
   RecordingOptions recording;
 };
 
-// Throws BadInput unless either two images or a recording is given.
+// Throws BadInput unless either two images, or a recording with its --camera, is given.
 void check_inputs(const Arguments& a) {
   if (!a.recording.given()) {
     for (int i = 0; i < 2; ++i)
@@ -46,7 +46,8 @@ void check_inputs(const Arguments& a) {
   if (a.cameras.both.empty()) throw BadInput("--recording needs --camera");
 }
 
-// The camera file of each image; both are empty without cameras, which some solvers do not need.
+// The camera file of each image; both are empty with --focal-35mm, and without cameras. Throws
+// BadInput if the solver needs cameras and none are given.
 std::array<std::string, 2> camera_files(const Arguments& a) {
   const std::array<std::string, 2> files = a.cameras.files();
   const bool has_focal = a.focal_35mm > 0;
@@ -98,7 +99,7 @@ nlohmann::ordered_json options_of(const Arguments& a) {
   return json;
 }
 
-// Makes all output files, in the order of the report.
+// Makes the output files that the result permits, in the order of the report.
 void make_files(const Outcome& outcome, OutputSet& files) {
   const std::vector<CloudPoint> cloud = cloud_of(outcome);
   const tv_reconstruction& r = outcome.reconstruction;

@@ -41,8 +41,8 @@ std::vector<tv_point> triangulated(const Arguments& a, const MatchList& matches,
   return points;
 }
 
-// Returns true if the cloud should hold the point: it is in front of both cameras, and its
-// reprojection error is small enough.
+// Returns true if the cloud should hold the point: it is in front of both cameras and not
+// at infinity, and its reprojection error is at most max_error_px.
 bool is_wanted(const tv_point& point, double max_error_px) {
   return point.status == TV_POINT_OK && static_cast<double>(point.error_px) <= max_error_px;
 }

@@ -21,10 +21,10 @@ enum { ARDRONE_AT_MAX_BYTES = 1024 };
 /* One datagram being written. Start with zeros; set `size` to 0 for the next datagram and
    `sequence` to 0 for another link. Every function below appends one command. On an error it
    appends nothing and uses no number. The errors are TVS_ERR_NULL; TVS_ERR_ARGUMENT: an argument
-   out of range (NaN included), or text with a quote, a control character, or a comma where none may
-   be; TVS_ERR_CAPACITY: the command does not fit in the rest of the datagram. An empty datagram has
-   room for any command. After the sequence number INT32_MAX - 1 the numbers start again at 1, as
-   the drone allows. */
+   out of range (NaN included), a key without a section, or text with a quote, a control character,
+   or a comma or blank where none may be; TVS_ERR_CAPACITY: the command does not fit in the rest of
+   the datagram. An empty datagram has room for any command. After the sequence number INT32_MAX - 1
+   the numbers start again at 1, as the drone allows. */
 typedef struct ardrone_at {
   /* The text of the commands written so far. */
   char text[ARDRONE_AT_MAX_BYTES];
@@ -63,8 +63,8 @@ TV_API tvs_status ardrone_at_pcmd(ardrone_at *at, const ardrone_move *move, int 
 TV_API tvs_status ardrone_at_pcmd_mag(ardrone_at *at, const ardrone_move *move, int flags,
                                       float heading, float accuracy);
 
-/* Flat trim: send it while the drone stands level on the ground; its attitude becomes level.
-   Statuses as of every command (ardrone_at). */
+/* Flat trim: send it while the drone stands level on the ground; the drone takes its present
+   attitude as level from then on. Statuses as of every command (ardrone_at). */
 TV_API tvs_status ardrone_at_ftrim(ardrone_at *at);
 
 /* Calibrates a device in flight. Device 0 is the magnetometer; the drone turns about its axis.
@@ -132,11 +132,11 @@ typedef enum ardrone_legacy {
   /* The command has 1 argument: which camera is sent; the present form is the key
      video:video_channel. */
   ARDRONE_ZAP,
-  /* The command has 2 arguments: which tags are looked for. */
+  /* The command has 2 arguments: which printed tags are looked for. */
   ARDRONE_CAD,
   /* The command has 3 arguments: a trim by hand. */
   ARDRONE_MTRIM,
-  /* The command has 5 arguments for "polaris", positions by tags. */
+  /* The command has 5 arguments for "polaris", positions by printed tags. */
   ARDRONE_POL,
   /* The command has 1 argument for autonomous flight. */
   ARDRONE_AFLIGHT,

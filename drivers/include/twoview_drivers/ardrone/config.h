@@ -49,7 +49,7 @@ typedef enum ardrone_id_kind {
 
 /* Gets the next entry of an id list, which has sections [applis], [profiles], [sessions] and lines
    `id,description`. *kind is the entry's section; hand the same variable to each call. text and
-     offset as ardrone_config_next. TVS_END after the last one. */
+   offset as ardrone_config_next. TVS_END after the last one. */
 TV_API tvs_status ardrone_ids_next(const char *text, size_t size, size_t *offset,
                                    ardrone_id_kind *kind, ardrone_span *id,
                                    ardrone_span *description);
@@ -64,9 +64,9 @@ TV_API tvs_status ardrone_config_check(const char *key, const char *value);
 TV_API int ardrone_config_needs_ids(const char *key);
 
 /* Writes a number to `text` as the drone reads it: with a dot in every locale and `digits` digits
-   after it. Use six digits, and nine for the degrees of the GPS keys. |value| < 10^9. text has
-   cap_text bytes, the terminating zero included. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT,
-   TVS_ERR_CAPACITY. */
+   after it. Use six digits, and nine for the degrees of the GPS keys. digits is in [0, 9], |value|
+   < 10^9. text has cap_text bytes, the terminating zero included. Returns TVS_ERR_NULL,
+   TVS_ERR_ARGUMENT, TVS_ERR_CAPACITY. */
 TV_API tvs_status ardrone_format_number(double value, int digits, char *text, size_t cap_text);
 
 /* Writes the value of leds:leds_anim: animation, hertz as float bits, seconds. text, cap_text and
@@ -90,7 +90,8 @@ typedef enum ardrone_video_codec {
 } ardrone_video_codec;
 
 /* ---- The handshake: one exchange at a time, over a lossy link ----------------------------------
-   clear the acknowledge bit -> send -> wait for the bit -> CTRL 5 until it is clear -> done. */
+   clear the acknowledge bit -> send -> wait for the bit, or for the whole text that was requested
+   -> CTRL 5 until the bit is clear -> done. */
 
 /* The purpose of an exchange. */
 typedef enum ardrone_exchange_kind {
@@ -106,13 +107,13 @@ typedef enum ardrone_exchange_kind {
 typedef enum ardrone_exchange_state {
   /* No exchange was begun. */
   ARDRONE_EXCHANGE_IDLE,
-  /* An old acknowledge bit is still set; it is being cleared. */
+  /* Waits until navdata shows that no old acknowledge bit is set; clears one that is. */
   ARDRONE_EXCHANGE_CLEARING,
   /* The command is to be sent at the next tick. */
   ARDRONE_EXCHANGE_SENDING,
   /* The command was sent; the bit, or the text, has not come yet. */
   ARDRONE_EXCHANGE_WAITING,
-  /* The bit came; CTRL 5 is sent until it is clear. */
+  /* The bit, or the text, came; CTRL 5 is sent while the bit is set. */
   ARDRONE_EXCHANGE_RELEASING,
   /* The drone acknowledged the command, or the whole text has come. */
   ARDRONE_EXCHANGE_DONE,
@@ -136,8 +137,10 @@ typedef struct ardrone_exchange {
 #define ARDRONE_EXCHANGE_TIMEOUT_NS INT64_C(5000000000)
 
 /* Begins an exchange. key and value are read for ARDRONE_EXCHANGE_SET only. ids is null, or
-   {session, user, application}, which are sent before the command. TVS_ERR_STATE: an exchange is
-   under way; TVS_ERR_ARGUMENT: ardrone_config_check refuses the value. */
+   {session, user, application}, which are sent before the command. now_ns, here and below, is the
+   time of one clock of the caller. TVS_ERR_NULL: the exchange, an id, or key or value of a SET is
+   null; TVS_ERR_STATE: an exchange is under way; TVS_ERR_ARGUMENT: ardrone_config_check refuses the
+   value, an id is not 8 hexadecimal digits, or kind is none of the above. */
 TV_API tvs_status ardrone_exchange_begin(ardrone_exchange *exchange, ardrone_exchange_kind kind,
                                          const char *key, const char *value,
                                          const char *const ids[3], int64_t now_ns);

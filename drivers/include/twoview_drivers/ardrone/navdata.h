@@ -88,7 +88,8 @@ enum { ARDRONE_NAVDATA_MAX_BYTES = 4096 };
 /* The motors are cut until they are re-armed. */
 #define ARDRONE_STATE_EMERGENCY (UINT32_C(1) << 31)
 
-/* Tags. Bit `tag` of ardrone_navdata.present and of the key general:navdata_options. */
+/* Tags of the options. An option is bit 1 << tag in ardrone_navdata.present and in the value of the
+   key general:navdata_options. */
 typedef enum ardrone_tag {
   /* Attitude, height, velocity and battery. */
   ARDRONE_TAG_DEMO = 0,
@@ -122,7 +123,7 @@ typedef enum ardrone_tag {
   ARDRONE_TAG_VISION_PERF = 14,
   /* The on-board vision's tracked points. */
   ARDRONE_TAG_TRACKERS = 15,
-  /* The tags and shells that the on-board vision saw. */
+  /* The markers (printed tags, shells of other drones) that the on-board vision saw. */
   ARDRONE_TAG_VISION_DETECT = 16,
   /* The counter of a watchdog. */
   ARDRONE_TAG_WATCHDOG = 17,
@@ -148,7 +149,7 @@ typedef enum ardrone_tag {
   ARDRONE_TAG_GPS = 27,
   /* The number of the tags above. */
   ARDRONE_NUM_TAGS = 28,
-  /* The last one: the sum of all bytes before it. */
+  /* The last option of each packet: the sum of all bytes before it. */
   ARDRONE_TAG_CHECKSUM = 0xffff
 } ardrone_tag;
 /* 1 when the packet has the option of this tag. */
@@ -195,10 +196,10 @@ typedef struct ardrone_demo {
   float velocity_mm_s[3];
   /* The on-board vision's count of frames. */
   uint32_t num_frames;
-  /* Rotation (3x3) and translation of a detected tag in the camera's frame; the translation's unit
-     is not documented. */
+  /* Rotation (3x3) and translation of a detected marker in the camera's frame; the translation's
+     unit is not documented. */
   float detection_rotation[9], detection_translation[3];
-  /* Which tag was detected, and which detector found it. */
+  /* Which marker was detected, and which detector found it. */
   uint32_t detection_tag, detection_type;
   /* Rotation (3x3) and translation of the camera in the body's frame, often 0; the translation's
      unit is not documented. */
@@ -346,7 +347,8 @@ typedef struct ardrone_vision {
   int32_t altitude_mm;
   /* When the picture was captured: milliseconds of the clock of ARDRONE_TAG_TIME. */
   uint32_t capture_ms;
-  /* Velocity along the body's axes, and the turns since the picture before, radians. */
+  /* Velocity along the body's axes; changes of roll, pitch and yaw since the picture before,
+     radians. */
   float velocity_mm_s[3], delta_phi, delta_theta, delta_psi;
   /* The place to hold: whether there is one; whether it was set anew. */
   uint32_t gold_defined, gold_reset;
@@ -367,16 +369,17 @@ typedef struct ardrone_trackers {
   int32_t locked[30], points[60];
 } ardrone_trackers;
 
-/* The option ARDRONE_TAG_VISION_DETECT: up to four tags that the on-board vision saw. */
+/* The option ARDRONE_TAG_VISION_DETECT: up to four markers that the on-board vision saw. */
 typedef struct ardrone_vision_detect {
-  /* The number of tags; for each, its type, and its place and size in 0..1000 of the picture. */
+  /* The number of markers; for each, its type, and its place and size in thousandths of the
+     picture's width and height. */
   uint32_t count, type[4], x[4], y[4], width[4], height[4];
-  /* The distance of each tag from the camera, centimetres. */
+  /* The distance of each marker from the camera, centimetres. */
   uint32_t distance_cm[4];
-  /* For each tag: its orientation in the picture, its rotation (3x3) and its translation (3), whose
-     unit is not documented. */
+  /* For each marker: its orientation in the picture, its rotation (3x3) and its translation (3),
+     whose unit is not documented. */
   float orientation_deg[4], rotation[36], translation[12];
-  /* Which camera saw each tag. */
+  /* Which camera saw each marker. */
   uint32_t camera[4];
 } ardrone_vision_detect;
 
@@ -390,7 +393,7 @@ typedef struct ardrone_watchdog {
 typedef struct ardrone_adc_data {
   /* The version of the sensor board. */
   uint32_t version;
-  /* The sensor board's packet. */
+  /* The sensor board's packet, raw: its layout is not documented. */
   uint8_t data[32];
 } ardrone_adc_data;
 
@@ -446,8 +449,8 @@ typedef struct ardrone_magneto {
 
 /* The option ARDRONE_TAG_WIND: the wind's estimate and its estimator's state. */
 typedef struct ardrone_wind {
-  /* Speed of the wind, m/s; its direction and the angles that hold against it, radians; the
-     estimator's internal state. */
+  /* Speed of the wind, m/s; its direction, and the pitch and roll with which the drone leans
+     against it, radians; the estimator's internal state. */
   float speed_m_s, angle, theta_rad, phi_rad, state[6], debug[3];
 } ardrone_wind;
 
@@ -538,8 +541,9 @@ typedef enum ardrone_gps_form {
 
 /* One packet. An option whose bit in `present` is 0 is filled with zeros. */
 typedef struct ardrone_navdata {
-  /* magic is 0x55667788; state has ARDRONE_STATE_ bits; sequence is the packet's number;
-     vision_defined is 1 when the on-board vision runs; checksum is as it was sent. */
+  /* magic is 0x55667788, or 0x55667789, which is also accepted; state has ARDRONE_STATE_ bits;
+     sequence is the packet's number; vision_defined is 1 when the on-board vision runs; checksum is
+     as it was sent. */
   uint32_t magic, state, sequence, vision_defined, checksum;
   /* Bit 1 << tag for each ardrone_tag whose option came whole. */
   uint32_t present;
@@ -611,10 +615,11 @@ typedef struct ardrone_navdata {
 } ardrone_navdata;
 
 /* Decodes one datagram. The whole datagram is checked first, so that an error leaves *navdata as it
-   was. Of an option that is longer than known (newer firmware), the known part is decoded. It reads
-   no byte outside [bytes, bytes + size). A full packet takes about 1 us. Returns TVS_ERR_NULL;
-   TVS_ERR_DATA: the magic number is wrong, the datagram is truncated, an option has size 0 to 3 or
-   reaches beyond the end, or the last option is no checksum; TVS_ERR_CHECKSUM. */
+   was. Of an option that is longer than known (newer firmware), the known part is decoded;
+   ARDRONE_TAG_GPS is decoded in its three sizes only. It reads no byte outside [bytes, bytes +
+   size). A full packet takes about 1 us. Returns TVS_ERR_NULL; TVS_ERR_DATA: the magic number is
+   wrong, the datagram is truncated, an option has size 0 to 3 or reaches beyond the end, or the
+   last option is no checksum; TVS_ERR_CHECKSUM. */
 TV_API tvs_status ardrone_navdata_decode(const uint8_t *bytes, size_t size,
                                          ardrone_navdata *navdata);
 
@@ -640,10 +645,11 @@ typedef enum ardrone_order {
 } ardrone_order;
 
 /* Compares the packet's sequence number with the last one, modulo 2^32. A larger number is a newer
-   packet. It is a restart when the number is smaller by at least 1000, when a bootstrap packet with
-   a smaller number follows one that was no bootstrap packet, or when 8 packets in a row have
-   smaller numbers and are in order among themselves. After a silence of the stream set has_last to
-   0; the next packet is then accepted whatever its number is. */
+   packet. It is a restart when the number is smaller by at least 1000, when a bootstrap packet
+   whose number is not larger follows one that was no bootstrap packet, or when 8 packets in a row
+   have numbers that are not larger and are in order among themselves; otherwise a number that is
+   not larger is ARDRONE_ORDER_LATE. The first packet is a restart. After a silence of the stream
+   set has_last to 0; the next packet is then accepted whatever its number is. */
 TV_API ardrone_order ardrone_sequence_check(ardrone_sequence *sequence,
                                             const ardrone_navdata *navdata);
 

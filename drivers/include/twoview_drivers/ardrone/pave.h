@@ -64,7 +64,7 @@ enum {
 
 /* The header of a packet, which is little-endian on the wire. */
 typedef struct ardrone_pave_header {
-  /* version is 2; codec is an ardrone_pave_codec. */
+  /* version is 2 (1 to 3 are accepted); codec is an ardrone_pave_codec. */
   uint8_t version, codec;
   /* The length of this header, bytes. */
   uint16_t header_size;
@@ -81,19 +81,21 @@ typedef struct ardrone_pave_header {
   uint32_t position_low, position_high;
   /* When it changes, another stream begins that refers to nothing before it. */
   uint16_t stream_id;
-  /* Slices of the picture; bytes of the parameter sets where the payload begins with them. */
+  /* The number of slices of the picture and this one's index; bytes of the parameter sets (sps,
+     pps) where the payload begins with them. */
   uint8_t total_slices, slice_index, sps_size, pps_size;
   /* The length of the picture that an advertisement announces, bytes. */
   uint32_t advertised_size;
-  /* In the 68-byte form only; its meaning is not documented. */
+  /* In headers of at least 68 bytes, else 0; its meaning is not documented. */
   uint32_t extra;
-  /* In the 68-byte form only; their meaning is not documented. In two captures they agree with
-     theta, phi and psi in radians at this frame. Compare them with navdata before you use them. */
+  /* In headers of at least 68 bytes, else 0; their meaning is not documented. In two captures they
+     agree with theta, phi and psi in radians at this frame. Compare them with navdata before you
+     use them. */
   float angles[3];
 } ardrone_pave_header;
 
 /* Decodes the header at the start of `bytes`. TVS_NONE: more bytes are needed. TVS_ERR_DATA: these
-   bytes are no header (signature, a size or a kind out of range). */
+   bytes are no header (signature, version, a size or a kind out of range). */
 TV_API tvs_status ardrone_pave_decode(const uint8_t *bytes, size_t size,
                                       ardrone_pave_header *header);
 
@@ -113,7 +115,7 @@ typedef struct ardrone_pave_packet {
 typedef struct ardrone_pave_parser {
   uint8_t *buffer;
   size_t capacity, begin, end;
-  /* How many bytes of the stream belonged to no packet. */
+  /* How many bytes of the stream belonged to no whole packet. */
   uint64_t bytes_skipped;
   uint64_t num_packets;
 } ardrone_pave_parser;
@@ -133,14 +135,16 @@ TV_API void ardrone_pave_clear(ardrone_pave_parser *parser);
    returned TVS_NONE. */
 TV_API uint8_t *ardrone_pave_space(ardrone_pave_parser *parser, size_t *room);
 
-/* Call it with the number of bytes that were written there. */
+/* Call it with the number of bytes that were written where ardrone_pave_space pointed. */
 TV_API void ardrone_pave_filled(ardrone_pave_parser *parser, size_t size);
 
 /* Gets the next whole packet, or TVS_NONE. The packets do not depend on how the stream was split on
    its way. Bytes that are no packet are skipped up to the next signature. */
 TV_API tvs_status ardrone_pave_next(ardrone_pave_parser *parser, ardrone_pave_packet *packet);
 
-/* Call it with the number of bytes that were written where ardrone_pave_space pointed. */
+/* Keeps the latency of the live stream low; call it after ardrone_pave_filled. Of the whole packets
+   at the front of the buffer it drops those before the last one that can be decoded by itself (the
+   first slice of an IDR picture). Returns how many it dropped: 0 if there is no such packet. */
 TV_API int ardrone_pave_skip_to_latest(ardrone_pave_parser *parser);
 
 /* Decides what to do with each packet, so that only pictures without errors are shown. Start with
@@ -159,13 +163,15 @@ enum {
   ARDRONE_PAVE_REPEAT = 2,
   /* Packets between the last one and this one are missing. */
   ARDRONE_PAVE_GAP = 4,
-  /* Another stream begins with this packet: reset the decoder before it decodes the payload. */
+  /* Decoding begins, or begins again after a gap or with another stream, with this packet: reset
+     the decoder before it decodes the payload. */
   ARDRONE_PAVE_RESET = 8
 };
 
 /* Returns the ARDRONE_PAVE_ bits above for the next packet. Without ARDRONE_PAVE_DECODE and
-   ARDRONE_PAVE_REPEAT leave the packet out: an earlier one is missing, and the stream goes on with
-   the next picture that can be decoded by itself. */
+   ARDRONE_PAVE_REPEAT leave the packet out: it only announces a picture
+   (ARDRONE_PAVE_ADVERTISEMENT), or a packet before it is missing or belongs to another stream. The
+   bits come again with the next picture that can be decoded by itself. */
 TV_API int ardrone_pave_gate_check(ardrone_pave_gate *gate, const ardrone_pave_header *header);
 
 TV_END_DECLS

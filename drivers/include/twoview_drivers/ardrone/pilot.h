@@ -1,13 +1,13 @@
 /* AR.Drone 2.0: which commands are sent when. A state machine without sockets, heap or a clock of
    its own; the caller's clock and the drone's state word drive it, and it writes AT commands. It
    keeps these safety rules:
-   - until the first flight call it sends keep-alives only;
+   - until the first flight call it sends keep-alives, and requested flat trims, only;
    - it sends a take-off only after ardrone_pilot_take_off. That request ends, and the pilot sends
-     "land" from then on, when the drone lands by itself, at an emergency, when the link is lost,
-   and after 20 s without leaving the ground;
+     "land" from then on, when the drone lands by itself, at an emergency or a request for one, when
+     the link is lost, and after 20 s without leaving the ground;
    - a movement that is not renewed ends after ARDRONE_MOVE_HOLD_NS and becomes "hover";
    - the drone acts when the emergency bit rises, so the pilot sends it in pulses until the drone's
-     state is the one that was requested. */
+     state is the one that was requested, for at most 3 s. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_PILOT_H
 #define TWOVIEW_DRIVERS_ARDRONE_PILOT_H
 
@@ -57,7 +57,8 @@ TV_API void ardrone_pilot_new_link(ardrone_pilot *pilot);
 TV_API void ardrone_pilot_state(ardrone_pilot *pilot, uint32_t state, int64_t now_ns);
 
 /* Requests flight until one of the rules above ends the request. Returns TVS_ERR_NULL;
-   TVS_ERR_STATE: the drone's state is not known, or it is in an emergency. */
+   TVS_ERR_STATE: the drone's state is not known, it is in an emergency, or cutting or re-arming the
+   motors is under way. */
 TV_API tvs_status ardrone_pilot_take_off(ardrone_pilot *pilot, int64_t now_ns);
 
 /* Ends the request to fly: the pilot sends "land". Returns TVS_ERR_NULL. */
@@ -71,17 +72,17 @@ TV_API tvs_status ardrone_pilot_hover(ardrone_pilot *pilot);
 TV_API tvs_status ardrone_pilot_move(ardrone_pilot *pilot, const ardrone_move *move,
                                      int64_t now_ns);
 
-/* Emergency: the motors stop and the drone falls. Does nothing where the drone is in an emergency
-   already. Returns TVS_ERR_NULL, TVS_ERR_STATE (re-arming is under way). */
+/* Emergency: the motors stop and the drone falls. Does nothing where the drone's last state word
+   reports an emergency already, also while it is being re-armed. Returns TVS_ERR_NULL. */
 TV_API tvs_status ardrone_pilot_cut_motors(ardrone_pilot *pilot, int64_t now_ns);
 
 /* Ends an emergency. Does nothing where there is none. Returns TVS_ERR_NULL; TVS_ERR_STATE: the
    drone's state is not known. */
 TV_API tvs_status ardrone_pilot_rearm(ardrone_pilot *pilot, int64_t now_ns);
 
-/* Flat trim: call it while the drone stands level on the ground; its present attitude becomes
-   level. Returns TVS_ERR_NULL; TVS_ERR_STATE: the drone's state is not known, it flies, or flight
-   was requested. */
+/* Flat trim: call it while the drone stands level on the ground; the drone takes its present
+   attitude as level from then on. Returns TVS_ERR_NULL; TVS_ERR_STATE: the drone's state is not
+   known, it flies, or flight was requested. */
 TV_API tvs_status ardrone_pilot_flat_trim(ardrone_pilot *pilot);
 
 /* Returns 1 when a datagram is due: it lies in pilot->at, the caller may append commands and then

@@ -47,8 +47,8 @@ TV_API void ardrone_replay_close(ardrone_replay *replay);
    clock serves. To play as fast as possible, advance to ardrone_replay_next_ns each time. */
 TV_API void ardrone_replay_advance(ardrone_replay *replay, int64_t now_ns);
 
-/* When the next bytes are due by that clock; always later than the last advance. Bytes that were
-   due and not received are due again after 10 ms. INT64_MAX when all has been played. */
+/* When the next bytes are due, ns of the caller's clock; always later than the last advance. Bytes
+   that were due and not received are due again after 10 ms. INT64_MAX when all has been played. */
 TV_API int64_t ardrone_replay_next_ns(const ardrone_replay *replay);
 
 /* Converts an instant of the caller's clock to the recorded host time that is played then. */
@@ -67,8 +67,8 @@ typedef struct ardrone_log {
 
 /* Opens the file at `path` and fills *source, for file_source.h. The samples' device times are the
    recording's host times; the drone's own stamps remove the network's jitter from them. Their
-   clock_id is 1, and another one after each reboot. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not
-   open). */
+   clock_id is 1, and a larger one after each reboot or jump of the clock; a packet without
+   ARDRONE_TAG_TIME gives 0. Returns TVS_ERR_NULL, TVS_ERR_IO (it does not open). */
 TV_API tvs_status ardrone_log_open(ardrone_log *log, const char *path, tvs_imu_source *source);
 /* Closes the file of a log, which may be null. */
 TV_API void ardrone_log_close(ardrone_log *log);

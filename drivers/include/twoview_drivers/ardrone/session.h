@@ -95,8 +95,8 @@ typedef struct ardrone_session_options {
   /* Reports every accepted navdata packet; imu->valid may be 0. */
   void (*on_navdata)(void *user, const uint8_t *bytes, size_t size, const ardrone_navdata *navdata,
                      const tvs_imu *imu);
-  /* Reports every packet of the live stream; gate has ARDRONE_PAVE_ bits
-     (ardrone_pave_gate_check). */
+  /* Reports every packet of the live stream that skip_to_latest did not drop; gate has
+     ARDRONE_PAVE_ bits (ardrone_pave_gate_check). */
   void (*on_packet)(void *user, const ardrone_pave_packet *packet, const tvs_time *time, int gate);
   /* Reports every packet of the recording stream and the host time at which it came. */
   void (*on_recording)(void *user, const ardrone_pave_packet *packet, int64_t received_ns);
@@ -107,14 +107,15 @@ typedef struct ardrone_session_options {
 /* Writes the defaults and struct_size to options, which may be null. */
 TV_API void ardrone_session_options_init(ardrone_session_options *options);
 
-/* Writes to *size_bytes what a session with these options needs: about 1.4 MB, of which 1 MB is one
-   whole video packet; 1 MB more with `recording`. Returns TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE,
-   TVS_ERR_ARGUMENT. */
+/* Writes to *size_bytes what a session with these options needs: about 1.2 MB, of which 1 MB is one
+   whole video packet (none of it without `video`); 1 MB more with `recording`. Returns
+   TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE, TVS_ERR_ARGUMENT. */
 TV_API tvs_status ardrone_session_size(const ardrone_session_options *options, size_t *size_bytes);
 
 /* Makes a session in `memory`, the caller's, aligned as malloc's and at least ardrone_session_size
    bytes. The transport is the caller's and outlives the session. Nothing is sent before the first
-   step. Returns also TVS_ERR_CAPACITY; *session is written on TVS_OK only. */
+   step. Statuses as ardrone_session_size; also TVS_ERR_CAPACITY: size_bytes is too small. *session
+   is written on TVS_OK only. */
 TV_API tvs_status ardrone_session_init(ardrone_session **session,
                                        const ardrone_session_options *options,
                                        const ardrone_transport *transport, void *memory,
@@ -125,23 +126,26 @@ TV_API tvs_status ardrone_session_init(ardrone_session **session,
    has landed; else its watchdog lands it. */
 TV_API void ardrone_session_close(ardrone_session *session);
 
-/* Receives, decodes and sends; at most 64 datagrams and 4 MB of video in one call. now_ns is at
-   least that of the call before. Returns TVS_ERR_NULL, TVS_ERR_ARGUMENT (now_ns is smaller than
-   before). A failure of the link is an event, not a status. */
+/* Receives, decodes and sends; one call takes at most 64 datagrams of navdata and stops receiving a
+   video stream after 4 MB. now_ns is at least that of the call before. Returns TVS_ERR_NULL,
+   TVS_ERR_ARGUMENT (now_ns is smaller than before). A failure of the link is an event, not a
+   status. */
 TV_API tvs_status ardrone_session_step(ardrone_session *session, int64_t now_ns);
 
-/* When the next step is due even if nothing arrives, ns of the caller's clock. */
+/* When the next step is due even if nothing arrives, ns of the caller's clock: at most 10 ms after
+   the last step. */
 TV_API int64_t ardrone_session_next_ns(const ardrone_session *session);
 
 /* 1 from ARDRONE_EVENT_LINK_UP until ARDRONE_EVENT_LINK_LOST, else 0. */
 TV_API int ardrone_session_is_up(const ardrone_session *session);
 
-/* The latest navdata packet, valid until the next step; null when it is more than 500 ms older than
-   the last step. */
+/* The latest navdata packet, valid until the next step; null when there is no link or the packet is
+   more than 500 ms older than the last step. */
 TV_API const ardrone_navdata *ardrone_session_navdata(const ardrone_session *session);
 
 /* The text of the last ARDRONE_EVENT_CONFIG or ARDRONE_EVENT_IDS: *size bytes at *text, which
-   belong to the session and are valid until the next step. TVS_NONE: there is none yet. */
+   belong to the session and are valid until the next step. TVS_NONE: there is none yet, or another
+   read has begun since. */
 TV_API tvs_status ardrone_session_text(const ardrone_session *session, const char **text,
                                        size_t *size);
 
@@ -157,7 +161,8 @@ typedef struct ardrone_counters {
   /* Navdata packets that came twice or were overtaken, and those missing by the sequence
      numbers. */
   uint64_t navdata_late, navdata_missing;
-  /* Packets of the live video, and how many of them the gate or skip_to_latest left out. */
+  /* Packets of the live video, and how many of them were left out, by ardrone_pave_gate_check or by
+     skip_to_latest. */
   uint64_t packets, packets_skipped;
   /* Pictures that were decoded, that did not decode, and that were dropped since the queue was
      full. */
@@ -180,7 +185,8 @@ TV_API tvs_status ardrone_session_frames(ardrone_session *session, tvs_frame_sou
 TV_API tvs_status ardrone_session_imu(ardrone_session *session, tvs_imu_source *source);
 
 /* This function and the next six call the pilot's function of the same name with the last step's
-   time. Statuses as ardrone_pilot_take_off; also TVS_ERR_STATE without a link. */
+   time. Statuses as ardrone_pilot_take_off; also TVS_ERR_STATE when the link is not up
+   (ardrone_session_is_up) or its latest navdata is more than 500 ms old. */
 TV_API tvs_status ardrone_session_take_off(ardrone_session *session);
 /* Calls ardrone_pilot_land. Statuses as ardrone_pilot_land. */
 TV_API tvs_status ardrone_session_land(ardrone_session *session);
@@ -196,9 +202,10 @@ TV_API tvs_status ardrone_session_rearm(ardrone_session *session);
 TV_API tvs_status ardrone_session_flat_trim(ardrone_session *session);
 
 /* Queues an exchange of ardrone/config.h that sets key to value; both are copied. The answer is
-   ARDRONE_EVENT_SET_DONE or ARDRONE_EVENT_SET_FAILED. It is set under ids when the session has
-   them. At most 16 exchanges wait. Returns TVS_ERR_NULL; TVS_ERR_ARGUMENT: ardrone_config_check
-   refuses the value, or the key needs ids; TVS_ERR_CAPACITY: the queue is full. */
+   ARDRONE_EVENT_SET_DONE or ARDRONE_EVENT_SET_FAILED. With the option use_ids the key is set under
+   the session's ids. At most 16 exchanges wait. Returns TVS_ERR_NULL; TVS_ERR_ARGUMENT:
+   ardrone_config_check refuses the value, or the key needs ids and use_ids is 0; TVS_ERR_CAPACITY:
+   the queue is full. */
 TV_API tvs_status ardrone_session_set(ardrone_session *session, const char *key, const char *value);
 /* Queues an exchange that reads the configuration; ARDRONE_EVENT_CONFIG reports the text. Returns
    TVS_ERR_NULL; TVS_ERR_CAPACITY: the queue is full. */

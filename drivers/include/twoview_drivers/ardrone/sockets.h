@@ -28,7 +28,8 @@ TV_API tvs_status ardrone_sockets_init(ardrone_sockets *sockets, const char *hos
 /* Returns the present time of CLOCK_MONOTONIC, ns. */
 TV_API int64_t ardrone_now_ns(void);
 
-/* Waits until bytes arrive, the next step is due, or until_ns has come. A signal ends the wait. */
+/* Waits until bytes arrive, the next step is due, or until_ns (a time of ardrone_now_ns) has come.
+   A signal ends the wait. */
 TV_API void ardrone_session_wait(const ardrone_session *session, int64_t until_ns);
 
 /* Steps the session until until_ns (INT64_MAX: without end), or until keep_going(user), which is

@@ -58,7 +58,8 @@ class CameraChoice:
 
     def of(self, name, width, height, K=None):
         """The camera of an image of this size. formats.choose_entry defines the choice. If the
-        pair's line has K, it replaces the camera's intrinsics."""
+        pair's line has K, it replaces the camera's intrinsics; without a camera it makes a
+        pinhole."""
         with refused(name):
             found = formats.choose_camera(self.cameras, name, K)
         camera = None if found is None else _camera(found)

@@ -28,7 +28,7 @@ def _columns(database):
 
 
 def maker_of(database):
-    """A description of the COLMAP version that made the database."""
+    """A description of the COLMAP version that made the database; "no COLMAP" if none did."""
     version = database.execute("PRAGMA user_version").fetchone()[0]
     if not {"cameras", "images", "two_view_geometries"} <= set(_columns(database)):
         return "no COLMAP"
@@ -196,7 +196,8 @@ def read_keypoints(database, path, image_id):
 
 
 def read_descriptors(database, path, image_id):
-    """Reads the descriptors of an image as an array (n, 128) of uint8."""
+    """Reads the descriptors of an image as uint8, one row for each keypoint; SIFT's have 128
+    columns."""
     row = database.execute(
         "SELECT rows, cols, data FROM descriptors WHERE image_id = ?", (image_id,)
     ).fetchone()

@@ -30,7 +30,7 @@ from .settings import PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
 
 @dataclass(frozen=True)
 class View:
-    """An image to be exported, with its keypoints and descriptors."""
+    """An image to be exported: its camera, keypoints and descriptors."""
 
     camera: Any
     keypoints: np.ndarray
@@ -118,7 +118,8 @@ class _Known:
 
 
 def _write_images(writer, known, views):
-    """Writes the images. Returns {name: image_id}."""
+    """Writes the images that the database does not hold yet, and checks the others. Returns
+    {name: image_id}."""
     ids = {}
     for name, view in views.items():
         camera = conventions.camera_to_colmap(view.camera)

@@ -10,7 +10,8 @@ EXTENSIONS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", 
 
 
 def list_images(folder):
-    """The names of the images below a folder, sorted; as in COLMAP, / separates folders."""
+    """The names of the files with one of EXTENSIONS below a folder, sorted, without hidden ones; as
+    in COLMAP, / separates folders."""
     if not os.path.isdir(folder):
         raise BadInput(f"{folder}: no such folder")
     names = [os.path.relpath(os.path.join(root, file), folder)
@@ -21,7 +22,8 @@ def list_images(folder):
 
 def _decode(path):
     """Decodes to 8 bits and 1, 3 (BGR) or 4 (BGRA) channels, with the pixels as they are stored."""
-    # OpenCV reads it when it is imported; only our own line is printed
+    # OpenCV reads this variable when it is imported: OFF, so that only our own error line is
+    # printed.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
     import cv2
     if not os.path.isfile(path):

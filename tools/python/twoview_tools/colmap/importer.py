@@ -41,7 +41,9 @@ def _camera(row, name):
 
 
 def _named_cameras(model):
-    """{entry: camera} of a cameras.yaml in which K selects the entry."""
+    """Returns ({entry: camera}, the text of a cameras.yaml with these entries). In a pairs file fx
+    and cx of K select the entry, so BadInput if cameras with equal fx and cx differ in image size
+    or lens."""
     used = sorted({image.camera_id for image in model.images.values()})
     cameras = {f"camera_{key}": _camera(model.cameras[key], f"camera {key}") for key in used}
     by_K = {}
@@ -69,7 +71,8 @@ def relative(image0, image1):
 
 
 def import_model(model, folder, pairs_file="", overlap=0, min_common_points=30):
-    """Writes pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model. Returns the
+    """Writes pairs.txt (with the truth), cameras.yaml and trajectory.tum of a model. Without a
+    pairs file, pairs with fewer than min_common_points points in common are left out. Returns the
     number of pairs."""
     cameras, cameras_text = _named_cameras(model)
     lines = []
@@ -125,8 +128,9 @@ class Features:
             self.matches[name0, name1] = matches
 
     def matches_of(self, name0, name1, engine):
-        """The database's matches (n, 2) in this order of the names. If the database has no row for
-        the pair, our matcher makes them."""
+        """(matches (n, 2), their ratios or None) in this order of the names. The database's matches
+        have no ratios. If the database has no row for the pair, our matcher makes the matches from
+        its descriptors; there are none if the descriptors do not have 128 bytes."""
         if (name0, name1) in self.matches:
             return self.matches[name0, name1], None
         if (name1, name0) in self.matches:
@@ -184,7 +188,9 @@ def import_database(
     quiet=False,
 ):
     """Estimates from a database's features and matches, and writes report.json in the form of
-    `twoview evaluate`."""
+    `twoview evaluate`. Without a pairs file and an overlap it takes the pairs that have matches in
+    the database, or all pairs if none has. The truth is that of `model`, else that of the pairs
+    file."""
     features = Features(path, camera_files)
     if pairs_file or overlap or not features.matches:
         pairs = _choose(list(features.pixels), pairs_file, overlap)

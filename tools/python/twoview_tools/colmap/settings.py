@@ -36,8 +36,8 @@ def _choice(enum):
 
 
 def add_options(parser, kinds=_KINDS, **defaults):
-    """Adds a flag for each field of the options. `defaults` are those that differ from the
-    library's."""
+    """Adds a flag for each field of the options, except those of gravity. `defaults` are those that
+    differ from the library's."""
     group = parser.add_argument_group("options of the stages (docs/cli.md)")
     for kind in kinds:
         for field in dataclasses.fields(kind):

@@ -11,8 +11,8 @@ HEADER = "# time tx ty tz qx qy qz qw, world from camera (x right, y down, z for
 
 
 def times_of(names):
-    """The times of the images: the numbers in their file names if all have one and no two are
-    equal, else 0, 1, ..."""
+    """The times of the images: if each file name is a number (without its extension) and no two are
+    equal, these numbers, else 0, 1, ..."""
     try:
         times = [float(os.path.splitext(os.path.basename(name))[0]) for name in names]
     except ValueError:

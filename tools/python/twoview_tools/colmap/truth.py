@@ -38,7 +38,7 @@ def align(source, target):
 
 def pose_errors(model, truth):
     """(names, position errors in the truth's unit, rotation errors in degrees) of {image: (R,
-    centre)}, for the images that both have; at least three.
+    centre)}, for the images that both have. With fewer than three images the errors are infinite.
 
     If the centres lie on a line, they do not determine the rotation about it. Therefore the
     rotations are aligned separately, by the rotation of the world that fits them best."""

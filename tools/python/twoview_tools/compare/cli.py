@@ -80,8 +80,8 @@ def parse(words):
 
 
 def unique_names(paths):
-    """A unique name for each list: that of its folder, or its own name if the folders' names are
-    not unique."""
+    """A unique name for each list: that of its folder, with the list's own name after it where
+    several lists have that folder name. Raises BadInput for two equal names."""
     folders = [os.path.basename(os.path.dirname(os.path.abspath(p))) for p in paths]
     stems = [os.path.splitext(os.path.basename(p))[0] for p in paths]
     names = [f if folders.count(f) == 1 else f"{f}/{s}" for f, s in zip(folders, stems)]
@@ -91,8 +91,8 @@ def unique_names(paths):
 
 
 def read_lists(arguments):
-    """The pairs of every list as tasks, without a reference. Raises BadInput for a list that cannot
-    be read."""
+    """The pairs of every list as tasks, without a reference. Raises BadInput if a list or its
+    cameras cannot be read, or if there is no folder of images."""
     tasks = []
     for path, name in zip(arguments.pairs, unique_names(arguments.pairs)):
         try:
@@ -132,7 +132,7 @@ def library_path():
 
 
 def thin_out(tasks, most):
-    """At most this many pairs of each list, evenly spaced."""
+    """At most `most` pairs of each list, evenly spaced; all of them if `most` is 0."""
     found = []
     for name in dict.fromkeys(t["set"] for t in tasks):
         part = [t for t in tasks if t["set"] == name]
@@ -144,9 +144,10 @@ def thin_out(tasks, most):
 
 
 def check_images(tasks, default_resize):
-    """Reads every image once: its size determines `resize`, and its hash detects a changed file.
-    Returns {path: hash}. BadInput names the first missing image and the number of missing
-    images."""
+    """Reads every image once; its hash shows in a later run whether the file has changed. Sets each
+    task's "resize": with default_resize the value for the width of the first image of its list that
+    no earlier list has (0 before there is one). Returns {path: hash}. BadInput names the first
+    image that cannot be read and the number of the others."""
     hashes, bad, resize = {}, [], {}
     for task in tasks:
         for view in task["views"]:
@@ -210,8 +211,8 @@ def _reconstruct(arguments, part, workers, store, hashes):
 
 
 def relative_pose(models, name0, name1):
-    """The pose cam1_from_cam0 of two images, with |t| = 1, from a model that contains both; None
-    if there is no such model."""
+    """The pose cam1_from_cam0 of two images, with |t| = 1, from the first model that contains both
+    at different places; None if there is no such model."""
     for model in models:
         if name0 in model and name1 in model and name0 != name1:
             (R0, t0), (R1, t1) = ((np.array(model[n]["R"]), np.array(model[n]["t"]))
@@ -231,8 +232,8 @@ def digest(*parts):
 
 
 class Store:
-    """The results of pairs, stored in a folder beside the report so that an interrupted run can
-    continue. Each result is stored completely or not at all."""
+    """The results of pairs and references, stored in a folder beside the report so that an
+    interrupted run can continue. Each result is stored completely or not at all."""
 
     def __init__(self, folder):
         self.folder = folder

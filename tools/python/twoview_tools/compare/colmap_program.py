@@ -39,7 +39,7 @@ def _run(*arguments):
 
 
 def camera_arguments(size, K, distortion):
-    """The name of COLMAP's camera model and its parameters, separated by commas."""
+    """(the name of COLMAP's camera model, the text of its parameters, separated by commas)."""
     camera = conventions.camera_to_colmap(twoview.Camera(
         *map(int, size), K[0, 0], K[1, 1], K[0, 2], K[1, 2], twoview.CameraModel.BROWN_CONRADY,
         distortion))

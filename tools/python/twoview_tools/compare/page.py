@@ -79,7 +79,8 @@ def pair_data(pair, index, names):
 
 
 def cells(system):
-    """The cells of a system's row in a table: for all pairs, or for one set."""
+    """The cells of a row of a table. `system` is a system of the report, whose values are those of
+    all pairs, or its entry for one set."""
     return {key: system[key] for key in ("auc", "median_error_deg", "median_rotation_error_deg",
                                          "median_translation_error_deg", "time_ms", "failures",
                                          "num_pairs", "num_scored", "num_matches", "num_inliers",

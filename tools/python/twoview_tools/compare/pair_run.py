@@ -37,7 +37,7 @@ def probe(task):
 
 
 class Run:
-    """Runs systems on one pair and sums the seconds of CPU of each."""
+    """Runs systems on one pair and records the seconds of CPU of each."""
 
     def __init__(self, task):
         self.task, self.seconds = task, {}
@@ -199,8 +199,10 @@ def overlay(matches, answer, task):
 # ---- triangulations ----------------------------------------------------------------------------
 
 def _triangulate(run, rows, source, wanted):
-    """Runs every triangulation on the reference's pose, else on the source pipeline's own pose,
-    with the inliers of that pose. Returns whose pose was used."""
+    """Runs every triangulation on matches of the pipeline task["matches_of"]: those within
+    2 max_error_px of the epipolar lines of the pose. The pose is the reference's, else that
+    pipeline's own. source: (its answer, its matches) or None. Returns whose pose was used; None if
+    there is none."""
     chosen = systems.of_kind("triangulation", wanted)
     if not chosen:
         return None

@@ -139,7 +139,8 @@ def inlier_histogram(report, pairs):
 
 
 def epipolar_histogram(report, pairs, kind):
-    """A histogram of the Sampson distances of all matches of all pairs under a system's pose."""
+    """The share of a system's matches, over all pairs, whose Sampson distance under its own pose is
+    below a threshold, as a curve."""
     listed = _listed(report, kind)
     edges = np.array(report["histogram_edges_px"])
     traces = []
@@ -160,7 +161,7 @@ def epipolar_histogram(report, pairs, kind):
 
 
 def all_plots(report, pairs):
-    """Makes all plots of the page as a list of {"title", "hint", "figure"}."""
+    """Makes all plots of the page as a list of {"title", "hint", "figure", "reference"}."""
     is_known = bool(_known(pairs))
     has = {kind: bool(_listed(report, kind)) for kind in ("pipeline", "solver")}
     found = []

@@ -30,7 +30,7 @@ def reference_words(arguments, run, pairs):
 
 
 def errors_of(rows):
-    """The pose errors of the pairs with a reference; infinite without a pose."""
+    """The pose errors of these rows, all of pairs with a reference; infinite without a pose."""
     return np.array([np.inf if row["pose_error_deg"] is None else row["pose_error_deg"]
                      for row in rows], float)
 

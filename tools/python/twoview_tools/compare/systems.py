@@ -5,7 +5,8 @@ import sys
 
 from ..accuracy import estimators, peers
 
-COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0  # COLMAP's defaults: most keypoints of an image; pixels
+# COLMAP's defaults: the most keypoints of an image, and the inlier threshold in pixels.
+COLMAP_CAP, COLMAP_ERROR_PX = 8192, 4.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,8 +82,8 @@ def of_kind(kind, ids=None):
 
 
 def chosen(text):
-    """The ids that a --systems list selects: by id, by kind, or by family of modules (colmap,
-    opengv)."""
+    """The ids that a --systems list selects. A word selects an id, a kind (pipelines, solvers,
+    triangulations), or all ids that begin with the word and "_" (opencv, opengv)."""
     if not text:
         return [s.id for s in SYSTEMS]
     found = []

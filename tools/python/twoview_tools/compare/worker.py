@@ -100,8 +100,8 @@ def run_twoview(views, options, task):
 
 @functools.lru_cache(maxsize=48)
 def peer_features(path, resize, front):
-    """(points, descriptors, milliseconds). The features of an image are computed once, and their
-    time counts in each of its pairs."""
+    """(points, descriptors, milliseconds). The features of the latest 48 images are kept; the time
+    of their extraction counts in each pair that uses them."""
     from ..accuracy import peers
     gray = luma(path, resize)[0]
     start = time.perf_counter()

@@ -191,7 +191,8 @@ def from_above(name, points, words):
 
 
 def colmap():
-    """Runs the example on eleven images of a fountain, if the data set and colmap are present."""
+    """Runs the example on eleven images of a fountain, if the data set is present. It needs colmap
+    and pycolmap."""
     data = (
         pathlib.Path(os.environ.get("TWOVIEW_DATA", ROOT / ".." / "shared" / "data"))
         / "strecha_fountain_P11"
@@ -228,7 +229,8 @@ def colmap():
 
 @contextlib.contextmanager
 def simulated(*options):
-    """A simulated drone on free ports: commands, navdata, video, control."""
+    """Yields the ports (commands, navdata, video, control) of a simulated drone, which the system
+    chooses. The drone is ended at the end of the block."""
     ports = [
         word
         for channel in ("at", "navdata", "video", "control", "recording")
@@ -248,8 +250,8 @@ def simulated(*options):
 
 
 def photograph(y):
-    """What the drone's camera sees before take-off, y metres to the right of the start. The lower
-    part of the image shows only bare floor."""
+    """The upper half of what the drone's camera sees before take-off, y metres to the right of the
+    start. The lower half shows only bare floor."""
     lens, folder = FOLDER / "pinhole.yaml", FOLDER / f"flight{y}"
     fx, fy, cx, _, cy = CAMERA
     lens.write_text(

@@ -11,8 +11,8 @@ def pages():
 
 
 class Page:
-    """A page. prose: the lines outside code blocks, with their numbers. blocks: (language, line,
-    lines before, text)."""
+    """A page. prose: (line number, text) of each line outside code blocks. blocks: (language, line
+    number of the opening fence, text) of each code block."""
 
     def __init__(self, path):
         self.path, self.prose, self.blocks = path, [], []
@@ -49,7 +49,8 @@ class Page:
         return set(found)
 
     def links(self):
-        """(line, target, anchor) of each link or picture that refers to a file."""
+        """(line, target, anchor) of each link or picture without a scheme such as https:. The
+        target is empty for an anchor of the same page."""
         for number, line in self.prose:
             line = re.sub(r"`[^`]*`", "", line)
             for target in re.findall(r"\]\(([^()\s]+)\)", line):

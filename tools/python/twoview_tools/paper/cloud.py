@@ -11,8 +11,8 @@ PATHS = {"unrefined": "FAST-12, SIFT, OpenCV's FM_RANSAC, its F as it is",
          "paper": "FAST-12, SIFT, eight-point RANSAC, refined",
          "default": "FAST-9, RootSIFT, five-point RANSAC, refined"}
 COLOURS = {"unrefined": drawing.GREY, "paper": drawing.ORANGE, "default": drawing.BLUE}
-# The scale of the Cauchy loss of bundle adjustment, in pixels: none, the default, and about the
-# noise of this pair.
+# The scale of the Cauchy loss of bundle adjustment, in pixels. None: before the adjustment; 1 px:
+# the default; 0.2 px: about the noise of this pair.
 STAGES = {"before": None, "adjusted, 1 px": 1.0, "adjusted, 0.2 px": 0.2}
 STYLES = {"before": "-", "adjusted, 1 px": "--", "adjusted, 0.2 px": ":"}
 # Standard deviation of a coordinate, estimated from the residuals of this pair.
@@ -103,8 +103,8 @@ def noise_percent(pair, depth_m):
 
 
 def near_points(pair, points, pixels0):
-    """(positions in metres, colours) of the points within the true scene's range of depth, for
-    drawing."""
+    """(positions in metres, colours) of the points within the true scene's range of depth and with
+    a reprojection error below 1 px, for drawing."""
     ok = (points["status"] == library().PointStatus.OK) & (points["error_px"] < 1)
     x, y = np.round(pixels0[ok]).astype(int).T
     colours = pair.colour[0][y, x, ::-1] / 255

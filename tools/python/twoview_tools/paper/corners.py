@@ -64,7 +64,7 @@ def longest_arc(values, threshold):
 
 
 def detect(image, arc, threshold):
-    """The library's corners in whole pixels, without a limit on their number."""
+    """The library's corners in whole pixels, at most 65535 of them."""
     tv = library()
     with tv.Context(max_width=image.shape[1], max_height=image.shape[0],
                     max_keypoints=65535) as context:
@@ -73,8 +73,8 @@ def detect(image, arc, threshold):
 
 
 def example_corner(image):
-    """A corner with an arc of 12 to 14 pixels and clear contrast, in which a reader can count the
-    pixels."""
+    """A corner with an arc of 12 or 13 pixels, more than 40 pixels from the border, in which a
+    reader can count the pixels: the strongest such corner."""
     found = detect(image, ARC, THRESHOLD)
     around = differences(image)
     for k in found:  # keypoints, strongest first

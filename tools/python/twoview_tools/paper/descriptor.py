@@ -17,7 +17,8 @@ MAX_STEP = 2.24  # largest distance between samples, in pixels of the octave
 
 
 def octave(image, size):
-    """(the image, halved as often as the keypoint's size requires and blurred; its scale)."""
+    """(the image, halved as often as the keypoint's size requires and blurred; the factor by which
+    it is smaller)."""
     pixels, scale = image.astype(int), 1
     while size * CELL_SIZE * STEP / scale >= MAX_STEP:
         height, width = pixels.shape[0] // 2, pixels.shape[1] // 2
@@ -56,7 +57,7 @@ def gradients(samples):
 
 
 def cell_weights():
-    """(4, 15): the weight of gradient k in cell c along one axis."""
+    """(4, 15): along one axis, the weight of each of the 15 gradients in each of the 4 cells."""
     p = STEP * (np.arange(SIDE - 1) - (SIDE - 2) / 2)
     c = np.arange(4)[:, None]
     return np.exp(-p ** 2 / 8) * np.maximum(0, 1 - np.abs(p + 1.5 - c))
@@ -202,7 +203,8 @@ def draw_bytes(axis, ours, definition):
 
 
 def example(image, keypoints):
-    """The keypoint at the corner that figure 5 shows."""
+    """The index of the keypoint at the corner that figure 5 shows. Raises Missing if there is
+    none."""
     corner = corners.example_corner(image)
     off = np.hypot(keypoints["x"] - corner["x"], keypoints["y"] - corner["y"])
     if off.min() > 1.5:

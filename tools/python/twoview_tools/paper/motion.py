@@ -53,7 +53,8 @@ def undistorted_image(camera, image):
 
 
 def epipole(K, direction):
-    """The pixel of a direction in the camera's frame, and whether the direction points forward."""
+    """The pixel in which a direction of the camera's frame, or its opposite, is seen; 1e9 pixels
+    away if the direction is parallel to the image."""
     seen = K @ direction
     return seen[:2] / seen[2] if abs(seen[2]) > 1e-12 else np.sign(seen[:2]) * 1e9
 
@@ -110,8 +111,8 @@ def true_motion(rows):
 
 
 def frames_apart(recorded, numbers, metres):
-    """Chooses two decoded pictures with the requested distance, late in the flight. Returns their
-    indices and their rows of the truth."""
+    """Chooses two decoded pictures taken `metres` apart, within 20 %; the second one is the fifth
+    from the end. Returns their indices and their rows of the truth."""
     rows = {int(row[0]): row for row in recorded.truth}
     known = [k for k, number in enumerate(numbers) if number in rows]
     last = len(known) - 5
@@ -164,8 +165,8 @@ def pair_of_flight(inputs, recorded, plan, metres):
 
 
 def flown_pair(inputs, plan, metres):
-    """Flies the plan and returns pair_of_flight of the recording. A flight is repeated if the
-    machine was too busy for real time."""
+    """Flies the plan and returns pair_of_flight of the recording. A flight that fails, as it may on
+    a machine that is too busy for real time, is repeated, up to FLIGHTS flights in all."""
     for attempt in range(FLIGHTS):
         try:
             return pair_of_flight(inputs, flight.fly(inputs, plan, attempt), plan, metres)

@@ -142,8 +142,8 @@ def matches_of(pair, **options):
 
 
 def true_matches(pair, pixels0, pixels1):
-    """A mask of the correct matches: near the true position where the depth is known, else near the
-    true epipolar line."""
+    """A mask of the correct matches: within truth_px of the true epipolar line and, where the depth
+    is known, within 2 truth_px of the true position."""
     lines = np.column_stack([pixels0, np.ones(len(pixels0))]) @ pair.true_F.T
     distance = np.abs(np.sum(lines[:, :2] * pixels1, axis=1) + lines[:, 2]) / np.hypot(
         *lines[:, :2].T
@@ -207,7 +207,7 @@ def pairs_of_figure9(inputs):
 
 
 def first_pair(inputs, folder, index):
-    """The two image names in line `index` of the pairs.txt in `folder`."""
+    """The two image names in pair line `index`, from 0, of the pairs.txt in `folder`."""
     with open(inputs.of_data(folder, "pairs.txt"), encoding="utf-8") as f:
         return [line.split()[:2] for line in f if line.strip() and not line.startswith("#")][index]
 

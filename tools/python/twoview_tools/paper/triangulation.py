@@ -29,8 +29,8 @@ NOISE_PX = 1.0
 
 def scene(kind, num=2000, noise_px=NOISE_PX, seed=7):
     """(pair without images, true points, noisy pixels0, noisy pixels1): 640x480, f = 500, |t| = 1,
-    points 4 to 20 baselines away. For kind "converging": two views of a place 1.2 baselines away,
-    45 degrees apart."""
+    depths of 4 to 20 baselines. For kind "converging": optical axes that cross 1.31 baselines away
+    at an angle of 45 degrees, and depths of 0.9 to 1.5 baselines."""
     tv = library()
     camera = tv.Camera(640, 480, 500, 500, 319.5, 239.5)
     angle = np.pi / 4 if kind == "converging" else 0.0
@@ -211,7 +211,8 @@ def rounds_table(weights, errors):
 # ---- table 1 ----
 
 def dlt(pair, pixels0, pixels1):
-    """Linear-Eigen from its definition: the smallest singular vector, computed for each match."""
+    """Linear-Eigen from its definition: for each match the singular vector of the smallest singular
+    value of the four equations."""
     P = [projection(pair, view) for view in (0, 1)]
     points = []
     for a, b in zip(pixels0, pixels1):

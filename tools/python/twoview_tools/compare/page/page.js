@@ -47,7 +47,8 @@ function drawPlot(box) {
   const layout = { ...figure.layout, ...rest };
   layout.xaxis = { ...axis, ...layout.xaxis };
   layout.yaxis = { ...axis, ...layout.yaxis };
-  // The legend below, its room counted: plotly would lay it over the axis's title.
+  // Puts the legend below the plot and adds its height to the margin; plotly alone would draw it
+  // over the axis's title.
   const columns = Math.max(1, Math.floor((box.clientWidth - 30) / 260));
   const legend = 18 * Math.ceil(figure.data.filter(d => d.showlegend !== false).length / columns) + 8;
   layout.legend = { ...layout.legend, orientation: "h", entrywidth: 1 / columns - 0.01, entrywidthmode: "fraction", x: 0, yref: "container", y: 0.01, yanchor: "bottom" };
@@ -123,7 +124,7 @@ function loadImage(index) {
   return image.loading;
 }
 
-async function sideBySide(canvas, pair) { // {context, place: pixels of view i to canvas, width of a pixel}
+async function sideBySide(canvas, pair) { // {context, place: canvas position of a pixel, clip to a view, sizes}
   const images = await Promise.all(pair.images.map(loadImage));
   const sizes = pair.images.map(i => [data.images[i].width, data.images[i].height]);
   const height = Math.max(sizes[0][1], sizes[1][1]), gap = 8;
@@ -217,7 +218,7 @@ for (const pair of data.pairs) {
   const others = pair.rows.filter(r => r !== first && data.systems[r[ROW.system]].kind === "pipeline");
   pair.ours = errorOf(first);
   pair.best = Math.min(...others.map(errorOf));
-  // A failure beside a small error counts as 180 degrees, so that differences stay finite.
+  // A pair without a pose (error Infinity) counts as 180 degrees, so that differences stay finite.
   pair.behind = Math.min(pair.ours, 180) - Math.min(pair.best, 180);
 }
 const ORDERS = {
