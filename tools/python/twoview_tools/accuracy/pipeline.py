@@ -33,7 +33,7 @@ def match_pairs(context, data, feature_options=None, match_options=None):
     for pair in data.pairs:
         (kp0, d0, ms0), (kp1, d1, ms1) = extract(pair.name0), extract(pair.name1)
         start = time.perf_counter()
-        links = context.match(d0, d1, match_options)
+        links = context.match(d0, d1, match_options, kp0, kp1)
         match_ms = 1e3 * (time.perf_counter() - start)
         pixels = [np.column_stack([k["x"], k["y"]])[links[i]].astype(float)
                   for k, i in ((kp0, "idx0"), (kp1, "idx1"))]
