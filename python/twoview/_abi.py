@@ -60,7 +60,8 @@ class tv_correspondence(Structure):
 
 
 class tv_match_options(Structure):
-    _fields_ = [("struct_size", c_uint32), ("ratio", c_float)]
+    _fields_ = [("struct_size", c_uint32), ("ratio", c_float), ("neighbourhood_px", c_float),
+                ("max_distance", c_float)]
 
 
 class tv_guided_options(Structure):

@@ -34,6 +34,9 @@ class MatchOptions:
     """The options of matching, as in tv_match_options."""
 
     ratio: float = 0.92  #: upper bound of nearest / second nearest distance, in both directions
+    #: Second nearest are only keypoints at least this far from the nearest one, pixels; 0: all.
+    neighbourhood_px: float = 0.0
+    max_distance: float = 0.0  #: upper bound of the second nearest L2 distance; 0: none
 
 
 @dataclass(frozen=True)

@@ -109,17 +109,25 @@ def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
 
 
 def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
-          options: Optional[MatchOptions] = None, **keywords: Any) -> np.ndarray:
+          options: Optional[MatchOptions] = None, keypoints0: Optional[np.ndarray] = None,
+          keypoints1: Optional[np.ndarray] = None, **keywords: Any) -> np.ndarray:
     """tv_match: mutual nearest neighbours that pass the ratio test in both directions.
 
-    descriptors: (n, 128) uint8. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq,
+    descriptors: (n, 128) uint8; keypoints: (n,) of twoview.KEYPOINT, required where
+    neighbourhood_px is above 0. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq,
     ratio."""
     wanted = to_struct(check_context(context).library, MatchOptions, options, keywords)
     descriptors0 = _descriptors("descriptors0", descriptors0)
     descriptors1 = _descriptors("descriptors1", descriptors1)
     found = np.empty(min(len(descriptors0), len(descriptors1)), _abi.CORRESPONDENCE)
     count = c_int32()
-    features = [_features(context, None, rows) for rows in (descriptors0, descriptors1)]
+    features = []
+    for view, keypoints, rows in ((0, keypoints0, descriptors0), (1, keypoints1, descriptors1)):
+        if keypoints is not None:
+            keypoints = _abi.check_array(f"keypoints{view}", keypoints, _abi.KEYPOINT)
+            if len(keypoints) != len(rows):
+                raise ValueError(f"{len(keypoints)} keypoints and {len(rows)} descriptors")
+        features.append(_features(context, keypoints, rows))
     context.call("tv_match", byref(features[0]), byref(features[1]), byref(wanted),
                  _abi.pointer(found), c_int32(len(found)), byref(count))
     return found[: count.value].copy()

@@ -82,6 +82,55 @@ static void test_options_out_of_range_are_refused(void) {
   refused(TV_ERR_STRUCT_SIZE, a.context, descriptors0, 9, descriptors1, 9, &options, 9);
 }
 
+static void test_a_neighbourhood_requires_finite_keypoints(void) {
+  static tv_keypoint keypoints[COUNT];
+  const float bad_px[] = {-0.5f, 1000.5f, (float)NAN, (float)INFINITY};
+  const float bad_distance[] = {-1.0f, 3000.5f, (float)NAN, (float)INFINITY};
+  tv_features features[2];
+  tv_match_options options;
+  int32_t count = -7;
+  size_t k;
+  tv_match_options_init(&options);
+  for (k = 0; k < 4; ++k) {
+    options.max_distance = bad_distance[k];
+    refused(TV_ERR_ARGUMENT, a.context, descriptors0, 9, descriptors1, 9, &options, 9);
+    options.max_distance = 0;
+    options.neighbourhood_px = bad_px[k];
+    refused(TV_ERR_ARGUMENT, a.context, descriptors0, 9, descriptors1, 9, &options, 9);
+  }
+  options.neighbourhood_px = 5;
+  refused(TV_ERR_NULL, a.context, descriptors0, 9, descriptors1, 9, &options, 9);
+  for (k = 0; k < COUNT; ++k) keypoints[k].x = 10 * (float)k, keypoints[k].size = 4;
+  features[0] = features_of(keypoints, descriptors0, COUNT);
+  features[1] = features_of(NULL, descriptors1, COUNT);
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_NULL, tv_match(a.context, &features[0], &features[1], &options, found, COUNT, &count));
+  features[1].keypoints = keypoints;
+  keypoints[COUNT - 1].y = (float)NAN;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NOT_FINITE, tv_match(a.context, &features[0], &features[1], &options,
+                                                    found, COUNT, &count));
+  keypoints[COUNT - 1].y = 2e5f;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_match(a.context, &features[0], &features[1], &options,
+                                                  found, COUNT, &count));
+  TEST_ASSERT_EQUAL_INT(-7, count);
+  TEST_ASSERT_TRUE(api_is_pattern(found, sizeof found));
+  keypoints[COUNT - 1].y = 2;
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_match(a.context, &features[0], &features[1], &options, found, COUNT, &count));
+  TEST_ASSERT_EQUAL_INT(COUNT, count);
+}
+
+/* An options struct of version 0.1.0 ends behind the ratio. */
+static void test_old_options_have_no_neighbourhood(void) {
+  tv_match_options options;
+  int32_t count = 0;
+  tv_match_options_init_sized(&options, 8);
+  options.neighbourhood_px = options.max_distance = (float)NAN;
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(a.context, descriptors0, COUNT, descriptors1, COUNT,
+                                          &options, found, COUNT, &count));
+  TEST_ASSERT_EQUAL_INT(COUNT, count);
+}
+
 static void test_a_full_context_matches_in_its_memory(void) {
   int32_t count = 0, k;
   tv_match_options options;
@@ -125,6 +174,8 @@ int main(void) {
   RUN_TEST(test_null_pointers_are_refused);
   RUN_TEST(test_counts_out_of_range_are_refused);
   RUN_TEST(test_options_out_of_range_are_refused);
+  RUN_TEST(test_a_neighbourhood_requires_finite_keypoints);
+  RUN_TEST(test_old_options_have_no_neighbourhood);
   RUN_TEST(test_a_full_context_matches_in_its_memory);
   RUN_TEST(test_capacity_is_told_and_the_least_of_both_is_enough);
   RUN_TEST(test_two_contexts_give_the_same_bytes);

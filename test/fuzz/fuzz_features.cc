@@ -54,13 +54,15 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   tv_match_options match_options;
   tv_match_options_init(&match_options);
   match_options.ratio = static_cast<float>(bytes.wild(0.01, 1));
-  tv_keypoint keypoints[kMaxKeypoints];
+  match_options.neighbourhood_px = static_cast<float>(bytes.whole(0, 40));
+  tv_keypoint keypoints_of[2][kMaxKeypoints];
   std::vector<uint8_t> descriptors[2];
   int32_t counts[2] = {0, 0};
   for (int v = 0; v < 2; ++v) {
     tv_image image;
     const std::vector<uint8_t> pixels = pixels_of(bytes, image);
     const bool masked = bytes.whole(0, 3) == 0;
+    tv_keypoint* const keypoints = keypoints_of[v];
     descriptors[v].resize(kMaxKeypoints * TV_DESCRIPTOR_BYTES);
     const tv_status status =
         tv_extract(context, &image, masked ? &image : nullptr, &options, keypoints,
@@ -77,8 +79,10 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   tv_correspondence matches[kMaxKeypoints];
   int32_t count = 0;
-  if (match_rows(context, descriptors[0].data(), counts[0], descriptors[1].data(), counts[1],
-                 &match_options, matches, std::min(counts[0], counts[1]), &count) != TV_OK)
+  const tv_features features[2] = {features_of(keypoints_of[0], descriptors[0].data(), counts[0]),
+                                   features_of(keypoints_of[1], descriptors[1].data(), counts[1])};
+  if (tv_match(context, &features[0], &features[1], &match_options, matches,
+               std::min(counts[0], counts[1]), &count) != TV_OK)
     return 0;
   for (int i = 0; i < count; ++i) {
     FUZZ_REQUIRE(matches[i].idx0 >= 0 && matches[i].idx0 < counts[0]);

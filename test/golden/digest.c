@@ -26,7 +26,7 @@ LAYOUT(tv_limits, 28, purposes, 24);
 LAYOUT(tv_keypoint, 24, level, 20);
 LAYOUT(tv_feature_options, 48, keypoint_size, 44);
 LAYOUT(tv_correspondence, 16, ratio, 12);
-LAYOUT(tv_match_options, 8, ratio, 4);
+LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
 LAYOUT(tv_camera, 112, k, 48);
 LAYOUT(tv_estimate_options, 104, principal_point_sigma, 96);

@@ -311,24 +311,84 @@ static uint8_t *random_descriptors(trial *t, int32_t count, const uint8_t *simil
   return rows;
 }
 
-static void case_mutual_nearest(trial *t) {
+static int32_t distance_of(const uint8_t *a, const uint8_t *b) {
+  int32_t sum = 0, k;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+  return sum;
+}
+
+static tvk_descriptors in_any_order(trial *t, const uint8_t *bytes, int32_t num) {
+  uint16_t *order = INPUT(t, uint16_t, num);
+  tvk_descriptors set;
+  int32_t k;
+  for (k = 0; k < num; ++k) {
+    const int32_t other = random_int(&t->seed, 0, k);
+    order[k] = order[other];
+    order[other] = (uint16_t)k;
+  }
+  set.bytes = bytes;
+  set.order = order;
+  set.num = num;
+  return set;
+}
+
+/* A list is right if it ascends, each entry is the distance of its group's nearest member, and no
+   descriptor of another group is nearer than the bound. The entries up to the bound are then right
+   in every set; those beyond it, the groups and the bound depend on the set. The list is replaced
+   by the smallest distance. */
+static void check_list(const uint8_t *query, const tvk_descriptors *set, int32_t group,
+                       tvk_nearest *list) {
+  int32_t least[TVK_NEAREST_LIST], smallest = TVK_NEAREST_NONE, rank, k;
+  for (k = 0; k < TVK_NEAREST_LIST; ++k) least[k] = TVK_NEAREST_NONE;
+  for (rank = 0; rank < set->num; ++rank) {
+    const int32_t dist =
+        distance_of(query, set->bytes + (size_t)set->order[rank] * TVK_DESCRIPTOR_SIZE);
+    int32_t listed = 0;
+    if (dist < smallest) smallest = dist;
+    for (k = 0; k < TVK_NEAREST_LIST && list->dists[k] < TVK_NEAREST_NONE; ++k) {
+      if (list->groups[k] != rank / group) continue;
+      TEST_ASSERT_FALSE(listed);
+      listed = 1;
+      if (dist < least[k]) least[k] = dist;
+    }
+    TEST_ASSERT_TRUE(listed || dist >= list->bound);
+  }
+  for (k = 0; k < TVK_NEAREST_LIST; ++k) {
+    TEST_ASSERT_EQUAL_INT(least[k], list->dists[k]);
+    TEST_ASSERT_TRUE(k == 0 || list->dists[k - 1] <= list->dists[k]);
+  }
+  TEST_ASSERT_EQUAL_INT(smallest, list->dists[0]);
+  TEST_ASSERT_TRUE(list->bound >= smallest && list->bound <= TVK_NEAREST_NONE);
+  memset(list, 0, sizeof *list);
+  list->dists[0] = smallest;
+}
+
+static void case_nearest_groups(trial *t) {
   /* A few trials have more rows or columns than a kernel handles at a time. */
   const int32_t many = random_int(&t->seed, 0, 59);
   const int32_t num_rows = pick(t, 0, many == 0 ? 2000 : 40, 1000);
   const int32_t num_columns = pick(t, 0, many == 1 ? TVK_NEAREST_PANEL + 300 : 150, 1000);
-  const uint8_t *rows = random_descriptors(t, num_rows, NULL, 0);
-  const uint8_t *columns = random_descriptors(t, num_columns, rows, num_rows);
+  const uint8_t *row_bytes = random_descriptors(t, num_rows, NULL, 0);
+  const uint8_t *column_bytes = random_descriptors(t, num_columns, row_bytes, num_rows);
+  const tvk_descriptors rows = in_any_order(t, row_bytes, num_rows);
+  const tvk_descriptors columns = in_any_order(t, column_bytes, num_columns);
   const size_t scratch_bytes = TVK_NEAREST_SCRATCH(num_rows, num_columns);
   uint8_t *scratch = OUTPUT(t, uint8_t, scratch_bytes + 64), *aligned = scratch;
   tvk_nearest *of_columns = OUTPUT(t, tvk_nearest, num_columns);
   tvk_nearest *of_rows = OUTPUT(t, tvk_nearest, num_rows);
+  int32_t group = 0, k;
   while ((uintptr_t)aligned % 64 != 0) ++aligned;
-  REPEAT(t, t->set->mutual_nearest(rows, num_rows, columns, num_columns, aligned, of_columns,
-                                   of_rows));
+  REPEAT(t, group = t->set->nearest_groups(&rows, &columns, aligned, of_columns, of_rows));
   TEST_ASSERT_TRUE(is_pattern(scratch, aligned));
   TEST_ASSERT_TRUE(is_pattern(aligned + scratch_bytes, scratch + scratch_bytes + 64));
   memset(scratch, PATTERN, scratch_bytes + 64);
-  if (num_columns > 0) memset(of_columns, PATTERN, (size_t)num_columns * sizeof of_columns[0]);
+  if (t->typical) return; /* timing */
+  for (k = 0; k < num_rows; ++k) {
+    check_list(row_bytes + k * TVK_DESCRIPTOR_SIZE, &columns, TVK_NEAREST_GROUP, &of_rows[k]);
+  }
+  for (k = 0; k < num_columns; ++k) {
+    check_list(column_bytes + k * TVK_DESCRIPTOR_SIZE, &rows, group, &of_columns[k]);
+  }
 }
 
 static void case_squared_distances(trial *t) {

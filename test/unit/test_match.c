@@ -1,5 +1,5 @@
 /* Mutual nearest neighbours with a ratio test in both directions, compared with a direct
-   implementation of match.h's definition that sorts all distances. */
+   implementation of match.h's definition that compares all distances. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,6 +12,7 @@
 enum { MANY = 2200, MAX_DESCRIPTORS = 120, SIZE = TV_DESCRIPTOR_BYTES };
 
 static uint8_t descriptors0[MANY * SIZE], descriptors1[MANY * SIZE];
+static tv_keypoint keypoints0[MANY], keypoints1[MANY];
 static tv_correspondence found[MANY], swapped[MANY], expected[MANY];
 static api_context contexts[8];
 static int num_contexts;
@@ -35,11 +36,28 @@ static int64_t distance_sq(const uint8_t *a, const uint8_t *b) {
   return sum;
 }
 
+static tv_match_options plain(float ratio) {
+  tv_match_options options;
+  tv_match_options_init(&options);
+  options.ratio = ratio;
+  options.neighbourhood_px = 0;
+  options.max_distance = 0;
+  return options;
+}
+
+/* Whether row j is so far from row `best` that it counts as the second nearest one. */
+static int is_far(const tv_keypoint *keypoints, int best, int j, double radius) {
+  const double dx = (double)keypoints[j].x - keypoints[best].x;
+  const double dy = (double)keypoints[j].y - keypoints[best].y;
+  return radius > 0 ? dx * dx + dy * dy >= radius * radius : j != best;
+}
+
 /* The nearest row, of equal ones that with the lowest index, and the ratio to the second
-   nearest; the ratio is 1 without a second row. */
-static int nearest(const uint8_t *query, const uint8_t *rows, int num_rows, int64_t *best,
-                   double *ratio) {
-  int64_t second = -1;
+   nearest; the ratio is 1 where there is none. */
+static int nearest(const uint8_t *query, const uint8_t *rows, const tv_keypoint *keypoints,
+                   int num_rows, const tv_match_options *options, int64_t *best, double *ratio) {
+  const double largest = (double)options->max_distance * options->max_distance;
+  double second = largest > 0 ? largest : -1;
   int idx = -1, j;
   for (j = 0; j < num_rows; ++j) {
     const int64_t d = distance_sq(query, rows + j * SIZE);
@@ -49,23 +67,28 @@ static int nearest(const uint8_t *query, const uint8_t *rows, int num_rows, int6
     }
   }
   for (j = 0; j < num_rows; ++j) {
-    const int64_t d = distance_sq(query, rows + j * SIZE);
-    if (j != idx && (second < 0 || d < second)) second = d;
+    const double d = (double)distance_sq(query, rows + j * SIZE);
+    if (!is_far(keypoints, idx, j, options->neighbourhood_px)) continue;
+    if (second < 0 || d < second) second = d;
   }
-  *ratio = second > 0 ? sqrt((double)*best / (double)second) : 1.0;
+  *ratio = second > 0 ? sqrt((double)*best / second) : 1.0;
   return idx;
 }
 
-static int match_by_definition(int num0, int num1, float ratio) {
+static int match_by_definition(int num0, int num1, const tv_match_options *options) {
   int count = 0, i;
   for (i = 0; i < num0; ++i) {
     int64_t best, back_best;
     double forward, back;
-    const int j = nearest(descriptors0 + i * SIZE, descriptors1, num1, &best, &forward);
+    const int j =
+        nearest(descriptors0 + i * SIZE, descriptors1, keypoints1, num1, options, &best, &forward);
     if (j < 0) continue;
-    if (nearest(descriptors1 + j * SIZE, descriptors0, num0, &back_best, &back) != i) continue;
+    if (nearest(descriptors1 + j * SIZE, descriptors0, keypoints0, num0, options, &back_best,
+                &back) != i) {
+      continue;
+    }
     if (back > forward) forward = back;
-    if ((float)forward >= ratio) continue;
+    if ((float)forward >= options->ratio) continue;
     expected[count].idx0 = i;
     expected[count].idx1 = j;
     expected[count].dist_sq = (uint32_t)best;
@@ -77,24 +100,30 @@ static int match_by_definition(int num0, int num1, float ratio) {
 
 static int32_t run(const api_context *a, const uint8_t *rows0, int32_t num0, const uint8_t *rows1,
                    int32_t num1, float ratio, tv_correspondence *out) {
-  tv_match_options options;
+  const tv_match_options options = plain(ratio);
   int32_t count = -1;
-  tv_match_options_init(&options);
-  options.ratio = ratio;
   TEST_ASSERT_EQUAL_INT(
       TV_OK, match_rows(a->context, rows0, num0, rows1, num1, &options, out, MANY, &count));
   return count;
 }
 
-static void check(int32_t num0, int32_t num1, float ratio) {
-  const int32_t count = match_by_definition(num0, num1, ratio);
+static int32_t run_options(const api_context *a, int32_t num0, int32_t num1, int swap,
+                           const tv_match_options *options, tv_correspondence *out) {
+  const tv_features features[2] = {features_of(keypoints0, descriptors0, num0),
+                                   features_of(keypoints1, descriptors1, num1)};
+  int32_t count = -1;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_match(a->context, &features[swap], &features[1 - swap], options,
+                                        out, MANY, &count));
+  return count;
+}
+
+static int32_t check_options(int32_t num0, int32_t num1, const tv_match_options *options) {
+  const int32_t count = match_by_definition(num0, num1, options);
   int k, c, other;
   for (c = 0; c < num_contexts; ++c) {
-    TEST_ASSERT_EQUAL_INT(count,
-                          run(&contexts[c], descriptors0, num0, descriptors1, num1, ratio, found));
+    TEST_ASSERT_EQUAL_INT(count, run_options(&contexts[c], num0, num1, 0, options, found));
     if (count > 0) TEST_ASSERT_EQUAL_MEMORY(expected, found, (size_t)count * sizeof found[0]);
-    TEST_ASSERT_EQUAL_INT(
-        count, run(&contexts[c], descriptors1, num1, descriptors0, num0, ratio, swapped));
+    TEST_ASSERT_EQUAL_INT(count, run_options(&contexts[c], num0, num1, 1, options, swapped));
     for (k = 0; k < count; ++k) {
       for (other = 0; swapped[other].idx1 != found[k].idx0; ++other) {
         TEST_ASSERT_TRUE(other + 1 < count);
@@ -104,6 +133,29 @@ static void check(int32_t num0, int32_t num1, float ratio) {
       TEST_ASSERT_EQUAL_MEMORY(&found[k].ratio, &swapped[other].ratio, sizeof(float));
       TEST_ASSERT_TRUE(k == 0 || swapped[k - 1].idx0 < swapped[k].idx0);
     }
+  }
+  return count;
+}
+
+static void check(int32_t num0, int32_t num1, float ratio) {
+  const tv_match_options options = plain(ratio);
+  check_options(num0, num1, &options);
+}
+
+/* Keypoints on a lattice of 5 px or anywhere in a square: distances of 5, 10 and 15 px are exact,
+   and several keypoints are at one place. */
+static void scatter(uint64_t *state, tv_keypoint *keypoints, int32_t side_px, int on_lattice) {
+  int k;
+  for (k = 0; k < MANY; ++k) {
+    keypoints[k] = keypoints[0];
+    keypoints[k].x = (float)(random_unit(state) * side_px - 7);
+    keypoints[k].y = (float)(random_unit(state) * side_px + 3);
+    if (on_lattice) {
+      keypoints[k].x = (float)(5 * random_int(state, 0, side_px / 5));
+      keypoints[k].y = (float)(5 * random_int(state, 0, side_px / 5));
+    }
+    keypoints[k].size = 4;
+    keypoints[k].angle_rad = 0;
   }
 }
 
@@ -150,6 +202,89 @@ static void test_many_descriptors_match_by_the_definition(void) {
     check(MANY - 7, 43, 1.0f);
     check(43, MANY - 7, 1.0f);
   }
+}
+
+static void test_the_second_neighbour_is_outside_the_neighbourhood(void) {
+  static const float radii[5] = {0.01f, 5, 10, 25, 1000};
+  static const int32_t sides_px[3] = {1, 40, 300};
+  uint64_t state = 16;
+  int32_t total = 0;
+  int kind, size, r;
+  for (kind = 0; kind < 4; ++kind) {
+    for (size = 0; size < 12; ++size) {
+      const int32_t num0 = random_int(&state, 0, size < 4 ? 5 : MAX_DESCRIPTORS);
+      const int32_t num1 = random_int(&state, 0, size < 4 ? 5 : MAX_DESCRIPTORS);
+      fill(&state, kind);
+      scatter(&state, keypoints0, sides_px[size % 3], size % 2);
+      scatter(&state, keypoints1, sides_px[size % 3], size % 2);
+      for (r = 0; r < 5; ++r) {
+        tv_match_options options = plain(random_int(&state, 0, 1) ? 1.0f : 0.9f);
+        options.neighbourhood_px = radii[r];
+        if (random_int(&state, 0, 3) == 0) {
+          options.max_distance = (float)random_int(&state, 1, kind == 1 ? 3 : 3000);
+        }
+        total += check_options(num0, num1, &options);
+      }
+    }
+  }
+  TEST_ASSERT_TRUE(total > 1000);
+}
+
+/* Each descriptor of image 1 is a noisy copy of one of image 0, and both have copies of their own
+   in the neighbourhood, as second orientations and further levels are: up to 40 of a corner. The
+   lists of the kernels do not reach beyond these. */
+static void test_crowded_neighbourhoods_match_by_the_definition(void) {
+  enum { NUM = 700 };
+  uint64_t state = 17;
+  int32_t corner, k, b, with, without;
+  tv_match_options options = plain(0.9f);
+  fill(&state, 0);
+  scatter(&state, keypoints0, 500, 0);
+  for (k = 0; k < NUM; ++k) {
+    corner = k < 300 ? k : k < 600 ? random_int(&state, 0, 299) : random_int(&state, 0, 4);
+    for (b = 0; b < SIZE; ++b) {
+      const int value = descriptors0[corner * SIZE + b] / 2 + 60;
+      descriptors1[k * SIZE + b] = (uint8_t)(value + random_int(&state, -3, 3));
+      if (k >= 300) descriptors0[k * SIZE + b] = descriptors0[corner * SIZE + b];
+      if (k >= 300 && b < 4) descriptors0[k * SIZE + b] ^= 1;
+    }
+    if (k >= 300) keypoints0[k] = keypoints0[corner];
+    keypoints0[k].x += (float)random_unit(&state);
+    keypoints1[k] = keypoints0[k];
+    keypoints1[k].y += (float)random_unit(&state);
+  }
+  for (k = 0; k < NUM * SIZE; ++k) descriptors0[k] = (uint8_t)(descriptors0[k] / 2 + 60);
+  without = check_options(NUM, NUM, &options);
+  options.neighbourhood_px = 3;
+  with = check_options(NUM, NUM, &options);
+  TEST_ASSERT_TRUE(with > 290 && without < 150);
+}
+
+/* All descriptors equal, or all keypoints at one place: nothing is matched, or by the index. */
+static void test_equal_descriptors_in_one_place_compete_by_their_index(void) {
+  enum { NUM = 300 };
+  tv_match_options options = plain(1.0f);
+  uint64_t state = 18;
+  int k;
+  memset(descriptors0, 7, sizeof descriptors0);
+  memset(descriptors1, 7, sizeof descriptors1);
+  scatter(&state, keypoints0, 300, 0);
+  scatter(&state, keypoints1, 300, 0);
+  options.neighbourhood_px = 10;
+  TEST_ASSERT_EQUAL_INT(0, check_options(NUM, NUM, &options));
+  for (k = 0; k < NUM; ++k) keypoints0[k] = keypoints1[k] = keypoints0[0];
+  TEST_ASSERT_EQUAL_INT(0, check_options(NUM, NUM, &options));
+  options.max_distance = 100; /* takes the place of the second neighbour, which does not exist */
+  TEST_ASSERT_EQUAL_INT(1, check_options(NUM, NUM, &options));
+  options.max_distance = 0;
+  memset(descriptors0 + 250 * SIZE, 9, SIZE); /* an unlike keypoint far away, in each image */
+  memset(descriptors1 + 120 * SIZE, 9, SIZE);
+  keypoints0[250].x += 10;
+  TEST_ASSERT_EQUAL_INT(0, check_options(NUM, NUM, &options));
+  keypoints1[120].y -= 10;
+  TEST_ASSERT_EQUAL_INT(2, check_options(NUM, NUM, &options));
+  TEST_ASSERT_EQUAL_INT(0, found[0].idx0);
+  TEST_ASSERT_EQUAL_INT(0, found[0].idx1);
 }
 
 static void test_noisy_copies_are_found(void) {
@@ -222,6 +357,9 @@ int main(void) {
   make_contexts();
   RUN_TEST(test_matches_equal_the_definition_and_swap_with_the_images);
   RUN_TEST(test_many_descriptors_match_by_the_definition);
+  RUN_TEST(test_the_second_neighbour_is_outside_the_neighbourhood);
+  RUN_TEST(test_crowded_neighbourhoods_match_by_the_definition);
+  RUN_TEST(test_equal_descriptors_in_one_place_compete_by_their_index);
   RUN_TEST(test_noisy_copies_are_found);
   RUN_TEST(test_an_empty_side_gives_no_matches);
   RUN_TEST(test_one_descriptor_never_passes_the_ratio_test);

@@ -1,14 +1,15 @@
 // The entry point of matching: it validates, calls match/match.h, and writes the matches that fit.
 #include "match/match.h"
 
-#include <algorithm>
-
 #include "api/sized.h"
 #include "api/validate.h"
 
 namespace {
 
-constexpr tv_match_options kDefaults = {sizeof(tv_match_options), 0.92f};
+constexpr tv_match_options kDefaults = {sizeof(tv_match_options), 0.92f, 0.0f, 0.0f};
+
+// Also false for NaN.
+bool in_range(float value, float largest) { return value >= 0.0f && value <= largest; }
 
 }  // namespace
 
@@ -26,24 +27,28 @@ tv_status tv_match(tv_context* context, const tv_features* features0, const tv_f
   tv_match_options checked = kDefaults;
   tv_status status = tv::read_sized(options, &checked);
   if (status != TV_OK) return status;
-  if (!(checked.ratio > 0.0f && checked.ratio <= 1.0f) || cap_correspondences < 0) {
+  if (!(checked.ratio > 0.0f && checked.ratio <= 1.0f) ||
+      !in_range(checked.neighbourhood_px, 1000.0f) || !in_range(checked.max_distance, 3000.0f) ||
+      cap_correspondences < 0) {
     return TV_ERR_ARGUMENT;
   }
   const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);
-  tv_features a, b;
-  status = tv::read_features(*context, features0, TV_PURPOSE_MATCH, correspondences, out_bytes, &a);
-  if (status == TV_OK) {
-    status =
-        tv::read_features(*context, features1, TV_PURPOSE_MATCH, correspondences, out_bytes, &b);
+  const tv_features* const given[2] = {features0, features1};
+  tv_features features[2];
+  for (int v = 0; v < 2; ++v) {
+    status = tv::read_features(*context, given[v], TV_PURPOSE_MATCH, correspondences, out_bytes,
+                               &features[v]);
+    if (status != TV_OK) return status;
+    if (checked.neighbourhood_px == 0.0f || features[v].num == 0) continue;
+    if (features[v].keypoints == nullptr) return TV_ERR_NULL;
+    status = tv::check_keypoints(features[v].keypoints, features[v].num);
+    if (status != TV_OK) return status;
   }
-  if (status != TV_OK) return status;
   tv::StageTimer timer(context, TV_STAGE_MATCH);
   tv::ArenaScope scope(context->arena);
-  tv_correspondence* found = tv::arena_alloc<tv_correspondence>(
-      context->arena, static_cast<size_t>(std::min(a.num, b.num)));
-  const int32_t count =
-      tv::match_descriptors(*context->kernels, a.descriptors, a.num, b.descriptors, b.num,
-                            checked.ratio, context->arena, found);
+  const tv_correspondence* found = nullptr;
+  const int32_t count = tv::match_descriptors(*context->kernels, features[0], features[1], checked,
+                                              context->arena, &found);
   *num_correspondences = count;
   if (count > cap_correspondences) return TV_ERR_CAPACITY;
   for (int32_t k = 0; k < count; ++k) correspondences[k] = found[k];

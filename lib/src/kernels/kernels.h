@@ -23,8 +23,24 @@
 extern "C" {
 #endif
 
+/* Descriptors in an order: order[rank] is the index of one. */
+typedef struct tvk_descriptors {
+  const uint8_t *bytes;
+  const uint16_t *order;
+  int32_t num;
+} tvk_descriptors;
+
+#define TVK_NEAREST_LIST 6       /* groups in a list */
+#define TVK_NEAREST_GROUP 4      /* columns of a group */
+#define TVK_NEAREST_NONE 8388607 /* above every squared distance */
+
+/* The groups nearest to a descriptor, nearest first: the squared distance of each one's nearest
+   member, TVK_NEAREST_NONE for unused entries, and its number. Group g holds the ranks g n .. g n +
+   n - 1. The distance of descriptors that are in no listed group is at least the bound. An entry
+   beyond the bound may not be the next one. */
 typedef struct tvk_nearest {
-  int32_t best, second, idx;
+  int32_t bound, dists[TVK_NEAREST_LIST];
+  uint16_t groups[TVK_NEAREST_LIST];
 } tvk_nearest;
 
 #define TVK_CIRCLE_RADIUS 3 /* radius of the segment test's circle, in pixels */
@@ -34,12 +50,12 @@ typedef struct tvk_nearest {
 #define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
 
-/* Scratch of mutual_nearest. It prepares up to TVK_NEAREST_PANEL columns at once, each of
+/* Scratch of nearest_groups. It prepares up to TVK_NEAREST_PANEL columns at once, each of
    TVK_NEAREST_COLUMN_BYTES. The sets without products of bytes store 16-bit numbers and use the two
    _16 constants instead. */
 #define TVK_NEAREST_PANEL 2048
 #define TVK_NEAREST_COLUMN_BYTES 152
-#define TVK_NEAREST_PANEL_16 768
+#define TVK_NEAREST_PANEL_16 512
 #define TVK_NEAREST_COLUMN_16_BYTES 272
 #define TVK_NEAREST_ROW_BYTES 832 /* scratch of one row; a chunk needs one row more */
 #define TVK_NEAREST_CHUNK_BYTES(num_rows) \
@@ -123,11 +139,11 @@ typedef struct tvk_triangulate_pair {
    quantize_descriptor: writes the 128 bytes of a histogram by SIFT's normalisation with clipping at
    0.2, or by RootSIFT's if `root` is not 0.
 
-   mutual_nearest: of_rows[i].idx is the column that is strictly the nearest to row i and whose
-   strictly nearest row is i, else -1 (and best = second = 0). best is their squared distance;
-   second is the smallest of all other squared distances of the row and of the column, INT32_MAX if
-   there is none. of_columns (num_columns elements) and scratch (TVK_NEAREST_SCRATCH(num_rows,
-   num_columns) bytes, aligned to 64) hold unspecified values afterwards.
+   nearest_groups: of_rows[i] lists the groups of columns that are nearest to row i, and
+   of_columns[j] the groups of rows that are nearest to column j; i and j are indices, not ranks. A
+   group holds TVK_NEAREST_GROUP columns; the number of rows of a group is returned. The groups
+   depend on the set. scratch has TVK_NEAREST_SCRATCH(rows->num, columns->num) bytes, is aligned to
+   64, and holds unspecified values afterwards.
 
    squared_distances: out[k] = the squared distance of the query and rows[indices[k]].
 
@@ -195,9 +211,9 @@ typedef struct tvk_triangulate_pair {
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
   X(gradient_histogram, void, (const int16_t *patch, int32_t *histogram))                          \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
-  X(mutual_nearest, void,                                                                          \
-    (const uint8_t *rows, int32_t num_rows, const uint8_t *columns, int32_t num_columns,           \
-     void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows))                                \
+  X(nearest_groups, int32_t,                                                                       \
+    (const tvk_descriptors *rows, const tvk_descriptors *columns, void *scratch,                   \
+     tvk_nearest *of_columns, tvk_nearest *of_rows))                                               \
   X(squared_distances, void,                                                                       \
     (const uint8_t *query, const uint8_t *rows, const int32_t *indices, int32_t count,             \
      int32_t *out))

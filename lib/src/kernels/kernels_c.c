@@ -8,7 +8,7 @@
 TVK_LEND(average_columns, c);
 TVK_LEND(sample_patch, c);
 TVK_LEND(quantize_descriptor, c);
-TVK_LEND(mutual_nearest, c);
+TVK_LEND(nearest_groups, c);
 TVK_LEND(squared_distances, c);
 #endif
 #include "kernels/kernels_table.h"

@@ -12,6 +12,6 @@
 #include "kernels/neon_dot.h"
 #undef TVK_TABLE
 #define TVK_TABLE tvk_table_neon_dot
-#define mutual_nearest tvk_mutual_nearest_neon_dot
+#define nearest_groups tvk_nearest_groups_neon_dot
 #include "kernels/kernels_table.h"
 #endif

@@ -8,8 +8,7 @@
 #include "kernels/nearest.h"
 /* clang-format on */
 
-void tvk_mutual_nearest_neon_dot(const uint8_t *rows, int32_t num_rows, const uint8_t *columns,
-                                 int32_t num_columns, void *scratch, tvk_nearest *of_columns,
-                                 tvk_nearest *of_rows) {
-  mutual_nearest(rows, num_rows, columns, num_columns, scratch, of_columns, of_rows);
+int32_t tvk_nearest_groups_neon_dot(const tvk_descriptors *rows, const tvk_descriptors *columns,
+                                    void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows) {
+  return nearest_groups(rows, columns, scratch, of_columns, of_rows);
 }

@@ -9,6 +9,6 @@
 #define average_columns tvk_average_columns_c
 #define sample_patch tvk_sample_patch_c
 #define quantize_descriptor tvk_quantize_descriptor_c
-#define mutual_nearest tvk_mutual_nearest_c
+#define nearest_groups tvk_nearest_groups_c
 #define squared_distances tvk_squared_distances_c
 #include "kernels/kernels_table.h"

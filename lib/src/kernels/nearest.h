@@ -1,20 +1,22 @@
-/* The kernel mutual_nearest: pairs of strictly nearest neighbours among 128-byte descriptors, found
-   by comparing all pairs.
+/* The kernel nearest_groups: for each of two sets of 128-byte descriptors, the groups of
+   descriptors of the other set that are nearest, found by comparing all pairs.
 
    Rows (descriptors of image 0) and columns (of image 1) are compared in tiles of NEAREST_QUERIES x
    NEAREST_COLUMNS. For each pair a, b a tile makes two keys: one from |a|^2 - 2 a . b for b's list
    and one from |b|^2 - 2 a . b for a's list. The term that is missing for the squared distance is
    the same for the whole list. A key is that number (24 bits with its sign) << 8, plus the place of
-   its tile in the low 8 bits: among 256 tiles of rows, or of columns.
+   its tile in the low 8 bits: among the tiles of a chunk of rows, or of a panel of columns.
 
    A group is the set of descriptors of a tile that share a list entry: all rows of the tile for a
    column; the columns of the tile in one lane for a row. A tile computes the smallest key of each
-   group. The two smallest keys of groups are kept for each column, and for each row and lane.
+   group. The two smallest keys are kept of each column for a chunk of rows, and of each row for a
+   lane: such a set of groups is a bin. From these pairs of keys merge_bin collects the list of the
+   nearest groups of a descriptor. What a bin holds besides is not nearer than its second key, so
+   that the smallest second key bounds the distance of all that is not in the list.
 
-   At the end the two nearest groups are known, each by the distance of its nearest member. The
-   second nearest neighbour may be in the same group as the nearest one. The distances within that
-   group are therefore computed again, but only for descriptors that can be mutual nearest
-   neighbours. Ties need no order, because descriptors at equal distances are not strictly nearest.
+   A group consists of descriptors whose ranks follow each other, and the next ranks are in another
+   bin. Where the caller ranks keypoints of a neighbourhood together, these are then in few groups
+   and in different bins, and the list reaches beyond them.
 
    Each kernel set provides the tile in a file of its own (nearest_*.h): the constants
    NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (rows of a chunk) and _PANEL; the structs nearest_rows
@@ -24,6 +26,7 @@
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
 #define NEAREST_PLACES 256
+#define NEAREST_TILES (NEAREST_ROWS / NEAREST_QUERIES) /* of a chunk */
 
 /* The part of a key that does not depend on the product: the squared norm and the place. make_rows
    and make_block write NEAREST_FAR instead for rows and columns after the last descriptor; no key
@@ -37,6 +40,14 @@ static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * a[k];
   return sum;
 }
+
+/* The descriptor of that rank; null after the last one. */
+static inline const uint8_t *ranked(const tvk_descriptors *set, int32_t rank) {
+  return rank < set->num ? set->bytes + (size_t)set->order[rank] * TVK_DESCRIPTOR_SIZE : NULL;
+}
+
+/* The rank of column j of a block whose first column has rank `first`. */
+static inline int32_t column_rank(int32_t first, int32_t j);
 
 static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
   int32_t sum = 0, k;
@@ -57,6 +68,10 @@ static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b)
 #include "kernels/nearest_c.h"
 #endif
 
+static inline int32_t column_rank(int32_t first, int32_t j) {
+  return first + j % NEAREST_LANES * NEAREST_VECTORS + j / NEAREST_LANES;
+}
+
 #if !defined(TVK_AVX2) /* only the tiles of AVX2 use the largest byte */
 static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
   (void)bytes;
@@ -75,8 +90,9 @@ NEAREST_ASSERT(nearest_panel_fits,
                sizeof(nearest_block) <= NEAREST_COLUMNS * (NEAREST_PANEL == TVK_NEAREST_PANEL
                                                                ? TVK_NEAREST_COLUMN_BYTES
                                                                : TVK_NEAREST_COLUMN_16_BYTES));
-NEAREST_ASSERT(nearest_chunks_are_whole, NEAREST_ROWS % NEAREST_QUERIES == 0 &&
-                                             NEAREST_PLACES * NEAREST_QUERIES % NEAREST_ROWS == 0);
+NEAREST_ASSERT(nearest_chunks_are_whole,
+               NEAREST_ROWS % NEAREST_QUERIES == 0 && NEAREST_TILES <= NEAREST_PLACES);
+NEAREST_ASSERT(nearest_groups_of_columns, NEAREST_VECTORS == TVK_NEAREST_GROUP);
 NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
                                              NEAREST_PANEL % NEAREST_COLUMNS == 0 &&
                                              NEAREST_PANEL / NEAREST_COLUMNS <= NEAREST_PLACES);
@@ -84,103 +100,64 @@ NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
 
 static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
 
-/* Merges the two smallest keys of groups into `nearest`, which holds the smallest and the second
-   smallest distance of groups so far, and in idx the first member of the nearest group. `norm` is
-   the term that the keys lack; `group` is the first member of best_key's group. */
-static TVK_NOINLINE void nearest_merge(tvk_nearest *nearest, int32_t best_key, int32_t second_key,
-                                       int32_t norm, int32_t group) {
-  const int32_t best = (best_key >> 8) + norm;
-  if (best_key == NEAREST_FAR || best >= nearest->second) return;
-  if (best < nearest->best) {
-    nearest->second = nearest->best;
-    nearest->best = best;
-    nearest->idx = group;
-  } else {
-    nearest->second = best;
+/* Adds a group to a list if it is nearer than the list's bound. What leaves a full list lowers the
+   bound. */
+static TVK_NOINLINE void nearest_add(tvk_nearest *list, int32_t dist, int32_t group) {
+  int32_t k = TVK_NEAREST_LIST;
+  if (dist >= list->bound) return;
+  list->bound = nearest_min(list->bound, list->dists[k - 1] > dist ? list->dists[k - 1] : dist);
+  while (--k > 0 && list->dists[k - 1] > dist) {
+    list->dists[k] = list->dists[k - 1];
+    list->groups[k] = list->groups[k - 1];
   }
-  if (second_key != NEAREST_FAR) {
-    nearest->second = nearest_min(nearest->second, (second_key >> 8) + norm);
-  }
+  if (list->dists[k] <= dist) return;
+  list->dists[k] = dist;
+  list->groups[k] = (uint16_t)group;
 }
 
-static inline void merge_columns(const nearest_block *block, int32_t first_row, int32_t num_columns,
+/* The squared distance of a key; at least TVK_NEAREST_NONE for NEAREST_FAR. */
+static inline int32_t key_distance(int32_t key, int32_t norm) { return (key >> 8) + norm; }
+
+/* Adds the second group of a bin, which bounds the distance of the bin's other groups. */
+static TVK_NOINLINE void nearest_bound(tvk_nearest *list, int32_t dist, int32_t group) {
+  nearest_add(list, dist, group);
+  list->bound = nearest_min(list->bound, dist);
+}
+
+/* Merges the lists of a block of columns into those of all rows. Of `num_chunks` chunks of rows
+   this is number `chunk`. */
+static inline void merge_columns(const nearest_block *block, int32_t chunk, int32_t num_chunks,
+                                 const tvk_descriptors *columns, int32_t first,
                                  tvk_nearest *of_columns) {
   int32_t j;
-  for (j = 0; j < num_columns; ++j) {
-    const int32_t key = block->best[j];
-    nearest_merge(&of_columns[j], key, block->second[j], block->norms[j],
-                  first_row + (key & (NEAREST_PLACES - 1)) * NEAREST_QUERIES);
+  for (j = 0; j < NEAREST_COLUMNS; ++j) {
+    const int32_t rank = column_rank(first, j), best = block->best[j], second = block->second[j];
+    const int32_t dist = key_distance(best, block->norms[j]);
+    tvk_nearest *list;
+    if (rank >= columns->num) continue;
+    list = &of_columns[columns->order[rank]];
+    if (dist >= list->bound) continue;
+    nearest_bound(list, key_distance(second, block->norms[j]),
+                  (second & (NEAREST_PLACES - 1)) * num_chunks + chunk);
+    nearest_add(list, dist, (best & (NEAREST_PLACES - 1)) * num_chunks + chunk);
   }
 }
 
-/* Merges the lists of a row, one per lane, into of_row: its nearest group, its smallest and second
-   smallest distance. */
+/* Merges the lists of a row, one per lane, into its list of the panel that starts with group
+   `first`. */
 static inline void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
-                               int32_t first_column, tvk_nearest *of_row) {
-  int32_t smallest = NEAREST_FAR, next = NEAREST_FAR, equals = 0, lane;
-  for (lane = 0; lane < NEAREST_LANES; ++lane) smallest = nearest_min(smallest, best[lane]);
+                               int32_t first, tvk_nearest *list) {
+  int32_t smallest = NEAREST_FAR, lane;
+  for (lane = 0; lane < NEAREST_LANES; ++lane) smallest = nearest_min(smallest, second[lane]);
+  for (lane = 0; second[lane] != smallest;) ++lane;
+  nearest_bound(list, key_distance(smallest, norm),
+                first + (smallest & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
   for (lane = 0; lane < NEAREST_LANES; ++lane) {
-    const int32_t other = best[lane] == smallest ? second[lane] : best[lane];
-    equals += best[lane] == smallest;
-    next = nearest_min(next, other);
-  }
-  if (equals > 1) next = smallest;
-  for (lane = 0; best[lane] != smallest;) ++lane;
-  nearest_merge(of_row, smallest, next, norm,
-                first_column + (smallest & (NEAREST_PLACES - 1)) * NEAREST_COLUMNS + lane);
-}
-
-/* Computes the distances from the query to the members of its nearest group again: `count`
-   descriptors of `others`, `stride` apart, from nearest->idx on. Lowers nearest->second to the
-   smallest distance of the other members. Returns the index of the strictly nearest descriptor, or
-   -1 if there is a tie. */
-static TVK_NOINLINE int32_t resolve_group(const uint8_t *query, const uint8_t *others,
-                                          int32_t num_others, int32_t stride, int32_t count,
-                                          tvk_nearest *nearest) {
-  int32_t found = -1, equals = 0, k, member = nearest->idx;
-  for (k = 0; k < count && member < num_others; ++k, member += stride) {
-    const int32_t dist = squared_distance(query, others + (int64_t)member * TVK_DESCRIPTOR_SIZE);
-    if (dist == nearest->best) {
-      found = member;
-      ++equals;
-    } else {
-      nearest->second = nearest_min(nearest->second, dist);
+    const int32_t key = best[lane], dist = key_distance(key, norm);
+    if (dist < list->bound) {
+      nearest_add(list, dist, first + (key & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
     }
   }
-  return equals == 1 && nearest->best < nearest->second ? found : -1;
-}
-
-/* Whether a column in row i's nearest group has the group of row i as its own nearest group, at the
-   same distance. If not, row i has no mutual nearest neighbour. */
-static inline int32_t may_be_mutual(int32_t i, const tvk_nearest *of_row,
-                                    const tvk_nearest *of_columns, int32_t num_columns) {
-  int32_t k, j = of_row->idx;
-  for (k = 0; k < NEAREST_VECTORS && j < num_columns; ++k, j += NEAREST_LANES) {
-    const int32_t before = i - of_columns[j].idx;
-    if (of_columns[j].best == of_row->best && before >= 0 && before < NEAREST_QUERIES) return 1;
-  }
-  return 0;
-}
-
-static inline void resolve_row(const uint8_t *rows, int32_t num_rows, int32_t i,
-                               const uint8_t *columns, int32_t num_columns,
-                               const tvk_nearest *of_columns, tvk_nearest *of_row) {
-  const tvk_nearest none = {0, 0, -1};
-  tvk_nearest row = *of_row, column;
-  int32_t j;
-  *of_row = none;
-  if (!may_be_mutual(i, &row, of_columns, num_columns)) return;
-  j = resolve_group(rows + (int64_t)i * TVK_DESCRIPTOR_SIZE, columns, num_columns, NEAREST_LANES,
-                    NEAREST_VECTORS, &row);
-  if (j < 0 || of_columns[j].best != row.best) return;
-  column = of_columns[j];
-  if (resolve_group(columns + (int64_t)j * TVK_DESCRIPTOR_SIZE, rows, num_rows, 1, NEAREST_QUERIES,
-                    &column) != i) {
-    return;
-  }
-  of_row->best = row.best;
-  of_row->second = nearest_min(row.second, column.second);
-  of_row->idx = j;
 }
 
 /* Vectors of NEAREST_LANES keys, signed and unsigned. */
@@ -261,21 +238,20 @@ static void meet_tile(nearest_rows *rows, nearest_block *block) {
   update_columns(products, rows->terms, block->best, block->second);
 }
 
-static void forget_columns(nearest_block *blocks, int32_t num_columns) {
-  int32_t first, k;
-  for (first = 0; first < num_columns; first += NEAREST_COLUMNS, ++blocks) {
-    for (k = 0; k < NEAREST_COLUMNS; ++k) blocks->best[k] = blocks->second[k] = NEAREST_FAR;
-  }
+static void forget_columns(nearest_block *block) {
+  int32_t k;
+  for (k = 0; k < NEAREST_COLUMNS; ++k) block->best[k] = block->second[k] = NEAREST_FAR;
 }
 
-/* Prepares the tiles of the chunk of rows that starts at row `first`; returns their number. */
-static int32_t make_chunk(const uint8_t *rows, int32_t num_rows, int32_t first, int32_t largest,
-                          nearest_rows *tiles) {
-  int32_t t, k, row = first;
-  for (t = 0; t < NEAREST_ROWS / NEAREST_QUERIES && row < num_rows; ++t, row += NEAREST_QUERIES) {
-    make_rows(rows + (int64_t)row * TVK_DESCRIPTOR_SIZE,
-              nearest_min(NEAREST_QUERIES, num_rows - row), row / NEAREST_QUERIES % NEAREST_PLACES,
-              largest, &tiles[t]);
+/* Prepares the tiles of a chunk of rows: of all tiles, those whose number is `chunk` more than a
+   multiple of num_chunks. Returns how many there are. */
+static int32_t make_chunk(const tvk_descriptors *rows, int32_t chunk, int32_t num_chunks,
+                          int32_t largest, nearest_rows *tiles) {
+  int32_t t, k;
+  for (t = 0; t < NEAREST_TILES; ++t) {
+    const int32_t first = (t * num_chunks + chunk) * NEAREST_QUERIES;
+    if (first >= rows->num) break;
+    make_rows(rows, first, t, largest, &tiles[t]);
     for (k = 0; k < NEAREST_QUERIES * NEAREST_LANES; ++k) {
       tiles[t].best[k] = tiles[t].second[k] = NEAREST_FAR;
     }
@@ -283,67 +259,60 @@ static int32_t make_chunk(const uint8_t *rows, int32_t num_rows, int32_t first, 
   return t;
 }
 
-/* Compares all rows with a panel of columns, a chunk of rows at a time: a chunk stays in the
-   first-level cache. */
-static void meet_panel(const uint8_t *rows, int32_t num_rows, nearest_block *blocks,
-                       int32_t first_column, int32_t num_columns, int32_t largest,
+/* Compares all rows with the panel of columns from rank `first_column` on, a chunk of rows at a
+   time: a chunk stays in the first-level cache. */
+static void meet_panel(const tvk_descriptors *rows, nearest_block *blocks, int32_t num_blocks,
+                       const tvk_descriptors *columns, int32_t first_column, int32_t largest,
                        nearest_rows *tiles, tvk_nearest *of_rows, tvk_nearest *of_columns) {
-  int32_t first, start = 0, i, j, t;
-  forget_columns(blocks, num_columns);
-  for (first = 0; first < num_rows; first += NEAREST_ROWS) {
-    const int32_t num_tiles = make_chunk(rows, num_rows, first, largest, tiles);
-    const int32_t count = nearest_min(NEAREST_ROWS, num_rows - first);
-    for (j = 0; j < num_columns; j += NEAREST_COLUMNS) {
-      for (t = 0; t < num_tiles; ++t) meet_tile(&tiles[t], blocks + j / NEAREST_COLUMNS);
+  const int32_t num_chunks = (rows->num + NEAREST_ROWS - 1) / NEAREST_ROWS;
+  int32_t chunk, b, t, q;
+  for (chunk = 0; chunk < num_chunks; ++chunk) {
+    const int32_t num_tiles = make_chunk(rows, chunk, num_chunks, largest, tiles);
+    for (b = 0; b < num_blocks; ++b) {
+      forget_columns(&blocks[b]);
+      for (t = 0; t < num_tiles; ++t) meet_tile(&tiles[t], &blocks[b]);
+      merge_columns(&blocks[b], chunk, num_chunks, columns, first_column + b * NEAREST_COLUMNS,
+                    of_columns);
     }
-    for (i = 0; i < count; ++i) {
-      const nearest_rows *const tile = &tiles[i / NEAREST_QUERIES];
-      const int32_t q = i % NEAREST_QUERIES;
-      merge_lanes(tile->best + q * NEAREST_LANES, tile->second + q * NEAREST_LANES, tile->norms[q],
-                  first_column, &of_rows[first + i]);
-    }
-    if (first + count == num_rows || first + count - start == NEAREST_PLACES * NEAREST_QUERIES) {
-      for (j = 0; j < num_columns; j += NEAREST_COLUMNS) {
-        merge_columns(blocks + j / NEAREST_COLUMNS, start,
-                      nearest_min(NEAREST_COLUMNS, num_columns - j), of_columns + j);
+    for (t = 0; t < num_tiles; ++t) {
+      const int32_t rank = (t * num_chunks + chunk) * NEAREST_QUERIES;
+      for (q = 0; q < NEAREST_QUERIES && rank + q < rows->num; ++q) {
+        merge_lanes(tiles[t].best + q * NEAREST_LANES, tiles[t].second + q * NEAREST_LANES,
+                    tiles[t].norms[q], first_column / NEAREST_VECTORS,
+                    &of_rows[rows->order[rank + q]]);
       }
-      /* All 256 places of a key are used, or the rows are finished. */
-      forget_columns(blocks, num_columns);
-      start = first + count;
     }
   }
 }
 
 /* Neither inlined nor unrolled: together this saves 570 bytes in the AVX-512 set. */
-static TVK_NOINLINE void forget_nearest(tvk_nearest *nearest, int32_t count) {
-  const tvk_nearest none = {NEAREST_FAR, NEAREST_FAR, 0};
-  int32_t k;
-  TVK_ROLLED
-  for (k = 0; k < count; ++k) nearest[k] = none;
+static TVK_NOINLINE void forget_nearest(tvk_nearest *lists, int32_t count) {
+  int32_t i, k;
+  for (i = 0; i < count; ++i) {
+    lists[i].bound = TVK_NEAREST_NONE;
+    TVK_ROLLED
+    for (k = 0; k < TVK_NEAREST_LIST; ++k) lists[i].dists[k] = TVK_NEAREST_NONE;
+  }
 }
 
-static void mutual_nearest(const uint8_t *rows, int32_t num_rows, const uint8_t *columns,
-                           int32_t num_columns, void *scratch, tvk_nearest *of_columns,
-                           tvk_nearest *of_rows) {
+static int32_t nearest_groups(const tvk_descriptors *rows, const tvk_descriptors *columns,
+                              void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows) {
   nearest_rows *const tiles = (nearest_rows *)scratch;
   nearest_block *const blocks =
-      (nearest_block *)(void *)((uint8_t *)scratch + TVK_NEAREST_CHUNK_BYTES(num_rows));
-  const int32_t largest = largest_byte(columns, (int64_t)num_columns * TVK_DESCRIPTOR_SIZE);
-  int32_t first, b, k;
-  forget_nearest(of_rows, num_rows);
-  forget_nearest(of_columns, num_columns);
-  for (first = 0; first < num_columns; first += NEAREST_PANEL) {
-    const int32_t count = nearest_min(NEAREST_PANEL, num_columns - first);
-    for (b = 0; b * NEAREST_COLUMNS < count; ++b) {
-      const int32_t column = first + b * NEAREST_COLUMNS;
-      make_block(columns + (int64_t)column * TVK_DESCRIPTOR_SIZE,
-                 nearest_min(NEAREST_COLUMNS, num_columns - column), b, largest, &blocks[b]);
+      (nearest_block *)(void *)((uint8_t *)scratch + TVK_NEAREST_CHUNK_BYTES(rows->num));
+  const int32_t largest = largest_byte(columns->bytes, (int64_t)columns->num * TVK_DESCRIPTOR_SIZE);
+  int32_t first, b;
+  forget_nearest(of_rows, rows->num);
+  forget_nearest(of_columns, columns->num);
+  for (first = 0; first < columns->num; first += NEAREST_PANEL) {
+    const int32_t count = nearest_min(NEAREST_PANEL, columns->num - first);
+    const int32_t num_blocks = (count + NEAREST_COLUMNS - 1) / NEAREST_COLUMNS;
+    for (b = 0; b < num_blocks; ++b) {
+      make_block(columns, first + b * NEAREST_COLUMNS, b, largest, &blocks[b]);
     }
-    meet_panel(rows, num_rows, blocks, first, count, largest, tiles, of_rows, of_columns + first);
+    meet_panel(rows, blocks, num_blocks, columns, first, largest, tiles, of_rows, of_columns);
   }
-  for (k = 0; k < num_rows; ++k) {
-    resolve_row(rows, num_rows, k, columns, num_columns, of_columns, &of_rows[k]);
-  }
+  return NEAREST_QUERIES;
 }
 
 /* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */

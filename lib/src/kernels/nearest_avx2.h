@@ -65,7 +65,7 @@ static inline int32_t take_step(uint8_t *left, int32_t most, uint8_t *step) {
   return stays;
 }
 
-static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t largest,
+static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
                       nearest_rows *tile) {
   const int32_t centre = nearest_centre(largest), farthest = largest - centre;
   const int32_t most = farthest > 0 ? 32767 / farthest : 32767;
@@ -73,11 +73,12 @@ static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t
   uint8_t left[NEAREST_QUERIES][TVK_DESCRIPTOR_SIZE];
   memset(left, 0, sizeof left);
   for (i = 0; i < NEAREST_QUERIES; ++i) {
+    const uint8_t *const row = ranked(rows, first + i);
     int32_t sum = 0;
-    if (i < count) memcpy(left[i], rows + i * TVK_DESCRIPTOR_SIZE, TVK_DESCRIPTOR_SIZE);
+    if (row) memcpy(left[i], row, TVK_DESCRIPTOR_SIZE);
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += left[i][k];
     tile->norms[i] = squared_norm(left[i]);
-    tile->terms[i] = i < count ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
+    tile->terms[i] = row ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
     tile->starts[i] = -centre * sum;
   }
   tile->num_steps = 0;
@@ -94,20 +95,21 @@ static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t
   }
 }
 
-static void make_block(const uint8_t *columns, int32_t count, int32_t place, int32_t largest,
-                       nearest_block *block) {
+static void make_block(const tvk_descriptors *columns, int32_t first, int32_t place,
+                       int32_t largest, nearest_block *block) {
   const int32_t centre = nearest_centre(largest);
   int32_t j, k;
-  if (count < NEAREST_COLUMNS) memset(block->bytes, centre, sizeof block->bytes);
-  for (j = 0; j < NEAREST_COLUMNS; ++j, columns += TVK_DESCRIPTOR_SIZE) {
-    if (j < count) {
+  if (first + NEAREST_COLUMNS > columns->num) memset(block->bytes, centre, sizeof block->bytes);
+  for (j = 0; j < NEAREST_COLUMNS; ++j) {
+    const uint8_t *const column = ranked(columns, column_rank(first, j));
+    if (column) {
       int8_t centred[TVK_DESCRIPTOR_SIZE];
-      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) centred[k] = (int8_t)(centre - columns[k]);
+      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) centred[k] = (int8_t)(centre - column[k]);
       TVK_ROLLED
       for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], centred + 4 * k, 4);
     }
-    block->norms[j] = j < count ? squared_norm(columns) : 0;
-    block->terms[j] = j < count ? nearest_term(block->norms[j], place) : NEAREST_FAR;
+    block->norms[j] = column ? squared_norm(column) : 0;
+    block->terms[j] = column ? nearest_term(block->norms[j], place) : NEAREST_FAR;
   }
 }
 

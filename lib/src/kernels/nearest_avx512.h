@@ -20,34 +20,36 @@ typedef struct nearest_block {
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 
-static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t largest,
+static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
                       nearest_rows *tile) {
   int32_t i, k;
   (void)largest;
-  for (i = 0; i < NEAREST_QUERIES; ++i, rows += TVK_DESCRIPTOR_SIZE) {
-    tile->norms[i] = i < count ? squared_norm(rows) : 0;
-    tile->terms[i] = i < count ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
+  for (i = 0; i < NEAREST_QUERIES; ++i) {
+    const uint8_t *const row = ranked(rows, first + i);
+    tile->norms[i] = row ? squared_norm(row) : 0;
+    tile->terms[i] = row ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = 127;
-    if (i < count) {
-      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = (int8_t)(127 - rows[k]);
+    if (row) {
+      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = (int8_t)(127 - row[k]);
     }
   }
 }
 
-static void make_block(const uint8_t *columns, int32_t count, int32_t place, int32_t largest,
-                       nearest_block *block) {
+static void make_block(const tvk_descriptors *columns, int32_t first, int32_t place,
+                       int32_t largest, nearest_block *block) {
   int32_t j, k;
   (void)largest;
-  if (count < NEAREST_COLUMNS) memset(block->bytes, 0, sizeof block->bytes);
-  for (j = 0; j < NEAREST_COLUMNS; ++j, columns += TVK_DESCRIPTOR_SIZE) {
+  if (first + NEAREST_COLUMNS > columns->num) memset(block->bytes, 0, sizeof block->bytes);
+  for (j = 0; j < NEAREST_COLUMNS; ++j) {
+    const uint8_t *const column = ranked(columns, column_rank(first, j));
     int32_t sum = 0;
-    if (j < count) {
-      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += columns[k];
+    if (column) {
+      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += column[k];
       TVK_ROLLED
-      for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], columns + 4 * k, 4);
+      for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], column + 4 * k, 4);
     }
-    block->norms[j] = j < count ? squared_norm(columns) : 0;
-    block->terms[j] = j < count ? nearest_term(block->norms[j], place) : NEAREST_FAR;
+    block->norms[j] = column ? squared_norm(column) : 0;
+    block->terms[j] = column ? nearest_term(block->norms[j], place) : NEAREST_FAR;
     block->starts[j] = -127 * sum;
   }
 }

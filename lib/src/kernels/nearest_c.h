@@ -16,30 +16,35 @@ typedef struct nearest_block {
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 
-static inline void widen_rows(const uint8_t *bytes, int32_t count, int32_t room, int32_t place,
-                              int16_t (*values)[TVK_DESCRIPTOR_SIZE], int32_t *norms,
-                              int32_t *terms) {
-  int32_t i, k;
-  for (i = 0; i < room; ++i, bytes += TVK_DESCRIPTOR_SIZE) {
-    norms[i] = i < count ? squared_norm(bytes) : 0;
-    terms[i] = i < count ? nearest_term(norms[i], place) : NEAREST_FAR;
-    for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) values[i][k] = 0;
-    if (i < count) {
-      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) values[i][k] = bytes[k];
-    }
+/* Widens one descriptor, or zeros if it is null. */
+static TVK_NOINLINE void widen(const uint8_t *bytes, int32_t place, int16_t *values, int32_t *norm,
+                               int32_t *term) {
+  int32_t k;
+  *norm = bytes ? squared_norm(bytes) : 0;
+  *term = bytes ? nearest_term(*norm, place) : NEAREST_FAR;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) values[k] = 0;
+  if (bytes) {
+    for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) values[k] = bytes[k];
   }
 }
 
-static void make_rows(const uint8_t *rows, int32_t count, int32_t place, int32_t largest,
+static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
                       nearest_rows *tile) {
+  int32_t i;
   (void)largest;
-  widen_rows(rows, count, NEAREST_QUERIES, place, tile->values, tile->norms, tile->terms);
+  for (i = 0; i < NEAREST_QUERIES; ++i) {
+    widen(ranked(rows, first + i), place, tile->values[i], &tile->norms[i], &tile->terms[i]);
+  }
 }
 
-static void make_block(const uint8_t *columns, int32_t count, int32_t place, int32_t largest,
-                       nearest_block *block) {
+static void make_block(const tvk_descriptors *columns, int32_t first, int32_t place,
+                       int32_t largest, nearest_block *block) {
+  int32_t j;
   (void)largest;
-  widen_rows(columns, count, NEAREST_COLUMNS, place, block->values, block->norms, block->terms);
+  for (j = 0; j < NEAREST_COLUMNS; ++j) {
+    widen(ranked(columns, column_rank(first, j)), place, block->values[j], &block->norms[j],
+          &block->terms[j]);
+  }
 }
 
 static inline void products_of_four(const int16_t *a, const int16_t (*b)[TVK_DESCRIPTOR_SIZE],

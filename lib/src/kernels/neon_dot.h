@@ -5,8 +5,7 @@
 
 #include "kernels/kernels.h"
 
-void tvk_mutual_nearest_neon_dot(const uint8_t *rows, int32_t num_rows, const uint8_t *columns,
-                                 int32_t num_columns, void *scratch, tvk_nearest *of_columns,
-                                 tvk_nearest *of_rows);
+int32_t tvk_nearest_groups_neon_dot(const tvk_descriptors *rows, const tvk_descriptors *columns,
+                                    void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows);
 
 #endif

@@ -3,17 +3,20 @@
 
 #include "base/arena.h"
 #include "kernels/kernels.h"
+#include "twoview/feature.h"
 #include "twoview/match.h"
 
 namespace tv {
 
-// The bytes of the arena that match_descriptors needs, together with an array for its result, for
-// images of at most max_keypoints keypoints.
+// The bytes of the arena that match_descriptors needs for images of at most max_keypoints
+// keypoints.
 size_t match_bytes(int32_t max_keypoints);
 
-// Writes at most min(num0, num1) correspondences in ascending order of idx0. Returns their number.
-int32_t match_descriptors(const tvk_table& kernels, const uint8_t* descriptors0, int32_t num0,
-                          const uint8_t* descriptors1, int32_t num1, float ratio, Arena& arena,
-                          tv_correspondence* correspondences);
+// Returns the number of matches, at most the smaller of both numbers of features. *found points to
+// them in the arena, in ascending order of idx0. The keypoints are read where
+// options.neighbourhood_px is above 0. The caller's ArenaScope gives the memory back.
+int32_t match_descriptors(const tvk_table& kernels, const tv_features& features0,
+                          const tv_features& features1, const tv_match_options& options,
+                          Arena& arena, const tv_correspondence** found);
 
 }  // namespace tv

@@ -30,7 +30,7 @@ def extract_images(context, data, names, feature_options=None):
 def match_features(context, features0, features1, match_options=None):
     """(array of dtype CORRESPONDENCE, ms) of two images' (keypoints, descriptors, ms)."""
     start = time.perf_counter()
-    links = context.match(features0[1], features1[1], match_options)
+    links = context.match(features0[1], features1[1], match_options, features0[0], features1[0])
     return links, 1e3 * (time.perf_counter() - start)
 
 

@@ -87,10 +87,12 @@ class Context(twoview.Context):
         return twoview.extract(self, gray, mask,
                                **_keywords(self.library.feature_options(options)))
 
-    def match(self, descriptors0, descriptors1, options=None):
-        """Matches two sets of descriptors. Returns an array of dtype CORRESPONDENCE."""
+    def match(self, descriptors0, descriptors1, options=None, keypoints0=None, keypoints1=None):
+        """Matches two sets of descriptors; keypoints are required where the options have a
+        neighbourhood. Returns an array of dtype CORRESPONDENCE."""
         return twoview.match(self, np.ascontiguousarray(descriptors0, np.uint8),
                              np.ascontiguousarray(descriptors1, np.uint8),
+                             keypoints0=keypoints0, keypoints1=keypoints1,
                              **_keywords(self.library.match_options(options)))
 
     def match_guided(self, camera0, camera1, epipolar, features0, features1, options=None):
