@@ -21,6 +21,7 @@ def match_pairs(context, data, feature_options=None, match_options=None):
     """[(estimators.Matches, {"extract": ms, "match": ms, "keypoints": n})] for each pair of a set.
     The features of an image are computed once, and their time counts in each of its pairs."""
     features = {}
+    size_of_one = context.library.feature_options(feature_options).keypoint_size
 
     def extract(name):
         if name not in features:
@@ -38,8 +39,10 @@ def match_pairs(context, data, feature_options=None, match_options=None):
         pixels = [np.column_stack([k["x"], k["y"]])[links[i]].astype(float)
                   for k, i in ((kp0, "idx0"), (kp1, "idx1"))]
         sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
+        relative = [(k["size"] / size_of_one).astype(float)[links[i]]
+                    for k, i in ((kp0, "idx0"), (kp1, "idx1"))]
         matches = estimators.Matches(*pixels, (data.camera(pair, 0), data.camera(pair, 1)), sizes,
-                                     links["ratio"].copy())
+                                     links["ratio"].copy(), relative)
         found.append((matches, {"extract": ms0 + ms1, "match": match_ms,
                                 "keypoints": (len(kp0) + len(kp1)) / 2}))
     return found
@@ -85,7 +88,8 @@ def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_o
     seed: the error keys of report.json, num_matches, num_inliers, num_keypoints, precision, and
     ms {extract (both images), match, estimate}.
 
-    Options are dicts of the C structs' fields; values may be text. estimator: "twoview" or a key of
+    Options are dicts of the C structs' fields; values may be text. estimate_options may hold
+    sigma_by_size, of tv_reconstruct_options, too. estimator: "twoview" or a key of
     estimators.PEERS, which reads max_error_px only. resize: None is the tables' rule, 0 native.
     library: a twoview_ctypes.Library or a path. save/load: a file for the matches (pickle, our own
     files only), so that estimators can be tuned on fixed matches.
