@@ -116,6 +116,54 @@ def test_pixels_that_are_not_finite_are_no_inliers(context, scene):
     assert result.verdict == tv.Verdict.OK and not inliers[7] and inliers.sum() == 199
 
 
+def test_sigmas_weigh_the_matches(context, scene):
+    random = np.random.default_rng(3)
+    sigmas = [np.where(np.arange(200) % 2 == 0, 4, 1).astype(np.float32) for _ in range(2)]
+    errors = {True: [], False: []}
+    for _ in range(40):
+        noisy = [p + 0.3 * s[:, None] * random.normal(0, 1, p.shape)
+                 for p, s in zip((scene.pixels0, scene.pixels1), sigmas)]
+        for known in errors:
+            given = {"sigmas0": sigmas[0], "sigmas1": sigmas[1]} if known else {}
+            found, _ = tv.estimate_two_view(context, scene.camera, scene.camera, *noisy, **given)
+            errors[known].append(angle_deg(found.R @ scene.R.T) ** 2)
+            if known:
+                assert found.noise_px == pytest.approx(0.3, rel=0.3)
+    assert np.mean(errors[True]) < 0.8 * np.mean(errors[False])
+    ones = np.ones(200, np.float32)
+    plain, _ = tv.estimate_two_view(context, scene.camera, scene.camera, *noisy)
+    same, _ = tv.estimate_two_view(context, scene.camera, scene.camera, *noisy, sigmas0=ones)
+    assert np.array_equal(plain.R, same.R)
+    for bad, error in ((ones[:199], ValueError), (ones.astype(float), TypeError),
+                       (0 * ones, tv.TV_ERR_ARGUMENT), (np.nan * ones, tv.TV_ERR_NOT_FINITE)):
+        with pytest.raises(error):
+            tv.estimate_two_view(context, scene.camera, scene.camera, *noisy, sigmas1=bad)
+
+
+def test_an_adjustment_divides_errors_by_sigmas(context, scene):
+    points = tv.triangulate(scene.camera, scene.camera, scene.R, scene.t, scene.pixels0,
+                            scene.pixels1)
+    noise = np.random.default_rng(2).normal(0, 0.3, scene.pixels0.shape)
+    halves = np.full(200, 0.5, np.float32)
+    plain, weighted = (tv.adjust_two_view(context, scene.camera, scene.camera,
+                                          scene.pixels0 + noise, scene.pixels1 - noise, scene.R,
+                                          scene.t, points, loss=tv.Loss.NONE, **given)
+                       for given in ({}, {"sigmas0": halves, "sigmas1": halves}))
+    assert weighted.final_cost == pytest.approx(4 * plain.final_cost, rel=1e-9)
+    assert np.allclose(plain.R, weighted.R, atol=1e-9)
+
+
+def test_keypoint_sigmas_are_powers_of_the_size(context, image):
+    keypoints, _ = tv.extract(context, image, levels=3, max_keypoints=400)
+    assert len(set(keypoints["level"])) == 3
+    sigmas = tv.keypoint_sigmas(keypoints, 0.75)
+    assert sigmas.dtype == np.float32
+    assert np.allclose(sigmas, 2.0 ** (0.75 * keypoints["level"]), rtol=1e-6)
+    assert (tv.keypoint_sigmas(keypoints, 1, size_of_one=1) == keypoints["size"]).all()
+    with pytest.raises(tv.TV_ERR_ARGUMENT):
+        tv.keypoint_sigmas(keypoints, 3)
+
+
 def test_triangulate_adjust_and_covariances(context, scene):
     points = tv.triangulate(scene.camera, scene.camera, scene.R, scene.t, scene.pixels0,
                             scene.pixels1)

@@ -15,8 +15,9 @@ from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, Orientation
 from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOptions,
                       MatchOptions)
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,
-                     corrected_camera, describe, detect, estimate_two_view, extract, match,
-                     match_guided, orient, point_covariances, reconstruct, triangulate)
+                     corrected_camera, describe, detect, estimate_two_view, extract,
+                     keypoint_sigmas, match, match_guided, orient, point_covariances,
+                     reconstruct, triangulate)
 
 
 def version_string() -> str:

@@ -71,7 +71,8 @@ class tv_guided_options(Structure):
 
 class tv_pixel_pairs(Structure):
     _fields_ = [("struct_size", c_uint32), ("num", c_int32), ("pixels0", c_void_p),
-                ("pixels1", c_void_p), ("ratios", c_void_p)]
+                ("pixels1", c_void_p), ("ratios", c_void_p), ("sigmas0", c_void_p),
+                ("sigmas1", c_void_p)]
 
 
 class tv_estimate_options(Structure):
@@ -112,7 +113,7 @@ class tv_view(Structure):
 class tv_reconstruct_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("triangulation", c_int32), ("feature", c_void_p),
                 ("match", c_void_p), ("estimate", c_void_p), ("guided_matching", c_int32),
-                ("bundle_adjustment", c_int32)]
+                ("bundle_adjustment", c_int32), ("sigma_by_size", c_double)]
 
 
 class tv_reconstruction(Structure):

@@ -99,13 +99,32 @@ def _features(context: Context, keypoints: Optional[np.ndarray], descriptors: np
     return features
 
 
+def keypoint_sigmas(keypoints: np.ndarray, exponent: float,
+                    size_of_one: float = FeatureOptions.keypoint_size) -> np.ndarray:
+    """tv_keypoint_sigmas: (n,) float32, (size / size_of_one)^exponent of each keypoint. Gather
+    them by a match's indices for estimate_two_view."""
+    keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
+    sigmas = np.empty(len(keypoints), np.float32)
+    _abi.default_library().call(
+        "tv_keypoint_sigmas", _abi.pointer(keypoints), c_int32(len(keypoints)),
+        ctypes.c_float(size_of_one), ctypes.c_double(exponent), _abi.pointer(sigmas))
+    return sigmas
+
+
 def _pairs(context: Context, pixels0: np.ndarray, pixels1: np.ndarray,
-           ratios: Optional[np.ndarray]) -> Any:
+           **values: Optional[np.ndarray]) -> Any:
+    """A tv_pixel_pairs; values: ratios, sigmas0, sigmas1, each (n,) float32 or None."""
     pairs = context.library.make(_abi.tv_pixel_pairs)
     pairs.num = len(pixels0)
     pairs.pixels0, pairs.pixels1 = _abi.pointer(pixels0), _abi.pointer(pixels1)
-    pairs.ratios = _abi.pointer(ratios)
-    return byref(pairs)
+    for name, array in values.items():
+        if array is None:
+            continue
+        array = _abi.check_array(name, array, np.float32)
+        if len(array) != len(pixels0):
+            raise ValueError(f"{len(array)} {name} and {len(pixels0)} matches")
+        setattr(pairs, name, _abi.pointer(array))
+    return pairs
 
 
 def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
@@ -233,18 +252,14 @@ def _pixels(pixels0: np.ndarray, pixels1: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _estimate(context: Context, camera0: Optional[Camera], camera1: Optional[Camera],
-              pixels0: np.ndarray, pixels1: np.ndarray, ratios: Optional[np.ndarray],
-              wanted: Any) -> tuple[Any, np.ndarray]:
+              pixels0: np.ndarray, pixels1: np.ndarray, wanted: Any,
+              **values: Optional[np.ndarray]) -> tuple[Any, np.ndarray]:
     pixels0, pixels1 = _pixels(pixels0, pixels1)
-    if ratios is not None:
-        ratios = _abi.check_array("ratios", ratios, np.float32)
-        if len(ratios) != len(pixels0):
-            raise ValueError(f"{len(ratios)} ratios and {len(pixels0)} matches")
+    pairs = _pairs(context, pixels0, pixels1, **values)
     found = context.library.make(_abi.tv_two_view)
     inliers = np.zeros(len(pixels0), np.uint8)
     context.call("tv_estimate_two_view", *_two_cameras(camera0, camera1),
-                 _pairs(context, pixels0, pixels1, ratios), byref(wanted), byref(found),
-                 _abi.pointer(inliers))
+                 byref(pairs), byref(wanted), byref(found), _abi.pointer(inliers))
     return found, inliers.view(bool)
 
 
@@ -252,15 +267,19 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
                       pixels0: np.ndarray, pixels1: np.ndarray,
                       ratios: Optional[np.ndarray] = None,
                       options: Optional[EstimateOptions] = None,
+                      sigmas0: Optional[np.ndarray] = None, sigmas1: Optional[np.ndarray] = None,
                       **keywords: Any) -> tuple[TwoView, np.ndarray]:
     """tv_estimate_two_view: returns the geometry and the inlier mask, (n,) bool.
 
     pixels: (n, 2) float64, as in the images (distorted). ratios: (n,) float32; lower means more
-    reliable. A pixel that is not finite is never an inlier. Without cameras only F and H are
-    estimated, and the method must be AUTO, EIGHT_POINT or SEVEN_POINT."""
-    found, inliers = _estimate(context, camera0, camera1, pixels0, pixels1, ratios,
+    reliable. sigmas: (n,) float32, the standard deviations of the pixels in units of that of the
+    most precise ones (keypoint_sigmas); None: 1 for all.
+    A pixel that is not finite is never an inlier. Without cameras only F and H are estimated, and
+    the method must be AUTO, EIGHT_POINT or SEVEN_POINT."""
+    found, inliers = _estimate(context, camera0, camera1, pixels0, pixels1,
                                to_struct(check_context(context).library, EstimateOptions, options,
-                                         keywords))
+                                         keywords),
+                               ratios=ratios, sigmas0=sigmas0, sigmas1=sigmas1)
     return _two_view(found), inliers
 
 
@@ -318,9 +337,10 @@ class BundleResult:
 def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0: np.ndarray,
                     pixels1: np.ndarray, R: Sequence[Sequence[float]], t: Sequence[float],
                     points: np.ndarray, options: Optional[BundleOptions] = None,
+                    sigmas0: Optional[np.ndarray] = None, sigmas1: Optional[np.ndarray] = None,
                     **keywords: Any) -> BundleResult:
     """tv_adjust_two_view: bundle adjustment from a given start, which is not modified. `points` are
-    those of triangulate."""
+    those of triangulate; sigmas as for estimate_two_view."""
     wanted = to_struct(check_context(context).library, BundleOptions, options, keywords)
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     rotation, translation = (
@@ -331,8 +351,9 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
     if len(points) != len(pixels0):
         raise ValueError(f"{len(points)} points and {len(pixels0)} matches")
     result = context.library.make(_abi.tv_bundle_result)
+    pairs = _pairs(context, pixels0, pixels1, sigmas0=sigmas0, sigmas1=sigmas1)
     context.call("tv_adjust_two_view", *_two_cameras(camera0, camera1),
-                 _pairs(context, pixels0, pixels1, None), byref(wanted), _abi.pointer(rotation),
+                 byref(pairs), byref(wanted), _abi.pointer(rotation),
                  _abi.pointer(translation), _abi.pointer(points), byref(result))
     covariance = np.array(result.covariance).reshape(5, 5) if result.has_covariance else None
     return BundleResult(rotation, translation, points, result.num_points, result.num_iterations,
@@ -383,15 +404,17 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
                 mask1: Optional[np.ndarray] = None, feature: Optional[FeatureOptions] = None,
                 match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
-                bundle_adjustment: bool = False) -> tuple[TwoView, Reconstruction]:
+                bundle_adjustment: bool = False,
+                sigma_by_size: float = 0.0) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points. Images are (height, width) uint8 and
-    are read without a copy. feature, match and estimate are the options of the stages."""
+    are read without a copy. feature, match and estimate are the options of the stages;
+    sigma_by_size is the exponent of keypoint_sigmas."""
     library = check_context(context).library
     kept = [to_struct(library, kind, options, {}) for kind, options in
             ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
     wanted = library.make(_abi.tv_reconstruct_options, {
         "triangulation": triangulation, "guided_matching": guided_matching,
-        "bundle_adjustment": bundle_adjustment})
+        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size})
     wanted.feature, wanted.match, wanted.estimate = map(ctypes.addressof, kept)
     views = []
     for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):

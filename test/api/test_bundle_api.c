@@ -190,6 +190,33 @@ static void test_poses_cameras_and_counts_are_checked(void) {
   expect_untouched();
 }
 
+static void test_sigmas_are_checked(void) {
+  static float sigmas[NUM_POINTS];
+  const float bad[] = {0, -1, 0.0099f, 1000.1f, NAN, INFINITY};
+  tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, NULL, NUM_POINTS);
+  int v, k;
+  for (k = 0; k < NUM_POINTS; ++k) sigmas[k] = 1;
+  for (v = 0; v < 2; ++v) {
+    pairs.sigmas0 = v == 0 ? sigmas : NULL;
+    pairs.sigmas1 = v == 1 ? sigmas : NULL;
+    for (k = 0; k < (int)(sizeof bad / sizeof bad[0]); ++k) {
+      sigmas[NUM_POINTS - 1] = bad[k];
+      TEST_ASSERT_EQUAL_INT(isfinite(bad[k]) ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE,
+                            tv_adjust_two_view(a.context, &camera0, &camera1, &pairs, &options, R,
+                                               t, points, &result));
+      expect_untouched();
+    }
+    sigmas[NUM_POINTS - 1] = 1;
+  }
+  /* The points over the sigmas: their bytes are sigmas of about 2. */
+  memset(start, 0x40, sizeof start);
+  memcpy(points, start, sizeof points);
+  pairs.sigmas1 = (const float *)points;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_adjust_two_view(a.context, &camera0, &camera1, &pairs,
+                                                           &options, R, t, points, &result));
+  expect_untouched();
+}
+
 static void test_outputs_may_not_overlap(void) {
   tv_context *c = a.context;
   double *inside = (double *)points;
@@ -300,6 +327,7 @@ int main(void) {
   RUN_TEST(test_null_pointers_are_refused);
   RUN_TEST(test_options_out_of_range_are_refused);
   RUN_TEST(test_poses_cameras_and_counts_are_checked);
+  RUN_TEST(test_sigmas_are_checked);
   RUN_TEST(test_outputs_may_not_overlap);
   RUN_TEST(test_covariances_are_symmetric_grow_with_the_pose_and_scale_with_t);
   RUN_TEST(test_points_that_are_not_ok_have_zero_covariance);

@@ -233,6 +233,63 @@ static void test_points_that_are_none_are_refused(void) {
   point_refused(TV_ERR_ARGUMENT, 5, 5, 4, 1e9f);
 }
 
+static void test_keypoint_sigmas_are_powers_of_the_size(void) {
+  enum { NUM = 9 };
+  const float sizes[NUM] = {4, 8, 5.64f, 4096, 0.004f, 2, 11.3f, 1e-30f, 4.0001f};
+  const double exponents[] = {0, 0.5, 1, 2, 0.37};
+  tv_keypoint points[NUM];
+  float sigmas[NUM + 1];
+  int e, k;
+  for (k = 0; k < NUM; ++k) {
+    const tv_keypoint point = {50, 50, 0, 0, 1, 7}; /* the level plays no part */
+    points[k] = point;
+    points[k].size = sizes[k];
+  }
+  sigmas[NUM] = -7;
+  for (e = 0; e < 5; ++e) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_keypoint_sigmas(points, NUM, 4, exponents[e], sigmas));
+    for (k = 0; k < NUM; ++k) {
+      const double power = pow((double)sizes[k] / 4, exponents[e]);
+      const double expected = power < 0.01 ? 0.01 : power > 1000 ? 1000 : power;
+      TEST_ASSERT_DOUBLE_WITHIN(1e-6 * expected, expected, sigmas[k]);
+      TEST_ASSERT_TRUE(exponents[e] != 0 || sigmas[k] == 1);
+      TEST_ASSERT_TRUE(sigmas[k] >= 0.01f && sigmas[k] <= 1000.0f);
+    }
+    TEST_ASSERT_TRUE(sigmas[0] == 1);
+  }
+  TEST_ASSERT_TRUE(sigmas[NUM] == -7);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_keypoint_sigmas(NULL, 0, 4, 1, NULL));
+}
+
+static void sigmas_refused(tv_status expected, const tv_keypoint *points, int32_t num, float size,
+                           double exponent, float *sigmas) {
+  float before[2];
+  if (sigmas != NULL) memcpy(before, sigmas, sizeof before);
+  TEST_ASSERT_EQUAL_INT(expected, tv_keypoint_sigmas(points, num, size, exponent, sigmas));
+  if (sigmas != NULL) TEST_ASSERT_EQUAL_MEMORY(before, sigmas, sizeof before);
+}
+
+static void test_keypoint_sigmas_check_their_arguments(void) {
+  tv_keypoint points[2] = {{50, 50, 4, 0, 1, 0}, {50, 50, 4, 0, 1, 0}};
+  float sigmas[2] = {-7, -7};
+  const float nan = (float)NAN;
+  sigmas_refused(TV_ERR_NULL, NULL, 2, 4, 1, sigmas);
+  sigmas_refused(TV_ERR_NULL, points, 2, 4, 1, NULL);
+  sigmas_refused(TV_ERR_ARGUMENT, points, -1, 4, 1, sigmas);
+  sigmas_refused(TV_ERR_ARGUMENT, points, 2, 0, 1, sigmas);
+  sigmas_refused(TV_ERR_ARGUMENT, points, 2, -4, 1, sigmas);
+  sigmas_refused(TV_ERR_ARGUMENT, points, 2, 4097, 1, sigmas);
+  sigmas_refused(TV_ERR_NOT_FINITE, points, 2, nan, 1, sigmas);
+  sigmas_refused(TV_ERR_ARGUMENT, points, 2, 4, -0.1, sigmas);
+  sigmas_refused(TV_ERR_ARGUMENT, points, 2, 4, 2.1, sigmas);
+  sigmas_refused(TV_ERR_NOT_FINITE, points, 2, 4, INFINITY, sigmas);
+  sigmas_refused(TV_ERR_OVERLAP, points, 2, 4, 1, &points[1].score);
+  points[1].size = 0;
+  sigmas_refused(TV_ERR_ARGUMENT, points, 2, 4, 1, sigmas);
+  points[1].size = nan;
+  sigmas_refused(TV_ERR_NOT_FINITE, points, 2, 4, 1, sigmas);
+}
+
 static void test_capacity_is_told_and_nothing_is_written(void) {
   const int32_t all = detect(a.context, others),
                 described = extract(a.context, others, descriptors);
@@ -561,6 +618,8 @@ int main(void) {
   RUN_TEST(test_options_out_of_range_are_refused);
   RUN_TEST(test_output_pointers_are_checked);
   RUN_TEST(test_points_that_are_none_are_refused);
+  RUN_TEST(test_keypoint_sigmas_are_powers_of_the_size);
+  RUN_TEST(test_keypoint_sigmas_check_their_arguments);
   RUN_TEST(test_capacity_is_told_and_nothing_is_written);
   RUN_TEST(test_keypoints_are_in_order_and_inside);
   RUN_TEST(test_extract_is_detect_orient_describe);

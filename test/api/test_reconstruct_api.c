@@ -180,6 +180,15 @@ static void test_what_the_stages_refuse_is_refused(void) {
   refused(TV_ERR_ARGUMENT, &o.all);
   o.all.bundle_adjustment = -1;
   refused(TV_ERR_ARGUMENT, &o.all);
+  default_stages(&o);
+  o.all.sigma_by_size = -0.001;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  o.all.sigma_by_size = 2.001;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  o.all.sigma_by_size = NAN;
+  refused(TV_ERR_NOT_FINITE, &o.all);
+  o.all.sigma_by_size = INFINITY;
+  refused(TV_ERR_NOT_FINITE, &o.all);
   views[1].mask = &mask;
   refused(TV_ERR_ARGUMENT, NULL);
   views[1].mask = NULL;
@@ -322,6 +331,95 @@ static void test_a_real_pair_has_the_same_bytes_with_every_kernel_set(void) {
   free(pair.luma[1]);
 }
 
+/* sigma_by_size is tv_keypoint_sigmas of the keypoints, gathered for the matches, in the estimate
+   and in the adjustment. */
+static void test_sigmas_by_size_are_those_of_the_stages_by_hand(void) {
+  static float sigmas[2][2048];
+  static double pixels[2][2 * 2048];
+  static float ratios[2048];
+  static tv_point points[2048];
+  static uint8_t mask[2048];
+  real_pair pair;
+  tv_limits limits;
+  stage_options o;
+  api_context b, c;
+  tv_two_view without;
+  static float gathered[2][2048];
+  int adjusted, v, k, n;
+  if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
+  limits = limits_of(pair.width, pair.height, 2048);
+  b = api_make(&limits);
+  c = api_make(&limits);
+  view_real_pair(&pair);
+  default_stages(&o);
+  o.feature.max_keypoints = 2048;
+  o.feature.levels = 4;
+  o.feature.scale_factor = 1.5f;
+  o.feature.keypoint_size = 5;
+  tv_two_view_init(&without);
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &o.all, &without, &reconstruction));
+  for (adjusted = 0; adjusted < 2; ++adjusted) {
+    tv_pixel_pairs pairs;
+    tv_two_view by_hand;
+    o.all.sigma_by_size = 0.75;
+    o.all.bundle_adjustment = adjusted;
+    TEST_ASSERT_EQUAL_INT(
+        TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &o.all, &two_view, &reconstruction));
+    TEST_ASSERT_TRUE(two_view.has_t && two_view.num_inliers > 100);
+    n = reconstruction.num_matches;
+    for (v = 0; v < 2; ++v) {
+      TEST_ASSERT_EQUAL_INT(
+          TV_OK, tv_keypoint_sigmas(reconstruction.keypoints[v], reconstruction.num_keypoints[v], 5,
+                                    0.75, sigmas[v]));
+    }
+    for (k = 0; k < n; ++k) {
+      const tv_correspondence *m = &reconstruction.matches[k];
+      for (v = 0; v < 2; ++v) {
+        const int32_t i = v == 0 ? m->idx0 : m->idx1;
+        pixels[v][2 * k] = reconstruction.keypoints[v][i].x;
+        pixels[v][2 * k + 1] = reconstruction.keypoints[v][i].y;
+      }
+      ratios[k] = m->ratio;
+    }
+    pairs = pairs_of(pixels[0], pixels[1], ratios, n);
+    for (k = 0; k < n; ++k) {
+      gathered[0][k] = sigmas[0][reconstruction.matches[k].idx0];
+      gathered[1][k] = sigmas[1][reconstruction.matches[k].idx1];
+    }
+    pairs.sigmas0 = gathered[0];
+    pairs.sigmas1 = gathered[1];
+    tv_two_view_init(&by_hand);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(c.context, &camera, &camera, &pairs,
+                                                      &o.estimate, &by_hand, mask));
+    if (adjusted) {
+      tv_bundle_result result;
+      tv_camera corrected;
+      tv_bundle_result_init(&result);
+      TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_camera(&by_hand, &camera, &corrected));
+      TEST_ASSERT_EQUAL_INT(
+          TV_OK, tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, &corrected, &corrected, by_hand.R,
+                                by_hand.t, pixels[0], pixels[1], n, points));
+      for (k = 0; k < n; ++k) {
+        if (mask[k] == 0) points[k].status = TV_POINT_INVALID;
+      }
+      TEST_ASSERT_EQUAL_INT(TV_OK, tv_adjust_two_view(c.context, &corrected, &corrected, &pairs,
+                                                      NULL, by_hand.R, by_hand.t, points, &result));
+      TEST_ASSERT_TRUE(by_hand.noise_px != two_view.noise_px);
+      by_hand.noise_px = result.noise_px;
+    }
+    TEST_ASSERT_EQUAL_MEMORY(mask, reconstruction.inlier_mask, (size_t)n);
+    TEST_ASSERT_EQUAL_MEMORY(by_hand.R, two_view.R, sizeof two_view.R);
+    TEST_ASSERT_EQUAL_MEMORY(by_hand.t, two_view.t, sizeof two_view.t);
+    TEST_ASSERT_TRUE(by_hand.noise_px == two_view.noise_px);
+    TEST_ASSERT_TRUE(without.noise_px != two_view.noise_px);
+  }
+  free(pair.luma[0]);
+  free(pair.luma[1]);
+  api_release(&b);
+  api_release(&c);
+}
+
 /* The index of a match among the result's matches, or -1. */
 static int32_t place_of(const tv_correspondence *match) {
   int32_t k;
@@ -448,6 +546,7 @@ int main(void) {
   RUN_TEST(test_the_same_call_gives_the_same_bytes);
   RUN_TEST(test_a_full_call_uses_most_of_the_memory);
   RUN_TEST(test_a_real_pair_has_the_same_bytes_with_every_kernel_set);
+  RUN_TEST(test_sigmas_by_size_are_those_of_the_stages_by_hand);
   RUN_TEST(test_guided_matching_adds_matches_and_keeps_the_verdict);
   RUN_TEST(test_bundle_adjustment_moves_the_pose_and_what_follows_from_it);
   return UNITY_END();

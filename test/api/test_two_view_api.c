@@ -1,6 +1,7 @@
 /* Tests of tv_estimate_two_view: the statuses and outputs that the header promises, and the kinds
    of pairs. */
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "support/api.h"
@@ -396,6 +397,79 @@ static void test_outputs_may_not_lie_over_a_struct_of_the_call(void) {
   TEST_ASSERT_EQUAL_MEMORY(&options_before, &options, sizeof options);
 }
 
+/* Sigmas: [0.01, 1000] and finite, in each of the two arrays and at any place. */
+static void test_sigmas_out_of_range_are_refused(void) {
+  static float sigmas[2][MAX_MATCHES];
+  const float bad[] = {0, -1, 0.0099f, 1000.1f, -0.0f, NAN, INFINITY, -INFINITY};
+  const float good[] = {0.01f, 1000, 1};
+  const tv_two_view before = result;
+  tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, NULL, 100);
+  int v, k, place;
+  TEST_ASSERT_TRUE(pairs.sigmas0 == NULL && pairs.sigmas1 == NULL);
+  for (v = 0; v < 2; ++v) {
+    for (k = 0; k < MAX_MATCHES; ++k) sigmas[v][k] = 1;
+  }
+  for (v = 0; v < 2; ++v) {
+    pairs.sigmas0 = v == 0 ? sigmas[0] : NULL;
+    pairs.sigmas1 = v == 1 ? sigmas[1] : NULL;
+    for (place = 0; place < 100; place += 99) {
+      for (k = 0; k < (int)(sizeof bad / sizeof bad[0]); ++k) {
+        sigmas[v][place] = bad[k];
+        TEST_ASSERT_EQUAL_INT(
+            isfinite(bad[k]) ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE,
+            tv_estimate_two_view(api.context, &camera0, &camera1, &pairs, &options, &result, mask));
+        TEST_ASSERT_EACH_EQUAL_UINT8(API_PATTERN, mask, 100);
+        TEST_ASSERT_EQUAL_MEMORY(&before, &result, sizeof before);
+      }
+      for (k = 0; k < 3; ++k) {
+        tv_two_view found;
+        tv_two_view_init(&found);
+        sigmas[v][place] = good[k];
+        TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
+                                                          &options, &found, NULL));
+        TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, found.kind);
+      }
+    }
+    sigmas[v][100] = NAN; /* behind the last match: not read */
+    TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                          tv_estimate_two_view(api.context, &camera0, &camera1, &pairs, &options,
+                                               &result, (uint8_t *)&sigmas[v][99]));
+    pairs.num = 0;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
+                                                      &options, &result, NULL));
+    result = before;
+    pairs.num = 100;
+    /* A caller of 0.1.0 has a struct that ends before the sigmas. */
+    sigmas[v][0] = NAN;
+    pairs.struct_size = offsetof(tv_pixel_pairs, sigmas0);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
+                                                      &options, &result, NULL));
+    result = before;
+    pairs.struct_size = sizeof pairs;
+  }
+}
+
+/* Sigmas of any size that is allowed, in any mixture, are no harm. */
+static void test_extreme_sigmas_do_no_harm(void) {
+  static float sigmas[2][MAX_MATCHES];
+  tv_pixel_pairs pairs = pairs_of(pixels0, pixels1, ratios, 300);
+  int round, k;
+  pairs.sigmas0 = sigmas[0];
+  pairs.sigmas1 = sigmas[1];
+  spoil(200, 300);
+  for (round = 0; round < 40; ++round) {
+    for (k = 0; k < 300; ++k) {
+      sigmas[0][k] = random_unit(&seed) < 0.5 ? 0.01f : 1000.0f;
+      sigmas[1][k] = round % 2 == 0 ? sigmas[0][k] : (float)uniform(0.01, 1000);
+      ratios[k] = (float)random_unit(&seed);
+    }
+    options.max_error_px = round % 4 < 2 ? 1 : 1e-3;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_estimate_two_view(api.context, &camera0, &camera1, &pairs,
+                                                      &options, &result, mask));
+    expect_sound(300, 1);
+  }
+}
+
 /* With exact true matches and a fifth of wrong ones every solver finds the motion. */
 static void test_every_method_finds_an_exact_motion(void) {
   int method;
@@ -646,6 +720,8 @@ int main(void) {
   RUN_TEST(test_cameras_are_checked);
   RUN_TEST(test_the_mask_may_not_lie_over_an_input);
   RUN_TEST(test_outputs_may_not_lie_over_a_struct_of_the_call);
+  RUN_TEST(test_sigmas_out_of_range_are_refused);
+  RUN_TEST(test_extreme_sigmas_do_no_harm);
   RUN_TEST(test_every_method_finds_an_exact_motion);
   RUN_TEST(test_a_pinhole_and_a_fisheye_make_a_pair);
   RUN_TEST(test_without_cameras_f_holds_for_the_pixels);

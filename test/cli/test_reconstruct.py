@@ -20,7 +20,7 @@ scale_sigma imu truth timings_ms context_bytes options seed version kernels""".s
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
 max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
-bundle_adjustment principal_point_sigma camera0 camera1 focal_35mm resize""".split()
+bundle_adjustment sigma_by_size principal_point_sigma camera0 camera1 focal_35mm resize""".split()
 TRUTH = "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [-1, 0, 0]\nbaseline: 0.5\ndepth0: depth.pfm\n"
 
 
@@ -212,6 +212,7 @@ class Reconstruct(cli.CliTest):
             "triangulation": "midpoint",
             "guided_matching": 1,
             "bundle_adjustment": 1,
+            "sigma_by_size": 0.75,
             "principal_point_sigma": 0.02,
             "resize": 300,
         }
@@ -224,6 +225,20 @@ class Reconstruct(cli.CliTest):
         self.assertEqual(result["kernels"], "c")
         self.assertLessEqual(max(result["num_keypoints"]), 300)
         self.assertEqual(result["image_size0"], [300, 225])
+
+    def test_sigmas_by_size_change_the_pose_of_several_levels_only(self):
+        noise = {}
+        for levels in ("1", "3"):
+            for power in ("0", "1"):
+                self.succeed(self.reconstruct("--levels", levels, "--sigma-by-size", power))
+                noise[levels, power] = self.result()["noise_px"]
+        self.assertEqual(noise["1", "0"], noise["1", "1"])
+        self.assertNotEqual(noise["3", "0"], noise["3", "1"])
+
+    def test_powers_of_a_size_out_of_range_are_refused(self):
+        for text in ("-0.1", "2.1", "nan"):
+            with self.subTest(text=text):
+                self.assert_refused(self.reconstruct("--sigma-by-size", text), "--sigma-by-size")
 
     def test_fixed_iterations_draw_exactly_that_many_samples(self):
         self.succeed(self.reconstruct("--fixed-iterations", "77"))

@@ -25,7 +25,8 @@ tv_estimate_options options_of(fuzz::Bytes& bytes) {
 }
 
 // The matches are new ones, copies of earlier ones, ones with equal pixels, and shifted ones.
-int matches_of(fuzz::Bytes& bytes, double pixels[2][2 * kMaxMatches], float* ratios) {
+int matches_of(fuzz::Bytes& bytes, double pixels[2][2 * kMaxMatches], float* ratios,
+               float sigmas[2][kMaxMatches]) {
   const int count = bytes.whole(0, kMaxMatches);
   for (int i = 0; i < count; ++i) {
     const int kind = bytes.whole(0, 7), of = i > 0 ? bytes.whole(0, i - 1) : 0;
@@ -39,6 +40,10 @@ int matches_of(fuzz::Bytes& bytes, double pixels[2][2 * kMaxMatches], float* rat
       }
     }
     ratios[i] = static_cast<float>(bytes.wild(0, 1));
+    for (int v = 0; v < 2; ++v) {
+      const int size = bytes.whole(0, 99);  // mostly 1; sometimes equal, extreme or no number
+      sigmas[v][i] = size < 60 ? 1 : static_cast<float>(bytes.wild(0.01, size < 98 ? 8 : 1001));
+    }
   }
   return count;
 }
@@ -63,7 +68,7 @@ void require_sound(const tv_two_view& r, const uint8_t* mask, int count) {
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static tv_context* const context = fuzz::context(16, 1, kMaxMatches);
   static double pixels[2][2 * kMaxMatches];
-  static float ratios[kMaxMatches];
+  static float ratios[kMaxMatches], sigmas[2][kMaxMatches];
   static uint8_t mask[2][kMaxMatches];
   fuzz::Bytes bytes(data, size);
   const tv_estimate_options options = options_of(bytes);
@@ -74,19 +79,25 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (lens == 1) cameras[1] = fuzz::camera(bytes);
   const tv_camera* const given[2] = {lens == 0 ? nullptr : &cameras[0],
                                      lens == 0 ? nullptr : &cameras[1]};
-  const int count = matches_of(bytes, pixels, ratios);
+  const int count = matches_of(bytes, pixels, ratios, sigmas);
+  const bool with_sigmas = bytes.whole(0, 1) == 1;
   tv_two_view result[2];
   tv_status status[2];
   for (int swap = 0; swap < 2; ++swap) {
     tv_two_view_init(&result[swap]);
-    status[swap] =
-        estimate_pixels(context, given[swap], given[1 - swap], pixels[swap], pixels[1 - swap],
-                        ratios, count, &options, &result[swap], mask[swap]);
+    tv_pixel_pairs pairs = pairs_of(pixels[swap], pixels[1 - swap], ratios, count);
+    if (with_sigmas) {
+      pairs.sigmas0 = sigmas[swap];
+      pairs.sigmas1 = sigmas[1 - swap];
+    }
+    status[swap] = tv_estimate_two_view(context, given[swap], given[1 - swap], &pairs, &options,
+                                        &result[swap], mask[swap]);
     if (status[swap] == TV_OK) require_sound(result[swap], mask[swap], count);
     // With gravity the two orders are not compared: the views' gravities would have to be swapped.
     if (options.gravity_sigma_rad != 0) return 0;
   }
-  FUZZ_REQUIRE(status[0] == status[1]);
+  // Sigmas that are refused for two reasons give the first one's status.
+  FUZZ_REQUIRE(status[0] == status[1] || (with_sigmas && status[0] != TV_OK && status[1] != TV_OK));
   if (status[0] != TV_OK) return 0;
   FUZZ_REQUIRE(result[0].kind == result[1].kind && result[0].verdict == result[1].verdict);
   for (int i = 0; i < 9; ++i) FUZZ_REQUIRE(result[0].R[i] == result[1].R[i % 3 * 3 + i / 3]);

@@ -201,13 +201,20 @@ void test_matrices_are_of_the_corrected_camera(void) {
 }
 
 // The gradient is compared with finite differences of the cost, for cameras whose principal point
-// is really moved; a fisheye's rays are unit vectors. The loss is plain least squares, so there are
-// no weights.
+// is really moved, without and with sigmas of the pixels; a fisheye's rays are unit vectors. The
+// loss is plain least squares, so there are no weights.
 void test_the_gradient_follows_differences(void) {
   constexpr int kNum = 60;
   static uint8_t memory[1 << 20] __attribute__((aligned(64)));
   const tv_camera cameras[3] = {scene::pinhole(), scene::distorted(), scene::fisheye()};
-  for (const tv_camera& camera : cameras) {
+  float sigmas[2][kNum];
+  for (int i = 0; i < kNum; ++i) {
+    sigmas[0][i] = i % 2 == 0 ? 1 : 0.4f;
+    sigmas[1][i] = i % 3 == 0 ? 1 : 3;
+  }
+  for (int trial = 0; trial < 6; ++trial) {
+    const tv_camera& camera = cameras[trial % 3];
+    const bool with_sigmas = trial >= 3;
     make_pair(9, kNum, camera, camera);
     tv::Arena arena = tv::arena_over(memory, sizeof memory);
     tv::TwoViewProblem problem{};
@@ -216,6 +223,7 @@ void test_the_gradient_follows_differences(void) {
     for (int v = 0; v < 2; ++v) {
       problem.camera[v] = tv::prepare_camera(camera);
       problem.pixels[v] = pair.pixels[v];
+      if (with_sigmas) problem.sigmas[v] = sigmas[v];
     }
     tv::Matches matches;
     tv::prepare_matches(problem, arena, &matches);

@@ -87,7 +87,9 @@ TV_API void tv_bundle_result_init_sized(tv_bundle_result *result, size_t struct_
 
 /* Minimises the sum of rho over the matches, over the pose (R and the direction of t; the length of
    t is kept) and the points, by the Levenberg-Marquardt method.
-   pairs: the matched pixels, one pair for each point; ratios are not read.
+   pairs: the matched pixels, one pair for each point; ratios are not read. Where they have sigmas,
+   e0 and e1 are divided by them, and all that the result states in pixels is in units of sigma.
+   error_px of a point is in pixels of the images.
    R, t: the start before the call, the result after it. cam1_from_cam0: x1 = R x0 + t; R is a
    row-major 3x3 rotation to within 1e-6, t is not zero.
    points: pairs->num points, for example of tv_triangulate; the start before the call, the result
@@ -100,10 +102,10 @@ TV_API void tv_bundle_result_init_sized(tv_bundle_result *result, size_t struct_
    result: null, or initialised by tv_bundle_result_init.
    No output overlaps another argument. Equal inputs give equal bytes on every CPU; the order of the
    matches is the order in which sums are formed.
-   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the count, R, t or an option),
-   TV_ERR_NOT_FINITE (R, t or an option), TV_ERR_CAMERA, TV_ERR_LIMITS (more points than the
-   context's max_matches, or a context without TV_PURPOSE_ADJUST), TV_ERR_OVERLAP.
-   Time: at most max_iterations passes over the points. Memory: from the context. */
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the count, R, t, an option or a sigma),
+   TV_ERR_NOT_FINITE (R, t, an option or a sigma), TV_ERR_CAMERA, TV_ERR_LIMITS (more points than
+   the context's max_matches, or a context without TV_PURPOSE_ADJUST), TV_ERR_OVERLAP. Time: at most
+   max_iterations passes over the points. Memory: from the context. */
 TV_API tv_status tv_adjust_two_view(tv_context *context, const tv_camera *camera0,
                                     const tv_camera *camera1, const tv_pixel_pairs *pairs,
                                     const tv_bundle_options *options, double R[9], double t[3],
@@ -112,7 +114,8 @@ TV_API tv_status tv_adjust_two_view(tv_context *context, const tv_camera *camera
 /* Computes the covariance of each point's position to first order.
    R, t: the pose, as for tv_adjust_two_view.
    noise_px: the standard deviation of both pixels of a match along each axis, [0, 1e9]; the noise
-   is taken as independent. pose_covariance: that of R and t, 25 numbers in the parameters of
+   is taken as independent. For points of matches with another sigma, call it with sigma times the
+   noise_px of the estimate. pose_covariance: that of R and t, 25 numbers in the parameters of
    tv_bundle_result, in radians^2; null means that the pose is exact. With that of a bundle
    adjustment, the result is the point's own block of the joint covariance. points: num_points. The
    result is exact to first order for points of the smallest error, as tv_adjust_two_view computes

@@ -162,6 +162,17 @@ TV_API tv_status tv_extract(tv_context *context, const tv_image *image, const tv
                             const tv_feature_options *options, tv_keypoint *keypoints,
                             uint8_t *descriptors, int32_t cap_keypoints, int32_t *num_keypoints);
 
+/* Computes how precisely keypoints are located from their sizes, for tv_pixel_pairs: the standard
+   deviation of a position, relative to that of a keypoint of size_of_one pixels, is taken as
+   (size / size_of_one)^exponent, limited to [0.01, 1000].
+   keypoints: num_keypoints; every field is checked as tv_describe checks it. size_of_one: (0,
+   4096], best tv_feature_options.keypoint_size. exponent: [0, 2]; 0 gives 1 for all, 1 a noise in
+   proportion to the size; docs/decisions/0017-noise-by-level.md has what was measured.
+   sigmas: room for num_keypoints; gather them by the indices of the matches.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_NOT_FINITE, TV_ERR_OVERLAP. Thread-safe. */
+TV_API tv_status tv_keypoint_sigmas(const tv_keypoint *keypoints, int32_t num_keypoints,
+                                    float size_of_one, double exponent, float *sigmas);
+
 TV_END_DECLS
 
 #endif

@@ -22,6 +22,12 @@ typedef struct tv_pixel_pairs {
   /* Null, or `num` values, of which a lower one marks a more certain match
      (tv_correspondence.ratio): more certain matches are sampled first. */
   const float *ratios;
+  /* Null (1 for all), or `num` values each, [0.01, 1000]: the standard deviation of the pixel in
+     image 0 and in image 1, as a multiple of a common unit, which is best that of the most precise
+     pixels. Of a match whose pixels have the sigma s, every residual is divided by s, exactly so
+     for two different sigmas, too: it may be s times as far from the model as max_error_px says,
+     and counts 1 / s^2 as much in the pose. tv_keypoint_sigmas computes them from keypoints. */
+  const float *sigmas0, *sigmas1;
 } tv_pixel_pairs;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
@@ -126,7 +132,8 @@ typedef struct tv_estimate_options {
   /* The inlier threshold: the largest Sampson distance of an inlier, in pixels of the images as
      given, for every lens alike; (0, 1e9], default 1. The residual of a homography or a rotation
      has two dimensions; its threshold is 1.25 times as large. A bigger value accepts noisier
-     matches and more wrong ones. */
+     matches and more wrong ones. It holds for pixels of sigma 1 (tv_pixel_pairs), and in proportion
+     for others. */
   double max_error_px;
   /* The search stops when the probability of having missed a better model is below 1 - confidence;
      [0, 1), default 0.9999. A bigger value draws more samples. */
@@ -209,10 +216,12 @@ typedef struct tv_two_view {
      rotation was removed; 0 without a full pose. */
   double median_parallax_rad;
   /* The root mean square of the inliers' residuals, in pixels: Sampson distances, or, where the
-     kind is panoramic, planar-or-panoramic or no-motion, transfer errors. */
+     kind is panoramic, planar-or-panoramic or no-motion, transfer errors. Where the matches have
+     sigmas, each residual is in units of its sigma: the value is that of matches of sigma 1. */
   double rms_error_px;
   /* The standard deviation of a matched pixel along one axis, in pixels, estimated from the
-     residuals of a full pose; 0 without one. */
+     residuals of a full pose; 0 without one. Where the matches have sigmas, it is that of a pixel
+     of sigma 1, and sigma times as much for any other. */
   double noise_px;
   /* The seed that was used. */
   uint64_t seed;
@@ -237,7 +246,8 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
 /* Estimates the two-view geometry of matched pixels.
    camera0, camera1: both cameras; or both null, which gives F and H only and requires the solver
    eight-point, seven-point or TV_SOLVER_AUTO.
-   pairs: the matched pixels. The order of the matches has no influence on the result. A match is
+   pairs: the matched pixels. The order of the matches has no influence on the result. A match that
+   is given more than once counts once, with the least sum of its sigmas. A match is
    never an inlier if a pixel lies outside its lens's valid region or is not finite, or if the
    absolute values of its four coordinates add up to a million pixels or more.
    options: null means the defaults.
@@ -247,11 +257,10 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
    inlier_mask: null, or room for pairs->num bytes; a byte is 1 where the match is an inlier of the
    model that the kind names.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
-   TV_ERR_NOT_FINITE (the options only), TV_ERR_OVERLAP. More matches than the context's max_matches
-   are TV_ERR_LIMITS: which of them to leave out is the caller's choice here (tv_reconstruct leaves
-   out those of the highest ratio).
-   Time: at most max_iterations samples, of at most 10 models each, which are scored on all
-   matches. */
+   TV_ERR_NOT_FINITE (the options and sigmas only), TV_ERR_OVERLAP. More matches than the context's
+   max_matches are TV_ERR_LIMITS: which of them to leave out is the caller's choice here
+   (tv_reconstruct leaves out those of the highest ratio). Time: at most max_iterations samples, of
+   at most 10 models each, which are scored on all matches. */
 TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,
                                       const tv_camera *camera1, const tv_pixel_pairs *pairs,
                                       const tv_estimate_options *options, tv_two_view *result,

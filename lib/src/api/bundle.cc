@@ -103,7 +103,7 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
   status = tv::read_pose(R, t, &pose, &baseline);
   if (status != TV_OK) return status;
   const size_t n = static_cast<size_t>(num_points);
-  const tv::Bytes arrays[10] = {{points, n * sizeof(tv_point)},
+  const tv::Bytes arrays[12] = {{points, n * sizeof(tv_point)},
                                 {R, 9 * sizeof(double)},
                                 {t, 3 * sizeof(double)},
                                 {result, result != nullptr ? result->struct_size : 0},
@@ -112,13 +112,17 @@ tv_status tv_adjust_two_view(tv_context* context, const tv_camera* camera0,
                                 {camera0, sizeof(tv_camera)},
                                 {camera1, sizeof(tv_camera)},
                                 {options, options != nullptr ? options->struct_size : 0},
-                                {pairs, pairs->struct_size}};
-  if (tv::outputs_overlap(arrays, 4, 10)) return TV_ERR_OVERLAP;
+                                {pairs, pairs->struct_size},
+                                {matches.sigmas0, n * sizeof(float)},
+                                {matches.sigmas1, n * sizeof(float)}};
+  if (tv::outputs_overlap(arrays, 4, 12)) return TV_ERR_OVERLAP;
   tv::StageTimer timer(context, TV_STAGE_REFINE);
   problem.camera[0] = tv::prepare_camera(*camera0);
   problem.camera[1] = tv::prepare_camera(*camera1);
   problem.pixels[0] = pixels0;
   problem.pixels[1] = pixels1;
+  problem.sigmas[0] = matches.sigmas0;
+  problem.sigmas[1] = matches.sigmas1;
   problem.num = num_points;
   tv::BundleOutcome outcome;
   tv::adjust_two_view(problem, pose, baseline, context->arena, points, &outcome);

@@ -214,3 +214,25 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   }
   return TV_OK;
 }
+
+tv_status tv_keypoint_sigmas(const tv_keypoint* keypoints, int32_t num_keypoints, float size_of_one,
+                             double exponent, float* sigmas) {
+  if (num_keypoints > 0 && (keypoints == nullptr || sigmas == nullptr)) return TV_ERR_NULL;
+  if (!tv::is_finite(size_of_one) || !tv::is_finite(exponent)) return TV_ERR_NOT_FINITE;
+  if (num_keypoints < 0 || !(size_of_one > 0) || size_of_one > tv::kMaxKeypointSize ||
+      !(exponent >= 0) || exponent > tv::kMostSigmaExponent) {
+    return TV_ERR_ARGUMENT;
+  }
+  const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
+  if (status != TV_OK) return status;
+  const size_t n = static_cast<size_t>(num_keypoints);
+  if (tv::overlap(sigmas, n * sizeof(float), keypoints, n * sizeof(tv_keypoint))) {
+    return TV_ERR_OVERLAP;
+  }
+  for (size_t k = 0; k < n; ++k) {
+    const double ratio = static_cast<double>(keypoints[k].size) / size_of_one;
+    const float sigma = static_cast<float>(tv::exp(exponent * tv::log(ratio)));
+    sigmas[k] = std::max(tv::kLeastSigma, std::min(sigma, tv::kLargestSigma));
+  }
+  return TV_OK;
+}

@@ -23,12 +23,16 @@ struct Results {
   double* pixels[2];
   tv_correspondence* matches;
   float* ratios;
+  float* sigmas[2];
   uint8_t* inlier_mask;
   tv_point* points;
   tv_correspondence* more_matches;  // the matches of tv_match and of guided matching together
   uint8_t* more_inlier_mask;
   // The cameras of the two views, corrected by the present estimate; set for full poses only.
   tv_camera cameras[2];
+  tv_pixel_pairs pairs;  // of the present matches; with sigmas where the option asks for them
+  float keypoint_size;   // of sigma 1
+  double sigma_by_size;  // the option
 };
 
 Results alloc_results(Arena& arena, int32_t max_keypoints) {
@@ -38,6 +42,7 @@ Results alloc_results(Arena& arena, int32_t max_keypoints) {
     r.keypoints[v] = arena_alloc<tv_keypoint>(arena, n);
     r.descriptors[v] = arena_alloc<uint8_t>(arena, n * TV_DESCRIPTOR_BYTES);
     r.pixels[v] = arena_alloc<double>(arena, 2 * n);
+    r.sigmas[v] = arena_alloc<float>(arena, n);
   }
   r.matches = arena_alloc<tv_correspondence>(arena, n);
   r.ratios = arena_alloc<float>(arena, n);
@@ -48,7 +53,13 @@ Results alloc_results(Arena& arena, int32_t max_keypoints) {
   return r;
 }
 
+// Writes the pixels, ratios and sigmas of the matches, and r.pairs.
 void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_matches) {
+  r.pairs = {sizeof r.pairs, num_matches, r.pixels[0], r.pixels[1], r.ratios, nullptr, nullptr};
+  if (r.sigma_by_size != 0) {
+    r.pairs.sigmas0 = r.sigmas[0];
+    r.pairs.sigmas1 = r.sigmas[1];
+  }
   for (int32_t k = 0; k < num_matches; ++k) {
     const tv_correspondence& m = matches[k];
     const tv_keypoint& a = r.keypoints[0][m.idx0];
@@ -58,6 +69,9 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     r.pixels[1][2 * k] = b.x;
     r.pixels[1][2 * k + 1] = b.y;
     r.ratios[k] = m.ratio;
+    if (r.pairs.sigmas0 == nullptr) continue;
+    tv_keypoint_sigmas(&a, 1, r.keypoint_size, r.sigma_by_size, r.sigmas[0] + k);
+    tv_keypoint_sigmas(&b, 1, r.keypoint_size, r.sigma_by_size, r.sigmas[1] + k);
   }
 }
 
@@ -120,10 +134,6 @@ tv_features features_of(const Results& r, const int32_t num_keypoints[2], int vi
   return {sizeof(tv_features), num_keypoints[view], r.keypoints[view], r.descriptors[view]};
 }
 
-tv_pixel_pairs pairs_of(const Results& r, int32_t num_matches) {
-  return {sizeof(tv_pixel_pairs), num_matches, r.pixels[0], r.pixels[1], r.ratios};
-}
-
 bool is_full_pose(const tv_two_view& v) { return v.has_R != 0 && v.has_t != 0; }
 
 // Stores the cameras that an estimate refers to in r, for the stages that follow. Call it for each
@@ -166,8 +176,7 @@ __attribute__((noinline)) tv_status match_along_lines(
   const int32_t left_out = keep_best(r.more_matches, limits.max_matches, &count);
   gather_pixels(r, r.more_matches, count);
   tv_two_view again = *estimate;
-  const tv_pixel_pairs pairs = pairs_of(r, count);
-  status = tv_estimate_two_view(context, view0.camera, view1.camera, &pairs, options, &again,
+  status = tv_estimate_two_view(context, view0.camera, view1.camera, &r.pairs, options, &again,
                                 r.more_inlier_mask);
   if (status != TV_OK) return status;
   if (!takes_guided_estimate(*estimate, &again)) {
@@ -221,8 +230,7 @@ __attribute__((noinline)) tv_status adjust(tv_context* context, int32_t num_matc
                                            tv_two_view* two_view, int32_t* num_points) {
   tv_bundle_result bundle;
   tv_bundle_result_init(&bundle);
-  const tv_pixel_pairs pairs = pairs_of(r, num_matches);
-  const tv_status status = tv_adjust_two_view(context, &r.cameras[0], &r.cameras[1], &pairs,
+  const tv_status status = tv_adjust_two_view(context, &r.cameras[0], &r.cameras[1], &r.pairs,
                                               nullptr, two_view->R, two_view->t, r.points, &bundle);
   if (status != TV_OK) return status;
   Pose pose;
@@ -241,17 +249,25 @@ __attribute__((noinline)) tv_status adjust(tv_context* context, int32_t num_matc
   return TV_OK;
 }
 
-constexpr tv_reconstruct_options kDefaults = {
-    sizeof(tv_reconstruct_options), TV_TRIANGULATION_ITERATIVE_LS, nullptr, nullptr, nullptr, 0, 0};
+constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
+                                              TV_TRIANGULATION_ITERATIVE_LS,
+                                              nullptr,
+                                              nullptr,
+                                              nullptr,
+                                              0,
+                                              0,
+                                              0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                                    tv_reconstruct_options* checked) {
   *checked = kDefaults;
   const tv_status status = read_sized(options, checked);
   if (status != TV_OK) return status;
+  if (!is_finite(checked->sigma_by_size)) return TV_ERR_NOT_FINITE;
   const bool valid = is_triangulation_method(checked->triangulation) &&
                      (checked->guided_matching == 0 || checked->guided_matching == 1) &&
-                     (checked->bundle_adjustment == 0 || checked->bundle_adjustment == 1);
+                     (checked->bundle_adjustment == 0 || checked->bundle_adjustment == 1) &&
+                     checked->sigma_by_size >= 0 && checked->sigma_by_size <= kMostSigmaExponent;
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
@@ -265,6 +281,8 @@ __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const
   tv_feature_options features;
   tv_status status = read_feature_options(*context, options.feature, &features);
   if (status != TV_OK) return status;
+  r.keypoint_size = features.keypoint_size;
+  r.sigma_by_size = options.sigma_by_size;
   for (int v = 0; v < 2; ++v) {
     status = tv_extract(context, &views[v].image, views[v].mask, &features, r.keypoints[v],
                         r.descriptors[v], capacity, &num_keypoints[v]);
@@ -340,9 +358,8 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   tv::gather_pixels(r, r.matches, num_matches);
   tv_two_view estimate;
   tv_two_view_init(&estimate);
-  const tv_pixel_pairs pairs = tv::pairs_of(r, num_matches);
-  status = tv_estimate_two_view(context, views[0].camera, views[1].camera, &pairs, checked.estimate,
-                                &estimate, r.inlier_mask);
+  status = tv_estimate_two_view(context, views[0].camera, views[1].camera, &r.pairs,
+                                checked.estimate, &estimate, r.inlier_mask);
   if (status != TV_OK) return status;
   tv::correct_cameras(estimate, views[0], views[1], r);
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {

@@ -19,7 +19,7 @@ size_t extract_scratch_bytes(const tv_limits& limits) {
 size_t reconstruct_result_bytes(const tv_limits& limits) {
   const size_t n = static_cast<size_t>(limits.max_keypoints);
   return 2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
-              arena_bytes<double>(2 * n)) +
+              arena_bytes<double>(2 * n) + arena_bytes<float>(n)) +
          2 * (arena_bytes<tv_correspondence>(n) + arena_bytes<uint8_t>(n)) +
          arena_bytes<tv_point>(n) + arena_bytes<float>(n);
 }

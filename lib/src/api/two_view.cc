@@ -70,6 +70,12 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
   return check_gravity(*checked);
 }
 
+uint32_t bits_of(float x) {
+  uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return bits;
+}
+
 uint64_t hash_of(const double* a, const double* b) {
   const double values[4] = {a[0], a[1], b[0], b[1]};
   uint64_t hash = 0;
@@ -86,17 +92,21 @@ uint64_t hash_of(const double* a, const double* b) {
 // Whether the two views are exchanged for the computation. The choice depends neither on which view
 // the caller names first nor on the order of the matches, so that both calls compute the same
 // result. The pixels decide; where every match occurs in both directions, the cameras, then the
-// matches' ratios, then gravity. Where all of these are equal, both calls are the same problem.
+// matches' ratios and sigmas, then gravity. Where all of these are equal, both calls are the same
+// problem.
 bool exchanged(const tv_camera* camera0, const tv_camera* camera1, const TwoViewProblem& named) {
   for (const bool with_ratios : {false, true}) {
     uint64_t forward = 0, backward = 0;
     for (int i = 0; i < named.num; ++i) {
-      uint32_t ratio = 0;
-      if (with_ratios && named.ratios != nullptr)
-        std::memcpy(&ratio, named.ratios + i, sizeof ratio);
+      // What an own view's sigma adds to the weight, and the other view's; 0 for sigmas of 1.
+      uint64_t ratio = 0, sigma[2] = {0, 0};
+      if (with_ratios && named.ratios != nullptr) ratio = bits_of(named.ratios[i]);
+      for (int v = 0; with_ratios && v < 2; ++v) {
+        sigma[v] = bits_of(static_cast<float>(named.sigma(v, i))) ^ bits_of(1.0f);
+      }
       const double *a = named.pixels[0] + 2 * i, *b = named.pixels[1] + 2 * i;
-      forward += hash_of(a, b) * (2 * uint64_t{ratio} + 1);
-      backward += hash_of(b, a) * (2 * uint64_t{ratio} + 1);
+      forward += hash_of(a, b) * (2 * (ratio + (sigma[0] << 32) + 3 * sigma[1]) + 1);
+      backward += hash_of(b, a) * (2 * (ratio + (sigma[1] << 32) + 3 * sigma[0]) + 1);
     }
     if (forward != backward) return forward > backward;
     const int cameras = camera0 == nullptr ? 0 : std::memcmp(camera0, camera1, sizeof(tv_camera));
@@ -216,6 +226,28 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
   write_sized(packed, result);
 }
 
+// Whether an output shares a byte with another argument. Not inlined, for the same reason.
+__attribute__((noinline)) bool arrays_overlap(const tv_pixel_pairs& given,
+                                              const tv_pixel_pairs* pairs,
+                                              const tv_estimate_options* options,
+                                              const tv_camera* camera0, const tv_camera* camera1,
+                                              const tv_two_view* result,
+                                              const uint8_t* inlier_mask) {
+  const size_t n = static_cast<size_t>(given.num);
+  const Bytes arrays[] = {{inlier_mask, n},
+                          {result, result->struct_size},
+                          {given.pixels0, 16 * n},
+                          {given.pixels1, 16 * n},
+                          {given.ratios, 4 * n},
+                          {given.sigmas0, 4 * n},
+                          {given.sigmas1, 4 * n},
+                          {pairs, pairs->struct_size},
+                          {options, options != nullptr ? options->struct_size : 0},
+                          {camera0, sizeof(tv_camera)},
+                          {camera1, sizeof(tv_camera)}};
+  return outputs_overlap(arrays, 2, 11);
+}
+
 }  // namespace
 }  // namespace tv
 
@@ -271,17 +303,9 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     if (status == TV_OK) status = tv_camera_check(camera1);
     if (status != TV_OK) return status;
   }
-  const size_t n = static_cast<size_t>(num_matches);
-  const tv::Bytes arrays[9] = {{inlier_mask, n},
-                               {result, result->struct_size},
-                               {pixels0, 16 * n},
-                               {pixels1, 16 * n},
-                               {ratios, 4 * n},
-                               {pairs, pairs->struct_size},
-                               {options, options != nullptr ? options->struct_size : 0},
-                               {camera0, sizeof(tv_camera)},
-                               {camera1, sizeof(tv_camera)}};
-  if (tv::outputs_overlap(arrays, 2, 9)) return TV_ERR_OVERLAP;
+  if (tv::arrays_overlap(given, pairs, options, camera0, camera1, result, inlier_mask)) {
+    return TV_ERR_OVERLAP;
+  }
   tv::ArenaScope scope(context->arena);
   tv::Matches matches{};
   tv::TwoViewModel model{};
@@ -291,6 +315,8 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     problem.pixels[0] = pixels0;
     problem.pixels[1] = pixels1;
     problem.ratios = ratios;
+    problem.sigmas[0] = given.sigmas0;
+    problem.sigmas[1] = given.sigmas1;
     problem.num = num_matches;
     swapped = tv::exchanged(camera0, camera1, problem);
     problem.calibrated = calibrated;
@@ -301,6 +327,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     }
     if (swapped) {
       std::swap(problem.pixels[0], problem.pixels[1]);
+      std::swap(problem.sigmas[0], problem.sigmas[1]);
       std::swap(problem.options.gravity0, problem.options.gravity1);
     }
     problem.kernels = context->kernels;
@@ -312,7 +339,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
   tv::finish_two_view(problem, model, context->arena, &matches, &outcome);
   tv::pack(problem, matches, model, outcome, swapped, result);
   if (inlier_mask != nullptr) {
-    std::memset(inlier_mask, 0, n);
+    std::memset(inlier_mask, 0, static_cast<size_t>(num_matches));
     for (int k = 0; k < matches.num_all; ++k) inlier_mask[matches.order[k]] = outcome.inlier[k];
   }
   return TV_OK;

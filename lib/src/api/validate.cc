@@ -1,5 +1,7 @@
 #include "api/validate.h"
 
+#include <initializer_list>
+
 #include "api/sized.h"
 
 namespace tv {
@@ -16,8 +18,6 @@ bool is_stride(int64_t stride_bytes, int32_t width) {
 }
 
 constexpr int32_t kAutoKeypoints = 2048;
-// The size of a keypoint on level 7 with the largest option keypoint_size.
-constexpr float kMaxKeypointSize = 4096.0f;
 constexpr float kMaxCoordinate = 1e5f;
 constexpr double kRotationTolerance = 1e-6;
 
@@ -85,7 +85,14 @@ tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs) {
   if (status != TV_OK) return status;
   if (pairs->num < 0) return TV_ERR_ARGUMENT;
   const bool missing = pairs->pixels0 == nullptr || pairs->pixels1 == nullptr;
-  return pairs->num > 0 && missing ? TV_ERR_NULL : TV_OK;
+  if (pairs->num > 0 && missing) return TV_ERR_NULL;
+  for (const float* sigmas : {pairs->sigmas0, pairs->sigmas1}) {
+    for (int32_t i = 0; sigmas != nullptr && i < pairs->num; ++i) {
+      if (!is_finite(sigmas[i])) return TV_ERR_NOT_FINITE;
+      if (!within(sigmas[i], kLeastSigma, kLargestSigma)) return TV_ERR_ARGUMENT;
+    }
+  }
+  return TV_OK;
 }
 
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count) {

@@ -29,7 +29,14 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
 tv_status read_features(const tv_context& context, const tv_features* given, uint32_t purpose,
                         const void* out, size_t out_bytes, tv_features* features);
 
-// Checks the caller's struct of matched pixels and copies it to *pairs.
+// The size of a keypoint on level 7 with the largest option keypoint_size.
+inline constexpr float kMaxKeypointSize = 4096.0f;
+
+// The range of a pixel's sigma, and of the exponent by which a keypoint's size gives it.
+inline constexpr double kMostSigmaExponent = 2;
+inline constexpr float kLeastSigma = 0.01f, kLargestSigma = 1000.0f;
+
+// Checks the caller's struct of matched pixels, sigmas included, and copies it to *pairs.
 tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 
 // Whether each keypoint is finite, with coordinates within 1e5 pixels, a size in (0, 4096] pixels

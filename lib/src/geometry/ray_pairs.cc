@@ -87,6 +87,8 @@ RayPairs alloc_ray_pairs(Arena& arena, int max_matches, bool on_plane) {
   return pairs;
 }
 
+double sigma_at(const float* sigmas, int32_t i) { return sigmas != nullptr ? sigmas[i] : 1; }
+
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian) {
   double entries[6];
   for (int k = 0; k < 6; ++k) entries[k] = jacobian(k / 2, k % 2);

@@ -44,6 +44,10 @@ inline size_t padded_to_blocks(int num_scored) {
   return (static_cast<size_t>(num_scored) + kScoreBlock - 1) / kScoreBlock * kScoreBlock;
 }
 
+// The standard deviation of the i-th pixel, relative to a common unit (tv_pixel_pairs); null: 1 for
+// all. A Jacobian that is multiplied by it makes residuals that are in units of it.
+double sigma_at(const float* sigmas, int32_t i);
+
 inline Vec3 ray_of(const RayPairs& pairs, int view, int i) {
   return Vec3(pairs.ray[view][0][i], pairs.ray[view][1][i], pairs.ray[view][2][i]);
 }

@@ -58,7 +58,7 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M) {
 }
 
 bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
-                    SampsonSlopes* slopes) {
+                    const double sigmas[2], SampsonSlopes* slopes) {
   Epipolar e;
   epipolar(pairs, i, M, &e);
   if (!(e.n > 0)) return false;
@@ -74,10 +74,11 @@ bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double cu
     J = pairs.jacobian[1] + 2 * r;
     q1[r] = e.f1[r] - share * (J[0][i] * e.s1[0] + J[1][i] * e.s1[1]);
   }
-  double along[2][3];  // M' q1, M q0: sqrt(n) times the slopes by ray 0 and by ray 1
+  // M' q1, M q0: sqrt(n) times the slopes by ray 0 and by ray 1, here over the rays' sigmas.
+  double along[2][3];
   for (int r = 0; r < 3; ++r) {
-    along[0][r] = (M(0, r) * q1[0] + M(1, r) * q1[1]) + M(2, r) * q1[2];
-    along[1][r] = (M(r, 0) * q0[0] + M(r, 1) * q0[1]) + M(r, 2) * q0[2];
+    along[0][r] = ((M(0, r) * q1[0] + M(1, r) * q1[1]) + M(2, r) * q1[2]) / sigmas[0];
+    along[1][r] = ((M(r, 0) * q0[0] + M(r, 1) * q0[1]) + M(r, 2) * q0[2]) / sigmas[1];
     for (int c = 0; c < 3; ++c) {
       slopes->by_entry[3 * r + c] = inverse * (e.f1[r] * q0[c] + (q1[r] - e.f1[r]) * e.f0[c]);
     }

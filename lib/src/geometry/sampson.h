@@ -24,13 +24,14 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 // Sampson's distance with its sign; its slopes by the entries of M, row by row; and its slopes by x
 // and y of the principal point that both views share, in pixels. A principal point that moves by d
 // moves every ray by -J d, and the Jacobians by the lens's curvature. curvature: d^2 ray / d
-// pixel^2 of each view, 3 x (xx, xy, yy), row by row; null counts as zeros.
+// pixel^2 of each view, 3 x (xx, xy, yy), row by row; null counts as zeros. sigmas: by which the
+// match's Jacobians and this curvature are multiplied; the principal point's pixels are not.
 struct SampsonSlopes {
   double residual, by_entry[9], by_point[2];
 };
 // Returns false where both rays of the match lie at the epipoles.
 bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
-                    SampsonSlopes* slopes);
+                    const double sigmas[2], SampsonSlopes* slopes);
 
 // Computes sampson_sq of the matches first .. first + count - 1, or of those listed.
 void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares);

@@ -121,7 +121,7 @@ void gather(Adjustment& adjustment, const BundleFrame& frame, double baseline,
     const Vec2 pixel0 = pixel_of(problem, 0, i), pixel1 = pixel_of(problem, 1, i);
     BundlePoint point;
     if (is_usable(pixel0) && is_usable(pixel1) && read_point(points[i], baseline, &point) &&
-        linearise(problem.camera, frame, point, pixel0, pixel1, &adjustment.now[adjustment.num])) {
+        linearise(problem, frame, point, i, &adjustment.now[adjustment.num])) {
       adjustment.index[adjustment.num++] = i;
     }
   }
@@ -225,8 +225,9 @@ void measure_covariance(const Adjustment& adjustment, const BundleFrame& frame, 
   out->has_covariance = true;
 }
 
-void write_point(const BundleFrame& frame, const BundleMatch& match, double baseline,
-                 tv_point* out) {
+// sigmas: those of the match, by which its errors become pixels of the images.
+void write_point(const BundleFrame& frame, const BundleMatch& match, const double sigmas[2],
+                 double baseline, tv_point* out) {
   const double* d = match.point.direction;
   const double rho = match.point.inverse_distance;
   double Rd[3], X1[3], across[3];
@@ -248,7 +249,12 @@ void write_point(const BundleFrame& frame, const BundleMatch& match, double base
   for (int i = 0; i < 3; ++i) out->position[i] = infinite ? d[i] : position[i];
   out->status = infinite ? TV_POINT_INFINITE : rho > 0.0 ? TV_POINT_OK : TV_POINT_BEHIND;
   out->angle_rad = static_cast<float>(atan2(std::sqrt(sine_sq), dot(Rd, X1)));
-  const double error = std::sqrt(0.5 * error_sq(match));
+  double in_pixels = 0;
+  for (int v = 0; v < 2; ++v) {
+    const double* e = match.error[v];
+    in_pixels += sigmas[v] * sigmas[v] * (e[0] * e[0] + e[1] * e[1]);
+  }
+  const double error = std::sqrt(0.5 * in_pixels);
   out->error_px = static_cast<float>(error < kMaxFloat ? error : kMaxFloat);
 }
 
@@ -279,7 +285,9 @@ void adjust_two_view(const BundleProblem& problem, const Pose& start, double bas
   outcome->final_sum_sq = sums.sum_sq;
   if (problem.options.hold_pose == 0) measure_covariance(adjustment, frame, sums, outcome);
   for (int k = 0; k < adjustment.num; ++k) {
-    write_point(frame, adjustment.now[k], baseline, &points[adjustment.index[k]]);
+    const int32_t i = adjustment.index[k];
+    const double sigmas[2] = {sigma_of(problem, 0, i), sigma_of(problem, 1, i)};
+    write_point(frame, adjustment.now[k], sigmas, baseline, &points[i]);
   }
 }
 

@@ -78,6 +78,24 @@ bool linearise(const Camera cameras[2], const BundleFrame& frame, const BundlePo
   return true;
 }
 
+static void scale(double* values, int count, double factor) {
+  for (int k = 0; k < count; ++k) values[k] *= factor;
+}
+
+bool linearise(const BundleProblem& problem, const BundleFrame& frame, const BundlePoint& point,
+               int32_t i, BundleMatch* match) {
+  if (!linearise(problem.camera, frame, point, pixel_of(problem, 0, i), pixel_of(problem, 1, i),
+                 match)) {
+    return false;
+  }
+  const double sigma0 = sigma_of(problem, 0, i), sigma1 = sigma_of(problem, 1, i);
+  scale(match->error[0], 2, 1 / sigma0);
+  scale(match->error[1], 2, 1 / sigma1);
+  scale(match->from_pixel0[0], 4, sigma0);
+  scale(match->jacobian1[0], 6, 1 / sigma1);
+  return true;
+}
+
 double error_sq(const BundleMatch& match) {
   const double(*e)[2] = match.error;
   return (e[0][0] * e[0][0] + e[0][1] * e[0][1]) + (e[1][0] * e[1][0] + e[1][1] * e[1][1]);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "geometry/essential.h"
+#include "geometry/ray_pairs.h"
 #include "twoview/bundle.h"
 
 namespace tv {
@@ -11,12 +12,16 @@ namespace tv {
 struct BundleProblem {
   Camera camera[2];
   const double* pixels[2];  // num x 2
+  const float* sigmas[2];   // num each; null: 1 for all
   int num;
   tv_bundle_options options;
 };
 
 inline Vec2 pixel_of(const BundleProblem& problem, int view, int i) {
   return Vec2(problem.pixels[view][2 * i], problem.pixels[view][2 * i + 1]);
+}
+inline double sigma_of(const BundleProblem& problem, int view, int i) {
+  return sigma_at(problem.sigmas[view], i);
 }
 
 // The pose at which matches are linearised: t has unit length, and b1, b2 span the plane across it.
@@ -43,7 +48,8 @@ bool read_point(const tv_point& point, double baseline, BundlePoint* out);
 // step of the homogeneous point (direction, inverse distance).
 BundlePoint moved_point(const BundlePoint& point, const double move[3]);
 
-// A point, the errors of its projections, and how the projections move with it.
+// A point, the errors of its projections, and how the projections move with it. Pixels are in units
+// of the sigma of the match's pixel in that image.
 struct BundleMatch {
   BundlePoint point;
   double error[2][2];        // projection - pixel in each image, pixels
@@ -54,8 +60,11 @@ struct BundleMatch {
 // Returns false where a camera does not see the point.
 bool linearise(const Camera cameras[2], const BundleFrame& frame, const BundlePoint& point,
                const Vec2& pixel0, const Vec2& pixel1, BundleMatch* match);
+// The same for the problem's i-th match, with its sigmas; linearise above takes them as 1.
+bool linearise(const BundleProblem& problem, const BundleFrame& frame, const BundlePoint& point,
+               int32_t i, BundleMatch* match);
 
-// The squared error of both projections, px^2.
+// The squared error of both projections, px^2 in units of the sigmas.
 double error_sq(const BundleMatch& match);
 
 // The match with its point eliminated: to first order, the least error over all points is, for a

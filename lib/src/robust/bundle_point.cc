@@ -60,15 +60,14 @@ bool damped_move(const BundleFrame& frame, const BundleMatch& match, double damp
 }
 
 // Brings one point to its least error at a fixed pose, by Levenberg-Marquardt.
-void settle(const BundleProblem& problem, const BundleFrame& frame, const Vec2& pixel0,
-            const Vec2& pixel1, BundleMatch* match) {
+void settle(const BundleProblem& problem, const BundleFrame& frame, int32_t i, BundleMatch* match) {
   double damping = kFirstDamping;
   for (int trial = 0; trial < kMaxTrials && damping < kMaxDamping; ++trial) {
     double move[3];
     if (!damped_move(frame, *match, damping, move)) return;
     BundleMatch moved;
     const double before = error_sq(*match);
-    if (linearise(problem.camera, frame, moved_point(match->point, move), pixel0, pixel1, &moved) &&
+    if (linearise(problem, frame, moved_point(match->point, move), i, &moved) &&
         error_sq(moved) < before) {
       const double gain = before - error_sq(moved);
       *match = moved;
@@ -83,11 +82,11 @@ void settle(const BundleProblem& problem, const BundleFrame& frame, const Vec2& 
 // A start for the point from the match's rays alone: its direction from its pixel in image 0, its
 // distance where that ray is nearest to the other one; or, with `far`, at infinity between the two
 // rays. False where this gives no point that both cameras see.
-bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far,
-                const Vec2& pixel0, const Vec2& pixel1, BundleMatch* match) {
+bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far, int32_t index,
+                BundleMatch* match) {
   Vec3 ray0, ray1;
-  if (!unproject(problem.camera[0], pixel0, &ray0, nullptr) ||
-      !unproject(problem.camera[1], pixel1, &ray1, nullptr)) {
+  if (!unproject(problem.camera[0], pixel_of(problem, 0, index), &ray0, nullptr) ||
+      !unproject(problem.camera[1], pixel_of(problem, 1, index), &ray1, nullptr)) {
     return false;
   }
   BundlePoint point{{ray0[0], ray0[1], ray0[2]}, 0.0};
@@ -102,7 +101,7 @@ bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far
     }
     const double length = length_of(point.direction);
     for (double& x : point.direction) x /= length;
-    return length > 0.0 && linearise(problem.camera, frame, point, pixel0, pixel1, match);
+    return length > 0.0 && linearise(problem, frame, point, index, match);
   }
   // With u the ray in camera 1's frame and n = u x ray1: rho = n.n / ((ray1 x t).n).
   const Vec3 u(turned[0], turned[1], turned[2]);
@@ -110,7 +109,7 @@ bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far
   const double across = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
   point.inverse_distance = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) / across;
   return std::fabs(point.inverse_distance) <= kMaxInverseDistance &&
-         linearise(problem.camera, frame, point, pixel0, pixel1, match);
+         linearise(problem, frame, point, index, match);
 }
 
 }  // namespace
@@ -118,22 +117,19 @@ bool begin_anew(const BundleProblem& problem, const BundleFrame& frame, bool far
 bool try_point(const BundleProblem& problem, const BundleFrame& old_frame, const BundleFrame& frame,
                const double step[5], bool careful, const BundleMatch& match, int32_t i,
                BundleMatch* out) {
-  const Vec2 pixel0 = pixel_of(problem, 0, i), pixel1 = pixel_of(problem, 1, i);
   const double before = error_sq(match);
   double move[3];
   point_step(old_frame, match, step, move);
-  const bool seen =
-      linearise(problem.camera, frame, moved_point(match.point, move), pixel0, pixel1, out);
+  const bool seen = linearise(problem, frame, moved_point(match.point, move), i, out);
   const double after = error_sq(*out);
   if (seen && after <= (careful ? before : kGrowth * before + kGrowthSq)) return true;
   BundleMatch other;
   bool found = seen;
   for (int from = 0; from < 3; ++from) {
-    const bool starts = from == 0
-                            ? linearise(problem.camera, frame, match.point, pixel0, pixel1, &other)
-                            : begin_anew(problem, frame, from == 2, pixel0, pixel1, &other);
+    const bool starts = from == 0 ? linearise(problem, frame, match.point, i, &other)
+                                  : begin_anew(problem, frame, from == 2, i, &other);
     if (!starts) continue;
-    settle(problem, frame, pixel0, pixel1, &other);
+    settle(problem, frame, i, &other);
     if (!found || error_sq(other) < error_sq(*out)) *out = other;
     found = true;
     if (error_sq(*out) <= kGrowth * before + kGrowthSq) break;
@@ -151,8 +147,7 @@ Elimination polish_point(const BundleProblem& problem, const BundleFrame& frame,
     double move[3];
     BundleMatch moved;
     point_step(frame, *match, no_step, move);
-    if (!linearise(problem.camera, frame, moved_point(match->point, move), pixel_of(problem, 0, i),
-                   pixel_of(problem, 1, i), &moved) ||
+    if (!linearise(problem, frame, moved_point(match->point, move), i, &moved) ||
         !(error_sq(moved) < before)) {
       break;
     }

@@ -93,8 +93,8 @@ double chance_of_agreement(const Matches& matches, const Mat3& M, double thresho
   // The share of the image that a band around a line covers, of half width sqrt(2) T, because
   // Sampson's distance shares the error between the two images. The band's length is taken as the
   // image's side.
-  const double prior =
-      std::min(1.0, 2.8284271247461903 * threshold_px / std::sqrt(matches.area_px));
+  const double prior = std::min(
+      1.0, 2.8284271247461903 * threshold_px / std::sqrt(matches.area_px) * sigma_means(matches).s);
   const int n = matches.num_unique();
   if (n < 2) return 1;
   Random random = random_seeded(seed);

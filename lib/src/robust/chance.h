@@ -13,6 +13,8 @@ double log_binomial(int n, int k);
 // n matches agree with by chance, where each does with probability p (L. Moisan, B. Stival, "A
 // probabilistic criterion to detect rigid point matches", IJCV 2004):
 //   NFA = models (n - m) C(n, k) C(k, m) p^(k - m).
+// Where the matches' probabilities differ, it is at most this with their mean as p, by Maclaurin's
+// inequality of symmetric means.
 double log_false_alarms(int n, int k, int m, int models, double p);
 
 inline constexpr double kLogMeaningful = -4.605170185988091;  // NFA < 0.01

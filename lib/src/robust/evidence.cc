@@ -58,17 +58,21 @@ double line_distance_px(const Fit& f, int view) {
 // Parallax, uncertainty and lines of points, of a full pose.
 void measure_pose(Fit& f) {
   Evidence& evidence = f.out->evidence;
-  double sum = 0;
+  double sum = 0, weights = 0;
   if (f.out->has_covariance) evidence.sigma_rad = largest_sigma(f.out->covariance);
   if (f.num_support == 0) return;
   for (int k = 0; k < f.num_support; ++k) {
     f.values[k] = pseudo_angle(f, f.support[k]);
-    sum += f.matches.pairs.pixel_angle[f.support[k]];
+    // Each angle counts by its information, so that matches of large sigmas are no evidence against
+    // a pose that the others determine.
+    const double weight = 1 / f.matches.sigma_sq(f.support[k]);
+    sum += weight * f.matches.pairs.pixel_angle[f.support[k]];
+    weights += weight;
   }
   double* middle = f.values + (f.num_support - 1) / 2;
   std::nth_element(f.values, middle, f.values + f.num_support);
   evidence.median_parallax_rad = angle_of_pseudo(*middle);
-  evidence.pixel_angle_rad = sum / f.num_support;
+  evidence.pixel_angle_rad = sum / weights;
   for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
 }
 

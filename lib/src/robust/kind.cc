@@ -28,7 +28,9 @@ bool leaves_parallax(const Matches& matches, const Mat3& H, const uint8_t* inlie
     if (residual.r_sq <= limit * limit) continue;
     ++unexplained;
     agreeing += inlier[i] != 0;
-    const double ratio = half_width * half_width / residual.d_sq;
+    const double sigma1 = matches.sigma(1, i);  // which d is in units of
+    const double ratio =
+        half_width * half_width * matches.sigma_sq(i) / (sigma1 * sigma1 * residual.d_sq);
     expected += ratio < 1 ? (2 / kPi) * asin(std::sqrt(ratio)) : 1.0;
   }
   if (unexplained < 3 || agreeing < 3) return false;
@@ -74,8 +76,9 @@ tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size) {
   const bool calibrated = f.problem.calibrated;
   const int n = f.matches.pairs.num;
   // Each model must be meaningful by its own number of inliers.
-  const double disc = std::min(1.0, kPi * kTransferThresholdScale * kTransferThresholdScale * 2 *
-                                        f.threshold * f.threshold / f.matches.area_px);
+  const double disc =
+      std::min(1.0, kPi * kTransferThresholdScale * kTransferThresholdScale * 2 * f.threshold *
+                        f.threshold / f.matches.area_px * sigma_means(f.matches).s_sq);
   const bool rotation_meaningful =
       rivals.has_rotation &&
       log_false_alarms(n, rivals.rotation_inliers, 2, 1, disc) < kLogMeaningful;

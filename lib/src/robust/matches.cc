@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "base/math.h"
 
@@ -39,6 +40,12 @@ bool same_place(const TwoViewProblem& p, int32_t i, int32_t j) {
   return a.v[0] == b.v[0] && a.v[1] == b.v[1] && a.v[2] == b.v[2] && a.v[3] == b.v[3];
 }
 
+// Whether match i has the lower sigmas: by their sum, then by that of view 0.
+bool more_precise(const TwoViewProblem& p, int32_t i, int32_t j) {
+  const double a = p.sigma(0, i) + p.sigma(1, i), b = p.sigma(0, j) + p.sigma(1, j);
+  return a != b ? a < b : p.sigma(0, i) < p.sigma(0, j);
+}
+
 struct SortKey {
   float ratio;
   int32_t index;
@@ -59,25 +66,32 @@ bool sorts_before(const TwoViewProblem& p, const SortKey& a, const SortKey& b) {
   for (int k = 0; k < 4; ++k) {
     if (ca.v[k] != cb.v[k]) return ca.v[k] < cb.v[k];
   }
+  if (more_precise(p, a.index, b.index)) return true;
+  if (more_precise(p, b.index, a.index)) return false;
   return a.index < b.index;  // the matches are equal, so that their order makes no difference
 }
 
-// Keeps the first of equal matches in order[0 ..), the others behind them. Returns how many differ.
+// Keeps the most precise of equal matches in order[0 ..), where the first of them would be, the
+// others behind them. Returns how many differ.
 int move_repeats_last(const TwoViewProblem& p, const SortKey* sorted, int count, int32_t* table,
                       uint32_t table_size, int32_t* order) {
   for (uint32_t s = 0; s < table_size; ++s) table[s] = -1;
   int num_unique = 0, num_repeats = 0;
   for (int k = 0; k < count; ++k) {
-    const int32_t i = sorted[k].index;
+    int32_t i = sorted[k].index;
     const Coordinates c = coordinates(p, i);
     uint64_t hash = 0;
     for (int d = 0; d < 4; ++d) hash = mix(hash + 0x9e3779b97f4a7c15ULL + bits_of(c.v[d]));
     uint32_t slot = static_cast<uint32_t>(hash) & (table_size - 1);
-    while (table[slot] >= 0 && !same_place(p, table[slot], i)) slot = (slot + 1) & (table_size - 1);
+    while (table[slot] >= 0 && !same_place(p, order[table[slot]], i)) {
+      slot = (slot + 1) & (table_size - 1);
+    }
     if (table[slot] < 0) {
-      table[slot] = i;
+      table[slot] = num_unique;
       order[num_unique++] = i;
     } else {
+      int32_t& kept = order[table[slot]];
+      if (more_precise(p, i, kept)) std::swap(i, kept);
       order[count - 1 - num_repeats++] = i;
     }
   }
@@ -162,6 +176,7 @@ void set_rays(const TwoViewProblem& problem, int view, const Camera& camera, Mat
     PixelRay p;
     const double* pixel = problem.pixels[view] + 2 * matches->order[k];
     if (ray_of_pixel(camera, pixel, matches->pairs.on_plane, &p) && sane(p)) {
+      for (double& slope : p.jacobian) slope *= matches->sigma(view, k);
       set_ray(matches->pairs, view, k, p.ray, p.jacobian);
     }
   }
@@ -191,6 +206,7 @@ size_t matches_bytes(int max_matches) {
 void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches) {
   const size_t n = static_cast<size_t>(problem.num);
   matches->order = arena_alloc<int32_t>(arena, n);
+  for (int v = 0; v < 2; ++v) matches->sigmas[v] = problem.sigmas[v];
   const bool on_plane =
       !problem.calibrated || (problem.camera[0].model.model != TV_CAMERA_KANNALA_BRANDT &&
                               problem.camera[1].model.model != TV_CAMERA_KANNALA_BRANDT);
@@ -243,11 +259,28 @@ bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const 
       for (int c = along; c < 2; ++c) {
         const int at = 2 * r + c;
         curvature[3 * r + along + c] =
-            known ? p.jacobian[at] - matches.pairs.jacobian[view][at][k] : 0;
+            known ? matches.sigma(view, k) * p.jacobian[at] - matches.pairs.jacobian[view][at][k]
+                  : 0;
       }
     }
   }
   return true;
+}
+
+double Matches::sigma_sq(int k) const {
+  const double s0 = sigma(0, k), s1 = sigma(1, k);
+  return 0.5 * (s0 * s0 + s1 * s1);
+}
+
+SigmaMeans sigma_means(const Matches& matches) {
+  const int n = matches.num_unique();
+  SigmaMeans sums{0, 0};
+  for (int k = 0; k < n; ++k) {
+    const double s_sq = matches.sigma_sq(k);
+    sums.s += std::sqrt(s_sq);
+    sums.s_sq += s_sq;
+  }
+  return n > 0 ? SigmaMeans{sums.s / n, sums.s_sq / n} : SigmaMeans{1, 1};
 }
 
 Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_px[2]) {

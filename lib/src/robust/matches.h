@@ -14,9 +14,11 @@ struct TwoViewProblem {
   Camera camera[2];         // valid for calibrated views only
   const double* pixels[2];  // num x 2
   const float* ratios;      // null when the matches have no ratios
+  const float* sigmas[2];   // tv_pixel_pairs.sigmas0 and sigmas1; null: 1 for all
   int num;
   tv_estimate_options options;
   const tvk_table* kernels;  // null: the kernels of the base ISA
+  double sigma(int view, int32_t i) const { return sigmas[view] != nullptr ? sigmas[view][i] : 1; }
 };
 
 struct Matches {
@@ -27,7 +29,10 @@ struct Matches {
   RayPairs pairs = {};
   int num_all = 0;
   int num_unique() const { return pairs.num; }
-  int32_t* order = nullptr;  // match k of `pairs` is the caller's match order[k]
+  int32_t* order = nullptr;                     // match k of `pairs` is the caller's match order[k]
+  const float* sigmas[2] = {nullptr, nullptr};  // the problem's
+  double sigma(int view, int k) const { return sigma_at(sigmas[view], order[k]); }
+  double sigma_sq(int k) const;  // the mean of its two sigmas' squares
   // For each view, the map from the plane of the rays to undistorted pixels: K of the camera, or,
   // for uncalibrated views, K of the pinhole that normalises the points.
   Mat3 intrinsics[2];
@@ -37,13 +42,23 @@ struct Matches {
 size_t matches_bytes(int max_matches);
 
 // Drops what is not finite or outside the lens model, sorts by (ratio, coordinates), and puts
-// repeated matches last: a match that is given five times is evidence once.
+// repeated matches last: a match that is given five times is evidence once, with the least sigmas
+// that were given for it. Each Jacobian is multiplied by its pixel's sigma, so that every residual
+// of the match, and all that is computed from residuals, is in units of its sigmas.
 void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* matches);
 
 // The second derivative d^2 ray / d pixel^2 of the k-th match in a view of that camera, 3 x (xx,
-// xy, yy). False, and nothing is written, for a pinhole on the plane, where the derivative is 0.
+// xy, yy), times the pixel's sigma as the Jacobian. False, and nothing is written, for a pinhole on
+// the plane, where the derivative is 0.
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
                    int view, int k, double curvature[9]);
+
+// The means of s and s^2 over the different matches, s^2 = sigma_sq. What a wrong match agrees with
+// by chance is a band or a disc that is s times as wide.
+struct SigmaMeans {
+  double s, s_sq;
+};
+SigmaMeans sigma_means(const Matches& matches);
 
 // The camera of a view with its principal point moved by shift_px.
 Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_px[2]);

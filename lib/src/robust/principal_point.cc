@@ -39,8 +39,9 @@ void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
     const int i = indices[m];
     const bool bends = ray_curvature(problem, matches, cameras[0], 0, i, curvature[0]) &&
                        ray_curvature(problem, matches, cameras[1], 1, i, curvature[1]);
+    const double sigmas[2] = {matches.sigma(0, i), matches.sigma(1, i)};
     SampsonSlopes s;
-    if (!sampson_slopes(matches.pairs, i, E, bends ? curvature : nullptr, &s)) continue;
+    if (!sampson_slopes(matches.pairs, i, E, bends ? curvature : nullptr, sigmas, &s)) continue;
     const double weight =
         loss.kind == Loss::kCauchy ? 1 / (1 + s.residual * s.residual * inverse_sq) : 1;
     for (int k = 0; k < 2; ++k) {

@@ -17,8 +17,8 @@ constexpr double kConfidence = 0.95;
 constexpr int kFewestInliers = 12;
 constexpr int kMaxLeft = 512;  // if more matches remain, this many, evenly spaced, are searched
 
-// Copies the listed matches alone.
-Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena& arena) {
+// Copies the listed matches alone. The list becomes their order.
+Matches gathered(const Matches& matches, int32_t* listed, int count, Arena& arena) {
   Matches part = matches;
   part.pairs = alloc_ray_pairs(arena, count, matches.pairs.on_plane);
   part.pairs.num = part.num_all = count;
@@ -30,6 +30,8 @@ Matches gathered(const Matches& matches, const int32_t* listed, int count, Arena
     }
   }
   finish_rays(part.pairs);
+  for (int k = 0; k < count; ++k) listed[k] = matches.order[listed[k]];
+  part.order = listed;
   return part;
 }
 

@@ -94,6 +94,8 @@ std::vector<Option> table(Options& o) {
        "1: match again along the epipolar lines, and estimate from all matches"},
       {"bundle-adjustment", kEstimate, &o.bundle_adjustment, 0, 1, closed,
        "1: adjust pose and points together"},
+      {"sigma-by-size", kEstimate, &o.sigma_by_size, 0, 2, closed,
+       "a keypoint's noise is in proportion to its size to this power; 0: the same for all"},
       {"gravity0", kGravity, Direction{e.gravity0}, 0, 0, closed,
        "the direction of gravity (down) in the first camera's frame"},
       {"gravity1", kGravity, Direction{e.gravity1}, 0, 0, closed, "the same of the second"},

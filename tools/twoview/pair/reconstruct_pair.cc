@@ -23,6 +23,7 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   stages.triangulation = options.triangulation;
   stages.guided_matching = options.guided_matching;
   stages.bundle_adjustment = options.bundle_adjustment;
+  stages.sigma_by_size = options.sigma_by_size;
   stages.feature = &options.feature;
   stages.match = &options.match;
   stages.estimate = &options.estimate;

@@ -17,13 +17,16 @@ OPENGV_MAX_ITERATIONS = 1000
 
 
 class Matches:
-    """The matched points of a pair, with the cameras of both views."""
+    """The matched points of a pair, with the cameras of both views. relative_sizes: None, or for
+    each view the size of each match's keypoint over that of a keypoint of level 0."""
 
-    def __init__(self, pixels0, pixels1, cameras, sizes, ratios=None):
+    relative_sizes = None  # of matches that an earlier version saved
+
+    def __init__(self, pixels0, pixels1, cameras, sizes, ratios=None, relative_sizes=None):
         self.pixels0 = np.asarray(pixels0, float).reshape(-1, 2)
         self.pixels1 = np.asarray(pixels1, float).reshape(-1, 2)
         self.cameras, self.sizes = cameras, sizes  # each a pair: (K, distortion), (width, height)
-        self.ratios = ratios
+        self.ratios, self.relative_sizes = ratios, relative_sizes
         self.rays0 = datasets.undistort(self.pixels0, *cameras[0])
         self.rays1 = datasets.undistort(self.pixels1, *cameras[1])
 
@@ -220,16 +223,20 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
 
 def run_twoview(context, matches, options=None, seed_step=0):
     """(R or None, t or None, inliers, tv_two_view) of our estimator; seed_step is added to its
-    seed."""
+    seed. The option sigma_by_size is the exponent of tv_keypoint_sigmas."""
     from . import twoview_ctypes
     cameras = [twoview_ctypes.make_camera(K, *size, distortion)
                for (K, distortion), size in zip(matches.cameras, matches.sizes)]
     wanted = dict(options or {})
+    exponent = float(wanted.pop("sigma_by_size", 0))
+    sigmas = (None, None)
+    if exponent:
+        sigmas = [np.clip(ratio ** exponent, 0.01, 1000) for ratio in matches.relative_sizes]
     if seed_step:
         default = context.library.estimate_options(wanted).seed
         wanted["seed"] = default + seed_step
     result, _ = context.estimate_two_view(*cameras, matches.pixels0, matches.pixels1,
-                                          matches.ratios, wanted)
+                                          matches.ratios, wanted, sigmas)
     R = np.array(result.R).reshape(3, 3) if result.has_R else None
     t = np.array(result.t) if result.has_R and result.has_t else None
     return R, t, result.num_inliers, result

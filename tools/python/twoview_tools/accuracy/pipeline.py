@@ -34,11 +34,13 @@ def match_features(context, features0, features1, match_options=None):
     return links, 1e3 * (time.perf_counter() - start)
 
 
-def make_matches(features0, features1, links, cameras, sizes):
-    """The estimators.Matches of two images' (keypoints, descriptors, ms)."""
-    pixels = [np.column_stack([f[0]["x"], f[0]["y"]])[links[i]].astype(float)
-              for f, i in ((features0, "idx0"), (features1, "idx1"))]
-    return estimators.Matches(*pixels, cameras, sizes, links["ratio"].copy())
+def make_matches(features0, features1, links, cameras, sizes, size_of_one):
+    """The estimators.Matches of two images' (keypoints, descriptors, ms). size_of_one: the size of
+    a keypoint of level 0, the feature option keypoint_size."""
+    chosen = [f[0][links[i]] for f, i in ((features0, "idx0"), (features1, "idx1"))]
+    pixels = [np.column_stack([k["x"], k["y"]]).astype(float) for k in chosen]
+    relative = [(k["size"] / size_of_one).astype(float) for k in chosen]
+    return estimators.Matches(*pixels, cameras, sizes, links["ratio"].copy(), relative)
 
 
 def match_pairs(context, data, feature_options=None, match_options=None, features=None):
@@ -48,12 +50,14 @@ def match_pairs(context, data, feature_options=None, match_options=None, feature
     if features is None:
         names = dict.fromkeys(n for p in data.pairs for n in (p.name0, p.name1))
         features = extract_images(context, data, names, feature_options)
+    size_of_one = context.library.feature_options(feature_options).keypoint_size
     found = []
     for pair in data.pairs:
         both = features[pair.name0], features[pair.name1]
         links, match_ms = match_features(context, *both, match_options)
         sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
-        matches = make_matches(*both, links, (data.camera(pair, 0), data.camera(pair, 1)), sizes)
+        matches = make_matches(*both, links, (data.camera(pair, 0), data.camera(pair, 1)), sizes,
+                               size_of_one)
         found.append((matches, {"extract": both[0][2] + both[1][2], "match": match_ms,
                                 "keypoints": (len(both[0][0]) + len(both[1][0])) / 2}))
     return found
@@ -99,7 +103,8 @@ def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_o
     seed: the error keys of report.json, num_matches, num_inliers, num_keypoints, precision, and
     ms {extract (both images), match, estimate}.
 
-    Options are dicts of the C structs' fields; values may be text. estimator: "twoview" or a key of
+    Options are dicts of the C structs' fields; values may be text. estimate_options may hold
+    sigma_by_size, of tv_reconstruct_options, too. estimator: "twoview" or a key of
     estimators.PEERS, which reads max_error_px only. resize: None is the tables' rule, 0 native.
     library: a twoview_ctypes.Library or a path. save/load: a file for the matches (pickle, our own
     files only), so that estimators can be tuned on fixed matches.

@@ -102,10 +102,12 @@ class Context(twoview.Context):
         return twoview.match_guided(self, camera0, camera1, epipolar, *features0, *features1,
                                     **wanted)
 
-    def estimate_two_view(self, camera0, camera1, pixels0, pixels1, ratios=None, options=None):
-        """(tv_two_view, inlier mask as bools); pixels are as in the images (distorted)."""
-        if ratios is not None:
-            ratios = np.ascontiguousarray(ratios, np.float32)
+    def estimate_two_view(self, camera0, camera1, pixels0, pixels1, ratios=None, options=None,
+                          sigmas=(None, None)):
+        """(tv_two_view, inlier mask as bools); pixels are as in the images (distorted). sigmas: of
+        the pixels of both views, or None for each."""
+        values = {name: None if array is None else np.ascontiguousarray(array, np.float32)
+                  for name, array in zip(("ratios", "sigmas0", "sigmas1"), (ratios, *sigmas))}
         return stages._estimate(self, camera0, camera1, np.ascontiguousarray(pixels0, np.float64),
-                                np.ascontiguousarray(pixels1, np.float64), ratios,
-                                self.library.estimate_options(options))
+                                np.ascontiguousarray(pixels1, np.float64),
+                                self.library.estimate_options(options), **values)

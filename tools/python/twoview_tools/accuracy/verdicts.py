@@ -93,7 +93,9 @@ class Pictures:
         """A row of two (set, image)."""
         (f0, camera0, size0), (f1, camera1, size1) = (self.view(*image) for image in pair)
         links, _ = pipeline.match_features(self.context, f0, f1, self.options[1])
-        matches = pipeline.make_matches(f0, f1, links, (camera0, camera1), (size0, size1))
+        size_of_one = self.context.library.feature_options(self.options[0]).keypoint_size
+        matches = pipeline.make_matches(f0, f1, links, (camera0, camera1), (size0, size1),
+                                        size_of_one)
         R, t, inliers, result = estimators.run_twoview(self.context, matches, self.options[2])
         return R, t, {"image0": "/".join(pair[0]), "image1": "/".join(pair[1]),
                       "verdict": twoview_ctypes.enum_name("verdict", result.verdict),

@@ -33,8 +33,11 @@ class Engine:
         except tv.StatusError as error:
             raise BadInput(f"image {name}: {error}") from None
 
-    def match(self, descriptors0, descriptors1):
-        return tv.match(self._context(1, 1), descriptors0, descriptors1, self.match_options)
+    def match(self, descriptors0, descriptors1, keypoints0=None, keypoints1=None):
+        """tv.match. Without keypoints, as for descriptors of other programs, the second nearest
+        neighbour is one of all others."""
+        return tv.match(self._context(1, 1), descriptors0, descriptors1, self.match_options,
+                        keypoints0, keypoints1)
 
     def estimate(self, camera0, camera1, pixels0, pixels1, ratios=None):
         try:

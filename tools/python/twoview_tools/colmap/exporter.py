@@ -160,7 +160,7 @@ def one_to_one(matches, order):
 
 def two_view(engine, view0, view1):
     """(matches (n, 2), TwoView, inliers (n,) bool), with one keypoint for each corner."""
-    found = engine.match(view0.descriptors, view1.descriptors)
+    found = engine.match(view0.descriptors, view1.descriptors, view0.keypoints, view1.keypoints)
     matches = np.column_stack([found["idx0"], found["idx1"]]).astype(np.uint32)
     result, inliers = engine.estimate(
         view0.camera, view1.camera, pixels_of(view0.keypoints)[matches[:, 0]],

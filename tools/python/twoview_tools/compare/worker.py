@@ -83,7 +83,7 @@ def run_twoview(views, options, task):
     watch = Stopwatch()
     features = [context.extract(gray) for gray in views.gray]
     watch.lap("extract")
-    links = context.match(features[0][1], features[1][1])
+    links = context.match(features[0][1], features[1][1], None, features[0][0], features[1][0])
     watch.lap("match")
     matches = views.matches(*(
         np.column_stack([k["x"], k["y"]])[links[side]]
