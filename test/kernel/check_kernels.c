@@ -332,6 +332,8 @@ static tvk_descriptors in_any_order(trial *t, const uint8_t *bytes, int32_t num)
   return set;
 }
 
+enum { BOUND = TVK_NEAREST_LIST - 1 };
+
 /* A list is right if it ascends, each entry is the distance of its group's nearest member, and no
    descriptor of another group is nearer than the bound. The entries up to the bound are then right
    in every set; those beyond it, the groups and the bound depend on the set. The list is replaced
@@ -345,20 +347,20 @@ static void check_list(const uint8_t *query, const tvk_descriptors *set, int32_t
         distance_of(query, set->bytes + (size_t)set->order[rank] * TVK_DESCRIPTOR_SIZE);
     int32_t listed = 0;
     if (dist < smallest) smallest = dist;
-    for (k = 0; k < TVK_NEAREST_LIST && list->dists[k] < TVK_NEAREST_NONE; ++k) {
-      if (list->groups[k] != rank / group) continue;
+    for (k = 0; k < TVK_NEAREST_LIST; ++k) {
+      if (list->dists[k] == TVK_NEAREST_NONE || list->groups[k] != rank / group) continue;
       TEST_ASSERT_FALSE(listed);
       listed = 1;
       if (dist < least[k]) least[k] = dist;
     }
-    TEST_ASSERT_TRUE(listed || dist >= list->bound);
+    TEST_ASSERT_TRUE(listed || dist >= list->dists[BOUND]);
   }
   for (k = 0; k < TVK_NEAREST_LIST; ++k) {
     TEST_ASSERT_EQUAL_INT(least[k], list->dists[k]);
-    TEST_ASSERT_TRUE(k == 0 || list->dists[k - 1] <= list->dists[k]);
+    TEST_ASSERT_TRUE(k == 0 || k == BOUND || list->dists[k - 1] <= list->dists[k]);
   }
   TEST_ASSERT_EQUAL_INT(smallest, list->dists[0]);
-  TEST_ASSERT_TRUE(list->bound >= smallest && list->bound <= TVK_NEAREST_NONE);
+  TEST_ASSERT_TRUE(list->dists[BOUND] >= smallest && list->dists[BOUND] <= TVK_NEAREST_NONE);
   memset(list, 0, sizeof *list);
   list->dists[0] = smallest;
 }

@@ -34,12 +34,12 @@ typedef struct tvk_descriptors {
 #define TVK_NEAREST_GROUP 4      /* columns of a group */
 #define TVK_NEAREST_NONE 8388607 /* above every squared distance */
 
-/* The groups nearest to a descriptor, nearest first: the squared distance of each one's nearest
-   member, TVK_NEAREST_NONE for unused entries, and its number. Group g holds the ranks g n .. g n +
-   n - 1. The distance of descriptors that are in no listed group is at least the bound. An entry
-   beyond the bound may not be the next one. */
+/* The groups nearest to a descriptor: the squared distance of each one's nearest member,
+   TVK_NEAREST_NONE for unused entries, and its number. Group g holds the ranks g n .. g n + n - 1.
+   The distance of descriptors that are in no listed group is at least that of the last entry, the
+   bound. The others ascend; of these, entries beyond the bound may not be the next ones. */
 typedef struct tvk_nearest {
-  int32_t bound, dists[TVK_NEAREST_LIST];
+  int32_t dists[TVK_NEAREST_LIST];
   uint16_t groups[TVK_NEAREST_LIST];
 } tvk_nearest;
 

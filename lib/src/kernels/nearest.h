@@ -100,17 +100,27 @@ NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
 
 static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
 
-/* Adds a group to a list if it is nearer than the list's bound. What leaves a full list lowers the
-   bound. */
+enum { NEAREST_BOUND = TVK_NEAREST_LIST - 1 };
+
+/* Lowers the bound of a list to that of a group, if it is nearer. */
+static inline void nearest_bound(tvk_nearest *list, int32_t dist, int32_t group) {
+  if (dist >= list->dists[NEAREST_BOUND]) return;
+  list->dists[NEAREST_BOUND] = dist;
+  list->groups[NEAREST_BOUND] = (uint16_t)group;
+}
+
+/* Adds a group that is not beyond the bound. What leaves a full list may lower the bound. */
 static TVK_NOINLINE void nearest_add(tvk_nearest *list, int32_t dist, int32_t group) {
-  int32_t k = TVK_NEAREST_LIST;
-  if (dist >= list->bound) return;
-  list->bound = nearest_min(list->bound, list->dists[k - 1] > dist ? list->dists[k - 1] : dist);
-  while (--k > 0 && list->dists[k - 1] > dist) {
+  int32_t k = NEAREST_BOUND - 1;
+  if (dist >= list->dists[k]) {
+    nearest_bound(list, dist, group);
+    return;
+  }
+  nearest_bound(list, list->dists[k], list->groups[k]);
+  for (; k > 0 && list->dists[k - 1] > dist; --k) {
     list->dists[k] = list->dists[k - 1];
     list->groups[k] = list->groups[k - 1];
   }
-  if (list->dists[k] <= dist) return;
   list->dists[k] = dist;
   list->groups[k] = (uint16_t)group;
 }
@@ -118,14 +128,8 @@ static TVK_NOINLINE void nearest_add(tvk_nearest *list, int32_t dist, int32_t gr
 /* The squared distance of a key; at least TVK_NEAREST_NONE for NEAREST_FAR. */
 static inline int32_t key_distance(int32_t key, int32_t norm) { return (key >> 8) + norm; }
 
-/* Adds the second group of a bin, which bounds the distance of the bin's other groups. */
-static TVK_NOINLINE void nearest_bound(tvk_nearest *list, int32_t dist, int32_t group) {
-  nearest_add(list, dist, group);
-  list->bound = nearest_min(list->bound, dist);
-}
-
 /* Merges the lists of a block of columns into those of all rows. Of `num_chunks` chunks of rows
-   this is number `chunk`. */
+   this is number `chunk`. The second group of a bin bounds the distance of the bin's others. */
 static inline void merge_columns(const nearest_block *block, int32_t chunk, int32_t num_chunks,
                                  const tvk_descriptors *columns, int32_t first,
                                  tvk_nearest *of_columns) {
@@ -136,7 +140,7 @@ static inline void merge_columns(const nearest_block *block, int32_t chunk, int3
     tvk_nearest *list;
     if (rank >= columns->num) continue;
     list = &of_columns[columns->order[rank]];
-    if (dist >= list->bound) continue;
+    if (dist >= list->dists[NEAREST_BOUND]) continue;
     nearest_bound(list, key_distance(second, block->norms[j]),
                   (second & (NEAREST_PLACES - 1)) * num_chunks + chunk);
     nearest_add(list, dist, (best & (NEAREST_PLACES - 1)) * num_chunks + chunk);
@@ -154,7 +158,7 @@ static inline void merge_lanes(const int32_t *best, const int32_t *second, int32
                 first + (smallest & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
   for (lane = 0; lane < NEAREST_LANES; ++lane) {
     const int32_t key = best[lane], dist = key_distance(key, norm);
-    if (dist < list->bound) {
+    if (dist <= list->dists[NEAREST_BOUND]) {
       nearest_add(list, dist, first + (key & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
     }
   }
@@ -289,7 +293,6 @@ static void meet_panel(const tvk_descriptors *rows, nearest_block *blocks, int32
 static TVK_NOINLINE void forget_nearest(tvk_nearest *lists, int32_t count) {
   int32_t i, k;
   for (i = 0; i < count; ++i) {
-    lists[i].bound = TVK_NEAREST_NONE;
     TVK_ROLLED
     for (k = 0; k < TVK_NEAREST_LIST; ++k) lists[i].dists[k] = TVK_NEAREST_NONE;
   }

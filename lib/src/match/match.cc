@@ -15,7 +15,8 @@ namespace tv {
 namespace {
 
 constexpr int32_t kNone = TVK_NEAREST_NONE;
-constexpr int32_t kBlock = 64;    // distances that are computed in one call
+constexpr int kBound = TVK_NEAREST_LIST - 1;  // a list's entry that bounds the distance of the rest
+constexpr int32_t kBlock = 64;                // distances that are computed in one call
 constexpr int32_t kCellBits = 6;  // cells along the longer side of the keypoints' bounding box
 constexpr int32_t kNumCells = 1 << 2 * kCellBits;
 constexpr double kTwice = 4.0001;  // the square of 2, and more than any rounding error
@@ -128,7 +129,8 @@ int32_t nearest_of(const tvk_table& kernels, const uint8_t* query, const tvk_nea
                    const Side& side) {
   const int32_t best = list.dists[0];
   int32_t found = -1, indices[kBlock], dists[kBlock];
-  for (int32_t k = 0; k < TVK_NEAREST_LIST && list.dists[k] == best; ++k) {
+  for (int k = 0; k < TVK_NEAREST_LIST; ++k) {
+    if (list.dists[k] != best) continue;
     const int32_t count = members_of(side, list.groups[k], indices);
     kernels.squared_distances(query, side.set.bytes, indices, count, dists);
     for (int32_t m = 0; m < count; ++m) {
@@ -137,7 +139,7 @@ int32_t nearest_of(const tvk_table& kernels, const uint8_t* query, const tvk_nea
       found = found < 0 ? indices[m] : std::min(found, indices[m]);
     }
   }
-  return list.bound > best ? found : scan(kernels, query, side, -1).idx;
+  return list.dists[kBound] > best ? found : scan(kernels, query, side, -1).idx;
 }
 
 // The smallest distance of the listed descriptors that are far from keypoint `from`; kNone if there
@@ -145,7 +147,8 @@ int32_t nearest_of(const tvk_table& kernels, const uint8_t* query, const tvk_nea
 int32_t listed_second(const tvk_table& kernels, const uint8_t* query, const tvk_nearest& list,
                       const Side& side, int32_t from) {
   int32_t second = kNone, indices[kBlock], dists[kBlock];
-  for (int32_t k = 0; k < TVK_NEAREST_LIST && list.dists[k] < second; ++k) {
+  for (int k = 0; k < TVK_NEAREST_LIST; ++k) {
+    if (list.dists[k] >= second || list.dists[k] > list.dists[kBound]) continue;
     const int32_t count = members_of(side, list.groups[k], indices);
     int32_t num_far = 0;
     for (int32_t m = 0; m < count; ++m) {
@@ -161,12 +164,12 @@ int32_t listed_second(const tvk_table& kernels, const uint8_t* query, const tvk_
   return second;
 }
 
-// Whether a descriptor at row i's smallest distance may have row i as its nearest one.
+// Whether a descriptor at the row's smallest distance may have the row as its nearest one.
 bool may_be_mutual(const tvk_nearest& row, const Side& side) {
   const int32_t best = row.dists[0];
-  if (row.bound == best) return true;
+  if (row.dists[kBound] == best) return true;
   int32_t indices[kBlock];
-  for (int32_t k = 0; k < TVK_NEAREST_LIST && row.dists[k] == best; ++k) {
+  for (int k = 0; k < kBound && row.dists[k] == best; ++k) {
     const int32_t count = members_of(side, row.groups[k], indices);
     for (int32_t m = 0; m < count; ++m) {
       if (side.lists[indices[m]].dists[0] == best) return true;
@@ -175,45 +178,45 @@ bool may_be_mutual(const tvk_nearest& row, const Side& side) {
   return false;
 }
 
-// Where the descriptors i and j of the two sides are a match, returns true and fills *match.
+// The ratio of a match at that squared distance; 1 where the second nearest one is not farther.
+float ratio_of(int32_t best, int32_t second, double largest) {
+  const double divisor = second == kNone ? largest : std::min<double>(second, largest);
+  return second > best ? static_cast<float>(std::sqrt(best / divisor)) : 1.0f;
+}
+
+// Where descriptor i of the first side has a match, returns true and fills *match.
 bool match_row(const tvk_table& kernels, const Side sides[2], const tv_match_options& options,
                int32_t i, tv_correspondence* match) {
   const tvk_nearest& row = sides[0].lists[i];
   if (!may_be_mutual(row, sides[1])) return false;
-  const uint8_t* const query0 = sides[0].descriptor(i);
-  const int32_t best = row.dists[0], j = nearest_of(kernels, query0, row, sides[1]);
+  const uint8_t* const row_query = sides[0].descriptor(i);
+  const int32_t best = row.dists[0], j = nearest_of(kernels, row_query, row, sides[1]);
   if (j < 0 || sides[1].lists[j].dists[0] != best) return false;
-  const uint8_t* const query1 = sides[1].descriptor(j);
-  const tvk_nearest& column = sides[1].lists[j];
-  if (nearest_of(kernels, query1, column, sides[0]) != i) return false;
 
   const bool bounded = options.max_distance > 0;
   const double largest =
       bounded ? static_cast<double>(options.max_distance) * options.max_distance : INT32_MAX;
-  const tvk_nearest* const lists[2] = {&row, &column};
-  const uint8_t* const queries[2] = {query0, query1};
+  const tvk_nearest* const lists[2] = {&row, &sides[1].lists[j]};
+  const uint8_t* const queries[2] = {row_query, sides[1].descriptor(j)};
   const int32_t from[2] = {j, i};
   int32_t second = kNone;
+  // `second` is the distance of some second neighbour, so that a match that fails with it fails
+  // with the nearest one, too.
   for (int v = 0; v < 2; ++v) {
     const Side& other = sides[1 - v];
+    if (v == 1 && nearest_of(kernels, queries[1], *lists[1], other) != i) return false;
     const int32_t listed = listed_second(kernels, queries[v], *lists[v], other, from[v]);
     if (listed == kNone && !bounded && !has_far(other, from[v])) return false;
     second = std::min(second, listed);
+    if (ratio_of(best, second, largest) >= options.ratio) return false;
   }
-  // `second` is the distance of some second neighbour, so that a match that fails now fails by the
-  // nearest one, too.
-  for (int v = 0;; ++v) {
-    const double divisor = second == kNone ? largest : std::min<double>(second, largest);
-    const float ratio = static_cast<float>(std::sqrt(best / divisor));
-    if (second <= best || ratio >= options.ratio) return false;
-    if (v == 2) {
-      *match = tv_correspondence{i, j, static_cast<uint32_t>(best), ratio};
-      return true;
-    }
-    if (lists[v]->bound < second) {
-      second = std::min(second, scan(kernels, queries[v], sides[1 - v], from[v]).dist);
-    }
+  for (int v = 0; v < 2; ++v) {
+    if (lists[v]->dists[kBound] >= second) continue;
+    second = std::min(second, scan(kernels, queries[v], sides[1 - v], from[v]).dist);
   }
+  const float ratio = ratio_of(best, second, largest);
+  *match = tv_correspondence{i, j, static_cast<uint32_t>(best), ratio};
+  return ratio < options.ratio;
 }
 
 }  // namespace
