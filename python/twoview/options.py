@@ -16,13 +16,13 @@ class FeatureOptions:
 
     #: Most descriptors of an image; 0: the smaller of 2048 and the context's limit.
     max_keypoints: int = 0
-    arc: int = 9  #: contiguous pixels of the circle of 16 that a corner needs, 9 to 12
-    threshold: int = 10  #: contrast that a corner needs, grey levels, [1, 254]
+    arc: int = 12  #: contiguous pixels of the circle of 16 that a corner needs, 9 to 12
+    threshold: int = 15  #: contrast that a corner needs, grey levels, [1, 254]
     min_threshold: int = 3  #: lowest value to which the threshold may fall; 0: it is fixed
-    levels: int = 1  #: number of pyramid levels, [1, 8]
-    scale_factor: float = 2.0  #: ratio of sizes of neighbouring pyramid levels, [1.1, 2]
+    levels: int = 4  #: number of pyramid levels, [1, 8]
+    scale_factor: float = 1.41  #: ratio of sizes of neighbouring pyramid levels, [1.1, 2]
     #: Side of the grid cells that share out the corners, pixels; 0: the strongest corners anywhere.
-    cell_px: int = 0
+    cell_px: int = 48
     subpixel: int = 1  #: 1: positions are refined to a fraction of a pixel
     orientation: int = Orientation.GRADIENT
     descriptor: int = Normalisation.ROOTSIFT
@@ -35,7 +35,7 @@ class MatchOptions:
 
     ratio: float = 0.92  #: upper bound of nearest / second nearest distance, in both directions
     #: Second nearest are only keypoints at least this far from the nearest one, pixels; 0: all.
-    neighbourhood_px: float = 0.0
+    neighbourhood_px: float = 10.0
     max_distance: float = 0.0  #: upper bound of the second nearest L2 distance; 0: none
 
 

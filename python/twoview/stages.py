@@ -132,9 +132,9 @@ def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
           keypoints1: Optional[np.ndarray] = None, **keywords: Any) -> np.ndarray:
     """tv_match: mutual nearest neighbours that pass the ratio test in both directions.
 
-    descriptors: (n, 128) uint8; keypoints: (n,) of twoview.KEYPOINT, required where
-    neighbourhood_px is above 0. Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1, dist_sq,
-    ratio."""
+    descriptors: (n, 128) uint8; keypoints: (n,) of twoview.KEYPOINT, without any, as for
+    descriptors of other programs, neighbourhood_px counts as 0. Returns (m,) of
+    twoview.CORRESPONDENCE: idx0, idx1, dist_sq, ratio."""
     wanted = to_struct(check_context(context).library, MatchOptions, options, keywords)
     descriptors0 = _descriptors("descriptors0", descriptors0)
     descriptors1 = _descriptors("descriptors1", descriptors1)

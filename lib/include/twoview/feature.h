@@ -39,8 +39,8 @@ typedef struct tv_features {
   uint32_t struct_size;
   /* How many descriptors (and keypoints) there are, [0, the context's max_keypoints]. */
   int32_t num;
-  /* `num` keypoints. tv_match does not read them, and they may be null there; tv_match_guided
-     requires them. */
+  /* `num` keypoints. They may be null for tv_match, which then has no neighbourhoods;
+     tv_match_guided requires them. */
   const tv_keypoint *keypoints;
   /* num x TV_DESCRIPTOR_BYTES bytes; row i describes keypoint i. */
   const uint8_t *descriptors;
@@ -82,25 +82,25 @@ typedef struct tv_feature_options {
      grows with the square. */
   int32_t max_keypoints;
   /* How many contiguous pixels of the circle of 16 must all be brighter or all be darker than the
-     centre: 9 (default), 10, 11 or 12 (the FAST-SIFT paper's). A longer arc gives fewer, sharper
+     centre: 9, 10, 11 or 12 (default, and the FAST-SIFT paper's). A longer arc gives fewer, sharper
      corners. */
   int32_t arc;
-  /* The difference in grey levels that these pixels must exceed, [1, 254], default 10. A bigger
+  /* The difference in grey levels that these pixels must exceed, [1, 254], default 15. A bigger
      value gives fewer, stronger corners. */
   int32_t threshold;
   /* 0: the threshold is fixed. Otherwise in [1, threshold], default 3: the threshold is lowered,
      but not below this value, until max_keypoints corners are found. */
   int32_t min_threshold;
-  /* How many levels the pyramid has, [1, 8], default 1. More levels find matches across a change of
+  /* How many levels the pyramid has, [1, 8], default 4. More levels find matches across a change of
      scale. They cost precision, because corners of coarse levels, which are located less precisely,
      take a share of max_keypoints in proportion to the level's area, and what finer levels leave
      unused. */
   int32_t levels;
-  /* The scale factor from a pyramid level to the next, [1.1, 2], default 2. */
+  /* The scale factor from a pyramid level to the next, [1.1, 2], default 1.41. */
   float scale_factor;
-  /* 0 (default): the strongest corners are kept, wherever they are. Otherwise the side of a grid
-     cell in pixels of each level, [8, 16384]: each cell keeps only its share, so that the corners
-     spread over the image. */
+  /* The side of a grid cell in pixels of each level, [8, 16384], default 48: each cell keeps only
+     its share, so that the corners spread over the image. Corners below `threshold` are kept only
+     where there are too few others. 0: the strongest corners are kept, wherever they are. */
   int32_t cell_px;
   /* 1 (default): the position of a corner is refined to a fraction of a pixel; 0: it is that of the
      pixel. */

@@ -30,7 +30,7 @@ typedef struct tv_match_options {
      bigger value gives more matches, of which more are wrong; 1 rejects only exact ties. */
   float ratio;
   /* Only keypoints at least this far from the nearest one, in pixels of the image as given, count
-     as the second nearest one; [0, 1000], default 0: all others count. Nearer ones are second
+     as the second nearest one; [0, 1000], default 10. 0: all others count. Nearer ones are second
      orientations of the same corner, the same corner on another level, or its neighbours on the
      same edge, whose descriptors are alike without making the match uncertain. A bigger value gives
      more matches; beyond about 15 more of them are wrong. */
@@ -58,19 +58,18 @@ TV_API void tv_match_options_init_sized(tv_match_options *options, size_t struct
    descriptors within the neighbourhood then compete by their index only; where an equal one is
    outside it, the pair is rejected as always. Where an image has no keypoint that far away, there
    is no second nearest one.
-   features0, features1: the descriptors of the two images. Their keypoints are required where
-   neighbourhood_px is above 0, and then every field is checked as tv_describe checks it; else they
-   are not read and may be null. options: null means the defaults.
-   correspondences: room for cap_correspondences, in ascending order of idx0; the smaller of both
-   counts of features is always enough.
-   *num_correspondences: how many were written; on TV_ERR_CAPACITY how many there are.
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_NOT_FINITE,
-   TV_ERR_CAPACITY, TV_ERR_OVERLAP.
-   Time: 128 multiply-adds for each pair of descriptors; at most five times as many, and four
-   distances of keypoints for each pair, where descriptors are equal or neighbourhoods are crowded
-   with similar ones.
-   Source of the neighbourhood: D. Mishkin, J. Matas, M. Perdoch, "MODS: Fast and robust method for
-   two-view matching", CVIU 2015 (first geometrically inconsistent nearest neighbour). */
+   features0, features1: the descriptors of the two images, with their keypoints, of which every
+   field is checked as tv_describe checks it. Descriptors without keypoints, as of other programs,
+   may be matched, too: where both are null, neighbourhood_px counts as 0; where one is null,
+   TV_ERR_NULL is returned. With neighbourhood_px 0 keypoints are not read. options: null means the
+   defaults. correspondences: room for cap_correspondences, in ascending order of idx0; the smaller
+   of both counts of features is always enough. *num_correspondences: how many were written; on
+   TV_ERR_CAPACITY how many there are. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE,
+   TV_ERR_LIMITS, TV_ERR_NOT_FINITE, TV_ERR_CAPACITY, TV_ERR_OVERLAP. Time: 128 multiply-adds for
+   each pair of descriptors; at most five times as many, and four distances of keypoints for each
+   pair, where descriptors are equal or neighbourhoods are crowded with similar ones. Source of the
+   neighbourhood: D. Mishkin, J. Matas, M. Perdoch, "MODS: Fast and robust method for two-view
+   matching", CVIU 2015 (first geometrically inconsistent nearest neighbour). */
 TV_API tv_status tv_match(tv_context *context, const tv_features *features0,
                           const tv_features *features1, const tv_match_options *options,
                           tv_correspondence *correspondences, int32_t cap_correspondences,

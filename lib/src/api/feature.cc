@@ -13,7 +13,7 @@ namespace tv {
 namespace {
 
 constexpr tv_feature_options kDefaults = {
-    sizeof(tv_feature_options), 0,   9, 10, 3, 1, 2.0f, 0, 1, TV_ORIENTATION_GRADIENT,
+    sizeof(tv_feature_options), 0,   12, 15, 3, 4, 1.41f, 48, 1, TV_ORIENTATION_GRADIENT,
     TV_NORMALISATION_ROOTSIFT,  4.0f};
 
 struct Request {

@@ -6,7 +6,7 @@
 
 namespace {
 
-constexpr tv_match_options kDefaults = {sizeof(tv_match_options), 0.92f, 0.0f, 0.0f};
+constexpr tv_match_options kDefaults = {sizeof(tv_match_options), 0.92f, 10.0f, 0.0f};
 
 // Also false for NaN.
 bool in_range(float value, float largest) { return value >= 0.0f && value <= largest; }
@@ -39,9 +39,14 @@ tv_status tv_match(tv_context* context, const tv_features* features0, const tv_f
     status = tv::read_features(*context, given[v], TV_PURPOSE_MATCH, correspondences, out_bytes,
                                &features[v]);
     if (status != TV_OK) return status;
-    if (checked.neighbourhood_px == 0.0f || features[v].num == 0) continue;
-    if (features[v].keypoints == nullptr) return TV_ERR_NULL;
-    status = tv::check_keypoints(features[v].keypoints, features[v].num);
+  }
+  if (features[0].keypoints == nullptr && features[1].keypoints == nullptr) {
+    checked.neighbourhood_px = 0.0f;
+  }
+  for (const tv_features& image : features) {
+    if (checked.neighbourhood_px == 0.0f || image.num == 0) continue;
+    if (image.keypoints == nullptr) return TV_ERR_NULL;
+    status = tv::check_keypoints(image.keypoints, image.num);
     if (status != TV_OK) return status;
   }
   tv::StageTimer timer(context, TV_STAGE_MATCH);

@@ -228,7 +228,7 @@ def run_twoview(context, matches, options=None, seed_step=0):
     cameras = [twoview_ctypes.make_camera(K, *size, distortion)
                for (K, distortion), size in zip(matches.cameras, matches.sizes)]
     wanted = dict(options or {})
-    exponent = float(wanted.pop("sigma_by_size", 0))
+    exponent = context.library.take_sigma_by_size(wanted)
     sigmas = (None, None)
     if exponent:
         sigmas = [np.clip(ratio ** exponent, 0.01, 1000) for ratio in matches.relative_sizes]

@@ -95,8 +95,10 @@ def canonical(library, point):
     mean equal options."""
     texts = []
     for stage, options in zip(STAGES, point):
+        fields, options = {}, dict(options)
+        if stage == "estimate":
+            fields["sigma_by_size"] = library.take_sigma_by_size(options)
         struct = getattr(library, stage + "_options")(options)
-        fields = {}
         for name, _ in struct._fields_[1:]:
             value = getattr(struct, name)
             fields[name] = list(value) if hasattr(value, "_length_") else value

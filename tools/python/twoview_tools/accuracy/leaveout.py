@@ -31,8 +31,9 @@ def choose(table, sets=None):
 
 def leave_one_out(table):
     """Returns {"tuned": the point chosen on all sets,
-    "sets": {set: {"point", "left_out", "tuned"}}, "left_out_mean", "tuned_mean": the AUC by mean_of_groups, "difference": the mean of the three
-    AUC, left out minus tuned, "worst": the set that loses most}. A set's own scores are not read
+    "sets": {set: {"point", "left_out", "tuned"}}, "left_out_mean", "tuned_mean": the AUC by
+    mean_of_groups, "difference": the mean of the three AUC, left out minus tuned, "worst": the set
+    that loses most}. A set's own scores are not read
     when its point is chosen. At least two sets."""
     if len(table) < 2:
         raise ValueError("leave-one-set-out needs at least two sets")

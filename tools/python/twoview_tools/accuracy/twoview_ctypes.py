@@ -72,6 +72,12 @@ class Library(twoview.Library):
     def estimate_options(self, options=None):
         return self._init_struct("tv_estimate_options", options)
 
+    def take_sigma_by_size(self, options):
+        """Removes tv_reconstruct_options.sigma_by_size from a dict of tv_estimate_options, with
+        which tuning gives it; returns it, or the library's default."""
+        default = self._init_struct("tv_reconstruct_options").sigma_by_size
+        return float(options.pop("sigma_by_size", default))
+
 
 def _keywords(struct):
     """The fields of an options struct as keywords for the package's functions."""
