@@ -104,8 +104,8 @@ TV_API void tv_bundle_result_init_sized(tv_bundle_result *result, size_t struct_
    matches is the order in which sums are formed.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (the count, R, t, an option or a sigma),
    TV_ERR_NOT_FINITE (R, t, an option or a sigma), TV_ERR_CAMERA, TV_ERR_LIMITS (more points than
-   the context's max_matches, or a context without TV_PURPOSE_ADJUST), TV_ERR_OVERLAP. Time: at most
-   max_iterations passes over the points. Memory: from the context. */
+   the context's max_matches, or a context without TV_PURPOSE_ADJUST), TV_ERR_OVERLAP.
+   Time: at most max_iterations passes over the points. Memory: from the context. */
 TV_API tv_status tv_adjust_two_view(tv_context *context, const tv_camera *camera0,
                                     const tv_camera *camera1, const tv_pixel_pairs *pairs,
                                     const tv_bundle_options *options, double R[9], double t[3],
@@ -114,8 +114,8 @@ TV_API tv_status tv_adjust_two_view(tv_context *context, const tv_camera *camera
 /* Computes the covariance of each point's position to first order.
    R, t: the pose, as for tv_adjust_two_view.
    noise_px: the standard deviation of both pixels of a match along each axis, [0, 1e9]; the noise
-   is taken as independent. For points of matches with another sigma, call it with sigma times the
-   noise_px of the estimate. pose_covariance: that of R and t, 25 numbers in the parameters of
+   is taken as independent. For a match whose pixels have the sigma s (tv_pixel_pairs), give s times
+   the noise of an estimate. pose_covariance: that of R and t, 25 numbers in the parameters of
    tv_bundle_result, in radians^2; null means that the pose is exact. With that of a bundle
    adjustment, the result is the point's own block of the joint covariance. points: num_points. The
    result is exact to first order for points of the smallest error, as tv_adjust_two_view computes

@@ -23,10 +23,10 @@ typedef struct tv_pixel_pairs {
      (tv_correspondence.ratio): more certain matches are sampled first. */
   const float *ratios;
   /* Null (1 for all), or `num` values each, [0.01, 1000]: the standard deviation of the pixel in
-     image 0 and in image 1, as a multiple of a common unit, which is best that of the most precise
-     pixels. Of a match whose pixels have the sigma s, every residual is divided by s, exactly so
-     for two different sigmas, too: it may be s times as far from the model as max_error_px says,
-     and counts 1 / s^2 as much in the pose. tv_keypoint_sigmas computes them from keypoints. */
+     image 0 and in image 1, relative to that of the most precise pixels. A residual is divided by
+     the standard deviation that both sigmas give it: a match whose two pixels have the sigma s is
+     an inlier up to s max_error_px, and has 1 / s^2 times the weight in the pose.
+     tv_keypoint_sigmas computes sigmas from the sizes of keypoints. */
   const float *sigmas0, *sigmas1;
 } tv_pixel_pairs;
 
@@ -257,10 +257,11 @@ TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera 
    inlier_mask: null, or room for pairs->num bytes; a byte is 1 where the match is an inlier of the
    model that the kind names.
    Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE, TV_ERR_LIMITS, TV_ERR_CAMERA,
-   TV_ERR_NOT_FINITE (the options and sigmas only), TV_ERR_OVERLAP. More matches than the context's
+   TV_ERR_NOT_FINITE (an option or a sigma), TV_ERR_OVERLAP. More matches than the context's
    max_matches are TV_ERR_LIMITS: which of them to leave out is the caller's choice here
-   (tv_reconstruct leaves out those of the highest ratio). Time: at most max_iterations samples, of
-   at most 10 models each, which are scored on all matches. */
+   (tv_reconstruct leaves out those of the highest ratio).
+   Time: at most max_iterations samples, of at most 10 models each, which are scored on all
+   matches. */
 TV_API tv_status tv_estimate_two_view(tv_context *context, const tv_camera *camera0,
                                       const tv_camera *camera1, const tv_pixel_pairs *pairs,
                                       const tv_estimate_options *options, tv_two_view *result,

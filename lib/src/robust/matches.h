@@ -18,7 +18,7 @@ struct TwoViewProblem {
   int num;
   tv_estimate_options options;
   const tvk_table* kernels;  // null: the kernels of the base ISA
-  double sigma(int view, int32_t i) const { return sigmas[view] != nullptr ? sigmas[view][i] : 1; }
+  double sigma(int view, int32_t i) const { return sigma_at(sigmas[view], i); }
 };
 
 struct Matches {
@@ -30,7 +30,7 @@ struct Matches {
   int num_all = 0;
   int num_unique() const { return pairs.num; }
   int32_t* order = nullptr;                     // match k of `pairs` is the caller's match order[k]
-  const float* sigmas[2] = {nullptr, nullptr};  // the problem's
+  const float* sigmas[2] = {nullptr, nullptr};  // those of the problem
   double sigma(int view, int k) const { return sigma_at(sigmas[view], order[k]); }
   double sigma_sq(int k) const;  // the mean of its two sigmas' squares
   // For each view, the map from the plane of the rays to undistorted pixels: K of the camera, or,
@@ -53,8 +53,8 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
                    int view, int k, double curvature[9]);
 
-// The means of s and s^2 over the different matches, s^2 = sigma_sq. What a wrong match agrees with
-// by chance is a band or a disc that is s times as wide.
+// The means of s and s^2 over the different matches, s^2 = sigma_sq. The band or the disc in which
+// a wrong match agrees with a model by chance is s times as wide as for sigmas of 1.
 struct SigmaMeans {
   double s, s_sq;
 };
