@@ -91,7 +91,8 @@ def test_a_result_is_of_the_corrected_camera(context):
     t = np.array([1.2, 0.3, 0.6])
     pixels = [tv.camera_project_points(right, np.ascontiguousarray(part))[0]
               + random.normal(0, 0.1, (400, 2)) for part in (points, points @ R.T + t)]
-    found, inliers = tv.estimate_two_view(context, wrong, wrong, *pixels)
+    found, inliers = tv.estimate_two_view(context, wrong, wrong, *pixels,
+                                          principal_point_sigma=0.01)
     assert np.abs(found.principal_point_shift - (5.5, -3.5)).max() < 1.5
     corrected = tv.corrected_camera(found, wrong)
     dx, dy = found.principal_point_shift
@@ -100,10 +101,18 @@ def test_a_result_is_of_the_corrected_camera(context):
                                        pixels[1][inliers])["error_px"])
               for camera in (corrected, wrong)]
     assert errors[0] < 0.15 and errors[1] > 2 * errors[0]
-    as_told, _ = tv.estimate_two_view(context, wrong, wrong, *pixels, principal_point_sigma=0)
+    as_told, _ = tv.estimate_two_view(context, wrong, wrong, *pixels)
     assert not as_told.principal_point_shift.any()
     assert tv.corrected_camera(as_told, wrong) == wrong
     assert angle_deg(found.R @ R.T) < angle_deg(as_told.R @ R.T)
+    for result in (found, as_told):
+        assert result.principal_point_chi2 > 13.8
+        off = result.principal_point_asked_px - (5.5, -3.5)
+        assert off @ np.linalg.solve(result.principal_point_asked_covariance, off) < 13.8
+    other = tv.Camera(640, 480, 500.0, 501.0, 319.5, 239.5)
+    unknown, _ = tv.estimate_two_view(context, wrong, other, *pixels)
+    assert unknown.principal_point_chi2 is None and unknown.principal_point_asked_px is None
+    assert unknown.principal_point_asked_covariance is None
     with pytest.raises(tv.TV_ERR_ARGUMENT):
         tv.estimate_two_view(context, wrong, wrong, *pixels, principal_point_sigma=0.2)
 

@@ -97,7 +97,9 @@ class tv_two_view(Structure):
                 ("rotation_inliers", c_int32), ("coverage", c_double),
                 ("median_parallax_rad", c_double), ("rms_error_px", c_double),
                 ("noise_px", c_double), ("seed", c_uint64),
-                ("principal_point_shift", c_double * 2)]
+                ("principal_point_shift", c_double * 2), ("principal_point_chi2", c_double),
+                ("principal_point_asked_px", c_double * 2),
+                ("principal_point_asked_covariance", c_double * 3)]
 
 
 class tv_point(Structure):

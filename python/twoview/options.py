@@ -62,8 +62,8 @@ class EstimateOptions:
     gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity in camera 0's frame
     gravity1: Sequence[float] = (0.0, 0.0, 0.0)
     gravity_sigma_rad: float = 0.0  #: standard deviation of gravity; 0: it is not used
-    #: Standard deviation in focal lengths; 0: the principal point is exact.
-    principal_point_sigma: float = 0.01
+    #: Standard deviation in focal lengths; 0: the principal point is exact and never moved.
+    principal_point_sigma: float = 0.0
 
 
 @dataclass(frozen=True)

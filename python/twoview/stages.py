@@ -212,6 +212,13 @@ class TwoView:
     seed: int
     #: (2,), pixels to add to cx and cy; all results refer to the cameras with this shift
     principal_point_shift: np.ndarray
+    #: Chi-square (2 degrees of freedom) against the given cx and cy; above 13.8 in one pair of a
+    #: thousand where they are right. None where one camera did not take both views, the kind is
+    #: not CALIBRATED, or the matches do not determine a shift; so are the next two.
+    principal_point_chi2: Optional[float]
+    #: (2,), the shift in pixels that the matches ask for, which is not applied
+    principal_point_asked_px: Optional[np.ndarray]
+    principal_point_asked_covariance: Optional[np.ndarray]  #: (2, 2), pixels squared
 
 
 def _two_view(found: Any) -> TwoView:
@@ -221,6 +228,9 @@ def _two_view(found: Any) -> TwoView:
     def inliers(count: int) -> Optional[int]:
         return count if count >= 0 else None
 
+    xx, xy, yy = found.principal_point_asked_covariance
+    asked = xx > 0
+    covariance = np.array([[xx, xy], [xy, yy]]) if asked else None
     return TwoView(
         Kind(found.kind), Verdict(found.verdict), Reason(found.reasons), found.num_matches,
         found.num_inliers, found.num_iterations, matrix("R", found.has_R, 3, 3),
@@ -233,7 +243,8 @@ def _two_view(found: Any) -> TwoView:
         inliers(found.essential_inliers), inliers(found.fundamental_inliers),
         inliers(found.homography_inliers), inliers(found.rotation_inliers), found.coverage,
         found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed,
-        np.array(found.principal_point_shift))
+        np.array(found.principal_point_shift), found.principal_point_chi2 if asked else None,
+        matrix("principal_point_asked_px", asked, 2), covariance)
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:

@@ -12,6 +12,7 @@
 #include "files/image_header.h"
 #include "files/matches_file.h"
 #include "files/pairs_file.h"
+#include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/options.h"
 #include "pictures/canvas.h"
@@ -51,6 +52,58 @@ void test_percentile_lies_between_its_neighbours() {
   TEST_ASSERT_EQUAL_DOUBLE(2.5, percentile({4, 1, 3, 2}, 0.5));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 3.85, percentile({4, 1, 3, 2}, 0.95));
   TEST_ASSERT_EQUAL_DOUBLE(4, percentile({4, 1, 3, 2}, 1));
+}
+
+// What `advise` says of pairs that ask for (x, y) + spread (1, 0), (-1, 0), (1, 0) ..., `asking` of
+// them beyond the 99.9 % point and the others just below it.
+CameraAdvice advice_of(int num, int asking, double x, double y, double spread) {
+  std::vector<ShiftEvidence> pairs;
+  for (int i = 0; i < num; ++i) {
+    const double chi2 = i < asking ? 13.82 : 13.81;
+    pairs.push_back({tv_camera{}, chi2, {x + (i % 2 == 0 ? spread : -spread), y}});
+  }
+  return advise(pairs).at(0);
+}
+
+void test_pairs_that_agree_on_a_shift_ask_for_a_calibration() {
+  const CameraAdvice advice = advice_of(26, 24, -10, 4, 3);
+  TEST_ASSERT_TRUE(advice.calibrate_again);
+  TEST_ASSERT_EQUAL_INT(26, advice.num_pairs);
+  TEST_ASSERT_EQUAL_INT(24, advice.num_asking);
+  TEST_ASSERT_EQUAL_DOUBLE(-10, advice.asked_px[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(4, advice.asked_px[1]);
+  TEST_ASSERT_EQUAL_DOUBLE(3, advice.deviation_px);
+  TEST_ASSERT_TRUE(advice_of(8, 5, -10, 4, 3).calibrate_again);
+}
+
+void test_pairs_that_are_few_or_do_not_agree_ask_for_nothing() {
+  TEST_ASSERT_FALSE(advice_of(7, 7, -10, 4, 3).calibrate_again);
+  TEST_ASSERT_FALSE(advice_of(8, 4, -10, 4, 3).calibrate_again);
+  TEST_ASSERT_FALSE(advice_of(8, 0, -10, 4, 3).calibrate_again);
+  TEST_ASSERT_TRUE(advice_of(26, 26, -10, 0, 4.99).calibrate_again);
+  TEST_ASSERT_FALSE(advice_of(26, 26, -10, 0, 5.01).calibrate_again);
+  TEST_ASSERT_TRUE(advise({}).empty());
+}
+
+void test_each_camera_gets_its_own_advice() {
+  tv_camera cameras[2] = {};
+  cameras[1].cx = 1;
+  std::vector<ShiftEvidence> pairs;
+  for (int i = 0; i < 20; ++i)
+    pairs.push_back({cameras[i % 2], i % 2 == 0 ? 50.0 : 1.0, {i % 2 == 0 ? 9.0 : -9.0, 0}});
+  const std::vector<CameraAdvice> advice = advise(pairs);
+  TEST_ASSERT_EQUAL_INT(2, static_cast<int>(advice.size()));
+  TEST_ASSERT_TRUE(advice[0].calibrate_again && advice[0].camera.cx == 0);
+  TEST_ASSERT_TRUE(!advice[1].calibrate_again && advice[1].camera.cx == 1);
+  TEST_ASSERT_TRUE(advice[0].num_pairs == 10 && advice[0].asked_px[0] == 9);
+}
+
+void test_a_result_without_evidence_says_nothing() {
+  tv_two_view result{};
+  TEST_ASSERT_FALSE(shift_evidence(result, tv_camera{}).has_value());
+  result.principal_point_asked_covariance[0] = 2;
+  result.principal_point_asked_px[1] = 3;
+  TEST_ASSERT_TRUE(shift_evidence(result, tv_camera{})->asked_px[1] == 3);
 }
 
 Matrix3 turn_about_y(double angle) {
@@ -311,6 +364,10 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
   RUN_TEST(test_percentile_lies_between_its_neighbours);
+  RUN_TEST(test_pairs_that_agree_on_a_shift_ask_for_a_calibration);
+  RUN_TEST(test_pairs_that_are_few_or_do_not_agree_ask_for_nothing);
+  RUN_TEST(test_each_camera_gets_its_own_advice);
+  RUN_TEST(test_a_result_without_evidence_says_nothing);
   RUN_TEST(test_rotation_error_is_exact_from_tiny_to_half_a_turn);
   RUN_TEST(test_translation_error_forgets_the_sign_only_when_asked);
   RUN_TEST(test_a_resized_camera_keeps_pixel_areas);

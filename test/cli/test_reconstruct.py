@@ -13,8 +13,8 @@ from cli_support import FOCAL, HEIGHT, WIDTH
 RESULT_KEYS = (
     """image0 image1 num_keypoints num_matches num_matches_left_out num_inliers config verdict
   reasons R t E F H
-alternative evidence covariance noise_px principal_point_shift_px num_points median_parallax_deg
-rms_reprojection_px scale
+alternative evidence covariance noise_px principal_point_shift_px principal_point num_points
+median_parallax_deg rms_reprojection_px scale
 scale_sigma imu truth timings_ms context_bytes options seed version kernels""".split()
 )
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()

@@ -313,6 +313,8 @@ def test_a_model_has_the_camera_that_its_points_are_of(bend, tmp_path, call):
         bend / "cam.yaml",
         "-o",
         tmp_path,
+        "--principal-point-sigma",
+        "0.01",
         "--json",
     )
     shift = np.array(json.loads(out)["principal_point_shift_px"])

@@ -54,6 +54,9 @@ void require_sound(const tv_two_view& r, const uint8_t* mask, int count) {
   FUZZ_REQUIRE(fuzz::all_finite(r.alternative_R, 9) && fuzz::all_finite(r.alternative_t, 3));
   FUZZ_REQUIRE(fuzz::all_finite(r.covariance, 25));
   FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_shift, 2));
+  FUZZ_REQUIRE(r.principal_point_chi2 >= 0 && fuzz::all_finite(&r.principal_point_chi2, 1));
+  FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_asked_px, 2));
+  FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_asked_covariance, 3));
   for (int i = 0; i < 5; ++i) FUZZ_REQUIRE(r.covariance[6 * i] >= 0);
   FUZZ_REQUIRE(std::isfinite(r.median_parallax_rad) && std::isfinite(r.rms_error_px));
   FUZZ_REQUIRE(r.coverage >= 0 && r.coverage <= 1);

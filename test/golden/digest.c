@@ -30,7 +30,7 @@ LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
 LAYOUT(tv_camera, 112, k, 48);
 LAYOUT(tv_estimate_options, 104, principal_point_sigma, 96);
-LAYOUT(tv_two_view, 920, principal_point_shift, 904);
+LAYOUT(tv_two_view, 968, principal_point_asked_covariance, 944);
 LAYOUT(tv_point, 40, reserved, 36);
 LAYOUT(tv_bundle_options, 24, hold_pose, 20);
 LAYOUT(tv_bundle_result, 256, noise_px, 248);
@@ -127,6 +127,9 @@ static void add_two_view(const tv_two_view *r) {
   add_double(r->noise_px);
   add_int((int64_t)r->seed);
   add_doubles(r->principal_point_shift, 2);
+  add_double(r->principal_point_chi2);
+  add_doubles(r->principal_point_asked_px, 2);
+  add_doubles(r->principal_point_asked_covariance, 3);
 }
 
 static void add_points(const tv_point *points, int32_t count) {
@@ -301,8 +304,11 @@ static void digest_principal_point(const pair *p, tv_context *context) {
   const double cosine = 0.96 / 1.04, sine = 0.4 / 1.04;
   tv_camera camera = p->camera[0];
   tv_two_view moved;
+  tv_estimate_options options;
   uint64_t seed = 1;
   int lens, k, v;
+  tv_estimate_options_init(&options);
+  options.principal_point_sigma = 0.01;
   start();
   for (lens = 0; lens < 2; ++lens) {
     camera.model = lens ? TV_CAMERA_BROWN_CONRADY : TV_CAMERA_PINHOLE;
@@ -323,7 +329,7 @@ static void digest_principal_point(const pair *p, tv_context *context) {
     }
     camera.cx += 0.03 * camera.fx;
     camera.cy -= 0.02 * camera.fy;
-    estimate_with(&camera, &camera, context, &m, NULL, &moved);
+    estimate_with(&camera, &camera, context, &m, &options, &moved);
     if (moved.principal_point_shift[0] == 0) fail("the principal point stayed", TV_OK);
     camera = p->camera[0];
   }

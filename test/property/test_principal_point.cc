@@ -1,9 +1,12 @@
-// A principal point that differs from the camera's: how well the matches determine it, how much
-// more accurate the pose becomes, whether the covariance still contains the truth as often as it
-// should, and that a right principal point stays.
-// TWOVIEW_PAIRS: pairs of each case, default 300.
+// A principal point that differs from the camera's. By default nothing is moved, and the result has
+// the evidence: a chi-square that is one, and the shift that the matches ask for. With a sigma: how
+// well the matches determine the shift, how much more accurate the pose becomes, whether the
+// covariance still contains the truth as often as it should, and that a right principal point
+// stays. TWOVIEW_PAIRS: pairs of each case, default 300.
+#include <Eigen/Dense>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 
 #include "geometry/sampson.h"
@@ -71,6 +74,187 @@ double pose_error_deg(const tv_two_view& r) {
                                  scene::translation_error_deg(r.t, pair.t)));
 }
 
+// The estimate with the library's default options.
+tv_two_view by_default(const tv_camera& camera) {
+  tv_two_view result;
+  tv_two_view_init(&result);
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, estimate_pixels(api.context, &camera, &camera, pair.pixels[0], pair.pixels[1], nullptr,
+                             pair.options.num, nullptr, &result, nullptr));
+  return result;
+}
+
+bool has_evidence(const tv_two_view& r) { return r.principal_point_asked_covariance[0] > 0; }
+
+// All three fields of the evidence, one after the other in the struct.
+constexpr int kNumEvidence = 6;
+const double* evidence_of(const tv_two_view& r) { return &r.principal_point_chi2; }
+
+void assert_equal_evidence(const tv_two_view& a, const tv_two_view& b) {
+  TEST_ASSERT_TRUE(std::memcmp(evidence_of(a), evidence_of(b), kNumEvidence * sizeof(double)) == 0);
+}
+
+void test_by_default_the_camera_is_as_given(void) {
+  const tv_camera right = scene::pinhole(), told = moved(right, 12, -12);
+  int contradicted = 0;
+  for (int k = 0; k < 40; ++k) {
+    make_pair(k, 400, right, right);
+    const tv_two_view r = by_default(told), with_0 = estimated(told, 0);
+    TEST_ASSERT_TRUE(std::memcmp(&r, &with_0, sizeof r) == 0);
+    TEST_ASSERT_FALSE(has_shift(r));
+    tv_camera corrected = right;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_camera(&r, &told, &corrected));
+    TEST_ASSERT_TRUE(std::memcmp(&corrected, &told, sizeof told) == 0);
+    contradicted += r.principal_point_chi2 > 13.8155;
+  }
+  TEST_ASSERT_TRUE(contradicted > 10);  // what stayed was wrong
+}
+
+// The squared distance of the shift that was asked for from the true one, by its own covariance.
+double distance_sq(const tv_two_view& r, double dx, double dy) {
+  const double* c = r.principal_point_asked_covariance;
+  const double x = r.principal_point_asked_px[0] - dx, y = r.principal_point_asked_px[1] - dy;
+  return (c[2] * x * x - 2 * c[1] * x * y + c[0] * y * y) / (c[0] * c[2] - c[1] * c[1]);
+}
+
+// The quantiles of chi-square with two degrees of freedom are -2 log of the tail's probability.
+void check_chi_square(const char* title, const tv_camera& right) {
+  const int total = 5 * num_pairs;
+  int known = 0, above_median = 0, above_95 = 0, above_999 = 0, outside_95 = 0;
+  for (int k = 0; k < total; ++k) {
+    make_pair(k, 100 + k % 300, right, right);
+    const tv_two_view r = by_default(right);
+    if (!has_evidence(r)) continue;
+    ++known;
+    above_median += r.principal_point_chi2 > 1.3863;
+    above_95 += r.principal_point_chi2 > 5.9915;
+    above_999 += r.principal_point_chi2 > 13.8155;
+    outside_95 += distance_sq(r, 0, 0) > 5.9915;
+  }
+  std::printf(
+      "%s, right: of %d pairs %.1f, %.1f, %.2f %% above the 50, 95, 99.9 %% quantile, %.1f "
+      "%% outside the 95 %% ellipse\n",
+      title, known, 100.0 * above_median / known, 100.0 * above_95 / known,
+      100.0 * above_999 / known, 100.0 * outside_95 / known);
+  TEST_ASSERT_TRUE(known > 0.95 * total);
+  TEST_ASSERT_TRUE(above_median > 0.43 * known && above_median < 0.60 * known);
+  TEST_ASSERT_TRUE(above_95 > 0.025 * known && above_95 < 0.08 * known);
+  TEST_ASSERT_TRUE(above_999 < 2 + 0.007 * known);
+  TEST_ASSERT_TRUE(outside_95 > 0.025 * known && outside_95 < 0.09 * known);
+}
+
+void test_the_evidence_is_a_chi_square_where_the_camera_is_right(void) {
+  check_chi_square("pinhole", scene::pinhole());
+  check_chi_square("Brown-Conrady", scene::distorted());
+  check_chi_square("fisheye", scene::fisheye());
+}
+
+// The covariance of the shift holds the true one as often as it says, and the chi-square grows.
+void check_asked(const char* title, const tv_camera& right) {
+  const double x = 0.02 * right.fx, y = -0.008 * right.fy;
+  int known = 0, within = 0, contradicted = 0;
+  for (int k = 0; k < num_pairs; ++k) {
+    make_pair(k, 400, right, right);
+    const tv_two_view r = by_default(moved(right, -x, -y));
+    if (!has_evidence(r)) continue;
+    ++known;
+    within += distance_sq(r, x, y) < 5.9915;
+    contradicted += r.principal_point_chi2 > 13.8155;
+  }
+  std::printf(
+      "%s, off by %.1f, %.1f px: asked for within the 95 %% ellipse in %.1f %% of %d, "
+      "contradicted in %.1f %%\n",
+      title, x, y, 100.0 * within / known, known, 100.0 * contradicted / known);
+  TEST_ASSERT_TRUE(known > 0.95 * num_pairs);
+  TEST_ASSERT_TRUE(within > 0.88 * known && within < 0.99 * known);
+  TEST_ASSERT_TRUE(contradicted > 0.2 * known);
+}
+
+void test_the_matches_ask_for_the_shift_that_is_missing(void) {
+  check_asked("pinhole", scene::pinhole());
+  check_asked("Brown-Conrady", scene::distorted());
+  check_asked("fisheye", scene::fisheye());
+}
+
+// The evidence is of the camera as given, whether or not the estimate may move it.
+void test_the_evidence_depends_neither_on_sigma_nor_on_the_order_of_the_views(void) {
+  const tv_camera right = scene::pinhole(), told = moved(right, 12, -12);
+  int shifts = 0;
+  for (int k = 0; k < 20; ++k) {
+    make_pair(k, 400, right, right);
+    const tv_two_view as_given = by_default(told), freed = estimated(told);
+    tv_two_view backward;
+    estimate(told, told, 0, true, &backward);
+    TEST_ASSERT_TRUE(has_evidence(as_given));
+    assert_equal_evidence(as_given, backward);
+    if (freed.kind == TV_KIND_CALIBRATED) assert_equal_evidence(as_given, freed);
+    shifts += has_shift(freed);
+  }
+  TEST_ASSERT_TRUE(shifts > 0);
+}
+
+void test_the_evidence_is_zero_where_it_is_not_known(void) {
+  const tv_camera camera = scene::pinhole();
+  const double zeros[kNumEvidence] = {};
+  tv_two_view result;
+  tv_camera other = camera;
+  other.fx += 1e-9;
+  make_pair(1, 400, camera, camera);
+  estimate(camera, other, 0, false, &result);
+  TEST_ASSERT_EQUAL_INT(TV_KIND_CALIBRATED, result.kind);
+  TEST_ASSERT_TRUE(std::memcmp(zeros, evidence_of(result), sizeof zeros) == 0);
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, estimate_pixels(api.context, nullptr, nullptr, pair.pixels[0], pair.pixels[1], nullptr,
+                             pair.options.num, nullptr, &result, nullptr));
+  TEST_ASSERT_EQUAL_INT(TV_KIND_UNCALIBRATED, result.kind);
+  TEST_ASSERT_TRUE(std::memcmp(zeros, evidence_of(result), sizeof zeros) == 0);
+  for (const scene::Kind kind :
+       {scene::Kind::kPlanar, scene::Kind::kRotation, scene::Kind::kStill}) {
+    scene::Options options;
+    options.kind = kind;
+    options.seed = 5;
+    scene::make(options, &pair);
+    result = by_default(camera);
+    TEST_ASSERT_TRUE(result.kind != TV_KIND_CALIBRATED);
+    TEST_ASSERT_TRUE(std::memcmp(zeros, evidence_of(result), sizeof zeros) == 0);
+  }
+}
+
+// Against the definition, A22 - A21 A11^-1 A12, and where the pose's columns contain the shift's.
+void test_the_pose_is_eliminated(void) {
+  constexpr int kPose = 5, kAll = tv::kShiftedParameters;
+  tv::Random random = tv::random_seeded(3);
+  for (int k = 0; k < 100; ++k) {
+    Eigen::Matrix<double, 12, kAll> J;
+    Eigen::Matrix<double, 12, 1> r;
+    for (int row = 0; row < 12; ++row) {
+      r[row] = scene::normal(&random);
+      for (int c = 0; c < kAll; ++c) J(row, c) = scene::normal(&random);
+    }
+    const bool contained = k % 2 == 1;
+    if (contained) J.col(6) = J.col(0) - 2 * J.col(3);
+    const Eigen::Matrix<double, kAll, kAll> A = J.transpose() * J;
+    const Eigen::Matrix<double, kAll, 1> g = J.transpose() * r;
+    tv::ShiftedEquations equations;
+    for (int row = 0, slot = 0; row < kAll; ++row) {
+      equations.gradient[row] = g[row];
+      for (int c = row; c < kAll; ++c) equations.upper[slot++] = A(row, c);
+    }
+    double s[3], gradient[2];
+    TEST_ASSERT_TRUE(tv::eliminate_pose(equations, s, gradient) != contained);
+    if (contained) continue;
+    const Eigen::Matrix<double, 2, kPose> of_pose =
+        A.bottomLeftCorner<2, kPose>() * A.topLeftCorner<kPose, kPose>().inverse();
+    const Eigen::Matrix2d S = A.bottomRightCorner<2, 2>() - of_pose * A.topRightCorner<kPose, 2>();
+    const Eigen::Vector2d h = g.tail<2>() - of_pose * g.head<kPose>();
+    const double expected[5] = {S(0, 0), S(0, 1), S(1, 1), h[0], h[1]};
+    const double found[5] = {s[0], s[1], s[2], gradient[0], gradient[1]};
+    for (int i = 0; i < 5; ++i) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + std::fabs(expected[i])), expected[i], found[i]);
+    }
+  }
+}
+
 void test_a_principal_point_as_told_stays(void) {
   int shifts = 0;
   for (int k = 0; k < 5 * num_pairs; ++k) {
@@ -117,7 +301,7 @@ void compare(const char* title, const tv_camera& right, double most_error_px, do
   TEST_ASSERT_TRUE(within > 0.9 * shifts);
 }
 
-// The camera's principal point is wrong by normal errors of the default sigma, 0.01 focal lengths.
+// The camera's principal point is wrong by normal errors of the option's sigma, 0.01 focal lengths.
 void test_a_principal_point_off_is_found_and_the_pose_gains(void) {
   compare("pinhole", scene::pinhole(), 4, 0.85);
   compare("Brown-Conrady", scene::distorted(), 4, 0.85);
@@ -288,6 +472,12 @@ int main(void) {
   api = api_make(&limits);
   UNITY_BEGIN();
   RUN_TEST(test_the_gradient_follows_differences);
+  RUN_TEST(test_the_pose_is_eliminated);
+  RUN_TEST(test_by_default_the_camera_is_as_given);
+  RUN_TEST(test_the_evidence_is_a_chi_square_where_the_camera_is_right);
+  RUN_TEST(test_the_matches_ask_for_the_shift_that_is_missing);
+  RUN_TEST(test_the_evidence_depends_neither_on_sigma_nor_on_the_order_of_the_views);
+  RUN_TEST(test_the_evidence_is_zero_where_it_is_not_known);
   RUN_TEST(test_a_principal_point_as_told_stays);
   RUN_TEST(test_a_principal_point_off_is_found_and_the_pose_gains);
   RUN_TEST(test_two_cameras_are_taken_as_they_are);

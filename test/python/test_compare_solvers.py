@@ -60,8 +60,8 @@ class TestConventions(unittest.TestCase):
 
 
 class TestShift(unittest.TestCase):
-    """Our poses may belong to a camera with a shifted principal point; then lines, residuals and
-    points belong to that camera too."""
+    """With principal_point_sigma our poses may belong to a camera with a shifted principal point;
+    then lines, residuals and points belong to that camera too."""
 
     @classmethod
     def setUpClass(cls):
@@ -87,7 +87,8 @@ class TestShift(unittest.TestCase):
         told = [[[500.0, 0, 319.5], [0, 500, 239.5], [0, 0, 1]], lens]
         cls.given = {"pixels0": pixels[0].tolist(), "pixels1": pixels[1].tolist(), "ratios": None,
                      "cameras": [told, told], "sizes": [[640, 480], [640, 480]]}
-        cls.task = {"max_error_px": 1.0, "seed": 0, "reference": None}
+        cls.task = {"max_error_px": 1.0, "seed": 0, "reference": None,
+                    "options": {"principal_point_sigma": 0.01}}
 
     def answer(self):
         from twoview_tools.compare import children, cli, systems

@@ -153,10 +153,10 @@ typedef struct tv_estimate_options {
      [0, pi]; 0 (default) means that gravity is not known. With every solver, a pose is refined with
      gravity as a prior; a direction that contradicts the matches counts less. */
   double gravity_sigma_rad;
-  /* The standard deviation of the principal point around (cx, cy), in focal lengths, [0, 0.1],
-     default 0.01; 0 means that it is exactly there. Used only when camera0 and camera1 are equal.
-     The principal point is moved only if the matches contradict (cx, cy) at a significance of
-     0.001. */
+  /* 0 (default): the cameras are exact. Above 0, at most 0.1: the standard deviation of the
+     principal point around (cx, cy), in focal lengths; 0.01 suits a camera whose calibration is
+     doubtful. Used only when camera0 and camera1 are equal. The principal point is moved only if
+     the matches contradict (cx, cy) at a significance of 0.001. */
   double principal_point_sigma;
 } tv_estimate_options;
 
@@ -225,9 +225,22 @@ typedef struct tv_two_view {
   double noise_px;
   /* The seed that was used. */
   uint64_t seed;
-  /* What the estimate adds to (cx, cy) of both cameras, in pixels; it is usually (0, 0). All of the
-     result refers to the cameras with it, which tv_corrected_camera computes. */
+  /* What the estimate adds to (cx, cy) of both cameras, in pixels: (0, 0) unless
+     principal_point_sigma is above 0. All of the result refers to the cameras with it, which
+     tv_corrected_camera computes. */
   double principal_point_shift[2];
+  /* Evidence against (cx, cy) as they were given, whatever principal_point_sigma is: chi-square
+     with two degrees of freedom where they are right, so that it exceeds 13.8 in one pair of a
+     thousand. This field and the next two are 0 where the evidence is not known: where camera0 and
+     camera1 differ, the kind is not TV_KIND_CALIBRATED, or the matches do not determine a shift.
+     Wrong matches and repeated structure are evidence, too: only a shift that many pairs agree on
+     is that of the camera. */
+  double principal_point_chi2;
+  /* The shift of (cx, cy), in pixels, that the matches ask for, without a prior. It is not
+     applied. */
+  double principal_point_asked_px[2];
+  /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
+  double principal_point_asked_covariance[3];
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call

@@ -27,7 +27,7 @@ constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            {0, 0, 0},
                                            {0, 0, 0},
                                            0,
-                                           0.01};
+                                           0};
 
 // Checks the directions of gravity, where they are used: finite and not zero, with a standard
 // deviation of at most pi.
@@ -183,6 +183,12 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
   for (int k = 0; k < 2; ++k) {
     packed.principal_point_shift[k] = outcome.principal_point_shift_px[k];
   }
+  if (outcome.evidence.kind == TV_KIND_CALIBRATED) {
+    const PrincipalPointTest& test = outcome.principal_point_test;
+    packed.principal_point_chi2 = test.chi2;
+    std::memcpy(packed.principal_point_asked_px, test.asked_px, sizeof test.asked_px);
+    std::memcpy(packed.principal_point_asked_covariance, test.covariance, sizeof test.covariance);
+  }
   packed.coverage = coverage_of(outcome.evidence);
   const Pose& pose = outcome.epipolar.pose;
   packed.has_R = outcome.has_R;
@@ -335,7 +341,7 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     tv::search_two_view(problem, matches, context->arena, &model);
   }
   tv::StageTimer timer(context, TV_STAGE_REFINE);
-  tv::TwoViewOutcome outcome;
+  tv::TwoViewOutcome outcome{};
   tv::finish_two_view(problem, model, context->arena, &matches, &outcome);
   tv::pack(problem, matches, model, outcome, swapped, result);
   if (inlier_mask != nullptr) {

@@ -193,42 +193,66 @@ Pose refined_pose(const PoseRefiner& f, const Pose& start) {
 
 namespace {
 
-// A step of pose and principal point together over the matches near the pose. evidence: twice the
-// logarithm of the factor by which the step makes the matches likelier, to first order. From a pose
-// at its minimum it follows chi-square with two degrees of freedom where the principal point is
-// correct (C. R. Rao's score test, 1948), or is less because of the prior. Returns how many matches
-// took part, 0 when they do not determine the step.
-int joint_step(const PoseRefiner& f, const Pose& pose, const GravityPrior& gravity,
-               double step[kShiftedParameters], double* evidence) {
+// The equations of pose and principal point together over the matches near the pose.
+struct JointEquations {
+  ShiftedEquations sums;
+  double noise_px;  // the standard deviation of a residual under the loss
+  double stretch;   // the factor of refine on each step
+};
+
+// Returns how many matches take part in the equations, 0 when there are too few.
+int joint_equations(const PoseRefiner& f, const Pose& pose, const GravityPrior& gravity,
+                    JointEquations* e) {
   const int count = near_pose(f, pose);
   if (count <= kShiftedParameters) return 0;
   const BestLoss best = best_loss(f, essential_from_pose(pose), count);
   // The residuals of exact input are rounding errors and no evidence, so the noise counts as at
   // least 0.02 thresholds.
-  const double noise_px = std::max(best.taken, 0.02 * f.threshold_px);
-  ShiftedEquations equations;
+  e->noise_px = std::max(best.taken, 0.02 * f.threshold_px);
+  e->stretch = best.stretch;
   shifted_equations(f.problem, f.matches, f.indices, count, GravityPoseModel{pose, &gravity},
-                    f.principal_point, best.loss, noise_px, &equations);
-  if (!solve_damped(kShiftedParameters, equations.upper, equations.gradient, 0, step)) return 0;
-  *evidence = 0;
-  for (int k = 0; k < kShiftedParameters; ++k) *evidence -= equations.gradient[k] * step[k];
-  *evidence *= best.stretch / (noise_px * noise_px);
+                    f.principal_point, best.loss, e->noise_px, &e->sums);
   return count;
 }
 
 }  // namespace
 
-bool principal_point_is_off(const PoseRefiner& f, const Pose& pose) {
-  double step[kShiftedParameters], evidence;
-  const int count = joint_step(f, pose, GravityPrior{}, step, &evidence);
-  // Divided by 2, the evidence follows F(2, left), whose tail is (1 + evidence / left)^(-left / 2).
-  const int left = count - kShiftedParameters;
-  return count > 0 && left * log(1 + evidence / left) > kShiftEvidence;
+bool principal_point_is_off(const PoseRefiner& f, const Pose& pose, const double sigma_px[2],
+                            PrincipalPointTest* test) {
+  JointEquations e;
+  double s[3], g[2], step[2], determinant;  // s, g: information and gradient of the shift
+  const int left = joint_equations(f, pose, GravityPrior{}, &e) - kShiftedParameters;
+  if (left <= 0 || !eliminate_pose(e.sums, s, g)) return false;
+  const double noise_sq = e.noise_px * e.noise_px;
+  // Takes the step and returns the evidence for it: twice the logarithm of the factor by which it
+  // makes the matches likelier, to first order. This is chi-square with two degrees of freedom
+  // where the principal point is correct (C. R. Rao's score test, 1948), or less because of a
+  // prior. With the noise estimated from the matches themselves its half follows F(2, left), whose
+  // tail is (1 + evidence / left)^(-left / 2).
+  const auto tested_step = [&] {
+    determinant = s[0] * s[2] - s[1] * s[1];
+    step[0] = (s[1] * g[1] - s[2] * g[0]) / determinant;
+    step[1] = (s[1] * g[0] - s[0] * g[1]) / determinant;
+    const double evidence = -(g[0] * step[0] + g[1] * step[1]) * e.stretch / noise_sq;
+    return left * log(1 + evidence / left);
+  };
+  test->chi2 = tested_step();
+  const double variance = noise_sq * e.stretch / determinant;
+  const double covariance[3] = {variance * s[2], -variance * s[1], variance * s[0]};
+  std::copy(covariance, covariance + 3, test->covariance);
+  for (int k = 0; k < 2; ++k) test->asked_px[k] = e.stretch * step[k];
+  if (!(sigma_px[0] > 0)) return false;
+  for (int k = 0; k < 2; ++k) s[2 * k] += noise_sq / (sigma_px[k] * sigma_px[k]);
+  return tested_step() > kShiftEvidence;
 }
 
 bool move_together(const PoseRefiner& f, Pose* pose, double shift_px[2]) {
-  double step[kShiftedParameters], evidence;
-  if (joint_step(f, *pose, tested_gravity(f, *pose), step, &evidence) == 0) return false;
+  JointEquations e;
+  double step[kShiftedParameters];
+  if (joint_equations(f, *pose, tested_gravity(f, *pose), &e) == 0 ||
+      !solve_damped(kShiftedParameters, e.sums.upper, e.sums.gradient, 0, step)) {
+    return false;
+  }
   *pose = PoseModel{*pose}.stepped(step).pose;
   for (int k = 0; k < 2; ++k) shift_px[k] = step[PoseModel::kParameters + k];
   return true;

@@ -24,9 +24,11 @@ struct PoseRefiner {
 // prior where it is known.
 Pose refined_pose(const PoseRefiner& refiner, const Pose& start);
 
-// Whether the matches contradict refiner.principal_point at a significance of 0.001. pose: the
-// result of refined_pose.
-bool principal_point_is_off(const PoseRefiner& refiner, const Pose& pose);
+// Tests the given principal point against the matches. pose: the result of refined_pose. With a
+// prior of the deviations sigma_px, true where they contradict it at a significance of 0.001; with
+// sigma_px = 0 always false.
+bool principal_point_is_off(const PoseRefiner& refiner, const Pose& pose, const double sigma_px[2],
+                            PrincipalPointTest* test);
 // One Gauss-Newton step of the pose and the principal point together. Writes the principal point's
 // step, in pixels, to shift_px; the caller then moves the rays. False when the step is not
 // determined.

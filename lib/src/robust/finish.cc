@@ -55,7 +55,6 @@ void refine_epipolar(Fit& f) {
 void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
                      Matches* all_matches, TwoViewOutcome* outcome) {
   Matches& matches = *all_matches;
-  *outcome = TwoViewOutcome{};
   const size_t n = static_cast<size_t>(matches.num_all);
   outcome->inlier = arena_alloc<uint8_t>(arena, n);
   for (size_t i = 0; i < n; ++i) outcome->inlier[i] = 0;

@@ -12,10 +12,11 @@ void place_principal_point(Fit& f) {
   PrincipalPoint& point = f.refiner.principal_point;
   const tv_camera& camera = f.problem.camera[0].model;
   const double sigma = f.problem.options.principal_point_sigma;
-  if (!f.problem.one_camera || !(sigma > 0)) return;
+  if (!f.problem.one_camera) return;
   point.sigma_px[0] = sigma * camera.fx;
   point.sigma_px[1] = sigma * camera.fy;
-  point.is_free = principal_point_is_off(f.refiner, pose);
+  point.is_free =
+      principal_point_is_off(f.refiner, pose, point.sigma_px, &f.out->principal_point_test);
   if (!point.is_free) return;
   const Pose as_told = pose;
   double step[2] = {1, 1};

@@ -26,7 +26,8 @@ void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
     for (int c = r; c < kPose; ++c) upper[row_of(r) + c - r] = of_pose[slot++];
   }
   for (int k = 0; k < 2; ++k) {
-    const double weight = noise_px * noise_px / (point.sigma_px[k] * point.sigma_px[k]);
+    const double weight =
+        point.is_free ? noise_px * noise_px / (point.sigma_px[k] * point.sigma_px[k]) : 0;
     gradient[kPose + k] = weight * point.shift_px[k];
     for (int c = k; c < 2; ++c) upper[row_of(kPose + k) + c - k] = c == k ? weight : 0;
   }
@@ -61,6 +62,25 @@ void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
       upper[row_of(p) + kPose + k - p] = sum;
     }
   }
+}
+
+bool eliminate_pose(const ShiftedEquations& equations, double information[3], double gradient[2]) {
+  constexpr double kDetermined = 1e-12;  // least share of an information that the pose may leave
+  ShiftedEquations e = equations;
+  double* const upper = e.upper;
+  for (int p = 0; p < kPose; ++p) {
+    const double* const row = upper + row_of(p) - p;
+    if (!(row[p] > 0)) return false;
+    for (int r = p + 1; r < kAll; ++r) {
+      const double factor = row[r] / row[p];
+      e.gradient[r] -= factor * e.gradient[p];
+      for (int c = r; c < kAll; ++c) upper[row_of(r) + c - r] -= factor * row[c];
+    }
+  }
+  for (int k = 0; k < 2; ++k) gradient[k] = e.gradient[kPose + k];
+  for (int k = 0; k < 3; ++k) information[k] = upper[row_of(kPose) + k];
+  const double *const before = equations.upper + row_of(kPose), *const s = information;
+  return s[0] > kDetermined * before[0] && s[2] - s[1] / s[0] * s[1] > kDetermined * before[2];
 }
 
 bool add_shift_variance(const TwoViewProblem& problem, const Matches& matches,

@@ -1,5 +1,5 @@
-// The principal point of the one camera that saw both views, which a calibration knows to a few
-// pixels only. docs/algorithms/principal_point.md.
+// The principal point of the one camera that saw both views: what the matches say of it.
+// docs/algorithms/principal_point.md.
 #pragma once
 
 #include "robust/gravity.h"
@@ -11,6 +11,14 @@ struct PrincipalPoint {
   double shift_px[2] = {0, 0};  // principal point of the rays minus that of the calibration
   double sigma_px[2] = {0, 0};  // standard deviation of the calibration's principal point
   bool is_free = false;         // whether the principal point is refined with the pose
+};
+
+// The test of a principal point that is where the calibration has it, and the shift that the
+// matches alone ask for; zeros where they do not determine it. In pixels.
+struct PrincipalPointTest {
+  double chi2 = 0;  // of two degrees of freedom: -2 log of the probability of as much evidence
+  double asked_px[2] = {0, 0};
+  double covariance[3] = {0, 0, 0};  // of asked_px: xx, xy, yy
 };
 
 // The parameters of PoseModel, then the step of the principal point in x and y, in pixels.
@@ -28,6 +36,10 @@ void shifted_equations(const TwoViewProblem& problem, const Matches& matches,
                        const int32_t* indices, int count, const GravityPoseModel& model,
                        const PrincipalPoint& point, const RobustLoss& loss, double noise_px,
                        ShiftedEquations* equations);
+
+// What is left of the equations for the shift alone, once the pose has taken its best step: the
+// information xx, xy, yy and the gradient. False where the matches do not determine the shift.
+bool eliminate_pose(const ShiftedEquations& equations, double information[3], double gradient[2]);
 
 // Adds the uncertainty of the principal point to the covariance of a pose: C += G S G', S the
 // covariance of the point and G the pose's slope by it. variance_px: of a residual of the listed

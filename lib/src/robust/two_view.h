@@ -2,8 +2,7 @@
 // (finish.cc), and the data that they pass on.
 #pragma once
 
-#include "robust/gravity.h"
-#include "robust/matches.h"
+#include "robust/principal_point.h"
 #include "robust/verdict.h"
 
 namespace tv {
@@ -37,6 +36,7 @@ struct TwoViewOutcome {
       rotation_inliers = -1;
   // Models and poses refer to cameras whose principal points are shifted by this.
   double principal_point_shift_px[2] = {0, 0};
+  PrincipalPointTest principal_point_test;  // of a calibrated pose
   double rms_error_px = 0;
   uint8_t* inlier = nullptr;  // one flag for each match, repeats included
 };
@@ -54,8 +54,9 @@ GravityPrior gravity_of(const TwoViewProblem& problem);
 void search_two_view(const TwoViewProblem& problem, const Matches& matches, Arena& arena,
                      TwoViewModel* model);
 
-// Refinement on all inliers, rivals, verdict, covariance (TV_STAGE_REFINE). outcome->inlier lies in
-// the arena. The rays of the matches move with the principal point.
+// Refinement on all inliers, rivals, verdict, covariance (TV_STAGE_REFINE). *outcome is given as
+// TwoViewOutcome{}; outcome->inlier will lie in the arena. The rays of the matches move with the
+// principal point.
 void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
                      Matches* matches, TwoViewOutcome* outcome);
 

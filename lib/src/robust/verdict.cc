@@ -105,10 +105,11 @@ Judgement judge(const Evidence& e) {
 }
 
 // Guided matching finds matches where the first estimate has their epipolar lines: their agreement
-// with it is no evidence for it, and so the verdict and the reasons stay those of the first. The
-// second estimate is the more accurate one and replaces the first, unless it is of another kind,
-// has fewer inliers, is judged worse, or has a second motion of the plane where the first has none
-// (or the reverse): then the matches that were added contradict it.
+// with it is no evidence for it, and so the verdict, the reasons and the test of the principal
+// point stay those of the first. The second estimate is the more accurate one and replaces the
+// first, unless it is of another kind, has fewer inliers, is judged worse, or has a second motion
+// of the plane where the first has none (or the reverse): then the matches that were added
+// contradict it.
 bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again) {
   if (again->has_R == 0 || again->has_t == 0 || again->kind != first.kind ||
       again->has_alternative != first.has_alternative || again->verdict < first.verdict ||
@@ -117,6 +118,11 @@ bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again) {
   }
   again->verdict = first.verdict;
   again->reasons = first.reasons;
+  again->principal_point_chi2 = first.principal_point_chi2;
+  std::copy(first.principal_point_asked_px, first.principal_point_asked_px + 2,
+            again->principal_point_asked_px);
+  std::copy(first.principal_point_asked_covariance, first.principal_point_asked_covariance + 3,
+            again->principal_point_asked_covariance);
   return true;
 }
 

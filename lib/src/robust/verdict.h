@@ -42,7 +42,7 @@ Judgement judge(const Evidence& evidence);
 double coverage_of(const Evidence& evidence);
 
 // Whether the estimate with the matches of guided matching replaces the first one. Where it does,
-// it is given the first one's verdict and reasons.
+// it is given the first one's verdict, reasons and test of the principal point.
 bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again);
 
 }  // namespace tv

@@ -87,9 +87,8 @@ std::vector<Option> table(Options& o) {
        "exactly this many samples; 0: adaptive stop"},
       {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
       {"principal-point-sigma", kEstimate, &e.principal_point_sigma, 0, 0.1, closed,
-       "how far the principal point may be off: standard deviation in focal lengths; 0: exactly "
-       "where "
-       "the camera file has it"},
+       "how far the principal point may be moved: standard deviation in focal lengths, such as "
+       "0.01; 0: it is where the camera file has it"},
       {"guided-matching", kEstimate, &o.guided_matching, 0, 1, closed,
        "1: match again along the epipolar lines, and estimate from all matches"},
       {"bundle-adjustment", kEstimate, &o.bundle_adjustment, 0, 1, closed,

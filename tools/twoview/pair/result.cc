@@ -136,6 +136,14 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size) {
   return frustum;
 }
 
+Json principal_point_json(const tv_two_view& v) {
+  const bool known = v.principal_point_asked_covariance[0] > 0;
+  return {{"chi2", known ? finite_or_null(v.principal_point_chi2) : Json(nullptr)},
+          {"asked_px", numbers_or_null(v.principal_point_asked_px, 2, known)},
+          {"asked_covariance_px2", numbers_or_null(v.principal_point_asked_covariance, 3, known)},
+          {"shift_px", numbers_or_null(v.principal_point_shift, 2, true)}};
+}
+
 Json result_json(const Outcome& outcome) {
   const tv_two_view& v = outcome.two_view;
   const tv_reconstruction& r = outcome.reconstruction;
@@ -175,6 +183,7 @@ Json result_json(const Outcome& outcome) {
   json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
   json["principal_point_shift_px"] =
       numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
+  json["principal_point"] = outcome.has_cameras ? principal_point_json(v) : Json(nullptr);
   json["num_points"] = r.num_points;
   json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)

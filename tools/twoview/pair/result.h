@@ -60,6 +60,10 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size);
 // `timings_ms`, `context_bytes`, `options` and `kernels`: the caller adds these.
 nlohmann::ordered_json result_json(const Outcome& outcome);
 
+// The test of the principal point: `chi2`, `asked_px`, `asked_covariance_px2` (null where it is not
+// known) and `shift_px`.
+nlohmann::ordered_json principal_point_json(const tv_two_view& two_view);
+
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.
 std::string reasons_in_words(uint32_t reasons);
 std::string kind_in_words(int32_t kind);

@@ -154,6 +154,8 @@ std::string tables(const Json& j) {
   if (j["imu"].is_object()) text += object_table("Against the IMU", j["imu"]);
   if (j.contains("recording")) text += object_table("Out of the recording", j["recording"]);
   text += object_table("Inliers of each model", j["evidence"]);
+  if (j["principal_point"].is_object())
+    text += object_table("The principal point", j["principal_point"]);
   text += object_table("Time, ms", j["timings_ms"]);
   text += object_table("Options as used", j["options"]);
   return text;

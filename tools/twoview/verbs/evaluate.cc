@@ -14,6 +14,7 @@
 #include "files/camera_file.h"
 #include "files/camera_set.h"
 #include "files/pairs_file.h"
+#include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/reconstruct_pair.h"
 #include "verbs/verbs.h"
@@ -42,6 +43,7 @@ struct PairReport {
   Json json;
   bool has_truth = false;
   Errors errors;
+  std::optional<ShiftEvidence> shift;  // empty where the pair says nothing of its camera
 };
 
 // The rotation from a camera's frame to its frame after its image is turned counter-clockwise.
@@ -96,7 +98,7 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
   for (const char* key :
        {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
         "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict",
-        "principal_point_shift_px", "time_ms"})
+        "principal_point_shift_px", "principal_point", "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;
@@ -108,6 +110,8 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
     json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
     json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
     json["principal_point_shift_px"] = v.principal_point_shift;
+    json["principal_point"] = principal_point_json(v);
+    report.shift = shift_evidence(v, outcome.camera[0]);
     json["time_ms"] = static_cast<double>(total_ns) * 1e-6;
     if (pair.has_truth) compare(pair, outcome, report);
   } catch (const BadInput& e) {
@@ -150,6 +154,29 @@ Json median_error(const std::vector<PairReport>& reports) {
   return finite_or_null((errors[(errors.size() - 1) / 2] + errors[errors.size() / 2]) / 2);
 }
 
+Json principal_points_json(const std::vector<PairReport>& reports) {
+  std::vector<ShiftEvidence> pairs;
+  for (const PairReport& report : reports)
+    if (report.shift) pairs.push_back(*report.shift);
+  Json list = Json::array();
+  for (const CameraAdvice& advice : advise(pairs)) {
+    const tv_camera& camera = advice.camera;
+    const Json asked = advice.num_asking > 0 ? Json(advice.asked_px) : Json(nullptr);
+    const Json deviation = advice.num_asking > 0 ? Json(advice.deviation_px) : Json(nullptr);
+    list.push_back({{"image_size", {camera.width, camera.height}},
+                    {"fx", camera.fx},
+                    {"fy", camera.fy},
+                    {"cx", camera.cx},
+                    {"cy", camera.cy},
+                    {"num_pairs", advice.num_pairs},
+                    {"num_asking", advice.num_asking},
+                    {"asked_px", asked},
+                    {"deviation_px", deviation},
+                    {"calibrate_again", advice.calibrate_again}});
+  }
+  return list;
+}
+
 Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
                  const Session& session) {
   const Options& options = a.common.options;
@@ -160,6 +187,7 @@ Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
   json["median_pose_error_deg"] = median_error(reports);
   for (const char* key : {"num_matches", "num_inliers", "precision", "time_ms"})
     json["mean_" + std::string(key)] = mean_of(reports, key);
+  json["principal_points"] = principal_points_json(reports);
   json["pairs"] = Json::array();
   for (const PairReport& report : reports) json["pairs"].push_back(report.json);
   json["options"] = options_json(options, kAllOptions);
@@ -183,6 +211,24 @@ std::string cell(const Json& value, const char* format, int width, double factor
 std::string padded(std::string text, size_t width) {
   if (text.size() > width) text = "..." + text.substr(text.size() - (width - 3));
   return text + std::string(width - text.size(), ' ');
+}
+
+// A line for each camera whose pairs agree that its principal point is elsewhere.
+std::string advice_lines(const Json& report) {
+  std::string text;
+  const Json& cameras = report["principal_points"];
+  for (const Json& camera : cameras) {
+    if (!camera["calibrate_again"].get<bool>()) continue;
+    char which[80] = "", line[200];
+    const double cx = camera["cx"], cy = camera["cy"];
+    if (cameras.size() > 1) std::snprintf(which, sizeof which, " of cx %.1f, cy %.1f", cx, cy);
+    std::snprintf(line, sizeof line, "%d of %d pairs%s ask for (%ld, %ld) px: calibrate again\n",
+                  camera["num_asking"].get<int>(), camera["num_pairs"].get<int>(), which,
+                  std::lround(camera["asked_px"][0].get<double>()),
+                  std::lround(camera["asked_px"][1].get<double>()));
+    text += line;
+  }
+  return text;
 }
 
 std::string table(const Json& report) {
@@ -212,7 +258,7 @@ std::string table(const Json& report) {
   }
   return text + std::to_string(report["num_pairs"].get<size_t>()) + " pairs; median pose error" +
          cell(report["median_pose_error_deg"], " %.2f deg", 4) + ", mean time" +
-         cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n";
+         cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n" + advice_lines(report);
 }
 
 // Shows progress as one line on stderr if that is a terminal. Each line replaces the last one, and

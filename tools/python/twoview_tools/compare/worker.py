@@ -189,7 +189,7 @@ def solver(system, task, matches):
                                     task["seed"])
         watch.lap("estimate")
         return {**pose_answer(*found or (None, None, 0)), "ms": watch.ms}
-    options = dict(system.options)
+    options = {**system.options, **task.get("options", {})}
     if options["method"] == "upright":
         if task["reference"] is None:
             raise Failed("no reference pose to take gravity from")
