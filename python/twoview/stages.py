@@ -416,7 +416,7 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
                 match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False,
-                sigma_by_size: float = 0.0) -> tuple[TwoView, Reconstruction]:
+                sigma_by_size: float = 1.0) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points. Images are (height, width) uint8 and
     are read without a copy. feature, match and estimate are the options of the stages;
     sigma_by_size is the exponent of keypoint_sigmas."""

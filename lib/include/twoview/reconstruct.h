@@ -55,10 +55,10 @@ typedef struct tv_reconstruct_options {
      (docs/decisions/0005-bundle.md). */
   int32_t bundle_adjustment;
   /* How a keypoint's size gives the noise of its position, the exponent of tv_keypoint_sigmas with
-     the feature option keypoint_size as the size of sigma 1: in [0, 2]; 0 (default): all keypoints
-     are taken as equally precise. The sigmas serve the estimate and bundle_adjustment. The band of
-     guided_matching stays the same for all, since it is the error of the first pose that makes it
-     wide. */
+     the feature option keypoint_size as the size of sigma 1: in [0, 2], default 1: in proportion
+     to the size. 0: all keypoints are taken as equally precise. The sigmas serve the estimate and
+     bundle_adjustment. The band of guided_matching stays the same for all, since it is the error of
+     the first pose that makes it wide. */
   double sigma_by_size;
 } tv_reconstruct_options;
 

@@ -256,7 +256,7 @@ constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
                                               nullptr,
                                               0,
                                               0,
-                                              0};
+                                              1.0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                                    tv_reconstruct_options* checked) {

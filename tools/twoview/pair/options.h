@@ -18,7 +18,7 @@ struct Options {
   int32_t triangulation = TV_TRIANGULATION_ITERATIVE_LS;
   int32_t guided_matching = 0;
   int32_t bundle_adjustment = 0;
-  double sigma_by_size = 0;
+  double sigma_by_size = 1;
   int32_t kernels = TV_KERNELS_AUTO;
   int32_t resize = 0;  // longer side of the resized images, pixels; 0: not resized
   bool min_threshold_given = false;
