@@ -54,15 +54,6 @@ static inline const uint8_t *ranked(const tvk_descriptors *set, int32_t rank) {
 /* The rank of column j of a block whose first column has rank `first`. */
 static inline int32_t column_rank(int32_t first, int32_t j);
 
-static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
-  int32_t sum = 0, k;
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-    const int16_t difference = (int16_t)(a[k] - b[k]);
-    sum += difference * difference;
-  }
-  return sum;
-}
-
 #if defined(TVK_AVX512)
 #include "kernels/nearest_avx512.h"
 #elif defined(TVK_AVX2)
@@ -351,6 +342,15 @@ static int32_t nearest_groups(const tvk_descriptors *rows, const tvk_descriptors
 
 /* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */
 #if !defined(TVK_NEON_DOT)
+static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
+  int32_t sum = 0, k;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
+    const int16_t difference = (int16_t)(a[k] - b[k]);
+    sum += difference * difference;
+  }
+  return sum;
+}
+
 static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
                               int32_t count, int32_t *out) {
   int32_t k;
