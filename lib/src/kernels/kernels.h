@@ -56,7 +56,7 @@ typedef struct tvk_nearest {
 #define TVK_NEAREST_PANEL 2048
 #define TVK_NEAREST_COLUMN_BYTES 152
 #define TVK_NEAREST_PANEL_16 512
-#define TVK_NEAREST_COLUMN_16_BYTES 272
+#define TVK_NEAREST_COLUMN_16_BYTES 276
 #define TVK_NEAREST_ROW_BYTES 832 /* scratch of one row; a chunk needs one row more */
 #define TVK_NEAREST_CHUNK_BYTES(num_rows) \
   ((size_t)((num_rows) < 63 ? (num_rows) + 1 : 64) * TVK_NEAREST_ROW_BYTES)

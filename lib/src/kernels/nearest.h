@@ -33,6 +33,11 @@
    is larger. */
 static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
 
+/* The first limit of a column: above every key, or below it after the last column. */
+static inline int32_t nearest_limit(int32_t term, int32_t norm) {
+  return term == NEAREST_FAR ? INT32_MIN : (TVK_NEAREST_NONE - norm) * 256;
+}
+
 /* Not inlined, like the other functions that run once per descriptor or tile instead of once per
    pair: -O3 would copy them to each call. */
 static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
@@ -48,15 +53,6 @@ static inline const uint8_t *ranked(const tvk_descriptors *set, int32_t rank) {
 
 /* The rank of column j of a block whose first column has rank `first`. */
 static inline int32_t column_rank(int32_t first, int32_t j);
-
-static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
-  int32_t sum = 0, k;
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-    const int16_t difference = (int16_t)(a[k] - b[k]);
-    sum += difference * difference;
-  }
-  return sum;
-}
 
 #if defined(TVK_AVX512)
 #include "kernels/nearest_avx512.h"
@@ -128,42 +124,6 @@ static TVK_NOINLINE void nearest_add(tvk_nearest *list, int32_t dist, int32_t gr
 /* The squared distance of a key; at least TVK_NEAREST_NONE for NEAREST_FAR. */
 static inline int32_t key_distance(int32_t key, int32_t norm) { return (key >> 8) + norm; }
 
-/* Merges the lists of a block of columns into those of all rows. Of `num_chunks` chunks of rows
-   this is number `chunk`. The second group of a bin bounds the distance of the bin's others. */
-static inline void merge_columns(const nearest_block *block, int32_t chunk, int32_t num_chunks,
-                                 const tvk_descriptors *columns, int32_t first,
-                                 tvk_nearest *of_columns) {
-  int32_t j;
-  for (j = 0; j < NEAREST_COLUMNS; ++j) {
-    const int32_t rank = column_rank(first, j), best = block->best[j], second = block->second[j];
-    const int32_t dist = key_distance(best, block->norms[j]);
-    tvk_nearest *list;
-    if (rank >= columns->num) continue;
-    list = &of_columns[columns->order[rank]];
-    if (dist >= list->dists[NEAREST_BOUND]) continue;
-    nearest_bound(list, key_distance(second, block->norms[j]),
-                  (second & (NEAREST_PLACES - 1)) * num_chunks + chunk);
-    nearest_add(list, dist, (best & (NEAREST_PLACES - 1)) * num_chunks + chunk);
-  }
-}
-
-/* Merges the lists of a row, one per lane, into its list of the panel that starts with group
-   `first`. */
-static inline void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
-                               int32_t first, tvk_nearest *list) {
-  int32_t smallest = NEAREST_FAR, lane;
-  for (lane = 0; lane < NEAREST_LANES; ++lane) smallest = nearest_min(smallest, second[lane]);
-  for (lane = 0; second[lane] != smallest;) ++lane;
-  nearest_bound(list, key_distance(smallest, norm),
-                first + (smallest & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
-  for (lane = 0; lane < NEAREST_LANES; ++lane) {
-    const int32_t key = best[lane], dist = key_distance(key, norm);
-    if (dist <= list->dists[NEAREST_BOUND]) {
-      nearest_add(list, dist, first + (key & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
-    }
-  }
-}
-
 /* Vectors of NEAREST_LANES keys, signed and unsigned. */
 typedef int32_t int_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
 typedef uint32_t key_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
@@ -197,6 +157,68 @@ static inline int_lanes max_lanes(int_lanes a, int_lanes b) {
 
 static inline int_lanes make_keys(int_lanes terms, const int32_t *products) {
   return (int_lanes)((key_lanes)terms + ((key_lanes)load_ints(products) << 9));
+}
+
+/* A bit for each lane whose key is below its limit. */
+static inline uint32_t lanes_below(const int32_t *keys, int_lanes limits) {
+#if defined(TVK_AVX512)
+  return _mm512_cmplt_epi32_mask((__m512i)load_ints(keys), (__m512i)limits);
+#elif defined(TVK_AVX2)
+  const __m256i below = _mm256_cmpgt_epi32((__m256i)limits, (__m256i)load_ints(keys));
+  return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(below));
+#else
+  uint32_t bits = 0;
+  int32_t lane;
+  for (lane = 0; lane < NEAREST_LANES; ++lane) {
+    bits |= (uint32_t)(keys[lane] < limits[lane]) << lane;
+  }
+  return bits;
+#endif
+}
+
+/* The smallest key of a distance: a key is below it where its distance is smaller. */
+static inline int32_t first_key(int32_t dist, int32_t norm) { return (dist - norm) * 256; }
+
+/* Merges the lists of a block of columns into those of all rows. Of `num_chunks` chunks of rows
+   this is number `chunk`. The second group of a bin bounds the distance of the bin's others. */
+static inline void merge_columns(nearest_block *block, int32_t chunk, int32_t num_chunks,
+                                 const tvk_descriptors *columns, int32_t first,
+                                 tvk_nearest *of_columns) {
+  int32_t v;
+  for (v = 0; v < NEAREST_COLUMNS; v += NEAREST_LANES) {
+    uint32_t bits = lanes_below(block->best + v, load_ints(block->limits + v));
+    for (; bits; bits &= bits - 1) {
+      const int32_t j = v + __builtin_ctz(bits);
+      const int32_t best = block->best[j], second = block->second[j], norm = block->norms[j];
+      tvk_nearest *const list = &of_columns[columns->order[column_rank(first, j)]];
+      nearest_bound(list, key_distance(second, norm),
+                    (second & (NEAREST_PLACES - 1)) * num_chunks + chunk);
+      nearest_add(list, key_distance(best, norm),
+                  (best & (NEAREST_PLACES - 1)) * num_chunks + chunk);
+      block->limits[j] = first_key(list->dists[NEAREST_BOUND], norm);
+    }
+  }
+}
+
+/* Merges the lists of a row, one per lane, into its list of the panel that starts with group
+   `first`. */
+static inline void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
+                               int32_t first, tvk_nearest *list) {
+  const int_lanes zero = {0};
+  int32_t smallest = NEAREST_FAR, lane;
+  uint32_t bits;
+  for (lane = 0; lane < NEAREST_LANES; ++lane) smallest = nearest_min(smallest, second[lane]);
+  for (lane = 0; second[lane] != smallest;) ++lane;
+  nearest_bound(list, key_distance(smallest, norm),
+                first + (smallest & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
+  bits = lanes_below(
+      best,
+      zero + first_key(nearest_min(list->dists[NEAREST_BOUND], TVK_NEAREST_NONE - 1) + 1, norm));
+  for (; bits; bits &= bits - 1) {
+    const int32_t key = best[lane = __builtin_ctz(bits)], dist = key_distance(key, norm);
+    if (dist > list->dists[NEAREST_BOUND]) continue;
+    nearest_add(list, dist, first + (key & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
+  }
 }
 
 /* Updates the two smallest keys of each lane with one more key. */
@@ -320,6 +342,15 @@ static int32_t nearest_groups(const tvk_descriptors *rows, const tvk_descriptors
 
 /* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */
 #if !defined(TVK_NEON_DOT)
+static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
+  int32_t sum = 0, k;
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
+    const int16_t difference = (int16_t)(a[k] - b[k]);
+    sum += difference * difference;
+  }
+  return sum;
+}
+
 static void squared_distances(const uint8_t *query, const uint8_t *rows, const int32_t *indices,
                               int32_t count, int32_t *out) {
   int32_t k;

@@ -28,6 +28,7 @@ typedef struct nearest_block {
   int8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
+  int32_t limits[NEAREST_COLUMNS]; /* best keys below these go to the columns' lists */
 } nearest_block;
 
 static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
@@ -110,6 +111,7 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
     }
     block->norms[j] = column ? squared_norm(column) : 0;
     block->terms[j] = column ? nearest_term(block->norms[j], place) : NEAREST_FAR;
+    block->limits[j] = nearest_limit(block->terms[j], block->norms[j]);
   }
 }
 

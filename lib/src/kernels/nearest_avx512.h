@@ -18,6 +18,7 @@ typedef struct nearest_block {
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
   int32_t starts[NEAREST_COLUMNS]; /* -127 times the sum of the bytes of column b */
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
+  int32_t limits[NEAREST_COLUMNS]; /* best keys below these go to the columns' lists */
 } nearest_block;
 
 static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
@@ -50,6 +51,7 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
     }
     block->norms[j] = column ? squared_norm(column) : 0;
     block->terms[j] = column ? nearest_term(block->norms[j], place) : NEAREST_FAR;
+    block->limits[j] = nearest_limit(block->terms[j], block->norms[j]);
     block->starts[j] = -127 * sum;
   }
 }

@@ -14,6 +14,7 @@ typedef struct nearest_block {
   int16_t values[NEAREST_COLUMNS][TVK_DESCRIPTOR_SIZE];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
+  int32_t limits[NEAREST_COLUMNS]; /* best keys below these go to the columns' lists */
 } nearest_block;
 
 /* Widens one descriptor, or zeros if it is null. */
@@ -44,6 +45,7 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
   for (j = 0; j < NEAREST_COLUMNS; ++j) {
     widen(ranked(columns, column_rank(first, j)), place, block->values[j], &block->norms[j],
           &block->terms[j]);
+    block->limits[j] = nearest_limit(block->terms[j], block->norms[j]);
   }
 }
 
