@@ -52,7 +52,8 @@ class tv_feature_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("max_keypoints", c_int32), ("arc", c_int32),
                 ("threshold", c_int32), ("min_threshold", c_int32), ("levels", c_int32),
                 ("scale_factor", c_float), ("cell_px", c_int32), ("subpixel", c_int32),
-                ("orientation", c_int32), ("descriptor", c_int32), ("keypoint_size", c_float)]
+                ("orientation", c_int32), ("descriptor", c_int32), ("keypoint_size", c_float),
+                ("pooling", c_int32), ("reserved", c_int32)]
 
 
 class tv_correspondence(Structure):

@@ -27,6 +27,8 @@ class FeatureOptions:
     orientation: int = Orientation.GRADIENT
     descriptor: int = Normalisation.ROOTSIFT
     keypoint_size: float = 4.0  #: diameter of a keypoint at level 0, pixels
+    pooling: int = 0  #: 1: a descriptor is the mean over windows of 0.7 and 1.3 times its size
+    reserved: int = 0  #: must be 0
 
 
 @dataclass(frozen=True)

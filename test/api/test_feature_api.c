@@ -154,6 +154,9 @@ static void test_options_out_of_range_are_refused(void) {
   REFUSED(TV_ERR_ARGUMENT, keypoint_size, 0.5f);
   REFUSED(TV_ERR_ARGUMENT, keypoint_size, 33.0f);
   REFUSED(TV_ERR_ARGUMENT, keypoint_size, (float)NAN);
+  REFUSED(TV_ERR_ARGUMENT, pooling, -1);
+  REFUSED(TV_ERR_ARGUMENT, pooling, 2);
+  REFUSED(TV_ERR_ARGUMENT, reserved, 1);
 #undef REFUSED
 }
 

@@ -24,7 +24,7 @@
   _Static_assert(sizeof(type) == bytes && offsetof(type, last) == offset, #type)
 LAYOUT(tv_limits, 28, purposes, 24);
 LAYOUT(tv_keypoint, 24, level, 20);
-LAYOUT(tv_feature_options, 48, keypoint_size, 44);
+LAYOUT(tv_feature_options, 56, reserved, 52);
 LAYOUT(tv_correspondence, 16, ratio, 12);
 LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);

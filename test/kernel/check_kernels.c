@@ -235,9 +235,10 @@ enum {
   SAMPLE_RANGE = LOWEST_SAMPLE + LARGEST_SAMPLE + 1
 };
 
-static const int16_t *random_patch(trial *t, int32_t num_rows) {
+/* num_patches patches that follow each other, and a 0. */
+static const int16_t *random_patches(trial *t, int32_t num_patches, int32_t num_rows) {
   const int32_t kind = random_int(&t->seed, 0, 4), base = random_int(&t->seed, 0, 8000);
-  const int32_t size = num_rows * TVK_PATCH_SIDE;
+  const int32_t size = num_patches * num_rows * TVK_PATCH_SIDE;
   int16_t *patch = INPUT(t, int16_t, size + 1);
   int32_t k;
   for (k = 0; k < size; ++k) {
@@ -255,15 +256,16 @@ static const int16_t *random_patch(trial *t, int32_t num_rows) {
 }
 
 static void case_orientation_histogram(trial *t) {
-  const int16_t *patch = random_patch(t, TVK_ORIENT_SIDE);
+  const int16_t *patch = random_patches(t, 1, TVK_ORIENT_SIDE);
   int32_t *smooth = OUTPUT(t, int32_t, TVK_ORIENT_BINS);
   REPEAT(t, t->set->orientation_histogram(patch, smooth));
 }
 
 static void case_gradient_histogram(trial *t) {
-  const int16_t *patch = random_patch(t, TVK_PATCH_SIDE);
+  const int32_t num_patches = pick(t, 1, 2, 1);
+  const int16_t *patches = random_patches(t, num_patches, TVK_PATCH_SIDE);
   int32_t *histogram = OUTPUT(t, int32_t, TVK_DESCRIPTOR_SIZE), k;
-  REPEAT(t, t->set->gradient_histogram(patch, histogram));
+  REPEAT(t, t->set->gradient_histogram(patches, num_patches, histogram));
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) TEST_ASSERT_TRUE(histogram[k] >= 0);
 }
 

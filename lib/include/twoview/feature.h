@@ -112,6 +112,13 @@ typedef struct tv_feature_options {
   /* The size that a corner of level 0 receives, in pixels, [1, 32], default 4. A larger patch is
      more distinctive and is more often disturbed by occlusion and perspective. */
   float keypoint_size;
+  /* 0 (default): a descriptor is the histogram of one window. 1: it is the mean of the histograms
+     of two windows, of 0.7 and 1.3 times its size (J. Dong, S. Soatto, "Domain-size pooling in
+     local descriptors: DSP-SIFT", CVPR 2015). This finds more matches across a change of view or
+     of scale. Descriptors with and without pooling must not be matched with each other. */
+  int32_t pooling;
+  /* Must be 0. */
+  int32_t reserved;
 } tv_feature_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call

@@ -14,7 +14,7 @@ namespace {
 
 constexpr tv_feature_options kDefaults = {
     sizeof(tv_feature_options), 0,   12, 15, 3, 4, 1.41f, 48, 1, TV_ORIENTATION_GRADIENT,
-    TV_NORMALISATION_ROOTSIFT,  4.0f};
+    TV_NORMALISATION_ROOTSIFT,  4.0f, 0, 0};
 
 struct Request {
   tv_feature_options options;
@@ -47,10 +47,10 @@ tv_keypoint* detect_into_arena(tv_context* context, const tv_image& image, const
   return corners;
 }
 
-Octaves octaves_for(tv_context* context, const tv_image& image, const tv_keypoint* keypoints,
-                    int32_t count) {
+Octaves octaves_for(tv_context* context, const tv_image& image, int32_t pooling,
+                    const tv_keypoint* keypoints, int32_t count) {
   StageTimer timer(context, TV_STAGE_PYRAMID);
-  const OctaveRange range = octave_range(keypoints, count);
+  const OctaveRange range = octave_range(keypoints, count, pooling);
   return make_octaves(*context->kernels, image, range.first, range.last, context->arena);
 }
 
@@ -144,7 +144,7 @@ tv_status tv_orient(tv_context* context, const tv_image* image, const tv_feature
   const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
   if (status != TV_OK) return status;
   tv::ArenaScope scope(context->arena);
-  const tv::Octaves octaves = tv::octaves_for(context, *image, keypoints, num_keypoints);
+  const tv::Octaves octaves = tv::octaves_for(context, *image, 0, keypoints, num_keypoints);
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
   const int32_t orientation = request.options.orientation;
   const int32_t total = tv::orient_keypoints(*context, octaves, orientation, keypoints,
@@ -170,10 +170,12 @@ tv_status tv_describe(tv_context* context, const tv_image* image, const tv_featu
   const tv_status status = tv::check_keypoints(keypoints, num_keypoints);
   if (status != TV_OK) return status;
   tv::ArenaScope scope(context->arena);
-  const tv::Octaves octaves = tv::octaves_for(context, *image, keypoints, num_keypoints);
+  const tv::Octaves octaves =
+      tv::octaves_for(context, *image, request.options.pooling, keypoints, num_keypoints);
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
   for (int32_t k = 0; k < num_keypoints; ++k) {
     tv::describe_keypoint(*context->kernels, octaves, keypoints[k], request.options.descriptor,
+                          request.options.pooling,
                           descriptors + tv::bytes_of(k, TV_DESCRIPTOR_BYTES));
   }
   return TV_OK;
@@ -198,7 +200,7 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   const tv_feature_options& o = request.options;
   int32_t num_corners = 0;
   const tv_keypoint* corners = tv::detect_into_arena(context, *image, mask, o, &num_corners);
-  const tv::Octaves octaves = tv::octaves_for(context, *image, corners, num_corners);
+  const tv::Octaves octaves = tv::octaves_for(context, *image, o.pooling, corners, num_corners);
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
   tv_keypoint* oriented =
       tv::arena_alloc<tv_keypoint>(context->arena, static_cast<size_t>(o.max_keypoints));
@@ -209,7 +211,7 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   if (count > cap_keypoints) return TV_ERR_CAPACITY;
   std::copy(oriented, oriented + count, keypoints);
   for (int32_t k = 0; k < count; ++k) {
-    tv::describe_keypoint(*context->kernels, octaves, keypoints[k], o.descriptor,
+    tv::describe_keypoint(*context->kernels, octaves, keypoints[k], o.descriptor, o.pooling,
                           descriptors + tv::bytes_of(k, TV_DESCRIPTOR_BYTES));
   }
   return TV_OK;

@@ -54,7 +54,8 @@ tv_status read_feature_options(const tv_context& context, const tv_feature_optio
                      (o.cell_px == 0 || within(o.cell_px, 8, 16384)) && within(o.subpixel, 0, 1) &&
                      within(o.orientation, TV_ORIENTATION_UPRIGHT, TV_ORIENTATION_GRADIENT) &&
                      within(o.descriptor, TV_NORMALISATION_SIFT, TV_NORMALISATION_ROOTSIFT) &&
-                     within(o.keypoint_size, 1.0f, 32.0f);
+                     within(o.keypoint_size, 1.0f, 32.0f) && within(o.pooling, 0, 1) &&
+                     o.reserved == 0;
   if (!valid) return TV_ERR_ARGUMENT;
   const int32_t most = context.limits.max_keypoints;
   if (o.max_keypoints == 0) o.max_keypoints = most < kAutoKeypoints ? most : kAutoKeypoints;

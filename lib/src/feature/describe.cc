@@ -19,12 +19,16 @@ constexpr double kOrientStep = 1.5 / 4.0;
 // blurred, and wider ones would alias (docs/decisions/0009).
 constexpr double kMaxStep = 2.24;
 
+// A pooled descriptor is the mean over two windows of these sizes, in keypoint sizes
+// (docs/decisions/0018).
+constexpr double kPooledSizes[2] = {0.7, 1.3};
+
 // A second peak is a direction of its own if it is above this share of the highest peak (Lowe,
 // section 5).
 constexpr double kSecondPeak = 0.8;
 
-const Octave& octave_for(const Octaves& octaves, const tv_keypoint& keypoint) {
-  const int32_t octave = octave_of(keypoint.size);
+const Octave& octave_for(const Octaves& octaves, double size) {
+  const int32_t octave = octave_of(size);
   return octaves.octaves[octave < octaves.count ? octave : octaves.count - 1];
 }
 
@@ -47,10 +51,12 @@ double near_image(double x, int32_t side) {
 }
 
 // Samples a square patch of side x side samples that is centred on the keypoint and whose x axis
-// points along angle_rad.
-void sample_around(const tvk_table& kernels, const Octave& octave, const tv_keypoint& keypoint,
-                   double angle_rad, double step_per_size, int32_t side, int16_t* patch) {
-  const double wanted = keypoint.size * step_per_size / octave.scale;
+// points along angle_rad, with the step of a keypoint of this size.
+void sample_around(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
+                   double size, double angle_rad, double step_per_size, int32_t side,
+                   int16_t* patch) {
+  const Octave& octave = octave_for(octaves, size);
+  const double wanted = size * step_per_size / octave.scale;
   const double step = wanted < kLargestStep ? wanted : kLargestStep;
   double sine = 0.0, cosine = 1.0;
   if (angle_rad != 0.0) sincos(angle_rad, &sine, &cosine);
@@ -80,7 +86,7 @@ float peak_angle(const int32_t* smooth, int32_t bin) {
 
 }  // namespace
 
-int32_t octave_of(float keypoint_size) {
+int32_t octave_of(double keypoint_size) {
   double step = keypoint_size * kStepPerSize;
   int32_t octave = 0;
   while (step >= kMaxStep && octave + 1 < kMaxOctaves) {
@@ -90,21 +96,25 @@ int32_t octave_of(float keypoint_size) {
   return octave;
 }
 
-OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count) {
-  OctaveRange range{kMaxOctaves - 1, 0};
-  for (int32_t k = 0; k < count; ++k) {
-    const int32_t octave = octave_of(keypoints[k].size);
-    if (octave < range.first) range.first = octave;
-    if (octave > range.last) range.last = octave;
+OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count, int32_t pooling) {
+  double smallest = count > 0 ? keypoints[0].size : 0.0, largest = smallest;
+  for (int32_t k = 1; k < count; ++k) {
+    const double size = keypoints[k].size;
+    if (size < smallest) smallest = size;
+    if (size > largest) largest = size;
   }
-  return range;
+  if (pooling != 0) {
+    smallest *= kPooledSizes[0];
+    largest *= kPooledSizes[1];
+  }
+  return OctaveRange{octave_of(smallest), octave_of(largest)};
 }
 
 int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint& keypoint, float angles_rad[2]) {
   int16_t patch[TVK_ORIENT_SIDE * TVK_PATCH_SIDE + 1];
   int32_t smooth[TVK_ORIENT_BINS];
-  sample_around(kernels, octave_for(octaves, keypoint), keypoint, 0.0, kOrientStep, TVK_ORIENT_SIDE,
+  sample_around(kernels, octaves, keypoint, keypoint.size, 0.0, kOrientStep, TVK_ORIENT_SIDE,
                 patch);
   kernels.orientation_histogram(patch, smooth);
   // The two highest local maxima; the lower bin wins a tie.
@@ -128,12 +138,18 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
 }
 
 void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
-                       const tv_keypoint& keypoint, int32_t kind, uint8_t* descriptor) {
-  int16_t patch[TVK_PATCH_SIDE * TVK_PATCH_SIDE + 1];
+                       const tv_keypoint& keypoint, int32_t kind, int32_t pooling,
+                       uint8_t* descriptor) {
+  constexpr int32_t kPatch = TVK_PATCH_SIDE * TVK_PATCH_SIDE;
+  int16_t patches[2 * kPatch + 1];
   int32_t histogram[TVK_DESCRIPTOR_SIZE];
-  sample_around(kernels, octave_for(octaves, keypoint), keypoint, keypoint.angle_rad, kStepPerSize,
-                TVK_PATCH_SIDE, patch);
-  kernels.gradient_histogram(patch, histogram);
+  const int32_t num_patches = pooling != 0 ? 2 : 1;
+  for (int32_t n = 0; n < num_patches; ++n) {
+    const double factor = pooling != 0 ? kPooledSizes[n] : 1.0;
+    sample_around(kernels, octaves, keypoint, keypoint.size * factor, keypoint.angle_rad,
+                  kStepPerSize, TVK_PATCH_SIDE, patches + n * kPatch);
+  }
+  kernels.gradient_histogram(patches, num_patches, histogram);
   kernels.quantize_descriptor(histogram, kind == TV_NORMALISATION_ROOTSIFT, descriptor);
 }
 

@@ -156,34 +156,44 @@ static const int16_t column_weights[4][8] = {
 
 /* Splits each gradient of a row into its shares in the eight directions, counter-clockwise in the
    image from x: the part along an axis, times sqrt(1/2), and the part along a diagonal. shares[d]
-   is the row of shares in direction d. */
-static void share_row(const int16_t *row, int16_t shares[8][TVK_PATCH_SIDE]) {
+   is the row of shares in direction d, summed over the patches. A share is below 2^14, so that the
+   sum of two fits 15 bits. */
+static void share_row(const int16_t *row, int32_t num_patches, int16_t shares[8][TVK_PATCH_SIDE]) {
   int32_t x;
   for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
-    const words u = gradient_u(row + x), v = gradient_v(row + x);
-    const words pu = words_positive(u), nu = words_positive(-u);
-    const words pv = words_positive(v), nv = words_positive(-v);
-    const words au = pu + nu, av = pv + nv;
-    words_store(shares[0] + x, words_min(pu, pv));
-    words_store(shares[1] + x, words_positive(v - au));
-    words_store(shares[2] + x, words_min(nu, pv));
-    words_store(shares[3] + x, words_positive(-u - av));
-    words_store(shares[4] + x, words_min(nu, nv));
-    words_store(shares[5] + x, words_positive(-v - au));
-    words_store(shares[6] + x, words_min(pu, nv));
-    words_store(shares[7] + x, words_positive(u - av));
+    const int16_t *at = row + x;
+    words sums[8];
+    int32_t bin, n;
+    for (bin = 0; bin < 8; ++bin) sums[bin] = words_of(0);
+    for (n = 0; n < num_patches; ++n, at += TVK_PATCH_SIDE * TVK_PATCH_SIDE) {
+      const words u = gradient_u(at), v = gradient_v(at);
+      const words pu = words_positive(u), nu = words_positive(-u);
+      const words pv = words_positive(v), nv = words_positive(-v);
+      const words au = pu + nu, av = pv + nv;
+      sums[0] += words_min(pu, pv);
+      sums[1] += words_positive(v - au);
+      sums[2] += words_min(nu, pv);
+      sums[3] += words_positive(-u - av);
+      sums[4] += words_min(nu, nv);
+      sums[5] += words_positive(-v - au);
+      sums[6] += words_min(pu, nv);
+      sums[7] += words_positive(u - av);
+    }
+    for (bin = 0; bin < 8; ++bin) words_store(shares[bin] + x, sums[bin]);
   }
 }
 
-/* Sums the shares over the rows of a cell, for each column and direction. */
-static void pool_rows(int16_t (*rows)[8][TVK_PATCH_SIDE], int32_t cell, int16_t *pooled) {
+/* Sums the shares over the rows of a cell, for each column and direction. The weights are divided
+   by 2^halvings. */
+static void pool_rows(int16_t (*rows)[8][TVK_PATCH_SIDE], int32_t cell, int32_t halvings,
+                      int16_t *pooled) {
   int32_t bin, x, i;
   for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
     words sums[8];
     for (bin = 0; bin < 8; ++bin) sums[bin] = words_of(0);
     for (i = 0; i < CELL_SAMPLES; ++i) {
-      const words even = words_of((int16_t)row_weights[0][cell][i]);
-      const words odd = words_of((int16_t)row_weights[1][cell][i]);
+      const words even = words_of((int16_t)(row_weights[0][cell][i] >> halvings));
+      const words odd = words_of((int16_t)(row_weights[1][cell][i] >> halvings));
       for (bin = 0; bin < 8; bin += 2) {
         sums[bin] += words_scale(words_load(rows[i][bin] + x), even);
         sums[bin + 1] += words_scale(words_load(rows[i][bin + 1] + x), odd);
@@ -221,13 +231,17 @@ static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t
 #endif
 }
 
-static void gradient_histogram(const int16_t *patch, int32_t *histogram) {
+static void gradient_histogram(const int16_t *patches, int32_t num_patches, int32_t *histogram) {
   int16_t rows[PATCH_GRADIENTS][8][TVK_PATCH_SIDE] TVK_ALIGNED;
   /* pool_columns reads two elements after the last column of cells. */
   int16_t pooled[4 * 8 * TVK_PATCH_SIDE + 2] TVK_ALIGNED;
   int32_t x, y;
-  for (y = 0; y < PATCH_GRADIENTS; ++y) share_row(patch + y * TVK_PATCH_SIDE, rows[y]);
-  for (y = 0; y < 4; ++y) pool_rows(rows + 3 * y, y, pooled + y * 8 * TVK_PATCH_SIDE);
+  for (y = 0; y < PATCH_GRADIENTS; ++y) {
+    share_row(patches + y * TVK_PATCH_SIDE, num_patches, rows[y]);
+  }
+  for (y = 0; y < 4; ++y) {
+    pool_rows(rows + 3 * y, y, num_patches - 1, pooled + y * 8 * TVK_PATCH_SIDE);
+  }
   memset(pooled + 4 * 8 * TVK_PATCH_SIDE, 0, 2 * sizeof pooled[0]);
   for (y = 0; y < 4; ++y) {
     const int16_t *columns = pooled + y * 8 * TVK_PATCH_SIDE;

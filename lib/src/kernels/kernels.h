@@ -132,9 +132,10 @@ typedef struct tvk_triangulate_pair {
    centre, with a Gaussian weight of sigma 2 samples, in TVK_ORIENT_BINS directions, clockwise in
    the image from x, smoothed around the circle.
 
-   gradient_histogram: SIFT's 4x4x8 histogram of TVK_PATCH_SIDE rows, with Gaussian weights. A
-   gradient is shared bilinearly between cells, and between two directions by decomposition
-   (kernels/describe.h).
+   gradient_histogram: SIFT's 4x4x8 histogram, with Gaussian weights, of a patch of TVK_PATCH_SIDE
+   rows, or the mean of the histograms of num_patches = 2 patches that follow each other. One number
+   is read after the last patch, and has no effect. A gradient is shared bilinearly between cells,
+   and between two directions by decomposition (kernels/describe.h).
 
    quantize_descriptor: writes the 128 bytes of a histogram by SIFT's normalisation with clipping at
    0.2, or by RootSIFT's if `root` is not 0.
@@ -209,7 +210,7 @@ typedef struct tvk_triangulate_pair {
     (const uint16_t *pairs, int32_t width, int32_t height, int32_t x, int32_t y, int32_t du_x,     \
      int32_t du_y, int32_t num_rows, int16_t *patch))                                              \
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
-  X(gradient_histogram, void, (const int16_t *patch, int32_t *histogram))                          \
+  X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
   X(nearest_groups, int32_t,                                                                       \
     (const tvk_descriptors *rows, const tvk_descriptors *columns, void *scratch,                   \

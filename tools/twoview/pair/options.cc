@@ -70,6 +70,8 @@ std::vector<Option> table(Options& o) {
        "kind of descriptor"},
       {"keypoint-size", kFeature, &f.keypoint_size, 1, 32, closed,
        "diameter of a corner on level 0, pixels"},
+      {"pooling", kFeature, &f.pooling, 0, 1, closed,
+       "1: descriptors are means over windows of 0.7 and 1.3 times their size"},
       {"ratio", kMatch, &o.match.ratio, 0, 1, open_low,
        "nearest over second nearest distance, both directions"},
       {"neighbourhood-px", kMatch, &o.match.neighbourhood_px, 0, 1000, closed,
