@@ -25,6 +25,8 @@ tv_feature_options options_of(int arc, int threshold) {
   options.arc = arc;
   options.threshold = threshold;
   options.min_threshold = 0;
+  options.levels = 1;
+  options.cell_px = 0;
   options.subpixel = 0;
   return options;
 }

@@ -141,12 +141,16 @@ struct Sift {
 void add_same_work_as_fast(const Pair& pair, float size) {
   const int threshold = 20;
   Options options;
+  options.feature.arc = 9;
   options.feature.threshold = threshold;
   options.feature.min_threshold = 0;
+  options.feature.levels = 1;
+  options.feature.cell_px = 0;
   options.feature.orientation = TV_ORIENTATION_UPRIGHT;
   options.feature.descriptor = TV_NORMALISATION_SIFT;
   options.feature.keypoint_size = size;
   options.match.ratio = kRatio;
+  options.match.neighbourhood_px = 0;
   const std::string name =
       "pair/" + pair.name + " same corners, size " + std::to_string(static_cast<int>(size));
   add_ours(name, pair, options);

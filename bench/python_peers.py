@@ -451,9 +451,10 @@ def _colmap_pair(pair):
 def pair_cases(library, pairs):
     for pair in pairs:
         case = Case("pair", f"{pair.name} same corners, size 7")
-        options = {"threshold": 20, "min_threshold": 0, "orientation": "upright",
-                   "descriptor": "sift", "keypoint_size": 7}
-        case.add(OURS, Ours(library, pair).reconstruct(options, {"ratio": RATIO}), dict)
+        options = {"arc": 9, "threshold": 20, "min_threshold": 0, "levels": 1, "cell_px": 0,
+                   "orientation": "upright", "descriptor": "sift", "keypoint_size": 7}
+        match_options = {"ratio": RATIO, "neighbourhood_px": 0}
+        case.add(OURS, Ours(library, pair).reconstruct(options, match_options), dict)
         case.add(OPENCV + " FAST + SIFT", _opencv_pair(pair, _fast_sift(7)), dict)
         yield case
 

@@ -54,6 +54,8 @@ int main(int argc, char **argv) {
   options.max_keypoints = MOST;
   options.arc = argc > 3 ? atoi(argv[3]) : 12;
   options.threshold = argc > 4 ? atoi(argv[4]) : 20;
+  options.levels = 1;
+  options.cell_px = 0;
   options.min_threshold = 0; /* 0: never lower the threshold to get more corners */
   status = tv_detect(context, &image, NULL, &options, corner, MOST, &count);
   if (status != TV_OK) return fail(tv_status_string(status));

@@ -123,8 +123,17 @@ double match_agreement() {
   for (int system = 0; system < 2; ++system) {
     uint8_t(*descriptors)[kMaxKeypoints * TV_DESCRIPTOR_BYTES] = system == 0 ? ours : opencvs;
     tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
-    found[system] = tv::match_descriptors(*tvk_select(TV_KERNELS_AUTO), descriptors[0], counts[0],
-                                          descriptors[1], counts[1], 0.8f, arena, matches[system]);
+    tv_features features[2] = {};
+    for (int view = 0; view < 2; ++view) {
+      features[view].num = counts[view];
+      features[view].descriptors = descriptors[view];
+    }
+    tv_match_options options = {};
+    options.ratio = 0.8f;
+    const tv_correspondence* in_arena = nullptr;
+    found[system] = tv::match_descriptors(*tvk_select(TV_KERNELS_AUTO), features[0], features[1],
+                                          options, arena, &in_arena);
+    std::copy(in_arena, in_arena + found[system], matches[system]);
   }
   int common = 0;
   for (int a = 0, b = 0; a < found[0] && b < found[1];) {

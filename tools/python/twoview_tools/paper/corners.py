@@ -69,7 +69,7 @@ def detect(image, arc, threshold):
     with tv.Context(max_width=image.shape[1], max_height=image.shape[0],
                     max_keypoints=65535) as context:
         return tv.detect(context, image, arc=arc, threshold=threshold, min_threshold=0,
-                         max_keypoints=65535, subpixel=0)
+                         max_keypoints=65535, levels=1, cell_px=0, subpixel=0)
 
 
 def example_corner(image):

@@ -103,7 +103,8 @@ def described_keypoints(image, count):
     """Detects at most `count` keypoints. Returns them with their SIFT and RootSIFT descriptors."""
     tv = library()
     with tv.Context(max_width=image.shape[1], max_height=image.shape[0]) as context:
-        keypoints = tv.orient(context, image, tv.detect(context, image, arc=12))[:count]
+        corners = tv.detect(context, image, arc=12, threshold=10, levels=1, cell_px=0)
+        keypoints = tv.orient(context, image, corners)[:count]
         keypoints = np.ascontiguousarray(keypoints)
         return keypoints, {kind: tv.describe(context, image, keypoints, descriptor=value)
                            for kind, value in (("sift", tv.Normalisation.SIFT),

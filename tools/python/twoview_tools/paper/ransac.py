@@ -130,7 +130,8 @@ def matches_of(pair, **options):
     tv = library()
     height = max(image.shape[0] for image in pair.grey)
     width = max(image.shape[1] for image in pair.grey)
-    feature = {"arc": 12, "descriptor": tv.Normalisation.SIFT, **options}
+    feature = {"arc": 12, "threshold": 10, "levels": 1, "cell_px": 0,
+               "descriptor": tv.Normalisation.SIFT, **options}
     with tv.Context(max_width=width, max_height=height) as context:
         (keys0, bytes0), (keys1, bytes1) = (
             tv.extract(context, image, **feature) for image in pair.grey
