@@ -355,7 +355,8 @@ static void test_extract_is_detect_orient_describe(void) {
     TEST_ASSERT_EQUAL_INT(
         TV_OK, tv_describe(a.context, &image, &options, others, oriented, other_descriptors));
     options.max_keypoints = CAP; /* so many that no second orientation is left out */
-    options.arc = 12;
+    options.levels = 1;
+    options.cell_px = 0;
     options.min_threshold = 0;
     corners = detect(a.context, keypoints);
     if (corners > CAP / 2) corners = CAP / 2;
@@ -403,7 +404,8 @@ static void test_the_mask_keeps_corners_where_it_is_not_zero(void) {
   const tv_image mask = api_image(mask_pixels, WIDTH, HEIGHT, WIDTH);
   int32_t all, count = 0, kept = 0, k, x, y;
   options.subpixel = 0;
-  options.arc = 12;
+  options.levels = 1;
+  options.cell_px = 0;
   options.min_threshold = 0;
   options.threshold = 40;
   all = detect(a.context, others);

@@ -99,7 +99,6 @@ static void test_a_neighbourhood_requires_finite_keypoints(void) {
     refused(TV_ERR_ARGUMENT, a.context, descriptors0, 9, descriptors1, 9, &options, 9);
   }
   options.neighbourhood_px = 5;
-  refused(TV_ERR_NULL, a.context, descriptors0, 9, descriptors1, 9, &options, 9);
   for (k = 0; k < COUNT; ++k) keypoints[k].x = 10 * (float)k, keypoints[k].size = 4;
   features[0] = features_of(keypoints, descriptors0, COUNT);
   features[1] = features_of(NULL, descriptors1, COUNT);
@@ -118,6 +117,22 @@ static void test_a_neighbourhood_requires_finite_keypoints(void) {
   TEST_ASSERT_EQUAL_INT(
       TV_OK, tv_match(a.context, &features[0], &features[1], &options, found, COUNT, &count));
   TEST_ASSERT_EQUAL_INT(COUNT, count);
+}
+
+/* Descriptors of other programs come without keypoints. */
+static void test_without_any_keypoints_there_is_no_neighbourhood(void) {
+  static tv_correspondence plain[COUNT];
+  tv_match_options options;
+  int32_t count = 0, num_plain = 0;
+  tv_match_options_init(&options);
+  TEST_ASSERT_TRUE(options.neighbourhood_px > 0);
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(a.context, descriptors0, COUNT, descriptors1, COUNT,
+                                          &options, found, COUNT, &count));
+  options.neighbourhood_px = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, match_rows(a.context, descriptors0, COUNT, descriptors1, COUNT,
+                                          &options, plain, COUNT, &num_plain));
+  TEST_ASSERT_EQUAL_INT(num_plain, count);
+  TEST_ASSERT_EQUAL_MEMORY(plain, found, (size_t)count * sizeof plain[0]);
 }
 
 /* An options struct of version 0.1.0 ends behind the ratio. */
@@ -175,6 +190,7 @@ int main(void) {
   RUN_TEST(test_counts_out_of_range_are_refused);
   RUN_TEST(test_options_out_of_range_are_refused);
   RUN_TEST(test_a_neighbourhood_requires_finite_keypoints);
+  RUN_TEST(test_without_any_keypoints_there_is_no_neighbourhood);
   RUN_TEST(test_old_options_have_no_neighbourhood);
   RUN_TEST(test_a_full_context_matches_in_its_memory);
   RUN_TEST(test_capacity_is_told_and_the_least_of_both_is_enough);
