@@ -236,6 +236,7 @@ static void digest_features(const pair *p, tv_context *context, features *f) {
     options.threshold = 2 * options.arc;
     options.min_threshold = options.arc == 10 ? 0 : 3;
     options.subpixel = options.arc != 11;
+    options.pooling = options.arc == 11;
     options.orientation = options.arc == 12 ? TV_ORIENTATION_UPRIGHT : TV_ORIENTATION_GRADIENT;
     options.descriptor = options.arc == 12 ? TV_NORMALISATION_ROOTSIFT : TV_NORMALISATION_SIFT;
     options.keypoint_size = (float)options.arc - 6.5f;
