@@ -72,7 +72,8 @@ typedef enum tv_normalisation {
 } tv_normalisation;
 
 /* Options of detection and description. Filled by tv_feature_options_init.
-   docs/decisions/0001-features.md has the measurements behind the defaults. */
+   docs/decisions/0001-features.md and 0019-scale-and-spread.md have the measurements behind the
+   defaults. */
 typedef struct tv_feature_options {
   /* The caller's sizeof, set by tv_feature_options_init. */
   uint32_t struct_size;

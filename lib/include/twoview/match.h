@@ -33,7 +33,7 @@ typedef struct tv_match_options {
      as the second nearest one; [0, 1000], default 10. 0: all others count. Nearer ones are second
      orientations of the same corner, the same corner on another level, or its neighbours on the
      same edge, whose descriptors are alike without making the match uncertain. A bigger value gives
-     more matches; beyond about 15 more of them are wrong. */
+     more matches. */
   float neighbourhood_px;
   /* The L2 distance of descriptors that replaces the distance to the second nearest one where that
      is larger or where there is none, as in tv_guided_options; [0, 3000], default 0: no such bound.
