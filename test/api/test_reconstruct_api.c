@@ -474,8 +474,8 @@ static void test_guided_matching_adds_matches_and_keeps_the_verdict(void) {
       TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
   guided = two_view;
   num_guided = reconstruction.num_matches;
-  printf("matches %d, guided %d; inliers %d, guided %d\n", num_plain, num_guided,
-         first.num_inliers, guided.num_inliers);
+  printf("matches %d, guided %d; inliers %d, guided %d\n", num_plain, num_guided, first.num_inliers,
+         guided.num_inliers);
   TEST_ASSERT_TRUE(num_guided > num_plain + num_plain / 50);
   TEST_ASSERT_TRUE(guided.num_inliers > first.num_inliers);
   TEST_ASSERT_EQUAL_INT(first.kind, guided.kind);

@@ -13,8 +13,8 @@ namespace tv {
 namespace {
 
 constexpr tv_feature_options kDefaults = {
-    sizeof(tv_feature_options), 0,   12, 15, 3, 4, 1.41f, 48, 1, TV_ORIENTATION_GRADIENT,
-    TV_NORMALISATION_ROOTSIFT,  4.0f, 0, 0};
+    sizeof(tv_feature_options), 0,    12, 15, 3, 4, 1.41f, 48, 1, TV_ORIENTATION_GRADIENT,
+    TV_NORMALISATION_ROOTSIFT,  4.0f, 0,  0};
 
 struct Request {
   tv_feature_options options;
