@@ -163,7 +163,7 @@ def test_an_adjustment_divides_errors_by_sigmas(context, scene):
 
 
 def test_keypoint_sigmas_are_powers_of_the_size(context, image):
-    keypoints, _ = tv.extract(context, image, levels=3, max_keypoints=400)
+    keypoints, _ = tv.extract(context, image, levels=3, scale_factor=2, max_keypoints=400)
     assert len(set(keypoints["level"])) == 3
     sigmas = tv.keypoint_sigmas(keypoints, 0.75)
     assert sigmas.dtype == np.float32

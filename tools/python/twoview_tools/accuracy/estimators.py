@@ -223,14 +223,15 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
 
 def run_twoview(context, matches, options=None, seed_step=0):
     """(R or None, t or None, inliers, tv_two_view) of our estimator; seed_step is added to its
-    seed. The option sigma_by_size is the exponent of tv_keypoint_sigmas."""
+    seed. The option sigma_by_size is the exponent of tv_keypoint_sigmas; matches without sizes
+    count alike."""
     from . import twoview_ctypes
     cameras = [twoview_ctypes.make_camera(K, *size, distortion)
                for (K, distortion), size in zip(matches.cameras, matches.sizes)]
     wanted = dict(options or {})
     exponent = context.library.take_sigma_by_size(wanted)
     sigmas = (None, None)
-    if exponent:
+    if exponent and matches.relative_sizes is not None:
         sigmas = [np.clip(ratio ** exponent, 0.01, 1000) for ratio in matches.relative_sizes]
     if seed_step:
         default = context.library.estimate_options(wanted).seed

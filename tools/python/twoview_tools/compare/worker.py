@@ -62,8 +62,9 @@ class Views:
             self.cameras.append((K, view["distortion"]))
         self.sizes = [image.shape[::-1] for image in self.gray]
 
-    def matches(self, pixels0, pixels1, ratios=None):
-        return estimators.Matches(pixels0, pixels1, self.cameras, self.sizes, ratios)
+    def matches(self, pixels0, pixels1, ratios=None, relative_sizes=None):
+        return estimators.Matches(pixels0, pixels1, self.cameras, self.sizes, ratios,
+                                  relative_sizes)
 
 
 @functools.lru_cache(maxsize=2)
@@ -85,9 +86,11 @@ def run_twoview(views, options, task):
     watch.lap("extract")
     links = context.match(features[0][1], features[1][1], None, features[0][0], features[1][0])
     watch.lap("match")
-    matches = views.matches(*(
-        np.column_stack([k["x"], k["y"]])[links[side]]
-        for (k, _), side in zip(features, ("idx0", "idx1"))), links["ratio"].copy())
+    chosen = [k[links[side]] for (k, _), side in zip(features, ("idx0", "idx1"))]
+    size_of_one = context.library.feature_options().keypoint_size
+    matches = views.matches(*(np.column_stack([k["x"], k["y"]]) for k in chosen),
+                            links["ratio"].copy(),
+                            [(k["size"] / size_of_one).astype(float) for k in chosen])
     watch.lap()
     from ..accuracy import twoview_ctypes
     R, t, inliers, found = estimators.run_twoview(context, matches, None, task["seed"])
