@@ -1,6 +1,5 @@
 /* Prints the epipolar lines in image 1 of some points of image 0, and both epipoles: outside the
-   images when the camera moved sideways, inside when it moved forward (figures 14 and 15 of the
-   paper).
+   images when the camera moved sideways, inside when it moved forward (the paper's figures 14, 15).
 
    usage: 06_epipolar MATCHES.txt WIDTH HEIGHT */
 #include <math.h>
