@@ -35,8 +35,8 @@ CHANGES = [
     (
         "a field in the middle of a growing struct",
         "match.h",
-        "  float ratio;\n} tv_match_options",
-        "  float more;\n  float ratio;\n} tv_match_options",
+        "  float ratio;\n  /* Only keypoints",
+        "  float more;\n  float ratio;\n  /* Only keypoints",
         True,
     ),
     (
