@@ -19,8 +19,8 @@ constexpr double kOrientStep = 1.5 / 4.0;
 // blurred, and wider ones would alias (docs/decisions/0009).
 constexpr double kMaxStep = 2.24;
 
-// A pooled descriptor is the mean over two windows of these sizes, in keypoint sizes
-// (docs/decisions/0018).
+// The histogram of a pooled descriptor is the mean over two windows: the keypoint's window scaled
+// by each of these factors (docs/decisions/0018).
 constexpr double kPooledSizes[2] = {0.7, 1.3};
 
 // A second peak is a direction of its own if it is above this share of the highest peak (Lowe,

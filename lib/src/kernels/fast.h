@@ -2,8 +2,8 @@
    learning for high-speed corner detection", ECCV 2006. */
 #include "kernels/bytes.h"
 
-/* The 16 pixels of the circle of radius 3, clockwise from below the centre: the index into rows[]
-   and the column offset of each. */
+/* The 16 pixels of the circle of radius 3, counter-clockwise as seen in the image, from the one
+   below the centre: the index into rows[] (3 is the centre's row) and the column offset of each. */
 static const int8_t fast_circle_row[16] = {6, 6, 5, 4, 3, 2, 1, 0, 0, 0, 1, 2, 3, 4, 5, 6};
 static const int8_t fast_circle_column[16] = {0, 1,  2,  3,  3,  3,  2,  1,
                                               0, -1, -2, -3, -3, -3, -2, -1};

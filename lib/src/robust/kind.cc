@@ -96,7 +96,8 @@ tv_kind choose_kind(Fit& f, const Rivals& rivals, int sample_size) {
   }
   // A rival determines the kind when it explains most of the epipolar model's inliers (or half of
   // all matches where there is no such model, since a failed search is no proof of a rotation) and
-  // the matches that it does not explain do not agree on an epipole.
+  // the matches that it does not explain do not agree on an epipole. Under a rotation, the matches
+  // that it explains must not move along the epipolar lines either.
   const double most = epipolar.found ? kRivalShare * f.num_support : kRivalShareAlone * n;
   const bool rotation_enough = rotation_meaningful && rivals.rotation_inliers > most &&
                                !leaves_parallax(f.matches, rivals.R, f.out->inlier, f.threshold) &&

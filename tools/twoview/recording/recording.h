@@ -49,7 +49,7 @@ class Recording {
   void add_packet(const ardrone_pave_packet& packet, const tvs_time& time);
   // Writes a decoded picture as frames/<number>.png, if with_frames was given.
   void add_frame(const tvs_frame& frame);
-  // Writes the summary at the end. The file appears complete or not at all.
+  // Writes summary.json; call it last. The file appears complete or not at all.
   void add_summary(const std::string& json);
 
  private:

@@ -155,7 +155,8 @@ def _opengv(algorithm, nonlinear):
         except RuntimeError:
             return None
         T = np.asarray(T, float)
-        for steps_left in (2, 1, 0) if nonlinear else (0,):  # T is the pose of camera 1 in camera 0
+        # T is the pose of camera 1 in camera 0; R and t are its inverse, with |t| = 1.
+        for steps_left in (2, 1, 0) if nonlinear else (0,):
             if T.shape != (3, 4) or not np.isfinite(T).all() or not np.any(T[:, 3]):
                 return None
             R, t = T[:, :3].T, -T[:, :3].T @ T[:, 3]

@@ -43,7 +43,7 @@ class Reference:
     def __init__(self, xml):
         self.xml = pathlib.Path(xml)
         self.compounds = {}
-        self.place_of = {}  # {symbol: (page, heading) that describe it}
+        self.place_of = {}  # {symbol: "page#heading" of the description}
         for entry in ElementTree.parse(self.xml / "index.xml").getroot():
             if entry.get("kind") in ("file", "struct"):
                 compound = ElementTree.parse(self.xml / f"{entry.get('refid')}.xml").getroot()[0]
