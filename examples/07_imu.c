@@ -61,8 +61,7 @@ int main(int argc, char **argv) {
   camera.fy = atof(argv[3]);
   camera.cx = atof(argv[4]);
   camera.cy = atof(argv[5]);
-  /* The size of the image follows from the assumption that the principal point is its middle. The
-     verdict needs the image's area. */
+  /* The verdict needs the image's area: the principal point is taken as the image's middle. */
   camera.width = (int)(2 * camera.cx);
   camera.height = (int)(2 * camera.cy);
   rotation_of(argv + 6, world[0]);

@@ -159,8 +159,9 @@ static inline int_lanes make_keys(int_lanes terms, const int32_t *products) {
   return (int_lanes)((key_lanes)terms + ((key_lanes)load_ints(products) << 9));
 }
 
-/* A bit for each lane whose key is below its limit. */
-static inline uint32_t lanes_below(const int32_t *keys, int_lanes limits) {
+/* A bit for each lane whose key is below its limit. Not inlined: with the sanitizers gcc 12 keeps
+   pointers in mask registers, and then takes one of them for this mask. */
+static TVK_NOINLINE uint32_t lanes_below(const int32_t *keys, int_lanes limits) {
 #if defined(TVK_AVX512)
   return _mm512_cmplt_epi32_mask((__m512i)load_ints(keys), (__m512i)limits);
 #elif defined(TVK_AVX2)
