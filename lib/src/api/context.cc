@@ -5,6 +5,7 @@
 
 #include "api/scratch.h"
 #include "api/sized.h"
+#include "api/within.h"
 
 namespace tv {
 namespace {
@@ -13,8 +14,6 @@ constexpr int32_t kMaxSide = 16384;
 constexpr int32_t kMaxKeypoints = 65535;
 constexpr int32_t kMaxMatches = 1000000;
 constexpr uint32_t kAllPurposes = 2 * TV_PURPOSE_ADJUST - 1;
-
-bool within(int32_t value, int32_t low, int32_t high) { return value >= low && value <= high; }
 
 constexpr tv_limits kDefaults = {sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO, 0};
 

@@ -7,6 +7,7 @@
 #include "api/scratch.h"
 #include "api/sized.h"
 #include "api/validate.h"
+#include "api/within.h"
 #include "geometry/camera.h"
 
 namespace tv {
@@ -14,18 +15,14 @@ namespace {
 
 constexpr tv_guided_options kDefaults = {sizeof(tv_guided_options), 4.0f, 0.87f, 180.0f, 4.0f};
 
-bool in_range(float value, float lowest, float largest) {
-  return value >= lowest && value <= largest;
-}
-
 tv_status read_guided_options(const tv_guided_options* options, tv_guided_options* checked) {
   *checked = kDefaults;
   const tv_status status = read_sized(options, checked);
   if (status != TV_OK) return status;
-  const bool valid = in_range(checked->max_error_px, 0.01f, 1000.0f) && checked->ratio > 0.0f &&
+  const bool valid = within(checked->max_error_px, 0.01f, 1000.0f) && checked->ratio > 0.0f &&
                      checked->ratio <= 1.0f && checked->max_distance > 0.0f &&
                      checked->max_distance <= 3000.0f &&
-                     in_range(checked->neighbourhood_px, 0.0f, 1000.0f);
+                     within(checked->neighbourhood_px, 0.0f, 1000.0f);
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 

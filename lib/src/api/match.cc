@@ -3,13 +3,11 @@
 
 #include "api/sized.h"
 #include "api/validate.h"
+#include "api/within.h"
 
 namespace {
 
 constexpr tv_match_options kDefaults = {sizeof(tv_match_options), 0.92f, 10.0f, 0.0f};
-
-// Also false for NaN.
-bool in_range(float value, float largest) { return value >= 0.0f && value <= largest; }
 
 }  // namespace
 
@@ -28,8 +26,8 @@ tv_status tv_match(tv_context* context, const tv_features* features0, const tv_f
   tv_status status = tv::read_sized(options, &checked);
   if (status != TV_OK) return status;
   if (!(checked.ratio > 0.0f && checked.ratio <= 1.0f) ||
-      !in_range(checked.neighbourhood_px, 1000.0f) || !in_range(checked.max_distance, 3000.0f) ||
-      cap_correspondences < 0) {
+      !tv::within(checked.neighbourhood_px, 0.0f, 1000.0f) ||
+      !tv::within(checked.max_distance, 0.0f, 3000.0f) || cap_correspondences < 0) {
     return TV_ERR_ARGUMENT;
   }
   const size_t out_bytes = static_cast<size_t>(cap_correspondences) * sizeof(tv_correspondence);

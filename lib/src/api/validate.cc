@@ -1,4 +1,5 @@
 #include "api/validate.h"
+#include "api/within.h"
 
 #include <initializer_list>
 
@@ -6,11 +7,6 @@
 
 namespace tv {
 namespace {
-
-bool within(int32_t value, int32_t low, int32_t high) { return value >= low && value <= high; }
-
-// False for a NaN.
-bool within(float value, float low, float high) { return value >= low && value <= high; }
 
 // True if the stride is at least the width, and so small that no row's offset overflows.
 bool is_stride(int64_t stride_bytes, int32_t width) {

@@ -159,8 +159,8 @@ static inline int_lanes make_keys(int_lanes terms, const int32_t *products) {
   return (int_lanes)((key_lanes)terms + ((key_lanes)load_ints(products) << 9));
 }
 
-/* A bit for each lane whose key is below its limit. Not inlined: with the sanitizers gcc 12 keeps
-   pointers in mask registers, and then takes one of them for this mask. */
+/* A bit for each lane whose key is below its limit. Not inlined: in the sanitizers' build gcc 12
+   then stores the mask's 16 bits on the stack and reads 32, of which the upper half is stale. */
 static TVK_NOINLINE uint32_t lanes_below(const int32_t *keys, int_lanes limits) {
 #if defined(TVK_AVX512)
   return _mm512_cmplt_epi32_mask((__m512i)load_ints(keys), (__m512i)limits);
