@@ -56,14 +56,16 @@ STATED = {
     "pc_room": Stated("room", 0.1, 0.1),
     # "rotation about 0.1 deg, position about 1 mm"
     "seq_chessboard_desk": Stated("room", 0.1, 0.0, 0.001),
-    # "exact (rendered)"
+    # "exact (rendered)"; of seq_tsukuba the published focal length is not: the matches under the true
+    # poses ask for one 1.2 per cent longer, at all gaps alike
     "seq_icl_of_kt3": Stated("room", 0.0, 0.0),
     # "some centimetres from frame to frame", "not more than about 0.1 deg between neighbours"; its
     # frames 100 to 119 are kitti00_turn's
     "seq_kitti00_first200": Stated("street", 0.65, 0.0, 0.03),
     "seq_parking": Stated("street", 0.0, 0.0),
-    # "about 1 cm and 0.5 deg"
-    "seq_tum_fr1_rpy": Stated("room", 0.5, 0.0, 0.01),
+    # "about 1 cm and 0.5 deg", with blur, rolling shutter and a time offset at up to 100 degrees a
+    # second; checked to 10 frames apart
+    "seq_tum_fr1_rpy": Stated("room", 0.5, 0.0, 0.01, trusted_gap=10),
     "seq_tsukuba": Stated("room", 0.0, 0.0),
     # "a few hundredths of a degree"
     "strecha_Herz_Jesus_P8": Stated("building", 0.03, 0.03),
@@ -77,7 +79,7 @@ STATED = {
 }
 # Sets of one and the same place.
 SAME_PLACE = (frozenset(("kitti00_turn", "seq_kitti00_first200")),)
-# Sets whose truth and camera are exact for the purpose: laser-scanned, or rendered.
+# Sets whose true poses are exact for the purpose: laser-scanned, or rendered.
 EXACT = ("strecha_Herz_Jesus_P8", "strecha_fountain_P11", "seq_icl_of_kt3", "seq_parking",
          "seq_tsukuba")
 
