@@ -287,14 +287,28 @@ def text(rows):
     return "\n".join(parts + [_others(_Text, rows)])
 
 
+def _overview(rows):
+    head = ["set", "pairs", "ok", "wrong in rotation", "wrong", "right", "% of these ok",
+            "rotation: error / sigma", "direction: error / sigma", "% inside", "+ truth"]
+    lines = []
+    for name, some in by_set(rows).items():
+        s, r = summary(some), reliability(ok(some))
+        lines.append([name, s["pairs"], s["ok"], s["wrong_rotation"], s["wrong"], s["right"],
+                      _percent(s["right_ok"], s["right"]), r["rotation_ratio"],
+                      r["direction_ratio"], _percent(r["inside"] * r["pairs"], r["pairs"]),
+                      _percent(r["inside_with_truth"] * r["pairs"], r["pairs"])])
+    return _Markdown.table("Pairs with a true pose, by set. The last four columns are of the "
+                           "\"ok\".", head, lines)
+
+
 def markdown(rows):
     """The tables of docs/accuracy.md."""
     good = related(rows)
-    return "\n".join([_sets(_Markdown, good),
+    return "\n".join([_overview(good),
                       _errors(_Markdown, "Verdict against the rotation's error [deg]", good,
                               "rotation_error_deg"),
-                      _reasons(_Markdown, good), _features(_Markdown, good),
-                      _reliability(_Markdown, good), _others(_Markdown, rows)])
+                      _features(_Markdown, good, FEATURES[:1]), _reasons(_Markdown, good),
+                      _others(_Markdown, rows)]).strip("\n")
 
 
 def wrong_pairs(rows, num):
