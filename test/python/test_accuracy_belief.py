@@ -1,5 +1,5 @@
 """Tests of twoview_tools.accuracy.belief, truth, reliability, belief_tables and match_evidence: the
-choice of pairs, errors, the ellipsoid test and the counting, against values computed another way."""
+choice of pairs, errors, the ellipsoid test and the counting, against values computed otherwise."""
 
 import itertools
 import json

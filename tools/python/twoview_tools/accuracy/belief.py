@@ -6,8 +6,8 @@
   scripts/belief --from rows.jsonl --table
 
 Pairs. Every set and sequence of $TWOVIEW_DATA with true poses and an entry in truth.py, whether or
-not anything can be matched. --pairs is shared out: a set with few images gives every pair of its
-images, the others equal shares, half of a share at the gaps 1, 2, 4, 8 .. in turn, half at random.
+not anything can be matched. --pairs is shared out: a set with few images gives all its pairs, the
+others equal shares, half of a share at the gaps 1, 2, 4, 8 .. in turn, half at random.
 Each pair goes from the images to the pose with the library's defaults and the set's camera.
 
 A pose is WRONG IN ROTATION when its rotation is off by more than 5 degrees plus the truth's stated
@@ -15,8 +15,7 @@ error, and WRONG when that is so or its direction is off by more than 10 degrees
 stated error. The direction (with its sign) counts only where the truth's direction is good to 5
 degrees, as the set's README.md and the length of the baseline say. A pose is RIGHT when rotation
 and direction are off by at most 2 degrees plus the truth's stated errors, and the direction counts.
-Pairs whose truth is not trusted (images of a drifting truth that are far apart) are run and written,
-but not counted.
+Pairs whose truth is not trusted (images too far apart for it) are run and written, but not counted.
 
 The other kinds of pairs, --others of each:
   unrelated    an image of one set with one of another, each with its own camera
@@ -28,9 +27,9 @@ Of the first three kinds every "ok" is wrong, since there is no translation to b
 pair is judged as the pairs above are.
 
 Reliability. sigma of the rotation: the square root of the trace of its 3x3 block of the covariance,
-of the direction: of its 2x2 block. Where the covariance is right, the median of error / sigma is 0.7
-to 0.9, and the truth lies in 95 of 100 ellipsoids. "+ truth" adds the truth's stated errors to the
-covariance.
+of the direction: of its 2x2 block. Where the covariance is right, the median of error / sigma is
+0.7 to 0.9, and the truth lies in 95 of 100 ellipsoids. "+ truth" adds the truth's stated errors to
+the covariance.
 """
 
 import os
@@ -299,8 +298,8 @@ def main(argv=None):
     parser.add_argument("--seed", type=int, default=1, help="of the choice of pairs (default 1)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     parser.add_argument("--rows", metavar="FILE",
-                        help="write a JSON object a line for each pair: all of tv_two_view, numbers "
-                             "of match_evidence.py, the truth and the errors")
+                        help="write a JSON object a line for each pair: all of tv_two_view, the "
+                             "numbers of match_evidence.py, the truth and the errors")
     parser.add_argument("--matches", metavar="DIR",
                         help="write the matches of each pair as numpy arrays; a row names its file")
     parser.add_argument("--from", dest="read", metavar="FILE",
