@@ -1,6 +1,6 @@
 """What the matches of a pair say about its pose, besides the numbers of tv_two_view: from
-keypoints, matches and the inlier mask. A rule of the verdict that uses such a number can be fitted on the rows
-of twoview_tools.accuracy.belief."""
+keypoints, matches and the inlier mask. A rule of the verdict that uses such a number can be fitted
+on the rows of twoview_tools.accuracy.belief."""
 
 import numpy as np
 
