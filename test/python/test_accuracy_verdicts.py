@@ -40,6 +40,12 @@ class TestChoice(unittest.TestCase):
         firsts = [a[0] < b[0] for a, b in pairs]
         self.assertTrue(60 < sum(firsts) < 140)
 
+    def test_sets_of_the_same_place_are_not_combined(self):
+        pairs = verdicts.choose_unrelated(self.images, 1000, same_place=(frozenset("ca"),))
+        self.assertEqual({frozenset((a[0], b[0])) for a, b in pairs},
+                         {frozenset("ab"), frozenset("bc")})
+        self.assertEqual(len(pairs), 60 + 80)
+
     def test_all_there_are_is_the_most(self):
         self.assertEqual(len(verdicts.choose_unrelated({"a": ["x"], "b": ["y", "z"]}, 10)), 2)
 

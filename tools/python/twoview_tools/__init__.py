@@ -1,7 +1,8 @@
 """The project's Python tools, one importable package.
 
 - formats: the one reader of pairs files, camera files and a data set's cameras.yaml.
-- accuracy: the accuracy tables (scripts/accuracy) and what measures them.
+- accuracy: the accuracy tables (scripts/accuracy), the verdict and covariance against true poses
+  (scripts/belief), and what measures them.
 - compare: twoview beside COLMAP, OpenGV, OpenCV and PoseLib (tools/compare_colmap/compare_colmap).
 - colmap: COLMAP databases and models, in and out (tools/compare_colmap/twoview_colmap).
 - paper: the paper's figures and tables (scripts/paper).

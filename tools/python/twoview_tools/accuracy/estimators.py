@@ -222,8 +222,8 @@ def run_peer(kind, matches, threshold_px=1.0, seed=0):
         return None
 
 
-def run_twoview(context, matches, options=None, seed_step=0):
-    """(R or None, t or None, inliers, tv_two_view) of our estimator; seed_step is added to its
+def estimate(context, matches, options=None, seed_step=0):
+    """(R or None, t or None, tv_two_view, inlier mask) of our estimator; seed_step is added to its
     seed. The option sigma_by_size is the exponent of tv_keypoint_sigmas; matches without sizes
     count alike."""
     from . import twoview_ctypes
@@ -237,8 +237,14 @@ def run_twoview(context, matches, options=None, seed_step=0):
     if seed_step:
         default = context.library.estimate_options(wanted).seed
         wanted["seed"] = default + seed_step
-    result, _ = context.estimate_two_view(*cameras, matches.pixels0, matches.pixels1,
-                                          matches.ratios, wanted, sigmas)
+    result, inliers = context.estimate_two_view(*cameras, matches.pixels0, matches.pixels1,
+                                                matches.ratios, wanted, sigmas)
     R = np.array(result.R).reshape(3, 3) if result.has_R else None
     t = np.array(result.t) if result.has_R and result.has_t else None
+    return R, t, result, inliers
+
+
+def run_twoview(context, matches, options=None, seed_step=0):
+    """(R or None, t or None, inliers, tv_two_view) of estimate()."""
+    R, t, result, _ = estimate(context, matches, options, seed_step)
     return R, t, result.num_inliers, result

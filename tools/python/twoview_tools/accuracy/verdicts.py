@@ -36,12 +36,15 @@ CHUNK = 200        # pairs of one piece of work
 
 # ---- the choice of unrelated pairs ---------------------------------------------------------------
 
-def choose_unrelated(images, num, seed=1):
+def choose_unrelated(images, num, seed=1, same_place=()):
     """[((set, image), (set, image))], `num` of them or all there are: images of two different sets,
-    from every pair of sets in turn. images: {set: names}. Equal input gives equal output."""
+    from every pair of sets in turn. images: {set: names}. same_place: frozensets of two sets that
+    are not combined. Equal input gives equal output."""
     random = np.random.default_rng(seed)
     queues = []
     for a, b in itertools.combinations(sorted(images), 2):
+        if frozenset((a, b)) in same_place:
+            continue
         crossed = list(itertools.product(images[a], images[b]))
         queues.append([((a, crossed[i][0]), (b, crossed[i][1]))
                        for i in random.permutation(len(crossed))])

@@ -1,0 +1,375 @@
+"""Tests of twoview_tools.accuracy.belief, truth, reliability, belief_tables and match_evidence: the
+choice of pairs, errors, the ellipsoid test and the counting, against values computed otherwise."""
+
+import itertools
+import json
+import math
+import os
+import tempfile
+import types
+import unittest
+import unittest.mock
+
+try:
+    import numpy as np
+except ImportError:
+    np = None
+
+if np is not None:
+    from twoview_tools import DEFAULT_LIBRARY
+    from twoview_tools.accuracy import (belief, belief_tables, datasets, match_evidence,
+                                        reliability, truth)
+
+
+def setUpModule():
+    if np is None:
+        raise unittest.SkipTest("no numpy: run scripts/bootstrap test")
+
+
+def cross_matrix(w):
+    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]], float)
+
+
+def exponential(w):
+    """exp([w]x) by its power series: independent of any formula for angles."""
+    X, term, total = cross_matrix(w), np.eye(3), np.eye(3)
+    for k in range(1, 60):
+        term = term @ X / k
+        total = total + term
+    return total
+
+
+def random_pose(random):
+    t = random.normal(size=3)
+    return exponential(random.normal(size=3)), t / np.linalg.norm(t)
+
+
+def moved(R, t, x):
+    """The pose that lies (w0 w1 w2 a b) from R, t, as two_view.h words it."""
+    k = min(range(3), key=lambda i: (abs(t[i]), i))
+    b1 = np.cross(np.eye(3)[k], t)
+    b1 = b1 / math.sqrt(b1 @ b1)
+    b2 = np.cross(t, b1)
+    direction = t + x[3] * b1 + x[4] * b2
+    return exponential(x[:3]) @ R, direction / math.sqrt(direction @ direction)
+
+
+class TestChoice(unittest.TestCase):
+    def test_shares_never_exceed_what_there_is_and_add_up(self):
+        shares = belief.share_out({"small": 3, "a": 1000, "b": 1000, "none": 0}, 103)
+        self.assertEqual(shares, {"small": 3, "a": 50, "b": 50, "none": 0})
+        self.assertEqual(sum(belief.share_out({"a": 5, "b": 7}, 1000).values()), 12)
+
+    def test_few_images_give_every_pair_once(self):
+        pairs = belief.choose_pairs(list("abcdef"), 100, np.random.default_rng(0))
+        self.assertEqual({frozenset(p) for p in pairs},
+                         {frozenset(p) for p in itertools.combinations("abcdef", 2)})
+        self.assertEqual(len(pairs), 15)
+
+    def test_many_images_give_gaps_and_random_pairs_without_repetition(self):
+        images = [f"{i:03d}" for i in range(200)]
+        pairs = belief.choose_pairs(images, 160, np.random.default_rng(0))
+        self.assertEqual(len({frozenset(p) for p in pairs}), 160)
+        gaps = [abs(int(a) - int(b)) for a, b in pairs]
+        for gap in (1, 2, 4, 8, 16, 32, 64, 128):  # 80 pairs over eight gaps
+            self.assertGreaterEqual(gaps.count(gap), 10)
+        self.assertGreater(sum(g & (g - 1) != 0 for g in gaps), 60)
+        self.assertEqual(pairs, belief.choose_pairs(images, 160, np.random.default_rng(0)))
+        self.assertTrue(40 < sum(a < b for a, b in pairs) < 120)
+
+    def test_an_enlarged_picture_keeps_its_middle(self):
+        gray = np.zeros((101, 201), np.uint8)
+        gray[50, 100] = gray[40, 110] = 255  # the middle, and 10 pixels from it
+        try:
+            large = belief.enlarged(gray, 2.0)
+        except ImportError:
+            self.skipTest("no cv2: run scripts/bootstrap test")
+        self.assertEqual(large.shape, gray.shape)
+        self.assertEqual(large[50, 100], 255)
+        self.assertEqual(large[30, 120], 255)
+        self.assertEqual(belief.mirrored(gray)[40, 90], 255)
+
+
+class TestReliability(unittest.TestCase):
+    def test_the_limits_are_those_of_chi_square(self):
+        for freedom, x in reliability.CHI2_95.items():
+            half, tail = x / 2, math.exp(-x / 2)
+            share = 1 - tail
+            if freedom > 2:  # closed forms for odd degrees of freedom
+                share = math.erf(math.sqrt(half)) - math.sqrt(2 * x / math.pi) * tail
+                share -= math.sqrt(2 * x / math.pi) * tail * x / 3 if freedom == 5 else 0
+            self.assertAlmostEqual(share, 0.95, 12)
+
+    def test_the_deviation_is_that_of_the_header(self):
+        random = np.random.default_rng(1)
+        for scale in (1e-9, 1e-3, 0.5):
+            for _ in range(50):
+                R, t = random_pose(random)
+                x = scale * random.normal(size=5)
+                np.testing.assert_allclose(reliability.deviation(R, t, *moved(R, t, x)), x,
+                                           rtol=1e-6, atol=1e-14)
+
+    def test_an_opposite_direction_has_no_deviation(self):
+        R, t = random_pose(np.random.default_rng(2))
+        self.assertIsNone(reliability.deviation(R, t, R, -t))
+
+    def test_a_rotation_vector_survives_half_a_turn(self):
+        for w in ([0, 0, math.pi], [math.pi - 1e-9, 0, 0], [1.0, -2, 2]):
+            R = exponential(w)
+            np.testing.assert_allclose(exponential(reliability.rotation_vector(R)), R, atol=1e-7)
+
+    def judged(self, x, C, stated, R=None, t=None, baseline=1.0):
+        if R is None:
+            R, t = random_pose(np.random.default_rng(3))
+        R_true, t_true = moved(R, t, x)
+        return reliability.judge(R, t, C.ravel(), R_true, baseline * t_true, stated)
+
+    def test_the_ellipsoid_ends_where_its_quadratic_form_says(self):
+        random = np.random.default_rng(4)
+        exact = truth.Stated("room", 0.0, 0.0)
+        for _ in range(20):
+            A = random.normal(size=(5, 5)) * 1e-3
+            C = A @ A.T + 1e-8 * np.eye(5)
+            x = random.normal(size=5)
+            edge = x * math.sqrt(11.070497693516351 / (x @ np.linalg.inv(C) @ x))
+            for factor, inside in ((0.999, True), (1.001, False)):
+                found = self.judged(edge * factor, C, exact)
+                self.assertIs(found["inside"], inside)
+                self.assertEqual(found["chi2_freedom"], 5)
+                self.assertAlmostEqual(found["chi2"], 11.0705 * factor ** 2, 2)
+
+    def test_draws_from_the_covariance_lie_inside_in_95_of_100(self):
+        random = np.random.default_rng(5)
+        A = random.normal(size=(5, 5)) * 1e-3
+        C = A @ A.T
+        draws = random.multivariate_normal(np.zeros(5), C, 2000)
+        for stated, freedom in ((truth.Stated("room", 0.0, 0.0), 5),
+                                (truth.Stated("room", 0.0, 90.0), 3)):
+            found = [self.judged(x, C, stated) for x in draws]
+            self.assertEqual(found[0]["chi2_freedom"], freedom)
+            share = np.mean([f["inside"] for f in found])
+            self.assertTrue(0.93 < share < 0.97, share)
+
+    def test_the_truth_s_error_enlarges_the_ellipsoid_by_its_mean_square(self):
+        stated = truth.Stated("room", 0.5, 1.0)
+        random = np.random.default_rng(6)
+        A = random.normal(size=(5, 5)) * 1e-3
+        C = A @ A.T
+        x = 0.01 * random.normal(size=5)
+        T = np.diag([math.radians(0.5) ** 2 / 3] * 3 + [math.radians(1.0) ** 2 / 2] * 2)
+        found = self.judged(x, C, stated)
+        self.assertAlmostEqual(found["chi2_with_truth"], x @ np.linalg.inv(C + T) @ x, 6)
+        # A truth whose angle has this root mean square: draw it and measure the angle.
+        angles = np.linalg.norm(random.multivariate_normal(np.zeros(3), T[:3, :3], 20000), axis=1)
+        self.assertAlmostEqual(math.degrees(math.sqrt(np.mean(angles ** 2))), 0.5, 2)
+
+    def test_wrong_and_right_begin_where_the_text_says(self):
+        stated, C = truth.Stated("room", 0.5, 1.0), 1e-6 * np.eye(5)
+        for angle, wrong, right in ((2.49, False, True), (2.51, False, False),
+                                    (5.49, False, False), (5.51, True, False)):
+            found = self.judged([math.radians(angle), 0, 0, 0, 0], C, stated)
+            self.assertAlmostEqual(found["rotation_error_deg"], angle, 9)
+            self.assertEqual((found["wrong"], found["wrong_rotation"], found["right"]),
+                             (wrong, wrong, right))
+        for angle, wrong, right in ((2.99, False, True), (3.01, False, False),
+                                    (10.99, False, False), (11.01, True, False)):
+            found = self.judged([0, 0, 0, math.tan(math.radians(angle)), 0], C, stated)
+            self.assertAlmostEqual(found["direction_error_deg"], angle, 9)
+            self.assertEqual((found["wrong"], found["wrong_rotation"], found["right"]),
+                             (wrong, False, right))
+
+    def test_the_direction_has_a_sign_and_counts_only_on_a_long_baseline(self):
+        stated = truth.Stated("room", 0.0, 0.0, position=0.01)
+        R, t = random_pose(np.random.default_rng(7))
+        far = reliability.judge(R, t, None, R, -t, stated)  # 1.4 cm in a metre: 0.8 degrees
+        self.assertEqual((far["direction_counts"], far["wrong"], far["wrong_rotation"]),
+                         (True, True, False))
+        self.assertAlmostEqual(far["direction_error_deg"], 180.0, 6)
+        self.assertAlmostEqual(far["truth_direction_deg"],
+                               math.degrees(math.atan(0.01 * math.sqrt(2))), 9)
+        near = reliability.judge(R, t, None, R, -0.1 * t, stated)  # 8 degrees
+        self.assertEqual((near["direction_counts"], near["wrong"], near["right"]),
+                         (False, False, None))
+
+    def test_no_pose_is_neither_right_nor_wrong(self):
+        found = reliability.judge(None, None, None, np.eye(3), np.ones(3),
+                                  truth.Stated("room", 0, 0))
+        self.assertEqual((found["wrong"], found["right"], found["rotation_error_deg"]),
+                         (None, None, None))
+
+    def test_sigmas_are_roots_of_the_traces(self):
+        C = np.diag([1.0, 4, 4, 9, 16]) * math.radians(1) ** 2
+        found = reliability.sigmas(C.ravel())
+        for key, value in (("rotation", 3), ("direction", 5), ("largest", 4)):
+            self.assertAlmostEqual(found[f"sigma_{key}_deg"], value, 12)
+
+
+def row(**values):
+    """A row with a right and "ok" pose, changed by `values`."""
+    return {"kind": "related", "trusted": True, "set": "a", "verdict": "ok", "reasons": [],
+            "rotation_error_deg": 0.1, "direction_error_deg": 1.0, "wrong": False,
+            "wrong_rotation": False, "right": True, "num_inliers": 50, "inlier_share": 0.5,
+            "median_parallax_deg": 5.0, "coverage": 0.5, "chi2_freedom": 5, "inside": True,
+            "inside_with_truth": True, "direction_counts": True, "sigma_rotation_deg": 0.1,
+            "sigma_direction_deg": 0.5, **values}
+
+
+def bad(**values):
+    return row(rotation_error_deg=50.0, wrong=True, wrong_rotation=True, right=False, inside=False,
+               inside_with_truth=False, **values)
+
+
+class TestCounts(unittest.TestCase):
+    def test_a_bound_belongs_to_the_class_above_it(self):
+        self.assertEqual([belief_tables.class_of(v, (1, 2, 5)) for v in (0, 1, 1.9, 2, 4.9, 5, 9)],
+                         [0, 1, 1, 2, 2, 3, 3])
+        self.assertEqual(belief_tables.class_names((1, 2, 5)), ["< 1", "1 - 2", "2 - 5", ">= 5"])
+
+    def test_each_error_is_counted_once(self):
+        rows = [row(), row(rotation_error_deg=0.5), row(rotation_error_deg=19.9),
+                row(rotation_error_deg=20.0), row(verdict="refused", rotation_error_deg=None)]
+        table = belief_tables.error_table(rows, "rotation_error_deg")
+        self.assertEqual(table["ok"], [1, 1, 0, 0, 0, 1, 1, 0])
+        self.assertEqual(table["refused"], [0] * 7 + [1])
+
+    def test_reasons_alone_and_together(self):
+        rows = [row(), bad(verdict="doubtful", reasons=["low_parallax", "second_motion"]),
+                row(verdict="doubtful", reasons=["low_parallax"]),
+                row(verdict="refused", rotation_error_deg=None, reasons=["no_motion"])]
+        table = belief_tables.reason_table(rows)
+        self.assertEqual(table["low_parallax"], {"pairs": 2, "wrong": 1, "right": 1, "alone": 1,
+                                                 "alone_wrong": 0, "alone_right": 1})
+        self.assertEqual(table["second_motion"]["alone"], 0)
+        self.assertEqual(table["none (ok)"]["pairs"], 1)
+        self.assertNotIn("no_motion", table)
+
+    def test_features_split_ok_and_right(self):
+        rows = [row(num_inliers=19), bad(num_inliers=20), row(num_inliers=20, verdict="doubtful"),
+                row(num_inliers=200, right=False, wrong=True)]
+        table = belief_tables.feature_table(rows, "num_inliers", (20, 200))
+        self.assertEqual(table, [[1, 0, 0, 1, 1], [1, 1, 1, 1, 0], [1, 0, 1, 0, 0]])
+
+    def test_reliability_is_medians_and_shares(self):
+        rows = [row(), row(rotation_error_deg=0.3, inside=False),
+                row(rotation_error_deg=0.2, direction_counts=False, direction_error_deg=70.0)]
+        found = belief_tables.reliability(rows)
+        self.assertEqual((found["pairs"], found["directions"]), (3, 2))
+        self.assertAlmostEqual(found["rotation_ratio"], 2.0)
+        self.assertAlmostEqual(found["direction_ratio"], 2.0)
+        self.assertAlmostEqual(found["inside"], 2 / 3)
+        self.assertAlmostEqual(found["inside_with_truth"], 1.0)
+
+    def test_the_check_counts_trusted_ok_pairs_alone(self):
+        rows = [row()] * 98 + [bad(), row(wrong=True, right=False), bad(trusted=False),
+                               bad(verdict="doubtful"), bad(kind="zoomed")]
+        for key, share in (("wrong", 0.02), ("wrong_rotation", 0.01)):
+            self.assertTrue(belief_tables.check(rows, key, share)[0])
+            self.assertFalse(belief_tables.check(rows, key, share - 1e-6)[0])
+
+    def test_the_summary_counts(self):
+        found = belief_tables.summary([row(), bad(), row(verdict="doubtful"),
+                                       row(wrong=True, right=False)])
+        self.assertEqual(found, {"pairs": 4, "ok": 3, "wrong_rotation": 1, "wrong": 2, "right": 2,
+                                 "right_ok": 1})
+
+    def test_the_command_reads_rows_and_its_status_follows_the_check(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "rows.jsonl")
+            impossible = {"kind": "unrelated", "verdict": "refused", "set": "a", "trusted": True}
+            with open(path, "w", encoding="utf-8") as file:
+                for one in [row()] * 9 + [bad(), impossible]:
+                    file.write(json.dumps(one) + "\n")
+            quiet = unittest.mock.patch("sys.stdout")
+            with quiet:
+                belief.main(["--from", path, "--check", "0.1"])
+                belief.main(["--from", path, "--table"])
+                with self.assertRaises(SystemExit) as caught:
+                    belief.main(["--from", path, "--check-rotation", "0.09"])
+        self.assertEqual(caught.exception.code, 1)
+
+
+class TestEvidence(unittest.TestCase):
+    def setUp(self):
+        random = np.random.default_rng(8)
+        self.R, self.t = exponential([0.1, -0.2, 0.7]), np.array([0.3, 0.1, 0.9])
+        self.t /= np.linalg.norm(self.t)
+        points = np.column_stack([random.uniform(-2, 2, (60, 2)), random.uniform(4, 8, 60)])
+        other = points @ self.R.T + self.t
+        K = np.diag([500.0, 500.0, 1.0])
+        self.matches = types.SimpleNamespace(
+            rays0=points[:, :2] / points[:, 2:], rays1=other[:, :2] / other[:, 2:],
+            cameras=((K, ()), (K, ())), sizes=((640, 480),) * 2)
+        kind = [("x", "f4"), ("y", "f4"), ("size", "f4"), ("angle_rad", "f4")]
+        self.keypoints = np.zeros(60, kind), np.zeros(60, kind)
+        self.keypoints[0]["size"] = 8.0
+        self.keypoints[1]["size"] = 8.0 * points[:, 2] / other[:, 2]
+        # What an edge does that lies in the plane of both centres and the point.
+        step = 1e-6 * (-self.R.T @ self.t)
+        for rays, k, from_world in ((self.matches.rays0, 0, lambda p: p),
+                                    (self.matches.rays1, 1, lambda p: p @ self.R.T + self.t)):
+            there = from_world(points + step)
+            change = there[:, :2] / there[:, 2:] - rays
+            self.keypoints[k]["angle_rad"] = np.arctan2(change[:, 1], change[:, 0])
+
+    def test_keypoints_that_follow_the_pose_agree_with_it(self):
+        every = np.ones(60, bool)
+        found = match_evidence.of_pose(self.matches, *self.keypoints, every, self.R, self.t)
+        self.assertEqual((found["scale_agreement"], found["orientation_agreement"]), (1.0, 1.0))
+        self.assertEqual((found["in_front_share"], found["within_1px"]), (1.0, 60))
+
+    def test_keypoints_that_do_not_disagree(self):
+        every = np.ones(60, bool)
+        self.keypoints[1]["size"] *= 2
+        self.keypoints[1]["angle_rad"] += np.pi / 2
+        found = match_evidence.of_pose(self.matches, *self.keypoints, every, self.R, self.t)
+        self.assertEqual((found["scale_agreement"], found["orientation_agreement"]), (0.0, 0.0))
+        self.assertAlmostEqual(found["scale_offset"], 1.0, 5)
+
+    def test_a_cluster_is_few_places(self):
+        pixels = np.array([[10.0 + i / 10, 10] for i in range(9)] + [[600.0, 400]])
+        links = np.zeros(10, [("ratio", "f4"), ("dist_sq", "i4")])
+        matches = types.SimpleNamespace(pixels0=pixels, pixels1=pixels, sizes=((640, 480),) * 2)
+        found = match_evidence.of_matches(matches, links, np.ones(10, bool))
+        self.assertEqual((found["inlier_places"], found["cluster_share"]), (2, 0.9))
+
+
+class TestRealPairs(unittest.TestCase):
+    def sets(self):
+        names = truth.posed_sets()
+        if not names:
+            self.skipTest(f"no data in {datasets.data_dir()}")
+        return [truth.PosedSet(os.path.join(datasets.data_dir(), n)) for n in names]
+
+    def test_the_poses_are_those_of_the_pairs_files(self):
+        for data in self.sets():
+            for (a, b), line in data.lines.items():
+                if {a, b} <= set(data.poses):
+                    R, t = data.motion(a, b)
+                    np.testing.assert_allclose(R, line.R, atol=2e-6)
+                    np.testing.assert_allclose(t, line.t, atol=1e-5 * np.linalg.norm(line.t))
+
+    def test_a_row_holds_the_error_of_its_pose(self):
+        names = [data.name for data in self.sets()]
+        if not os.path.isfile(os.environ.get("TWOVIEW_LIBRARY", DEFAULT_LIBRARY)):
+            self.skipTest("no library: build build/release")
+        if "strecha_Herz_Jesus_P8" not in names:
+            self.skipTest("no strecha_Herz_Jesus_P8")
+        with unittest.mock.patch("sys.stderr"):
+            rows = belief.run(["strecha_Herz_Jesus_P8"], 6, 2,
+                              library=os.environ.get("TWOVIEW_LIBRARY"))
+        related = [r for r in rows if r["kind"] == "related"]
+        self.assertEqual(len(related), 6)
+        self.assertEqual([r["kind"] for r in rows[6:]].count("mirrored"), 2)
+        for r in related:
+            if r["rotation_error_deg"] is None:
+                continue
+            R, R_true = (np.reshape(r[key], (3, 3)) for key in ("R", "R_true"))
+            cosine = np.clip((np.trace(R @ R_true.T) - 1) / 2, -1, 1)
+            self.assertAlmostEqual(r["rotation_error_deg"], math.degrees(math.acos(cosine)), 4)
+            self.assertAlmostEqual(r["inlier_share"], r["num_inliers"] / r["num_matches"])
+        self.assertTrue(any(r["right"] for r in related))
+        json.dumps(related, allow_nan=False)
+
+
+if __name__ == "__main__":
+    unittest.main()
