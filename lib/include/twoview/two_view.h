@@ -89,7 +89,7 @@ typedef enum tv_reason {
   TV_REASON_TOO_FEW_MATCHES = 1 << 0,
   /* Fewer than 25 % of the matches are inliers, or the residuals are uniform over the threshold, as
      random matches' are. Matches that can never be inliers (tv_estimate_two_view) are not counted.
-   */
+     Of tv_reconstruct also: the two images match better when one of them is mirrored. */
   TV_REASON_LOW_INLIER_RATIO = 1 << 1,
   /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
      10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees. */

@@ -292,6 +292,37 @@ __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const
   return tv_match(context, &found[0], &found[1], options.match, r.matches, capacity, num_matches);
 }
 
+// Replaces descriptors by those of the mirrored patches; a second call restores them. A patch is
+// turned to its angle: mirrored across that axis, its rows of cells change places, the first with
+// the last, and the direction bin k becomes bin -k.
+void mirror_descriptors(uint8_t* descriptors, int32_t num) {
+  for (int32_t i = 0; i < num; ++i, descriptors += TV_DESCRIPTOR_BYTES) {
+    uint8_t mirrored[TV_DESCRIPTOR_BYTES];
+    for (int k = 0; k < TV_DESCRIPTOR_BYTES; ++k) {
+      mirrored[k] = descriptors[32 * (3 - k / 32) + (k & 24) + (-k & 7)];
+    }
+    std::copy(mirrored, mirrored + TV_DESCRIPTOR_BYTES, descriptors);
+  }
+}
+
+// Whether more of the strongest keypoints match when one picture is mirrored; the same for
+// exchanged views. docs/algorithms/two_view.md, mirrored pictures. Not inlined, so that its stack
+// frame is not in use during the estimate.
+__attribute__((noinline)) bool looks_mirrored(tv_context* context, const int32_t num_keypoints[2],
+                                              const tv_match_options* options, Results& r) {
+  constexpr int32_t kStrongest = 512;
+  const int32_t strongest[2] = {std::min(num_keypoints[0], kStrongest),
+                                std::min(num_keypoints[1], kStrongest)};
+  const tv_features features[2] = {features_of(r, strongest, 0), features_of(r, strongest, 1)};
+  int32_t count[2] = {0, 0};  // as they are, mirrored
+  for (int32_t& n : count) {
+    tv_match(context, &features[0], &features[1], options, r.more_matches,
+             context->limits.max_keypoints, &n);
+    mirror_descriptors(r.descriptors[0], strongest[0]);
+  }
+  return count[1] > count[0];
+}
+
 // Not inlined, so that its stack frame is not in use during the estimate.
 __attribute__((noinline)) void write_reconstruction(const Results& r,
                                                     const int32_t num_keypoints[2],
@@ -362,6 +393,12 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
                                 checked.estimate, &estimate, r.inlier_mask);
   if (status != TV_OK) return status;
   tv::correct_cameras(estimate, views[0], views[1], r);
+  // Where a quarter of the keypoints match, the pictures are not mirrored.
+  if (estimate.verdict == TV_VERDICT_OK &&
+      4 * num_matches < std::min(num_keypoints[0], num_keypoints[1]) &&
+      tv::looks_mirrored(context, num_keypoints, checked.match, r)) {
+    tv::doubt_mirrored(&estimate);
+  }
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
     status = tv::match_along_lines(context, views[0], views[1], num_keypoints, checked.estimate, r,
                                    &num_matches, &num_left_out, &estimate);

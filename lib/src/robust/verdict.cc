@@ -104,6 +104,14 @@ Judgement judge(const Evidence& e) {
           reasons};
 }
 
+// LOW_INLIER_RATIO: the matches that would show that the pictures are of one scene are missing.
+// Those that there are lie on corners that are their own mirror image, and for such matches there
+// is a pose, too.
+void doubt_mirrored(tv_two_view* estimate) {
+  estimate->reasons |= TV_REASON_LOW_INLIER_RATIO;
+  if (estimate->verdict == TV_VERDICT_OK) estimate->verdict = TV_VERDICT_DOUBTFUL;
+}
+
 // Guided matching finds matches where the first estimate has their epipolar lines: their agreement
 // with it is no evidence for it, and so the verdict, the reasons and the test of the principal
 // point stay those of the first. The second estimate is the more accurate one and replaces the

@@ -41,6 +41,9 @@ Judgement judge(const Evidence& evidence);
 // The coverage that is reported and judged: the larger of the two views'.
 double coverage_of(const Evidence& evidence);
 
+// Gives an estimate the reason that its two pictures match better when one of them is mirrored.
+void doubt_mirrored(tv_two_view* estimate);
+
 // Whether the estimate with the matches of guided matching replaces the first one. Where it does,
 // it is given the first one's verdict, reasons and test of the principal point.
 bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again);
