@@ -76,39 +76,62 @@ void measure_pose(Fit& f) {
   for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
 }
 
-// The share of an 8x8 grid on the view's image, or, uncalibrated, on the box around its points,
-// that holds an inlier.
-double coverage(const Fit& f, int view) {
+struct Box {
+  double low[2], high[2];
+};
+
+// The view's image or, uncalibrated, the box around its points.
+Box image_box(const Fit& f, int view) {
   const TwoViewProblem& problem = f.problem;
-  const double* pixels = problem.pixels[view];
-  double low[2] = {0, 0}, high[2] = {0, 0};
   if (problem.calibrated) {
-    low[0] = low[1] = -0.5;
-    high[0] = problem.camera[view].model.width - 0.5;
-    high[1] = problem.camera[view].model.height - 0.5;
-  } else {
-    for (int k = 0; k < f.matches.num_all; ++k) {
-      for (int d = 0; d < 2; ++d) {
-        const double x = pixels[2 * f.matches.order[k] + d];
-        if (k == 0 || x < low[d]) low[d] = x;
-        if (k == 0 || x > high[d]) high[d] = x;
-      }
+    const tv_camera& camera = problem.camera[view].model;
+    return {{-0.5, -0.5}, {camera.width - 0.5, camera.height - 0.5}};
+  }
+  const double* pixels = problem.pixels[view];
+  Box box = {};
+  for (int k = 0; k < f.matches.num_all; ++k) {
+    for (int d = 0; d < 2; ++d) {
+      const double x = pixels[2 * f.matches.order[k] + d];
+      if (k == 0 || x < box.low[d]) box.low[d] = x;
+      if (k == 0 || x > box.high[d]) box.high[d] = x;
     }
   }
-  bool cells[64] = {};
-  int filled = 0;
+  return box;
+}
+
+// The number of cells of a grid on the box that hold an inlier. A point outside the box counts in
+// the nearest cell. The grid has at most 64 columns and rows.
+int filled_cells(const Fit& f, int view, const Box& box, const int grid[2]) {
+  uint64_t filled[64] = {};
+  int count = 0;
   for (int k = 0; k < f.matches.num_all; ++k) {
     if (f.out->inlier[k] == 0) continue;
     int cell[2];
     for (int d = 0; d < 2; ++d) {
-      const double place = 8 * (pixels[2 * f.matches.order[k] + d] - low[d]) / (high[d] - low[d]);
-      cell[d] = place >= 7 ? 7 : (place > 0 ? static_cast<int>(place) : 0);
+      const double x = f.problem.pixels[view][2 * f.matches.order[k] + d];
+      const double place = grid[d] * (x - box.low[d]) / (box.high[d] - box.low[d]);
+      const int last = grid[d] - 1;
+      cell[d] = place >= last ? last : (place > 0 ? static_cast<int>(place) : 0);
     }
-    bool& place = cells[8 * cell[1] + cell[0]];
-    filled += !place;
-    place = true;
+    const uint64_t bit = uint64_t{1} << cell[0];
+    count += (filled[cell[1]] & bit) == 0;
+    filled[cell[1]] |= bit;
   }
-  return filled / 64.0;
+  return count;
+}
+
+// The share of an 8x8 grid that holds an inlier, and the number of places: of cells of 32 pixels,
+// or of a 16th of the longer side where the image is small, a 64th where it is large.
+void measure_spread(const Fit& f, int view, Evidence& evidence) {
+  const Box box = image_box(f, view);
+  const double sides[2] = {box.high[0] - box.low[0], box.high[1] - box.low[1]};
+  const double longer = std::max(sides[0], sides[1]);
+  const double cell = std::max(std::min(32.0, longer / 16), longer / 64);
+  const int eighths[2] = {8, 8};
+  int places[2];
+  for (int d = 0; d < 2; ++d) places[d] = std::max(1, static_cast<int>(sides[d] / cell + 0.5));
+  evidence.coverage[view] = filled_cells(f, view, box, eighths) / 64.0;
+  evidence.num_places[view] = filled_cells(f, view, box, places);
 }
 
 void measure_inliers(Fit& f) {
@@ -134,7 +157,7 @@ void measure_inliers(Fit& f) {
   evidence.num_matches = matches.num_all;
   evidence.num_different = matches.num_unique();
   evidence.threshold_px = f.threshold;
-  for (int v = 0; v < 2; ++v) evidence.coverage[v] = coverage(f, v);
+  for (int v = 0; v < 2; ++v) measure_spread(f, v, evidence);
 }
 
 // A second model is searched only among the matches that are farther from the first than kClear

@@ -11,14 +11,22 @@ namespace {
 // others are too few to contradict a wrong one. COLMAP requires as many.
 constexpr int kFewMatches = 15;
 
+// Inliers within a few pixels of one another fit or miss a wrong pose together, and so count as one
+// witness. Fewer places than this are wrong about five times as often as more
+// (docs/decisions/0021-places.md).
+constexpr int kFewPlaces = 20;
+
 bool has_full_pose(const Evidence& e) {
   return e.kind == TV_KIND_CALIBRATED || e.kind == TV_KIND_PLANAR;
 }
 
-// TOO_FEW_MATCHES: fewer than 15 different matches are inliers. Of a degenerate pair, which has no
-// inliers, fewer than 15 different matches were given.
+// TOO_FEW_MATCHES: fewer than 15 different matches are inliers, or the inliers of a full pose lie
+// in fewer than 20 places of an image. Of a degenerate pair, which has no inliers, fewer than 15
+// different matches were given.
 bool too_few_matches(const Evidence& e) {
-  return (e.kind == TV_KIND_DEGENERATE ? e.num_different : e.num_different_inliers) < kFewMatches;
+  if (e.kind == TV_KIND_DEGENERATE) return e.num_different < kFewMatches;
+  const int places = std::min(e.num_places[0], e.num_places[1]);
+  return e.num_different_inliers < kFewMatches || (has_full_pose(e) && places < kFewPlaces);
 }
 
 // LOW_INLIER_RATIO: fewer than 25 % of the matches are inliers, or the residuals are uniform over

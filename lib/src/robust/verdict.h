@@ -16,6 +16,7 @@ struct Evidence {
   // Usable matches and inliers; `different` ones do not count the repeats of a match.
   int num_matches = 0, num_inliers = 0, num_different = 0, num_different_inliers = 0;
   double coverage[2] = {0, 0};  // share of an 8x8 grid on the image that holds an inlier
+  int num_places[2] = {0, 0};   // cells of about 32 pixels that hold an inlier
   // Calibrated kinds but the degenerate one. Whether matches far from the pair's model have a model
   // of their own (second_model.h), and how far the points lie as on a lattice (lattice.h).
   bool has_second_model = false;
