@@ -34,13 +34,13 @@ typedef struct trial {
   int typical;   /* 1: use the sizes of a 640 x 480 image, for --time */
   int64_t calls; /* number of calls of the kernel on the same input */
   block blocks[MAX_BLOCKS];
-  int num_blocks;
+  int num_lists;
 } trial;
 
 static void *take(trial *t, size_t bytes, size_t unit, int is_output) {
   const size_t offset = GUARD_BYTES + unit * (size_t)random_int(&t->seed, 0, 15);
-  block *b = &t->blocks[t->num_blocks++];
-  TEST_ASSERT_TRUE(t->num_blocks <= MAX_BLOCKS);
+  block *b = &t->blocks[t->num_lists++];
+  TEST_ASSERT_TRUE(t->num_lists <= MAX_BLOCKS);
   b->memory = (uint8_t *)malloc(offset + bytes + (is_output ? GUARD_BYTES : 0));
   TEST_ASSERT_NOT_NULL(b->memory);
   b->data = b->memory + offset;
@@ -51,7 +51,7 @@ static void *take(trial *t, size_t bytes, size_t unit, int is_output) {
 }
 
 static void release(trial *t) {
-  while (t->num_blocks > 0) free(t->blocks[--t->num_blocks].memory);
+  while (t->num_lists > 0) free(t->blocks[--t->num_lists].memory);
 }
 
 #define INPUT(t, type, count) ((type *)take(t, (size_t)(count) * sizeof(type), sizeof(type), 0))
@@ -334,37 +334,60 @@ static tvk_descriptors in_any_order(trial *t, const uint8_t *bytes, int32_t num)
   return set;
 }
 
-enum { BOUND = TVK_NEAREST_LIST - 1 };
-
-/* A list is right if it ascends, each entry is the distance of its group's nearest member, and no
-   descriptor of another group is nearer than the bound. The entries up to the bound are then right
-   in every set; those beyond it, the groups and the bound depend on the set. The list is replaced
-   by the smallest distance. */
+/* A list is right if it ascends, each entry is the distance of its group's nearest member, which
+   the entry names, and no descriptor of another group is nearer than both the last entry and the
+   odd entry of its bin. Entries depend on the set, but for the smallest distance; the list is
+   replaced by it. */
 static void check_list(const uint8_t *query, const tvk_descriptors *set, int32_t group,
-                       tvk_nearest *list) {
+                       int32_t bins, tvk_nearest *list) {
   int32_t least[TVK_NEAREST_LIST], smallest = TVK_NEAREST_NONE, rank, k;
   for (k = 0; k < TVK_NEAREST_LIST; ++k) least[k] = TVK_NEAREST_NONE;
   for (rank = 0; rank < set->num; ++rank) {
     const int32_t dist =
         distance_of(query, set->bytes + (size_t)set->order[rank] * TVK_DESCRIPTOR_SIZE);
-    int32_t listed = 0;
+    int32_t listed = 0, bound = list->keys[TVK_NEAREST_LIST - 1] >> 1;
     if (dist < smallest) smallest = dist;
     for (k = 0; k < TVK_NEAREST_LIST; ++k) {
-      if (list->dists[k] == TVK_NEAREST_NONE || list->groups[k] != rank / group) continue;
+      const int32_t listed_group = list->ranks[k] / group, of_list = list->keys[k] >> 1;
+      if (of_list >= TVK_NEAREST_NONE) continue;
+      if (list->keys[k] % 2 != 0 && listed_group % bins == rank / group % bins && of_list < bound) {
+        bound = of_list;
+      }
+      if (listed_group != rank / group) continue;
       TEST_ASSERT_FALSE(listed);
       listed = 1;
       if (dist < least[k]) least[k] = dist;
+      if (rank == list->ranks[k]) TEST_ASSERT_EQUAL_INT(dist, of_list);
     }
-    TEST_ASSERT_TRUE(listed || dist >= list->dists[BOUND]);
+    if (!(listed || dist >= bound)) {
+      printf("n %d group %d bins %d rank %d dist %d bound %d\n", set->num, group, bins, rank, dist,
+             bound);
+      for (k = 0; k < 6; k++) printf(" %d:%d", list->keys[k], list->ranks[k]);
+      puts("");
+    }
+    TEST_ASSERT_TRUE(listed || dist >= bound);
   }
   for (k = 0; k < TVK_NEAREST_LIST; ++k) {
-    TEST_ASSERT_EQUAL_INT(least[k], list->dists[k]);
-    TEST_ASSERT_TRUE(k == 0 || k == BOUND || list->dists[k - 1] <= list->dists[k]);
+    const int32_t of_list = list->keys[k] >> 1;
+    TEST_ASSERT_EQUAL_INT(least[k], of_list < TVK_NEAREST_NONE ? of_list : TVK_NEAREST_NONE);
+    TEST_ASSERT_TRUE(of_list >= TVK_NEAREST_NONE || list->ranks[k] < set->num);
+    TEST_ASSERT_TRUE(k == 0 || list->keys[k - 1] <= list->keys[k]);
   }
-  TEST_ASSERT_EQUAL_INT(smallest, list->dists[0]);
-  TEST_ASSERT_TRUE(list->dists[BOUND] >= smallest && list->dists[BOUND] <= TVK_NEAREST_NONE);
+  TEST_ASSERT_EQUAL_INT(smallest, least[0]);
   memset(list, 0, sizeof *list);
-  list->dists[0] = smallest;
+  list->keys[0] = smallest;
+}
+
+/* The list of the column of that rank. */
+static tvk_nearest list_of(const tvk_nearest_lists *of_columns, int32_t rank) {
+  const tvk_nearest_lists *lists = &of_columns[TVK_NEAREST_NUMBER(rank)];
+  tvk_nearest list;
+  int32_t k;
+  for (k = 0; k < TVK_NEAREST_LIST; ++k) {
+    list.keys[k] = lists->entries[k].keys[TVK_NEAREST_LANE(rank)];
+    list.ranks[k] = lists->entries[k].ranks[TVK_NEAREST_LANE(rank)];
+  }
+  return list;
 }
 
 static void case_nearest_groups(trial *t) {
@@ -378,21 +401,27 @@ static void case_nearest_groups(trial *t) {
   const tvk_descriptors columns = in_any_order(t, column_bytes, num_columns);
   const size_t scratch_bytes = TVK_NEAREST_SCRATCH(num_rows, num_columns);
   uint8_t *scratch = OUTPUT(t, uint8_t, scratch_bytes + 64), *aligned = scratch;
-  tvk_nearest *of_columns = OUTPUT(t, tvk_nearest, num_columns);
+  const int32_t num_lists = TVK_NEAREST_LISTS(num_columns);
+  tvk_nearest_lists *of_columns = OUTPUT(t, tvk_nearest_lists, num_lists);
   tvk_nearest *of_rows = OUTPUT(t, tvk_nearest, num_rows);
-  int32_t group = 0, k;
+  tvk_nearest_shape shape = {0, 0, 0};
+  int32_t k;
   while ((uintptr_t)aligned % 64 != 0) ++aligned;
-  REPEAT(t, group = t->set->nearest_groups(&rows, &columns, aligned, of_columns, of_rows));
+  REPEAT(t, shape = t->set->nearest_groups(&rows, &columns, aligned, of_columns, of_rows));
   TEST_ASSERT_TRUE(is_pattern(scratch, aligned));
   TEST_ASSERT_TRUE(is_pattern(aligned + scratch_bytes, scratch + scratch_bytes + 64));
   memset(scratch, PATTERN, scratch_bytes + 64);
   if (t->typical) return; /* timing */
   for (k = 0; k < num_rows; ++k) {
-    check_list(row_bytes + k * TVK_DESCRIPTOR_SIZE, &columns, TVK_NEAREST_GROUP, &of_rows[k]);
+    check_list(row_bytes + k * TVK_DESCRIPTOR_SIZE, &columns, TVK_NEAREST_GROUP, shape.column_bins,
+               &of_rows[k]);
   }
   for (k = 0; k < num_columns; ++k) {
-    check_list(column_bytes + k * TVK_DESCRIPTOR_SIZE, &rows, group, &of_columns[k]);
+    tvk_nearest list = list_of(of_columns, k);
+    check_list(column_bytes + columns.order[k] * TVK_DESCRIPTOR_SIZE, &rows, shape.row_group,
+               shape.row_bins, &list);
   }
+  memset(of_columns, 0, (size_t)num_lists * sizeof *of_columns);
 }
 
 static void case_squared_distances(trial *t) {
@@ -496,10 +525,10 @@ static void case_transfer_sums(trial *t) {
 }
 
 static void case_sampson_score(trial *t) {
-  const int32_t num_blocks = pick(t, 0, 8, 16), on_plane = pick(t, 0, 1, 1);
-  const int32_t n = num_blocks * TVK_SCORE_BLOCK, scale = random_int(&t->seed, 0, 2);
+  const int32_t num_lists = pick(t, 0, 8, 16), on_plane = pick(t, 0, 1, 1);
+  const int32_t n = num_lists * TVK_SCORE_BLOCK, scale = random_int(&t->seed, 0, 2);
   const float inverse_sq = scale == 0 ? 1e-18f : scale == 1 ? 1.0f : 1e37f;
-  const int32_t first_block = pick(t, 0, num_blocks, 0);
+  const int32_t first_block = pick(t, 0, num_lists, 0);
   const float *read[18];
   float *m = INPUT(t, float, 9);
   int64_t *score = OUTPUT(t, int64_t, 1);
@@ -516,7 +545,7 @@ static void case_sampson_score(trial *t) {
     read[k] = array;
   }
   for (k = 0; k < 9; ++k) m[k] = (float)(2 * random_unit(&t->seed) - 1);
-  REPEAT(t, *score = t->set->sampson_score(read, first_block, num_blocks - first_block, on_plane, m,
+  REPEAT(t, *score = t->set->sampson_score(read, first_block, num_lists - first_block, on_plane, m,
                                            inverse_sq));
 }
 
@@ -612,7 +641,7 @@ static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_
 /* Compares the kernel set with C on one input; returns what differs, or null. */
 static const char *difference(const trial *expected, const trial *actual) {
   int k;
-  for (k = 0; k < actual->num_blocks; ++k) {
+  for (k = 0; k < actual->num_lists; ++k) {
     const block *b = &actual->blocks[k];
     if (!b->is_output) {
       if (memcmp(expected->blocks[k].data, b->data, b->bytes) != 0) return "an input was changed";

@@ -30,18 +30,37 @@ typedef struct tvk_descriptors {
   int32_t num;
 } tvk_descriptors;
 
-#define TVK_NEAREST_LIST 6       /* groups in a list */
+#define TVK_NEAREST_LIST 7       /* groups in a list */
 #define TVK_NEAREST_GROUP 4      /* columns of a group */
 #define TVK_NEAREST_NONE 8388607 /* above every squared distance */
 
-/* The groups nearest to a descriptor: the squared distance of each one's nearest member,
-   TVK_NEAREST_NONE for unused entries, and its number. Group g holds the ranks g n .. g n + n - 1.
-   The distance of descriptors that are in no listed group is at least that of the last entry, the
-   bound. The others ascend; of these, entries beyond the bound may not be the next ones. */
+/* The groups nearest to a descriptor, in ascending order, each by its nearest member: twice its
+   squared distance, TVK_NEAREST_NONE or more for unused entries, and its rank. A key that is odd is
+   a bound for its bin: no group of the bin that is not listed is nearer. The groups of bins without
+   an odd key that are not listed are not nearer than the last entry. */
 typedef struct tvk_nearest {
-  int32_t dists[TVK_NEAREST_LIST];
-  uint16_t groups[TVK_NEAREST_LIST];
+  int32_t keys[TVK_NEAREST_LIST];
+  uint16_t ranks[TVK_NEAREST_LIST];
 } tvk_nearest;
+
+/* The lists of 16 columns, an entry of each list after another: of the ranks r, r + 4, r + 8 ..,
+   where r = 64 n + k and k < 4, in number 4 n + k. */
+typedef struct tvk_nearest_lists {
+  struct {
+    int32_t keys[16];
+    uint16_t ranks[16];
+  } entries[TVK_NEAREST_LIST];
+} tvk_nearest_lists;
+#define TVK_NEAREST_LISTS(num_columns) (((num_columns) + 63) / 64 * 4)
+/* Which of the tvk_nearest_lists, and which list of it, is that of the column of a rank. */
+#define TVK_NEAREST_NUMBER(rank) (((rank) >> 6) * 4 + ((rank)&3))
+#define TVK_NEAREST_LANE(rank) (((rank)&63) >> 2)
+
+/* Group g of rows holds the ranks g n .. g n + n - 1, where n = row_group, and is in the bin g %
+   row_bins. Groups of columns likewise, with TVK_NEAREST_GROUP and column_bins. */
+typedef struct tvk_nearest_shape {
+  int32_t row_group, row_bins, column_bins;
+} tvk_nearest_shape;
 
 #define TVK_CIRCLE_RADIUS 3 /* radius of the segment test's circle, in pixels */
 
@@ -54,9 +73,9 @@ typedef struct tvk_nearest {
    TVK_NEAREST_COLUMN_BYTES. The sets without products of bytes store 16-bit numbers and use the two
    _16 constants instead. */
 #define TVK_NEAREST_PANEL 2048
-#define TVK_NEAREST_COLUMN_BYTES 152
+#define TVK_NEAREST_COLUMN_BYTES 148
 #define TVK_NEAREST_PANEL_16 512
-#define TVK_NEAREST_COLUMN_16_BYTES 276
+#define TVK_NEAREST_COLUMN_16_BYTES 272
 #define TVK_NEAREST_ROW_BYTES 832 /* scratch of one row; a chunk needs one row more */
 #define TVK_NEAREST_CHUNK_BYTES(num_rows) \
   ((size_t)((num_rows) < 63 ? (num_rows) + 1 : 64) * TVK_NEAREST_ROW_BYTES)
@@ -140,11 +159,11 @@ typedef struct tvk_triangulate_pair {
    quantize_descriptor: writes the 128 bytes of a histogram by SIFT's normalisation with clipping at
    0.2, or by RootSIFT's if `root` is not 0.
 
-   nearest_groups: of_rows[i] lists the groups of columns that are nearest to row i, and
-   of_columns[j] the groups of rows that are nearest to column j; i and j are indices, not ranks. A
-   group holds TVK_NEAREST_GROUP columns; the number of rows of a group is returned. The groups
-   depend on the set. scratch has TVK_NEAREST_SCRATCH(rows->num, columns->num) bytes, is aligned to
-   64, and holds unspecified values afterwards.
+   nearest_groups: of_rows[i] lists the groups of columns that are nearest to row i, an index, and
+   of_columns, of TVK_NEAREST_LISTS(columns->num), the groups of rows that are nearest to each
+   column. The groups and bins are returned; they depend on the set. scratch has
+   TVK_NEAREST_SCRATCH(rows->num, columns->num) bytes, is aligned to 64, and holds unspecified
+   values afterwards.
 
    squared_distances: out[k] = the squared distance of the query and rows[indices[k]].
 
@@ -212,9 +231,9 @@ typedef struct tvk_triangulate_pair {
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
   X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
-  X(nearest_groups, int32_t,                                                                       \
+  X(nearest_groups, tvk_nearest_shape,                                                             \
     (const tvk_descriptors *rows, const tvk_descriptors *columns, void *scratch,                   \
-     tvk_nearest *of_columns, tvk_nearest *of_rows))                                               \
+     tvk_nearest_lists *of_columns, tvk_nearest *of_rows))                                         \
   X(squared_distances, void,                                                                       \
     (const uint8_t *query, const uint8_t *rows, const int32_t *indices, int32_t count,             \
      int32_t *out))

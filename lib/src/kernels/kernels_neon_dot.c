@@ -8,7 +8,8 @@
 #include "kernels/nearest.h"
 /* clang-format on */
 
-int32_t tvk_nearest_groups_neon_dot(const tvk_descriptors *rows, const tvk_descriptors *columns,
-                                    void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows) {
+tvk_nearest_shape tvk_nearest_groups_neon_dot(const tvk_descriptors *rows,
+                                              const tvk_descriptors *columns, void *scratch,
+                                              tvk_nearest_lists *of_columns, tvk_nearest *of_rows) {
   return nearest_groups(rows, columns, scratch, of_columns, of_rows);
 }

@@ -5,27 +5,30 @@
    NEAREST_COLUMNS. For each pair a, b a tile makes two keys: one from |a|^2 - 2 a . b for b's list
    and one from |b|^2 - 2 a . b for a's list. The term that is missing for the squared distance is
    the same for the whole list. A key is that number (24 bits with its sign) << 8, plus the place of
-   its tile in the low 8 bits: among the tiles of a chunk of rows, or of a panel of columns.
+   a in the low 8 bits: of the row among those of a chunk, or of the column among those of its lane
+   in a panel.
 
    A group is the set of descriptors of a tile that share a list entry: all rows of the tile for a
    column; the columns of the tile in one lane for a row. A tile computes the smallest key of each
    group. The two smallest keys are kept of each column for a chunk of rows, and of each row for a
-   lane: such a set of groups is a bin. From these pairs of keys merge_bin collects the list of the
-   nearest groups of a descriptor. What a bin holds besides is not nearer than its second key, so
-   that the smallest second key bounds the distance of all that is not in the list.
+   lane: such a set of groups is a bin. From these pairs of keys merge_keys (columns, NEAREST_LANES
+   at a time) and merge_lanes (a row) collect the list of the nearest groups of a descriptor. What a
+   bin holds besides is not nearer than its second key, which is marked in the list.
 
    A group consists of descriptors whose ranks follow each other, and the next ranks are in another
    bin. Where the caller ranks keypoints of a neighbourhood together, these are then in few groups
    and in different bins, and the list reaches beyond them.
 
    Each kernel set provides the tile in a file of its own (nearest_*.h): the constants
-   NEAREST_LANES, _VECTORS, _QUERIES, _ROWS (rows of a chunk) and _PANEL; the structs nearest_rows
-   and nearest_block; make_rows and make_block, which fill them; largest_byte where these need it
-   (AVX2); and tile_products, which writes -a . b of all pairs of a tile, row by row. */
+   NEAREST_LANES, _VECTORS, _QUERIES, _SHIFT (a tile has 1 << _SHIFT places of rows), _ROWS (rows of
+   a chunk) and _PANEL; the structs nearest_rows and nearest_block; make_rows and make_block, which
+   fill them; largest_byte where these need it (AVX2); and tile_products, which writes -a . b of all
+   pairs of a tile, row by row. */
 
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
 #define NEAREST_PLACES 256
+#define NEAREST_UNUSED 127                             /* each byte of a key that is not used */
 #define NEAREST_TILES (NEAREST_ROWS / NEAREST_QUERIES) /* of a chunk */
 
 /* The part of a key that does not depend on the product: the squared norm and the place. make_rows
@@ -33,16 +36,13 @@
    is larger. */
 static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
 
-/* The first limit of a column: above every key, or below it after the last column. */
-static inline int32_t nearest_limit(int32_t term, int32_t norm) {
-  return term == NEAREST_FAR ? INT32_MIN : (TVK_NEAREST_NONE - norm) * 256;
-}
-
 /* Not inlined, like the other functions that run once per descriptor or tile instead of once per
    pair: -O3 would copy them to each call. */
 static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
+  int16_t wide[TVK_DESCRIPTOR_SIZE]; /* so that the compiler uses multiply-adds of 16-bit numbers */
   int32_t sum = 0, k;
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += a[k] * a[k];
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) wide[k] = a[k];
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += wide[k] * wide[k];
   return sum;
 }
 
@@ -83,55 +83,38 @@ NEAREST_ASSERT(nearest_few_rows_fit,
                sizeof(nearest_rows) <= 2 * TVK_NEAREST_ROW_BYTES &&
                    sizeof(nearest_rows) <= NEAREST_QUERIES * TVK_NEAREST_ROW_BYTES);
 NEAREST_ASSERT(nearest_panel_fits,
-               sizeof(nearest_block) <= NEAREST_COLUMNS * (NEAREST_PANEL == TVK_NEAREST_PANEL
-                                                               ? TVK_NEAREST_COLUMN_BYTES
-                                                               : TVK_NEAREST_COLUMN_16_BYTES));
-NEAREST_ASSERT(nearest_chunks_are_whole,
-               NEAREST_ROWS % NEAREST_QUERIES == 0 && NEAREST_TILES <= NEAREST_PLACES);
-NEAREST_ASSERT(nearest_groups_of_columns, NEAREST_VECTORS == TVK_NEAREST_GROUP);
+               sizeof(nearest_block) <= NEAREST_COLUMNS * (NEAREST_PANEL == TVK_NEAREST_PANEL_16
+                                                               ? TVK_NEAREST_COLUMN_16_BYTES
+                                                               : TVK_NEAREST_COLUMN_BYTES));
+NEAREST_ASSERT(nearest_chunks_are_whole, NEAREST_ROWS % NEAREST_QUERIES == 0 &&
+                                             NEAREST_QUERIES <= 1 << NEAREST_SHIFT &&
+                                             NEAREST_TILES << NEAREST_SHIFT <= NEAREST_PLACES);
+NEAREST_ASSERT(nearest_groups_of_columns,
+               NEAREST_VECTORS == TVK_NEAREST_GROUP && 16 % NEAREST_LANES == 0);
 NEAREST_ASSERT(nearest_panels_are_whole, 64 % NEAREST_COLUMNS == 0 &&
                                              NEAREST_PANEL % NEAREST_COLUMNS == 0 &&
-                                             NEAREST_PANEL / NEAREST_COLUMNS <= NEAREST_PLACES);
+                                             NEAREST_PANEL / NEAREST_LANES <= NEAREST_PLACES);
 #undef NEAREST_ASSERT
 
 static inline int32_t nearest_min(int32_t a, int32_t b) { return a < b ? a : b; }
-
-enum { NEAREST_BOUND = TVK_NEAREST_LIST - 1 };
-
-/* Lowers the bound of a list to that of a group, if it is nearer. */
-static inline void nearest_bound(tvk_nearest *list, int32_t dist, int32_t group) {
-  if (dist >= list->dists[NEAREST_BOUND]) return;
-  list->dists[NEAREST_BOUND] = dist;
-  list->groups[NEAREST_BOUND] = (uint16_t)group;
-}
-
-/* Adds a group that is not beyond the bound. What leaves a full list may lower the bound. */
-static TVK_NOINLINE void nearest_add(tvk_nearest *list, int32_t dist, int32_t group) {
-  int32_t k = NEAREST_BOUND - 1;
-  if (dist >= list->dists[k]) {
-    nearest_bound(list, dist, group);
-    return;
-  }
-  nearest_bound(list, list->dists[k], list->groups[k]);
-  for (; k > 0 && list->dists[k - 1] > dist; --k) {
-    list->dists[k] = list->dists[k - 1];
-    list->groups[k] = list->groups[k - 1];
-  }
-  list->dists[k] = dist;
-  list->groups[k] = (uint16_t)group;
-}
-
-/* The squared distance of a key; at least TVK_NEAREST_NONE for NEAREST_FAR. */
-static inline int32_t key_distance(int32_t key, int32_t norm) { return (key >> 8) + norm; }
 
 /* Vectors of NEAREST_LANES keys, signed and unsigned. */
 typedef int32_t int_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
 typedef uint32_t key_lanes __attribute__((vector_size(4 * NEAREST_LANES)));
 typedef int32_t unaligned_int_lanes
     __attribute__((vector_size(4 * NEAREST_LANES), aligned(4), may_alias));
+typedef uint16_t rank_lanes __attribute__((vector_size(2 * NEAREST_LANES)));
+typedef uint16_t unaligned_rank_lanes
+    __attribute__((vector_size(2 * NEAREST_LANES), aligned(2), may_alias));
 
 static inline int_lanes load_ints(const int32_t *p) { return *(const unaligned_int_lanes *)p; }
 static inline void store_ints(int32_t *p, int_lanes x) { *(unaligned_int_lanes *)p = x; }
+static inline int_lanes load_ranks(const uint16_t *p) {
+  return __builtin_convertvector(*(const unaligned_rank_lanes *)p, int_lanes);
+}
+static inline void store_ranks(uint16_t *p, int_lanes x) {
+  *(unaligned_rank_lanes *)p = __builtin_convertvector(x, rank_lanes);
+}
 
 static inline int_lanes min_lanes(int_lanes a, int_lanes b) {
 #if defined(TVK_AVX512)
@@ -155,70 +138,119 @@ static inline int_lanes max_lanes(int_lanes a, int_lanes b) {
 #endif
 }
 
+/* Keys of a list: its terms and the scaled products. Modulo 2^32, like the scaling. */
 static inline int_lanes make_keys(int_lanes terms, const int32_t *products) {
-  return (int_lanes)((key_lanes)terms + ((key_lanes)load_ints(products) << 9));
+  return (int_lanes)((key_lanes)terms + (key_lanes)load_ints(products));
 }
 
-/* A bit for each lane whose key is below its limit. Not inlined: in the sanitizers' build gcc 12
-   then stores the mask's 16 bits on the stack and reads 32, of which the upper half is stale. */
-static TVK_NOINLINE uint32_t lanes_below(const int32_t *keys, int_lanes limits) {
-#if defined(TVK_AVX512)
-  return _mm512_cmplt_epi32_mask((__m512i)load_ints(keys), (__m512i)limits);
-#elif defined(TVK_AVX2)
-  const __m256i below = _mm256_cmpgt_epi32((__m256i)limits, (__m256i)load_ints(keys));
-  return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(below));
-#else
-  uint32_t bits = 0;
-  int32_t lane;
-  for (lane = 0; lane < NEAREST_LANES; ++lane) {
-    bits |= (uint32_t)(keys[lane] < limits[lane]) << lane;
-  }
-  return bits;
-#endif
+static inline int_lanes scale_and_make_keys(int_lanes terms, int32_t *products) {
+  store_ints(products, (int_lanes)((key_lanes)load_ints(products) << 9));
+  return make_keys(terms, products);
 }
 
-/* The smallest key of a distance: a key is below it where its distance is smaller. */
-static inline int32_t first_key(int32_t dist, int32_t norm) { return (dist - norm) * 256; }
+/* `a` where all bits of the mask are set, else `b`. */
+static inline int_lanes select_lanes(int_lanes mask, int_lanes a, int_lanes b) {
+  return (a & mask) | (b & ~mask);
+}
 
-/* Merges the lists of a block of columns into those of all rows. Of `num_chunks` chunks of rows
-   this is number `chunk`. The second group of a bin bounds the distance of the bin's others. */
-static inline void merge_columns(nearest_block *block, int32_t chunk, int32_t num_chunks,
-                                 const tvk_descriptors *columns, int32_t first,
-                                 tvk_nearest *of_columns) {
-  int32_t v;
-  for (v = 0; v < NEAREST_COLUMNS; v += NEAREST_LANES) {
-    uint32_t bits = lanes_below(block->best + v, load_ints(block->limits + v));
-    for (; bits; bits &= bits - 1) {
-      const int32_t j = v + __builtin_ctz(bits);
-      const int32_t best = block->best[j], second = block->second[j], norm = block->norms[j];
-      tvk_nearest *const list = &of_columns[columns->order[column_rank(first, j)]];
-      nearest_bound(list, key_distance(second, norm),
-                    (second & (NEAREST_PLACES - 1)) * num_chunks + chunk);
-      nearest_add(list, key_distance(best, norm),
-                  (best & (NEAREST_PLACES - 1)) * num_chunks + chunk);
-      block->limits[j] = first_key(list->dists[NEAREST_BOUND], norm);
+/* The keys of lists: twice the distance, and 1 for the second group of a bin. */
+static inline int_lanes list_keys(int_lanes keys, int_lanes norms, int32_t odd) {
+  return ((keys >> 8) + norms) * 2 + odd;
+}
+
+/* Merges the two keys of each of NEAREST_LANES columns into their lists. A tile of rows begins
+   `step` ranks after the one before, the first with rank `first`. */
+static TVK_NOINLINE void merge_keys(const int32_t *best, const int32_t *second,
+                                    const int32_t *norms, int32_t step, int32_t first,
+                                    tvk_nearest_lists *lists, int32_t lane) {
+  int32_t odd, k;
+  for (odd = 0; odd < 2; ++odd) {
+    const int_lanes from = load_ints(odd ? second : best);
+    int_lanes keys = list_keys(from, load_ints(norms), odd);
+    int_lanes ranks = ((from & (NEAREST_PLACES - 1)) >> NEAREST_SHIFT) * step + first +
+                      (from & ((1 << NEAREST_SHIFT) - 1));
+    TVK_ROLLED
+    for (k = 0; k < TVK_NEAREST_LIST; ++k) {
+      int32_t *const key = lists->entries[k].keys + lane;
+      uint16_t *const rank = lists->entries[k].ranks + lane;
+      const int_lanes old = load_ints(key), old_ranks = load_ranks(rank), less = keys < old;
+      store_ints(key, min_lanes(keys, old));
+      store_ranks(rank, select_lanes(less, ranks, old_ranks));
+      keys = max_lanes(keys, old);
+      ranks = select_lanes(less, old_ranks, ranks);
     }
   }
 }
 
-/* Merges the lists of a row, one per lane, into its list of the panel that starts with group
-   `first`. */
-static inline void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
-                               int32_t first, tvk_nearest *list) {
+/* Merges the keys of a block, number `number` of all blocks of columns, into the columns' lists. Of
+   num_chunks chunks of rows this is number `chunk`. */
+static inline void merge_columns(const nearest_block *block, int32_t number, int32_t chunk,
+                                 int32_t num_chunks, tvk_nearest_lists *of_columns) {
+  const int32_t step = num_chunks * NEAREST_QUERIES, first = chunk * NEAREST_QUERIES;
+  const int32_t lane = number * NEAREST_LANES % 16;
+  tvk_nearest_lists *lists = of_columns + number * NEAREST_LANES / 16 * NEAREST_VECTORS;
+  int32_t v;
+  TVK_ROLLED
+  for (v = 0; v < NEAREST_COLUMNS; v += NEAREST_LANES, ++lists) {
+    merge_keys(block->best + v, block->second + v, block->norms + v, step, first, lists, lane);
+  }
+}
+
+/* The smallest key, in every lane. */
+static inline int_lanes smallest_key(int_lanes keys) {
+#if defined(TVK_AVX512)
+  __m512i x = (__m512i)keys;
+  x = _mm512_min_epi32(x, _mm512_shuffle_i64x2(x, x, 0x4E));
+  x = _mm512_min_epi32(x, _mm512_shuffle_i64x2(x, x, 0xB1));
+  x = _mm512_min_epi32(x, _mm512_shuffle_epi32(x, (_MM_PERM_ENUM)0x4E));
+  return (int_lanes)_mm512_min_epi32(x, _mm512_shuffle_epi32(x, (_MM_PERM_ENUM)0xB1));
+#elif defined(TVK_AVX2)
+  __m256i x = (__m256i)keys;
+  x = _mm256_min_epi32(x, _mm256_permute2x128_si256(x, x, 1));
+  x = _mm256_min_epi32(x, _mm256_shuffle_epi32(x, 0x4E));
+  return (int_lanes)_mm256_min_epi32(x, _mm256_shuffle_epi32(x, 0xB1));
+#else
   const int_lanes zero = {0};
-  int32_t smallest = NEAREST_FAR, lane;
-  uint32_t bits;
-  for (lane = 0; lane < NEAREST_LANES; ++lane) smallest = nearest_min(smallest, second[lane]);
-  for (lane = 0; second[lane] != smallest;) ++lane;
-  nearest_bound(list, key_distance(smallest, norm),
-                first + (smallest & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
-  bits = lanes_below(
-      best,
-      zero + first_key(nearest_min(list->dists[NEAREST_BOUND], TVK_NEAREST_NONE - 1) + 1, norm));
-  for (; bits; bits &= bits - 1) {
-    const int32_t key = best[lane = __builtin_ctz(bits)], dist = key_distance(key, norm);
-    if (dist > list->dists[NEAREST_BOUND]) continue;
-    nearest_add(list, dist, first + (key & (NEAREST_PLACES - 1)) * NEAREST_LANES + lane);
+  return zero + nearest_min(nearest_min(keys[0], keys[1]), nearest_min(keys[2], keys[3]));
+#endif
+}
+
+/* The ranks of the columns with these keys; `first` is the rank of the panel's first column. */
+static inline int_lanes ranks_of(int_lanes keys, int_lanes lanes, int32_t first) {
+  const int_lanes places = keys & (NEAREST_PLACES - 1);
+  return (places & ~(NEAREST_VECTORS - 1)) * NEAREST_LANES + lanes * NEAREST_VECTORS +
+         (places & (NEAREST_VECTORS - 1)) + first;
+}
+
+/* Merges the keys of a row, two for each lane, into its list; `first` is the rank of the panel's
+   first column. The smallest key is moved to the list again and again; its low five bits say which
+   one it is. */
+static TVK_NOINLINE void merge_lanes(const int32_t *best, const int32_t *second, int32_t norm,
+                                     int32_t first, tvk_nearest *list) {
+  const tvk_nearest old = *list;
+  const int_lanes zero = {0};
+  int_lanes lanes, keys = zero, next = zero;
+  int32_t ranks[32], k, odd, num_old = 0;
+  for (k = 0; k < NEAREST_LANES; ++k) lanes[k] = k;
+  for (odd = 0; odd < 2; ++odd) {
+    const int_lanes from = load_ints(odd ? second : best);
+    store_ints(ranks + 16 * odd, ranks_of(from, lanes, first));
+    keys = next;
+    next = list_keys(from, zero + norm, odd) * 16 + lanes;
+  }
+  for (k = 0; k < TVK_NEAREST_LIST; ++k) {
+    const int_lanes smallest_keys = smallest_key(keys);
+    const int32_t smallest = smallest_keys[0];
+    if (old.keys[num_old] <= smallest >> 4) {
+      list->keys[k] = old.keys[num_old];
+      list->ranks[k] = old.ranks[num_old++];
+    } else {
+      const int_lanes taken = keys == smallest_keys;
+      list->keys[k] = smallest >> 4;
+      list->ranks[k] = (uint16_t)ranks[smallest & 31];
+      keys = select_lanes(taken, next, keys);
+      next |= taken & NEAREST_FAR;
+    }
   }
 }
 
@@ -229,13 +261,14 @@ static inline void update_two(int_lanes keys, int32_t *best, int32_t *second) {
   store_ints(best, min_lanes(keys, old));
 }
 
-/* Updates a row's lists, one per lane, with its keys of a tile: the smallest key of each lane. */
-static inline void update_row(const int32_t *products, const int32_t *terms, int32_t *best,
+/* Scales a row's products of a tile by 512, and updates the row's lists, one per lane, with its
+   keys: the smallest key of each lane. */
+static inline void update_row(int32_t *products, const int32_t *terms, int32_t *best,
                               int32_t *second) {
-  int_lanes keys = make_keys(load_ints(terms), products);
+  int_lanes keys = scale_and_make_keys(load_ints(terms), products);
   int32_t v;
   for (v = NEAREST_LANES; v < NEAREST_COLUMNS; v += NEAREST_LANES) {
-    keys = min_lanes(keys, make_keys(load_ints(terms + v), products + v));
+    keys = min_lanes(keys, scale_and_make_keys(load_ints(terms + v), products + v));
   }
   update_two(keys, best, second);
 }
@@ -278,7 +311,7 @@ static int32_t make_chunk(const tvk_descriptors *rows, int32_t chunk, int32_t nu
   for (t = 0; t < NEAREST_TILES; ++t) {
     const int32_t first = (t * num_chunks + chunk) * NEAREST_QUERIES;
     if (first >= rows->num) break;
-    make_rows(rows, first, t, largest, &tiles[t]);
+    make_rows(rows, first, t << NEAREST_SHIFT, largest, &tiles[t]);
     for (k = 0; k < NEAREST_QUERIES * NEAREST_LANES; ++k) {
       tiles[t].best[k] = tiles[t].second[k] = NEAREST_FAR;
     }
@@ -289,8 +322,8 @@ static int32_t make_chunk(const tvk_descriptors *rows, int32_t chunk, int32_t nu
 /* Compares all rows with the panel of columns from rank `first_column` on, a chunk of rows at a
    time: a chunk stays in the first-level cache. */
 static void meet_panel(const tvk_descriptors *rows, nearest_block *blocks, int32_t num_blocks,
-                       const tvk_descriptors *columns, int32_t first_column, int32_t largest,
-                       nearest_rows *tiles, tvk_nearest *of_rows, tvk_nearest *of_columns) {
+                       int32_t first_column, int32_t largest, nearest_rows *tiles,
+                       tvk_nearest *of_rows, tvk_nearest_lists *of_columns) {
   const int32_t num_chunks = (rows->num + NEAREST_ROWS - 1) / NEAREST_ROWS;
   int32_t chunk, b, t, q;
   for (chunk = 0; chunk < num_chunks; ++chunk) {
@@ -298,52 +331,44 @@ static void meet_panel(const tvk_descriptors *rows, nearest_block *blocks, int32
     for (b = 0; b < num_blocks; ++b) {
       forget_columns(&blocks[b]);
       for (t = 0; t < num_tiles; ++t) meet_tile(&tiles[t], &blocks[b]);
-      merge_columns(&blocks[b], chunk, num_chunks, columns, first_column + b * NEAREST_COLUMNS,
-                    of_columns);
+      merge_columns(&blocks[b], first_column / NEAREST_COLUMNS + b, chunk, num_chunks, of_columns);
     }
     for (t = 0; t < num_tiles; ++t) {
       const int32_t rank = (t * num_chunks + chunk) * NEAREST_QUERIES;
       for (q = 0; q < NEAREST_QUERIES && rank + q < rows->num; ++q) {
         merge_lanes(tiles[t].best + q * NEAREST_LANES, tiles[t].second + q * NEAREST_LANES,
-                    tiles[t].norms[q], first_column / NEAREST_VECTORS,
-                    &of_rows[rows->order[rank + q]]);
+                    tiles[t].norms[q], first_column, &of_rows[rows->order[rank + q]]);
       }
     }
   }
 }
 
-/* Neither inlined nor unrolled: together this saves 570 bytes in the AVX-512 set. */
-static TVK_NOINLINE void forget_nearest(tvk_nearest *lists, int32_t count) {
-  int32_t i, k;
-  for (i = 0; i < count; ++i) {
-    TVK_ROLLED
-    for (k = 0; k < TVK_NEAREST_LIST; ++k) lists[i].dists[k] = TVK_NEAREST_NONE;
-  }
-}
-
-static int32_t nearest_groups(const tvk_descriptors *rows, const tvk_descriptors *columns,
-                              void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows) {
+static tvk_nearest_shape nearest_groups(const tvk_descriptors *rows, const tvk_descriptors *columns,
+                                        void *scratch, tvk_nearest_lists *of_columns,
+                                        tvk_nearest *of_rows) {
   nearest_rows *const tiles = (nearest_rows *)scratch;
   nearest_block *const blocks =
       (nearest_block *)(void *)((uint8_t *)scratch + TVK_NEAREST_CHUNK_BYTES(rows->num));
   const int32_t largest = largest_byte(columns->bytes, (int64_t)columns->num * TVK_DESCRIPTOR_SIZE);
+  const tvk_nearest_shape shape = {NEAREST_QUERIES, (rows->num + NEAREST_ROWS - 1) / NEAREST_ROWS,
+                                   NEAREST_LANES};
   int32_t first, b;
-  forget_nearest(of_rows, rows->num);
-  forget_nearest(of_columns, columns->num);
+  memset(of_rows, NEAREST_UNUSED, (size_t)rows->num * sizeof *of_rows);
+  memset(of_columns, NEAREST_UNUSED, TVK_NEAREST_LISTS((size_t)columns->num) * sizeof *of_columns);
   for (first = 0; first < columns->num; first += NEAREST_PANEL) {
     const int32_t count = nearest_min(NEAREST_PANEL, columns->num - first);
     const int32_t num_blocks = (count + NEAREST_COLUMNS - 1) / NEAREST_COLUMNS;
     for (b = 0; b < num_blocks; ++b) {
-      make_block(columns, first + b * NEAREST_COLUMNS, b, largest, &blocks[b]);
+      make_block(columns, first + b * NEAREST_COLUMNS, b * NEAREST_VECTORS, largest, &blocks[b]);
     }
-    meet_panel(rows, blocks, num_blocks, columns, first, largest, tiles, of_rows, of_columns);
+    meet_panel(rows, blocks, num_blocks, first, largest, tiles, of_rows, of_columns);
   }
-  return NEAREST_QUERIES;
+  return shape;
 }
 
 /* The table for ARMv8.2's dot product uses the NEON set's squared_distances. */
 #if !defined(TVK_NEON_DOT)
-static TVK_NOINLINE int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
+static inline int32_t squared_distance(const uint8_t *a, const uint8_t *b) {
   int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
     const int16_t difference = (int16_t)(a[k] - b[k]);

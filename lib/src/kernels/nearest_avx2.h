@@ -10,6 +10,7 @@
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 8, NEAREST_VECTORS = 4, NEAREST_QUERIES = 2, NEAREST_ROWS = 64 };
+enum { NEAREST_SHIFT = 1 };
 enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4, NEAREST_MOST_STEPS = 2 * NEAREST_GROUPS };
 
@@ -28,7 +29,6 @@ typedef struct nearest_block {
   int8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
-  int32_t limits[NEAREST_COLUMNS]; /* best keys below these go to the columns' lists */
 } nearest_block;
 
 static inline int32_t largest_byte(const uint8_t *bytes, int64_t count) {
@@ -79,7 +79,7 @@ static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place,
     if (row) memcpy(left[i], row, TVK_DESCRIPTOR_SIZE);
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += left[i][k];
     tile->norms[i] = squared_norm(left[i]);
-    tile->terms[i] = row ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
+    tile->terms[i] = row ? nearest_term(tile->norms[i], place + i) : NEAREST_FAR;
     tile->starts[i] = -centre * sum;
   }
   tile->num_steps = 0;
@@ -110,8 +110,8 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
       for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], centred + 4 * k, 4);
     }
     block->norms[j] = column ? squared_norm(column) : 0;
-    block->terms[j] = column ? nearest_term(block->norms[j], place) : NEAREST_FAR;
-    block->limits[j] = nearest_limit(block->terms[j], block->norms[j]);
+    block->terms[j] =
+        column ? nearest_term(block->norms[j], place + j / NEAREST_LANES) : NEAREST_FAR;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 16, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
+enum { NEAREST_SHIFT = 3 };
 enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4 };
 
@@ -18,7 +19,6 @@ typedef struct nearest_block {
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
   int32_t starts[NEAREST_COLUMNS]; /* -127 times the sum of the bytes of column b */
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
-  int32_t limits[NEAREST_COLUMNS]; /* best keys below these go to the columns' lists */
 } nearest_block;
 
 static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
@@ -28,7 +28,7 @@ static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place,
   for (i = 0; i < NEAREST_QUERIES; ++i) {
     const uint8_t *const row = ranked(rows, first + i);
     tile->norms[i] = row ? squared_norm(row) : 0;
-    tile->terms[i] = row ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
+    tile->terms[i] = row ? nearest_term(tile->norms[i], place + i) : NEAREST_FAR;
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = 127;
     if (row) {
       for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = (int8_t)(127 - row[k]);
@@ -50,8 +50,8 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
       for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], column + 4 * k, 4);
     }
     block->norms[j] = column ? squared_norm(column) : 0;
-    block->terms[j] = column ? nearest_term(block->norms[j], place) : NEAREST_FAR;
-    block->limits[j] = nearest_limit(block->terms[j], block->norms[j]);
+    block->terms[j] =
+        column ? nearest_term(block->norms[j], place + j / NEAREST_LANES) : NEAREST_FAR;
     block->starts[j] = -127 * sum;
   }
 }

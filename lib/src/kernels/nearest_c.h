@@ -2,6 +2,7 @@
    loop that every compiler turns into the multiply-adds of its base instruction set. */
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 4, NEAREST_ROWS = 128 };
+enum { NEAREST_SHIFT = 2 };
 enum { NEAREST_PANEL = TVK_NEAREST_PANEL_16 };
 
 typedef struct nearest_rows {
@@ -14,19 +15,19 @@ typedef struct nearest_block {
   int16_t values[NEAREST_COLUMNS][TVK_DESCRIPTOR_SIZE];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
-  int32_t limits[NEAREST_COLUMNS]; /* best keys below these go to the columns' lists */
 } nearest_block;
 
 /* Widens one descriptor, or zeros if it is null. */
 static TVK_NOINLINE void widen(const uint8_t *bytes, int32_t place, int16_t *values, int32_t *norm,
                                int32_t *term) {
-  int32_t k;
-  *norm = bytes ? squared_norm(bytes) : 0;
-  *term = bytes ? nearest_term(*norm, place) : NEAREST_FAR;
+  int32_t sum = 0, k;
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) values[k] = 0;
   if (bytes) {
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) values[k] = bytes[k];
   }
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += values[k] * values[k];
+  *norm = sum;
+  *term = bytes ? nearest_term(sum, place) : NEAREST_FAR;
 }
 
 static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
@@ -34,7 +35,7 @@ static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place,
   int32_t i;
   (void)largest;
   for (i = 0; i < NEAREST_QUERIES; ++i) {
-    widen(ranked(rows, first + i), place, tile->values[i], &tile->norms[i], &tile->terms[i]);
+    widen(ranked(rows, first + i), place + i, tile->values[i], &tile->norms[i], &tile->terms[i]);
   }
 }
 
@@ -43,9 +44,8 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
   int32_t j;
   (void)largest;
   for (j = 0; j < NEAREST_COLUMNS; ++j) {
-    widen(ranked(columns, column_rank(first, j)), place, block->values[j], &block->norms[j],
-          &block->terms[j]);
-    block->limits[j] = nearest_limit(block->terms[j], block->norms[j]);
+    widen(ranked(columns, column_rank(first, j)), place + j / NEAREST_LANES, block->values[j],
+          &block->norms[j], &block->terms[j]);
   }
 }
 

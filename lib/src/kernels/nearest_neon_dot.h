@@ -3,7 +3,8 @@
 #include <arm_neon.h>
 
 enum { NEAREST_LANES = 4, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
-enum { NEAREST_PANEL = TVK_NEAREST_PANEL };
+enum { NEAREST_SHIFT = 3 };
+enum { NEAREST_PANEL = TVK_NEAREST_PANEL / 2 };
 enum { NEAREST_GROUPS = TVK_DESCRIPTOR_SIZE / 4 };
 
 typedef struct nearest_rows {
@@ -16,7 +17,6 @@ typedef struct nearest_block {
   uint8_t bytes[NEAREST_GROUPS][NEAREST_COLUMNS][4];
   int32_t norms[NEAREST_COLUMNS], terms[NEAREST_COLUMNS];
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
-  int32_t limits[NEAREST_COLUMNS]; /* best keys below these go to the columns' lists */
 } nearest_block;
 
 static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
@@ -27,7 +27,7 @@ static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place,
   for (i = 0; i < NEAREST_QUERIES; ++i) {
     const uint8_t *const row = ranked(rows, first + i);
     tile->norms[i] = row ? squared_norm(row) : 0;
-    tile->terms[i] = row ? nearest_term(tile->norms[i], place) : NEAREST_FAR;
+    tile->terms[i] = row ? nearest_term(tile->norms[i], place + i) : NEAREST_FAR;
     if (row) memcpy(tile->bytes[i], row, TVK_DESCRIPTOR_SIZE);
   }
 }
@@ -43,8 +43,8 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
       for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], column + 4 * k, 4);
     }
     block->norms[j] = column ? squared_norm(column) : 0;
-    block->terms[j] = column ? nearest_term(block->norms[j], place) : NEAREST_FAR;
-    block->limits[j] = nearest_limit(block->terms[j], block->norms[j]);
+    block->terms[j] =
+        column ? nearest_term(block->norms[j], place + j / NEAREST_LANES) : NEAREST_FAR;
   }
 }
 

@@ -5,7 +5,8 @@
 
 #include "kernels/kernels.h"
 
-int32_t tvk_nearest_groups_neon_dot(const tvk_descriptors *rows, const tvk_descriptors *columns,
-                                    void *scratch, tvk_nearest *of_columns, tvk_nearest *of_rows);
+tvk_nearest_shape tvk_nearest_groups_neon_dot(const tvk_descriptors *rows,
+                                              const tvk_descriptors *columns, void *scratch,
+                                              tvk_nearest_lists *of_columns, tvk_nearest *of_rows);
 
 #endif
