@@ -26,12 +26,18 @@ struct Workspace {
   Corner* candidates;
   Corner* sorted;
   uint16_t* cell_counts;
+  uint32_t* marks;
 };
 
 constexpr int32_t kMinCell = 8;
 
 size_t max_cells(int32_t width, int32_t height) {
   return static_cast<size_t>(width / kMinCell + 1) * static_cast<size_t>(height / kMinCell + 1);
+}
+
+// 32-bit words with a bit for each pixel of a level.
+size_t marks_count(int32_t width, int32_t height) {
+  return (static_cast<size_t>(width) * static_cast<size_t>(height) + 31) / 32;
 }
 
 bool is_masked_out(const tv_image* mask, const Level& level, int32_t x, int32_t y) {
@@ -154,27 +160,42 @@ void sort_within_scores(tv_keypoint* keypoints, int32_t count) {
   }
 }
 
-// Makes one keypoint from each corner of a level, in the same order.
-void make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
-                    const Level& level, int32_t index, const tv_feature_options& options,
-                    tv_keypoint* keypoints) {
-  for (int32_t begin = 0; begin < count; begin += kRefineBlock) {
-    const int32_t here = std::min(count - begin, kRefineBlock);
-    Position positions[kRefineBlock];
-    for (int32_t k = 0; k < here; ++k) {
-      positions[k] = Position{1.0 * corners[begin + k].x, 1.0 * corners[begin + k].y};
+// Whether the pixel was marked before; marks it. `marks` holds a bit for each pixel of the level.
+bool mark_pixel(uint32_t* marks, const Level& level, int32_t x, int32_t y) {
+  const uint32_t place = static_cast<uint32_t>(y * level.width + x), bit = 1u << (place & 31);
+  const bool was_marked = (marks[place >> 5] & bit) != 0;
+  marks[place >> 5] |= bit;
+  return was_marked;
+}
+
+// Makes keypoints from the corners of a level and returns their number. With subpixel positions,
+// two corners may move to the same maximum: the first one becomes a keypoint, the others do not. A
+// corner does not move to a pixel that is masked out.
+int32_t make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
+                       const Level& level, int32_t index, const tv_image* mask,
+                       const tv_feature_options& options, uint32_t* marks,
+                       tv_keypoint* keypoints) {
+  int32_t made = 0;
+  memset(marks, 0, marks_count(level.width, level.height) * sizeof marks[0]);
+  for (int32_t k = 0; k < count; ++k) {
+    const int32_t corner_x = corners[k].x, corner_y = corners[k].y;
+    double x = corner_x, y = corner_y;
+    Peak peak;
+    if (options.subpixel != 0 && find_peak(kernels, level, corner_x, corner_y, &peak) &&
+        !is_masked_out(mask, level, peak.pixel_x, peak.pixel_y)) {
+      if (mark_pixel(marks, level, peak.pixel_x, peak.pixel_y)) continue;
+      x = peak.x;
+      y = peak.y;
     }
-    if (options.subpixel != 0) refine_corners(kernels, level, options.arc, positions, here);
-    for (int32_t k = 0; k < here; ++k) {
-      tv_keypoint& keypoint = keypoints[begin + k];
-      keypoint.x = static_cast<float>(to_full(level, positions[k].x));
-      keypoint.y = static_cast<float>(to_full(level, positions[k].y));
-      keypoint.size = static_cast<float>(options.keypoint_size * level.scale);
-      keypoint.angle_rad = 0.0f;
-      keypoint.score = corners[begin + k].score;
-      keypoint.level = index;
-    }
+    tv_keypoint& keypoint = keypoints[made++];
+    keypoint.x = static_cast<float>(to_full(level, x));
+    keypoint.y = static_cast<float>(to_full(level, y));
+    keypoint.size = static_cast<float>(options.keypoint_size * level.scale);
+    keypoint.angle_rad = 0.0f;
+    keypoint.score = corners[k].score;
+    keypoint.level = index;
   }
+  return made;
 }
 
 // The part of the budget that level `index` of `count` may use at least, in proportion to its area:
@@ -207,6 +228,7 @@ Workspace alloc_workspace(Arena& arena, int32_t width, int32_t height) {
   work.candidates = arena_alloc<Corner>(arena, candidate_capacity(width, height));
   work.sorted = arena_alloc<Corner>(arena, candidate_capacity(width, height));
   work.cell_counts = arena_alloc<uint16_t>(arena, max_cells(width, height));
+  work.marks = arena_alloc<uint32_t>(arena, marks_count(width, height));
   return work;
 }
 
@@ -226,8 +248,8 @@ int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_ima
       sort_by_score(work.candidates, found, histogram, lowest, highest, share, work.sorted);
   const int32_t kept = spread_over_grid(work.sorted, sorted, share, level, options.cell_px,
                                         work.cell_counts, work.candidates);
-  make_keypoints(kernels, work.sorted, kept, level, index, options, keypoints);
-  return kept;
+  return make_keypoints(kernels, work.sorted, kept, level, index, mask, options, work.marks,
+                        keypoints);
 }
 
 }  // namespace
@@ -237,7 +259,8 @@ size_t corners_bytes(int32_t max_width, int32_t max_height) {
   return level_buffers_bytes(max_width, max_height) + 3 * arena_bytes<uint8_t>(width) +
          arena_bytes<uint16_t>((width + 1) / 2) +
          2 * arena_bytes<Corner>(candidate_capacity(max_width, max_height)) +
-         arena_bytes<uint16_t>(max_cells(max_width, max_height));
+         arena_bytes<uint16_t>(max_cells(max_width, max_height)) +
+         arena_bytes<uint32_t>(marks_count(max_width, max_height));
 }
 
 int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_image* mask,

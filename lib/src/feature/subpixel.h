@@ -5,17 +5,16 @@
 
 namespace tv {
 
-struct Position {
-  double x, y;
+// A local maximum of the determinant of the Hessian (kernel hessian_determinants).
+struct Peak {
+  int32_t pixel_x, pixel_y;  // the pixel of the level with the largest determinant
+  double x, y;               // the maximum itself, at most 1 from that pixel along x and y
 };
 
-inline constexpr int32_t kRefineBlock = 64;
-
-// Refines at most kRefineBlock positions, which are whole pixels of the level. A position moves to
-// the maximum of a quadratic, fitted by least squares to the contrast of the segment test (kernel
-// fast_contrasts) at the pixel and its eight neighbours. It stays unchanged if the fit has no
-// maximum within 0.75 pixel along x and y, or if one of the nine circles would leave the image.
-void refine_corners(const tvk_table& kernels, const Level& level, int32_t arc, Position* positions,
-                    int32_t count);
+// Looks for a maximum near the pixel (x, y) of a level: moves at most twice to the largest of the
+// eight neighbours, then fits a quadratic to the pixel and its neighbours. Returns false, and
+// leaves *peak alone, when the quadratic has no maximum within 1 pixel along x and y, or when
+// (x, y) is nearer than TVK_HESSIAN_REACH to the border of the level.
+bool find_peak(const tvk_table& kernels, const Level& level, int32_t x, int32_t y, Peak* peak);
 
 }  // namespace tv

@@ -9,18 +9,9 @@
 /* bytes_add and bytes_sub saturate at 255 and at 0.
    bytes_any(a): true when some lane is not 0.
    bytes_above(a, b): a bit mask; the bit lane * TVK_BYTES_BITS is set where a > b.
-   bytes_where_above(a, b, x): x in the lanes where a > b, 0 in the others.
-   bytes_of_rows(at, stride): fills each group of 16 lanes with 4 bytes from at[group] - stride, 4
-   from at[group] and 4 from at[group] + stride. The last 4 lanes of a group are unspecified. */
+   bytes_where_above(a, b, x): x in the lanes where a > b, 0 in the others. */
 #if defined(TVK_AVX512) || defined(TVK_AVX2) || defined(TVK_SSE2)
 #include <immintrin.h>
-static inline __m128i bytes_of_three(const uint8_t *at, int64_t stride) {
-  int32_t above, middle, below;
-  memcpy(&above, at - stride, 4);
-  memcpy(&middle, at, 4);
-  memcpy(&below, at + stride, 4);
-  return _mm_set_epi32(0, below, middle, above);
-}
 #endif
 
 #if defined(TVK_AVX512)
@@ -41,13 +32,6 @@ static inline uint64_t bytes_above(byte_lanes a, byte_lanes b) {
 }
 static inline byte_lanes bytes_where_above(byte_lanes a, byte_lanes b, byte_lanes x) {
   return _mm512_maskz_mov_epi8(_mm512_cmpgt_epu8_mask(a, b), x);
-}
-static inline byte_lanes bytes_of_rows(const uint8_t *const *at, int64_t stride) {
-  const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(bytes_of_three(at[0], stride)),
-                                              bytes_of_three(at[1], stride), 1);
-  const __m256i high = _mm256_inserti128_si256(
-      _mm256_castsi128_si256(bytes_of_three(at[2], stride)), bytes_of_three(at[3], stride), 1);
-  return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
 
 #elif defined(TVK_AVX2)
@@ -73,10 +57,6 @@ static inline uint64_t bytes_above(byte_lanes a, byte_lanes b) {
 }
 static inline byte_lanes bytes_where_above(byte_lanes a, byte_lanes b, byte_lanes x) {
   return _mm256_andnot_si256(bytes_not_above(a, b), x);
-}
-static inline byte_lanes bytes_of_rows(const uint8_t *const *at, int64_t stride) {
-  return _mm256_inserti128_si256(_mm256_castsi128_si256(bytes_of_three(at[0], stride)),
-                                 bytes_of_three(at[1], stride), 1);
 }
 
 #elif defined(TVK_SSE2)
@@ -105,9 +85,6 @@ static inline uint64_t bytes_above(byte_lanes a, byte_lanes b) {
 static inline byte_lanes bytes_where_above(byte_lanes a, byte_lanes b, byte_lanes x) {
   return _mm_andnot_si128(bytes_not_above(a, b), x);
 }
-static inline byte_lanes bytes_of_rows(const uint8_t *const *at, int64_t stride) {
-  return bytes_of_three(at[0], stride);
-}
 
 #elif defined(TVK_NEON)
 
@@ -132,14 +109,6 @@ static inline uint64_t bytes_above(byte_lanes a, byte_lanes b) {
 }
 static inline byte_lanes bytes_where_above(byte_lanes a, byte_lanes b, byte_lanes x) {
   return vandq_u8(vcgtq_u8(a, b), x);
-}
-static inline byte_lanes bytes_of_rows(const uint8_t *const *at, int64_t stride) {
-  uint32_t rows[3];
-  memcpy(rows, at[0] - stride, 4);
-  memcpy(rows + 1, at[0], 4);
-  memcpy(rows + 2, at[0] + stride, 4);
-  return vreinterpretq_u8_u32(
-      vsetq_lane_u32(rows[2], vsetq_lane_u32(rows[1], vdupq_n_u32(rows[0]), 1), 2));
 }
 
 #else /* the definition; compilers turn each loop into one vector instruction where they can */
@@ -196,14 +165,6 @@ static inline uint64_t bytes_above(byte_lanes a, byte_lanes b) {
 }
 static inline byte_lanes bytes_where_above(byte_lanes a, byte_lanes b, byte_lanes x) {
   TVK_BYTES_EACH(a.lane[k] > b.lane[k] ? x.lane[k] : 0);
-}
-static inline byte_lanes bytes_of_rows(const uint8_t *const *at, int64_t stride) {
-  byte_lanes r;
-  memcpy(r.lane, at[0] - stride, 4);
-  memcpy(r.lane + 4, at[0], 4);
-  memcpy(r.lane + 8, at[0] + stride, 4);
-  memset(r.lane + 12, 0, 4);
-  return r;
 }
 
 #endif

@@ -111,38 +111,6 @@ static void fast_score_row(const uint8_t *const rows[7], int32_t width, int32_t 
   }
 }
 
-/* Each group of 16 lanes holds one of the `count` pixels and its neighbours: three rows of three
-   pixels and one unused. */
-static void fast_contrasts(const uint8_t *const *centres, int32_t count, int64_t stride,
-                           int32_t arc, int16_t *contrasts) {
-  enum { GROUPS = TVK_BYTES / 16 };
-  int32_t done, g, i, k;
-  for (done = 0; done < count; done += GROUPS) {
-    const uint8_t *at[GROUPS], *shifted[GROUPS];
-    uint8_t above[TVK_BYTES], below[TVK_BYTES];
-    int16_t wide[TVK_BYTES];
-    byte_lanes p[16], c, brightest, darkest;
-    for (g = 0; g < GROUPS; ++g) at[g] = centres[done + g < count ? done + g : count - 1] - 1;
-    c = bytes_of_rows(at, stride);
-    for (i = 0; i < 16; ++i) {
-      const int64_t offset = (fast_circle_row[i] - 3) * stride + fast_circle_column[i];
-      for (g = 0; g < GROUPS; ++g) shifted[g] = at[g] + offset;
-      p[i] = bytes_of_rows(shifted, stride);
-    }
-    brightest = brightest_arc(p, arc);
-    darkest = darkest_arc(p, arc);
-    /* At most one of the two contrasts is above 0, because any two arcs have pixels in common. */
-    bytes_store(above, bytes_max(bytes_sub(brightest, c), bytes_sub(c, darkest)));
-    bytes_store(below, bytes_min(bytes_sub(c, brightest), bytes_sub(darkest, c)));
-    for (k = 0; k < TVK_BYTES; ++k) wide[k] = (int16_t)(above[k] - below[k]);
-    for (g = 0; g < GROUPS && done + g < count; ++g) {
-      for (k = 0; k < 3; ++k) {
-        memcpy(contrasts + 9 * (done + g) + 3 * k, wide + 16 * g + 4 * k, 3 * sizeof wide[0]);
-      }
-    }
-  }
-}
-
 /* A bit mask, as bytes_above returns it, of the TVK_BYTES pixels from x on whose score is above the
    scores of all eight neighbours. */
 static inline uint64_t suppress(const uint8_t *prev, const uint8_t *cur, const uint8_t *next,

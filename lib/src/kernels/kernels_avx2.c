@@ -6,7 +6,7 @@
 #define TVK_MATCH(name) tvk_##name##_avx2
 #include "kernels/kernels_impl.h"
 
-TVK_LEND(fast_contrasts, avx2);
+TVK_LEND(hessian_determinants, avx2);
 TVK_LEND(average_rows, avx2);
 TVK_LEND(halve_row, avx2);
 TVK_LEND(blur_row, avx2);

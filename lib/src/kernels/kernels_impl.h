@@ -15,6 +15,7 @@
 #include "kernels/fast.h"
 #include "kernels/resample.h"
 #include "kernels/words.h"
+#include "kernels/hessian.h"
 #include "kernels/patch.h"
 #include "kernels/describe.h"
 #include "kernels/nearest.h"
