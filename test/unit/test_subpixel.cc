@@ -43,8 +43,6 @@ void render_wedge(double tip_x, double tip_y, double turn, double opening, int d
   }
 }
 
-// A round blob has its corner in its middle; the segment test's bias on wedges does not matter
-// there.
 void render_blob(double centre_x, double centre_y, double sigma, int base, int height) {
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
@@ -78,11 +76,11 @@ bool find_corner(int arc, int* best_x, int* best_y) {
   return best > 0;
 }
 
-void refine(int arc, int x, int y, double* rx, double* ry) {
-  tv::Position position{1.0 * x, 1.0 * y};
-  tv::refine_corners(*tvk_select(TV_KERNELS_AUTO), level, arc, &position, 1);
-  *rx = position.x;
-  *ry = position.y;
+void refine(int x, int y, double* rx, double* ry) {
+  tv::Peak peak{x, y, 1.0 * x, 1.0 * y};
+  tv::find_peak(*tvk_select(TV_KERNELS_AUTO), level, x, y, &peak);
+  *rx = peak.x;
+  *ry = peak.y;
 }
 
 void test_a_blobs_middle_is_found_below_a_pixel() {
@@ -96,7 +94,7 @@ void test_a_blobs_middle_is_found_below_a_pixel() {
     int x = 0, y = 0;
     double rx, ry;
     TEST_ASSERT_TRUE(find_corner(9 + k % 4, &x, &y));
-    refine(9 + k % 4, x, y, &rx, &ry);
+    refine(x, y, &rx, &ry);
     sum_integer += std::hypot(x - cx, y - cy);
     sum_refined += std::hypot(rx - cx, ry - cy);
   }
@@ -105,8 +103,8 @@ void test_a_blobs_middle_is_found_below_a_pixel() {
   TEST_ASSERT_TRUE(sum_refined / kTrials <= 0.15);
 }
 
-// The segment test places a wedge's corner a little inside the wedge, by the same amount at every
-// sub-pixel shift; so the test compares shifts.
+// The maximum lies a little inside the wedge, by the same amount at every sub-pixel shift; so the
+// test compares shifts.
 void test_a_wedge_that_moves_takes_its_corner_along() {
   uint64_t seed = 32;
   double sum_integer = 0, sum_refined = 0;
@@ -121,7 +119,7 @@ void test_a_wedge_that_moves_takes_its_corner_along() {
       double rx, ry;
       render_wedge(tip_x, tip_y, turn, opening, k % 2 ? 30 : 210, k % 2 ? 210 : 30);
       if (!find_corner(9 + k % 4, &x, &y)) continue;
-      refine(9 + k % 4, x, y, &rx, &ry);
+      refine(x, y, &rx, &ry);
       dx[found] = rx - tip_x;
       dy[found] = ry - tip_y;
       ix[found] = x - tip_x;
@@ -138,6 +136,56 @@ void test_a_wedge_that_moves_takes_its_corner_along() {
   TEST_ASSERT_TRUE(sum_refined < 0.6 * sum_integer);
 }
 
+// The smoothed pixel by definition: both sums at once, rounded once.
+int smoothed_pixel(int x, int y) {
+  const int weights[5] = {1, 4, 6, 4, 1};
+  int sum = 0;
+  for (int v = 0; v < 5; ++v) {
+    for (int u = 0; u < 5; ++u) {
+      sum += weights[u] * weights[v] * pixels[(y + v - 2) * kSide + x + u - 2];
+    }
+  }
+  return (sum + 8) / 16;
+}
+
+int64_t determinant_at(int x, int y) {
+  const int second[3] = {1, -2, 1}, smooth[3] = {1, 2, 1}, first[3] = {-1, 0, 1};
+  int64_t xx = 0, yy = 0, xy = 0;
+  for (int v = 0; v < 3; ++v) {
+    for (int u = 0; u < 3; ++u) {
+      const int s = smoothed_pixel(x + u - 1, y + v - 1);
+      xx += second[u] * smooth[v] * s;
+      yy += smooth[u] * second[v] * s;
+      xy += first[u] * first[v] * s;
+    }
+  }
+  return xx * yy - xy * xy;
+}
+
+// Black and white images reach the largest values, so that an overflow would show.
+void test_determinants_are_those_of_the_definition() {
+  uint64_t seed = 34;
+  for (int trial = 0; trial < 60; ++trial) {
+    random_bytes(&seed, pixels, sizeof pixels);
+    for (uint8_t& pixel : pixels) {
+      if (trial % 3 == 1) pixel = pixel > 127 ? 255 : 0;
+      if (trial % 3 == 2) pixel = pixel > 250 ? 255 : 0;
+    }
+    if (trial % 10 == 4) render_blob(20, 20, 0.6 + 0.1 * trial, 0, 255);
+    const int cx = random_int(&seed, 6, kSide - 7), cy = random_int(&seed, 6, kSide - 7);
+    for (int set = TV_KERNELS_C; set <= TV_KERNELS_AVX512; ++set) {
+      const tvk_table* kernels = tvk_select(static_cast<tv_kernels>(set));
+      if (kernels == nullptr) continue;
+      int32_t found[56];
+      kernels->hessian_determinants(pixels + cy * kSide + cx, kSide, found);
+      for (int k = 0; k < 49; ++k) {
+        const int64_t expected = determinant_at(cx + k % 7 - 3, cy + k / 7 - 3);
+        TEST_ASSERT_TRUE(expected == found[8 * (k / 7) + k % 7]);
+      }
+    }
+  }
+}
+
 void test_refinement_never_moves_more_than_its_limit() {
   uint64_t seed = 33;
   int moved = 0, kept = 0;
@@ -145,9 +193,9 @@ void test_refinement_never_moves_more_than_its_limit() {
     if (k % 100 == 0) random_bytes(&seed, pixels, sizeof pixels);
     const int x = random_int(&seed, 0, kSide - 1), y = random_int(&seed, 0, kSide - 1);
     double rx, ry;
-    refine(9 + k % 4, x, y, &rx, &ry);
-    TEST_ASSERT_TRUE(std::fabs(rx - x) <= 0.75 && std::fabs(ry - y) <= 0.75);
-    const bool is_inside = x >= 4 && y >= 4 && x < kSide - 4 && y < kSide - 4;
+    refine(x, y, &rx, &ry);
+    TEST_ASSERT_TRUE(std::fabs(rx - x) <= 3 && std::fabs(ry - y) <= 3);
+    const bool is_inside = x >= 6 && y >= 6 && x < kSide - 6 && y < kSide - 6;
     TEST_ASSERT_TRUE(is_inside || (rx == x && ry == y));
     (rx == x && ry == y ? kept : moved) += 1;
   }
@@ -157,10 +205,10 @@ void test_refinement_never_moves_more_than_its_limit() {
 void test_a_flat_or_symmetric_place_stays() {
   double rx, ry;
   memset(pixels, 90, sizeof pixels);
-  refine(9, 20, 20, &rx, &ry);
+  refine(20, 20, &rx, &ry);
   TEST_ASSERT_TRUE(rx == 20 && ry == 20);
   render_blob(20, 20, 2.0, 20, 200);
-  refine(12, 20, 20, &rx, &ry);
+  refine(20, 20, &rx, &ry);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 20, rx);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 20, ry);
 }
@@ -174,6 +222,7 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(test_a_blobs_middle_is_found_below_a_pixel);
   RUN_TEST(test_a_wedge_that_moves_takes_its_corner_along);
+  RUN_TEST(test_determinants_are_those_of_the_definition);
   RUN_TEST(test_refinement_never_moves_more_than_its_limit);
   RUN_TEST(test_a_flat_or_symmetric_place_stays);
   return UNITY_END();

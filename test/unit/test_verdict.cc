@@ -20,6 +20,7 @@ Evidence good() {
   e.num_inliers = 80;
   e.num_different_inliers = 70;
   e.coverage[0] = e.coverage[1] = 0.5;
+  e.num_places[0] = e.num_places[1] = 40;
   e.noise_px = 0.3;
   e.sigma_rad = 0.005;
   e.median_parallax_rad = 0.05;
@@ -37,6 +38,7 @@ void assert_reason(uint32_t reasons, Evidence e) {
   for (double* values : {e.coverage, e.lattice_share, e.lattice_sigmas, e.line_distance_px}) {
     std::swap(values[0], values[1]);
   }
+  std::swap(e.num_places[0], e.num_places[1]);
   TEST_ASSERT_EQUAL_HEX32(reasons, judge(e).reasons);
 }
 
@@ -46,6 +48,12 @@ void test_each_reason_has_its_threshold(void) {
   e.num_different_inliers = 15;
   assert_reason(0, e);
   e.num_different_inliers = 14;
+  assert_reason(TV_REASON_TOO_FEW_MATCHES, e);
+  // The inliers are in enough places of both images.
+  e = good();
+  e.num_places[1] = 20;
+  assert_reason(0, e);
+  e.num_places[1] = 19;
   assert_reason(TV_REASON_TOO_FEW_MATCHES, e);
   e = good();
   e.num_inliers = 30;

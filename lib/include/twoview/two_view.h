@@ -85,7 +85,9 @@ typedef enum tv_verdict {
 
 /* Why a verdict is not "ok". The values are bits of tv_two_view.reasons. */
 typedef enum tv_reason {
-  /* Fewer than 15 distinct matches are inliers. */
+  /* Fewer than 15 distinct matches are inliers, or the inliers of a full pose lie in fewer than 20
+     cells of 32 x 32 pixels (a 16th of the longer side where an image is smaller than 512 pixels, a
+     64th where it is larger than 2048) of one of the images. */
   TV_REASON_TOO_FEW_MATCHES = 1 << 0,
   /* Fewer than 25 % of the matches are inliers, or the residuals are uniform over the threshold, as
      random matches' are. Matches that can never be inliers (tv_estimate_two_view) are not counted.

@@ -173,8 +173,7 @@ bool mark_pixel(uint32_t* marks, const Level& level, int32_t x, int32_t y) {
 // corner does not move to a pixel that is masked out.
 int32_t make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
                        const Level& level, int32_t index, const tv_image* mask,
-                       const tv_feature_options& options, uint32_t* marks,
-                       tv_keypoint* keypoints) {
+                       const tv_feature_options& options, uint32_t* marks, tv_keypoint* keypoints) {
   int32_t made = 0;
   memset(marks, 0, marks_count(level.width, level.height) * sizeof marks[0]);
   for (int32_t k = 0; k < count; ++k) {

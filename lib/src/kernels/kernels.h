@@ -120,11 +120,11 @@ typedef struct tvk_triangulate_pair {
    the 3 pixels at each end of the row.
 
    hessian_determinants: the determinant of the Hessian of the smoothed image at the 7 x 7 pixels
-   around `centre`: determinants[8 y + x], y and x in 0..6; determinants[8 y + 7] is unspecified. The
-   13 x 13 pixels around `centre` (TVK_HESSIAN_REACH) are read, and no others. Smoothed: by
-   (1 4 6 4 1) along x and along y, divided by 16 and rounded. In units of these values the second
-   derivatives are the products of (1 -2 1) along their axis and (1 2 1) across it, and the mixed one
-   is that of (-1 0 1) along both.
+   around `centre`: determinants[8 y + x], y and x in 0..6; determinants[8 y + 7] is unspecified.
+   The 13 x 13 pixels around `centre` (TVK_HESSIAN_REACH) are read, and no others. Smoothed: by (1 4
+   6 4 1) along x and along y, divided by 16 and rounded. In units of these values the second
+   derivatives are the products of (1 -2 1) along their axis and (1 2 1) across it, and the mixed
+   one is that of (-1 0 1) along both.
 
    suppress_row: writes to xs, in ascending order, each x whose score in `cur` is above 0 and above
    the scores of all eight neighbours, and returns their number. The first and the last x are never
@@ -214,8 +214,7 @@ typedef struct tvk_triangulate_pair {
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                  \
      uint8_t *scores))                                                                             \
-  X(hessian_determinants, void,                                                                    \
-    (const uint8_t *centre, int64_t stride, int32_t *determinants))                                \
+  X(hessian_determinants, void, (const uint8_t *centre, int64_t stride, int32_t *determinants))    \
   X(suppress_row, int32_t,                                                                         \
     (const uint8_t *prev, const uint8_t *cur, const uint8_t *next, int32_t width, uint16_t *xs))   \
   X(average_rows, void,                                                                            \
