@@ -168,8 +168,9 @@ class Evaluate(cli.CliTest):
             f"k3: 0, image_width: {WIDTH}, image_height: {HEIGHT}}}\n"
         )
         # On level 0 the second image is the first one, shifted by whole pixels, so that the pose is
-        # exact; the pixels of coarser levels are averages over other pixels.
-        fine = ("--levels", "1")
+        # exact with corners at whole pixels; the pixels of coarser levels are averages over other
+        # pixels.
+        fine = ("--levels", "1", "--subpixel", "0")
         error = lambda: self.report(pair_line(), *fine)["pairs"][0]["pose_error_deg"]
         self.write("set/cameras.yaml", entry("cam", 0))
         straight = error()

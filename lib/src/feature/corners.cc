@@ -53,13 +53,16 @@ struct Histogram {
 };
 
 // Appends the corners that the kernel found in row y at xs[0 .. found) to the candidates, except
-// masked ones and those below the threshold. Returns the new number of candidates.
-int32_t add_row(const Level& level, const tv_image* mask, int32_t threshold, const uint16_t* xs,
-                int32_t found, int32_t y, const uint8_t* scores, Corner* candidates, int32_t count,
-                Histogram& histogram) {
+// masked ones, those below the threshold and those nearer to the border than `border`. Returns the
+// new number of candidates.
+int32_t add_row(const Level& level, const tv_image* mask, int32_t border, int32_t threshold,
+                const uint16_t* xs, int32_t found, int32_t y, const uint8_t* scores,
+                Corner* candidates, int32_t count, Histogram& histogram) {
+  if (y < border || y + border >= level.height) return count;
   for (int32_t k = 0; k < found; ++k) {
     const int32_t x = xs[k];
-    if (scores[x] < threshold || is_masked_out(mask, level, x, y)) continue;
+    if (scores[x] < threshold || x < border || x + border >= level.width) continue;
+    if (is_masked_out(mask, level, x, y)) continue;
     candidates[count++] = Corner{static_cast<uint16_t>(x), static_cast<uint16_t>(y), scores[x]};
     ++histogram.counts[scores[x]];
   }
@@ -69,10 +72,12 @@ int32_t add_row(const Level& level, const tv_image* mask, int32_t threshold, con
 // Writes the corners of a level to work.candidates in raster order and returns their number. All
 // corners that can be among the `wanted` best are included. Once at least `wanted` corners score
 // above the threshold, the threshold rises by one for the rest of the image, up to `highest`.
-int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image* mask, int32_t arc,
-                   int32_t threshold, int32_t highest, int32_t wanted, Workspace& work,
-                   Histogram& histogram) {
+int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image* mask,
+                   const tv_feature_options& options, int32_t threshold, int32_t highest,
+                   int32_t wanted, Workspace& work, Histogram& histogram) {
   const int32_t rim = TVK_CIRCLE_RADIUS;
+  // A corner that cannot move to a maximum, for lack of pixels, is elsewhere in another view.
+  const int32_t border = options.subpixel != 0 ? TVK_HESSIAN_REACH : rim;
   histogram = Histogram{};
   if (level.width <= 2 * rim || level.height <= 2 * rim) return 0;
   int32_t count = 0, below = 0;  // the candidates, and how many of them are below the threshold
@@ -82,7 +87,7 @@ int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image*
     if (y < level.height - rim) {
       const uint8_t* rows[7];
       for (int32_t k = 0; k < 7; ++k) rows[k] = level.data + (y - rim + k) * level.stride;
-      kernels.fast_score_row(rows, level.width, arc, threshold, row);
+      kernels.fast_score_row(rows, level.width, options.arc, threshold, row);
     } else {
       memset(row, 0, static_cast<size_t>(level.width));
     }
@@ -90,8 +95,8 @@ int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image*
     const uint8_t* middle = work.scores[(y - 1) % 3];
     const int32_t found =
         kernels.suppress_row(work.scores[(y - 2) % 3], middle, row, level.width, work.xs);
-    count = add_row(level, mask, threshold, work.xs, found, y - 1, middle, work.candidates, count,
-                    histogram);
+    count = add_row(level, mask, border, threshold, work.xs, found, y - 1, middle, work.candidates,
+                    count, histogram);
     while (threshold < highest && count - below - histogram.counts[threshold] >= wanted) {
       below += histogram.counts[threshold++];
     }
@@ -242,7 +247,7 @@ int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_ima
   const int32_t highest = options.cell_px == 0 ? 254 : options.threshold;
   Histogram histogram;
   const int32_t found =
-      scan_level(kernels, level, mask, options.arc, lowest, highest, share, work, histogram);
+      scan_level(kernels, level, mask, options, lowest, highest, share, work, histogram);
   const int32_t sorted =
       sort_by_score(work.candidates, found, histogram, lowest, highest, share, work.sorted);
   const int32_t kept = spread_over_grid(work.sorted, sorted, share, level, options.cell_px,

@@ -27,12 +27,11 @@ int32_t largest_of_nine(const int32_t* determinants, int32_t place) {
 }  // namespace
 
 bool find_peak(const tvk_table& kernels, const Level& level, int32_t x, int32_t y, Peak* peak) {
-  constexpr int32_t rim = TVK_HESSIAN_REACH;
-  if (x < rim || y < rim || x + rim >= level.width || y + rim >= level.height) return false;
   int32_t determinants[7 * kPitch];
   kernels.hessian_determinants(level.data + y * level.stride + x, level.stride, determinants);
   int32_t place = kMiddle * kPitch + kMiddle;
   for (int32_t step = 0; step < kMaxSteps; ++step) place = largest_of_nine(determinants, place);
+  if (largest_of_nine(determinants, place) != place) return false;
 
   // The quadratic c(u, v) = .. + gx u + gy v + hxx u^2/2 + hxy u v + hyy v^2/2 has central
   // differences of the determinants as its coefficients.
