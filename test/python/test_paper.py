@@ -303,8 +303,10 @@ class Figure16(Case):
         told = numbers["default"]["before"]
         self.assertAlmostEqual(told["depth_error_median_percent"], np.median(errors), delta=1e-6)
         self.assertLess(told["depth_error_median_percent"], 1)
-        self.assertLess(numbers["unrefined"]["adjusted, 0.2 px"]["depth_error_median_percent"],
-                        numbers["unrefined"]["before"]["depth_error_median_percent"])
+        # Bundle adjustment corrects a pose that nobody refined. Its depths may be right by accident.
+        unrefined = numbers["unrefined"]
+        for key in ("rotation_error_deg", "reprojection_rms_px"):
+            self.assertLess(unrefined["adjusted, 0.2 px"][key], unrefined["before"][key] / 2, key)
 
 
 class Page(Case):
