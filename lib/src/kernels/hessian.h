@@ -2,14 +2,22 @@
    which fit 32: smoothed pixels are at most 4080, second derivatives at most 32640. Each pass is
    over all rows, so that a row is not read, at another offset, just after it was stored. */
 
-static inline words words_binomial(words a, words b, words c, words d, words e) {
-  return a + e + (b + d) * words_of(4) + c * words_of(6);
+typedef uint16_t unsigned_words __attribute__((vector_size(2 * TVK_WORDS)));
+
+/* p[0] + 4 p[step] + 6 p[2 step] + 4 p[3 step] + p[4 step]: of pixels at most 4080, of such sums at
+   most 65280, which only unsigned numbers hold. */
+static inline unsigned_words binomial(const int16_t *p, int step) {
+  const unsigned_words outer =
+      (unsigned_words)words_load(p) + (unsigned_words)words_load(p + 4 * step);
+  const unsigned_words inner =
+      (unsigned_words)words_load(p + step) + (unsigned_words)words_load(p + 3 * step);
+  const unsigned_words middle = (unsigned_words)words_load(p + 2 * step);
+  return outer + inner * 4 + middle * 6;
 }
 
 static void hessian_determinants(const uint8_t *centre, int64_t stride, int32_t *determinants) {
   enum { PIXELS = 2 * TVK_HESSIAN_REACH + 1, SMOOTHED = PIXELS - 4, FOUND = SMOOTHED - 2 };
   enum { PITCH = 16 + 8 };
-  typedef uint16_t unsigned_words __attribute__((vector_size(2 * TVK_WORDS)));
   typedef uint8_t eight_bytes __attribute__((vector_size(8)));
   typedef int16_t eight_words __attribute__((vector_size(16)));
   int16_t pixels[PIXELS][PITCH] TVK_ALIGNED = {{0}}, sums[SMOOTHED][PITCH] TVK_ALIGNED = {{0}};
@@ -28,18 +36,12 @@ static void hessian_determinants(const uint8_t *centre, int64_t stride, int32_t 
   }
   for (y = 0; y < SMOOTHED; ++y) {
     for (x = 0; x < 16; x += TVK_WORDS) {
-      words_store(sums[y] + x,
-                  words_binomial(words_load(pixels[y] + x), words_load(pixels[y + 1] + x),
-                                 words_load(pixels[y + 2] + x), words_load(pixels[y + 3] + x),
-                                 words_load(pixels[y + 4] + x)));
+      words_store(sums[y] + x, (words)binomial(pixels[y] + x, PITCH));
     }
   }
   for (y = 0; y < SMOOTHED; ++y) {
     for (x = 0; x < 16; x += TVK_WORDS) {
-      const int16_t *s = sums[y] + x;
-      const words sum = words_binomial(words_load(s), words_load(s + 1), words_load(s + 2),
-                                       words_load(s + 3), words_load(s + 4));
-      words_store(smoothed[y] + x, (words)((unsigned_words)(sum + words_of(8)) >> 4));
+      words_store(smoothed[y] + x, (words)((binomial(sums[y] + x, 1) + 8) >> 4));
     }
   }
   for (y = 0; y < SMOOTHED; ++y) {
