@@ -306,7 +306,8 @@ class Figure16(Case):
         # Bundle adjustment corrects a pose that nobody refined. Its depths may be right by accident.
         unrefined = numbers["unrefined"]
         for key in ("rotation_error_deg", "reprojection_rms_px"):
-            self.assertLess(unrefined["adjusted, 0.2 px"][key], unrefined["before"][key] / 2, key)
+            before, adjusted = (unrefined[stage][key] for stage in ("before", "adjusted, 0.2 px"))
+            self.assertLess(adjusted, before / 2, key)
 
 
 class Page(Case):
