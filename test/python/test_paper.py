@@ -303,7 +303,7 @@ class Figure16(Case):
         told = numbers["default"]["before"]
         self.assertAlmostEqual(told["depth_error_median_percent"], np.median(errors), delta=1e-6)
         self.assertLess(told["depth_error_median_percent"], 1)
-        # Bundle adjustment corrects a pose that nobody refined, whose depths may be right by chance.
+        # Bundle adjustment corrects a pose that nobody refined; its depths may be right by chance.
         unrefined = numbers["unrefined"]
         for key in ("rotation_error_deg", "reprojection_rms_px"):
             before, adjusted = (unrefined[stage][key] for stage in ("before", "adjusted, 0.2 px"))
