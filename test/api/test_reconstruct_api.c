@@ -519,11 +519,13 @@ static void test_bundle_adjustment_moves_the_pose_and_what_follows_from_it(void)
   limits = limits_of(pair.width, pair.height, 2048);
   b = api_make(&limits);
   view_real_pair(&pair);
-  TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
+  tv_reconstruct_options_init(&options);
+  options.sigma_by_size = 0; /* the adjustment then lowers the sum of squares as it is compared */
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
   first = two_view;
   memcpy(plain, reconstruction.points, (size_t)reconstruction.num_matches * sizeof plain[0]);
   TEST_ASSERT_EQUAL_INT(1, first.has_t);
-  tv_reconstruct_options_init(&options);
   options.bundle_adjustment = 1;
   TEST_ASSERT_EQUAL_INT(
       TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
