@@ -129,7 +129,11 @@ void measure_spread(const Fit& f, int view, Evidence& evidence) {
   const double cell = std::max(std::min(32.0, longer / 16), longer / 64);
   const int eighths[2] = {8, 8};
   int places[2];
-  for (int d = 0; d < 2; ++d) places[d] = std::max(1, static_cast<int>(sides[d] / cell + 0.5));
+  for (int d = 0; d < 2; ++d) {
+    // One cell where the box is empty or not finite, whose ratio is not a number.
+    const double cells = sides[d] / cell + 0.5;
+    places[d] = cells >= 1 && cells < 65 ? static_cast<int>(cells) : 1;
+  }
   evidence.coverage[view] = filled_cells(f, view, box, eighths) / 64.0;
   evidence.num_places[view] = filled_cells(f, view, box, places);
 }
