@@ -427,6 +427,36 @@ static void test_the_mask_keeps_corners_where_it_is_not_zero(void) {
   TEST_ASSERT_EQUAL_INT(0, count);
 }
 
+/* Corners move by up to three pixels to a maximum: never to one that another corner has, nor into
+   the part that is masked out, of which a maximum's pixel is no part. */
+static void test_corners_that_move_meet_no_other_and_no_mask(void) {
+  const tv_image mask = api_image(mask_pixels, WIDTH, HEIGHT, WIDTH);
+  uint64_t seed = 74;
+  int32_t count = 0, k, x, y;
+  random_bytes(&seed, pixels, sizeof pixels);
+  options.levels = 1;
+  for (y = 0; y < HEIGHT; ++y) {
+    for (x = 0; x < WIDTH; ++x) mask_pixels[y * WIDTH + x] = (x / 8 + y / 8) % 2 ? 1 : 0;
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_detect(a.context, &image, &mask, &options, keypoints, CAP, &count));
+  TEST_ASSERT_TRUE(count > 50);
+  for (k = 0; k < count; ++k) {
+    int32_t near_kept = 0, other;
+    for (other = 0; other < k; ++other) {
+      TEST_ASSERT_TRUE(keypoints[k].x != keypoints[other].x ||
+                       keypoints[k].y != keypoints[other].y);
+    }
+    for (y = 0; y < HEIGHT; ++y) {
+      for (x = 0; x < WIDTH; ++x) {
+        near_kept |= mask_pixels[y * WIDTH + x] != 0 && fabsf(keypoints[k].x - (float)x) <= 1.0f &&
+                     fabsf(keypoints[k].y - (float)y) <= 1.0f;
+      }
+    }
+    TEST_ASSERT_EQUAL_INT(1, near_kept);
+  }
+}
+
 static void test_a_blank_or_tiny_image_has_no_corners(void) {
   static const int32_t sizes[][2] = {{1, 1}, {1, HEIGHT}, {WIDTH, 1},
                                      {6, 6}, {WIDTH, 6},  {6, HEIGHT}};
@@ -631,6 +661,7 @@ int main(void) {
   RUN_TEST(test_max_keypoints_bounds_descriptors);
   RUN_TEST(test_padding_is_never_read);
   RUN_TEST(test_the_mask_keeps_corners_where_it_is_not_zero);
+  RUN_TEST(test_corners_that_move_meet_no_other_and_no_mask);
   RUN_TEST(test_a_blank_or_tiny_image_has_no_corners);
   RUN_TEST(test_the_largest_size_is_described_in_any_image);
   RUN_TEST(test_any_point_of_a_1x1_image_is_described);

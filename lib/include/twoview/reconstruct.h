@@ -114,11 +114,12 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
    With guided_matching, the second estimate replaces the first one if it is of the same kind, has
    no fewer inliers and no worse a verdict. Verdict and reasons remain those of the first estimate,
    because matches that were searched along its epipolar lines are no independent evidence for it.
-   An image and a mirrored one are never "ok" for their poses: where the verdict would be "ok" and
-   less than a quarter of the keypoints match, the strongest 512 of each image are matched again, as
-   they are and with the patches of one image mirrored; if more match mirrored, the reason
-   TV_REASON_LOW_INLIER_RATIO is given. With upright descriptors (TV_ORIENTATION_UPRIGHT) this
-   recognises an image mirrored top to bottom only.
+   An image and a mirrored one may agree on a pose that does not exist. Where the verdict would be
+   "ok" and less than a quarter of the keypoints match, the strongest 512 of each image are
+   therefore matched again, as they are and with the patches of one image mirrored; if more match
+   mirrored, the reason TV_REASON_LOW_INLIER_RATIO is given. A scene that is its own mirror image
+   can still pass, and with upright descriptors (TV_ORIENTATION_UPRIGHT) an image mirrored left to
+   right can.
    With bundle_adjustment, exchanged views give the inverse pose up to rounding; without it, bit for
    bit.
    options: null means the defaults.

@@ -1,9 +1,9 @@
 #include "api/validate.h"
-#include "api/within.h"
 
 #include <initializer_list>
 
 #include "api/sized.h"
+#include "api/within.h"
 
 namespace tv {
 namespace {

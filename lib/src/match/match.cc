@@ -70,7 +70,7 @@ float order_keypoints(const tv_keypoint* keypoints, int32_t num, void* scratch, 
   }
   float lowest[2] = {keypoints[0].x, keypoints[0].y}, highest[2] = {lowest[0], lowest[1]};
   for (int32_t k = 0; k < num; ++k) {
-    lowest[0] = std::min(lowest[0], keypoints[k].x),
+    lowest[0] = std::min(lowest[0], keypoints[k].x);
     lowest[1] = std::min(lowest[1], keypoints[k].y);
     highest[0] = std::max(highest[0], keypoints[k].x);
     highest[1] = std::max(highest[1], keypoints[k].y);

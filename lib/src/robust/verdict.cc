@@ -12,8 +12,8 @@ namespace {
 constexpr int kFewMatches = 15;
 
 // Inliers within a few pixels of one another fit or miss a wrong pose together, and so count as one
-// witness. Fewer places than this are wrong about five times as often as more
-// (docs/decisions/0021-places.md).
+// witness. Of 292 real pairs with fewer places and no other reason 86 had a wrong rotation, of 3462
+// with more 42 (docs/decisions/0021-places.md).
 constexpr int kFewPlaces = 20;
 
 bool has_full_pose(const Evidence& e) {
