@@ -323,6 +323,26 @@ __attribute__((noinline)) bool looks_mirrored(tv_context* context, const int32_t
   return count[1] > count[0];
 }
 
+// Whether more than half of the inliers have a second nearest descriptor that is as near as those
+// of one place in two pictures are: then another place looks the same. docs/algorithms/two_view.md,
+// a second place that looks the same.
+bool looks_repeated(const tv_match_options* options, const Results& r, int32_t num_matches) {
+  constexpr float kAlikeSq = 20000;
+  tv_match_options match{};
+  read_sized(options, &match);
+  // Below such a bound max_distance replaces the distance of the second nearest descriptor, and
+  // nothing is known of it.
+  if (match.max_distance > 0 && match.max_distance * match.max_distance <= kAlikeSq) return false;
+  int32_t alike = 0, inliers = 0;
+  for (int32_t k = 0; k < num_matches; ++k) {
+    if (r.inlier_mask[k] == 0) continue;
+    const tv_correspondence& m = r.matches[k];
+    ++inliers;
+    alike += static_cast<float>(m.dist_sq) < kAlikeSq * (m.ratio * m.ratio);
+  }
+  return 2 * alike > inliers;
+}
+
 // Not inlined, so that its stack frame is not in use during the estimate.
 __attribute__((noinline)) void write_reconstruction(const Results& r,
                                                     const int32_t num_keypoints[2],
@@ -393,11 +413,14 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
                                 checked.estimate, &estimate, r.inlier_mask);
   if (status != TV_OK) return status;
   tv::correct_cameras(estimate, views[0], views[1], r);
+  if (estimate.verdict != TV_VERDICT_REFUSED && tv::looks_repeated(checked.match, r, num_matches)) {
+    tv::doubt(TV_REASON_REPEATED_STRUCTURE, &estimate);
+  }
   // Where a quarter of the keypoints match, the pictures are not mirrored.
   if (estimate.verdict == TV_VERDICT_OK &&
       4 * num_matches < std::min(num_keypoints[0], num_keypoints[1]) &&
       tv::looks_mirrored(context, num_keypoints, checked.match, r)) {
-    tv::doubt_mirrored(&estimate);
+    tv::doubt(TV_REASON_LOW_INLIER_RATIO, &estimate);
   }
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
     status = tv::match_along_lines(context, views[0], views[1], num_keypoints, checked.estimate, r,
