@@ -271,6 +271,10 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
+bool is_of_size(const tv_camera* camera, const tv_image& image) {
+  return camera == nullptr || (camera->width == image.width && camera->height == image.height);
+}
+
 // Extracts the keypoints of both views and matches them. Not inlined, so that its stack frame is
 // not in use during the estimate.
 __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const tv_view views[2],
@@ -287,6 +291,7 @@ __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const
     status = tv_extract(context, &views[v].image, views[v].mask, &features, r.keypoints[v],
                         r.descriptors[v], capacity, &num_keypoints[v]);
     if (status != TV_OK) return status;
+    if (!is_of_size(views[v].camera, views[v].image)) return TV_ERR_CAMERA;
   }
   const tv_features found[2] = {features_of(r, num_keypoints, 0), features_of(r, num_keypoints, 1)};
   return tv_match(context, &found[0], &found[1], options.match, r.matches, capacity, num_matches);
