@@ -27,6 +27,17 @@ def test_an_image_above_the_limits(context):
     assert isinstance(caught.value, (tv.StatusError, ValueError))
 
 
+def test_an_image_of_another_size_than_its_camera(context, image):
+    camera = tv.Camera(320, 240, 300, 300, 159.5, 119.5)
+    half = np.ascontiguousarray(image[::2, ::2])
+    for bad in ((image, camera, half, camera), (half, camera, image, camera)):
+        with pytest.raises(tv.TV_ERR_CAMERA, match="image[01] is 160x120, but camera[01] is for "
+                                                   "320x240.*camera_scale") as caught:
+            tv.reconstruct(context, *bad)
+        assert isinstance(caught.value, ValueError) and "\n" not in str(caught.value)
+    tv.reconstruct(context, image, camera, half, tv.camera_scale(camera, 0.5))
+
+
 def test_a_mask_of_another_shape(context, image):
     with pytest.raises(ValueError, match="mask"):
         tv.detect(context, image, image[:-1], max_keypoints=100)

@@ -418,8 +418,9 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
                 bundle_adjustment: bool = False,
                 sigma_by_size: float = 1.0) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points. Images are (height, width) uint8 and
-    are read without a copy. feature, match and estimate are the options of the stages;
-    sigma_by_size is the exponent of keypoint_sigmas."""
+    are read without a copy; TV_ERR_CAMERA is raised for one that is not of its camera's size.
+    feature, match and estimate are the options of the stages; sigma_by_size is the exponent of
+    keypoint_sigmas."""
     library = check_context(context).library
     kept = [to_struct(library, kind, options, {}) for kind, options in
             ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
@@ -434,6 +435,11 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
         view.image, view.camera = _abi.check_image("image" + name, image), ctypes.addressof(
             kept[-1]
         )
+        if (kept[-1].height, kept[-1].width) != image.shape:
+            raise _abi.TV_ERR_CAMERA(
+                f"image{name} is {image.shape[1]}x{image.shape[0]}, but camera{name} is for "
+                f"{kept[-1].width}x{kept[-1].height}: resize the image, or its camera by "
+                "twoview.camera_scale")
         if mask is not None:
             kept.append(_abi.check_image("mask" + name, mask))
             view.mask = ctypes.addressof(kept[-1])

@@ -195,6 +195,18 @@ static void test_what_the_stages_refuse_is_refused(void) {
   bad.fx = 0;
   views[1].camera = &bad;
   refused(TV_ERR_CAMERA, NULL);
+  for (int k = 0; k < 3; ++k) {
+    bad = camera;
+    if (k == 0) bad.width = 2 * WIDTH;
+    if (k == 1) bad.height = HEIGHT - 1;
+    if (k == 2) TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_scale(&camera, 2.0, &bad));
+    refused(TV_ERR_CAMERA, NULL);
+    views[1].camera = &camera;
+    views[0].camera = &bad;
+    refused(TV_ERR_CAMERA, NULL);
+    views[0].camera = &camera;
+    views[1].camera = &bad;
+  }
   views[1].camera = &camera;
   views[1].image.width = WIDTH + 1;
   views[1].image.stride_bytes = WIDTH + 1;
@@ -245,6 +257,8 @@ static void test_no_geometry_is_a_result(void) {
   TEST_ASSERT_EQUAL_INT(TV_KIND_DEGENERATE, two_view.kind);
   TEST_ASSERT_EQUAL_INT(0, two_view.has_R);
   views[0].image = api_image(drawn[0], 1, 1, 1);
+  tv_camera one = camera_of(1, 1);
+  views[0].camera = &one;
   TEST_ASSERT_EQUAL_INT(TV_OK, run(a.context));
 }
 

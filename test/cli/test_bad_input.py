@@ -149,7 +149,7 @@ class Cameras(cli.CliTest):
     def test_images_of_another_size_than_the_camera_name_both_sizes(self):
         small = self.write("small.png", png(160, 120, grey(160, 120)))
         done = self.reconstruct(b=small)
-        self.assert_refused(done, "small.png", "160x120", f"{WIDTH}x{HEIGHT}")
+        self.assert_refused(done, "small.png", "160x120", f"{WIDTH}x{HEIGHT}", "--resize")
 
     def test_a_missing_camera_file_is_named(self):
         self.assert_refused(self.reconstruct("--camera", "no.yaml", camera=False), "no.yaml")

@@ -153,6 +153,19 @@ class Triangulate(cli.CliTest):
                 )
         self.assert_refused(self.triangulate(matches="none.csv"), "none.csv")
 
+    def test_pixels_outside_the_cameras_image_are_refused(self):
+        """Those of the images at twice the size, on both sides; pixels on the border are taken."""
+        rows = [[2 * value for value in row] for row in seen(POINTS)]
+        outside = self.write("twice.csv", "\n".join(" ".join(map(repr, row)) for row in rows))
+        self.assert_refused(self.triangulate(matches=outside), "twice.csv", "cam.yaml",
+                            f"{WIDTH}x{HEIGHT}", "in image")
+        for x, y in ((-1.5, 10), (10, -1.5), (WIDTH + 0.5, 10), (10, HEIGHT + 0.5)):
+            with self.subTest(x=x, y=y):
+                one = self.write("one.csv", f"10 10 {x} {y}\n")
+                self.assert_refused(self.triangulate(matches=one), "in image 1")
+        self.succeed(self.triangulate(
+            matches=self.write("edge.csv", f"-0.5 -0.5 {WIDTH} {HEIGHT}\nnan 1 2 3\n")))
+
     def test_bad_poses_and_cameras_are_refused(self):
         for text, word in (
             ("R: [1,0,0, 0,1,0, 0,0,1]\n", "t is missing"),

@@ -21,7 +21,8 @@ typedef struct tv_view {
   uint32_t reserved;
   /* The image. */
   tv_image image;
-  /* The camera of this image; null in both views means uncalibrated, which gives no pose. */
+  /* The camera of this image, of its width and height; null in both views means uncalibrated, which
+     gives no pose. */
   const tv_camera *camera;
   /* Null, or an image of the same size; only corners where its byte is not 0 are kept. */
   const tv_image *mask;
@@ -120,13 +121,18 @@ TV_API void tv_reconstruction_init_sized(tv_reconstruction *reconstruction, size
    mirrored, the reason TV_REASON_LOW_INLIER_RATIO is given. A scene that is its own mirror image
    can still pass, and with upright descriptors (TV_ORIENTATION_UPRIGHT) an image mirrored left to
    right can.
+   The estimate is given the reason TV_REASON_REPEATED_STRUCTURE where more than half of its inliers
+   have a second nearest descriptor at a squared distance below 20000: then a second place looks the
+   same, as on a wall that one pattern covers. With a max_distance of 141 and below in the options
+   of tv_match that distance is unknown, and the reason is not given for it.
    With bundle_adjustment, exchanged views give the inverse pose up to rounding; without it, bit for
    bit.
    options: null means the defaults.
    two_view: initialised by tv_two_view_init; reconstruction: initialised by tv_reconstruction_init.
    They do not overlap (TV_ERR_OVERLAP).
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, or a reserved field that is
-   not 0), and the statuses of the stages. */
+   not 0), TV_ERR_CAMERA (also where the width or height of a view's image is not that of its
+   camera: tv_camera_scale gives the camera of a resized image), and the statuses of the stages. */
 TV_API tv_status tv_reconstruct(tv_context *context, const tv_view *view0, const tv_view *view1,
                                 const tv_reconstruct_options *options, tv_two_view *two_view,
                                 tv_reconstruction *reconstruction);

@@ -65,7 +65,8 @@ typedef enum tv_status {
   /* An output array overlaps another argument. */
   TV_ERR_OVERLAP = 9,
   /* A camera has an unknown model, a size or focal length that is not above 0, a number that is not
-     finite, or a reserved field that is not 0. */
+     finite, or a reserved field that is not 0; or it is for images of another size than its image
+     (tv_reconstruct). */
   TV_ERR_CAMERA = 10,
   /* A pixel or a ray lies outside the region in which the lens model is valid. */
   TV_ERR_OUTSIDE = 11,

@@ -271,6 +271,10 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
+bool is_of_size(const tv_camera* camera, const tv_image& image) {
+  return camera == nullptr || (camera->width == image.width && camera->height == image.height);
+}
+
 // Extracts the keypoints of both views and matches them. Not inlined, so that its stack frame is
 // not in use during the estimate.
 __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const tv_view views[2],
@@ -287,6 +291,7 @@ __attribute__((noinline)) tv_status extract_and_match(tv_context* context, const
     status = tv_extract(context, &views[v].image, views[v].mask, &features, r.keypoints[v],
                         r.descriptors[v], capacity, &num_keypoints[v]);
     if (status != TV_OK) return status;
+    if (!is_of_size(views[v].camera, views[v].image)) return TV_ERR_CAMERA;
   }
   const tv_features found[2] = {features_of(r, num_keypoints, 0), features_of(r, num_keypoints, 1)};
   return tv_match(context, &found[0], &found[1], options.match, r.matches, capacity, num_matches);
@@ -321,6 +326,26 @@ __attribute__((noinline)) bool looks_mirrored(tv_context* context, const int32_t
     mirror_descriptors(r.descriptors[0], strongest[0]);
   }
   return count[1] > count[0];
+}
+
+// Whether more than half of the inliers have a second nearest descriptor that is as near as those
+// of one place in two pictures are: then another place looks the same. docs/algorithms/two_view.md,
+// a second place that looks the same.
+bool looks_repeated(const tv_match_options* options, const Results& r, int32_t num_matches) {
+  constexpr float kAlikeSq = 20000;
+  tv_match_options match{};
+  read_sized(options, &match);
+  // Below such a bound max_distance replaces the distance of the second nearest descriptor, and
+  // nothing is known of it.
+  if (match.max_distance > 0 && match.max_distance * match.max_distance <= kAlikeSq) return false;
+  int32_t alike = 0, inliers = 0;
+  for (int32_t k = 0; k < num_matches; ++k) {
+    if (r.inlier_mask[k] == 0) continue;
+    const tv_correspondence& m = r.matches[k];
+    ++inliers;
+    alike += static_cast<float>(m.dist_sq) < kAlikeSq * (m.ratio * m.ratio);
+  }
+  return 2 * alike > inliers;
 }
 
 // Not inlined, so that its stack frame is not in use during the estimate.
@@ -393,11 +418,14 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
                                 checked.estimate, &estimate, r.inlier_mask);
   if (status != TV_OK) return status;
   tv::correct_cameras(estimate, views[0], views[1], r);
+  if (estimate.verdict != TV_VERDICT_REFUSED && tv::looks_repeated(checked.match, r, num_matches)) {
+    tv::doubt(TV_REASON_REPEATED_STRUCTURE, &estimate);
+  }
   // Where a quarter of the keypoints match, the pictures are not mirrored.
   if (estimate.verdict == TV_VERDICT_OK &&
       4 * num_matches < std::min(num_keypoints[0], num_keypoints[1]) &&
       tv::looks_mirrored(context, num_keypoints, checked.match, r)) {
-    tv::doubt_mirrored(&estimate);
+    tv::doubt(TV_REASON_LOW_INLIER_RATIO, &estimate);
   }
   if (checked.guided_matching != 0 && tv::is_full_pose(estimate) && estimate.has_E != 0) {
     status = tv::match_along_lines(context, views[0], views[1], num_keypoints, checked.estimate, r,

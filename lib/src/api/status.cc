@@ -18,7 +18,7 @@ const char *tv_status_string(tv_status status) {
     case TV_ERR_LIMITS: return "above the limits or the purposes of the context";
     case TV_ERR_CAPACITY: return "an output array is too small";
     case TV_ERR_OVERLAP: return "an output array overlaps another argument";
-    case TV_ERR_CAMERA: return "camera intrinsics are invalid";
+    case TV_ERR_CAMERA: return "camera intrinsics are invalid, or for another image size";
     case TV_ERR_OUTSIDE: return "outside the valid region of the lens model";
     case TV_ERR_KERNELS: return "this CPU or build lacks the kernel set";
     default: return "unknown status";

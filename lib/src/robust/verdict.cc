@@ -112,11 +112,11 @@ Judgement judge(const Evidence& e) {
           reasons};
 }
 
-// LOW_INLIER_RATIO: the matches that would show that the pictures are of one scene are missing.
-// Those that there are lie on corners that are their own mirror image, and for such matches there
-// is a pose, too.
-void doubt_mirrored(tv_two_view* estimate) {
-  estimate->reasons |= TV_REASON_LOW_INLIER_RATIO;
+// LOW_INLIER_RATIO for mirrored pictures: the matches that would show that the pictures are of one
+// scene are missing. Those that there are lie on corners that are their own mirror image, and for
+// such matches there is a pose, too.
+void doubt(tv_reason reason, tv_two_view* estimate) {
+  estimate->reasons |= static_cast<uint32_t>(reason);
   if (estimate->verdict == TV_VERDICT_OK) estimate->verdict = TV_VERDICT_DOUBTFUL;
 }
 

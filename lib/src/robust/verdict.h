@@ -42,8 +42,10 @@ Judgement judge(const Evidence& evidence);
 // The coverage that is reported and judged: the larger of the two views'.
 double coverage_of(const Evidence& evidence);
 
-// Gives an estimate the reason that its two pictures match better when one of them is mirrored.
-void doubt_mirrored(tv_two_view* estimate);
+// Gives an estimate a reason that its matches do not show, only their descriptors:
+// TV_REASON_LOW_INLIER_RATIO where the pictures match better when one of them is mirrored,
+// TV_REASON_REPEATED_STRUCTURE where most inliers have a second place that looks the same.
+void doubt(tv_reason reason, tv_two_view* estimate);
 
 // Whether the estimate with the matches of guided matching replaces the first one. Where it does,
 // it is given the first one's verdict, reasons and test of the principal point.

@@ -124,7 +124,9 @@ void require_size(const tv_camera& camera, const std::string& camera_name, int w
                   const std::string& image_name) {
   if (camera.width == width && camera.height == height) return;
   throw BadInput("image " + image_name + " is " + size_text(width, height) + ", but camera " +
-                 camera_name + " is for " + size_text(camera.width, camera.height));
+                 camera_name + " is for " + size_text(camera.width, camera.height) +
+                 ": give the picture as the camera took it (--resize L makes both smaller), or a "
+                 "camera file for this size");
 }
 
 tv_camera resized(const tv_camera& camera, int width, int height) {

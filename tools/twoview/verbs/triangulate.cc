@@ -27,10 +27,30 @@ struct Arguments {
   double max_error_px = Options().estimate.max_error_px;
 };
 
+// Throws BadInput where a matched pixel is not in the image that its camera is for: then the
+// matches are of images of another size. One pixel is allowed for other conventions of the origin.
+void require_inside(const Arguments& a, const MatchList& matches,
+                    const std::array<tv_camera, 2>& camera,
+                    const std::array<std::string, 2>& camera_files) {
+  for (size_t v = 0; v < 2; ++v) {
+    for (size_t i = 0; i < matches.size(); ++i) {
+      const double x = matches.pixels[v][2 * i], y = matches.pixels[v][2 * i + 1];
+      if (!(x < -1 || y < -1 || x > camera[v].width || y > camera[v].height)) continue;
+      char text[96];
+      std::snprintf(text, sizeof text, "has the pixel (%g, %g) in image %d, but camera ", x, y,
+                    static_cast<int>(v));
+      throw BadInput(a.matches + " " + text + camera_files[v] + " is for " +
+                     std::to_string(camera[v].width) + "x" + std::to_string(camera[v].height) +
+                     ": give the camera of the images that were matched");
+    }
+  }
+}
+
 std::vector<tv_point> triangulated(const Arguments& a, const MatchList& matches,
                                    const KnownPose& pose,
                                    const std::array<std::string, 2>& camera_files) {
   std::array<tv_camera, 2> camera = CameraOptions::load(camera_files);
+  require_inside(a, matches, camera, camera_files);
   for (tv_camera& c : camera) c = pose.corrected(c);
   std::vector<tv_point> points(matches.size());
   const auto method = static_cast<tv_triangulation>(a.common.options.triangulation);

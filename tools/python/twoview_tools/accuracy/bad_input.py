@@ -3,12 +3,12 @@
 
   scripts/python -m twoview_tools.accuracy.bad_input --pairs 10 --jobs 2
 
-Each line is one kind of input: rendered pictures without a pose or with a repeating pattern; a
-picture of a data set with a change of itself; and pairs of the data sets, one picture of which is
-changed. Every pair goes through tv_reconstruct with its defaults. "right" is a pose within 10
-degrees of the truth (the larger of the rotation's and the direction's angle, the direction with its
-sign), "wrong" any other. Where there is no true pose, every "ok" is wrong. The last lines name the
-pairs that are "ok" and wrong.
+Each line is one kind of input: rendered pictures without a pose or with a repeating pattern; the
+scenes of scenes.py; a picture of a data set with a change of itself; and pairs of the data sets,
+one picture of which is changed. Every pair goes through tv_reconstruct with its defaults. "right"
+is a pose within 10 degrees of the truth (the larger of the rotation's and the direction's angle,
+the direction with its sign), "wrong" any other. Where there is no true pose, every "ok" is wrong.
+The last lines name the pairs that are "ok" and wrong.
 """
 
 import os
@@ -25,11 +25,12 @@ import numpy as np
 import twoview as tv
 
 from .. import DEFAULT_LIBRARY
-from . import datasets, metrics, parallel, pictures, tables
+from . import datasets, metrics, parallel, pictures, scenes, tables
 
 WRONG_DEG = 10.0
 SIZES = (1, 0.71, 0.5, 0.35)
 SEEDS = 20  # pairs of each rendered line that is drawn
+SCENE_SEEDS = 10  # pairs of each scene
 PERIODS = (16, 24, 40, 64, 100)  # of the patterns, in pixels of the texture
 MOST_REASONS = 3  # in a line of the table
 
@@ -50,8 +51,11 @@ CHANGES = {
 # Changes after which no pose explains the pair: {line: (function, its arguments)}.
 MIRRORS = {"mirrored, left and right": (pictures.mirrored, 1),
            "mirrored, top and bottom": (pictures.mirrored, 0)}
-# The caller's mistake: the picture is smaller, and the camera is not.
-MISTAKES = {"0.5 of the size, the camera of the full size": (pictures.resized, 0.5, False)}
+# The caller's mistake: the picture is smaller, and the camera is not. In the second line the camera
+# states the picture's size, but its focal length is that of the full size.
+MISTAKES = {"0.5 of the size, the camera of the full size": (pictures.resized, 0.5, False, True),
+            "0.5 of the size, only the camera's width and height with it":
+                (pictures.resized, 0.5, False)}
 
 
 def _drawn(function, *arguments):
@@ -79,6 +83,12 @@ def rendered_lines():
     return lines
 
 
+def scene_lines():
+    """{line: Pairs} of rendered scenes that mislead."""
+    return {name: [make(seed) for seed in range(1, SCENE_SEEDS + 1)]
+            for name, make in scenes.SCENES.items()}
+
+
 def lines_of_picture(view):
     """{line: Pair} of a picture with a change of itself. There is no motion, so "ok" is wrong."""
     both = pictures.with_itself(view)
@@ -93,13 +103,14 @@ def lines_of_pair(pair):
         found = pictures.changed(pair, *change)
         lines[name] = pictures.Pair(found.views, found.R, None if name in MIRRORS else found.t)
     lines["both mirrored"] = pictures.mirrored_both(pair)
+    lines["a moving person before half of both"] = scenes.before_person(pair, 1)
     return lines
 
 
 # ---- the estimate --------------------------------------------------------------------------------
 
 def camera_of(view):
-    height, width = view.luma.shape
+    width, height = view.stated or view.luma.shape[::-1]
     K, lens = view.K, tuple(float(k) for k in view.lens)
     model = tv.CameraModel.BROWN_CONRADY if any(lens) else tv.CameraModel.PINHOLE
     return tv.Camera(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2], model,
@@ -112,10 +123,16 @@ def context_for(pairs):
 
 
 def run(context, pair):
-    """(twoview.TwoView, the row of the table) of a Pair."""
+    """(twoview.TwoView, the row of the table) of a Pair. A picture that is not of its camera's size
+    is an error: (None, a row that is "refused" for TV_ERR_CAMERA)."""
     (view0, view1) = pair.views
-    found, cloud = tv.reconstruct(context, view0.luma, camera_of(view0), view1.luma,
-                                  camera_of(view1))
+    try:
+        found, cloud = tv.reconstruct(context, view0.luma, camera_of(view0), view1.luma,
+                                      camera_of(view1))
+    except tv.TV_ERR_CAMERA:
+        return None, {"verdict": "refused", "kind": "error", "reasons": ["TV_ERR_CAMERA"],
+                      "has_pose": pair.t is not None, "error_deg": np.inf, "num_iterations": 0,
+                      "num_keypoints": [0, 0], "num_matches": 0, "num_inliers": 0}
     error = np.inf
     if pair.t is not None:
         errors = metrics.pose_error(found.R, found.t, pair.R, pair.t)
@@ -152,22 +169,26 @@ def _run_set(job):
     return rows
 
 
-def _run_rendered(_):
-    lines = rendered_lines()
+RENDERED = {"rendered": rendered_lines, "scene": scene_lines}
+
+
+def _run_rendered(group):
+    lines = RENDERED[group]()
     with context_for([pair for pairs in lines.values() for pair in pairs]) as context:
         return [row for line, pairs in lines.items() for i, pair in enumerate(pairs)
-                for row in _rows(context, "rendered", str(i), {line: pair})]
+                for row in _rows(context, group, str(i), {line: pair})]
 
 
 def _run(job):
-    return _run_rendered(job) if job is None else _run_set(job)
+    return _run_rendered(job) if job in RENDERED else _run_set(job)
 
 
 # ---- the table -----------------------------------------------------------------------------------
 
 COLUMNS = ("ok, right", "ok, wrong", "doubtful, right", "doubtful, wrong", "refused")
 NO_POSE_COLUMNS = ("ok", "doubtful", "refused")
-TITLES = {"rendered": "rendered pictures", "picture": "a picture with itself, one of the two",
+TITLES = {"rendered": "rendered pictures", "scene": "rendered scenes",
+          "picture": "a picture with itself, one of the two",
           "pair": "two pictures of a scene, one of the two"}
 
 
@@ -218,7 +239,7 @@ def main(argv=None):
     parser.add_argument("--json", metavar="F", help="write every pair")
     arguments = parser.parse_args(argv)
     os.environ.setdefault("TWOVIEW_LIBRARY", DEFAULT_LIBRARY)
-    work = [None]
+    work = list(RENDERED)
     if arguments.pairs:
         try:
             work += [(name, arguments.pairs) for name in datasets.select_sets(arguments.sets)]

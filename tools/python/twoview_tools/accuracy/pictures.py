@@ -20,6 +20,8 @@ class View:
     luma: np.ndarray  #: (height, width) uint8
     K: np.ndarray  #: (3, 3), pixel (0, 0) is the centre of a pixel
     lens: tuple = (0.0,) * 5  #: k1 k2 p1 p2 k3 of Brown and Conrady
+    #: (width, height) that the camera states, where it is another than the picture's
+    stated: Optional[tuple] = None
 
 
 @dataclass(frozen=True)
@@ -56,13 +58,14 @@ def turned(view, quarters):
     return view, Q
 
 
-def resized(view, scale, scale_camera=True):
-    """The picture made smaller by area averaging, and the camera with it."""
+def resized(view, scale, scale_camera=True, state_size=False):
+    """The picture made smaller by area averaging, and the camera with it. Without scale_camera it
+    keeps its K; with state_size its width and height, too."""
     height, width = view.luma.shape
     size = max(1, round(width * scale)), max(1, round(height * scale))
     luma = cv2.resize(view.luma, size, interpolation=cv2.INTER_AREA)
     if not scale_camera:
-        return replace(view, luma=luma), NO_TURN
+        return replace(view, luma=luma, stated=(width, height) if state_size else None), NO_TURN
     K = datasets.scale_K(view.K, size[0] / width, size[1] / height)
     return replace(view, luma=luma, K=K), NO_TURN
 
