@@ -2,8 +2,6 @@
    which fit 32: smoothed pixels are at most 4080, second derivatives at most 32640. Each pass is
    over all rows, so that a row is not read, at another offset, just after it was stored. */
 
-typedef uint16_t unsigned_words __attribute__((vector_size(2 * TVK_WORDS)));
-
 /* p[0] + 4 p[step] + 6 p[2 step] + 4 p[3 step] + p[4 step]: of pixels at most 4080, of such sums at
    most 65280, which only unsigned numbers hold. */
 static inline unsigned_words binomial(const int16_t *p, int step) {
