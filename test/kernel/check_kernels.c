@@ -263,8 +263,8 @@ static const int16_t *random_patches(trial *t, int32_t num_patches, int32_t num_
 
 static void case_orientation_histogram(trial *t) {
   const int16_t *patch = random_patches(t, 1, TVK_ORIENT_SIDE);
-  int32_t *smooth = OUTPUT(t, int32_t, TVK_ORIENT_BINS);
-  REPEAT(t, t->set->orientation_histogram(patch, smooth));
+  int32_t *smooth = OUTPUT(t, int32_t, TVK_ORIENT_BINS + 2), *peaks = OUTPUT(t, int32_t, 2);
+  REPEAT(t, t->set->orientation_histogram(patch, smooth, peaks));
 }
 
 static void case_gradient_histogram(trial *t) {

@@ -161,7 +161,10 @@ typedef struct tvk_triangulate_pair {
    orientation_histogram: `patch` is TVK_ORIENT_SIDE rows of an upright patch, of which
    TVK_ORIENT_SIDE samples each count. Writes the histogram of the gradients within 6 samples of the
    centre, with a Gaussian weight of sigma 2 samples, in TVK_ORIENT_BINS directions, clockwise in
-   the image from x, smoothed around the circle.
+   the image from x, smoothed around the circle: bin k to histogram[1 + k], and to histogram[0] and
+   histogram[TVK_ORIENT_BINS + 1] the last and the first bin. Writes to peaks[0] the highest bin,
+   and to peaks[1] the highest of the other bins that are above both neighbours, or -1 if there is
+   none. Of equal bins the first is taken.
 
    gradient_histogram: SIFT's 4x4x8 histogram, with Gaussian weights, of a patch of TVK_PATCH_SIDE
    rows, or the mean of the histograms of num_patches = 2 patches that follow each other. One number
@@ -237,7 +240,8 @@ typedef struct tvk_triangulate_pair {
   X(sample_patch, void,                                                                            \
     (const uint16_t *pairs, int32_t width, int32_t height, int32_t x, int32_t y, int32_t du_x,     \
      int32_t du_y, int32_t num_rows, int16_t *patch))                                              \
-  X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
+  X(orientation_histogram, void,                                                                   \
+    (const int16_t *patch, int32_t *histogram, int32_t peaks[2]))                                  \
   X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
   X(nearest_groups, tvk_nearest_shape,                                                             \
