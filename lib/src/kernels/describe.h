@@ -93,6 +93,7 @@ enum { AROUND = TVK_ORIENT_BINS + 5 };
    around the circle. smooth[1 + k] is bin k, and likewise repeated. */
 static void smooth_circle(const uint32_t around[AROUND], int32_t *smooth) {
   int32_t k;
+  TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
     const uint32_t *const a = around + k;
     const uint32_t own = (a[1] & 65535) + (a[5] & 65535) +
@@ -109,10 +110,12 @@ static void smooth_circle(const uint32_t around[AROUND], int32_t *smooth) {
    below 2^22, then by falling number; a bin above its neighbours has a key above 0. */
 static void find_peaks(const int32_t *smooth, int32_t peaks[2]) {
   int32_t keys[TVK_ORIENT_BINS], best = 0, second = 0, k;
+  TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
     keys[k] = smooth[1 + k] * TVK_ORIENT_BINS + TVK_ORIENT_BINS - 1 - k;
     best = keys[k] > best ? keys[k] : best;
   }
+  TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
     const int32_t above_left = smooth[1 + k] > smooth[k] ? keys[k] : 0;
     const int32_t above_both = smooth[1 + k] > smooth[2 + k] ? above_left : 0;
@@ -134,6 +137,7 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t
   uint32_t both[COUNT + TVK_PATCH_SIDE - ORIENT_GRADIENTS], around[AROUND];
   int32_t x, y;
   for (y = 0; y < 4; ++y) {
+    TVK_ROLLED
     for (x = 0; x < TVK_ORIENT_BINS; ++x) tables[y][x] = 0;
   }
   TVK_ROLLED
@@ -149,6 +153,7 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t
   for (x = 0; x < PADDED; x += 4) {
     for (y = 0; y < 4; ++y) tables[y][bin[x + y]] += both[x + y];
   }
+  TVK_ROLLED
   for (x = 0; x < TVK_ORIENT_BINS; ++x) {
     around[3 + x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
   }
