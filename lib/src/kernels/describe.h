@@ -300,16 +300,28 @@ static int32_t sum_of_squares(const int16_t *values) {
   return sum;
 }
 
+/* Clips the values at the limit and returns their sum. A lane adds up to 16 values below 4096. */
+static int32_t clip_values(int16_t *values, int16_t limit) {
+  uint16_t lanes[TVK_WORDS];
+  words sums = words_of(0);
+  int32_t l1 = 0, k;
+  TVK_ROLLED
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; k += TVK_WORDS) {
+    const words clipped = words_min(words_load(values + k), words_of(limit));
+    words_store(values + k, clipped);
+    sums += clipped;
+  }
+  words_store(lanes, sums);
+  for (k = 0; k < TVK_WORDS; ++k) l1 += lanes[k];
+  return l1;
+}
+
 static void quantize_descriptor(const int32_t *histogram, int32_t root, uint8_t *descriptor) {
   int16_t values[TVK_DESCRIPTOR_SIZE];
-  int32_t l1 = 0, limit, k;
+  int32_t l1, k;
   uint32_t scale;
   normalise_histogram(histogram, values);
-  limit = (int32_t)(0.2f * sqrtf((float)sum_of_squares(values)));
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-    values[k] = (int16_t)(values[k] < limit ? values[k] : limit);
-    l1 += values[k];
-  }
+  l1 = clip_values(values, (int16_t)(0.2f * sqrtf((float)sum_of_squares(values))));
   if (l1 == 0) {
     memset(descriptor, 0, TVK_DESCRIPTOR_SIZE);
     return;
