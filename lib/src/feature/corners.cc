@@ -154,8 +154,8 @@ struct IsBetter {
   }
 };
 
-// Writes the keypoints to `sorted` in the order of IsBetter: first by a counting sort by score, which
-// is a byte; only runs of equal scores, which are short, then need sorting.
+// Writes the keypoints to `sorted` in the order of IsBetter: first by a counting sort by score,
+// which is a byte; only runs of equal scores, which are short, then need sorting.
 void sort_keypoints(const tv_keypoint* keypoints, int32_t count, tv_keypoint* sorted) {
   int32_t ends[257] = {0};  // for each score, the number of higher ones: where its next one goes
   const auto place = [](const tv_keypoint& k) { return 255 - static_cast<int32_t>(k.score); };

@@ -70,8 +70,8 @@ void sample_around(const tvk_table& kernels, const Octaves& octaves, const tv_ke
   kernels.sample_patch(octave.pairs, octave.width, octave.height, x, y, du_x, du_y, side, patch);
 }
 
-// The angle, in (-pi, pi], at the top of the parabola through a bin and its two neighbours. smooth[1
-// + k] is bin k.
+// The angle, in (-pi, pi], at the top of the parabola through a bin and its two neighbours.
+// smooth[1 + k] is bin k.
 float peak_angle(const int32_t* smooth, int32_t bin) {
   const double left = static_cast<double>(smooth[bin]);
   const double middle = static_cast<double>(smooth[bin + 1]);

@@ -116,7 +116,8 @@ LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_he
     pixels = arena_alloc<uint8_t>(arena, area(max_width, max_height));
   }
   for (uint16_t*& sums : buffers.sums) sums = arena_alloc<uint16_t>(arena, columns);
-  for (uint16_t*& weights : buffers.columns.weights) weights = arena_alloc<uint16_t>(arena, columns);
+  for (uint16_t*& weights : buffers.columns.weights)
+    weights = arena_alloc<uint16_t>(arena, columns);
   buffers.columns.picks = arena_alloc<uint16_t>(arena, columns);
   buffers.columns.first = arena_alloc<int32_t>(arena, columns / 8);
   return buffers;

@@ -96,8 +96,8 @@ static void smooth_circle(const uint32_t around[AROUND], int32_t *smooth) {
   TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
     const uint32_t *const a = around + k;
-    const uint32_t own = (a[1] & 65535) + (a[5] & 65535) +
-                         4 * ((a[2] & 65535) + (a[4] & 65535)) + 6 * (a[3] & 65535);
+    const uint32_t own = (a[1] & 65535) + (a[5] & 65535) + 4 * ((a[2] & 65535) + (a[4] & 65535)) +
+                         6 * (a[3] & 65535);
     const uint32_t from_before =
         (a[0] >> 16) + (a[4] >> 16) + 4 * ((a[1] >> 16) + (a[3] >> 16)) + 6 * (a[2] >> 16);
     smooth[1 + k] = (int32_t)(own + from_before);

@@ -9,9 +9,9 @@ typedef uint16_t eight_unsigned __attribute__((vector_size(16)));
 #if defined(__SSSE3__)
 #define EIGHT_AFTER(a, b, n) ((eight_unsigned)_mm_alignr_epi8((__m128i)(b), (__m128i)(a), 2 * (n)))
 #elif defined(__SSE2__)
-#define EIGHT_AFTER(a, b, n)                                               \
+#define EIGHT_AFTER(a, b, n)                                           \
   ((eight_unsigned)_mm_or_si128(_mm_srli_si128((__m128i)(a), 2 * (n)), \
-                                    _mm_slli_si128((__m128i)(b), 16 - 2 * (n))))
+                                _mm_slli_si128((__m128i)(b), 16 - 2 * (n))))
 #elif defined(__ARM_NEON)
 #define EIGHT_AFTER(a, b, n) ((eight_unsigned)vextq_u16((uint16x8_t)(a), (uint16x8_t)(b), n))
 #else

@@ -142,8 +142,8 @@ typedef struct tvk_triangulate_pair {
    15) + k]. Up to 18 pixels from row[first[x / 8]] on are read. sums has room for out_width rounded
    up to a multiple of 16; the sums from out_width on are unspecified.
 
-   average_rows: out[x] = (the sum of three rows, weighted by row_weights, + 2^15) >> 16. The weights
-   are at most 255 and add up to 256, the rows are at most 65280, and width is at least 16.
+   average_rows: out[x] = (the sum of three rows, weighted by row_weights, + 2^15) >> 16. The
+   weights are at most 255 and add up to 256, the rows are at most 65280, and width is at least 16.
 
    halve_row: out[x] = (a[2x] + a[2x+1] + b[2x] + b[2x+1] + 2) / 4.
 
@@ -240,8 +240,7 @@ typedef struct tvk_triangulate_pair {
   X(sample_patch, void,                                                                            \
     (const uint16_t *pairs, int32_t width, int32_t height, int32_t x, int32_t y, int32_t du_x,     \
      int32_t du_y, int32_t num_rows, int16_t *patch))                                              \
-  X(orientation_histogram, void,                                                                   \
-    (const int16_t *patch, int32_t *histogram, int32_t peaks[2]))                                  \
+  X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram, int32_t peaks[2]))     \
   X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
   X(nearest_groups, tvk_nearest_shape,                                                             \

@@ -50,7 +50,7 @@ static void average_columns(const uint8_t *row, const tvk_columns *columns, int3
 
 #endif
 
-/* The high and the low bytes of the rows are summed apart, so that 16 bits suffice: a sum of each is
+/* The high and the low bytes of the rows are summed apart, so that 16 bits suffice: each sum is
    at most 255 * 256. */
 static void average_rows(const uint16_t *const rows[3], const int32_t row_weights[3], int32_t width,
                          uint8_t *out) {
