@@ -21,7 +21,7 @@ static inline eight_unsigned eight_after(eight_unsigned a, eight_unsigned b, int
   for (k = 0; k < 8; ++k) after[k] = k + n < 8 ? a[k + n] : b[k + n - 8];
   return after;
 }
-#define EIGHT_AFTER(a, b, n) eight_after(a, b, n)
+#define EIGHT_AFTER(a, b, n) eight_after((eight_unsigned)(a), (eight_unsigned)(b), n)
 #endif
 
 /* Eight bytes from p on, without the first `skip` of them. */
