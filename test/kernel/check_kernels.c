@@ -140,44 +140,50 @@ static void case_suppress_row(trial *t) {
   memset(xs + *found, PATTERN, (size_t)(room - *found) * sizeof xs[0]);
 }
 
-static void case_average_rows(trial *t) {
-  const int32_t width = pick(t, 1, 300, 640);
-  const uint8_t *rows[3];
-  int32_t weights[3], k;
-  uint16_t *sums;
-  for (k = 0; k < 3; ++k) rows[k] = row_of_bytes(t, width);
-  weights[0] = random_int(&t->seed, 0, 256);
-  weights[1] = random_int(&t->seed, 0, 256 - weights[0]);
+static void random_weights(trial *t, int32_t weights[3]) {
+  weights[0] = random_int(&t->seed, 1, 255);
+  weights[1] = random_int(&t->seed, weights[0] == 1, 256 - weights[0] - (weights[0] == 1));
   weights[2] = 256 - weights[0] - weights[1];
-  sums = OUTPUT(t, uint16_t, width);
-  REPEAT(t, t->set->average_rows(rows, weights, width, sums));
 }
 
 static void case_average_columns(trial *t) {
-  const int32_t out_width = pick(t, 1, 200, 533);
-  int32_t *first = INPUT(t, int32_t, out_width), *weights = INPUT(t, int32_t, 3 * out_width);
-  int32_t width = 0, x;
-  uint16_t *sums;
+  const int32_t out_width = pick(t, 1, 200, 453), padded = (out_width + 15) / 16 * 16;
+  const int32_t stride = pick(t, 0, 15, 11), width = padded / 8 * stride + 18;
+  int32_t *first = INPUT(t, int32_t, padded / 8), weights[3], x, k;
+  uint16_t *picks = INPUT(t, uint16_t, padded), *sums;
+  tvk_columns columns;
+  /* The block ends with the last pixel of the last columns, so that the address sanitizer reports a
+     kernel that reads further ones. */
+  const uint8_t *row = row_of_bytes(t, width);
+  columns.first = first;
+  columns.picks = picks;
+  for (k = 0; k < 3; ++k) columns.weights[k] = INPUT(t, uint16_t, padded);
+  for (x = 0; x < padded; ++x) {
+    first[x / 8] = x / 8 < padded / 8 - 1 ? x / 8 * stride : width - 18;
+    picks[x] = (uint16_t)(0xff00 + random_int(&t->seed, 0, 15));
+    random_weights(t, weights);
+    for (k = 0; k < 3; ++k) columns.weights[k][x] = (uint16_t)weights[k];
+  }
+  sums = OUTPUT(t, uint16_t, padded);
+  REPEAT(t, t->set->average_columns(row, &columns, out_width, sums));
+  /* The sums after the last column may hold anything, so they are not compared. */
+  for (x = out_width; x < padded; ++x) sums[x] = 0;
+}
+
+static void case_average_rows(trial *t) {
+  const int32_t width = pick(t, 16, 300, 453);
+  const uint16_t *rows[3];
+  int32_t weights[3], k, x;
   uint8_t *out;
-  for (x = 0; x < out_width; ++x) {
-    const int32_t used = random_int(&t->seed, 1, 3);
-    first[x] = width > 0 ? width - random_int(&t->seed, 0, 1) : 0;
-    weights[3 * x] = used == 1 ? 256 : random_int(&t->seed, 0, 256);
-    weights[3 * x + 1] = used == 1   ? 0
-                         : used == 2 ? 256 - weights[3 * x]
-                                     : random_int(&t->seed, 0, 256 - weights[3 * x]);
-    weights[3 * x + 2] = 256 - weights[3 * x] - weights[3 * x + 1];
-    if (first[x] + used > width) width = first[x] + used;
+  for (k = 0; k < 3; ++k) {
+    uint16_t *row = INPUT(t, uint16_t, width);
+    const int32_t lowest = random_int(&t->seed, 0, 1) * 65000;
+    for (x = 0; x < width; ++x) row[x] = (uint16_t)random_int(&t->seed, lowest, 65280);
+    rows[k] = row;
   }
-  /* The block ends with the last element that has a weight, so that the address sanitizer reports
-     a kernel that reads further ones. */
-  sums = INPUT(t, uint16_t, width);
-  for (x = 0; x < width; ++x) {
-    const int32_t noise = random_int(&t->seed, 0, 65280);
-    sums[x] = (uint16_t)(random_int(&t->seed, 0, 3) == 0 ? 65280 : noise);
-  }
-  out = OUTPUT(t, uint8_t, out_width);
-  REPEAT(t, t->set->average_columns(sums, first, weights, out_width, out));
+  random_weights(t, weights);
+  out = OUTPUT(t, uint8_t, width);
+  REPEAT(t, t->set->average_rows(rows, weights, width, out));
 }
 
 static void case_halve_row(trial *t) {
@@ -257,8 +263,8 @@ static const int16_t *random_patches(trial *t, int32_t num_patches, int32_t num_
 
 static void case_orientation_histogram(trial *t) {
   const int16_t *patch = random_patches(t, 1, TVK_ORIENT_SIDE);
-  int32_t *smooth = OUTPUT(t, int32_t, TVK_ORIENT_BINS);
-  REPEAT(t, t->set->orientation_histogram(patch, smooth));
+  int32_t *smooth = OUTPUT(t, int32_t, TVK_ORIENT_BINS + 2), *peaks = OUTPUT(t, int32_t, 2);
+  REPEAT(t, t->set->orientation_histogram(patch, smooth, peaks));
 }
 
 static void case_gradient_histogram(trial *t) {

@@ -10,6 +10,8 @@
 
 namespace tv {
 
+// Two arrays of keypoints: what was found, and its order while corners are found, or the oriented
+// keypoints afterwards.
 size_t extract_scratch_bytes(const tv_limits& limits) {
   const size_t keypoints = arena_bytes<tv_keypoint>(static_cast<size_t>(limits.max_keypoints));
   return 2 * keypoints + std::max(corners_bytes(limits.max_width, limits.max_height),

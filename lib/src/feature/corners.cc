@@ -154,14 +154,16 @@ struct IsBetter {
   }
 };
 
-// Sorts by IsBetter keypoints that are already in descending order of score: only runs of equal
-// scores, which are short, need sorting.
-void sort_within_scores(tv_keypoint* keypoints, int32_t count) {
-  int32_t begin = 0;
-  for (int32_t k = 1; k <= count; ++k) {
-    if (k < count && keypoints[k].score == keypoints[begin].score) continue;
-    std::sort(keypoints + begin, keypoints + k, IsBetter());
-    begin = k;
+// Writes the keypoints to `sorted` in the order of IsBetter: first by a counting sort by score,
+// which is a byte; only runs of equal scores, which are short, then need sorting.
+void sort_keypoints(const tv_keypoint* keypoints, int32_t count, tv_keypoint* sorted) {
+  int32_t ends[257] = {0};  // for each score, the number of higher ones: where its next one goes
+  const auto place = [](const tv_keypoint& k) { return 255 - static_cast<int32_t>(k.score); };
+  for (int32_t k = 0; k < count; ++k) ++ends[place(keypoints[k]) + 1];
+  for (int32_t p = 0; p < 256; ++p) ends[p + 1] += ends[p];
+  for (int32_t k = 0; k < count; ++k) sorted[ends[place(keypoints[k])]++] = keypoints[k];
+  for (int32_t p = 0, begin = 0; p < 256; begin = ends[p++]) {
+    std::sort(sorted + begin, sorted + ends[p], IsBetter());
   }
 }
 
@@ -274,6 +276,7 @@ int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_i
   const double factor = options.scale_factor;
   LevelBuffers buffers = alloc_level_buffers(arena, image.width, image.height);
   Workspace work = alloc_workspace(arena, image.width, image.height);
+  tv_keypoint* found = arena_alloc<tv_keypoint>(arena, static_cast<size_t>(budget));
   const int32_t levels = count_levels(image, options, factor);
   Level level = full_level(image);
   int32_t count = 0;
@@ -284,14 +287,10 @@ int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_i
     for (int32_t j = k + 1; j < levels; ++j) promised += level_share(budget, j, levels, factor);
     share = std::max(share, budget - count - promised);
     share = std::min(share, budget - count);
-    count += collect_level(kernels, level, mask, options, k, share, work, keypoints + count);
+    count += collect_level(kernels, level, mask, options, k, share, work, found + count);
     if (k + 1 < levels) next_level(kernels, level, factor, k, buffers, &level);
   }
-  if (levels == 1 && options.cell_px == 0) {
-    sort_within_scores(keypoints, count);
-  } else {
-    std::sort(keypoints, keypoints + count, IsBetter());
-  }
+  sort_keypoints(found, count, keypoints);
   return count;
 }
 

@@ -71,14 +71,14 @@ void sample_around(const tvk_table& kernels, const Octaves& octaves, const tv_ke
 }
 
 // The angle, in (-pi, pi], at the top of the parabola through a bin and its two neighbours.
+// smooth[1 + k] is bin k.
 float peak_angle(const int32_t* smooth, int32_t bin) {
-  constexpr int32_t n = TVK_ORIENT_BINS;
-  const double left = static_cast<double>(smooth[(bin + n - 1) % n]);
-  const double middle = static_cast<double>(smooth[bin]);
-  const double right = static_cast<double>(smooth[(bin + 1) % n]);
+  const double left = static_cast<double>(smooth[bin]);
+  const double middle = static_cast<double>(smooth[bin + 1]);
+  const double right = static_cast<double>(smooth[bin + 2]);
   const double curvature = left - 2.0 * middle + right;
   const double shift = curvature < 0.0 ? 0.5 * (left - right) / curvature : 0.0;
-  double turn = (bin + shift) / n;
+  double turn = (bin + shift) / TVK_ORIENT_BINS;
   if (turn > 0.5) turn -= 1.0;
   const float angle_rad = static_cast<float>(turn * 2.0 * kPi);
   return angle_rad == 0.0f ? 0.0f : angle_rad;
@@ -113,27 +113,16 @@ OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count, int32_t po
 int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint& keypoint, float angles_rad[2]) {
   int16_t patch[TVK_ORIENT_SIDE * TVK_PATCH_SIDE + 1];
-  int32_t smooth[TVK_ORIENT_BINS];
+  int32_t smooth[TVK_ORIENT_BINS + 2], peaks[2];
   sample_around(kernels, octaves, keypoint, keypoint.size, 0.0, kOrientStep, TVK_ORIENT_SIDE,
                 patch);
-  kernels.orientation_histogram(patch, smooth);
-  // The two highest local maxima; the lower bin wins a tie.
-  int32_t best = 0, second = -1;
-  for (int32_t k = 1; k < TVK_ORIENT_BINS; ++k) {
-    if (smooth[k] > smooth[best]) best = k;
-  }
-  for (int32_t k = 0; k < TVK_ORIENT_BINS; ++k) {
-    const int32_t left = smooth[(k + TVK_ORIENT_BINS - 1) % TVK_ORIENT_BINS];
-    const int32_t right = smooth[(k + 1) % TVK_ORIENT_BINS];
-    if (k == best || smooth[k] <= left || smooth[k] <= right) continue;
-    if (second < 0 || smooth[k] > smooth[second]) second = k;
-  }
-  angles_rad[0] = peak_angle(smooth, best);
-  if (second < 0 ||
-      static_cast<double>(smooth[second]) <= kSecondPeak * static_cast<double>(smooth[best])) {
+  kernels.orientation_histogram(patch, smooth, peaks);
+  angles_rad[0] = peak_angle(smooth, peaks[0]);
+  if (peaks[1] < 0 || static_cast<double>(smooth[1 + peaks[1]]) <=
+                          kSecondPeak * static_cast<double>(smooth[1 + peaks[0]])) {
     return 1;
   }
-  angles_rad[1] = peak_angle(smooth, second);
+  angles_rad[1] = peak_angle(smooth, peaks[1]);
   return 2;
 }
 

@@ -2,6 +2,8 @@
 // kernels/resample.h and pair_rows. Test: test/unit/test_pyramid.cc.
 #include "image/pyramid.h"
 
+#include <algorithm>
+
 namespace tv {
 namespace {
 
@@ -36,23 +38,48 @@ void halve(const tvk_table& kernels, const Level& source, uint8_t* pixels, int32
   }
 }
 
+// The columns that average_columns makes at once, and the pixels that it reads for eight of them.
+constexpr int32_t kColumns = 16, kColumnPixels = 18;
+
+size_t padded_columns(int32_t width) {
+  return static_cast<size_t>((width + kColumns - 1) / kColumns * kColumns);
+}
+
+// Fills `columns` for the new columns 0 .. width - 1, and for those that pad them with weight 0.
+void plan_columns(int32_t source_width, double factor, int32_t width, tvk_columns& columns) {
+  const int32_t last = source_width - 3;  // the last pixel that can be the first of three
+  int32_t block_first = 0;
+  for (int32_t x = 0; x < static_cast<int32_t>(padded_columns(width)); ++x) {
+    const Footprint f = x < width ? footprint(x, factor) : Footprint{last, {0, 0, 0}};
+    if (x % 8 == 0) {
+      block_first = std::min(f.first, source_width - kColumnPixels);
+      columns.first[x / 8] = block_first;
+    }
+    // A footprint of the last two pixels becomes one of the last three, the first without weight.
+    const int32_t first = std::min(f.first, last), moved = f.first - first;
+    columns.picks[x] = static_cast<uint16_t>(0xff00 + first - block_first);
+    for (int k = 0; k < 3; ++k) {
+      columns.weights[k][x] = static_cast<uint16_t>(k < moved ? 0 : f.weights[k - moved]);
+    }
+  }
+}
+
 void average(const tvk_table& kernels, const Level& source, double factor, LevelBuffers& buffers,
              uint8_t* pixels, int32_t width, int32_t height) {
-  for (int32_t x = 0; x < width; ++x) {
-    const Footprint f = footprint(x, factor);
-    buffers.first[x] = f.first;
-    for (int k = 0; k < 3; ++k) buffers.column_weights[3 * x + k] = f.weights[k];
-  }
+  plan_columns(source.width, factor, width, buffers.columns);
+  int32_t made = 0;  // the rows of `source` whose columns are averaged
   for (int32_t y = 0; y < height; ++y) {
     const Footprint f = footprint(y, factor);
-    const uint8_t* rows[3];
+    const uint16_t* rows[3];
     for (int k = 0; k < 3; ++k) {
       const int32_t row = f.weights[k] != 0 ? f.first + k : f.first;
-      rows[k] = source.data + row * source.stride;
+      for (; made <= row; ++made) {
+        kernels.average_columns(source.data + made * source.stride, &buffers.columns, width,
+                                buffers.sums[made % 3]);
+      }
+      rows[k] = buffers.sums[row % 3];
     }
-    kernels.average_rows(rows, f.weights, source.width, buffers.sums);
-    kernels.average_columns(buffers.sums, buffers.first, buffers.column_weights, width,
-                            pixels + static_cast<int64_t>(y) * width);
+    kernels.average_rows(rows, f.weights, width, pixels + static_cast<int64_t>(y) * width);
   }
 }
 
@@ -77,20 +104,22 @@ size_t area(int32_t width, int32_t height) {
 }  // namespace
 
 size_t level_buffers_bytes(int32_t max_width, int32_t max_height) {
-  const size_t width = static_cast<size_t>(max_width);
-  return 2 * arena_bytes<uint8_t>(area(max_width, max_height)) + arena_bytes<uint16_t>(width) +
-         arena_bytes<int32_t>(width) + arena_bytes<int32_t>(3 * width);
+  const size_t columns = padded_columns(max_width);
+  return 2 * arena_bytes<uint8_t>(area(max_width, max_height)) +
+         7 * arena_bytes<uint16_t>(columns) + arena_bytes<int32_t>(columns / 8);
 }
 
 LevelBuffers alloc_level_buffers(Arena& arena, int32_t max_width, int32_t max_height) {
-  const size_t width = static_cast<size_t>(max_width);
+  const size_t columns = padded_columns(max_width);
   LevelBuffers buffers;
   for (uint8_t*& pixels : buffers.pixels) {
     pixels = arena_alloc<uint8_t>(arena, area(max_width, max_height));
   }
-  buffers.sums = arena_alloc<uint16_t>(arena, width);
-  buffers.first = arena_alloc<int32_t>(arena, width);
-  buffers.column_weights = arena_alloc<int32_t>(arena, 3 * width);
+  for (uint16_t*& sums : buffers.sums) sums = arena_alloc<uint16_t>(arena, columns);
+  for (uint16_t*& weights : buffers.columns.weights)
+    weights = arena_alloc<uint16_t>(arena, columns);
+  buffers.columns.picks = arena_alloc<uint16_t>(arena, columns);
+  buffers.columns.first = arena_alloc<int32_t>(arena, columns / 8);
   return buffers;
 }
 

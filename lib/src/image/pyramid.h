@@ -37,9 +37,8 @@ inline double to_level(const Level& level, double x) { return to_level(level.sca
 // that made it.
 struct LevelBuffers {
   uint8_t* pixels[2];
-  uint16_t* sums;           // for each source column: its weighted sum over up to three rows
-  int32_t* first;           // for each new column: its first source column
-  int32_t* column_weights;  // for each new column: the weights of three source columns
+  uint16_t* sums[3];  // the new columns of three source rows; row y is in sums[y % 3]
+  tvk_columns columns;
 };
 
 size_t level_buffers_bytes(int32_t max_width, int32_t max_height);

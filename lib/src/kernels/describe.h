@@ -86,45 +86,81 @@ static direction_shares share_directions(words u, words v, words weights) {
   return shares;
 }
 
-/* Smooths a histogram by (1 4 6 4 1) around the circle. The sums are not divided by 16. */
-static void smooth_circle(const int32_t *histogram, int32_t *smooth) {
-  int32_t around[TVK_ORIENT_BINS + 4], k;
-  memcpy(around, histogram + TVK_ORIENT_BINS - 2, 2 * sizeof around[0]);
-  memcpy(around + 2, histogram, TVK_ORIENT_BINS * sizeof around[0]);
-  memcpy(around + 2 + TVK_ORIENT_BINS, histogram, 2 * sizeof around[0]);
+enum { AROUND = TVK_ORIENT_BINS + 5 };
+
+/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. around[3 + k] is the
+   sum of the shares of bin k in itself (low 16 bits) and in the next one (high 16 bits), repeated
+   around the circle. smooth[1 + k] is bin k, and likewise repeated. */
+static void smooth_circle(const uint32_t around[AROUND], int32_t *smooth) {
+  int32_t k;
+  TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
-    smooth[k] = around[k] + around[k + 4] + 4 * (around[k + 1] + around[k + 3]) + 6 * around[k + 2];
+    const uint32_t *const a = around + k;
+    const uint32_t own = (a[1] & 65535) + (a[5] & 65535) + 4 * ((a[2] & 65535) + (a[4] & 65535)) +
+                         6 * (a[3] & 65535);
+    const uint32_t from_before =
+        (a[0] >> 16) + (a[4] >> 16) + 4 * ((a[1] >> 16) + (a[3] >> 16)) + 6 * (a[2] >> 16);
+    smooth[1 + k] = (int32_t)(own + from_before);
   }
+  smooth[0] = smooth[TVK_ORIENT_BINS];
+  smooth[TVK_ORIENT_BINS + 1] = smooth[1];
 }
 
-static void orientation_histogram(const int16_t *patch, int32_t *smooth) {
+/* The two highest bins as orientation_histogram returns them. A bin's key orders by value, which is
+   below 2^22, then by falling number; a bin above its neighbours has a key above 0. */
+static void find_peaks(const int32_t *smooth, int32_t peaks[2]) {
+  int32_t keys[TVK_ORIENT_BINS], best = 0, second = 0, k;
+  TVK_ROLLED
+  for (k = 0; k < TVK_ORIENT_BINS; ++k) {
+    keys[k] = smooth[1 + k] * TVK_ORIENT_BINS + TVK_ORIENT_BINS - 1 - k;
+    best = keys[k] > best ? keys[k] : best;
+  }
+  TVK_ROLLED
+  for (k = 0; k < TVK_ORIENT_BINS; ++k) {
+    const int32_t above_left = smooth[1 + k] > smooth[k] ? keys[k] : 0;
+    const int32_t above_both = smooth[1 + k] > smooth[2 + k] ? above_left : 0;
+    const int32_t other = keys[k] < best ? above_both : 0;
+    second = other > second ? other : second;
+  }
+  peaks[0] = TVK_ORIENT_BINS - 1 - (best & (TVK_ORIENT_BINS - 1));
+  peaks[1] = second == 0 ? -1 : TVK_ORIENT_BINS - 1 - (second & (TVK_ORIENT_BINS - 1));
+}
+
+static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t peaks[2]) {
+  enum { COUNT = ORIENT_GRADIENTS * ORIENT_GRADIENTS, PADDED = (COUNT + 3) / 4 * 4 };
   /* A single addition adds both shares of a gradient, 16 bits each. Neighbouring samples add to
      different tables, so that no addition waits for the one before. */
   uint32_t tables[4][TVK_ORIENT_BINS] TVK_ALIGNED;
-  int32_t histogram[TVK_ORIENT_BINS];
+  /* Of all gradients; what a row writes after its last one, the next row writes over, and after the
+     last row the shares are 0. */
+  uint16_t bin[COUNT + TVK_PATCH_SIDE - ORIENT_GRADIENTS];
+  uint32_t both[COUNT + TVK_PATCH_SIDE - ORIENT_GRADIENTS], around[AROUND];
   int32_t x, y;
-  memset(tables, 0, sizeof tables);
+  for (y = 0; y < 4; ++y) {
+    TVK_ROLLED
+    for (x = 0; x < TVK_ORIENT_BINS; ++x) tables[y][x] = 0;
+  }
+  TVK_ROLLED
   for (y = 0; y < ORIENT_GRADIENTS; ++y) {
-    uint16_t bin[TVK_PATCH_SIDE] TVK_ALIGNED;
-    uint32_t both[TVK_PATCH_SIDE] TVK_ALIGNED;
     for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
       const int16_t *at = patch + y * TVK_PATCH_SIDE + x;
       const direction_shares shares =
           share_directions(gradient_u(at), gradient_v(at), words_load(orientation_weights[y] + x));
-      words_store(bin + x, shares.bin);
-      words_zip(shares.low, shares.high, both + x);
-    }
-    for (x = 0; x < ORIENT_GRADIENTS; ++x) {
-      tables[x & 3][bin[x]] += both[x];
+      words_store(bin + y * ORIENT_GRADIENTS + x, shares.bin);
+      words_zip(shares.low, shares.high, both + y * ORIENT_GRADIENTS + x);
     }
   }
+  for (x = 0; x < PADDED; x += 4) {
+    for (y = 0; y < 4; ++y) tables[y][bin[x + y]] += both[x + y];
+  }
+  TVK_ROLLED
   for (x = 0; x < TVK_ORIENT_BINS; ++x) {
-    tables[0][x] += tables[1][x] + tables[2][x] + tables[3][x];
-    histogram[x] = (int32_t)(tables[0][x] & 65535);
+    around[3 + x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
   }
-  histogram[0] += (int32_t)(tables[0][TVK_ORIENT_BINS - 1] >> 16);
-  for (x = 1; x < TVK_ORIENT_BINS; ++x) histogram[x] += (int32_t)(tables[0][x - 1] >> 16);
-  smooth_circle(histogram, smooth);
+  memcpy(around, around + TVK_ORIENT_BINS, 3 * sizeof around[0]);
+  memcpy(around + 3 + TVK_ORIENT_BINS, around + 3, 2 * sizeof around[0]);
+  smooth_circle(around, smooth);
+  find_peaks(smooth, peaks);
 }
 
 enum { PATCH_GRADIENTS = TVK_PATCH_SIDE - 1, CELL_SAMPLES = 6 };
@@ -264,16 +300,28 @@ static int32_t sum_of_squares(const int16_t *values) {
   return sum;
 }
 
+/* Clips the values at the limit and returns their sum. A lane adds up to 16 values below 4096. */
+static int32_t clip_values(int16_t *values, int16_t limit) {
+  uint16_t lanes[TVK_WORDS];
+  words sums = words_of(0);
+  int32_t l1 = 0, k;
+  TVK_ROLLED
+  for (k = 0; k < TVK_DESCRIPTOR_SIZE; k += TVK_WORDS) {
+    const words clipped = words_min(words_load(values + k), words_of(limit));
+    words_store(values + k, clipped);
+    sums += clipped;
+  }
+  words_store(lanes, sums);
+  for (k = 0; k < TVK_WORDS; ++k) l1 += lanes[k];
+  return l1;
+}
+
 static void quantize_descriptor(const int32_t *histogram, int32_t root, uint8_t *descriptor) {
   int16_t values[TVK_DESCRIPTOR_SIZE];
-  int32_t l1 = 0, limit, k;
+  int32_t l1, k;
   uint32_t scale;
   normalise_histogram(histogram, values);
-  limit = (int32_t)(0.2f * sqrtf((float)sum_of_squares(values)));
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-    values[k] = (int16_t)(values[k] < limit ? values[k] : limit);
-    l1 += values[k];
-  }
+  l1 = clip_values(values, (int16_t)(0.2f * sqrtf((float)sum_of_squares(values))));
   if (l1 == 0) {
     memset(descriptor, 0, TVK_DESCRIPTOR_SIZE);
     return;

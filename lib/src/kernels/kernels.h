@@ -99,6 +99,14 @@ typedef struct tvk_nearest_shape {
 #define TVK_SAMPSON_SUMS 56      /* the number of sums of sampson_sums */
 #define TVK_TRANSFER_SUMS 47     /* the number of sums of transfer_sums */
 
+/* The pixels that average_columns reads for each new column, and their weights, which are at most
+   255 and add up to 256. The arrays are filled for a multiple of 16 columns. */
+typedef struct tvk_columns {
+  int32_t *first;       /* for each eight columns, the pixel from which they pick */
+  uint16_t *picks;      /* 0xff00 + which of the 16 pixels from there on is the column's first */
+  uint16_t *weights[3]; /* of the column's first pixel and of the next two */
+} tvk_columns;
+
 struct tv_point;
 
 /* A pair of pinhole cameras. focal, inverse_focal and principal hold x, y of camera 0, then x, y of
@@ -130,11 +138,12 @@ typedef struct tvk_triangulate_pair {
    the scores of all eight neighbours, and returns their number. The first and the last x are never
    written. xs has room for (width + 1) / 2.
 
-   average_rows: sums[x] = the sum of up to three rows, weighted by row_weights, which add up to
-   256; the sums are in [0, 65280].
+   average_columns: sums[x] = the sum over k < 3 of weights[k][x] * row[first[x / 8] + (picks[x] &
+   15) + k]. Up to 18 pixels from row[first[x / 8]] on are read. sums has room for out_width rounded
+   up to a multiple of 16; the sums from out_width on are unspecified.
 
-   average_columns: out[x] = (sum over k < 3 of column_weights[3 x + k] * sums[first[x] + k] + 2^15)
-   >> 16. A sum after the first whose weight is 0 is not read.
+   average_rows: out[x] = (the sum of three rows, weighted by row_weights, + 2^15) >> 16. The
+   weights are at most 255 and add up to 256, the rows are at most 65280, and width is at least 16.
 
    halve_row: out[x] = (a[2x] + a[2x+1] + b[2x] + b[2x+1] + 2) / 4.
 
@@ -152,7 +161,10 @@ typedef struct tvk_triangulate_pair {
    orientation_histogram: `patch` is TVK_ORIENT_SIDE rows of an upright patch, of which
    TVK_ORIENT_SIDE samples each count. Writes the histogram of the gradients within 6 samples of the
    centre, with a Gaussian weight of sigma 2 samples, in TVK_ORIENT_BINS directions, clockwise in
-   the image from x, smoothed around the circle.
+   the image from x, smoothed around the circle: bin k to histogram[1 + k], and to histogram[0] and
+   histogram[TVK_ORIENT_BINS + 1] the last and the first bin. Writes to peaks[0] the highest bin,
+   and to peaks[1] the highest of the other bins that are above both neighbours, or -1 if there is
+   none. Of equal bins the first is taken.
 
    gradient_histogram: SIFT's 4x4x8 histogram, with Gaussian weights, of a patch of TVK_PATCH_SIDE
    rows, or the mean of the histograms of num_patches = 2 patches that follow each other. One number
@@ -217,11 +229,10 @@ typedef struct tvk_triangulate_pair {
   X(hessian_determinants, void, (const uint8_t *centre, int64_t stride, int32_t *determinants))    \
   X(suppress_row, int32_t,                                                                         \
     (const uint8_t *prev, const uint8_t *cur, const uint8_t *next, int32_t width, uint16_t *xs))   \
-  X(average_rows, void,                                                                            \
-    (const uint8_t *const rows[3], const int32_t row_weights[3], int32_t width, uint16_t *sums))   \
   X(average_columns, void,                                                                         \
-    (const uint16_t *sums, const int32_t *first, const int32_t *column_weights, int32_t out_width, \
-     uint8_t *out))                                                                                \
+    (const uint8_t *row, const tvk_columns *columns, int32_t out_width, uint16_t *sums))           \
+  X(average_rows, void,                                                                            \
+    (const uint16_t *const rows[3], const int32_t row_weights[3], int32_t width, uint8_t *out))    \
   X(halve_row, void, (const uint8_t *a, const uint8_t *b, int32_t out_width, uint8_t *out))        \
   X(blur_row, void,                                                                                \
     (const uint8_t *above, const uint8_t *row, const uint8_t *below, int32_t width, uint8_t *out)) \
@@ -229,7 +240,7 @@ typedef struct tvk_triangulate_pair {
   X(sample_patch, void,                                                                            \
     (const uint16_t *pairs, int32_t width, int32_t height, int32_t x, int32_t y, int32_t du_x,     \
      int32_t du_y, int32_t num_rows, int16_t *patch))                                              \
-  X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram))                       \
+  X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram, int32_t peaks[2]))     \
   X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
   X(nearest_groups, tvk_nearest_shape,                                                             \

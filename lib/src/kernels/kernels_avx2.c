@@ -7,6 +7,7 @@
 #include "kernels/kernels_impl.h"
 
 TVK_LEND(hessian_determinants, avx2);
+TVK_LEND(average_columns, avx2);
 TVK_LEND(average_rows, avx2);
 TVK_LEND(halve_row, avx2);
 TVK_LEND(blur_row, avx2);
@@ -14,7 +15,4 @@ TVK_LEND(pair_rows, avx2);
 TVK_LEND(orientation_histogram, avx2);
 TVK_LEND(gradient_histogram, avx2);
 TVK_LEND(quantize_descriptor, avx2);
-
-/* This kernel is the C set's, which is as fast. */
-#define average_columns tvk_average_columns_c
 #include "kernels/kernels_table.h"

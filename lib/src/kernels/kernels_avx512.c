@@ -13,8 +13,8 @@
 
 /* These kernels are other sets', which are as fast, or whose difference does not show in the time
    of a pair. */
-#define average_columns tvk_average_columns_c
 #define hessian_determinants tvk_hessian_determinants_avx2
+#define average_columns tvk_average_columns_avx2
 #define average_rows tvk_average_rows_avx2
 #define halve_row tvk_halve_row_avx2
 #define blur_row tvk_blur_row_avx2

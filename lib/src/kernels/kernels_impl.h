@@ -13,8 +13,8 @@
 
 /* clang-format off */
 #include "kernels/fast.h"
-#include "kernels/resample.h"
 #include "kernels/words.h"
+#include "kernels/resample.h"
 #include "kernels/hessian.h"
 #include "kernels/patch.h"
 #include "kernels/describe.h"

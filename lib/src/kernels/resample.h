@@ -1,24 +1,73 @@
 /* The kernels that make the rows of the pyramid: area averages, halving, blur. */
 
-static void average_rows(const uint8_t *const rows[3], const int32_t row_weights[3], int32_t width,
-                         uint16_t *sums) {
-  const uint8_t *a = rows[0], *b = rows[1], *c = rows[2];
-  const int32_t wa = row_weights[0], wb = row_weights[1], wc = row_weights[2];
-  int32_t x;
-  for (x = 0; x < width; ++x) sums[x] = (uint16_t)(wa * a[x] + wb * b[x] + wc * c[x]);
+#include "kernels/words.h"
+
+typedef uint16_t unsigned_words __attribute__((vector_size(2 * TVK_WORDS)));
+
+#if defined(TVK_AVX2) || defined(TVK_AVX512) || defined(TVK_NEON)
+
+/* The pixels that are picked for TVK_WORDS columns. first[0] is that of the first eight. */
+static inline unsigned_words pick_pixels(const uint8_t *row, const int32_t *first, words picks) {
+#if defined(TVK_NEON) && defined(__aarch64__)
+  return (unsigned_words)vqtbl1q_u8(vld1q_u8(row + first[0]), (uint8x16_t)picks);
+#elif defined(TVK_NEON)
+  const uint8x16_t pixels = vld1q_u8(row + first[0]), bytes = (uint8x16_t)picks;
+  const uint8x8x2_t both = {{vget_low_u8(pixels), vget_high_u8(pixels)}};
+  return (unsigned_words)vcombine_u8(vtbl2_u8(both, vget_low_u8(bytes)),
+                                     vtbl2_u8(both, vget_high_u8(bytes)));
+#else
+  const __m128i near_pixels = _mm_loadu_si128((const __m128i *)(row + first[0]));
+  const __m128i far_pixels = _mm_loadu_si128((const __m128i *)(row + first[1]));
+  return (unsigned_words)_mm256_shuffle_epi8(_mm256_set_m128i(far_pixels, near_pixels),
+                                             (__m256i)picks);
+#endif
 }
 
-static void average_columns(const uint16_t *sums, const int32_t *first,
-                            const int32_t *column_weights, int32_t out_width, uint8_t *out) {
+static void average_columns(const uint8_t *row, const tvk_columns *columns, int32_t out_width,
+                            uint16_t *sums) {
+  int32_t x, k;
+  for (x = 0; x < out_width; x += TVK_WORDS) {
+    unsigned_words sum = {0};
+    for (k = 0; k < 3; ++k) {
+      sum += pick_pixels(row + k, columns->first + x / 8, words_load(columns->picks + x)) *
+             (unsigned_words)words_load(columns->weights[k] + x);
+    }
+    words_store(sums + x, (words)sum);
+  }
+}
+
+#else
+
+static void average_columns(const uint8_t *row, const tvk_columns *columns, int32_t out_width,
+                            uint16_t *sums) {
   int32_t x;
   for (x = 0; x < out_width; ++x) {
-    const uint16_t *s = sums + first[x];
-    const int32_t *w = column_weights + 3 * x;
-    int32_t sum = 1 << 15;
-    sum += w[0] * s[0];
-    if (w[1]) sum += w[1] * s[1];
-    if (w[2]) sum += w[2] * s[2];
-    out[x] = (uint8_t)(sum >> 16);
+    const uint8_t *at = row + columns->first[x / 8] + (columns->picks[x] & 15);
+    sums[x] = (uint16_t)(columns->weights[0][x] * at[0] + columns->weights[1][x] * at[1] +
+                         columns->weights[2][x] * at[2]);
+  }
+}
+
+#endif
+
+/* The high and the low bytes of the rows are summed apart, so that 16 bits suffice: each sum is
+   at most 255 * 256. */
+static void average_rows(const uint16_t *const rows[3], const int32_t row_weights[3], int32_t width,
+                         uint8_t *out) {
+  typedef uint8_t narrow __attribute__((vector_size(TVK_WORDS)));
+  const int32_t last = width - TVK_WORDS;
+  int32_t x, k;
+  for (x = 0; x < width; x += TVK_WORDS) { /* the last block may overlap its predecessor */
+    const int32_t at = x < last ? x : last;
+    unsigned_words high = {0}, low = {0};
+    narrow bytes;
+    for (k = 0; k < 3; ++k) {
+      const unsigned_words row = (unsigned_words)words_load(rows[k] + at);
+      high += (row >> 8) * (uint16_t)row_weights[k];
+      low += (row & 255) * (uint16_t)row_weights[k];
+    }
+    bytes = __builtin_convertvector((high + (low >> 8) + 128) >> 8, narrow);
+    memcpy(out + at, &bytes, sizeof bytes);
   }
 }
 
