@@ -113,7 +113,7 @@ def build(folder, architecture, compiler, level, keep_footprint):
         options += ["-DCMAKE_C_COMPILER=gcc", "-DCMAKE_CXX_COMPILER=g++"]
     targets = ["golden_digest"]
     if keep_footprint and architecture != "x86-64":
-        targets.append("twoview")
+        targets += ["twoview", "twoview_without_odometry"]
         options += ["-DCMAKE_C_COMPILER_LAUNCHER=", "-DCMAKE_CXX_COMPILER_LAUNCHER="]
     configured = there / "configured_with"
     if not configured.exists() or configured.read_text() != repr(options):
