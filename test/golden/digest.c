@@ -34,6 +34,8 @@ LAYOUT(tv_two_view, 968, principal_point_asked_covariance, 944);
 LAYOUT(tv_point, 40, reserved, 36);
 LAYOUT(tv_bundle_options, 24, hold_pose, 20);
 LAYOUT(tv_bundle_result, 256, noise_px, 248);
+LAYOUT(tv_absolute_pose_options, 96, gravity_sigma_rad, 88);
+LAYOUT(tv_absolute_pose, 544, seed, 536);
 
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 
@@ -371,6 +373,70 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   digest_principal_point(p, context);
 }
 
+/* The absolute pose from simulated matches, a third of them wrong: each camera model,
+   with sigmas, with gravity, and of a plane, the last two of them with ratios. */
+static void digest_absolute_pose(const pair *p, tv_context *context) {
+  static double pixels[2 * MAX_KEYPOINTS], points[3 * MAX_KEYPOINTS];
+  static float sigmas[MAX_KEYPOINTS], ratios[MAX_KEYPOINTS];
+  static uint8_t inliers[MAX_KEYPOINTS];
+  tv_camera camera = p->camera[0];
+  tv_pixel_points matches;
+  tv_absolute_pose_options options;
+  tv_absolute_pose r;
+  uint64_t seed = 3;
+  int part, k;
+  start();
+  for (part = 0; part < 6; ++part) {
+    camera.model = part % 3;
+    memset(camera.k, 0, sizeof camera.k);
+    camera.k[0] = part % 3 == 0 ? 0 : -0.02;
+    tv_pixel_points_init(&matches);
+    for (k = 0; k < MAX_KEYPOINTS; ++k) {
+      const double x = uniform(&seed, -0.4, 0.4), y = uniform(&seed, -0.3, 0.3),
+                   z = part == 5 ? 4 + x : uniform(&seed, 2, 8);
+      const double seen[3] = {x * z, y * z, z};
+      must("project", tv_camera_project(&camera, seen, pixels + 2 * k, NULL));
+      pixels[2 * k] += uniform(&seed, -1, 1) * (k % 3 == 0 ? 100 : 1);
+      pixels[2 * k + 1] += uniform(&seed, -1, 1);
+      points[3 * k] = seen[1] - 5;
+      points[3 * k + 1] = seen[2] + 70;
+      points[3 * k + 2] = seen[0];
+      sigmas[k] = (float)uniform(&seed, 1, 3);
+      ratios[k] = (float)uniform(&seed, 0, 1);
+    }
+    matches.num = MAX_KEYPOINTS;
+    matches.pixels = pixels;
+    matches.points = points;
+    if (part >= 3) matches.sigmas = sigmas;
+    if (part >= 4) matches.ratios = ratios;
+    tv_absolute_pose_options_init(&options);
+    if (part == 4) { /* a little off */
+      options.gravity_in_world[1] = options.gravity_in_camera[2] = 1;
+      options.gravity_in_camera[0] = 0.01;
+      options.gravity_sigma_rad = 0.01;
+    }
+    tv_absolute_pose_init(&r);
+    must("absolute_pose",
+         tv_estimate_absolute_pose(context, &camera, &matches, &options, &r, inliers));
+    if (!r.has_pose) fail("no absolute pose", TV_OK);
+    add_int(r.verdict);
+    add_int(r.reasons);
+    add_int(r.num_inliers);
+    add_int(r.num_iterations);
+    add_doubles(r.R, 9);
+    add_doubles(r.t, 3);
+    add_int(r.has_alternative);
+    add_doubles(r.alternative_R, 9);
+    add_doubles(r.alternative_t, 3);
+    add_doubles(r.covariance, 36);
+    add_double(r.coverage);
+    add_double(r.rms_error_px);
+    add_double(r.noise_px);
+    add_bytes(inliers, sizeof inliers);
+  }
+  print(p, context, "absolute_pose");
+}
+
 static void digest_guided(const pair *p, tv_context *context, const features *f,
                           const tv_two_view *pose) {
   static tv_correspondence found[MAX_KEYPOINTS];
@@ -512,6 +578,7 @@ static void digest_pair(const pair *p, int32_t kernels) {
   digest_guided(p, context, &f, &pose);
   digest_points(p, context, &m, &pose, points);
   digest_bundle(p, context, &m, &pose, points);
+  digest_absolute_pose(p, context);
   digest_reconstruct(p, context);
   digest_memory(p, context, &limits);
   tv_context_free(context);

@@ -4,6 +4,6 @@
 #ifndef TWOVIEW_ODOMETRY_H
 #define TWOVIEW_ODOMETRY_H
 
-#include "twoview/status.h"
+#include "twoview/absolute_pose.h"
 
 #endif
