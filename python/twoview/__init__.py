@@ -12,8 +12,9 @@ from .camera import (Camera, camera_check, camera_project_points, camera_scale,
 from .context import Context
 from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, Orientation, PointStatus,
                     Purpose, Reason, Solver, Stage, Status, Triangulation, Verdict)
-from .options import (BundleOptions, EstimateOptions, FeatureOptions, GuidedOptions,
-                      MatchOptions)
+from .options import (AbsolutePoseOptions, BundleOptions, EstimateOptions, FeatureOptions,
+                      GuidedOptions, MatchOptions)
+from .absolute_pose import AbsolutePose, estimate_absolute_pose
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,
                      corrected_camera, describe, detect, estimate_two_view, extract,
                      keypoint_sigmas, match, match_guided, orient, point_covariances,

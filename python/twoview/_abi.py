@@ -140,10 +140,33 @@ class tv_bundle_result(Structure):
                 ("noise_px", c_double)]
 
 
+class tv_pixel_points(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num", c_int32), ("pixels", c_void_p),
+                ("points", c_void_p), ("ratios", c_void_p), ("sigmas", c_void_p)]
+
+
+class tv_absolute_pose_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_iterations", c_int32),
+                ("fixed_iterations", c_int32), ("reserved", c_int32), ("max_error_px", c_double),
+                ("confidence", c_double), ("seed", c_uint64), ("gravity_in_world", c_double * 3),
+                ("gravity_in_camera", c_double * 3), ("gravity_sigma_rad", c_double)]
+
+
+class tv_absolute_pose(Structure):
+    _fields_ = [("struct_size", c_uint32), ("verdict", c_int32), ("reasons", c_uint32),
+                ("num_matches", c_int32), ("num_inliers", c_int32), ("num_iterations", c_int32),
+                ("has_pose", c_uint8), ("has_covariance", c_uint8), ("has_alternative", c_uint8),
+                ("reserved", c_uint8 * 5), ("R", c_double * 9), ("t", c_double * 3),
+                ("alternative_R", c_double * 9), ("alternative_t", c_double * 3),
+                ("covariance", c_double * 36), ("coverage", c_double), ("rms_error_px", c_double),
+                ("noise_px", c_double), ("seed", c_uint64)]
+
+
 STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
            tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
            tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
-           tv_reconstruction, tv_bundle_options, tv_bundle_result]
+           tv_reconstruction, tv_bundle_options, tv_bundle_result, tv_pixel_points,
+           tv_absolute_pose_options, tv_absolute_pose]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
@@ -221,8 +244,9 @@ class Library:
             getattr(self.lib, name).restype = c_char_p
         self.lib.tv_context_high_water.restype = c_size_t
         for struct in STRUCTS:
-            if struct._fields_[0][0] == "struct_size":
-                init = getattr(self.lib, struct.__name__ + "_init_sized")
+            # A library without odometry (TWOVIEW_ODOMETRY=OFF) does not have all of them.
+            init = getattr(self.lib, struct.__name__ + "_init_sized", None)
+            if init is not None:
                 init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
     def make(self, struct: Any, fields: Optional[dict[str, Any]] = None) -> Any:
