@@ -5,5 +5,6 @@
 #define TWOVIEW_ODOMETRY_H
 
 #include "twoview/absolute_pose.h"
+#include "twoview/window.h"
 
 #endif

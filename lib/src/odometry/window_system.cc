@@ -1,0 +1,385 @@
+#include "odometry/window_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tv {
+namespace {
+
+constexpr double kVanished = 1e-14;  // a pivot at most this share of its entry counts as zero
+// A point moves at most to ten times its distance in one step.
+constexpr double kLeastShare = 0.1;
+// A point whose cost grows by more than this, beyond that of an error of the loss's scale, is
+// settled alone, and takes so many steps without the loss's curvature.
+constexpr double kGrowth = 1.2;
+constexpr int kCarefulSteps = 2;
+constexpr int kSettleSteps = 10;
+constexpr double kSettleDamping = 1e-3, kSettled = 0.999;
+
+// The sums over a point's observations: V = sum Jp'Jp (xx xy xz yy yz zz) and half the gradient.
+struct PointSums {
+  double V[6], gradient[3];
+};
+
+// An observation, linearised: the point in the camera's frame, and the derivatives of the residual.
+struct ViewPart {
+  double x[3], h[2][3], q[3], Jp[2][3];
+};
+
+// Linearises an observation. h: d residual / d x, weighed so that h'h is half its Hessian; q: half
+// the gradient by x.
+void linearise(const Window& window, const Weighing& weighing, const WindowObservation& o,
+               const double x[3], double h[2][3], double q[3]) {
+  Residual r{};
+  residual_at(o, x, &r);
+  const double s = norm_sq(r);
+  const LossSlope loss = slope_of(window.options, s);
+  for (int i = 0; i < 3; ++i) {
+    h[0][i] = (o.J[i] - r.e[0] * o.n[i]) * r.inverse_depth;
+    h[1][i] = (o.J[3 + i] - r.e[1] * o.n[i]) * r.inverse_depth;
+    q[i] = loss.weight * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
+  }
+  if (loss.weight == 1.0) return;
+  double weight = loss.weight;
+  if (weighing.covariance) weight *= 1.0 + 0.5 * loss.bend;
+  const double root = std::sqrt(weight);
+  double along[3] = {};
+  if (weighing.bend > 0.0) {
+    // In the direction of e, the curvature is 1 + bend of that across it (B. Triggs et al. 1999,
+    // 4.3), as far as this is not negative.
+    const double kept = std::sqrt(1.0 + weighing.bend * std::max(loss.bend, -1.0));
+    const double factor = (1.0 - kept) / s;
+    for (int i = 0; i < 3; ++i) along[i] = factor * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
+  }
+  for (int i = 0; i < 3; ++i) {
+    h[0][i] = root * (h[0][i] - r.e[0] * along[i]);
+    h[1][i] = root * (h[1][i] - r.e[1] * along[i]);
+  }
+}
+
+// The derivative of the residual by (w, v) is (x cross h, h).
+struct ViewRow {
+  alignas(16) double at[kBlock];
+};
+
+ViewRow view_row(const double x[3], const double h[3]) {
+  ViewRow row;
+  cross(x, h, row.at);
+  for (int i = 0; i < 3; ++i) row.at[3 + i] = h[i];
+  return row;
+}
+
+void add_to_view(const Window& window, int block, const ViewRow rows[2], const ViewRow& gradient) {
+  const int stride = kBlock * window.num_blocks;
+  double* U = block_at(window.system, block, block);
+  const Pair* row0 = reinterpret_cast<const Pair*>(rows[0].at);
+  const Pair* row1 = reinterpret_cast<const Pair*>(rows[1].at);
+  for (int r = 0; r < kBlock; ++r) {
+    const double a = rows[0].at[r], b = rows[1].at[r];
+    Pair* entry = reinterpret_cast<Pair*>(U + r * stride);
+    for (int c = 0; c < kBlockPairs; ++c) entry[c] += a * row0[c] + b * row1[c];
+    window.system.diagonal[kBlock * block + r] += a * a + b * b;
+    window.gradient[kBlock * block + r] += gradient.at[r];
+  }
+}
+
+// Adds an observation to the point's sums; h: its rows by x, for the view's part.
+void add_to_point(const Window& window, const Weighing& weighing, const WindowPose& pose,
+                  const WindowObservation& o, const double X[3], PointSums* sums, ViewPart* part) {
+  double Rq[3];
+  to_camera(pose, X, part->x);
+  linearise(window, weighing, o, part->x, part->h, part->q);
+  for (int i = 0; i < 2; ++i) rotate_back(pose.R, part->h[i], part->Jp[i]);
+  rotate_back(pose.R, part->q, Rq);
+  for (int i = 0, slot = 0; i < 3; ++i) {
+    sums->gradient[i] += Rq[i];
+    for (int j = i; j < 3; ++j, ++slot) {
+      sums->V[slot] += part->Jp[0][i] * part->Jp[0][j] + part->Jp[1][i] * part->Jp[1][j];
+    }
+  }
+}
+
+void add_to_slot(const Window& window, const ViewPart& part, int place, bool same_view) {
+  const ViewRow rows[2] = {view_row(part.x, part.h[0]), view_row(part.x, part.h[1])};
+  add_to_view(window, window.slot_block[place], rows, view_row(part.x, part.q));
+  const Pair* row0 = reinterpret_cast<const Pair*>(rows[0].at);
+  const Pair* row1 = reinterpret_cast<const Pair*>(rows[1].at);
+  Pair* W = window.Z[place].at;
+  for (int m = 0; m < 3; ++m) {
+    for (int c = 0; c < kBlockPairs; ++c) {
+      const Pair product = part.Jp[0][m] * row0[c] + part.Jp[1][m] * row1[c];
+      W[kBlockPairs * m + c] = same_view ? W[kBlockPairs * m + c] + product : product;
+    }
+  }
+}
+
+// The vector from the first view that sees the point to the point.
+void ray_of(const Window& window, const WindowPose* pose, const WindowPoint& point,
+            const double X[3], double ray[3]) {
+  double centre[3];
+  centre_of(pose[window.observations[point.begin].view], centre);
+  for (int i = 0; i < 3; ++i) ray[i] = X[i] - centre[i];
+}
+
+// V + damping = L L', with the same damping for all directions across the ray, and that of its own
+// for the direction along it: depths are often known a thousand times less well.
+void eliminate(const double ray[3], double damping, PointSums* sums, EliminatedPoint* out) {
+  double* V = sums->V;
+  const double length_sq = dot(ray, ray);
+  const double scale = length_sq > 0.0 ? 1.0 / length_sq : 0.0;
+  const double Vr[3] = {(V[0] * ray[0] + V[1] * ray[1]) + V[2] * ray[2],
+                        (V[1] * ray[0] + V[3] * ray[1]) + V[4] * ray[2],
+                        (V[2] * ray[0] + V[4] * ray[1]) + V[5] * ray[2]};
+  const double trace = (V[0] + V[3]) + V[5];
+  const double along = std::min(std::max(dot(ray, Vr) * scale, 0.0), trace);
+  out->across = damping * (0.5 * (trace - along));
+  out->along = damping * along;
+  const double more = (out->along - out->across) * scale;
+  const double diagonal[3] = {V[0], V[3], V[5]};
+  for (int i = 0, slot = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j, ++slot) {
+      V[slot] += more * ray[i] * ray[j] + (i == j ? out->across : 0.0);
+    }
+  }
+  const auto inverse_of = [](double pivot, double entry) {
+    return pivot > kVanished * entry ? 1.0 / std::sqrt(pivot) : 0.0;
+  };
+  double* inverses = out->inverses;
+  inverses[0] = inverse_of(V[0], diagonal[0]);
+  out->l10 = V[1] * inverses[0];
+  out->l20 = V[2] * inverses[0];
+  inverses[1] = inverse_of(V[3] - out->l10 * out->l10, diagonal[1]);
+  out->l21 = (V[4] - out->l20 * out->l10) * inverses[1];
+  inverses[2] = inverse_of((V[5] - out->l20 * out->l20) - out->l21 * out->l21, diagonal[2]);
+  const double* g = sums->gradient;
+  out->y[0] = g[0] * inverses[0];
+  out->y[1] = (g[1] - out->l10 * out->y[0]) * inverses[1];
+  out->y[2] = ((g[2] - out->l20 * out->y[0]) - out->l21 * out->y[1]) * inverses[2];
+}
+
+// Z = L^-1 W' in place of W', and its part of the reduced gradient.
+void reduce_slot(const EliminatedPoint& e, Pair* Z, double* gradient) {
+  Pair* g = reinterpret_cast<Pair*>(gradient);
+  for (int c = 0; c < kBlockPairs; ++c) {
+    const Pair z0 = Z[c] * e.inverses[0];
+    const Pair z1 = (Z[3 + c] - e.l10 * z0) * e.inverses[1];
+    const Pair z2 = ((Z[6 + c] - e.l20 * z0) - e.l21 * z1) * e.inverses[2];
+    Z[c] = z0, Z[3 + c] = z1, Z[6 + c] = z2;
+    g[c] -= (z0 * e.y[0] + z1 * e.y[1]) + z2 * e.y[2];
+  }
+}
+
+double add_point(const Window& window, Weighing weighing, int p) {
+  WindowPoint& point = window.points[p];
+  const double* X = window.position + 3 * p;
+  PointSums sums{};
+  if (point.careful > 0) weighing.bend = 0.0;
+  if (point.careful > 0) --point.careful;
+  for (int k = point.begin; k < point.end; ++k) {
+    const WindowObservation& o = window.observations[k];
+    ViewPart part;
+    add_to_point(window, weighing, window.pose[o.view], o, X, &sums, &part);
+    if (o.slot < 0) continue;
+    const bool same_view = k > point.begin && o.view == window.observations[k - 1].view;
+    add_to_slot(window, part, point.begin + o.slot, same_view);
+  }
+  double ray[3];
+  ray_of(window, window.pose, point, X, ray);
+  EliminatedPoint& e = window.eliminated[p];
+  eliminate(ray, weighing.damping, &sums, &e);
+  const int32_t* blocks = window.slot_block + point.begin;
+  Columns* Z = window.Z + point.begin;
+  for (int k = 0; k < point.num_slots; ++k) {
+    reduce_slot(e, Z[k].at, window.gradient + kBlock * blocks[k]);
+  }
+  subtract_products(window.system, Z, blocks, point.num_slots);
+  return dot(e.y, e.y);
+}
+
+// Calls use(term, view of its first gradient, view of its second one or -1) for every prior.
+template <typename Use>
+void for_each_prior(const Window& window, const WindowPose* pose, const Use& use) {
+  const tv_window& given = window.given;
+  PriorTerm term;
+  for (int k = 0; k < given.num_pose_priors; ++k) {
+    const tv_pose_prior& prior = given.pose_priors[k];
+    pose_term(prior, pose[prior.idx_view], &term);
+    use(term, prior.idx_view, -1);
+  }
+  for (int k = 0; k < given.num_gravity_priors; ++k) {
+    const tv_gravity_prior& prior = given.gravity_priors[k];
+    gravity_term(prior, given.world_down, pose[prior.idx_view], &term);
+    use(term, prior.idx_view, -1);
+  }
+  for (int k = 0; k < given.num_distance_priors; ++k) {
+    const tv_distance_prior& prior = given.distance_priors[k];
+    const int32_t low = std::min(prior.idx_view0, prior.idx_view1);
+    const int32_t high = std::max(prior.idx_view0, prior.idx_view1);
+    distance_term(prior, pose[low], pose[high], &term);
+    use(term, low, high);
+  }
+}
+
+// Writes the point's sum of rho, and adds its squared residuals. False where a view does not see
+// it.
+bool see_point(const Window& window, const WindowPose* pose, const WindowPoint& point,
+               const double X[3], double* cost, double* sum_sq) {
+  LossSum sum(window.options);
+  for (int k = point.begin; k < point.end; ++k) {
+    const WindowObservation& o = window.observations[k];
+    double x[3];
+    Residual r{};
+    to_camera(pose[o.view], X, x);
+    if (!residual_at(o, x, &r)) return false;
+    const double s = norm_sq(r);
+    *sum_sq += s;
+    sum.add(s);
+  }
+  *cost = sum.value();
+  return true;
+}
+
+}  // namespace
+
+void add_term(const Window& window, double weight, const PriorTerm& term, int low, int high) {
+  const int views[2] = {low, high};
+  for (int a = 0; a < 2; ++a) {
+    const int row = views[a] < 0 ? -1 : window.block[views[a]];
+    if (row < 0) continue;
+    for (int i = 0; i < kBlock; ++i) {
+      window.gradient[kBlock * row + i] += weight * term.gradient[a][i];
+      window.system.diagonal[kBlock * row + i] += weight * term.H[a][a][kBlock * i + i];
+    }
+    for (int b = 0; b <= a; ++b) {
+      const int column = window.block[views[b]];
+      if (column < 0) continue;
+      double* block = block_at(window.system, row, column);
+      for (int i = 0; i < kBlock; ++i) {
+        for (int j = 0; j < kBlock; ++j) {
+          block[i * kBlock * window.num_blocks + j] += weight * term.H[a][b][kBlock * i + j];
+        }
+      }
+    }
+  }
+}
+
+double build_system(const Window& window, const Weighing& weighing) {
+  const size_t size = static_cast<size_t>(kBlock * window.num_blocks);
+  std::fill(window.system.entries, window.system.entries + size * size, 0.0);
+  std::fill(window.system.diagonal, window.system.diagonal + size, 0.0);
+  std::fill(window.gradient, window.gradient + size, 0.0);
+  for_each_prior(window, window.pose, [&](const PriorTerm& term, int low, int high) {
+    add_term(window, weighing.prior_weight, term, low, high);
+  });
+  double sum = 0.0;
+  for (int p = 0; p < window.num_points; ++p) sum += add_point(window, weighing, p);
+  return sum;
+}
+
+double observations_cost(const Window& window, double* sum_sq) {
+  double cost = 0.0;
+  *sum_sq = 0.0;
+  for (int p = 0; p < window.num_points; ++p) {
+    WindowPoint& point = window.points[p];
+    see_point(window, window.pose, point, window.position + 3 * p, &point.cost, sum_sq);
+    cost += point.cost;
+  }
+  return cost;
+}
+
+double priors_cost(const Window& window, const WindowPose* pose) {
+  double sum = 0.0;
+  for_each_prior(window, pose, [&](const PriorTerm& term, int, int) { sum += term.cost; });
+  return sum;
+}
+
+namespace {
+
+// The point's step where y = L^-1 gradient, with the views' part. To first order it is that of
+// least cost; to higher orders it is a step of the inverse distance from the first view.
+void step_of(const EliminatedPoint& e, const double y[3], const double ray[3], double step[3],
+             double* damped) {
+  step[2] = -y[2] * e.inverses[2];
+  step[1] = (-y[1] - e.l21 * step[2]) * e.inverses[1];
+  step[0] = ((-y[0] - e.l10 * step[1]) - e.l20 * step[2]) * e.inverses[0];
+  const double ray_sq = dot(ray, ray), inward = dot(ray, step);
+  const double share = ray_sq > 0.0 ? inward / ray_sq : 0.0;
+  const double along_sq = share * inward;
+  *damped += e.across * (dot(step, step) - along_sq) + e.along * along_sq;
+  const double factor = 1.0 / std::max(1.0 - share, kLeastShare);
+  for (int i = 0; i < 3; ++i) step[i] *= factor;
+}
+
+void joint_step(const Window& window, int p, double next[3], double* damped) {
+  const WindowPoint& point = window.points[p];
+  const EliminatedPoint& e = window.eliminated[p];
+  const double* X = window.position + 3 * p;
+  double y[3] = {e.y[0], e.y[1], e.y[2]}, ray[3], step[3];
+  for (int k = 0; k < point.num_slots; ++k) {
+    const int place = point.begin + k;
+    const double* Z = reinterpret_cast<const double*>(window.Z[place].at);
+    const double* of_view = window.step + kBlock * window.slot_block[place];
+    for (int m = 0; m < 3; ++m) {
+      const double* z = Z + kBlock * m;
+      y[m] += (z[0] * of_view[0] + z[1] * of_view[1] + z[2] * of_view[2]) +
+              (z[3] * of_view[3] + z[4] * of_view[4] + z[5] * of_view[5]);
+    }
+  }
+  ray_of(window, window.pose, point, X, ray);
+  step_of(e, y, ray, step, damped);
+  for (int i = 0; i < 3; ++i) next[i] = X[i] + step[i];
+}
+
+// Lowers the cost of a point alone at the next poses, from X. False where a view does not see X.
+bool settle(const Window& window, WindowPoint* point, double X[3]) {
+  double sum_sq = 0.0, damping = kSettleDamping;
+  if (!see_point(window, window.next_pose, *point, X, &point->next_cost, &sum_sq)) return false;
+  for (int i = 0; i < kSettleSteps; ++i) {
+    PointSums sums{};
+    for (int k = point->begin; k < point->end; ++k) {
+      const WindowObservation& o = window.observations[k];
+      ViewPart part;
+      add_to_point(window, {0.0, 0.0, 0.0, false}, window.next_pose[o.view], o, X, &sums, &part);
+    }
+    EliminatedPoint e;
+    double ray[3], step[3], next[3], cost, damped = 0.0;
+    ray_of(window, window.next_pose, *point, X, ray);
+    eliminate(ray, damping, &sums, &e);
+    step_of(e, e.y, ray, step, &damped);
+    for (int c = 0; c < 3; ++c) next[c] = X[c] + step[c];
+    const bool seen = see_point(window, window.next_pose, *point, next, &cost, &sum_sq);
+    const bool lower = seen && cost < point->next_cost;
+    const bool enough = lower && cost > point->next_cost * kSettled;
+    damping *= lower ? 0.1 : 10.0;
+    if (lower) {
+      point->next_cost = cost;
+      for (int c = 0; c < 3; ++c) X[c] = next[c];
+    }
+    if (enough) break;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool move_points(const Window& window, double* cost, double* damped) {
+  const double scale = window.options.loss_scale_px;
+  *cost = 0.0;
+  for (int p = 0; p < window.num_points; ++p) {
+    WindowPoint& point = window.points[p];
+    const double* X = window.position + 3 * p;
+    double* next = window.next_position + 3 * p;
+    double sum_sq = 0.0;
+    joint_step(window, p, next, damped);
+    if (!see_point(window, window.next_pose, point, next, &point.next_cost, &sum_sq) ||
+        point.next_cost > kGrowth * (point.cost + scale * scale)) {
+      for (int i = 0; i < 3; ++i) next[i] = X[i];
+      point.careful = kCarefulSteps;
+      if (!settle(window, &point, next)) return false;
+    }
+    *cost += point.next_cost;
+  }
+  return true;
+}
+
+}  // namespace tv
