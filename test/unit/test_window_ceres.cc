@@ -248,7 +248,7 @@ void expect_same_minimum(const Options& options, const tv_window_options& adjust
   window_scene::make(options, &scene);
   Scene theirs = scene;
   tv_window_options tight = adjust;
-  tight.tolerance = 1e-10;
+  tight.tolerance = 1e-9;
   tight.max_iterations = 200;
   tv_window_result result;
   const Answer our = solve_ours(&scene, tight, &result);
@@ -301,7 +301,7 @@ void test_reaches_the_minimum_that_ceres_finds() {
       o.shortest_track = 5;
     }
     if (loss == TV_LOSS_CAUCHY) {
-      o.off_rad = 0.002, o.off_position = 0.01, o.off_point = 0.01;
+      o.off_rad = 0.001, o.off_position = 0.005, o.off_point = 0.005;
     }
     tv_window_options options = options_of(loss, random.uniform(1, 3));
     options.noise_px = o.noise_px;

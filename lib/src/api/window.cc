@@ -21,7 +21,7 @@ constexpr tv_window make_default_window() {
 
 constexpr tv_window kDefaultWindow = make_default_window();
 constexpr tv_window_options kDefaultOptions = {
-    sizeof(tv_window_options), TV_LOSS_CAUCHY, 2.0, 1.0, 1e-8, 50, 0};
+    sizeof(tv_window_options), TV_LOSS_CAUCHY, 2.0, 1.0, 1e-6, 50, 0};
 constexpr double kLargest = 1e9, kLeastScale = 1e-6;
 constexpr int32_t kMaxPriors = 4 * TV_WINDOW_MAX_VIEWS;
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kNearChange = 0.1;  // below this relative change, the loss's curvature counts
 constexpr double kLeastKept = 0.03;
+constexpr double kLargestFactor = 0.9;  // of two gains that follow each other
 constexpr double kNoErrorSq = 1e-20;  // px^2 for each observation; smaller errors count as none
 constexpr double kFirstDamping = 1e-4, kMinDamping = 1e-12, kMaxDamping = 1e8;
 // With more damping, a small change of the cost is no evidence for a minimum.
@@ -187,7 +188,7 @@ void step_views(const Window& window) {
 void minimise(Window* window, double prior_weight, double cost, tv_window_result* result) {
   const tv_window_options& options = window->options;
   const double no_error = kNoErrorSq * window->num_observations;
-  double damping = kFirstDamping, growth = 2.0;
+  double damping = kFirstDamping, growth = 2.0, previous = 0.0;
   double kept = 1.0;  // of the curvature in the direction of a residual, least squares'
   result->final_cost = cost;
   while (result->num_iterations < options.max_iterations && result->converged == 0) {
@@ -203,7 +204,13 @@ void minimise(Window* window, double prior_weight, double cost, tv_window_result
     const bool seen = move_points(*window, &next_cost, &damped);
     if (seen) next_cost += prior_weight * priors_cost(*window, window->next_pose);
     const double change = std::fabs(cost - next_cost);
-    const bool small = seen && change <= options.tolerance * cost && damping <= kHonestDamping;
+    // What is left to gain if the gains go on falling by the last factor: those that were made or
+    // predicted, whichever are larger. Not where damping shortens the steps.
+    const double larger = std::max(change, gain + damped);
+    const double factor =
+        previous > 0.0 ? std::min(larger / previous, kLargestFactor) : kLargestFactor;
+    const bool small = seen && damping <= kHonestDamping &&
+                       larger * factor <= options.tolerance * cost * (1.0 - factor);
     if (seen && next_cost < cost) {
       std::swap(window->position, window->next_position);
       std::swap(window->pose, window->next_pose);
@@ -217,6 +224,7 @@ void minimise(Window* window, double prior_weight, double cost, tv_window_result
       damping = std::max(damping, kMinDamping);
       growth = 2.0;
       cost = next_cost;
+      previous = larger;
     } else {
       damping *= growth;
       growth *= 2.0;
@@ -276,16 +284,14 @@ void hold_free_parameters(const Window& window, bool scale_is_free) {
   const BlockMatrix& A = window.system;
   const int size = kBlock * window.num_blocks, reference = reference_view(window);
   if (reference < 0) return;
-  double from[3];
-  centre_of(window.pose[reference], from);
+  const double* from = window.pose[reference].centre;
   if (scale_is_free) {
     int farthest = -1;
     tv_distance_prior prior{reference, -1, 0.0, 1.0};
     for (int v = 0; v < window.given.num_views; ++v) {
       if (window.block[v] < 0 || v == reference) continue;
       double across[3];
-      centre_of(window.pose[v], across);
-      for (int i = 0; i < 3; ++i) across[i] -= from[i];
+      for (int i = 0; i < 3; ++i) across[i] = window.pose[v].centre[i] - from[i];
       const double distance = length_of(across);
       if (distance > prior.distance) farthest = v, prior.distance = distance;
     }
@@ -407,6 +413,7 @@ bool adjust_window(const tv_window& given, const tv_window_options& options, Are
   for (size_t v = 0; v < views; ++v) {
     std::memcpy(window.pose[v].R, given.views[v].R, sizeof window.pose[v].R);
     std::memcpy(window.pose[v].t, given.views[v].t, sizeof window.pose[v].t);
+    set_centre(&window.pose[v]);
   }
   {
     ArenaScope scope(arena);

@@ -6,6 +6,17 @@ namespace tv {
 
 bool make_observation(const Camera& camera, const tv_observation& given, WindowObservation* out) {
   if (!all_finite(given.pixel, 2)) return false;
+  const tv_camera& model = camera.model;
+  const double sigma = given.sigma == 0.0f ? 1.0 : static_cast<double>(given.sigma);
+  if (model.model == TV_CAMERA_PINHOLE) {  // the general case, without its square roots
+    const double fx = model.fx / sigma, fy = model.fy / sigma;
+    const double u = (model.cx - given.pixel[0]) / sigma, v = (model.cy - given.pixel[1]) / sigma;
+    const double J[6] = {fx, 0.0, u, 0.0, fy, v};
+    for (int i = 0; i < 6; ++i) out->J[i] = J[i];
+    out->n[0] = out->n[1] = 0.0;
+    out->n[2] = 1.0;
+    return true;
+  }
   Vec3 ray;
   Vec2 pixel;
   Mat23 J;
@@ -13,8 +24,7 @@ bool make_observation(const Camera& camera, const tv_observation& given, WindowO
       !project(camera, ray, &pixel, &J)) {
     return false;
   }
-  const bool sphere = camera.model.model == TV_CAMERA_KANNALA_BRANDT;
-  const double sigma = given.sigma == 0.0f ? 1.0 : static_cast<double>(given.sigma);
+  const bool sphere = model.model == TV_CAMERA_KANNALA_BRANDT;
   // The derivative by a point is in inverse proportion to its depth: at the plane z = 1 it is ray z
   // times that at the unit ray.
   const double scale = (sphere ? 1.0 : ray[2]) / sigma;

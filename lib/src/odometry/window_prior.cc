@@ -51,6 +51,7 @@ WindowPose stepped(const WindowPose& pose, const double step[6]) {
   WindowPose result;
   for (int i = 0; i < 9; ++i) result.R[i] = R(i / 3, i % 3);
   for (int i = 0; i < 3; ++i) result.t[i] = t[i];
+  set_centre(&result);
   return result;
 }
 
@@ -103,10 +104,7 @@ void gravity_term(const tv_gravity_prior& prior, const double world_down[3], con
 
 void distance_term(const tv_distance_prior& prior, const WindowPose& pose0, const WindowPose& pose1,
                    PriorTerm* term) {
-  double C0[3], C1[3];
-  centre_of(pose0, C0);
-  centre_of(pose1, C1);
-  const Vec3 across = vector(C1) - vector(C0);
+  const Vec3 across = vector(pose1.centre) - vector(pose0.centre);
   const double length = across.norm();
   const double r = (length - prior.distance) / prior.sigma;
   *term = PriorTerm{};

@@ -7,14 +7,19 @@
 #include "geometry/camera.h"
 #include "twoview/window.h"
 
+// Put before a loop of three turns, which is then straight code even where the compiler would leave it.
+#define TV_UNROLL _Pragma("GCC unroll 3")
+
 namespace tv {
 
-// cam_from_world, in plain arrays: the arena and the loops over observations take them.
+// cam_from_world, and the camera's centre -R't, in plain arrays: the arena and the loops over
+// observations take them.
 struct WindowPose {
-  double R[9], t[3];
+  double R[9], t[3], centre[3];
 };
 
 inline void to_camera(const WindowPose& pose, const double X[3], double x[3]) {
+  TV_UNROLL
   for (int i = 0; i < 3; ++i) {
     const double* row = pose.R + 3 * i;
     x[i] = ((row[0] * X[0] + row[1] * X[1]) + row[2] * X[2]) + pose.t[i];
@@ -23,12 +28,13 @@ inline void to_camera(const WindowPose& pose, const double X[3], double x[3]) {
 
 // R'v
 inline void rotate_back(const double R[9], const double v[3], double out[3]) {
+  TV_UNROLL
   for (int i = 0; i < 3; ++i) out[i] = (R[i] * v[0] + R[3 + i] * v[1]) + R[6 + i] * v[2];
 }
 
-inline void centre_of(const WindowPose& pose, double centre[3]) {
-  rotate_back(pose.R, pose.t, centre);
-  for (int i = 0; i < 3; ++i) centre[i] = -centre[i];
+inline void set_centre(WindowPose* pose) {
+  rotate_back(pose->R, pose->t, pose->centre);
+  for (int i = 0; i < 3; ++i) pose->centre[i] = -pose->centre[i];
 }
 
 WindowPose stepped(const WindowPose& pose, const double step[6]);

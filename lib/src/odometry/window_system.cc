@@ -34,6 +34,7 @@ void linearise(const Window& window, const Weighing& weighing, const WindowObser
   residual_at(o, x, &r);
   const double s = norm_sq(r);
   const LossSlope loss = slope_of(window.options, s);
+  TV_UNROLL
   for (int i = 0; i < 3; ++i) {
     h[0][i] = (o.J[i] - r.e[0] * o.n[i]) * r.inverse_depth;
     h[1][i] = (o.J[3 + i] - r.e[1] * o.n[i]) * r.inverse_depth;
@@ -57,29 +58,35 @@ void linearise(const Window& window, const Weighing& weighing, const WindowObser
   }
 }
 
-// The derivative of the residual by (w, v) is (x cross h, h).
+// The derivative of the residual by (w, v) is (x cross h, h). It is made of pairs, because the CPU
+// cannot load a pair that was just stored as two numbers without delay.
 struct ViewRow {
-  alignas(16) double at[kBlock];
+  Pair at[kBlockPairs];
 };
 
-ViewRow view_row(const double x[3], const double h[3]) {
-  ViewRow row;
-  cross(x, h, row.at);
-  for (int i = 0; i < 3; ++i) row.at[3 + i] = h[i];
-  return row;
+inline ViewRow view_row(const double x[3], const double h[3]) {
+  return {{Pair{x[1] * h[2] - x[2] * h[1], x[2] * h[0] - x[0] * h[2]},
+           Pair{x[0] * h[1] - x[1] * h[0], h[0]}, Pair{h[1], h[2]}}};
 }
 
 void add_to_view(const Window& window, int block, const ViewRow rows[2], const ViewRow& gradient) {
   const int stride = kBlock * window.num_blocks;
   double* U = block_at(window.system, block, block);
-  const Pair* row0 = reinterpret_cast<const Pair*>(rows[0].at);
-  const Pair* row1 = reinterpret_cast<const Pair*>(rows[1].at);
-  for (int r = 0; r < kBlock; ++r) {
-    const double a = rows[0].at[r], b = rows[1].at[r];
-    Pair* entry = reinterpret_cast<Pair*>(U + r * stride);
-    for (int c = 0; c < kBlockPairs; ++c) entry[c] += a * row0[c] + b * row1[c];
-    window.system.diagonal[kBlock * block + r] += a * a + b * b;
-    window.gradient[kBlock * block + r] += gradient.at[r];
+  Pair* g = reinterpret_cast<Pair*>(window.gradient + kBlock * block);
+  Pair* diagonal = reinterpret_cast<Pair*>(window.system.diagonal + kBlock * block);
+  TV_UNROLL
+  for (int c = 0; c < kBlockPairs; ++c) {
+    const Pair a = rows[0].at[c], b = rows[1].at[c];
+    g[c] += gradient.at[c];
+    diagonal[c] += a * a + b * b;
+    TV_UNROLL
+    for (int half = 0; half < 2; ++half) {
+      Pair* entry = reinterpret_cast<Pair*>(U + (2 * c + half) * stride);
+      TV_UNROLL
+      for (int k = 0; k < kBlockPairs; ++k) {
+        entry[k] += a[half] * rows[0].at[k] + b[half] * rows[1].at[k];
+      }
+    }
   }
 }
 
@@ -89,10 +96,13 @@ void add_to_point(const Window& window, const Weighing& weighing, const WindowPo
   double Rq[3];
   to_camera(pose, X, part->x);
   linearise(window, weighing, o, part->x, part->h, part->q);
+  TV_UNROLL
   for (int i = 0; i < 2; ++i) rotate_back(pose.R, part->h[i], part->Jp[i]);
   rotate_back(pose.R, part->q, Rq);
+  TV_UNROLL
   for (int i = 0, slot = 0; i < 3; ++i) {
     sums->gradient[i] += Rq[i];
+    TV_UNROLL
     for (int j = i; j < 3; ++j, ++slot) {
       sums->V[slot] += part->Jp[0][i] * part->Jp[0][j] + part->Jp[1][i] * part->Jp[1][j];
     }
@@ -102,12 +112,12 @@ void add_to_point(const Window& window, const Weighing& weighing, const WindowPo
 void add_to_slot(const Window& window, const ViewPart& part, int place, bool same_view) {
   const ViewRow rows[2] = {view_row(part.x, part.h[0]), view_row(part.x, part.h[1])};
   add_to_view(window, window.slot_block[place], rows, view_row(part.x, part.q));
-  const Pair* row0 = reinterpret_cast<const Pair*>(rows[0].at);
-  const Pair* row1 = reinterpret_cast<const Pair*>(rows[1].at);
   Pair* W = window.Z[place].at;
+  TV_UNROLL
   for (int m = 0; m < 3; ++m) {
+    TV_UNROLL
     for (int c = 0; c < kBlockPairs; ++c) {
-      const Pair product = part.Jp[0][m] * row0[c] + part.Jp[1][m] * row1[c];
+      const Pair product = part.Jp[0][m] * rows[0].at[c] + part.Jp[1][m] * rows[1].at[c];
       W[kBlockPairs * m + c] = same_view ? W[kBlockPairs * m + c] + product : product;
     }
   }
@@ -116,8 +126,7 @@ void add_to_slot(const Window& window, const ViewPart& part, int place, bool sam
 // The vector from the first view that sees the point to the point.
 void ray_of(const Window& window, const WindowPose* pose, const WindowPoint& point,
             const double X[3], double ray[3]) {
-  double centre[3];
-  centre_of(pose[window.observations[point.begin].view], centre);
+  const double* centre = pose[window.observations[point.begin].view].centre;
   for (int i = 0; i < 3; ++i) ray[i] = X[i] - centre[i];
 }
 
@@ -136,7 +145,9 @@ void eliminate(const double ray[3], double damping, PointSums* sums, EliminatedP
   out->along = damping * along;
   const double more = (out->along - out->across) * scale;
   const double diagonal[3] = {V[0], V[3], V[5]};
+  TV_UNROLL
   for (int i = 0, slot = 0; i < 3; ++i) {
+    TV_UNROLL
     for (int j = i; j < 3; ++j, ++slot) {
       V[slot] += more * ray[i] * ray[j] + (i == j ? out->across : 0.0);
     }
@@ -160,6 +171,7 @@ void eliminate(const double ray[3], double damping, PointSums* sums, EliminatedP
 // Z = L^-1 W' in place of W', and its part of the reduced gradient.
 void reduce_slot(const EliminatedPoint& e, Pair* Z, double* gradient) {
   Pair* g = reinterpret_cast<Pair*>(gradient);
+  TV_UNROLL
   for (int c = 0; c < kBlockPairs; ++c) {
     const Pair z0 = Z[c] * e.inverses[0];
     const Pair z1 = (Z[3 + c] - e.l10 * z0) * e.inverses[1];
@@ -319,6 +331,7 @@ void joint_step(const Window& window, int p, double next[3], double* damped) {
     const int place = point.begin + k;
     const double* Z = reinterpret_cast<const double*>(window.Z[place].at);
     const double* of_view = window.step + kBlock * window.slot_block[place];
+    TV_UNROLL
     for (int m = 0; m < 3; ++m) {
       const double* z = Z + kBlock * m;
       y[m] += (z[0] * of_view[0] + z[1] * of_view[1] + z[2] * of_view[2]) +
