@@ -14,7 +14,7 @@ namespace {
 constexpr double kNearChange = 0.1;  // below this relative change, the loss's curvature counts
 constexpr double kLeastKept = 0.03;
 constexpr double kLargestFactor = 0.9;  // of two gains that follow each other
-constexpr double kNoErrorSq = 1e-20;  // px^2 for each observation; smaller errors count as none
+constexpr double kNoErrorSq = 1e-20;    // px^2 for each observation; smaller errors count as none
 constexpr double kFirstDamping = 1e-4, kMinDamping = 1e-12, kMaxDamping = 1e8;
 // With more damping, a small change of the cost is no evidence for a minimum.
 constexpr double kHonestDamping = 1e-2;
@@ -197,7 +197,7 @@ void minimise(Window* window, double prior_weight, double cost, tv_window_result
       break;
     }
     double damped = 0.0, next_cost = 0.0;
-    double gain = build_system(*window, {damping, prior_weight, 1.0 - kept, false});
+    double gain = build_system(*window, {damping, prior_weight, {1.0 - kept, false}});
     gain += solve_views(*window, damping, &damped);
     ++result->num_iterations;
     step_views(*window);
@@ -347,7 +347,7 @@ void measure_covariances(const Window& window, double* covariances, tv_window_re
     return;
   }
   result->noise_px = std::sqrt(variance);
-  build_system(window, {0.0, scale, 0.0, true});
+  build_system(window, {0.0, scale, {0.0, true}});
   hold_free_parameters(window, result->scale_is_free != 0);
   if (!(scale > 0.0) || factorise(window.system, kUndetermined) > 0) return;
   const bool is_held = given.num_pose_priors == 0;

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "geometry/camera.h"
+#include "odometry/block_cholesky.h"
 #include "twoview/window.h"
 
 namespace tv {
@@ -57,6 +58,61 @@ inline LossSlope slope_of(const tv_window_options& options, double s) {
   }
   if (options.loss == TV_LOSS_HUBER && s > c_sq) return {c / std::sqrt(s), -1.0};
   return {1.0, 0.0};
+}
+
+// How the second derivative of the loss enters the Hessian.
+struct LossCurvature {
+  double bend;    // the share of it that is taken, [0, 1], along the residual
+  bool averaged;  // instead: all of it, as its mean over all directions
+};
+
+// An observation, linearised. h: d residual / d x, weighed so that h'h is half its Hessian; q: half
+// its gradient by x; Jp: h R, by the point in the world's frame.
+struct LinearObservation {
+  double x[3];  // the point in the frame of the camera: given
+  double h[2][3], q[3], Jp[2][3];
+};
+
+// Writes h and q. The point is in front of the camera.
+inline void linearise(const tv_window_options& options, const LossCurvature& curvature,
+                      const WindowObservation& o, LinearObservation* out) {
+  double(*h)[3] = out->h;
+  Residual r{};
+  residual_at(o, out->x, &r);
+  const double s = norm_sq(r);
+  const LossSlope loss = slope_of(options, s);
+  TV_UNROLL
+  for (int i = 0; i < 3; ++i) {
+    h[0][i] = (o.J[i] - r.e[0] * o.n[i]) * r.inverse_depth;
+    h[1][i] = (o.J[3 + i] - r.e[1] * o.n[i]) * r.inverse_depth;
+    out->q[i] = loss.weight * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
+  }
+  if (loss.weight == 1.0) return;
+  const double root =
+      std::sqrt(curvature.averaged ? loss.weight * (1.0 + 0.5 * loss.bend) : loss.weight);
+  double along[3] = {};
+  if (curvature.bend > 0.0) {
+    // Along the residual, the curvature is 1 + bend of that across it (B. Triggs et al. 1999, 4.3),
+    // as far as this is not negative.
+    const double kept = std::sqrt(1.0 + curvature.bend * (loss.bend > -1.0 ? loss.bend : -1.0));
+    const double factor = (1.0 - kept) / s;
+    for (int i = 0; i < 3; ++i) along[i] = factor * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
+  }
+  for (int i = 0; i < 3; ++i) {
+    h[0][i] = root * (h[0][i] - r.e[0] * along[i]);
+    h[1][i] = root * (h[1][i] - r.e[1] * along[i]);
+  }
+}
+
+// The derivative of the residual by (w, v) is (x cross h, h). It is made of pairs, because the CPU
+// cannot load a pair that was just stored as two numbers without delay.
+struct ViewRow {
+  Pair at[kBlockPairs];
+};
+
+inline ViewRow view_row(const double x[3], const double h[3]) {
+  return {{Pair{x[1] * h[2] - x[2] * h[1], x[2] * h[0] - x[0] * h[2]},
+           Pair{x[0] * h[1] - x[1] * h[0], h[0]}, Pair{h[1], h[2]}}};
 }
 
 // A sum of rho. Cauchy's logarithms are taken of products of many arguments, which costs a tenth.

@@ -5,10 +5,8 @@
 #pragma once
 
 #include "geometry/camera.h"
+#include "odometry/block_cholesky.h"
 #include "twoview/window.h"
-
-// Put before a loop of three turns, which is then straight code even where the compiler would leave it.
-#define TV_UNROLL _Pragma("GCC unroll 3")
 
 namespace tv {
 

@@ -21,54 +21,6 @@ struct PointSums {
   double V[6], gradient[3];
 };
 
-// An observation, linearised: the point in the camera's frame, and the derivatives of the residual.
-struct ViewPart {
-  double x[3], h[2][3], q[3], Jp[2][3];
-};
-
-// Linearises an observation. h: d residual / d x, weighed so that h'h is half its Hessian; q: half
-// the gradient by x.
-void linearise(const Window& window, const Weighing& weighing, const WindowObservation& o,
-               const double x[3], double h[2][3], double q[3]) {
-  Residual r{};
-  residual_at(o, x, &r);
-  const double s = norm_sq(r);
-  const LossSlope loss = slope_of(window.options, s);
-  TV_UNROLL
-  for (int i = 0; i < 3; ++i) {
-    h[0][i] = (o.J[i] - r.e[0] * o.n[i]) * r.inverse_depth;
-    h[1][i] = (o.J[3 + i] - r.e[1] * o.n[i]) * r.inverse_depth;
-    q[i] = loss.weight * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
-  }
-  if (loss.weight == 1.0) return;
-  double weight = loss.weight;
-  if (weighing.covariance) weight *= 1.0 + 0.5 * loss.bend;
-  const double root = std::sqrt(weight);
-  double along[3] = {};
-  if (weighing.bend > 0.0) {
-    // In the direction of e, the curvature is 1 + bend of that across it (B. Triggs et al. 1999,
-    // 4.3), as far as this is not negative.
-    const double kept = std::sqrt(1.0 + weighing.bend * std::max(loss.bend, -1.0));
-    const double factor = (1.0 - kept) / s;
-    for (int i = 0; i < 3; ++i) along[i] = factor * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
-  }
-  for (int i = 0; i < 3; ++i) {
-    h[0][i] = root * (h[0][i] - r.e[0] * along[i]);
-    h[1][i] = root * (h[1][i] - r.e[1] * along[i]);
-  }
-}
-
-// The derivative of the residual by (w, v) is (x cross h, h). It is made of pairs, because the CPU
-// cannot load a pair that was just stored as two numbers without delay.
-struct ViewRow {
-  Pair at[kBlockPairs];
-};
-
-inline ViewRow view_row(const double x[3], const double h[3]) {
-  return {{Pair{x[1] * h[2] - x[2] * h[1], x[2] * h[0] - x[0] * h[2]},
-           Pair{x[0] * h[1] - x[1] * h[0], h[0]}, Pair{h[1], h[2]}}};
-}
-
 void add_to_view(const Window& window, int block, const ViewRow rows[2], const ViewRow& gradient) {
   const int stride = kBlock * window.num_blocks;
   double* U = block_at(window.system, block, block);
@@ -92,10 +44,11 @@ void add_to_view(const Window& window, int block, const ViewRow rows[2], const V
 
 // Adds an observation to the point's sums; h: its rows by x, for the view's part.
 void add_to_point(const Window& window, const Weighing& weighing, const WindowPose& pose,
-                  const WindowObservation& o, const double X[3], PointSums* sums, ViewPart* part) {
+                  const WindowObservation& o, const double X[3], PointSums* sums,
+                  LinearObservation* part) {
   double Rq[3];
   to_camera(pose, X, part->x);
-  linearise(window, weighing, o, part->x, part->h, part->q);
+  linearise(window.options, weighing.curvature, o, part);
   TV_UNROLL
   for (int i = 0; i < 2; ++i) rotate_back(pose.R, part->h[i], part->Jp[i]);
   rotate_back(pose.R, part->q, Rq);
@@ -109,7 +62,7 @@ void add_to_point(const Window& window, const Weighing& weighing, const WindowPo
   }
 }
 
-void add_to_slot(const Window& window, const ViewPart& part, int place, bool same_view) {
+void add_to_slot(const Window& window, const LinearObservation& part, int place, bool same_view) {
   const ViewRow rows[2] = {view_row(part.x, part.h[0]), view_row(part.x, part.h[1])};
   add_to_view(window, window.slot_block[place], rows, view_row(part.x, part.q));
   Pair* W = window.Z[place].at;
@@ -185,11 +138,11 @@ double add_point(const Window& window, Weighing weighing, int p) {
   WindowPoint& point = window.points[p];
   const double* X = window.position + 3 * p;
   PointSums sums{};
-  if (point.careful > 0) weighing.bend = 0.0;
+  if (point.careful > 0) weighing.curvature.bend = 0.0;
   if (point.careful > 0) --point.careful;
   for (int k = point.begin; k < point.end; ++k) {
     const WindowObservation& o = window.observations[k];
-    ViewPart part;
+    LinearObservation part;
     add_to_point(window, weighing, window.pose[o.view], o, X, &sums, &part);
     if (o.slot < 0) continue;
     const bool same_view = k > point.begin && o.view == window.observations[k - 1].view;
@@ -351,8 +304,8 @@ bool settle(const Window& window, WindowPoint* point, double X[3]) {
     PointSums sums{};
     for (int k = point->begin; k < point->end; ++k) {
       const WindowObservation& o = window.observations[k];
-      ViewPart part;
-      add_to_point(window, {0.0, 0.0, 0.0, false}, window.next_pose[o.view], o, X, &sums, &part);
+      LinearObservation part;
+      add_to_point(window, {0.0, 0.0, {0.0, false}}, window.next_pose[o.view], o, X, &sums, &part);
     }
     EliminatedPoint e;
     double ray[3], step[3], next[3], cost, damped = 0.0;

@@ -54,8 +54,7 @@ struct Window {
 struct Weighing {
   double damping;
   double prior_weight;
-  double bend;      // the share of the loss's curvature that is taken, [0, 1]
-  bool covariance;  // instead: the mean over all directions of the loss's curvature
+  LossCurvature curvature;
 };
 
 // Builds the reduced system at the present state, without the damping of the views, and
