@@ -35,84 +35,6 @@ double error_sq_at(const Window& window, const WindowObservation& o, const doubl
   return norm_sq(r);
 }
 
-// ---- the observations in order ----
-
-// Sorts 0 .. num - 1, or `from` where it is not null, by key, stably. `begin` has num_keys + 1
-// entries.
-template <typename Key>
-void counting_sort(int num, int num_keys, const Key& key, const int32_t* from, int32_t* begin,
-                   int32_t* to) {
-  std::fill(begin, begin + num_keys + 1, 0);
-  for (int i = 0; i < num; ++i) ++begin[key(i) + 1];
-  for (int k = 0; k < num_keys; ++k) begin[k + 1] += begin[k];
-  for (int i = 0; i < num; ++i) {
-    const int32_t idx = from == nullptr ? i : from[i];
-    to[begin[key(idx)]++] = idx;
-  }
-  // begin[k] is now the end of key k.
-}
-
-// Appends the observations [first, last) of a point in `order`, as far as they can be used. Returns
-// from how many views they are.
-int append_observations(Window* window, const Camera* cameras, const int32_t* order, int first,
-                        int last, tv_window_result* result) {
-  const tv_window& given = window->given;
-  int num_views = 0, previous = -1;
-  for (int k = first; k < last; ++k) {
-    const tv_observation& from = given.observations[order[k]];
-    const double* X = given.points + 3 * count_of(from.idx_point);
-    WindowObservation o{};
-    o.view = from.idx_view;
-    o.idx = order[k];
-    const Camera& camera = cameras[given.views[o.view].idx_camera];
-    if (!all_finite(X, 3) || !make_observation(camera, from, &o)) {
-      ++result->num_invalid;
-      continue;
-    }
-    double x[3];
-    Residual r{};
-    to_camera(window->pose[o.view], X, x);
-    if (!residual_at(o, x, &r)) {
-      ++result->num_behind;
-      continue;
-    }
-    num_views += o.view != previous;
-    previous = o.view;
-    window->observations[window->num_observations++] = o;
-  }
-  return num_views;
-}
-
-void gather_points(Window* window, const Camera* cameras, int32_t* order, int32_t* begin,
-                   tv_window_result* result) {
-  const tv_window& given = window->given;
-  const tv_observation* observations = given.observations;
-  // By view, then stably by point.
-  counting_sort(
-      given.num_observations, given.num_views, [=](int i) { return observations[i].idx_view; },
-      nullptr, begin, window->slot_block);
-  counting_sort(
-      given.num_observations, given.num_points, [=](int i) { return observations[i].idx_point; },
-      window->slot_block, begin, order);
-  int last = 0;
-  for (int32_t p = 0; p < given.num_points; ++p) {
-    const int first = last;
-    last = begin[p];
-    const int start = window->num_observations;
-    const int num_views = append_observations(window, cameras, order, first, last, result);
-    if (num_views < 2) {
-      result->num_single += window->num_observations - start;
-      window->num_observations = start;
-      continue;
-    }
-    window->points[window->num_points] =
-        WindowPoint{p, start, window->num_observations, 0, 0, 0, 0.0, 0.0};
-    std::memcpy(window->position + 3 * count_of(window->num_points), given.points + 3 * count_of(p),
-                3 * sizeof(double));
-    ++window->num_points;
-  }
-}
-
 // ---- the views that are adjusted ----
 
 // Numbers the blocks of the views that are adjusted: those that take part and are not held.
@@ -185,7 +107,8 @@ void step_views(const Window& window) {
   }
 }
 
-void minimise(Window* window, double prior_weight, double cost, tv_window_result* result) {
+void minimise(Window* window, double prior_weight, double cost, double* sum_sq,
+              tv_window_result* result) {
   const tv_window_options& options = window->options;
   const double no_error = kNoErrorSq * window->num_observations;
   double damping = kFirstDamping, growth = 2.0, previous = 0.0;
@@ -196,13 +119,16 @@ void minimise(Window* window, double prior_weight, double cost, tv_window_result
       result->converged = 1;
       break;
     }
-    double damped = 0.0, next_cost = 0.0;
+    double damped = 0.0;
+    Moved moved;
     double gain = build_system(*window, {damping, prior_weight, {1.0 - kept, false}});
     gain += solve_views(*window, damping, &damped);
     ++result->num_iterations;
     step_views(*window);
-    const bool seen = move_points(*window, &next_cost, &damped);
-    if (seen) next_cost += prior_weight * priors_cost(*window, window->next_pose);
+    const bool seen = move_points(*window, &moved);
+    const double next_cost =
+        seen ? moved.cost + prior_weight * priors_cost(*window, window->next_pose) : cost;
+    damped += moved.damped;
     const double change = std::fabs(cost - next_cost);
     // What is left to gain if the gains go on falling by the last factor: those that were made or
     // predicted, whichever are larger. Not where damping shortens the steps.
@@ -224,6 +150,7 @@ void minimise(Window* window, double prior_weight, double cost, tv_window_result
       damping = std::max(damping, kMinDamping);
       growth = 2.0;
       cost = next_cost;
+      *sum_sq = moved.sum_sq;
       previous = larger;
     } else {
       damping *= growth;
@@ -436,8 +363,7 @@ bool adjust_window(const tv_window& given, const tv_window_options& options, Are
       observations_cost(window, &sum_sq) + prior_weight * priors_cost(window, window.pose);
   if (!is_finite(result->initial_cost)) return false;
   result->initial_rms_px = rms(sum_sq, window.num_observations);
-  minimise(&window, prior_weight, result->initial_cost, result);
-  observations_cost(window, &sum_sq);
+  minimise(&window, prior_weight, result->initial_cost, &sum_sq, result);
   result->rms_px = rms(sum_sq, window.num_observations);
   if (covariances != nullptr) measure_covariances(window, covariances, result);
   write_results(window, errors_px);

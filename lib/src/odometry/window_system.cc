@@ -185,11 +185,12 @@ void for_each_prior(const Window& window, const WindowPose* pose, const Use& use
   }
 }
 
-// Writes the point's sum of rho, and adds its squared residuals. False where a view does not see
+// Writes the point's sum of rho and that of its squared residuals. False where a view does not see
 // it.
 bool see_point(const Window& window, const WindowPose* pose, const WindowPoint& point,
                const double X[3], double* cost, double* sum_sq) {
   LossSum sum(window.options);
+  double squares = 0.0;
   for (int k = point.begin; k < point.end; ++k) {
     const WindowObservation& o = window.observations[k];
     double x[3];
@@ -197,10 +198,11 @@ bool see_point(const Window& window, const WindowPose* pose, const WindowPoint& 
     to_camera(pose[o.view], X, x);
     if (!residual_at(o, x, &r)) return false;
     const double s = norm_sq(r);
-    *sum_sq += s;
+    squares += s;
     sum.add(s);
   }
   *cost = sum.value();
+  *sum_sq = squares;
   return true;
 }
 
@@ -242,11 +244,12 @@ double build_system(const Window& window, const Weighing& weighing) {
 }
 
 double observations_cost(const Window& window, double* sum_sq) {
-  double cost = 0.0;
+  double cost = 0.0, of_point;
   *sum_sq = 0.0;
   for (int p = 0; p < window.num_points; ++p) {
     WindowPoint& point = window.points[p];
-    see_point(window, window.pose, point, window.position + 3 * p, &point.cost, sum_sq);
+    see_point(window, window.pose, point, window.position + 3 * p, &point.cost, &of_point);
+    *sum_sq += of_point;
     cost += point.cost;
   }
   return cost;
@@ -297,9 +300,9 @@ void joint_step(const Window& window, int p, double next[3], double* damped) {
 }
 
 // Lowers the cost of a point alone at the next poses, from X. False where a view does not see X.
-bool settle(const Window& window, WindowPoint* point, double X[3]) {
-  double sum_sq = 0.0, damping = kSettleDamping;
-  if (!see_point(window, window.next_pose, *point, X, &point->next_cost, &sum_sq)) return false;
+bool settle(const Window& window, WindowPoint* point, double X[3], double* sum_sq) {
+  double damping = kSettleDamping;
+  if (!see_point(window, window.next_pose, *point, X, &point->next_cost, sum_sq)) return false;
   for (int i = 0; i < kSettleSteps; ++i) {
     PointSums sums{};
     for (int k = point->begin; k < point->end; ++k) {
@@ -308,17 +311,18 @@ bool settle(const Window& window, WindowPoint* point, double X[3]) {
       add_to_point(window, {0.0, 0.0, {0.0, false}}, window.next_pose[o.view], o, X, &sums, &part);
     }
     EliminatedPoint e;
-    double ray[3], step[3], next[3], cost, damped = 0.0;
+    double ray[3], step[3], next[3], cost, next_sum_sq, damped = 0.0;
     ray_of(window, window.next_pose, *point, X, ray);
     eliminate(ray, damping, &sums, &e);
     step_of(e, e.y, ray, step, &damped);
     for (int c = 0; c < 3; ++c) next[c] = X[c] + step[c];
-    const bool seen = see_point(window, window.next_pose, *point, next, &cost, &sum_sq);
+    const bool seen = see_point(window, window.next_pose, *point, next, &cost, &next_sum_sq);
     const bool lower = seen && cost < point->next_cost;
     const bool enough = lower && cost > point->next_cost * kSettled;
     damping *= lower ? 0.1 : 10.0;
     if (lower) {
       point->next_cost = cost;
+      *sum_sq = next_sum_sq;
       for (int c = 0; c < 3; ++c) X[c] = next[c];
     }
     if (enough) break;
@@ -328,22 +332,23 @@ bool settle(const Window& window, WindowPoint* point, double X[3]) {
 
 }  // namespace
 
-bool move_points(const Window& window, double* cost, double* damped) {
+bool move_points(const Window& window, Moved* moved) {
   const double scale = window.options.loss_scale_px;
-  *cost = 0.0;
+  *moved = Moved{};
   for (int p = 0; p < window.num_points; ++p) {
     WindowPoint& point = window.points[p];
     const double* X = window.position + 3 * p;
     double* next = window.next_position + 3 * p;
     double sum_sq = 0.0;
-    joint_step(window, p, next, damped);
+    joint_step(window, p, next, &moved->damped);
     if (!see_point(window, window.next_pose, point, next, &point.next_cost, &sum_sq) ||
         point.next_cost > kGrowth * (point.cost + scale * scale)) {
       for (int i = 0; i < 3; ++i) next[i] = X[i];
       point.careful = kCarefulSteps;
-      if (!settle(window, &point, next)) return false;
+      if (!settle(window, &point, next, &sum_sq)) return false;
     }
-    *cost += point.next_cost;
+    moved->cost += point.next_cost;
+    moved->sum_sq += sum_sq;
   }
   return true;
 }

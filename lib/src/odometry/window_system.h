@@ -50,6 +50,12 @@ struct Window {
   double* step = nullptr;
 };
 
+// Gathers the observations, as far as they can be used, by point and view, and counts the others.
+// `order` has as many entries as there are observations; `begin` one more than there are views and
+// points.
+void gather_points(Window* window, const Camera* cameras, int32_t* order, int32_t* begin,
+                   tv_window_result* result);
+
 // How the terms are weighed: for a step, or for the covariance.
 struct Weighing {
   double damping;
@@ -64,10 +70,15 @@ double build_system(const Window& window, const Weighing& weighing);
 // The sum of rho over the observations at the present state.
 double observations_cost(const Window& window, double* sum_sq);
 
-// Moves the points by their own steps, given `step` and the views' next poses. Writes the sum of
-// rho at the next state, and adds to *damped what the damping takes. False where a view does not
-// see one of the points any more.
-bool move_points(const Window& window, double* cost, double* damped);
+// What a step leads to, over all observations.
+struct Moved {
+  double cost, sum_sq;  // the sum of rho, and that of the squared residuals
+  double damped;        // what the damping takes of the points' gain
+};
+
+// Moves the points by their own steps, given `step` and the views' next poses. False where a view
+// does not see one of the points any more.
+bool move_points(const Window& window, Moved* moved);
 
 // The sum of the priors' terms at `pose`.
 double priors_cost(const Window& window, const WindowPose* pose);
