@@ -93,10 +93,23 @@ class AbsolutePoseOptions:
     gravity_sigma_rad: float = 0.0  #: standard deviation in the camera; 0: it is not used
 
 
+@dataclass(frozen=True)
+class WindowOptions:
+    """The options of adjust_window, as in tv_window_options."""
+
+    loss: int = Loss.CAUCHY
+    loss_scale_px: float = 2.0
+    noise_px: float = 1.0  #: of an observation of sigma 1, which weighs it against the priors
+    tolerance: float = 1e-6  #: share of the cost that may be left to gain
+    max_iterations: int = 50
+    reserved: int = 0  #: must be 0
+
+
 _STRUCTS = {FeatureOptions: _abi.tv_feature_options, MatchOptions: _abi.tv_match_options,
             GuidedOptions: _abi.tv_guided_options, EstimateOptions: _abi.tv_estimate_options,
             BundleOptions: _abi.tv_bundle_options,
-            AbsolutePoseOptions: _abi.tv_absolute_pose_options}
+            AbsolutePoseOptions: _abi.tv_absolute_pose_options,
+            WindowOptions: _abi.tv_window_options}
 
 
 def to_struct(library: _abi.Library, kind: type, options: Any, keywords: dict[str, Any]) -> Any:

@@ -53,8 +53,8 @@ struct LossSlope {
 inline LossSlope slope_of(const tv_window_options& options, double s) {
   const double c = options.loss_scale_px, c_sq = c * c;
   if (options.loss == TV_LOSS_CAUCHY) {
-    const double u = s / c_sq, inverse = 1.0 / (1.0 + u);
-    return {inverse, -2.0 * u * inverse};
+    const double inverse = 1.0 / (c_sq + s);
+    return {c_sq * inverse, -2.0 * s * inverse};
   }
   if (options.loss == TV_LOSS_HUBER && s > c_sq) return {c / std::sqrt(s), -1.0};
   return {1.0, 0.0};
@@ -96,8 +96,10 @@ inline void linearise(const tv_window_options& options, const LossCurvature& cur
     // as far as this is not negative.
     const double kept = std::sqrt(1.0 + curvature.bend * (loss.bend > -1.0 ? loss.bend : -1.0));
     const double factor = (1.0 - kept) / s;
+    TV_UNROLL
     for (int i = 0; i < 3; ++i) along[i] = factor * (r.e[0] * h[0][i] + r.e[1] * h[1][i]);
   }
+  TV_UNROLL
   for (int i = 0; i < 3; ++i) {
     h[0][i] = root * (h[0][i] - r.e[0] * along[i]);
     h[1][i] = root * (h[1][i] - r.e[1] * along[i]);
