@@ -127,15 +127,16 @@ typedef struct tv_window_options {
   /* A tv_loss, default TV_LOSS_CAUCHY. Here it is the loss of an observation: s is the squared
      distance in one image, in units of the observation's sigma. */
   int32_t loss;
-  /* The scale c of the loss in pixels, (0, 1e9], default 2. A smaller value reduces the influence
-     of more observations. */
+  /* The scale c of the loss in pixels, [1e-6, 1e9], default 2. A smaller value reduces the
+     influence of more observations. */
   double loss_scale_px;
   /* The standard deviation of an observation of sigma 1 along each axis, in pixels, (0, 1e9],
      default 1. It weighs the observations against the priors: the cost is in pixels^2, and the
      terms of the priors are multiplied by noise_px^2. */
   double noise_px;
-  /* The adjustment ends when a step changes the cost by at most this share of it, [0, 0.1], default
-     1e-8. */
+  /* The adjustment ends where the gain that is left is at most this share of the cost, [0, 0.1],
+     default 1e-6. That gain is estimated from the last two steps, whose gains are taken to go on
+     falling by the same factor. */
   double tolerance;
   /* The most steps that are tried, [0, 1000], default 50; 0 only measures the cost. */
   int32_t max_iterations;
@@ -157,8 +158,8 @@ typedef struct tv_window_result {
   int32_t num_views, num_points;
   /* How many observations took part. The counts from here to num_single add up to the window's. */
   int32_t num_observations;
-  /* How many were discarded because the point lies behind the camera at the start, or beyond the
-     angle of a right angle to the pixel's ray. */
+  /* How many were discarded because the point lies behind the camera at the start, or at a
+     right angle or more to the pixel's ray. */
   int32_t num_behind;
   /* How many were discarded because the pixel has no ray in the lens model, or because the pixel or
      the point is not finite. */
@@ -168,7 +169,7 @@ typedef struct tv_window_result {
   int32_t num_single;
   /* How many steps were tried. */
   int32_t num_iterations;
-  /* 1 where the last step changed the cost by at most `tolerance` of it, or where no step, however
+  /* 1 where the gain that is left is at most `tolerance` of the cost, or where no step, however
      short, lowers it; else 0. */
   uint8_t converged;
   /* 1 where the covariances were asked for and computed; 0 where they were not, or where the window
@@ -234,8 +235,8 @@ TV_API tv_status tv_adjust_window_size(const tv_window *window, size_t *size_byt
    No output overlaps another argument. Equal inputs give equal bytes on every CPU.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (a count, an index, a rotation, a prior,
    a sigma or an option is out of its range, or a field that must be 0 is not), TV_ERR_NOT_FINITE
-   (a pose, a prior, a sigma or an option), TV_ERR_CAMERA, TV_ERR_OVERLAP, TV_ERR_ALIGNMENT,
-   TV_ERR_MEMORY.
+   (a pose, a prior, a sigma, an option, or the cost at the start), TV_ERR_CAMERA, TV_ERR_OVERLAP,
+   TV_ERR_ALIGNMENT, TV_ERR_MEMORY.
    Time: at most max_iterations steps, each at most in proportion to observations x views, plus
    views^3. Needs no context. Thread-safe: the memory is the only state. */
 TV_API tv_status tv_adjust_window(const tv_window *window, const tv_window_options *options,
