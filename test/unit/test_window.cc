@@ -292,6 +292,21 @@ void test_the_cost_of_a_pose_prior_of_half_a_turn_is_known() {
   }
 }
 
+void test_the_cost_of_an_exact_half_turn_is_not_zero() {
+  for (int axis = 0; axis < 3; ++axis) {
+    tv_pose_prior prior{};
+    tv_window_view view{};
+    for (int i = 0; i < 3; ++i) {
+      prior.R[4 * i] = prior.information[7 * i] = 1;
+      view.R[4 * i] = i == axis ? 1 : -1;
+    }
+    tv::PriorTerm term;
+    tv::pose_term(prior, pose_of(view), &term);
+    TEST_ASSERT_TRUE(std::fabs(term.cost - 9.869604401089358) <= 1e-9);
+    for (double g : term.gradient[0]) TEST_ASSERT_TRUE(g - g == 0);
+  }
+}
+
 void test_the_factorisation_solves_like_a_dense_one() {
   Random random(4);
   for (int blocks : {1, 2, 5, 20}) {
@@ -599,6 +614,7 @@ int main() {
   RUN_TEST(test_derivatives_of_an_observation_agree_with_differences);
   RUN_TEST(test_derivatives_of_priors_agree_with_differences);
   RUN_TEST(test_the_cost_of_a_pose_prior_of_half_a_turn_is_known);
+  RUN_TEST(test_the_cost_of_an_exact_half_turn_is_not_zero);
   RUN_TEST(test_the_factorisation_solves_like_a_dense_one);
   RUN_TEST(test_covariances_are_those_of_the_dense_inverse);
   RUN_TEST(test_covariances_without_a_fixed_view_are_relative);

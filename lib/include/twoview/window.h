@@ -98,7 +98,8 @@ typedef struct tv_window {
   const tv_camera *cameras;
   /* num_views views: start and result. */
   tv_window_view *views;
-  /* num_points x 3, positions in the world's frame: start and result. */
+  /* num_points x 3, positions in the world's frame and in the unit of the map, which is that of the
+     views' t: start and result. */
   double *points;
   /* num_observations observations, in any order: the result does not depend on the order, except
      where a view has several observations of the same point. */
