@@ -145,7 +145,7 @@ void minimise(Window* window, double prior_weight, double cost, double* sum_sq,
       }
       const double ratio = change / (gain + damped), excess = 2.0 * ratio - 1.0;
       if (change < kNearChange * cost && ratio > 1.0) kept = std::max(0.5 * kept, kLeastKept);
-      if (ratio < 0.65) kept = std::min(2.0 * kept, 1.0);
+      if (ratio < 0.25) kept = std::min(2.0 * kept, 1.0);
       damping *= std::max(0.1, 1.0 - excess * excess * excess);
       damping = std::max(damping, kMinDamping);
       growth = 2.0;
