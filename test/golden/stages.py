@@ -34,6 +34,7 @@ STAGES = {
                     "iterative_ls", "midpoint"],
     "bundle": ["point_covariances", "bundle"],
     "absolute_pose": ["absolute_pose"],
+    "window": ["window"],
     "reconstruct": ["reconstruct"],
 }
 NOT_A_RESULT = {"memory"}
