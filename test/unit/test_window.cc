@@ -580,6 +580,97 @@ void test_the_minimum_does_not_depend_on_the_frame_or_the_scale() {
   }
 }
 
+// The widest distance between two of the views that see a point, and that between the first of them
+// and the point.
+void distances_of(const Scene& s, int32_t idx_point, double* baseline, double* distance) {
+  std::vector<double> centres;
+  for (const tv_observation& o : s.observations) {
+    if (o.idx_point != idx_point) continue;
+    double C[3];
+    window_scene::centre(s.views[static_cast<size_t>(o.idx_view)], C);
+    centres.insert(centres.end(), C, C + 3);
+  }
+  const auto between = [](const double* a, const double* b) {
+    return std::sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                     (a[2] - b[2]) * (a[2] - b[2]));
+  };
+  *baseline = 0;
+  for (size_t i = 0; i < centres.size(); i += 3) {
+    for (size_t j = 0; j < i; j += 3) {
+      *baseline = std::max(*baseline, between(&centres[i], &centres[j]));
+    }
+  }
+  *distance = between(&centres[0], &s.points[3 * static_cast<size_t>(idx_point)]);
+}
+
+// Tracks whose pixels move as if their points lay beyond infinity: without a limit such points go
+// on by a factor of ten in each step.
+void test_points_stay_within_a_million_baselines() {
+  for (tv_loss loss : {TV_LOSS_NONE, TV_LOSS_HUBER, TV_LOSS_CAUCHY}) {
+    Options o;
+    o.num_views = 8;
+    o.num_points = 400;
+    o.shortest_track = 4;
+    o.off_rad = 0.001, o.off_position = 0.005, o.off_point = 0.005;
+    window_scene::make(o, &scene);
+    double first[2] = {0, 0};
+    int32_t previous = -1;
+    for (tv_observation& observation : scene.observations) {
+      if (observation.idx_point % 20 != 0) continue;
+      for (int i = 0; i < 2; ++i) {
+        if (observation.idx_point != previous) first[i] = observation.pixel[i];
+        observation.pixel[i] = 2 * first[i] - observation.pixel[i];
+      }
+      previous = observation.idx_point;
+    }
+    tv_window_result result;
+    TEST_ASSERT_EQUAL_INT(TV_OK, adjust(&scene, options_of(loss, 2), nullptr, &result));
+    TEST_ASSERT_TRUE(result.converged);
+    int num_far = 0;
+    double farthest = 0;
+    for (int32_t p = 0; p < o.num_points; ++p) {
+      double baseline, distance;
+      distances_of(scene, p, &baseline, &distance);
+      farthest = std::max(farthest, distance / baseline);
+      num_far += distance > 1e5 * baseline;
+    }
+    std::printf("loss %d: %d points are far, the farthest at %.3g baselines, %d steps\n", loss,
+                num_far, farthest, result.num_iterations);
+    TEST_ASSERT_TRUE(farthest <= 1.1e6);  // the views still move when a point is there
+    TEST_ASSERT_TRUE(num_far >= 5);
+  }
+}
+
+// Points that start far away, half of them about as far as points may go, are brought back by their
+// pixels; the minimum is that from a near start.
+void test_far_points_come_back() {
+  for (tv_loss loss : {TV_LOSS_NONE, TV_LOSS_CAUCHY}) {
+    Options o;
+    o.num_views = 8;
+    o.num_points = 200;
+    o.shortest_track = 4;
+    window_scene::make(o, &scene);
+    const Scene start = scene;
+    tv_window_result near, far;
+    TEST_ASSERT_EQUAL_INT(TV_OK, adjust(&scene, options_of(loss, 2), nullptr, &near));
+    const std::vector<double> expected = scene.points;
+    scene = start;
+    for (size_t p = 0; p < 20; ++p) {
+      const double times = p % 2 == 0 ? 1e4 : 3e5;  // of 1 to 13 baselines
+      for (size_t k = 3 * p; k < 3 * p + 3; ++k) scene.points[k] *= times;
+    }
+    TEST_ASSERT_EQUAL_INT(TV_OK, adjust(&scene, options_of(loss, 2), nullptr, &far));
+    std::printf("loss %d: cost %.12g from a near start, %.12g from far points, %d steps\n", loss,
+                near.final_cost, far.final_cost, far.num_iterations);
+    TEST_ASSERT_TRUE(far.converged && far.initial_cost > 2 * near.final_cost);
+    TEST_ASSERT_TRUE(std::fabs(far.final_cost - near.final_cost) <= 1e-6 * near.final_cost);
+    for (size_t k = 0; k < expected.size(); ++k) {
+      TEST_ASSERT_TRUE(std::fabs(scene.points[k] - expected[k]) <=
+                       1e-3 * (1 + std::fabs(expected[k])));
+    }
+  }
+}
+
 // The lens model linearised at the pixels gives the poses of the lens itself: the differences are
 // far below the noise of the poses.
 void test_a_linearised_lens_gives_the_poses_of_the_lens() {
@@ -622,5 +713,7 @@ int main() {
   RUN_TEST(test_the_order_of_observations_does_not_matter);
   RUN_TEST(test_the_minimum_does_not_depend_on_the_frame_or_the_scale);
   RUN_TEST(test_a_linearised_lens_gives_the_poses_of_the_lens);
+  RUN_TEST(test_points_stay_within_a_million_baselines);
+  RUN_TEST(test_far_points_come_back);
   return UNITY_END();
 }

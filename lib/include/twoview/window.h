@@ -210,7 +210,8 @@ TV_API tv_status tv_adjust_window_size(const tv_window *window, size_t *size_byt
 
 /* Minimises the sum of rho over the observations and of the terms of the priors, over the poses of
    the views that are not fixed and over the points, by the Levenberg-Marquardt method with the
-   points eliminated (the Schur complement).
+   points eliminated (the Schur complement). A point whose pixels ask for a place beyond infinity
+   ends at 1e6 times the distance between the views that see it.
    The distance between a pixel and the image of its point is measured in pixels, with the lens
    model linearised at the pixel: exact for TV_CAMERA_PINHOLE, to first order in the distance for
    the other models.

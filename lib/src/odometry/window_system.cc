@@ -7,8 +7,12 @@ namespace tv {
 namespace {
 
 constexpr double kVanished = 1e-14;  // a pivot at most this share of its entry counts as zero
-// A point moves at most to ten times its distance in one step.
+// A point moves at most to ten times its distance in one step, and not beyond kFarthest times the
+// distance from the first view that sees it to another one. From there infinity looks the same to
+// within 0.001 px for a focal length of 1000 px. Ten times farther the elimination, in doubles,
+// would take the depth for undetermined, and the point could not come back.
 constexpr double kLeastShare = 0.1;
+constexpr double kFarthest = 1e6;
 // A point whose cost grows by more than this, beyond that of an error of the loss's scale, is
 // settled alone, and takes so many steps without the loss's curvature.
 constexpr double kGrowth = 1.2;
@@ -83,9 +87,52 @@ void ray_of(const Window& window, const WindowPose* pose, const WindowPoint& poi
   for (int i = 0; i < 3; ++i) ray[i] = X[i] - centre[i];
 }
 
+double distance_sq(const double a[3], const double b[3]) {
+  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return dot(d, d);
+}
+
+// The squared distance from the first view that sees the point up to which the point may go, or any
+// larger number than enough_sq if it is larger: mostly the last view alone shows that.
+double farthest_sq(const Window& window, const WindowPose* pose, const WindowPoint& point,
+                   double enough_sq) {
+  const WindowObservation* observations = window.observations;
+  const double* centre = pose[observations[point.begin].view].centre;
+  double largest_sq = 0.0;
+  for (int k = point.end - 1; k > point.begin && largest_sq <= enough_sq; --k) {
+    const double baseline_sq = distance_sq(pose[observations[k].view].centre, centre);
+    largest_sq = std::max(largest_sq, kFarthest * kFarthest * baseline_sq);
+  }
+  return largest_sq;
+}
+
+// Moves a point back towards the first view that sees it, if it is too far away and farther than
+// before, when its squared distance was before_sq.
+void keep_near(const Window& window, const WindowPose* pose, const WindowPoint& point,
+               double before_sq, double X[3]) {
+  double ray[3];
+  ray_of(window, pose, point, X, ray);
+  const double now_sq = dot(ray, ray);
+  if (now_sq <= before_sq) return;
+  const double limit_sq = std::max(before_sq, farthest_sq(window, pose, point, now_sq));
+  if (now_sq <= limit_sq) return;
+  const double less = std::sqrt(limit_sq / now_sq) - 1.0;
+  for (int i = 0; i < 3; ++i) X[i] += less * ray[i];
+}
+
+// Whether a point is as far away as it may go, but for a tenth of the square.
+bool is_far(const Window& window, const WindowPose* pose, const WindowPoint& point,
+            const double ray[3]) {
+  const double ray_sq = dot(ray, ray);
+  return ray_sq > 0.9 * farthest_sq(window, pose, point, 2.0 * ray_sq);
+}
+
 // V + damping = L L', with the same damping for all directions across the ray, and that of its own
-// for the direction along it: depths are often known a thousand times less well.
-void eliminate(const double ray[3], double damping, PointSums* sums, EliminatedPoint* out) {
+// for the direction along it: depths are often known a thousand times less well. Of a far point
+// that the gradient would move farther away the depth is held, so that the gain of this is not
+// expected.
+void eliminate(const double ray[3], bool far, double damping, PointSums* sums,
+               EliminatedPoint* out) {
   double* V = sums->V;
   const double length_sq = dot(ray, ray);
   const double scale = length_sq > 0.0 ? 1.0 / length_sq : 0.0;
@@ -95,7 +142,7 @@ void eliminate(const double ray[3], double damping, PointSums* sums, EliminatedP
   const double trace = (V[0] + V[3]) + V[5];
   const double along = std::min(std::max(dot(ray, Vr) * scale, 0.0), trace);
   out->across = damping * (0.5 * (trace - along));
-  out->along = damping * along;
+  out->along = far && damping > 0.0 && dot(sums->gradient, ray) < 0.0 ? trace : damping * along;
   const double more = (out->along - out->across) * scale;
   const double diagonal[3] = {V[0], V[3], V[5]};
   TV_UNROLL
@@ -151,7 +198,7 @@ double add_point(const Window& window, Weighing weighing, int p) {
   double ray[3];
   ray_of(window, window.pose, point, X, ray);
   EliminatedPoint& e = window.eliminated[p];
-  eliminate(ray, weighing.damping, &sums, &e);
+  eliminate(ray, is_far(window, window.pose, point, ray), weighing.damping, &sums, &e);
   const int32_t* blocks = window.slot_block + point.begin;
   Columns* Z = window.Z + point.begin;
   for (int k = 0; k < point.num_slots; ++k) {
@@ -297,6 +344,7 @@ void joint_step(const Window& window, int p, double next[3], double* damped) {
   ray_of(window, window.pose, point, X, ray);
   step_of(e, y, ray, step, damped);
   for (int i = 0; i < 3; ++i) next[i] = X[i] + step[i];
+  keep_near(window, window.next_pose, point, dot(ray, ray), next);
 }
 
 // Lowers the cost of a point alone at the next poses, from X. False where a view does not see X.
@@ -313,9 +361,10 @@ bool settle(const Window& window, WindowPoint* point, double X[3], double* sum_s
     EliminatedPoint e;
     double ray[3], step[3], next[3], cost, next_sum_sq, damped = 0.0;
     ray_of(window, window.next_pose, *point, X, ray);
-    eliminate(ray, damping, &sums, &e);
+    eliminate(ray, is_far(window, window.next_pose, *point, ray), damping, &sums, &e);
     step_of(e, e.y, ray, step, &damped);
     for (int c = 0; c < 3; ++c) next[c] = X[c] + step[c];
+    keep_near(window, window.next_pose, *point, dot(ray, ray), next);
     const bool seen = see_point(window, window.next_pose, *point, next, &cost, &next_sum_sq);
     const bool lower = seen && cost < point->next_cost;
     const bool enough = lower && cost > point->next_cost * kSettled;
