@@ -467,9 +467,9 @@ typedef struct window_data {
   tv_distance_prior distance_prior;
 } window_data;
 
-/* Views on an arc, points, pixels with noise, every 20th one of them wrong, and a start that is
-   off. */
-static void make_window(const tv_camera *camera, uint64_t *seed, window_data *d) {
+/* Views on an arc, points, pixels with noise, every 20th one of them off by up to wrong_px, and a
+   start that is off. */
+static void make_window(const tv_camera *camera, double wrong_px, uint64_t *seed, window_data *d) {
   int v, k, i;
   memset(d, 0, sizeof *d);
   for (v = 0; v < VIEWS; ++v) {
@@ -502,7 +502,7 @@ static void make_window(const tv_camera *camera, uint64_t *seed, window_data *d)
       seen[i] = R[3 * i] * X[0] + R[3 * i + 1] * X[1] + R[3 * i + 2] * X[2] + d->truth[view].t[i];
     }
     must("project", tv_camera_project(camera, seen, o->pixel, NULL));
-    o->pixel[0] += uniform(seed, -1, 1) * (k % 20 == 3 ? 30 : 1);
+    o->pixel[0] += uniform(seed, -1, 1) * (k % 20 == 3 ? wrong_px : 1);
     o->pixel[1] += uniform(seed, -1, 1);
     o->idx_view = view;
     o->idx_point = point;
@@ -511,8 +511,8 @@ static void make_window(const tv_camera *camera, uint64_t *seed, window_data *d)
   for (k = 0; k < 3 * POINTS; ++k) d->points[k] += uniform(seed, -0.1, 0.1);
 }
 
-/* The window's bundle adjustment: each camera model and loss, without priors, with each kind of
-   prior, and with two held views. */
+/* The window's bundle adjustment: each camera model and loss, with wrong pixels where there is a
+   loss, without priors, with each kind of prior, and with two held views. */
 static void digest_window(const pair *p, tv_context *context) {
   static _Alignas(TV_CONTEXT_ALIGNMENT) uint8_t memory[1 << 18];
   static window_data d;
@@ -529,7 +529,7 @@ static void digest_window(const pair *p, tv_context *context) {
     camera.model = part % 3;
     memset(camera.k, 0, sizeof camera.k);
     camera.k[0] = part % 3 == 0 ? 0 : -0.02;
-    make_window(&camera, &seed, &d);
+    make_window(&camera, part < 3 ? 1 : 30, &seed, &d);
     tv_window_init(&window);
     window.num_cameras = 1;
     window.num_views = VIEWS;
