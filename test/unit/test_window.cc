@@ -641,6 +641,22 @@ void test_points_stay_within_a_million_baselines() {
   }
 }
 
+// A tenth of the observations is wrong, and so points of short tracks are far: the steps must not
+// go on expecting what moving these away would gain.
+void test_far_points_do_not_keep_the_steps_from_ending() {
+  Options o;
+  o.num_views = o.longest_track = 7;
+  o.num_points = 2000;
+  o.outlier_share = 0.1;
+  window_scene::make(o, &scene);
+  tv_window_options options;
+  tv_window_options_init(&options);
+  tv_window_result result;
+  TEST_ASSERT_EQUAL_INT(TV_OK, adjust(&scene, options, nullptr, &result));
+  TEST_ASSERT_TRUE(result.converged);
+  TEST_ASSERT_LESS_OR_EQUAL_INT(15, result.num_iterations);
+}
+
 // Points that start far away, half of them about as far as points may go, are brought back by their
 // pixels; the minimum is that from a near start.
 void test_far_points_come_back() {
@@ -714,6 +730,7 @@ int main() {
   RUN_TEST(test_the_minimum_does_not_depend_on_the_frame_or_the_scale);
   RUN_TEST(test_a_linearised_lens_gives_the_poses_of_the_lens);
   RUN_TEST(test_points_stay_within_a_million_baselines);
+  RUN_TEST(test_far_points_do_not_keep_the_steps_from_ending);
   RUN_TEST(test_far_points_come_back);
   return UNITY_END();
 }

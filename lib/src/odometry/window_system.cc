@@ -13,6 +13,8 @@ constexpr double kVanished = 1e-14;  // a pivot at most this share of its entry 
 // would take the depth for undetermined, and the point could not come back.
 constexpr double kLeastShare = 0.1;
 constexpr double kFarthest = 1e6;
+// The curvature along the ray, as a share of that across it, below which a point may be so far.
+constexpr double kHardlyKnown = 1e-10;
 // A point whose cost grows by more than this, beyond that of an error of the loss's scale, is
 // settled alone, and takes so many steps without the loss's curvature.
 constexpr double kGrowth = 1.2;
@@ -127,31 +129,9 @@ bool is_far(const Window& window, const WindowPose* pose, const WindowPoint& poi
   return ray_sq > 0.9 * farthest_sq(window, pose, point, 2.0 * ray_sq);
 }
 
-// V + damping = L L', with the same damping for all directions across the ray, and that of its own
-// for the direction along it: depths are often known a thousand times less well. Of a far point
-// that the gradient would move farther away the depth is held, so that the gain of this is not
-// expected.
-void eliminate(const double ray[3], bool far, double damping, PointSums* sums,
-               EliminatedPoint* out) {
-  double* V = sums->V;
-  const double length_sq = dot(ray, ray);
-  const double scale = length_sq > 0.0 ? 1.0 / length_sq : 0.0;
-  const double Vr[3] = {(V[0] * ray[0] + V[1] * ray[1]) + V[2] * ray[2],
-                        (V[1] * ray[0] + V[3] * ray[1]) + V[4] * ray[2],
-                        (V[2] * ray[0] + V[4] * ray[1]) + V[5] * ray[2]};
-  const double trace = (V[0] + V[3]) + V[5];
-  const double along = std::min(std::max(dot(ray, Vr) * scale, 0.0), trace);
-  out->across = damping * (0.5 * (trace - along));
-  out->along = far && damping > 0.0 && dot(sums->gradient, ray) < 0.0 ? trace : damping * along;
-  const double more = (out->along - out->across) * scale;
-  const double diagonal[3] = {V[0], V[3], V[5]};
-  TV_UNROLL
-  for (int i = 0, slot = 0; i < 3; ++i) {
-    TV_UNROLL
-    for (int j = i; j < 3; ++j, ++slot) {
-      V[slot] += more * ray[i] * ray[j] + (i == j ? out->across : 0.0);
-    }
-  }
+// V = L L' and y, as far as the pivots do not vanish beside the entries of the diagonal before.
+void factorise(const PointSums& sums, const double diagonal[3], EliminatedPoint* out) {
+  const double *V = sums.V, *g = sums.gradient;
   const auto inverse_of = [](double pivot, double entry) {
     return pivot > kVanished * entry ? 1.0 / std::sqrt(pivot) : 0.0;
   };
@@ -162,10 +142,56 @@ void eliminate(const double ray[3], bool far, double damping, PointSums* sums,
   inverses[1] = inverse_of(V[3] - out->l10 * out->l10, diagonal[1]);
   out->l21 = (V[4] - out->l20 * out->l10) * inverses[1];
   inverses[2] = inverse_of((V[5] - out->l20 * out->l20) - out->l21 * out->l21, diagonal[2]);
-  const double* g = sums->gradient;
   out->y[0] = g[0] * inverses[0];
   out->y[1] = (g[1] - out->l10 * out->y[0]) * inverses[1];
   out->y[2] = ((g[2] - out->l20 * out->y[0]) - out->l21 * out->y[1]) * inverses[2];
+}
+
+// V grows by `across` in each direction across the ray and by `along` in that of the ray.
+void damp(const double ray[3], double scale, double across, double along, PointSums* sums) {
+  const double more = (along - across) * scale;
+  TV_UNROLL
+  for (int i = 0, slot = 0; i < 3; ++i) {
+    TV_UNROLL
+    for (int j = i; j < 3; ++j, ++slot) {
+      sums->V[slot] += more * ray[i] * ray[j] + (i == j ? across : 0.0);
+    }
+  }
+}
+
+// -L'^-1 y
+void solve_point(const EliminatedPoint& e, const double y[3], double step[3]) {
+  step[2] = -y[2] * e.inverses[2];
+  step[1] = (-y[1] - e.l21 * step[2]) * e.inverses[1];
+  step[0] = ((-y[0] - e.l10 * step[1]) - e.l20 * step[2]) * e.inverses[0];
+}
+
+// V + damping = L L', with the same damping for all directions across the ray, and that of its own
+// for the direction along it: depths are often known a thousand times less well.
+void eliminate(const Window& window, const WindowPose* pose, const WindowPoint& point,
+               const double ray[3], double damping, PointSums* sums, EliminatedPoint* out) {
+  const double* V = sums->V;
+  const double length_sq = dot(ray, ray);
+  const double scale = length_sq > 0.0 ? 1.0 / length_sq : 0.0;
+  const double Vr[3] = {(V[0] * ray[0] + V[1] * ray[1]) + V[2] * ray[2],
+                        (V[1] * ray[0] + V[3] * ray[1]) + V[4] * ray[2],
+                        (V[2] * ray[0] + V[4] * ray[1]) + V[5] * ray[2]};
+  const double trace = (V[0] + V[3]) + V[5];
+  const double along = std::min(std::max(dot(ray, Vr) * scale, 0.0), trace);
+  const double diagonal[3] = {V[0], V[3], V[5]};
+  out->across = damping * (0.5 * (trace - along));
+  out->along = damping * along;
+  damp(ray, scale, out->across, out->along, sums);
+  factorise(*sums, diagonal, out);
+  // Of a far point that would move farther away the depth is held, so that the gain of this is not
+  // expected.
+  if (!(damping > 0.0 && along < kHardlyKnown * trace && is_far(window, pose, point, ray))) return;
+  double step[3];
+  solve_point(*out, out->y, step);
+  if (!(dot(step, ray) > 0.0)) return;
+  damp(ray, scale, 0.0, trace, sums);
+  out->along += trace;
+  factorise(*sums, diagonal, out);
 }
 
 // Z = L^-1 W' in place of W', and its part of the reduced gradient.
@@ -198,7 +224,7 @@ double add_point(const Window& window, Weighing weighing, int p) {
   double ray[3];
   ray_of(window, window.pose, point, X, ray);
   EliminatedPoint& e = window.eliminated[p];
-  eliminate(ray, is_far(window, window.pose, point, ray), weighing.damping, &sums, &e);
+  eliminate(window, window.pose, point, ray, weighing.damping, &sums, &e);
   const int32_t* blocks = window.slot_block + point.begin;
   Columns* Z = window.Z + point.begin;
   for (int k = 0; k < point.num_slots; ++k) {
@@ -314,9 +340,7 @@ namespace {
 // least cost; to higher orders it is a step of the inverse distance from the first view.
 void step_of(const EliminatedPoint& e, const double y[3], const double ray[3], double step[3],
              double* damped) {
-  step[2] = -y[2] * e.inverses[2];
-  step[1] = (-y[1] - e.l21 * step[2]) * e.inverses[1];
-  step[0] = ((-y[0] - e.l10 * step[1]) - e.l20 * step[2]) * e.inverses[0];
+  solve_point(e, y, step);
   const double ray_sq = dot(ray, ray), inward = dot(ray, step);
   const double share = ray_sq > 0.0 ? inward / ray_sq : 0.0;
   const double along_sq = share * inward;
@@ -361,7 +385,7 @@ bool settle(const Window& window, WindowPoint* point, double X[3], double* sum_s
     EliminatedPoint e;
     double ray[3], step[3], next[3], cost, next_sum_sq, damped = 0.0;
     ray_of(window, window.next_pose, *point, X, ray);
-    eliminate(ray, is_far(window, window.next_pose, *point, ray), damping, &sums, &e);
+    eliminate(window, window.next_pose, *point, ray, damping, &sums, &e);
     step_of(e, e.y, ray, step, &damped);
     for (int c = 0; c < 3; ++c) next[c] = X[c] + step[c];
     keep_near(window, window.next_pose, *point, dot(ray, ray), next);
