@@ -470,12 +470,15 @@ typedef struct window_data {
 /* Views on an arc, points, pixels with noise, every 20th one of them off by up to wrong_px, and a
    start that is off. */
 static void make_window(const tv_camera *camera, double wrong_px, uint64_t *seed, window_data *d) {
+  double dx, dz;
   int v, k, i;
   memset(d, 0, sizeof *d);
   for (v = 0; v < VIEWS; ++v) {
     d->truth[v] = window_view(v, 0.3 * v, 0.02 * v * v, -0.02 * v);
-    d->views[v] = window_view(v, 0.3 * v + uniform(seed, -0.02, 0.02),
-                              0.02 * v * v + uniform(seed, -0.02, 0.02), -0.021 * v);
+    /* One after the other: compilers differ in the order in which they evaluate arguments. */
+    dx = uniform(seed, -0.02, 0.02);
+    dz = uniform(seed, -0.02, 0.02);
+    d->views[v] = window_view(v, 0.3 * v + dx, 0.02 * v * v + dz, -0.021 * v);
     d->gravity_priors[v].idx_view = v;
     d->gravity_priors[v].down[1] = 9.81;
     d->gravity_priors[v].down[2] = uniform(seed, -0.05, 0.05);
