@@ -11,7 +11,7 @@ OURS = "twoview"
 # divided.
 UNITS = {"fast": ("ms", 1e3), "describe": ("us/keypoint", 1), "extract": ("ms", 1e3),
          "match": ("ms", 1e3), "relpose": ("us/sample", 1), "robust": ("ms/problem", 1e3),
-         "triangulate": ("us/point", 1), "pair": ("ms", 1e3)}
+         "triangulate": ("us/point", 1), "pair": ("ms", 1e3), "window": ("ms", 1e3)}
 
 
 @dataclasses.dataclass
@@ -66,6 +66,7 @@ TARGETS = [
     ("triangulate", "Iterative-LS", "", None, 0.1),
     ("triangulate", "Poly$", "", None, 0.5),
     ("triangulate", "Midpoint", "OpenGV", 1, 0.011),
+    ("window", "", "Ceres", 5, None),
     ("pair", ".*same corners", "OpenCV.*FAST", 10, None),
     ("pair", ".*median window", "OpenCV.*SIFT", 12, None),
     ("pair", ".*median window", "pycolmap", 50, None),

@@ -28,7 +28,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # {stage: the C++ program that measures it}; footprint needs no program.
 PROGRAMS = {"fast": "bench_fast", "describe": "bench_describe", "extract": "bench_describe",
             "match": "bench_match", "relpose": "bench_relpose", "robust": "bench_robust",
-            "triangulate": "bench_triangulation", "pair": "bench_pair", "footprint": None}
+            "triangulate": "bench_triangulation", "pair": "bench_pair", "window": "bench_window",
+            "footprint": None}
 
 
 def run_program(build, name, stage, quick):

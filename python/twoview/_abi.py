@@ -140,14 +140,95 @@ class tv_bundle_result(Structure):
                 ("noise_px", c_double)]
 
 
+class tv_pixel_points(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num", c_int32), ("pixels", c_void_p),
+                ("points", c_void_p), ("ratios", c_void_p), ("sigmas", c_void_p)]
+
+
+class tv_absolute_pose_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_iterations", c_int32),
+                ("fixed_iterations", c_int32), ("reserved", c_int32), ("max_error_px", c_double),
+                ("confidence", c_double), ("seed", c_uint64), ("gravity_in_world", c_double * 3),
+                ("gravity_in_camera", c_double * 3), ("gravity_sigma_rad", c_double)]
+
+
+class tv_absolute_pose(Structure):
+    _fields_ = [("struct_size", c_uint32), ("verdict", c_int32), ("reasons", c_uint32),
+                ("num_matches", c_int32), ("num_inliers", c_int32), ("num_iterations", c_int32),
+                ("has_pose", c_uint8), ("has_covariance", c_uint8), ("has_alternative", c_uint8),
+                ("reserved", c_uint8 * 5), ("R", c_double * 9), ("t", c_double * 3),
+                ("alternative_R", c_double * 9), ("alternative_t", c_double * 3),
+                ("covariance", c_double * 36), ("coverage", c_double), ("rms_error_px", c_double),
+                ("noise_px", c_double), ("seed", c_uint64)]
+
+
+class tv_window_view(Structure):
+    _fields_ = [("R", c_double * 9), ("t", c_double * 3), ("idx_camera", c_int32),
+                ("fixed", c_int32)]
+
+
+class tv_observation(Structure):
+    _fields_ = [("idx_view", c_int32), ("idx_point", c_int32), ("pixel", c_double * 2),
+                ("sigma", c_float), ("reserved", c_int32)]
+
+
+class tv_pose_prior(Structure):
+    _fields_ = [("idx_view", c_int32), ("reserved", c_int32), ("R", c_double * 9),
+                ("t", c_double * 3), ("information", c_double * 36)]
+
+
+class tv_gravity_prior(Structure):
+    _fields_ = [("idx_view", c_int32), ("reserved", c_int32), ("down", c_double * 3),
+                ("sigma_rad", c_double)]
+
+
+class tv_distance_prior(Structure):
+    _fields_ = [("idx_view0", c_int32), ("idx_view1", c_int32), ("distance", c_double),
+                ("sigma", c_double)]
+
+
+class tv_window(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num_cameras", c_int32), ("num_views", c_int32),
+                ("num_points", c_int32), ("num_observations", c_int32),
+                ("num_pose_priors", c_int32), ("num_gravity_priors", c_int32),
+                ("num_distance_priors", c_int32), ("cameras", c_void_p), ("views", c_void_p),
+                ("points", c_void_p), ("observations", c_void_p), ("pose_priors", c_void_p),
+                ("gravity_priors", c_void_p), ("distance_priors", c_void_p),
+                ("world_down", c_double * 3)]
+
+
+class tv_window_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("loss", c_int32), ("loss_scale_px", c_double),
+                ("noise_px", c_double), ("tolerance", c_double), ("max_iterations", c_int32),
+                ("reserved", c_int32)]
+
+
+class tv_window_result(Structure):
+    _fields_ = [("struct_size", c_uint32), ("num_views", c_int32), ("num_points", c_int32),
+                ("num_observations", c_int32), ("num_behind", c_int32), ("num_invalid", c_int32),
+                ("num_single", c_int32), ("num_iterations", c_int32), ("converged", c_uint8),
+                ("has_covariance", c_uint8), ("held_first_view", c_uint8),
+                ("scale_is_free", c_uint8), ("reserved", c_uint8 * 4), ("initial_cost", c_double),
+                ("final_cost", c_double), ("initial_rms_px", c_double), ("rms_px", c_double),
+                ("noise_px", c_double)]
+
+
 STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
            tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
            tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
-           tv_reconstruction, tv_bundle_options, tv_bundle_result]
+           tv_reconstruction, tv_bundle_options, tv_bundle_result, tv_pixel_points,
+           tv_absolute_pose_options, tv_absolute_pose, tv_window_view, tv_observation,
+           tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window, tv_window_options,
+           tv_window_result]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
 POINT = np.dtype(tv_point)
+WINDOW_VIEW = np.dtype(tv_window_view)
+OBSERVATION = np.dtype(tv_observation)
+POSE_PRIOR = np.dtype(tv_pose_prior)
+GRAVITY_PRIOR = np.dtype(tv_gravity_prior)
+DISTANCE_PRIOR = np.dtype(tv_distance_prior)
 
 
 class StatusError(RuntimeError):
@@ -222,8 +303,9 @@ class Library:
         self.lib.tv_context_high_water.restype = c_size_t
         for struct in STRUCTS:
             if struct._fields_[0][0] == "struct_size":
-                init = getattr(self.lib, struct.__name__ + "_init_sized")
-                init.restype, init.argtypes = None, [c_void_p, c_size_t]
+                init = getattr(self.lib, struct.__name__ + "_init_sized", None)
+                if init is not None:  # a library without odometry does not have all of them
+                    init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
     def make(self, struct: Any, fields: Optional[dict[str, Any]] = None) -> Any:
         """Returns a struct with the defaults of its tv_..._init_sized; `fields` then replaces some

@@ -37,6 +37,7 @@ class Purpose(IntFlag):
     RECONSTRUCT = 1 << 3 | 7
     MATCH_GUIDED = 1 << 4
     ADJUST = 1 << 5
+    ABSOLUTE_POSE = 1 << 6
 
 
 class Stage(IntEnum):

@@ -78,9 +78,38 @@ class BundleOptions:
     hold_pose: int = 0
 
 
+@dataclass(frozen=True)
+class AbsolutePoseOptions:
+    """The options of the absolute pose, as in tv_absolute_pose_options."""
+
+    max_iterations: int = 10000
+    fixed_iterations: int = 0  #: number of iterations; 0: it is adaptive
+    reserved: int = 0  #: must be 0
+    max_error_px: float = 4.0  #: inlier threshold, pixels between a pixel and its point's image
+    confidence: float = 0.9999
+    seed: Optional[int] = None  #: seed of the sampler; None: the library's constant
+    gravity_in_world: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity, "down"
+    gravity_in_camera: Sequence[float] = (0.0, 0.0, 0.0)
+    gravity_sigma_rad: float = 0.0  #: standard deviation in the camera; 0: it is not used
+
+
+@dataclass(frozen=True)
+class WindowOptions:
+    """The options of adjust_window, as in tv_window_options."""
+
+    loss: int = Loss.CAUCHY
+    loss_scale_px: float = 2.0
+    noise_px: float = 1.0  #: of an observation of sigma 1, which weighs it against the priors
+    tolerance: float = 1e-6  #: share of the cost that may be left to gain
+    max_iterations: int = 50
+    reserved: int = 0  #: must be 0
+
+
 _STRUCTS = {FeatureOptions: _abi.tv_feature_options, MatchOptions: _abi.tv_match_options,
             GuidedOptions: _abi.tv_guided_options, EstimateOptions: _abi.tv_estimate_options,
-            BundleOptions: _abi.tv_bundle_options}
+            BundleOptions: _abi.tv_bundle_options,
+            AbsolutePoseOptions: _abi.tv_absolute_pose_options,
+            WindowOptions: _abi.tv_window_options}
 
 
 def to_struct(library: _abi.Library, kind: type, options: Any, keywords: dict[str, Any]) -> Any:

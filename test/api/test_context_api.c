@@ -46,7 +46,7 @@ static void test_limits_out_of_range_are_refused(void) {
   static const int32_t bad_counts[] = {0, -1, 65536, INT32_MAX, INT32_MIN};
   static const int32_t bad_matches[] = {-1, 1000001, INT32_MAX, INT32_MIN};
   static const int32_t bad_kernels[] = {-1, TV_KERNELS_NEON + 1, INT32_MAX, INT32_MIN};
-  static const uint32_t bad_purposes[] = {64, UINT32_MAX, 1u << 31};
+  static const uint32_t bad_purposes[] = {128, UINT32_MAX, 1u << 31};
   tv_limits limits;
   size_t k;
   check_size_status(TV_ERR_NULL, NULL);
@@ -163,9 +163,12 @@ static void test_a_context_pays_for_its_purposes_alone(void) {
   const size_t all = size_for(0), whole = size_for(TV_PURPOSE_RECONSTRUCT);
   uint32_t purposes;
   TEST_ASSERT_TRUE(size_for(TV_PURPOSE_MATCH) <= 300 * 1024);
+  TEST_ASSERT_EQUAL_UINT64(all, size_for(127));
+  /* The purposes of odometry do not make the context of a program that names none larger. */
   TEST_ASSERT_EQUAL_UINT64(all, size_for(63));
+  TEST_ASSERT_TRUE(size_for(TV_PURPOSE_ABSOLUTE_POSE) < size_for(TV_PURPOSE_ESTIMATE));
   TEST_ASSERT_TRUE(whole <= all);
-  for (purposes = 1; purposes < 63; ++purposes) {
+  for (purposes = 1; purposes < 127; ++purposes) {
     const uint32_t one = purposes & (0u - purposes);
     TEST_ASSERT_TRUE(size_for(purposes) <= all);
     TEST_ASSERT_TRUE(size_for(purposes) >= size_for(one));

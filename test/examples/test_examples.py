@@ -196,6 +196,31 @@ class Examples(unittest.TestCase):
             drone.kill()
             drone.communicate()
 
+    def test_absolute_pose(self):
+        if not (self.bin / "15_absolute_pose").exists():
+            self.skipTest("built without odometry")
+        random = np.random.default_rng(15)
+        K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+        R = cv2.Rodrigues(np.array([0.2, -0.5, 0.1]))[0]
+        t = np.array([0.3, -1, 2])
+        pixels = random.uniform((0, 0), (640, 480), (300, 2))
+        rays = np.column_stack([pixels, np.ones(300)]) @ np.linalg.inv(K).T
+        points = (rays * random.uniform(2, 8, (300, 1)) - t) @ R
+        pixels += 0.5 * random.normal(size=pixels.shape)
+        pixels[200:] = random.uniform((0, 0), (640, 480), (100, 2))
+        file = self.folder / "points.txt"
+        np.savetxt(file, np.column_stack([pixels, points]))
+        text = self.example("15_absolute_pose", file, 500, 500, 320, 240)
+        self.assertIn("ok: ", text)
+        self.assertEqual(number(r"wrong match is in line (\d+)", text), 201)
+        found = re.search(r"stands at \((.*), (.*), (.*)\)", text).groups()
+        np.testing.assert_allclose(np.array(found, float), -R.T @ t, atol=0.02)
+        self.assertTrue(0 < number(r"sigma of the rotation: ([\d.]+)", text) < 0.2)
+        np.savetxt(file, np.column_stack([random.permutation(pixels), points]))
+        self.assertIn("refused", self.example("15_absolute_pose", file, 500, 500, 320, 240,
+                                              status=3))
+        self.assertIn("usage", self.example("15_absolute_pose", status=2))
+
     def test_each_builds_by_pkg_config_alone(self):
         if not shutil.which("pkg-config"):
             self.skipTest("no pkg-config")
@@ -207,6 +232,8 @@ class Examples(unittest.TestCase):
                 if not (self.bin / "11_ardrone").exists():
                     continue
                 packages += ["twoview_ardrone", "twoview_h264"]
+            if source.stem == "15_absolute_pose" and not (self.bin / source.stem).exists():
+                continue
             flags = run("pkg-config", "--cflags", "--libs", *packages, env=environment).split()
             run(CC, "-std=c11", source, "-o", self.folder / "alone", *flags, "-lm")
 

@@ -34,6 +34,15 @@ LAYOUT(tv_two_view, 968, principal_point_asked_covariance, 944);
 LAYOUT(tv_point, 40, reserved, 36);
 LAYOUT(tv_bundle_options, 24, hold_pose, 20);
 LAYOUT(tv_bundle_result, 256, noise_px, 248);
+LAYOUT(tv_absolute_pose_options, 96, gravity_sigma_rad, 88);
+LAYOUT(tv_absolute_pose, 544, seed, 536);
+LAYOUT(tv_window_view, 104, fixed, 100);
+LAYOUT(tv_observation, 32, reserved, 28);
+LAYOUT(tv_pose_prior, 392, information, 104);
+LAYOUT(tv_gravity_prior, 40, sigma_rad, 32);
+LAYOUT(tv_distance_prior, 24, sigma, 16);
+LAYOUT(tv_window_options, 40, reserved, 36);
+LAYOUT(tv_window_result, 80, noise_px, 72);
 
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 
@@ -371,6 +380,201 @@ static void digest_estimates(const pair *p, tv_context *context, const matched *
   digest_principal_point(p, context);
 }
 
+/* The absolute pose from simulated matches, a third of them wrong: each camera model,
+   with sigmas, with gravity, and of a plane, the last two of them with ratios. */
+static void digest_absolute_pose(const pair *p, tv_context *context) {
+  static double pixels[2 * MAX_KEYPOINTS], points[3 * MAX_KEYPOINTS];
+  static float sigmas[MAX_KEYPOINTS], ratios[MAX_KEYPOINTS];
+  static uint8_t inliers[MAX_KEYPOINTS];
+  tv_camera camera = p->camera[0];
+  tv_pixel_points matches;
+  tv_absolute_pose_options options;
+  tv_absolute_pose r;
+  uint64_t seed = 3;
+  int part, k;
+  start();
+  for (part = 0; part < 6; ++part) {
+    camera.model = part % 3;
+    memset(camera.k, 0, sizeof camera.k);
+    camera.k[0] = part % 3 == 0 ? 0 : -0.02;
+    tv_pixel_points_init(&matches);
+    for (k = 0; k < MAX_KEYPOINTS; ++k) {
+      const double x = uniform(&seed, -0.4, 0.4), y = uniform(&seed, -0.3, 0.3),
+                   z = part == 5 ? 4 + x : uniform(&seed, 2, 8);
+      const double seen[3] = {x * z, y * z, z};
+      must("project", tv_camera_project(&camera, seen, pixels + 2 * k, NULL));
+      pixels[2 * k] += uniform(&seed, -1, 1) * (k % 3 == 0 ? 100 : 1);
+      pixels[2 * k + 1] += uniform(&seed, -1, 1);
+      points[3 * k] = seen[1] - 5;
+      points[3 * k + 1] = seen[2] + 70;
+      points[3 * k + 2] = seen[0];
+      sigmas[k] = (float)uniform(&seed, 1, 3);
+      ratios[k] = (float)uniform(&seed, 0, 1);
+    }
+    matches.num = MAX_KEYPOINTS;
+    matches.pixels = pixels;
+    matches.points = points;
+    if (part >= 3) matches.sigmas = sigmas;
+    if (part >= 4) matches.ratios = ratios;
+    tv_absolute_pose_options_init(&options);
+    if (part == 4) { /* a little off */
+      options.gravity_in_world[1] = options.gravity_in_camera[2] = 1;
+      options.gravity_in_camera[0] = 0.01;
+      options.gravity_sigma_rad = 0.01;
+    }
+    tv_absolute_pose_init(&r);
+    must("absolute_pose",
+         tv_estimate_absolute_pose(context, &camera, &matches, &options, &r, inliers));
+    if (!r.has_pose) fail("no absolute pose", TV_OK);
+    add_int(r.verdict);
+    add_int(r.reasons);
+    add_int(r.num_inliers);
+    add_int(r.num_iterations);
+    add_doubles(r.R, 9);
+    add_doubles(r.t, 3);
+    add_int(r.has_alternative);
+    add_doubles(r.alternative_R, 9);
+    add_doubles(r.alternative_t, 3);
+    add_doubles(r.covariance, 36);
+    add_double(r.coverage);
+    add_double(r.rms_error_px);
+    add_double(r.noise_px);
+    add_bytes(inliers, sizeof inliers);
+  }
+  print(p, context, "absolute_pose");
+}
+
+/* A view at the height y = -0.1 k, turned about y by the angle whose half has the tangent u. */
+static tv_window_view window_view(int k, double x, double z, double u) {
+  const double cosine = (1 - u * u) / (1 + u * u), sine = 2 * u / (1 + u * u);
+  const double R[9] = {cosine, 0, -sine, 0, 1, 0, sine, 0, cosine};
+  tv_window_view view;
+  int i;
+  memset(&view, 0, sizeof view);
+  memcpy(view.R, R, sizeof R);
+  for (i = 0; i < 3; ++i) view.t[i] = -(R[3 * i] * x - 0.1 * k * R[3 * i + 1] + R[3 * i + 2] * z);
+  return view;
+}
+
+enum { VIEWS = 8, POINTS = 80, SEEN_BY = 5 }; /* a point is seen by SEEN_BY consecutive views */
+
+typedef struct window_data {
+  tv_window_view views[VIEWS], truth[VIEWS];
+  double points[3 * POINTS];
+  tv_observation observations[SEEN_BY * POINTS];
+  tv_pose_prior pose_prior;
+  tv_gravity_prior gravity_priors[VIEWS];
+  tv_distance_prior distance_prior;
+} window_data;
+
+/* Views on an arc, points, pixels with noise, every 20th one of them off by up to wrong_px, and a
+   start that is off. */
+static void make_window(const tv_camera *camera, double wrong_px, uint64_t *seed, window_data *d) {
+  double dx, dz;
+  int v, k, i;
+  memset(d, 0, sizeof *d);
+  for (v = 0; v < VIEWS; ++v) {
+    d->truth[v] = window_view(v, 0.3 * v, 0.02 * v * v, -0.02 * v);
+    /* One after the other: compilers differ in the order in which they evaluate arguments. */
+    dx = uniform(seed, -0.02, 0.02);
+    dz = uniform(seed, -0.02, 0.02);
+    d->views[v] = window_view(v, 0.3 * v + dx, 0.02 * v * v + dz, -0.021 * v);
+    d->gravity_priors[v].idx_view = v;
+    d->gravity_priors[v].down[1] = 9.81;
+    d->gravity_priors[v].down[2] = uniform(seed, -0.05, 0.05);
+    d->gravity_priors[v].sigma_rad = 0.01;
+  }
+  d->pose_prior.idx_view = 1;
+  memcpy(d->pose_prior.R, d->truth[1].R, sizeof d->pose_prior.R);
+  memcpy(d->pose_prior.t, d->truth[1].t, sizeof d->pose_prior.t);
+  for (i = 0; i < 6; ++i) d->pose_prior.information[7 * i] = 1e4;
+  d->distance_prior.idx_view1 = VIEWS - 1;
+  d->distance_prior.distance = 2.5;
+  d->distance_prior.sigma = 0.01;
+  for (k = 0; k < SEEN_BY * POINTS; ++k) {
+    const int point = k / SEEN_BY, view = point % (VIEWS - SEEN_BY + 1) + k % SEEN_BY;
+    tv_observation *o = &d->observations[k];
+    double *X = d->points + 3 * point, seen[3];
+    const double *R = d->truth[view].R;
+    if (k % SEEN_BY == 0) {
+      X[2] = uniform(seed, 3, 9);
+      X[0] = 1 + X[2] * uniform(seed, -0.2, 0.2);
+      X[1] = X[2] * uniform(seed, -0.2, 0.2);
+    }
+    for (i = 0; i < 3; ++i) {
+      seen[i] = R[3 * i] * X[0] + R[3 * i + 1] * X[1] + R[3 * i + 2] * X[2] + d->truth[view].t[i];
+    }
+    must("project", tv_camera_project(camera, seen, o->pixel, NULL));
+    o->pixel[0] += uniform(seed, -1, 1) * (k % 20 == 3 ? wrong_px : 1);
+    o->pixel[1] += uniform(seed, -1, 1);
+    o->idx_view = view;
+    o->idx_point = point;
+    o->sigma = (float)uniform(seed, 1, 2);
+  }
+  for (k = 0; k < 3 * POINTS; ++k) d->points[k] += uniform(seed, -0.1, 0.1);
+}
+
+/* The window's bundle adjustment: each camera model and loss, with wrong pixels where there is a
+   loss, without priors, with each kind of prior, and with two held views. */
+static void digest_window(const pair *p, tv_context *context) {
+  static _Alignas(TV_CONTEXT_ALIGNMENT) uint8_t memory[1 << 18];
+  static window_data d;
+  static double covariances[36 * VIEWS];
+  static float errors_px[SEEN_BY * POINTS];
+  tv_camera camera = p->camera[0];
+  tv_window window;
+  tv_window_options options;
+  tv_window_result r;
+  uint64_t seed = 5;
+  int part, k;
+  start();
+  for (part = 0; part < 9; ++part) {
+    camera.model = part % 3;
+    memset(camera.k, 0, sizeof camera.k);
+    camera.k[0] = part % 3 == 0 ? 0 : -0.02;
+    make_window(&camera, part < 3 ? 1 : 30, &seed, &d);
+    tv_window_init(&window);
+    window.num_cameras = 1;
+    window.num_views = VIEWS;
+    window.num_points = POINTS;
+    window.num_observations = SEEN_BY * POINTS;
+    window.cameras = &camera;
+    window.views = d.views;
+    window.points = d.points;
+    window.observations = d.observations;
+    window.pose_priors = &d.pose_prior;
+    window.gravity_priors = d.gravity_priors;
+    window.distance_priors = &d.distance_prior;
+    window.num_pose_priors = part == 3;
+    window.num_gravity_priors = part == 4 || part == 5 ? VIEWS : 0;
+    window.num_distance_priors = part == 5 || part == 6;
+    d.views[0].fixed = d.views[2].fixed = part >= 7;
+    tv_window_options_init(&options);
+    options.loss = part / 3;
+    tv_window_result_init(&r);
+    must("adjust_window",
+         tv_adjust_window(&window, &options, memory, sizeof memory, covariances, errors_px, &r));
+    if (!r.converged || !r.has_covariance) fail("the window did not converge", TV_OK);
+    for (k = 0; k < VIEWS; ++k) {
+      add_doubles(d.views[k].R, 9);
+      add_doubles(d.views[k].t, 3);
+    }
+    add_doubles(d.points, 3 * POINTS);
+    add_doubles(covariances, 36 * VIEWS);
+    for (k = 0; k < SEEN_BY * POINTS; ++k) add_float(errors_px[k]);
+    add_int(r.num_views);
+    add_int(r.num_points);
+    add_int(r.num_observations);
+    add_int(r.num_iterations);
+    add_double(r.initial_cost);
+    add_double(r.final_cost);
+    add_double(r.initial_rms_px);
+    add_double(r.rms_px);
+    add_double(r.noise_px);
+  }
+  print(p, context, "window");
+}
+
 static void digest_guided(const pair *p, tv_context *context, const features *f,
                           const tv_two_view *pose) {
   static tv_correspondence found[MAX_KEYPOINTS];
@@ -512,6 +716,8 @@ static void digest_pair(const pair *p, int32_t kernels) {
   digest_guided(p, context, &f, &pose);
   digest_points(p, context, &m, &pose, points);
   digest_bundle(p, context, &m, &pose, points);
+  digest_absolute_pose(p, context);
+  digest_window(p, context);
   digest_reconstruct(p, context);
   digest_memory(p, context, &limits);
   tv_context_free(context);

@@ -33,6 +33,8 @@ STAGES = {
     "triangulate": ["poly", "poly_abs", "linear_eigen", "linear_ls", "iterative_eigen",
                     "iterative_ls", "midpoint"],
     "bundle": ["point_covariances", "bundle"],
+    "absolute_pose": ["absolute_pose"],
+    "window": ["window"],
     "reconstruct": ["reconstruct"],
 }
 NOT_A_RESULT = {"memory"}

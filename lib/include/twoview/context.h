@@ -52,7 +52,9 @@ typedef enum tv_purpose {
   /* tv_match_guided, and tv_reconstruct with guided_matching. */
   TV_PURPOSE_MATCH_GUIDED = 1 << 4,
   /* tv_adjust_two_view, and tv_reconstruct with bundle_adjustment. */
-  TV_PURPOSE_ADJUST = 1 << 5
+  TV_PURPOSE_ADJUST = 1 << 5,
+  /* tv_estimate_absolute_pose. */
+  TV_PURPOSE_ABSOLUTE_POSE = 1 << 6
 } tv_purpose;
 
 /* The largest inputs that a context is made for. They decide how much memory it needs. Filled by

@@ -9,6 +9,7 @@
 #include "twoview/feature.h"
 #include "twoview/image.h"
 #include "twoview/match.h"
+#include "twoview/odometry.h"
 #include "twoview/reconstruct.h"
 #include "twoview/status.h"
 #include "twoview/triangulate.h"

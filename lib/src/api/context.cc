@@ -13,7 +13,7 @@ namespace {
 constexpr int32_t kMaxSide = 16384;
 constexpr int32_t kMaxKeypoints = 65535;
 constexpr int32_t kMaxMatches = 1000000;
-constexpr uint32_t kAllPurposes = 2 * TV_PURPOSE_ADJUST - 1;
+constexpr uint32_t kAllPurposes = 2 * TV_PURPOSE_ABSOLUTE_POSE - 1;
 
 constexpr tv_limits kDefaults = {sizeof(tv_limits), 640, 480, 2048, 0, TV_KERNELS_AUTO, 0};
 

@@ -4,6 +4,7 @@
 
 #include "feature/corners.h"
 #include "match/match.h"
+#include "odometry/absolute_pose.h"
 #include "robust/bundle.h"
 #include "robust/two_view.h"
 #include "twoview/reconstruct.h"
@@ -32,9 +33,10 @@ size_t scratch_bytes(const tv_limits& limits) {
                                two_view_scratch_bytes(limits.max_matches),
                                0,  // tv_reconstruct: the bytes of its results are added below
                                guided_scratch_bytes(limits),
-                               bundle_scratch_bytes(limits.max_matches)};
+                               bundle_scratch_bytes(limits.max_matches),
+                               absolute_pose_bytes(limits.max_matches)};
   size_t stage = 0;
-  for (unsigned bit = 0; bit < 6; ++bit) {
+  for (unsigned bit = 0; bit < 7; ++bit) {
     if ((limits.purposes >> bit & 1) != 0) stage = std::max(stage, of_purpose[bit]);
   }
   return stage + ((limits.purposes >> 3 & 1) != 0 ? reconstruct_result_bytes(limits) : 0);

@@ -163,8 +163,22 @@ def main():
     )
     from_above("09", points, f"{len(points)} points, from above")
     terminal("10", re.sub(r"(.{58,}?) ", r"\1\n", run("10_static_memory")), 72)
+    absolute_pose()
     drone()
     colmap()
+
+
+def absolute_pose():
+    """300 simulated matches of pixels and points, a third of them wrong."""
+    random = np.random.default_rng(15)
+    R = cv2.Rodrigues(np.array([0.2, -0.5, 0.1]))[0]
+    pixels = random.uniform((0, 0), (640, 480), (300, 2))
+    rays = np.column_stack([(pixels - (320, 240)) / 500, np.ones(300)])
+    points = (rays * random.uniform(2, 8, (300, 1)) - (0.3, -1, 2)) @ R
+    pixels += 0.5 * random.normal(size=pixels.shape)
+    pixels[200:] = random.uniform((0, 0), (640, 480), (100, 2))
+    np.savetxt(FOLDER / "points.txt", np.column_stack([pixels, points]))
+    terminal("15", run("15_absolute_pose", "points.txt", 500, 500, 320, 240), 58)
 
 
 def from_above(name, points, words):

@@ -1,0 +1,517 @@
+#include "odometry/absolute_pose.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/math.h"
+#include "base/random.h"
+#include "geometry/null_space.h"
+#include "odometry/absolute_pose_3pt.h"
+#include "odometry/reprojection.h"
+#include "robust/chance.h"
+#include "robust/gravity.h"
+#include "robust/ldlt.h"
+#include "robust/loop.h"
+
+namespace tv {
+namespace {
+
+// ---- search ----
+
+// Local optimisation takes matches within kNear thresholds, at most kMostLocal of them.
+constexpr double kNear = 3;
+constexpr int kMostLocal = 128, kLocalIterations = 5;
+constexpr double kLocalGain = 1e-3;
+
+// The least number of samples, and that number times the inliers where inliers are few.
+constexpr int kMinIterations = 20, kFewInliersIterations = 1000;
+
+int near_sightings(const Sightings& s, const Pose& pose, double limit_px, int32_t* indices) {
+  int near = 0;
+  for (int i = 0; i < s.num; ++i) {
+    if (reprojection_sq(s.all[i], pose) <= limit_px * limit_px) indices[near++] = i;
+  }
+  return near;
+}
+
+struct AbsoluteEstimator {
+  using Model = Pose;
+  static constexpr int kSampleSize = 3;
+  static constexpr int kMaxModels = kMaxAbsolutePose3pt;
+  static constexpr int kBatch = 1;
+  const Sightings& sightings;
+  double threshold_px;
+  int32_t* indices;  // scratch, one entry a match
+
+  int generate_models(const int32_t* sample, Pose* poses) const {
+    double rays[3][3], points[3][3];
+    for (int k = 0; k < 3; ++k) {
+      const Sighting& sighting = sightings.all[sample[k]];
+      unit_ray(sighting, rays[k]);
+      for (int d = 0; d < 3; ++d) points[k][d] = sighting.point[d];
+    }
+    return absolute_pose_3pt(rays, points, poses);
+  }
+  int64_t fast_cost(const Pose& pose, int64_t bound) const {
+    return reprojection_cost(sightings, pose, threshold_px, bound);
+  }
+  int64_t full_cost(const Pose& pose, int* num_inliers) const {
+    const double inverse_sq = 1 / (threshold_px * threshold_px);
+    int64_t cost = 0;
+    *num_inliers = 0;
+    for (int i = 0; i < sightings.num; ++i) {
+      const double q = reprojection_sq(sightings.all[i], pose) * inverse_sq;
+      *num_inliers += q <= 1;
+      cost += q < 1 ? static_cast<int64_t>(q * kSightingCost) : kSightingCost;
+    }
+    return cost;
+  }
+  void refine_model(Pose* pose) const {
+    int count = near_sightings(sightings, *pose, kNear * threshold_px, indices);
+    if (count > kMostLocal) {
+      for (int k = 0; k < kMostLocal; ++k) {
+        indices[k] = indices[static_cast<int64_t>(k) * count / kMostLocal];
+      }
+      count = kMostLocal;
+    }
+    const PoseProblem problem{nullptr, sightings, indices, count, threshold_px, {}, 0};
+    refine_absolute(problem, kLocalIterations, kLocalGain, pose, nullptr);
+  }
+};
+
+// ---- finish ----
+
+// A pose is refined at the one of these scales of the loss, in standard deviations of the noise, at
+// which Huber's estimate of the variance, sum psi^2 / (sum psi')^2, is least: with heavy tails that
+// is a small one, with normal noise a large one. The covariance is computed at kScale, since a
+// variance that was chosen for being small is biased low (robust/final_pose.cc).
+constexpr double kScales[] = {6, 4, 3, 2, 1.5, 1};
+// A smaller scale must lower the estimate by this many times its relative standard deviation, which
+// is 1 / sqrt(n).
+constexpr double kClearly = 2;
+// kVariance: the variance of the estimate over that of least squares at kScale, for normal noise.
+constexpr double kScale = 4, kVariance = 1.0563871016563298;
+constexpr double kLeastScale = 0.02;  // in thresholds: exact matches come from an inexact camera
+constexpr int kFinalRounds = 2, kFinalIterations = 20;
+constexpr double kFinalGains[kFinalRounds] = {1e-3, 1e-6};
+
+// Fewer different inliers are too few, as in robust/verdict.cc.
+constexpr int kFewMatches = 15;
+// The largest standard deviation of a rotation, and of the position over the distance of the
+// points.
+constexpr double kMostSigma = 1.25 * kPi / 180;
+// Twice the logarithm of a thousand: evidence against a pose at a significance of 0.001.
+constexpr double kEvidence = 13.815510557964274;
+// Chi-square of two degrees of freedom at 99 per cent, up to which gravity agrees with the matches.
+constexpr double kAgreementSq = 9.21;
+
+struct Finish {
+  const SightingInput& input;
+  const Sightings& s;
+  double threshold_px;
+  GravitySight gravity;  // with the weight that the caller's sigma gives
+  int32_t* indices;      // scratch, one entry a match
+  double* values;        // scratch, one entry a match
+};
+
+// A pose as it is judged.
+struct Candidate {
+  Pose pose;
+  PoseEquations equations;  // without gravity
+  double scale_px, noise_px;
+  bool determined, has_covariance;
+  double variance_px;     // variance_px (J' W J)^-1 is the covariance without gravity
+  double covariance[36];  // with gravity, in the parameters of PoseEquations
+  double gravity_sq;      // squared distance of gravity in standard deviations, at most 2 kEvidence
+};
+
+// The information of the matches and of gravity; the covariance is its inverse.
+bool covariance_of(const Candidate& c, const GravitySight& gravity, double covariance[36]) {
+  double upper[21];
+  for (int k = 0; k < 21; ++k) upper[k] = c.equations.upper[k] / c.variance_px;
+  const Vec3 h = c.pose.R * gravity.in_world;
+  for (int a = 0, slot = 0; a < 3; ++a, slot += 3) {
+    for (int b = a; b < 3; ++b)
+      upper[slot++] += gravity.weight * ((a == b ? 1.0 : 0.0) - h[a] * h[b]);
+  }
+  return invert_symmetric(6, upper, covariance) && all_finite(covariance, 36);
+}
+
+// The squared distance of gravity from a pose that the matches alone gave, in standard deviations.
+double gravity_distance_sq(const Candidate& c, const GravitySight& gravity) {
+  const Vec3 h = c.pose.R * gravity.in_world;
+  Vec3 b[2];
+  tangent_basis(h, &b[0], &b[1]);
+  double e[2], S[2][2];
+  for (int i = 0; i < 2; ++i) {
+    e[i] = -b[i].dot(gravity.in_camera);
+    const Vec3 left = h.cross(b[i]);
+    for (int j = 0; j < 2; ++j) {
+      const Vec3 right = h.cross(b[j]);
+      S[i][j] = i == j ? 1 / gravity.weight : 0;
+      for (int k = 0; k < 9; ++k) {
+        S[i][j] += left[k / 3] * c.covariance[6 * (k / 3) + k % 3] * right[k % 3];
+      }
+    }
+  }
+  // The length of the chord increases up to half a turn; that of its projection does not.
+  const double chord_sq = (h - gravity.in_camera).squaredNorm();
+  const double length_sq = e[0] * e[0] + e[1] * e[1];
+  const double distance =
+      (S[1][1] * e[0] * e[0] - 2 * S[0][1] * e[0] * e[1] + S[0][0] * e[1] * e[1]) /
+      (S[0][0] * S[1][1] - S[0][1] * S[0][1]);
+  return length_sq > 0 ? distance * (chord_sq / length_sq) : chord_sq * gravity.weight;
+}
+
+// The variance of the estimate by Huber's formula (robust/covariance.h), for residuals of two
+// dimensions. False where the matches are too few for it.
+bool set_variance(const Finish& f, Candidate* c) {
+  const PoseEquations& e = c->equations;
+  const int n = e.visible, left = 2 * n - 6;
+  const double mean = e.slope / n, weight = e.weight / n;
+  if (left <= 4 || !(mean > 0.05)) return false;
+  const double K = 1 + 6.0 / (2 * n) * (e.slope_sq / n - mean * mean) / (mean * mean);
+  const double least = 0.05 * kLeastScale * f.threshold_px;
+  const double uncorrected = std::max(e.psi_sq / left / (mean * mean), least * least);
+  c->noise_px = std::sqrt(uncorrected / kVariance);
+  // The noise is itself estimated, from `left` degrees of freedom: with this factor the ellipsoid
+  // at 95 per cent is that of the F distribution, within 3 % for 14 and more.
+  c->variance_px = uncorrected * K * K * weight * (left / (left - 4.0));
+  return true;
+}
+
+PoseProblem problem_of(const Finish& f, const Candidate& c, int count) {
+  const bool exact = f.input.camera.model.model != TV_CAMERA_PINHOLE;
+  return PoseProblem{exact ? &f.input : nullptr, f.s, f.indices, count, c.scale_px, {}, 0};
+}
+
+// The scale of least estimated variance for the squared errors in f.values.
+double best_scale(const Finish& f, double noise_px, int count) {
+  double least = 0, best = 0;
+  const double better = 1 - kClearly / std::sqrt(static_cast<double>(count));
+  for (const double factor : kScales) {
+    const double scale = std::max(factor * noise_px, kLeastScale * f.threshold_px);
+    double psi_sq = 0, slope = 0;
+    for (int k = 0; k < count; ++k) {
+      const double q = f.values[k] / (scale * scale), share = 1 / (1 + q), weight = share * share;
+      psi_sq += f.values[k] * weight * weight;
+      slope += weight * (1 - q) * share;
+    }
+    if (best > 0 && !(slope > 0 && psi_sq < better * least * slope * slope)) continue;
+    least = slope > 0 ? psi_sq / (slope * slope) : __builtin_inf();
+    best = scale;
+  }
+  return best;
+}
+
+// Refines a pose over all matches near it, and judges it.
+Candidate refined(const Finish& f, const Pose& start) {
+  Candidate c{};
+  c.pose = start;
+  int count = 0;
+  for (int round = 0; round < kFinalRounds; ++round) {
+    count = near_sightings(f.s, c.pose, kNear * f.threshold_px, f.indices);
+    if (count < 3) return c;
+    for (int k = 0; k < count; ++k) f.values[k] = reprojection_sq(f.s.all[f.indices[k]], c.pose);
+    // Half of chi-square with two degrees of freedom lies below 2 log 2.
+    c.noise_px = std::sqrt(median(f.values, count) / 1.3862943611198906);
+    c.scale_px = best_scale(f, c.noise_px, count);
+    refine_absolute(problem_of(f, c, count), kFinalIterations, kFinalGains[round], &c.pose,
+                    &c.equations);
+  }
+  PoseProblem with_gravity = problem_of(f, c, count);
+  with_gravity.noise_sq = c.equations.slope > 0 ? c.equations.psi_sq / (2 * c.equations.slope) : 0;
+  c.scale_px = std::max(kScale * c.noise_px, kLeastScale * f.threshold_px);
+  pose_equations(problem_of(f, c, count), c.pose, &c.equations);
+  c.has_covariance = set_variance(f, &c);
+  if (!c.has_covariance) c.variance_px = c.scale_px * c.scale_px;
+  c.determined = covariance_of(c, GravitySight{}, c.covariance);
+  GravitySight gravity = f.gravity;
+  if (!(gravity.weight > 0)) return c;
+  if (c.determined) {
+    // Gravity that contradicts the matches counts less (robust/gravity.h).
+    const double z_sq = gravity_distance_sq(c, gravity);
+    const double ratio = z_sq > kAgreementSq ? kAgreementSq / z_sq : 1;
+    gravity.weight *= ratio * ratio;
+    c.gravity_sq = std::min(z_sq, 2 * kEvidence);
+  }
+  with_gravity.gravity = gravity;
+  refine_absolute(with_gravity, kFinalIterations, kFinalGains[1], &c.pose, nullptr);
+  c.determined = covariance_of(c, gravity, c.covariance);
+  return c;
+}
+
+// Minus twice the logarithm of a pose's likelihood, but for a constant, by the noise of `judge`.
+double evidence_against(const Finish& f, const Candidate& c, const Candidate& judge) {
+  const double scale_sq = judge.scale_px * judge.scale_px;
+  double sum = 0;
+  for (int k = 0; k < f.s.num; ++k) {
+    const double error_sq = reprojection_sq(f.s.all[k], c.pose);
+    sum += error_sq < 1e300 ? error_sq / (1 + error_sq / scale_sq) : scale_sq;
+  }
+  return sum / std::max(judge.noise_px * judge.noise_px, 1e-300) + c.gravity_sq;
+}
+
+// The middle of points, and the directions and squared sizes of their spread.
+struct Spread {
+  double mean[3];
+  Svd3 svd;
+};
+
+// noinline: it is called twice
+__attribute__((noinline)) Spread spread_of(const Finish& f, int count) {
+  Spread spread{};
+  Mat3 sum = Mat3::Zero();
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int k = 0; k < count; ++k) {
+      const double* point = f.s.all[f.indices[k]].point;
+      for (int i = 0; i < 9; ++i) {
+        const double x = point[i % 3] - spread.mean[i % 3];
+        if (pass == 1) {
+          sum.data()[i] += x * (point[i / 3] - spread.mean[i / 3]);
+        } else if (i < 3) {
+          sum.data()[i] += point[i] / count;
+        }
+      }
+    }
+    if (pass == 1) break;
+    for (int i = 0; i < 3; ++i) {
+      spread.mean[i] = sum.data()[i];
+      sum.data()[i] = 0;
+    }
+  }
+  spread.svd = svd3(sum);
+  return spread;
+}
+
+// v becomes its mirror image on the plane through 0 across `normal`.
+void reflect(const double normal[3], double v[3]) {
+  const double factor = 2 * dot(normal, v) / dot(normal, normal);
+  for (int k = 0; k < 3; ++k) v[k] -= factor * normal[k];
+}
+
+// The pose that sees a flat set of points nearly as this one does: the plane mirrored in depth (D.
+// Oberkampf, D. DeMenthon, L. Davis, "Iterative pose estimation using coplanar feature points",
+// 1996). R x becomes R x mirrored on the plane, then in depth.
+Pose mirrored(const Pose& pose, const Spread& spread) {
+  double centre[3], normal[3];
+  place(pose, spread.mean, centre);
+  const double axis[3] = {spread.svd.U(0, 2), spread.svd.U(1, 2), spread.svd.U(2, 2)};
+  rotate(pose.R, axis, normal);
+  Pose twin;
+  for (int c = 0; c < 3; ++c) {
+    double column[3] = {pose.R(0, c), pose.R(1, c), pose.R(2, c)};
+    reflect(normal, column);
+    reflect(centre, column);
+    for (int r = 0; r < 3; ++r) twin.R(r, c) = column[r];
+  }
+  double turned[3];
+  rotate(twin.R, spread.mean, turned);
+  for (int r = 0; r < 3; ++r) twin.t[r] = centre[r] - turned[r];
+  return twin;
+}
+
+// The probability that a wrong match agrees with the pose: by pairings of points with the pixels of
+// other matches, and by the share of the image that the threshold's disc covers (robust/chance.h).
+double chance_of(const Finish& f, const Pose& pose, uint64_t seed) {
+  constexpr int kPairings = 512;
+  constexpr double kPriorWeight = 100;
+  const int n = f.s.num;
+  if (n < 2) return 1;
+  double sigmas_sq = 0;
+  for (int k = 0; k < n; ++k) {
+    const double sigma = f.input.sigma(f.s.order[k]);
+    sigmas_sq += sigma * sigma / n;
+  }
+  const tv_camera& camera = f.input.camera.model;
+  const double area = static_cast<double>(camera.width) * camera.height;
+  const double prior = std::min(1.0, kPi * f.threshold_px * f.threshold_px * sigmas_sq / area);
+  Random random = random_seeded(seed);
+  int agreeing = 0;
+  for (int k = 0; k < kPairings; ++k) {
+    const uint32_t i = random_below(random, static_cast<uint32_t>(n));
+    const uint32_t j = random_below(random, static_cast<uint32_t>(n - 1));
+    Sighting wrong = f.s.all[j + (j >= i)];
+    std::copy(f.s.all[i].point, f.s.all[i].point + 3, wrong.point);
+    agreeing += reprojection_sq(wrong, pose) <= f.threshold_px * f.threshold_px;
+  }
+  const double weight = std::min(0.5 * n * (n - 1.0), double(kPairings));
+  return (weight * agreeing / kPairings + kPriorWeight * prior) / (weight + kPriorWeight);
+}
+
+// The standard deviations of the rotation and, over the distance of the points, of the position.
+double largest_sigma(const Candidate& c, double distance) {
+  double rotation = 0, position = 0;
+  for (int k = 0; k < 3; ++k) {
+    // The camera's centre moves by -d + w x t.
+    const int a = (k + 1) % 3, b = (k + 2) % 3;
+    double row[6] = {};
+    row[a] = c.pose.t[b];
+    row[b] = -c.pose.t[a];
+    row[3 + k] = -1;
+    for (int i = 0; i < 36; ++i) position += row[i / 6] * c.covariance[i] * row[i % 6];
+    rotation += c.covariance[7 * k];
+  }
+  return std::sqrt(std::max(rotation, position / (distance * distance)));
+}
+
+// Writes a pose of the caller's points.
+void store(const Sightings& s, const Pose& pose, double R[9], double t[3]) {
+  double turned[3];
+  rotate(pose.R, s.centre, turned);
+  for (int k = 0; k < 9; ++k) R[k] = pose.R(k / 3, k % 3);
+  for (int k = 0; k < 3; ++k) t[k] = pose.t[k] / s.scale - turned[k];
+}
+
+// The covariance in the caller's parameters, (w, d') with d' = (d + t x w) / scale: a turn about
+// the camera instead of the middle of the points.
+void store_covariance(const Sightings& s, const Candidate& c, double out[36]) {
+  const Mat3 lever = cross_matrix(c.pose.t) / s.scale;
+  double half[36];
+  for (int i = 0; i < 36; ++i) {
+    const int row = i / 6, column = i % 6;
+    half[i] = c.covariance[i] / (row < 3 ? 1 : s.scale);
+    for (int k = 0; k < 3 && row >= 3; ++k) {
+      half[i] += lever(row - 3, k) * c.covariance[6 * k + column];
+    }
+  }
+  for (int i = 0; i < 36; ++i) {
+    const int row = i / 6, column = i % 6;
+    if (column < row) continue;
+    double sum = half[i] / (column < 3 ? 1 : s.scale);
+    for (int k = 0; k < 3 && column >= 3; ++k) sum += half[6 * row + k] * lever(column - 3, k);
+    out[i] = out[6 * column + row] = sum;
+  }
+}
+
+// Counts the inliers of a pose and the cells of an 8x8 grid that hold them, and marks them. Writes
+// the different ones to f.indices and returns how many.
+int count_inliers(const Finish& f, const Pose& pose, tv_absolute_pose* out, uint8_t* mask) {
+  const tv_camera& camera = f.input.camera.model;
+  const double side[2] = {camera.width / 8.0, camera.height / 8.0};
+  uint64_t cells = 0;
+  int different = 0;
+  double sum = 0;
+  for (int k = 0; k < f.s.num_all; ++k) {
+    const double error_sq = reprojection_sq(f.s.all[k], pose);
+    if (!(error_sq <= f.threshold_px * f.threshold_px)) continue;
+    if (k < f.s.num) f.indices[different++] = k;
+    if (mask != nullptr) mask[f.s.order[k]] = 1;
+    sum += error_sq;
+    ++out->num_inliers;
+    int cell[2];
+    for (int d = 0; d < 2; ++d) {
+      const double place = (f.input.pixels[2 * f.s.order[k] + d] + 0.5) / side[d];
+      cell[d] = place >= 7 ? 7 : (place > 0 ? static_cast<int>(place) : 0);
+    }
+    cells |= uint64_t{1} << (8 * cell[1] + cell[0]);
+  }
+  out->coverage = __builtin_popcountll(cells) / 64.0;
+  if (out->num_inliers > 0) out->rms_error_px = std::sqrt(sum / out->num_inliers);
+  return different;
+}
+
+}  // namespace
+
+void search_absolute_pose(const Sightings& sightings, const tv_absolute_pose_options& options,
+                          bool progressive, Arena& arena, AbsolutePoseSearch* search) {
+  if (sightings.num < AbsoluteEstimator::kSampleSize) return;
+  ArenaScope scope(arena);
+  int32_t* indices = arena_alloc<int32_t>(arena, static_cast<size_t>(sightings.num));
+  AbsoluteEstimator estimator{sightings, options.max_error_px, indices};
+  Sampler sampler =
+      make_sampler(options.seed, sightings.num, AbsoluteEstimator::kSampleSize, progressive);
+  // Few matches have few different samples; so many draws miss all those of four inliers once in 50
+  // times.
+  const double n = sightings.num, different = n * (n - 1) * (n - 2) / 6;
+  const int most =
+      different < options.max_iterations ? static_cast<int>(different) : options.max_iterations;
+  const LoopOptions loop{options.confidence, kMinIterations, most, options.fixed_iterations,
+                         kFewInliersIterations};
+  const LoopResult<Pose> result = robust_loop(estimator, sampler, loop);
+  search->found = result.found;
+  search->num_iterations = result.num_iterations;
+  if (result.found) search->pose = result.model;
+}
+
+void finish_absolute_pose(const SightingInput& input, const Sightings& s,
+                          const tv_absolute_pose_options& options, const AbsolutePoseSearch& search,
+                          Arena& arena, tv_absolute_pose* out, uint8_t* mask) {
+  ArenaScope scope(arena);
+  const size_t n = static_cast<size_t>(s.num_all);
+  Finish f{input,
+           s,
+           options.max_error_px,
+           {},
+           arena_alloc<int32_t>(arena, n),
+           arena_alloc<double>(arena, n)};
+  const GravityPrior prior =
+      gravity_prior(options.gravity_in_world, options.gravity_in_camera, options.gravity_sigma_rad);
+  if (prior.known)
+    f.gravity = {1 / (prior.sigma_rad * prior.sigma_rad), prior.down[0], prior.down[1]};
+  Candidate best{};
+  int different = 0;
+  if (search.found) {
+    best = refined(f, search.pose);
+    different = count_inliers(f, best.pose, out, nullptr);
+  }
+  const double log_alarms = different > 3
+                                ? log_false_alarms(s.num, different, 3, kMaxAbsolutePose3pt,
+                                                   chance_of(f, best.pose, options.seed))
+                                : 0;
+  if (!best.determined || !(log_alarms < kLogMeaningful)) {
+    // No pose: too few matches, points on a line, or no more inliers than chance explains.
+    out->num_inliers = 0;
+    out->coverage = out->rms_error_px = 0;
+    for (int i = 0; i < s.num; ++i) f.indices[i] = i;
+    const Vec3 sizes = spread_of(f, s.num).svd.s;
+    out->reasons = s.num < kFewMatches              ? TV_REASON_TOO_FEW_MATCHES
+                   : !(sizes[1] > 1e-12 * sizes[0]) ? TV_REASON_CROWDED_MATCHES
+                                                    : TV_REASON_LOW_INLIER_RATIO;
+    return;
+  }
+  const Spread spread = spread_of(f, different);
+  const Vec3& sizes = spread.svd.s;
+  if (sizes[2] < 0.01 * sizes[1]) {
+    const Candidate twin = refined(f, mirrored(best.pose, spread));
+    const double turn_sq = (twin.pose.R - best.pose.R).squaredNorm();
+    if (twin.determined && turn_sq > 1e-6) {
+      const double difference = evidence_against(f, twin, best) - evidence_against(f, best, best);
+      const Candidate& other = difference < 0 ? best : twin;
+      if (std::fabs(difference) < kEvidence) {
+        out->has_alternative = 1;
+        out->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+        store(s, other.pose, out->alternative_R, out->alternative_t);
+      }
+      if (difference < 0) best = twin;
+    }
+  }
+  out->num_inliers = 0;
+  different = count_inliers(f, best.pose, out, mask);
+  out->has_pose = 1;
+  store(s, best.pose, out->R, out->t);
+  out->has_covariance = best.has_covariance;
+  if (best.has_covariance) {
+    out->noise_px = best.noise_px;
+    store_covariance(s, best, out->covariance);
+  }
+  // The verdict, by the rules of robust/verdict.cc.
+  double centre[3];
+  place(best.pose, spread.mean, centre);
+  const double distance = length_of(centre);
+  const double focal = 0.5 * (input.camera.model.fx + input.camera.model.fy);
+  const double width_px = std::sqrt(sizes[1] / different) / distance * focal;
+  if (different < kFewMatches) out->reasons |= TV_REASON_TOO_FEW_MATCHES;
+  if (4 * out->num_inliers < s.num_all || best.noise_px > 0.7 * options.max_error_px) {
+    out->reasons |= TV_REASON_LOW_INLIER_RATIO;
+  }
+  if (!best.has_covariance || !(largest_sigma(best, distance) <= kMostSigma)) {
+    out->reasons |= TV_REASON_LOW_PARALLAX;
+  }
+  if (out->coverage < 4.5 / 64 || width_px < 3 * options.max_error_px) {
+    out->reasons |= TV_REASON_CROWDED_MATCHES;
+  }
+  out->verdict = out->reasons == 0 ? TV_VERDICT_OK : TV_VERDICT_DOUBTFUL;
+}
+
+}  // namespace tv

@@ -1,0 +1,128 @@
+#include "odometry/block_cholesky.h"
+
+#include <cmath>
+
+namespace tv {
+namespace {
+
+Pair both(double x) { return Pair{x, x}; }
+
+// Subtracts Z_a Z_b' for all b of a row of blocks. The three products are added first, so each
+// entry changes once.
+void subtract_row(const BlockMatrix& A, const Columns* Z, const int32_t* blocks, int a) {
+  const double* za = reinterpret_cast<const double*>(Z[a].at);
+  for (int r = 0; r < kBlock; ++r) {
+    const Pair z0 = both(za[r]), z1 = both(za[kBlock + r]), z2 = both(za[2 * kBlock + r]);
+    double* row = block_at(A, blocks[a], 0) + r * kBlock * A.num_blocks;
+    for (int b = 0; b <= a; ++b) {
+      Pair* entry = reinterpret_cast<Pair*>(row + kBlock * blocks[b]);
+      const Pair* zb = Z[b].at;
+      entry[0] -= (z0 * zb[0] + z1 * zb[3]) + z2 * zb[6];
+      entry[1] -= (z0 * zb[1] + z1 * zb[4]) + z2 * zb[7];
+      entry[2] -= (z0 * zb[2] + z1 * zb[5]) + z2 * zb[8];
+    }
+  }
+}
+
+// The factor of a block of the diagonal, in place. Returns how many pivots vanished.
+int factorise_block(double* block, int stride, const double* diagonal, double smallest,
+                    double* inverses) {
+  int vanished = 0;
+  for (int c = 0; c < kBlock; ++c) {
+    double* row_c = block + c * stride;
+    double pivot = row_c[c];
+    for (int k = 0; k < c; ++k) pivot -= row_c[k] * row_c[k];
+    const bool positive = pivot > smallest * diagonal[c];
+    const double root = positive ? std::sqrt(pivot) : 0.0;
+    inverses[c] = positive ? 1.0 / root : 0.0;
+    vanished += !positive;
+    row_c[c] = root;
+    for (int r = c + 1; r < kBlock; ++r) {
+      double* row = block + r * stride;
+      double value = row[c];
+      for (int k = 0; k < c; ++k) value -= row[k] * row_c[k];
+      row[c] = value * inverses[c];
+    }
+  }
+  return vanished;
+}
+
+// A block below the diagonal becomes that of the factor, of which `halves` receives a copy, the
+// columns 0 to 2 and 3 to 5.
+void solve_block(const double* factor, int stride, const double* inverses, double* block,
+                 Columns* const halves[2]) {
+  for (int c = 0; c < kBlock; ++c) {
+    double* column = reinterpret_cast<double*>(halves[c / 3]->at) + c % 3 * kBlock;
+    for (int r = 0; r < kBlock; ++r) {
+      double value = block[r * stride + c];
+      for (int k = 0; k < c; ++k) value -= block[r * stride + k] * factor[c * stride + k];
+      value *= inverses[c];
+      block[r * stride + c] = value;
+      column[r] = value;
+    }
+  }
+}
+
+}  // namespace
+
+size_t block_matrix_bytes(int num_blocks) {
+  const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
+  return arena_bytes<double>(n * n) + 2 * arena_bytes<double>(n) +
+         arena_bytes<Columns>(2 * blocks) + arena_bytes<int32_t>(blocks);
+}
+
+BlockMatrix block_matrix(int num_blocks, Arena& arena) {
+  const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
+  BlockMatrix A;
+  A.num_blocks = num_blocks;
+  A.entries = arena_alloc<double>(arena, n * n);
+  A.inverses = arena_alloc<double>(arena, n);
+  A.diagonal = arena_alloc<double>(arena, n);
+  A.panel = arena_alloc<Columns>(arena, 2 * blocks);
+  A.sequence = arena_alloc<int32_t>(arena, blocks);
+  for (int i = 0; i < num_blocks; ++i) A.sequence[i] = i;
+  return A;
+}
+
+void subtract_products(const BlockMatrix& A, const Columns* Z, const int32_t* blocks, int num) {
+  for (int a = 0; a < num; ++a) subtract_row(A, Z, blocks, a);
+}
+
+int factorise(const BlockMatrix& A, double smallest) {
+  const int stride = kBlock * A.num_blocks;
+  int vanished = 0;
+  for (int j = 0; j < A.num_blocks; ++j) {
+    double* corner = block_at(A, j, j);
+    double* inverses = A.inverses + kBlock * j;
+    vanished += factorise_block(corner, stride, A.diagonal + kBlock * j, smallest, inverses);
+    for (int i = j + 1; i < A.num_blocks; ++i) {
+      Columns* const halves[2] = {A.panel + i, A.panel + A.num_blocks + i};
+      solve_block(corner, stride, inverses, block_at(A, i, j), halves);
+    }
+    const int first = j + 1, num = A.num_blocks - first;
+    subtract_products(A, A.panel + first, A.sequence + first, num);
+    subtract_products(A, A.panel + A.num_blocks + first, A.sequence + first, num);
+  }
+  return vanished;
+}
+
+void solve_lower(const BlockMatrix& A, int first_block, double* x) {
+  const int size = kBlock * A.num_blocks;
+  for (int r = kBlock * first_block; r < size; ++r) {
+    const double* row = A.entries + static_cast<size_t>(r) * static_cast<size_t>(size);
+    double value = x[r];
+    for (int k = kBlock * first_block; k < r; ++k) value -= row[k] * x[k];
+    x[r] = value * A.inverses[r];
+  }
+}
+
+void solve_upper(const BlockMatrix& A, double* x) {
+  const int size = kBlock * A.num_blocks;
+  for (int r = size - 1; r >= 0; --r) {
+    const double* row = A.entries + static_cast<size_t>(r) * static_cast<size_t>(size);
+    x[r] *= A.inverses[r];
+    for (int k = 0; k < r; ++k) x[k] -= row[k] * x[r];
+  }
+}
+
+}  // namespace tv

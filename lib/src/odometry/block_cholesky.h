@@ -1,0 +1,60 @@
+// The reduced camera system of a window: a symmetric matrix of 6x6 blocks, of which the lower
+// triangle is stored, its factorisation A = L L' (G. Golub, C. Van Loan, "Matrix computations",
+// 4.2), and the update by a point. Every entry is a sum in a fixed order. Tests:
+// test/unit/test_window.cc.
+#pragma once
+
+#include <cstdint>
+
+#include "base/arena.h"
+
+// Put before a loop of three turns, which is then straight code even where the compiler would leave
+// it.
+#define TV_UNROLL _Pragma("GCC unroll 3")
+
+namespace tv {
+
+// Two doubles, of which each operation is the same IEEE operation on each: every CPU of the library
+// that has vectors of doubles has those of 16 bytes.
+typedef double Pair __attribute__((vector_size(16)));
+
+inline constexpr int kBlock = 6;
+inline constexpr int kBlockPairs = 3;
+
+// Three columns of a panel of six rows: column m has the entries [3 m], [3 m + 1], [3 m + 2].
+struct Columns {
+  Pair at[3 * kBlockPairs];
+};
+
+struct BlockMatrix {
+  int num_blocks;
+  double* entries;    // num_blocks * 6 rows of as many entries, 16-byte aligned; lower triangle
+  double* inverses;   // of the factor's diagonal, or 0 where a pivot vanished
+  double* diagonal;   // of A, which decides when a pivot has vanished
+  Columns* panel;     // scratch: 2 for each block
+  int32_t* sequence;  // 0, 1, 2, ...: all blocks
+};
+
+size_t block_matrix_bytes(int num_blocks);
+BlockMatrix block_matrix(int num_blocks, Arena& arena);
+
+inline double* block_at(const BlockMatrix& A, int row, int column) {
+  return A.entries + (static_cast<size_t>(kBlock * row) * static_cast<size_t>(A.num_blocks) +
+                      static_cast<size_t>(column)) *
+                         kBlock;
+}
+
+// Subtracts Z_a Z_b' from the blocks (blocks[a], blocks[b]) for all a and all b <= a, where blocks
+// ascends.
+void subtract_products(const BlockMatrix& A, const Columns* Z, const int32_t* blocks, int num);
+
+// Factorises A in place. A pivot of at most `smallest` times its entry of `diagonal` counts as
+// zero, and its unknown becomes 0. Returns how many did.
+int factorise(const BlockMatrix& A, double smallest);
+
+// x becomes L^-1 x, for rows from 6 first_block on; those above are zero.
+void solve_lower(const BlockMatrix& A, int first_block, double* x);
+// x becomes L^-T x.
+void solve_upper(const BlockMatrix& A, double* x);
+
+}  // namespace tv

@@ -1,0 +1,61 @@
+#include "odometry/window_observation.h"
+
+#include "base/math.h"
+
+namespace tv {
+
+bool make_observation(const Camera& camera, const tv_observation& given, WindowObservation* out) {
+  if (!all_finite(given.pixel, 2)) return false;
+  const tv_camera& model = camera.model;
+  const double sigma = given.sigma == 0.0f ? 1.0 : static_cast<double>(given.sigma);
+  if (model.model == TV_CAMERA_PINHOLE) {  // the general case, without its square roots
+    const double fx = model.fx / sigma, fy = model.fy / sigma;
+    const double u = (model.cx - given.pixel[0]) / sigma, v = (model.cy - given.pixel[1]) / sigma;
+    const double J[6] = {fx, 0.0, u, 0.0, fy, v};
+    for (int i = 0; i < 6; ++i) out->J[i] = J[i];
+    out->n[0] = out->n[1] = 0.0;
+    out->n[2] = 1.0;
+    return true;
+  }
+  Vec3 ray;
+  Vec2 pixel;
+  Mat23 J;
+  if (!unproject(camera, Vec2(given.pixel[0], given.pixel[1]), &ray, nullptr) ||
+      !project(camera, ray, &pixel, &J)) {
+    return false;
+  }
+  const bool sphere = model.model == TV_CAMERA_KANNALA_BRANDT;
+  // The derivative by a point is in inverse proportion to its depth: at the plane z = 1 it is ray z
+  // times that at the unit ray.
+  const double scale = (sphere ? 1.0 : ray[2]) / sigma;
+  for (int i = 0; i < 6; ++i) out->J[i] = J(i / 3, i % 3) * scale;
+  for (int i = 0; i < 3; ++i) out->n[i] = sphere ? ray[i] : i == 2 ? 1.0 : 0.0;
+  return true;
+}
+
+void LossSum::add(double s) {
+  const double c = options_->loss_scale_px, c_sq = c * c;
+  if (options_->loss == TV_LOSS_HUBER && s > c_sq) {
+    sum_ += 2.0 * c * std::sqrt(s) - c_sq;
+  } else if (options_->loss != TV_LOSS_CAUCHY) {
+    sum_ += s;
+  } else {
+    const double u = s / c_sq;
+    if (u < 1e-4) {  // log(1 + u) by its series, exact to rounding
+      sum_ += c_sq * (u * (1.0 - u * (0.5 - u * (1.0 / 3.0 - 0.25 * u))));
+    } else {
+      product_ *= 1.0 + u;
+      if (product_ > 1e150) {
+        sum_ += c_sq * log(product_);
+        product_ = 1.0;
+      }
+    }
+  }
+}
+
+double LossSum::value() const {
+  const double c = options_->loss_scale_px;
+  return product_ > 1.0 ? sum_ + c * c * log(product_) : sum_;
+}
+
+}  // namespace tv

@@ -1,0 +1,54 @@
+// The terms of a window's cost that do not come from observations: what is known of poses, of the
+// direction of gravity and of distances between views, each with its Jacobian in the parameters
+// (w, v) of a view, x -> exp([w]x) x + v. Derivations: docs/algorithms/window.md. Tests:
+// test/unit/test_window.cc.
+#pragma once
+
+#include "geometry/camera.h"
+#include "odometry/block_cholesky.h"
+#include "twoview/window.h"
+
+namespace tv {
+
+// cam_from_world, and the camera's centre -R't, in plain arrays: the arena and the loops over
+// observations take them.
+struct WindowPose {
+  double R[9], t[3], centre[3];
+};
+
+inline void to_camera(const WindowPose& pose, const double X[3], double x[3]) {
+  TV_UNROLL
+  for (int i = 0; i < 3; ++i) {
+    const double* row = pose.R + 3 * i;
+    x[i] = ((row[0] * X[0] + row[1] * X[1]) + row[2] * X[2]) + pose.t[i];
+  }
+}
+
+// R'v
+inline void rotate_back(const double R[9], const double v[3], double out[3]) {
+  TV_UNROLL
+  for (int i = 0; i < 3; ++i) out[i] = (R[i] * v[0] + R[3 + i] * v[1]) + R[6 + i] * v[2];
+}
+
+inline void set_centre(WindowPose* pose) {
+  rotate_back(pose->R, pose->t, pose->centre);
+  for (int i = 0; i < 3; ++i) pose->centre[i] = -pose->centre[i];
+}
+
+WindowPose stepped(const WindowPose& pose, const double step[6]);
+
+// A term of the cost, quadratic to first order: `cost`, half its gradient by the parameters of one
+// or two views, and half its Hessian, of which H[a][b] is the block of the views a and b <= a.
+struct PriorTerm {
+  double cost;
+  double gradient[2][6];
+  double H[2][2][36];
+};
+
+void pose_term(const tv_pose_prior& prior, const WindowPose& pose, PriorTerm* term);
+void gravity_term(const tv_gravity_prior& prior, const double world_down[3], const WindowPose& pose,
+                  PriorTerm* term);
+void distance_term(const tv_distance_prior& prior, const WindowPose& pose0, const WindowPose& pose1,
+                   PriorTerm* term);
+
+}  // namespace tv

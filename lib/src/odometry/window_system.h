@@ -1,0 +1,89 @@
+// A window's observations in the order of its points, and one step of Levenberg-Marquardt: the
+// points eliminated, the reduced camera system, and the points' own steps. Derivations:
+// docs/algorithms/window.md. Tests: test/unit/test_window.cc, test/unit/test_window_ceres.cc.
+#pragma once
+
+#include "geometry/vector3.h"
+#include "odometry/block_cholesky.h"
+#include "odometry/window_observation.h"
+#include "odometry/window_prior.h"
+
+namespace tv {
+
+// What a point leaves for its own step when it is eliminated: V + damping = L L'.
+struct EliminatedPoint {
+  double l10, l20, l21;
+  double inverses[3];    // of L's diagonal; 0 where a pivot vanished
+  double y[3];           // L^-1 gradient
+  double across, along;  // the damping across the ray and along it
+};
+
+struct WindowPoint {
+  int32_t idx;         // in the caller's array
+  int32_t begin, end;  // its observations
+  int32_t num_slots;   // how many adjusted views see it
+  int32_t careful;     // for so many steps more, without the loss's curvature
+  int32_t reserved;
+  double cost, next_cost;  // its sum of rho
+};
+
+inline constexpr int32_t kHeldView = -1, kAbsentView = -2;
+
+struct Window {
+  const tv_window& given;
+  const tv_window_options& options;
+  int num_points = 0, num_observations = 0;
+  WindowObservation* observations = nullptr;  // by point, view, and index
+  int32_t* slot_block =
+      nullptr;  // for each observation's place: the block of the point's k-th adjusted view
+  WindowPoint* points = nullptr;
+  double* position = nullptr;  // 3 for each point that takes part
+  double* next_position = nullptr;
+  WindowPose* pose = nullptr;  // of each view
+  WindowPose* next_pose = nullptr;
+  int32_t* block = nullptr;  // of each view in the reduced system, or one of the values below
+  int num_blocks = 0;
+  Columns* Z = nullptr;  // for each observation's place: the point's k-th slot, L^-1 W'
+  EliminatedPoint* eliminated = nullptr;
+  BlockMatrix system = {};
+  double* gradient = nullptr;  // half that of the cost, reduced by the points
+  double* step = nullptr;
+};
+
+// Gathers the observations, as far as they can be used, by point and view, and counts the others.
+// `order` has as many entries as there are observations; `begin` one more than there are views and
+// points.
+void gather_points(Window* window, const Camera* cameras, int32_t* order, int32_t* begin,
+                   tv_window_result* result);
+
+// How the terms are weighed: for a step, or for the covariance.
+struct Weighing {
+  double damping;
+  double prior_weight;
+  LossCurvature curvature;
+};
+
+// Builds the reduced system at the present state, without the damping of the views, and
+// `gradient`. Returns the sum of |y|^2 over the points.
+double build_system(const Window& window, const Weighing& weighing);
+
+// The sum of rho over the observations at the present state.
+double observations_cost(const Window& window, double* sum_sq);
+
+// What a step leads to, over all observations.
+struct Moved {
+  double cost, sum_sq;  // the sum of rho, and that of the squared residuals
+  double damped;        // what the damping takes of the points' gain
+};
+
+// Moves the points by their own steps, given `step` and the views' next poses. False where a view
+// does not see one of the points any more.
+bool move_points(const Window& window, Moved* moved);
+
+// The sum of the priors' terms at `pose`.
+double priors_cost(const Window& window, const WindowPose* pose);
+
+// Adds a prior's term to the reduced system; a view may be -1.
+void add_term(const Window& window, double weight, const PriorTerm& term, int low, int high);
+
+}  // namespace tv
