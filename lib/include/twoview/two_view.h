@@ -243,6 +243,26 @@ typedef struct tv_two_view {
   double principal_point_asked_px[2];
   /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
   double principal_point_asked_covariance[3];
+  /* The probability that the pose is wrong, [0, 1]. It is calibrated on real pairs for one event:
+     the rotation is off by more than 5 degrees (docs/verdict.md has the figures); the direction is
+     wrong more often, and how uncertain each is where the pose is right says the covariance. 1
+     where there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic
+     and no-motion. Pictures that match better when one is mirrored get at least 0.5. The next three
+     fields are the evidence that it is computed from, with noise_px, has_alternative and the
+     reasons second-motion and repeated-structure. */
+  double probability_wrong;
+  /* The share of the different matches that are inliers, each weighted by (1 - ratio)^2, [0, 1]:
+     the matches with the most certain descriptors count most. */
+  double agreement;
+  /* By how many radians the rotation turns, to first order, when the inliers of one sixteenth of an
+     image are left out: of the part that turns it most, the mean of both images; [0, pi]. 0 without
+     a full pose. */
+  double region_shift_rad;
+  /* How many cells of 32 pixels hold an inlier, in the image where fewer do (at most 64 cells, at
+     least 16, along the longer side). */
+  int32_t num_places;
+  /* Reserved, 0. */
+  int32_t reserved;
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call

@@ -207,9 +207,8 @@ def row_of_result(result):
                     _plain(result.principal_point_asked_px) if asked else None,
                 "principal_point_asked_covariance":
                     _plain(result.principal_point_asked_covariance) if asked else None})
-    known = {name for name, _ in result._fields_}
-    if "probability_wrong" in known:
-        row["probability_wrong"] = result.probability_wrong
+    for field in ("probability_wrong", "agreement", "region_shift_rad", "num_places"):
+        row[field] = getattr(result, field)
     return row
 
 
