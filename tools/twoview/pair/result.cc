@@ -159,6 +159,7 @@ Json result_json(const Outcome& outcome) {
   json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
   json["reasons"] = reasons_json(v.reasons);
+  json["probability_wrong"] = finite_or_null(v.probability_wrong);
   json["R"] = numbers_or_null(v.R, 9, v.has_R);
   const double unit = unit_of(outcome);
   const double t[3] = {unit * v.t[0], unit * v.t[1], unit * v.t[2]};
@@ -178,7 +179,10 @@ Json result_json(const Outcome& outcome) {
                       {"fundamental", count_or_null(v.fundamental_inliers)},
                       {"homography", count_or_null(v.homography_inliers)},
                       {"rotation", count_or_null(v.rotation_inliers)},
-                      {"coverage", finite_or_null(v.coverage)}};
+                      {"coverage", finite_or_null(v.coverage)},
+                      {"agreement", finite_or_null(v.agreement)},
+                      {"region_shift_deg", finite_or_null(v.region_shift_rad * kDegrees)},
+                      {"places", v.num_places}};
   json["covariance"] = numbers_or_null(v.covariance, 25, v.has_covariance);
   json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
   json["principal_point_shift_px"] =
