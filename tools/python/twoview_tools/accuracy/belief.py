@@ -44,7 +44,7 @@ import sys
 
 import numpy as np
 
-from . import (belief_tables, datasets, estimators, match_evidence, metrics, parallel, pipeline,
+from . import (belief_fit, belief_tables, datasets, estimators, match_evidence, metrics, parallel, pipeline,
                reliability, tables, truth, twoview_ctypes, verdicts)
 
 ZOOMS = (1.25, 1.5, 2.0)
@@ -305,6 +305,10 @@ def main(argv=None):
                         help="print the tables of an earlier --rows; nothing is run")
     parser.add_argument("--table", action="store_true",
                         help="print the Markdown tables of docs/accuracy.md instead")
+    parser.add_argument("--fit", action="store_true",
+                        help="fit the model of probability_wrong on the rows: print the constants "
+                             "of lib/src/robust/belief.cc, and what \"ok\" would be worth on sets "
+                             "left out of the fit")
     parser.add_argument("--wrong", type=int, default=0, metavar="N",
                         help="list at most N wrong \"ok\" pairs, the worst first")
     parser.add_argument("--check", type=float, metavar="SHARE",
@@ -339,6 +343,10 @@ def main(argv=None):
         with open(arguments.rows, "w", encoding="utf-8") as file:
             for row in rows:
                 file.write(json.dumps(metrics.finite(row), allow_nan=False) + "\n")
+    if arguments.fit:
+        tables.say(belief_tables.fitted(belief_fit.constants(rows), belief_fit.left_out_tables(rows),
+                                        arguments.table))
+        return
     tables.say(belief_tables.markdown(rows) if arguments.table else belief_tables.text(rows))
     if arguments.wrong:
         tables.say(belief_tables.wrong_pairs(rows, arguments.wrong))

@@ -87,6 +87,8 @@ def left_out(rows):
     sets = np.array([r["set"] for r in rows])
     places = np.array([place_of(s) for s in sets])
     found = np.zeros(len(rows))
+    if len(np.unique(places)) < 2:
+        raise ValueError("at least two places are needed")
     for place in np.unique(places):
         train, test = places != place, places == place
         found[test] = probabilities(X[test], fit(X[train], y[train], weights_of(sets[train])))
@@ -103,6 +105,7 @@ def believed(row, probability):
 def constants(rows):
     """The lines of belief.cc: the model that is fitted on all rows, and the medians of its parts
     over the right poses."""
+    rows = usable(rows)
     X = np.array([parts_of(r) for r in rows])
     y = np.array([bool(r["wrong_rotation"]) for r in rows], float)
     bias, *weights = fit(X, y, weights_of(np.array([r["set"] for r in rows])))
@@ -112,7 +115,7 @@ def constants(rows):
                     for name, weight, value in zip(PARTS, weights, usual)]
 
 
-def tables(rows):
+def left_out_tables(rows):
     """[(title, header, lines)] of the left-out judgement: by set, and by tenths."""
     rows = usable(rows)
     p = left_out(rows)
@@ -124,15 +127,10 @@ def tables(rows):
         right = [r for r in some if r["right"]]
         right_ok = [r for r in ok if r["right"]]
         wrong = sum(bool(r["wrong_rotation"]) for r in ok)
-        by_set.append((name, len(some), len(ok), wrong, 100 * wrong / max(len(ok), 1), len(right),
-                       len(right_ok), 100 * len(right_ok) / len(right) if right else None))
-    by_tenth = []
-    for k, chosen in enumerate(np.array_split(np.argsort(p, kind="stable"), 10)):
-        wrong = sum(bool(rows[i]["wrong_rotation"]) for i in chosen)
-        by_tenth.append((k + 1, len(chosen), 100 * float(p[chosen].mean()), wrong,
-                         100 * wrong / len(chosen)))
+        by_set.append([name, len(some), len(ok), wrong, 100 * wrong / max(len(ok), 1), len(right),
+                       len(right_ok), 100 * len(right_ok) / len(right) if right else None])
     return [("Left one set out: \"ok\" by the model of the other sets",
-             ("set", "poses", "ok", "wrong in rotation", "% wrong", "right", "of these ok", "%"),
+             ["set", "poses", "ok", "wrong in rotation", "% wrong", "right", "of these ok", "%"],
              by_set),
             ("Left one set out: probability_wrong in tenths of the poses",
-             ("tenth", "poses", "stated %", "wrong in rotation", "actual %"), by_tenth)]
+             belief_tables.TENTHS_HEAD, belief_tables.tenths(rows, p))]
