@@ -147,42 +147,62 @@ double agreement_of(const Fit& f) {
   return n > 0 ? inliers / n : 0;
 }
 
-// By how much the rotation turns when the inliers of one region are left out, for the region that
-// turns it most, by one Gauss-Newton step without them: a deletion diagnostic (D. Belsley, E. Kuh,
-// R. Welsch, "Regression diagnostics", 1980). The regions are the cells of a 4x4 grid on the view's
-// image. At most kPi, and kPi where the others do not determine the pose.
-double region_shift_rad(Fit& f, int view) {
-  constexpr int P = PoseModel::kParameters, kPacked = P * (P + 1) / 2, kSide = 4;
-  const int grid[2] = {kSide, kSide};
+// The normal equations of the pose over some of its inliers.
+struct PoseEquations {
+  static constexpr int kPacked = PoseModel::kParameters * (PoseModel::kParameters + 1) / 2;
+  double upper[kPacked], gradient[PoseModel::kParameters];
+};
+
+// The largest squared turn of the rotation when the inliers of one region are left out, by one
+// Gauss-Newton step without them: a deletion diagnostic (D. Belsley, E. Kuh, R. Welsch, "Regression
+// diagnostics", 1980). The regions are the cells of a 4x4 grid on the view's image. whole: the step
+// with all of them. At most kPi^2, also where the others do not determine the pose.
+double largest_turn_sq(Fit& f, int view, const PoseModel& model, const RobustLoss& loss,
+                       const PoseEquations& all, const double* whole) {
+  constexpr int kSide = 4, grid[2] = {kSide, kSide};
   const Box box = image_box(f, view);
-  const PoseModel model{f.out->epipolar.pose};
-  const double noise = f.out->evidence.noise_px;
-  const RobustLoss loss{Loss::kCauchy, 2 * std::max(noise, 0.1 * f.threshold)};
-  double sum[kPacked], sum_gradient[P], upper[kPacked], gradient[P], whole[P], step[P];
-  model.normal_equations(f.matches.pairs, f.support, f.num_support, loss, sum, sum_gradient);
-  if (!solve_damped(P, sum, sum_gradient, 0, whole)) return kPi;
   for (int k = 0; k < f.num_support; ++k) {
     int cell[2];
     find_cell(f, view, box, grid, f.support[k], cell);
     f.values[k] = cell[1] * kSide + cell[0];
   }
-  double largest_sq = 0;
+  double largest = 0;
   for (int region = 0; region < kSide * kSide; ++region) {
     int count = 0;
     for (int k = 0; k < f.num_support; ++k) {
       if (f.values[k] == region) f.indices[count++] = f.support[k];
     }
     if (count == 0) continue;
-    model.normal_equations(f.matches.pairs, f.indices, count, loss, upper, gradient);
-    for (int k = 0; k < kPacked; ++k) upper[k] = sum[k] - upper[k];
-    for (int k = 0; k < P; ++k) gradient[k] = sum_gradient[k] - gradient[k];
-    if (!solve_damped(P, upper, gradient, 1e-6, step)) return kPi;
-    double turn_sq = 0;
+    PoseEquations rest;
+    double step[PoseModel::kParameters], turn_sq = 0;
+    model.normal_equations(f.matches.pairs, f.indices, count, loss, rest.upper, rest.gradient);
+    for (int k = 0; k < PoseEquations::kPacked; ++k) rest.upper[k] = all.upper[k] - rest.upper[k];
+    for (int k = 0; k < PoseModel::kParameters; ++k) {
+      rest.gradient[k] = all.gradient[k] - rest.gradient[k];
+    }
+    // The damping keeps rounding errors from determining what the rest does not.
+    if (!solve_damped(PoseModel::kParameters, rest.upper, rest.gradient, 1e-6, step)) {
+      return kPi * kPi;
+    }
     for (int k = 0; k < 3; ++k) turn_sq += (step[k] - whole[k]) * (step[k] - whole[k]);
-    if (!(turn_sq < kPi * kPi)) return kPi;
-    largest_sq = std::max(largest_sq, turn_sq);
+    if (!(turn_sq < kPi * kPi)) return kPi * kPi;
+    largest = std::max(largest, turn_sq);
   }
-  return std::sqrt(largest_sq);
+  return largest;
+}
+
+// tv_two_view.region_shift_rad: the mean of both views' largest turns.
+double region_shift_rad(Fit& f) {
+  const PoseModel model{f.out->epipolar.pose};
+  const double noise_px = std::max(f.out->evidence.noise_px, 0.1 * f.threshold);
+  const RobustLoss loss{Loss::kCauchy, 2 * noise_px};
+  PoseEquations all;
+  double whole[PoseModel::kParameters];
+  model.normal_equations(f.matches.pairs, f.support, f.num_support, loss, all.upper, all.gradient);
+  if (!solve_damped(PoseModel::kParameters, all.upper, all.gradient, 0, whole)) return kPi;
+  double sum = 0;
+  for (int v = 0; v < 2; ++v) sum += std::sqrt(largest_turn_sq(f, v, model, loss, all, whole));
+  return 0.5 * sum;
 }
 
 // Parallax, uncertainty, lines of points and stability, of a full pose.
@@ -204,7 +224,7 @@ void measure_pose(Fit& f) {
   evidence.median_parallax_rad = angle_of_pseudo(*middle);
   evidence.pixel_angle_rad = sum / weights;
   for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
-  evidence.region_shift_rad = 0.5 * (region_shift_rad(f, 0) + region_shift_rad(f, 1));
+  evidence.region_shift_rad = region_shift_rad(f);
 }
 
 void measure_inliers(Fit& f) {
