@@ -4,7 +4,7 @@
 // test/property/test_verdict_statistics.cc.
 #pragma once
 
-#include "robust/verdict.h"
+#include "robust/pair_evidence.h"
 
 namespace tv {
 

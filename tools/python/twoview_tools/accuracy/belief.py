@@ -44,8 +44,8 @@ import sys
 
 import numpy as np
 
-from . import (belief_fit, belief_tables, datasets, estimators, match_evidence, metrics, parallel, pipeline,
-               reliability, tables, truth, twoview_ctypes, verdicts)
+from . import (belief_fit, belief_tables, datasets, estimators, match_evidence, metrics, parallel,
+               pipeline, reliability, tables, truth, twoview_ctypes, verdicts)
 
 ZOOMS = (1.25, 1.5, 2.0)
 UNRELATED_IMAGES = 15  # of each set, evenly spaced
@@ -344,8 +344,8 @@ def main(argv=None):
             for row in rows:
                 file.write(json.dumps(metrics.finite(row), allow_nan=False) + "\n")
     if arguments.fit:
-        tables.say(belief_tables.fitted(belief_fit.constants(rows), belief_fit.left_out_tables(rows),
-                                        arguments.table))
+        left_out = belief_fit.left_out_tables(rows)
+        tables.say(belief_tables.fitted(belief_fit.constants(rows), left_out, arguments.table))
         return
     tables.say(belief_tables.markdown(rows) if arguments.table else belief_tables.text(rows))
     if arguments.wrong:

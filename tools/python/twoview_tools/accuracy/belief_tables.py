@@ -278,7 +278,8 @@ def text(rows):
                     "rotation_error_deg"),
             _errors(_Text, "Verdict against the direction's error [deg], where it counts", aimed,
                     "direction_error_deg"),
-            _sets(_Text, good), _calibration(_Text, good), _reasons(_Text, good), _features(_Text, good),
+            _sets(_Text, good), _calibration(_Text, good), _reasons(_Text, good),
+            _features(_Text, good),
             _reliability(_Text, good), _curve(_Text, good, "rotation"),
             _curve(_Text, good, "direction")]
     apart = sum(r["kind"] == "related" and not r["trusted"] for r in rows)
