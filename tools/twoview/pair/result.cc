@@ -179,10 +179,7 @@ Json result_json(const Outcome& outcome) {
                       {"fundamental", count_or_null(v.fundamental_inliers)},
                       {"homography", count_or_null(v.homography_inliers)},
                       {"rotation", count_or_null(v.rotation_inliers)},
-                      {"coverage", finite_or_null(v.coverage)},
-                      {"agreement", finite_or_null(v.agreement)},
-                      {"region_shift_deg", finite_or_null(v.region_shift_rad * kDegrees)},
-                      {"places", v.num_places}};
+                      {"coverage", finite_or_null(v.coverage)}};
   json["covariance"] = numbers_or_null(v.covariance, 25, v.has_covariance);
   json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
   json["principal_point_shift_px"] =
