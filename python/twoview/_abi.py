@@ -100,7 +100,9 @@ class tv_two_view(Structure):
                 ("noise_px", c_double), ("seed", c_uint64),
                 ("principal_point_shift", c_double * 2), ("principal_point_chi2", c_double),
                 ("principal_point_asked_px", c_double * 2),
-                ("principal_point_asked_covariance", c_double * 3)]
+                ("principal_point_asked_covariance", c_double * 3),
+                ("probability_wrong", c_double), ("agreement", c_double),
+                ("region_shift_rad", c_double), ("num_places", c_int32), ("reserved", c_int32)]
 
 
 class tv_point(Structure):

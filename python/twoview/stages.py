@@ -219,6 +219,13 @@ class TwoView:
     #: (2,), the shift in pixels that the matches ask for, which is not applied
     principal_point_asked_px: Optional[np.ndarray]
     principal_point_asked_covariance: Optional[np.ndarray]  #: (2, 2), pixels squared
+    #: [0, 1], that the rotation is off by more than 5 degrees; calibrated on real pairs. 1 where
+    #: there is no full pose. The next three are the evidence for it.
+    probability_wrong: float
+    agreement: float  #: share of matches that are inliers, each weighted by (1 - ratio)^2
+    #: how far the rotation turns without the inliers of the image region that turns it most
+    region_shift_rad: float
+    num_places: int  #: cells of 32 pixels with an inlier, in the image with fewer of them
 
 
 def _two_view(found: Any) -> TwoView:
@@ -244,7 +251,8 @@ def _two_view(found: Any) -> TwoView:
         inliers(found.homography_inliers), inliers(found.rotation_inliers), found.coverage,
         found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed,
         np.array(found.principal_point_shift), found.principal_point_chi2 if asked else None,
-        matrix("principal_point_asked_px", asked, 2), covariance)
+        matrix("principal_point_asked_px", asked, 2), covariance, found.probability_wrong,
+        found.agreement, found.region_shift_rad, found.num_places)
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:

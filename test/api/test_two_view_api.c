@@ -226,6 +226,8 @@ static void expect_sound(int count, int cameras_given) {
   if (result.has_H && result.H[8] != 1) TEST_ASSERT_DOUBLE_WITHIN(1e-14, 1, norm(result.H, 9));
   if (result.has_covariance) expect_covariance();
   TEST_ASSERT_TRUE(result.coverage >= 0 && result.coverage <= 1);
+  TEST_ASSERT_TRUE(result.probability_wrong > 0 && result.probability_wrong <= 1);
+  TEST_ASSERT_TRUE((result.has_R && result.has_t) || result.probability_wrong == 1);
   TEST_ASSERT_TRUE(result.median_parallax_rad >= 0 && result.median_parallax_rad <= 3.15);
   TEST_ASSERT_TRUE(result.rms_error_px >= 0 && result.rms_error_px <= options.max_error_px * 1.25);
   TEST_ASSERT_TRUE(result.num_iterations >= 0 && result.num_iterations <= options.max_iterations);

@@ -60,6 +60,10 @@ void require_sound(const tv_two_view& r, const uint8_t* mask, int count) {
   for (int i = 0; i < 5; ++i) FUZZ_REQUIRE(r.covariance[6 * i] >= 0);
   FUZZ_REQUIRE(std::isfinite(r.median_parallax_rad) && std::isfinite(r.rms_error_px));
   FUZZ_REQUIRE(r.coverage >= 0 && r.coverage <= 1);
+  FUZZ_REQUIRE(r.probability_wrong > 0 && r.probability_wrong <= 1);
+  FUZZ_REQUIRE((r.has_R && r.has_t) || r.probability_wrong == 1);
+  FUZZ_REQUIRE(r.agreement >= 0 && r.agreement <= 1 && r.num_places >= 0);
+  FUZZ_REQUIRE(r.region_shift_rad >= 0 && r.region_shift_rad < 3.1416);
   FUZZ_REQUIRE((r.verdict == TV_VERDICT_OK) == (r.reasons == 0));
   int inliers = 0;
   for (int i = 0; i < count; ++i) inliers += mask[i];

@@ -36,7 +36,9 @@ tv_two_view estimate(bool calibrated, bool swapped, const float* of_matches) {
 
 bool same_report(const tv_two_view& a, const tv_two_view& b) {
   return a.kind == b.kind && a.verdict == b.verdict && a.reasons == b.reasons &&
-         a.coverage == b.coverage && a.num_matches == b.num_matches &&
+         a.coverage == b.coverage && a.probability_wrong == b.probability_wrong &&
+         a.agreement == b.agreement && a.region_shift_rad == b.region_shift_rad &&
+         a.num_places == b.num_places && a.num_matches == b.num_matches &&
          a.num_inliers == b.num_inliers && a.num_iterations == b.num_iterations &&
          a.essential_inliers == b.essential_inliers &&
          a.fundamental_inliers == b.fundamental_inliers &&

@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 import os
+import re
 import tempfile
 import types
 import unittest
@@ -17,8 +18,8 @@ except ImportError:
 
 if np is not None:
     from twoview_tools import DEFAULT_LIBRARY
-    from twoview_tools.accuracy import (belief, belief_tables, datasets, match_evidence,
-                                        reliability, truth)
+    from twoview_tools.accuracy import (belief, belief_fit, belief_tables, datasets,
+                                        match_evidence, reliability, truth)
 
 
 def setUpModule():
@@ -331,6 +332,151 @@ class TestEvidence(unittest.TestCase):
         matches = types.SimpleNamespace(pixels0=pixels, pixels1=pixels, sizes=((640, 480),) * 2)
         found = match_evidence.of_matches(matches, links, np.ones(10, bool))
         self.assertEqual((found["inlier_places"], found["cluster_share"]), (2, 0.9))
+
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+
+
+def model_of_the_library():
+    """[bias, coefficients] as lib/src/robust/belief.cc has them."""
+    with open(os.path.join(ROOT, "lib/src/robust/belief.cc"), encoding="utf-8") as file:
+        text = file.read()
+    names = ("Disagreement", "Noise", "Places", "RegionShift")
+    first = [float(re.search(rf"k{name} = {{(-?[0-9.]+),", text)[1]) for name in names]
+    bias, alternative = (float(re.search(rf"k{name} = (-?[0-9.]+);", text)[1])
+                         for name in ("Bias", "Alternative"))
+    return np.array([bias, *first, alternative])
+
+
+class TestFit(unittest.TestCase):
+    """The fit of probability_wrong, on evidence that is drawn from a model that is known."""
+
+    def drawn(self, coefficients, num, seed=1):
+        random = np.random.default_rng(seed)
+        rows = []
+        for k in range(num):
+            row = {"kind": "related", "trusted": True, "set": f"s{k % 6}", "num_inliers": 100,
+                   "rotation_error_deg": 1.0, "right": True,
+                   "region_shift_rad": float(np.exp(random.uniform(-7, -1.2))),
+                   "agreement": random.uniform(0, 1), "noise_px": random.uniform(0, 1),
+                   "num_places": int(random.integers(1, 60)),
+                   "reasons": ["two_planar_solutions"] * int(random.integers(0, 2))}
+            p = belief_fit.probabilities(np.array([belief_fit.parts_of(row)]), coefficients)[0]
+            row["wrong_rotation"] = bool(random.uniform() < p)
+            rows.append(row)
+        return rows
+
+    def arrays(self, rows):
+        return (np.array([belief_fit.parts_of(r) for r in rows]),
+                np.array([float(r["wrong_rotation"]) for r in rows]), np.ones(len(rows)))
+
+    def test_the_fit_finds_the_model_that_the_pairs_were_drawn_from(self):
+        true = np.array([6.0, 1.2, 3.0, -2.5, 0.5, 1.3])
+        found = belief_fit.fit(*self.arrays(self.drawn(true, 20000)))
+        np.testing.assert_allclose(found[1:], true[1:], atol=0.2)
+
+    def test_a_part_of_the_wrong_sign_is_left_out(self):
+        found = belief_fit.fit(*self.arrays(self.drawn(np.array([2, 1.2, -3, -1, 0.5, 0]), 5000)))
+        self.assertEqual(found[2], 0)
+        self.assertTrue((found[[1, 4]] > 0).all() and found[3] < 0)
+
+    def test_a_set_is_judged_without_its_own_pairs(self):
+        rows = self.drawn(np.array([6.0, 1.2, 3.0, -2.5, 0.5, 1.3]), 1200)
+        before = belief_fit.left_out(rows)
+        for row in rows:
+            if row["set"] == "s2":
+                row["wrong_rotation"] = not row["wrong_rotation"]
+        after = belief_fit.left_out(rows)
+        own = np.array([r["set"] == "s2" for r in rows])
+        np.testing.assert_array_equal(before[own], after[own])
+        self.assertTrue((before[~own] != after[~own]).all())
+
+    def test_sets_of_one_place_are_left_out_together(self):
+        self.assertEqual(*(belief_fit.place_of(n) for n in ("kitti00_turn",
+                                                            "seq_kitti00_first200")))
+
+    def test_no_set_outweighs_the_others(self):
+        weights = belief_fit.weights_of(["a"] * 1000 + ["b"] * 5)
+        self.assertAlmostEqual(weights[:1000].sum(), belief_fit.MOST_WEIGHT)
+        self.assertEqual(weights[-1], 1)
+
+    def test_the_limit_is_that_of_the_library(self):
+        with open(os.path.join(ROOT, "lib/src/robust/belief.h"), encoding="utf-8") as file:
+            limit = re.search(r"kMostProbabilityWrong = ([0-9.]+);", file.read())[1]
+        self.assertEqual(float(limit), belief_fit.MOST_PROBABILITY_WRONG)
+
+    def test_tenths_count_each_pose_once(self):
+        rows = [{"wrong_rotation": k >= 25} for k in range(30)]
+        lines = belief_tables.tenths(rows, [0.01 * k for k in range(30)])
+        self.assertEqual([line[1] for line in lines], [3] * 10)
+        self.assertEqual([line[3] for line in lines], [0] * 8 + [2, 3])
+        self.assertAlmostEqual(lines[3][2], 10)
+
+
+class TestBelievedPairs(unittest.TestCase):
+    """A small fixed sample of real pairs: what "ok" and probability_wrong are worth on it, and that
+    the evidence is what the header says."""
+    SETS = ("desk_monitors", "strecha_Herz_Jesus_P8")
+
+    @classmethod
+    def setUpClass(cls):
+        if not os.path.isfile(os.environ.get("TWOVIEW_LIBRARY", DEFAULT_LIBRARY)):
+            raise unittest.SkipTest("no library: build build/release")
+        missing = set(cls.SETS) - set(truth.posed_sets())
+        if missing:
+            raise unittest.SkipTest(f"no {', '.join(sorted(missing))} in {datasets.data_dir()}")
+        cls.folder = tempfile.TemporaryDirectory()
+        with unittest.mock.patch("sys.stderr"):
+            cls.rows = belief.run(list(cls.SETS), 56, 24, folder=cls.folder.name,
+                                  library=os.environ.get("TWOVIEW_LIBRARY"))
+        cls.posed = [r for r in cls.rows if r["t"] is not None]
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def matches(self, row):
+        file, i = row["matches"]
+        with np.load(os.path.join(self.folder.name, file)) as arrays:
+            return {key: arrays[f"{key}_{i}"]
+                    for key in ("links", "keypoints0", "keypoints1", "inliers")}
+
+    def test_ok_is_right_and_right_is_ok(self):
+        related = belief_tables.related(self.rows)
+        good = belief_tables.ok(related)
+        right = [r for r in related if r["right"]]
+        self.assertEqual([r["image0"] for r in good if r["wrong_rotation"]], [])
+        self.assertGreater(len(right), 40)
+        self.assertGreaterEqual(len(belief_tables.ok(right)), 0.9 * len(right))
+
+    def test_unrelated_pictures_are_not_believed(self):
+        unrelated = [r for r in self.rows if r["kind"] == "unrelated"]
+        self.assertEqual(len(unrelated), 24)
+        self.assertEqual({r["verdict"] for r in unrelated}, {"refused"})
+        self.assertEqual({r["probability_wrong"] for r in unrelated}, {1.0})
+
+    def test_the_probability_is_the_model_of_the_evidence(self):
+        model = model_of_the_library()
+        for r in self.posed:
+            p = belief_fit.probabilities(np.array([belief_fit.parts_of(r)]), model)[0]
+            self.assertAlmostEqual(r["probability_wrong"], p, 12)
+            if r["verdict"] == "ok":
+                self.assertLessEqual(r["probability_wrong"], belief_fit.MOST_PROBABILITY_WRONG)
+
+    def test_a_doubtful_pose_has_a_reason_besides_its_probability(self):
+        for r in self.posed:
+            if r["probability_wrong"] <= belief_fit.MOST_PROBABILITY_WRONG:
+                continue
+            self.assertTrue({"too_few_matches", "low_inlier_ratio", "crowded_matches"}
+                            & set(r["reasons"]))
+
+    def test_the_agreement_is_the_weighted_share_of_inliers(self):
+        for r in self.posed:
+            found = self.matches(r)
+            weights = (1 - found["links"]["ratio"].astype(float)) ** 2
+            share = weights[found["inliers"]].sum() / weights.sum()
+            # The library counts repeated matches once.
+            self.assertAlmostEqual(r["agreement"], share, delta=0.02)
 
 
 class TestRealPairs(unittest.TestCase):

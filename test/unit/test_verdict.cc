@@ -2,8 +2,10 @@
 // sets itself.
 #include <unity.h>
 
+#include <cmath>
 #include <utility>
 
+#include "robust/belief.h"
 #include "robust/verdict.h"
 
 namespace {
@@ -22,6 +24,8 @@ Evidence good() {
   e.coverage[0] = e.coverage[1] = 0.5;
   e.num_places[0] = e.num_places[1] = 40;
   e.noise_px = 0.3;
+  e.agreement = 0.85;
+  e.region_shift_rad = 0.002;
   e.sigma_rad = 0.005;
   e.median_parallax_rad = 0.05;
   e.pixel_angle_rad = 0.002;
@@ -49,20 +53,6 @@ void test_each_reason_has_its_threshold(void) {
   assert_reason(0, e);
   e.num_different_inliers = 14;
   assert_reason(TV_REASON_TOO_FEW_MATCHES, e);
-  // The inliers are in enough places of both images.
-  e = good();
-  e.num_places[1] = 20;
-  assert_reason(0, e);
-  e.num_places[1] = 19;
-  assert_reason(TV_REASON_TOO_FEW_MATCHES, e);
-  e = good();
-  e.num_inliers = 30;
-  assert_reason(0, e);
-  e.num_inliers = 29;
-  assert_reason(TV_REASON_LOW_INLIER_RATIO, e);
-  e = good();
-  e.noise_px = 0.71;
-  assert_reason(TV_REASON_LOW_INLIER_RATIO, e);
   // Low parallax is below 3 px (10 times the noise of 0.3 px), and a pixel is 0.002 rad.
   for (const double parallax : {0.0061, 0.0059}) {
     e = good();
@@ -128,6 +118,99 @@ void test_without_a_translation_the_pair_is_refused(void) {
   TEST_ASSERT_EQUAL_HEX32(TV_REASON_TOO_FEW_MATCHES, judge(e).reasons);
 }
 
+double probability_of(const Evidence& e) { return judge(e).probability_wrong; }
+
+// Each step of the evidence, from very good to very bad, raises the probability or leaves it.
+template <typename Change>
+void assert_rises(const char* name, Change change) {
+  double before = 0;
+  for (int step = 0; step <= 100; ++step) {
+    Evidence e = good();
+    change(&e, 0.01 * step);
+    const double p = probability_of(e);
+    TEST_ASSERT_TRUE_MESSAGE(p > 0 && p < 1 && p >= before, name);
+    before = p;
+  }
+  Evidence best = good();
+  change(&best, 0);
+  TEST_ASSERT_TRUE_MESSAGE(before > 2 * probability_of(best), name);
+}
+
+void test_the_probability_rises_with_each_kind_of_bad_evidence(void) {
+  assert_rises("agreement", [](Evidence* e, double bad) { e->agreement = 1 - bad; });
+  assert_rises("noise", [](Evidence* e, double bad) { e->noise_px = bad; });
+  assert_rises("places 0",
+               [](Evidence* e, double bad) { e->num_places[0] = static_cast<int>(40 - 40 * bad); });
+  assert_rises("places 1",
+               [](Evidence* e, double bad) { e->num_places[1] = static_cast<int>(40 - 40 * bad); });
+  assert_rises("region", [](Evidence* e, double bad) { e->region_shift_rad = 3.14159 * bad; });
+  assert_rises("alternative", [](Evidence* e, double bad) { e->has_alternative = bad > 0.5; });
+}
+
+void test_the_probability_is_the_logistic_function_of_the_documented_sum(void) {
+  Evidence e = good();
+  e.num_places[0] = 12;
+  e.threshold_px = 2;
+  const double logit = 8.005 + 1.193 * std::log(1.02 - 0.85) + 3.032 * 0.3 / 2 -
+                       2.623 * std::log(12.0) + 0.519 * std::log(0.002);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1 / (1 + std::exp(-logit)), probability_of(e));
+}
+
+// "ok" up to the limit, and beyond it the reasons of the evidence that raises the probability most.
+void test_a_pose_that_is_probably_wrong_is_doubtful_for_what_makes_it_so(void) {
+  Evidence e = good();
+  e.agreement = 0.2;
+  e.noise_px = 0.6;
+  TEST_ASSERT_TRUE(probability_of(e) > tv::kMostProbabilityWrong);
+  assert_reason(TV_REASON_LOW_INLIER_RATIO, e);
+  e = good();
+  e.num_places[1] = 6;
+  TEST_ASSERT_TRUE(probability_of(e) > tv::kMostProbabilityWrong);
+  assert_reason(TV_REASON_TOO_FEW_MATCHES, e);
+  e = good();
+  e.region_shift_rad = 1;
+  TEST_ASSERT_TRUE(probability_of(e) > tv::kMostProbabilityWrong);
+  assert_reason(TV_REASON_CROWDED_MATCHES, e);
+  e.num_places[0] = 9;
+  assert_reason(TV_REASON_CROWDED_MATCHES | TV_REASON_TOO_FEW_MATCHES, e);
+  int believed = 0;
+  for (int shift = 1; shift < 200; ++shift) {
+    e = good();
+    e.region_shift_rad = 0.001 * shift;
+    const bool ok = judge(e).verdict == TV_VERDICT_OK;
+    TEST_ASSERT_EQUAL_INT(probability_of(e) <= tv::kMostProbabilityWrong, ok);
+    believed += ok;
+  }
+  TEST_ASSERT_TRUE(believed > 0 && believed < 199);
+}
+
+void test_views_that_change_places_give_the_same_bits(void) {
+  Evidence e = good();
+  e.num_places[0] = 11;
+  e.num_places[1] = 17;
+  const double p = probability_of(e);
+  std::swap(e.num_places[0], e.num_places[1]);
+  TEST_ASSERT_TRUE(p == probability_of(e));
+}
+
+// Evidence at its bounds and beyond: what the estimate writes where there is none of it.
+void test_no_evidence_gives_a_probability(void) {
+  Evidence e = good();
+  e.num_places[0] = e.num_places[1] = 0;
+  e.agreement = 0;
+  e.noise_px = 0;
+  e.region_shift_rad = 0;
+  TEST_ASSERT_TRUE(probability_of(e) > 0 && probability_of(e) < 1);
+  Evidence nothing;
+  TEST_ASSERT_TRUE(judge(nothing).probability_wrong == 1);
+  for (const tv_kind kind : {TV_KIND_PANORAMIC, TV_KIND_NO_MOTION, TV_KIND_UNCALIBRATED,
+                             TV_KIND_PLANAR_OR_PANORAMIC, TV_KIND_DEGENERATE}) {
+    e = good();
+    e.kind = kind;
+    TEST_ASSERT_TRUE(judge(e).probability_wrong == 1);
+  }
+}
+
 // An uncalibrated pair has neither parallax nor lines nor a second model.
 void test_an_uncalibrated_pair_is_judged_by_its_inliers_alone(void) {
   Evidence e;
@@ -136,6 +219,8 @@ void test_an_uncalibrated_pair_is_judged_by_its_inliers_alone(void) {
   e.num_matches = e.num_inliers = e.num_different = e.num_different_inliers = 50;
   e.coverage[0] = e.coverage[1] = 0.5;
   assert_reason(0, e);
+  e.num_matches = 201;
+  assert_reason(TV_REASON_LOW_INLIER_RATIO, e);
 }
 
 void test_after_guided_matching_the_first_verdict_stays(void) {
@@ -146,8 +231,12 @@ void test_after_guided_matching_the_first_verdict_stays(void) {
   first.verdict = TV_VERDICT_DOUBTFUL;
   first.reasons = TV_REASON_CROWDED_MATCHES;
   again.verdict = TV_VERDICT_OK;
+  first.probability_wrong = 0.25;
+  first.num_places = 30;
+  again.probability_wrong = 0.01;
   TEST_ASSERT_TRUE(tv::takes_guided_estimate(first, &again));
   TEST_ASSERT_EQUAL_INT(TV_VERDICT_DOUBTFUL, again.verdict);
+  TEST_ASSERT_TRUE(again.probability_wrong == 0.25 && again.num_places == 30);
   TEST_ASSERT_EQUAL_HEX32(TV_REASON_CROWDED_MATCHES, again.reasons);
   again.num_inliers = 49;
   TEST_ASSERT_FALSE(tv::takes_guided_estimate(first, &again));
@@ -170,6 +259,11 @@ int main(void) {
   RUN_TEST(test_inliers_are_crowded_where_they_are_in_both_images_or_on_a_line_in_one);
   RUN_TEST(test_a_second_model_is_a_motion_or_a_lattice);
   RUN_TEST(test_without_a_translation_the_pair_is_refused);
+  RUN_TEST(test_the_probability_rises_with_each_kind_of_bad_evidence);
+  RUN_TEST(test_the_probability_is_the_logistic_function_of_the_documented_sum);
+  RUN_TEST(test_a_pose_that_is_probably_wrong_is_doubtful_for_what_makes_it_so);
+  RUN_TEST(test_views_that_change_places_give_the_same_bits);
+  RUN_TEST(test_no_evidence_gives_a_probability);
   RUN_TEST(test_an_uncalibrated_pair_is_judged_by_its_inliers_alone);
   RUN_TEST(test_after_guided_matching_the_first_verdict_stays);
   return UNITY_END();

@@ -85,13 +85,16 @@ typedef enum tv_verdict {
 
 /* Why a verdict is not "ok". The values are bits of tv_two_view.reasons. */
 typedef enum tv_reason {
-  /* Fewer than 15 distinct matches are inliers, or the inliers of a full pose lie in fewer than 20
-     cells of 32 x 32 pixels (a 16th of the longer side where an image is smaller than 512 pixels, a
-     64th where it is larger than 2048) of one of the images. */
+  /* Fewer than 15 different matches are inliers (of a degenerate pair: were given). Or the pose is
+     too probably wrong (probability_wrong), and what raises that most is that the inliers lie in
+     few places: cells of 32 pixels, or of a 16th of the longer side where it is smaller than 512, a
+     64th where it is larger than 2048. */
   TV_REASON_TOO_FEW_MATCHES = 1 << 0,
-  /* Fewer than 25 % of the matches are inliers, or the residuals are uniform over the threshold, as
-     random matches' are. Matches that can never be inliers (tv_estimate_two_view) are not counted.
-     Of tv_reconstruct also: the two images match better when one of them is mirrored. */
+  /* The pose is too probably wrong, and what raises that most is that certain matches are no
+     inliers, or the residuals are large. Without a full pose: fewer than 25 % of the matches are
+     inliers, or the residuals are uniform over the threshold, as random matches' are. Matches that
+     can never be inliers (tv_estimate_two_view) are not counted. Of tv_reconstruct also: the two
+     images match better when one of them is mirrored. */
   TV_REASON_LOW_INLIER_RATIO = 1 << 1,
   /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
      10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees. */
@@ -107,7 +110,8 @@ typedef enum tv_reason {
      Something in the scene moves by itself, or this pose is that of the moving object. */
   TV_REASON_SECOND_MOTION = 1 << 6,
   /* The inliers cover fewer than 5 of the 64 cells of an 8x8 grid over each of the two images, or
-     lie on a line in one of them. */
+     lie on a line in one of them. Or the pose is too probably wrong, and what raises that most is
+     that it depends on the inliers of one region of an image. */
   TV_REASON_CROWDED_MATCHES = 1 << 7,
   /* The matched pixels of both images lie on a regular lattice, and either most inliers do, too, or
      a second model fits the other matches: the pose may be wrong by one period of a repeated
@@ -244,6 +248,26 @@ typedef struct tv_two_view {
   double principal_point_asked_px[2];
   /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
   double principal_point_asked_covariance[3];
+  /* The probability that the pose is wrong, [0, 1]. It is calibrated on real pairs for one event:
+     the rotation is off by more than 5 degrees (docs/verdict.md has the figures); the direction is
+     wrong more often, and how uncertain each is where the pose is right says the covariance. 1
+     where there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic
+     and no-motion. Pictures that match better when one is mirrored get at least 0.5. The next three
+     fields are the evidence that it is computed from, with noise_px, has_alternative and the
+     reasons second-motion and repeated-structure. */
+  double probability_wrong;
+  /* The share of the different matches that are inliers, each weighted by (1 - ratio)^2, [0, 1]:
+     the matches with the most certain descriptors count most. */
+  double agreement;
+  /* By how many radians the rotation turns, to first order, when the inliers of one sixteenth of an
+     image are left out: of the part that turns it most, the mean of both images; [0, pi]. 0 without
+     a full pose. */
+  double region_shift_rad;
+  /* How many cells of 32 pixels hold an inlier, in the image where fewer do (at most 64 cells, at
+     least 16, along the longer side). */
+  int32_t num_places;
+  /* Reserved, 0. */
+  int32_t reserved;
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call

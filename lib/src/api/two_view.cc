@@ -2,6 +2,7 @@
 // run the search and the finish, and write the result in the caller's order.
 #include "twoview/two_view.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <utility>
@@ -169,6 +170,10 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
   packed.kind = outcome.evidence.kind;
   packed.verdict = outcome.judgement.verdict;
   packed.reasons = outcome.judgement.reasons;
+  packed.probability_wrong = outcome.judgement.probability_wrong;
+  packed.agreement = outcome.evidence.agreement;
+  if (outcome.has_t) packed.region_shift_rad = outcome.evidence.region_shift_rad;
+  packed.num_places = std::min(outcome.evidence.num_places[0], outcome.evidence.num_places[1]);
   packed.num_matches = problem.num;
   packed.num_inliers = outcome.evidence.num_inliers;
   packed.num_iterations = model.num_iterations;

@@ -7,6 +7,8 @@
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
 #include "robust/lattice.h"
+#include "robust/ldlt.h"
+#include "robust/models.h"
 #include "robust/second_model.h"
 
 namespace tv {
@@ -55,27 +57,6 @@ double line_distance_px(const Fit& f, int view) {
   return std::sqrt(svd3(sum).s[2] / f.num_support) / f.out->evidence.pixel_angle_rad;
 }
 
-// Parallax, uncertainty and lines of points, of a full pose.
-void measure_pose(Fit& f) {
-  Evidence& evidence = f.out->evidence;
-  double sum = 0, weights = 0;
-  if (f.out->has_covariance) evidence.sigma_rad = largest_sigma(f.out->covariance);
-  if (f.num_support == 0) return;
-  for (int k = 0; k < f.num_support; ++k) {
-    f.values[k] = pseudo_angle(f, f.support[k]);
-    // Each angle counts by its information, so that matches of large sigmas are no evidence against
-    // a pose that the others determine.
-    const double weight = 1 / f.matches.sigma_sq(f.support[k]);
-    sum += weight * f.matches.pairs.pixel_angle[f.support[k]];
-    weights += weight;
-  }
-  double* middle = f.values + (f.num_support - 1) / 2;
-  std::nth_element(f.values, middle, f.values + f.num_support);
-  evidence.median_parallax_rad = angle_of_pseudo(*middle);
-  evidence.pixel_angle_rad = sum / weights;
-  for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
-}
-
 struct Box {
   double low[2], high[2];
 };
@@ -99,20 +80,26 @@ Box image_box(const Fit& f, int view) {
   return box;
 }
 
-// The number of cells of a grid on the box that hold an inlier. A point outside the box counts in
-// the nearest cell. The grid has at most 64 columns and rows.
+// The cell of a grid on the box that holds match k: its column and row. A point outside the box
+// counts in the nearest cell.
+void find_cell(const Fit& f, int view, const Box& box, const int grid[2], int k, int cell[2]) {
+  for (int d = 0; d < 2; ++d) {
+    const double x = f.problem.pixels[view][2 * f.matches.order[k] + d];
+    const double place = grid[d] * (x - box.low[d]) / (box.high[d] - box.low[d]);
+    const int last = grid[d] - 1;
+    cell[d] = place >= last ? last : (place > 0 ? static_cast<int>(place) : 0);
+  }
+}
+
+// The number of cells of a grid on the box that hold an inlier. The grid has at most 64 columns and
+// rows.
 int filled_cells(const Fit& f, int view, const Box& box, const int grid[2]) {
   uint64_t filled[64] = {};
   int count = 0;
   for (int k = 0; k < f.matches.num_all; ++k) {
     if (f.out->inlier[k] == 0) continue;
     int cell[2];
-    for (int d = 0; d < 2; ++d) {
-      const double x = f.problem.pixels[view][2 * f.matches.order[k] + d];
-      const double place = grid[d] * (x - box.low[d]) / (box.high[d] - box.low[d]);
-      const int last = grid[d] - 1;
-      cell[d] = place >= last ? last : (place > 0 ? static_cast<int>(place) : 0);
-    }
+    find_cell(f, view, box, grid, k, cell);
     const uint64_t bit = uint64_t{1} << cell[0];
     count += (filled[cell[1]] & bit) == 0;
     filled[cell[1]] |= bit;
@@ -136,6 +123,108 @@ void measure_spread(const Fit& f, int view, Evidence& evidence) {
   }
   evidence.coverage[view] = filled_cells(f, view, box, eighths) / 64.0;
   evidence.num_places[view] = filled_cells(f, view, box, places);
+}
+
+// The share of the different matches that are inliers, each weighted by (1 - ratio)^2: a match
+// whose second nearest is as near says little about the pose, and one without a rival much. Without
+// ratios, or where they give no weight, the plain share.
+double agreement_of(const Fit& f) {
+  double agree = 0, sum = 0, inliers = 0;
+  const int n = f.matches.num_unique();
+  for (int i = 0; i < n; ++i) {
+    double certain = 1;
+    if (f.problem.ratios != nullptr) {
+      certain = 1 - static_cast<double>(f.problem.ratios[f.matches.order[i]]);
+      certain = certain < 1 ? std::max(certain, 0.0) : 1;
+    }
+    const double weight = certain * certain;
+    sum += weight;
+    if (f.out->inlier[i] == 0) continue;
+    agree += weight;
+    ++inliers;
+  }
+  if (sum > 0) return agree / sum;
+  return n > 0 ? inliers / n : 0;
+}
+
+// The normal equations of the pose over some of its inliers.
+struct PoseEquations {
+  static constexpr int kPacked = PoseModel::kParameters * (PoseModel::kParameters + 1) / 2;
+  double upper[kPacked], gradient[PoseModel::kParameters];
+};
+
+// The largest squared turn of the rotation when the inliers of one region are left out, by one
+// Gauss-Newton step without them: a deletion diagnostic (D. Belsley, E. Kuh, R. Welsch, "Regression
+// diagnostics", 1980). The regions are the cells of a 4x4 grid on the view's image. whole: the step
+// with all of them. At most kPi^2, also where the others do not determine the pose.
+double largest_turn_sq(Fit& f, int view, const PoseModel& model, const RobustLoss& loss,
+                       const PoseEquations& all, const double* whole) {
+  constexpr int kSide = 4, grid[2] = {kSide, kSide};
+  const Box box = image_box(f, view);
+  for (int k = 0; k < f.num_support; ++k) {
+    int cell[2];
+    find_cell(f, view, box, grid, f.support[k], cell);
+    f.values[k] = cell[1] * kSide + cell[0];
+  }
+  double largest = 0;
+  for (int region = 0; region < kSide * kSide; ++region) {
+    int count = 0;
+    for (int k = 0; k < f.num_support; ++k) {
+      if (f.values[k] == region) f.indices[count++] = f.support[k];
+    }
+    if (count == 0) continue;
+    PoseEquations rest;
+    double step[PoseModel::kParameters], turn_sq = 0;
+    model.normal_equations(f.matches.pairs, f.indices, count, loss, rest.upper, rest.gradient);
+    for (int k = 0; k < PoseEquations::kPacked; ++k) rest.upper[k] = all.upper[k] - rest.upper[k];
+    for (int k = 0; k < PoseModel::kParameters; ++k) {
+      rest.gradient[k] = all.gradient[k] - rest.gradient[k];
+    }
+    // The damping keeps rounding errors from determining what the rest does not.
+    if (!solve_damped(PoseModel::kParameters, rest.upper, rest.gradient, 1e-6, step)) {
+      return kPi * kPi;
+    }
+    for (int k = 0; k < 3; ++k) turn_sq += (step[k] - whole[k]) * (step[k] - whole[k]);
+    if (!(turn_sq < kPi * kPi)) return kPi * kPi;
+    largest = std::max(largest, turn_sq);
+  }
+  return largest;
+}
+
+// tv_two_view.region_shift_rad: the mean of both views' largest turns.
+double region_shift_rad(Fit& f) {
+  const PoseModel model{f.out->epipolar.pose};
+  const double noise_px = std::max(f.out->evidence.noise_px, 0.1 * f.threshold);
+  const RobustLoss loss{Loss::kCauchy, 2 * noise_px};
+  PoseEquations all;
+  double whole[PoseModel::kParameters];
+  model.normal_equations(f.matches.pairs, f.support, f.num_support, loss, all.upper, all.gradient);
+  if (!solve_damped(PoseModel::kParameters, all.upper, all.gradient, 0, whole)) return kPi;
+  double sum = 0;
+  for (int v = 0; v < 2; ++v) sum += std::sqrt(largest_turn_sq(f, v, model, loss, all, whole));
+  return 0.5 * sum;
+}
+
+// Parallax, uncertainty, lines of points and stability, of a full pose.
+void measure_pose(Fit& f) {
+  Evidence& evidence = f.out->evidence;
+  double sum = 0, weights = 0;
+  if (f.out->has_covariance) evidence.sigma_rad = largest_sigma(f.out->covariance);
+  if (f.num_support == 0) return;
+  for (int k = 0; k < f.num_support; ++k) {
+    f.values[k] = pseudo_angle(f, f.support[k]);
+    // Each angle counts by its information, so that matches of large sigmas are no evidence against
+    // a pose that the others determine.
+    const double weight = 1 / f.matches.sigma_sq(f.support[k]);
+    sum += weight * f.matches.pairs.pixel_angle[f.support[k]];
+    weights += weight;
+  }
+  double* middle = f.values + (f.num_support - 1) / 2;
+  std::nth_element(f.values, middle, f.values + f.num_support);
+  evidence.median_parallax_rad = angle_of_pseudo(*middle);
+  evidence.pixel_angle_rad = sum / weights;
+  for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
+  evidence.region_shift_rad = region_shift_rad(f);
 }
 
 void measure_inliers(Fit& f) {
@@ -162,6 +251,7 @@ void measure_inliers(Fit& f) {
   evidence.num_different = matches.num_unique();
   evidence.threshold_px = f.threshold;
   for (int v = 0; v < 2; ++v) measure_spread(f, v, evidence);
+  evidence.agreement = agreement_of(f);
 }
 
 // A second model is searched only among the matches that are farther from the first than kClear

@@ -1,5 +1,5 @@
-// Measures what the verdict is decided from (Evidence in verdict.h), once the kind and the pose are
-// known: inliers and their residuals, coverage, parallax, lines of points, a second model,
+// Measures what the verdict is decided from (Evidence in pair_evidence.h), once the kind and the
+// pose are known: inliers and their residuals, coverage, parallax, lines of points, a second model,
 // lattices.
 #pragma once
 

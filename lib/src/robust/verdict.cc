@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/math.h"
+#include "robust/belief.h"
 
 namespace tv {
 namespace {
@@ -11,28 +12,22 @@ namespace {
 // others are too few to contradict a wrong one. COLMAP requires as many.
 constexpr int kFewMatches = 15;
 
-// Inliers within a few pixels of one another fit or miss a wrong pose together, and so count as one
-// witness. Of 292 real pairs with fewer places and no other reason 86 had a wrong rotation, of 3462
-// with more 42 (docs/decisions/0021-places.md).
-constexpr int kFewPlaces = 20;
-
 bool has_full_pose(const Evidence& e) {
   return e.kind == TV_KIND_CALIBRATED || e.kind == TV_KIND_PLANAR;
 }
 
-// TOO_FEW_MATCHES: fewer than 15 different matches are inliers, or the inliers of a full pose lie
-// in fewer than 20 places of an image. Of a degenerate pair, which has no inliers, fewer than 15
-// different matches were given.
+// TOO_FEW_MATCHES: fewer than 15 different matches are inliers. Of a degenerate pair, which has no
+// inliers, fewer than 15 different matches were given.
 bool too_few_matches(const Evidence& e) {
-  if (e.kind == TV_KIND_DEGENERATE) return e.num_different < kFewMatches;
-  const int places = std::min(e.num_places[0], e.num_places[1]);
-  return e.num_different_inliers < kFewMatches || (has_full_pose(e) && places < kFewPlaces);
+  const bool degenerate = e.kind == TV_KIND_DEGENERATE;
+  return (degenerate ? e.num_different : e.num_different_inliers) < kFewMatches;
 }
 
-// LOW_INLIER_RATIO: fewer than 25 % of the matches are inliers, or the residuals are uniform over
-// the threshold, as random matches' are: the noise that is estimated from their median is then 0.74
-// thresholds, and more than 0.7 counts as uniform. A degenerate pair has this reason when its
-// matches are not too few: no model explains more of them than chance does.
+// LOW_INLIER_RATIO, where there is no full pose whose probability says it better: fewer than 25 %
+// of the matches are inliers, or the residuals are uniform over the threshold, as random matches'
+// are: the noise that is estimated from their median is then 0.74 thresholds, and more than 0.7
+// counts as uniform. A degenerate pair has this reason when its matches are not too few: no model
+// explains more of them than chance does.
 bool low_inlier_ratio(const Evidence& e) {
   if (e.kind == TV_KIND_DEGENERATE) return !too_few_matches(e);
   return 4 * e.num_inliers < e.num_matches || e.noise_px > 0.7 * e.threshold_px;
@@ -71,11 +66,11 @@ bool on_a_lattice(const Evidence& e) {
   return sigmas > 3.3 && (e.has_second_model || share > 0.5);
 }
 
-// All reasons of a pair, as bits of tv_reason.
+// The reasons of evidence that is certain, whatever the probability, as bits of tv_reason.
 uint32_t reasons_of(const Evidence& e) {
   uint32_t reasons = 0;
   if (too_few_matches(e)) reasons |= TV_REASON_TOO_FEW_MATCHES;
-  if (low_inlier_ratio(e)) reasons |= TV_REASON_LOW_INLIER_RATIO;
+  if (!has_full_pose(e) && low_inlier_ratio(e)) reasons |= TV_REASON_LOW_INLIER_RATIO;
   if (e.kind == TV_KIND_DEGENERATE) return reasons;
   if (low_parallax(e)) reasons |= TV_REASON_LOW_PARALLAX;
   if (crowded_matches(e)) reasons |= TV_REASON_CROWDED_MATCHES;
@@ -101,15 +96,22 @@ uint32_t reasons_of(const Evidence& e) {
 double coverage_of(const Evidence& e) { return std::max(e.coverage[0], e.coverage[1]); }
 
 // Refused: the kind is degenerate, a pure rotation or no motion, so the caller has no translation
-// to use. Ok: there is no reason. Doubtful: there is at least one.
+// to use. Ok: there is no reason. Doubtful: there is at least one. A full pose that is too probably
+// wrong has the reasons of the evidence that makes it so.
 Judgement judge(const Evidence& e) {
-  const uint32_t reasons = reasons_of(e);
+  uint32_t reasons = reasons_of(e);
+  double probability_wrong = 1;
+  if (has_full_pose(e)) {
+    const Belief belief = belief_of(e);
+    probability_wrong = belief.probability_wrong;
+    if (!(probability_wrong <= kMostProbabilityWrong)) reasons |= belief.raised_by;
+  }
   const bool refused =
       e.kind == TV_KIND_DEGENERATE || e.kind == TV_KIND_PANORAMIC || e.kind == TV_KIND_NO_MOTION;
   return {refused        ? TV_VERDICT_REFUSED
           : reasons == 0 ? TV_VERDICT_OK
                          : TV_VERDICT_DOUBTFUL,
-          reasons};
+          reasons, probability_wrong};
 }
 
 // LOW_INLIER_RATIO for mirrored pictures: the matches that would show that the pictures are of one
@@ -117,6 +119,7 @@ Judgement judge(const Evidence& e) {
 // such matches there is a pose, too.
 void doubt(tv_reason reason, tv_two_view* estimate) {
   estimate->reasons |= static_cast<uint32_t>(reason);
+  estimate->probability_wrong = std::max(estimate->probability_wrong, 0.5);
   if (estimate->verdict == TV_VERDICT_OK) estimate->verdict = TV_VERDICT_DOUBTFUL;
 }
 
@@ -134,6 +137,10 @@ bool takes_guided_estimate(const tv_two_view& first, tv_two_view* again) {
   }
   again->verdict = first.verdict;
   again->reasons = first.reasons;
+  again->probability_wrong = first.probability_wrong;
+  again->agreement = first.agreement;
+  again->region_shift_rad = first.region_shift_rad;
+  again->num_places = first.num_places;
   again->principal_point_chi2 = first.principal_point_chi2;
   std::copy(first.principal_point_asked_px, first.principal_point_asked_px + 2,
             again->principal_point_asked_px);

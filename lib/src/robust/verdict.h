@@ -3,38 +3,14 @@
 // exchanged. docs/decisions/0016-one-verdict.md.
 #pragma once
 
-#include "twoview/two_view.h"
+#include "robust/pair_evidence.h"
 
 namespace tv {
-
-inline constexpr double kUnknown = __builtin_inf();
-
-// What was measured of a pair. An array of two has one entry a view.
-struct Evidence {
-  tv_kind kind = TV_KIND_DEGENERATE;
-  double threshold_px = 0;
-  // Usable matches and inliers; `different` ones do not count the repeats of a match.
-  int num_matches = 0, num_inliers = 0, num_different = 0, num_different_inliers = 0;
-  double coverage[2] = {0, 0};  // share of an 8x8 grid on the image that holds an inlier
-  int num_places[2] = {0, 0};   // cells of about 32 pixels that hold an inlier
-  // Calibrated kinds but the degenerate one. Whether matches far from the pair's model have a model
-  // of their own (second_model.h), and how far the points lie as on a lattice (lattice.h).
-  bool has_second_model = false;
-  double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
-  // The fields from here on are measured of a full pose (calibrated or planar).
-  bool has_alternative = false;    // whether a second motion of the plane fits
-  double noise_px = 0;             // noise of a matched pixel; 0 where there is no covariance
-  double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
-  double median_parallax_rad = 0;  // median parallax of the inliers
-  double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
-  // For each image, the root mean square distance in pixels of the inliers from the one line that
-  // is fitted to all of them (in rays: from a plane through the camera's centre).
-  double line_distance_px[2] = {kUnknown, kUnknown};
-};
 
 struct Judgement {
   tv_verdict verdict = TV_VERDICT_REFUSED;
   uint32_t reasons = 0;
+  double probability_wrong = 1;
 };
 
 Judgement judge(const Evidence& evidence);

@@ -159,6 +159,7 @@ Json result_json(const Outcome& outcome) {
   json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
   json["reasons"] = reasons_json(v.reasons);
+  json["probability_wrong"] = finite_or_null(v.probability_wrong);
   json["R"] = numbers_or_null(v.R, 9, v.has_R);
   const double unit = unit_of(outcome);
   const double t[3] = {unit * v.t[0], unit * v.t[1], unit * v.t[2]};

@@ -98,7 +98,7 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
   for (const char* key :
        {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
         "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict",
-        "principal_point_shift_px", "principal_point", "time_ms"})
+        "probability_wrong", "principal_point_shift_px", "principal_point", "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;
@@ -109,6 +109,7 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
     json["num_inliers"] = v.num_inliers;
     json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
     json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
+    json["probability_wrong"] = v.probability_wrong;
     json["principal_point_shift_px"] = v.principal_point_shift;
     json["principal_point"] = principal_point_json(v);
     report.shift = shift_evidence(v, outcome.camera[0]);

@@ -206,6 +206,8 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   text += summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
                        tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
                        kind_in_words(v.kind).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
+  if (v.has_R && v.has_t)
+    text += summary_line("belief", "wrong with probability %.2g %%", 100 * v.probability_wrong);
   text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
   text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
                        v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);

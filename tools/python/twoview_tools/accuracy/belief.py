@@ -44,8 +44,8 @@ import sys
 
 import numpy as np
 
-from . import (belief_tables, datasets, estimators, match_evidence, metrics, parallel, pipeline,
-               reliability, tables, truth, twoview_ctypes, verdicts)
+from . import (belief_fit, belief_tables, datasets, estimators, match_evidence, metrics, parallel,
+               pipeline, reliability, tables, truth, twoview_ctypes, verdicts)
 
 ZOOMS = (1.25, 1.5, 2.0)
 UNRELATED_IMAGES = 15  # of each set, evenly spaced
@@ -207,9 +207,8 @@ def row_of_result(result):
                     _plain(result.principal_point_asked_px) if asked else None,
                 "principal_point_asked_covariance":
                     _plain(result.principal_point_asked_covariance) if asked else None})
-    known = {name for name, _ in result._fields_}
-    if "probability_wrong" in known:
-        row["probability_wrong"] = result.probability_wrong
+    for field in ("probability_wrong", "agreement", "region_shift_rad", "num_places"):
+        row[field] = getattr(result, field)
     return row
 
 
@@ -306,6 +305,10 @@ def main(argv=None):
                         help="print the tables of an earlier --rows; nothing is run")
     parser.add_argument("--table", action="store_true",
                         help="print the Markdown tables of docs/accuracy.md instead")
+    parser.add_argument("--fit", action="store_true",
+                        help="fit the model of probability_wrong on the rows: print the constants "
+                             "of lib/src/robust/belief.cc, and what \"ok\" would be worth on sets "
+                             "left out of the fit")
     parser.add_argument("--wrong", type=int, default=0, metavar="N",
                         help="list at most N wrong \"ok\" pairs, the worst first")
     parser.add_argument("--check", type=float, metavar="SHARE",
@@ -340,6 +343,10 @@ def main(argv=None):
         with open(arguments.rows, "w", encoding="utf-8") as file:
             for row in rows:
                 file.write(json.dumps(metrics.finite(row), allow_nan=False) + "\n")
+    if arguments.fit:
+        left_out = belief_fit.left_out_tables(rows)
+        tables.say(belief_tables.fitted(belief_fit.constants(rows), left_out, arguments.table))
+        return
     tables.say(belief_tables.markdown(rows) if arguments.table else belief_tables.text(rows))
     if arguments.wrong:
         tables.say(belief_tables.wrong_pairs(rows, arguments.wrong))

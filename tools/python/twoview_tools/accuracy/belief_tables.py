@@ -278,13 +278,41 @@ def text(rows):
                     "rotation_error_deg"),
             _errors(_Text, "Verdict against the direction's error [deg], where it counts", aimed,
                     "direction_error_deg"),
-            _sets(_Text, good), _reasons(_Text, good), _features(_Text, good),
+            _sets(_Text, good), _calibration(_Text, good), _reasons(_Text, good),
+            _features(_Text, good),
             _reliability(_Text, good), _curve(_Text, good, "rotation"),
             _curve(_Text, good, "direction")]
     apart = sum(r["kind"] == "related" and not r["trusted"] for r in rows)
     if apart:
         parts.append(f"\n{apart} pairs have no trusted truth and are not counted.")
     return "\n".join(parts + [_others(_Text, rows)])
+
+
+def tenths(rows, probabilities):
+    """[(tenth, poses, stated %, wrong in rotation, actual %)]: the poses in the order of their
+    probability_wrong, in ten equal parts."""
+    lines = []
+    for k, chosen in enumerate(np.array_split(np.argsort(probabilities, kind="stable"), 10)):
+        wrong = sum(bool(rows[i]["wrong_rotation"]) for i in chosen)
+        stated = float(np.mean([probabilities[i] for i in chosen])) if len(chosen) else np.nan
+        lines.append([k + 1, len(chosen), 100 * stated, wrong, _percent(wrong, len(chosen))])
+    return lines
+
+
+TENTHS_HEAD = ["tenth", "poses", "stated %", "wrong in rotation", "actual %"]
+
+
+def _calibration(style, rows):
+    posed = [r for r in rows if r["rotation_error_deg"] is not None
+             and r.get("probability_wrong") is not None]
+    return style.table("probability_wrong: stated and actual, in tenths of the poses", TENTHS_HEAD,
+                       tenths(posed, [r["probability_wrong"] for r in posed])) if posed else ""
+
+
+def fitted(constants, left_out, as_markdown=False):
+    """The result of belief_fit: the constants and the left-out tables."""
+    style = _Markdown if as_markdown else _Text
+    return "\n".join(constants + [style.table(*table) for table in left_out])
 
 
 def _overview(rows):
@@ -304,7 +332,7 @@ def _overview(rows):
 def markdown(rows):
     """The tables of docs/accuracy.md."""
     good = related(rows)
-    return "\n".join([_overview(good),
+    return "\n".join([_overview(good), _calibration(_Markdown, good),
                       _errors(_Markdown, "Verdict against the rotation's error [deg]", good,
                               "rotation_error_deg"),
                       _features(_Markdown, good, FEATURES[:1]), _reasons(_Markdown, good),

@@ -150,7 +150,8 @@ def _row(task, answer, status, message, matches):
            "translation_error_signed_deg": None, "pose_error_deg": None}
     if answer:
         row.update({key: answer[key]
-                    for key in ("num_keypoints", "config", "verdict", "principal_point_shift_px")
+                    for key in ("num_keypoints", "config", "verdict", "probability_wrong",
+                                "principal_point_shift_px")
                     if key in answer})
         row["num_inliers"], row["ms"] = answer["num_inliers"], _rounded(answer["ms"])
         row["time_ms"] = round(sum(answer["ms"].values()), 3)

@@ -98,6 +98,7 @@ def run_twoview(views, options, task):
     return {"num_keypoints": [len(k) for k, _ in features], **pose_answer(R, t, inliers, found),
             "config": twoview_ctypes.enum_name("kind", found.kind),
             "verdict": twoview_ctypes.enum_name("verdict", found.verdict),
+            "probability_wrong": found.probability_wrong,
             **matches_answer(matches)}, watch.ms
 
 

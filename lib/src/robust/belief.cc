@@ -1,0 +1,56 @@
+#include "robust/belief.h"
+
+#include <algorithm>
+
+#include "base/math.h"
+
+namespace tv {
+namespace {
+
+// One number of the evidence: how much it adds to the logit, and the reason that it is evidence
+// for. usual: its value in the median of the right poses, in which it adds nothing to a doubt.
+struct Part {
+  double weight, usual;
+  uint32_t reason;
+};
+
+// scripts/belief --fit prints these lines.
+constexpr double kBias = 8.005;
+constexpr Part kDisagreement = {1.193, -2.418, TV_REASON_LOW_INLIER_RATIO};
+constexpr Part kNoise = {3.032, 0.260, TV_REASON_LOW_INLIER_RATIO};
+constexpr Part kPlaces = {-2.623, 2.996, TV_REASON_TOO_FEW_MATCHES};
+constexpr Part kRegionShift = {0.519, -6.881, TV_REASON_CROWDED_MATCHES};
+constexpr double kAlternative = 1.263;
+
+// More places than this are no more evidence: what is wrong with a pose that so many agree on is
+// not that they are few.
+constexpr double kEnoughPlaces = 20;
+
+double clamped(double x, double low, double high) { return std::max(low, std::min(x, high)); }
+
+}  // namespace
+
+Belief belief_of(const Evidence& e) {
+  const double places = std::min(e.num_places[0], e.num_places[1]);
+  const double shift = clamped(e.region_shift_rad, 0.05 * kPi / 180, 20 * kPi / 180);
+  const struct {
+    Part part;
+    double value;
+  } found[] = {{kDisagreement, log(1.02 - clamped(e.agreement, 0, 1))},
+               {kNoise, clamped(e.noise_px / e.threshold_px, 0, 1)},
+               {kPlaces, log(clamped(places, 1, kEnoughPlaces))},
+               {kRegionShift, log(shift)}};
+  double logit = kBias + (e.has_alternative ? kAlternative : 0);
+  double most = 0;
+  for (const auto& f : found) {
+    logit += f.part.weight * f.value;
+    most = std::max(most, f.part.weight * (f.value - f.part.usual));
+  }
+  uint32_t raised_by = 0;
+  for (const auto& f : found) {
+    if (2 * f.part.weight * (f.value - f.part.usual) >= most) raised_by |= f.part.reason;
+  }
+  return {1 / (1 + exp(-logit)), raised_by};
+}
+
+}  // namespace tv
