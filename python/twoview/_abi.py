@@ -81,7 +81,9 @@ class tv_estimate_options(Structure):
                 ("confidence", c_double), ("max_iterations", c_int32),
                 ("fixed_iterations", c_int32), ("seed", c_uint64), ("gravity0", c_double * 3),
                 ("gravity1", c_double * 3), ("gravity_sigma_rad", c_double),
-                ("principal_point_sigma", c_double)]
+                ("principal_point_sigma", c_double),
+                ("focal_sigma0", c_double), ("focal_sigma1", c_double),
+                ("center_sigma0", c_double), ("center_sigma1", c_double)]
 
 
 class tv_two_view(Structure):
@@ -100,7 +102,8 @@ class tv_two_view(Structure):
                 ("noise_px", c_double), ("seed", c_uint64),
                 ("principal_point_shift", c_double * 2), ("principal_point_chi2", c_double),
                 ("principal_point_asked_px", c_double * 2),
-                ("principal_point_asked_covariance", c_double * 3)]
+                ("principal_point_asked_covariance", c_double * 3),
+                ("focal_scale", c_double), ("focal_sigma", c_double)]
 
 
 class tv_point(Structure):

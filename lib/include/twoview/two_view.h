@@ -160,6 +160,18 @@ typedef struct tv_estimate_options {
      doubtful. Used only when camera0 and camera1 are equal. The principal point is moved only if
      the matches contradict (cx, cy) at a significance of 0.001. */
   double principal_point_sigma;
+  /* How sure the focal lengths of camera0 and camera1 are: the standard deviation of fx and fy, one
+     factor for both, relative to them, [0, 0.5]. 0 (default): they are exact. The covariance grows
+     by what such errors make of the pose, to first order. Where camera0 and camera1 are equal, they
+     are one camera with one error, of the larger sigma; then, above 0.02, the focal length is also
+     refined with the pose, with this deviation as a prior (focal_scale), and the principal point is
+     not moved. 0.005 suits a calibration of unknown quality, 0.1 a focal length from a data
+     sheet. */
+  double focal_sigma0, focal_sigma1;
+  /* How sure (cx, cy) of camera0 and of camera1 are: the standard deviation of each coordinate, in
+     focal lengths, [0, 0.5]. 0 (default): they are exact. The covariance grows as for the focal
+     length; unlike principal_point_sigma, nothing is moved. */
+  double center_sigma0, center_sigma1;
 } tv_estimate_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -243,6 +255,14 @@ typedef struct tv_two_view {
   double principal_point_asked_px[2];
   /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
   double principal_point_asked_covariance[3];
+  /* What the estimate multiplies fx and fy of both cameras by, where the focal length was refined
+     with the pose (focal_sigma0): all of the result refers to the cameras with it, which
+     tv_corrected_camera computes. 0 where the focal length is as given. */
+  double focal_scale;
+  /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
+     that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
+     focal_sigma0 as given. 0 where it is taken as exact, or there is no covariance. */
+  double focal_sigma;
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
@@ -252,7 +272,8 @@ TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
 #define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
 
 /* Writes to `corrected` the camera that the result refers to: `camera` with the result's
-   principal_point_shift added to cx and cy. Use it for what follows the estimate: triangulation,
+   principal_point_shift added to cx and cy, and with fx and fy multiplied by its focal_scale where
+   that is above 0. Use it for what follows the estimate: triangulation,
    guided matching and bundle adjustment. `corrected` may be `camera` itself.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. Thread-safe. */
 TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera *camera,

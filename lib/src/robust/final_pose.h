@@ -18,6 +18,7 @@ struct PoseRefiner {
   PrincipalPoint principal_point;  // the one that the matches' rays were computed with
   int32_t* indices;                // scratch, one entry a match
   double* values;                  // scratch, one entry a match
+  bool focal_is_free;  // whether the focal length of the rays was refined with the pose
 };
 
 // The pose that minimises Cauchy's loss over the matches near the epipolar lines, with gravity as a
@@ -34,8 +35,17 @@ bool principal_point_is_off(const PoseRefiner& refiner, const Pose& pose, const 
 // determined.
 bool move_together(const PoseRefiner& refiner, Pose* pose, double shift_px[2]);
 
+// One Gauss-Newton step of the pose and the logarithm of the focal length together, with sigma as
+// the deviation of its prior. log_scale: that of the present rays. growth: by how much the matches'
+// covariance grows through shared errors; 0 in the first call, which computes it. The caller then
+// moves the rays by *step. False, and nothing is changed, where the step is not determined, or
+// where the matches would not lower the deviation by a fifth.
+bool step_focal_length(const PoseRefiner& refiner, double sigma, double log_scale, double* growth,
+                       Pose* pose, double* step);
+
 // The covariance of a refined pose and the noise of a pixel. It includes the uncertainty of a
-// principal point that is free. False when the pose is not determined.
+// principal point and a focal length that are free, the errors that matches share, and the sigmas
+// of the calibration. False when the pose is not determined.
 bool uncertainty_of(const PoseRefiner& refiner, const Pose& pose, PoseUncertainty* uncertainty);
 
 // The two motions of a plane that explains nearly all matches, refined together with the plane:

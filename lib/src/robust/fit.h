@@ -8,7 +8,7 @@
 namespace tv {
 
 struct Fit {
-  const TwoViewProblem& problem;
+  TwoViewProblem& problem;  // only place_focal_length changes it, and only its cameras
   const Matches& matches;  // only the refiner may change the matches, and only their rays
   double threshold;
   int32_t* indices;  // scratch, one entry a match
