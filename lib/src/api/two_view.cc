@@ -10,6 +10,7 @@
 #include "api/validate.h"
 #include "base/math.h"
 #include "robust/covariance.h"
+#include "robust/place_focal_length.h"
 #include "robust/two_view.h"
 
 namespace tv {
@@ -372,7 +373,11 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     }
     problem.kernels = context->kernels;
     tv::prepare_matches(problem, context->arena, &matches);
-    tv::search_two_view(problem, matches, context->arena, &model);
+    if (calibrated && tv::has_uncertain_focal_length(problem)) {
+      tv::search_focal_length(problem, &matches, context->arena, &model);
+    } else {
+      tv::search_two_view(problem, matches, context->arena, &model);
+    }
   }
   tv::StageTimer timer(context, TV_STAGE_REFINE);
   tv::TwoViewOutcome outcome{};

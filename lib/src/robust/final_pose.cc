@@ -38,6 +38,10 @@ constexpr double kScales[] = {1, 1.5, 2, 3};
 constexpr double kLargestScale = 2;  // largest scale of the loss, in thresholds
 constexpr double kMostStretch = 1.5;
 
+// The matches' information on the focal length is divided by this: a lens, a rolling shutter and
+// wrong matches move it by more than the spread of the residuals tells.
+constexpr double kFocalShare = 4;
+
 // The relative gain of the cost at which each round stops. The pose of the first round only serves
 // to select the near matches and to estimate the noise. A step that gains less than a millionth of
 // the cost is a fiftieth of a standard deviation long, and the next one a tenth of that.
@@ -267,11 +271,11 @@ bool move_together(const PoseRefiner& f, Pose* pose, double shift_px[2]) {
   return true;
 }
 
-bool step_focal_length(const PoseRefiner& f, double sigma, double log_scale, double* growth,
-                       Pose* pose, double* step) {
+bool step_focal_length(const PoseRefiner& f, double* growth, Pose* pose, double* step) {
   constexpr int kNum = PoseModel::kParameters + 1;
   constexpr double kStays = 0.64;  // the share of the prior's variance that is left
-  GravityPrior gravity = tested_gravity(f, *pose);
+  const double sigma = f.problem.options.focal_sigma0, log_scale = f.problem.focal_log_scale;
+  const GravityPrior gravity = tested_gravity(f, *pose);
   if (*growth == 0) {
     PoseUncertainty uncertainty;
     Listed listed;
@@ -290,8 +294,8 @@ bool step_focal_length(const PoseRefiner& f, double sigma, double log_scale, dou
   if (!pose_slopes(f.problem, e, &slopes, &information)) return false;
   GravityPoseModel{*pose, &gravity, noise_px}.normal_equations(f.matches.pairs, f.indices, count,
                                                                best.loss, of_pose, gradient);
-  const double prior = *growth * noise_px * noise_px / (sigma * sigma);
-  if (!(prior < kStays * (prior + information))) return false;
+  const double prior = kFocalShare * *growth * noise_px * noise_px / (sigma * sigma);
+  if (log_scale == 0 && !(prior < kStays * (prior + information))) return false;
   for (int r = 0, slot = 0, from = 0; r < PoseModel::kParameters; ++r) {
     for (int c = r; c < PoseModel::kParameters; ++c) upper[slot++] = of_pose[from++];
     upper[slot++] = e.with_pose[0][r] + e.with_pose[kOfView][r];
@@ -308,6 +312,7 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
   const GravityPrior gravity = tested_gravity(f, pose);
   Listed listed;
   double *const noise = uncertainty->covariance, all[25];
+  if (f.problem.focal_is_ambiguous) return false;
   if (!uncertainty_without_gravity(f, pose, uncertainty, &listed)) return false;
   std::copy(noise, noise + 25, all);
   const double growth =
@@ -322,10 +327,10 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
     if (!pose_slopes(f.problem, e, &slopes, &information)) return false;
     double variance = -1;
     if (f.focal_is_free) {
-      // The matches' information, for their noise alone and with what they share.
-      const double of_noise = information / (uncertainty->mean_weight * uncertainty->variance_px);
-      add_calibration(f.problem, slopes, 1 / (of_noise + 1 / (sigma * sigma)), true, noise);
-      variance = 1 / (of_noise / growth + 1 / (sigma * sigma));
+      const double of_matches = information / (kFocalShare * growth * uncertainty->mean_weight *
+                                               uncertainty->variance_px);
+      variance = 1 / (of_matches + 1 / (sigma * sigma));
+      add_calibration(f.problem, slopes, variance, true, noise);
       uncertainty->focal_sigma = std::sqrt(variance);
     }
     add_calibration(f.problem, slopes, variance, false, all);
