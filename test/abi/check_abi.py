@@ -78,8 +78,8 @@ CHANGES = [
     (
         "a field at the end of a growing struct",
         "two_view.h",
-        "double principal_point_asked_covariance[3];",
-        "double principal_point_asked_covariance[3];\n  double more;",
+        "double focal_sigma;",
+        "double focal_sigma;\n  double more;",
         False,
     ),
 ]

@@ -106,36 +106,45 @@ void plane_slopes(const TwoViewProblem& problem, const Mat3& H, const Vec3& mean
     double* const by = slopes->by[q];
     for (int p = 0; p < kPose; ++p) by[p] = 0;
     if (problem.one_camera && q >= kOfView) continue;
-    for (const int sign : {-1, 1}) {
-      // K'^-1 K and its inverse, to first order.
-      Mat3 to = Mat3::Identity(), back = Mat3::Identity();
-      for (int k = 0; k < 2; ++k) {
-        const int k1 = q % kOfView == 0 ? k : 2;
-        if (q % kOfView != 0 && k != q % kOfView - 1) continue;
-        to(k, k1) -= sign * kStep;
-        back(k, k1) += sign * kStep;
+    const int k = q % kOfView;  // 0: the focal length, 1: x of the principal point, 2: y
+    for (const double step : {-kStep, kStep}) {
+      Mat3 moved = H;  // K'^-1 K H of view 1 and H K^-1 K' of view 0, to first order
+      for (int view = 0; view < 2; ++view) {
+        if (!problem.one_camera && view != q / kOfView) continue;
+        // View 1's camera changes rows, view 0's columns.
+        const int along = view == 1 ? 1 : 3, across = 4 - along;
+        for (int d = 0; d < 2; ++d) {
+          if (k != 0 && d != k - 1) continue;
+          const int third = k == 0 ? d : 2;
+          double* const to = moved.data() + across * (view == 1 ? d : third);
+          const double* const from = moved.data() + across * (view == 1 ? third : d);
+          const double by_step = view == 1 ? -step : step;
+          for (int i = 0; i < 3; ++i) to[along * i] += by_step * from[along * i];
+        }
       }
-      Mat3 moved = H;
-      if (problem.one_camera || q >= kOfView) moved = to * moved;
-      if (problem.one_camera || q < kOfView) moved = moved * back;
       PlanarPose found[2];
       const int num = decompose_homography(moved, mean_ray0, found);
-      const Pose* nearest = nullptr;
-      double least = 0;
-      for (int k = 0; k < num; ++k) {
-        const double far =
-            (found[k].pose.R - pose.R).squaredNorm() + (found[k].pose.t - pose.t).squaredNorm();
-        if (nearest != nullptr && far >= least) continue;
-        least = far;
-        nearest = &found[k].pose;
+      double nearest = -8, deviation[kPose] = {};
+      for (int n = 0; n < num; ++n) {
+        const Pose& other = found[n].pose;
+        double turn[3][3], along = 0;  // R_other R'; how alike both poses are
+        for (int r = 0; r < 3; ++r) {
+          along += other.t[r] * pose.t[r];
+          for (int c = 0; c < 3; ++c) {
+            turn[r][c] = 0;
+            for (int j = 0; j < 3; ++j) turn[r][c] += other.R(r, j) * pose.R(c, j);
+          }
+          along += turn[r][r];
+        }
+        if (!(along > nearest)) continue;
+        nearest = along;
+        for (int p = 0; p < 3; ++p) {
+          const int next = (p + 1) % 3, last = (p + 2) % 3;
+          deviation[p] = 0.5 * (turn[last][next] - turn[next][last]);
+        }
+        for (int p = 0; p < 2; ++p) deviation[3 + p] = b[p].dot(other.t);
       }
-      if (nearest == nullptr) continue;
-      const Mat3 turn = nearest->R * pose.R.transpose();
-      const double scale = sign / (2 * kStep);
-      for (int p = 0; p < 3; ++p) {
-        by[p] += scale * 0.5 * (turn((p + 2) % 3, (p + 1) % 3) - turn((p + 1) % 3, (p + 2) % 3));
-      }
-      for (int p = 0; p < 2; ++p) by[3 + p] += scale * b[p].dot(nearest->t);
+      for (int p = 0; p < kPose; ++p) by[p] += deviation[p] / (2 * step);
     }
   }
 }

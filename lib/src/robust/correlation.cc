@@ -126,9 +126,19 @@ double add_jackknife(int num, BlockSums& sums, const PoseUncertainty& uncertaint
   return 1 + growth / kPose;
 }
 
+using Equations = double (*)(const void* model, const RayPairs& pairs, const int32_t* indices,
+                             int count, const RobustLoss& loss, double* upper, double* gradient);
+
 template <typename Model>
-double add_of_model(const PoseRefiner& f, int count, const Model& model, const RobustLoss& loss,
-                    const PoseUncertainty& uncertainty, double covariance[25]) {
+double equations_of(const void* model, const RayPairs& pairs, const int32_t* indices, int count,
+                    const RobustLoss& loss, double* upper, double* gradient) {
+  return static_cast<const Model*>(model)->normal_equations(pairs, indices, count, loss, upper,
+                                                            gradient);
+}
+
+TVK_NOINLINE double add_of_model(const PoseRefiner& f, int count, const void* model, int num,
+                                 Equations equations, const RobustLoss& loss,
+                                 const PoseUncertainty& uncertainty, double covariance[25]) {
   BlockSums sums = {};
   int ends[kBlocks + 1] = {};
   ends[kBlocks] = count;
@@ -139,10 +149,10 @@ double add_of_model(const PoseRefiner& f, int count, const Model& model, const R
   }
   for (int b = 0; b < kBlocks; ++b) {
     if (ends[b + 1] == ends[b]) continue;
-    model.normal_equations(f.matches.pairs, f.indices + ends[b], ends[b + 1] - ends[b], loss,
-                           sums.upper[b], sums.gradient[b]);
+    equations(model, f.matches.pairs, f.indices + ends[b], ends[b + 1] - ends[b], loss,
+              sums.upper[b], sums.gradient[b]);
   }
-  return add_jackknife(Model::kParameters, sums, uncertainty, covariance);
+  return add_jackknife(num, sums, uncertainty, covariance);
 }
 
 }  // namespace
@@ -150,13 +160,15 @@ double add_of_model(const PoseRefiner& f, int count, const Model& model, const R
 double add_correlation(const PoseRefiner& f, int count, const PoseModel& model,
                        const RobustLoss& loss, const PoseUncertainty& uncertainty,
                        double covariance[25]) {
-  return add_of_model(f, count, model, loss, uncertainty, covariance);
+  return add_of_model(f, count, &model, PoseModel::kParameters, equations_of<PoseModel>, loss,
+                      uncertainty, covariance);
 }
 
 double add_correlation(const PoseRefiner& f, int count, const PlaneModel& model,
                        const RobustLoss& loss, const PoseUncertainty& uncertainty,
                        double covariance[25]) {
-  return add_of_model(f, count, model, loss, uncertainty, covariance);
+  return add_of_model(f, count, &model, PlaneModel::kParameters, equations_of<PlaneModel>, loss,
+                      uncertainty, covariance);
 }
 
 }  // namespace tv

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "geometry/vector3.h"
 #include "robust/calibration.h"
 #include "robust/estimators.h"
 
@@ -39,7 +40,7 @@ void search_focal_length(TwoViewProblem& problem, Matches* matches, Arena& arena
                          TwoViewModel* model) {
   const double sigma = problem.options.focal_sigma0, threshold = problem.options.max_error_px;
   double least = 0, best = 0, now = 0, costs[kNumStarts];
-  Vec3 directions[kNumStarts];
+  double directions[kNumStarts][3];
   int num_iterations = 0, num_found = 0;
   for (const double start : kStarts) {
     TwoViewModel found;
@@ -54,7 +55,8 @@ void search_focal_length(TwoViewProblem& problem, Matches* matches, Arena& arena
         static_cast<double>(scorer.full_cost(found.epipolar.pose, &inliers)) / kCostOne;
     const double cost = of_matches / kLessSure + start * start;
     costs[num_found] = cost;
-    directions[num_found++] = found.epipolar.pose.t;
+    for (int r = 0; r < 3; ++r) directions[num_found][r] = found.epipolar.pose.t[r];
+    ++num_found;
     if (model->epipolar.has_pose && !(cost < least)) continue;
     least = cost;
     best = start;
@@ -63,7 +65,7 @@ void search_focal_length(TwoViewProblem& problem, Matches* matches, Arena& arena
   scale_focal_length(problem, exp((best - now) * sigma), matches);
   problem.focal_log_scale = best * sigma;
   for (int k = 0; k < num_found; ++k) {
-    if (costs[k] < least + kRival && directions[k].dot(model->epipolar.pose.t) < kOtherWay) {
+    if (costs[k] < least + kRival && dot(directions[k], model->epipolar.pose.t.data()) < kOtherWay) {
       problem.focal_is_ambiguous = true;
     }
   }
