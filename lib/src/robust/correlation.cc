@@ -14,8 +14,8 @@ constexpr int kMost = PlaneModel::kParameters, kPacked = kMost * (kMost + 1) / 2
 
 // Where kappa begins to count, and the width over which it comes to count in full. Independent
 // errors exceed 1.2 in one pair of five, and 1.5 in one of thirty.
-constexpr double kFirstKappa = 1.2, kKappaWidth = 0.3;
-constexpr double kJackknives = 3;  // docs/decisions/0024-honest-covariance.md
+constexpr double kFirstKappa = 1.4, kKappaWidth = 0.3;
+constexpr double kJackknives = 4;  // docs/decisions/0024-honest-covariance.md
 
 // Splits indices[0 .. count) at the mean of the coordinate that extends farthest; returns where.
 int split(const PoseRefiner& f, int32_t* indices, int count) {
