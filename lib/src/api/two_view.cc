@@ -50,8 +50,8 @@ tv_status check_gravity(const tv_estimate_options& options) {
 
 // Checks the standard deviations of the cameras, each in [0, 0.5].
 tv_status check_calibration_sigmas(const tv_estimate_options& options) {
-  for (const double sigma : {options.focal_sigma0, options.focal_sigma1, options.center_sigma0,
-                             options.center_sigma1}) {
+  for (const double sigma :
+       {options.focal_sigma0, options.focal_sigma1, options.center_sigma0, options.center_sigma1}) {
     if (!is_finite(sigma)) return TV_ERR_NOT_FINITE;
     if (!(sigma >= 0 && sigma <= 0.5)) return TV_ERR_ARGUMENT;
   }
@@ -355,8 +355,8 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     problem.one_camera = calibrated && std::memcmp(camera0, camera1, sizeof *camera0) == 0;
     tv_estimate_options& o = problem.options;
     if (problem.one_camera) {
-      o.focal_sigma0 = o.focal_sigma1 = o.focal_sigma0 > o.focal_sigma1 ? o.focal_sigma0
-                                                                        : o.focal_sigma1;
+      o.focal_sigma0 = o.focal_sigma1 =
+          o.focal_sigma0 > o.focal_sigma1 ? o.focal_sigma0 : o.focal_sigma1;
       o.center_sigma0 = o.center_sigma1 =
           o.center_sigma0 > o.center_sigma1 ? o.center_sigma0 : o.center_sigma1;
     }

@@ -12,9 +12,9 @@ namespace {
 constexpr int kLevels = 3, kBlocks = 1 << kLevels, kPose = PoseModel::kParameters;
 constexpr int kMost = PlaneModel::kParameters, kPacked = kMost * (kMost + 1) / 2;
 
-// Where kappa begins to count, and the width over which it comes to count in full. Independent
-// errors exceed 1.2 in one pair of five, and 1.5 in one of thirty.
-constexpr double kFirstKappa = 1.4, kKappaWidth = 0.3;
+// Where kappa begins to count, and the width over which it comes to count in full. Few pairs of
+// independent errors exceed it.
+constexpr double kFirstKappa = 1.35, kKappaWidth = 0.2;
 constexpr double kJackknives = 4;  // docs/decisions/0024-honest-covariance.md
 
 // Splits indices[0 .. count) at the mean of the coordinate that extends farthest; returns where.

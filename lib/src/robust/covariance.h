@@ -12,8 +12,8 @@ struct PoseUncertainty {
   double variance_px;  // variance of the M-estimate for a residual: C = variance_px (J' J)^-1, px^2
   double mean_weight, mean_slope;  // means of the loss's weight and of psi' over the matches
   double focal_sigma;  // relative standard deviation of a refined focal length; else the given one
-  double sigma_rad;                // of the verdict: largest_sigma before errors that matches share
-                                   // and a calibration that is not refined are added
+  double sigma_rad;    // of the verdict: largest_sigma before errors that matches share
+                       // and a calibration that is not refined are added
 };
 
 // An upper bound of the standard deviations of the rotation and of the direction about any axis:

@@ -18,7 +18,7 @@ struct PoseRefiner {
   PrincipalPoint principal_point;  // the one that the matches' rays were computed with
   int32_t* indices;                // scratch, one entry a match
   double* values;                  // scratch, one entry a match
-  bool focal_is_free;  // whether the focal length of the rays was refined with the pose
+  bool focal_is_free;              // whether the focal length of the rays was refined with the pose
 };
 
 // The pose that minimises Cauchy's loss over the matches near the epipolar lines, with gravity as a

@@ -65,7 +65,8 @@ void search_focal_length(TwoViewProblem& problem, Matches* matches, Arena& arena
   scale_focal_length(problem, exp((best - now) * sigma), matches);
   problem.focal_log_scale = best * sigma;
   for (int k = 0; k < num_found; ++k) {
-    if (costs[k] < least + kRival && dot(directions[k], model->epipolar.pose.t.data()) < kOtherWay) {
+    if (costs[k] < least + kRival &&
+        dot(directions[k], model->epipolar.pose.t.data()) < kOtherWay) {
       problem.focal_is_ambiguous = true;
     }
   }
