@@ -12,9 +12,10 @@ namespace tv {
 //     kappa = sum u_b' A^-1 u_b / (E[psi^2] / E[w] sum tr(A^-1 A_b (I - A^-1 A_b))),
 // A_b a block's normal equations, A those of all. Above 1.35, four times the jackknife's covariance
 // is added, in full from 1.55 on: (7/8) sum D_b D_b', where D_b is the Gauss-Newton step of leaving
-// block b out (B. Efron, "The jackknife, the bootstrap and other resampling plans", 1982). The blocks are made by splitting three times at
-// the mean of the pixel coordinate, of both images, that extends farthest. Changes the order of
-// refiner.indices. Returns by how much the mean variance grew, at least 1.
+// block b out (B. Efron, "The jackknife, the bootstrap and other resampling plans", 1982). The
+// blocks are made by splitting three times at the mean of the pixel coordinate, of both images,
+// that extends farthest. Changes the order of refiner.indices. Returns by how much the mean
+// variance grew, at least 1.
 double add_correlation(const PoseRefiner& refiner, int count, const PoseModel& model,
                        const RobustLoss& loss, const PoseUncertainty& uncertainty,
                        double covariance[25]);
