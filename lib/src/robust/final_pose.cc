@@ -41,6 +41,9 @@ constexpr double kMostStretch = 1.5;
 // The matches' information on the focal length is divided by this: a lens, a rolling shutter and
 // wrong matches move it by more than the spread of the residuals tells.
 constexpr double kFocalShare = 4;
+// What is left of a refined focal length's variance at the least, over that of its prior: three
+// tenths of the standard deviation.
+constexpr double kFocalFloor = 0.09;
 
 // The relative gain of the cost at which each round stops. The pose of the first round only serves
 // to select the near matches and to estimate the noise. A step that gains less than a millionth of
@@ -329,7 +332,8 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
     if (f.focal_is_free) {
       const double of_matches = information / (kFocalShare * growth * uncertainty->mean_weight *
                                                uncertainty->variance_px);
-      variance = 1 / (of_matches + 1 / (sigma * sigma));
+      variance = std::min(1 / (of_matches + 1 / (sigma * sigma)) + kFocalFloor * (sigma * sigma),
+                          sigma * sigma);
       add_calibration(f.problem, slopes, variance, true, noise);
       uncertainty->focal_sigma = std::sqrt(variance);
     }
