@@ -2,7 +2,8 @@
 // a pose, and the focal length as an unknown. docs/algorithms/covariance.md.
 #pragma once
 
-#include "robust/final_pose.h"
+#include "robust/covariance.h"
+#include "robust/pose_refiner.h"
 
 namespace tv {
 

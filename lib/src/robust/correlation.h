@@ -1,7 +1,8 @@
 // What errors that neighbouring matches share add to a covariance. docs/algorithms/covariance.md.
 #pragma once
 
-#include "robust/final_pose.h"
+#include "robust/covariance.h"
+#include "robust/pose_refiner.h"
 
 namespace tv {
 

@@ -65,12 +65,15 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
   int32_t* indices = arena_alloc<int32_t>(arena, n);
   double* values = arena_alloc<double>(arena, n);
   int32_t* support = arena_alloc<int32_t>(arena, n);
-  Fit f{
-      problem,   matches,
-      threshold, indices,
-      values,    support,
-      0,         PoseRefiner{problem, matches, threshold, gravity_of(problem), {}, indices, values, false},
-      outcome};
+  Fit f{problem,
+        matches,
+        threshold,
+        indices,
+        values,
+        support,
+        0,
+        PoseRefiner{problem, matches, threshold, gravity_of(problem), {}, indices, values, false},
+        outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {

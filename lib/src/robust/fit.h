@@ -9,7 +9,7 @@ namespace tv {
 
 struct Fit {
   TwoViewProblem& problem;  // only place_focal_length changes it, and only its cameras
-  const Matches& matches;  // only the refiner may change the matches, and only their rays
+  const Matches& matches;   // only the refiner may change the matches, and only their rays
   double threshold;
   int32_t* indices;  // scratch, one entry a match
   double* values;    // scratch, one entry a match

@@ -36,8 +36,8 @@ struct TwoViewOutcome {
       rotation_inliers = -1;
   // Models and poses refer to cameras whose principal points are shifted by this.
   double principal_point_shift_px[2] = {0, 0};
-  double focal_scale = 0;  // of their focal lengths; 0 where they are as given
-  double focal_sigma = 0;  // its relative standard deviation, refined or given
+  double focal_scale = 0;                   // of their focal lengths; 0 where they are as given
+  double focal_sigma = 0;                   // its relative standard deviation, refined or given
   PrincipalPointTest principal_point_test;  // of a calibrated pose
   double rms_error_px = 0;
   uint8_t* inlier = nullptr;  // one flag for each match, repeats included
