@@ -1,7 +1,7 @@
 /* twoview: the geometry of two views from matched pixels.
 
    Formulas, papers, the rules of the verdict, and tests: docs/algorithms/two_view.md,
-   docs/algorithms/gravity.md, docs/algorithms/principal_point.md. */
+   docs/algorithms/gravity.md, docs/algorithms/principal_point.md, docs/algorithms/covariance.md. */
 #ifndef TWOVIEW_TWO_VIEW_H
 #define TWOVIEW_TWO_VIEW_H
 
@@ -255,9 +255,9 @@ typedef struct tv_two_view {
   double principal_point_asked_px[2];
   /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
   double principal_point_asked_covariance[3];
-  /* What the estimate multiplies fx and fy of both cameras by, where the focal length was refined
-     with the pose (focal_sigma0): all of the result refers to the cameras with it, which
-     tv_corrected_camera computes. 0 where the focal length is as given. */
+  /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
+     the focal length was refined with the pose (focal_sigma0): all of the result refers to the
+     cameras with it, which tv_corrected_camera computes. 0 where the focal length is as given. */
   double focal_scale;
   /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
      that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
