@@ -81,7 +81,9 @@ class tv_estimate_options(Structure):
                 ("confidence", c_double), ("max_iterations", c_int32),
                 ("fixed_iterations", c_int32), ("seed", c_uint64), ("gravity0", c_double * 3),
                 ("gravity1", c_double * 3), ("gravity_sigma_rad", c_double),
-                ("principal_point_sigma", c_double)]
+                ("principal_point_sigma", c_double),
+                ("focal_sigma0", c_double), ("focal_sigma1", c_double),
+                ("center_sigma0", c_double), ("center_sigma1", c_double)]
 
 
 class tv_two_view(Structure):
@@ -102,7 +104,8 @@ class tv_two_view(Structure):
                 ("principal_point_asked_px", c_double * 2),
                 ("principal_point_asked_covariance", c_double * 3),
                 ("probability_wrong", c_double), ("agreement", c_double),
-                ("region_shift_rad", c_double), ("num_places", c_int32), ("reserved", c_int32)]
+                ("region_shift_rad", c_double), ("num_places", c_int32), ("reserved", c_int32),
+                ("focal_scale", c_double), ("focal_sigma", c_double)]
 
 
 class tv_point(Structure):

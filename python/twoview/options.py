@@ -66,6 +66,12 @@ class EstimateOptions:
     gravity_sigma_rad: float = 0.0  #: standard deviation of gravity; 0: it is not used
     #: Standard deviation in focal lengths; 0: the principal point is exact and never moved.
     principal_point_sigma: float = 0.0
+    #: Relative standard deviations of the two cameras' focal lengths; 0: exact. Above 0.02, where
+    #: both cameras are equal, the focal length is refined with the pose (TwoView.focal_scale).
+    focal_sigma0: float = 0.0
+    focal_sigma1: float = 0.0
+    center_sigma0: float = 0.0  #: of the principal points, in focal lengths; 0: exact
+    center_sigma1: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -226,6 +226,11 @@ class TwoView:
     #: how far the rotation turns without the inliers of the image region that turns it most
     region_shift_rad: float
     num_places: int  #: cells of 32 pixels with an inlier, in the image with fewer of them
+    #: What fx and fy are multiplied by, where the focal length was refined with the pose; all
+    #: results then refer to the cameras with it. 0: as given.
+    focal_scale: float
+    #: Relative standard deviation of the focal length that the covariance contains. 0: exact.
+    focal_sigma: float
 
 
 def _two_view(found: Any) -> TwoView:
@@ -252,14 +257,17 @@ def _two_view(found: Any) -> TwoView:
         found.median_parallax_rad, found.rms_error_px, found.noise_px, found.seed,
         np.array(found.principal_point_shift), found.principal_point_chi2 if asked else None,
         matrix("principal_point_asked_px", asked, 2), covariance, found.probability_wrong,
-        found.agreement, found.region_shift_rad, found.num_places)
+        found.agreement, found.region_shift_rad, found.num_places, found.focal_scale,
+        found.focal_sigma)
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:
     """tv_corrected_camera: the camera that the results in `found` refer to. Use it in calls after
     the estimate."""
     shift = found.principal_point_shift
-    return replace(camera, cx=camera.cx + float(shift[0]), cy=camera.cy + float(shift[1]))
+    scale = found.focal_scale if found.focal_scale > 0 else 1.0
+    return replace(camera, fx=camera.fx * scale, fy=camera.fy * scale,
+                   cx=camera.cx + float(shift[0]), cy=camera.cy + float(shift[1]))
 
 
 def _pixels(pixels0: np.ndarray, pixels1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -78,8 +78,8 @@ CHANGES = [
     (
         "a field at the end of a growing struct",
         "two_view.h",
-        "  int32_t reserved;\n} tv_two_view;",
-        "  int32_t reserved;\n  double more;\n} tv_two_view;",
+        "double focal_sigma;",
+        "double focal_sigma;\n  double more;",
         False,
     ),
 ]

@@ -21,6 +21,12 @@ tv_estimate_options options_of(fuzz::Bytes& bytes) {
     for (double& g : options.gravity1) g = bytes.wild(-1, 1);
   }
   if (bytes.whole(0, 3) == 0) options.principal_point_sigma = bytes.wild(0, 0.1);
+  if (bytes.whole(0, 3) == 0) {
+    options.focal_sigma0 = bytes.wild(0, 0.5);
+    options.focal_sigma1 = bytes.wild(0, 0.5);
+    options.center_sigma0 = bytes.wild(0, 0.5);
+    options.center_sigma1 = bytes.wild(0, 0.5);
+  }
   return options;
 }
 
@@ -54,6 +60,8 @@ void require_sound(const tv_two_view& r, const uint8_t* mask, int count) {
   FUZZ_REQUIRE(fuzz::all_finite(r.alternative_R, 9) && fuzz::all_finite(r.alternative_t, 3));
   FUZZ_REQUIRE(fuzz::all_finite(r.covariance, 25));
   FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_shift, 2));
+  FUZZ_REQUIRE(r.focal_scale >= 0 && fuzz::all_finite(&r.focal_scale, 1));
+  FUZZ_REQUIRE(r.focal_sigma >= 0 && fuzz::all_finite(&r.focal_sigma, 1));
   FUZZ_REQUIRE(r.principal_point_chi2 >= 0 && fuzz::all_finite(&r.principal_point_chi2, 1));
   FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_asked_px, 2));
   FUZZ_REQUIRE(fuzz::all_finite(r.principal_point_asked_covariance, 3));

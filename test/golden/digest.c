@@ -29,8 +29,8 @@ LAYOUT(tv_correspondence, 16, ratio, 12);
 LAYOUT(tv_match_options, 16, max_distance, 12);
 LAYOUT(tv_guided_options, 20, neighbourhood_px, 16);
 LAYOUT(tv_camera, 112, k, 48);
-LAYOUT(tv_estimate_options, 104, principal_point_sigma, 96);
-LAYOUT(tv_two_view, 1000, num_places, 992);
+LAYOUT(tv_estimate_options, 136, center_sigma1, 128);
+LAYOUT(tv_two_view, 1016, focal_sigma, 1008);
 LAYOUT(tv_point, 40, reserved, 36);
 LAYOUT(tv_bundle_options, 24, hold_pose, 20);
 LAYOUT(tv_bundle_result, 256, noise_px, 248);
@@ -140,6 +140,8 @@ static void add_two_view(const tv_two_view *r) {
   add_doubles(r->principal_point_asked_px, 2);
   add_doubles(r->principal_point_asked_covariance, 3);
   add_doubles(&r->probability_wrong, 3); /* and agreement, region_shift_rad */
+  add_double(r->focal_scale);
+  add_double(r->focal_sigma);
 }
 
 static void add_points(const tv_point *points, int32_t count) {

@@ -1,7 +1,7 @@
 /* twoview: the geometry of two views from matched pixels.
 
    Formulas, papers, the rules of the verdict, and tests: docs/algorithms/two_view.md,
-   docs/algorithms/gravity.md, docs/algorithms/principal_point.md. */
+   docs/algorithms/gravity.md, docs/algorithms/principal_point.md, docs/algorithms/covariance.md. */
 #ifndef TWOVIEW_TWO_VIEW_H
 #define TWOVIEW_TWO_VIEW_H
 
@@ -165,6 +165,18 @@ typedef struct tv_estimate_options {
      doubtful. Used only when camera0 and camera1 are equal. The principal point is moved only if
      the matches contradict (cx, cy) at a significance of 0.001. */
   double principal_point_sigma;
+  /* How sure the focal lengths of camera0 and camera1 are: the standard deviation of fx and fy, one
+     factor for both, relative to them, [0, 0.5]. 0 (default): they are exact. The covariance grows
+     by what such errors make of the pose, to first order. Where camera0 and camera1 are equal, they
+     are one camera with one error, of the larger sigma; then, above 0.02, the focal length is also
+     refined with the pose, with this deviation as a prior (focal_scale), and the principal point is
+     not moved. 0.005 suits a calibration of unknown quality, 0.1 a focal length from a data
+     sheet. */
+  double focal_sigma0, focal_sigma1;
+  /* How sure (cx, cy) of camera0 and of camera1 are: the standard deviation of each coordinate, in
+     focal lengths, [0, 0.5]. 0 (default): they are exact. The covariance grows as for the focal
+     length; unlike principal_point_sigma, nothing is moved. */
+  double center_sigma0, center_sigma1;
 } tv_estimate_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -249,12 +261,12 @@ typedef struct tv_two_view {
   /* The covariance of principal_point_asked_px, in pixels^2: of x, of x and y, of y. */
   double principal_point_asked_covariance[3];
   /* The probability that the pose is wrong, [0, 1]. It is calibrated on real pairs for one event:
-     the rotation is off by more than 5 degrees (docs/verdict.md has the figures); the direction is
-     wrong more often, and how uncertain each is where the pose is right says the covariance. 1
-     where there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic
-     and no-motion. Pictures that match better when one is mirrored get at least 0.5. The next three
-     fields are the evidence that it is computed from, with noise_px, has_alternative and the
-     reasons second-motion and repeated-structure. */
+     the rotation is off by more than 5 degrees (docs/verdict.md has the figures). The direction is
+     wrong more often; the covariance says how uncertain both are where the pose is right. 1 where
+     there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic and
+     no-motion. It is at least 0.5 where tv_reconstruct finds a reason in the descriptors: a mirrored
+     image, or a second place that looks the same. The next three fields are the evidence that it is
+     computed from, with noise_px and has_alternative. */
   double probability_wrong;
   /* The share of the different matches that are inliers, each weighted by (1 - ratio)^2, [0, 1]:
      the matches with the most certain descriptors count most. */
@@ -268,6 +280,14 @@ typedef struct tv_two_view {
   int32_t num_places;
   /* Reserved, 0. */
   int32_t reserved;
+  /* The factor, without a unit, by which the estimate multiplies fx and fy of both cameras, where
+     the focal length was refined with the pose (focal_sigma0): all of the result refers to the
+     cameras with it, which tv_corrected_camera computes. 0 where the focal length is as given. */
+  double focal_scale;
+  /* The relative standard deviation of the focal length (of camera0's, where the cameras differ)
+     that the covariance contains: what the matches leave of focal_sigma0 where it was refined, else
+     focal_sigma0 as given. 0 where it is taken as exact, or there is no covariance. */
+  double focal_sigma;
 } tv_two_view;
 
 /* Writes zeros into a struct of struct_size bytes, and the size; null is allowed. Programs call
@@ -277,7 +297,8 @@ TV_API void tv_two_view_init_sized(tv_two_view *result, size_t struct_size);
 #define tv_two_view_init(result) tv_two_view_init_sized((result), sizeof *(result))
 
 /* Writes to `corrected` the camera that the result refers to: `camera` with the result's
-   principal_point_shift added to cx and cy. Use it for what follows the estimate: triangulation,
+   principal_point_shift added to cx and cy, and with fx and fy multiplied by its focal_scale where
+   that is above 0. Use it for what follows the estimate: triangulation,
    guided matching and bundle adjustment. `corrected` may be `camera` itself.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE. Thread-safe. */
 TV_API tv_status tv_corrected_camera(const tv_two_view *result, const tv_camera *camera,

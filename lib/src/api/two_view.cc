@@ -11,6 +11,7 @@
 #include "api/validate.h"
 #include "base/math.h"
 #include "robust/covariance.h"
+#include "robust/place_focal_length.h"
 #include "robust/two_view.h"
 
 namespace tv {
@@ -28,6 +29,10 @@ constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            {0, 0, 0},
                                            {0, 0, 0},
                                            0,
+                                           0,
+                                           0,
+                                           0,
+                                           0,
                                            0};
 
 // Checks the directions of gravity, where they are used: finite and not zero, with a standard
@@ -42,6 +47,16 @@ tv_status check_gravity(const tv_estimate_options& options) {
   }
   const bool in_range = options.gravity_sigma_rad > 0 && options.gravity_sigma_rad <= kPi;
   return in_range && !zero ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+// Checks the standard deviations of the cameras, each in [0, 0.5].
+tv_status check_calibration_sigmas(const tv_estimate_options& options) {
+  for (const double sigma :
+       {options.focal_sigma0, options.focal_sigma1, options.center_sigma0, options.center_sigma1}) {
+    if (!is_finite(sigma)) return TV_ERR_NOT_FINITE;
+    if (!(sigma >= 0 && sigma <= 0.5)) return TV_ERR_ARGUMENT;
+  }
+  return TV_OK;
 }
 
 tv_status read_estimate_options(const tv_estimate_options* options, bool calibrated,
@@ -68,7 +83,8 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
                             (checked->method == TV_SOLVER_FIVE_POINT && calibrated) ||
                             (checked->method == TV_SOLVER_UPRIGHT && calibrated && with_gravity);
   if (!in_range || !method_known) return TV_ERR_ARGUMENT;
-  return check_gravity(*checked);
+  const tv_status sigmas = check_calibration_sigmas(*checked);
+  return sigmas != TV_OK ? sigmas : check_gravity(*checked);
 }
 
 uint32_t bits_of(float x) {
@@ -195,6 +211,11 @@ __attribute__((noinline)) void pack(const TwoViewProblem& problem, const Matches
     std::memcpy(packed.principal_point_asked_covariance, test.covariance, sizeof test.covariance);
   }
   packed.coverage = coverage_of(outcome.evidence);
+  packed.focal_scale = outcome.focal_scale;
+  packed.focal_sigma = outcome.focal_sigma;
+  if (outcome.has_covariance && !problem.one_camera) {
+    packed.focal_sigma = swapped ? problem.options.focal_sigma1 : problem.options.focal_sigma0;
+  }
   const Pose& pose = outcome.epipolar.pose;
   packed.has_R = outcome.has_R;
   packed.has_t = outcome.has_t;
@@ -286,6 +307,11 @@ tv_status tv_corrected_camera(const tv_two_view* result, const tv_camera* camera
   }
   corrected->cx += shift[0];
   corrected->cy += shift[1];
+  if (result->struct_size >= offsetof(tv_two_view, focal_scale) + sizeof(double) &&
+      result->focal_scale > 0) {
+    corrected->fx *= result->focal_scale;
+    corrected->fy *= result->focal_scale;
+  }
   return TV_OK;
 }
 
@@ -332,6 +358,13 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     swapped = tv::exchanged(camera0, camera1, problem);
     problem.calibrated = calibrated;
     problem.one_camera = calibrated && std::memcmp(camera0, camera1, sizeof *camera0) == 0;
+    tv_estimate_options& o = problem.options;
+    if (problem.one_camera) {
+      o.focal_sigma0 = o.focal_sigma1 =
+          o.focal_sigma0 > o.focal_sigma1 ? o.focal_sigma0 : o.focal_sigma1;
+      o.center_sigma0 = o.center_sigma1 =
+          o.center_sigma0 > o.center_sigma1 ? o.center_sigma0 : o.center_sigma1;
+    }
     if (calibrated) {
       problem.camera[0] = tv::prepare_camera(swapped ? *camera1 : *camera0);
       problem.camera[1] = tv::prepare_camera(swapped ? *camera0 : *camera1);
@@ -339,11 +372,17 @@ tv_status tv_estimate_two_view(tv_context* context, const tv_camera* camera0,
     if (swapped) {
       std::swap(problem.pixels[0], problem.pixels[1]);
       std::swap(problem.sigmas[0], problem.sigmas[1]);
-      std::swap(problem.options.gravity0, problem.options.gravity1);
+      std::swap(o.gravity0, o.gravity1);
+      std::swap(o.focal_sigma0, o.focal_sigma1);
+      std::swap(o.center_sigma0, o.center_sigma1);
     }
     problem.kernels = context->kernels;
     tv::prepare_matches(problem, context->arena, &matches);
-    tv::search_two_view(problem, matches, context->arena, &model);
+    if (calibrated && tv::has_uncertain_focal_length(problem)) {
+      tv::search_focal_length(problem, &matches, context->arena, &model);
+    } else {
+      tv::search_two_view(problem, matches, context->arena, &model);
+    }
   }
   tv::StageTimer timer(context, TV_STAGE_REFINE);
   tv::TwoViewOutcome outcome{};

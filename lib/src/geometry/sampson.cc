@@ -58,7 +58,7 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M) {
 }
 
 bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
-                    const double sigmas[2], SampsonSlopes* slopes) {
+                    const double sigmas[2], SampsonSlopes* slopes, SampsonViewSlopes* of_views) {
   Epipolar e;
   epipolar(pairs, i, M, &e);
   if (!(e.n > 0)) return false;
@@ -94,6 +94,21 @@ bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double cu
                         (bend1[0] * e.s1[0] + bend1[1] * e.s1[1]) * e.line1[r]);
     }
     slopes->by_point[k] = inverse * slope;
+  }
+  if (of_views == nullptr) return true;
+  for (int v = 0; v < 2; ++v) {
+    const double *const s = v == 0 ? e.s0 : e.s1, *const line = (v == 0 ? e.line0 : e.line1).data();
+    of_views->by_scale[v] = slopes->residual * (s[0] * s[0] + s[1] * s[1]) / e.n;
+    for (int k = 0; k < 2; ++k) {
+      double slope = 0;
+      for (int r = 0; r < 3; ++r) {
+        slope -= pairs.jacobian[v][2 * r + k][i] * along[v][r];
+        if (curvature == nullptr) continue;
+        const double* const bend = curvature[v] + 3 * r + k;
+        slope += share * (bend[0] * s[0] + bend[1] * s[1]) * line[r];
+      }
+      of_views->by_view[v][k] = inverse * slope;
+    }
   }
   return true;
 }

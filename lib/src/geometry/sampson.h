@@ -29,9 +29,16 @@ double sampson_sq(const RayPairs& pairs, int i, const Mat3& M);
 struct SampsonSlopes {
   double residual, by_entry[9], by_point[2];
 };
+// The slopes by x and y of each view's own principal point, in pixels, and by the logarithm of each
+// view's focal length, of which only the part that comes from the Jacobian's scale, J ~ 1 / f, is
+// in by_scale: the ray's own part is by_view . (pixel - principal point).
+struct SampsonViewSlopes {
+  double by_view[2][2], by_scale[2];
+};
 // Returns false where both rays of the match lie at the epipoles.
 bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double curvature[2][9],
-                    const double sigmas[2], SampsonSlopes* slopes);
+                    const double sigmas[2], SampsonSlopes* slopes,
+                    SampsonViewSlopes* of_views = nullptr);
 
 // Computes sampson_sq of the matches first .. first + count - 1, or of those listed.
 void sampson_squares(const RayPairs& pairs, int first, int count, const Mat3& M, double* squares);

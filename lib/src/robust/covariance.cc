@@ -21,9 +21,9 @@ constexpr double kVarianceOfCauchy = 1.1484187788317, kVarianceOnPlane = 1.0919;
 constexpr double kLeastResidual = 0.05;  // least deviation of a residual, in scales of the loss
 constexpr int kChunk = 64;               // matches that are handled at a time, on the stack
 
-// Sums over the matches of psi^2, psi' and psi'^2.
+// Sums over the matches of psi^2, psi', psi'^2 and the weight.
 struct LossSums {
-  double psi_sq = 0, slope = 0, slope_sq = 0;
+  double psi_sq = 0, slope = 0, slope_sq = 0, weight = 0;
 };
 
 // Huber's variance for n residuals of `dimensions` each and p parameters; negative where the mean
@@ -57,6 +57,12 @@ void multiply5(const double A[25], const double B[25], double C[25]) {
 
 }  // namespace
 
+double largest_sigma(const double covariance[25]) {
+  const double rotation = covariance[0] + covariance[6] + covariance[12];
+  const double direction = covariance[18] + covariance[24];
+  return std::sqrt(std::max(rotation, direction));
+}
+
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                       double scale_px, double limit_px, PoseUncertainty* uncertainty) {
   constexpr int P = PoseModel::kParameters;
@@ -76,6 +82,7 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
       sums.psi_sq += squares[k] * weight * weight;
       sums.slope += slope;
       sums.slope_sq += slope * slope;
+      sums.weight += weight;
     }
   }
   const double uncut = variance_of(sums, count, 1, P, scale_px, 0);
@@ -87,6 +94,8 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   const double variance = variance_of(sums, count, 1, P, scale_px, cut_slope);
   uncertainty->noise_px = noise_px;
   uncertainty->variance_px = variance;
+  uncertainty->mean_weight = sums.weight / count;
+  uncertainty->mean_slope = sums.slope / count - cut_slope;
   if (!(variance > 0)) return false;
   // A = J' J holds J at the noisy pixels. A0, without what the noise adds to it, is the information
   // of the points' motion alone: C = A0^-1 A A0^-1.
@@ -129,12 +138,15 @@ bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
     sums.psi_sq += r_sq * slope;
     sums.slope += slope;
     sums.slope_sq += slope * slope;
+    sums.weight += weight;
   }
   const double variance = variance_of(sums, count, 2, P, scale_px, 0);
   for (int r = 0; r < 5; ++r) {
     for (int c = 0; c < 5; ++c) uncertainty->covariance[5 * r + c] = variance * inverse[P * r + c];
   }
   uncertainty->variance_px = variance;
+  uncertainty->mean_weight = sums.weight / count;
+  uncertainty->mean_slope = sums.slope / count;
   uncertainty->noise_px = std::sqrt(std::max(variance, 0.0) / kVarianceOnPlane);
   return variance > 0 && all_finite(uncertainty->covariance, 25);
 }

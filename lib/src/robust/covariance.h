@@ -10,7 +10,15 @@ struct PoseUncertainty {
   double covariance[25];  // in the parameters (w, a, b) of PoseModel
   double noise_px;        // standard deviation of a pixel's coordinate
   double variance_px;  // variance of the M-estimate for a residual: C = variance_px (J' J)^-1, px^2
+  double mean_weight, mean_slope;  // means of the loss's weight and of psi' over the matches
+  double focal_sigma;  // relative standard deviation of a refined focal length; else the given one
+  double sigma_rad;    // of the verdict: largest_sigma before errors that matches share
+                       // and a calibration that is not refined are added
 };
+
+// An upper bound of the standard deviations of the rotation and of the direction about any axis:
+// the root of the larger trace of their two blocks.
+double largest_sigma(const double covariance[25]);
 
 // The covariance of the M-estimate that minimises Cauchy's loss with scale_px over the listed
 // matches (P. Huber, "Robust Statistics", 1981, 7.6): with psi the derivative of the loss and p = 5

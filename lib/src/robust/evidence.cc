@@ -28,14 +28,6 @@ double pseudo_angle(const Fit& f, int i) {
 
 double angle_of_pseudo(double p) { return p < 1 ? atan2(p, 1 - p) : atan2(2 - p, 1 - p); }
 
-// An upper bound of the standard deviations of the rotation and of the direction about any axis:
-// the root of the larger trace of their two blocks.
-double largest_sigma(const double covariance[25]) {
-  const double rotation = covariance[0] + covariance[6] + covariance[12];
-  const double direction = covariance[18] + covariance[24];
-  return std::sqrt(std::max(rotation, direction));
-}
-
 // The distance of the support's rays of one view from the plane nearest to them, root mean square,
 // in pixels: small for the rays of points on a line.
 double line_distance_px(const Fit& f, int view) {
@@ -209,7 +201,6 @@ double region_shift_rad(Fit& f) {
 void measure_pose(Fit& f) {
   Evidence& evidence = f.out->evidence;
   double sum = 0, weights = 0;
-  if (f.out->has_covariance) evidence.sigma_rad = largest_sigma(f.out->covariance);
   if (f.num_support == 0) return;
   for (int k = 0; k < f.num_support; ++k) {
     f.values[k] = pseudo_angle(f, f.support[k]);

@@ -8,6 +8,8 @@
 #include "geometry/parallax.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/calibration.h"
+#include "robust/correlation.h"
 #include "robust/estimators.h"
 #include "robust/ldlt.h"
 #include "robust/refine.h"
@@ -35,6 +37,13 @@ constexpr int kParallaxSample = 128;  // matches that the quantile is computed f
 constexpr double kScales[] = {1, 1.5, 2, 3};
 constexpr double kLargestScale = 2;  // largest scale of the loss, in thresholds
 constexpr double kMostStretch = 1.5;
+
+// The matches' information on the focal length is divided by this: a lens, a rolling shutter and
+// wrong matches move it by more than the spread of the residuals tells.
+constexpr double kFocalShare = 4;
+// What is left of a refined focal length's variance at the least, over that of its prior: three
+// tenths of the standard deviation.
+constexpr double kFocalFloor = 0.09;
 
 // The relative gain of the cost at which each round stops. The pose of the first round only serves
 // to select the near matches and to estimate the noise. A step that gains less than a millionth of
@@ -108,13 +117,19 @@ Pose refined_with(const PoseRefiner& f, const Pose& start, const GravityPrior& g
   return model.pose;
 }
 
-// The uncertainty of a pose that was refined without gravity.
+// The matches that an uncertainty is computed from: f.indices[0 .. count), and their loss.
+struct Listed {
+  int count;
+  RobustLoss loss;
+};
+
+// The uncertainty of a pose that was refined without gravity, from the matches' own noise.
 bool uncertainty_without_gravity(const PoseRefiner& f, const Pose& pose,
-                                 PoseUncertainty* uncertainty) {
+                                 PoseUncertainty* uncertainty, Listed* listed) {
   const int count = near_pose(f, pose);
-  const double scale = final_loss(f, essential_from_pose(pose), count).scale_px;
-  if (!pose_uncertainty(f.matches.pairs, f.indices, count, pose, scale, kFinalNear * f.threshold_px,
-                        uncertainty)) {
+  *listed = Listed{count, final_loss(f, essential_from_pose(pose), count)};
+  if (!pose_uncertainty(f.matches.pairs, f.indices, count, pose, listed->loss.scale_px,
+                        kFinalNear * f.threshold_px, uncertainty)) {
     return false;
   }
   if (!f.principal_point.is_free) return true;
@@ -129,7 +144,8 @@ GravityPrior tested_gravity(const PoseRefiner& f, const Pose& start) {
   if (!gravity.known) return gravity;
   const Pose alone = refined_with(f, start, GravityPrior{});
   PoseUncertainty uncertainty;
-  if (uncertainty_without_gravity(f, alone, &uncertainty)) {
+  Listed listed;
+  if (uncertainty_without_gravity(f, alone, &uncertainty, &listed)) {
     gravity.weight = gravity_weight(gravity, alone.R, uncertainty.covariance);
   }
   return gravity;
@@ -258,11 +274,78 @@ bool move_together(const PoseRefiner& f, Pose* pose, double shift_px[2]) {
   return true;
 }
 
+bool step_focal_length(const PoseRefiner& f, double* growth, Pose* pose, double* step) {
+  constexpr int kNum = PoseModel::kParameters + 1;
+  constexpr double kStays = 0.64;  // the share of the prior's variance that is left
+  const double sigma = f.problem.options.focal_sigma0, log_scale = f.problem.focal_log_scale;
+  const GravityPrior gravity = tested_gravity(f, *pose);
+  if (*growth == 0) {
+    PoseUncertainty uncertainty;
+    Listed listed;
+    if (!uncertainty_without_gravity(f, *pose, &uncertainty, &listed)) return false;
+    *growth = add_correlation(f, listed.count, PoseModel{*pose}, listed.loss, uncertainty,
+                              uncertainty.covariance);
+  }
+  const int count = near_pose(f, *pose);
+  if (count <= kNum) return false;
+  const BestLoss best = best_loss(f, essential_from_pose(*pose), count);
+  const double noise_px = std::max(best.taken, 0.02 * f.threshold_px);
+  CalibrationEquations e;
+  CalibrationSlopes slopes;
+  double gradient[kNum], of_pose[15], upper[kNum * (kNum + 1) / 2], steps[kNum], information;
+  calibration_equations(f, count, *pose, best.loss, &e);
+  if (!pose_slopes(f.problem, e, &slopes, &information)) return false;
+  GravityPoseModel{*pose, &gravity, noise_px}.normal_equations(f.matches.pairs, f.indices, count,
+                                                               best.loss, of_pose, gradient);
+  const double prior = kFocalShare * *growth * noise_px * noise_px / (sigma * sigma);
+  if (log_scale == 0 && !(prior < kStays * (prior + information))) return false;
+  for (int r = 0, slot = 0, from = 0; r < PoseModel::kParameters; ++r) {
+    for (int c = r; c < PoseModel::kParameters; ++c) upper[slot++] = of_pose[from++];
+    upper[slot++] = e.with_pose[0][r] + e.with_pose[kOfView][r];
+  }
+  upper[kNum * (kNum + 1) / 2 - 1] = e.focal_sq + prior;
+  gradient[kNum - 1] = e.focal_gradient + prior * log_scale;
+  if (!solve_damped(kNum, upper, gradient, 0, steps)) return false;
+  *pose = PoseModel{*pose}.stepped(steps).pose;
+  *step = steps[kNum - 1];
+  return true;
+}
+
 bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* uncertainty) {
   const GravityPrior gravity = tested_gravity(f, pose);
-  if (!uncertainty_without_gravity(f, pose, uncertainty)) return false;
-  if (gravity.known) add_gravity_information(gravity, pose.R, uncertainty->covariance);
-  return true;
+  Listed listed;
+  double *const noise = uncertainty->covariance, all[25];
+  if (f.problem.focal_is_ambiguous) return false;
+  if (!uncertainty_without_gravity(f, pose, uncertainty, &listed)) return false;
+  std::copy(noise, noise + 25, all);
+  const double growth =
+      add_correlation(f, listed.count, PoseModel{pose}, listed.loss, *uncertainty, all);
+  const double sigma = f.problem.options.focal_sigma0;
+  uncertainty->focal_sigma = sigma;
+  CalibrationEquations e;
+  CalibrationSlopes slopes;
+  double information;
+  if (has_calibration_sigmas(f.problem)) {
+    calibration_equations(f, listed.count, pose, listed.loss, &e);
+    if (!pose_slopes(f.problem, e, &slopes, &information)) return false;
+    double variance = -1;
+    if (f.focal_is_free) {
+      const double of_matches = information / (kFocalShare * growth * uncertainty->mean_weight *
+                                               uncertainty->variance_px);
+      variance = std::min(1 / (of_matches + 1 / (sigma * sigma)) + kFocalFloor * (sigma * sigma),
+                          sigma * sigma);
+      add_calibration(f.problem, slopes, variance, true, noise);
+      uncertainty->focal_sigma = std::sqrt(variance);
+    }
+    add_calibration(f.problem, slopes, variance, false, all);
+  }
+  if (gravity.known) {
+    add_gravity_information(gravity, pose.R, noise);
+    add_gravity_information(gravity, pose.R, all);
+  }
+  uncertainty->sigma_rad = largest_sigma(noise);
+  std::copy(all, all + 25, noise);
+  return all_finite(noise, 25);
 }
 
 int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, PlaneFit* fit) {
@@ -281,17 +364,36 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
   count = near_plane(f, model.matrix());
   if (count < 8) return 0;
   double from_gravity[2] = {};
+  PlaneModel twins[2];
   for (int k = 0; k < num; ++k) {
-    const PlaneModel twin{planar[k].pose, planar[k].baseline_over_depth * planar[k].normal};
-    fit->pose[k] = twin.pose;
-    fit->certain[k] = plane_uncertainty(f.matches.pairs, f.indices, count, twin, loss.scale_px,
+    twins[k] = PlaneModel{planar[k].pose, planar[k].baseline_over_depth * planar[k].normal};
+    fit->pose[k] = twins[k].pose;
+    fit->certain[k] = plane_uncertainty(f.matches.pairs, f.indices, count, twins[k], loss.scale_px,
                                         &fit->uncertainty[k]);
-    if (!f.gravity.known || !fit->certain[k]) continue;
-    GravityPrior gravity = f.gravity;
-    double* covariance = fit->uncertainty[k].covariance;
-    from_gravity[k] = gravity_distance_sq(gravity, twin.pose.R, covariance);
-    gravity.weight = gravity_weight(gravity, twin.pose.R, covariance);
-    add_gravity(gravity, &fit->pose[k], covariance);
+  }
+  for (int k = 0; k < num; ++k) {
+    if (!fit->certain[k]) continue;
+    PoseUncertainty& uncertainty = fit->uncertainty[k];
+    double *const noise = uncertainty.covariance, all[25];
+    std::copy(noise, noise + 25, all);
+    add_correlation(f, count, twins[k], loss, uncertainty, all);
+    uncertainty.focal_sigma = f.problem.options.focal_sigma0;
+    if (has_calibration_sigmas(f.problem)) {
+      CalibrationSlopes slopes;
+      plane_slopes(f.problem, twins[k].matrix(), mean_ray0, twins[k].pose, &slopes);
+      add_calibration(f.problem, slopes, -1, false, all);
+    }
+    if (f.gravity.known) {
+      GravityPrior gravity = f.gravity;
+      from_gravity[k] = gravity_distance_sq(gravity, twins[k].pose.R, noise);
+      gravity.weight = gravity_weight(gravity, twins[k].pose.R, noise);
+      Pose with_all = fit->pose[k];
+      add_gravity(gravity, &fit->pose[k], noise);
+      add_gravity(gravity, &with_all, all);
+    }
+    uncertainty.sigma_rad = largest_sigma(noise);
+    std::copy(all, all + 25, noise);
+    fit->certain[k] = all_finite(noise, 25);
   }
   // If gravity contradicts one of the two motions and not the other, only the other is returned.
   for (int k = 0; k < num && num == 2; ++k) {

@@ -3,22 +3,9 @@
 #pragma once
 
 #include "robust/covariance.h"
-#include "robust/gravity.h"
-#include "robust/principal_point.h"
+#include "robust/pose_refiner.h"
 
 namespace tv {
-
-// What the refinement works on. The functions below do not change the matches; only
-// place_principal_point moves their rays.
-struct PoseRefiner {
-  const TwoViewProblem& problem;
-  Matches& matches;
-  double threshold_px;
-  GravityPrior gravity;
-  PrincipalPoint principal_point;  // the one that the matches' rays were computed with
-  int32_t* indices;                // scratch, one entry a match
-  double* values;                  // scratch, one entry a match
-};
 
 // The pose that minimises Cauchy's loss over the matches near the epipolar lines, with gravity as a
 // prior where it is known.
@@ -34,8 +21,16 @@ bool principal_point_is_off(const PoseRefiner& refiner, const Pose& pose, const 
 // determined.
 bool move_together(const PoseRefiner& refiner, Pose* pose, double shift_px[2]);
 
+// One Gauss-Newton step of the pose and the logarithm of the focal length together, with the
+// options' deviation as its prior. growth: by how much the matches'
+// covariance grows through shared errors; 0 in the first call, which computes it. The caller then
+// moves the rays by *step. False, and nothing is changed, where the step is not determined, or
+// where the matches would not lower the deviation by a fifth.
+bool step_focal_length(const PoseRefiner& refiner, double* growth, Pose* pose, double* step);
+
 // The covariance of a refined pose and the noise of a pixel. It includes the uncertainty of a
-// principal point that is free. False when the pose is not determined.
+// principal point and a focal length that are free, the errors that matches share, and the sigmas
+// of the calibration. False when the pose is not determined.
 bool uncertainty_of(const PoseRefiner& refiner, const Pose& pose, PoseUncertainty* uncertainty);
 
 // The two motions of a plane that explains nearly all matches, refined together with the plane:

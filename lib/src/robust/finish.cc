@@ -8,6 +8,7 @@
 #include "robust/evidence.h"
 #include "robust/fit.h"
 #include "robust/kind.h"
+#include "robust/place_focal_length.h"
 #include "robust/place_principal_point.h"
 #include "robust/planar_pose.h"
 #include "robust/refine.h"
@@ -42,6 +43,7 @@ void refine_epipolar(Fit& f) {
   EpipolarModel& epipolar = f.out->epipolar;
   if (epipolar.has_pose) {
     epipolar.pose = refined_pose(f.refiner, epipolar.pose);
+    place_focal_length(f);
     place_principal_point(f);
     epipolar.M = essential_from_pose(epipolar.pose);
   } else {
@@ -52,7 +54,7 @@ void refine_epipolar(Fit& f) {
 
 }  // namespace
 
-void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
+void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
                      Matches* all_matches, TwoViewOutcome* outcome) {
   Matches& matches = *all_matches;
   const size_t n = static_cast<size_t>(matches.num_all);
@@ -63,12 +65,15 @@ void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, A
   int32_t* indices = arena_alloc<int32_t>(arena, n);
   double* values = arena_alloc<double>(arena, n);
   int32_t* support = arena_alloc<int32_t>(arena, n);
-  Fit f{
-      problem,   matches,
-      threshold, indices,
-      values,    support,
-      0,         PoseRefiner{problem, matches, threshold, gravity_of(problem), {}, indices, values},
-      outcome};
+  Fit f{problem,
+        matches,
+        threshold,
+        indices,
+        values,
+        support,
+        0,
+        PoseRefiner{problem, matches, threshold, gravity_of(problem), {}, indices, values, false},
+        outcome};
   TwoViewOutcome& out = *outcome;
   out.epipolar = model.epipolar;
   if (out.epipolar.found) {

@@ -26,6 +26,8 @@ void collect_support(Fit& f) {
 void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out) {
   out->has_covariance = true;
   out->evidence.noise_px = uncertainty.noise_px;
+  out->focal_sigma = uncertainty.focal_sigma;
+  out->evidence.sigma_rad = uncertainty.sigma_rad;
   std::copy(uncertainty.covariance, uncertainty.covariance + 25, out->covariance);
 }
 

@@ -8,8 +8,8 @@
 namespace tv {
 
 struct Fit {
-  const TwoViewProblem& problem;
-  const Matches& matches;  // only the refiner may change the matches, and only their rays
+  TwoViewProblem& problem;  // only place_focal_length changes it, and only its cameras
+  const Matches& matches;   // only the refiner may change the matches, and only their rays
   double threshold;
   int32_t* indices;  // scratch, one entry a match
   double* values;    // scratch, one entry a match

@@ -17,6 +17,8 @@ struct TwoViewProblem {
   const float* sigmas[2];   // tv_pixel_pairs.sigmas0 and sigmas1; null: 1 for all
   int num;
   tv_estimate_options options;
+  double focal_log_scale;    // logarithm of the cameras' focal length over the given one
+  bool focal_is_ambiguous;   // whether two directions of motion fit, each at its own focal length
   const tvk_table* kernels;  // null: the kernels of the base ISA
   double sigma(int view, int32_t i) const { return sigma_at(sigmas[view], i); }
 };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robust/calibration.h"
+
 namespace tv {
 
 void place_principal_point(Fit& f) {
@@ -11,7 +13,9 @@ void place_principal_point(Fit& f) {
   Pose& pose = f.out->epipolar.pose;
   PrincipalPoint& point = f.refiner.principal_point;
   const tv_camera& camera = f.problem.camera[0].model;
-  const double sigma = f.problem.options.principal_point_sigma;
+  // Where the focal length is uncertain, the principal point does not move in its stead.
+  const tv_estimate_options& options = f.problem.options;
+  const double sigma = options.focal_sigma0 > kUncertainFocal ? 0 : options.principal_point_sigma;
   if (!f.problem.one_camera) return;
   point.sigma_px[0] = sigma * camera.fx;
   point.sigma_px[1] = sigma * camera.fy;

@@ -36,6 +36,8 @@ struct TwoViewOutcome {
       rotation_inliers = -1;
   // Models and poses refer to cameras whose principal points are shifted by this.
   double principal_point_shift_px[2] = {0, 0};
+  double focal_scale = 0;                   // of their focal lengths; 0 where they are as given
+  double focal_sigma = 0;                   // its relative standard deviation, refined or given
   PrincipalPointTest principal_point_test;  // of a calibrated pose
   double rms_error_px = 0;
   uint8_t* inlier = nullptr;  // one flag for each match, repeats included
@@ -56,8 +58,8 @@ void search_two_view(const TwoViewProblem& problem, const Matches& matches, Aren
 
 // Refinement on all inliers, rivals, verdict, covariance (TV_STAGE_REFINE). *outcome is given as
 // TwoViewOutcome{}; outcome->inlier will lie in the arena. The rays of the matches move with the
-// principal point.
-void finish_two_view(const TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
+// principal point, and rays and the problem's cameras with the focal length.
+void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& arena,
                      Matches* matches, TwoViewOutcome* outcome);
 
 }  // namespace tv

@@ -85,6 +85,18 @@ tv_camera load_camera(const std::string& path) {
   return parse_camera(read_file(path, kMaxFileBytes), path);
 }
 
+CalibrationSigmas load_sigmas(const std::string& path) {
+  const YAML::Node root = parse_yaml(read_file(path, kMaxFileBytes), path);
+  CalibrationSigmas sigmas = kPlainFile;
+  for (auto [name, value] :
+       {std::pair{"focal_sigma", &sigmas.focal}, std::pair{"center_sigma", &sigmas.center}}) {
+    if (!root[name]) continue;
+    *value = number_at(root, name, path);
+    if (!(*value >= 0 && *value <= 0.5)) throw BadInput(path + ": " + name + " is not in [0, 0.5]");
+  }
+  return sigmas;
+}
+
 tv_camera film_camera(double focal_35mm, int width, int height) {
   tv_camera camera{};
   camera.model = TV_CAMERA_PINHOLE;

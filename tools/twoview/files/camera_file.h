@@ -12,6 +12,19 @@ namespace cli {
 // missing, zero, not finite, or of the wrong length.
 tv_camera load_camera(const std::string& path);
 
+// How sure a calibration is: relative standard deviation of the focal length, and standard
+// deviation of the principal point in focal lengths.
+struct CalibrationSigmas {
+  double focal, center;
+};
+// Of a camera file that does not say how sure it is, measured on the data sets' calibrations
+// (docs/decisions/0024-honest-covariance.md), and of a focal length as for 35 mm film.
+inline constexpr CalibrationSigmas kPlainFile{0.01, 0.005}, kFilm{0.1, 0.01};
+
+// Reads the entries focal_sigma and center_sigma of a camera file, each in [0, 0.5]; kPlainFile's
+// where one is missing. Throws BadInput as load_camera does.
+CalibrationSigmas load_sigmas(const std::string& path);
+
 // Parses the text of a camera file; `name` is used in messages.
 tv_camera parse_camera(const std::string& text, const std::string& name);
 

@@ -102,6 +102,12 @@ std::vector<Option> table(Options& o) {
       {"gravity1", kGravity, Direction{e.gravity1}, 0, 0, closed, "the same of the second"},
       {"gravity-sigma-deg", kGravity, &o.gravity_sigma_deg, 0, 180, closed,
        "standard deviation of each direction about each axis across it; 0: not known"},
+      {"focal-sigma", kGravity, &o.focal_sigma, -1, 0.5, closed,
+       "relative standard deviation of the focal length; above 0.02 it is refined with the pose; "
+       "0: exact; -1: what the camera file says, else 0.01, with --focal-35mm 0.1"},
+      {"center-sigma", kGravity, &o.center_sigma, -1, 0.5, closed,
+       "standard deviation of the principal point in focal lengths; 0: exact; -1: what the camera "
+       "file says, else 0.005, with --focal-35mm 0.01"},
       {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations}, 0, 0, closed,
        "method"},
       {"kernels", kCommon, Choice{&o.kernels, &kKernels}, 0, 0, closed, "kernel set"},

@@ -22,6 +22,8 @@ struct Options {
   int32_t kernels = TV_KERNELS_AUTO;
   int32_t resize = 0;  // longer side of the resized images, pixels; 0: not resized
   bool min_threshold_given = false;
+  // Of the calibration (tv_estimate_options); below 0: what the camera file says.
+  double focal_sigma = -1, center_sigma = -1;
   double gravity_sigma_deg = 0;  // settle() copies it, in radians, to `estimate`
 
   Options();

@@ -144,6 +144,15 @@ Json principal_point_json(const tv_two_view& v) {
           {"shift_px", numbers_or_null(v.principal_point_shift, 2, true)}};
 }
 
+bool focal_length_is_uncertain(const tv_two_view& v) { return v.focal_sigma > 0.02; }
+
+Json focal_length_json(const tv_two_view& v) {
+  if (!(v.focal_sigma > 0)) return nullptr;
+  return {{"scale", v.focal_scale > 0 ? v.focal_scale : 1.0},
+          {"sigma", v.focal_sigma},
+          {"uncertain", focal_length_is_uncertain(v)}};
+}
+
 Json result_json(const Outcome& outcome) {
   const tv_two_view& v = outcome.two_view;
   const tv_reconstruction& r = outcome.reconstruction;
@@ -185,6 +194,7 @@ Json result_json(const Outcome& outcome) {
   json["principal_point_shift_px"] =
       numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
   json["principal_point"] = outcome.has_cameras ? principal_point_json(v) : Json(nullptr);
+  json["focal_length"] = focal_length_json(v);
   json["num_points"] = r.num_points;
   json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)

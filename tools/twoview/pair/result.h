@@ -64,6 +64,13 @@ nlohmann::ordered_json result_json(const Outcome& outcome);
 // known) and `shift_px`.
 nlohmann::ordered_json principal_point_json(const tv_two_view& two_view);
 
+// Whether the covariance contains a focal length that is uncertain by more than 2 per cent.
+bool focal_length_is_uncertain(const tv_two_view& two_view);
+
+// `scale` (1 where it is as given), `sigma` and `uncertain` of the focal length; null where it is
+// taken as exact.
+nlohmann::ordered_json focal_length_json(const tv_two_view& two_view);
+
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.
 std::string reasons_in_words(uint32_t reasons);
 std::string kind_in_words(int32_t kind);

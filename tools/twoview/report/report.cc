@@ -68,6 +68,9 @@ std::string cards(const Outcome& outcome) {
   if (shift[0] != 0 || shift[1] != 0)
     text += card(formatted("%+.1f, ", shift[0]) + formatted("%+.1f", shift[1]), "px",
                  "the principal point is off; pose and points are of the corrected camera");
+  if (focal_length_is_uncertain(outcome.two_view))
+    text += card(formatted("%.1f", 100 * outcome.two_view.focal_sigma), "%",
+                 "focal length uncertain: calibrate the camera");
   const Json& truth = j["truth"];
   if (truth.is_object()) {
     text += card(number_of(truth["rotation_error_deg"], "%.3f"), "deg", "rotation error");

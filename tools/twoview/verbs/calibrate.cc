@@ -250,6 +250,18 @@ Json calibration_json(const std::vector<BoardView>& views, const Calibration& c,
   return json;
 }
 
+// The entries focal_sigma and center_sigma of the camera file: what the calibration's own standard
+// deviations are, as load_sigmas reads them.
+std::string sigmas_yaml(const Calibration& c) {
+  if (c.sigma.size() < 4) return "";
+  const double focal = std::max(c.sigma[0] / c.camera.fx, c.sigma[1] / c.camera.fy);
+  const double center = std::max(c.sigma[2] / c.camera.fx, c.sigma[3] / c.camera.fy);
+  if (!(focal >= 0 && focal <= 0.5 && center >= 0 && center <= 0.5)) return "";
+  char text[80];
+  std::snprintf(text, sizeof text, "focal_sigma: %.3g\ncenter_sigma: %.3g\n", focal, center);
+  return text;
+}
+
 std::string with_sigma(const std::string& name, double value, double sigma, int digits) {
   char text[96];
   std::snprintf(text, sizeof text, "%s %.*f +- %.*f", name.c_str(), digits, value, digits, sigma);
@@ -338,7 +350,7 @@ int calibrate(Arguments& a) {
   const Calibration calibration = calibrate_camera(views, a.board, image, lens_of(a.model));
   const std::vector<Warning> warnings = warnings_of(calibration);
 
-  files.add("camera.yaml", camera_yaml(calibration.camera));
+  files.add("camera.yaml", camera_yaml(calibration.camera) + sigmas_yaml(calibration));
   files.add("camera_info.yaml", camera_info_yaml(calibration));
   const Json json = calibration_json(views, calibration, warnings, a);
   files.add("calibration.json", json_text(json));

@@ -63,6 +63,25 @@ std::array<std::string, 2> camera_files(const Arguments& a) {
   return files;
 }
 
+// The sigmas of the calibration: those that the command line gives, else those of the camera files
+// or, with --focal-35mm, of such a focal length.
+void set_calibration_sigmas(Arguments& a) {
+  const std::array<std::string, 2> files = camera_files(a);
+  tv_estimate_options& e = a.common.options.estimate;
+  double* const focal[2] = {&e.focal_sigma0, &e.focal_sigma1};
+  double* const center[2] = {&e.center_sigma0, &e.center_sigma1};
+  for (int i = 0; i < 2; ++i) {
+    CalibrationSigmas sigmas{0, 0};
+    if (!files[i].empty()) {
+      sigmas = load_sigmas(files[i]);
+    } else if (a.focal_35mm > 0) {
+      sigmas = kFilm;
+    }
+    *focal[i] = a.common.options.focal_sigma >= 0 ? a.common.options.focal_sigma : sigmas.focal;
+    *center[i] = a.common.options.center_sigma >= 0 ? a.common.options.center_sigma : sigmas.center;
+  }
+}
+
 void load_inputs(const Arguments& a, RecordingInput* recording, Session& session,
                  Outcome& outcome) {
   const std::array<std::string, 2> files = camera_files(a);
@@ -173,6 +192,9 @@ std::string pose_lines(const Outcome& outcome) {
                          -unit * c[0], -unit * c[1], -unit * c[2], far);
   }
   if (v.has_covariance) text += uncertainty_line(v);
+  if (focal_length_is_uncertain(v))
+    text += summary_line("camera", "focal length uncertain: %+.1f %% of the given one, +- %.1f %%",
+                         v.focal_scale > 0 ? 100 * (v.focal_scale - 1) : 0.0, 100 * v.focal_sigma);
   return text + camera_line(v);
 }
 
@@ -242,6 +264,7 @@ int reconstruct(Arguments& a) {
   Session session(common.options);
   Outcome outcome;
   load_inputs(a, recording.get(), session, outcome);
+  set_calibration_sigmas(a);
   if (recording) recording->add_gravity(common.options.estimate);
   const bool has_truth = !a.truth.empty();
   Truth truth;

@@ -1,0 +1,282 @@
+// The covariance beyond independent noise, against references that do not use its formulas: errors
+// that neighbours share (simulated), what a wrong calibration does to the pose (differences of the
+// estimate itself), and a focal length that is off by its stated deviation (simulated).
+// TWOVIEW_PAIRS: simulated pairs of each test, default 120. TWOVIEW_SEED selects other pairs.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "support/calls.h"
+#include "support/estimator.h"
+#include "support/pair_kinds.h"
+#include "twoview/two_view.h"
+
+namespace {
+
+using scene::Vec5;
+using tv::Vec3;
+using Mat5 = Eigen::Matrix<double, 5, 5, Eigen::RowMajor>;
+
+constexpr double kChiSq95 = 11.070;
+tv_context* context;
+pair_kinds::Pair pair;
+int num_pairs = 120;
+uint64_t base_seed = 1;
+
+tv_camera pinhole() {
+  tv_camera camera{};
+  camera.model = TV_CAMERA_PINHOLE;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 500;
+  camera.cx = 319.5;
+  camera.cy = 239.5;
+  return camera;
+}
+
+// Draws a general pair of one pinhole camera, or one of a plane.
+void draw(uint64_t number, double noise_px, int num, bool plane) {
+  pair_kinds::Maker maker{tv::random_seeded(base_seed * 1000003 + number), {}, &pair};
+  bool made = false;
+  while (!made) {
+    pair.num = 0;
+    pair.kind = plane ? pair_kinds::kPlanar : pair_kinds::kGeneral;
+    pair.noise_px = noise_px;
+    for (int v = 0; v < 2; ++v) {
+      pair.camera[v] = pinhole();
+      maker.cameras[v] = tv::prepare_camera(pair.camera[v]);
+    }
+    const pair_kinds::Ranges ranges;
+    maker.draw_motion(ranges);
+    made = plane ? maker.put_plane(num) : maker.put_general(num, 1);
+  }
+}
+
+tv_two_view estimate(const tv_camera& camera0, const tv_camera& camera1,
+                     const tv_estimate_options& options) {
+  tv_two_view r;
+  tv_two_view_init(&r);
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, estimate_pixels(context, &camera0, &camera1, pair.pixels[0], pair.pixels[1], nullptr,
+                             pair.num, &options, &r, nullptr));
+  return r;
+}
+
+tv_estimate_options defaults() {
+  tv_estimate_options options;
+  tv_estimate_options_init(&options);
+  return options;
+}
+
+Mat5 covariance_of(const tv_two_view& r) { return Eigen::Map<const Mat5>(r.covariance); }
+
+double distance_of(const tv_two_view& r, const Mat5& C) {
+  const Vec5 e = scene::pose_error(r.R, r.t, pair.R, pair.t);
+  return e.dot(C.ldlt().solve(e));
+}
+
+// Every match within the same sixteenth of image 0 shares an error of 0.2 px in image 1, of another
+// direction for each sixteenth, beside 0.2 px of its own.
+void test_errors_that_neighbours_share_are_in_the_covariance(void) {
+  int within = 0, total = 0;
+  for (int k = 0; k < num_pairs; ++k) {
+    draw(static_cast<uint64_t>(k), 0.2, 300, false);
+    tv::Random random = tv::random_seeded(base_seed * 77 + static_cast<uint64_t>(k));
+    double shared[16][2];
+    for (auto& error : shared) {
+      for (double& e : error) e = 0.2 * scene::normal(&random);
+    }
+    for (int i = 0; i < pair.num; ++i) {
+      const double* p = pair.pixels[0] + 2 * i;
+      const int column = std::clamp(static_cast<int>(4 * p[0] / 640), 0, 3);
+      const int row = std::clamp(static_cast<int>(4 * p[1] / 480), 0, 3);
+      for (int d = 0; d < 2; ++d) pair.pixels[1][2 * i + d] += shared[4 * row + column][d];
+    }
+    const tv_two_view r = estimate(pair.camera[0], pair.camera[1], defaults());
+    if (r.has_covariance == 0 || r.kind != TV_KIND_CALIBRATED) continue;
+    ++total;
+    within += distance_of(r, covariance_of(r)) <= kChiSq95;
+  }
+  std::printf("shared errors: truth within the ellipsoid in %d of %d\n", within, total);
+  TEST_ASSERT_TRUE(10 * total > 9 * num_pairs);
+  TEST_ASSERT_TRUE(within > 0.80 * total);
+}
+
+// The covariance with one sigma less the one without it is sigma^2 g g', where g is what the
+// estimate does when the camera is changed, by differences of two estimates.
+void check_slopes(bool plane, bool one_camera, int parameter) {
+  constexpr double kSigma = 0.01, kStep = 0.002;
+  int compared = 0;
+  std::vector<double> errors;
+  for (int k = 0; k < 12; ++k) {
+    draw(9000 + static_cast<uint64_t>(k), 0.2, 250, plane);
+    tv_camera cameras[2] = {pair.camera[0], pair.camera[1]};
+    // Two cameras that differ, though not in what they see.
+    if (!one_camera) cameras[1].height += 1;
+    tv_estimate_options options = defaults();
+    const tv_two_view without = estimate(cameras[0], cameras[1], options);
+    if (parameter == 0) {
+      options.focal_sigma0 = kSigma;
+    } else {
+      options.center_sigma0 = kSigma;
+    }
+    const tv_two_view with = estimate(cameras[0], cameras[1], options);
+    if (without.has_covariance == 0 || without.has_alternative != 0) continue;
+    TEST_ASSERT_EQUAL_MEMORY(without.R, with.R, sizeof with.R);
+    const Mat5 added = covariance_of(with) - covariance_of(without);
+    Mat5 expected = Mat5::Zero();
+    bool same = true;
+    for (int axis = 0; axis < (parameter == 0 ? 1 : 2); ++axis) {
+      tv_two_view moved[2];
+      for (int side = 0; side < 2; ++side) {
+        const double step = side == 0 ? -kStep : kStep;
+        tv_camera changed[2] = {cameras[0], cameras[1]};
+        for (int v = 0; v < (one_camera ? 2 : 1); ++v) {
+          if (parameter == 0) {
+            changed[v].fx *= 1 + step;
+            changed[v].fy *= 1 + step;
+          } else {
+            (axis == 0 ? changed[v].cx : changed[v].cy) += step * cameras[v].fx;
+          }
+        }
+        moved[side] = estimate(changed[0], changed[1], defaults());
+        same = same && moved[side].kind == without.kind && moved[side].has_t != 0;
+      }
+      if (!same) break;
+      tv::Mat3 R;
+      Vec3 t;
+      const auto deviation = [&](const tv_two_view& r) {
+        for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = r.R[i];
+        for (int i = 0; i < 3; ++i) t[i] = r.t[i];
+        return scene::pose_error(without.R, without.t, R, t);
+      };
+      const Vec5 g = (deviation(moved[1]) - deviation(moved[0])) / (2 * kStep);
+      expected += kSigma * kSigma * g * g.transpose();
+    }
+    if (!same) continue;
+    ++compared;
+    errors.push_back((added - expected).norm() / expected.norm());
+  }
+  std::sort(errors.begin(), errors.end());
+  std::printf("%s, %s, parameter %d: relative difference %.3f in the median of %d\n",
+              plane ? "plane" : "general", one_camera ? "one camera" : "two cameras", parameter,
+              errors.empty() ? -1.0 : errors[errors.size() / 2], compared);
+  TEST_ASSERT_TRUE(compared >= 4);
+  TEST_ASSERT_TRUE(errors[errors.size() / 2] < 0.1);
+}
+
+void test_a_calibrations_sigmas_propagate_as_changed_cameras_do(void) {
+  for (const bool one_camera : {true, false}) {
+    for (int parameter = 0; parameter < 2; ++parameter) check_slopes(false, one_camera, parameter);
+  }
+}
+
+void test_a_planes_pose_follows_the_cameras_as_well(void) {
+  for (const bool one_camera : {true, false}) {
+    for (int parameter = 0; parameter < 2; ++parameter) check_slopes(true, one_camera, parameter);
+  }
+}
+
+void test_an_uncertain_focal_length_is_refined_and_its_error_covered(void) {
+  int within = 0, exact_within = 0, total = 0, refined = 0;
+  std::vector<double> given_off, left_off;
+  for (int k = 0; k < num_pairs; ++k) {
+    draw(5000 + static_cast<uint64_t>(k), 0.3, 200, false);
+    tv::Random random = tv::random_seeded(base_seed * 91 + static_cast<uint64_t>(k));
+    const double off = 0.1 * scene::normal(&random);
+    tv_camera camera = pair.camera[0];
+    camera.fx *= std::exp(off);
+    camera.fy *= std::exp(off);
+    tv_estimate_options options = defaults();
+    const tv_two_view exact = estimate(camera, camera, options);
+    options.focal_sigma0 = 0.1;
+    options.principal_point_sigma = 0.01;
+    const tv_two_view r = estimate(camera, camera, options);
+    TEST_ASSERT_TRUE(r.principal_point_shift[0] == 0 && r.principal_point_shift[1] == 0);
+    if (r.verdict != TV_VERDICT_OK || r.kind != TV_KIND_CALIBRATED) continue;
+    ++total;
+    within += distance_of(r, covariance_of(r)) <= kChiSq95;
+    exact_within +=
+        exact.has_covariance != 0 && distance_of(exact, covariance_of(exact)) <= kChiSq95;
+    tv_camera corrected;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_corrected_camera(&r, &camera, &corrected));
+    const double scale = r.focal_scale > 0 ? r.focal_scale : 1;
+    TEST_ASSERT_TRUE(corrected.fx == camera.fx * scale && corrected.fy == camera.fy * scale);
+    if (r.focal_scale == 0) {
+      TEST_ASSERT_TRUE(r.focal_sigma == 0.1);
+      continue;
+    }
+    TEST_ASSERT_TRUE(r.focal_sigma >= 0.03 && r.focal_sigma <= 0.1);
+    ++refined;
+    given_off.push_back(std::fabs(std::log(camera.fx / 500)));
+    left_off.push_back(std::fabs(std::log(corrected.fx / 500)));
+  }
+  std::printf("focal length: within %d of %d (taken as exact: %d), refined %d\n", within, total,
+              exact_within, refined);
+  TEST_ASSERT_TRUE(3 * total > num_pairs);
+  TEST_ASSERT_TRUE(within > 0.85 * total);
+  TEST_ASSERT_TRUE(exact_within < 0.5 * total);
+  TEST_ASSERT_TRUE(2 * refined > total);
+  std::sort(given_off.begin(), given_off.end());
+  std::sort(left_off.begin(), left_off.end());
+  TEST_ASSERT_TRUE(left_off[left_off.size() / 2] < 0.5 * given_off[given_off.size() / 2]);
+}
+
+void test_exchanged_views_have_the_same_focal_length(void) {
+  for (int k = 0; k < 12; ++k) {
+    draw(7000 + static_cast<uint64_t>(k), 0.3, 150, false);
+    tv_estimate_options options = defaults();
+    options.focal_sigma0 = 0.08;
+    options.center_sigma1 = 0.004;
+    const tv_two_view forward = estimate(pair.camera[0], pair.camera[0], options);
+    tv_two_view back;
+    tv_two_view_init(&back);
+    std::swap(options.focal_sigma0, options.focal_sigma1);
+    std::swap(options.center_sigma0, options.center_sigma1);
+    TEST_ASSERT_EQUAL_INT(
+        TV_OK, estimate_pixels(context, &pair.camera[0], &pair.camera[0], pair.pixels[1],
+                               pair.pixels[0], nullptr, pair.num, &options, &back, nullptr));
+    for (int i = 0; i < 9; ++i) TEST_ASSERT_TRUE(forward.R[i] == back.R[3 * (i % 3) + i / 3]);
+    TEST_ASSERT_TRUE(forward.focal_scale == back.focal_scale);
+    TEST_ASSERT_TRUE(forward.focal_sigma == back.focal_sigma);
+    TEST_ASSERT_EQUAL_INT(forward.verdict, back.verdict);
+  }
+}
+
+void test_sigmas_out_of_range_are_refused(void) {
+  draw(1, 0.3, 100, false);
+  double tv_estimate_options::*const fields[] = {
+      &tv_estimate_options::focal_sigma0, &tv_estimate_options::focal_sigma1,
+      &tv_estimate_options::center_sigma0, &tv_estimate_options::center_sigma1};
+  for (const auto field : fields) {
+    for (const double value : {-0.001, 0.51, std::nan("")}) {
+      tv_estimate_options options = defaults();
+      options.*field = value;
+      tv_two_view r;
+      tv_two_view_init(&r);
+      const tv_status status =
+          estimate_pixels(context, &pair.camera[0], &pair.camera[1], pair.pixels[0], pair.pixels[1],
+                          nullptr, pair.num, &options, &r, nullptr);
+      TEST_ASSERT_EQUAL_INT(value == value ? TV_ERR_ARGUMENT : TV_ERR_NOT_FINITE, status);
+    }
+  }
+}
+
+}  // namespace
+
+void setUp(void) { context = estimator::make_context(pair_kinds::kMaxMatches); }
+
+void tearDown(void) {}
+
+int main(void) {
+  estimator::read_environment(1, &num_pairs, &base_seed);
+  UNITY_BEGIN();
+  RUN_TEST(test_errors_that_neighbours_share_are_in_the_covariance);
+  RUN_TEST(test_a_calibrations_sigmas_propagate_as_changed_cameras_do);
+  RUN_TEST(test_a_planes_pose_follows_the_cameras_as_well);
+  RUN_TEST(test_an_uncertain_focal_length_is_refined_and_its_error_covered);
+  RUN_TEST(test_exchanged_views_have_the_same_focal_length);
+  RUN_TEST(test_sigmas_out_of_range_are_refused);
+  return UNITY_END();
+}
