@@ -264,9 +264,9 @@ typedef struct tv_two_view {
      the rotation is off by more than 5 degrees (docs/verdict.md has the figures). The direction is
      wrong more often; the covariance says how uncertain both are where the pose is right. 1 where
      there is no full pose R and t: without cameras, and for the kinds degenerate, panoramic and
-     no-motion. It is at least 0.5 where tv_reconstruct finds a reason in the descriptors: a mirrored
-     image, or a second place that looks the same. The next three fields are the evidence that it is
-     computed from, with noise_px and has_alternative. */
+     no-motion. It is at least 0.5 where tv_reconstruct finds a reason in the descriptors: a
+     mirrored image, or a second place that looks the same. The next three fields are the evidence
+     that it is computed from, with noise_px and has_alternative. */
   double probability_wrong;
   /* The share of the different matches that are inliers, each weighted by (1 - ratio)^2, [0, 1]:
      the matches with the most certain descriptors count most. */
