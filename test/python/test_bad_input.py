@@ -147,22 +147,23 @@ class TestPatterns(PictureTest):
 
 
 class TestScenes(PictureTest):
-    """Repeated structure, copies, screens, mirrors and people: "ok" only with the right rotation.
-    A film on a screen, a copy of a poster and a twin room are not told from the thing itself in
-    every pair (docs/verdict.md has the counts); their seeds here are pairs that are."""
+    """Repeated structure, copies, screens, mirrors and people: "ok" only with the right rotation,
+    but for what is counted here. docs/verdict.md has the table of ten seeds."""
 
-    SEEDS = {"screen with a film": (2, 3, 4), "one of the two posters in each picture": (1, 2, 3)}
+    # How many of the seeds 1 to 3 are "ok" and wrong: a film that moves on is a view of another
+    # scene, as far as two pictures tell.
+    MISLED = {"screen with a film": 1}
 
     def test_scenes_that_mislead_are_right_or_doubted(self):
         for name, make in scenes.SCENES.items():
-            for seed in self.SEEDS.get(name, (1, 2, 3)):
-                pair = make(seed)
-                if pair.t is None:
-                    continue
-                with self.subTest(scene=name, seed=seed):
-                    found, _ = self.run_pair(pair)
-                    if found.verdict == tv.Verdict.OK:
-                        self.assertLess(metrics.rotation_error_deg(found.R, pair.R), RIGHT_DEG)
+            errors = []
+            for pair in map(make, (1, 2, 3)):
+                found, _ = self.run_pair(pair)
+                if pair.t is not None and found.verdict == tv.Verdict.OK:
+                    errors.append(metrics.rotation_error_deg(found.R, pair.R))
+            with self.subTest(scene=name):
+                wrong = sum(error >= RIGHT_DEG for error in errors)
+                self.assertLessEqual(wrong, self.MISLED.get(name, 0), errors)
 
     def test_a_room_and_its_twin_have_the_pose_of_one_room(self):
         """The furniture stands alike, so that the pictures are of one room as far as it tells."""
@@ -252,21 +253,22 @@ class Changes:
         for axis in (0, 1):
             self.each_picture(pictures.mirrored, axis)
 
+    # How many of the pairs below are "ok" with the motion of the person.
+    MISLED_BY_PERSONS = 0
+
     def test_a_person_before_half_of_the_view_is_right_or_doubted(self):
-        """Where most matches lie on the person, the pose is the person's, which no pair of pictures
-        tells (docs/verdict.md): two of these ten are "ok" and so left out."""
-        persons = {("kitti00_turn", 1), ("pc_room", 2)}
+        errors = []
         for name, pair in self.pairs():
             for seed in (1, 2):
-                if (name, seed) in persons:
-                    continue
                 covered = scenes.before_person(pair, seed)
                 for old, new in zip(pair.views, covered.views):
                     self.assertGreater((old.luma != new.luma).mean(), 0.25)
                 with self.subTest(pair=name, seed=seed):
                     found, _ = self.run_pair(covered)
                     if found.verdict == tv.Verdict.OK:
-                        self.assertLess(metrics.rotation_error_deg(found.R, pair.R), RIGHT_DEG)
+                        errors.append(metrics.rotation_error_deg(found.R, pair.R))
+        wrong = sum(error >= RIGHT_DEG for error in errors)
+        self.assertLessEqual(wrong, self.MISLED_BY_PERSONS, errors)
 
     # -- two pictures of a scene, one of them changed
 
@@ -314,6 +316,8 @@ class TestRendered(Changes, PictureTest):
 
 
 class TestReal(Changes, PictureTest):
+    MISLED_BY_PERSONS = 2
+
     @classmethod
     def setUpClass(cls):
         have = datasets.all_sets()

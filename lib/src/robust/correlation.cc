@@ -126,19 +126,24 @@ double add_jackknife(int num, BlockSums& sums, const PoseUncertainty& uncertaint
   return 1 + growth / kPose;
 }
 
-using Equations = double (*)(const void* model, const RayPairs& pairs, const int32_t* indices,
-                             int count, const RobustLoss& loss, double* upper, double* gradient);
+// One of the two models; the other is null. Called by its type and not through a pointer, so that
+// rules/stack sees what is called.
+struct EitherModel {
+  const PoseModel* pose;
+  const PlaneModel* plane;
+};
 
-template <typename Model>
-double equations_of(const void* model, const RayPairs& pairs, const int32_t* indices, int count,
-                    const RobustLoss& loss, double* upper, double* gradient) {
-  return static_cast<const Model*>(model)->normal_equations(pairs, indices, count, loss, upper,
-                                                            gradient);
+double normal_equations(const EitherModel& model, const RayPairs& pairs, const int32_t* indices,
+                        int count, const RobustLoss& loss, double* upper, double* gradient) {
+  if (model.pose != nullptr) {
+    return model.pose->normal_equations(pairs, indices, count, loss, upper, gradient);
+  }
+  return model.plane->normal_equations(pairs, indices, count, loss, upper, gradient);
 }
 
-TVK_NOINLINE double add_of_model(const PoseRefiner& f, int count, const void* model, int num,
-                                 Equations equations, const RobustLoss& loss,
-                                 const PoseUncertainty& uncertainty, double covariance[25]) {
+TVK_NOINLINE double add_of_model(const PoseRefiner& f, int count, const EitherModel& model,
+                                 const RobustLoss& loss, const PoseUncertainty& uncertainty,
+                                 double covariance[25]) {
   BlockSums sums = {};
   int ends[kBlocks + 1] = {};
   ends[kBlocks] = count;
@@ -149,9 +154,10 @@ TVK_NOINLINE double add_of_model(const PoseRefiner& f, int count, const void* mo
   }
   for (int b = 0; b < kBlocks; ++b) {
     if (ends[b + 1] == ends[b]) continue;
-    equations(model, f.matches.pairs, f.indices + ends[b], ends[b + 1] - ends[b], loss,
-              sums.upper[b], sums.gradient[b]);
+    normal_equations(model, f.matches.pairs, f.indices + ends[b], ends[b + 1] - ends[b], loss,
+                     sums.upper[b], sums.gradient[b]);
   }
+  const int num = model.pose != nullptr ? PoseModel::kParameters : PlaneModel::kParameters;
   return add_jackknife(num, sums, uncertainty, covariance);
 }
 
@@ -160,15 +166,13 @@ TVK_NOINLINE double add_of_model(const PoseRefiner& f, int count, const void* mo
 double add_correlation(const PoseRefiner& f, int count, const PoseModel& model,
                        const RobustLoss& loss, const PoseUncertainty& uncertainty,
                        double covariance[25]) {
-  return add_of_model(f, count, &model, PoseModel::kParameters, equations_of<PoseModel>, loss,
-                      uncertainty, covariance);
+  return add_of_model(f, count, {&model, nullptr}, loss, uncertainty, covariance);
 }
 
 double add_correlation(const PoseRefiner& f, int count, const PlaneModel& model,
                        const RobustLoss& loss, const PoseUncertainty& uncertainty,
                        double covariance[25]) {
-  return add_of_model(f, count, &model, PlaneModel::kParameters, equations_of<PlaneModel>, loss,
-                      uncertainty, covariance);
+  return add_of_model(f, count, {nullptr, &model}, loss, uncertainty, covariance);
 }
 
 }  // namespace tv
