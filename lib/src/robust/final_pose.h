@@ -22,10 +22,10 @@ bool principal_point_is_off(const PoseRefiner& refiner, const Pose& pose, const 
 bool move_together(const PoseRefiner& refiner, Pose* pose, double shift_px[2]);
 
 // One Gauss-Newton step of the pose and the logarithm of the focal length together, with the
-// options' deviation as its prior. growth: by how much the matches'
-// covariance grows through shared errors; 0 in the first call, which computes it. The caller then
-// moves the rays by *step. False, and nothing is changed, where the step is not determined, or
-// where the matches would not lower the deviation by a fifth.
+// options' deviation as its prior. growth: by how much the matches' covariance grows through shared
+// errors; 0 in the first call, which computes it. The caller then moves the rays by *step. False,
+// and nothing is changed, where the step is not determined, or where the matches would not lower
+// the deviation by a fifth.
 bool step_focal_length(const PoseRefiner& refiner, double* growth, Pose* pose, double* step);
 
 // The covariance of a refined pose and the noise of a pixel. It includes the uncertainty of a
