@@ -58,6 +58,17 @@ class Evaluate(cli.CliTest):
             pair["pose_error_deg"], max(pair["rotation_error_deg"], pair["translation_error_deg"])
         )
         self.assertGreater(report["auc"]["5"], 90)
+        self.assertEqual(pair["reasons"], [])
+        self.assertEqual(len(pair["covariance"]), 25)
+
+    def test_verdicts_are_counted_and_their_reasons_told(self):
+        lines = pair_line() + pair_line(name1="a.png") + pair_line(name1="none.png")
+        done = self.succeed(self.evaluate(lines))
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual(report["verdict_counts"], {"ok": 1, "doubtful": 0, "refused": 1})
+        self.assertEqual([p["reasons"] for p in report["pairs"]], [[], ["no_motion"], None])
+        self.assertIsNone(report["pairs"][1]["covariance"])
+        self.assertIn(b"3 pairs: 1 ok, 0 doubtful, 1 refused; median pose error", done.stdout)
 
     def test_auc_is_superglues_and_failures_are_infinite(self):
         wrong = lambda deg: [

@@ -69,13 +69,21 @@ class Reconstruct(cli.CliTest):
         a = self.write("wall0.png", cli.png(WIDTH, HEIGHT, b"".join(map(bytes, rows))))
         nearer = b"".join(bytes(rows[y][x] for x in xs) for y in ys)
         b = self.write("wall1.png", cli.png(WIDTH, HEIGHT, nearer))
-        self.succeed(self.reconstruct(a=a, b=b))
+        done = self.succeed(self.reconstruct(a=a, b=b))
         result = self.result()
         self.assertEqual(result["config"], "planar")
         self.assertIn("two_planar_solutions", result["reasons"])
         self.assertEqual(set(result["alternative"]), {"R", "t", "covariance"})
         self.assertEqual(len(result["alternative"]["covariance"]), 25)
         self.assertNotEqual(result["alternative"]["covariance"], result["covariance"])
+        # What to do about each reason is in the file, in the summary and in the report.
+        self.assertEqual(len(result["advice"]), len(result["reasons"]))
+        self.assertIn("show something off the plane, or give the direction of gravity",
+                      result["advice"])
+        page = (self.out / "report.html").read_text()
+        for advice in result["advice"]:
+            self.assertRegex(done.stdout.decode(), rf"(?m)^advice +{re.escape(advice)}$")
+            self.assertIn(f"<li>{advice}</li>", page)
 
     def test_E_is_t_cross_R_with_its_sign(self):
         self.succeed(self.reconstruct())
@@ -169,6 +177,7 @@ class Reconstruct(cli.CliTest):
     def test_the_summary_is_a_dozen_lines_without_colour_codes(self):
         text = self.succeed(self.reconstruct()).stdout.decode()
         self.assertTrue(8 <= text.count("\n") <= 14, text)
+        self.assertNotIn("advice", text)
         self.assertNotIn("\033", text)
 
     def test_equal_runs_give_equal_bytes(self):
@@ -316,6 +325,11 @@ class Reconstruct(cli.CliTest):
         self.assertEqual(page.count("data:image/"), 3)
         self.assertIn("x&lt;b&gt;&amp;.png", page)
         self.assertNotIn("<b>&", page)
+        c = self.result()["covariance"]
+        for name, variance in (("rotation", c[0] + c[6] + c[12]), ("direction", c[18] + c[24])):
+            sigma = math.degrees(math.sqrt(variance))
+            self.assertIn(f"<b>{sigma:.3f}<i>deg</i></b><span>1 sigma of the {name}", page)
+        self.assertNotIn('class="advice"', page)
         data = json.loads(re.search(r'id="cloud-data">(.*?)</script>', page, re.S).group(1))
         self.assertEqual(len(data["cameras"]), 2)
 

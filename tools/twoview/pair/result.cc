@@ -24,26 +24,28 @@ Json count_or_null(int32_t count) { return count < 0 ? Json(nullptr) : Json(coun
 struct Phrase {
   tv_reason reason;
   const char* words;
+  const char* advice;  // what to do about it: docs/verdict.md, "what helps"
 };
 
 constexpr Phrase kReasons[] = {
-    {TV_REASON_TOO_FEW_MATCHES, "too few matches"},
-    {TV_REASON_LOW_INLIER_RATIO, "few of the matches agree"},
-    {TV_REASON_LOW_PARALLAX, "low parallax: the camera hardly moved for this depth"},
-    {TV_REASON_TWO_PLANAR_SOLUTIONS, "the scene is a plane, which two poses explain"},
-    {TV_REASON_PURE_ROTATION, "the camera only rotated"},
-    {TV_REASON_NO_MOTION, "the camera did not move"},
-    {TV_REASON_SECOND_MOTION, "a second motion is in the scene"},
-    {TV_REASON_CROWDED_MATCHES, "the matches crowd in a small part of the image"},
-    {TV_REASON_REPEATED_STRUCTURE, "repeated structure makes the matches doubtful"},
+    {TV_REASON_TOO_FEW_MATCHES, "too few matches",
+     "take pictures with more overlap or texture, or try --guided-matching 1"},
+    {TV_REASON_LOW_INLIER_RATIO, "few of the matches agree",
+     "check that the camera file is of these pictures and that none is mirrored; more overlap"},
+    {TV_REASON_LOW_PARALLAX, "low parallax: the camera hardly moved for this depth",
+     "move farther between the pictures; the rotation can be used"},
+    {TV_REASON_TWO_PLANAR_SOLUTIONS, "the scene is a plane, which two poses explain",
+     "show something off the plane, or give the direction of gravity"},
+    {TV_REASON_PURE_ROTATION, "the camera only rotated",
+     "move the camera between the pictures; the rotation can be used"},
+    {TV_REASON_NO_MOTION, "the camera did not move", "move the camera between the pictures"},
+    {TV_REASON_SECOND_MOTION, "a second motion is in the scene",
+     "keep what moves out of the pictures, or mask it"},
+    {TV_REASON_CROWDED_MATCHES, "the matches crowd in a small part of the image",
+     "show texture in other parts of the pictures, or try --cell-px 32"},
+    {TV_REASON_REPEATED_STRUCTURE, "repeated structure makes the matches doubtful",
+     "show where the repeated structure ends"},
 };
-
-Json reasons_json(uint32_t reasons) {
-  Json list = Json::array();
-  for (const Phrase& phrase : kReasons)
-    if (reasons & phrase.reason) list.push_back(tv_reason_string(phrase.reason));
-  return list;
-}
 
 // The root mean square reprojection error of the cloud's points; NaN without points.
 double rms_reprojection_px(const tv_reconstruction& reconstruction) {
@@ -136,6 +138,17 @@ Frustum frustum_of(const Outcome& outcome, int camera, double size) {
   return frustum;
 }
 
+Json reasons_json(uint32_t reasons) {
+  Json list = Json::array();
+  for (const Phrase& phrase : kReasons)
+    if (reasons & phrase.reason) list.push_back(tv_reason_string(phrase.reason));
+  return list;
+}
+
+Json covariance_json(const tv_two_view& v) {
+  return numbers_or_null(v.covariance, 25, v.has_covariance);
+}
+
 Json principal_point_json(const tv_two_view& v) {
   const bool known = v.principal_point_asked_covariance[0] > 0;
   return {{"chi2", known ? finite_or_null(v.principal_point_chi2) : Json(nullptr)},
@@ -168,6 +181,7 @@ Json result_json(const Outcome& outcome) {
   json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
   json["reasons"] = reasons_json(v.reasons);
+  json["advice"] = advice_on(v.reasons);
   json["probability_wrong"] = finite_or_null(v.probability_wrong);
   json["R"] = numbers_or_null(v.R, 9, v.has_R);
   const double unit = unit_of(outcome);
@@ -189,7 +203,7 @@ Json result_json(const Outcome& outcome) {
                       {"homography", count_or_null(v.homography_inliers)},
                       {"rotation", count_or_null(v.rotation_inliers)},
                       {"coverage", finite_or_null(v.coverage)}};
-  json["covariance"] = numbers_or_null(v.covariance, 25, v.has_covariance);
+  json["covariance"] = covariance_json(v);
   json["noise_px"] = v.noise_px > 0 ? finite_or_null(v.noise_px) : Json(nullptr);
   json["principal_point_shift_px"] =
       numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
@@ -215,6 +229,18 @@ std::string reasons_in_words(uint32_t reasons) {
   for (const Phrase& phrase : kReasons)
     if (reasons & phrase.reason) text += (text.empty() ? "" : "; ") + std::string(phrase.words);
   return text;
+}
+
+std::vector<std::string> advice_on(uint32_t reasons) {
+  std::vector<std::string> advice;
+  for (const Phrase& phrase : kReasons)
+    if (reasons & phrase.reason) advice.push_back(phrase.advice);
+  return advice;
+}
+
+Uncertainty uncertainty_deg(const tv_two_view& v) {
+  const double* c = v.covariance;
+  return {std::sqrt(c[0] + c[6] + c[12]) * kDegrees, std::sqrt(c[18] + c[24]) * kDegrees};
 }
 
 std::string kind_in_words(int32_t kind) {

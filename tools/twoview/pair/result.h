@@ -64,6 +64,12 @@ nlohmann::ordered_json result_json(const Outcome& outcome);
 // known) and `shift_px`.
 nlohmann::ordered_json principal_point_json(const tv_two_view& two_view);
 
+// The names of the reasons, such as "low_parallax".
+nlohmann::ordered_json reasons_json(uint32_t reasons);
+
+// The 25 numbers of the covariance; null where there is none.
+nlohmann::ordered_json covariance_json(const tv_two_view& two_view);
+
 // Whether the covariance contains a focal length that is uncertain by more than 2 per cent.
 bool focal_length_is_uncertain(const tv_two_view& two_view);
 
@@ -74,6 +80,16 @@ nlohmann::ordered_json focal_length_json(const tv_two_view& two_view);
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.
 std::string reasons_in_words(uint32_t reasons);
 std::string kind_in_words(int32_t kind);
+
+// What to do about each reason, in the order of reasons_json; empty if there is none.
+std::vector<std::string> advice_on(uint32_t reasons);
+
+// The standard deviations of rotation and direction in degrees. Each is the square root of the
+// trace of its block of the covariance: that of the total angle, not of the angle about one axis.
+struct Uncertainty {
+  double rotation, direction;
+};
+Uncertainty uncertainty_deg(const tv_two_view& two_view);
 
 // The number as JSON; null if it is not finite.
 nlohmann::ordered_json finite_or_null(double value);

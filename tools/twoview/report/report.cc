@@ -62,6 +62,17 @@ std::string cards(const Outcome& outcome) {
       card(std::to_string(outcome.reconstruction.num_points), "", "points in the cloud");
   text += card(std::to_string(outcome.two_view.num_inliers),
                "of " + std::to_string(outcome.two_view.num_matches), "matches that agree");
+  const tv_two_view& v = outcome.two_view;
+  if (v.has_R)
+    text += card(formatted("%.2f", rotation_error_deg(rotation_of(v), {1, 0, 0, 0, 1, 0, 0, 0, 1})),
+                 "deg", "rotation between the views");
+  if (v.has_covariance) {
+    const Uncertainty sigma = uncertainty_deg(v);
+    text += card(formatted("%.3f", sigma.rotation), "deg", "1 sigma of the rotation");
+    text += card(formatted("%.3f", sigma.direction), "deg", "1 sigma of the direction");
+  }
+  if (v.has_R && v.has_t)
+    text += card(formatted("%.2g", 100 * v.probability_wrong), "%", "probability to be wrong");
   text += card(number_of(j["median_parallax_deg"], "%.2f"), "deg", "median parallax");
   text += card(number_of(j["rms_reprojection_px"], "%.2f"), "px", "reprojection, rms");
   const double* shift = outcome.two_view.principal_point_shift;
@@ -88,6 +99,14 @@ std::string cards(const Outcome& outcome) {
                  "between the cameras, by " + outcome.scale->source);
   text += card(number_of(j["timings_ms"]["total"], "%.1f"), "ms", "computing time");
   return text;
+}
+
+// What to do about each reason of the verdict, as a list.
+std::string advice_list(uint32_t reasons) {
+  std::string items;
+  for (const std::string& advice : advice_on(reasons))
+    items += "<li>" + escaped(advice) + "</li>\n";
+  return items.empty() ? "" : "<ul class=\"advice\">\n" + items + "</ul>\n";
 }
 
 std::string leaf_text(const Json& value) {
@@ -240,6 +259,7 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
        {"verdict_class", classes[v.verdict]},
        {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
        {"verdict_words", escaped(kind_in_words(v.kind) + (reasons.empty() ? "" : ": " + reasons))},
+       {"advice", advice_list(v.reasons)},
        {"cards", cards(outcome)},
        {"cloud", cloud_section(outcome, cloud)},
        {"figures", sections},

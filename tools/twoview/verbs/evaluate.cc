@@ -97,8 +97,9 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
   json["name1"] = pair.name1;
   for (const char* key :
        {"rotation_error_deg", "translation_error_deg", "translation_error_signed_deg",
-        "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict",
-        "probability_wrong", "principal_point_shift_px", "principal_point", "time_ms"})
+        "pose_error_deg", "num_matches", "num_inliers", "precision", "config", "verdict", "reasons",
+        "probability_wrong", "covariance", "principal_point_shift_px", "principal_point",
+        "time_ms"})
     json[key] = nullptr;
   try {
     Outcome outcome;
@@ -109,7 +110,9 @@ PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const 
     json["num_inliers"] = v.num_inliers;
     json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
     json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
+    json["reasons"] = reasons_json(v.reasons);
     json["probability_wrong"] = v.probability_wrong;
+    json["covariance"] = covariance_json(v);
     json["principal_point_shift_px"] = v.principal_point_shift;
     json["principal_point"] = principal_point_json(v);
     report.shift = shift_evidence(v, outcome.camera[0]);
@@ -155,6 +158,18 @@ Json median_error(const std::vector<PairReport>& reports) {
   return finite_or_null((errors[(errors.size() - 1) / 2] + errors[errors.size() / 2]) / 2);
 }
 
+// How many pairs have each verdict. A pair that cannot be read has none.
+Json verdict_counts(const std::vector<PairReport>& reports) {
+  Json counts;
+  for (const tv_verdict verdict : {TV_VERDICT_OK, TV_VERDICT_DOUBTFUL, TV_VERDICT_REFUSED}) {
+    const char* const name = tv_verdict_string(verdict);
+    counts[name] = std::count_if(reports.begin(), reports.end(), [name](const PairReport& report) {
+      return report.json["verdict"] == name;
+    });
+  }
+  return counts;
+}
+
 Json principal_points_json(const std::vector<PairReport>& reports) {
   std::vector<ShiftEvidence> pairs;
   for (const PairReport& report : reports)
@@ -185,6 +200,7 @@ Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
   json["auc"] = auc_json(reports, &Errors::pose);
   json["auc_signed"] = auc_json(reports, &Errors::pose_signed);
   json["num_pairs"] = reports.size();
+  json["verdict_counts"] = verdict_counts(reports);
   json["median_pose_error_deg"] = median_error(reports);
   for (const char* key : {"num_matches", "num_inliers", "precision", "time_ms"})
     json["mean_" + std::string(key)] = mean_of(reports, key);
@@ -257,9 +273,13 @@ std::string table(const Json& report) {
     text += padded(key, 11) + " at 5, 10, 20 deg:" + cell(auc["5"], "%6.1f", 6) +
             cell(auc["10"], "%6.1f", 6) + cell(auc["20"], "%6.1f", 6) + " %\n";
   }
-  return text + std::to_string(report["num_pairs"].get<size_t>()) + " pairs; median pose error" +
-         cell(report["median_pose_error_deg"], " %.2f deg", 4) + ", mean time" +
-         cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n" + advice_lines(report);
+  const Json& counts = report["verdict_counts"];
+  text += std::to_string(report["num_pairs"].get<size_t>()) + " pairs: ";
+  for (const auto& [verdict, count] : counts.items())
+    text += std::to_string(count.get<int>()) + " " + verdict + (verdict == "refused" ? "" : ", ");
+  return text + "; median pose error" + cell(report["median_pose_error_deg"], " %.2f deg", 4) +
+         ", mean time" + cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n" +
+         advice_lines(report);
 }
 
 // Shows progress as one line on stderr if that is a terminal. Each line replaces the last one, and

@@ -1,7 +1,6 @@
 // twoview reconstruct A B, or --recording DIR: from two views to a pose, a cloud, pictures and a
 // report.
 
-#include <cmath>
 #include <cstdio>
 #include <memory>
 
@@ -155,13 +154,10 @@ void make_files(const Outcome& outcome, OutputSet& files) {
   files.add("report.html", report_html(outcome, cloud, figures));
 }
 
-// The standard deviations of rotation and direction. Each is the square root of the trace of its
-// block of the covariance: that of the total angle, not of the angle about one axis.
 std::string uncertainty_line(const tv_two_view& v) {
-  const double* c = v.covariance;
+  const Uncertainty sigma = uncertainty_deg(v);
   return summary_line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
-                      std::sqrt(c[0] + c[6] + c[12]) * 180 / M_PI,
-                      std::sqrt(c[18] + c[24]) * 180 / M_PI);
+                      sigma.rotation, sigma.direction);
 }
 
 // The line that reports the shift of the principal point; empty if there is none.
@@ -228,6 +224,8 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   text += summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
                        tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
                        kind_in_words(v.kind).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
+  for (const std::string& advice : advice_on(v.reasons))
+    text += summary_line("advice", "%s", advice.c_str());
   if (v.has_R && v.has_t)
     text += summary_line("belief", "wrong with probability %.2g %%", 100 * v.probability_wrong);
   text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
