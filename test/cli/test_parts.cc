@@ -15,6 +15,7 @@
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/options.h"
+#include "pair/result.h"
 #include "pictures/canvas.h"
 #include "report/report.h"
 #include "report/tables.h"
@@ -52,6 +53,35 @@ void test_percentile_lies_between_its_neighbours() {
   TEST_ASSERT_EQUAL_DOUBLE(2.5, percentile({4, 1, 3, 2}, 0.5));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 3.85, percentile({4, 1, 3, 2}, 0.95));
   TEST_ASSERT_EQUAL_DOUBLE(4, percentile({4, 1, 3, 2}, 1));
+}
+
+// Whether the advice on a pose of low parallax is to calibrate, and not to move farther.
+bool calibrates(double focal_sigma, double parallax_rad) {
+  tv_two_view v;
+  tv_two_view_init(&v);
+  v.reasons = TV_REASON_LOW_PARALLAX;
+  v.focal_sigma = focal_sigma;
+  v.median_parallax_rad = parallax_rad;
+  const std::vector<std::string> advice = advice_on(v);
+  return advice.size() == 1 && advice[0].find("calibrate") != std::string::npos;
+}
+
+void test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibration() {
+  TEST_ASSERT_TRUE(calibrates(0.1, 0.5));
+  TEST_ASSERT_FALSE(calibrates(0.1, 0.01));
+  TEST_ASSERT_FALSE(calibrates(0.01, 0.5));
+  TEST_ASSERT_FALSE(calibrates(0, 0.5));
+}
+
+void test_each_reason_has_words_and_advice_and_no_reason_none() {
+  tv_two_view v;
+  tv_two_view_init(&v);
+  TEST_ASSERT_TRUE(reasons_in_words(v).empty() && advice_on(v).empty());
+  for (uint32_t bit = 1; bit <= TV_REASON_REPEATED_STRUCTURE; bit *= 2) {
+    v.reasons = bit;
+    TEST_ASSERT_FALSE(reasons_in_words(v).empty());
+    TEST_ASSERT_EQUAL_UINT(1, advice_on(v).size());
+  }
 }
 
 // What `advise` says of pairs that ask for (x, y) + spread (1, 0), (-1, 0), (1, 0) ..., `asking` of
@@ -377,6 +407,8 @@ int main() {
   RUN_TEST(test_an_images_camera_has_the_lines_K_and_the_entrys_lens_and_size);
   RUN_TEST(test_pairs_lines_have_two_four_twenty_two_or_thirty_eight_fields);
   RUN_TEST(test_headers_are_read_within_their_bytes);
+  RUN_TEST(test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibration);
+  RUN_TEST(test_each_reason_has_words_and_advice_and_no_reason_none);
   RUN_TEST(test_base64_has_the_vectors_of_rfc_4648);
   RUN_TEST(test_csv_numbers_are_the_shortest_that_read_back);
   RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);

@@ -299,6 +299,15 @@ class Reconstruct(cli.CliTest):
         self.assert_refused(self.reconstruct("--focal-35mm", "26", out=other), "--focal-35mm",
                             "without a camera file", out=other)
 
+    def test_an_uncertain_focal_length_is_told_with_what_helps(self):
+        for sigma in ("0.1", "0"):
+            done = self.succeed(self.reconstruct("--focal-sigma", sigma))
+            result, text = self.result(), done.stdout.decode()
+            with self.subTest(sigma=sigma):
+                uncertain = sigma != "0"
+                self.assertEqual("focal length uncertain" in text, uncertain)
+                self.assertEqual(result["focal_length"] is not None, uncertain)
+
     def test_files_of_an_earlier_pair_do_not_stay_beside_new_ones(self):
         self.succeed(self.reconstruct())
         (self.out / "mine.txt").write_text("kept")

@@ -47,6 +47,24 @@ constexpr Phrase kReasons[] = {
      "show where the repeated structure ends"},
 };
 
+// Low parallax where the parallax is not low: it is the focal length that leaves the pose open.
+constexpr Phrase kFocalLength = {TV_REASON_LOW_PARALLAX,
+                                 "the focal length is too uncertain for this pose",
+                                 "calibrate the camera (twoview calibrate)"};
+constexpr double kMuchParallaxRad = 2 / kDegrees;
+
+std::vector<Phrase> phrases_of(const tv_two_view& v) {
+  std::vector<Phrase> phrases;
+  for (const Phrase& phrase : kReasons) {
+    if ((v.reasons & phrase.reason) == 0) continue;
+    const bool of_focal_length = phrase.reason == TV_REASON_LOW_PARALLAX &&
+                                 focal_length_is_uncertain(v) &&
+                                 v.median_parallax_rad > kMuchParallaxRad;
+    phrases.push_back(of_focal_length ? kFocalLength : phrase);
+  }
+  return phrases;
+}
+
 // The root mean square reprojection error of the cloud's points; NaN without points.
 double rms_reprojection_px(const tv_reconstruction& reconstruction) {
   double sum = 0;
@@ -181,7 +199,7 @@ Json result_json(const Outcome& outcome) {
   json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
   json["reasons"] = reasons_json(v.reasons);
-  json["advice"] = advice_on(v.reasons);
+  json["advice"] = advice_on(v);
   json["probability_wrong"] = finite_or_null(v.probability_wrong);
   json["R"] = numbers_or_null(v.R, 9, v.has_R);
   const double unit = unit_of(outcome);
@@ -224,17 +242,16 @@ Json result_json(const Outcome& outcome) {
   return json;
 }
 
-std::string reasons_in_words(uint32_t reasons) {
+std::string reasons_in_words(const tv_two_view& v) {
   std::string text;
-  for (const Phrase& phrase : kReasons)
-    if (reasons & phrase.reason) text += (text.empty() ? "" : "; ") + std::string(phrase.words);
+  for (const Phrase& phrase : phrases_of(v))
+    text += (text.empty() ? "" : "; ") + std::string(phrase.words);
   return text;
 }
 
-std::vector<std::string> advice_on(uint32_t reasons) {
+std::vector<std::string> advice_on(const tv_two_view& v) {
   std::vector<std::string> advice;
-  for (const Phrase& phrase : kReasons)
-    if (reasons & phrase.reason) advice.push_back(phrase.advice);
+  for (const Phrase& phrase : phrases_of(v)) advice.push_back(phrase.advice);
   return advice;
 }
 

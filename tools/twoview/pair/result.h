@@ -78,11 +78,11 @@ bool focal_length_is_uncertain(const tv_two_view& two_view);
 nlohmann::ordered_json focal_length_json(const tv_two_view& two_view);
 
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.
-std::string reasons_in_words(uint32_t reasons);
+std::string reasons_in_words(const tv_two_view& two_view);
 std::string kind_in_words(int32_t kind);
 
 // What to do about each reason, in the order of reasons_json; empty if there is none.
-std::vector<std::string> advice_on(uint32_t reasons);
+std::vector<std::string> advice_on(const tv_two_view& two_view);
 
 // The standard deviations of rotation and direction in degrees. Each is the square root of the
 // trace of its block of the covariance: that of the total angle, not of the angle about one axis.

@@ -102,10 +102,9 @@ std::string cards(const Outcome& outcome) {
 }
 
 // What to do about each reason of the verdict, as a list.
-std::string advice_list(uint32_t reasons) {
+std::string advice_list(const tv_two_view& v) {
   std::string items;
-  for (const std::string& advice : advice_on(reasons))
-    items += "<li>" + escaped(advice) + "</li>\n";
+  for (const std::string& advice : advice_on(v)) items += "<li>" + escaped(advice) + "</li>\n";
   return items.empty() ? "" : "<ul class=\"advice\">\n" + items + "</ul>\n";
 }
 
@@ -247,7 +246,7 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
   const tv_two_view& v = outcome.two_view;
   const std::string name0 = escaped(outcome.picture[0].name),
                     name1 = escaped(outcome.picture[1].name);
-  const std::string reasons = reasons_in_words(v.reasons);
+  const std::string reasons = reasons_in_words(v);
   std::string sections;
   for (const Figure& figure : figures) sections += figure_section(figure);
   const char* const classes[] = {"poor", "fair", "good"};
@@ -259,7 +258,7 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
        {"verdict_class", classes[v.verdict]},
        {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
        {"verdict_words", escaped(kind_in_words(v.kind) + (reasons.empty() ? "" : ": " + reasons))},
-       {"advice", advice_list(v.reasons)},
+       {"advice", advice_list(v)},
        {"cards", cards(outcome)},
        {"cloud", cloud_section(outcome, cloud)},
        {"figures", sections},

@@ -220,11 +220,11 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   text += summary_line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows,
                        b.name.c_str(), b.luma.cols, b.luma.rows);
   const char* const colours[] = {style.poor, style.fair, style.good};
-  const std::string reasons = reasons_in_words(v.reasons);
+  const std::string reasons = reasons_in_words(v);
   text += summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
                        tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
                        kind_in_words(v.kind).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
-  for (const std::string& advice : advice_on(v.reasons))
+  for (const std::string& advice : advice_on(v))
     text += summary_line("advice", "%s", advice.c_str());
   if (v.has_R && v.has_t)
     text += summary_line("belief", "wrong with probability %.2g %%", 100 * v.probability_wrong);
@@ -293,7 +293,7 @@ int reconstruct(Arguments& a) {
   files.commit();
   files.remove_others(kFiles);
   if (has_full_pose(outcome.two_view)) return kExitPose;
-  const std::string reasons = reasons_in_words(outcome.two_view.reasons);
+  const std::string reasons = reasons_in_words(outcome.two_view);
   std::fprintf(stderr, "twoview: no full pose: %s%s%s\n",
                kind_in_words(outcome.two_view.kind).c_str(), reasons.empty() ? "" : ": ",
                reasons.c_str());
