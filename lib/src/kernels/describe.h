@@ -303,15 +303,15 @@ static int32_t sum_of_squares(const int16_t *values) {
 /* Clips the values at the limit and returns their sum. A lane adds up to 16 values below 4096. */
 static int32_t clip_values(int16_t *values, int16_t limit) {
   uint16_t lanes[TVK_WORDS];
-  words sums = words_of(0);
+  unsigned_words sums = {0};
   int32_t l1 = 0, k;
   TVK_ROLLED
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; k += TVK_WORDS) {
     const words clipped = words_min(words_load(values + k), words_of(limit));
     words_store(values + k, clipped);
-    sums += clipped;
+    sums += (unsigned_words)clipped;
   }
-  words_store(lanes, sums);
+  words_store(lanes, (words)sums);
   for (k = 0; k < TVK_WORDS; ++k) l1 += lanes[k];
   return l1;
 }

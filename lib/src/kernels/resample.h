@@ -2,8 +2,6 @@
 
 #include "kernels/words.h"
 
-typedef uint16_t unsigned_words __attribute__((vector_size(2 * TVK_WORDS)));
-
 #if defined(TVK_AVX2) || defined(TVK_AVX512) || defined(TVK_NEON)
 
 /* The pixels that are picked for TVK_WORDS columns. first[0] is that of the first eight. */

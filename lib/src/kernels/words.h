@@ -21,6 +21,7 @@
 #define TVK_ALIGNED __attribute__((aligned(32)))
 
 typedef int16_t words __attribute__((vector_size(2 * TVK_WORDS))); /* arithmetic must wrap around */
+typedef uint16_t unsigned_words __attribute__((vector_size(2 * TVK_WORDS)));
 typedef int16_t unaligned_words __attribute__((vector_size(2 * TVK_WORDS), aligned(2), may_alias));
 
 static inline words words_of(int16_t a) { return (words){0} + a; }
