@@ -34,6 +34,10 @@ distortion_coefficients: !!opencv-matrix
    cols: 5
    dt: d
    data: [ 0., 0., 0., 0., 0. ]
+# Middlebury's rig is calibrated to about 0.2 pixels (D. Scharstein et al., GCPR 2014), which is
+# 0.0002 focal lengths.
+focal_sigma: 0.0002
+center_sigma: 0.0002
 """
 
 TRUTH = """# x1 = R x0 + t, |t| = 1; baseline in metres; depth0 holds metres, 0 where unknown
