@@ -308,6 +308,16 @@ class Reconstruct(cli.CliTest):
                 self.assertEqual("focal length uncertain" in text, uncertain)
                 self.assertEqual(result["focal_length"] is not None, uncertain)
 
+    def test_a_camera_files_sigmas_are_read_and_refused_out_of_range(self):
+        plain = self.camera.read_text()
+        self.camera.write_text(plain + "focal_sigma: 0.004\ncenter_sigma: 0\n")
+        self.succeed(self.reconstruct())
+        self.assertEqual(self.result()["focal_length"]["sigma"], 0.004)
+        for entry in ("focal_sigma: 0.6", "center_sigma: -0.1", "focal_sigma: .nan"):
+            self.camera.write_text(plain + entry + "\n")
+            self.assert_refused(self.reconstruct(out=self.folder / "other"), "cam.yaml",
+                                entry.split(":")[0], out=self.folder / "other")
+
     def test_files_of_an_earlier_pair_do_not_stay_beside_new_ones(self):
         self.succeed(self.reconstruct())
         (self.out / "mine.txt").write_text("kept")

@@ -36,19 +36,15 @@ tv_status read_options(const tv_absolute_pose_options* given, tv_absolute_pose_o
   const tv_status status = read_sized(given, options);
   if (status != TV_OK) return status;
   const tv_absolute_pose_options& o = *options;
-  const double* const gravity[2] = {o.gravity_in_world, o.gravity_in_camera};
   if (!is_finite(o.max_error_px) || !is_finite(o.confidence) || !is_finite(o.gravity_sigma_rad)) {
     return TV_ERR_NOT_FINITE;
   }
-  bool valid = o.max_error_px > 0 && o.max_error_px <= 1e9 && o.confidence >= 0 &&
-               o.confidence < 1 && within(o.max_iterations, 1, 1000000) &&
-               within(o.fixed_iterations, 0, 1000000) && o.reserved == 0 &&
-               o.gravity_sigma_rad >= 0 && o.gravity_sigma_rad <= kPi;
-  for (int v = 0; v < 2 && o.gravity_sigma_rad != 0; ++v) {
-    if (!all_finite(gravity[v], 3)) return TV_ERR_NOT_FINITE;
-    valid = valid && (gravity[v][0] != 0 || gravity[v][1] != 0 || gravity[v][2] != 0);
-  }
-  return valid ? TV_OK : TV_ERR_ARGUMENT;
+  const bool valid = o.max_error_px > 0 && o.max_error_px <= 1e9 && o.confidence >= 0 &&
+                     o.confidence < 1 && within(o.max_iterations, 1, 1000000) &&
+                     within(o.fixed_iterations, 0, 1000000) && o.reserved == 0;
+  const tv_status gravity =
+      check_gravity(o.gravity_in_world, o.gravity_in_camera, o.gravity_sigma_rad);
+  return gravity == TV_OK && !valid ? TV_ERR_ARGUMENT : gravity;
 }
 
 }  // namespace

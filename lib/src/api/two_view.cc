@@ -35,20 +35,6 @@ constexpr tv_estimate_options kDefaults = {sizeof(tv_estimate_options),
                                            0,
                                            0};
 
-// Checks the directions of gravity, where they are used: finite and not zero, with a standard
-// deviation of at most pi.
-tv_status check_gravity(const tv_estimate_options& options) {
-  if (options.gravity_sigma_rad == 0) return TV_OK;
-  const double* gravity[2] = {options.gravity0, options.gravity1};
-  bool zero = false;
-  for (const double* g : gravity) {
-    if (!is_finite(g[0]) || !is_finite(g[1]) || !is_finite(g[2])) return TV_ERR_NOT_FINITE;
-    zero = zero || (g[0] == 0 && g[1] == 0 && g[2] == 0);
-  }
-  const bool in_range = options.gravity_sigma_rad > 0 && options.gravity_sigma_rad <= kPi;
-  return in_range && !zero ? TV_OK : TV_ERR_ARGUMENT;
-}
-
 // Checks the standard deviations of the cameras, each in [0, 0.5].
 tv_status check_calibration_sigmas(const tv_estimate_options& options) {
   for (const double sigma :
@@ -84,7 +70,9 @@ tv_status read_estimate_options(const tv_estimate_options* options, bool calibra
                             (checked->method == TV_SOLVER_UPRIGHT && calibrated && with_gravity);
   if (!in_range || !method_known) return TV_ERR_ARGUMENT;
   const tv_status sigmas = check_calibration_sigmas(*checked);
-  return sigmas != TV_OK ? sigmas : check_gravity(*checked);
+  return sigmas != TV_OK
+             ? sigmas
+             : check_gravity(checked->gravity0, checked->gravity1, checked->gravity_sigma_rad);
 }
 
 uint32_t bits_of(float x) {

@@ -119,6 +119,16 @@ bool outputs_overlap(const Bytes* arrays, int num_outputs, int num_arrays) {
   return false;
 }
 
+tv_status check_gravity(const double gravity0[3], const double gravity1[3], double sigma_rad) {
+  if (sigma_rad == 0) return TV_OK;
+  bool zero = false;
+  for (const double* g : {gravity0, gravity1}) {
+    if (!is_finite(g[0]) || !is_finite(g[1]) || !is_finite(g[2])) return TV_ERR_NOT_FINITE;
+    zero = zero || (g[0] == 0 && g[1] == 0 && g[2] == 0);
+  }
+  return sigma_rad > 0 && sigma_rad <= kPi && !zero ? TV_OK : TV_ERR_ARGUMENT;
+}
+
 bool is_rotation(const double R[9]) {
   for (int i = 0; i < 3; ++i) {
     for (int j = i; j < 3; ++j) {

@@ -43,6 +43,10 @@ tv_status read_pixel_pairs(const tv_pixel_pairs* given, tv_pixel_pairs* pairs);
 // and an angle within 1000 radians.
 tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);
 
+// Checks two directions of gravity, unless sigma_rad is 0: finite and not zero, with a standard
+// deviation of at most pi.
+tv_status check_gravity(const double gravity0[3], const double gravity1[3], double sigma_rad);
+
 // Whether every entry of R R' is within 1e-6 of that of I, and det R > 0.
 bool is_rotation(const double R[9]);
 

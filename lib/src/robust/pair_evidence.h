@@ -2,6 +2,7 @@
 // from. robust/evidence.h measures it.
 #pragma once
 
+#include "base/math.h"
 #include "twoview/two_view.h"
 
 namespace tv {
@@ -28,7 +29,7 @@ struct Evidence {
   double median_parallax_rad = 0;  // median parallax of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
   // By how much the rotation turns when the inliers of one region are left out; at most kPi.
-  double region_shift_rad = 3.14159265358979323846;
+  double region_shift_rad = kPi;
   // For each image, the root mean square distance in pixels of the inliers from the one line that
   // is fitted to all of them (in rays: from a plane through the camera's centre).
   double line_distance_px[2] = {kUnknown, kUnknown};

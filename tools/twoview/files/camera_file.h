@@ -17,7 +17,7 @@ tv_camera load_camera(const std::string& path);
 struct CalibrationSigmas {
   double focal, center;
 };
-// Of a camera file that does not say how sure it is, measured on the data sets' calibrations
+// Of a camera file that does not say how sure it is, chosen on the data sets' pairs
 // (docs/decisions/0024-honest-covariance.md), and of a focal length as for 35 mm film.
 inline constexpr CalibrationSigmas kPlainFile{0.01, 0.005}, kFilm{0.1, 0.01};
 
