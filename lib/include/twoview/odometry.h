@@ -1,10 +1,345 @@
-/* twoview: visual odometry, from a flight to a map. This header includes those of its pieces, which
-   are useful alone. A library that was built with TWOVIEW_ODOMETRY=OFF has none of these functions:
-   a program that calls one does not link. */
+/* twoview: visual odometry, from the frames of one camera to its path and a map of points.
+
+   This header includes those of its pieces, which are useful alone: tv_estimate_absolute_pose and
+   tv_adjust_window. A library that was built with TWOVIEW_ODOMETRY=OFF has none of these functions:
+   a program that calls one does not link. How it works and what it cannot do: docs/odometry.md. */
 #ifndef TWOVIEW_ODOMETRY_H
 #define TWOVIEW_ODOMETRY_H
 
+#include <stddef.h>
+#include <stdint.h>
+
 #include "twoview/absolute_pose.h"
+#include "twoview/camera.h"
+#include "twoview/context.h"
+#include "twoview/image.h"
+#include "twoview/two_view.h"
 #include "twoview/window.h"
+
+TV_BEGIN_DECLS
+
+/* The odometry of one camera: its map, and the memory that it works in. One thread uses it at a
+   time. */
+typedef struct tv_odometry tv_odometry;
+
+/* What is known of a frame's pose. */
+typedef enum tv_odometry_status {
+  /* There is no map yet: the frames so far do not determine one. The pose is not known. */
+  TV_ODOMETRY_STARTING = 0,
+  /* The pose was estimated from points of the map, and nothing speaks against it. */
+  TV_ODOMETRY_TRACKING = 1,
+  /* The pose was estimated, and `reasons` says why it may be wrong. */
+  TV_ODOMETRY_WEAK = 2,
+  /* The camera turned to where the map has too few points: the attitude was estimated from the
+     frame before, and the position is that of the last frame in which it was known. */
+  TV_ODOMETRY_ROTATION = 3,
+  /* The frame fits neither the map nor the frame before it. The pose is not known. */
+  TV_ODOMETRY_LOST = 4
+} tv_odometry_status;
+
+/* How many values tv_odometry_status has. */
+#define TV_ODOMETRY_NUM_STATUSES 5
+
+/* Returns "starting", "tracking", "weak", "rotation" or "lost", or "unknown" for any other number.
+   The string is constant and never freed. Thread-safe. */
+TV_API const char *tv_odometry_status_string(tv_odometry_status status);
+
+/* Where the unit of a map's lengths comes from. */
+typedef enum tv_scale_source {
+  /* Nothing metric is known: the first two keyframes are at the distance 1. */
+  TV_SCALE_UNIT = 0,
+  /* The heights above the ground. */
+  TV_SCALE_HEIGHT = 1,
+  /* The velocities. */
+  TV_SCALE_VELOCITY = 2,
+  /* Heights and velocities. */
+  TV_SCALE_HEIGHT_AND_VELOCITY = 3
+} tv_scale_source;
+
+/* What the odometry is made for: the memory that it takes, and how it works. Filled by
+   tv_odometry_options_init; change fields before tv_odometry_size. */
+typedef struct tv_odometry_options {
+  /* The caller's sizeof, set by tv_odometry_options_init. */
+  uint32_t struct_size;
+  /* The most keypoints of a frame, [100, 4096], default 1000. More keypoints are tracked more
+     reliably, and take more time. */
+  int32_t max_keypoints;
+  /* The most keyframes of the map, [8, 2000], default 200. When the map is full, the keyframe that
+     its neighbours make most nearly redundant is removed. */
+  int32_t max_keyframes;
+  /* The most points of the map, [500, 200000], default 20000. */
+  int32_t max_points;
+  /* How many keyframes are adjusted together, [3, 20], default 10. */
+  int32_t window;
+  /* A tv_kernels, default TV_KERNELS_AUTO. */
+  int32_t kernels;
+  /* The seed of every sampler. Its default is constant and never the time of day: equal frames give
+     equal bytes. */
+  uint64_t seed;
+} tv_odometry_options;
+
+/* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
+   tv_odometry_options_init. */
+TV_API void tv_odometry_options_init_sized(tv_odometry_options *options, size_t struct_size);
+/* Writes the default options; null is allowed. */
+#define tv_odometry_options_init(options) \
+  tv_odometry_options_init_sized((options), sizeof *(options))
+
+/* A frame, and what other sensors say of the camera at its time. Filled by tv_odometry_frame_init
+   with zeros: nothing else is known. */
+typedef struct tv_odometry_frame {
+  /* The caller's sizeof, set by tv_odometry_frame_init. */
+  uint32_t struct_size;
+  /* 1: frames are missing between the one before and this one, or the stream began anew; else 0.
+     The motion from frame to frame is then not predicted. */
+  int32_t gap;
+  /* The picture, of the camera's size. Its pixels are read during the call only. */
+  tv_image image;
+  /* The time of the exposure in seconds, from any moment; later than that of the frame before. */
+  double time_s;
+  /* The camera's attitude as the vehicle measures it, the row-major rotation world_from_cam, in a
+     world whose z axis points down. Read only where attitude_sigma_rad is above 0. */
+  double world_from_cam[9];
+  /* The standard deviation in radians of the direction of gravity that this attitude gives; 0
+     (default): there is no attitude. */
+  double attitude_sigma_rad;
+  /* The height of the camera above the ground in metres, and its standard deviation, 0 (default):
+     there is no height. The ground is taken as level from frame to frame of a window. */
+  double height_m, height_sigma_m;
+  /* The camera's velocity over ground in metres per second, along the axes of the camera, and the
+     standard deviation of each component; 0 (default): there is no velocity. */
+  double velocity_m_s[3], velocity_sigma_m_s;
+} tv_odometry_frame;
+
+/* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
+   tv_odometry_frame_init. */
+TV_API void tv_odometry_frame_init_sized(tv_odometry_frame *frame, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_odometry_frame_init(frame) tv_odometry_frame_init_sized((frame), sizeof *(frame))
+
+/* What is known after a frame. */
+typedef struct tv_odometry_state {
+  /* The caller's sizeof, set by tv_odometry_state_init. */
+  uint32_t struct_size;
+  /* A tv_odometry_status. */
+  int32_t status;
+  /* The bits of tv_reason that make the frame weak, or that keep the map from starting. */
+  uint32_t reasons;
+  /* Which segment the pose belongs to, from 0; -1 where no pose is known. A segment is a stretch
+     within one frame of coordinates: poses of different segments do not compare. */
+  int32_t segment;
+  /* 1 where the frame became a keyframe, else 0. */
+  uint8_t is_keyframe;
+  /* 1 where the pose was found again after frames without one, by matching with the whole map. */
+  uint8_t relocated;
+  /* 1 where a loop was closed at this frame: the keyframes moved. */
+  uint8_t loop_closed;
+  /* 1 where world_from_cam and the fields up to `covariance` hold a pose; else they are 0. */
+  uint8_t has_pose;
+  /* 1 where `covariance` was estimated. */
+  uint8_t has_covariance;
+  /* Always 0. */
+  uint8_t reserved[3];
+  /* How many frames were given so far, this one included. */
+  int32_t num_frames;
+  /* How many keypoints the frame has. */
+  int32_t num_keypoints;
+  /* How many of them were matched with points of the map, and how many are inliers of the pose. */
+  int32_t num_matches, num_inliers;
+  /* How many keyframes and points the map has, over all segments. */
+  int32_t num_keyframes, num_points;
+  /* How many segments were begun, how many poses were found again, and how many loops were closed,
+     since the start. */
+  int32_t num_segments, num_relocations, num_loops;
+  /* The id of the keyframe that the pose is relative to, -1 without a pose; see
+     tv_odometry_pose_of. */
+  int32_t reference_id;
+  /* The pose relative to that keyframe: a point X of the frame's camera is R X + t in the
+     keyframe's camera; row-major. */
+  double reference_from_cam_R[9], reference_from_cam_t[3];
+  /* The pose world_from_cam: a point X of the camera's frame is R X + t in the world, in the unit
+     of the map; row-major. The world is the camera's frame at the segment's first keyframe, or,
+     where attitudes were given, upright: with its z axis along gravity. */
+  double world_from_cam_R[9], world_from_cam_t[3];
+  /* The covariance of cam_from_world as this frame alone determines it from the points of the map,
+     in the parameters of tv_absolute_pose.covariance, row-major 6x6. */
+  double covariance[36];
+  /* The standard deviation of a pixel of sigma 1 along one axis, in pixels. */
+  double noise_px;
+  /* A tv_scale_source. */
+  int32_t scale_source;
+  /* Always 0. */
+  int32_t reserved2;
+  /* The standard deviation of the scale, relative to it; 0 where scale_source is TV_SCALE_UNIT. */
+  double scale_sigma;
+} tv_odometry_state;
+
+/* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
+   tv_odometry_state_init. */
+TV_API void tv_odometry_state_init_sized(tv_odometry_state *state, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_odometry_state_init(state) tv_odometry_state_init_sized((state), sizeof *(state))
+
+/* Writes to *size_bytes how much memory the odometry of this camera with these options needs. The
+   number depends on the image's size, the options and the library's version, and not on the CPU.
+   options: null means the defaults.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_ARGUMENT (an option, or an image
+   that is smaller than 32 or larger than 16384 pixels). */
+TV_API tv_status tv_odometry_size(const tv_camera *camera, const tv_odometry_options *options,
+                                  size_t *size_bytes);
+
+/* Makes an odometry without a map in `memory` of size_bytes bytes and writes a pointer to it to
+   *odometry.
+   memory: starts at a multiple of TV_CONTEXT_ALIGNMENT and is at least as large as tv_odometry_size
+   reports. The caller owns it, does not move it, and frees it after the last call.
+   Returns the statuses as tv_odometry_size does, and TV_ERR_ALIGNMENT, TV_ERR_MEMORY,
+   TV_ERR_KERNELS. */
+TV_API tv_status tv_odometry_init(tv_odometry **odometry, const tv_camera *camera,
+                                  const tv_odometry_options *options, void *memory,
+                                  size_t size_bytes);
+
+/* Forgets the map and every frame: afterwards the odometry is as tv_odometry_init made it. Returns
+   TV_ERR_NULL. */
+TV_API tv_status tv_odometry_reset(tv_odometry *odometry);
+
+/* Tracks a frame, and extends and adjusts the map.
+   frame: initialised by tv_odometry_frame_init. An attitude, a height or a velocity that is not
+   finite, and an attitude that is not a rotation, are left out of account; the call succeeds.
+   state: initialised by tv_odometry_state_init. That the pose is not known is TV_OK, and reported
+   in status.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA (the image is not of the camera's size),
+   TV_ERR_ARGUMENT (the image's stride, gap; the time is not later than that of the frame before),
+   TV_ERR_NOT_FINITE (the time), TV_ERR_OVERLAP. With each of these the odometry is as before.
+   Time: bounded by the options. Memory: the odometry's own. Equal frames give equal bytes on every
+   CPU. */
+TV_API tv_status tv_odometry_track(tv_odometry *odometry, const tv_odometry_frame *frame,
+                                   tv_odometry_state *state);
+
+/* Estimates the pose of a frame from the map as it is, without changing it: for a frame from before
+   the map began, or of another flight.
+   image: as tv_odometry_frame.image. state: as for tv_odometry_track; its status is
+   TV_ODOMETRY_TRACKING, TV_ODOMETRY_WEAK or TV_ODOMETRY_LOST. near_id: the id of a keyframe whose
+   surroundings are searched first; -1: no such hint.
+   Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_ARGUMENT, TV_ERR_OVERLAP. */
+TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image, int32_t near_id,
+                                    tv_odometry_state *state);
+
+/* Writes the pose world_from_cam of a frame in the last state of the map, from what
+   tv_odometry_state said of the frame when it was tracked: reference_id, reference_from_cam_R and
+   reference_from_cam_t. The keyframe may have been removed from the map since.
+   R: room for 9 numbers, row-major; t: room for 3. segment: null, or receives the segment.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (no keyframe has had this id), TV_ERR_OVERLAP. */
+TV_API tv_status tv_odometry_pose_of(const tv_odometry *odometry, int32_t reference_id,
+                                     const double reference_from_cam_R[9],
+                                     const double reference_from_cam_t[3], double R[9], double t[3],
+                                     int32_t *segment);
+
+/* A keyframe of the map. */
+typedef struct tv_keyframe {
+  /* The caller's sizeof, set by tv_keyframe_init. */
+  uint32_t struct_size;
+  /* The number of the keyframe: keyframes are numbered from 0 in the order in which they were made,
+     those included that were removed since. */
+  int32_t id;
+  /* Its segment. */
+  int32_t segment;
+  /* The number of its frame, from 0: how many frames were given before it. */
+  int32_t frame;
+  /* The time of its frame, in seconds. */
+  double time_s;
+  /* The pose world_from_cam, as in tv_odometry_state. */
+  double world_from_cam_R[9], world_from_cam_t[3];
+  /* How many keypoints the keyframe has, and how many of them see points of the map. */
+  int32_t num_keypoints, num_observations;
+  /* 1 where `covariance` is known, else 0. */
+  int32_t has_covariance;
+  /* Always 0. */
+  int32_t reserved;
+  /* The covariance of cam_from_world relative to the keyframe before it, in the parameters of
+     tv_adjust_window, row-major 6x6, in the unit of the map. */
+  double covariance[36];
+} tv_keyframe;
+
+/* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
+   tv_keyframe_init. */
+TV_API void tv_keyframe_init_sized(tv_keyframe *keyframe, size_t struct_size);
+/* Writes zeros, and struct_size; null is allowed. */
+#define tv_keyframe_init(keyframe) tv_keyframe_init_sized((keyframe), sizeof *(keyframe))
+
+/* Writes the keyframe number idx of the map, [0, num_keyframes), in the order of their ids. Returns
+   TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (idx). */
+TV_API tv_status tv_odometry_keyframe(const tv_odometry *odometry, int32_t idx,
+                                      tv_keyframe *keyframe);
+
+/* A point of the map. */
+typedef struct tv_map_point {
+  /* The number of the point, in the order in which they were made. */
+  int32_t id;
+  /* Its segment. */
+  int32_t segment;
+  /* How many keyframes see it. */
+  int32_t num_observations;
+  /* Its brightness in grey levels, [0, 255], where it was last seen. */
+  int32_t grey;
+  /* The position in the world, in the unit of the map. */
+  double position[3];
+  /* The covariance of the position, row-major symmetric 3x3, for exact poses of the keyframes. */
+  double covariance[9];
+} tv_map_point;
+
+/* Writes the points of the map, in the order of their ids.
+   points: room for cap_points; the options' max_points is always enough. *num_points: how many were
+   written; on TV_ERR_CAPACITY how many there are.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
+TV_API tv_status tv_odometry_points(const tv_odometry *odometry, tv_map_point *points,
+                                    int32_t cap_points, int32_t *num_points);
+
+/* A pixel at which a keyframe sees a point. */
+typedef struct tv_map_observation {
+  /* The index of the point in the array of tv_odometry_points, and of the keypoint among those of
+     the keyframe. */
+  int32_t idx_point, idx_keypoint;
+  /* The pixel, distorted as in the image, and its standard deviation relative to that of a keypoint
+     of the finest level. */
+  float x, y, sigma;
+  /* Always 0. */
+  int32_t reserved;
+} tv_map_observation;
+
+/* Writes what the keyframe number idx sees, in ascending order of idx_keypoint.
+   observations: room for cap_observations; max_keypoints is always enough. *num_observations: how
+   many were written; on TV_ERR_CAPACITY how many there are.
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
+TV_API tv_status tv_odometry_observations(const tv_odometry *odometry, int32_t idx,
+                                          tv_map_observation *observations,
+                                          int32_t cap_observations, int32_t *num_observations);
+
+/* The frame's observations of the last call of tv_odometry_track: which points of the map the frame
+   sees. observations and statuses as for tv_odometry_observations; idx_point is -1 for a keypoint
+   that sees no point, and every keypoint of the frame is written. */
+TV_API tv_status tv_odometry_last_frame(const tv_odometry *odometry,
+                                        tv_map_observation *observations, int32_t cap_observations,
+                                        int32_t *num_observations);
+
+/* Writes to *size_bytes how many bytes tv_odometry_save writes now. Returns TV_ERR_NULL. */
+TV_API tv_status tv_odometry_save_size(const tv_odometry *odometry, size_t *size_bytes);
+
+/* Writes the map as bytes: little-endian, with a version and a checksum, equal on every CPU
+   (docs/formats.md). bytes: room for cap_bytes. *num_bytes: how many were written; on
+   TV_ERR_CAPACITY how many there are. Returns TV_ERR_NULL, TV_ERR_CAPACITY, TV_ERR_OVERLAP. */
+TV_API tv_status tv_odometry_save(const tv_odometry *odometry, uint8_t *bytes, size_t cap_bytes,
+                                  size_t *num_bytes);
+
+/* Replaces the map by one that tv_odometry_save wrote. The next frame is looked for in the whole
+   map, as after a loss.
+   Returns TV_ERR_NULL, TV_ERR_MAP (the bytes are no map, are cut or altered, or are of a version
+   that this library does not know), TV_ERR_CAMERA (the map is of another camera), TV_ERR_LIMITS
+   (the map is larger than the options allow). With each of these the odometry is as before. */
+TV_API tv_status tv_odometry_load(tv_odometry *odometry, const uint8_t *bytes, size_t num_bytes);
+
+/* Gives the odometry a clock, for tv_odometry_take_times; see tv_context_set_clock. */
+TV_API tv_status tv_odometry_set_clock(tv_odometry *odometry, tv_clock now_ns, void *user);
+
+TV_END_DECLS
 
 #endif

@@ -71,7 +71,10 @@ typedef enum tv_status {
   /* A pixel or a ray lies outside the region in which the lens model is valid. */
   TV_ERR_OUTSIDE = 11,
   /* This CPU or this build of the library does not have the kernel set that was chosen. */
-  TV_ERR_KERNELS = 12
+  TV_ERR_KERNELS = 12,
+  /* The bytes are no map, are cut or altered, or are of a version that this library does not know
+     (tv_odometry_load). */
+  TV_ERR_MAP = 13
 } tv_status;
 
 /* Returns a short English phrase for a status, or "unknown status" for any other number. The string

@@ -21,6 +21,7 @@ const char *tv_status_string(tv_status status) {
     case TV_ERR_CAMERA: return "camera intrinsics are invalid, or for another image size";
     case TV_ERR_OUTSIDE: return "outside the valid region of the lens model";
     case TV_ERR_KERNELS: return "this CPU or build lacks the kernel set";
+    case TV_ERR_MAP: return "the bytes are no map of this version";
     default: return "unknown status";
   }
 }
