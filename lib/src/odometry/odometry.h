@@ -66,3 +66,6 @@ using Odometry = tv_odometry;
 size_t scratch_bytes(const tv_odometry_options& options);
 
 }  // namespace tv
+extern "C" __attribute__((visibility("default"))) double tv_tune[32];
+
+inline double T(int k, double v) { return tv_tune[k] == tv_tune[k] ? tv_tune[k] : v; }

@@ -15,8 +15,10 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
-constexpr double kLeastParallax = 0.015;  // radians, the median
-constexpr double kLeastAngle = 0.006;     // radians
+#define kLeastParallax T(19,0.015)
+  // radians, the median
+#define kLeastAngle T(15,0.006)
+     // radians
 constexpr int32_t kFramesBetween = 6;     // between frames that wait
 
 void copy_frame(const Frame& from, Frame* to) {

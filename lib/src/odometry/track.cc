@@ -13,8 +13,10 @@
 namespace tv {
 namespace {
 
-constexpr int32_t kLeastInliers = 20;
-constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
+#define kLeastInliers static_cast<int32_t>(T(0,20))
+constexpr double kMaxDistance_ = 200;
+#define kMaxDistance T(8,200)
+#define kSearchRatio T(9,0.9)
 constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
 constexpr int32_t kLostBeforeStart = 8;    // frames
 
@@ -102,8 +104,8 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
   const double moved = distance_between(a, b) / odometry.median_depth;
   const double turned =
       rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
-  const bool few = 10 * num_inliers < 7 * odometry.keyframe_inliers || num_inliers < 60;
-  return moved > 0.10 || turned > 0.25 || (few && (moved > 0.02 || turned > 0.08));
+  const bool few = num_inliers < T(6,0.6) * odometry.keyframe_inliers || num_inliers < T(5,100);
+  return moved > T(1,0.10) || turned > T(2,0.25) || (few && (moved > T(3,0.02) || turned > T(4,0.08)));
 }
 
 // Makes room for one more keyframe: removes the one that moved the camera least.
@@ -135,11 +137,11 @@ void make_room(Odometry* odometry) {
 void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
   make_room(odometry);
   const int32_t idx = make_keyframe(odometry, *frame);
-  odometry->keyframe_inliers = odometry->map.keyframes[idx].num_observations;
   make_points(odometry, idx, image);
   remove_bad_points(odometry);
-  adjust_around(odometry, idx, 6);
+  adjust_around(odometry, idx, static_cast<int32_t>(T(7,6)));
   const Map& map = odometry->map;
+  odometry->keyframe_inliers = map.keyframes[idx].num_observations;
   frame->cam_from_world = map.keyframes[idx].cam_from_world;
   odometry->reference_id = map.keyframes[idx].id;
   list_local_points(odometry, idx);
