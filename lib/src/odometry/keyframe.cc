@@ -16,7 +16,7 @@ namespace {
 #define kMostNeighbours static_cast<int32_t>(T(14,4))
 #define kLeastAngle T(15,0.006)
    // radians
-#define kLargestError T(16,2.0)
+#define kLargestError T(16,3.0)
    // px, of a pixel of sigma 1
 constexpr double kLargestSizeRatio = 2.2;
 constexpr double kTypicalNoise = 0.7;  // px
@@ -197,7 +197,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     }
     tv_guided_options guided;
     tv_guided_options_init(&guided);
-    guided.max_error_px = static_cast<float>(T(17,2.0)); guided.ratio = static_cast<float>(T(18,0.87));
+    guided.max_error_px = static_cast<float>(T(17,4.0)); guided.ratio = static_cast<float>(T(18,0.87));
     int32_t num_found = 0;
     if (tv_match_guided(odometry->context, &odometry->camera.model, &odometry->camera.model, E,
                         &theirs.features, &mine.features, &guided, found, room,
