@@ -13,10 +13,11 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastKeyframesBetween = 12;
-constexpr int32_t kLeastMatches = 25, kLeastInliers = 45, kLeastCommon = 15;
-constexpr double kLargestDrift = 0.12;  // of the path, in position
-constexpr double kLargestTurn = 0.5;    // radians
-constexpr double kLargestScale = 1.7;
+constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 15;
+constexpr double kLargestDrift = 0.05;  // of the path, in position
+constexpr double kLargestShift = 0.15;  // of the median depth, added to it
+constexpr double kLargestTurn = 0.4;    // radians
+constexpr double kLargestScale = 1.5;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
 
 
@@ -41,7 +42,7 @@ bool is_plausible(const Odometry& odometry, const Frame& frame, const LoopEnd& e
   centre_of(frame.cam_from_world, now);
   centre_of(end.cam_from_world, there);
   const double path = path_between(map, end.keyframe, map.num_keyframes - 1);
-  return distance_between(now, there) <= kLargestDrift * path + odometry.median_depth &&
+  return distance_between(now, there) <= kLargestDrift * path + kLargestShift * odometry.median_depth &&
          rotation_angle(compose(end.cam_from_world, inverse(frame.cam_from_world))) <=
              kLargestTurn;
 }

@@ -106,7 +106,7 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
   const double moved = distance_between(a, b) / odometry.median_depth;
   const double turned =
       rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
-  const bool few = num_inliers < T(6,0.6) * odometry.keyframe_inliers || num_inliers < T(5,100);
+  const bool few = num_inliers < T(6,0.7) * odometry.keyframe_inliers || num_inliers < T(5,100);
   return moved > T(1,0.10) || turned > T(2,0.25) || (few && (moved > T(3,0.02) || turned > T(4,0.08)));
 }
 
