@@ -175,7 +175,7 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   o->camera = tv::prepare_camera(plan.camera);
   tv_feature_options_init(&o->features);
   o->features.max_keypoints = plan.options.max_keypoints;
-  o->features.arc=(int)T(20,9); o->features.levels=(int)T(21,4); o->features.scale_factor=(float)T(22,1.41); o->features.threshold=(int)T(23,15); o->features.cell_px=(int)T(24,32);o->features.keypoint_size=(float)T(25,4);
+  o->features.arc=(int)T(20,9); o->features.levels=(int)T(21,4); o->features.min_threshold=(int)T(26,3); o->features.scale_factor=(float)T(22,1.41); o->features.threshold=(int)T(23,15); o->features.cell_px=(int)T(24,32);o->features.keypoint_size=(float)T(25,4);
   o->grid_columns = plan.columns;
   o->grid_rows = plan.rows;
   tv::make_map(plan.sizes, arena, &o->map);
