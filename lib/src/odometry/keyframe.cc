@@ -153,7 +153,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   tv_keypoint* their_room = arena_alloc<tv_keypoint>(arena, n);
   double centre[3];
   centre_of(own.cam_from_world, centre);
-  int32_t num_neighbours = 0;
+  int32_t neighbours[16], num_neighbours = 0;
   for (int32_t k = keyframe - 1; k >= 0 && num_neighbours < kMostNeighbours; --k) {
     const MapKeyframe& other = map.keyframes[k];
     if (other.described < 0 || other.segment != own.segment) continue;
@@ -161,7 +161,12 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     centre_of(other.cam_from_world, there);
     if (distance_between(centre, there) < kLeastBaseline * odometry->median_depth) continue;
     if (rotation_angle(compose(own.cam_from_world, inverse(other.cam_from_world))) > 1.0) continue;
-    ++num_neighbours;
+    neighbours[num_neighbours++] = k;
+  }
+  // The farthest ones first: a point is made of the widest baseline that sees it.
+  for (int32_t i = 0; i < num_neighbours; ++i) {
+    const int32_t k = neighbours[T(30, 1) > 0 ? num_neighbours - 1 - i : i];
+    const MapKeyframe& other = map.keyframes[k];
     const tv_features theirs = features_of(map, other, their_room);
     tv_match_options options;
     tv_match_options_init(&options);
@@ -173,8 +178,8 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
     const MapKeypoint* their_keypoints = keypoints_of(map, other);
     int32_t num = 0;
-    for (int32_t i = 0; i < num_found; ++i) {
-      const int32_t a = found[i].idx0, b = found[i].idx1;
+    for (int32_t m = 0; m < num_found; ++m) {
+      const int32_t a = found[m].idx0, b = found[m].idx1;
       const int32_t theirs_point = their_keypoints[a].point, point = my_keypoints[b].point;
       if (point == kNoPoint && theirs_point == kNoPoint) {
         keypoints0[num] = a;
@@ -191,7 +196,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
         }
       }
     }
-    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num, kLeastAngle, image);
+    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num, std::max(kLeastAngle, T(31, 5) * odometry->turn_sigma), image);
   }
 }
 

@@ -301,6 +301,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
       odometry->motion_s = frame->time_s - odometry->previous.time_s;
       odometry->has_motion = true;
     }
+    odometry->turn_sigma = std::sqrt(std::max({state->covariance[0], state->covariance[7], state->covariance[14]}));
     if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
       add_frame_as_keyframe(odometry, frame, input.image);
       state->is_keyframe = 1;
