@@ -41,13 +41,13 @@ struct Stream {
   const uint8_t* from;
   size_t at;
   size_t end;   // of `from`
-  bool is_cut;  // `from` had too few bytes: the numbers are 0
+  bool is_bad;  // `from` has too few bytes, or what must be 0 is not
 };
 
 void pass_numbers(Stream* s, void* numbers, size_t width, size_t bytes) {
   uint8_t* own = static_cast<uint8_t*>(numbers);
   if (s->from != nullptr && bytes > s->end - s->at) {
-    s->is_cut = true;
+    s->is_bad = true;
     std::memset(own, 0, bytes);
     return;
   }
@@ -68,6 +68,13 @@ void pass(Stream* s, Number* number) {
 template <typename Number, size_t kNum>
 void pass(Stream* s, Number (*numbers)[kNum]) {
   pass_numbers(s, numbers, sizeof(Number), sizeof *numbers);
+}
+
+// Keeps the numbers of 8 bytes at multiples of 8.
+void pass_reserved(Stream* s) {
+  int32_t reserved = 0;
+  pass(s, &reserved);
+  s->is_bad = s->is_bad || reserved != 0;
 }
 
 struct Header {
@@ -103,6 +110,7 @@ void pass_header(Stream* s, Header* h) {
   pass(s, &h->num_segments);
   pass(s, &h->num_relocations);
   pass(s, &h->num_loops);
+  pass_reserved(s);
 }
 
 void pass_point(Stream* s, MapPoint* p, uint8_t (*descriptor)[TV_DESCRIPTOR_BYTES]) {
@@ -129,6 +137,7 @@ void pass_keyframe(Stream* s, MapKeyframe* k) {
   pass(s, &k->frame);
   pass(s, &k->num_keypoints);
   pass(s, &k->has_covariance);
+  pass_reserved(s);
   pass(s, &k->time_s);
   pass_pose(s, &k->cam_from_world);
   pass(s, &k->down);
@@ -219,7 +228,7 @@ bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool
     MapPoint point{};
     uint8_t descriptor[TV_DESCRIPTOR_BYTES];
     pass_point(s, &point, &descriptor);
-    if (s->is_cut || !is_point(h, point) || point.id <= last_id) return false;
+    if (s->is_bad || !is_point(h, point) || point.id <= last_id) return false;
     last_id = point.id;
     if (map == nullptr) continue;
     map->points[n] = point;
@@ -230,7 +239,7 @@ bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool
   for (int32_t n = 0; n < h.num_keyframes; ++n) {
     MapKeyframe keyframe{};
     pass_keyframe(s, &keyframe);
-    if (s->is_cut || !is_keyframe(h, keyframe) || keyframe.id <= last_id) return false;
+    if (s->is_bad || !is_keyframe(h, keyframe) || keyframe.id <= last_id) return false;
     last_id = keyframe.id;
     *fits = *fits && keyframe.num_keypoints <= sizes.max_keypoints;
     MapKeypoint* own = nullptr;
@@ -244,7 +253,7 @@ bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool
     for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
       MapKeypoint keypoint;
       pass_keypoint(s, &keypoint);
-      if (s->is_cut || !is_keypoint(h, keypoint)) return false;
+      if (s->is_bad || !is_keypoint(h, keypoint)) return false;
       if (map == nullptr) continue;
       own[k] = keypoint;
       if (keypoint.point != kNoPoint) observe(map, n, k, keypoint.point);
@@ -254,7 +263,7 @@ bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool
   for (int32_t n = 0; n < h.num_removed; ++n) {
     RemovedKeyframe removed;
     pass_removed(s, &removed);
-    if (s->is_cut || !is_removed(h, removed) || removed.id <= last_id) return false;
+    if (s->is_bad || !is_removed(h, removed) || removed.id <= last_id) return false;
     last_id = removed.id;
     if (map == nullptr) continue;
     map->removed[n] = removed;
@@ -324,7 +333,7 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, Odometry* odometry) {
   Header h;
   Stream s{nullptr, bytes, 0, num_bytes, false};
   pass_header(&s, &h);
-  if (s.is_cut || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version != kVersion ||
+  if (s.is_bad || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version != kVersion ||
       h.num_bytes != num_bytes ||
       h.checksum != checksum(bytes + kUnchecked, num_bytes - kUnchecked) || !is_header(h)) {
     return TV_ERR_MAP;

@@ -87,7 +87,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
           pixel.y() < model.height)) {
       continue;
     }
-    ++point.num_visible;
+    if (!odometry->is_locating) ++point.num_visible;
     const double radius =
         search.radius_px + 2 * depth_error_px(*odometry, point, search.cam_from_world, x[2]);
     const float px = static_cast<float>(pixel.x()), py = static_cast<float>(pixel.y());

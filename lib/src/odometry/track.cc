@@ -354,6 +354,7 @@ void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
   Frame* frame = &odometry->starts[0];  // has no other use while there is a map
   extract_frame(odometry, image, frame);
   PoseFit fit;
+  odometry->is_locating = true;
   state->status = TV_ODOMETRY_LOST;
   state->segment = state->reference_id = -1;
   state->num_keypoints = frame->num;
@@ -365,6 +366,7 @@ void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
     state->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
     write_pose(*odometry, *frame, state);
   }
+  odometry->is_locating = false;
   odometry->segment = segment;
   odometry->reference_id = reference;
   const int32_t k = find_keyframe(odometry->map, reference);

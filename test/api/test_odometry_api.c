@@ -1,0 +1,737 @@
+/* Tests of the odometry: the statuses and outputs that odometry.h promises, its accessors, and the
+   bytes of its map. It flies through a small room that support/room_scene.h draws. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "support/api.h"
+#include "support/room_scene.h"
+#include "twoview/odometry.h"
+
+enum {
+  GUARD = 256,
+  KEYPOINTS = 160,
+  KEYFRAMES = 8,
+  POINTS = 500,
+  MOST_FRAMES = 60,
+  MEMORY = 6 << 20,
+  MAP = 1 << 18,
+  /* The sizes of the records of the map's bytes, and where the first point begins. */
+  HEADER = 176,
+  POINT = 192,
+  KEYFRAME = 488,
+  KEYPOINT = 16,
+  REMOVED = 112
+};
+
+static tv_camera camera;
+static tv_odometry_options options;
+static tv_odometry_frame frame;
+static tv_odometry_state state;
+static tv_odometry *odometry, *other;
+static _Alignas(64) uint8_t blocks[2][MEMORY];
+static size_t size_bytes;
+static uint8_t pixels[ROOM_WIDTH * ROOM_HEIGHT];
+static uint8_t map[MAP], altered[MAP], again[MAP];
+static size_t num_map;
+static tv_map_point points[POINTS];
+static tv_map_observation observations[KEYPOINTS];
+static int num_flown;
+
+static void begin(int idx, tv_odometry **made) {
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_size(&camera, &options, &size_bytes));
+  TEST_ASSERT_TRUE(size_bytes + 2 * GUARD <= MEMORY);
+  memset(blocks[idx], API_PATTERN, MEMORY);
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_odometry_init(made, &camera, &options, blocks[idx] + GUARD, size_bytes));
+}
+
+static tv_status give(tv_odometry *to, int n) {
+  room_flight(n, pixels);
+  frame.time_s = n / 30.0;
+  return tv_odometry_track(to, &frame, &state);
+}
+
+/* Flies until the map has this many keyframes, or for MOST_FRAMES frames. */
+static void fly(tv_odometry *to, int num_keyframes) {
+  num_flown = 0;
+  do {
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(to, num_flown++));
+  } while (state.num_keyframes < num_keyframes && num_flown < MOST_FRAMES);
+  TEST_ASSERT_TRUE(state.has_pose && state.num_keyframes >= num_keyframes);
+}
+
+static void save(const tv_odometry *from, uint8_t *bytes, size_t *num) {
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_save(from, bytes, MAP, num));
+}
+
+static void expect_unchanged(void) {
+  size_t num;
+  save(odometry, again, &num);
+  TEST_ASSERT_EQUAL_UINT64(num_map, num);
+  TEST_ASSERT_EQUAL_MEMORY(map, again, num);
+}
+
+void setUp(void) {
+  camera = room_camera();
+  tv_odometry_options_init(&options);
+  options.max_keypoints = KEYPOINTS;
+  options.max_keyframes = KEYFRAMES;
+  options.max_points = POINTS;
+  tv_odometry_frame_init(&frame);
+  frame.image = api_image(pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH);
+  tv_odometry_state_init(&state);
+  begin(0, &odometry);
+}
+
+void tearDown(void) {}
+
+static void test_init_functions_write_defaults_and_sizes(void) {
+  tv_keyframe keyframe;
+  tv_odometry_options_init(&options);
+  TEST_ASSERT_EQUAL_UINT32(sizeof options, options.struct_size);
+  TEST_ASSERT_EQUAL_INT(1000, options.max_keypoints);
+  TEST_ASSERT_EQUAL_INT(200, options.max_keyframes);
+  TEST_ASSERT_EQUAL_INT(20000, options.max_points);
+  TEST_ASSERT_EQUAL_INT(10, options.window);
+  TEST_ASSERT_EQUAL_INT(TV_KERNELS_AUTO, options.kernels);
+  memset(&frame, 1, sizeof frame);
+  tv_odometry_frame_init(&frame);
+  TEST_ASSERT_EQUAL_UINT32(sizeof frame, frame.struct_size);
+  TEST_ASSERT_TRUE(frame.gap == 0 && frame.time_s == 0 && frame.attitude_sigma_rad == 0);
+  memset(&state, 1, sizeof state);
+  tv_odometry_state_init(&state);
+  TEST_ASSERT_EQUAL_UINT32(sizeof state, state.struct_size);
+  TEST_ASSERT_TRUE(state.status == 0 && state.scale_sigma == 0);
+  memset(&keyframe, 1, sizeof keyframe);
+  tv_keyframe_init(&keyframe);
+  TEST_ASSERT_EQUAL_UINT32(sizeof keyframe, keyframe.struct_size);
+  TEST_ASSERT_TRUE(keyframe.id == 0 && keyframe.covariance[35] == 0);
+  tv_odometry_options_init_sized(NULL, 8);
+  tv_odometry_frame_init_sized(NULL, 8);
+  tv_odometry_state_init_sized(NULL, 8);
+  tv_keyframe_init_sized(NULL, 8);
+}
+
+static void test_each_status_has_a_name(void) {
+  static const char *const names[] = {"starting", "tracking", "weak", "rotation", "lost"};
+  int k;
+  for (k = 0; k < TV_ODOMETRY_NUM_STATUSES; ++k) {
+    TEST_ASSERT_EQUAL_STRING(names[k], tv_odometry_status_string((tv_odometry_status)k));
+  }
+  TEST_ASSERT_EQUAL_STRING("unknown", tv_odometry_status_string((tv_odometry_status)k));
+}
+
+/* Expects the status of tv_odometry_size and of tv_odometry_init. */
+static void expect_size(tv_status expected) {
+  const size_t before = size_bytes = 12345;
+  tv_odometry *const unmade = other = odometry;
+  TEST_ASSERT_EQUAL_INT(expected, tv_odometry_size(&camera, &options, &size_bytes));
+  TEST_ASSERT_EQUAL_UINT64(before, size_bytes);
+  TEST_ASSERT_EQUAL_INT(expected, tv_odometry_init(&other, &camera, &options, blocks[1], MEMORY));
+  TEST_ASSERT_TRUE(other == unmade);
+}
+
+static void test_size_refuses_bad_cameras_and_options(void) {
+  const tv_odometry_options good = options;
+  static const int32_t ranges[5][2] = {
+      {100, 4096}, {8, 2000}, {500, 200000}, {3, 20}, {TV_KERNELS_AUTO, TV_KERNELS_NEON}};
+  int k;
+  for (k = 0; k < 5; ++k) {
+    int32_t *const fields[5] = {&options.max_keypoints, &options.max_keyframes, &options.max_points,
+                                &options.window, &options.kernels};
+    *fields[k] = ranges[k][0] - 1, expect_size(TV_ERR_ARGUMENT);
+    *fields[k] = ranges[k][1] + 1, expect_size(TV_ERR_ARGUMENT);
+    options = good;
+  }
+  options.struct_size = 3, expect_size(TV_ERR_STRUCT_SIZE), options = good;
+  camera.width = 31, expect_size(TV_ERR_ARGUMENT);
+  camera.width = 16385, expect_size(TV_ERR_ARGUMENT), camera.width = ROOM_WIDTH;
+  camera.fx = 0, expect_size(TV_ERR_CAMERA), camera = room_camera();
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_size(NULL, NULL, &size_bytes));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_size(&camera, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_size(&camera, NULL, &size_bytes));
+}
+
+static void test_init_refuses_bad_memory(void) {
+  tv_odometry *const before = other = odometry;
+  const size_t size = size_bytes;
+  uint8_t *const memory = blocks[1];
+#if defined(__x86_64__)
+  options.kernels = TV_KERNELS_NEON;
+#else
+  options.kernels = TV_KERNELS_AVX2;
+#endif
+  TEST_ASSERT_EQUAL_INT(TV_ERR_KERNELS,
+                        tv_odometry_init(&other, &camera, &options, memory, MEMORY));
+  options.kernels = TV_KERNELS_AUTO;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_init(NULL, &camera, &options, memory, size));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_init(&other, NULL, &options, memory, size));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_init(&other, &camera, &options, NULL, size));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ALIGNMENT,
+                        tv_odometry_init(&other, &camera, &options, memory + 8, size));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_MEMORY,
+                        tv_odometry_init(&other, &camera, &options, memory, size - 1));
+  TEST_ASSERT_TRUE(other == before);
+}
+
+static void test_a_flight_stays_within_its_memory(void) {
+  size_t num_first;
+  fly(odometry, KEYFRAMES);
+  TEST_ASSERT_TRUE(api_is_pattern(blocks[0], GUARD));
+  TEST_ASSERT_TRUE(api_is_pattern(blocks[0] + GUARD + size_bytes, MEMORY - GUARD - size_bytes));
+  save(odometry, map, &num_first);
+  /* Reset makes it as it was made: the same flight gives the same bytes. */
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_reset(NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  save(odometry, again, &num_map);
+  TEST_ASSERT_EQUAL_UINT64(HEADER, num_map);
+  fly(odometry, KEYFRAMES);
+  num_map = num_first;
+  expect_unchanged();
+}
+
+static void test_every_kernel_set_gives_the_same_map(void) {
+  fly(odometry, 4);
+  save(odometry, map, &num_map);
+  for (options.kernels = TV_KERNELS_C; options.kernels <= TV_KERNELS_NEON; ++options.kernels) {
+    const tv_status status = tv_odometry_init(&odometry, &camera, &options, blocks[1], MEMORY);
+    if (status == TV_ERR_KERNELS) continue;
+    TEST_ASSERT_EQUAL_INT(TV_OK, status);
+    fly(odometry, 4);
+    expect_unchanged();
+  }
+}
+
+/* Expects that a frame is refused, and that neither the state nor the odometry changes. */
+static void expect_refused(tv_status expected) {
+  const tv_odometry_state before = state;
+  TEST_ASSERT_EQUAL_INT(expected, tv_odometry_track(odometry, &frame, &state));
+  TEST_ASSERT_EQUAL_MEMORY(&before, &state, sizeof state);
+  expect_unchanged();
+}
+
+static void test_bad_frames_are_refused(void) {
+  tv_odometry_frame good;
+  fly(odometry, 3);
+  save(odometry, map, &num_map);
+  expect_refused(TV_ERR_ARGUMENT); /* the time stands */
+  frame.time_s += 1;
+  good = frame;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_track(NULL, &frame, &state));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_track(odometry, NULL, &state));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_track(odometry, &frame, NULL));
+  frame.image.data = NULL, expect_refused(TV_ERR_NULL), frame = good;
+  frame.struct_size = 2, expect_refused(TV_ERR_STRUCT_SIZE), frame = good;
+  state.struct_size = 2, expect_refused(TV_ERR_STRUCT_SIZE), state.struct_size = sizeof state;
+  frame.image.width -= 1, expect_refused(TV_ERR_CAMERA), frame = good;
+  frame.image.height += 1, expect_refused(TV_ERR_CAMERA), frame = good;
+  frame.image.stride_bytes -= 1, expect_refused(TV_ERR_ARGUMENT), frame = good;
+  frame.image.stride_bytes = INT64_MAX, expect_refused(TV_ERR_ARGUMENT), frame = good;
+  frame.gap = 2, expect_refused(TV_ERR_ARGUMENT), frame = good;
+  frame.time_s = 0, expect_refused(TV_ERR_ARGUMENT), frame = good;
+  frame.time_s = NAN, expect_refused(TV_ERR_NOT_FINITE), frame = good;
+  frame.time_s = INFINITY, expect_refused(TV_ERR_NOT_FINITE), frame = good;
+  frame.image.data = (const uint8_t *)&state, expect_refused(TV_ERR_OVERLAP), frame = good;
+}
+
+static void test_wrong_sensors_are_left_out_of_account(void) {
+  frame.attitude_sigma_rad = 0.01; /* of an attitude of zeros */
+  frame.height_m = NAN, frame.height_sigma_m = 0.1;
+  frame.velocity_m_s[1] = INFINITY, frame.velocity_sigma_m_s = 0.1;
+  fly(odometry, 3);
+  save(odometry, map, &num_map);
+  tv_odometry_frame_init(&frame);
+  frame.image = api_image(pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  fly(odometry, 3);
+  expect_unchanged();
+}
+
+/* How far the image of a point lies from the pixel at which the keyframe sees it. */
+static double error_px(const tv_keyframe *k, const double X[3], const tv_map_observation *o) {
+  const double *R = k->world_from_cam_R, *t = k->world_from_cam_t;
+  double x[3], pixel[2];
+  int c;
+  for (c = 0; c < 3; ++c) {
+    x[c] = R[c] * (X[0] - t[0]) + R[3 + c] * (X[1] - t[1]) + R[6 + c] * (X[2] - t[2]);
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_project(&camera, x, pixel, NULL));
+  return hypot(pixel[0] - (double)o->x, pixel[1] - (double)o->y);
+}
+
+static void test_the_map_holds_together(void) {
+  int32_t num_points, num, k, i, counts[POINTS] = {0}, total = 0, near_ones = 0, last_id = -1;
+  tv_keyframe keyframe;
+  fly(odometry, KEYFRAMES);
+  for (i = 0; i < 25; ++i) { /* points are removed, and their places used again */
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown++));
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_points(odometry, points, POINTS, &num_points));
+  TEST_ASSERT_EQUAL_INT(state.num_points, num_points);
+  for (i = 0; i < num_points; ++i) {
+    TEST_ASSERT_TRUE(points[i].id > (i > 0 ? points[i - 1].id : -1));
+    TEST_ASSERT_TRUE(points[i].grey >= 0 && points[i].grey <= 255);
+  }
+  TEST_ASSERT_TRUE(points[num_points - 1].id >= num_points); /* some were removed */
+  for (k = 0; k < state.num_keyframes; ++k) {
+    tv_keyframe_init(&keyframe);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, k, &keyframe));
+    TEST_ASSERT_TRUE(keyframe.id > last_id && keyframe.frame < num_flown);
+    TEST_ASSERT_TRUE(fabs(keyframe.time_s - keyframe.frame / 30.0) < 1e-12);
+    last_id = keyframe.id;
+    TEST_ASSERT_EQUAL_INT(TV_OK,
+                          tv_odometry_observations(odometry, k, observations, KEYPOINTS, &num));
+    TEST_ASSERT_EQUAL_INT(keyframe.num_observations, num);
+    for (i = 0; i < num; ++i) {
+      const tv_map_observation *o = &observations[i];
+      TEST_ASSERT_TRUE(o->idx_keypoint > (i > 0 ? o[-1].idx_keypoint : -1));
+      TEST_ASSERT_TRUE(o->idx_keypoint < keyframe.num_keypoints);
+      TEST_ASSERT_TRUE(o->idx_point >= 0 && o->idx_point < num_points && o->sigma >= 1);
+      ++counts[o->idx_point], ++total;
+      near_ones += error_px(&keyframe, points[o->idx_point].position, o) < 4 * (double)o->sigma;
+    }
+  }
+  for (i = 0; i < num_points; ++i) TEST_ASSERT_EQUAL_INT(counts[i], points[i].num_observations);
+  TEST_ASSERT_TRUE(total > 100 && near_ones > 0.9 * total);
+}
+
+static void test_the_last_frame_is_shown(void) {
+  int32_t num, k, num_seen = 0;
+  tv_keyframe as_keyframe;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_last_frame(odometry, NULL, 0, &num));
+  TEST_ASSERT_EQUAL_INT(0, num);
+  fly(odometry, 3);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_last_frame(odometry, observations, KEYPOINTS, &num));
+  TEST_ASSERT_EQUAL_INT(state.num_keypoints, num);
+  /* The frame is a keyframe, too. */
+  tv_keyframe_init(&as_keyframe);
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_odometry_keyframe(odometry, state.num_keyframes - 1, &as_keyframe));
+  TEST_ASSERT_EQUAL_INT(num_flown - 1, as_keyframe.frame);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_points(odometry, points, POINTS, &k));
+  for (k = 0; k < num; ++k) {
+    TEST_ASSERT_EQUAL_INT(k, observations[k].idx_keypoint);
+    if (observations[k].idx_point < 0) continue;
+    ++num_seen;
+    TEST_ASSERT_TRUE(
+        error_px(&as_keyframe, points[observations[k].idx_point].position, &observations[k]) < 20);
+  }
+  TEST_ASSERT_EQUAL_INT(as_keyframe.num_observations, num_seen);
+  memset(pixels, 128, sizeof pixels);
+  frame.time_s += 1;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, state.status);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_last_frame(odometry, observations, KEYPOINTS, &num));
+  TEST_ASSERT_EQUAL_INT(0, num);
+}
+
+static void test_accessors_refuse_bad_arguments(void) {
+  tv_keyframe keyframe;
+  int32_t num = 0, k;
+  fly(odometry, 3);
+  save(odometry, map, &num_map);
+  tv_keyframe_init(&keyframe);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_keyframe(NULL, 0, &keyframe));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_keyframe(odometry, 0, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_keyframe(odometry, -1, &keyframe));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_odometry_keyframe(odometry, state.num_keyframes, &keyframe));
+  keyframe.struct_size = 1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_odometry_keyframe(odometry, 0, &keyframe));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_points(NULL, points, POINTS, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_points(odometry, NULL, 1, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_points(odometry, points, POINTS, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_points(odometry, points, -1, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_odometry_points(odometry, points, POINTS, &points[3].id));
+  TEST_ASSERT_EQUAL_INT(0, num);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY,
+                        tv_odometry_points(odometry, points, state.num_points - 1, &num));
+  TEST_ASSERT_EQUAL_INT(state.num_points, num);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_points(odometry, points, num, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_observations(odometry, -1, NULL, 0, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_odometry_observations(odometry, state.num_keyframes, NULL, 0, &num));
+  for (k = 0; k < 2; ++k) { /* the two functions with the same rules */
+#define OBSERVE(o, array, cap, n)                           \
+  (k == 0 ? tv_odometry_observations((o), 0, array, cap, n) \
+          : tv_odometry_last_frame((o), array, cap, n))
+    TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, OBSERVE(NULL, observations, KEYPOINTS, &num));
+    TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, OBSERVE(odometry, NULL, 1, &num));
+    TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, OBSERVE(odometry, observations, KEYPOINTS, NULL));
+    TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, OBSERVE(odometry, observations, -1, &num));
+    TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                          OBSERVE(odometry, observations, KEYPOINTS, &observations[2].reserved));
+    num = 0;
+    TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, OBSERVE(odometry, observations, 3, &num));
+    TEST_ASSERT_TRUE(num > 3);
+    TEST_ASSERT_EQUAL_INT(TV_OK, OBSERVE(odometry, observations, num, &num));
+  }
+  expect_unchanged();
+}
+
+static void test_poses_are_found_again_from_their_keyframes(void) {
+  static tv_odometry_state states[MOST_FRAMES + 20];
+  double R[9], t[3];
+  int32_t segment, k, i, removed = 0;
+  tv_keyframe first;
+  for (k = 0; k < MOST_FRAMES + 20; ++k) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, k));
+    states[k] = state;
+    if (!state.has_pose) continue;
+    TEST_ASSERT_EQUAL_INT(
+        TV_OK, tv_odometry_pose_of(odometry, state.reference_id, state.reference_from_cam_R,
+                                   state.reference_from_cam_t, R, t, &segment));
+    TEST_ASSERT_EQUAL_INT(state.segment, segment);
+    for (i = 0; i < 9; ++i) TEST_ASSERT_TRUE(fabs(R[i] - state.world_from_cam_R[i]) < 1e-9);
+    for (i = 0; i < 3; ++i) TEST_ASSERT_TRUE(fabs(t[i] - state.world_from_cam_t[i]) < 1e-9);
+  }
+  for (k = 0; k < MOST_FRAMES + 20; ++k) { /* also where the keyframe is gone */
+    const tv_odometry_state *s = &states[k];
+    if (!s->has_pose) continue;
+    TEST_ASSERT_EQUAL_INT(TV_OK,
+                          tv_odometry_pose_of(odometry, s->reference_id, s->reference_from_cam_R,
+                                              s->reference_from_cam_t, R, t, NULL));
+    for (i = 0; i < 3; ++i) TEST_ASSERT_TRUE(fabs(t[i] - s->world_from_cam_t[i]) < 0.3);
+    for (i = 0; i < state.num_keyframes; ++i) {
+      tv_keyframe_init(&first);
+      tv_odometry_keyframe(odometry, i, &first);
+      if (first.id == s->reference_id) break;
+    }
+    removed += i == state.num_keyframes;
+  }
+  TEST_ASSERT_TRUE(removed > 0);
+#define POSE_OF(id, R_in, R_out, t_out) \
+  tv_odometry_pose_of(odometry, (id), R_in, state.reference_from_cam_t, R_out, t_out, &segment)
+  k = state.reference_id;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, POSE_OF(-1, state.reference_from_cam_R, R, t));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, POSE_OF(100000, state.reference_from_cam_R, R, t));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, POSE_OF(k, NULL, R, t));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, POSE_OF(k, state.reference_from_cam_R, NULL, t));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, POSE_OF(k, state.reference_from_cam_R, R, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, POSE_OF(k, R, R, t));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, POSE_OF(k, state.reference_from_cam_R, R, R + 6));
+}
+
+static void test_a_frame_is_located_without_changing_the_map(void) {
+  tv_image image = frame.image;
+  tv_odometry_state found;
+  fly(odometry, 5);
+  save(odometry, map, &num_map);
+  room_flight(num_flown - 4, pixels);
+  tv_odometry_state_init(&found);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, -1, &found));
+  TEST_ASSERT_TRUE(found.has_pose);
+  TEST_ASSERT_TRUE(found.has_pose && found.reference_id >= 0);
+  expect_unchanged();
+  memset(pixels, 0, sizeof pixels);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(odometry, &image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, found.status);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(NULL, &image, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(odometry, NULL, 0, &found));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_locate(odometry, &image, 0, NULL));
+  image.data = (const uint8_t *)&found;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_odometry_locate(odometry, &image, 0, &found));
+  image.data = pixels, image.width = 16;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_odometry_locate(odometry, &image, 0, &found));
+  image = frame.image, image.stride_bytes = 1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_locate(odometry, &image, 0, &found));
+  found.struct_size = 1;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_odometry_locate(odometry, &frame.image, 0, &found));
+}
+
+static uint64_t count_calls(void *user) { return ++*(uint64_t *)user; }
+
+static void test_the_clock_is_read(void) {
+  uint64_t calls = 0, before;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_set_clock(NULL, count_calls, &calls));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_set_clock(odometry, count_calls, &calls));
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, 0));
+  TEST_ASSERT_TRUE(calls > 0);
+  before = calls;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_set_clock(odometry, NULL, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, 1));
+  TEST_ASSERT_EQUAL_UINT64(before, calls);
+}
+
+static uint64_t number_at(const uint8_t *bytes, int width) {
+  uint64_t n = 0;
+  while (width > 0) n = n << 8 | bytes[--width];
+  return n;
+}
+
+static double double_at(const uint8_t *bytes) {
+  const uint64_t bits = number_at(bytes, 8);
+  double x;
+  memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+/* CRC-32 by its definition, bit by bit. */
+static uint32_t crc_of(const uint8_t *bytes, size_t num) {
+  uint32_t crc = 0xffffffffu;
+  int bit;
+  while (num-- > 0) {
+    crc ^= *bytes++;
+    for (bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1) ? 0xedb88320u : 0);
+  }
+  return ~crc;
+}
+
+/* Reads some of the map's bytes at the offsets of docs/formats.md. */
+static void test_the_bytes_are_as_documented(void) {
+  const uint8_t *p = map + HEADER;
+  tv_keyframe keyframe;
+  int32_t num, k, c;
+  size_t size;
+  fly(odometry, KEYFRAMES);
+  for (k = 0; k < 20; ++k) TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown++));
+  save(odometry, map, &num_map);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_save_size(odometry, &size));
+  TEST_ASSERT_EQUAL_UINT64(size, num_map);
+  TEST_ASSERT_EQUAL_MEMORY("TVMAP\r\n\x1a", map, 8);
+  TEST_ASSERT_EQUAL_UINT64(1, number_at(map + 8, 4));
+  TEST_ASSERT_EQUAL_UINT64(crc_of(map + 16, num_map - 16), number_at(map + 12, 4));
+  TEST_ASSERT_EQUAL_UINT64(num_map, number_at(map + 16, 8));
+  TEST_ASSERT_EQUAL_UINT64(ROOM_WIDTH, number_at(map + 28, 4));
+  TEST_ASSERT_TRUE(double_at(map + 40) == camera.fx && double_at(map + 64) == camera.cy);
+  TEST_ASSERT_EQUAL_UINT64(state.num_points, number_at(map + 136, 4));
+  TEST_ASSERT_EQUAL_UINT64(state.num_keyframes, number_at(map + 140, 4));
+  TEST_ASSERT_EQUAL_UINT64(state.num_frames, number_at(map + 156, 4));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_points(odometry, points, POINTS, &num));
+  for (k = 0; k < num; ++k, p += POINT) {
+    TEST_ASSERT_EQUAL_UINT64(points[k].id, number_at(p + 24, 4));
+    TEST_ASSERT_EQUAL_UINT64(points[k].grey, number_at(p + 44, 4));
+    for (c = 0; c < 3; ++c) TEST_ASSERT_TRUE(double_at(p + 8 * c) == points[k].position[c]);
+  }
+  for (k = 0; k < state.num_keyframes; ++k) {
+    const uint8_t *keypoint = p + KEYFRAME;
+    int32_t i;
+    tv_keyframe_init(&keyframe);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, k, &keyframe));
+    TEST_ASSERT_EQUAL_UINT64(keyframe.id, number_at(p, 4));
+    TEST_ASSERT_EQUAL_UINT64(keyframe.num_keypoints, number_at(p + 12, 4));
+    TEST_ASSERT_TRUE(double_at(p + 24) == keyframe.time_s);
+    TEST_ASSERT_TRUE(double_at(p + 40) == keyframe.world_from_cam_R[3]); /* its transpose */
+    TEST_ASSERT_EQUAL_INT(TV_OK,
+                          tv_odometry_observations(odometry, k, observations, KEYPOINTS, &num));
+    for (i = 0, c = 0; i < keyframe.num_keypoints; ++i, keypoint += KEYPOINT) {
+      const int32_t point = (int32_t)(uint32_t)number_at(keypoint + 12, 4);
+      if (point == -1) continue;
+      TEST_ASSERT_EQUAL_INT(observations[c].idx_keypoint, i);
+      TEST_ASSERT_EQUAL_INT(observations[c++].idx_point, point);
+    }
+    TEST_ASSERT_EQUAL_INT(num, c);
+    p = keypoint;
+  }
+  TEST_ASSERT_TRUE(number_at(map + 144, 4) > 0);
+  TEST_ASSERT_EQUAL_PTR(map + num_map, p + REMOVED * number_at(map + 144, 4));
+}
+
+static void test_a_loaded_map_is_the_same_and_is_found_again(void) {
+  size_t num_again;
+  fly(odometry, KEYFRAMES);
+  save(odometry, map, &num_map);
+  begin(1, &other);
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(other, 3));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_load(other, map, num_map));
+  save(other, again, &num_again);
+  TEST_ASSERT_EQUAL_UINT64(num_map, num_again);
+  TEST_ASSERT_EQUAL_MEMORY(map, again, num_map);
+  room_flight(num_flown - 2, pixels);
+  frame.time_s = -7; /* times may begin anew */
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(other, &frame, &state));
+  TEST_ASSERT_TRUE(state.has_pose);
+  TEST_ASSERT_EQUAL_INT(1, state.relocated);
+  TEST_ASSERT_EQUAL_INT(num_flown + 1, state.num_frames);
+  for (num_again = 0; num_again < 20; ++num_again) { /* and the flight goes on */
+    room_flight(num_flown - 2 + (int)num_again, pixels);
+    frame.time_s += 0.03;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(other, &frame, &state));
+    TEST_ASSERT_TRUE(state.has_pose);
+  }
+  /* An empty map is one, too. */
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  save(odometry, map, &num_map);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_load(other, map, num_map));
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(other, 0));
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_STARTING, state.status);
+}
+
+static void test_save_refuses_bad_arguments(void) {
+  size_t num = 0, needed;
+  fly(odometry, 2);
+  save(odometry, map, &needed);
+  memset(again, API_PATTERN, sizeof again);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_save_size(NULL, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_save_size(odometry, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_save(NULL, again, MAP, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_save(odometry, NULL, 1, &num));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_save(odometry, again, MAP, NULL));
+  TEST_ASSERT_EQUAL_UINT64(0, num);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAPACITY, tv_odometry_save(odometry, again, needed - 1, &num));
+  TEST_ASSERT_EQUAL_UINT64(needed, num);
+  num = 4;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP, tv_odometry_save(odometry, (uint8_t *)&num, 8, &num));
+  TEST_ASSERT_TRUE(api_is_pattern(again, sizeof again));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_save(odometry, again, needed, &num));
+  TEST_ASSERT_TRUE(api_is_pattern(again + needed, sizeof again - needed));
+}
+
+static void expect_load(tv_status expected, size_t num) {
+  TEST_ASSERT_EQUAL_INT(expected, tv_odometry_load(odometry, altered, num));
+}
+
+/* A smaller map, so that each of its bytes can be altered. */
+static void fly_little(void) {
+  options.max_keypoints = 120;
+  begin(0, &odometry);
+  fly(odometry, 2);
+  save(odometry, map, &num_map);
+  memcpy(altered, map, num_map);
+}
+
+static void test_a_map_that_is_cut_or_altered_at_any_byte_is_refused(void) {
+  size_t k;
+  fly_little();
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_load(NULL, map, num_map));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_load(odometry, NULL, num_map));
+  for (k = 0; k < num_map; ++k) {
+    altered[k] ^= (uint8_t)(1 + k % 255);
+    expect_load(TV_ERR_MAP, num_map);
+    altered[k] = map[k];
+    expect_load(TV_ERR_MAP, k);
+  }
+  altered[num_map] = 0;
+  expect_load(TV_ERR_MAP, num_map + 1);
+  expect_unchanged();
+  /* The odometry goes on as if nothing had been. */
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown));
+  TEST_ASSERT_TRUE(state.has_pose);
+}
+
+/* Expects the status for the altered bytes with a length and a checksum that are right. */
+static void expect_sealed(tv_status expected, size_t num) {
+  uint32_t crc;
+  int k;
+  for (k = 0; k < 8; ++k) altered[16 + k] = (uint8_t)((uint64_t)num >> (8 * k));
+  crc = crc_of(altered + 16, num - 16);
+  for (k = 0; k < 4; ++k) altered[12 + k] = (uint8_t)(crc >> (8 * k));
+  expect_load(expected, num);
+  memcpy(altered, map, num_map);
+  if (expected != TV_OK) expect_unchanged();
+}
+
+static void put(size_t at, uint64_t number, int width) {
+  for (; width > 0; --width, ++at, number >>= 8) altered[at] = (uint8_t)number;
+}
+
+static void test_a_map_of_wrong_content_is_refused(void) {
+  static const uint64_t nan = 0x7ff8000000000000u, huge = 0x7fe0000000000000u;
+  size_t keyframe, keypoint, k;
+  fly_little();
+  keyframe = HEADER + POINT * number_at(map + 136, 4);
+  keypoint = keyframe + KEYFRAME;
+  expect_sealed(TV_OK, num_map);
+  put(8, 2, 4), expect_sealed(TV_ERR_MAP, num_map);    /* the version */
+  put(36, 1, 4), expect_sealed(TV_ERR_MAP, num_map);   /* the camera's reserved field */
+  put(40, nan, 8), expect_sealed(TV_ERR_MAP, num_map); /* fx */
+  put(172, 1, 4), expect_sealed(TV_ERR_MAP, num_map);  /* the header's reserved field */
+  for (k = 136; k < 172; k += 4) {                     /* the counts */
+    put(k, 0xffffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
+  }
+  for (k = 136; k < 148; k += 4) { /* one more or one less than there are */
+    put(k, number_at(map + k, 4) + 1, 4), expect_sealed(TV_ERR_MAP, num_map);
+    put(k, number_at(map + k, 4) - 1, 4), expect_sealed(TV_ERR_MAP, num_map);
+  }
+  put(148, 1, 4), expect_sealed(TV_ERR_MAP, num_map); /* the next ids */
+  put(152, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(160, 0, 4), expect_sealed(TV_ERR_MAP, num_map); /* the segments */
+  /* Points: position, id as of the next, segment, counts, keyframe, grey, sigma, seen_from. */
+  put(HEADER + 8, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 16, huge, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 24, number_at(map + HEADER + POINT + 24, 4), 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 28, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 32, 0x80000000u, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 36, 0x7fffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 40, 1000, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 44, 256, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 48, 0xbf800000u, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 52, 0x7f800000u, 4), expect_sealed(TV_ERR_MAP, num_map);
+  /* Keyframes: id, segment, frame, keypoints, flag, reserved, time, R, t, sigma, scale, covariance.
+   */
+  put(keyframe, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 4, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 8, 1000, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 12, 0xffffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 12, 0x3fffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 16, 2, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 20, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 24, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 32, 0x3fe0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 104, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 152, 0xbff0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 192, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 200, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  /* Keypoints: x, size, a point that does not exist. */
+  put(keypoint, 0x7fc00000u, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keypoint + 8, 0, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keypoint + 12, number_at(map + 136, 4), 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(keypoint + 12, 0xfffffffeu, 4), expect_sealed(TV_ERR_MAP, num_map);
+  /* A removed keyframe whose id is that of what replaced it. */
+  put(144, 1, 4);
+  memset(altered + num_map, 0, REMOVED);
+  expect_sealed(TV_ERR_MAP, num_map + REMOVED);
+  altered[num_map] = 0;
+  expect_sealed(TV_ERR_MAP, num_map + 1); /* a byte too many */
+}
+
+static void test_a_map_of_another_camera_or_too_large_is_refused(void) {
+  size_t num;
+  fly(odometry, 3);
+  save(odometry, altered, &num);
+  camera.fx += 1e-9;
+  begin(0, &odometry);
+  save(odometry, map, &num_map);
+  expect_load(TV_ERR_CAMERA, num);
+  expect_unchanged();
+  camera = room_camera();
+  camera.k[0] = 7; /* which a pinhole ignores */
+  options.max_keypoints = KEYPOINTS - 1;
+  begin(0, &odometry);
+  save(odometry, map, &num_map);
+  expect_load(TV_ERR_LIMITS, num);
+  expect_unchanged();
+  options.max_keypoints = KEYPOINTS + 100;
+  begin(0, &odometry);
+  expect_load(TV_OK, num);
+  save(odometry, map, &num_map);
+  TEST_ASSERT_EQUAL_UINT64(num, num_map);
+  TEST_ASSERT_EQUAL_MEMORY(altered, map, num);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_init_functions_write_defaults_and_sizes);
+  RUN_TEST(test_each_status_has_a_name);
+  RUN_TEST(test_size_refuses_bad_cameras_and_options);
+  RUN_TEST(test_init_refuses_bad_memory);
+  RUN_TEST(test_a_flight_stays_within_its_memory);
+  RUN_TEST(test_every_kernel_set_gives_the_same_map);
+  RUN_TEST(test_bad_frames_are_refused);
+  RUN_TEST(test_wrong_sensors_are_left_out_of_account);
+  RUN_TEST(test_the_map_holds_together);
+  RUN_TEST(test_the_last_frame_is_shown);
+  RUN_TEST(test_accessors_refuse_bad_arguments);
+  RUN_TEST(test_poses_are_found_again_from_their_keyframes);
+  RUN_TEST(test_a_frame_is_located_without_changing_the_map);
+  RUN_TEST(test_the_clock_is_read);
+  RUN_TEST(test_the_bytes_are_as_documented);
+  RUN_TEST(test_a_loaded_map_is_the_same_and_is_found_again);
+  RUN_TEST(test_save_refuses_bad_arguments);
+  RUN_TEST(test_a_map_that_is_cut_or_altered_at_any_byte_is_refused);
+  RUN_TEST(test_a_map_of_wrong_content_is_refused);
+  RUN_TEST(test_a_map_of_another_camera_or_too_large_is_refused);
+  return UNITY_END();
+}
