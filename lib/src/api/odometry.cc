@@ -105,11 +105,11 @@ void start_anew(tv_odometry* o) {
 
 size_t scratch_bytes(const tv_odometry_options& o) {
   const size_t n = static_cast<size_t>(o.max_keypoints);
-  const size_t choices = 2 * (arena_bytes<tv_keypoint>(n) +
-                              arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
-                              arena_bytes<int32_t>(n)) +
-                         arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) +
-                         arena_bytes<tv_point>(n) + arena_bytes<uint8_t>(3 * n * 128);
+  const size_t choices =
+      2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
+           arena_bytes<int32_t>(n)) +
+      arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) + arena_bytes<tv_point>(n) +
+      arena_bytes<uint8_t>(3 * n * 128);
   const size_t points = static_cast<size_t>(o.max_points);
   const size_t tracking = std::max(choices, arena_bytes<double>(40 * n) + adjust_bytes(o)) +
                           arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
@@ -177,15 +177,16 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   o->camera = tv::prepare_camera(plan.camera);
   tv_feature_options_init(&o->features);
   o->features.max_keypoints = plan.options.max_keypoints;
-  o->features.arc=(int)T(20,9); o->features.levels=(int)T(21,4); o->features.min_threshold=(int)T(26,3); o->features.scale_factor=(float)T(22,1.41); o->features.threshold=(int)T(23,15); o->features.cell_px=(int)T(24,32);o->features.keypoint_size=(float)T(25,4);
+  // Measured on the sequences: docs/odometry.md.
+  o->features.arc = 9;
+  o->features.cell_px = 32;
   o->grid_columns = plan.columns;
   o->grid_rows = plan.rows;
   tv::make_map(plan.sizes, arena, &o->map);
   tv::make_frame(plan, arena, &o->frame);
   tv::make_frame(plan, arena, &o->previous);
   for (tv::Frame& frame : o->starts) tv::make_frame(plan, arena, &frame);
-  o->local_points =
-      tv::arena_alloc<int32_t>(arena, static_cast<size_t>(plan.limits.max_keypoints));
+  o->local_points = tv::arena_alloc<int32_t>(arena, static_cast<size_t>(plan.limits.max_keypoints));
   const size_t scratch = tv::scratch_bytes(plan.options);
   o->scratch = tv::arena_over(tv::arena_alloc<uint8_t>(arena, scratch), scratch);
   tv::start_anew(o);

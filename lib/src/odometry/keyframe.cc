@@ -1,6 +1,6 @@
+#include "odometry/keyframe.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
-#include "odometry/keyframe.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,13 +11,13 @@
 namespace tv {
 namespace {
 
-#define kLeastBaseline T(13,0.01)
-  // of the median depth: nearer keyframes make no points
-#define kMostNeighbours static_cast<int32_t>(T(14,4))
-#define kLeastAngle T(15,0.006)
-   // radians
-#define kLargestError T(16,3.0)
-   // px, of a pixel of sigma 1
+constexpr double kLeastBaseline = 0.01;  // of the median depth: nearer keyframes make no points
+constexpr int32_t kMostNeighbours = 4;
+// A point is made where its rays meet at this many times the standard deviation of the attitude:
+// below that, the depths of all points are wrong together.
+constexpr double kLeastTurnSigmas = 5;
+constexpr double kLeastAngle = 0.006;  // radians
+constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
 constexpr double kLargestSizeRatio = 2.2;
 constexpr double kTypicalNoise = 0.7;  // px
 
@@ -70,7 +70,7 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
     const int32_t point = frame.points[k];
     if (point == kNoPoint) continue;
     observe(&map, idx, k, point);
-    if (frame.distances[k] < T(29, 1e9)) std::copy_n(frame.descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES,
+    std::copy_n(frame.descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES,
                 TV_DESCRIPTOR_BYTES, descriptor_of(map, point));
   }
   return idx;
@@ -111,14 +111,14 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     const MapKeypoint& b = own1[keypoints1[k]];
     if (a.point != kNoPoint || b.point != kNoPoint) continue;
     const double sigma = std::sqrt(0.5 * (sigma_of(a) * sigma_of(a) + sigma_of(b) * sigma_of(b)));
-    if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad * (T(28, 1) > 0 ? sigma : 1) ||
+    if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad * sigma ||
         static_cast<double>(p.error_px) > kLargestError * sigma) {
       continue;
     }
     double x[3], world[3];
     transform(cam1_from_cam0, p.position, x);
-    const double ratio = (static_cast<double>(a.size) * p.position[2]) /
-                         (static_cast<double>(b.size) * x[2]);
+    const double ratio =
+        (static_cast<double>(a.size) * p.position[2]) / (static_cast<double>(b.size) * x[2]);
     if (!(ratio < kLargestSizeRatio && ratio > 1 / kLargestSizeRatio)) continue;
     transform(world_from_cam0, p.position, world);
     const uint8_t* descriptor =
@@ -163,16 +163,12 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     if (rotation_angle(compose(own.cam_from_world, inverse(other.cam_from_world))) > 1.0) continue;
     neighbours[num_neighbours++] = k;
   }
-  // The farthest ones first: a point is made of the widest baseline that sees it.
   for (int32_t i = 0; i < num_neighbours; ++i) {
-    const int32_t k = neighbours[T(30, 1) > 0 ? num_neighbours - 1 - i : i];
+    const int32_t k = neighbours[i];
     const MapKeyframe& other = map.keyframes[k];
     const tv_features theirs = features_of(map, other, their_room);
-    tv_match_options options;
-    tv_match_options_init(&options);
-    options.ratio = static_cast<float>(T(18, 0.92));
     int32_t num_found = 0;
-    if (tv_match(odometry->context, &theirs, &mine, &options, found, room, &num_found) != TV_OK) {
+    if (tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num_found) != TV_OK) {
       continue;
     }
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
@@ -196,7 +192,8 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
         }
       }
     }
-    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num, std::max(kLeastAngle, T(31, 5) * odometry->turn_sigma), image);
+    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num,
+                        std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma), image);
   }
 }
 
@@ -218,8 +215,7 @@ void remove_bad_points(Odometry* odometry) {
 void list_local_points(Odometry* odometry, int32_t keyframe) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
-  int32_t* shared =
-      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  int32_t* shared = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   count_shared(odometry, keyframe, shared);
   shared[keyframe] = 1 << 30;
   const int32_t mark = ++odometry->mark;

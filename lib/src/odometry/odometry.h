@@ -54,7 +54,7 @@ struct tv_odometry {
   int32_t status;
   int32_t lost_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
-  bool is_locating;  // a frame of tv_odometry_locate, which does not change the map
+  bool is_locating;          // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
   double last_time_s;
@@ -71,6 +71,3 @@ void start_anew(Odometry* odometry);
 size_t scratch_bytes(const tv_odometry_options& options);
 
 }  // namespace tv
-extern "C" __attribute__((visibility("default"))) double tv_tune[32];
-
-inline double T(int k, double v) { return tv_tune[k] == tv_tune[k] ? tv_tune[k] : v; }

@@ -1,6 +1,6 @@
+#include "odometry/search.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
-#include "odometry/search.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@ namespace {
 
 constexpr int32_t kMostCandidates = 400;
 // The keypoints within this radius in pixels are compared: a match is the nearest of them all.
-constexpr double kComparedRadius = 40.0;
-constexpr float kSameCornerSq = 16.0f;  // px^2: nearer keypoints are of the same corner
+constexpr double kComparedRadius = 20.0;
+constexpr float kSameCornerSq = 16.0f;       // px^2: nearer keypoints are of the same corner
 constexpr double kLargestDepthError = 40.0;  // px
 
 int32_t clamped_cell(float x, int32_t cells) {
@@ -92,7 +92,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
         search.radius_px + 2 * depth_error_px(*odometry, point, search.cam_from_world, x[2]);
     const float px = static_cast<float>(pixel.x()), py = static_cast<float>(pixel.y());
     const float near_sq = static_cast<float>(radius * radius);
-    const float reach = static_cast<float>(std::max(radius, T(27, kComparedRadius)));
+    const float reach = static_cast<float>(std::max(radius, kComparedRadius));
     const int32_t x0 = clamped_cell(px - reach, columns), x1 = clamped_cell(px + reach, columns);
     const int32_t y0 = clamped_cell(py - reach, odometry->grid_rows);
     const int32_t y1 = clamped_cell(py + reach, odometry->grid_rows);

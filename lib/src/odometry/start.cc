@@ -1,6 +1,6 @@
+#include "odometry/start.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
-#include "odometry/start.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,10 +15,8 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
-#define kLeastParallax T(19,0.015)
-  // radians, the median
-#define kLeastAngle T(15,0.006)
-     // radians
+constexpr double kLeastParallax = 0.015;  // radians, the median
+constexpr double kLeastAngle = 0.006;     // radians
 constexpr int32_t kFramesBetween = 6;     // between frames that wait
 
 tv_features features_of(const Frame& frame) {
@@ -102,18 +100,16 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
   forget_points(frame);
   const int32_t first = make_keyframe(odometry, *frame0);
   const int32_t second = make_keyframe(odometry, *frame);
-  int32_t* keypoints0 =
-      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
-  int32_t* keypoints1 =
-      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
+  int32_t* keypoints0 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
+  int32_t* keypoints1 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
   int32_t num = 0;
   for (int32_t k = 0; k < pair.num; ++k) {
     if (!pair.is_inlier[k]) continue;
     keypoints0[num] = pair.keypoints0[k];
     keypoints1[num++] = pair.keypoints1[k];
   }
-  int32_t made = triangulate_matches(odometry, first, second, keypoints0, keypoints1, num,
-                                     kLeastAngle, image);
+  int32_t made =
+      triangulate_matches(odometry, first, second, keypoints0, keypoints1, num, kLeastAngle, image);
   if (made >= kLeastPoints) {
     adjust_around(odometry, second, 20);
     made = map.keyframes[second].num_observations;
@@ -154,8 +150,8 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
     ArenaScope scope(odometry->scratch);
     Pair pair;
     Frame* const first = &odometry->starts[n];
-    if (!estimate_pair(odometry, *first, *frame, &pair) ||
-        2 * pair.view.num_inliers < pair.num || pair.view.num_inliers < kLeastMatches) {
+    if (!estimate_pair(odometry, *first, *frame, &pair) || 2 * pair.view.num_inliers < pair.num ||
+        pair.view.num_inliers < kLeastMatches) {
       *reasons |= TV_REASON_TOO_FEW_MATCHES;
       if (pair.num < kLeastMatches || odometry->num_starts > 1) drop_start(odometry, n--);
       continue;

@@ -14,13 +14,16 @@
 namespace tv {
 namespace {
 
-#define kLeastInliers static_cast<int32_t>(T(0,20))
-constexpr double kMaxDistance_ = 200;
-#define kMaxDistance T(8,200)
-#define kSearchRatio T(9,0.9)
+constexpr int32_t kLeastInliers = 20;
+constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
 constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
-constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
-constexpr int32_t kLostBeforeStart = 8;    // frames
+// A frame becomes a keyframe when the camera moved by kFarMoved median depths or turned by
+// kFarTurned radians since the last one, and earlier where few of its points are left.
+constexpr double kFarMoved = 0.10, kFarTurned = 0.25, kLeastMoved = 0.02, kLeastTurned = 0.08;
+constexpr int32_t kFewInliers = 100;
+constexpr int32_t kWindowSteps = 6;      // of the adjustment after a keyframe
+constexpr int32_t kLoopKeyframes = 2;    // that are searched for a loop at each frame
+constexpr int32_t kLostBeforeStart = 8;  // frames
 
 void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
   frame->num = 0;
@@ -49,8 +52,9 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
 // The pose is known to a few pixels: looks for all points once more, near where they must be.
 bool refine_track(Odometry* odometry, Frame* frame, PoseFit* fit) {
   const PoseFit before = *fit;
-  PointSearch search{odometry->local_points, odometry->num_local_points, fit->cam_from_world, 5.0,
-                     kMaxDistance, kSearchRatio};
+  PointSearch search{odometry->local_points, odometry->num_local_points,
+                     fit->cam_from_world,    5.0,
+                     kMaxDistance,           kSearchRatio};
   find_points(odometry, search, frame);
   frame->cam_from_world = fit->cam_from_world;
   if (!fit_pose(odometry, 50, 3.0, frame, fit)) {
@@ -104,10 +108,10 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
   centre_of(frame.cam_from_world, a);
   centre_of(last.cam_from_world, b);
   const double moved = distance_between(a, b) / odometry.median_depth;
-  const double turned =
-      rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
-  const bool few = num_inliers < T(6,0.7) * odometry.keyframe_inliers || num_inliers < T(5,100);
-  return moved > T(1,0.10) || turned > T(2,0.25) || (few && (moved > T(3,0.02) || turned > T(4,0.08)));
+  const double turned = rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
+  const bool few = 10 * num_inliers < 6 * odometry.keyframe_inliers || num_inliers < kFewInliers;
+  return moved > kFarMoved || turned > kFarTurned ||
+         (few && (moved > kLeastMoved || turned > kLeastTurned));
 }
 
 // Makes room for one more keyframe: removes the one that moved the camera least.
@@ -125,8 +129,8 @@ void make_room(Odometry* odometry) {
         before->segment != map.keyframes[k].segment ? 1e9
         : after->segment != map.keyframes[k].segment
             ? 1e8
-            : distance_between(a, b) + odometry->median_depth *
-                                           rotation_angle(compose(after->cam_from_world,
+            : distance_between(a, b) +
+                  odometry->median_depth * rotation_angle(compose(after->cam_from_world,
                                                                   inverse(before->cam_from_world)));
     if (k == 1 || gap < least) {
       least = gap;
@@ -149,7 +153,7 @@ void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
   const int32_t idx = make_keyframe(odometry, *frame);
   make_points(odometry, idx, image);
   remove_bad_points(odometry);
-  adjust_around(odometry, idx, static_cast<int32_t>(T(7,6)));
+  adjust_around(odometry, idx, kWindowSteps);
   const Map& map = odometry->map;
   odometry->keyframe_inliers = map.keyframes[idx].num_observations;
   odometry->reference_id = map.keyframes[idx].id;
@@ -217,8 +221,8 @@ bool track_map(Odometry* odometry, const tv_odometry_frame& input, Frame* frame,
   if (odometry->has_motion && input.gap == 0) {
     const double factor =
         odometry->motion_s > 0 ? (input.time_s - previous.time_s) / odometry->motion_s : 1;
-    predicted = compose(scaled_motion(odometry->motion, std::min(factor, 3.0)),
-                        previous.cam_from_world);
+    predicted =
+        compose(scaled_motion(odometry->motion, std::min(factor, 3.0)), previous.cam_from_world);
   }
   const int32_t* points = odometry->local_points;
   const int32_t num = odometry->num_local_points;
@@ -296,12 +300,12 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     write_fit(fit, state);
     odometry->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
     if (had_pose) {
-      odometry->motion =
-          compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
+      odometry->motion = compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
       odometry->motion_s = frame->time_s - odometry->previous.time_s;
       odometry->has_motion = true;
     }
-    odometry->turn_sigma = std::sqrt(std::max({state->covariance[0], state->covariance[7], state->covariance[14]}));
+    odometry->turn_sigma =
+        std::sqrt(std::max({state->covariance[0], state->covariance[7], state->covariance[14]}));
     if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
       add_frame_as_keyframe(odometry, frame, input.image);
       state->is_keyframe = 1;
@@ -312,8 +316,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   } else {
     frame->has_pose = false;
     odometry->has_motion = false;
-    odometry->status =
-        odometry->map.num_keyframes > 0 ? TV_ODOMETRY_LOST : TV_ODOMETRY_STARTING;
+    odometry->status = odometry->map.num_keyframes > 0 ? TV_ODOMETRY_LOST : TV_ODOMETRY_STARTING;
     ++odometry->lost_frames;
     const int32_t segment = odometry->segment;
     if (odometry->map.num_keyframes == 0 || odometry->lost_frames > kLostBeforeStart) {
