@@ -93,17 +93,10 @@ static direction_shares share_directions(words u, words v, words weights) {
   return shares;
 }
 
-/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. sums[1 + k] is the
-   sum of the shares of bin k in itself (low 16 bits) and in the next one (high 16 bits); sums[0] is
-   that of the last bin. smooth[1 + k] is bin k, repeated around the circle like the bins. */
-static void smooth_circle(const uint32_t sums[TVK_ORIENT_BINS + 1], int32_t *smooth) {
-  int32_t around[TVK_ORIENT_BINS + 4], k; /* around[2 + k] is bin k */
-  TVK_ROLLED
-  for (k = 0; k < TVK_ORIENT_BINS; ++k) {
-    around[2 + k] = (int32_t)((sums[1 + k] & 65535) + (sums[k] >> 16));
-  }
-  memcpy(around, around + TVK_ORIENT_BINS, 2 * sizeof around[0]);
-  memcpy(around + 2 + TVK_ORIENT_BINS, around + 2, 2 * sizeof around[0]);
+/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. around[2 + k] is bin
+   k, repeated around the circle, and smooth[1 + k] likewise. */
+static void smooth_circle(const int32_t around[TVK_ORIENT_BINS + 4], int32_t *smooth) {
+  int32_t k;
   TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
     const int32_t *const a = around + k;
@@ -136,12 +129,13 @@ static void find_peaks(const int32_t *smooth, int32_t peaks[2]) {
 static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t peaks[2]) {
   /* A single addition adds both shares of a gradient, 16 bits each. Neighbouring samples add to
      different tables, so that no addition waits for the one before. */
-  uint32_t tables[4][TVK_ORIENT_BINS] TVK_ALIGNED;
+  uint32_t tables[4][1 + TVK_ORIENT_BINS];
   /* What a row writes after its last gradient, the next row writes over. */
   int16_t u[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED,
       v[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED;
   uint16_t bin[ORIENT_COUNT] TVK_ALIGNED;
-  uint32_t both[ORIENT_COUNT] TVK_ALIGNED, sums[TVK_ORIENT_BINS + 1];
+  uint32_t both[ORIENT_COUNT] TVK_ALIGNED;
+  int32_t around[TVK_ORIENT_BINS + 4];
   int32_t x, y, count = 0;
   memset(tables, 0, sizeof tables);
   for (y = 0; y < ORIENT_ROWS; ++y) {
@@ -159,14 +153,18 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t
     words_zip(shares.low, shares.high, both + x);
   }
   for (x = 0; x < ORIENT_COUNT; x += 4) {
-    for (y = 0; y < 4; ++y) tables[y][bin[x + y]] += both[x + y];
+    for (y = 0; y < 4; ++y) tables[y][1 + bin[x + y]] += both[x + y];
   }
+  for (y = 0; y < 4; ++y) tables[y][0] = tables[y][TVK_ORIENT_BINS];
   TVK_ROLLED
   for (x = 0; x < TVK_ORIENT_BINS; ++x) {
-    sums[1 + x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
+    const uint32_t own = tables[0][1 + x] + tables[1][1 + x] + tables[2][1 + x] + tables[3][1 + x];
+    const uint32_t before = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
+    around[2 + x] = (int32_t)((own & 65535) + (before >> 16));
   }
-  sums[0] = sums[TVK_ORIENT_BINS];
-  smooth_circle(sums, smooth);
+  memcpy(around, around + TVK_ORIENT_BINS, 2 * sizeof around[0]);
+  memcpy(around + 2 + TVK_ORIENT_BINS, around + 2, 2 * sizeof around[0]);
+  smooth_circle(around, smooth);
   find_peaks(smooth, peaks);
 }
 
@@ -197,30 +195,33 @@ static const int16_t column_weights[4][8] = {
     {945, 5100, 8684, 11541, 9441, 5474, 0, 0},
 };
 
-/* Splits each gradient of a row into its shares in the eight directions, counter-clockwise in the
-   image from x: the part along an axis, times sqrt(1/2), and the part along a diagonal. shares[d]
-   is the row of shares in direction d, summed over the patches. A share is below 2^14, so that the
-   sum of two fits 15 bits. */
+/* Splits each gradient into its shares in the eight directions, counter-clockwise in the image from
+   x: the part along an axis, times sqrt(1/2), and the part along a diagonal. A share is below 2^14.
+ */
+static inline void share_gradients(const int16_t *at, words shares[8]) {
+  const words u = gradient_u(at), v = gradient_v(at);
+  const words pu = words_positive(u), nu = pu - u, au = pu + nu;
+  const words pv = words_positive(v), nv = pv - v, av = pv + nv;
+  shares[0] = words_min(pu, pv);
+  shares[1] = words_excess(pv, au);
+  shares[2] = words_min(nu, pv);
+  shares[3] = words_excess(nu, av);
+  shares[4] = words_min(nu, nv);
+  shares[5] = words_excess(nv, au);
+  shares[6] = words_min(pu, nv);
+  shares[7] = words_excess(pu, av);
+}
+
+/* shares[d] is the row of shares in direction d, summed over the one or two patches; a sum fits 15
+   bits. */
 static void share_row(const int16_t *row, int32_t num_patches, int16_t shares[8][TVK_PATCH_SIDE]) {
-  int32_t x;
+  int32_t x, bin;
   for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
-    const int16_t *at = row + x;
-    words sums[8];
-    int32_t bin, n;
-    for (bin = 0; bin < 8; ++bin) sums[bin] = words_of(0);
-    for (n = 0; n < num_patches; ++n, at += TVK_PATCH_SIDE * TVK_PATCH_SIDE) {
-      const words u = gradient_u(at), v = gradient_v(at);
-      const words pu = words_positive(u), nu = words_positive(-u);
-      const words pv = words_positive(v), nv = words_positive(-v);
-      const words au = pu + nu, av = pv + nv;
-      sums[0] += words_min(pu, pv);
-      sums[1] += words_positive(v - au);
-      sums[2] += words_min(nu, pv);
-      sums[3] += words_positive(-u - av);
-      sums[4] += words_min(nu, nv);
-      sums[5] += words_positive(-v - au);
-      sums[6] += words_min(pu, nv);
-      sums[7] += words_positive(u - av);
+    words sums[8], more[8];
+    share_gradients(row + x, sums);
+    if (num_patches == 2) {
+      share_gradients(row + x + TVK_PATCH_SIDE * TVK_PATCH_SIDE, more);
+      for (bin = 0; bin < 8; ++bin) sums[bin] += more[bin];
     }
     for (bin = 0; bin < 8; ++bin) words_store(shares[bin] + x, sums[bin]);
   }
