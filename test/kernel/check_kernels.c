@@ -231,6 +231,10 @@ static void case_sample_patch(trial *t) {
     du_x = 1 << 16;
     du_y = 0;
   }
+  if (!t->typical && random_int(&t->seed, 0, 2) == 0) { /* upright */
+    du_x = random_int(&t->seed, 0, 5 << 15);
+    du_y = 0;
+  }
   REPEAT(t, t->set->sample_patch(pairs, width, height, x, y, du_x, du_y, num_rows, patch));
 }
 
