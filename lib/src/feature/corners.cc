@@ -181,13 +181,19 @@ bool mark_pixel(uint32_t* marks, const Level& level, int32_t x, int32_t y) {
 int32_t make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
                        const Level& level, int32_t index, const tv_image* mask,
                        const tv_feature_options& options, uint32_t* marks, tv_keypoint* keypoints) {
+  int32_t determinants[2][TVK_HESSIAN_PLACES];  // of corners k and k + 1, for even k
+  const auto at = [&](const Corner& c) { return level.data + c.y * level.stride + c.x; };
   int32_t made = 0;
   memset(marks, 0, marks_count(level.width, level.height) * sizeof marks[0]);
   for (int32_t k = 0; k < count; ++k) {
     const int32_t corner_x = corners[k].x, corner_y = corners[k].y;
     double x = corner_x, y = corner_y;
     Peak peak;
-    if (options.subpixel != 0 && find_peak(kernels, level, corner_x, corner_y, &peak) &&
+    if (options.subpixel != 0 && k % 2 == 0) {
+      const uint8_t* const centres[2] = {at(corners[k]), at(corners[std::min(k + 1, count - 1)])};
+      kernels.hessian_determinants(centres, level.stride, determinants[0]);
+    }
+    if (options.subpixel != 0 && find_peak(determinants[k % 2], corner_x, corner_y, &peak) &&
         !is_masked_out(mask, level, peak.pixel_x, peak.pixel_y)) {
       if (mark_pixel(marks, level, peak.pixel_x, peak.pixel_y)) continue;
       x = peak.x;
