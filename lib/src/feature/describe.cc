@@ -2,6 +2,8 @@
 // formulas: docs/algorithms/sift.md; tests: test/unit/test_orientation.cc and test_sift_opencv.cc.
 #include "feature/describe.h"
 
+#include <algorithm>
+
 #include "base/math.h"
 
 namespace tv {
@@ -22,6 +24,8 @@ constexpr double kMaxStep = 2.24;
 // The histogram of a pooled descriptor is the mean over two windows: the keypoint's window scaled
 // by each of these factors (docs/decisions/0018).
 constexpr double kPooledSizes[2] = {0.7, 1.3};
+
+constexpr int32_t kBlock = 32;  // keypoints
 
 // A second peak is a direction of its own if it is above this share of the highest peak (Lowe,
 // section 5).
@@ -90,6 +94,27 @@ float peak_angle(const int32_t* smooth, int32_t bin) {
   return angle_rad == 0.0f ? 0.0f : angle_rad;
 }
 
+Direction direction_of(float angle_rad) {
+  Direction direction = kUpright;
+  if (angle_rad != 0) sincos(angle_rad, &direction.sine, &direction.cosine);
+  return direction;
+}
+
+void describe(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
+              Direction direction, int32_t kind, int32_t pooling, uint8_t* descriptor) {
+  constexpr int32_t kPatch = TVK_PATCH_SIDE * TVK_PATCH_SIDE;
+  int16_t patches[2 * kPatch + 1];
+  int32_t histogram[TVK_DESCRIPTOR_SIZE];
+  const int32_t num_patches = pooling != 0 ? 2 : 1;
+  for (int32_t n = 0; n < num_patches; ++n) {
+    const double factor = pooling != 0 ? kPooledSizes[n] : 1.0;
+    sample_around(kernels, octaves, keypoint, keypoint.size * factor, direction, kStepPerSize,
+                  TVK_PATCH_SIDE, patches + n * kPatch);
+  }
+  kernels.gradient_histogram(patches, num_patches, histogram);
+  kernels.quantize_descriptor(histogram, kind == TV_NORMALISATION_ROOTSIFT, descriptor);
+}
+
 }  // namespace
 
 int32_t octave_of(double keypoint_size) {
@@ -132,22 +157,22 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
   return 2;
 }
 
-void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
-                       const tv_keypoint& keypoint, int32_t kind, int32_t pooling,
-                       uint8_t* descriptor) {
-  constexpr int32_t kPatch = TVK_PATCH_SIDE * TVK_PATCH_SIDE;
-  int16_t patches[2 * kPatch + 1];
-  int32_t histogram[TVK_DESCRIPTOR_SIZE];
-  const int32_t num_patches = pooling != 0 ? 2 : 1;
-  Direction direction = kUpright;
-  if (keypoint.angle_rad != 0) sincos(keypoint.angle_rad, &direction.sine, &direction.cosine);
-  for (int32_t n = 0; n < num_patches; ++n) {
-    const double factor = pooling != 0 ? kPooledSizes[n] : 1.0;
-    sample_around(kernels, octaves, keypoint, keypoint.size * factor, direction, kStepPerSize,
-                  TVK_PATCH_SIDE, patches + n * kPatch);
+void describe_keypoints(const tvk_table& kernels, const Octaves& octaves,
+                        const tv_keypoint* keypoints, int32_t count, int32_t kind, int32_t pooling,
+                        uint8_t* descriptors) {
+  for (int32_t first = 0; first < count; first += kBlock) {
+    const int32_t end = std::min(first + kBlock, count);
+    // The directions of a block are computed together: each is a long chain of operations, and
+    // those of several keypoints overlap.
+    Direction directions[kBlock];
+    for (int32_t k = first; k < end; ++k) {
+      directions[k - first] = direction_of(keypoints[k].angle_rad);
+    }
+    for (int32_t k = first; k < end; ++k) {
+      describe(kernels, octaves, keypoints[k], directions[k - first], kind, pooling,
+               descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES);
+    }
   }
-  kernels.gradient_histogram(patches, num_patches, histogram);
-  kernels.quantize_descriptor(histogram, kind == TV_NORMALISATION_ROOTSIFT, descriptor);
 }
 
 }  // namespace tv

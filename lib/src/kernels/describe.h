@@ -93,10 +93,17 @@ static direction_shares share_directions(words u, words v, words weights) {
   return shares;
 }
 
-/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. around[2 + k] is bin
-   k, repeated around the circle, and smooth[1 + k] likewise. */
-static void smooth_circle(const int32_t around[TVK_ORIENT_BINS + 4], int32_t *smooth) {
-  int32_t k;
+/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. sums[1 + k] is the
+   sum of the shares of bin k in itself (low 16 bits) and in the next one (high 16 bits); sums[0] is
+   that of the last bin. smooth[1 + k] is bin k, repeated around the circle. */
+static void smooth_circle(const uint32_t sums[1 + TVK_ORIENT_BINS], int32_t *smooth) {
+  int32_t around[TVK_ORIENT_BINS + 4], k; /* around[2 + k] is bin k */
+  TVK_ROLLED
+  for (k = 0; k < TVK_ORIENT_BINS; ++k) {
+    around[2 + k] = (int32_t)((sums[1 + k] & 65535) + (sums[k] >> 16));
+  }
+  memcpy(around, around + TVK_ORIENT_BINS, 2 * sizeof around[0]);
+  memcpy(around + 2 + TVK_ORIENT_BINS, around + 2, 2 * sizeof around[0]);
   TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
     const int32_t *const a = around + k;
@@ -129,13 +136,12 @@ static void find_peaks(const int32_t *smooth, int32_t peaks[2]) {
 static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t peaks[2]) {
   /* A single addition adds both shares of a gradient, 16 bits each. Neighbouring samples add to
      different tables, so that no addition waits for the one before. */
-  uint32_t tables[4][1 + TVK_ORIENT_BINS];
+  uint32_t tables[4][TVK_ORIENT_BINS] TVK_ALIGNED;
   /* What a row writes after its last gradient, the next row writes over. */
   int16_t u[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED,
       v[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED;
   uint16_t bin[ORIENT_COUNT] TVK_ALIGNED;
-  uint32_t both[ORIENT_COUNT] TVK_ALIGNED;
-  int32_t around[TVK_ORIENT_BINS + 4];
+  uint32_t both[ORIENT_COUNT] TVK_ALIGNED, sums[1 + TVK_ORIENT_BINS];
   int32_t x, y, count = 0;
   memset(tables, 0, sizeof tables);
   for (y = 0; y < ORIENT_ROWS; ++y) {
@@ -153,18 +159,14 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t
     words_zip(shares.low, shares.high, both + x);
   }
   for (x = 0; x < ORIENT_COUNT; x += 4) {
-    for (y = 0; y < 4; ++y) tables[y][1 + bin[x + y]] += both[x + y];
+    for (y = 0; y < 4; ++y) tables[y][bin[x + y]] += both[x + y];
   }
-  for (y = 0; y < 4; ++y) tables[y][0] = tables[y][TVK_ORIENT_BINS];
   TVK_ROLLED
   for (x = 0; x < TVK_ORIENT_BINS; ++x) {
-    const uint32_t own = tables[0][1 + x] + tables[1][1 + x] + tables[2][1 + x] + tables[3][1 + x];
-    const uint32_t before = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
-    around[2 + x] = (int32_t)((own & 65535) + (before >> 16));
+    sums[1 + x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
   }
-  memcpy(around, around + TVK_ORIENT_BINS, 2 * sizeof around[0]);
-  memcpy(around + 2 + TVK_ORIENT_BINS, around + 2, 2 * sizeof around[0]);
-  smooth_circle(around, smooth);
+  sums[0] = sums[TVK_ORIENT_BINS];
+  smooth_circle(sums, smooth);
   find_peaks(smooth, peaks);
 }
 
