@@ -10,6 +10,7 @@
 #include "api/validate.h"
 #include "geometry/essential.h"
 #include "geometry/triangulation.h"
+#include "image/pyramid.h"
 #include "robust/verdict.h"
 #include "twoview/bundle.h"
 
@@ -53,6 +54,30 @@ Results alloc_results(Arena& arena, int32_t max_keypoints) {
   return r;
 }
 
+// The sigmas of keypoints that tv_extract made. Those of a level have one size, so that a logarithm
+// and an exponential a level suffice.
+class SigmasOfLevels {
+ public:
+  SigmasOfLevels(float size_of_one, double exponent)
+      : size_of_one_(size_of_one), exponent_(exponent) {}
+  float of(const tv_keypoint& keypoint) {
+    OfLevel& known = levels_[keypoint.level];
+    if (known.size != keypoint.size) {
+      tv_keypoint_sigmas(&keypoint, 1, size_of_one_, exponent_, &known.sigma);
+      known.size = keypoint.size;
+    }
+    return known.sigma;
+  }
+
+ private:
+  struct OfLevel {
+    float size, sigma;
+  };
+  OfLevel levels_[kMaxLevels] = {};
+  float size_of_one_;
+  double exponent_;
+};
+
 // Writes the pixels, ratios and sigmas of the matches, and r.pairs.
 void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_matches) {
   r.pairs = {sizeof r.pairs, num_matches, r.pixels[0], r.pixels[1], r.ratios, nullptr, nullptr};
@@ -60,6 +85,7 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     r.pairs.sigmas0 = r.sigmas[0];
     r.pairs.sigmas1 = r.sigmas[1];
   }
+  SigmasOfLevels sigmas(r.keypoint_size, r.sigma_by_size);
   for (int32_t k = 0; k < num_matches; ++k) {
     const tv_correspondence& m = matches[k];
     const tv_keypoint& a = r.keypoints[0][m.idx0];
@@ -70,8 +96,8 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     r.pixels[1][2 * k + 1] = b.y;
     r.ratios[k] = m.ratio;
     if (r.pairs.sigmas0 == nullptr) continue;
-    tv_keypoint_sigmas(&a, 1, r.keypoint_size, r.sigma_by_size, r.sigmas[0] + k);
-    tv_keypoint_sigmas(&b, 1, r.keypoint_size, r.sigma_by_size, r.sigmas[1] + k);
+    r.sigmas[0][k] = sigmas.of(a);
+    r.sigmas[1][k] = sigmas.of(b);
   }
 }
 
