@@ -19,6 +19,8 @@ from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, DISTANCE_PRIOR, GRAVITY_PRI
 from .absolute_pose import AbsolutePose, estimate_absolute_pose
 from .camera import (Camera, camera_check, camera_project_points, camera_scale,
                      camera_undistort, camera_unproject_points, camera_valid_angle)
+from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, FormatError, format_cameras,
+                           parse_cameras, read_camera, read_cameras, read_sigmas, write_cameras)
 from .context import Context
 from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, Orientation, PointStatus,
                     Purpose, Reason, Solver, Stage, Status, Triangulation, Verdict)
@@ -40,7 +42,7 @@ def version_string() -> str:
     return default_library().version()
 
 
-if not _typing.TYPE_CHECKING:  # a type checker would take every unknown name for this function's result
+if not _typing.TYPE_CHECKING:  # or a type checker would accept every unknown name
     def __getattr__(name: str) -> str:
         if name == "__version__":  # asked of the library, which is loaded at its first use
             return version_string()
@@ -50,9 +52,10 @@ if not _typing.TYPE_CHECKING:  # a type checker would take every unknown name fo
 # A type checker reads this list; a test compares it with the imports above.
 __all__ = [
     "AbsolutePose", "AbsolutePoseOptions", "BundleOptions", "BundleResult", "CORRESPONDENCE",
-    "Camera", "CameraModel", "Context", "DESCRIPTOR_BYTES", "DISTANCE_PRIOR", "EstimateOptions",
-    "FeatureOptions", "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Kind",
-    "Library", "Loss", "MatchOptions", "Normalisation", "OBSERVATION", "Orientation", "POINT",
+    "CalibrationSigmas", "Camera", "CameraModel", "Context", "DESCRIPTOR_BYTES",
+    "DISTANCE_PRIOR", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
+    "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Kind", "Library", "Loss",
+    "MatchOptions", "Normalisation", "OBSERVATION", "Orientation", "PLAIN_FILE", "POINT",
     "POSE_PRIOR", "PointStatus", "Purpose", "Reason", "Reconstruction", "Solver", "Stage",
     "Status", "StatusError", "TV_ERR_ALIGNMENT", "TV_ERR_ARGUMENT", "TV_ERR_CAMERA",
     "TV_ERR_CAPACITY", "TV_ERR_KERNELS", "TV_ERR_LIMITS", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE",
@@ -61,6 +64,8 @@ __all__ = [
     "adjust_window", "camera_check", "camera_project_points", "camera_scale",
     "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
     "corrected_camera", "default_library", "describe", "detect", "estimate_absolute_pose",
-    "estimate_two_view", "extract", "keypoint_sigmas", "match", "match_guided", "orient",
-    "point_covariances", "reconstruct", "triangulate", "version_string",
+    "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match",
+    "match_guided", "orient", "parse_cameras", "point_covariances", "read_camera",
+    "read_cameras", "read_sigmas", "reconstruct", "triangulate", "version_string",
+    "write_cameras",
 ]

@@ -360,8 +360,8 @@ _default: Optional[Library] = None
 
 
 def default_library() -> Library:
-    """Returns the library that TWOVIEW_LIBRARY names, else the one inside the package, as a Library.
-    Raises ImportError where there is none."""
+    """Returns the Library that TWOVIEW_LIBRARY names, else the one inside the package. Raises
+    ImportError where there is none."""
     global _default
     if _default is None:
         beside = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libtwoview.so")
