@@ -149,9 +149,9 @@ class TestPages(unittest.TestCase):
                     if verb not in verbs:
                         wrong.append(f"{page}:{first}: twoview {verb}")
                         continue
-                    if verb in ("compare", "colmap"):
-                        # These verbs are Python programs. The tests python/compare_* and
-                        # python/colmap_* run the commands of their pages.
+                    if verb in ("compare", "colmap", "rerun"):
+                        # These verbs are Python programs. The tests python/compare_*,
+                        # python/colmap_* and cli/rerun run their commands.
                         continue
                     path = [verb] + (
                         [rest[0]]
