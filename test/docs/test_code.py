@@ -52,7 +52,8 @@ class TestCode(unittest.TestCase):
 
     def test_every_block_names_its_language(self):
         self.assertEqual([f"{page}:{line}" for page, language, line, _ in self.blocks
-                          if language not in ("c", "sh", "python", "yaml", "json", "math", "text")], [])
+                          if language not in ("c", "sh", "python", "yaml", "json", "math",
+                                              "text")], [])
 
     def test_formulas_become_mathml(self):
         try:
@@ -67,7 +68,8 @@ class TestCode(unittest.TestCase):
                 self.assertEqual(text.count("{"), text.count("}"))
                 self.assertNotIn("\\", drawn)  # a command that is not known stays as it is
                 whole = formulas.rendered(f"before\n\n```math\n{text.rstrip()}\n```\n\nafter")
-                self.assertRegex(whole, r'(?s)before\n\n<div class="formula"><math.*</div>\n\nafter')
+                self.assertRegex(
+                    whole, r'(?s)before\n\n<div class="formula"><math.*</div>\n\nafter')
 
     def test_c_compiles(self):
         for page, line, text in self.each("c"):
