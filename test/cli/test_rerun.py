@@ -88,6 +88,32 @@ class Rerun(cli.CliTest):
         return K
 
     @NEEDS_RERUN
+    def test_the_lens_is_what_the_result_names(self):
+        folder = self.folder / "pair"
+        folder.mkdir()
+        size = [cli.WIDTH // 2, cli.HEIGHT // 2]  # as after --resize
+        half = self.K()
+        half[:2] /= 2
+        f = 30 * np.hypot(*size) / np.hypot(36, 24)
+        film = np.array([[f, 0, size[0] / 2], [0, f, size[1] / 2], [0, 0, 1]])
+        for more, K in (({"options": {"camera1": str(self.camera)}}, half),
+                        ({"options": {"focal_35mm": 30}}, film),
+                        ({"cameras": [{}, {"source": "exif", "focal_35mm": 30}]}, film),
+                        ({"cameras": [{}, {"source": "file", "file": str(self.camera)}]}, half),
+                        ({}, None)):
+            (folder / "result.json").write_text(json.dumps(
+                {"image_size0": size, "image_size1": size, "R": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+                 "t": [1, 0, 0], **more}))
+            self.assertEqual(self.tool(folder, self.folder / "f.rrd").stderr, b"")
+            found = read_back(self.folder / "f.rrd")
+            key = "/world/camera1/image", "Pinhole:image_from_camera"
+            if K is None:
+                self.assertNotIn(key, found)
+            else:
+                drawn = np.array(only(found, *key)).reshape(3, 3).T
+                self.assertTrue(np.allclose(drawn, K, atol=1e-3), (more, drawn, K))
+
+    @NEEDS_RERUN
     def test_a_recording_reads_back(self):
         folder = self.folder / "flight"
         (folder / "frames").mkdir(parents=True)

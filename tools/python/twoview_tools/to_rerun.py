@@ -86,9 +86,12 @@ def intrinsics_of(result, view, given):
         return given[4 * view:4 * view + 4]
     width, height = result[f"image_size{view}"]
     options = result.get("options", {})
-    if options.get(f"camera{view}"):
+    known = (result.get("cameras") or [{}, {}])[view] or {}  # not in results of older versions
+    file = known.get("file") or options.get(f"camera{view}")
+    focal_35mm = known.get("focal_35mm") or options.get("focal_35mm")
+    if file:
         try:
-            camera = camera_file(options[f"camera{view}"])
+            camera = camera_file(file)
         except (OSError, tv.FormatError) as error:
             print(f"twoview: rerun: camera {view} is drawn without its lens: {error}",
                   file=sys.stderr)
@@ -96,8 +99,8 @@ def intrinsics_of(result, view, given):
         sx, sy = width / camera.width, height / camera.height
         found = [camera.fx * sx, camera.fy * sy, (camera.cx + 0.5) * sx - 0.5,
                  (camera.cy + 0.5) * sy - 0.5]
-    elif options.get("focal_35mm"):
-        f = options["focal_35mm"] * math.hypot(width, height) / FILM_DIAGONAL_MM
+    elif focal_35mm:
+        f = focal_35mm * math.hypot(width, height) / FILM_DIAGONAL_MM
         found = [f, f, (width - 1) / 2, (height - 1) / 2]
     else:
         return None
