@@ -332,7 +332,7 @@ class Library:
             raise error
 
     def version(self) -> str:
-        return self.lib.tv_version_string().decode()
+        return str(self.lib.tv_version_string().decode())
 
 
 def set_field(struct: Any, name: str, value: Any) -> None:
@@ -360,7 +360,8 @@ _default: Optional[Library] = None
 
 
 def default_library() -> Library:
-    """The library that TWOVIEW_LIBRARY names, else the one inside the package."""
+    """Returns the Library that TWOVIEW_LIBRARY names, else the one inside the package. Raises
+    ImportError where there is none."""
     global _default
     if _default is None:
         beside = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libtwoview.so")

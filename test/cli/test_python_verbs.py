@@ -26,7 +26,7 @@ class HandOver(cli.CliTest):
         self.tree = self.folder / "a tree"
         tools = self.tree / "tools" / "compare_colmap"
         tools.mkdir(parents=True)
-        for script in ("compare_colmap", "twoview_colmap"):
+        for script in ("compare_colmap", "twoview_colmap", "twoview_rerun"):
             (tools / script).write_text(SCRIPT)
         bin_dir, lib_dir = self.tree / "build" / "x" / "bin", self.tree / "build" / "x" / "lib"
         bin_dir.mkdir(parents=True)
@@ -46,8 +46,8 @@ class HandOver(cli.CliTest):
         self.assertEqual((done.returncode, done.stderr), (3, b""))
         return json.loads(done.stdout)
 
-    def test_both_get_the_arguments_and_this_library_and_their_status_comes_back(self):
-        for verb in ("compare", "colmap"):
+    def test_all_get_the_arguments_and_this_library_and_their_status_comes_back(self):
+        for verb in ("compare", "colmap", "rerun"):
             got = self.report(self.start(verb, "--help", "a b", "", TWOVIEW_PYTHON=sys.executable))
             self.assertEqual(got["argv"], ["--help", "a b", ""])
             self.assertEqual((got["library"], got["blocked"]), (self.library, []))
@@ -90,7 +90,7 @@ class HandOver(cli.CliTest):
 
     def test_help_lists_them(self):
         listed = self.start("--help").stdout.decode()
-        self.assertRegex(listed, r"\n  compare  .*\n  colmap  ")
+        self.assertRegex(listed, r"\n  compare  .*\n  colmap  .*\n  rerun  ")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@
 #include "report/report.h"
 #include "report/tables.h"
 #include "verbs/camera_options.h"
+#include "verbs/python_verbs.h"
 #include "verbs/verbs.h"
 
 namespace cli {
@@ -25,7 +26,7 @@ const std::vector<std::string> kFiles = {"result.json",  "cloud.ply", "matches.p
 
 struct Arguments {
   Common common;
-  std::string image[2], truth;
+  std::string image[2], truth, rerun;
   CameraOptions cameras;
   double focal_35mm = 0;
   RecordingOptions recording;
@@ -252,10 +253,31 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   return text + summary_line("files", "%s:%s", files.folder().c_str(), names.c_str());
 }
 
+// Writes the result in the folder as a file for Rerun's viewer. Returns the exit status.
+int write_rerun(const Arguments& a, const Outcome& outcome, const std::string& folder) {
+  std::vector<std::string> arguments{folder, a.rerun};
+  if (!a.recording.given()) arguments.insert(arguments.end(), {"--images", a.image[0], a.image[1]});
+  if (outcome.has_cameras) {
+    arguments.emplace_back("--intrinsics");
+    for (const tv_camera& given : outcome.camera) {
+      tv_camera camera;
+      tv_corrected_camera(&outcome.two_view, &given, &camera);
+      for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) {
+        char digits[32];
+        std::snprintf(digits, sizeof digits, "%.17g", value);
+        arguments.emplace_back(digits);
+      }
+    }
+  }
+  return run_python_verb("rerun", arguments);
+}
+
 int reconstruct(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
   check_inputs(a);
+  // A missing package is reported, by the tool itself, before anything is computed or written.
+  if (!a.rerun.empty() && run_python_verb("rerun", {"--check"}) != 0) return kExitBadInput;
   std::unique_ptr<RecordingInput> recording;
   if (a.recording.given())
     recording = std::make_unique<RecordingInput>(a.recording, a.cameras.both);
@@ -292,6 +314,7 @@ int reconstruct(Arguments& a) {
   if (common.speaks()) print(summary(outcome, recording.get(), files, session.context_bytes()));
   files.commit();
   files.remove_others(kFiles);
+  if (!a.rerun.empty() && write_rerun(a, outcome, files.folder()) != 0) return kExitBadInput;
   if (has_full_pose(outcome.two_view)) return kExitPose;
   const std::string reasons = reasons_in_words(outcome.two_view);
   std::fprintf(stderr, "twoview: no full pose: %s%s%s\n",
@@ -317,6 +340,8 @@ void add_reconstruct(CLI::App& program, Run& run) {
       ->check(CLI::Range(1.0, 10000.0));
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
       ->type_name("FILE");
+  verb->add_option("--rerun", a->rerun, "also write a file for Rerun's viewer (needs rerun-sdk)")
+      ->type_name("FILE.rrd");
   add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
 }
