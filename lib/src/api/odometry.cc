@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "api/context.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/adjust.h"
+#include "odometry/metric.h"
 #include "odometry/track.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
@@ -95,11 +97,15 @@ void start_anew(tv_odometry* o) {
   o->reference_id = -1;
   o->has_motion = false;
   o->mark = o->num_frames = o->segment = o->num_segments = 0;
-  o->num_relocations = o->num_loops = o->lost_frames = o->next_search = o->next_loop = 0;
+  o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
+      o->next_loop = 0;
   o->status = TV_ODOMETRY_STARTING;
   o->frame.has_pose = o->previous.has_pose = false;
   o->frame.num = o->previous.num = 0;
   o->median_depth = 1;
+  o->turn_sigma = 0;
+  o->is_upright = false;
+  forget_scale(o);
   o->last_time_s = 0;
 }
 
@@ -172,6 +178,8 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   status = tv_context_init(&o->context, &plan.limits,
                            tv::arena_alloc<uint8_t>(arena, plan.context_bytes), plan.context_bytes);
   if (status != TV_OK) return status;
+  o->kernels = o->context->kernels;
+  o->max_matched = plan.limits.max_keypoints;
   o->options = plan.options;
   o->options.struct_size = sizeof(tv_odometry_options);
   o->camera = tv::prepare_camera(plan.camera);

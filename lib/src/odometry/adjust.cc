@@ -224,7 +224,21 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   const size_t num_observations = static_cast<size_t>(around.window.num_observations);
   float* errors = arena_alloc<float>(arena, num_observations);
 
+  tv_gravity_prior* downs =
+      arena_alloc<tv_gravity_prior>(arena, static_cast<size_t>(most_views(options)) + 1);
   tv_window& window = around.window;
+  for (int32_t v = 0; v < num_adjusted && odometry->is_upright; ++v) {
+    const MapKeyframe& view = map.keyframes[around.keyframes[v]];
+    if (view.down_sigma_rad == 0) continue;
+    tv_gravity_prior* down = &downs[window.num_gravity_priors++];
+    *down = tv_gravity_prior{};
+    down->idx_view = v;
+    std::copy_n(view.down, 3, down->down);
+    down->sigma_rad = view.down_sigma_rad;
+  }
+  window.gravity_priors = downs;
+  window.world_down[1] = 0;
+  window.world_down[2] = 1;
   window.num_cameras = 1;
   window.cameras = &odometry->camera.model;
   window.views = around.views;

@@ -66,6 +66,13 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
   keyframe->frame = frame.number;
   keyframe->time_s = frame.time_s;
   keyframe->cam_from_world = orthonormalised(frame.cam_from_world);
+  const Sensors& sensors = frame.sensors;
+  if (odometry->is_upright && sensors.attitude_sigma_rad > 0) {
+    std::copy_n(sensors.world_from_cam + 6, 3, keyframe->down);
+    keyframe->down_sigma_rad = sensors.attitude_sigma_rad;
+  }
+  keyframe->height_m = sensors.height_m;
+  keyframe->height_sigma_m = sensors.height_sigma_m;
   for (int32_t k = 0; k < frame.num; ++k) {
     const int32_t point = frame.points[k];
     if (point == kNoPoint) continue;
@@ -220,7 +227,7 @@ void list_local_points(Odometry* odometry, int32_t keyframe) {
   shared[keyframe] = 1 << 30;
   const int32_t mark = ++odometry->mark;
   odometry->num_local_points = 0;
-  const int32_t most = odometry->context->limits.max_keypoints;
+  const int32_t most = odometry->max_matched;
   for (int32_t n = 0; n < 12; ++n) {
     int32_t best = map.num_keyframes - 1;
     for (int32_t k = best - 1; k >= 0; --k) {

@@ -28,7 +28,6 @@ struct MapKeyframe {
   Rigid cam_from_world;
   double down[3], down_sigma_rad;   // gravity in the camera's frame; sigma 0: not known
   double height_m, height_sigma_m;  // sigma 0: not known
-  double travel_m, travel_sigma_m;  // the way from the keyframe before; sigma 0: not known
   double scale;           // by which loops have multiplied its surroundings since it was made
   double covariance[36];  // of cam_from_world relative to the keyframe before
 };

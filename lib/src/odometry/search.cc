@@ -107,8 +107,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       }
     }
     if (num == 0) continue;
-    odometry->context->kernels->squared_distances(descriptor_of(map, idx), frame->descriptors,
-                                                  candidates, num, distances);
+    odometry->kernels->squared_distances(descriptor_of(map, idx), frame->descriptors, candidates,
+                                         num, distances);
     int32_t best = 0;
     for (int32_t n = 1; n < num; ++n) {
       if (distances[n] < distances[best]) best = n;
@@ -138,7 +138,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
 int32_t match_points(Odometry* odometry, const int32_t* points, int32_t num, double ratio,
                      Frame* frame) {
   ArenaScope scope(odometry->scratch);
-  const int32_t most = odometry->context->limits.max_keypoints;
+  const int32_t most = odometry->max_matched;
   num = std::min(num, most);
   uint8_t* descriptors =
       arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(num) * TV_DESCRIPTOR_BYTES);

@@ -17,7 +17,8 @@ namespace {
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
 constexpr double kLeastParallax = 0.015;  // radians, the median
 constexpr double kLeastAngle = 0.006;     // radians
-constexpr int32_t kFramesBetween = 6;     // between frames that wait
+constexpr int32_t kLeastTurnInliers = 50;
+constexpr int32_t kFramesBetween = 6;  // between frames that wait
 
 tv_features features_of(const Frame& frame) {
   tv_features features;
@@ -94,9 +95,17 @@ void drop_start(Odometry* odometry, int n) {
 bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pair& pair,
                        const tv_image& image) {
   Map& map = odometry->map;
+  // With an attitude, the world is that of the attitude, and upright.
   frame0->cam_from_world = kIdentity;
-  std::copy_n(pair.view.R, 9, frame->cam_from_world.R);
-  std::copy_n(pair.view.t, 3, frame->cam_from_world.t);
+  odometry->is_upright = frame0->sensors.attitude_sigma_rad > 0;
+  if (odometry->is_upright) {
+    std::copy_n(frame0->sensors.world_from_cam, 9, frame0->cam_from_world.R);
+    frame0->cam_from_world = inverse(frame0->cam_from_world);
+  }
+  Rigid relative;
+  std::copy_n(pair.view.R, 9, relative.R);
+  std::copy_n(pair.view.t, 3, relative.t);
+  frame->cam_from_world = compose(relative, frame0->cam_from_world);
   forget_points(frame);
   const int32_t first = make_keyframe(odometry, *frame0);
   const int32_t second = make_keyframe(odometry, *frame);
@@ -139,6 +148,7 @@ void copy_frame(const Frame& from, Frame* to) {
   to->num = from.num;
   to->number = from.number;
   to->time_s = from.time_s;
+  to->sensors = from.sensors;
   to->cam_from_world = kIdentity;
   forget_points(to);
 }
@@ -173,6 +183,18 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
     copy_frame(*frame, &odometry->starts[odometry->num_starts++]);
   }
   return false;
+}
+
+bool estimate_turn(Odometry* odometry, const Frame& frame0, const Frame& frame1, Rigid* turn) {
+  ArenaScope scope(odometry->scratch);
+  Pair pair;
+  if (!estimate_pair(odometry, frame0, frame1, &pair) || !pair.view.has_R ||
+      pair.view.num_inliers < kLeastTurnInliers || 2 * pair.view.num_inliers < pair.num) {
+    return false;
+  }
+  *turn = kIdentity;
+  std::copy_n(pair.view.R, 9, turn->R);
+  return true;
 }
 
 }  // namespace tv
