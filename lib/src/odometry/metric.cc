@@ -11,9 +11,11 @@ namespace tv {
 namespace {
 
 constexpr double kLargestScaleSigma = 0.1;  // relative
-constexpr double kLeastChange = 0.01;       // of the scale, for which the map is rescaled
-constexpr double kLargestTilt = 0.1;        // radians, added to three standard deviations
-constexpr double kDown[3] = {0, 0, 1};      // in an upright world
+// What the map's own scale may drift by, relative: added to the standard deviation.
+constexpr double kScaleDrift = 0.007;
+constexpr double kLeastChange = 0.01;   // of the scale, for which the map is rescaled
+constexpr double kLargestTilt = 0.1;    // radians, added to three standard deviations
+constexpr double kDown[3] = {0, 0, 1};  // in an upright world
 
 // The map's unit becomes `scale` of what it was.
 void rescale(Odometry* odometry, double scale, Frame* frame) {
@@ -129,7 +131,7 @@ void measure_scale(Odometry* odometry, Frame* frame) {
   const double scale = odometry->scale_product / odometry->scale_square;
   const double sigma = 1 / std::sqrt(odometry->scale_square);
   if (!(scale > 0) || !(sigma <= kLargestScaleSigma * scale)) return;
-  odometry->scale_sigma = sigma / scale;
+  odometry->scale_sigma = std::sqrt(sigma * sigma / (scale * scale) + kScaleDrift * kScaleDrift);
   const bool is_new = odometry->scale_source == TV_SCALE_UNIT;
   odometry->scale_source = odometry->scale_evidence;
   if (!is_new && std::fabs(scale - 1) < kLeastChange) return;
