@@ -354,7 +354,8 @@ int main(int argc, char** argv) {
   program.add_option("--seed", a.seed, "room, path, lens and light; the same seed, the same bytes");
   program.add_option("-o,--output", a.out, "the folder")->required();
   program.add_flag("--half-turn", a.has_half_turn, "half a turn on the spot after two walls");
-  program.add_option("--max-frames", a.max_frames, "only the first N frames")->check(CLI::Range(1, 1000));
+  program.add_option("--max-frames", a.max_frames, "only the first N frames")
+      ->check(CLI::Range(1, 1000));
   program.add_option("--depth-every", a.depth_every, "a depth picture every N frames; 0: none")
       ->check(CLI::NonNegativeNumber);
   program.add_option("--quality", a.quality, "JPEG quality")->check(CLI::Range(1, 100));

@@ -222,56 +222,79 @@ struct Scene::Rays {
   size_t count = 0;
   float x[kMost], y[kMost], z[kMost];  // unit rays in the world
   float distance[kMost];               // along the ray, metres
-  int face[kMost];                     // 6 box + side
+  float face[kMost];                   // 6 box + side; a float, so that the loop below is one of
+                                       // vectors of one type
 };
 
 // Slabs: a ray is inside a box between the last of its entries and the first of its exits (T. L.
-// Kay, J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986). The camera lies in the room. The
-// compiler turns the inner loop into vector instructions; a component of 0 gives infinities, which
-// the comparisons treat rightly.
+// Kay, J. T. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986). The camera lies in the room,
+// which is met at the exit. The conditions have no short cuts, so that the compiler makes vector
+// instructions of the inner loop; a component of 0 gives infinities, which compare as they should.
 void Scene::cast(const std::vector<Ready>& near, Rays& rays) {
   for (size_t i = 0; i < rays.count; ++i) rays.distance[i] = std::numeric_limits<float>::max();
+  const auto least = [](float a, float b) { return a < b ? a : b; };
+  const auto most = [](float a, float b) { return a > b ? a : b; };
   for (const Ready& box : near) {
     const float c = box.cosine, s = box.sine;
     const float fx = box.from[0], fy = box.from[1], fz = box.from[2];
     const float hx = box.half[0], hy = box.half[1], hz = box.half[2];
-    const int base = 6 * box.index;
-    const bool is_room = box.is_room;
-    for (size_t i = 0; i < rays.count; ++i) {
+    const float base = static_cast<float>(6 * box.index);
+    // The side that a ray along the positive axis meets: the high one of the room, else the low
+    // one.
+    const float ahead = base + (box.is_room ? 1.0f : 0.0f);
+    const float behind = base + (box.is_room ? 0.0f : 1.0f);
+    const size_t count = rays.count;
+    if (box.is_room) {
+      for (size_t i = 0; i < count; ++i) {
+        const float x = c * rays.x[i] + s * rays.y[i], y = c * rays.y[i] - s * rays.x[i];
+        const float z = rays.z[i];
+        const float far_x = most((-hx - fx) / x, (hx - fx) / x);
+        const float far_y = most((-hy - fy) / y, (hy - fy) / y);
+        const float far_z = most((-hz - fz) / z, (hz - fz) / z);
+        const float exit = least(far_x, least(far_y, far_z));
+        const float across = exit == far_z ? z : exit == far_y ? y : x;
+        const float axis = exit == far_z ? 4.0f : exit == far_y ? 2.0f : 0.0f;
+        const float face = (across > 0 ? ahead : behind) + axis;
+        const bool is_hit = exit < rays.distance[i];
+        rays.distance[i] = is_hit ? exit : rays.distance[i];
+        rays.face[i] = is_hit ? face : rays.face[i];
+      }
+      continue;
+    }
+    for (size_t i = 0; i < count; ++i) {
       const float x = c * rays.x[i] + s * rays.y[i], y = c * rays.y[i] - s * rays.x[i];
       const float z = rays.z[i];
       const float ax = (-hx - fx) / x, bx = (hx - fx) / x;
       const float ay = (-hy - fy) / y, by = (hy - fy) / y;
       const float az = (-hz - fz) / z, bz = (hz - fz) / z;
-      const float near_x = std::min(ax, bx), near_y = std::min(ay, by), near_z = std::min(az, bz);
-      const float far_x = std::max(ax, bx), far_y = std::max(ay, by), far_z = std::max(az, bz);
-      const float entry = std::max(near_x, std::max(near_y, near_z));
-      const float exit = std::min(far_x, std::min(far_y, far_z));
-      const float distance = is_room ? exit : entry;
-      const bool on_y = distance == (is_room ? far_y : near_y);
-      const bool on_z = distance == (is_room ? far_z : near_z);
-      const float across = on_z ? z : on_y ? y : x;
-      const int side = (on_z ? 4 : on_y ? 2 : 0) + ((across > 0) == is_room ? 1 : 0);
-      const bool is_hit = (is_room || (entry > 0 && entry < exit)) && distance < rays.distance[i];
-      rays.distance[i] = is_hit ? distance : rays.distance[i];
-      rays.face[i] = is_hit ? base + side : rays.face[i];
+      const float near_x = least(ax, bx), near_y = least(ay, by), near_z = least(az, bz);
+      const float entry = most(near_x, most(near_y, near_z));
+      const float exit = least(most(ax, bx), least(most(ay, by), most(az, bz)));
+      const float across = entry == near_z ? z : entry == near_y ? y : x;
+      const float axis = entry == near_z ? 4.0f : entry == near_y ? 2.0f : 0.0f;
+      const float face = (across > 0 ? ahead : behind) + axis;
+      const bool is_hit =
+          static_cast<bool>(static_cast<int>(entry > 0) & static_cast<int>(entry < exit) &
+                            static_cast<int>(entry < rays.distance[i]));
+      rays.distance[i] = is_hit ? entry : rays.distance[i];
+      rays.face[i] = is_hit ? face : rays.face[i];
     }
   }
 }
 
 float Scene::grey_at(const std::vector<Ready>& all, const Rays& rays, size_t ray,
                      float angle) const {
-  const Ready& box = all[static_cast<size_t>(rays.face[ray] / 6)];
-  const size_t axis = static_cast<size_t>(rays.face[ray] % 6 / 2);
+  const size_t face = static_cast<size_t>(rays.face[ray]);
+  const Ready& box = all[face / 6];
+  const size_t axis = face % 6 / 2;
   const float local[3] = {box.cosine * rays.x[ray] + box.sine * rays.y[ray],
                           box.cosine * rays.y[ray] - box.sine * rays.x[ray], rays.z[ray]};
   const size_t iu = kAxisU[axis], iv = kAxisV[axis];
   const float distance = rays.distance[ray];
   const float slant = std::max(std::abs(local[axis]), 0.05f);
-  return surfaces_[static_cast<size_t>(rays.face[ray])].sample(
-      box.from[iu] + distance * local[iu] + box.half[iu],
-      box.from[iv] + distance * local[iv] + box.half[iv],
-      0.85f * distance * angle / std::sqrt(slant));
+  return surfaces_[face].sample(box.from[iu] + distance * local[iu] + box.half[iu],
+                                box.from[iv] + distance * local[iv] + box.half[iv],
+                                0.85f * distance * angle / std::sqrt(slant));
 }
 
 void Scene::render(const Eye& eye, const CameraPose& pose, float* grey, float* depth) const {
@@ -353,7 +376,7 @@ void Scene::render(const Eye& eye, const CameraPose& pose, float* grey, float* d
       }
       cast(list, rays);
       for (size_t i = 0; i < rays.count; ++i) {
-        faces[pixels[i]] = rays.face[i];
+        faces[pixels[i]] = static_cast<int>(rays.face[i]);
         grey[pixels[i]] = grey_at(all, rays, i, angle);
         if (depth == nullptr) continue;
         const int pixel = static_cast<int>(pixels[i]);

@@ -72,12 +72,14 @@ def of_keyframes(covariances, keyframes, truth, scale):
     trajectories are looked up by their times."""
     def at(poses, time):
         k = int(np.abs(poses.times - time).argmin())
-        return (poses.rotations[k], poses.positions[k]) if abs(poses.times[k] - time) < 0.01 else None
+        is_there = abs(poses.times[k] - time) < 0.01
+        return (poses.rotations[k], poses.positions[k]) if is_there else None
 
     items = []
     for time0, time1, matrix in covariances:
-        ours, theirs = ([at(poses, time) for time in (time0, time1)] for poses in (keyframes, truth))
-        if None in ours or None in theirs:
+        ours, theirs = ([at(poses, time) for time in (time0, time1)]
+                        for poses in (keyframes, truth))
+        if any(pose is None for pose in (*ours, *theirs)):
             continue
         unit = np.diag([1, 1, 1, scale, scale, scale])
         (R0, p0), (R1, p1) = ours

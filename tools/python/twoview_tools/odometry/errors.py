@@ -31,7 +31,8 @@ def longest_segment(poses):
 def position_errors(estimate, truth, with_scale=True):
     """(distances, similarity) of associated trajectories."""
     similarity = alignment.umeyama(estimate.positions, truth.positions, with_scale)
-    return np.linalg.norm(estimate.moved(similarity).positions - truth.positions, axis=1), similarity
+    offsets = estimate.moved(similarity).positions - truth.positions
+    return np.linalg.norm(offsets, axis=1), similarity
 
 
 def relative_errors(estimate, truth):
@@ -108,9 +109,9 @@ def silent_errors(estimate, truth, states, sigma=(0.0, 0.0), elsewhere=()):
 
     Positions are compared after the similarity, and attitudes after the mean rotation, of the
     segment's tracked poses, so that neither depends on the other. A segment of fewer than
-    MIN_POSES poses is compared by nothing. Returns num_tracking, num_wrong, share, the worst errors,
-    the times of wrong frames, and unflagged_jumps: steps from one tracked pose to the next in which
-    the error changes by as much, without any flag; flagged_jumps: the same with a flag."""
+    MIN_POSES poses is not compared. Returns num_tracking, num_wrong, share, the worst errors, the
+    times of wrong frames, and unflagged_jumps: steps from one tracked pose to the next in which the
+    error changes by as much, without any flag; flagged_jumps: the same with a flag."""
     def is_elsewhere(time):
         return any(first <= time <= last for first, last in elsewhere)
 

@@ -3,7 +3,7 @@
 | form | a line | pose |
 | --- | --- | --- |
 | TUM | `time tx ty tz qx qy qz qw`, seconds | world from camera |
-| EuRoC | `time,px,py,pz,qw,qx,qy,qz[,...]`, nanoseconds | world from body: T_BS makes the camera's |
+| EuRoC | `time,px,py,pz,qw,qx,qy,qz[,...]`, nanoseconds | world from body; needs T_BS |
 | KITTI | 12 numbers, a row-major 3 x 4; the times are in another file | world from camera |
 
 In trajectories of `twoview odometry` a comment `# segment N` begins a segment; poses of different
