@@ -25,13 +25,14 @@ namespace fs = std::filesystem;
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 constexpr int kWidth = 640, kHeight = 480;
+constexpr int kFrames = 600;             // about that many of each flight
 constexpr double kDepthPerMetre = 5000;  // levels of the depth pictures, as TUM's
 
 struct Arguments {
   uint64_t seed = 0;
   std::string out;
   bool has_half_turn = false;
-  int max_frames = 1000, depth_every = 50, quality = 92;
+  int first_frame = 0, max_frames = 1000, depth_every = 50, quality = 92;
 };
 
 // How the camera of one flight forms its pictures.
@@ -72,6 +73,9 @@ Optics optics_of(uint64_t seed) {
   o.target = random.uniform(90, 130);
   return o;
 }
+
+// Two of three flights have 25 frames a second, the others 30.
+double frames_per_second(uint64_t seed) { return seed % 3 == 2 ? 30 : 25; }
 
 room::Mat3 body_attitude(const BodyState& state) {
   return room::world_from_body(state.yaw, state.pitch, state.roll);
@@ -157,15 +161,15 @@ class Flight {
     if (arguments_.depth_every > 0) fs::create_directories(out / "depth");
     const flights::Scene scene(interior_.boxes, interior_.lamps, arguments_.seed);
     const room::Eye eye(optics_.camera);
-    const double interval = 1.0 / 30, first = 0.02;
-    const int count = std::min(arguments_.max_frames,
-                               static_cast<int>((route_.seconds() - 2 * first) / interval));
+    const double interval = 1 / frames_per_second(arguments_.seed), first = 0.02;
+    const int all = static_cast<int>((route_.seconds() - 2 * first) / interval);
+    const int end = std::min(all, arguments_.first_frame + arguments_.max_frames);
     std::string names = "# timestamp filename\n";
     std::string poses =
         "# timestamp tx ty tz qx qy qz qw   (camera-to-world, optical frame: x right, y down, z "
         "forward; world: x forward at the start, y right, z down)\n";
     prepare_imu();
-    for (int k = 0; k < count; ++k) {
+    for (int k = arguments_.first_frame; k < end; ++k) {
       const double time = first + interval * k;
       char name[32];
       std::snprintf(name, sizeof name, "%05d", k);
@@ -194,7 +198,8 @@ class Flight {
     write(out / "imu.txt", imu_);
     write(out / "cameras.yaml", camera_text());
     write(out / "surfaces.json", surfaces().dump(1) + "\n");
-    write(out / "flight.json", description(count).dump(1) + "\n");
+    write(out / "flight.json",
+          description(std::max(end - arguments_.first_frame, 0)).dump(1) + "\n");
   }
 
  private:
@@ -202,7 +207,7 @@ class Flight {
     flights::RouteOptions options;
     options.seed = a.seed;
     options.has_half_turn = a.has_half_turn;
-    options.max_seconds = a.has_half_turn ? 23 : 20;
+    options.max_seconds = kFrames / frames_per_second(a.seed) + (a.has_half_turn ? 3.8 : 0);
     Random random(a.seed * 12289 + 7);
     options.tremble = random.uniform(0.3, 1.2);
     return options;
@@ -319,7 +324,7 @@ class Flight {
     for (const flights::Lamp& lamp : interior_.lamps) lamps.push_back(lamp.position);
     return {{"seed", arguments_.seed},
             {"num_frames", count},
-            {"frames_per_second", 30},
+            {"frames_per_second", frames_per_second(arguments_.seed)},
             {"path_length", route_.path_length()},
             {"room_size", {2 * interior_.half_x, 2 * interior_.half_y, interior_.height}},
             {"num_boxes", interior_.boxes.size()},
@@ -354,8 +359,9 @@ int main(int argc, char** argv) {
   program.add_option("--seed", a.seed, "room, path, lens and light; the same seed, the same bytes");
   program.add_option("-o,--output", a.out, "the folder")->required();
   program.add_flag("--half-turn", a.has_half_turn, "half a turn on the spot after two walls");
-  program.add_option("--max-frames", a.max_frames, "only the first N frames")
-      ->check(CLI::Range(1, 1000));
+  program.add_option("--first-frame", a.first_frame, "leave out the first N frames")
+      ->check(CLI::NonNegativeNumber);
+  program.add_option("--max-frames", a.max_frames, "only N frames")->check(CLI::Range(1, 1000));
   program.add_option("--depth-every", a.depth_every, "a depth picture every N frames; 0: none")
       ->check(CLI::NonNegativeNumber);
   program.add_option("--quality", a.quality, "JPEG quality")->check(CLI::Range(1, 100));

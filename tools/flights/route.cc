@@ -7,8 +7,8 @@ namespace flights {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846, kGravity = 9.81;
-constexpr double kSmoothPosition = 0.28, kSmoothYaw = 0.38;  // seconds, sigma of a Gaussian
-constexpr double kPause = 3.8, kTurning = 1.8;               // seconds, of a half turn
+constexpr double kSmoothPosition = 0.28, kSmoothYaw = 0.6;  // seconds, sigma of a Gaussian
+constexpr double kPause = 3.8, kTurning = 1.8;              // seconds, of a half turn
 
 struct Waypoint {
   double x, y, height;
@@ -93,7 +93,7 @@ Route::Route(const Interior& interior, const RouteOptions& options) {
   for (size_t i = 1; i < points.size(); ++i)
     length += std::hypot(points[i].x - points[i - 1].x, points[i].y - points[i - 1].y);
   const double pauses = options.has_half_turn ? kPause : 0;
-  const double ground_time = 0.3, climb_speed = 0.7, final_time = 1.6;
+  const double ground_time = 0.3, climb_speed = 0.7, final_time = 2.2;
   const double climb_time = (points[0].height - 0.15) / climb_speed;
   const double left = options.max_seconds - pauses - ground_time - climb_time - 0.4 - final_time;
   const double speed = std::max(random.uniform(0.8, 1.3), length / left);
@@ -141,7 +141,7 @@ Route::Route(const Interior& interior, const RouteOptions& options) {
   for (double t = 0; t < final_time; t += kStep) {
     const Waypoint& end = points.back();
     add(end.x, end.y, end.height,
-        t > 0.2 ? nearest_turn(first_yaw - turned, yaw.back()) : yaw.back());
+        t > 0.1 ? nearest_turn(first_yaw - turned, yaw.back()) : yaw.back());
   }
   const double position_sigma = kSmoothPosition / kStep, yaw_sigma = kSmoothYaw / kStep;
   for (std::vector<double>* values : {&x, &y, &z}) smooth(*values, position_sigma);

@@ -1,7 +1,7 @@
-"""Runs ORB-SLAM3 (orbslam3-python, PyPI) over a set folder and writes trajectory.txt, frames.csv and
-peer.json as scripts/odometry reads them. Each pose is the one that was given when its frame was
-tracked. It runs in the virtual environment of its own that orbslam.py makes, so it imports nothing
-of the project.
+"""Runs ORB-SLAM3 (orbslam3-python, PyPI) over a set folder and writes trajectory.txt, frames.csv
+and peer.json as scripts/odometry reads them. Each pose is the one that was given when its frame was
+tracked; each unbroken piece is a segment. It runs in the virtual environment of its own that
+orbslam.py makes, so it imports nothing of the project.
 
 usage: python orbslam_child.py SET OUT VOCABULARY SETTINGS INTERVAL_MS"""
 

@@ -1,6 +1,6 @@
 """Makes the vocabulary that ORB-SLAM3 needs, from images: a tree of binary words by hierarchical
-k-majority over ORB descriptors, in DBoW2's text form (D. Galvez-Lopez, J. D. Tardos, "Bags of binary
-words for fast place recognition in image sequences", TRO 28(5), 2012).
+k-majority over ORB descriptors, in DBoW2's text form (D. Galvez-Lopez, J. D. Tardos, "Bags of
+binary words for fast place recognition in image sequences", TRO 28(5), 2012).
 
 It stands in for the official one (145 MB, one million words), which is not fetched: relocation and
 loops of ORB-SLAM3 may be weaker with it.
