@@ -97,6 +97,12 @@ class Flights(unittest.TestCase):
         z = depth[cls.pixels[:, 1], cls.pixels[:, 0]] / 5000.0
         cls.points = np.column_stack([rays, np.ones(len(rays))]) * z[:, None]  # of camera 0
 
+    def test_a_flight_is_rendered_again_only_when_its_options_change(self):
+        before = os.stat(self.folder).st_ino
+        options = ["--first-frame", "300", "--max-frames", "2", "--depth-every", "1"]
+        self.assertEqual(os.stat(flights.render(7, self.folder, options)).st_ino, before)
+        self.assertNotEqual(flights.made_by(options), flights.made_by())
+
     def test_depths_and_poses_lie_on_the_surfaces(self):
         world = self.points @ self.truth.rotations[0].T + self.truth.positions[0]
         away = surfaces.distances(surfaces.read_boxes(self.set.file("surfaces.json")), world)
