@@ -231,7 +231,10 @@ struct Scene::Rays {
 // which is met at the exit. The conditions have no short cuts, so that the compiler makes vector
 // instructions of the inner loop; a component of 0 gives infinities, which compare as they should.
 void Scene::cast(const std::vector<Ready>& near, Rays& rays) {
-  for (size_t i = 0; i < rays.count; ++i) rays.distance[i] = std::numeric_limits<float>::max();
+  for (size_t i = 0; i < rays.count; ++i) {
+    rays.distance[i] = std::numeric_limits<float>::max();
+    rays.face[i] = 0;
+  }
   const auto least = [](float a, float b) { return a < b ? a : b; };
   const auto most = [](float a, float b) { return a > b ? a : b; };
   for (const Ready& box : near) {
