@@ -177,6 +177,14 @@ class Drone(unittest.TestCase):
         for name in os.listdir(self.path("frames")):
             self.assertEqual(pathlib.Path(self.path("frames"), name).read_bytes(),
                              pathlib.Path(self.path("again"), name).read_bytes())
+        pair = run("reconstruct", "--recording", self.output, "--focal-35mm", "30", "--frames", "0",
+                   "3", "--resize", "320", "-o", self.path("pair"), "--json")
+        self.assertIn(pair.returncode, (0, 3), pair.stderr)
+        found = json.loads(pair.stdout)
+        self.assertEqual((found["cameras"][0]["source"], found["image_size0"]),
+                         ("focal_35mm", [320, 180]))
+        self.assert_refused(run("reconstruct", "--recording", self.output, "-o", self.path("none")),
+                            "--recording needs --camera, or --focal-35mm")
         # Another run into the same folder must not change the recording.
         again = run("record", "--duration", "1", "-o", self.output, *drone.ports())
         self.assert_refused(again, "holds a recording already")

@@ -12,8 +12,8 @@ from .model import TwoViewModel
 
 def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None, resize=0):
     """(TwoView, TwoViewModel); the model is None without a full pose. Images and cameras are scaled
-    down so that the longer side is `resize`, where it is above 0. The model's cameras are those that
-    pose and points refer to: the given ones with the estimated shift of the principal point
+    down so that the longer side is `resize`, where it is above 0. The model's cameras are those
+    that pose and points refer to: the given ones with the estimated shift of the principal point
     (twoview.corrected_camera)."""
     lumas = [read_luma(path) for path in paths]
     for path, luma, camera in zip(paths, lumas, cameras):
