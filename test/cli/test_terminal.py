@@ -72,12 +72,12 @@ class Terminal(cli.CliTest):
         self.assertNotIn(b"looking for the board", shown)
 
     def test_long_work_shows_its_seconds(self):
-        rows = cli.texture(3000, 2000)
-        image = self.write("big.png", png(3000, 2000, b"".join(rows)))
-        _, shown = self.on_terminal("match", image, image, "--max-keypoints", "16000",
+        rows = cli.texture(1200, 900)
+        image = self.write("big.png", png(1200, 900, b"".join(rows)))
+        _, shown = self.on_terminal("match", image, image, "--max-keypoints", "7000",
                                     "--threshold", "1", "--resize", "0", "--kernels", "c", "-o",
                                     self.out)
-        self.assertIn(b"at most 16000 keypoints an image: ", shown)
+        self.assertIn(b"at most 7000 keypoints an image: ", shown)
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ Stopwatch::Stopwatch(bool wanted, const std::string& text) : progress_(wanted) {
     std::unique_lock<std::mutex> lock(mutex_);
     for (int seconds = 1; !stop_.wait_for(lock, std::chrono::seconds(1), [&] { return stopped_; });
          ++seconds)
-      if (seconds > 1) progress_.tell(text + ": " + std::to_string(seconds) + " s");
+      progress_.tell(text + ": " + std::to_string(seconds) + " s");
   });
 }
 

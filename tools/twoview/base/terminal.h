@@ -26,8 +26,8 @@ class Progress {
   bool shown_;
 };
 
-// Shows "TEXT: 12 s" in the same way, once a second from the second second on, until it is
-// destroyed: for one long call that reports no progress.
+// Shows "TEXT: 12 s" in the same way, once a second, until it is destroyed: for one long call that
+// reports no progress.
 class Stopwatch {
  public:
   Stopwatch(bool wanted, const std::string& text);

@@ -48,9 +48,10 @@ std::string filled(const std::string& page,
   return result + page.substr(at);
 }
 
-std::string card(const std::string& number, const std::string& unit, const std::string& what) {
-  return "<div class=\"card\"><b>" + number + (unit.empty() ? "" : "<i>" + unit + "</i>") +
-         "</b><span>" + what + "</span></div>\n";
+std::string card(const std::string& number, const std::string& unit, const std::string& what,
+                 const char* classes = "card") {
+  return std::string("<div class=\"") + classes + "\"><b>" + number +
+         (unit.empty() ? "" : "<i>" + unit + "</i>") + "</b><span>" + what + "</span></div>\n";
 }
 
 std::string number_of(const Json& value, const char* format) {
@@ -64,7 +65,7 @@ std::string direction_card(const Outcome& outcome) {
   const double unit = -unit_of(outcome);
   return card(formatted("%+.2f ", unit * c[0]) + formatted("%+.2f ", unit * c[1]) +
                   formatted("%+.2f", unit * c[2]),
-              outcome.scale ? "m" : "", "camera 1 stands right, down, forward");
+              outcome.scale ? "m" : "", "camera 1 stands right, down, forward", "card wide");
 }
 
 std::string cards(const Outcome& outcome) {
