@@ -182,8 +182,8 @@ class Drone(unittest.TestCase):
         for name in os.listdir(self.path("frames")):
             self.assertEqual(pathlib.Path(self.path("frames"), name).read_bytes(),
                              pathlib.Path(self.path("again"), name).read_bytes())
-        pair = reconstruct(self.output, self.path("pair"), "--focal-35mm", "30", "--frames", "0", "3",
-                           "--resize", "320", "--json")
+        pair = reconstruct(self.output, self.path("pair"), "--focal-35mm", "30", "--frames", "0",
+                           "3", "--resize", "320", "--json")
         self.assertIn(pair.returncode, (0, 3), pair.stderr)
         found = json.loads(pair.stdout)
         self.assertEqual((found["cameras"][0]["source"], found["image_size0"]),
