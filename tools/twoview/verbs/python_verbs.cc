@@ -70,6 +70,7 @@ void name_library(const fs::path& program) {
         " of the source tree or of an installed " TWOVIEW_DATA_DIR ", and there is none above " +
         program.string());
   name_library(program);
+  setenv("TWOVIEW_VERB", (std::string("twoview ") + verb.name).c_str(), 1);
 
   std::string python = python_of(tree), path = script.string();
   std::vector<std::string> texts = given;
