@@ -432,17 +432,19 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: n
                 match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False,
-                sigma_by_size: float = 1.0) -> tuple[TwoView, Reconstruction]:
+                sigma_by_size: float = 1.0,
+                align_matches: bool = False) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points. Images are (height, width) uint8 and
     are read without a copy; TV_ERR_CAMERA is raised for one that is not of its camera's size.
     feature, match and estimate are the options of the stages; sigma_by_size is the exponent of
-    keypoint_sigmas."""
+    keypoint_sigmas; align_matches moves the keypoints of each match by the pixels around them."""
     library = check_context(context).library
     kept = [to_struct(library, kind, options, {}) for kind, options in
             ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
     wanted = library.make(_abi.tv_reconstruct_options, {
         "triangulation": triangulation, "guided_matching": guided_matching,
-        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size})
+        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size,
+        "align_matches": align_matches})
     wanted.feature, wanted.match, wanted.estimate = map(ctypes.addressof, kept)
     views = []
     for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
