@@ -121,7 +121,8 @@ class tv_view(Structure):
 class tv_reconstruct_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("triangulation", c_int32), ("feature", c_void_p),
                 ("match", c_void_p), ("estimate", c_void_p), ("guided_matching", c_int32),
-                ("bundle_adjustment", c_int32), ("sigma_by_size", c_double)]
+                ("bundle_adjustment", c_int32), ("sigma_by_size", c_double),
+                ("align_matches", c_int32), ("reserved", c_int32)]
 
 
 class tv_reconstruction(Structure):

@@ -546,7 +546,8 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
                 match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False,
-                sigma_by_size: float = 1.0) -> tuple[TwoView, Reconstruction]:
+                sigma_by_size: float = 1.0,
+                align_matches: bool = False) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points.
 
     context: as large as both images. image0, image1: (height, width) uint8, read without a copy.
@@ -555,7 +556,8 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
     shape, 0 where no corner is wanted. feature, match, estimate: the options of the stages, None
     for the defaults. triangulation: a Triangulation. guided_matching: whether a second matching
     follows along the epipolar lines. bundle_adjustment: whether pose and points are adjusted
-    together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2].
+    together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches: whether the
+    keypoints of each match are moved by the pixels around them.
     Returns a TwoView and a Reconstruction. "No geometry" is a result, not an exception: see
     TwoView.verdict.
     Raises TypeError or ValueError for an array that C could not read and for one camera alone,
@@ -566,7 +568,8 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
             ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
     wanted = library.make(_abi.tv_reconstruct_options, {
         "triangulation": triangulation, "guided_matching": guided_matching,
-        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size})
+        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size,
+        "align_matches": align_matches})
     wanted.feature, wanted.match, wanted.estimate = map(ctypes.addressof, kept)
     views = []
     is_calibrated = not _are_uncalibrated(camera0, camera1)
