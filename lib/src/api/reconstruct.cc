@@ -106,7 +106,7 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     r.sigmas[0][k] = sigmas.of(a);
     r.sigmas[1][k] = sigmas.of(b);
     if (r.aligned[m.idx0] == 0) continue;
-    for (float* sigmas : r.sigmas) sigmas[k] *= static_cast<float>(kAlignedSigma);
+    for (float* of_view : r.sigmas) of_view[k] *= static_cast<float>(kAlignedSigma);
   }
 }
 
