@@ -14,6 +14,9 @@
 #include "pair/result.h"
 #include "pair/session.h"
 #include "verbs/common.h"
+#ifdef TWOVIEW_HAS_DRONE
+#include "odometry/drone_frames.h"
+#endif
 
 namespace cli {
 namespace {
@@ -28,16 +31,56 @@ const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "poi
 struct Arguments {
   Common common;
   std::string source, camera, truth;
-  double fps = 0;
+  double fps = 0, duration = 0;
   FlightOptions flight;
+#ifdef TWOVIEW_HAS_DRONE
+  DroneAddress drone;  // without a host: none
+#endif
 };
 
+bool is_number(const std::string& text) {
+  return !text.empty() && text.size() < 4 &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+std::unique_ptr<FrameSource> open_recording_folder(const Arguments& a) {
+#ifdef TWOVIEW_HAS_DRONE
+  if (a.camera.empty())
+    throw BadInput("--camera is required: a recording of a drone does not describe its camera");
+  return open_recording(a.source, a.camera);
+#else
+  throw BadInput("cannot read " + a.source +
+                 ": this program was built without the drone's driver");
+#endif
+}
+
 std::unique_ptr<FrameSource> open_source(const Arguments& a) {
+#ifdef TWOVIEW_HAS_DRONE
+  if (!a.drone.host.empty()) {
+    if (!a.source.empty()) throw BadInput("give SOURCE or --drone, not both");
+    if (a.camera.empty())
+      throw BadInput("--camera is required: the drone does not describe its camera");
+    return open_drone(a.drone, a.duration, a.camera);
+  }
+#endif
   if (a.source.empty()) throw BadInput("SOURCE is required");
   std::error_code error;
-  if (fs::is_directory(a.source, error)) return open_image_folder(a.source, a.fps);
-  throw BadInput("cannot read " + a.source + ": it is neither a folder, a film nor the number of "
-                 "a camera");
+  const fs::path path = a.source;
+  if (fs::is_directory(path, error)) {
+    const bool is_recording = fs::exists(path / "video.pave", error);
+    if (!is_recording) return open_image_folder(a.source, a.fps);
+    if (a.fps > 0) throw BadInput("--fps: a recording of a drone has times");
+    return open_recording_folder(a);
+  }
+  if (fs::is_regular_file(path, error)) return open_film(a.source, a.fps);
+  if (is_number(a.source)) {
+    if (a.camera.empty())
+      throw BadInput("--camera is required: a camera does not describe its lens");
+    if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
+    return open_camera(std::stoi(a.source));
+  }
+  throw BadInput("cannot read " + a.source +
+                 ": it is neither a folder, a film nor the number of a camera");
 }
 
 // The words of the progress line while the flight lasts.
@@ -203,12 +246,12 @@ int odometry(Arguments& a) {
     Progress progress(flight, wanted, common.speaks() && stdout_style().bold[0] != '\0');
     flight.track(stop, [&] { progress.show(); });
   }
-  if (flight.frames().empty()) throw BadInput("no frame came from " + a.source);
+  if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
   flight.finish(stop);
   FlightResult result = result_of(
       flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
   result.json["interrupted"] = stop.load();
-  result.json["source"] = a.source;
+  result.json["source"] = a.source.empty() ? source->kind() : a.source;
   result.json["options"] = options_of(a, truth_file);
   result.json["seed"] = a.flight.odometry.seed;
   result.json["version"] = tv_version_string();
@@ -265,6 +308,12 @@ void add_odometry(CLI::App& program, Run& run) {
   add_count(*verb, "--max-points", o.max_points, 500, 200000, "most points of the map");
   add_count(*verb, "--window", o.window, 3, 20, "keyframes that are adjusted together");
   verb->add_option("--seed", o.seed, "of the samplers")->type_name("N")->capture_default_str();
+#ifdef TWOVIEW_HAS_DRONE
+  verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")
+      ->type_name("HOST");
+  add_ports(*verb, a->drone);
+  add_duration(*verb, a->duration);
+#endif
   add_common(*verb, a->common, kCommon, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return odometry(*a); }; });
 }

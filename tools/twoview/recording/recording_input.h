@@ -10,6 +10,7 @@
 
 #include "pair/result.h"
 #include "pair/session.h"
+#include "recording/metric_scale.h"
 
 namespace cli {
 
@@ -22,6 +23,11 @@ struct RecordingOptions {
   void add_to(CLI::App& verb);
   bool given() const { return !folder.empty(); }
 };
+
+// The mount from the options, else from the entries body_from_camera and camera_in_body of the
+// camera file, else a camera at the body's origin that looks forward. Throws BadInput. Only in a
+// program with the driver.
+CameraMount mount_of(const RecordingOptions& options, const std::string& camera_file);
 
 class RecordingInput {
  public:

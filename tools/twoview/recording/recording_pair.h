@@ -9,6 +9,7 @@
 #include "pair/result.h"
 #include "pair/session.h"
 #include "recording/metric_scale.h"
+#include "twoview_drivers/source.h"
 
 namespace cli {
 
@@ -23,6 +24,9 @@ struct RecordedFlight {
   FlightLog log;
   std::vector<RecordedFrame> frames;
 };
+
+// An instant of the log from a sample of the IMU, which must have an attitude.
+FlightSample flight_sample(const tvs_imu& imu);
 
 // Plays the whole recording once. Throws BadInput where there is none, or no picture in it decodes.
 RecordedFlight read_flight(const std::string& folder);
