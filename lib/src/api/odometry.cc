@@ -1,0 +1,338 @@
+// The entry points of the odometry: they validate, call odometry/track.h, and write the results.
+#include "twoview/odometry.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "api/sized.h"
+#include "api/validate.h"
+#include "api/within.h"
+#include "odometry/adjust.h"
+#include "odometry/track.h"
+#include "twoview/match.h"
+#include "twoview/triangulate.h"
+
+namespace tv {
+namespace {
+
+constexpr tv_odometry_options kDefaults = {
+    sizeof(tv_odometry_options), 1000, 200, 20000, 10, TV_KERNELS_AUTO, 20130814};
+constexpr size_t kOdometryBytes = 4096;  // with 64-bit and with 32-bit pointers alike
+static_assert(sizeof(tv_odometry) <= kOdometryBytes);
+
+struct Plan {
+  tv_camera camera;
+  tv_odometry_options options;
+  tv_limits limits;
+  size_t context_bytes;
+  int32_t columns, rows;
+  MapSizes sizes;
+};
+
+tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options, Plan* plan) {
+  tv_status status = tv_camera_check(camera);
+  if (status != TV_OK) return status;
+  plan->camera = *camera;
+  plan->options = kDefaults;
+  status = read_sized(options, &plan->options);
+  if (status != TV_OK) return status;
+  const tv_odometry_options& o = plan->options;
+  if (!within(o.max_keypoints, 100, 4096) || !within(o.max_keyframes, 8, 2000) ||
+      !within(o.max_points, 500, 200000) || !within(o.window, 3, 20) ||
+      !within(o.kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) || !within(camera->width, 32, 16384) ||
+      !within(camera->height, 32, 16384)) {
+    return TV_ERR_ARGUMENT;
+  }
+  tv_limits_init(&plan->limits);
+  plan->limits.max_width = camera->width;
+  plan->limits.max_height = camera->height;
+  plan->limits.max_keypoints = 3 * o.max_keypoints;
+  plan->limits.max_matches = o.max_keypoints;
+  plan->limits.kernels = o.kernels;
+  plan->limits.purposes = TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE |
+                          TV_PURPOSE_MATCH_GUIDED | TV_PURPOSE_ABSOLUTE_POSE;
+  plan->columns = (camera->width + kCellPx - 1) / kCellPx;
+  plan->rows = (camera->height + kCellPx - 1) / kCellPx;
+  plan->sizes = {o.max_keypoints, o.max_keyframes, o.max_points};
+  return tv_context_size(&plan->limits, &plan->context_bytes);
+}
+
+size_t frame_bytes(const Plan& plan) {
+  const size_t n = static_cast<size_t>(plan.options.max_keypoints);
+  const size_t cells = static_cast<size_t>(plan.columns) * static_cast<size_t>(plan.rows);
+  return arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
+         3 * arena_bytes<int32_t>(n) + arena_bytes<float>(n) + arena_bytes<int32_t>(cells + 1);
+}
+
+void make_frame(const Plan& plan, Arena& arena, Frame* frame) {
+  const size_t n = static_cast<size_t>(plan.options.max_keypoints);
+  const size_t cells = static_cast<size_t>(plan.columns) * static_cast<size_t>(plan.rows);
+  frame->keypoints = arena_alloc<tv_keypoint>(arena, n);
+  frame->descriptors = arena_alloc<uint8_t>(arena, n * TV_DESCRIPTOR_BYTES);
+  frame->points = arena_alloc<int32_t>(arena, n);
+  frame->distances = arena_alloc<int32_t>(arena, n);
+  frame->cell_items = arena_alloc<int32_t>(arena, n);
+  frame->sigmas = arena_alloc<float>(arena, n);
+  frame->cell_starts = arena_alloc<int32_t>(arena, cells + 1);
+}
+
+constexpr int kNumFrames = 2 + kNumStarts;
+
+size_t local_points_bytes(const Plan& plan) {
+  return arena_bytes<int32_t>(static_cast<size_t>(plan.limits.max_keypoints));
+}
+
+size_t plan_bytes(const Plan& plan) {
+  return kOdometryBytes + arena_bytes<uint8_t>(plan.context_bytes) + map_bytes(plan.sizes) +
+         kNumFrames * frame_bytes(plan) + local_points_bytes(plan) + scratch_bytes(plan.options);
+}
+
+void start_anew(tv_odometry* o) {
+  clear_map(&o->map);
+  o->num_starts = o->num_local_points = 0;
+  o->reference_id = -1;
+  o->has_motion = false;
+  o->mark = o->num_frames = o->segment = o->num_segments = 0;
+  o->num_relocations = o->num_loops = o->lost_frames = o->next_search = 0;
+  o->status = TV_ODOMETRY_STARTING;
+  o->frame.has_pose = o->previous.has_pose = false;
+  o->frame.num = o->previous.num = 0;
+  o->median_depth = 1;
+  o->last_time_s = 0;
+}
+
+}  // namespace
+
+size_t scratch_bytes(const tv_odometry_options& o) {
+  const size_t n = static_cast<size_t>(o.max_keypoints);
+  const size_t choices = 2 * (arena_bytes<tv_keypoint>(n) +
+                              arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
+                              arena_bytes<int32_t>(n)) +
+                         arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) +
+                         arena_bytes<tv_point>(n) + arena_bytes<uint8_t>(3 * n * 128);
+  return std::max(choices, arena_bytes<double>(40 * n) + adjust_bytes(o)) +
+         arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
+         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));
+}
+
+}  // namespace tv
+
+void tv_odometry_options_init_sized(tv_odometry_options* options, size_t struct_size) {
+  tv::init_sized(options, struct_size, &tv::kDefaults, sizeof tv::kDefaults);
+}
+
+void tv_odometry_frame_init_sized(tv_odometry_frame* frame, size_t struct_size) {
+  tv::init_zeros(frame, struct_size);
+}
+
+void tv_odometry_state_init_sized(tv_odometry_state* state, size_t struct_size) {
+  tv::init_zeros(state, struct_size);
+}
+
+void tv_keyframe_init_sized(tv_keyframe* keyframe, size_t struct_size) {
+  tv::init_zeros(keyframe, struct_size);
+}
+
+const char* tv_odometry_status_string(tv_odometry_status status) {
+  switch (static_cast<int>(status)) {
+    case TV_ODOMETRY_STARTING: return "starting";
+    case TV_ODOMETRY_TRACKING: return "tracking";
+    case TV_ODOMETRY_WEAK: return "weak";
+    case TV_ODOMETRY_ROTATION: return "rotation";
+    case TV_ODOMETRY_LOST: return "lost";
+    default: return "unknown";
+  }
+}
+
+tv_status tv_odometry_size(const tv_camera* camera, const tv_odometry_options* options,
+                           size_t* size_bytes) {
+  tv::Plan plan;
+  const tv_status status = tv::make_plan(camera, options, &plan);
+  if (status != TV_OK) return status;
+  if (size_bytes == nullptr) return TV_ERR_NULL;
+  *size_bytes = tv::plan_bytes(plan);
+  return TV_OK;
+}
+
+tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
+                           const tv_odometry_options* options, void* memory, size_t size_bytes) {
+  tv::Plan plan;
+  tv_status status = tv::make_plan(camera, options, &plan);
+  if (status != TV_OK) return status;
+  if (odometry == nullptr || memory == nullptr) return TV_ERR_NULL;
+  if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
+  const size_t needed = tv::plan_bytes(plan);
+  if (size_bytes < needed) return TV_ERR_MEMORY;
+  tv_odometry* o = static_cast<tv_odometry*>(memory);
+  *o = tv_odometry{};
+  tv::Arena arena = tv::arena_over(static_cast<uint8_t*>(memory) + tv::kOdometryBytes,
+                                   needed - tv::kOdometryBytes);
+  status = tv_context_init(&o->context, &plan.limits,
+                           tv::arena_alloc<uint8_t>(arena, plan.context_bytes), plan.context_bytes);
+  if (status != TV_OK) return status;
+  o->options = plan.options;
+  o->options.struct_size = sizeof(tv_odometry_options);
+  o->camera = tv::prepare_camera(plan.camera);
+  tv_feature_options_init(&o->features);
+  o->features.max_keypoints = plan.options.max_keypoints;
+  o->grid_columns = plan.columns;
+  o->grid_rows = plan.rows;
+  tv::make_map(plan.sizes, arena, &o->map);
+  tv::make_frame(plan, arena, &o->frame);
+  tv::make_frame(plan, arena, &o->previous);
+  for (tv::Frame& frame : o->starts) tv::make_frame(plan, arena, &frame);
+  o->local_points =
+      tv::arena_alloc<int32_t>(arena, static_cast<size_t>(plan.limits.max_keypoints));
+  const size_t scratch = tv::scratch_bytes(plan.options);
+  o->scratch = tv::arena_over(tv::arena_alloc<uint8_t>(arena, scratch), scratch);
+  tv::start_anew(o);
+  *odometry = o;
+  return TV_OK;
+}
+
+tv_status tv_odometry_reset(tv_odometry* odometry) {
+  if (odometry == nullptr) return TV_ERR_NULL;
+  tv::start_anew(odometry);
+  return TV_OK;
+}
+
+namespace tv {
+namespace {
+
+tv_status check_odometry_image(const tv_odometry& odometry, const tv_image& image) {
+  if (image.data == nullptr) return TV_ERR_NULL;
+  const tv_camera& camera = odometry.camera.model;
+  if (image.width != camera.width || image.height != camera.height) return TV_ERR_CAMERA;
+  return image.stride_bytes >= image.width ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+}  // namespace
+}  // namespace tv
+
+tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* frame,
+                            tv_odometry_state* state) {
+  if (odometry == nullptr || frame == nullptr || state == nullptr) return TV_ERR_NULL;
+  tv_odometry_frame input{};
+  tv_status status = tv::read_sized(frame, &input);
+  if (status == TV_OK) status = tv::check_sized(state);
+  if (status == TV_OK) status = tv::check_odometry_image(*odometry, input.image);
+  if (status != TV_OK) return status;
+  if (!tv::is_finite(input.time_s)) return TV_ERR_NOT_FINITE;
+  if (!tv::within(input.gap, 0, 1)) return TV_ERR_ARGUMENT;
+  if (odometry->num_frames > 0 && !(input.time_s > odometry->last_time_s)) return TV_ERR_ARGUMENT;
+  tv_odometry_state packed{};
+  tv::track_frame(odometry, input, &packed);
+  tv::write_sized(packed, state);
+  return TV_OK;
+}
+
+tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, int32_t near_id,
+                             tv_odometry_state* state) {
+  if (odometry == nullptr || image == nullptr || state == nullptr) return TV_ERR_NULL;
+  tv_status status = tv::check_sized(state);
+  if (status == TV_OK) status = tv::check_odometry_image(*odometry, *image);
+  if (status != TV_OK) return status;
+  tv_odometry_state packed{};
+  tv::locate_frame(odometry, *image, near_id, &packed);
+  tv::write_sized(packed, state);
+  return TV_OK;
+}
+
+tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
+                              const double reference_from_cam_R[9],
+                              const double reference_from_cam_t[3], double R[9], double t[3],
+                              int32_t* segment) {
+  if (odometry == nullptr || reference_from_cam_R == nullptr || reference_from_cam_t == nullptr ||
+      R == nullptr || t == nullptr) {
+    return TV_ERR_NULL;
+  }
+  tv::Rigid pose;
+  std::copy_n(reference_from_cam_R, 9, pose.R);
+  std::copy_n(reference_from_cam_t, 3, pose.t);
+  const tv::Map& map = odometry->map;
+  int32_t id = reference_id;
+  int32_t k = tv::find_keyframe(map, id);
+  for (int32_t steps = 0; k < 0 && steps <= map.num_removed; ++steps) {
+    int32_t n = 0;
+    while (n < map.num_removed && map.removed[n].id != id) ++n;
+    if (n == map.num_removed) return TV_ERR_ARGUMENT;
+    pose = tv::compose(map.removed[n].kept_from_removed, pose);
+    id = map.removed[n].kept_id;
+    k = tv::find_keyframe(map, id);
+  }
+  if (k < 0) return TV_ERR_ARGUMENT;
+  pose = tv::compose(tv::inverse(map.keyframes[k].cam_from_world), pose);
+  std::copy_n(pose.R, 9, R);
+  std::copy_n(pose.t, 3, t);
+  if (segment != nullptr) *segment = map.keyframes[k].segment;
+  return TV_OK;
+}
+
+tv_status tv_odometry_keyframe(const tv_odometry* odometry, int32_t idx, tv_keyframe* keyframe) {
+  if (odometry == nullptr || keyframe == nullptr) return TV_ERR_NULL;
+  const tv_status status = tv::check_sized(keyframe);
+  if (status != TV_OK) return status;
+  if (!tv::within(idx, 0, odometry->map.num_keyframes - 1)) return TV_ERR_ARGUMENT;
+  const tv::MapKeyframe& k = odometry->map.keyframes[idx];
+  const tv::Rigid world_from_cam = tv::inverse(k.cam_from_world);
+  tv_keyframe packed{};
+  packed.id = k.id;
+  packed.segment = k.segment;
+  packed.frame = k.frame;
+  packed.time_s = k.time_s;
+  std::copy_n(world_from_cam.R, 9, packed.world_from_cam_R);
+  std::copy_n(world_from_cam.t, 3, packed.world_from_cam_t);
+  packed.num_keypoints = k.num_keypoints;
+  packed.num_observations = k.num_observations;
+  packed.has_covariance = k.has_covariance;
+  std::copy_n(k.covariance, 36, packed.covariance);
+  tv::write_sized(packed, keyframe);
+  return TV_OK;
+}
+
+tv_status tv_odometry_points(const tv_odometry* odometry, tv_map_point* points, int32_t cap_points,
+                             int32_t* num_points) {
+  if (odometry == nullptr || num_points == nullptr || (points == nullptr && cap_points > 0)) {
+    return TV_ERR_NULL;
+  }
+  if (cap_points < 0) return TV_ERR_ARGUMENT;
+  const tv::Map& map = odometry->map;
+  *num_points = map.num_points;
+  if (map.num_points > cap_points) return TV_ERR_CAPACITY;
+  int32_t n = 0;
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    const tv::MapPoint& point = map.points[p];
+    if (point.id < 0) continue;
+    tv_map_point* out = &points[n++];
+    *out = tv_map_point{};
+    out->id = point.id;
+    out->segment = point.segment;
+    out->num_observations = point.num_observations;
+    out->grey = point.grey;
+    std::copy_n(point.position, 3, out->position);
+  }
+  return TV_OK;
+}
+
+tv_status tv_odometry_observations(const tv_odometry* odometry, int32_t idx,
+                                   tv_map_observation* observations, int32_t cap_observations,
+                                   int32_t* num_observations) {
+  if (odometry == nullptr || num_observations == nullptr ||
+      (observations == nullptr && cap_observations > 0)) {
+    return TV_ERR_NULL;
+  }
+  const tv::Map& map = odometry->map;
+  if (cap_observations < 0 || !tv::within(idx, 0, map.num_keyframes - 1)) return TV_ERR_ARGUMENT;
+  const tv::MapKeyframe& keyframe = map.keyframes[idx];
+  *num_observations = keyframe.num_observations;
+  if (keyframe.num_observations > cap_observations) return TV_ERR_CAPACITY;
+  const tv::MapKeypoint* own = tv::keypoints_of(map, keyframe);
+  int32_t n = 0;
+  for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
+    if (own[k].point == tv::kNoPoint) continue;
+    int32_t rank = 0;
+    for (int32_t p = 0; p < own[k].point; ++p) rank += map.points[p].id >= 0;
+    observations[n++] = {rank, k, own[k].x, own[k].y, own[k].size / 4.0f, 0};
+  }
+  return TV_OK;
+}

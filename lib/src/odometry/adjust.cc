@@ -1,0 +1,274 @@
+#include "odometry/adjust.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/vector3.h"
+
+namespace tv {
+namespace {
+
+constexpr int32_t kLeastShared = 10;
+constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
+constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;
+constexpr double kTypicalNoise = 0.7;  // px
+
+int32_t most_views(const tv_odometry_options& o) { return 2 * o.window; }
+int32_t most_points(const tv_odometry_options& o) {
+  return std::min(6 * o.max_keypoints, o.max_points);
+}
+int32_t most_observations(const tv_odometry_options& o) { return 14 * o.max_keypoints; }
+
+tv_window largest_window(const tv_odometry_options& options) {
+  tv_window window;
+  tv_window_init(&window);
+  window.num_cameras = 1;
+  window.num_views = most_views(options);
+  window.num_points = most_points(options);
+  window.num_observations = most_observations(options);
+  window.num_gravity_priors = window.num_views;
+  return window;
+}
+
+size_t window_bytes(const tv_odometry_options& options) {
+  const tv_window window = largest_window(options);
+  size_t bytes = 0;
+  tv_adjust_window_size(&window, &bytes);
+  return bytes;
+}
+
+// What is adjusted, with the arrays that tv_window points to.
+struct Around {
+  tv_window window;
+  tv_window_view* views;
+  int32_t* keyframes;  // of each view
+  double* points;
+  int32_t* places;  // of each point in the map
+  int32_t* numbers;  // of each place in the map: its point here, or -1
+  tv_observation* observations;
+  int32_t* keypoints;  // of each observation
+};
+
+void add_view(const Map& map, int32_t keyframe, bool fixed, Around* around) {
+  const int32_t v = around->window.num_views++;
+  around->keyframes[v] = keyframe;
+  tv_window_view* view = &around->views[v];
+  const Rigid& pose = map.keyframes[keyframe].cam_from_world;
+  std::copy_n(pose.R, 9, view->R);
+  std::copy_n(pose.t, 3, view->t);
+  view->idx_camera = 0;
+  view->fixed = fixed;
+}
+
+// The indices of at most `count` keyframes with the largest numbers above `least`, the later of
+// equal ones first.
+int32_t largest(const int32_t* numbers, int32_t num, int32_t least, int32_t count,
+                int32_t* chosen) {
+  int32_t num_chosen = 0;
+  for (int32_t k = num - 1; k >= 0; --k) {
+    if (numbers[k] < least) continue;
+    int32_t at = num_chosen;
+    while (at > 0 && numbers[chosen[at - 1]] < numbers[k]) --at;
+    if (at >= count) continue;
+    num_chosen = std::min(num_chosen + 1, count);
+    for (int32_t i = num_chosen - 1; i > at; --i) chosen[i] = chosen[i - 1];
+    chosen[at] = k;
+  }
+  return num_chosen;
+}
+
+void add_observations(const Map& map, int32_t view, int32_t most, Around* around) {
+  const MapKeyframe& keyframe = map.keyframes[around->keyframes[view]];
+  const MapKeypoint* own = keypoints_of(map, keyframe);
+  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
+    if (own[i].point == kNoPoint || around->numbers[own[i].point] < 0) continue;
+    if (around->window.num_observations == most) return;
+    const int32_t n = around->window.num_observations++;
+    tv_observation* o = &around->observations[n];
+    *o = tv_observation{};
+    o->idx_view = view;
+    o->idx_point = around->numbers[own[i].point];
+    o->pixel[0] = static_cast<double>(own[i].x);
+    o->pixel[1] = static_cast<double>(own[i].y);
+    o->sigma = own[i].size / 4.0f;
+    around->keypoints[n] = i;
+  }
+}
+
+// Sets how uncertain the points' depths are from the largest angle between the rays to them.
+void measure_depths(Odometry* odometry, const Around& around) {
+  Map& map = odometry->map;
+  for (int32_t k = 0; k < around.window.num_points; ++k) {
+    MapPoint& point = map.points[around.places[k]];
+    point.depth_sigma = 0;  // here: the largest squared sine
+  }
+  for (int32_t n = 0; n < around.window.num_observations; ++n) {
+    const tv_observation& o = around.observations[n];
+    MapPoint& point = map.points[around.places[o.idx_point]];
+    double centre[3], a[3], b[3], normal[3];
+    centre_of(map.keyframes[around.keyframes[o.idx_view]].cam_from_world, centre);
+    for (int c = 0; c < 3; ++c) {
+      a[c] = point.position[c] - centre[c];
+      b[c] = point.position[c] - static_cast<double>(point.seen_from[c]);
+    }
+    cross(a, b, normal);
+    const double sine_sq = dot(normal, normal) / std::max(dot(a, a) * dot(b, b), 1e-300);
+    point.depth_sigma = std::max(point.depth_sigma, static_cast<float>(sine_sq));
+  }
+  for (int32_t k = 0; k < around.window.num_points; ++k) {
+    MapPoint& point = map.points[around.places[k]];
+    const double sine = std::sqrt(static_cast<double>(point.depth_sigma));
+    const double sigma =
+        kTypicalNoise / (odometry->camera.model.fx * std::max(sine, 1e-6));
+    point.depth_sigma =
+        std::min(std::max(static_cast<float>(sigma), kLeastDepthSigma), kLargestDepthSigma);
+  }
+}
+
+}  // namespace
+
+size_t adjust_bytes(const tv_odometry_options& o) {
+  const size_t views = static_cast<size_t>(most_views(o)) + 1;
+  const size_t points = static_cast<size_t>(most_points(o));
+  const size_t observations = static_cast<size_t>(most_observations(o));
+  const size_t keyframes = static_cast<size_t>(o.max_keyframes);
+  return arena_bytes<tv_window_view>(views) + 3 * arena_bytes<int32_t>(views) +
+         2 * arena_bytes<int32_t>(keyframes) + arena_bytes<double>(3 * points) +
+         arena_bytes<int32_t>(points) + arena_bytes<int32_t>(static_cast<size_t>(o.max_points)) +
+         arena_bytes<tv_observation>(observations) + arena_bytes<int32_t>(observations) +
+         arena_bytes<float>(observations) + arena_bytes<double>(36 * views) +
+         arena_bytes<tv_gravity_prior>(views) +
+         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points)) +
+         arena_bytes<uint8_t>(window_bytes(o));
+}
+
+void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared) {
+  Map& map = odometry->map;
+  const int32_t mark = ++odometry->mark;
+  const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
+  for (int32_t i = 0; i < map.keyframes[keyframe].num_keypoints; ++i) {
+    if (own[i].point != kNoPoint) map.points[own[i].point].mark = mark;
+  }
+  for (int32_t k = 0; k < map.num_keyframes; ++k) {
+    shared[k] = 0;
+    if (map.keyframes[k].segment != map.keyframes[keyframe].segment) continue;
+    const MapKeypoint* other = keypoints_of(map, map.keyframes[k]);
+    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
+      shared[k] += other[i].point != kNoPoint && map.points[other[i].point].mark == mark;
+    }
+  }
+}
+
+void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations) {
+  ArenaScope scope(odometry->scratch);
+  Arena& arena = odometry->scratch;
+  Map& map = odometry->map;
+  const tv_odometry_options& options = odometry->options;
+  const size_t num_keyframes = static_cast<size_t>(map.num_keyframes);
+  const size_t room = static_cast<size_t>(most_observations(options));
+  Around around{};
+  tv_window_init(&around.window);
+  around.views = arena_alloc<tv_window_view>(arena, static_cast<size_t>(most_views(options)) + 1);
+  around.keyframes = arena_alloc<int32_t>(arena, static_cast<size_t>(most_views(options)) + 1);
+  around.points = arena_alloc<double>(arena, 3 * static_cast<size_t>(most_points(options)));
+  around.places = arena_alloc<int32_t>(arena, static_cast<size_t>(most_points(options)));
+  around.numbers = arena_alloc<int32_t>(arena, static_cast<size_t>(options.max_points));
+  around.observations = arena_alloc<tv_observation>(arena, room);
+  around.keypoints = arena_alloc<int32_t>(arena, room);
+  int32_t* shared = arena_alloc<int32_t>(arena, num_keyframes);
+  int32_t* chosen = arena_alloc<int32_t>(arena, static_cast<size_t>(options.window) + 1);
+
+  // The keyframes that are adjusted, in ascending order, so that the first one is held where none
+  // is fixed.
+  count_shared(odometry, keyframe, shared);
+  shared[keyframe] = 1 << 30;
+  const int32_t num_adjusted =
+      largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
+  std::sort(chosen, chosen + num_adjusted);
+  const int32_t segment = map.keyframes[keyframe].segment;
+  int32_t first = 0;
+  while (map.keyframes[first].segment != segment) ++first;
+  for (int32_t k = 0; k < num_adjusted; ++k) {
+    add_view(map, chosen[k], chosen[k] == first, &around);
+    shared[chosen[k]] = -1;
+  }
+  // Their points.
+  std::fill(around.numbers, around.numbers + options.max_points, -1);
+  for (int32_t v = num_adjusted - 1; v >= 0; --v) {
+    const MapKeyframe& view = map.keyframes[around.keyframes[v]];
+    const MapKeypoint* own = keypoints_of(map, view);
+    for (int32_t i = 0; i < view.num_keypoints; ++i) {
+      const int32_t p = own[i].point;
+      if (p == kNoPoint || around.numbers[p] >= 0) continue;
+      if (around.window.num_points == most_points(options)) break;
+      const int32_t n = around.window.num_points++;
+      around.numbers[p] = n;
+      around.places[n] = p;
+      std::copy_n(map.points[p].position, 3, around.points + 3 * n);
+    }
+  }
+  // The other keyframes that see them are held.
+  for (int32_t k = 0; k < map.num_keyframes; ++k) {
+    if (shared[k] == -1) continue;
+    shared[k] = 0;
+    if (map.keyframes[k].segment != segment) continue;
+    const MapKeypoint* own = keypoints_of(map, map.keyframes[k]);
+    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
+      shared[k] += own[i].point != kNoPoint && around.numbers[own[i].point] >= 0;
+    }
+  }
+  const int32_t num_held =
+      largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
+  for (int32_t k = 0; k < num_held; ++k) add_view(map, chosen[k], true, &around);
+  for (int32_t v = 0; v < around.window.num_views; ++v) {
+    add_observations(map, v, most_observations(options), &around);
+  }
+  const size_t num_observations = static_cast<size_t>(around.window.num_observations);
+  float* errors = arena_alloc<float>(arena, num_observations);
+
+  tv_window& window = around.window;
+  window.num_cameras = 1;
+  window.cameras = &odometry->camera.model;
+  window.views = around.views;
+  window.points = around.points;
+  window.observations = around.observations;
+  tv_window_options how;
+  tv_window_options_init(&how);
+  how.max_iterations = max_iterations;
+  how.tolerance = 1e-4;
+  size_t bytes = 0;
+  tv_adjust_window_size(&window, &bytes);
+  void* memory = arena_alloc<uint8_t>(arena, bytes);
+  tv_window_result result;
+  tv_window_result_init(&result);
+  if (memory == nullptr ||
+      tv_adjust_window(&window, &how, memory, bytes, nullptr, errors, &result) != TV_OK) {
+    return;
+  }
+  for (int32_t v = 0; v < window.num_views; ++v) {
+    if (around.views[v].fixed) continue;
+    Rigid pose;
+    std::copy_n(around.views[v].R, 9, pose.R);
+    std::copy_n(around.views[v].t, 3, pose.t);
+    map.keyframes[around.keyframes[v]].cam_from_world = pose;
+  }
+  for (int32_t k = 0; k < window.num_points; ++k) {
+    std::copy_n(around.points + 3 * k, 3, map.points[around.places[k]].position);
+  }
+  for (int32_t n = 0; n < window.num_observations; ++n) {
+    const tv_observation& o = around.observations[n];
+    const double largest_error = kLargestError * static_cast<double>(o.sigma);
+    if (errors[n] >= 0 && static_cast<double>(errors[n]) <= largest_error) continue;
+    forget_observation(&map, around.keyframes[o.idx_view], around.keypoints[n]);
+  }
+  measure_depths(odometry, around);
+  uint8_t* is_removed = arena_alloc<uint8_t>(arena, static_cast<size_t>(options.max_points));
+  bool any = false;
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    is_removed[p] = map.points[p].id >= 0 && map.points[p].num_observations < 2;
+    any = any || is_removed[p];
+  }
+  if (any) remove_points(&map, is_removed);
+}
+
+}  // namespace tv

@@ -1,0 +1,17 @@
+// Bundle adjustment of the keyframes around one of them.
+#pragma once
+
+#include "odometry/odometry.h"
+
+namespace tv {
+
+size_t adjust_bytes(const tv_odometry_options& options);
+
+// Adjusts a keyframe, those that share most points with it, and their points; then forgets the
+// observations that do not fit, and removes the points that fewer than two keyframes see.
+void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations);
+
+// How many points each keyframe shares with one of them; 0 for keyframes of other segments.
+void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared);
+
+}  // namespace tv

@@ -1,0 +1,265 @@
+#include "twoview/match.h"
+#include "twoview/triangulate.h"
+#include "odometry/keyframe.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/vector3.h"
+#include "odometry/adjust.h"
+
+namespace tv {
+namespace {
+
+constexpr double kLeastBaseline = 0.01;  // of the median depth: nearer keyframes make no points
+constexpr int32_t kMostNeighbours = 4;
+constexpr double kLeastAngle = 0.006;    // radians
+constexpr double kLargestError = 2.0;    // px, of a pixel of sigma 1
+constexpr double kLargestSizeRatio = 2.2;
+constexpr double kTypicalNoise = 0.7;  // px
+
+double sigma_of(const MapKeypoint& keypoint) { return static_cast<double>(keypoint.size) / 4.0; }
+
+int32_t grey_at(const tv_image& image, const MapKeypoint& keypoint) {
+  const int64_t x = std::min(std::max(static_cast<int32_t>(keypoint.x + 0.5f), 0), image.width - 1);
+  const int64_t y =
+      std::min(std::max(static_cast<int32_t>(keypoint.y + 0.5f), 0), image.height - 1);
+  return image.data[y * image.stride_bytes + x];
+}
+
+// The distance in pixels between a keypoint and the image of a point; huge behind the camera.
+double error_of(const Odometry& odometry, const MapKeyframe& keyframe, const MapKeypoint& keypoint,
+                const double point[3]) {
+  double x[3];
+  transform(keyframe.cam_from_world, point, x);
+  Vec2 pixel;
+  if (!project(odometry.camera, Vec3(x[0], x[1], x[2]), &pixel, nullptr)) return 1e9;
+  const double dx = pixel.x() - static_cast<double>(keypoint.x);
+  const double dy = pixel.y() - static_cast<double>(keypoint.y);
+  return std::sqrt(dx * dx + dy * dy);
+}
+
+struct Chosen {
+  tv_features features;
+  tv_keypoint* keypoints;
+  uint8_t* descriptors;
+  int32_t* indices;
+};
+
+Chosen make_chosen(Arena& arena, int32_t room) {
+  const size_t n = static_cast<size_t>(room);
+  Chosen chosen;
+  tv_features_init(&chosen.features);
+  chosen.keypoints = arena_alloc<tv_keypoint>(arena, n);
+  chosen.descriptors = arena_alloc<uint8_t>(arena, n * TV_DESCRIPTOR_BYTES);
+  chosen.indices = arena_alloc<int32_t>(arena, n);
+  chosen.features.keypoints = chosen.keypoints;
+  chosen.features.descriptors = chosen.descriptors;
+  return chosen;
+}
+
+// Chooses the keypoints without a point, or, with made_at, also those whose point that keyframe
+// made.
+void choose(const Map& map, const MapKeyframe& keyframe, int32_t made_at, Chosen* chosen) {
+  const MapKeypoint* own = keypoints_of(map, keyframe);
+  const uint8_t* descriptors = descriptors_of(map, keyframe);
+  chosen->features.num = 0;
+  for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
+    const int32_t point = own[k].point;
+    if (point != kNoPoint && (made_at < 0 || map.points[point].made_at != made_at)) continue;
+    const int32_t n = chosen->features.num++;
+    chosen->keypoints[n] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
+    std::copy_n(descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES, TV_DESCRIPTOR_BYTES,
+                chosen->descriptors + static_cast<size_t>(n) * TV_DESCRIPTOR_BYTES);
+    chosen->indices[n] = k;
+  }
+}
+
+}  // namespace
+
+int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
+  Map& map = odometry->map;
+  const int32_t idx = add_keyframe(&map, frame.keypoints, frame.descriptors, frame.num);
+  MapKeyframe* keyframe = &map.keyframes[idx];
+  keyframe->segment = odometry->segment;
+  keyframe->frame = frame.number;
+  keyframe->time_s = frame.time_s;
+  keyframe->cam_from_world = orthonormalised(frame.cam_from_world);
+  for (int32_t k = 0; k < frame.num; ++k) {
+    const int32_t point = frame.points[k];
+    if (point == kNoPoint) continue;
+    observe(&map, idx, k, point);
+    std::copy_n(frame.descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES,
+                TV_DESCRIPTOR_BYTES, descriptor_of(map, point));
+  }
+  return idx;
+}
+
+int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
+                            const int32_t* keypoints0, const int32_t* keypoints1, int32_t num,
+                            double least_angle_rad, const tv_image& image) {
+  ArenaScope scope(odometry->scratch);
+  Arena& arena = odometry->scratch;
+  Map& map = odometry->map;
+  const MapKeyframe& k0 = map.keyframes[keyframe0];
+  const MapKeyframe& k1 = map.keyframes[keyframe1];
+  const MapKeypoint* own0 = keypoints_of(map, k0);
+  const MapKeypoint* own1 = keypoints_of(map, k1);
+  const size_t n = static_cast<size_t>(num);
+  double* pixels0 = arena_alloc<double>(arena, 2 * n);
+  double* pixels1 = arena_alloc<double>(arena, 2 * n);
+  tv_point* points = arena_alloc<tv_point>(arena, n);
+  for (int32_t k = 0; k < num; ++k) {
+    pixels0[2 * k] = static_cast<double>(own0[keypoints0[k]].x);
+    pixels0[2 * k + 1] = static_cast<double>(own0[keypoints0[k]].y);
+    pixels1[2 * k] = static_cast<double>(own1[keypoints1[k]].x);
+    pixels1[2 * k + 1] = static_cast<double>(own1[keypoints1[k]].y);
+  }
+  const Rigid cam1_from_cam0 =
+      orthonormalised(compose(k1.cam_from_world, inverse(k0.cam_from_world)));
+  const tv_camera* camera = &odometry->camera.model;
+  if (tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, camera, camera, cam1_from_cam0.R,
+                     cam1_from_cam0.t, pixels0, pixels1, num, points) != TV_OK) {
+    return 0;
+  }
+  const Rigid world_from_cam0 = inverse(k0.cam_from_world);
+  int32_t num_made = 0;
+  for (int32_t k = 0; k < num; ++k) {
+    const tv_point& p = points[k];
+    const MapKeypoint& a = own0[keypoints0[k]];
+    const MapKeypoint& b = own1[keypoints1[k]];
+    if (a.point != kNoPoint || b.point != kNoPoint) continue;
+    const double sigma = std::sqrt(0.5 * (sigma_of(a) * sigma_of(a) + sigma_of(b) * sigma_of(b)));
+    if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad ||
+        static_cast<double>(p.error_px) > kLargestError * sigma) {
+      continue;
+    }
+    double x[3], world[3];
+    transform(cam1_from_cam0, p.position, x);
+    const double ratio = (static_cast<double>(a.size) * p.position[2]) /
+                         (static_cast<double>(b.size) * x[2]);
+    if (!(ratio < kLargestSizeRatio && ratio > 1 / kLargestSizeRatio)) continue;
+    transform(world_from_cam0, p.position, world);
+    const uint8_t* descriptor =
+        descriptors_of(map, k1) + static_cast<size_t>(keypoints1[k]) * TV_DESCRIPTOR_BYTES;
+    const int32_t made = add_point(&map, world, descriptor, k1.segment);
+    if (made == kNoPoint) break;
+    MapPoint* point = &map.points[made];
+    point->made_at = k1.id;
+    point->num_visible = point->num_found = 1;
+    for (int c = 0; c < 3; ++c) point->seen_from[c] = static_cast<float>(world_from_cam0.t[c]);
+    point->depth_sigma = static_cast<float>(
+        std::min(1.0, kTypicalNoise / (camera->fx * static_cast<double>(p.angle_rad))));
+    point->grey = grey_at(image, b);
+    observe(&map, keyframe0, keypoints0[k], made);
+    observe(&map, keyframe1, keypoints1[k], made);
+    ++num_made;
+  }
+  return num_made;
+}
+
+void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
+  ArenaScope scope(odometry->scratch);
+  Arena& arena = odometry->scratch;
+  Map& map = odometry->map;
+  const MapKeyframe& own = map.keyframes[keyframe];
+  const int32_t room = map.sizes.max_keypoints;
+  Chosen mine = make_chosen(arena, room), theirs = make_chosen(arena, room);
+  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, static_cast<size_t>(room));
+  int32_t* keypoints0 = arena_alloc<int32_t>(arena, static_cast<size_t>(room));
+  int32_t* keypoints1 = arena_alloc<int32_t>(arena, static_cast<size_t>(room));
+  double centre[3];
+  centre_of(own.cam_from_world, centre);
+  int32_t num_neighbours = 0;
+  for (int32_t k = keyframe - 1; k >= 0 && num_neighbours < kMostNeighbours; --k) {
+    const MapKeyframe& other = map.keyframes[k];
+    if (other.described < 0 || other.segment != own.segment) continue;
+    double there[3];
+    centre_of(other.cam_from_world, there);
+    if (distance_between(centre, there) < kLeastBaseline * odometry->median_depth) continue;
+    const Rigid relative =
+        orthonormalised(compose(own.cam_from_world, inverse(other.cam_from_world)));
+    if (rotation_angle(relative) > 1.0) continue;
+    ++num_neighbours;
+    choose(map, own, own.id, &mine);
+    choose(map, other, -1, &theirs);
+    const double t[3] = {relative.t[0], relative.t[1], relative.t[2]};
+    const double length = std::sqrt(dot(t, t));
+    const double u[3] = {t[0] / length, t[1] / length, t[2] / length};
+    double E[9];
+    for (int c = 0; c < 3; ++c) {  // [u]x R
+      E[c] = u[1] * relative.R[6 + c] - u[2] * relative.R[3 + c];
+      E[3 + c] = u[2] * relative.R[c] - u[0] * relative.R[6 + c];
+      E[6 + c] = u[0] * relative.R[3 + c] - u[1] * relative.R[c];
+    }
+    tv_guided_options guided;
+    tv_guided_options_init(&guided);
+    guided.max_error_px = 2.0f;
+    int32_t num_found = 0;
+    if (tv_match_guided(odometry->context, &odometry->camera.model, &odometry->camera.model, E,
+                        &theirs.features, &mine.features, &guided, found, room,
+                        &num_found) != TV_OK) {
+      continue;
+    }
+    const MapKeypoint* my_keypoints = keypoints_of(map, own);
+    const MapKeypoint* their_keypoints = keypoints_of(map, other);
+    int32_t num = 0;
+    for (int32_t i = 0; i < num_found; ++i) {
+      const int32_t a = theirs.indices[found[i].idx0], b = mine.indices[found[i].idx1];
+      const int32_t point = my_keypoints[b].point;
+      if (point == kNoPoint) {
+        keypoints0[num] = a;
+        keypoints1[num++] = b;
+      } else if (error_of(*odometry, other, their_keypoints[a], map.points[point].position) <=
+                 kLargestError * sigma_of(their_keypoints[a])) {
+        observe(&map, k, a, point);
+      }
+    }
+    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num, kLeastAngle, image);
+  }
+}
+
+void remove_bad_points(Odometry* odometry) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  uint8_t* is_removed =
+      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
+  bool any = false;
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    const MapPoint& point = map.points[p];
+    is_removed[p] =
+        point.id >= 0 && point.num_visible >= 8 && 4 * point.num_found < point.num_visible;
+    any = any || is_removed[p];
+  }
+  if (any) remove_points(&map, is_removed);
+}
+
+void list_local_points(Odometry* odometry, int32_t keyframe) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  int32_t* shared =
+      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  count_shared(odometry, keyframe, shared);
+  shared[keyframe] = 1 << 30;
+  const int32_t mark = ++odometry->mark;
+  odometry->num_local_points = 0;
+  const int32_t most = odometry->context->limits.max_keypoints;
+  for (int32_t n = 0; n < 12; ++n) {
+    int32_t best = map.num_keyframes - 1;
+    for (int32_t k = best - 1; k >= 0; --k) {
+      if (shared[k] > shared[best]) best = k;
+    }
+    if (shared[best] < 5) break;
+    shared[best] = 0;
+    const MapKeypoint* own = keypoints_of(map, map.keyframes[best]);
+    for (int32_t i = 0; i < map.keyframes[best].num_keypoints; ++i) {
+      const int32_t p = own[i].point;
+      if (p == kNoPoint || map.points[p].mark == mark) continue;
+      if (odometry->num_local_points == most) return;
+      map.points[p].mark = mark;
+      odometry->local_points[odometry->num_local_points++] = p;
+    }
+  }
+}
+
+}  // namespace tv

@@ -1,0 +1,26 @@
+// Keyframes: when a frame becomes one, and the points that it adds to the map.
+#pragma once
+
+#include "odometry/odometry.h"
+
+namespace tv {
+
+// Makes the frame a keyframe, with the points that it sees, and returns its index.
+int32_t make_keyframe(Odometry* odometry, const Frame& frame);
+
+// Makes points of the keypoints that match those of earlier keyframes.
+void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image);
+
+// Makes points of matched pixels of two keyframes. Returns how many.
+int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
+                            const int32_t* keypoints0, const int32_t* keypoints1, int32_t num,
+                            double least_angle_rad, const tv_image& image);
+
+// Removes points that frames do not find where they must appear.
+void remove_bad_points(Odometry* odometry);
+
+// Lists the points that are looked for in the next frames: those of the keyframes that share most
+// points with this one.
+void list_local_points(Odometry* odometry, int32_t keyframe);
+
+}  // namespace tv

@@ -1,0 +1,160 @@
+#include "odometry/map.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace tv {
+namespace {
+
+size_t as_size(int32_t n) { return static_cast<size_t>(n); }
+
+size_t num_map_keypoints(const MapSizes& sizes) {
+  return as_size(sizes.max_keyframes) * as_size(sizes.max_keypoints);
+}
+
+size_t num_described(const MapSizes& sizes) {
+  return as_size(kDescribedKeyframes) * as_size(sizes.max_keypoints) * TV_DESCRIPTOR_BYTES;
+}
+
+void release_point(Map* map, int32_t point) {
+  map->points[point].id = -1;
+  map->free_points[map->num_free_points++] = point;
+  --map->num_points;
+}
+
+}  // namespace
+
+size_t map_bytes(const MapSizes& sizes) {
+  const size_t points = as_size(sizes.max_points);
+  return arena_bytes<MapKeyframe>(as_size(sizes.max_keyframes)) +
+         arena_bytes<MapKeypoint>(num_map_keypoints(sizes)) +
+         arena_bytes<int32_t>(as_size(sizes.max_keyframes)) + arena_bytes<MapPoint>(points) +
+         arena_bytes<uint8_t>(points * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(points) +
+         arena_bytes<uint8_t>(num_described(sizes)) +
+         arena_bytes<RemovedKeyframe>(as_size(max_removed(sizes)));
+}
+
+void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
+  const size_t points = as_size(sizes.max_points);
+  map->sizes = sizes;
+  map->keyframes = arena_alloc<MapKeyframe>(arena, as_size(sizes.max_keyframes));
+  map->keypoints = arena_alloc<MapKeypoint>(arena, num_map_keypoints(sizes));
+  map->free_rooms = arena_alloc<int32_t>(arena, as_size(sizes.max_keyframes));
+  map->points = arena_alloc<MapPoint>(arena, points);
+  map->point_descriptors = arena_alloc<uint8_t>(arena, points * TV_DESCRIPTOR_BYTES);
+  map->free_points = arena_alloc<int32_t>(arena, points);
+  map->descriptors = arena_alloc<uint8_t>(arena, num_described(sizes));
+  map->removed = arena_alloc<RemovedKeyframe>(arena, as_size(max_removed(sizes)));
+  clear_map(map);
+}
+
+void clear_map(Map* map) {
+  map->num_keyframes = map->num_points = map->end_points = map->num_removed = 0;
+  map->next_described = map->next_keyframe_id = map->next_point_id = 0;
+  map->num_free_rooms = map->sizes.max_keyframes;
+  for (int32_t k = 0; k < map->num_free_rooms; ++k) {
+    map->free_rooms[k] = map->num_free_rooms - 1 - k;
+  }
+  map->num_free_points = 0;
+}
+
+int32_t find_keyframe(const Map& map, int32_t id) {
+  int32_t low = 0, high = map.num_keyframes;
+  while (low < high) {
+    const int32_t middle = (low + high) / 2;
+    if (map.keyframes[middle].id < id) low = middle + 1;
+    else high = middle;
+  }
+  return low < map.num_keyframes && map.keyframes[low].id == id ? low : -1;
+}
+
+int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* descriptors,
+                     int32_t num) {
+  const int32_t idx = map->num_keyframes++;
+  MapKeyframe* keyframe = &map->keyframes[idx];
+  *keyframe = MapKeyframe{};
+  keyframe->id = map->next_keyframe_id++;
+  keyframe->room = map->free_rooms[--map->num_free_rooms];
+  keyframe->num_keypoints = num;
+  keyframe->described = map->next_described;
+  map->next_described = (map->next_described + 1) % kDescribedKeyframes;
+  for (int32_t k = 0; k < idx; ++k) {
+    if (map->keyframes[k].described == keyframe->described) map->keyframes[k].described = -1;
+  }
+  MapKeypoint* own = keypoints_of(*map, *keyframe);
+  for (int32_t k = 0; k < num; ++k) {
+    own[k] = {keypoints[k].x, keypoints[k].y, keypoints[k].size, kNoPoint};
+  }
+  std::memcpy(descriptors_of(*map, *keyframe), descriptors, as_size(num) * TV_DESCRIPTOR_BYTES);
+  return idx;
+}
+
+int32_t add_point(Map* map, const double position[3], const uint8_t* descriptor, int32_t segment) {
+  int32_t idx = kNoPoint;
+  if (map->num_free_points > 0) {
+    idx = map->free_points[--map->num_free_points];
+  } else if (map->end_points < map->sizes.max_points) {
+    idx = map->end_points++;
+  } else {
+    return kNoPoint;
+  }
+  MapPoint* point = &map->points[idx];
+  *point = MapPoint{};
+  for (int k = 0; k < 3; ++k) point->position[k] = position[k];
+  point->id = map->next_point_id++;
+  point->segment = segment;
+  std::memcpy(descriptor_of(*map, idx), descriptor, TV_DESCRIPTOR_BYTES);
+  ++map->num_points;
+  return idx;
+}
+
+void observe(Map* map, int32_t keyframe, int32_t keypoint, int32_t point) {
+  keypoints_of(*map, map->keyframes[keyframe])[keypoint].point = point;
+  ++map->keyframes[keyframe].num_observations;
+  ++map->points[point].num_observations;
+}
+
+void forget_observation(Map* map, int32_t keyframe, int32_t keypoint) {
+  MapKeypoint* own = &keypoints_of(*map, map->keyframes[keyframe])[keypoint];
+  --map->keyframes[keyframe].num_observations;
+  --map->points[own->point].num_observations;
+  own->point = kNoPoint;
+}
+
+void remove_points(Map* map, const uint8_t* is_removed) {
+  for (int32_t k = 0; k < map->num_keyframes; ++k) {
+    MapKeypoint* own = keypoints_of(*map, map->keyframes[k]);
+    for (int32_t i = 0; i < map->keyframes[k].num_keypoints; ++i) {
+      if (own[i].point != kNoPoint && is_removed[own[i].point]) forget_observation(map, k, i);
+    }
+  }
+  for (int32_t p = 0; p < map->end_points; ++p) {
+    if (is_removed[p] && map->points[p].id >= 0) release_point(map, p);
+  }
+}
+
+void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
+  MapKeyframe* removed = &map->keyframes[keyframe];
+  const MapKeyframe& stays = map->keyframes[kept];
+  if (map->num_removed == max_removed(map->sizes)) {
+    std::memmove(map->removed, map->removed + 1,
+                 as_size(map->num_removed - 1) * sizeof *map->removed);
+    --map->num_removed;
+  }
+  int32_t at = map->num_removed++;
+  for (; at > 0 && map->removed[at - 1].id > removed->id; --at) {
+    map->removed[at] = map->removed[at - 1];
+  }
+  map->removed[at] = {removed->id, stays.id,
+                      compose(stays.cam_from_world, inverse(removed->cam_from_world))};
+  MapKeypoint* own = keypoints_of(*map, *removed);
+  for (int32_t i = 0; i < removed->num_keypoints; ++i) {
+    if (own[i].point != kNoPoint) forget_observation(map, keyframe, i);
+  }
+  map->free_rooms[map->num_free_rooms++] = removed->room;
+  std::memmove(removed, removed + 1,
+               as_size(map->num_keyframes - keyframe - 1) * sizeof *removed);
+  --map->num_keyframes;
+}
+
+}  // namespace tv

@@ -1,0 +1,118 @@
+// The map: keyframes, points, and which keypoint of a keyframe sees which point. All of it lies in
+// arrays of a fixed size. Tests: test/unit/test_odometry_map.cc.
+#pragma once
+
+#include "base/arena.h"
+#include "odometry/rigid.h"
+#include "twoview/feature.h"
+
+namespace tv {
+
+inline constexpr int32_t kNoPoint = -1;
+// How many keyframes keep all their descriptors: the last ones, with which new points are made.
+// The others keep those of the points that they see.
+inline constexpr int32_t kDescribedKeyframes = 16;
+
+struct MapKeypoint {
+  float x, y, size;
+  int32_t point;  // its index among the points, or kNoPoint
+};
+
+struct MapKeyframe {
+  int32_t id, segment, frame;
+  int32_t room;  // which part of the keypoints' array is its own
+  int32_t num_keypoints, num_observations;
+  int32_t described;  // which part of the descriptors' array is its own; -1: none
+  int32_t has_covariance;
+  double time_s;
+  Rigid cam_from_world;
+  double down[3], down_sigma_rad;          // gravity in the camera's frame; sigma 0: not known
+  double height_m, height_sigma_m;         // sigma 0: not known
+  double travel_m, travel_sigma_m;         // the way from the keyframe before; sigma 0: not known
+  double covariance[36];                   // of cam_from_world relative to the keyframe before
+};
+
+struct MapPoint {
+  double position[3];
+  int32_t id;       // -1: the place is free
+  int32_t segment;
+  int32_t num_observations;
+  int32_t num_visible, num_found;  // in frames since it was made
+  int32_t mark;                    // the last search that met it
+  int32_t made_at;                 // the id of the keyframe that made it
+  float depth_sigma;  // of the logarithm of its distance from `seen_from`
+  float seen_from[3];
+  int32_t grey;
+};
+
+// Where a keyframe that was removed lies relative to one that stayed when it was removed.
+struct RemovedKeyframe {
+  int32_t id, kept_id;
+  Rigid kept_from_removed;  // cameras
+};
+
+struct MapSizes {
+  int32_t max_keypoints, max_keyframes, max_points;
+};
+
+struct Map {
+  MapSizes sizes;
+  MapKeyframe* keyframes;  // in ascending order of id
+  int32_t num_keyframes;
+  MapKeypoint* keypoints;  // max_keypoints for each room
+  int32_t* free_rooms;
+  int32_t num_free_rooms;
+  MapPoint* points;
+  uint8_t* point_descriptors;  // TV_DESCRIPTOR_BYTES for each point
+  int32_t num_points, end_points;  // those that are in use, and the end of the used places
+  int32_t* free_points;
+  int32_t num_free_points;
+  uint8_t* descriptors;  // kDescribedKeyframes times max_keypoints times TV_DESCRIPTOR_BYTES
+  int32_t next_described;
+  RemovedKeyframe* removed;  // in ascending order of id
+  int32_t num_removed;
+  int32_t next_keyframe_id, next_point_id;
+};
+
+inline int32_t max_removed(const MapSizes& sizes) { return 16 * sizes.max_keyframes; }
+
+size_t map_bytes(const MapSizes& sizes);
+void make_map(const MapSizes& sizes, Arena& arena, Map* map);
+void clear_map(Map* map);
+
+inline MapKeypoint* keypoints_of(const Map& map, const MapKeyframe& keyframe) {
+  return map.keypoints + static_cast<size_t>(keyframe.room) *
+                             static_cast<size_t>(map.sizes.max_keypoints);
+}
+
+inline uint8_t* descriptors_of(const Map& map, const MapKeyframe& keyframe) {
+  return map.descriptors + static_cast<size_t>(keyframe.described) *
+                               static_cast<size_t>(map.sizes.max_keypoints) * TV_DESCRIPTOR_BYTES;
+}
+
+inline uint8_t* descriptor_of(const Map& map, int32_t point) {
+  return map.point_descriptors + static_cast<size_t>(point) * TV_DESCRIPTOR_BYTES;
+}
+
+// The index of the keyframe of this id among the keyframes; -1 where the map has none.
+int32_t find_keyframe(const Map& map, int32_t id);
+
+// Adds a keyframe with the keypoints and descriptors of a frame, none of which sees a point, and
+// returns its index. The map must have room for it.
+int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* descriptors,
+                     int32_t num);
+
+// Adds a point that no keyframe sees, and returns its index; kNoPoint when the map is full.
+int32_t add_point(Map* map, const double position[3], const uint8_t* descriptor, int32_t segment);
+
+void observe(Map* map, int32_t keyframe, int32_t keypoint, int32_t point);
+void forget_observation(Map* map, int32_t keyframe, int32_t keypoint);
+
+// Removes a point from the map and from the keyframes that see it.
+void remove_points(Map* map, const uint8_t* is_removed);
+
+// Removes a keyframe, and the points that fewer than two keyframes see then. The path of frames that
+// are relative to it continues from the keyframe `kept`.
+void remove_keyframe(Map* map, int32_t keyframe, int32_t kept);
+
+}  // namespace tv

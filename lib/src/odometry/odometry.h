@@ -1,0 +1,68 @@
+// The state of the odometry, which all its files work on. docs/odometry.md.
+#pragma once
+
+#include "api/context.h"
+#include "base/arena.h"
+#include "geometry/camera.h"
+#include "odometry/map.h"
+#include "twoview/odometry.h"
+
+namespace tv {
+
+// A frame: its keypoints, and the points of the map that they see.
+struct Frame {
+  tv_keypoint* keypoints;
+  uint8_t* descriptors;
+  int32_t* points;     // for each keypoint, or kNoPoint
+  int32_t* distances;  // of its descriptor to that of the point, squared
+  float* sigmas;       // of its pixel, relative to that of a keypoint of the finest level
+  int32_t num;
+  int32_t* cell_starts;  // of each cell of the grid, into cell_items; one more at the end
+  int32_t* cell_items;
+  int32_t number;  // how many frames were given before it
+  double time_s;
+  bool has_pose;
+  Rigid cam_from_world;
+};
+
+inline constexpr int32_t kCellPx = 16;
+inline constexpr int kNumStarts = 4;  // frames that wait for a second view
+
+}  // namespace tv
+
+struct tv_odometry {
+  tv_odometry_options options;
+  tv::Camera camera;
+  tv_context* context;
+  tv_feature_options features;
+  tv::Map map;
+  tv::Arena scratch;
+  int32_t grid_columns, grid_rows;
+  tv::Frame frame, previous;
+  tv::Frame starts[tv::kNumStarts];
+  int32_t num_starts;
+  // The points that are looked for in the next frame, and the keyframe whose surroundings they are.
+  int32_t* local_points;
+  int32_t num_local_points;
+  int32_t reference_id;
+  // The motion from the frame before last to the last: cam_from_cam, in motion_s seconds.
+  bool has_motion;
+  tv::Rigid motion;
+  double motion_s;
+  int32_t mark;
+  int32_t num_frames, segment, num_segments, num_relocations, num_loops;
+  int32_t status;
+  int32_t lost_frames, next_search;
+  int32_t keyframe_inliers;  // of the frame that became the last keyframe
+  double median_depth;
+  double last_time_s;
+};
+
+namespace tv {
+
+using Odometry = tv_odometry;
+
+// How many bytes of scratch the stages take.
+size_t scratch_bytes(const tv_odometry_options& options);
+
+}  // namespace tv

@@ -1,0 +1,78 @@
+#include "odometry/rigid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/math.h"
+#include "geometry/essential.h"
+#include "geometry/vector3.h"
+
+namespace tv {
+
+void transform(const Rigid& rigid, const double X[3], double x[3]) {
+  const double* R = rigid.R;
+  const double y[3] = {dot(R, X) + rigid.t[0], dot(R + 3, X) + rigid.t[1],
+                       dot(R + 6, X) + rigid.t[2]};
+  for (int k = 0; k < 3; ++k) x[k] = y[k];
+}
+
+Rigid compose(const Rigid& outer, const Rigid& inner) {
+  Rigid product;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      product.R[3 * r + c] =
+          (outer.R[3 * r] * inner.R[c] + outer.R[3 * r + 1] * inner.R[3 + c]) +
+          outer.R[3 * r + 2] * inner.R[6 + c];
+    }
+  }
+  transform(outer, inner.t, product.t);
+  return product;
+}
+
+Rigid inverse(const Rigid& rigid) {
+  Rigid result;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) result.R[3 * r + c] = rigid.R[3 * c + r];
+  }
+  for (int r = 0; r < 3; ++r) result.t[r] = -dot(result.R + 3 * r, rigid.t);
+  return result;
+}
+
+void centre_of(const Rigid& cam_from_world, double centre[3]) {
+  const Rigid world_from_cam = inverse(cam_from_world);
+  for (int k = 0; k < 3; ++k) centre[k] = world_from_cam.t[k];
+}
+
+double rotation_angle(const Rigid& rigid) {
+  const double* R = rigid.R;
+  const double sine[3] = {R[7] - R[5], R[2] - R[6], R[3] - R[1]};
+  return atan2(length_of(sine), R[0] + R[4] + R[8] - 1);
+}
+
+double distance_between(const double a[3], const double b[3]) {
+  const double difference[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return length_of(difference);
+}
+
+Rigid orthonormalised(const Rigid& rigid) {
+  Rigid result = rigid;
+  Eigen::Map<Mat3> R(result.R);
+  R = orthonormalised(Mat3(R));
+  return result;
+}
+
+Rigid scaled_motion(const Rigid& rigid, double factor) {
+  const double* R = rigid.R;
+  Vec3 axis(R[7] - R[5], R[2] - R[6], R[3] - R[1]);
+  const double length = std::sqrt(axis.dot(axis));
+  Rigid result = kIdentity;
+  if (length > 1e-12) {
+    const Vec3 unit = axis / length;
+    Eigen::Map<Mat3> turned(result.R);
+    turned = rotation_about(unit, factor * rotation_angle(rigid));
+  }
+  for (int k = 0; k < 3; ++k) result.t[k] = factor * rigid.t[k];
+  return result;
+}
+
+}  // namespace tv

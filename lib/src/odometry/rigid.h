@@ -1,0 +1,29 @@
+// Rigid transformations as plain numbers, which lie in the caller's memory and are copied as bytes.
+// A point X becomes R X + t. Tests: test/unit/test_odometry_map.cc.
+#pragma once
+
+#include "geometry/camera.h"
+
+namespace tv {
+
+struct Rigid {
+  double R[9];  // row-major
+  double t[3];
+};
+
+inline constexpr Rigid kIdentity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
+
+void transform(const Rigid& rigid, const double X[3], double x[3]);
+Rigid compose(const Rigid& outer, const Rigid& inner);  // x = outer(inner(X))
+Rigid inverse(const Rigid& rigid);
+void centre_of(const Rigid& cam_from_world, double centre[3]);
+double rotation_angle(const Rigid& rigid);  // in radians
+double distance_between(const double a[3], const double b[3]);
+
+// `rigid` with the rotation's rounding errors removed.
+Rigid orthonormalised(const Rigid& rigid);
+
+// `rigid` carried out `factor` times, for factors of at most a few.
+Rigid scaled_motion(const Rigid& rigid, double factor);
+
+}  // namespace tv

@@ -1,0 +1,34 @@
+// Which keypoints of a frame see which points of the map, by where the points must appear.
+#pragma once
+
+#include "odometry/odometry.h"
+
+namespace tv {
+
+struct PointSearch {
+  const int32_t* points;
+  int32_t num;
+  Rigid cam_from_world;
+  double radius_px;    // for a point whose place is known exactly
+  double max_distance;  // of descriptors, L2
+  double ratio;         // of the nearest one's distance to that of the second
+};
+
+// Sorts the keypoints of a frame into the cells of its grid.
+void make_grid(const Odometry& odometry, Frame* frame);
+
+// Finds the keypoints that see the points, those excepted that see one already, and returns how
+// many there are then. Counts the points as visible.
+int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame);
+
+// The nearest descriptors among all points of a list, without regard to place.
+int32_t match_points(Odometry* odometry, const int32_t* points, int32_t num, double ratio,
+                     Frame* frame);
+
+void forget_points(Frame* frame);
+
+// By how many pixels the error of a point's depth may move its image, one standard deviation.
+double depth_error_px(const Odometry& odometry, const MapPoint& point, const Rigid& cam_from_world,
+                      double depth);
+
+}  // namespace tv

@@ -1,0 +1,180 @@
+#include "twoview/match.h"
+#include "twoview/triangulate.h"
+#include "odometry/start.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "geometry/vector3.h"
+#include "odometry/adjust.h"
+#include "odometry/keyframe.h"
+#include "odometry/search.h"
+
+namespace tv {
+namespace {
+
+constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
+constexpr double kLeastParallax = 0.015;  // radians, the median
+constexpr double kLeastAngle = 0.006;     // radians
+constexpr int32_t kFramesBetween = 6;     // between frames that wait
+
+void copy_frame(const Frame& from, Frame* to) {
+  const size_t n = static_cast<size_t>(from.num);
+  std::copy_n(from.keypoints, n, to->keypoints);
+  std::copy_n(from.descriptors, n * TV_DESCRIPTOR_BYTES, to->descriptors);
+  std::copy_n(from.sigmas, n, to->sigmas);
+  to->num = from.num;
+  to->number = from.number;
+  to->time_s = from.time_s;
+  to->cam_from_world = kIdentity;
+  for (int32_t k = 0; k < from.num; ++k) to->points[k] = kNoPoint;
+}
+
+tv_features features_of(const Frame& frame) {
+  tv_features features;
+  tv_features_init(&features);
+  features.num = frame.num;
+  features.keypoints = frame.keypoints;
+  features.descriptors = frame.descriptors;
+  return features;
+}
+
+struct Pair {
+  int32_t* keypoints0;
+  int32_t* keypoints1;
+  uint8_t* is_inlier;
+  int32_t num;
+  tv_two_view view;
+};
+
+// False: too few matches.
+bool estimate_pair(Odometry* odometry, const Frame& frame0, const Frame& frame1, Pair* pair) {
+  Arena& arena = odometry->scratch;
+  const int32_t room = std::min(frame0.num, frame1.num);
+  const size_t n = static_cast<size_t>(std::max(room, 1));
+  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, n);
+  double* pixels0 = arena_alloc<double>(arena, 2 * n);
+  double* pixels1 = arena_alloc<double>(arena, 2 * n);
+  float* ratios = arena_alloc<float>(arena, n);
+  float* sigmas0 = arena_alloc<float>(arena, n);
+  float* sigmas1 = arena_alloc<float>(arena, n);
+  pair->keypoints0 = arena_alloc<int32_t>(arena, n);
+  pair->keypoints1 = arena_alloc<int32_t>(arena, n);
+  pair->is_inlier = arena_alloc<uint8_t>(arena, n);
+  pair->num = 0;
+  const tv_features features0 = features_of(frame0), features1 = features_of(frame1);
+  tv_match(odometry->context, &features0, &features1, nullptr, found, room, &pair->num);
+  if (pair->num < kLeastMatches) return false;
+  for (int32_t k = 0; k < pair->num; ++k) {
+    const int32_t a = found[k].idx0, b = found[k].idx1;
+    pixels0[2 * k] = static_cast<double>(frame0.keypoints[a].x);
+    pixels0[2 * k + 1] = static_cast<double>(frame0.keypoints[a].y);
+    pixels1[2 * k] = static_cast<double>(frame1.keypoints[b].x);
+    pixels1[2 * k + 1] = static_cast<double>(frame1.keypoints[b].y);
+    ratios[k] = found[k].ratio;
+    sigmas0[k] = frame0.sigmas[a];
+    sigmas1[k] = frame1.sigmas[b];
+    pair->keypoints0[k] = a;
+    pair->keypoints1[k] = b;
+  }
+  tv_pixel_pairs pairs;
+  tv_pixel_pairs_init(&pairs);
+  pairs.num = pair->num;
+  pairs.pixels0 = pixels0;
+  pairs.pixels1 = pixels1;
+  pairs.ratios = ratios;
+  pairs.sigmas0 = sigmas0;
+  pairs.sigmas1 = sigmas1;
+  tv_estimate_options options;
+  tv_estimate_options_init(&options);
+  options.seed = odometry->options.seed;
+  options.max_iterations = 2000;
+  tv_two_view_init(&pair->view);
+  return tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
+                              &pairs, &options, &pair->view, pair->is_inlier) == TV_OK;
+}
+
+void drop_start(Odometry* odometry, int n) {
+  const Frame dropped = odometry->starts[n];
+  for (int k = n; k + 1 < odometry->num_starts; ++k) odometry->starts[k] = odometry->starts[k + 1];
+  odometry->starts[--odometry->num_starts] = dropped;
+}
+
+// The two frames as the first keyframes of a segment. False, and no keyframe was made, where too
+// few points lie between them.
+bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pair& pair,
+                       const tv_image& image) {
+  Map& map = odometry->map;
+  frame0->cam_from_world = kIdentity;
+  std::copy_n(pair.view.R, 9, frame->cam_from_world.R);
+  std::copy_n(pair.view.t, 3, frame->cam_from_world.t);
+  forget_points(frame);
+  const int32_t first = make_keyframe(odometry, *frame0);
+  const int32_t second = make_keyframe(odometry, *frame);
+  int32_t* keypoints0 =
+      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
+  int32_t* keypoints1 =
+      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
+  int32_t num = 0;
+  for (int32_t k = 0; k < pair.num; ++k) {
+    if (!pair.is_inlier[k]) continue;
+    keypoints0[num] = pair.keypoints0[k];
+    keypoints1[num++] = pair.keypoints1[k];
+  }
+  int32_t made = triangulate_matches(odometry, first, second, keypoints0, keypoints1, num,
+                                     kLeastAngle, image);
+  if (made >= kLeastPoints) {
+    adjust_around(odometry, second, 20);
+    made = map.keyframes[second].num_observations;
+  }
+  if (made >= kLeastPoints) return true;
+  ArenaScope scope(odometry->scratch);
+  uint8_t* is_removed =
+      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    is_removed[p] = map.points[p].id >= 0 && map.points[p].segment == odometry->segment;
+  }
+  remove_points(&map, is_removed);
+  map.free_rooms[map.num_free_rooms++] = map.keyframes[second].room;
+  map.free_rooms[map.num_free_rooms++] = map.keyframes[first].room;
+  map.num_keyframes -= 2;
+  map.next_keyframe_id -= 2;
+  return false;
+}
+
+}  // namespace
+
+bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons) {
+  *reasons = 0;
+  if (odometry->map.num_keyframes + 2 > odometry->map.sizes.max_keyframes) return false;
+  for (int n = 0; n < odometry->num_starts; ++n) {
+    ArenaScope scope(odometry->scratch);
+    Pair pair;
+    Frame* const first = &odometry->starts[n];
+    if (!estimate_pair(odometry, *first, *frame, &pair) ||
+        2 * pair.view.num_inliers < pair.num || pair.view.num_inliers < kLeastMatches) {
+      *reasons |= TV_REASON_TOO_FEW_MATCHES;
+      if (pair.num < kLeastMatches || odometry->num_starts > 1) drop_start(odometry, n--);
+      continue;
+    }
+    *reasons |= pair.view.reasons;
+    if (pair.view.verdict != TV_VERDICT_OK || !pair.view.has_t ||
+        pair.view.median_parallax_rad < kLeastParallax) {
+      if (pair.view.verdict == TV_VERDICT_OK) *reasons |= TV_REASON_LOW_PARALLAX;
+      continue;
+    }
+    if (!make_first_points(odometry, first, frame, pair, image)) continue;
+    *reasons = 0;
+    odometry->num_starts = 0;
+    return true;
+  }
+  if (odometry->num_starts == 0 ||
+      frame->number - odometry->starts[odometry->num_starts - 1].number >= kFramesBetween) {
+    if (odometry->num_starts == kNumStarts) drop_start(odometry, kNumStarts / 2);
+    copy_frame(*frame, &odometry->starts[odometry->num_starts++]);
+  }
+  return false;
+}
+
+}  // namespace tv

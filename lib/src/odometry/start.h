@@ -1,0 +1,13 @@
+// The start of a map, or of a segment of it, from two views.
+#pragma once
+
+#include "odometry/odometry.h"
+
+namespace tv {
+
+// Looks for a frame that waits for a second view and with which this frame determines a pose beyond
+// doubt. True: the two are keyframes with points between them, and the frame has its pose. False:
+// the frame may wait itself; *reasons says what was missing.
+bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons);
+
+}  // namespace tv

@@ -1,0 +1,332 @@
+#include "odometry/track.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/vector3.h"
+#include "odometry/adjust.h"
+#include "odometry/fit_pose.h"
+#include "odometry/keyframe.h"
+#include "odometry/search.h"
+#include "odometry/start.h"
+
+namespace tv {
+namespace {
+
+constexpr int32_t kLeastInliers = 20;
+constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
+constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
+constexpr int32_t kLostBeforeStart = 8;    // frames
+
+void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
+  frame->num = 0;
+  tv_extract(odometry->context, &image, nullptr, &odometry->features, frame->keypoints,
+             frame->descriptors, odometry->options.max_keypoints, &frame->num);
+  tv_keypoint_sigmas(frame->keypoints, frame->num, odometry->features.keypoint_size, 1.0,
+                     frame->sigmas);
+  make_grid(*odometry, frame);
+  frame->has_pose = false;
+}
+
+// The pose from the points that are looked for around a predicted pose.
+bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const Rigid& predicted,
+                  double radius_px, Frame* frame, PoseFit* fit) {
+  PointSearch search{points, num, predicted, radius_px, kMaxDistance, kSearchRatio};
+  forget_points(frame);
+  frame->cam_from_world = predicted;
+  frame->has_pose = true;
+  if (find_points(odometry, search, frame) < kLeastInliers) return false;
+  if (!fit_pose(odometry, 100, 4.0, frame, fit)) return false;
+  if (fit->estimate.num_inliers < kLeastInliers) return false;
+  frame->cam_from_world = fit->cam_from_world;
+  return true;
+}
+
+// The pose is known to a few pixels: looks for all points once more, near where they must be.
+bool refine_track(Odometry* odometry, Frame* frame, PoseFit* fit) {
+  const PoseFit before = *fit;
+  PointSearch search{odometry->local_points, odometry->num_local_points, fit->cam_from_world, 5.0,
+                     kMaxDistance, kSearchRatio};
+  find_points(odometry, search, frame);
+  frame->cam_from_world = fit->cam_from_world;
+  if (!fit_pose(odometry, 50, 3.0, frame, fit)) {
+    *fit = before;
+    return false;
+  }
+  frame->cam_from_world = fit->cam_from_world;
+  return fit->estimate.num_inliers >= kLeastInliers;
+}
+
+bool match_and_fit(Odometry* odometry, const int32_t* points, int32_t num, Frame* frame,
+                   PoseFit* fit) {
+  frame->has_pose = false;
+  if (match_points(odometry, points, num, 0.9, frame) < kLeastInliers) return false;
+  if (!fit_pose(odometry, 1000, 4.0, frame, fit)) return false;
+  if (fit->estimate.num_inliers < kLeastInliers ||
+      4 * fit->estimate.num_inliers < fit->estimate.num_matches) {
+    return false;
+  }
+  frame->cam_from_world = fit->cam_from_world;
+  frame->has_pose = true;
+  return true;
+}
+
+void measure_depth(Odometry* odometry, const Frame& frame) {
+  ArenaScope scope(odometry->scratch);
+  double* depths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(frame.num));
+  int32_t num = 0;
+  for (int32_t k = 0; k < frame.num; ++k) {
+    if (frame.points[k] == kNoPoint) continue;
+    double x[3];
+    transform(frame.cam_from_world, odometry->map.points[frame.points[k]].position, x);
+    depths[num++] = x[2];
+  }
+  if (num == 0) return;
+  std::nth_element(depths, depths + num / 2, depths + num);
+  odometry->median_depth = depths[num / 2];
+}
+
+void count_found(Odometry* odometry, const Frame& frame) {
+  for (int32_t k = 0; k < frame.num; ++k) {
+    if (frame.points[k] != kNoPoint) ++odometry->map.points[frame.points[k]].num_found;
+  }
+}
+
+bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_inliers) {
+  const Map& map = odometry.map;
+  const MapKeyframe& last = map.keyframes[map.num_keyframes - 1];
+  if (frame.number == last.frame) return false;
+  double a[3], b[3];
+  centre_of(frame.cam_from_world, a);
+  centre_of(last.cam_from_world, b);
+  const double moved = distance_between(a, b) / odometry.median_depth;
+  const double turned =
+      rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
+  const bool few = 10 * num_inliers < 7 * odometry.keyframe_inliers || num_inliers < 60;
+  return moved > 0.10 || turned > 0.25 || (few && (moved > 0.02 || turned > 0.08));
+}
+
+// Makes room for one more keyframe: removes the one that moved the camera least.
+void make_room(Odometry* odometry) {
+  Map& map = odometry->map;
+  if (map.num_keyframes < map.sizes.max_keyframes) return;
+  int32_t best = 1;
+  double least = 0;
+  for (int32_t k = 1; k + 2 < map.num_keyframes; ++k) {
+    const MapKeyframe *before = &map.keyframes[k - 1], *after = &map.keyframes[k + 1];
+    double a[3], b[3];
+    centre_of(before->cam_from_world, a);
+    centre_of(after->cam_from_world, b);
+    const double gap =
+        before->segment != map.keyframes[k].segment ? 1e9
+        : after->segment != map.keyframes[k].segment
+            ? 1e8
+            : distance_between(a, b) + odometry->median_depth *
+                                           rotation_angle(compose(after->cam_from_world,
+                                                                  inverse(before->cam_from_world)));
+    if (k == 1 || gap < least) {
+      least = gap;
+      best = k;
+    }
+  }
+  remove_keyframe(&map, best, best - 1);
+}
+
+void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
+  make_room(odometry);
+  const int32_t idx = make_keyframe(odometry, *frame);
+  odometry->keyframe_inliers = odometry->map.keyframes[idx].num_observations;
+  make_points(odometry, idx, image);
+  remove_bad_points(odometry);
+  adjust_around(odometry, idx, 6);
+  const Map& map = odometry->map;
+  frame->cam_from_world = map.keyframes[idx].cam_from_world;
+  odometry->reference_id = map.keyframes[idx].id;
+  list_local_points(odometry, idx);
+  // The frame's points are now the keyframe's.
+  const MapKeypoint* own = keypoints_of(map, map.keyframes[idx]);
+  for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
+}
+
+// Looks for the frame in the map. True: the frame has its pose, and the keyframe's surroundings are
+// those in which the next frame is looked for.
+bool relocate(Odometry* odometry, int32_t from, int32_t count, Frame* frame, PoseFit* fit) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  int32_t* points =
+      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.sizes.max_keypoints));
+  for (int32_t n = 0; n < count && n < map.num_keyframes; ++n) {
+    const int32_t k = (from + map.num_keyframes - n) % map.num_keyframes;
+    const MapKeypoint* own = keypoints_of(map, map.keyframes[k]);
+    int32_t num = 0;
+    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
+      if (own[i].point != kNoPoint) points[num++] = own[i].point;
+    }
+    if (num < kLeastInliers || !match_and_fit(odometry, points, num, frame, fit)) continue;
+    list_local_points(odometry, k);
+    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < 30) continue;
+    odometry->segment = map.keyframes[k].segment;
+    odometry->reference_id = map.keyframes[k].id;
+    return true;
+  }
+  return false;
+}
+
+bool track_map(Odometry* odometry, const tv_odometry_frame& input, Frame* frame, PoseFit* fit) {
+  const Frame& previous = odometry->previous;
+  Rigid predicted = previous.cam_from_world;
+  if (odometry->has_motion && input.gap == 0) {
+    const double factor =
+        odometry->motion_s > 0 ? (input.time_s - previous.time_s) / odometry->motion_s : 1;
+    predicted = compose(scaled_motion(odometry->motion, std::min(factor, 3.0)),
+                        previous.cam_from_world);
+  }
+  const int32_t* points = odometry->local_points;
+  const int32_t num = odometry->num_local_points;
+  return (track_points(odometry, points, num, predicted, 15.0, frame, fit) ||
+          track_points(odometry, points, num, predicted, 40.0, frame, fit) ||
+          match_and_fit(odometry, points, num, frame, fit)) &&
+         refine_track(odometry, frame, fit);
+}
+
+void write_pose(const Odometry& odometry, const Frame& frame, tv_odometry_state* state) {
+  const Map& map = odometry.map;
+  const int32_t k = find_keyframe(map, odometry.reference_id);
+  const Rigid world_from_cam = inverse(frame.cam_from_world);
+  const Rigid relative = compose(map.keyframes[k].cam_from_world, world_from_cam);
+  state->has_pose = 1;
+  state->segment = odometry.segment;
+  state->reference_id = odometry.reference_id;
+  std::copy_n(relative.R, 9, state->reference_from_cam_R);
+  std::copy_n(relative.t, 3, state->reference_from_cam_t);
+  std::copy_n(world_from_cam.R, 9, state->world_from_cam_R);
+  std::copy_n(world_from_cam.t, 3, state->world_from_cam_t);
+}
+
+void write_fit(const PoseFit& fit, tv_odometry_state* state) {
+  state->num_matches = fit.estimate.num_matches;
+  state->num_inliers = fit.estimate.num_inliers;
+  state->has_covariance = fit.estimate.has_covariance;
+  std::copy_n(fit.estimate.covariance, 36, state->covariance);
+  state->noise_px = fit.estimate.noise_px;
+  state->reasons = fit.estimate.reasons;
+}
+
+}  // namespace
+
+void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state) {
+  std::swap(odometry->frame, odometry->previous);
+  Frame* frame = &odometry->frame;
+  extract_frame(odometry, input.image, frame);
+  frame->number = odometry->num_frames++;
+  frame->time_s = input.time_s;
+  state->num_keypoints = frame->num;
+  state->segment = -1;
+  state->reference_id = -1;
+
+  PoseFit fit;
+  const bool had_pose = odometry->previous.has_pose;
+  bool found = false;
+  if (odometry->map.num_keyframes > 0) {
+    found = had_pose && track_map(odometry, input, frame, &fit);
+    if (!found && odometry->map.num_keyframes > 0) {
+      if (had_pose) {
+        odometry->lost_frames = 0;
+        odometry->next_search = odometry->map.num_keyframes - 1;
+        odometry->num_starts = 0;
+      }
+      found = relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, &fit);
+      if (found) {
+        state->relocated = odometry->lost_frames > 0;
+        odometry->num_relocations += odometry->lost_frames > 0;
+      } else {
+        odometry->next_search = odometry->next_search >= kSearchedKeyframes
+                                    ? odometry->next_search - kSearchedKeyframes
+                                    : odometry->map.num_keyframes - 1;
+      }
+      odometry->has_motion = false;
+    }
+  }
+  if (found) {
+    odometry->lost_frames = 0;
+    odometry->num_starts = 0;
+    count_found(odometry, *frame);
+    measure_depth(odometry, *frame);
+    write_fit(fit, state);
+    odometry->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
+    if (had_pose) {
+      odometry->motion =
+          compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
+      odometry->motion_s = frame->time_s - odometry->previous.time_s;
+      odometry->has_motion = true;
+    }
+    if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
+      add_frame_as_keyframe(odometry, frame, input.image);
+      state->is_keyframe = 1;
+    }
+    frame->has_pose = true;
+    write_pose(*odometry, *frame, state);
+  } else {
+    frame->has_pose = false;
+    odometry->has_motion = false;
+    odometry->status =
+        odometry->map.num_keyframes > 0 ? TV_ODOMETRY_LOST : TV_ODOMETRY_STARTING;
+    ++odometry->lost_frames;
+    const int32_t segment = odometry->segment;
+    if (odometry->map.num_keyframes == 0 || odometry->lost_frames > kLostBeforeStart) {
+      odometry->segment = odometry->num_segments;
+      if (start_map(odometry, frame, input.image, &state->reasons)) {
+        ++odometry->num_segments;
+        odometry->lost_frames = 0;
+        const int32_t idx = odometry->map.num_keyframes - 1;
+        frame->cam_from_world = odometry->map.keyframes[idx].cam_from_world;
+        const MapKeypoint* own = keypoints_of(odometry->map, odometry->map.keyframes[idx]);
+        for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
+        odometry->reference_id = odometry->map.keyframes[idx].id;
+        odometry->keyframe_inliers = odometry->map.keyframes[idx].num_observations;
+        list_local_points(odometry, idx);
+        measure_depth(odometry, *frame);
+        frame->has_pose = true;
+        state->is_keyframe = 1;
+        odometry->status = TV_ODOMETRY_TRACKING;
+        write_pose(*odometry, *frame, state);
+      } else {
+        odometry->segment = segment;
+      }
+    }
+  }
+  state->status = odometry->status;
+  state->num_frames = odometry->num_frames;
+  state->num_keyframes = odometry->map.num_keyframes;
+  state->num_points = odometry->map.num_points;
+  state->num_segments = odometry->num_segments;
+  state->num_relocations = odometry->num_relocations;
+  state->num_loops = odometry->num_loops;
+  odometry->last_time_s = input.time_s;
+}
+
+void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
+                  tv_odometry_state* state) {
+  const int32_t segment = odometry->segment, reference = odometry->reference_id;
+  Frame* frame = &odometry->starts[0];  // has no other use while there is a map
+  extract_frame(odometry, image, frame);
+  PoseFit fit;
+  state->status = TV_ODOMETRY_LOST;
+  state->segment = state->reference_id = -1;
+  state->num_keypoints = frame->num;
+  const int32_t from = find_keyframe(odometry->map, near_id);
+  if (odometry->map.num_keyframes > 0 &&
+      relocate(odometry, from >= 0 ? from : odometry->map.num_keyframes - 1,
+               odometry->map.num_keyframes, frame, &fit)) {
+    write_fit(fit, state);
+    state->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
+    write_pose(*odometry, *frame, state);
+  }
+  odometry->segment = segment;
+  odometry->reference_id = reference;
+  const int32_t k = find_keyframe(odometry->map, reference);
+  if (k >= 0) list_local_points(odometry, k);
+  odometry->num_starts = 0;
+}
+
+}  // namespace tv

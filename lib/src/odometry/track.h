@@ -1,0 +1,14 @@
+// The steps of a frame: extraction, tracking, keyframes, loss and relocation.
+#pragma once
+
+#include "odometry/odometry.h"
+
+namespace tv {
+
+// The frame and the state have been checked; *state is zeros but for struct_size.
+void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state);
+
+void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
+                  tv_odometry_state* state);
+
+}  // namespace tv
