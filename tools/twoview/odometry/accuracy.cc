@@ -114,8 +114,7 @@ Accuracy accuracy_of(const Trajectory& estimate, const Trajectory& truth) {
     Pose e = relative(estimate[a.pairs[i - 1].idx_estimate].pose,
                       estimate[a.pairs[i].idx_estimate].pose);
     for (double& value : e.t) value *= a.similarity.scale;
-    const Pose q =
-        relative(truth[a.pairs[i - 1].idx_truth].pose, truth[a.pairs[i].idx_truth].pose);
+    const Pose q = relative(truth[a.pairs[i - 1].idx_truth].pose, truth[a.pairs[i].idx_truth].pose);
     const Pose error = relative(q, e);
     const double angle = kDegrees * angle_of(error.R);
     turn += angle * angle;

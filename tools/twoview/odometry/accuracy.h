@@ -30,11 +30,11 @@ Similarity fitted(const std::vector<Vector3>& from, const std::vector<Vector3>& 
                   bool with_scale);
 
 struct Accuracy {
-  size_t num_poses = 0;  // associated ones; below 3 nothing else is filled
-  double ate_rmse = 0;   // in the truth's unit, after the similarity
-  double ate_rigid_rmse = 0;  // after the best rigid motion, without a scale
-  double path_length = 0;     // of the truth, over the associated poses
-  double rpe_rotation_deg = 0;     // rms over consecutive associated poses
+  size_t num_poses = 0;             // associated ones; below 3 nothing else is filled
+  double ate_rmse = 0;              // in the truth's unit, after the similarity
+  double ate_rigid_rmse = 0;        // after the best rigid motion, without a scale
+  double path_length = 0;           // of the truth, over the associated poses
+  double rpe_rotation_deg = 0;      // rms over consecutive associated poses
   double rpe_translation_rmse = 0;  // the same of the translation, in the truth's unit
   Similarity similarity;
   std::vector<double> errors;  // of each associated pose, after the similarity

@@ -26,7 +26,8 @@ class Film : public FrameSource {
  public:
   Film(const std::string& file, double fps) : file_(file), fps_(fps) {
     cv::VideoCapture film(file);
-    if (!film.isOpened()) throw BadInput("cannot read " + file + ": it is no film that OpenCV reads");
+    if (!film.isOpened())
+      throw BadInput("cannot read " + file + ": it is no film that OpenCV reads");
     if (fps_ > 0) return;
     fps_ = film.get(cv::CAP_PROP_FPS);
     if (!(fps_ > 0 && fps_ < 1e5))
@@ -45,7 +46,8 @@ class Film : public FrameSource {
       frame.name = name;
       frame.time_s = index / fps_;
       if (film.retrieve(picture)) frame.luma = luma_of(picture);
-      if (frame.luma.empty()) frame.problem = "frame " + frame.name + " of " + file_ + " does not decode";
+      if (frame.luma.empty())
+        frame.problem = "frame " + frame.name + " of " + file_ + " does not decode";
       if (!consume(frame)) return;
     }
   }

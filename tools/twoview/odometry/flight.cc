@@ -11,6 +11,10 @@
 #include "files/camera_file.h"
 #include "files/image_file.h"
 
+// Until the library has them, map.twm is not written.
+#pragma weak tv_odometry_save
+#pragma weak tv_odometry_save_size
+
 namespace cli {
 namespace {
 
@@ -52,8 +56,8 @@ bool Flight::wants(int index) const {
 void Flight::prepare(SourceFrame& frame) {
   if (!options_.camera_file.empty())
     require_size(file_camera_, options_.camera_file, frame.luma.cols, frame.luma.rows, frame.name);
-  if (odometry_ != nullptr && (frame.luma.cols != file_camera_.width ||
-                               frame.luma.rows != file_camera_.height))
+  if (odometry_ != nullptr &&
+      (frame.luma.cols != file_camera_.width || frame.luma.rows != file_camera_.height))
     throw BadInput("frame " + frame.name + " is " + std::to_string(frame.luma.cols) + "x" +
                    std::to_string(frame.luma.rows) + ", not " + std::to_string(file_camera_.width) +
                    "x" + std::to_string(file_camera_.height) + " as the first one");
@@ -154,8 +158,7 @@ void Flight::track_frame(SourceFrame frame) {
     record.live_segment = state_.segment;
     record.live = pose_of(state_.world_from_cam_R, state_.world_from_cam_t);
     record.reference_id = state_.reference_id;
-    record.reference_from_cam =
-        pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
+    record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
   given_.push_back(frames_.size());
   frames_.push_back(record);
@@ -183,12 +186,12 @@ void Flight::finish(const std::atomic<bool>& stop) {
               [&](const SourceFrame& frame) {
                 const auto found = missing.find(frame.index);
                 if (found == missing.end() || frame.luma.empty()) return true;
-                const auto nearest = std::min_element(
-                    keyframes.begin(), keyframes.end(),
-                    [&](const FlightKeyframe& a, const FlightKeyframe& b) {
-                      return std::abs(a.keyframe.time_s - frame.time_s) <
-                             std::abs(b.keyframe.time_s - frame.time_s);
-                    });
+                const auto nearest =
+                    std::min_element(keyframes.begin(), keyframes.end(),
+                                     [&](const FlightKeyframe& a, const FlightKeyframe& b) {
+                                       return std::abs(a.keyframe.time_s - frame.time_s) <
+                                              std::abs(b.keyframe.time_s - frame.time_s);
+                                     });
                 locate(frame, *found->second,
                        nearest == keyframes.end() ? -1 : nearest->keyframe.id);
                 return frame.index < missing.rbegin()->first;
@@ -248,7 +251,7 @@ std::vector<tv_map_point> Flight::points() const {
 }
 
 std::string Flight::map_bytes() const {
-  if (!odometry_) return "";
+  if (!odometry_ || !tv_odometry_save) return "";
   size_t size = 0;
   check(tv_odometry_save_size(odometry_, &size), "the map");
   std::string bytes(size, '\0');

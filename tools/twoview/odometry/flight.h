@@ -49,13 +49,13 @@ struct FlightOptions {
   tv_odometry_options odometry;
   int max_frames = 0;  // 0: all
   int every = 1;
-  int resize = 0;      // longer side, pixels; 0: as they are
+  int resize = 0;           // longer side, pixels; 0: as they are
   std::string camera_file;  // empty: the source's own camera
 };
 
 class Flight {
  public:
-  Flight(FrameSource &source, const FlightOptions& options);
+  Flight(FrameSource& source, const FlightOptions& options);
   ~Flight();
   Flight(const Flight&) = delete;
   Flight& operator=(const Flight&) = delete;
@@ -69,7 +69,9 @@ class Flight {
 
   const std::vector<FlightFrame>& frames() const { return frames_; }
   // The frame that was given to the odometry after `number` others: unreadable ones do not count.
-  const FlightFrame& given(int number) const { return frames_[given_[static_cast<size_t>(number)]]; }
+  const FlightFrame& given(int number) const {
+    return frames_[given_[static_cast<size_t>(number)]];
+  }
   const tv_odometry_state& state() const { return state_; }
   const tv_camera& camera() const { return camera_; }
   size_t context_bytes() const { return context_bytes_; }
@@ -104,7 +106,7 @@ class Flight {
   tv_odometry_state state_;
   std::vector<FlightFrame> frames_;
   std::vector<size_t> given_;  // indices of frames_
-  bool gap_ = false;  // a frame was left out before the next one
+  bool gap_ = false;           // a frame was left out before the next one
   int num_unreadable_ = 0;
   std::string first_problem_;
 };

@@ -20,9 +20,9 @@ struct SourceFrame {
   int index = 0;  // among all frames of the source, from 0; frames that are left out count
   std::string name;
   double time_s = 0;
-  cv::Mat luma;  // 8-bit; empty where the frame cannot be read
-  std::string problem;  // why luma is empty
-  bool gap = false;     // frames were lost before this one
+  cv::Mat luma;                           // 8-bit; empty where the frame cannot be read
+  std::string problem;                    // why luma is empty
+  bool gap = false;                       // frames were lost before this one
   std::optional<Matrix3> world_from_cam;  // the vehicle's attitude; the world's z axis points down
   double attitude_sigma_rad = 0;
   std::optional<double> height_m;

@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kFiles = {"trajectory.txt", "live.txt",    "keyframes.txt",
-                                         "frames.csv",     "cloud.ply",   "map.twm",
+const std::vector<std::string> kFiles = {"trajectory.txt", "live.txt",   "keyframes.txt",
+                                         "frames.csv",     "cloud.ply",  "map.twm",
                                          "report.html",    "result.json"};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
@@ -49,8 +49,7 @@ std::unique_ptr<FrameSource> open_recording_folder(const Arguments& a) {
     throw BadInput("--camera is required: a recording of a drone does not describe its camera");
   return open_recording(a.source, a.camera);
 #else
-  throw BadInput("cannot read " + a.source +
-                 ": this program was built without the drone's driver");
+  throw BadInput("cannot read " + a.source + ": this program was built without the drone's driver");
 #endif
 }
 
@@ -155,7 +154,8 @@ void make_files(const FlightResult& result, OutputSet& files) {
   if (result.keyframes.empty()) return;
   files.add("keyframes.txt", keyframes_text(result));
   files.add("cloud.ply", map_ply(result.points));
-  files.add("map.twm", flight.map_bytes());
+  const std::string map = flight.map_bytes();
+  if (!map.empty()) files.add("map.twm", map);
 }
 
 void make_colmap_files(const FlightResult& result, OutputSet& files) {
@@ -202,10 +202,10 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
     text += summary_line("length", "%.3f times the distance of the first two keyframes", length);
   if (j["truth"].is_object()) text += truth_line(j["truth"]);
   if (j["time_ms"]["mean"].is_number())
-    text += summary_line("work", "%.2f ms a frame (mean), %.2f ms (max) with %s kernels in %.1f MiB",
-                         j["time_ms"]["mean"].get<double>(), j["time_ms"]["max"].get<double>(),
-                         j["kernels"].get<std::string>().c_str(),
-                         j["context_bytes"].get<double>() / (1 << 20));
+    text += summary_line(
+        "work", "%.2f ms a frame (mean), %.2f ms (max) with %s kernels in %.1f MiB",
+        j["time_ms"]["mean"].get<double>(), j["time_ms"]["max"].get<double>(),
+        j["kernels"].get<std::string>().c_str(), j["context_bytes"].get<double>() / (1 << 20));
   std::string names;
   for (const std::string& name : files.names()) names += " " + name;
   return text + summary_line("files", "%s:%s%s", files.folder().c_str(), names.c_str(),
@@ -248,8 +248,8 @@ int odometry(Arguments& a) {
   }
   if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
   flight.finish(stop);
-  FlightResult result = result_of(
-      flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
+  FlightResult result =
+      result_of(flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
   result.json["interrupted"] = stop.load();
   result.json["source"] = a.source.empty() ? source->kind() : a.source;
   result.json["options"] = options_of(a, truth_file);

@@ -90,9 +90,10 @@ Json truth_json(const FlightResult& result, bool is_metric) {
   const Accuracy& live = result.live_accuracy;
   Json json;
   const Trajectory best = trajectory_of(*result.flight, result.segment, false);
-  json["coverage"] = result.num_source_frames > 0 ? static_cast<double>(best.size()) /
-                                                        static_cast<double>(result.num_source_frames)
-                                                  : 0.0;
+  json["coverage"] =
+      result.num_source_frames > 0
+          ? static_cast<double>(best.size()) / static_cast<double>(result.num_source_frames)
+          : 0.0;
   json["num_compared"] = a.num_poses;
   const bool known = a.num_poses >= 3;
   const auto number = [](bool has, double value) {
@@ -136,12 +137,13 @@ std::string colmap_cameras(const tv_camera& c) {
                       : c.model == TV_CAMERA_KANNALA_BRANDT ? "OPENCV_FISHEYE"
                       : is_rational                         ? "FULL_OPENCV"
                                                             : "OPENCV";
-  const int count = c.model == TV_CAMERA_PINHOLE                       ? 0
+  const int count = c.model == TV_CAMERA_PINHOLE                        ? 0
                     : c.model == TV_CAMERA_BROWN_CONRADY && is_rational ? 8
                                                                         : 4;
-  std::string text = "# Camera list with one line of data per camera:\n"
-                     "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
-                     "# Number of cameras: 1\n1 ";
+  std::string text =
+      "# Camera list with one line of data per camera:\n"
+      "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
+      "# Number of cameras: 1\n1 ";
   text += model + std::string(" ") + std::to_string(c.width) + " " + std::to_string(c.height);
   for (const double value : {c.fx, c.fy, c.cx + 0.5, c.cy + 0.5}) text += number_text(value);
   for (int k = 0; k < count; ++k) text += number_text(c.k[k]);
@@ -250,8 +252,7 @@ std::string reasons_text(const FlightFrame& frame) {
   std::string text;
   for (uint32_t bit = 1; bit != 0 && bit <= frame.reasons; bit <<= 1) {
     if ((frame.reasons & bit) == 0) continue;
-    text += (text.empty() ? "" : " ") +
-            std::string(tv_reason_string(static_cast<tv_reason>(bit)));
+    text += (text.empty() ? "" : " ") + std::string(tv_reason_string(static_cast<tv_reason>(bit)));
   }
   return text;
 }
@@ -275,8 +276,7 @@ std::string frames_csv(const Flight& flight) {
 
 std::string map_ply(const std::vector<tv_map_point>& points) {
   std::string bytes =
-      "ply\nformat binary_little_endian 1.0\ncomment twoview " +
-      std::string(tv_version_string()) +
+      "ply\nformat binary_little_endian 1.0\ncomment twoview " + std::string(tv_version_string()) +
       "\ncomment the map's world; points of different segments do not compare\n"
       "element vertex " +
       std::to_string(points.size()) +
@@ -300,7 +300,7 @@ ColmapModel colmap_model(const FlightResult& result) {
   struct Sighting {
     int32_t image, idx;
   };
-  std::map<int32_t, std::vector<Sighting>> tracks;     // by the index of the point
+  std::map<int32_t, std::vector<Sighting>> tracks;      // by the index of the point
   std::map<int32_t, std::pair<double, int>> residuals;  // their sum and number, by the same
   int num_images = 0;
   std::string images;
@@ -335,10 +335,11 @@ ColmapModel colmap_model(const FlightResult& result) {
     }
     images += "\n";
   }
-  model.images = "# Image list with two lines of data per image:\n"
-                 "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
-                 "#   POINTS2D[] as (X, Y, POINT3D_ID)\n# Number of images: " +
-                 std::to_string(num_images) + "\n" + images;
+  model.images =
+      "# Image list with two lines of data per image:\n"
+      "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
+      "#   POINTS2D[] as (X, Y, POINT3D_ID)\n# Number of images: " +
+      std::to_string(num_images) + "\n" + images;
   std::string points;
   for (const auto& [idx, track] : tracks) {
     const tv_map_point& point = result.points[static_cast<size_t>(idx)];
@@ -351,10 +352,11 @@ ColmapModel colmap_model(const FlightResult& result) {
       points += " " + std::to_string(sighting.image) + " " + std::to_string(sighting.idx);
     points += "\n";
   }
-  model.points = "# 3D point list with one line of data per point:\n"
-                 "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n"
-                 "# Number of points: " +
-                 std::to_string(tracks.size()) + "\n" + points;
+  model.points =
+      "# 3D point list with one line of data per point:\n"
+      "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n"
+      "# Number of points: " +
+      std::to_string(tracks.size()) + "\n" + points;
   return model;
 }
 

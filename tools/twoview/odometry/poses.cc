@@ -110,8 +110,8 @@ Trajectory load_trajectory(const std::string& file, const std::vector<double>& f
   for (const TextLine& line : lines) {
     const std::vector<double> n = numbers_in(file, line);
     if (n.size() != count)
-      refuse_line(file, line.number, "has " + std::to_string(n.size()) + " numbers, not " +
-                                         std::to_string(count));
+      refuse_line(file, line.number,
+                  "has " + std::to_string(n.size()) + " numbers, not " + std::to_string(count));
     TimedPose at;
     if (is_kitti) {
       const size_t idx = trajectory.size();
