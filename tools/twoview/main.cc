@@ -17,7 +17,7 @@
 #include "drone/drone.h"
 #endif
 #ifdef TWOVIEW_HAS_ODOMETRY
-#include "odometry/odometry.h"
+#include "odometry/odometry_verb.h"
 #endif
 #ifdef TWOVIEW_HAS_SIMULATOR
 #include "simulate/simulate.h"

@@ -1,6 +1,6 @@
 // twoview odometry SOURCE -o OUT: the frames of one camera to its path and a map.
 
-#include "odometry/odometry.h"
+#include "odometry/odometry_verb.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
