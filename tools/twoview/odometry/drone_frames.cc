@@ -30,7 +30,7 @@ void add_measurements(const FlightSample& at, const CameraMount& mount, SourceFr
 }
 
 CameraMount mount_in(const std::string& camera_file) {
-  return camera_file.empty() ? CameraMount{} : mount_of(RecordingOptions{}, camera_file);
+  return camera_file.empty() ? CameraMount{} : load_mount(camera_file);
 }
 
 // Turns the driver's frames into those of a source, and drops those whose time does not rise.

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <opencv2/imgcodecs.hpp>
 
 #include "base/error.h"
 #include "files/camera_file.h"
@@ -27,6 +28,22 @@ double cpu_ms() {
 
 tv_image view_of(const cv::Mat& luma) {
   return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};
+}
+
+// The picture scaled down as --resize does.
+cv::Mat shrunk(const cv::Mat& luma, int longer) {
+  Picture picture;
+  picture.luma = picture.colour = luma;
+  shrink(picture, longer);
+  return picture.luma;
+}
+
+Thumbnail thumbnail_of(const cv::Mat& luma) {
+  constexpr int kLongerSide = 400;
+  const cv::Mat small = shrunk(luma, kLongerSide);
+  std::vector<uint8_t> bytes;
+  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, 75});
+  return {small.cols, small.rows, std::string(bytes.begin(), bytes.end())};
 }
 
 Pose pose_of(const double R[9], const double t[3]) {
@@ -61,12 +78,7 @@ void Flight::prepare(SourceFrame& frame) {
     throw BadInput("frame " + frame.name + " is " + std::to_string(frame.luma.cols) + "x" +
                    std::to_string(frame.luma.rows) + ", not " + std::to_string(file_camera_.width) +
                    "x" + std::to_string(file_camera_.height) + " as the first one");
-  Picture picture;
-  picture.luma = frame.luma;
-  picture.file_width = frame.luma.cols;
-  picture.file_height = frame.luma.rows;
-  shrink(picture, options_.resize);
-  frame.luma = picture.luma;
+  frame.luma = shrunk(frame.luma, options_.resize);
 }
 
 void Flight::start(const SourceFrame& first) {
@@ -160,6 +172,8 @@ void Flight::track_frame(SourceFrame frame) {
     record.reference_id = state_.reference_id;
     record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
+  if (frame.world_from_cam) is_upright_ = true;
+  if (record.is_keyframe) thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
   given_.push_back(frames_.size());
   frames_.push_back(record);
 }
@@ -214,6 +228,11 @@ void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id) {
   record.origin = PoseOrigin::kLocated;
   record.segment = state.segment;
   record.pose = pose_of(state.world_from_cam_R, state.world_from_cam_t);
+}
+
+const Thumbnail* Flight::thumbnail(int number) const {
+  const auto found = thumbnails_.find(number);
+  return found == thumbnails_.end() ? nullptr : &found->second;
 }
 
 bool Flight::ended_tracked() const {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -45,6 +46,12 @@ struct FlightKeyframe {
   std::vector<tv_map_observation> observations;
 };
 
+// A small picture of a keyframe, for the report.
+struct Thumbnail {
+  int width = 0, height = 0;  // pixels
+  std::string jpeg;
+};
+
 struct FlightOptions {
   tv_odometry_options odometry;
   int max_frames = 0;  // 0: all
@@ -72,6 +79,11 @@ class Flight {
   const FlightFrame& given(int number) const {
     return frames_[given_[static_cast<size_t>(number)]];
   }
+  size_t index_given(int number) const { return given_[static_cast<size_t>(number)]; }
+  // The picture of a frame that was given and became a keyframe; null for other frames.
+  const Thumbnail* thumbnail(int number) const;
+  // Whether attitudes were given, so that the map's z axis points down.
+  bool is_upright() const { return is_upright_; }
   const tv_odometry_state& state() const { return state_; }
   const tv_camera& camera() const { return camera_; }
   size_t context_bytes() const { return context_bytes_; }
@@ -106,6 +118,8 @@ class Flight {
   tv_odometry_state state_;
   std::vector<FlightFrame> frames_;
   std::vector<size_t> given_;  // indices of frames_
+  std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
+  bool is_upright_ = false;
   bool gap_ = false;           // a frame was left out before the next one
   int num_unreadable_ = 0;
   std::string first_problem_;

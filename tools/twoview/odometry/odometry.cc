@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 
 #include "base/error.h"
 #include "base/output.h"
 #include "odometry/flight.h"
 #include "odometry/outputs.h"
+#include "odometry/report.h"
 #include "pair/result.h"
 #include "pair/session.h"
 #include "verbs/common.h"
@@ -139,18 +141,20 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
                                  {"max_frames", a.flight.max_frames},
                                  {"every", a.flight.every},
                                  {"fps", a.fps}};
-  json.update(options_json(a.common.options, kCommon));
+  json["resize"] = a.flight.resize;
+  json["kernels"] = tv_kernels_string(static_cast<tv_kernels>(o.kernels));
   json["camera"] = text_or_null(a.camera);
   json["truth"] = text_or_null(truth_file);
   return json;
 }
 
-void make_files(const FlightResult& result, OutputSet& files) {
+void make_files(const FlightResult& result, const std::string& name, OutputSet& files) {
   const Flight& flight = *result.flight;
   files.add("result.json", json_text(result.json));
   files.add("frames.csv", frames_csv(flight));
   files.add("trajectory.txt", trajectory_text(flight, false));
   files.add("live.txt", trajectory_text(flight, true));
+  files.add("report.html", flight_report(result, name));
   if (result.keyframes.empty()) return;
   files.add("keyframes.txt", keyframes_text(result));
   files.add("cloud.ply", map_ply(result.points));
@@ -224,8 +228,7 @@ int exit_status(const Flight& flight, const FlightResult& result) {
 
 int odometry(Arguments& a) {
   Common& common = a.common;
-  a.flight.odometry.kernels = common.options.kernels;
-  a.flight.resize = common.options.resize;
+  common.options.kernels = a.flight.odometry.kernels;
   a.flight.camera_file = a.camera;
   const std::unique_ptr<FrameSource> source = open_source(a);
   const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
@@ -256,7 +259,8 @@ int odometry(Arguments& a) {
   result.json["seed"] = a.flight.odometry.seed;
   result.json["version"] = tv_version_string();
   result.json["kernels"] = session.kernels();
-  make_files(result, files);
+  const std::string name = fs::absolute(fs::path(a.source) / "x").parent_path().filename().string();
+  make_files(result, a.source.empty() ? source->kind() : name, files);
   std::optional<OutputSet> colmap;
   if (!result.keyframes.empty()) {
     colmap.emplace(files.folder() / "colmap");
@@ -308,13 +312,22 @@ void add_odometry(CLI::App& program, Run& run) {
   add_count(*verb, "--max-points", o.max_points, 500, 200000, "most points of the map");
   add_count(*verb, "--window", o.window, 3, 20, "keyframes that are adjusted together");
   verb->add_option("--seed", o.seed, "of the samplers")->type_name("N")->capture_default_str();
+  add_count(*verb, "--resize", a->flight.resize, 0, kMaxSide,
+            "scale frames down to this longer side, pixels; 0: as they are");
+  std::map<std::string, int32_t> kernels;
+  for (int32_t k = 0; k <= TV_KERNELS_NEON; ++k)
+    kernels[tv_kernels_string(static_cast<tv_kernels>(k))] = k;
+  verb->add_option("--kernels", o.kernels, "kernel set")
+      ->transform(CLI::CheckedTransformer(kernels))
+      ->type_name("auto|c|sse2|avx2|avx512|neon")
+      ->default_str("auto");
 #ifdef TWOVIEW_HAS_DRONE
   verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")
       ->type_name("HOST");
   add_ports(*verb, a->drone);
   add_duration(*verb, a->duration);
 #endif
-  add_common(*verb, a->common, kCommon, "folder for the results");
+  add_common(*verb, a->common, 0, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return odometry(*a); }; });
 }
 

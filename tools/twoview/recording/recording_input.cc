@@ -39,8 +39,8 @@ std::vector<double> optional_numbers(const YAML::Node& root, const std::string& 
   return numbers;
 }
 
-}  // namespace
-
+// The mount from the command line, else from the camera file, else a camera at the body's origin
+// that looks forward.
 CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
   const YAML::Node root = parse_yaml(read_file(file, kMaxFileBytes), file);
   const bool rotation_given = !options.body_from_camera.empty();
@@ -58,6 +58,10 @@ CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
   std::copy(position.begin(), position.end(), mount.position.begin());
   return mount;
 }
+
+}  // namespace
+
+CameraMount load_mount(const std::string& camera_file) { return mount_of({}, camera_file); }
 
 struct RecordingInput::State {
   RecordingOptions options;

@@ -24,10 +24,9 @@ struct RecordingOptions {
   bool given() const { return !folder.empty(); }
 };
 
-// The mount from the options, else from the entries body_from_camera and camera_in_body of the
-// camera file, else a camera at the body's origin that looks forward. Throws BadInput. Only in a
-// program with the driver.
-CameraMount mount_of(const RecordingOptions& options, const std::string& camera_file);
+// The mount of the camera that a camera file describes, else a camera at the body's origin that
+// looks forward. Throws BadInput. Only in a program with the driver.
+CameraMount load_mount(const std::string& camera_file);
 
 class RecordingInput {
  public:

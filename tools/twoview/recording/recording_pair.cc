@@ -29,6 +29,24 @@ Matrix3 matrix_of(const double q[4]) {
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
+FlightSample sample_of(const tvs_imu& imu) {
+  FlightSample sample;
+  sample.time_s = static_cast<double>(imu.time.host_ns) * 1e-9;
+  sample.run = imu.attitude.clock_id;
+  sample.world_from_body = matrix_of(imu.attitude.world_from_body);
+  sample.attitude_sigma_rad = imu.attitude.sigma_rad;
+  constexpr uint32_t kVelocity = TVS_IMU_VELOCITY_XY | TVS_IMU_VELOCITY_Z;
+  if ((imu.valid & kVelocity) == kVelocity) {
+    sample.velocity_m_s = Vector3{imu.velocity_m_s[0], imu.velocity_m_s[1], imu.velocity_m_s[2]};
+    sample.velocity_sigma = imu.velocity_sigma;
+  }
+  if ((imu.valid & TVS_IMU_ALTITUDE) != 0) {
+    sample.altitude_m = imu.altitude_m;
+    sample.altitude_sigma = imu.altitude_sigma;
+  }
+  return sample;
+}
+
 // Decodes the pictures with these indices; the keys are the indices.
 std::map<int, cv::Mat> read_pictures(const std::string& folder, const std::set<int>& wanted) {
   std::map<int, cv::Mat> pictures;
@@ -92,29 +110,13 @@ double score_of(const tv_two_view& v) {
 
 }  // namespace
 
-FlightSample flight_sample(const tvs_imu& imu) {
-  FlightSample sample;
-  sample.time_s = static_cast<double>(imu.time.host_ns) * 1e-9;
-  sample.run = imu.attitude.clock_id;
-  sample.world_from_body = matrix_of(imu.attitude.world_from_body);
-  sample.attitude_sigma_rad = imu.attitude.sigma_rad;
-  constexpr uint32_t kVelocity = TVS_IMU_VELOCITY_XY | TVS_IMU_VELOCITY_Z;
-  if ((imu.valid & kVelocity) == kVelocity) {
-    sample.velocity_m_s = Vector3{imu.velocity_m_s[0], imu.velocity_m_s[1], imu.velocity_m_s[2]};
-    sample.velocity_sigma = imu.velocity_sigma;
-  }
-  if ((imu.valid & TVS_IMU_ALTITUDE) != 0) {
-    sample.altitude_m = imu.altitude_m;
-    sample.altitude_sigma = imu.altitude_sigma;
-  }
-  return sample;
-}
+FlightSample flight_sample(const tvs_imu& imu) { return sample_of(imu); }
 
 RecordedFlight read_flight(const std::string& folder) {
   RecordedFlight flight;
   LinkListener listener;
   listener.on_navdata = [&](const uint8_t*, size_t, const ardrone_navdata&, const tvs_imu& imu) {
-    if ((imu.valid & TVS_IMU_ATTITUDE) != 0) flight.log.push_back(flight_sample(imu));
+    if ((imu.valid & TVS_IMU_ATTITUDE) != 0) flight.log.push_back(sample_of(imu));
   };
   listener.on_frame = [&](const tvs_frame& frame) {
     const double time_s = static_cast<double>(frame.time.host_ns) * 1e-9;
