@@ -93,7 +93,7 @@ void start_anew(tv_odometry* o) {
   o->reference_id = -1;
   o->has_motion = false;
   o->mark = o->num_frames = o->segment = o->num_segments = 0;
-  o->num_relocations = o->num_loops = o->lost_frames = o->next_search = 0;
+  o->num_relocations = o->num_loops = o->lost_frames = o->next_search = o->next_loop = 0;
   o->status = TV_ODOMETRY_STARTING;
   o->frame.has_pose = o->previous.has_pose = false;
   o->frame.num = o->previous.num = 0;
@@ -175,6 +175,7 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   o->camera = tv::prepare_camera(plan.camera);
   tv_feature_options_init(&o->features);
   o->features.max_keypoints = plan.options.max_keypoints;
+  o->features.arc=(int)T(20,9); o->features.levels=(int)T(21,4); o->features.scale_factor=(float)T(22,1.41); o->features.threshold=(int)T(23,15); o->features.cell_px=(int)T(24,32);o->features.keypoint_size=(float)T(25,4);
   o->grid_columns = plan.columns;
   o->grid_rows = plan.rows;
   tv::make_map(plan.sizes, arena, &o->map);
@@ -251,16 +252,19 @@ tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
   std::copy_n(reference_from_cam_t, 3, pose.t);
   const tv::Map& map = odometry->map;
   int32_t id = reference_id;
+
   int32_t k = tv::find_keyframe(map, id);
   for (int32_t steps = 0; k < 0 && steps <= map.num_removed; ++steps) {
     int32_t n = 0;
     while (n < map.num_removed && map.removed[n].id != id) ++n;
     if (n == map.num_removed) return TV_ERR_ARGUMENT;
+    for (double& x : pose.t) x *= map.removed[n].scale;
     pose = tv::compose(map.removed[n].kept_from_removed, pose);
     id = map.removed[n].kept_id;
     k = tv::find_keyframe(map, id);
   }
   if (k < 0) return TV_ERR_ARGUMENT;
+  for (double& x : pose.t) x *= map.keyframes[k].scale;
   pose = tv::compose(tv::inverse(map.keyframes[k].cam_from_world), pose);
   std::copy_n(pose.R, 9, R);
   std::copy_n(pose.t, 3, t);

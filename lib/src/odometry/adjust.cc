@@ -9,7 +9,7 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastShared = 10;
-constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
+#define kLargestError T(12,3.0)  // px, of a pixel of sigma 1
 constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;
 constexpr double kTypicalNoise = 0.7;  // px
 
@@ -235,7 +235,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   tv_window_options how;
   tv_window_options_init(&how);
   how.max_iterations = max_iterations;
-  how.tolerance = 1e-4;
+  how.tolerance = T(10,1e-4); how.loss_scale_px = T(11,2.0);
   size_t bytes = 0;
   tv_adjust_window_size(&window, &bytes);
   void* memory = arena_alloc<uint8_t>(arena, bytes);

@@ -11,10 +11,13 @@
 namespace tv {
 namespace {
 
-constexpr double kLeastBaseline = 0.01;  // of the median depth: nearer keyframes make no points
-constexpr int32_t kMostNeighbours = 4;
-constexpr double kLeastAngle = 0.006;    // radians
-constexpr double kLargestError = 2.0;    // px, of a pixel of sigma 1
+#define kLeastBaseline T(13,0.01)
+  // of the median depth: nearer keyframes make no points
+#define kMostNeighbours static_cast<int32_t>(T(14,4))
+#define kLeastAngle T(15,0.006)
+   // radians
+#define kLargestError T(16,3.0)
+   // px, of a pixel of sigma 1
 constexpr double kLargestSizeRatio = 2.2;
 constexpr double kTypicalNoise = 0.7;  // px
 
@@ -194,7 +197,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     }
     tv_guided_options guided;
     tv_guided_options_init(&guided);
-    guided.max_error_px = 2.0f;
+    guided.max_error_px = static_cast<float>(T(17,4.0)); guided.ratio = static_cast<float>(T(18,0.87));
     int32_t num_found = 0;
     if (tv_match_guided(odometry->context, &odometry->camera.model, &odometry->camera.model, E,
                         &theirs.features, &mine.features, &guided, found, room,

@@ -73,6 +73,7 @@ int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* desc
   const int32_t idx = map->num_keyframes++;
   MapKeyframe* keyframe = &map->keyframes[idx];
   *keyframe = MapKeyframe{};
+  keyframe->scale = 1;
   keyframe->id = map->next_keyframe_id++;
   keyframe->room = map->free_rooms[--map->num_free_rooms];
   keyframe->num_keypoints = num;
@@ -145,8 +146,9 @@ void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
   for (; at > 0 && map->removed[at - 1].id > removed->id; --at) {
     map->removed[at] = map->removed[at - 1];
   }
-  map->removed[at] = {removed->id, stays.id,
-                      compose(stays.cam_from_world, inverse(removed->cam_from_world))};
+  Rigid kept_from_removed = compose(stays.cam_from_world, inverse(removed->cam_from_world));
+  for (double& t : kept_from_removed.t) t /= stays.scale;
+  map->removed[at] = {removed->id, stays.id, kept_from_removed, removed->scale / stays.scale};
   MapKeypoint* own = keypoints_of(*map, *removed);
   for (int32_t i = 0; i < removed->num_keypoints; ++i) {
     if (own[i].point != kNoPoint) forget_observation(map, keyframe, i);

@@ -29,6 +29,7 @@ struct MapKeyframe {
   double down[3], down_sigma_rad;          // gravity in the camera's frame; sigma 0: not known
   double height_m, height_sigma_m;         // sigma 0: not known
   double travel_m, travel_sigma_m;         // the way from the keyframe before; sigma 0: not known
+  double scale;            // by which loops have multiplied its surroundings since it was made
   double covariance[36];                   // of cam_from_world relative to the keyframe before
 };
 
@@ -48,7 +49,8 @@ struct MapPoint {
 // Where a keyframe that was removed lies relative to one that stayed when it was removed.
 struct RemovedKeyframe {
   int32_t id, kept_id;
-  Rigid kept_from_removed;  // cameras
+  Rigid kept_from_removed;  // cameras, in the unit of the one that was kept when it was made
+  double scale;             // from the removed one's unit when it was made to that unit
 };
 
 struct MapSizes {

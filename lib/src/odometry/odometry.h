@@ -52,7 +52,7 @@ struct tv_odometry {
   int32_t mark;
   int32_t num_frames, segment, num_segments, num_relocations, num_loops;
   int32_t status;
-  int32_t lost_frames, next_search;
+  int32_t lost_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
   double median_depth;
   double last_time_s;
@@ -66,3 +66,6 @@ using Odometry = tv_odometry;
 size_t scratch_bytes(const tv_odometry_options& options);
 
 }  // namespace tv
+extern "C" __attribute__((visibility("default"))) double tv_tune[32];
+
+inline double T(int k, double v) { return tv_tune[k] == tv_tune[k] ? tv_tune[k] : v; }

@@ -7,6 +7,8 @@
 #include "geometry/essential.h"
 #include "geometry/vector3.h"
 
+extern "C" __attribute__((visibility("default"))) double tv_tune[32];
+double tv_tune[32];
 namespace tv {
 
 void transform(const Rigid& rigid, const double X[3], double x[3]) {

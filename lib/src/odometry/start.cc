@@ -15,21 +15,11 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
-constexpr double kLeastParallax = 0.015;  // radians, the median
-constexpr double kLeastAngle = 0.006;     // radians
+#define kLeastParallax T(19,0.015)
+  // radians, the median
+#define kLeastAngle T(15,0.006)
+     // radians
 constexpr int32_t kFramesBetween = 6;     // between frames that wait
-
-void copy_frame(const Frame& from, Frame* to) {
-  const size_t n = static_cast<size_t>(from.num);
-  std::copy_n(from.keypoints, n, to->keypoints);
-  std::copy_n(from.descriptors, n * TV_DESCRIPTOR_BYTES, to->descriptors);
-  std::copy_n(from.sigmas, n, to->sigmas);
-  to->num = from.num;
-  to->number = from.number;
-  to->time_s = from.time_s;
-  to->cam_from_world = kIdentity;
-  for (int32_t k = 0; k < from.num; ++k) to->points[k] = kNoPoint;
-}
 
 tv_features features_of(const Frame& frame) {
   tv_features features;
@@ -144,6 +134,18 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
 }
 
 }  // namespace
+
+void copy_frame(const Frame& from, Frame* to) {
+  const size_t n = static_cast<size_t>(from.num);
+  std::copy_n(from.keypoints, n, to->keypoints);
+  std::copy_n(from.descriptors, n * TV_DESCRIPTOR_BYTES, to->descriptors);
+  std::copy_n(from.sigmas, n, to->sigmas);
+  to->num = from.num;
+  to->number = from.number;
+  to->time_s = from.time_s;
+  to->cam_from_world = kIdentity;
+  forget_points(to);
+}
 
 bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons) {
   *reasons = 0;

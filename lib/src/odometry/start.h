@@ -10,4 +10,7 @@ namespace tv {
 // the frame may wait itself; *reasons says what was missing.
 bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons);
 
+// Copies a frame's keypoints, which see no point in the copy.
+void copy_frame(const Frame& from, Frame* to);
+
 }  // namespace tv

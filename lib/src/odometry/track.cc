@@ -7,15 +7,19 @@
 #include "odometry/adjust.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
+#include "odometry/loop.h"
 #include "odometry/search.h"
 #include "odometry/start.h"
 
 namespace tv {
 namespace {
 
-constexpr int32_t kLeastInliers = 20;
-constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
+#define kLeastInliers static_cast<int32_t>(T(0,20))
+constexpr double kMaxDistance_ = 200;
+#define kMaxDistance T(8,200)
+#define kSearchRatio T(9,0.9)
 constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
+constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
 constexpr int32_t kLostBeforeStart = 8;    // frames
 
 void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
@@ -102,8 +106,8 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
   const double moved = distance_between(a, b) / odometry.median_depth;
   const double turned =
       rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
-  const bool few = 10 * num_inliers < 7 * odometry.keyframe_inliers || num_inliers < 60;
-  return moved > 0.10 || turned > 0.25 || (few && (moved > 0.02 || turned > 0.08));
+  const bool few = num_inliers < T(6,0.7) * odometry.keyframe_inliers || num_inliers < T(5,100);
+  return moved > T(1,0.10) || turned > T(2,0.25) || (few && (moved > T(3,0.02) || turned > T(4,0.08)));
 }
 
 // Makes room for one more keyframe: removes the one that moved the camera least.
@@ -132,20 +136,55 @@ void make_room(Odometry* odometry) {
   remove_keyframe(&map, best, best - 1);
 }
 
+// The frame's pose and points are those of the keyframe that was made of it.
+void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
+  const MapKeyframe& keyframe = odometry.map.keyframes[idx];
+  const MapKeypoint* own = keypoints_of(odometry.map, keyframe);
+  frame->cam_from_world = keyframe.cam_from_world;
+  for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
+}
+
 void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
   make_room(odometry);
   const int32_t idx = make_keyframe(odometry, *frame);
-  odometry->keyframe_inliers = odometry->map.keyframes[idx].num_observations;
   make_points(odometry, idx, image);
   remove_bad_points(odometry);
-  adjust_around(odometry, idx, 6);
+  adjust_around(odometry, idx, static_cast<int32_t>(T(7,6)));
   const Map& map = odometry->map;
-  frame->cam_from_world = map.keyframes[idx].cam_from_world;
+  odometry->keyframe_inliers = map.keyframes[idx].num_observations;
   odometry->reference_id = map.keyframes[idx].id;
   list_local_points(odometry, idx);
-  // The frame's points are now the keyframe's.
-  const MapKeypoint* own = keypoints_of(map, map.keyframes[idx]);
-  for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
+  take_keyframe(*odometry, idx, frame);
+}
+
+// Looks for a loop in a few keyframes, and closes it.
+void search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
+                  tv_odometry_state* state) {
+  Frame* again = &odometry->starts[0];  // has no other use while the map is tracked
+  LoopEnd end;
+  if (!find_loop(odometry, *frame, kLoopKeyframes, again, &end)) return;
+  Map& map = odometry->map;
+  const int32_t end_id = map.keyframes[end.keyframe].id;
+  if (state->is_keyframe == 0) {
+    add_frame_as_keyframe(odometry, frame, image);
+    state->is_keyframe = 1;
+    end.keyframe = find_keyframe(map, end_id);
+    if (end.keyframe < 0) return;
+    for (int32_t k = 0; k < again->num; ++k) {
+      if (again->points[k] != kNoPoint && map.points[again->points[k]].id < 0) {
+        again->points[k] = kNoPoint;
+      }
+    }
+  }
+  close_loop(odometry, *again, end);
+  const int32_t newest = map.num_keyframes - 1;
+  adjust_around(odometry, newest, 10);
+  list_local_points(odometry, newest);
+  take_keyframe(*odometry, newest, frame);
+  for (double& t : odometry->motion.t) t *= end.scale;
+  measure_depth(odometry, *frame);
+  ++odometry->num_loops;
+  state->loop_closed = 1;
 }
 
 // Looks for the frame in the map. True: the frame has its pose, and the keyframe's surroundings are
@@ -198,7 +237,9 @@ void write_pose(const Odometry& odometry, const Frame& frame, tv_odometry_state*
   state->segment = odometry.segment;
   state->reference_id = odometry.reference_id;
   std::copy_n(relative.R, 9, state->reference_from_cam_R);
-  std::copy_n(relative.t, 3, state->reference_from_cam_t);
+  for (int c = 0; c < 3; ++c) {
+    state->reference_from_cam_t[c] = relative.t[c] / map.keyframes[k].scale;
+  }
   std::copy_n(world_from_cam.R, 9, state->world_from_cam_R);
   std::copy_n(world_from_cam.t, 3, state->world_from_cam_t);
 }
@@ -264,6 +305,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
       add_frame_as_keyframe(odometry, frame, input.image);
       state->is_keyframe = 1;
     }
+    search_loops(odometry, frame, input.image, state);
     frame->has_pose = true;
     write_pose(*odometry, *frame, state);
   } else {

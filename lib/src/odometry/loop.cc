@@ -1,0 +1,263 @@
+#include "odometry/loop.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/math.h"
+#include "odometry/fit_pose.h"
+#include "odometry/keyframe.h"
+#include "odometry/search.h"
+#include "odometry/start.h"
+
+namespace tv {
+namespace {
+
+constexpr int32_t kLeastKeyframesBetween = 12;
+constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 15;
+constexpr double kLargestDrift = 0.05;  // of the path, in position
+constexpr double kLargestShift = 0.15;  // of the median depth, added to it
+constexpr double kLargestTurn = 0.4;    // radians
+constexpr double kLargestScale = 1.5;
+constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
+
+
+// The length of the path over the keyframes from..to.
+double path_between(const Map& map, int32_t from, int32_t to) {
+  double length = 0;
+  for (int32_t k = from; k < to; ++k) {
+    double a[3], b[3];
+    centre_of(map.keyframes[k].cam_from_world, a);
+    centre_of(map.keyframes[k + 1].cam_from_world, b);
+    length += distance_between(a, b);
+  }
+  return length;
+}
+
+// Whether drift can explain where the camera is now and where it must be for a loop.
+bool is_plausible(const Odometry& odometry, const Frame& frame, const LoopEnd& end) {
+  const Map& map = odometry.map;
+  if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
+  if (!(end.scale < kLargestScale && end.scale > 1 / kLargestScale)) return false;
+  double now[3], there[3];
+  centre_of(frame.cam_from_world, now);
+  centre_of(end.cam_from_world, there);
+  const double path = path_between(map, end.keyframe, map.num_keyframes - 1);
+  return distance_between(now, there) <= kLargestDrift * path + kLargestShift * odometry.median_depth &&
+         rotation_angle(compose(end.cam_from_world, inverse(frame.cam_from_world))) <=
+             kLargestTurn;
+}
+
+// Whether the frame may see what a keyframe saw, if the drift is as large as it may be.
+bool may_meet(const Odometry& odometry, const Frame& frame, int32_t keyframe) {
+  const Map& map = odometry.map;
+  const MapKeyframe& other = map.keyframes[keyframe];
+  if (other.segment != odometry.segment) return true;
+  double now[3], there[3];
+  centre_of(frame.cam_from_world, now);
+  centre_of(other.cam_from_world, there);
+  const double path = path_between(map, keyframe, map.num_keyframes - 1);
+  return distance_between(now, there) <= kLargestDrift * path + 2 * odometry.median_depth &&
+         rotation_angle(compose(other.cam_from_world, inverse(frame.cam_from_world))) < 1.2;
+}
+
+// The median of the depths of the same keypoints among the old points over those among the new
+// ones; 0 where too few keypoints see both.
+double scale_between(Odometry* odometry, const Frame& frame, const Frame& again) {
+  ArenaScope scope(odometry->scratch);
+  const Map& map = odometry->map;
+  double* ratios = arena_alloc<double>(odometry->scratch, static_cast<size_t>(frame.num));
+  int32_t num = 0;
+  for (int32_t k = 0; k < frame.num; ++k) {
+    if (frame.points[k] == kNoPoint || again.points[k] == kNoPoint) continue;
+    double x_new[3], x_old[3];
+    transform(frame.cam_from_world, map.points[frame.points[k]].position, x_new);
+    transform(again.cam_from_world, map.points[again.points[k]].position, x_old);
+    if (x_new[2] > 0 && x_old[2] > 0) ratios[num++] = x_old[2] / x_new[2];
+  }
+  if (num < kLeastCommon) return 0;
+  std::nth_element(ratios, ratios + num / 2, ratios + num);
+  return ratios[num / 2];
+}
+
+bool meets(Odometry* odometry, const Frame& frame, int32_t keyframe, Frame* again, LoopEnd* end) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  int32_t* points =
+      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.sizes.max_keypoints));
+  const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
+  int32_t num = 0, num_known = 0;
+  const int32_t mark = ++odometry->mark;
+  for (int32_t k = 0; k < frame.num; ++k) {
+    if (frame.points[k] != kNoPoint) map.points[frame.points[k]].mark = mark;
+  }
+  for (int32_t i = 0; i < map.keyframes[keyframe].num_keypoints; ++i) {
+    if (own[i].point == kNoPoint) continue;
+    num_known += map.points[own[i].point].mark == mark;
+    points[num++] = own[i].point;
+  }
+  if (num < kLeastInliers || 10 * num_known > num) return false;
+  again->has_pose = false;
+  if (match_points(odometry, points, num, 0.87, again) < kLeastMatches) return false;
+  PoseFit fit;
+  if (!fit_pose(odometry, 500, 4.0, again, &fit) ||
+      fit.estimate.num_inliers < kLeastMatches / 2 ||
+      3 * fit.estimate.num_inliers < fit.estimate.num_matches) {
+    return false;
+  }
+  list_local_points(odometry, keyframe);
+  for (int round = 0; round < 2; ++round) {
+    const PointSearch search{odometry->local_points, odometry->num_local_points,
+                             fit.cam_from_world,     round == 0 ? 8.0 : 5.0,
+                             kMaxDistance,           kSearchRatio};
+    find_points(odometry, search, again);
+    again->cam_from_world = fit.cam_from_world;
+    again->has_pose = true;
+    if (!fit_pose(odometry, 50, 3.0, again, &fit)) return false;
+  }
+  again->cam_from_world = fit.cam_from_world;
+  if (fit.estimate.num_inliers < kLeastInliers || fit.estimate.verdict != TV_VERDICT_OK) {
+    return false;
+  }
+  end->keyframe = keyframe;
+  end->cam_from_world = fit.cam_from_world;
+  end->scale = scale_between(odometry, frame, *again);
+  return end->scale > 0 && is_plausible(*odometry, frame, *end);
+}
+
+struct Node {
+  Rigid cam_from_world;
+  double scale;
+};
+
+// The pose of a keyframe between what the loop's beginning says of it and what its end says.
+Node blend(const Rigid& from_begin, const Rigid& from_end, double scale, double share) {
+  Node node;
+  const Rigid turn = scaled_motion(compose(from_end, inverse(from_begin)), share);
+  Rigid rotation = turn;
+  for (double& t : rotation.t) t = 0;
+  double a[3], b[3];
+  centre_of(from_begin, a);
+  centre_of(from_end, b);
+  Rigid world_from_cam = inverse(compose(rotation, from_begin));
+  for (int c = 0; c < 3; ++c) world_from_cam.t[c] = a[c] + share * (b[c] - a[c]);
+  node.cam_from_world = inverse(world_from_cam);
+  node.scale = exp(share * log(scale));
+  return node;
+}
+
+void move_points(Map* map, const Node* nodes) {
+  // A point moves with the keyframe that made it, or the next one that is left.
+  for (int32_t p = 0; p < map->end_points; ++p) {
+    MapPoint& point = map->points[p];
+    if (point.id < 0) continue;
+    int32_t k = 0;
+    while (k + 1 < map->num_keyframes && map->keyframes[k].id < point.made_at) ++k;
+    const Node& node = nodes[k];
+    if (node.scale == 0) continue;  // a keyframe that stays
+    const Rigid world_from_cam = inverse(node.cam_from_world);
+    double x[3], seen[3];
+    const double from[3] = {static_cast<double>(point.seen_from[0]),
+                            static_cast<double>(point.seen_from[1]),
+                            static_cast<double>(point.seen_from[2])};
+    transform(map->keyframes[k].cam_from_world, point.position, x);
+    transform(map->keyframes[k].cam_from_world, from, seen);
+    for (int c = 0; c < 3; ++c) {
+      x[c] *= node.scale;
+      seen[c] *= node.scale;
+    }
+    transform(world_from_cam, x, point.position);
+    transform(world_from_cam, seen, seen);
+    for (int c = 0; c < 3; ++c) point.seen_from[c] = static_cast<float>(seen[c]);
+  }
+}
+
+// The keypoints that see a new point and an old one see the old one from now on, in every keyframe.
+void fuse_points(Odometry* odometry, const Frame& again) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  const size_t room = static_cast<size_t>(map.end_points);
+  int32_t* instead = arena_alloc<int32_t>(odometry->scratch, room);
+  std::fill(instead, instead + room, kNoPoint);
+  const int32_t newest = map.num_keyframes - 1;
+  const MapKeypoint* own = keypoints_of(map, map.keyframes[newest]);
+  for (int32_t i = 0; i < again.num; ++i) {
+    const int32_t old_point = again.points[i], point = own[i].point;
+    if (old_point == kNoPoint || old_point == point) continue;
+    if (point == kNoPoint) observe(&map, newest, i, old_point);
+    else instead[point] = old_point;
+  }
+  for (int32_t k = 0; k < map.num_keyframes; ++k) {
+    MapKeypoint* keypoints = keypoints_of(map, map.keyframes[k]);
+    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
+      const int32_t point = keypoints[i].point;
+      if (point == kNoPoint || instead[point] == kNoPoint) continue;
+      forget_observation(&map, k, i);
+      if (instead[instead[point]] == kNoPoint) observe(&map, k, i, instead[point]);
+    }
+  }
+  uint8_t* is_removed = arena_alloc<uint8_t>(odometry->scratch, room);
+  for (int32_t p = 0; p < map.end_points; ++p) is_removed[p] = instead[p] != kNoPoint;
+  remove_points(&map, is_removed);
+}
+
+}  // namespace
+
+bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end) {
+  const Map& map = odometry->map;
+  const int32_t last = map.num_keyframes - 1 - kLeastKeyframesBetween;
+  bool copied = false, found = false;
+  for (int32_t tried = 0, n = 0; tried < count && n < map.num_keyframes && !found; ++n) {
+    if (odometry->next_loop <= 0 || odometry->next_loop > map.num_keyframes) {
+      odometry->next_loop = map.num_keyframes;
+    }
+    const int32_t k = --odometry->next_loop;
+    if (k > last && map.keyframes[k].segment == odometry->segment) continue;
+    if (!may_meet(*odometry, frame, k)) continue;
+    if (!copied) copy_frame(frame, again);
+    copied = true;
+    ++tried;
+    found = meets(odometry, frame, k, again, end);
+  }
+  if (copied) list_local_points(odometry, find_keyframe(map, odometry->reference_id));
+  return found;
+}
+
+void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  const int32_t newest = map.num_keyframes - 1;
+  const int32_t old_segment = map.keyframes[end.keyframe].segment;
+  const int32_t segment = map.keyframes[newest].segment;
+  Node* nodes =
+      arena_alloc<Node>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  const Rigid now = map.keyframes[newest].cam_from_world;
+  const double whole = std::max(path_between(map, end.keyframe, newest), 1e-12);
+  double path = 0;
+  for (int32_t k = 0; k <= newest; ++k) {
+    const MapKeyframe& keyframe = map.keyframes[k];
+    nodes[k] = {keyframe.cam_from_world, 0};
+    if (k > end.keyframe) path += path_between(map, k - 1, k);
+    if (keyframe.segment != segment) continue;
+    if (segment == old_segment && k <= end.keyframe) continue;
+    // As the loop's end says: the way from the newest keyframe, in the other scale.
+    Rigid relative = compose(keyframe.cam_from_world, inverse(now));
+    for (double& t : relative.t) t *= end.scale;
+    const Rigid from_end = compose(relative, end.cam_from_world);
+    const double share = segment == old_segment ? path / whole : 1;
+    nodes[k] = blend(keyframe.cam_from_world, from_end, end.scale, share);
+  }
+  move_points(&map, nodes);
+  for (int32_t k = 0; k <= newest; ++k) {
+    if (nodes[k].scale == 0) continue;
+    map.keyframes[k].cam_from_world = orthonormalised(nodes[k].cam_from_world);
+    map.keyframes[k].scale *= nodes[k].scale;
+    map.keyframes[k].segment = old_segment;
+  }
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    if (map.points[p].segment == segment) map.points[p].segment = old_segment;
+  }
+  odometry->segment = old_segment;
+  fuse_points(odometry, again);
+}
+
+}  // namespace tv

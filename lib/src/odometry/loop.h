@@ -1,0 +1,26 @@
+// Loops: the camera sees again what it saw long before. The keyframes in between are corrected by
+// what the path drifted in position, attitude and scale, as in the pose chain of G. Dubbelman,
+// B. Browning, "COP-SLAM: closed-form online pose-chain optimization for visual SLAM", 2015; and a
+// segment that meets another one becomes part of it.
+#pragma once
+
+#include "odometry/odometry.h"
+
+namespace tv {
+
+// What the loop's keyframe would be in the frame of coordinates of what it sees again: a point x of
+// its camera is `scale` times as far away there.
+struct LoopEnd {
+  int32_t keyframe;      // the old keyframe that was seen again
+  Rigid cam_from_world;  // of the newest keyframe
+  double scale;
+};
+
+// Looks for the tracked frame in `count` keyframes that do not share its points. True: *end is
+// known, and `again`, with the frame's keypoints, has the old points that they see.
+bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end);
+
+// Corrects the keyframes and points. The newest keyframe has the frame's keypoints.
+void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end);
+
+}  // namespace tv
