@@ -238,12 +238,11 @@ int odometry(Arguments& a) {
   Flight flight(*source, a.flight);
   Session session(common.options);  // says which kernels are used
   session.context(64, 64);
+  const std::atomic<bool>& stop = stop_flag_for_signals();
   OutputSet files(common.output);
   for (const std::string& name : source->files()) files.keep(name);
   files.keep(a.camera);
   files.keep(truth_file);
-
-  const std::atomic<bool>& stop = stop_flag_for_signals();
   const int wanted = num_wanted(*source, a.flight);
   {
     Progress progress(flight, wanted, common.speaks() && stdout_style().bold[0] != '\0');
