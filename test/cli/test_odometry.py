@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Tests of `twoview odometry`: a rendered flight past five walls, whose path is known, through every
-format of a source, and bad input."""
+"""Tests of `twoview odometry`: a rendered flight past five walls, whose path is known, in every format of a
+source, and bad input."""
 import csv
 import json
 import math
@@ -233,7 +233,7 @@ distortion_coefficients: [0, 0, 0, 0]
         euroc = "#timestamp,p x,p y,p z,q w,q x,q y,q z,v\n" + "".join(
             f"{round(t * 1e9)},{0.1 * i},-0.5,7,{math.sqrt(0.5)},0,0,{-math.sqrt(0.5)},0\n"
             for i, t in enumerate(TIMES))
-        # T_BS turns by 90 degrees about z, and the vehicle by -90: the camera looks as in the world.
+        # T_BS turns by 90 degrees about z, the vehicle by -90: the camera looks as in the world.
         kitti = "".join(f"1 0 0 {0.1 * i} 0 1 0 0 0 0 1 0\n" for i in range(COUNT))
         found = []
         for name, text in (("euroc", euroc), ("kitti", kitti), ("tum", TUM_TRUTH)):
@@ -257,6 +257,40 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assertEqual(self.result()["num_frames"], COUNT)
         self.assertLess(self.result()["truth"]["ate_rmse_percent_of_path"], 1)
         self.assertIn("frame_000003.png", (self.out / "frames.csv").read_text())
+
+    def test_a_drone_and_its_recording_are_tracked(self):
+        if self.run_program("drone", "simulate", "--help").returncode != 0:
+            self.skipTest("the program was built without the simulator")
+        pictures = [self.write(f"film/{i:02}.png", data) for i, data in enumerate(PICTURES)]
+        channels = ("at", "navdata", "video", "control", "recording")
+        child = subprocess.Popen(
+            [program(), "drone", "simulate", "--fps", "8", "--duration", "60",
+             *(word for c in channels for word in (f"--{c}-port", "0")), "--images", *pictures],
+            stdout=subprocess.PIPE, text=True)
+        self.addCleanup(child.communicate)
+        self.addCleanup(child.kill)
+        words = child.stdout.readline().replace(",", "").split()
+        ports = [word for option, name in (("at", "commands"), ("navdata",) * 2, ("video",) * 2,
+                                           ("control",) * 2)
+                 for word in (f"--{option}-port", words[words.index(name) + 1])]
+        # The simulator scales the pictures to those of the drone, 640 x 360.
+        camera = ("--camera", self.write("drone.yaml", camera_yaml(
+            640, 360, 2 * FOCAL, 1.5 * FOCAL, 319.5, 179.5)))
+        self.succeed(self.run_program("drone", "record", "--host", "127.0.0.1", *ports,
+                                      "-o", "flown", "--duration", "4"))
+        live = self.odometry("--drone", "127.0.0.1", *ports, *camera, "--duration", "4")
+        results = [self.result()]
+        again = self.odometry("flown", *camera)
+        results.append(self.result())
+        for done, result in zip((live, again), results):
+            self.assertIn(done.returncode, (0, 3), done.stderr.decode())  # the film begins again
+            self.assertGreater(result["num_frames"], 12)
+            self.assertGreater(result["num_tracked"], 8)
+        self.assertGreaterEqual(results[1]["num_located"], 1)
+        self.assert_refused(self.odometry("flown", out="new"), "--camera is required",
+                            out=self.folder / "new")
+        self.assert_refused(self.odometry("flown", "--drone", "127.0.0.1", *camera, out="new"),
+                            "not both", out=self.folder / "new")
 
     # -- what goes wrong ----------------------------------------------------------------------
 
