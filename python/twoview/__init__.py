@@ -4,8 +4,10 @@ The functions have the names of the C API without tv_. Images are read without a
 the interpreter's lock. docs/python.md has an example."""
 
 from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, DISTANCE_PRIOR, GRAVITY_PRIOR, KEYPOINT,
-                   MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT, TV_ERR_ARGUMENT,
-                   TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP, TV_ERR_MEMORY,
+                   MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT,
+                   TV_ERR_ARGUMENT,
+                   TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP,
+                   TV_ERR_MEMORY,
                    TV_ERR_NOT_FINITE, TV_ERR_NULL, TV_ERR_OUTSIDE, TV_ERR_OVERLAP,
                    TV_ERR_STRUCT_SIZE, WINDOW_VIEW, Library, StatusError, default_library)
 from .absolute_pose import AbsolutePose, estimate_absolute_pose

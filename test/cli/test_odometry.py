@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Tests of `twoview odometry`: a rendered flight past five walls, whose path is known, in every format of a
-source, and bad input."""
+"""Tests of `twoview odometry`: a rendered flight past five walls, whose path is known, in every
+format of a source, and bad input."""
 import csv
 import json
 import math
@@ -278,7 +278,8 @@ distortion_coefficients: [0, 0, 0, 0]
             640, 360, 2 * FOCAL, 1.5 * FOCAL, 319.5, 179.5)))
         self.succeed(self.run_program("drone", "record", "--host", "127.0.0.1", *ports,
                                       "-o", "flown", "--duration", "4"))
-        live = self.odometry("--drone", "127.0.0.1", *ports, *camera, "--duration", "4")
+        live = self.run_program("odometry", "--drone", "127.0.0.1", *ports, *camera,
+                                "--duration", "4", "-o", self.out)
         results = [self.result()]
         again = self.odometry("flown", *camera)
         results.append(self.result())

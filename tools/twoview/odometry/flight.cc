@@ -12,10 +12,6 @@
 #include "files/camera_file.h"
 #include "files/image_file.h"
 
-// Until the library has them, map.twm is not written.
-#pragma weak tv_odometry_save
-#pragma weak tv_odometry_save_size
-
 namespace cli {
 namespace {
 
@@ -270,7 +266,7 @@ std::vector<tv_map_point> Flight::points() const {
 }
 
 std::string Flight::map_bytes() const {
-  if (!odometry_ || !tv_odometry_save) return "";
+  if (!odometry_) return "";
   size_t size = 0;
   check(tv_odometry_save_size(odometry_, &size), "the map");
   std::string bytes(size, '\0');

@@ -158,8 +158,7 @@ void make_files(const FlightResult& result, const std::string& name, OutputSet& 
   if (result.keyframes.empty()) return;
   files.add("keyframes.txt", keyframes_text(result));
   files.add("cloud.ply", map_ply(result.points));
-  const std::string map = flight.map_bytes();
-  if (!map.empty()) files.add("map.twm", map);
+  files.add("map.twm", flight.map_bytes());
 }
 
 void make_colmap_files(const FlightResult& result, OutputSet& files) {
