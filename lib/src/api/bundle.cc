@@ -7,6 +7,7 @@
 
 #include "api/sized.h"
 #include "api/validate.h"
+#include "geometry/essential.h"
 #include "robust/bundle.h"
 #include "robust/point_covariance.h"
 

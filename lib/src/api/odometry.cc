@@ -87,6 +87,8 @@ size_t plan_bytes(const Plan& plan) {
          kNumFrames * frame_bytes(plan) + local_points_bytes(plan) + scratch_bytes(plan.options);
 }
 
+}  // namespace
+
 void start_anew(tv_odometry* o) {
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
@@ -101,8 +103,6 @@ void start_anew(tv_odometry* o) {
   o->last_time_s = 0;
 }
 
-}  // namespace
-
 size_t scratch_bytes(const tv_odometry_options& o) {
   const size_t n = static_cast<size_t>(o.max_keypoints);
   const size_t choices = 2 * (arena_bytes<tv_keypoint>(n) +
@@ -110,9 +110,11 @@ size_t scratch_bytes(const tv_odometry_options& o) {
                               arena_bytes<int32_t>(n)) +
                          arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) +
                          arena_bytes<tv_point>(n) + arena_bytes<uint8_t>(3 * n * 128);
-  return std::max(choices, arena_bytes<double>(40 * n) + adjust_bytes(o)) +
-         arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
-         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));
+  const size_t points = static_cast<size_t>(o.max_points);
+  const size_t tracking = std::max(choices, arena_bytes<double>(40 * n) + adjust_bytes(o)) +
+                          arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
+                          arena_bytes<uint8_t>(points);
+  return std::max(tracking, 2 * arena_bytes<int32_t>(points));  // for rank_points
 }
 
 }  // namespace tv
@@ -175,7 +177,7 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   o->camera = tv::prepare_camera(plan.camera);
   tv_feature_options_init(&o->features);
   o->features.max_keypoints = plan.options.max_keypoints;
-  o->features.arc=(int)T(20,9); o->features.levels=(int)T(21,4); o->features.scale_factor=(float)T(22,1.41); o->features.threshold=(int)T(23,15); o->features.cell_px=(int)T(24,32);o->features.keypoint_size=(float)T(25,4);
+  o->features.arc=(int)T(20,9); o->features.levels=(int)T(21,4); o->features.min_threshold=(int)T(26,3); o->features.scale_factor=(float)T(22,1.41); o->features.threshold=(int)T(23,15); o->features.cell_px=(int)T(24,32);o->features.keypoint_size=(float)T(25,4);
   o->grid_columns = plan.columns;
   o->grid_rows = plan.rows;
   tv::make_map(plan.sizes, arena, &o->map);
@@ -204,7 +206,14 @@ tv_status check_odometry_image(const tv_odometry& odometry, const tv_image& imag
   if (image.data == nullptr) return TV_ERR_NULL;
   const tv_camera& camera = odometry.camera.model;
   if (image.width != camera.width || image.height != camera.height) return TV_ERR_CAMERA;
-  return image.stride_bytes >= image.width ? TV_OK : TV_ERR_ARGUMENT;
+  return image.stride_bytes >= image.width && image.stride_bytes <= INT64_MAX / 65536
+             ? TV_OK
+             : TV_ERR_ARGUMENT;
+}
+
+bool overlaps_image(const tv_odometry_state& state, const tv_image& image) {
+  const int64_t bytes = (image.height - 1) * image.stride_bytes + image.width;
+  return overlap(&state, state.struct_size, image.data, static_cast<size_t>(bytes));
 }
 
 }  // namespace
@@ -221,6 +230,10 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
   if (!tv::is_finite(input.time_s)) return TV_ERR_NOT_FINITE;
   if (!tv::within(input.gap, 0, 1)) return TV_ERR_ARGUMENT;
   if (odometry->num_frames > 0 && !(input.time_s > odometry->last_time_s)) return TV_ERR_ARGUMENT;
+  if (tv::overlap(state, state->struct_size, frame, frame->struct_size) ||
+      tv::overlaps_image(*state, input.image)) {
+    return TV_ERR_OVERLAP;
+  }
   tv_odometry_state packed{};
   tv::track_frame(odometry, input, &packed);
   tv::write_sized(packed, state);
@@ -233,6 +246,10 @@ tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, int32
   tv_status status = tv::check_sized(state);
   if (status == TV_OK) status = tv::check_odometry_image(*odometry, *image);
   if (status != TV_OK) return status;
+  if (tv::overlap(state, state->struct_size, image, sizeof *image) ||
+      tv::overlaps_image(*state, *image)) {
+    return TV_ERR_OVERLAP;
+  }
   tv_odometry_state packed{};
   tv::locate_frame(odometry, *image, near_id, &packed);
   tv::write_sized(packed, state);
@@ -247,6 +264,12 @@ tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
       R == nullptr || t == nullptr) {
     return TV_ERR_NULL;
   }
+  const tv::Bytes arrays[5] = {{R, 72},
+                               {t, 24},
+                               {segment, segment != nullptr ? sizeof *segment : 0},
+                               {reference_from_cam_R, 72},
+                               {reference_from_cam_t, 24}};
+  if (tv::outputs_overlap(arrays, 3, 5)) return TV_ERR_OVERLAP;
   tv::Rigid pose;
   std::copy_n(reference_from_cam_R, 9, pose.R);
   std::copy_n(reference_from_cam_t, 3, pose.t);
@@ -269,74 +292,5 @@ tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
   std::copy_n(pose.R, 9, R);
   std::copy_n(pose.t, 3, t);
   if (segment != nullptr) *segment = map.keyframes[k].segment;
-  return TV_OK;
-}
-
-tv_status tv_odometry_keyframe(const tv_odometry* odometry, int32_t idx, tv_keyframe* keyframe) {
-  if (odometry == nullptr || keyframe == nullptr) return TV_ERR_NULL;
-  const tv_status status = tv::check_sized(keyframe);
-  if (status != TV_OK) return status;
-  if (!tv::within(idx, 0, odometry->map.num_keyframes - 1)) return TV_ERR_ARGUMENT;
-  const tv::MapKeyframe& k = odometry->map.keyframes[idx];
-  const tv::Rigid world_from_cam = tv::inverse(k.cam_from_world);
-  tv_keyframe packed{};
-  packed.id = k.id;
-  packed.segment = k.segment;
-  packed.frame = k.frame;
-  packed.time_s = k.time_s;
-  std::copy_n(world_from_cam.R, 9, packed.world_from_cam_R);
-  std::copy_n(world_from_cam.t, 3, packed.world_from_cam_t);
-  packed.num_keypoints = k.num_keypoints;
-  packed.num_observations = k.num_observations;
-  packed.has_covariance = k.has_covariance;
-  std::copy_n(k.covariance, 36, packed.covariance);
-  tv::write_sized(packed, keyframe);
-  return TV_OK;
-}
-
-tv_status tv_odometry_points(const tv_odometry* odometry, tv_map_point* points, int32_t cap_points,
-                             int32_t* num_points) {
-  if (odometry == nullptr || num_points == nullptr || (points == nullptr && cap_points > 0)) {
-    return TV_ERR_NULL;
-  }
-  if (cap_points < 0) return TV_ERR_ARGUMENT;
-  const tv::Map& map = odometry->map;
-  *num_points = map.num_points;
-  if (map.num_points > cap_points) return TV_ERR_CAPACITY;
-  int32_t n = 0;
-  for (int32_t p = 0; p < map.end_points; ++p) {
-    const tv::MapPoint& point = map.points[p];
-    if (point.id < 0) continue;
-    tv_map_point* out = &points[n++];
-    *out = tv_map_point{};
-    out->id = point.id;
-    out->segment = point.segment;
-    out->num_observations = point.num_observations;
-    out->grey = point.grey;
-    std::copy_n(point.position, 3, out->position);
-  }
-  return TV_OK;
-}
-
-tv_status tv_odometry_observations(const tv_odometry* odometry, int32_t idx,
-                                   tv_map_observation* observations, int32_t cap_observations,
-                                   int32_t* num_observations) {
-  if (odometry == nullptr || num_observations == nullptr ||
-      (observations == nullptr && cap_observations > 0)) {
-    return TV_ERR_NULL;
-  }
-  const tv::Map& map = odometry->map;
-  if (cap_observations < 0 || !tv::within(idx, 0, map.num_keyframes - 1)) return TV_ERR_ARGUMENT;
-  const tv::MapKeyframe& keyframe = map.keyframes[idx];
-  *num_observations = keyframe.num_observations;
-  if (keyframe.num_observations > cap_observations) return TV_ERR_CAPACITY;
-  const tv::MapKeypoint* own = tv::keypoints_of(map, keyframe);
-  int32_t n = 0;
-  for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
-    if (own[k].point == tv::kNoPoint) continue;
-    int32_t rank = 0;
-    for (int32_t p = 0; p < own[k].point; ++p) rank += map.points[p].id >= 0;
-    observations[n++] = {rank, k, own[k].x, own[k].y, own[k].size / 4.0f, 0};
-  }
   return TV_OK;
 }

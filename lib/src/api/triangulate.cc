@@ -7,6 +7,7 @@
 
 #include "api/enum_value.h"
 #include "api/validate.h"
+#include "geometry/essential.h"
 #include "geometry/triangulation.h"
 
 namespace {

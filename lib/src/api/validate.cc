@@ -15,7 +15,6 @@ bool is_stride(int64_t stride_bytes, int32_t width) {
 
 constexpr int32_t kAutoKeypoints = 2048;
 constexpr float kMaxCoordinate = 1e5f;
-constexpr double kRotationTolerance = 1e-6;
 
 }  // namespace
 
@@ -127,20 +126,6 @@ tv_status check_gravity(const double gravity0[3], const double gravity1[3], doub
     zero = zero || (g[0] == 0 && g[1] == 0 && g[2] == 0);
   }
   return sigma_rad > 0 && sigma_rad <= kPi && !zero ? TV_OK : TV_ERR_ARGUMENT;
-}
-
-bool is_rotation(const double R[9]) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i; j < 3; ++j) {
-      const double* a = R + 3 * i;
-      const double* b = R + 3 * j;
-      const double product = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-      if (!(std::fabs(product - (i == j ? 1.0 : 0.0)) <= kRotationTolerance)) return false;
-    }
-  }
-  const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
-                     R[2] * (R[3] * R[7] - R[4] * R[6]);
-  return det > 0.0;
 }
 
 }  // namespace tv

@@ -47,9 +47,6 @@ tv_status check_keypoints(const tv_keypoint* keypoints, int32_t count);
 // deviation of at most pi.
 tv_status check_gravity(const double gravity0[3], const double gravity1[3], double sigma_rad);
 
-// Whether every entry of R R' is within 1e-6 of that of I, and det R > 0.
-bool is_rotation(const double R[9]);
-
 // Whether two arrays share a byte. An array of no bytes shares none.
 inline bool overlap(const void* a, size_t a_bytes, const void* b, size_t b_bytes) {
   const uintptr_t a0 = reinterpret_cast<uintptr_t>(a), b0 = reinterpret_cast<uintptr_t>(b);

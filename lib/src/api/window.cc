@@ -7,6 +7,7 @@
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
+#include "geometry/essential.h"
 #include "odometry/window.h"
 
 namespace tv {

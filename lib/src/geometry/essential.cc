@@ -5,6 +5,11 @@
 #include "base/math.h"
 
 namespace tv {
+namespace {
+
+constexpr double kRotationTolerance = 1e-6;
+
+}  // namespace
 
 Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
@@ -33,6 +38,20 @@ Mat3 orthonormalised(const Mat3& R) {
   result.row(1) = y.transpose();
   result.row(2) = x.cross(y).transpose();
   return result;
+}
+
+bool is_rotation(const double R[9]) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) {
+      const double* a = R + 3 * i;
+      const double* b = R + 3 * j;
+      const double product = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+      if (!(std::fabs(product - (i == j ? 1.0 : 0.0)) <= kRotationTolerance)) return false;
+    }
+  }
+  const double det = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6]) +
+                     R[2] * (R[3] * R[7] - R[4] * R[6]);
+  return det > 0.0;
 }
 
 void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2) {

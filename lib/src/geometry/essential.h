@@ -21,6 +21,9 @@ Mat3 rotation_step(const Vec3& w);
 // rotations accumulate.
 Mat3 orthonormalised(const Mat3& R);
 
+// Whether every entry of R R' is within 1e-6 of that of I, and det R > 0.
+bool is_rotation(const double R[9]);
+
 // Two unit vectors perpendicular to the unit vector t and to each other: b1 = normalise(e_k x t), k
 // the index of the smallest |t_k| (the lowest on a tie), and b2 = t x b1.
 void tangent_basis(const Vec3& t, Vec3* b1, Vec3* b2);

@@ -42,40 +42,18 @@ double error_of(const Odometry& odometry, const MapKeyframe& keyframe, const Map
   return std::sqrt(dx * dx + dy * dy);
 }
 
-struct Chosen {
-  tv_features features;
-  tv_keypoint* keypoints;
-  uint8_t* descriptors;
-  int32_t* indices;
-};
-
-Chosen make_chosen(Arena& arena, int32_t room) {
-  const size_t n = static_cast<size_t>(room);
-  Chosen chosen;
-  tv_features_init(&chosen.features);
-  chosen.keypoints = arena_alloc<tv_keypoint>(arena, n);
-  chosen.descriptors = arena_alloc<uint8_t>(arena, n * TV_DESCRIPTOR_BYTES);
-  chosen.indices = arena_alloc<int32_t>(arena, n);
-  chosen.features.keypoints = chosen.keypoints;
-  chosen.features.descriptors = chosen.descriptors;
-  return chosen;
-}
-
-// Chooses the keypoints without a point, or, with made_at, also those whose point that keyframe
-// made.
-void choose(const Map& map, const MapKeyframe& keyframe, int32_t made_at, Chosen* chosen) {
+// All keypoints of a keyframe that has its descriptors.
+tv_features features_of(const Map& map, const MapKeyframe& keyframe, tv_keypoint* keypoints) {
   const MapKeypoint* own = keypoints_of(map, keyframe);
-  const uint8_t* descriptors = descriptors_of(map, keyframe);
-  chosen->features.num = 0;
   for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
-    const int32_t point = own[k].point;
-    if (point != kNoPoint && (made_at < 0 || map.points[point].made_at != made_at)) continue;
-    const int32_t n = chosen->features.num++;
-    chosen->keypoints[n] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
-    std::copy_n(descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES, TV_DESCRIPTOR_BYTES,
-                chosen->descriptors + static_cast<size_t>(n) * TV_DESCRIPTOR_BYTES);
-    chosen->indices[n] = k;
+    keypoints[k] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
   }
+  tv_features features;
+  tv_features_init(&features);
+  features.num = keyframe.num_keypoints;
+  features.keypoints = keypoints;
+  features.descriptors = descriptors_of(map, keyframe);
+  return features;
 }
 
 }  // namespace
@@ -92,7 +70,7 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
     const int32_t point = frame.points[k];
     if (point == kNoPoint) continue;
     observe(&map, idx, k, point);
-    std::copy_n(frame.descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES,
+    if (frame.distances[k] < T(29, 1e9)) std::copy_n(frame.descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES,
                 TV_DESCRIPTOR_BYTES, descriptor_of(map, point));
   }
   return idx;
@@ -133,7 +111,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     const MapKeypoint& b = own1[keypoints1[k]];
     if (a.point != kNoPoint || b.point != kNoPoint) continue;
     const double sigma = std::sqrt(0.5 * (sigma_of(a) * sigma_of(a) + sigma_of(b) * sigma_of(b)));
-    if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad ||
+    if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad * (T(28, 1) > 0 ? sigma : 1) ||
         static_cast<double>(p.error_px) > kLargestError * sigma) {
       continue;
     }
@@ -167,10 +145,12 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   Map& map = odometry->map;
   const MapKeyframe& own = map.keyframes[keyframe];
   const int32_t room = map.sizes.max_keypoints;
-  Chosen mine = make_chosen(arena, room), theirs = make_chosen(arena, room);
-  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, static_cast<size_t>(room));
-  int32_t* keypoints0 = arena_alloc<int32_t>(arena, static_cast<size_t>(room));
-  int32_t* keypoints1 = arena_alloc<int32_t>(arena, static_cast<size_t>(room));
+  const size_t n = static_cast<size_t>(room);
+  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, n);
+  int32_t* keypoints0 = arena_alloc<int32_t>(arena, n);
+  int32_t* keypoints1 = arena_alloc<int32_t>(arena, n);
+  const tv_features mine = features_of(map, own, arena_alloc<tv_keypoint>(arena, n));
+  tv_keypoint* their_room = arena_alloc<tv_keypoint>(arena, n);
   double centre[3];
   centre_of(own.cam_from_world, centre);
   int32_t num_neighbours = 0;
@@ -180,42 +160,35 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     double there[3];
     centre_of(other.cam_from_world, there);
     if (distance_between(centre, there) < kLeastBaseline * odometry->median_depth) continue;
-    const Rigid relative =
-        orthonormalised(compose(own.cam_from_world, inverse(other.cam_from_world)));
-    if (rotation_angle(relative) > 1.0) continue;
+    if (rotation_angle(compose(own.cam_from_world, inverse(other.cam_from_world))) > 1.0) continue;
     ++num_neighbours;
-    choose(map, own, own.id, &mine);
-    choose(map, other, -1, &theirs);
-    const double t[3] = {relative.t[0], relative.t[1], relative.t[2]};
-    const double length = std::sqrt(dot(t, t));
-    const double u[3] = {t[0] / length, t[1] / length, t[2] / length};
-    double E[9];
-    for (int c = 0; c < 3; ++c) {  // [u]x R
-      E[c] = u[1] * relative.R[6 + c] - u[2] * relative.R[3 + c];
-      E[3 + c] = u[2] * relative.R[c] - u[0] * relative.R[6 + c];
-      E[6 + c] = u[0] * relative.R[3 + c] - u[1] * relative.R[c];
-    }
-    tv_guided_options guided;
-    tv_guided_options_init(&guided);
-    guided.max_error_px = static_cast<float>(T(17,4.0)); guided.ratio = static_cast<float>(T(18,0.87));
+    const tv_features theirs = features_of(map, other, their_room);
+    tv_match_options options;
+    tv_match_options_init(&options);
+    options.ratio = static_cast<float>(T(18, 0.92));
     int32_t num_found = 0;
-    if (tv_match_guided(odometry->context, &odometry->camera.model, &odometry->camera.model, E,
-                        &theirs.features, &mine.features, &guided, found, room,
-                        &num_found) != TV_OK) {
+    if (tv_match(odometry->context, &theirs, &mine, &options, found, room, &num_found) != TV_OK) {
       continue;
     }
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
     const MapKeypoint* their_keypoints = keypoints_of(map, other);
     int32_t num = 0;
     for (int32_t i = 0; i < num_found; ++i) {
-      const int32_t a = theirs.indices[found[i].idx0], b = mine.indices[found[i].idx1];
-      const int32_t point = my_keypoints[b].point;
-      if (point == kNoPoint) {
+      const int32_t a = found[i].idx0, b = found[i].idx1;
+      const int32_t theirs_point = their_keypoints[a].point, point = my_keypoints[b].point;
+      if (point == kNoPoint && theirs_point == kNoPoint) {
         keypoints0[num] = a;
         keypoints1[num++] = b;
-      } else if (error_of(*odometry, other, their_keypoints[a], map.points[point].position) <=
-                 kLargestError * sigma_of(their_keypoints[a])) {
-        observe(&map, k, a, point);
+      } else if (theirs_point == kNoPoint) {
+        if (error_of(*odometry, other, their_keypoints[a], map.points[point].position) <=
+            kLargestError * sigma_of(their_keypoints[a])) {
+          observe(&map, k, a, point);
+        }
+      } else if (point == kNoPoint) {
+        if (error_of(*odometry, own, my_keypoints[b], map.points[theirs_point].position) <=
+            kLargestError * sigma_of(my_keypoints[b])) {
+          observe(&map, keyframe, b, theirs_point);
+        }
       }
     }
     triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num, kLeastAngle, image);

@@ -122,6 +122,19 @@ void forget_observation(Map* map, int32_t keyframe, int32_t keypoint) {
   own->point = kNoPoint;
 }
 
+void rank_points(const Map& map, int32_t* places, int32_t* ranks) {
+  int32_t num = 0;
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    if (map.points[p].id >= 0) places[num++] = p;
+  }
+  const auto is_older = [&map](int32_t a, int32_t b) {
+    return map.points[a].id < map.points[b].id;
+  };
+  std::make_heap(places, places + num, is_older);
+  std::sort_heap(places, places + num, is_older);
+  for (int32_t n = 0; n < num; ++n) ranks[places[n]] = n;
+}
+
 void remove_points(Map* map, const uint8_t* is_removed) {
   for (int32_t k = 0; k < map->num_keyframes; ++k) {
     MapKeypoint* own = keypoints_of(*map, map->keyframes[k]);

@@ -110,6 +110,10 @@ int32_t add_point(Map* map, const double position[3], const uint8_t* descriptor,
 void observe(Map* map, int32_t keyframe, int32_t keypoint, int32_t point);
 void forget_observation(Map* map, int32_t keyframe, int32_t keypoint);
 
+// Writes the places of the points in the order of their ids, and for each place in use the rank of
+// its point in that order. Both arrays have room for end_points.
+void rank_points(const Map& map, int32_t* places, int32_t* ranks);
+
 // Removes a point from the map and from the keyframes that see it.
 void remove_points(Map* map, const uint8_t* is_removed);
 

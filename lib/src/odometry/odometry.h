@@ -62,6 +62,9 @@ namespace tv {
 
 using Odometry = tv_odometry;
 
+// Forgets the map and every frame.
+void start_anew(Odometry* odometry);
+
 // How many bytes of scratch the stages take.
 size_t scratch_bytes(const tv_odometry_options& options);
 

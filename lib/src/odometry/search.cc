@@ -10,7 +10,9 @@
 namespace tv {
 namespace {
 
-constexpr int32_t kMostCandidates = 64;
+constexpr int32_t kMostCandidates = 400;
+// The keypoints within this radius in pixels are compared: a match is the nearest of them all.
+constexpr double kComparedRadius = 40.0;
 constexpr float kSameCornerSq = 16.0f;  // px^2: nearer keypoints are of the same corner
 constexpr double kLargestDepthError = 40.0;  // px
 
@@ -89,7 +91,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
     const double radius =
         search.radius_px + 2 * depth_error_px(*odometry, point, search.cam_from_world, x[2]);
     const float px = static_cast<float>(pixel.x()), py = static_cast<float>(pixel.y());
-    const float reach = static_cast<float>(radius);
+    const float near_sq = static_cast<float>(radius * radius);
+    const float reach = static_cast<float>(std::max(radius, T(27, kComparedRadius)));
     const int32_t x0 = clamped_cell(px - reach, columns), x1 = clamped_cell(px + reach, columns);
     const int32_t y0 = clamped_cell(py - reach, odometry->grid_rows);
     const int32_t y1 = clamped_cell(py + reach, odometry->grid_rows);
@@ -112,6 +115,9 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
     }
     if (distances[best] > most_sq) continue;
     const int32_t keypoint = candidates[best];
+    const float near_x = frame->keypoints[keypoint].x - px;
+    const float near_y = frame->keypoints[keypoint].y - py;
+    if (near_x * near_x + near_y * near_y > near_sq) continue;
     int32_t second_sq = TVK_NEAREST_NONE;
     for (int32_t n = 0; n < num; ++n) {
       const tv_keypoint& other = frame->keypoints[candidates[n]];

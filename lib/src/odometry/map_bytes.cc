@@ -1,0 +1,358 @@
+#include "odometry/map_bytes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "base/math.h"
+#include "geometry/essential.h"
+
+namespace tv {
+namespace {
+
+constexpr uint8_t kMagic[8] = {'T', 'V', 'M', 'A', 'P', '\r', '\n', 0x1a};
+constexpr uint32_t kVersion = 1;
+constexpr bool kLittleEndian = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
+constexpr size_t kUnchecked = 16;  // the checksum is that of the bytes from here on
+// Ranges in which nothing that is computed from the numbers overflows.
+constexpr double kLargest = 1e15;
+constexpr int32_t kMost = 1 << 30;
+constexpr float kLargestPixel = 1e5f, kLargestSize = 4096;
+
+// CRC-32 as of PNG and zlib, four bits at a time.
+constexpr uint32_t kRemainders[16] = {
+    0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
+    0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
+
+uint32_t checksum(const uint8_t* bytes, size_t num) {
+  uint32_t crc = ~0u;
+  for (size_t k = 0; k < num; ++k) {
+    crc ^= bytes[k];
+    crc = (crc >> 4) ^ kRemainders[crc & 15];
+    crc = (crc >> 4) ^ kRemainders[crc & 15];
+  }
+  return ~crc;
+}
+
+// Numbers go from the map to `to`, or from `from` to the map. Each pass_ function lists the numbers
+// of a struct once for both directions; with neither array they are only counted.
+struct Stream {
+  uint8_t* to;
+  const uint8_t* from;
+  size_t at;
+  size_t end;   // of `from`
+  bool is_cut;  // `from` had too few bytes: the numbers are 0
+};
+
+void pass_numbers(Stream* s, void* numbers, size_t width, size_t bytes) {
+  uint8_t* own = static_cast<uint8_t*>(numbers);
+  if (s->from != nullptr && bytes > s->end - s->at) {
+    s->is_cut = true;
+    std::memset(own, 0, bytes);
+    return;
+  }
+  for (size_t k = 0; k < bytes; ++k) {
+    const size_t within = k % width;
+    uint8_t* byte = own + (kLittleEndian ? k : k - within + width - 1 - within);
+    if (s->to != nullptr) s->to[s->at + k] = *byte;
+    if (s->from != nullptr) *byte = s->from[s->at + k];
+  }
+  s->at += bytes;
+}
+
+template <typename Number>
+void pass(Stream* s, Number* number) {
+  pass_numbers(s, number, sizeof *number, sizeof *number);
+}
+
+template <typename Number, size_t kNum>
+void pass(Stream* s, Number (*numbers)[kNum]) {
+  pass_numbers(s, numbers, sizeof(Number), sizeof *numbers);
+}
+
+struct Header {
+  uint8_t magic[8];
+  uint32_t version, checksum;
+  uint64_t num_bytes;
+  tv_camera camera;
+  int32_t num_points, num_keyframes, num_removed;
+  int32_t next_point_id, next_keyframe_id;
+  int32_t num_frames, num_segments, num_relocations, num_loops;
+};
+
+void pass_header(Stream* s, Header* h) {
+  pass(s, &h->magic);
+  pass(s, &h->version);
+  pass(s, &h->checksum);
+  pass(s, &h->num_bytes);
+  pass(s, &h->camera.model);
+  pass(s, &h->camera.width);
+  pass(s, &h->camera.height);
+  pass(s, &h->camera.reserved);
+  pass(s, &h->camera.fx);
+  pass(s, &h->camera.fy);
+  pass(s, &h->camera.cx);
+  pass(s, &h->camera.cy);
+  pass(s, &h->camera.k);
+  pass(s, &h->num_points);
+  pass(s, &h->num_keyframes);
+  pass(s, &h->num_removed);
+  pass(s, &h->next_point_id);
+  pass(s, &h->next_keyframe_id);
+  pass(s, &h->num_frames);
+  pass(s, &h->num_segments);
+  pass(s, &h->num_relocations);
+  pass(s, &h->num_loops);
+}
+
+void pass_point(Stream* s, MapPoint* p, uint8_t (*descriptor)[TV_DESCRIPTOR_BYTES]) {
+  pass(s, &p->position);
+  pass(s, &p->id);
+  pass(s, &p->segment);
+  pass(s, &p->num_visible);
+  pass(s, &p->num_found);
+  pass(s, &p->made_at);
+  pass(s, &p->grey);
+  pass(s, &p->depth_sigma);
+  pass(s, &p->seen_from);
+  pass(s, descriptor);
+}
+
+void pass_pose(Stream* s, Rigid* pose) {
+  pass(s, &pose->R);
+  pass(s, &pose->t);
+}
+
+void pass_keyframe(Stream* s, MapKeyframe* k) {
+  pass(s, &k->id);
+  pass(s, &k->segment);
+  pass(s, &k->frame);
+  pass(s, &k->num_keypoints);
+  pass(s, &k->has_covariance);
+  pass(s, &k->time_s);
+  pass_pose(s, &k->cam_from_world);
+  pass(s, &k->down);
+  pass(s, &k->down_sigma_rad);
+  pass(s, &k->height_m);
+  pass(s, &k->height_sigma_m);
+  pass(s, &k->travel_m);
+  pass(s, &k->travel_sigma_m);
+  pass(s, &k->scale);
+  pass(s, &k->covariance);
+}
+
+void pass_keypoint(Stream* s, MapKeypoint* k) {
+  pass(s, &k->x);
+  pass(s, &k->y);
+  pass(s, &k->size);
+  pass(s, &k->point);
+}
+
+void pass_removed(Stream* s, RemovedKeyframe* r) {
+  pass(s, &r->id);
+  pass(s, &r->kept_id);
+  pass_pose(s, &r->kept_from_removed);
+  pass(s, &r->scale);
+}
+
+bool is_count(int32_t n) { return n >= 0 && n <= kMost; }
+bool is_index(int32_t n, int32_t end) { return n >= 0 && n < end; }
+bool is_length(double x) { return std::fabs(x) <= kLargest; }
+bool is_sigma(double x) { return x >= 0 && x <= kLargest; }
+bool is_scale(double x) { return x >= 1 / kLargest && x <= kLargest; }
+
+template <typename Number>
+bool are_lengths(const Number (&x)[3]) {
+  return is_length(x[0]) && is_length(x[1]) && is_length(x[2]);
+}
+
+bool is_pose(const Rigid& pose) { return is_rotation(pose.R) && are_lengths(pose.t); }
+
+bool is_header(const Header& h) {
+  return is_count(h.num_points) && is_count(h.num_keyframes) && is_count(h.num_removed) &&
+         is_count(h.next_point_id) && is_count(h.next_keyframe_id) && is_count(h.num_frames) &&
+         is_count(h.num_segments) && is_count(h.num_relocations) && is_count(h.num_loops) &&
+         tv_camera_check(&h.camera) == TV_OK;
+}
+
+bool is_point(const Header& h, const MapPoint& p) {
+  return is_index(p.id, h.next_point_id) && is_index(p.segment, h.num_segments) &&
+         is_count(p.num_visible) && is_count(p.num_found) &&
+         is_index(p.made_at, h.next_keyframe_id) && is_index(p.grey, 256) &&
+         are_lengths(p.position) && is_sigma(static_cast<double>(p.depth_sigma)) &&
+         are_lengths(p.seen_from);
+}
+
+bool is_keyframe(const Header& h, const MapKeyframe& k) {
+  return is_index(k.id, h.next_keyframe_id) && is_index(k.segment, h.num_segments) &&
+         is_index(k.frame, h.num_frames) && is_count(k.num_keypoints) &&
+         is_index(k.has_covariance, 2) && is_finite(k.time_s) && is_pose(k.cam_from_world) &&
+         are_lengths(k.down) && is_sigma(k.down_sigma_rad) && is_length(k.height_m) &&
+         is_sigma(k.height_sigma_m) && is_length(k.travel_m) && is_sigma(k.travel_sigma_m) &&
+         is_scale(k.scale) && all_finite(k.covariance, 36);
+}
+
+bool is_keypoint(const Header& h, const MapKeypoint& k) {
+  return std::fabs(k.x) <= kLargestPixel && std::fabs(k.y) <= kLargestPixel && k.size > 0 &&
+         k.size <= kLargestSize && (k.point == kNoPoint || is_index(k.point, h.num_points));
+}
+
+bool is_removed(const Header& h, const RemovedKeyframe& r) {
+  return is_index(r.id, h.next_keyframe_id) && is_index(r.kept_id, h.next_keyframe_id) &&
+         r.id != r.kept_id && is_pose(r.kept_from_removed) && is_scale(r.scale);
+}
+
+// The camera without the coefficients that its model ignores.
+tv_camera camera_of(const Odometry& odometry) {
+  tv_camera camera = odometry.camera.model;
+  if (camera.model == TV_CAMERA_PINHOLE) std::fill_n(camera.k, 8, 0.0);
+  return camera;
+}
+
+// Reads what follows the header, and stores it unless `map` is null. False: it is no map. *fits:
+// whether no count is above those of `sizes`.
+bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool* fits) {
+  *fits = h.num_points <= sizes.max_points && h.num_keyframes <= sizes.max_keyframes &&
+          h.num_removed <= max_removed(sizes);
+  int32_t last_id = -1;
+  for (int32_t n = 0; n < h.num_points; ++n) {
+    MapPoint point{};
+    uint8_t descriptor[TV_DESCRIPTOR_BYTES];
+    pass_point(s, &point, &descriptor);
+    if (s->is_cut || !is_point(h, point) || point.id <= last_id) return false;
+    last_id = point.id;
+    if (map == nullptr) continue;
+    map->points[n] = point;
+    std::memcpy(descriptor_of(*map, n), descriptor, sizeof descriptor);
+    map->num_points = map->end_points = n + 1;
+  }
+  last_id = -1;
+  for (int32_t n = 0; n < h.num_keyframes; ++n) {
+    MapKeyframe keyframe{};
+    pass_keyframe(s, &keyframe);
+    if (s->is_cut || !is_keyframe(h, keyframe) || keyframe.id <= last_id) return false;
+    last_id = keyframe.id;
+    *fits = *fits && keyframe.num_keypoints <= sizes.max_keypoints;
+    MapKeypoint* own = nullptr;
+    if (map != nullptr) {
+      keyframe.room = map->free_rooms[--map->num_free_rooms];
+      keyframe.described = -1;
+      map->keyframes[n] = keyframe;
+      map->num_keyframes = n + 1;
+      own = keypoints_of(*map, keyframe);
+    }
+    for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
+      MapKeypoint keypoint;
+      pass_keypoint(s, &keypoint);
+      if (s->is_cut || !is_keypoint(h, keypoint)) return false;
+      if (map == nullptr) continue;
+      own[k] = keypoint;
+      if (keypoint.point != kNoPoint) observe(map, n, k, keypoint.point);
+    }
+  }
+  last_id = -1;
+  for (int32_t n = 0; n < h.num_removed; ++n) {
+    RemovedKeyframe removed;
+    pass_removed(s, &removed);
+    if (s->is_cut || !is_removed(h, removed) || removed.id <= last_id) return false;
+    last_id = removed.id;
+    if (map == nullptr) continue;
+    map->removed[n] = removed;
+    map->num_removed = n + 1;
+  }
+  return s->at == s->end;
+}
+
+}  // namespace
+
+size_t write_map(const Odometry& odometry, uint8_t* to) {
+  const Map& map = odometry.map;
+  Arena scratch = odometry.scratch;
+  const size_t room = static_cast<size_t>(map.end_points);
+  int32_t* places = arena_alloc<int32_t>(scratch, room);
+  int32_t* ranks = arena_alloc<int32_t>(scratch, room);
+  rank_points(map, places, ranks);
+  Header h{};
+  std::memcpy(h.magic, kMagic, sizeof kMagic);
+  h.version = kVersion;
+  h.camera = camera_of(odometry);
+  h.num_points = map.num_points;
+  h.num_keyframes = map.num_keyframes;
+  h.num_removed = map.num_removed;
+  h.next_point_id = map.next_point_id;
+  h.next_keyframe_id = map.next_keyframe_id;
+  h.num_frames = odometry.num_frames;
+  h.num_segments = odometry.num_segments;
+  h.num_relocations = odometry.num_relocations;
+  h.num_loops = odometry.num_loops;
+  Stream s{to, nullptr, 0, 0, false};
+  pass_header(&s, &h);
+  for (int32_t n = 0; n < map.num_points; ++n) {
+    MapPoint point = map.points[places[n]];
+    uint8_t descriptor[TV_DESCRIPTOR_BYTES];
+    std::memcpy(descriptor, descriptor_of(map, places[n]), sizeof descriptor);
+    pass_point(&s, &point, &descriptor);
+  }
+  for (int32_t n = 0; n < map.num_keyframes; ++n) {
+    MapKeyframe keyframe = map.keyframes[n];
+    const MapKeypoint* own = keypoints_of(map, keyframe);
+    pass_keyframe(&s, &keyframe);
+    for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
+      MapKeypoint keypoint = own[k];
+      if (keypoint.point != kNoPoint) keypoint.point = ranks[keypoint.point];
+      pass_keypoint(&s, &keypoint);
+    }
+  }
+  for (int32_t n = 0; n < map.num_removed; ++n) {
+    RemovedKeyframe removed = map.removed[n];
+    pass_removed(&s, &removed);
+  }
+  const size_t num_bytes = s.at;
+  if (to != nullptr) {  // the header again, now that what it tells is known
+    h.num_bytes = num_bytes;
+    s.at = 0;
+    pass_header(&s, &h);
+    h.checksum = checksum(to + kUnchecked, num_bytes - kUnchecked);
+    s.at = 0;
+    pass_header(&s, &h);
+  }
+  return num_bytes;
+}
+
+tv_status read_map(const uint8_t* bytes, size_t num_bytes, Odometry* odometry) {
+  const MapSizes& sizes = odometry->map.sizes;
+  Header h;
+  Stream s{nullptr, bytes, 0, num_bytes, false};
+  pass_header(&s, &h);
+  if (s.is_cut || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version != kVersion ||
+      h.num_bytes != num_bytes ||
+      h.checksum != checksum(bytes + kUnchecked, num_bytes - kUnchecked) || !is_header(h)) {
+    return TV_ERR_MAP;
+  }
+  const size_t begin = s.at;
+  bool fits;
+  if (!read_body(h, sizes, &s, nullptr, &fits)) return TV_ERR_MAP;
+  const tv_camera camera = camera_of(*odometry);
+  if (std::memcmp(&h.camera, &camera, sizeof camera) != 0) return TV_ERR_CAMERA;
+  if (!fits) return TV_ERR_LIMITS;
+  start_anew(odometry);
+  odometry->last_time_s = -HUGE_VAL;  // the next frame may have any time
+  s.at = begin;
+  Map* map = &odometry->map;
+  read_body(h, sizes, &s, map, &fits);
+  map->next_point_id = h.next_point_id;
+  map->next_keyframe_id = h.next_keyframe_id;
+  odometry->num_frames = h.num_frames;
+  odometry->num_segments = h.num_segments;
+  odometry->num_relocations = h.num_relocations;
+  odometry->num_loops = h.num_loops;
+  if (map->num_keyframes > 0) {
+    odometry->status = TV_ODOMETRY_LOST;
+    odometry->lost_frames = 1;
+    odometry->next_search = map->num_keyframes - 1;
+    odometry->keyframe_inliers = map->keyframes[odometry->next_search].num_observations;
+  }
+  return TV_OK;
+}
+
+}  // namespace tv
