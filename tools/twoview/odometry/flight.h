@@ -117,10 +117,10 @@ class Flight {
   tv_odometry* odometry_ = nullptr;
   tv_odometry_state state_;
   std::vector<FlightFrame> frames_;
-  std::vector<size_t> given_;  // indices of frames_
+  std::vector<size_t> given_;            // indices of frames_
   std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
   bool is_upright_ = false;
-  bool gap_ = false;           // a frame was left out before the next one
+  bool gap_ = false;  // a frame was left out before the next one
   int num_unreadable_ = 0;
   std::string first_problem_;
 };
