@@ -191,7 +191,7 @@ class OdometryTest(CliTest):
             text = re.search(rf'id="{name}">(.*?)</script>', page, re.S)[1]
             data = json.loads(text)
         self.assertEqual(len(data["frames"]["status"]), COUNT)
-        self.assertGreaterEqual(len(data["keyframes"]), 2)
+        self.assertEqual(len(data["keyframes"]), self.result()["num_keyframes"])
         self.assertTrue(all(key["tracks"] for key in data["keyframes"]))
         self.assertEqual(len(data["frames"]["error"]), COUNT)
 
@@ -287,7 +287,6 @@ distortion_coefficients: [0, 0, 0, 0]
             self.assertIn(done.returncode, (0, 3), done.stderr.decode())  # the film begins again
             self.assertGreater(result["num_frames"], 12)
             self.assertGreater(result["num_tracked"], 8)
-        self.assertGreaterEqual(results[1]["num_located"], 1)
         self.assert_refused(self.odometry("flown", out="new"), "--camera is required",
                             out=self.folder / "new")
         self.assert_refused(self.odometry("flown", "--drone", "127.0.0.1", *camera, out="new"),

@@ -186,27 +186,44 @@ void Flight::finish(const std::atomic<bool>& stop) {
     frame.pose = pose_of(R, t);
     frame.origin = PoseOrigin::kTracked;
   }
-  if (!source_.can_run_again() || state_.num_keyframes == 0) return;
   std::map<int, FlightFrame*> missing;
+  std::map<int, int> without_picture;  // the source's index and the number of the given frame
+  const std::vector<FlightKeyframe> keyframes = this->keyframes();
+  // The first keyframe of a segment became one only when a later frame completed the start.
+  for (const FlightKeyframe& key : keyframes) {
+    FlightFrame& frame = frames_[index_given(key.keyframe.frame)];
+    frame.is_keyframe = true;
+    if (thumbnail(key.keyframe.frame) == nullptr) without_picture[frame.index] = key.keyframe.frame;
+    if (frame.origin != PoseOrigin::kNone) continue;
+    frame.origin = PoseOrigin::kTracked;
+    frame.segment = key.keyframe.segment;
+    frame.pose = pose_of(key.keyframe.world_from_cam_R, key.keyframe.world_from_cam_t);
+  }
+  if (!source_.can_run_again() || keyframes.empty()) return;
   for (FlightFrame& frame : frames_)
     if (frame.origin == PoseOrigin::kNone && !frame.unreadable) missing[frame.index] = &frame;
-  if (missing.empty()) return;
-  const std::vector<FlightKeyframe> keyframes = this->keyframes();
-  source_.run([&](int index) { return missing.count(index) != 0; },
-              [&](const SourceFrame& frame) {
-                const auto found = missing.find(frame.index);
-                if (found == missing.end() || frame.luma.empty()) return true;
-                const auto nearest =
-                    std::min_element(keyframes.begin(), keyframes.end(),
-                                     [&](const FlightKeyframe& a, const FlightKeyframe& b) {
-                                       return std::abs(a.keyframe.time_s - frame.time_s) <
-                                              std::abs(b.keyframe.time_s - frame.time_s);
-                                     });
-                locate(frame, *found->second,
-                       nearest == keyframes.end() ? -1 : nearest->keyframe.id);
-                return frame.index < missing.rbegin()->first;
-              },
-              stop);
+  int last = missing.empty() ? -1 : missing.rbegin()->first;
+  if (!without_picture.empty()) last = std::max(last, without_picture.rbegin()->first);
+  if (last < 0) return;
+  const auto wanted = [&](int index) {
+    return missing.count(index) != 0 || without_picture.count(index) != 0;
+  };
+  const auto consume = [&](const SourceFrame& frame) {
+    const auto picture = without_picture.find(frame.index);
+    if (picture != without_picture.end() && !frame.luma.empty())
+      thumbnails_[picture->second] = thumbnail_of(frame.luma);
+    const auto found = missing.find(frame.index);
+    if (found != missing.end() && !frame.luma.empty()) {
+      const auto nearest = std::min_element(keyframes.begin(), keyframes.end(),
+                                            [&](const FlightKeyframe& a, const FlightKeyframe& b) {
+                                              return std::abs(a.keyframe.time_s - frame.time_s) <
+                                                     std::abs(b.keyframe.time_s - frame.time_s);
+                                            });
+      locate(frame, *found->second, nearest->keyframe.id);
+    }
+    return frame.index < last;
+  };
+  source_.run(wanted, consume, stop);
 }
 
 void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id) {
