@@ -182,6 +182,24 @@ class OdometryTest(CliTest):
         self.assertEqual([row.split(",")[1] for row in rows],
                          [f"images/{i:05}.png" for i in range(0, 12, 2)])
 
+    def test_a_map_tells_what_it_holds(self):
+        self.succeed(self.odometry(self.set_folder()))
+        path, result = self.out / "map.twm", self.result()
+        info = json.loads(self.succeed(self.run_program("map", "info", path, "--json")).stdout)
+        self.assertEqual([info[k] for k in ("num_keyframes", "num_points", "num_segments")],
+                         [result[k] for k in ("num_keyframes", "num_points", "num_segments")])
+        self.assertEqual((info["image_size"], info["camera"]["fx"]), ([WIDTH, HEIGHT], FOCAL))
+        self.assertIn(b"keyframes over", self.run_program("map", "info", path).stdout)
+        self.succeed(self.run_program("map", "export", path, "-o", self.folder / "more"))
+        for name in ("cloud.ply", "keyframes.txt"):
+            self.assertEqual((self.folder / "more" / name).read_bytes(),
+                             (self.out / name).read_bytes(), name)
+        data = path.read_bytes()
+        for wrong in (b"no map", data[:-1], data[:500] + b"\0\0" + data[502:], data + b"x"):
+            done = self.run_program("map", "info", self.write("wrong.twm", wrong))
+            self.assertEqual(done.returncode, 2)
+            self.one_line(done, "wrong.twm")
+
     def test_the_report_holds_all_that_it_shows(self):
         self.succeed(self.odometry(self.set_folder()))
         page = (self.out / "report.html").read_text()

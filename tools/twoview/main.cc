@@ -53,6 +53,7 @@ int run_program(int argc, char** argv) {
   cli::add_evaluate(program, run);
 #ifdef TWOVIEW_HAS_ODOMETRY
   cli::add_odometry(program, run);
+  cli::add_map(program, run);
 #endif
 #ifdef TWOVIEW_HAS_DRONE
   cli::add_drone(program, run, kAddSimulate);

@@ -1,5 +1,5 @@
-// twoview odometry: how its verb is added. A program that is built without the library's odometry
-// (TWOVIEW_ODOMETRY=OFF) does not have it.
+// twoview odometry and twoview map: how the verbs are added. A program that is built without the library's odometry
+// (TWOVIEW_ODOMETRY=OFF) does not have them.
 #pragma once
 
 #include "verbs/common.h"
@@ -7,5 +7,6 @@
 namespace cli {
 
 void add_odometry(CLI::App& program, Run& run);
+void add_map(CLI::App& program, Run& run);
 
 }  // namespace cli
