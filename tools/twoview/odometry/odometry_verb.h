@@ -1,5 +1,5 @@
-// twoview odometry and twoview map: how the verbs are added. A program that is built without the library's odometry
-// (TWOVIEW_ODOMETRY=OFF) does not have them.
+// twoview odometry and twoview map: how the verbs are added. A program that is built without the
+// library's odometry (TWOVIEW_ODOMETRY=OFF) does not have them.
 #pragma once
 
 #include "verbs/common.h"
