@@ -53,12 +53,13 @@ ROOMS = {
     "recording": {"pair", "files", "base"},
     "verbs": {"recording", "calibration", "report", "pictures", "pair", "files", "base"},
     "drone": {"recording", "files", "base"},
+    "odometry": {"drone", "recording", "report", "pictures", "pair", "files", "base"},
     "simulate": {"drone", "files", "base"},
     "sources": {"base"},
 }
 # The one header of `verbs` that the drone's verbs may include: it declares how a verb is added and
 # run.
-ROOM_HEADERS = {"drone": {"verbs/common.h"}, "simulate": {"verbs/common.h"}}
+ROOM_HEADERS = {room: {"verbs/common.h"} for room in ("drone", "odometry", "simulate")}
 # Folders outside tools/twoview, and the rooms that may include each.
 OUTSIDE_ROOMS = {
     "simulator": {"simulate"},

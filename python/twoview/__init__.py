@@ -12,8 +12,10 @@ context), TV_ERR_CAMERA, TV_ERR_OUTSIDE (beyond what a lens model is valid for) 
 import typing as _typing
 
 from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, DISTANCE_PRIOR, GRAVITY_PRIOR, KEYPOINT,
-                   OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT, TV_ERR_ARGUMENT,
-                   TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MEMORY,
+                   MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT,
+                   TV_ERR_ARGUMENT,
+                   TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP,
+                   TV_ERR_MEMORY,
                    TV_ERR_NOT_FINITE, TV_ERR_NULL, TV_ERR_OUTSIDE, TV_ERR_OVERLAP,
                    TV_ERR_STRUCT_SIZE, WINDOW_VIEW, Library, StatusError, default_library)
 from .absolute_pose import AbsolutePose, estimate_absolute_pose
@@ -22,10 +24,12 @@ from .camera import (Camera, camera_check, camera_project_points, camera_scale,
 from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, FormatError, format_cameras,
                            parse_cameras, read_camera, read_cameras, read_sigmas, write_cameras)
 from .context import Context
-from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, Orientation, PointStatus,
-                    Purpose, Reason, Solver, Stage, Status, Triangulation, Verdict)
+from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, OdometryStatus, Orientation,
+                    PointStatus, Purpose, Reason, ScaleSource, Solver, Stage, Status,
+                    Triangulation, Verdict)
+from .odometry import Keyframe, Odometry, OdometryState
 from .options import (AbsolutePoseOptions, BundleOptions, EstimateOptions, FeatureOptions,
-                      GuidedOptions, MatchOptions, WindowOptions)
+                      GuidedOptions, MatchOptions, OdometryOptions, WindowOptions)
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,
                      corrected_camera, describe, detect, estimate_two_view, extract,
                      keypoint_sigmas, match, match_guided, orient, point_covariances,

@@ -219,13 +219,60 @@ class tv_window_result(Structure):
                 ("noise_px", c_double)]
 
 
+class tv_odometry_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_keypoints", c_int32), ("max_keyframes", c_int32),
+                ("max_points", c_int32), ("window", c_int32), ("kernels", c_int32),
+                ("seed", c_uint64)]
+
+
+class tv_odometry_frame(Structure):
+    _fields_ = [("struct_size", c_uint32), ("gap", c_int32), ("image", tv_image),
+                ("time_s", c_double), ("world_from_cam", c_double * 9),
+                ("attitude_sigma_rad", c_double), ("height_m", c_double),
+                ("height_sigma_m", c_double), ("velocity_m_s", c_double * 3),
+                ("velocity_sigma_m_s", c_double)]
+
+
+class tv_odometry_state(Structure):
+    _fields_ = [("struct_size", c_uint32), ("status", c_int32), ("reasons", c_uint32),
+                ("segment", c_int32), ("is_keyframe", c_uint8), ("relocated", c_uint8),
+                ("loop_closed", c_uint8), ("has_pose", c_uint8), ("has_covariance", c_uint8),
+                ("reserved", c_uint8 * 3), ("num_frames", c_int32), ("num_keypoints", c_int32),
+                ("num_matches", c_int32), ("num_inliers", c_int32), ("num_keyframes", c_int32),
+                ("num_points", c_int32), ("num_segments", c_int32), ("num_relocations", c_int32),
+                ("num_loops", c_int32), ("reference_id", c_int32),
+                ("reference_from_cam_R", c_double * 9), ("reference_from_cam_t", c_double * 3),
+                ("world_from_cam_R", c_double * 9), ("world_from_cam_t", c_double * 3),
+                ("covariance", c_double * 36), ("noise_px", c_double), ("scale_source", c_int32),
+                ("reserved2", c_int32), ("scale_sigma", c_double)]
+
+
+class tv_keyframe(Structure):
+    _fields_ = [("struct_size", c_uint32), ("id", c_int32), ("segment", c_int32),
+                ("frame", c_int32), ("time_s", c_double), ("world_from_cam_R", c_double * 9),
+                ("world_from_cam_t", c_double * 3), ("num_keypoints", c_int32),
+                ("num_observations", c_int32), ("has_covariance", c_int32), ("reserved", c_int32),
+                ("covariance", c_double * 36)]
+
+
+class tv_map_point(Structure):
+    _fields_ = [("id", c_int32), ("segment", c_int32), ("num_observations", c_int32),
+                ("grey", c_int32), ("position", c_double * 3), ("covariance", c_double * 9)]
+
+
+class tv_map_observation(Structure):
+    _fields_ = [("idx_point", c_int32), ("idx_keypoint", c_int32), ("x", c_float), ("y", c_float),
+                ("sigma", c_float), ("reserved", c_int32)]
+
+
 STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
            tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
            tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
            tv_reconstruction, tv_bundle_options, tv_bundle_result, tv_pixel_points,
            tv_absolute_pose_options, tv_absolute_pose, tv_window_view, tv_observation,
            tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window, tv_window_options,
-           tv_window_result]
+           tv_window_result, tv_odometry_options, tv_odometry_frame, tv_odometry_state,
+           tv_keyframe, tv_map_point, tv_map_observation]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
@@ -235,6 +282,8 @@ OBSERVATION = np.dtype(tv_observation)
 POSE_PRIOR = np.dtype(tv_pose_prior)
 GRAVITY_PRIOR = np.dtype(tv_gravity_prior)
 DISTANCE_PRIOR = np.dtype(tv_distance_prior)
+MAP_POINT = np.dtype(tv_map_point)
+MAP_OBSERVATION = np.dtype(tv_map_observation)
 
 
 class StatusError(RuntimeError):
@@ -292,6 +341,10 @@ class TV_ERR_OUTSIDE(StatusError, ValueError):
 
 class TV_ERR_KERNELS(StatusError):
     status = Status.ERR_KERNELS
+
+
+class TV_ERR_MAP(StatusError, ValueError):
+    status = Status.ERR_MAP
 
 
 ERRORS = {int(kind.status): kind for kind in StatusError.__subclasses__()}

@@ -19,6 +19,7 @@ class Status(IntEnum):
     ERR_CAMERA = 10
     ERR_OUTSIDE = 11
     ERR_KERNELS = 12
+    ERR_MAP = 13
 
 
 class Kernels(IntEnum):
@@ -125,6 +126,21 @@ class Loss(IntEnum):
     CAUCHY = 2
 
 
+class OdometryStatus(IntEnum):
+    STARTING = 0
+    TRACKING = 1
+    WEAK = 2
+    ROTATION = 3
+    LOST = 4
+
+
+class ScaleSource(IntEnum):
+    UNIT = 0
+    HEIGHT = 1
+    VELOCITY = 2
+    HEIGHT_AND_VELOCITY = 3
+
+
 # {enum: the prefix of its values' names in C}.
 C_PREFIXES = {
     Status: "TV_", Kernels: "TV_KERNELS_", Stage: "TV_STAGE_", Purpose: "TV_PURPOSE_",
@@ -132,4 +148,5 @@ C_PREFIXES = {
     CameraModel: "TV_CAMERA_", Solver: "TV_SOLVER_", Kind: "TV_KIND_", Verdict: "TV_VERDICT_",
     Reason: "TV_REASON_",
     Triangulation: "TV_TRIANGULATION_", PointStatus: "TV_POINT_", Loss: "TV_LOSS_",
+    OdometryStatus: "TV_ODOMETRY_", ScaleSource: "TV_SCALE_",
 }

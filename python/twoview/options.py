@@ -9,7 +9,7 @@ from typing import Any, Optional, Sequence
 import numpy as np
 
 from . import _abi
-from .enums import Loss, Normalisation, Orientation, Solver
+from .enums import Kernels, Loss, Normalisation, Orientation, Solver
 
 
 class _Options:
@@ -123,11 +123,23 @@ class WindowOptions:
     reserved: int = 0  #: must be 0
 
 
+@dataclass(frozen=True)
+class OdometryOptions:
+    """The options of the odometry, as in tv_odometry_options."""
+
+    max_keypoints: int = 1000  #: most keypoints of a frame, [100, 4096]
+    max_keyframes: int = 200  #: most keyframes of the map, [8, 2000]
+    max_points: int = 20000  #: most points of the map, [500, 200000]
+    window: int = 10  #: keyframes that are adjusted together, [3, 20]
+    kernels: int = Kernels.AUTO
+    seed: Optional[int] = None  #: seed of every sampler; None: the library's constant
+
+
 _STRUCTS = {FeatureOptions: _abi.tv_feature_options, MatchOptions: _abi.tv_match_options,
             GuidedOptions: _abi.tv_guided_options, EstimateOptions: _abi.tv_estimate_options,
             BundleOptions: _abi.tv_bundle_options,
             AbsolutePoseOptions: _abi.tv_absolute_pose_options,
-            WindowOptions: _abi.tv_window_options}
+            WindowOptions: _abi.tv_window_options, OdometryOptions: _abi.tv_odometry_options}
 
 
 def to_struct(library: _abi.Library, kind: type, options: Any, keywords: dict[str, Any]) -> Any:

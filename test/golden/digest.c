@@ -43,6 +43,11 @@ LAYOUT(tv_gravity_prior, 40, sigma_rad, 32);
 LAYOUT(tv_distance_prior, 24, sigma, 16);
 LAYOUT(tv_window_options, 40, reserved, 36);
 LAYOUT(tv_window_result, 80, noise_px, 72);
+LAYOUT(tv_odometry_options, 32, seed, 24);
+LAYOUT(tv_odometry_state, 568, scale_sigma, 560);
+LAYOUT(tv_keyframe, 424, covariance, 136);
+LAYOUT(tv_map_point, 112, covariance, 40);
+LAYOUT(tv_map_observation, 24, reserved, 20);
 
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 

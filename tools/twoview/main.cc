@@ -16,6 +16,9 @@
 #ifdef TWOVIEW_HAS_DRONE
 #include "drone/drone.h"
 #endif
+#ifdef TWOVIEW_HAS_ODOMETRY
+#include "odometry/odometry_verb.h"
+#endif
 #ifdef TWOVIEW_HAS_SIMULATOR
 #include "simulate/simulate.h"
 #endif
@@ -48,6 +51,10 @@ int run_program(int argc, char** argv) {
   cli::add_undistort(program, run);
   cli::add_calibrate(program, run);
   cli::add_evaluate(program, run);
+#ifdef TWOVIEW_HAS_ODOMETRY
+  cli::add_odometry(program, run);
+  cli::add_map(program, run);
+#endif
 #ifdef TWOVIEW_HAS_DRONE
   cli::add_drone(program, run, kAddSimulate);
 #endif

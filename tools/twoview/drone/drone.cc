@@ -11,6 +11,10 @@ void add_address(CLI::App& verb, DroneAddress& address, const std::string& host)
   verb.add_option("--host", address.host, "the drone's address")
       ->type_name("ADDRESS")
       ->capture_default_str();
+  add_ports(verb, address);
+}
+
+void add_ports(CLI::App& verb, DroneAddress& address) {
   const auto port = [&](const char* name, int& value, const char* help) {
     verb.add_option(name, value, help)
         ->check(CLI::Range(0, 65535))

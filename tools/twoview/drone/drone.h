@@ -15,6 +15,8 @@ struct DroneAddress {
   int at_port = 5556, navdata_port = 5554, video_port = 5555, control_port = 5559;
 };
 void add_address(CLI::App& verb, DroneAddress& address, const std::string& host);
+// Adds the ports alone, for a verb that has another option for the host.
+void add_ports(CLI::App& verb, DroneAddress& address);
 
 // A range check like CLI::Range that also refuses "nan".
 CLI::Validator number_in(double low, double high);

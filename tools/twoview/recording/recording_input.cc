@@ -71,6 +71,8 @@ CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
 
 }  // namespace
 
+CameraMount load_mount(const std::string& camera_file) { return mount_of({}, camera_file); }
+
 struct RecordingInput::State {
   RecordingOptions options;
   CameraMount mount;

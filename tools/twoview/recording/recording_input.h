@@ -11,6 +11,7 @@
 #include "base/terminal.h"
 #include "pair/result.h"
 #include "pair/session.h"
+#include "recording/metric_scale.h"
 
 namespace cli {
 
@@ -23,6 +24,10 @@ struct RecordingOptions {
   void add_to(CLI::App& verb);
   bool given() const { return !folder.empty(); }
 };
+
+// The mount of the camera that a camera file describes, else a camera at the body's origin that
+// looks forward. Throws BadInput. Only in a program with the driver.
+CameraMount load_mount(const std::string& camera_file);
 
 class RecordingInput {
  public:

@@ -110,6 +110,8 @@ double score_of(const tv_two_view& v) {
 
 }  // namespace
 
+FlightSample flight_sample(const tvs_imu& imu) { return sample_of(imu); }
+
 RecordedFlight read_flight(const std::string& folder) {
   RecordedFlight flight;
   LinkListener listener;

@@ -10,6 +10,7 @@
 #include "pair/result.h"
 #include "pair/session.h"
 #include "recording/metric_scale.h"
+#include "twoview_drivers/source.h"
 
 namespace cli {
 
@@ -25,6 +26,9 @@ struct RecordedFlight {
   std::vector<RecordedFrame> frames;
   int width = 0, height = 0;  // of the first picture
 };
+
+// An instant of the log from a sample of the IMU, which must have an attitude.
+FlightSample flight_sample(const tvs_imu& imu);
 
 // Plays the whole recording once. Throws BadInput where there is none, or no picture in it decodes.
 RecordedFlight read_flight(const std::string& folder);

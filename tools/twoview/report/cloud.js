@@ -1,6 +1,8 @@
 // An interactive view of a point cloud: dragging rotates it. Plain canvas: no library, no network,
 // no GPU needed. The page gives an element #cloud-data with JSON {points, colours, cameras}; points
-// and colours are base64.
+// and colours are base64. It may give paths, each {points, colour} with points x y z one after the
+// other; a colour of a camera; and the names of the axes. After a change of these it sends the event
+// "cloud-changed" to the window.
 (function () {
   "use strict";
   const data = JSON.parse(document.getElementById("cloud-data").textContent);
@@ -113,8 +115,12 @@
       context.arc(p[0], p[1], r, 0, 6.2832);
       context.fill();
     }
+    (data.paths || []).forEach(function (path) {
+      for (let i = 3; i + 2 < path.points.length; i += 3)
+        line(project, path.points.slice(i - 3, i), path.points.slice(i, i + 3), path.colour, 1.8);
+    });
     data.cameras.forEach(function (camera, index) {
-      const colour = index ? "#ffb260" : "#ffffff";
+      const colour = camera.colour || (index ? "#ffb260" : "#ffffff");
       for (let i = 0; i < 4; ++i) {
         line(project, camera.centre, camera.corners[i], colour, 1);
         line(project, camera.corners[i], camera.corners[(i + 1) % 4], colour, 1.6);
@@ -133,8 +139,10 @@
     context.font = 12 * ratio + "px sans-serif";
     context.textAlign = "center";
     context.textBaseline = "middle";
-    [["x", [1, 0, 0], "#ff7b72"], ["y", [0, 1, 0], "#7ee787"], ["z", [0, 0, 1], "#79c0ff"]].forEach(
-      function ([name, axis, colour]) {
+    const names = data.axes || ["x", "y", "z"];
+    [[[1, 0, 0], "#ff7b72"], [[0, 1, 0], "#7ee787"], [[0, 0, 1], "#79c0ff"]].forEach(
+      function ([axis, colour], index) {
+        const name = names[index];
         const d = turn(axis);
         context.strokeStyle = context.fillStyle = colour;
         context.lineWidth = 2 * ratio;
@@ -210,6 +218,8 @@
     draw();
     window.requestAnimationFrame(swing);
   }
+  window.cloudData = data;
+  window.addEventListener("cloud-changed", request);
   window.addEventListener("resize", resize);
   resize();
   window.requestAnimationFrame(swing);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pair/result.h"
+#include "report/html.h"
 
 namespace cli {
 
@@ -17,8 +18,5 @@ struct Figure {
 
 std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& cloud,
                         const std::vector<Figure>& figures);
-
-// Encodes bytes as Base64 (RFC 4648) with padding.
-std::string base64(const std::string& bytes);
 
 }  // namespace cli

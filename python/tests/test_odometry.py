@@ -1,0 +1,137 @@
+"""Odometry: a flight past textured walls, whose path is known."""
+
+import numpy as np
+import pytest
+import twoview as tv
+
+WIDTH, HEIGHT, FOCAL, STEP = 320, 240, 300.0, 0.08
+DEPTHS = (2.5, 6.0, 3.5, 8.0, 4.5)  # of the walls, one above the other in the image, in units
+CAMERA = tv.Camera(WIDTH, HEIGHT, FOCAL, FOCAL, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)
+
+
+@pytest.fixture(scope="module")
+def frames():
+    """Twenty frames of a camera that flies to the right, 0.08 units a frame."""
+    noise = np.random.default_rng(11).integers(0, 256, (HEIGHT + 4, 3 * WIDTH + 4))
+    wide = sum(noise[y:y + HEIGHT, x:x + 3 * WIDTH] for y in range(5) for x in range(5)) / 25
+    wide = np.clip((wide - 127) * 4 + 127, 0, 255)
+    rows = np.arange(HEIGHT)
+    depth = np.array(DEPTHS)[rows * len(DEPTHS) // HEIGHT]
+    made = []
+    for i in range(20):
+        at = np.arange(WIDTH) + (FOCAL * STEP * i / depth)[:, None]
+        left = at.astype(int)
+        share = at - left
+        row = rows[:, None]
+        frame = (1 - share) * wide[row, left] + share * wide[row, left + 1]
+        made.append(np.rint(frame).astype(np.uint8))
+    return made
+
+
+@pytest.fixture(scope="module")
+def flight(frames):
+    odometry = tv.Odometry(CAMERA, max_keypoints=800)
+    return odometry, [odometry.track(frame, i / 30) for i, frame in enumerate(frames)]
+
+
+def test_the_path_is_the_flown_one(flight):
+    odometry, states = flight
+    assert states[-1].status == tv.OdometryStatus.TRACKING and states[-1].num_frames == 20
+    known = [(i, *odometry.pose_of(s)) for i, s in enumerate(states) if s.R is not None]
+    assert len(known) >= 10 and {segment for *_, segment in known} == {0}
+    steps = np.array([t for _, _, t, _ in known])
+    numbers = np.array([i for i, *_ in known], float)
+    # The unit is free: one scale and one offset for all frames, along the camera's x axis.
+    a = np.column_stack([numbers, np.ones_like(numbers)])
+    scale = np.linalg.lstsq(a, steps[:, 0], rcond=None)[0]
+    assert scale[0] > 0
+    error = steps - np.column_stack([a @ scale, np.zeros((len(steps), 2)) + steps[0, 1:]])
+    assert np.abs(error).max() < 0.05 * abs(steps[-1, 0] - steps[0, 0])
+    for _, R, _, _ in known:
+        assert np.abs(R - np.eye(3)).max() < 0.02
+
+
+def test_the_map_is_consistent(flight):
+    odometry, states = flight
+    points = odometry.points()
+    assert points.dtype == tv.MAP_POINT and len(points) == states[-1].num_points > 100
+    first = odometry.keyframe(0)
+    assert first.id == 0 and first.R.shape == (3, 3)
+    seen = odometry.observations(0)
+    assert seen.dtype == tv.MAP_OBSERVATION and len(seen) == first.num_observations
+    x = (points["position"][seen["idx_point"]] - first.t) @ first.R
+    pixels = FOCAL * x[:, :2] / x[:, 2:] + [CAMERA.cx, CAMERA.cy]
+    error = np.hypot(pixels[:, 0] - seen["x"], pixels[:, 1] - seen["y"])
+    assert np.median(error) < 1
+    frame = odometry.last_frame()
+    assert len(frame) == states[-1].num_keypoints
+    assert (frame["idx_point"] >= 0).sum() >= states[-1].num_inliers
+
+
+def test_the_same_frames_give_the_same_states(frames, flight):
+    with tv.Odometry(CAMERA, tv.OdometryOptions(max_keypoints=800)) as odometry:
+        for i, frame in enumerate(frames):
+            state = odometry.track(frame, i / 30)
+        last = flight[1][-1]
+        assert (state.R.tobytes(), state.t.tobytes()) == (last.R.tobytes(), last.t.tobytes())
+        odometry.reset()
+        assert odometry.track(frames[0], 0.0).num_frames == 1
+
+
+def test_a_known_frame_is_located(frames, flight):
+    odometry, states = flight
+    found = odometry.locate(frames[15])
+    assert found.status == tv.OdometryStatus.TRACKING
+    _, t, _ = odometry.pose_of(states[15])
+    assert np.linalg.norm(found.t - t) < 0.05 * np.linalg.norm(states[-1].t)
+    blank = odometry.locate(np.full((HEIGHT, WIDTH), 128, np.uint8))
+    assert blank.status == tv.OdometryStatus.LOST and blank.t is None
+    with pytest.raises(ValueError, match="no pose"):
+        odometry.pose_of(blank)
+
+
+def test_bad_input_is_refused(frames):
+    with tv.Odometry(CAMERA) as odometry:
+        odometry.track(frames[0], 1.0)
+        with pytest.raises(tv.TV_ERR_ARGUMENT):
+            odometry.track(frames[1], 1.0)  # the time stands
+        with pytest.raises(tv.TV_ERR_NOT_FINITE):
+            odometry.track(frames[1], float("nan"))
+        with pytest.raises(tv.TV_ERR_CAMERA):
+            odometry.track(frames[1][:100], 2.0)
+        with pytest.raises(TypeError, match="uint8"):
+            odometry.track(frames[1].astype(float), 2.0)
+        with pytest.raises(ValueError, match="world_from_cam"):
+            odometry.track(frames[1], 2.0, world_from_cam=np.eye(4))
+        assert odometry.track(frames[1], 2.0).num_frames == 2
+    with pytest.raises(ValueError, match="closed"):
+        odometry.track(frames[1], 3.0)
+    with pytest.raises(tv.TV_ERR_ARGUMENT):
+        tv.Odometry(CAMERA, max_keypoints=5)
+    with pytest.raises(TypeError, match="no option|unexpected"):
+        tv.Odometry(CAMERA, keypoints=5)
+
+
+def test_a_map_is_saved_and_loaded(frames, flight):
+    odometry, states = flight
+    data = odometry.save()
+    assert data == odometry.save()
+    with tv.Odometry(CAMERA, max_keypoints=800) as other:
+        other.load(data)
+        assert other.save() == data
+        assert np.array_equal(other.points()["position"], odometry.points()["position"])
+        for wrong in (b"", data[:-1], data[:40], b"x" + data[1:], data[:-1] + b"\0" + data[-1:]):
+            with pytest.raises(tv.TV_ERR_MAP):
+                other.load(wrong)
+        assert other.save() == data
+        assert other.locate(frames[15]).status == tv.OdometryStatus.TRACKING
+    camera = tv.Camera(WIDTH, HEIGHT, FOCAL + 1, FOCAL, CAMERA.cx, CAMERA.cy)
+    with tv.Odometry(camera, max_keypoints=800) as other, pytest.raises(tv.TV_ERR_CAMERA):
+        other.load(data)
+
+
+def test_locate_leaves_the_map_as_it_is(frames, flight):
+    odometry, _ = flight
+    data = odometry.save()
+    assert odometry.locate(frames[15]).status == tv.OdometryStatus.TRACKING
+    assert odometry.save() == data

@@ -1,0 +1,211 @@
+"""Visual odometry: the frames of one camera to its path and a map of points (odometry.h)."""
+
+from __future__ import annotations
+
+import threading
+from ctypes import byref, c_int32, c_size_t, c_void_p
+from dataclasses import dataclass
+from typing import Any, Optional
+
+import numpy as np
+
+from . import _abi
+from .camera import Camera, camera_struct
+from .enums import OdometryStatus, Reason, ScaleSource
+from .options import OdometryOptions, to_struct
+
+
+@dataclass(frozen=True)
+class OdometryState:
+    """tv_odometry_state: what is known after a frame. A value that is not known is None."""
+
+    status: OdometryStatus
+    reasons: Reason
+    segment: Optional[int]  #: poses of different segments do not compare; None without a pose
+    is_keyframe: bool
+    relocated: bool
+    loop_closed: bool
+    num_frames: int
+    num_keypoints: int
+    num_matches: int
+    num_inliers: int
+    num_keyframes: int
+    num_points: int
+    num_segments: int
+    num_relocations: int
+    num_loops: int
+    reference_id: Optional[int]  #: id of the keyframe of reference_R and reference_t
+    reference_R: Optional[np.ndarray]  #: (3, 3), reference_from_cam
+    reference_t: Optional[np.ndarray]  #: (3,)
+    R: Optional[np.ndarray]  #: (3, 3), world_from_cam
+    t: Optional[np.ndarray]  #: (3,), the camera's position in the unit of the map
+    covariance: Optional[np.ndarray]  #: (6, 6): w0 w1 w2 d0 d1 d2 of absolute_pose.h
+    noise_px: float
+    scale_source: ScaleSource
+    scale_sigma: Optional[float]  #: relative; None where the unit is not the metre
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """tv_keyframe: a keyframe of the map."""
+
+    id: int
+    segment: int
+    frame: int  #: how many frames were given before it
+    time_s: float
+    R: np.ndarray  #: (3, 3), world_from_cam
+    t: np.ndarray  #: (3,)
+    num_keypoints: int
+    num_observations: int
+    covariance: Optional[np.ndarray]  #: (6, 6), relative to the keyframe before it
+
+
+def _matrix(values: Any, *shape: int) -> np.ndarray:
+    return np.array(values, np.float64).reshape(shape)
+
+
+class Odometry:
+    """tv_odometry in memory that Python owns: the tracker and the map of one camera.
+
+    Calls from several threads wait for each other. close() or a with statement frees the memory;
+    later calls raise ValueError."""
+
+    def __init__(self, camera: Camera, options: Optional[OdometryOptions] = None, *,
+                 library: Optional[_abi.Library] = None, **keywords: Any):
+        self.library = library or _abi.default_library()
+        if not hasattr(self.library.lib, "tv_odometry_track"):
+            raise NotImplementedError("this library was built without odometry")
+        wanted = to_struct(self.library, OdometryOptions, options, keywords)
+        struct, size = camera_struct("camera", camera), c_size_t()
+        self.library.call("tv_odometry_size", byref(struct), byref(wanted), byref(size))
+        self._memory: Optional[np.ndarray] = np.empty(size.value + _abi.CONTEXT_ALIGNMENT, np.uint8)
+        start = -self._memory.ctypes.data % _abi.CONTEXT_ALIGNMENT
+        self._pointer = c_void_p()
+        self.library.call("tv_odometry_init", byref(self._pointer), byref(struct), byref(wanted),
+                          c_void_p(self._memory.ctypes.data + start), size)
+        self.camera, self.size_bytes = camera, size.value
+        self.max_keypoints, self.max_points = int(wanted.max_keypoints), int(wanted.max_points)
+        self._lock = threading.RLock()
+
+    def __enter__(self) -> Odometry:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def close(self) -> None:
+        with self._lock:
+            self._memory = None
+            self._pointer = c_void_p()
+
+    def _call(self, function: str, *arguments: Any) -> None:
+        with self._lock:
+            if self._memory is None:
+                raise ValueError(f"{function}: the odometry is closed")
+            self.library.call(function, self._pointer, *arguments)
+
+    def reset(self) -> None:
+        """tv_odometry_reset: forgets the map and every frame."""
+        self._call("tv_odometry_reset")
+
+    def track(self, image: np.ndarray, time_s: float, *, gap: bool = False,
+              world_from_cam: Optional[np.ndarray] = None, attitude_sigma_rad: float = 0.0,
+              height_m: float = 0.0, height_sigma_m: float = 0.0,
+              velocity_m_s: Any = (0.0, 0.0, 0.0),
+              velocity_sigma_m_s: float = 0.0) -> OdometryState:
+        """tv_odometry_track: tracks a frame, and extends and adjusts the map.
+
+        image: (height, width) uint8, of the camera's size. time_s: later than that of the frame
+        before. gap: frames are missing before this one. world_from_cam: (3, 3), the vehicle's
+        attitude in a world whose z axis points down. Measurements with a sigma of 0 do not
+        exist."""
+        frame = self.library.make(_abi.tv_odometry_frame, {
+            "gap": int(gap), "time_s": time_s, "attitude_sigma_rad": attitude_sigma_rad,
+            "height_m": height_m, "height_sigma_m": height_sigma_m, "velocity_m_s": velocity_m_s,
+            "velocity_sigma_m_s": velocity_sigma_m_s})
+        frame.image = _abi.check_image("image", image)
+        if world_from_cam is not None:
+            R = _abi.small_array("world_from_cam", world_from_cam, 3, 3)
+            frame.world_from_cam[:] = R.ravel().tolist()
+        state = self.library.make(_abi.tv_odometry_state)
+        self._call("tv_odometry_track", byref(frame), byref(state))
+        return _state(state)
+
+    def locate(self, image: np.ndarray, near_id: int = -1) -> OdometryState:
+        """tv_odometry_locate: the pose of a frame in the map as it is. near_id: a keyframe whose
+        surroundings are searched first."""
+        view = _abi.check_image("image", image)
+        state = self.library.make(_abi.tv_odometry_state)
+        self._call("tv_odometry_locate", byref(view), c_int32(near_id), byref(state))
+        return _state(state)
+
+    def pose_of(self, state: OdometryState) -> tuple[np.ndarray, np.ndarray, int]:
+        """tv_odometry_pose_of: R (3, 3), t (3,) and the segment of a frame in the last state of the
+        map, from what track returned. Raises ValueError for a state without a pose."""
+        if state.reference_id is None:
+            raise ValueError("pose_of: the state has no pose")
+        R0 = _abi.small_array("reference_R", state.reference_R, 3, 3)
+        t0 = _abi.small_array("reference_t", state.reference_t, 3)
+        R, t, segment = np.empty((3, 3)), np.empty(3), c_int32()
+        self._call("tv_odometry_pose_of", c_int32(state.reference_id), _abi.pointer(R0),
+                   _abi.pointer(t0), _abi.pointer(R), _abi.pointer(t), byref(segment))
+        return R, t, segment.value
+
+    def keyframe(self, idx: int) -> Keyframe:
+        """tv_odometry_keyframe: the keyframe number idx of the map, [0, num_keyframes)."""
+        k = self.library.make(_abi.tv_keyframe)
+        self._call("tv_odometry_keyframe", c_int32(idx), byref(k))
+        return Keyframe(k.id, k.segment, k.frame, k.time_s, _matrix(k.world_from_cam_R, 3, 3),
+                        _matrix(k.world_from_cam_t, 3), k.num_keypoints, k.num_observations,
+                        _matrix(k.covariance, 6, 6) if k.has_covariance else None)
+
+    def points(self) -> np.ndarray:
+        """tv_odometry_points: the points of the map, of dtype twoview.MAP_POINT."""
+        return self._array("tv_odometry_points", _abi.MAP_POINT, self.max_points)
+
+    def observations(self, idx: int) -> np.ndarray:
+        """tv_odometry_observations: what the keyframe number idx sees, of dtype
+        twoview.MAP_OBSERVATION; idx_point is an index into points()."""
+        return self._array("tv_odometry_observations", _abi.MAP_OBSERVATION, self.max_keypoints,
+                           c_int32(idx))
+
+    def last_frame(self) -> np.ndarray:
+        """tv_odometry_last_frame: the keypoints of the last frame, of dtype
+        twoview.MAP_OBSERVATION; idx_point is -1 where one sees no point."""
+        return self._array("tv_odometry_last_frame", _abi.MAP_OBSERVATION, self.max_keypoints)
+
+    def _array(self, function: str, dtype: np.dtype, capacity: int, *first: Any) -> np.ndarray:
+        array, count = np.zeros(capacity, dtype), c_int32()
+        self._call(function, *first, _abi.pointer(array), c_int32(capacity), byref(count))
+        return array[:count.value].copy()
+
+    def save(self) -> bytes:
+        """tv_odometry_save: the map as bytes, equal on every CPU."""
+        size = c_size_t()
+        with self._lock:
+            self._call("tv_odometry_save_size", byref(size))
+            array = np.empty(size.value, np.uint8)
+            self._call("tv_odometry_save", _abi.pointer(array), size, byref(size))
+        return array[:size.value].tobytes()
+
+    def load(self, data: bytes) -> None:
+        """tv_odometry_load: replaces the map by one that save returned, of the same camera."""
+        array = np.frombuffer(data, np.uint8)
+        self._call("tv_odometry_load", _abi.pointer(array), c_size_t(array.size))
+
+
+def _state(s: Any) -> OdometryState:
+    posed = bool(s.has_pose)
+    scale = ScaleSource(s.scale_source)
+    return OdometryState(
+        OdometryStatus(s.status), Reason(s.reasons), s.segment if posed else None,
+        bool(s.is_keyframe), bool(s.relocated), bool(s.loop_closed), s.num_frames,
+        s.num_keypoints, s.num_matches, s.num_inliers, s.num_keyframes, s.num_points,
+        s.num_segments, s.num_relocations, s.num_loops,
+        s.reference_id if posed and s.reference_id >= 0 else None,
+        _matrix(s.reference_from_cam_R, 3, 3) if posed else None,
+        _matrix(s.reference_from_cam_t, 3) if posed else None,
+        _matrix(s.world_from_cam_R, 3, 3) if posed else None,
+        _matrix(s.world_from_cam_t, 3) if posed else None,
+        _matrix(s.covariance, 6, 6) if s.has_covariance else None, s.noise_px, scale,
+        s.scale_sigma if scale != ScaleSource.UNIT else None)

@@ -1,0 +1,436 @@
+#!/usr/bin/env python3
+"""Tests of `twoview odometry`: a rendered flight past five walls, whose path is known, in every
+format of a source, and bad input."""
+import csv
+import json
+import math
+import os
+import random
+import re
+import resource
+import signal
+import struct
+import subprocess
+import time
+import unittest
+
+from cli_support import CliTest, camera_yaml, main, png, program
+
+WIDTH, HEIGHT, FOCAL, COUNT = 320, 240, 300.0, 20
+SHIFTS = (9, 4, 7, 3, 5)  # pixels a frame, of each wall
+FPS = 25.0
+FILES = ["cloud.ply", "colmap", "frames.csv", "keyframes.txt", "live.txt", "map.twm",
+         "report.html", "result.json", "trajectory.txt"]
+CAMERAS = f"""cam0:
+  image_width: {WIDTH}
+  image_height: {HEIGHT}
+  fx: {FOCAL}
+  fy: {FOCAL}
+  cx: {(WIDTH - 1) / 2}
+  cy: {(HEIGHT - 1) / 2}
+"""
+
+
+def smooth_noise(width, height):
+    """Random grey, the mean of 5 x 5 pixels with four times the contrast: corners everywhere."""
+    rng = random.Random(3)
+    rows = [[rng.randrange(256) for _ in range(width + 4)] for _ in range(height + 4)]
+    rows = [[sum(row[x:x + 5]) for x in range(width)] for row in rows]
+    return [bytes(max(0, min(255, 4 * sum(column) // 25 - 381)) for column in zip(*rows[y:y + 5]))
+            for y in range(height)]
+
+
+def render():
+    """The frames of a camera that flies to the right; each wall moves left by its own shift."""
+    wide = smooth_noise(WIDTH + COUNT * max(SHIFTS), HEIGHT)
+    return [b"".join(row[i * SHIFTS[y * 5 // HEIGHT]:][:WIDTH]
+                     for y, row in enumerate(wide)) for i in range(COUNT)]
+
+
+LUMA = render()
+PICTURES = [png(WIDTH, HEIGHT, luma) for luma in LUMA]
+TIMES = [i / FPS for i in range(COUNT)]
+TUM_TRUTH = "# the true path\n" + "".join(f"{t:.9f} {0.1 * i} 0 0 0 0 0 1\n"
+                                           for i, t in enumerate(TIMES))
+
+
+def poses(path):
+    """{time: its other numbers} of a TUM file, and its comments."""
+    lines = path.read_text().splitlines()
+    numbers = [list(map(float, line.split())) for line in lines if not line.startswith("#")]
+    return {n[0]: n[1:] for n in numbers}, [line for line in lines if line.startswith("#")]
+
+
+class OdometryTest(CliTest):
+    def set_folder(self, name="set", truth=TUM_TRUTH):
+        for i, data in enumerate(PICTURES):
+            self.write(f"{name}/images/{i:05}.png", data)
+        self.write(f"{name}/frames.txt", "# timestamp filename\n" + "".join(
+            f"{t:.9f} images/{i:05}.png\n" for i, t in enumerate(TIMES)))
+        self.write(f"{name}/cameras.yaml", CAMERAS)
+        if truth:
+            self.write(f"{name}/groundtruth.txt", truth)
+        return self.folder / name
+
+    def odometry(self, source, *more, out=None, **options):
+        return self.run_program("odometry", source, "-o", out or self.out, *more, **options)
+
+    def trajectory(self, out=None):
+        return ((out or self.out) / "trajectory.txt").read_bytes()
+
+    # -- a whole run --------------------------------------------------------------------------
+
+    def test_a_set_folder_gives_all_files_and_the_flown_path(self):
+        done = self.succeed(self.odometry(self.set_folder()))
+        self.assertEqual(self.listing(), FILES)
+        self.assertIn(f"{COUNT} frames", done.stdout.decode())
+        result = self.result()
+        self.assertEqual(result["num_frames"], COUNT)
+        self.assertEqual(result["num_tracked"], COUNT)
+        self.assertEqual(sum(result["status_counts"].values()), COUNT)
+        self.assertEqual((result["scale"], result["scale_sigma"]), ("unit", None))
+        self.assertEqual(result["truth"]["coverage"], 1)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 0.5)
+        self.assertLess(result["truth"]["rpe_rotation_deg"], 0.2)
+        self.assertAlmostEqual(result["truth"]["path_length"], 0.1 * (COUNT - 1), 9)
+        self.assertIsNone(result["truth"].get("ate_metric_rmse"))
+        # The path of the estimate over that of the truth is the ratio of the scales.
+        self.assertAlmostEqual(result["path_length"] / result["truth"]["path_length"],
+                               result["truth"]["scale_ratio"],
+                               delta=0.02 * result["truth"]["scale_ratio"])
+        path, comments = poses(self.out / "trajectory.txt")
+        self.assertEqual(sorted(path), [round(t, 9) for t in TIMES])
+        self.assertEqual(sum("segment" in c for c in comments), 1)
+        for value in path.values():
+            self.assertAlmostEqual(math.hypot(*value[3:]), 1, 6)
+        live, _ = poses(self.out / "live.txt")
+        self.assertTrue(set(live) < set(path), "the first frames are found afterwards")
+        self.assertLessEqual(len(poses(self.out / "keyframes.txt")[0]), result["num_keyframes"])
+        with open(self.out / "frames.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual([row["name"] for row in rows],
+                         [f"images/{i:05}.png" for i in range(COUNT)])
+        self.assertEqual([float(row["timestamp"]) in live for row in rows],
+                         [row["segment"] == "0" for row in rows])
+        for row in rows:
+            self.assertIn(row["status"], result["status_counts"])
+            self.assertIn(row["pose"], ("tracked", "located"))
+        self.assertEqual(sum(int(row["is_keyframe"]) for row in rows), result["num_keyframes"])
+        for key in ("mean", "median", "p99", "max"):
+            self.assertGreater(result["time_ms"][key], 0)
+
+    def test_the_cloud_has_the_walls(self):
+        self.succeed(self.odometry(self.set_folder()))
+        data = (self.out / "cloud.ply").read_bytes()
+        head, body = data.split(b"end_header\n", 1)
+        count = int(re.search(rb"element vertex (\d+)", head)[1])
+        self.assertEqual(count, self.result()["num_points"])
+        self.assertEqual(len(body), 27 * count)
+        points = [struct.unpack_from("<fff", body, 27 * i) for i in range(count)]
+        # The first keyframe is the world: a wall's depth is one over its shift.
+        depths = {shift: [] for shift in SHIFTS}
+        for x, y, z in points:
+            row = FOCAL * y / z + (HEIGHT - 1) / 2
+            if 0 <= row < HEIGHT:
+                depths[SHIFTS[int(row * 5 / HEIGHT)]].append(z * SHIFTS[int(row * 5 / HEIGHT)])
+        middles = [sorted(d)[len(d) // 2] for d in depths.values()]
+        self.assertGreater(min(map(len, depths.values())), 10)
+        self.assertLess(max(middles) / min(middles), 1.06)
+
+    def test_the_colmap_model_is_consistent(self):
+        self.succeed(self.odometry(self.set_folder()))
+
+        def rows(name):
+            text = (self.out / "colmap" / name).read_text()
+            return [line.split() for line in text.split("\n") if not line.startswith("#")][:-1]
+
+        camera, = rows("cameras.txt")
+        self.assertEqual(camera[1:4], ["PINHOLE", str(WIDTH), str(HEIGHT)])
+        # COLMAP's pixels begin at the corner of the first one.
+        self.assertEqual(list(map(float, camera[4:])), [FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2])
+        points = {p[0]: p for p in rows("points3D.txt")}
+        images = rows("images.txt")
+        seen = set()
+        errors = []
+        for head, pixels in zip(images[::2], images[1::2]):
+            w, x, y, z, *t = map(float, head[1:8])
+            R = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                 [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+            for k in range(0, len(pixels), 3):
+                point = points[pixels[k + 2]]
+                seen.add((pixels[k + 2], head[0], str(k // 3)))
+                X = list(map(float, point[1:4]))
+                c = [sum(R[r][k] * X[k] for k in range(3)) + t[r] for r in range(3)]
+                errors.append(math.hypot(FOCAL * c[0] / c[2] + WIDTH / 2 - float(pixels[k]),
+                                         FOCAL * c[1] / c[2] + HEIGHT / 2 - float(pixels[k + 1])))
+        self.assertLess(sorted(errors)[len(errors) // 2], 1)
+        tracks = {(p[0], p[k], p[k + 1]) for p in points.values() for k in range(8, len(p), 2)}
+        self.assertEqual(tracks, seen)
+
+    def test_a_run_repeats_and_json_is_the_result(self):
+        source = self.set_folder()
+        done = self.succeed(self.odometry(source, "--json", "--max-frames", 9))
+        self.assertEqual(json.loads(done.stdout), self.result())
+        self.assertEqual(self.result()["num_frames"], 9)
+        first = self.trajectory(), (self.out / "map.twm").read_bytes()
+        done = self.succeed(self.odometry(source, "--quiet", "--max-frames", 9))
+        self.assertEqual(done.stdout, b"")
+        self.assertEqual((self.trajectory(), (self.out / "map.twm").read_bytes()), first)
+        self.succeed(self.odometry(source, "--quiet", "--every", 2, "--max-frames", 6))
+        rows = (self.out / "frames.csv").read_text().splitlines()[1:]
+        self.assertEqual([row.split(",")[1] for row in rows],
+                         [f"images/{i:05}.png" for i in range(0, 12, 2)])
+
+    def test_a_map_tells_what_it_holds(self):
+        self.succeed(self.odometry(self.set_folder()))
+        path, result = self.out / "map.twm", self.result()
+        info = json.loads(self.succeed(self.run_program("map", "info", path, "--json")).stdout)
+        self.assertEqual([info[k] for k in ("num_keyframes", "num_points", "num_segments")],
+                         [result[k] for k in ("num_keyframes", "num_points", "num_segments")])
+        self.assertEqual((info["image_size"], info["camera"]["fx"]), ([WIDTH, HEIGHT], FOCAL))
+        self.assertIn(b"keyframes over", self.run_program("map", "info", path).stdout)
+        self.succeed(self.run_program("map", "export", path, "-o", self.folder / "more"))
+        for name in ("cloud.ply", "keyframes.txt"):
+            self.assertEqual((self.folder / "more" / name).read_bytes(),
+                             (self.out / name).read_bytes(), name)
+        data = path.read_bytes()
+        for wrong in (b"no map", data[:-1], data[:500] + b"\0\0" + data[502:], data + b"x"):
+            done = self.run_program("map", "info", self.write("wrong.twm", wrong))
+            self.assertEqual(done.returncode, 2)
+            self.one_line(done, "wrong.twm")
+
+    def test_the_report_holds_all_that_it_shows(self):
+        self.succeed(self.odometry(self.set_folder()))
+        page = (self.out / "report.html").read_text()
+        self.assertNotRegex(page, r"""(src|href)=["']?(https?:|//)""")
+        self.assertNotIn("{{", page)
+        for name in ("cloud-data", "flight-data"):
+            text = re.search(rf'id="{name}">(.*?)</script>', page, re.S)[1]
+            data = json.loads(text)
+        self.assertEqual(len(data["frames"]["status"]), COUNT)
+        self.assertEqual(len(data["keyframes"]), self.result()["num_keyframes"])
+        self.assertTrue(all(key["tracks"] for key in data["keyframes"]))
+        self.assertEqual(len(data["frames"]["error"]), COUNT)
+
+    # -- the formats --------------------------------------------------------------------------
+
+    def test_every_folder_gives_the_same_path(self):
+        self.succeed(self.odometry(self.set_folder(truth="")))
+        path, result = self.trajectory(), self.result()
+        self.assertIsNone(result["truth"])
+        for i, data in enumerate(PICTURES):
+            self.write(f"tum/rgb/{TIMES[i]:.6f}.png", data)
+            self.write(f"euroc/mav0/cam0/data/{i}.png", data)
+            self.write(f"kitti/image_0/{i:06}.png", data)
+            self.write(f"plain/{i:04}.PNG", data)
+        self.write("tum/rgb.txt", "".join(f"{t:.9f} rgb/{t:.6f}.png\n" for t in TIMES))
+        self.write("euroc/mav0/cam0/data.csv", "#timestamp [ns],filename\r\n" + "".join(
+            f"{round(t * 1e9)},{i}.png\r\n" for i, t in enumerate(TIMES)))
+        self.write("euroc/mav0/cam0/sensor.yaml", f"""sensor_type: camera
+T_BS:
+  cols: 4
+  rows: 4
+  data: [0, -1, 0, 0.5, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+resolution: [{WIDTH}, {HEIGHT}]
+camera_model: pinhole
+intrinsics: [{FOCAL}, {FOCAL}, {(WIDTH - 1) / 2}, {(HEIGHT - 1) / 2}]
+distortion_model: radial-tangential
+distortion_coefficients: [0, 0, 0, 0]
+""")
+        self.write("kitti/times.txt", "".join(f"{t:e}\n" for t in TIMES))
+        row = f"{FOCAL} 0 {(WIDTH - 1) / 2} 0 0 {FOCAL} {(HEIGHT - 1) / 2} 0 0 0 1 0"
+        self.write("kitti/calib.txt", f"P0: {row}\nP1: {row}\n")
+        camera = ("--camera", self.write("own.yaml", camera_yaml()))
+        for name, more in (("tum", camera), ("euroc", ()), ("kitti", ()),
+                           ("plain", (*camera, "--fps", FPS)), ("set", camera)):
+            out = self.folder / f"out_{name}"
+            self.succeed(self.odometry(name, *more, out=out))
+            self.assertEqual(self.trajectory(out), path, name)
+        # EuRoC's poses are the vehicle's, on which the camera sits turned and 0.5 m off.
+        euroc = "#timestamp,p x,p y,p z,q w,q x,q y,q z,v\n" + "".join(
+            f"{round(t * 1e9)},{0.1 * i},-0.5,7,{math.sqrt(0.5)},0,0,{-math.sqrt(0.5)},0\n"
+            for i, t in enumerate(TIMES))
+        # T_BS turns by 90 degrees about z, the vehicle by -90: the camera looks as in the world.
+        kitti = "".join(f"1 0 0 {0.1 * i} 0 1 0 0 0 0 1 0\n" for i in range(COUNT))
+        found = []
+        for name, text in (("euroc", euroc), ("kitti", kitti), ("tum", TUM_TRUTH)):
+            truth = self.write(f"truth_{name}", text)
+            more = camera if name == "tum" else ()
+            self.succeed(self.odometry(name, "--truth", truth, *more))
+            found.append(self.result()["truth"])
+        for truth in found:
+            self.assertAlmostEqual(truth["ate_rmse"], found[0]["ate_rmse"], 9)
+            self.assertAlmostEqual(truth["rpe_rotation_deg"], found[0]["rpe_rotation_deg"], 5)
+            self.assertAlmostEqual(truth["rpe_translation_rmse"],
+                                   found[0]["rpe_translation_rmse"], 9)
+            self.assertAlmostEqual(truth["scale_ratio"], found[0]["scale_ratio"], 9)
+
+    def test_a_film_is_tracked(self):
+        film = b"YUV4MPEG2 W%d H%d F25:1 Ip A1:1 Cmono\n" % (WIDTH, HEIGHT)
+        film += b"".join(b"FRAME\n" + luma for luma in LUMA)
+        path = self.write("flight.y4m", film)
+        self.succeed(self.odometry(path, "--camera", self.camera,
+                                   "--truth", self.write("truth", TUM_TRUTH)))
+        self.assertEqual(self.result()["num_frames"], COUNT)
+        self.assertLess(self.result()["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertIn("frame_000003.png", (self.out / "frames.csv").read_text())
+
+    def test_a_drone_and_its_recording_are_tracked(self):
+        if self.run_program("drone", "simulate", "--help").returncode != 0:
+            self.skipTest("the program was built without the simulator")
+        pictures = [self.write(f"film/{i:02}.png", data) for i, data in enumerate(PICTURES)]
+        channels = ("at", "navdata", "video", "control", "recording")
+        child = subprocess.Popen(
+            [program(), "drone", "simulate", "--fps", "8", "--duration", "60",
+             *(word for c in channels for word in (f"--{c}-port", "0")), "--images", *pictures],
+            stdout=subprocess.PIPE, text=True)
+        self.addCleanup(child.communicate)
+        self.addCleanup(child.kill)
+        words = child.stdout.readline().replace(",", "").split()
+        ports = [word for option, name in (("at", "commands"), ("navdata",) * 2, ("video",) * 2,
+                                           ("control",) * 2)
+                 for word in (f"--{option}-port", words[words.index(name) + 1])]
+        # The simulator scales the pictures to those of the drone, 640 x 360.
+        camera = ("--camera", self.write("drone.yaml", camera_yaml(
+            640, 360, 2 * FOCAL, 1.5 * FOCAL, 319.5, 179.5)))
+        self.succeed(self.run_program("drone", "record", "--host", "127.0.0.1", *ports,
+                                      "-o", "flown", "--duration", "4"))
+        live = self.run_program("odometry", "--drone", "127.0.0.1", *ports, *camera,
+                                "--duration", "4", "-o", self.out)
+        results = [self.result()]
+        again = self.odometry("flown", *camera)
+        results.append(self.result())
+        for done, result in zip((live, again), results):
+            self.assertIn(done.returncode, (0, 3), done.stderr.decode())  # the film begins again
+            self.assertGreater(result["num_frames"], 12)
+            self.assertGreater(result["num_tracked"], 8)
+        self.assert_refused(self.odometry("flown", out="new"), "--camera is required",
+                            out=self.folder / "new")
+        self.assert_refused(self.odometry("flown", "--drone", "127.0.0.1", *camera, out="new"),
+                            "not both", out=self.folder / "new")
+
+    # -- what goes wrong ----------------------------------------------------------------------
+
+    def test_a_frame_that_cannot_be_read_is_left_out(self):
+        source = self.set_folder()
+        (source / "images/00012.png").write_bytes(b"no picture")
+        self.write("set/images/00013.png", png(64, 64, bytes(64 * 64)))
+        done = self.succeed(self.odometry(source))
+        self.one_line(done, "2 frames could not be used", "00012.png")
+        result = self.result()
+        self.assertEqual((result["num_frames"], result["num_unreadable"]), (COUNT, 2))
+        rows = (self.out / "frames.csv").read_text().splitlines()
+        self.assertIn(",lost,unreadable,-1,", rows[13])
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 0.5)
+        self.assertAlmostEqual(result["truth"]["coverage"], (COUNT - 2) / COUNT)
+
+    def test_a_blank_wall_gives_no_map(self):
+        source = self.set_folder()
+        for i in range(COUNT):
+            self.write(f"set/images/{i:05}.png", png(WIDTH, HEIGHT, bytes([90]) * WIDTH * HEIGHT))
+        done = self.odometry(source)
+        self.assertEqual(done.returncode, 3)
+        self.one_line(done, "nothing could be tracked")
+        self.assertEqual(self.result()["num_tracked"], 0)
+        self.assertEqual(self.result()["truth"]["coverage"], 0)
+        self.assertIsNone(self.result()["truth"]["ate_rmse"])
+        self.assertNotIn("cloud.ply", self.listing())
+        self.assertIn("no map", (self.out / "report.html").read_text())
+
+    def test_a_source_that_ends_lost_says_so(self):
+        source = self.set_folder()
+        for i in range(12, COUNT):
+            self.write(f"set/images/{i:05}.png", png(WIDTH, HEIGHT, bytes([90]) * WIDTH * HEIGHT))
+        done = self.odometry(source)
+        self.assertEqual(done.returncode, 3)
+        self.one_line(done, "ended lost")
+        self.assertGreaterEqual(self.result()["num_tracked"], 10)
+        self.assertEqual(self.listing(), FILES)
+
+    def test_ctrl_c_keeps_what_there_is(self):
+        source = self.set_folder()
+        # The flight to and fro, many times.
+        names = [COUNT - 1 - abs(COUNT - 1 - j % (2 * (COUNT - 1))) for j in range(40000)]
+        self.write("set/frames.txt", "".join(f"{0.04 * i:.3f} images/{n:05}.png\n"
+                                             for i, n in enumerate(names)))
+        child = subprocess.Popen([program(), "odometry", source, "-o", self.out, "--quiet"],
+                                 stderr=subprocess.PIPE)
+        while child.poll() is None and not self.out.exists():
+            time.sleep(0.1)
+        time.sleep(2)
+        child.send_signal(signal.SIGINT)
+        error = child.communicate(timeout=120)[1].decode()
+        self.assertEqual(child.returncode, 0, error)
+        self.assertEqual(self.listing(), FILES)
+        result = self.result()
+        self.assertTrue(result["interrupted"])
+        self.assertGreater(result["num_frames"], 8)
+        self.assertLess(result["num_frames"], 40000)
+        self.assertLess(result["truth"]["coverage"], 0.5)
+
+    def test_a_full_disk_is_one_line(self):
+        done = self.odometry(self.set_folder(), preexec_fn=lambda: resource.setrlimit(
+            resource.RLIMIT_FSIZE, (2000, 2000)))
+        self.assert_refused(done, "cannot write", "File too large")
+
+    def test_bad_sources_are_refused(self):
+        source = self.set_folder()
+        lines = (source / "frames.txt").read_text().splitlines()
+
+        def refused(*words, name="frames.txt", text=None, more=(), where=source):
+            kept = (source / name).read_bytes()
+            if text is not None:
+                self.write(f"set/{name}", text)
+            self.assert_refused(self.odometry(where, *more), *words)
+            self.write(f"set/{name}", kept)
+
+        refused("nowhere", "neither a folder", where="nowhere")
+        refused("no film", where=self.write("film.avi", "no film"))
+        refused("--camera is required", where="0")
+        refused("it is empty", text="")
+        refused("no frame in it", text="# none\n")
+        refused("line 2", "not a time and a file's name", text="0 a.png\n1\n")
+        refused("line 1", "not a time", text="nan images/00000.png\n")
+        refused("line 4", "not later", text="\n".join(lines[:3] + lines[2:]))
+        refused("absent.png", text="0 images/absent.png\n")
+        refused("no image", "00000.png", name="images/00000.png", text="no image")
+        refused("cameras.yaml", "fx", name="cameras.yaml", text=CAMERAS.replace("fx", "gx"))
+        refused("320x240", "640x240", name="cameras.yaml", text=CAMERAS.replace(": 320", ": 640"))
+        refused("line 1", "7 numbers", name="groundtruth.txt", text="0 0 0 0 0 0 0\n")
+        refused("line 2", "not later", name="groundtruth.txt",
+                text="0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n")
+        refused("line 1", "length 0", name="groundtruth.txt", text="0 0 0 0 0 0 0 0\n")
+        refused("--fps", "has times", more=("--fps", 30))
+        refused("--every", more=("--every", 0))
+        refused("--max-keypoints", more=("--max-keypoints", 5))
+        refused("cannot read", more=("--truth", "absent"))
+        refused("cannot read", more=("--camera", "absent"))
+        (source / "cameras.yaml").unlink()
+        self.assert_refused(self.odometry(source), "--camera is required", "set folder")
+        self.assert_refused(self.odometry(source / "images"), "--fps is required")
+        (self.folder / "void").mkdir()
+        self.assert_refused(self.odometry("void"), "neither frames.txt")
+        self.assert_refused(self.run_program("odometry", "-o", self.out), "SOURCE is required")
+        for i in range(3):
+            self.write(f"kitti/image_0/{i}.png", PICTURES[i])
+        self.write("kitti/times.txt", "0\n1\n")
+        self.assert_refused(self.odometry("kitti"), "2 times", "3 images")
+
+    def test_an_output_never_replaces_an_input(self):
+        source = self.set_folder()
+        os.rename(source / "frames.txt", source / "kept")
+        self.write("set/frames.txt", (source / "kept").read_bytes())
+        truth = self.write("set/trajectory.txt", TUM_TRUTH)
+        done = self.odometry(source, "--truth", truth, out=source)
+        self.assertEqual(done.returncode, 2)
+        self.one_line(done, "trajectory.txt", "read by this run")
+        self.assertEqual(truth.read_text(), TUM_TRUTH)
+
+
+if __name__ == "__main__":
+    if b"odometry" not in subprocess.run([program(), "--help"], capture_output=True).stdout:
+        print("skipped: the program was built without TWOVIEW_ODOMETRY")
+        raise SystemExit(77)
+    unittest.TestLoader.sortTestMethodsUsing = None
+    main()

@@ -1,0 +1,296 @@
+#include "odometry/flight.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+
+#include "base/error.h"
+#include "files/camera_file.h"
+#include "files/image_file.h"
+
+namespace cli {
+namespace {
+
+// CPU time of this thread, in milliseconds: other programs on the machine do not count.
+double cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+tv_image view_of(const cv::Mat& luma) {
+  return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};
+}
+
+// The picture scaled down as --resize does.
+cv::Mat shrunk(const cv::Mat& luma, int longer) {
+  Picture picture;
+  picture.luma = picture.colour = luma;
+  shrink(picture, longer);
+  return picture.luma;
+}
+
+Thumbnail thumbnail_of(const cv::Mat& luma) {
+  constexpr int kLongerSide = 400;
+  const cv::Mat small = shrunk(luma, kLongerSide);
+  std::vector<uint8_t> bytes;
+  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, 75});
+  return {small.cols, small.rows, std::string(bytes.begin(), bytes.end())};
+}
+
+Pose pose_of(const double R[9], const double t[3]) {
+  Pose pose;
+  std::copy(R, R + 9, pose.R.begin());
+  std::copy(t, t + 3, pose.t.begin());
+  return pose;
+}
+
+}  // namespace
+
+void Flight::Free::operator()(void* memory) const { std::free(memory); }
+
+Flight::Flight(FrameSource& source, const FlightOptions& options)
+    : source_(source), options_(options) {
+  tv_odometry_state_init(&state_);
+  if (!options.camera_file.empty()) file_camera_ = load_camera(options.camera_file);
+}
+
+Flight::~Flight() = default;
+
+bool Flight::wants(int index) const {
+  if (index % options_.every != 0) return false;
+  return options_.max_frames == 0 || index / options_.every < options_.max_frames;
+}
+
+void Flight::prepare(SourceFrame& frame) {
+  if (!options_.camera_file.empty())
+    require_size(file_camera_, options_.camera_file, frame.luma.cols, frame.luma.rows, frame.name);
+  if (odometry_ != nullptr &&
+      (frame.luma.cols != file_camera_.width || frame.luma.rows != file_camera_.height))
+    throw BadInput("frame " + frame.name + " is " + std::to_string(frame.luma.cols) + "x" +
+                   std::to_string(frame.luma.rows) + ", not " + std::to_string(file_camera_.width) +
+                   "x" + std::to_string(file_camera_.height) + " as the first one");
+  frame.luma = shrunk(frame.luma, options_.resize);
+}
+
+void Flight::start(const SourceFrame& first) {
+  SourceFrame frame = first;
+  if (options_.camera_file.empty()) {
+    const auto camera = source_.camera(frame, frame.luma.cols, frame.luma.rows);
+    if (!camera)
+      throw BadInput("--camera is required: " + source_.kind() + " does not describe its camera");
+    file_camera_ = *camera;
+  }
+  prepare(frame);
+  camera_ = resized(file_camera_, frame.luma.cols, frame.luma.rows);
+  const tv_odometry_options& options = options_.odometry;
+  check(tv_odometry_size(&camera_, &options, &context_bytes_), "cannot track these frames");
+  const size_t unit = TV_CONTEXT_ALIGNMENT;
+  memory_.reset(std::aligned_alloc(unit, (context_bytes_ + unit - 1) / unit * unit));
+  if (!memory_)
+    throw BadInput("not enough memory: the odometry needs " +
+                   std::to_string((context_bytes_ >> 20) + 1) + " MiB");
+  const tv_status status =
+      tv_odometry_init(&odometry_, &camera_, &options, memory_.get(), context_bytes_);
+  if (status == TV_ERR_KERNELS)
+    check(status,
+          std::string("--kernels ") + tv_kernels_string(static_cast<tv_kernels>(options.kernels)));
+  check(status, "cannot start the odometry");
+}
+
+void Flight::track(const std::atomic<bool>& stop, const std::function<void()>& after_frame) {
+  const auto wanted = [this](int index) { return wants(index); };
+  const auto consume = [&](const SourceFrame& frame) {
+    track_frame(frame);
+    if (after_frame) after_frame();
+    const int next = frame.index / options_.every + 1;
+    return options_.max_frames == 0 || next < options_.max_frames;
+  };
+  source_.run(wanted, consume, stop);
+}
+
+void Flight::track_frame(SourceFrame frame) {
+  const bool is_first = odometry_ == nullptr;
+  FlightFrame record;
+  record.index = frame.index;
+  record.name = frame.name;
+  record.time_s = frame.time_s;
+  try {
+    if (frame.luma.empty()) throw BadInput(frame.problem);
+    if (is_first) start(frame);
+    prepare(frame);
+  } catch (const BadInput& e) {
+    // A source whose first frame cannot be used is refused; a later one is a missing frame.
+    if (is_first) throw;
+    if (num_unreadable_++ == 0) first_problem_ = e.what();
+    record.unreadable = true;
+    record.status = state_.status == TV_ODOMETRY_STARTING ? TV_ODOMETRY_STARTING : TV_ODOMETRY_LOST;
+    gap_ = true;
+    frames_.push_back(record);
+    return;
+  }
+  tv_odometry_frame input;
+  tv_odometry_frame_init(&input);
+  input.gap = frame.gap || gap_ ? 1 : 0;
+  input.image = view_of(frame.luma);
+  input.time_s = frame.time_s;
+  if (frame.world_from_cam) {
+    std::copy(frame.world_from_cam->begin(), frame.world_from_cam->end(), input.world_from_cam);
+    input.attitude_sigma_rad = frame.attitude_sigma_rad;
+  }
+  if (frame.height_m) {
+    input.height_m = *frame.height_m;
+    input.height_sigma_m = frame.height_sigma_m;
+  }
+  if (frame.velocity_m_s) {
+    std::copy(frame.velocity_m_s->begin(), frame.velocity_m_s->end(), input.velocity_m_s);
+    input.velocity_sigma_m_s = frame.velocity_sigma_m_s;
+  }
+  const double before = cpu_ms();
+  check(tv_odometry_track(odometry_, &input, &state_), "frame " + frame.name);
+  record.time_ms = cpu_ms() - before;
+  gap_ = false;
+  record.status = state_.status;
+  record.reasons = state_.reasons;
+  record.is_keyframe = state_.is_keyframe != 0;
+  record.relocated = state_.relocated != 0;
+  record.loop_closed = state_.loop_closed != 0;
+  record.num_keypoints = state_.num_keypoints;
+  record.num_matches = state_.num_matches;
+  record.num_inliers = state_.num_inliers;
+  if (state_.has_pose) {
+    record.live_segment = state_.segment;
+    record.live = pose_of(state_.world_from_cam_R, state_.world_from_cam_t);
+    record.reference_id = state_.reference_id;
+    record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
+  }
+  if (frame.world_from_cam) is_upright_ = true;
+  if (record.is_keyframe) thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
+  given_.push_back(frames_.size());
+  frames_.push_back(record);
+}
+
+void Flight::finish(const std::atomic<bool>& stop) {
+  if (odometry_ == nullptr) return;
+  for (FlightFrame& frame : frames_) {
+    if (frame.reference_id < 0) continue;
+    double R[9], t[3];
+    const Pose& relative = frame.reference_from_cam;
+    check(tv_odometry_pose_of(odometry_, frame.reference_id, relative.R.data(), relative.t.data(),
+                              R, t, &frame.segment),
+          "frame " + frame.name);
+    frame.pose = pose_of(R, t);
+    frame.origin = PoseOrigin::kTracked;
+  }
+  std::map<int, FlightFrame*> missing;
+  std::map<int, int> without_picture;  // the source's index and the number of the given frame
+  const std::vector<FlightKeyframe> keyframes = this->keyframes();
+  // The first keyframe of a segment became one only when a later frame completed the start.
+  for (const FlightKeyframe& key : keyframes) {
+    FlightFrame& frame = frames_[index_given(key.keyframe.frame)];
+    frame.is_keyframe = true;
+    if (thumbnail(key.keyframe.frame) == nullptr) without_picture[frame.index] = key.keyframe.frame;
+    if (frame.origin != PoseOrigin::kNone) continue;
+    frame.origin = PoseOrigin::kTracked;
+    frame.segment = key.keyframe.segment;
+    frame.pose = pose_of(key.keyframe.world_from_cam_R, key.keyframe.world_from_cam_t);
+  }
+  if (!source_.can_run_again() || keyframes.empty()) return;
+  for (FlightFrame& frame : frames_)
+    if (frame.origin == PoseOrigin::kNone && !frame.unreadable) missing[frame.index] = &frame;
+  int last = missing.empty() ? -1 : missing.rbegin()->first;
+  if (!without_picture.empty()) last = std::max(last, without_picture.rbegin()->first);
+  if (last < 0) return;
+  const auto wanted = [&](int index) {
+    return missing.count(index) != 0 || without_picture.count(index) != 0;
+  };
+  const auto consume = [&](const SourceFrame& frame) {
+    const auto picture = without_picture.find(frame.index);
+    if (picture != without_picture.end() && !frame.luma.empty())
+      thumbnails_[picture->second] = thumbnail_of(frame.luma);
+    const auto found = missing.find(frame.index);
+    if (found != missing.end() && !frame.luma.empty()) {
+      const auto nearest = std::min_element(keyframes.begin(), keyframes.end(),
+                                            [&](const FlightKeyframe& a, const FlightKeyframe& b) {
+                                              return std::abs(a.keyframe.time_s - frame.time_s) <
+                                                     std::abs(b.keyframe.time_s - frame.time_s);
+                                            });
+      locate(frame, *found->second, nearest->keyframe.id);
+    }
+    return frame.index < last;
+  };
+  source_.run(wanted, consume, stop);
+}
+
+void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id) {
+  try {
+    prepare(frame);
+  } catch (const BadInput&) {
+    return;
+  }
+  tv_odometry_state state;
+  tv_odometry_state_init(&state);
+  const tv_image image = view_of(frame.luma);
+  check(tv_odometry_locate(odometry_, &image, near_id, &state), "frame " + frame.name);
+  // A weak pose that nothing before or after confirms is not written as known.
+  if (state.status != TV_ODOMETRY_TRACKING || !state.has_pose) return;
+  record.origin = PoseOrigin::kLocated;
+  record.segment = state.segment;
+  record.pose = pose_of(state.world_from_cam_R, state.world_from_cam_t);
+}
+
+const Thumbnail* Flight::thumbnail(int number) const {
+  const auto found = thumbnails_.find(number);
+  return found == thumbnails_.end() ? nullptr : &found->second;
+}
+
+bool Flight::ended_tracked() const {
+  if (frames_.empty()) return false;
+  const FlightFrame& last = frames_.back();
+  return !last.unreadable && last.live_segment >= 0;
+}
+
+std::vector<FlightKeyframe> Flight::keyframes() const {
+  std::vector<FlightKeyframe> keyframes(odometry_ ? static_cast<size_t>(state_.num_keyframes) : 0);
+  for (size_t k = 0; k < keyframes.size(); ++k) {
+    FlightKeyframe& key = keyframes[k];
+    const int32_t idx = static_cast<int32_t>(k);
+    tv_keyframe_init(&key.keyframe);
+    check(tv_odometry_keyframe(odometry_, idx, &key.keyframe), "keyframe " + std::to_string(idx));
+    key.observations.resize(static_cast<size_t>(options_.odometry.max_keypoints));
+    int32_t count = 0;
+    check(tv_odometry_observations(odometry_, idx, key.observations.data(),
+                                   static_cast<int32_t>(key.observations.size()), &count),
+          "keyframe " + std::to_string(idx));
+    key.observations.resize(static_cast<size_t>(count));
+  }
+  return keyframes;
+}
+
+std::vector<tv_map_point> Flight::points() const {
+  std::vector<tv_map_point> points(odometry_ ? static_cast<size_t>(options_.odometry.max_points)
+                                             : 0);
+  if (!odometry_) return points;
+  int32_t count = 0;
+  check(tv_odometry_points(odometry_, points.data(), options_.odometry.max_points, &count),
+        "the map's points");
+  points.resize(static_cast<size_t>(count));
+  return points;
+}
+
+std::string Flight::map_bytes() const {
+  if (!odometry_) return "";
+  size_t size = 0;
+  check(tv_odometry_save_size(odometry_, &size), "the map");
+  std::string bytes(size, '\0');
+  check(tv_odometry_save(odometry_, reinterpret_cast<uint8_t*>(bytes.data()), size, &size),
+        "the map");
+  bytes.resize(size);
+  return bytes;
+}
+
+}  // namespace cli

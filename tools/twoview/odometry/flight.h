@@ -1,0 +1,128 @@
+// A source's frames through the library's odometry: the tracker with its memory, and what is known
+// of each frame while the flight lasts and in the last state of the map.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "odometry/frames.h"
+#include "odometry/poses.h"
+#include "twoview/odometry.h"
+
+namespace cli {
+
+// What a frame's final pose comes from.
+enum class PoseOrigin { kNone, kTracked, kLocated };
+
+// What is kept of each frame.
+struct FlightFrame {
+  int index = 0;  // among the source's frames
+  std::string name;
+  double time_s = 0;
+  int32_t status = TV_ODOMETRY_STARTING;
+  uint32_t reasons = 0;
+  bool unreadable = false;
+  bool is_keyframe = false, relocated = false, loop_closed = false;
+  int32_t num_keypoints = 0, num_matches = 0, num_inliers = 0;
+  double time_ms = 0;  // CPU time of tv_odometry_track
+  // As known when the frame was tracked; segment -1: no pose.
+  int32_t live_segment = -1;
+  Pose live;
+  int32_t reference_id = -1;
+  Pose reference_from_cam;
+  // In the last state of the map.
+  PoseOrigin origin = PoseOrigin::kNone;
+  int32_t segment = -1;
+  Pose pose;
+};
+
+// A keyframe with what it sees, and its frame.
+struct FlightKeyframe {
+  tv_keyframe keyframe;
+  std::vector<tv_map_observation> observations;
+};
+
+// A small picture of a keyframe, for the report.
+struct Thumbnail {
+  int width = 0, height = 0;  // pixels
+  std::string jpeg;
+};
+
+struct FlightOptions {
+  tv_odometry_options odometry;
+  int max_frames = 0;  // 0: all
+  int every = 1;
+  int resize = 0;           // longer side, pixels; 0: as they are
+  std::string camera_file;  // empty: the source's own camera
+};
+
+class Flight {
+ public:
+  Flight(FrameSource& source, const FlightOptions& options);
+  ~Flight();
+  Flight(const Flight&) = delete;
+  Flight& operator=(const Flight&) = delete;
+
+  // Tracks the source's frames until its end or until `stop` is set; `after_frame` may be empty.
+  // Throws BadInput where the first frame cannot be used.
+  void track(const std::atomic<bool>& stop, const std::function<void()>& after_frame);
+  // Fills the frames' final poses: of tracked frames from the map, of the others, where the source
+  // can be read again, by looking for them in the map.
+  void finish(const std::atomic<bool>& stop);
+
+  const std::vector<FlightFrame>& frames() const { return frames_; }
+  // The frame that was given to the odometry after `number` others: unreadable ones do not count.
+  const FlightFrame& given(int number) const {
+    return frames_[given_[static_cast<size_t>(number)]];
+  }
+  size_t index_given(int number) const { return given_[static_cast<size_t>(number)]; }
+  // The picture of a frame that was given and became a keyframe; null for other frames.
+  const Thumbnail* thumbnail(int number) const;
+  // Whether attitudes were given, so that the map's z axis points down.
+  bool is_upright() const { return is_upright_; }
+  const tv_odometry_state& state() const { return state_; }
+  const tv_camera& camera() const { return camera_; }
+  size_t context_bytes() const { return context_bytes_; }
+  int num_unreadable() const { return num_unreadable_; }
+  const std::string& first_problem() const { return first_problem_; }
+  // Whether the source ended before its frames could be tracked to the end, or --max-frames did.
+  bool ended_tracked() const;
+
+  // The map as it is. The index of a point in points() is that of the observations.
+  std::vector<FlightKeyframe> keyframes() const;
+  std::vector<tv_map_point> points() const;
+  std::string map_bytes() const;
+  tv_odometry* odometry() const { return odometry_; }
+
+ private:
+  bool wants(int index) const;
+  // Scales the frame down; throws BadInput where it does not fit the camera.
+  void prepare(SourceFrame& frame);
+  void start(const SourceFrame& frame);
+  void track_frame(SourceFrame frame);
+  void locate(SourceFrame frame, FlightFrame& record, int32_t near_id);
+
+  FrameSource& source_;
+  FlightOptions options_;
+  tv_camera file_camera_{}, camera_{};  // of the frames' files, and as they are tracked
+  struct Free {
+    void operator()(void* memory) const;
+  };
+  std::unique_ptr<void, Free> memory_;
+  size_t context_bytes_ = 0;
+  tv_odometry* odometry_ = nullptr;
+  tv_odometry_state state_;
+  std::vector<FlightFrame> frames_;
+  std::vector<size_t> given_;            // indices of frames_
+  std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
+  bool is_upright_ = false;
+  bool gap_ = false;  // a frame was left out before the next one
+  int num_unreadable_ = 0;
+  std::string first_problem_;
+};
+
+}  // namespace cli

@@ -1,0 +1,321 @@
+// Folders of images as sources of frames. All formats become one list of times and files.
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "files/camera_file.h"
+#include "files/camera_set.h"
+#include "files/image_file.h"
+#include "files/yaml_values.h"
+#include "odometry/frames.h"
+#include "odometry/numbers.h"
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr size_t kMaxFileBytes = 1 << 28;
+
+struct Listed {
+  double time_s;
+  std::string name;  // relative to the source's folder
+};
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+// What the formats have in common.
+struct Folder {
+  std::string path, kind;
+  std::vector<Listed> frames;
+  NamedCameras cameras;     // of cameras.yaml; may be empty
+  std::string camera_name;  // in messages
+  std::string truth;
+  std::optional<std::array<double, 12>> body_from_camera;
+  std::vector<std::string> files;
+};
+
+class ImageFolder : public FrameSource {
+ public:
+  explicit ImageFolder(Folder folder) : folder_(std::move(folder)) {}
+
+  void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
+    for (size_t k = 0; k < folder_.frames.size() && !stop; ++k) {
+      const Listed& listed = folder_.frames[k];
+      SourceFrame frame;
+      frame.index = static_cast<int>(k);
+      if (!wanted(frame.index)) continue;
+      frame.name = listed.name;
+      frame.time_s = listed.time_s;
+      try {
+        frame.luma = load_picture((fs::path(folder_.path) / listed.name).string()).luma;
+      } catch (const BadInput& e) {
+        frame.problem = e.what();
+      }
+      if (!consume(frame)) return;
+    }
+  }
+  bool can_run_again() const override { return true; }
+  int num_frames() const override { return static_cast<int>(folder_.frames.size()); }
+  std::string kind() const override { return folder_.kind; }
+  std::optional<tv_camera> camera(const SourceFrame& frame, int width, int height) const override {
+    if (folder_.cameras.empty()) return {};
+    const tv_camera* const entry = choose_camera(folder_.cameras, frame.name, nullptr);
+    if (!entry) throw BadInput(folder_.camera_name + ": no entry fits image " + frame.name);
+    require_size(*entry, folder_.camera_name, width, height, frame.name);
+    return *entry;
+  }
+  std::string truth_file() const override { return folder_.truth; }
+  std::vector<double> times() const override {
+    std::vector<double> times;
+    for (const Listed& listed : folder_.frames) times.push_back(listed.time_s);
+    return times;
+  }
+  std::optional<std::array<double, 12>> body_from_camera() const override {
+    return folder_.body_from_camera;
+  }
+  std::vector<std::string> files() const override { return folder_.files; }
+
+ private:
+  Folder folder_;
+};
+
+// Reads lines `time name` and checks that the times rise; `scale` makes them seconds. The name is
+// looked for below each of `folders`, which are relative to the source's folder.
+void read_list(Folder& folder, const std::string& file, double scale, std::string_view separators,
+               const std::vector<std::string>& folders) {
+  const std::string path = (fs::path(folder.path) / file).string();
+  const std::string text = read_file(path, kMaxFileBytes);
+  for (const TextLine& line : lines_of(text)) {
+    const std::string where = path + ": line " + std::to_string(line.number);
+    const std::vector<std::string_view> words = words_of(line.text, separators);
+    Listed listed{};
+    if (words.size() != 2 || !to_number(words[0], listed.time_s))
+      throw BadInput(where + " is not a time and a file's name");
+    listed.time_s *= scale;
+    if (!folder.frames.empty() && !(listed.time_s > folder.frames.back().time_s))
+      throw BadInput(where + ": its time is not later than that of the frame before");
+    const std::string name(words[1]);
+    listed.name = (fs::path(folders[0]) / name).string();
+    for (const std::string& below : folders) {
+      const std::string candidate = (fs::path(below) / name).string();
+      if (!is_file(fs::path(folder.path) / candidate)) continue;
+      listed.name = candidate;
+      break;
+    }
+    folder.frames.push_back(listed);
+  }
+  if (folder.frames.empty()) throw BadInput(path + ": no frame in it");
+  folder.files.push_back(path);
+}
+
+void add_cameras(Folder& folder) {
+  const std::string path = (fs::path(folder.path) / "cameras.yaml").string();
+  if (!is_file(path)) return;
+  folder.cameras = load_camera_set(path);
+  folder.camera_name = path;
+  folder.files.push_back(path);
+}
+
+void add_truth(Folder& folder, const std::string& name) {
+  const std::string path = (fs::path(folder.path) / name).string();
+  if (!is_file(path)) return;
+  folder.truth = path;
+  folder.files.push_back(path);
+}
+
+// The camera of EuRoC's sensor.yaml: resolution, intrinsics, distortion_model,
+// distortion_coefficients, and T_BS, which is body_from_camera.
+void add_euroc_camera(Folder& folder) {
+  const std::string path = (fs::path(folder.path) / "mav0/cam0/sensor.yaml").string();
+  if (!is_file(path)) return;
+  const YAML::Node root = parse_yaml(read_file(path, 1 << 20), path);
+  const auto exactly = [&](const char* entry, size_t count) {
+    const std::vector<double> n = numbers_at(root, entry, path);
+    if (n.size() != count)
+      throw BadInput(path + ": " + entry + " has " + std::to_string(n.size()) + " numbers, not " +
+                     std::to_string(count));
+    return n;
+  };
+  const std::vector<double> size = exactly("resolution", 2), K = exactly("intrinsics", 4),
+                            k = exactly("distortion_coefficients", 4);
+  tv_camera camera{};
+  for (const double side : size)
+    if (!(side >= 1 && side <= kMaxSide && side == std::floor(side)))
+      throw BadInput(path + ": resolution is not two whole numbers of pixels");
+  camera.width = static_cast<int32_t>(size[0]);
+  camera.height = static_cast<int32_t>(size[1]);
+  camera.fx = K[0];
+  camera.fy = K[1];
+  camera.cx = K[2];
+  camera.cy = K[3];
+  std::copy(k.begin(), k.end(), camera.k);
+  const YAML::Node node = root["distortion_model"];
+  const std::string model = node && node.IsScalar() ? node.Scalar() : "";
+  if (model == "equidistant") {
+    camera.model = TV_CAMERA_KANNALA_BRANDT;
+  } else if (model == "radial-tangential" || model == "radtan" || model == "plumb_bob") {
+    camera.model = TV_CAMERA_BROWN_CONRADY;
+  } else {
+    throw BadInput(path + ": distortion_model '" + model +
+                   "' is neither radial-tangential nor equidistant");
+  }
+  check(tv_camera_check(&camera), path);
+  folder.cameras.emplace_back("cam0", camera);
+  folder.camera_name = path;
+  folder.files.push_back(path);
+  if (!root["T_BS"]) return;
+  const std::vector<double> T = exactly("T_BS", 16);
+  folder.body_from_camera.emplace();
+  std::copy(T.begin(), T.begin() + 12, folder.body_from_camera->begin());
+}
+
+// The camera of KITTI's calib.txt: the line of P0, 12 numbers.
+void add_kitti_camera(Folder& folder) {
+  const std::string path = (fs::path(folder.path) / "calib.txt").string();
+  if (!is_file(path)) return;
+  const std::string text = read_file(path, 1 << 20);
+  for (const TextLine& line : lines_of(text)) {
+    const std::vector<std::string_view> words = words_of(line.text);
+    if (words[0] != "P0:" && words[0] != "P_rect_00:") continue;
+    const std::string where = path + ": line " + std::to_string(line.number);
+    std::array<double, 12> P{};
+    bool good = words.size() == 13;
+    for (size_t k = 0; good && k < 12; ++k) good = to_number(words[k + 1], P[k]);
+    if (!good) throw BadInput(where + " is not P0: and 12 numbers");
+    tv_camera camera{};
+    camera.model = TV_CAMERA_PINHOLE;
+    camera.fx = P[0];
+    camera.cx = P[2];
+    camera.fy = P[5];
+    camera.cy = P[6];
+    camera.width = camera.height = 1;  // calib.txt does not say them
+    check(tv_camera_check(&camera), where);
+    folder.cameras.emplace_back("P0", camera);
+    folder.camera_name = path;
+    folder.files.push_back(path);
+    return;
+  }
+  throw BadInput(path + ": no line P0");
+}
+
+bool is_image_name(const fs::path& path) {
+  static const std::vector<std::string> kEndings = {".jpg", ".jpeg", ".png",  ".bmp", ".pgm",
+                                                    ".ppm", ".tif",  ".tiff", ".webp"};
+  std::string ending = path.extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
+// The names of a folder's images in the order of their bytes.
+std::vector<std::string> image_names(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    if (is_image_name(at->path()) && is_file(at->path()))
+      names.push_back(at->path().filename().string());
+  if (error) throw BadInput("cannot read folder " + folder.string() + ": " + error.message());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+void read_kitti(Folder& folder) {
+  const fs::path path = folder.path;
+  const std::string times = (path / "times.txt").string();
+  const std::vector<std::string> names = image_names(path / "image_0");
+  if (names.empty()) throw BadInput((path / "image_0").string() + ": no image in it");
+  const std::string text = read_file(times, kMaxFileBytes);
+  const std::vector<TextLine> lines = lines_of(text);
+  if (lines.size() != names.size())
+    throw BadInput(times + " has " + std::to_string(lines.size()) + " times, but image_0 has " +
+                   std::to_string(names.size()) + " images");
+  for (size_t k = 0; k < names.size(); ++k) {
+    Listed listed{0, "image_0/" + names[k]};
+    const std::string where = times + ": line " + std::to_string(lines[k].number);
+    if (!to_number(lines[k].text, listed.time_s)) throw BadInput(where + " is not a time");
+    if (k > 0 && !(listed.time_s > folder.frames.back().time_s))
+      throw BadInput(where + ": its time is not later than that of the frame before");
+    folder.frames.push_back(listed);
+  }
+  folder.files.push_back(times);
+  add_kitti_camera(folder);
+}
+
+// KITTI's calib.txt gives no image size: the camera takes that of the images.
+class KittiFolder : public ImageFolder {
+ public:
+  explicit KittiFolder(Folder folder)
+      : ImageFolder(Folder(folder)), cameras_(std::move(folder.cameras)) {}
+  std::optional<tv_camera> camera(const SourceFrame&, int width, int height) const override {
+    if (cameras_.empty()) return {};
+    tv_camera camera = cameras_[0].second;
+    camera.width = width;
+    camera.height = height;
+    return camera;
+  }
+
+ private:
+  NamedCameras cameras_;
+};
+
+void refuse_fps(double fps, const Folder& folder) {
+  if (fps > 0)
+    throw BadInput("--fps is for a folder of images without times, or a film: " + folder.path +
+                   " is " + folder.kind + ", which has times");
+}
+
+}  // namespace
+
+std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double fps) {
+  Folder folder;
+  folder.path = path;
+  const fs::path root = path;
+  if (is_file(root / "frames.txt")) {
+    folder.kind = "a set folder (frames.txt)";
+    refuse_fps(fps, folder);
+    read_list(folder, "frames.txt", 1, "", {"", "images"});
+    add_cameras(folder);
+    add_truth(folder, "groundtruth.txt");
+  } else if (is_file(root / "rgb.txt")) {
+    folder.kind = "a TUM RGB-D folder (rgb.txt)";
+    refuse_fps(fps, folder);
+    read_list(folder, "rgb.txt", 1, "", {""});
+    add_cameras(folder);
+    add_truth(folder, "groundtruth.txt");
+  } else if (is_file(root / "mav0/cam0/data.csv")) {
+    folder.kind = "an EuRoC folder (mav0/cam0)";
+    refuse_fps(fps, folder);
+    read_list(folder, "mav0/cam0/data.csv", 1e-9, ",", {"mav0/cam0/data"});
+    add_euroc_camera(folder);
+    add_truth(folder, "mav0/state_groundtruth_estimate0/data.csv");
+  } else if (is_folder(root / "image_0")) {
+    folder.kind = "a KITTI folder (image_0, times.txt)";
+    refuse_fps(fps, folder);
+    read_kitti(folder);
+    return std::make_unique<KittiFolder>(std::move(folder));
+  } else {
+    folder.kind = "a folder of images";
+    const std::vector<std::string> names = image_names(root);
+    if (names.empty())
+      throw BadInput(path +
+                     " holds neither frames.txt, rgb.txt, mav0/cam0/data.csv, image_0, video.pave "
+                     "nor any image");
+    if (!(fps > 0)) throw BadInput("--fps is required: " + path + " holds images without times");
+    for (size_t k = 0; k < names.size(); ++k)
+      folder.frames.push_back({static_cast<double>(k) / fps, names[k]});
+    add_cameras(folder);
+  }
+  return std::make_unique<ImageFolder>(std::move(folder));
+}
+
+}  // namespace cli

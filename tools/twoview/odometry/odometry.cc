@@ -1,0 +1,332 @@
+// twoview odometry SOURCE -o OUT: the frames of one camera to its path and a map.
+
+#include "odometry/odometry_verb.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+
+#include "base/error.h"
+#include "base/output.h"
+#include "odometry/flight.h"
+#include "odometry/outputs.h"
+#include "odometry/report.h"
+#include "pair/result.h"
+#include "pair/session.h"
+#include "verbs/common.h"
+#ifdef TWOVIEW_HAS_DRONE
+#include "odometry/drone_frames.h"
+#endif
+
+namespace cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<std::string> kFiles = {"trajectory.txt", "live.txt",   "keyframes.txt",
+                                         "frames.csv",     "cloud.ply",  "map.twm",
+                                         "report.html",    "result.json"};
+const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
+
+struct Arguments {
+  Common common;
+  std::string source, camera, truth;
+  double fps = 0, duration = 0;
+  FlightOptions flight;
+#ifdef TWOVIEW_HAS_DRONE
+  DroneAddress drone;  // without a host: none
+#endif
+};
+
+bool is_number(const std::string& text) {
+  return !text.empty() && text.size() < 4 &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+std::unique_ptr<FrameSource> open_recording_folder(const Arguments& a) {
+#ifdef TWOVIEW_HAS_DRONE
+  if (a.camera.empty())
+    throw BadInput("--camera is required: a recording of a drone does not describe its camera");
+  return open_recording(a.source, a.camera);
+#else
+  throw BadInput("cannot read " + a.source + ": this program was built without the drone's driver");
+#endif
+}
+
+std::unique_ptr<FrameSource> open_source(const Arguments& a) {
+#ifdef TWOVIEW_HAS_DRONE
+  if (!a.drone.host.empty()) {
+    if (!a.source.empty()) throw BadInput("give SOURCE or --drone, not both");
+    if (a.camera.empty())
+      throw BadInput("--camera is required: the drone does not describe its camera");
+    return open_drone(a.drone, a.duration, a.camera);
+  }
+#endif
+  if (a.source.empty()) throw BadInput("SOURCE is required");
+  std::error_code error;
+  const fs::path path = a.source;
+  if (fs::is_directory(path, error)) {
+    const bool is_recording = fs::exists(path / "video.pave", error);
+    if (!is_recording) return open_image_folder(a.source, a.fps);
+    if (a.fps > 0) throw BadInput("--fps: a recording of a drone has times");
+    return open_recording_folder(a);
+  }
+  if (fs::is_regular_file(path, error)) return open_film(a.source, a.fps);
+  if (is_number(a.source)) {
+    if (a.camera.empty())
+      throw BadInput("--camera is required: a camera does not describe its lens");
+    if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
+    return open_camera(std::stoi(a.source));
+  }
+  throw BadInput("cannot read " + a.source +
+                 ": it is neither a folder, a film nor the number of a camera");
+}
+
+// The words of the progress line while the flight lasts.
+class Progress {
+ public:
+  Progress(const Flight& flight, int num_frames, bool is_shown)
+      : flight_(flight), num_frames_(num_frames), is_shown_(is_shown), start_ns_(now_ns()) {}
+  ~Progress() { end(); }
+
+  void show() {
+    if (!is_shown_) return;
+    const double now = static_cast<double>(now_ns() - start_ns_) * 1e-9;
+    if (now < next_) return;
+    next_ = now + 0.2;
+    const size_t count = flight_.frames().size();
+    const tv_odometry_state& state = flight_.state();
+    char line[200], of[32] = "";
+    if (num_frames_ >= 0) std::snprintf(of, sizeof of, " of %d", num_frames_);
+    std::snprintf(line, sizeof line,
+                  "\r%zu%s frames, %.1f frames a second, %s, %d keyframes, %d points\033[K", count,
+                  of, now > 0 ? static_cast<double>(count) / now : 0.0,
+                  tv_odometry_status_string(static_cast<tv_odometry_status>(state.status)),
+                  state.num_keyframes, state.num_points);
+    print(line);
+    is_open_ = true;
+  }
+  void end() {
+    if (is_open_) print("\n");
+    is_open_ = false;
+  }
+
+ private:
+  const Flight& flight_;
+  int num_frames_;
+  bool is_shown_, is_open_ = false;
+  uint64_t start_ns_;
+  double next_ = 0;
+};
+
+// How many of the source's frames the run is to track; -1 where it is not known.
+int num_wanted(const FrameSource& source, const FlightOptions& options) {
+  const int all = source.num_frames();
+  if (all < 0) return options.max_frames > 0 ? options.max_frames : -1;
+  const int some = (all + options.every - 1) / options.every;
+  return options.max_frames > 0 ? std::min(some, options.max_frames) : some;
+}
+
+nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_file) {
+  const tv_odometry_options& o = a.flight.odometry;
+  const auto text_or_null = [](const std::string& text) {
+    return text.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(text);
+  };
+  nlohmann::ordered_json json = {{"max_keypoints", o.max_keypoints},
+                                 {"max_keyframes", o.max_keyframes},
+                                 {"max_points", o.max_points},
+                                 {"window", o.window},
+                                 {"max_frames", a.flight.max_frames},
+                                 {"every", a.flight.every},
+                                 {"fps", a.fps}};
+  json["resize"] = a.flight.resize;
+  json["kernels"] = tv_kernels_string(static_cast<tv_kernels>(o.kernels));
+  json["camera"] = text_or_null(a.camera);
+  json["truth"] = text_or_null(truth_file);
+  return json;
+}
+
+void make_files(const FlightResult& result, const std::string& name, OutputSet& files) {
+  const Flight& flight = *result.flight;
+  files.add("result.json", json_text(result.json));
+  files.add("frames.csv", frames_csv(flight));
+  files.add("trajectory.txt", trajectory_text(flight, false));
+  files.add("live.txt", trajectory_text(flight, true));
+  files.add("report.html", flight_report(result, name));
+  if (result.keyframes.empty()) return;
+  files.add("keyframes.txt", keyframes_text(result));
+  files.add("cloud.ply", map_ply(result.points));
+  files.add("map.twm", flight.map_bytes());
+}
+
+void make_colmap_files(const FlightResult& result, OutputSet& files) {
+  const ColmapModel model = colmap_model(result);
+  files.add("cameras.txt", model.cameras);
+  files.add("images.txt", model.images);
+  files.add("points3D.txt", model.points);
+}
+
+std::string truth_line(const nlohmann::ordered_json& truth) {
+  if (!truth["ate_rmse"].is_number())
+    return summary_line("truth", "%s", "fewer than three of its poses have a time of the path");
+  std::string text = summary_line(
+      "truth", "position off by %.4g (rms after the best similarity), %.2f %% of the path of %.4g",
+      truth["ate_rmse"].get<double>(), truth["ate_rmse_percent_of_path"].get<double>(),
+      truth["path_length"].get<double>());
+  return text + summary_line("coverage", "%.1f %% of the frames, in the longest segment",
+                             100 * truth["coverage"].get<double>());
+}
+
+std::string summary(const FlightResult& result, const FrameSource& source, const OutputSet& files,
+                    bool has_colmap) {
+  const nlohmann::ordered_json& j = result.json;
+  std::string text =
+      summary_line("source", "%s, %d frames", source.kind().c_str(), j["num_frames"].get<int>());
+  std::string counts;
+  for (const auto& [name, count] : j["status_counts"].items())
+    if (count.get<int>() > 0)
+      counts += (counts.empty() ? "" : ", ") + std::to_string(count.get<int>()) + " " + name;
+  text += summary_line("tracking", "%s", counts.c_str());
+  text += summary_line("path", "%d frames with a pose, %d of them found in the map afterwards",
+                       j["num_tracked"].get<int>(), j["num_located"].get<int>());
+  const int segments = j["num_segments"].get<int>();
+  text += summary_line("map", "%d keyframes, %d points in %d segment%s; %d found again, %d loops",
+                       j["num_keyframes"].get<int>(), j["num_points"].get<int>(), segments,
+                       segments == 1 ? "" : "s", j["num_relocalisations"].get<int>(),
+                       j["num_loops"].get<int>());
+  const bool is_metric = j["scale"] == "metric";
+  const double length = j["path_length"].get<double>();
+  if (is_metric)
+    text += summary_line("length", "%.3f m, scale to %.1f %%", length,
+                         100 * j["scale_sigma"].get<double>());
+  else
+    text += summary_line("length", "%.3f times the distance of the first two keyframes", length);
+  if (j["truth"].is_object()) text += truth_line(j["truth"]);
+  if (j["time_ms"]["mean"].is_number())
+    text += summary_line(
+        "work", "%.2f ms a frame (mean), %.2f ms (max) with %s kernels in %.1f MiB",
+        j["time_ms"]["mean"].get<double>(), j["time_ms"]["max"].get<double>(),
+        j["kernels"].get<std::string>().c_str(), j["context_bytes"].get<double>() / (1 << 20));
+  std::string names;
+  for (const std::string& name : files.names()) names += " " + name;
+  return text + summary_line("files", "%s:%s%s", files.folder().c_str(), names.c_str(),
+                             has_colmap ? " colmap/" : "");
+}
+
+int exit_status(const Flight& flight, const FlightResult& result) {
+  if (result.live_segment < 0) {
+    std::fprintf(stderr, "twoview: nothing could be tracked: no two frames determine a map\n");
+    return kExitNoPose;
+  }
+  if (flight.ended_tracked()) return kExitPose;
+  std::fprintf(stderr, "twoview: the source ended lost: its last frame has no pose\n");
+  return kExitNoPose;
+}
+
+int odometry(Arguments& a) {
+  Common& common = a.common;
+  common.options.kernels = a.flight.odometry.kernels;
+  a.flight.camera_file = a.camera;
+  const std::unique_ptr<FrameSource> source = open_source(a);
+  const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
+  std::optional<Trajectory> truth;
+  if (!truth_file.empty())
+    truth = load_trajectory(truth_file, source->times(), source->body_from_camera());
+  Flight flight(*source, a.flight);
+  Session session(common.options);  // says which kernels are used
+  session.context(64, 64);
+  const std::atomic<bool>& stop = stop_flag_for_signals();
+  OutputSet files(common.output);
+  for (const std::string& name : source->files()) files.keep(name);
+  files.keep(a.camera);
+  files.keep(truth_file);
+  const int wanted = num_wanted(*source, a.flight);
+  {
+    Progress progress(flight, wanted, common.speaks() && stdout_style().bold[0] != '\0');
+    flight.track(stop, [&] { progress.show(); });
+  }
+  if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
+  flight.finish(stop);
+  FlightResult result =
+      result_of(flight, truth, wanted < 0 ? static_cast<int>(flight.frames().size()) : wanted);
+  result.json["interrupted"] = stop.load();
+  result.json["source"] = a.source.empty() ? source->kind() : a.source;
+  result.json["options"] = options_of(a, truth_file);
+  result.json["seed"] = a.flight.odometry.seed;
+  result.json["version"] = tv_version_string();
+  result.json["kernels"] = session.kernels();
+  const std::string name = fs::absolute(fs::path(a.source) / "x").parent_path().filename().string();
+  make_files(result, a.source.empty() ? source->kind() : name, files);
+  std::optional<OutputSet> colmap;
+  if (!result.keyframes.empty()) {
+    colmap.emplace(files.folder() / "colmap");
+    make_colmap_files(result, *colmap);
+  }
+  if (common.json) print(json_text(result.json));
+  if (common.speaks()) print(summary(result, *source, files, colmap.has_value()));
+  files.commit();
+  files.remove_others(kFiles);
+  if (colmap) colmap->commit();
+  if (flight.num_unreadable() > 0)
+    std::fprintf(stderr, "twoview: %d frames could not be used, the first: %s\n",
+                 flight.num_unreadable(), flight.first_problem().c_str());
+  return exit_status(flight, result);
+}
+
+CLI::Option* add_count(CLI::App& verb, const char* name, int32_t& value, int low, int high,
+                       const char* help) {
+  return verb.add_option(name, value, help)
+      ->check(CLI::Range(low, high))
+      ->type_name("N")
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_odometry(CLI::App& program, Run& run) {
+  auto a = std::make_shared<Arguments>();
+  tv_odometry_options& o = a->flight.odometry;
+  tv_odometry_options_init(&o);
+  CLI::App* verb =
+      program.add_subcommand("odometry", "the frames of one camera to its path and a map");
+  verb->add_option("SOURCE", a->source,
+                   "folder with frames.txt, of TUM RGB-D, EuRoC or KITTI, or of images with --fps; "
+                   "a film; the number of a camera; a recording of a drone")
+      ->type_name("SOURCE");
+  verb->add_option("--camera", a->camera, "camera file; without: what the source says of it")
+      ->type_name("FILE");
+  verb->add_option("--truth", a->truth, "true poses of TUM, EuRoC or KITTI to compare with")
+      ->type_name("FILE");
+  verb->add_option("--fps", a->fps, "frames a second, of images without times and of films")
+      ->check(CLI::Range(0.001, 10000.0))
+      ->type_name("F");
+  constexpr int kMany = 1 << 30;
+  add_count(*verb, "--max-frames", a->flight.max_frames, 0, kMany, "end after so many; 0: all");
+  add_count(*verb, "--every", a->flight.every, 1, kMany, "track every K-th frame only");
+  add_count(*verb, "--max-keypoints", o.max_keypoints, 100, 4096, "most keypoints of a frame");
+  add_count(*verb, "--max-keyframes", o.max_keyframes, 8, 2000, "most keyframes of the map");
+  add_count(*verb, "--max-points", o.max_points, 500, 200000, "most points of the map");
+  add_count(*verb, "--window", o.window, 3, 20, "keyframes that are adjusted together");
+  verb->add_option("--seed", o.seed, "of the samplers")->type_name("N")->capture_default_str();
+  add_count(*verb, "--resize", a->flight.resize, 0, kMaxSide,
+            "scale frames down to this longer side, pixels; 0: as they are");
+  std::map<std::string, int32_t> kernels;
+  for (int32_t k = 0; k <= TV_KERNELS_NEON; ++k)
+    kernels[tv_kernels_string(static_cast<tv_kernels>(k))] = k;
+  verb->add_option("--kernels", o.kernels, "kernel set")
+      ->transform(CLI::CheckedTransformer(kernels))
+      ->type_name("auto|c|sse2|avx2|avx512|neon")
+      ->default_str("auto");
+#ifdef TWOVIEW_HAS_DRONE
+  verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")
+      ->type_name("HOST");
+  add_ports(*verb, a->drone);
+  add_duration(*verb, a->duration);
+#endif
+  add_common(*verb, a->common, 0, "folder for the results");
+  verb->final_callback([a, &run] { run = [a] { return odometry(*a); }; });
+}
+
+}  // namespace cli

@@ -1,0 +1,363 @@
+#include "odometry/outputs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <set>
+
+#include "report/tables.h"
+
+namespace cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const Pose& pose_of(const FlightFrame& frame, bool live) { return live ? frame.live : frame.pose; }
+int32_t segment_of(const FlightFrame& frame, bool live) {
+  if (live) return frame.live_segment;
+  return frame.origin == PoseOrigin::kNone ? -1 : frame.segment;
+}
+
+// The segment with the most frames; the first one on a tie, -1 without any pose.
+int32_t longest_segment(const Flight& flight, bool live) {
+  std::map<int32_t, int> counts;
+  for (const FlightFrame& frame : flight.frames())
+    if (segment_of(frame, live) >= 0) ++counts[segment_of(frame, live)];
+  int32_t best = -1;
+  for (const auto& [segment, count] : counts)
+    if (best < 0 || count > counts[best]) best = segment;
+  return best;
+}
+
+// The number with the digits that the table of times needs.
+std::string milliseconds(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f", value);
+  return text;
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == text.npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string seconds(double time_s) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.9f", time_s);
+  return text;
+}
+
+// The value below which the share of the sorted values lies: the nearest rank.
+double quantile(const std::vector<double>& sorted, double share) {
+  if (sorted.empty()) return 0;
+  const double rank = std::ceil(share * static_cast<double>(sorted.size()));
+  return sorted[static_cast<size_t>(std::max(1.0, rank)) - 1];
+}
+
+Json times_json(const Flight& flight) {
+  std::vector<double> times;
+  double sum = 0;
+  for (const FlightFrame& frame : flight.frames()) {
+    if (frame.unreadable) continue;
+    times.push_back(frame.time_ms);
+    sum += frame.time_ms;
+  }
+  if (times.empty())
+    return {{"mean", nullptr}, {"median", nullptr}, {"p99", nullptr}, {"max", nullptr}};
+  std::sort(times.begin(), times.end());
+  return {{"mean", sum / static_cast<double>(times.size())},
+          {"median", quantile(times, 0.5)},
+          {"p99", quantile(times, 0.99)},
+          {"max", times.back()}};
+}
+
+double path_length(const Trajectory& trajectory) {
+  double sum = 0;
+  for (size_t i = 1; i < trajectory.size(); ++i) {
+    Vector3 d = trajectory[i].pose.t;
+    for (size_t k = 0; k < 3; ++k) d[k] -= trajectory[i - 1].pose.t[k];
+    sum += norm(d);
+  }
+  return sum;
+}
+
+Json truth_json(const FlightResult& result, bool is_metric) {
+  if (!result.has_truth) return nullptr;
+  const Accuracy& a = result.accuracy;
+  const Accuracy& live = result.live_accuracy;
+  Json json;
+  const Trajectory best = trajectory_of(*result.flight, result.segment, false);
+  json["coverage"] =
+      result.num_source_frames > 0
+          ? static_cast<double>(best.size()) / static_cast<double>(result.num_source_frames)
+          : 0.0;
+  json["num_compared"] = a.num_poses;
+  const bool known = a.num_poses >= 3;
+  const auto number = [](bool has, double value) {
+    return has && std::isfinite(value) ? Json(value) : Json(nullptr);
+  };
+  json["path_length"] = number(known, a.path_length);
+  json["ate_rmse"] = number(known, a.ate_rmse);
+  json["ate_live_rmse"] = number(live.num_poses >= 3, live.ate_rmse);
+  json["ate_rmse_percent_of_path"] = number(known, 100 * a.ate_rmse / a.path_length);
+  json["ate_metric_rmse"] = number(known && is_metric, a.ate_rigid_rmse);
+  json["rpe_rotation_deg"] = number(known, a.rpe_rotation_deg);
+  json["rpe_translation_rmse"] = number(known, a.rpe_translation_rmse);
+  const double step = a.path_length / std::max(1.0, static_cast<double>(a.num_poses) - 1);
+  json["rpe_translation_percent"] = number(known, 100 * a.rpe_translation_rmse / step);
+  json["scale_ratio"] = number(known, 1 / a.similarity.scale);
+  return json;
+}
+
+// The largest standard deviation along a coordinate axis would depend on the axes: the square root
+// of the trace does not.
+float sigma_of(const tv_map_point& point) {
+  const double* c = point.covariance;
+  return static_cast<float>(std::sqrt(std::max(0.0, c[0] + c[4] + c[8])));
+}
+
+void append_int(std::string& bytes, int32_t value) {
+  for (int shift = 0; shift < 32; shift += 8)
+    bytes += static_cast<char>(static_cast<uint32_t>(value) >> shift & 255);
+}
+
+std::string number_text(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, " %.17g", value);
+  return text;
+}
+
+// COLMAP counts pixels from the corner of the first one: its coordinates are larger by 0.5.
+std::string colmap_cameras(const tv_camera& c) {
+  const bool is_rational = std::any_of(c.k + 4, c.k + 8, [](double k) { return k != 0; });
+  const char* model = c.model == TV_CAMERA_PINHOLE          ? "PINHOLE"
+                      : c.model == TV_CAMERA_KANNALA_BRANDT ? "OPENCV_FISHEYE"
+                      : is_rational                         ? "FULL_OPENCV"
+                                                            : "OPENCV";
+  const int count = c.model == TV_CAMERA_PINHOLE                        ? 0
+                    : c.model == TV_CAMERA_BROWN_CONRADY && is_rational ? 8
+                                                                        : 4;
+  std::string text =
+      "# Camera list with one line of data per camera:\n"
+      "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
+      "# Number of cameras: 1\n1 ";
+  text += model + std::string(" ") + std::to_string(c.width) + " " + std::to_string(c.height);
+  for (const double value : {c.fx, c.fy, c.cx + 0.5, c.cy + 0.5}) text += number_text(value);
+  for (int k = 0; k < count; ++k) text += number_text(c.k[k]);
+  return text + "\n";
+}
+
+}  // namespace
+
+Trajectory trajectory_of(const Flight& flight, int32_t segment, bool live) {
+  Trajectory trajectory;
+  for (const FlightFrame& frame : flight.frames())
+    if (segment >= 0 && segment_of(frame, live) == segment)
+      trajectory.push_back({frame.time_s, pose_of(frame, live)});
+  return trajectory;
+}
+
+FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& truth,
+                       int num_source_frames) {
+  FlightResult result;
+  result.flight = &flight;
+  result.num_source_frames = num_source_frames;
+  result.keyframes = flight.keyframes();
+  result.points = flight.points();
+  result.segment = longest_segment(flight, false);
+  result.live_segment = longest_segment(flight, true);
+  if (truth) {
+    result.has_truth = true;
+    result.truth = *truth;
+    result.accuracy = accuracy_of(trajectory_of(flight, result.segment, false), *truth);
+    result.live_accuracy = accuracy_of(trajectory_of(flight, result.live_segment, true), *truth);
+  }
+  result.json = flight_json(result);
+  return result;
+}
+
+Json flight_json(const FlightResult& result) {
+  const Flight& flight = *result.flight;
+  const tv_odometry_state& state = flight.state();
+  std::map<int32_t, int> counts;
+  int num_tracked = 0, num_located = 0;
+  for (const FlightFrame& frame : flight.frames()) {
+    ++counts[frame.status];
+    num_tracked += frame.origin != PoseOrigin::kNone;
+    num_located += frame.origin == PoseOrigin::kLocated;
+  }
+  const bool is_metric = state.scale_source != TV_SCALE_UNIT;
+  Json json;
+  json["num_frames"] = flight.frames().size();
+  json["num_tracked"] = num_tracked;
+  json["num_located"] = num_located;
+  json["num_unreadable"] = flight.num_unreadable();
+  json["num_keyframes"] = result.keyframes.size();
+  json["num_points"] = result.points.size();
+  json["num_segments"] = state.num_segments;
+  json["num_relocalisations"] = state.num_relocations;
+  json["num_loops"] = state.num_loops;
+  json["longest_segment"] = result.segment;
+  json["path_length"] = path_length(trajectory_of(flight, result.segment, false));
+  for (int32_t s = 0; s < TV_ODOMETRY_NUM_STATUSES; ++s)
+    json["status_counts"][tv_odometry_status_string(static_cast<tv_odometry_status>(s))] =
+        counts[s];
+  json["scale"] = is_metric ? "metric" : "unit";
+  json["scale_sigma"] = is_metric ? Json(state.scale_sigma) : Json(nullptr);
+  json["time_ms"] = times_json(flight);
+  json["context_bytes"] = flight.context_bytes();
+  json["truth"] = truth_json(result, is_metric);
+  return json;
+}
+
+std::string trajectory_text(const Flight& flight, bool live) {
+  std::string text =
+      live ? "# timestamp tx ty tz qx qy qz qw, world_from_cam, as known when the frame was "
+             "tracked\n"
+           : "# timestamp tx ty tz qx qy qz qw, world_from_cam, in the last state of the map\n";
+  int32_t segment = -1;
+  for (const FlightFrame& frame : flight.frames()) {
+    const int32_t own = segment_of(frame, live);
+    if (own < 0) continue;
+    if (own != segment)
+      text += "# segment " + std::to_string(own) +
+              ": its poses do not compare with those of another segment\n";
+    segment = own;
+    text += tum_line(frame.time_s, pose_of(frame, live));
+  }
+  return text;
+}
+
+std::string keyframes_text(const FlightResult& result) {
+  std::string text = "# timestamp tx ty tz qx qy qz qw, world_from_cam, of the map's keyframes\n";
+  int32_t segment = -1;
+  for (const FlightKeyframe& key : result.keyframes) {
+    if (key.keyframe.segment != segment)
+      text += "# segment " + std::to_string(key.keyframe.segment) +
+              ": its poses do not compare with those of another segment\n";
+    segment = key.keyframe.segment;
+    Pose pose;
+    std::copy(key.keyframe.world_from_cam_R, key.keyframe.world_from_cam_R + 9, pose.R.begin());
+    std::copy(key.keyframe.world_from_cam_t, key.keyframe.world_from_cam_t + 3, pose.t.begin());
+    text += tum_line(key.keyframe.time_s, pose);
+  }
+  return text;
+}
+
+std::string reasons_text(const FlightFrame& frame) {
+  if (frame.unreadable) return "unreadable";
+  std::string text;
+  for (uint32_t bit = 1; bit != 0 && bit <= frame.reasons; bit <<= 1) {
+    if ((frame.reasons & bit) == 0) continue;
+    text += (text.empty() ? "" : " ") + std::string(tv_reason_string(static_cast<tv_reason>(bit)));
+  }
+  return text;
+}
+
+std::string frames_csv(const Flight& flight) {
+  std::string text =
+      "timestamp,name,status,reasons,segment,num_tracked,is_keyframe,time_ms,relocated,"
+      "loop_closed,pose\n";
+  const char* const origins[] = {"none", "tracked", "located"};
+  for (const FlightFrame& frame : flight.frames()) {
+    const auto status = static_cast<tv_odometry_status>(frame.status);
+    text += seconds(frame.time_s) + "," + csv_field(frame.name) + "," +
+            tv_odometry_status_string(status) + "," + reasons_text(frame) + "," +
+            std::to_string(frame.live_segment) + "," + std::to_string(frame.num_inliers) + "," +
+            (frame.is_keyframe ? "1," : "0,") + milliseconds(frame.time_ms) +
+            (frame.relocated ? ",1" : ",0") + (frame.loop_closed ? ",1," : ",0,") +
+            origins[static_cast<int>(frame.origin)] + "\n";
+  }
+  return text;
+}
+
+std::string map_ply(const std::vector<tv_map_point>& points) {
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\ncomment twoview " + std::string(tv_version_string()) +
+      "\ncomment the map's world; points of different segments do not compare\n"
+      "element vertex " +
+      std::to_string(points.size()) +
+      "\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "property int num_observations\nproperty float sigma\nproperty int segment\nend_header\n";
+  for (const tv_map_point& point : points) {
+    for (const double value : point.position) append_float(bytes, static_cast<float>(value));
+    bytes.append(3, static_cast<char>(std::clamp(point.grey, 0, 255)));
+    append_int(bytes, point.num_observations);
+    append_float(bytes, sigma_of(point));
+    append_int(bytes, point.segment);
+  }
+  return bytes;
+}
+
+ColmapModel colmap_model(const FlightResult& result) {
+  const Flight& flight = *result.flight;
+  ColmapModel model;
+  model.cameras = colmap_cameras(flight.camera());
+  struct Sighting {
+    int32_t image, idx;
+  };
+  std::map<int32_t, std::vector<Sighting>> tracks;      // by the index of the point
+  std::map<int32_t, std::pair<double, int>> residuals;  // their sum and number, by the same
+  int num_images = 0;
+  std::string images;
+  for (const FlightKeyframe& key : result.keyframes) {
+    const tv_keyframe& k = key.keyframe;
+    if (k.segment != result.segment) continue;
+    ++num_images;
+    Pose world_from_cam;
+    std::copy(k.world_from_cam_R, k.world_from_cam_R + 9, world_from_cam.R.begin());
+    std::copy(k.world_from_cam_t, k.world_from_cam_t + 3, world_from_cam.t.begin());
+    const Pose pose = inverse(world_from_cam);
+    const std::array<double, 4> q = quaternion_of(pose.R);
+    images += std::to_string(k.id + 1);
+    for (const double value : {q[3], q[0], q[1], q[2], pose.t[0], pose.t[1], pose.t[2]})
+      images += number_text(value);
+    images += " 1 " + flight.given(k.frame).name + "\n";
+    int32_t idx = 0;
+    for (const tv_map_observation& seen : key.observations) {
+      if (seen.idx_point < 0) continue;
+      const tv_map_point& point = result.points[static_cast<size_t>(seen.idx_point)];
+      images += number_text(static_cast<double>(seen.x) + 0.5).substr(idx == 0 ? 1 : 0) +
+                number_text(static_cast<double>(seen.y) + 0.5) + " " + std::to_string(point.id + 1);
+      tracks[seen.idx_point].push_back({k.id + 1, idx++});
+      Vector3 x = applied(pose.R, {point.position[0], point.position[1], point.position[2]});
+      for (size_t axis = 0; axis < 3; ++axis) x[axis] += pose.t[axis];
+      double pixel[2];
+      if (tv_camera_project(&flight.camera(), x.data(), pixel, nullptr) != TV_OK) continue;
+      auto& [sum, count] = residuals[seen.idx_point];
+      sum += std::hypot(pixel[0] - static_cast<double>(seen.x),
+                        pixel[1] - static_cast<double>(seen.y));
+      ++count;
+    }
+    images += "\n";
+  }
+  model.images =
+      "# Image list with two lines of data per image:\n"
+      "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
+      "#   POINTS2D[] as (X, Y, POINT3D_ID)\n# Number of images: " +
+      std::to_string(num_images) + "\n" + images;
+  std::string points;
+  for (const auto& [idx, track] : tracks) {
+    const tv_map_point& point = result.points[static_cast<size_t>(idx)];
+    points += std::to_string(point.id + 1);
+    for (const double value : point.position) points += number_text(value);
+    const std::string grey = " " + std::to_string(std::clamp(point.grey, 0, 255));
+    const auto& [sum, count] = residuals[idx];
+    points += grey + grey + grey + number_text(count > 0 ? sum / count : -1.0);
+    for (const Sighting& sighting : track)
+      points += " " + std::to_string(sighting.image) + " " + std::to_string(sighting.idx);
+    points += "\n";
+  }
+  model.points =
+      "# 3D point list with one line of data per point:\n"
+      "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n"
+      "# Number of points: " +
+      std::to_string(tracks.size()) + "\n" + points;
+  return model;
+}
+
+}  // namespace cli

@@ -1,0 +1,55 @@
+// The files of `twoview odometry`: trajectories, tables, the cloud, COLMAP's text model, and
+// result.json.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "odometry/accuracy.h"
+#include "odometry/flight.h"
+
+namespace cli {
+
+// What the outputs are made from.
+struct FlightResult {
+  const Flight* flight = nullptr;
+  int num_source_frames = 0;  // that the run was to track: after --every and --max-frames
+  std::vector<FlightKeyframe> keyframes;
+  std::vector<tv_map_point> points;
+  // The segment that the most frames have their final pose in, -1 without any pose; and the one
+  // that the most frames had when they were tracked.
+  int32_t segment = -1, live_segment = -1;
+  bool has_truth = false;
+  Trajectory truth;
+  Accuracy accuracy, live_accuracy;  // of these two segments
+  nlohmann::ordered_json json;
+};
+
+// Collects the map, chooses the segments, and compares them with the truth.
+FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& truth,
+                       int num_source_frames);
+
+// The frames of one segment with their final poses, or as they were known when tracked.
+Trajectory trajectory_of(const Flight& flight, int32_t segment, bool live);
+
+// The content of result.json but for `options`, `seed`, `version` and `kernels`.
+nlohmann::ordered_json flight_json(const FlightResult& result);
+
+// trajectory.txt, or with `live` live.txt. A comment says where a segment begins.
+std::string trajectory_text(const Flight& flight, bool live);
+std::string keyframes_text(const FlightResult& result);
+std::string frames_csv(const Flight& flight);
+// The words for a frame's reasons: those of the verdict, or "unreadable".
+std::string reasons_text(const FlightFrame& frame);
+// x y z, colour, number of observations, standard deviation of the position, segment.
+std::string map_ply(const std::vector<tv_map_point>& points);
+
+// COLMAP's model of one segment as text: cameras.txt, images.txt, points3D.txt.
+struct ColmapModel {
+  std::string cameras, images, points;
+};
+ColmapModel colmap_model(const FlightResult& result);
+
+}  // namespace cli

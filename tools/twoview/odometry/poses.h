@@ -1,0 +1,44 @@
+// Poses with times: quaternions, the text of a TUM trajectory, and files of true poses.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/matrix.h"
+
+namespace cli {
+
+// A pose world_from_cam: a point X of the camera's frame is R X + t in the world.
+struct Pose {
+  Matrix3 R{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Vector3 t{0, 0, 0};
+};
+struct TimedPose {
+  double time_s = 0;
+  Pose pose;
+};
+using Trajectory = std::vector<TimedPose>;  // sorted by time
+
+Pose composed(const Pose& a_from_b, const Pose& b_from_c);
+Pose inverse(const Pose& pose);
+
+// The quaternion x y z w of a rotation, with w >= 0; and the rotation of any quaternion but 0.
+std::array<double, 4> quaternion_of(const Matrix3& R);
+Matrix3 rotation_of_quaternion(double x, double y, double z, double w);
+
+// The angle of a rotation in radians, in [0, pi].
+double angle_of(const Matrix3& R);
+
+// A line of a TUM trajectory: timestamp tx ty tz qx qy qz qw.
+std::string tum_line(double time_s, const Pose& pose);
+
+// Reads true poses: TUM's lines, EuRoC's data.csv (nanoseconds, position, quaternion w x y z, more
+// columns), or KITTI's lines of 12 numbers, which have no times and belong to `frame_times` one by
+// one. body_from_camera: of EuRoC's poses, which are the vehicle's; empty: taken as the camera's.
+// Throws BadInput that names the line.
+Trajectory load_trajectory(const std::string& file, const std::vector<double>& frame_times,
+                           const std::optional<std::array<double, 12>>& body_from_camera);
+
+}  // namespace cli
