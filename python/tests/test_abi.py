@@ -100,7 +100,8 @@ def test_limits_and_reconstruct_defaults_are_the_librarys():
     for name, _ in limits._fields_[1:]:
         assert defaults(tv.Context)[name] == getattr(limits, name), name
     wanted = tv.default_library().make(_abi.tv_reconstruct_options)
-    for name in ("triangulation", "guided_matching", "bundle_adjustment", "sigma_by_size"):
+    for name in ("triangulation", "guided_matching", "bundle_adjustment", "sigma_by_size",
+                 "align_matches"):
         assert defaults(tv.reconstruct)[name] == getattr(wanted, name), name
 
 

@@ -1,7 +1,15 @@
 """FAST-SIFT matching and two-view geometry: poses with a verdict and a covariance.
 
 The functions have the names of the C API without tv_. Images are read without a copy. Calls release
-the interpreter's lock. docs/python.md has an example."""
+the interpreter's lock. docs/python.md has an example.
+
+Every function raises TypeError for an argument of another type or dtype and ValueError for another
+shape, before C is called. A status of C is an exception of its name, a subclass of StatusError:
+TV_ERR_ARGUMENT (out of its range), TV_ERR_NOT_FINITE, TV_ERR_LIMITS (above the limits of the
+context), TV_ERR_CAMERA, TV_ERR_OUTSIDE (beyond what a lens model is valid for) and others.
+"No geometry" is a result: it is in TwoView.verdict."""
+
+import typing as _typing
 
 from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, DISTANCE_PRIOR, GRAVITY_PRIOR, KEYPOINT,
                    OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT, TV_ERR_ARGUMENT,
@@ -11,6 +19,8 @@ from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, DISTANCE_PRIOR, GRAVITY_PRI
 from .absolute_pose import AbsolutePose, estimate_absolute_pose
 from .camera import (Camera, camera_check, camera_project_points, camera_scale,
                      camera_undistort, camera_unproject_points, camera_valid_angle)
+from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, FormatError, format_cameras,
+                           parse_cameras, read_camera, read_cameras, read_sigmas, write_cameras)
 from .context import Context
 from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, Orientation, PointStatus,
                     Purpose, Reason, Solver, Stage, Status, Triangulation, Verdict)
@@ -22,10 +32,40 @@ from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, cor
                      reconstruct, triangulate)
 from .window import WindowResult, adjust_window
 
+#: The version of the loaded library, such as "0.1.0": that of version_string().
+__version__: str
+
 
 def version_string() -> str:
-    """The version of the loaded library, from tv_version_string."""
+    """tv_version_string: returns the version of the loaded library, such as "0.1.0". Raises
+    ImportError where there is no library."""
     return default_library().version()
 
 
-__all__ = [name for name in dir() if not name.startswith("_")]
+if not _typing.TYPE_CHECKING:  # or a type checker would accept every unknown name
+    def __getattr__(name: str) -> str:
+        if name == "__version__":  # asked of the library, which is loaded at its first use
+            return version_string()
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+# A type checker reads this list; a test compares it with the imports above.
+__all__ = [
+    "AbsolutePose", "AbsolutePoseOptions", "BundleOptions", "BundleResult", "CORRESPONDENCE",
+    "CalibrationSigmas", "Camera", "CameraModel", "Context", "DESCRIPTOR_BYTES",
+    "DISTANCE_PRIOR", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
+    "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Kind", "Library", "Loss",
+    "MatchOptions", "Normalisation", "OBSERVATION", "Orientation", "PLAIN_FILE", "POINT",
+    "POSE_PRIOR", "PointStatus", "Purpose", "Reason", "Reconstruction", "Solver", "Stage",
+    "Status", "StatusError", "TV_ERR_ALIGNMENT", "TV_ERR_ARGUMENT", "TV_ERR_CAMERA",
+    "TV_ERR_CAPACITY", "TV_ERR_KERNELS", "TV_ERR_LIMITS", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE",
+    "TV_ERR_NULL", "TV_ERR_OUTSIDE", "TV_ERR_OVERLAP", "TV_ERR_STRUCT_SIZE", "Triangulation",
+    "TwoView", "Verdict", "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view",
+    "adjust_window", "camera_check", "camera_project_points", "camera_scale",
+    "camera_undistort", "camera_unproject_points", "camera_valid_angle", "correct_matches",
+    "corrected_camera", "default_library", "describe", "detect", "estimate_absolute_pose",
+    "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match",
+    "match_guided", "orient", "parse_cameras", "point_covariances", "read_camera",
+    "read_cameras", "read_sigmas", "reconstruct", "triangulate", "version_string",
+    "write_cameras",
+]

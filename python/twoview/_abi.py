@@ -121,7 +121,8 @@ class tv_view(Structure):
 class tv_reconstruct_options(Structure):
     _fields_ = [("struct_size", c_uint32), ("triangulation", c_int32), ("feature", c_void_p),
                 ("match", c_void_p), ("estimate", c_void_p), ("guided_matching", c_int32),
-                ("bundle_adjustment", c_int32), ("sigma_by_size", c_double)]
+                ("bundle_adjustment", c_int32), ("sigma_by_size", c_double),
+                ("align_matches", c_int32), ("reserved", c_int32)]
 
 
 class tv_reconstruction(Structure):
@@ -332,7 +333,7 @@ class Library:
             raise error
 
     def version(self) -> str:
-        return self.lib.tv_version_string().decode()
+        return str(self.lib.tv_version_string().decode())
 
 
 def set_field(struct: Any, name: str, value: Any) -> None:
@@ -360,7 +361,8 @@ _default: Optional[Library] = None
 
 
 def default_library() -> Library:
-    """The library that TWOVIEW_LIBRARY names, else the one inside the package."""
+    """Returns the Library that TWOVIEW_LIBRARY names, else the one inside the package. Raises
+    ImportError where there is none."""
     global _default
     if _default is None:
         beside = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libtwoview.so")

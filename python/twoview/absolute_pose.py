@@ -9,31 +9,41 @@ from typing import Any, Optional
 import numpy as np
 
 from . import _abi
+from ._record import Record, judged, rotation, table, vector
 from .camera import Camera, camera_struct
 from .context import Context, check_context
 from .enums import Reason, Verdict
 from .options import AbsolutePoseOptions, to_struct
 
 
-@dataclass(frozen=True)
-class AbsolutePose:
+@dataclass(frozen=True, eq=False, repr=False)
+class AbsolutePose(Record):
     """tv_absolute_pose, with the pose cam_from_world: x = R X + t. A value that was not estimated
-    is None."""
+    is None. print shows the pose and the verdict; == compares all fields."""
 
-    verdict: Verdict
-    reasons: Reason
-    num_matches: int
-    num_inliers: int
-    num_iterations: int
+    verdict: Verdict  #: whether the result can be relied on
+    reasons: Reason  #: why the verdict is not OK
+    num_matches: int  #: how many pixels and points were given
+    num_inliers: int  #: how many of them agree with the pose
+    num_iterations: int  #: samples that were drawn
     R: Optional[np.ndarray]  #: (3, 3), rotation
     t: Optional[np.ndarray]  #: (3,), translation in the unit of the points
-    alternative_R: Optional[np.ndarray]  #: the second pose that points on a plane permit
-    alternative_t: Optional[np.ndarray]
+    alternative_R: Optional[np.ndarray]  #: (3, 3), the second pose that points on a plane permit
+    alternative_t: Optional[np.ndarray]  #: (3,), its translation
     covariance: Optional[np.ndarray]  #: (6, 6): w0 w1 w2 d0 d1 d2 of absolute_pose.h
     coverage: float  #: share of 8x8 cells with an inlier
-    rms_error_px: float
-    noise_px: float
-    seed: int
+    rms_error_px: float  #: root mean square of the inliers' errors, pixels
+    noise_px: float  #: standard deviation of a pixel's coordinate, from the residuals
+    seed: int  #: of the sampler, as it was used
+
+    def __str__(self) -> str:
+        name = "no pose" if self.R is None else "pose"
+        rows = [("", f"{judged(name, self.verdict, self.reasons)}: {self.num_inliers} of "
+                     f"{self.num_matches} points agree")]
+        if self.R is not None:
+            rows += [("rotation", rotation(self.R)), ("t", vector(self.t) + ", x = R X + t"),
+                     ("noise", f"{self.noise_px:.2f} px")]
+        return table(rows)
 
 
 def estimate_absolute_pose(context: Context, camera: Camera, pixels: np.ndarray,
@@ -41,11 +51,17 @@ def estimate_absolute_pose(context: Context, camera: Camera, pixels: np.ndarray,
                            options: Optional[AbsolutePoseOptions] = None,
                            sigmas: Optional[np.ndarray] = None,
                            **keywords: Any) -> tuple[AbsolutePose, np.ndarray]:
-    """tv_estimate_absolute_pose: returns the pose and the inlier mask, (n,) bool.
+    """tv_estimate_absolute_pose: the pose of a camera from pixels of known points.
 
-    pixels: (n, 2) float64, as in the image (distorted). points: (n, 3) float64. ratios: (n,)
-    float32; lower means more reliable. sigmas: (n,) float32, the standard deviations of the pixels
-    in units of that of the most precise ones; None: 1 for all."""
+    context: of enough matches. camera: of any model. pixels: (n, 2) float64, as in the image
+    (distorted). points: (n, 3) float64, of any unit. ratios: None, or (n,) float32; lower means
+    more reliable. options: an AbsolutePoseOptions, or its fields as keywords. sigmas: None (1 for
+    all), or (n,) float32, the standard deviations of the pixels in units of that of the most
+    precise ones.
+    Returns an AbsolutePose, and the inlier mask (n,) bool.
+    Raises TypeError or ValueError for an array that C could not read, TV_ERR_LIMITS for more
+    matches than the context's max_matches, TV_ERR_CAMERA, TV_ERR_ARGUMENT and TV_ERR_NOT_FINITE for
+    an option or a sigma out of its range."""
     wanted = to_struct(check_context(context).library, AbsolutePoseOptions, options, keywords)
     pixels = _abi.check_array("pixels", pixels, np.float64, 2)
     points = _abi.check_array("points", points, np.float64, 3)

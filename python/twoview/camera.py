@@ -13,19 +13,37 @@ from . import _abi
 from .enums import CameraModel
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Camera:
-    """tv_camera: focal lengths and principal point in pixels; k holds the coefficients of the
-    model, at most 8."""
+    """tv_camera: a camera's intrinsics. Two cameras are equal when the library sees the same
+    numbers: zeros at the end of k make no difference. read_camera makes one from a file."""
 
-    width: int
-    height: int
-    fx: float
-    fy: float
-    cx: float
+    width: int  #: of the image, pixels
+    height: int  #: of the image, pixels
+    fx: float  #: focal length along x, pixels
+    fy: float  #: focal length along y, pixels
+    cx: float  #: principal point, pixels; (0, 0) is the centre of the top-left pixel
     cy: float
-    model: int = CameraModel.PINHOLE
+    model: int = CameraModel.PINHOLE  #: a CameraModel, of the lens
+    #: Coefficients without a unit, at most 8: k1 k2 p1 p2 k3 k4 k5 k6 of BROWN_CONRADY, k1 k2 k3 k4
+    #: of KANNALA_BRANDT, none of a PINHOLE. Those that are left out are 0.
     k: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.k, tuple):  # a list or an array has no hash
+            object.__setattr__(self, "k", tuple(float(k) for k in self.k))
+
+    def _key(self) -> tuple[object, ...]:
+        k = list(self.k)
+        while k and k[-1] == 0:
+            k.pop()
+        return (self.width, self.height, self.fx, self.fy, self.cx, self.cy, int(self.model), *k)
+
+    def __eq__(self, other: object) -> bool:
+        return self._key() == other._key() if isinstance(other, Camera) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._key())
 
     def _struct(self) -> Any:
         if len(self.k) > 8:
@@ -50,12 +68,20 @@ def camera_struct(name: str, camera: Any) -> Any:
 
 
 def camera_check(camera: Camera) -> None:
-    """Raises TV_ERR_CAMERA for intrinsics that every function refuses."""
+    """tv_camera_check: returns None for intrinsics that the library accepts.
+
+    camera: of any model.
+    Raises TV_ERR_CAMERA for intrinsics that every function refuses: a side below 1 pixel, a focal
+    length that is not above 0, a number that is not finite, another model; ValueError for more
+    than 8 coefficients; TypeError for anything but a Camera."""
     _abi.default_library().call("tv_camera_check", ctypes.byref(camera_struct("camera", camera)))
 
 
 def camera_valid_angle(camera: Camera) -> float:
-    """The largest angle from the optical axis, in radians, at which the lens model is valid."""
+    """tv_camera_valid_angle: the largest angle from the optical axis, in radians, at which the lens
+    model is valid.
+
+    camera: of any model. Raises TV_ERR_CAMERA as camera_check does."""
     angle = ctypes.c_double()
     _abi.default_library().call("tv_camera_valid_angle",
                                 ctypes.byref(camera_struct("camera", camera)), ctypes.byref(angle))
@@ -74,20 +100,33 @@ def _points(function: str, camera: Camera, name: str, given: np.ndarray, columns
 
 
 def camera_project_points(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projects points (n, 3) float64 of the camera's frame. Returns pixels (n, 2), and a (n,) bool
-    array that says which points have a pixel."""
+    """tv_camera_project_points: where the camera sees points.
+
+    camera: of any model. points: (n, 3) float64 in the camera's frame, of any unit (x right, y
+    down, z forward).
+    Returns the pixels (n, 2) float64, and a (n,) bool array that is True for a point that has a
+    pixel.
+    Raises TypeError for another dtype, ValueError for another shape, TV_ERR_CAMERA."""
     return _points("tv_camera_project_points", camera, "points", points, 3, 2)
 
 
 def camera_unproject_points(camera: Camera, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unprojects pixels (n, 2) float64. Returns unit rays (n, 3), and a (n,) bool array that says
-    which pixels have a ray."""
+    """tv_camera_unproject_points: the directions in which the camera sees pixels.
+
+    camera: of any model. pixels: (n, 2) float64, distorted as in the image.
+    Returns unit rays (n, 3) float64 in the camera's frame, and a (n,) bool array that is True for a
+    pixel that has a ray.
+    Raises TypeError for another dtype, ValueError for another shape, TV_ERR_CAMERA."""
     return _points("tv_camera_unproject_points", camera, "pixels", pixels, 2, 3)
 
 
 def camera_undistort(camera: Camera, pixel: Sequence[float]) -> np.ndarray:
-    """The pixel (2 numbers) at which a camera without distortion sees what this camera sees at
-    `pixel`."""
+    """tv_camera_undistort: the pixel (2,) float64 at which a pinhole camera with the same fx, fy,
+    cx and cy sees what this camera sees at `pixel`.
+
+    camera: of any model. pixel: 2 numbers, distorted as in the image.
+    Raises TV_ERR_OUTSIDE where the lens model is not valid at the pixel, or its ray lies 90 degrees
+    and more from the axis; TV_ERR_NOT_FINITE; TV_ERR_CAMERA; ValueError for another shape."""
     given, out = _abi.small_array("pixel", pixel, 2), np.empty(2)
     _abi.default_library().call("tv_camera_undistort",
                                 ctypes.byref(camera_struct("camera", camera)),
@@ -96,7 +135,12 @@ def camera_undistort(camera: Camera, pixel: Sequence[float]) -> np.ndarray:
 
 
 def camera_scale(camera: Camera, scale: float) -> Camera:
-    """The camera of an image that was resized by the factor `scale`."""
+    """tv_camera_scale: the Camera of an image that was resized by the factor `scale`: f' = s f, c'
+    = s (c + 0.5) - 0.5, width and height rounded.
+
+    camera: of any model. scale: without a unit, in (0, 16]; 0.5 is the camera of the half picture.
+    Raises TV_ERR_ARGUMENT or TV_ERR_NOT_FINITE for another scale or a result that is no camera,
+    and TV_ERR_CAMERA."""
     scaled = _abi.tv_camera()
     _abi.default_library().call("tv_camera_scale", ctypes.byref(camera_struct("camera", camera)),
                                 ctypes.c_double(scale), ctypes.byref(scaled))

@@ -18,9 +18,11 @@ class Context:
     max_width, max_height: the largest image, pixels. max_keypoints: the most descriptors of an
     image. max_matches: the most matches of an estimate; 0 means max_keypoints. kernels: a
     Kernels. purposes: bits of Purpose for the calls that get memory, 0 for all; another call
-    raises TV_ERR_LIMITS. Calls from several threads wait for each other; use one context for
-    each thread to run them at once. close() or a with statement frees the memory; later calls
-    raise ValueError."""
+    raises TV_ERR_LIMITS. library: a Library in place of the package's own. Calls from several
+    threads wait for each other; use one context for each thread to run them at once. close() or
+    a with statement frees the memory; later calls raise ValueError.
+    Raises TV_ERR_ARGUMENT for a limit out of its range, TV_ERR_KERNELS for kernels that this CPU
+    does not have, ImportError where there is no library."""
 
     def __init__(self, *, max_width: int = 640, max_height: int = 480, max_keypoints: int = 2048,
                  max_matches: int = 0, kernels: int = Kernels.AUTO,
@@ -47,6 +49,7 @@ class Context:
         self.close()
 
     def close(self) -> None:
+        """Frees the memory. Calls after it raise ValueError; closing twice is allowed."""
         with self.lock:
             self._memory = None
             self._pointer = ctypes.c_void_p()

@@ -6,8 +6,20 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Optional, Sequence
 
+import numpy as np
+
 from . import _abi
 from .enums import Loss, Normalisation, Orientation, Solver
+
+
+class _Options:
+    """Options with arrays among their fields compare and hash like tuples of numbers."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):  # type: ignore[arg-type]  # each subclass is a dataclass
+            value = getattr(self, field.name)
+            if isinstance(value, (list, np.ndarray)):
+                object.__setattr__(self, field.name, tuple(np.asarray(value).tolist()))
 
 
 @dataclass(frozen=True)
@@ -24,8 +36,8 @@ class FeatureOptions:
     #: Side of the grid cells that share out the corners, pixels; 0: the strongest corners anywhere.
     cell_px: int = 48
     subpixel: int = 1  #: 1: positions are refined to a fraction of a pixel
-    orientation: int = Orientation.GRADIENT
-    descriptor: int = Normalisation.ROOTSIFT
+    orientation: int = Orientation.GRADIENT  #: an Orientation: of the patch that is described
+    descriptor: int = Normalisation.ROOTSIFT  #: a Normalisation
     keypoint_size: float = 4.0  #: diameter of a keypoint at level 0, pixels
     pooling: int = 0  #: 1: a descriptor is the mean over windows of 0.7 and 1.3 times its size
     reserved: int = 0  #: must be 0
@@ -46,56 +58,56 @@ class GuidedOptions:
     """The options of matching along epipolar lines, as in tv_guided_options."""
 
     max_error_px: float = 4.0  #: half the width of the band around the epipolar line, pixels
-    ratio: float = 0.87
+    ratio: float = 0.87  #: upper bound of nearest / second nearest distance within the band
     max_distance: float = 180.0  #: largest L2 distance of the descriptors of a match
-    neighbourhood_px: float = 4.0
+    neighbourhood_px: float = 4.0  #: the second nearest is at least this far away, pixels
 
 
 @dataclass(frozen=True)
-class EstimateOptions:
+class EstimateOptions(_Options):
     """The options of the two-view estimate, as in tv_estimate_options."""
 
     method: int = Solver.AUTO  #: AUTO: five-point with cameras, else eight-point
     max_error_px: float = 1.0  #: inlier threshold, pixels of the given images
-    confidence: float = 0.9999
-    max_iterations: int = 10000
+    confidence: float = 0.9999  #: probability of not having missed a better model, [0, 1)
+    max_iterations: int = 10000  #: most samples, [1, 1000000]; it bounds the time
     fixed_iterations: int = 0  #: number of iterations; 0: it is adaptive
     seed: Optional[int] = None  #: seed of the sampler; None: the library's constant
     gravity0: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity in camera 0's frame
-    gravity1: Sequence[float] = (0.0, 0.0, 0.0)
+    gravity1: Sequence[float] = (0.0, 0.0, 0.0)  #: and in camera 1's; of any length
     gravity_sigma_rad: float = 0.0  #: standard deviation of gravity; 0: it is not used
     #: Standard deviation in focal lengths; 0: the principal point is exact and never moved.
     principal_point_sigma: float = 0.0
     #: Relative standard deviations of the two cameras' focal lengths; 0: exact. Above 0.02, where
     #: both cameras are equal, the focal length is refined with the pose (TwoView.focal_scale).
     focal_sigma0: float = 0.0
-    focal_sigma1: float = 0.0
+    focal_sigma1: float = 0.0  #: of camera 1
     center_sigma0: float = 0.0  #: of the principal points, in focal lengths; 0: exact
-    center_sigma1: float = 0.0
+    center_sigma1: float = 0.0  #: of camera 1
 
 
 @dataclass(frozen=True)
 class BundleOptions:
     """The options of bundle adjustment, as in tv_bundle_options."""
 
-    loss: int = Loss.CAUCHY
-    loss_scale_px: float = 1.0
-    max_iterations: int = 50
-    hold_pose: int = 0
+    loss: int = Loss.CAUCHY  #: a Loss
+    loss_scale_px: float = 1.0  #: scale of the loss, pixels; a smaller one trusts outliers less
+    max_iterations: int = 50  #: most steps, [0, 1000]
+    hold_pose: int = 0  #: 1: only the points are adjusted
 
 
 @dataclass(frozen=True)
-class AbsolutePoseOptions:
+class AbsolutePoseOptions(_Options):
     """The options of the absolute pose, as in tv_absolute_pose_options."""
 
-    max_iterations: int = 10000
+    max_iterations: int = 10000  #: most samples, [1, 1000000]; it bounds the time
     fixed_iterations: int = 0  #: number of iterations; 0: it is adaptive
     reserved: int = 0  #: must be 0
     max_error_px: float = 4.0  #: inlier threshold, pixels between a pixel and its point's image
-    confidence: float = 0.9999
+    confidence: float = 0.9999  #: probability of not having missed a better model, [0, 1)
     seed: Optional[int] = None  #: seed of the sampler; None: the library's constant
     gravity_in_world: Sequence[float] = (0.0, 0.0, 0.0)  #: direction of gravity, "down"
-    gravity_in_camera: Sequence[float] = (0.0, 0.0, 0.0)
+    gravity_in_camera: Sequence[float] = (0.0, 0.0, 0.0)  #: the same in the camera's frame
     gravity_sigma_rad: float = 0.0  #: standard deviation in the camera; 0: it is not used
 
 
@@ -103,11 +115,11 @@ class AbsolutePoseOptions:
 class WindowOptions:
     """The options of adjust_window, as in tv_window_options."""
 
-    loss: int = Loss.CAUCHY
-    loss_scale_px: float = 2.0
+    loss: int = Loss.CAUCHY  #: a Loss
+    loss_scale_px: float = 2.0  #: scale of the loss, pixels; a smaller one trusts outliers less
     noise_px: float = 1.0  #: of an observation of sigma 1, which weighs it against the priors
     tolerance: float = 1e-6  #: share of the cost that may be left to gain
-    max_iterations: int = 50
+    max_iterations: int = 50  #: most steps, [0, 1000]
     reserved: int = 0  #: must be 0
 
 
@@ -126,5 +138,6 @@ def to_struct(library: _abi.Library, kind: type, options: Any, keywords: dict[st
         options = kind(**keywords)
     if not isinstance(options, kind):
         raise TypeError(f"options: {kind.__name__} is expected, not {type(options).__name__}")
-    given = {f.name: getattr(options, f.name) for f in fields(options)}
+    given = {f.name: getattr(options, f.name)
+             for f in fields(options)}  # type: ignore[arg-type]  # isinstance has narrowed it
     return library.make(_STRUCTS[kind], {k: v for k, v in given.items() if v is not None})

@@ -1,5 +1,5 @@
 """The stages under their C names. Arrays are numpy arrays, and the caller's images are read without
-a copy."""
+a copy. What every stage raises stands in the package's own text, help(twoview)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any, Optional, Sequence
 import numpy as np
 
 from . import _abi
+from ._record import Record, judged, largest_sigma, rotation, table, vector
 from .camera import Camera, camera_struct
 from .context import Context, check_context
 from .enums import Kind, Reason, Triangulation, Verdict
@@ -36,9 +37,13 @@ def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = Non
            options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
     """tv_detect: FAST corners, strongest first.
 
-    image: (height, width) uint8; the rows need not be adjacent. mask: the same shape, 0 where no
-    corner is wanted. Returns (n,) of twoview.KEYPOINT: x, y (pixels), size, angle_rad, score,
-    level."""
+    context: as large as the image. image: (height, width) uint8; the rows need not be adjacent.
+    mask: None, or uint8 of the same shape, 0 where no corner is wanted. options: a FeatureOptions,
+    or its fields as keywords.
+    Returns (n,) of twoview.KEYPOINT: x, y (pixels), size (pixels), angle_rad, score (grey levels),
+    level.
+    Raises TypeError or ValueError for an array that C could not read, TV_ERR_LIMITS for an image or
+    a count above the context's, TV_ERR_ARGUMENT for an option out of its range."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = np.empty(_room(context, wanted), _abi.KEYPOINT)
     count = c_int32()
@@ -49,8 +54,12 @@ def detect(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = Non
 
 def orient(context: Context, image: np.ndarray, keypoints: np.ndarray,
            options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_orient: keypoints with their angles. A keypoint with a second orientation appears
-    twice."""
+    """tv_orient: keypoints with their angles. A keypoint with a second orientation appears twice.
+
+    context: as large as the image. image: (height, width) uint8. keypoints: (n,) of
+    twoview.KEYPOINT, of detect. options: a FeatureOptions, or its fields as keywords.
+    Returns (m,) of twoview.KEYPOINT, n <= m <= 2n, with angle_rad in radians from x towards y.
+    Raises as detect does, and TV_ERR_NOT_FINITE for a keypoint that is not finite."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     oriented = np.empty(2 * len(keypoints), _abi.KEYPOINT)
@@ -63,8 +72,13 @@ def orient(context: Context, image: np.ndarray, keypoints: np.ndarray,
 
 def describe(context: Context, image: np.ndarray, keypoints: np.ndarray,
              options: Optional[FeatureOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_describe: descriptors (n, 128) uint8, one row for each keypoint, in the byte order that
-    OpenCV and COLMAP use (UBC order)."""
+    """tv_describe: a descriptor for each keypoint, in the byte order that OpenCV and COLMAP use
+    (UBC order).
+
+    context: as large as the image. image: (height, width) uint8. keypoints: (n,) of
+    twoview.KEYPOINT, of orient. options: a FeatureOptions, or its fields as keywords.
+    Returns (n, 128) uint8, a row for each keypoint.
+    Raises as orient does."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     descriptors = np.empty((len(keypoints), _abi.DESCRIPTOR_BYTES), np.uint8)
@@ -76,8 +90,12 @@ def describe(context: Context, image: np.ndarray, keypoints: np.ndarray,
 def extract(context: Context, image: np.ndarray, mask: Optional[np.ndarray] = None,
             options: Optional[FeatureOptions] = None,
             **keywords: Any) -> tuple[np.ndarray, np.ndarray]:
-    """tv_extract: keypoints (n,) and descriptors (n, 128), the same as from detect, orient and
-    describe."""
+    """tv_extract: keypoints and descriptors, the same as from detect, orient and describe.
+
+    context: as large as the image. image: (height, width) uint8. mask: None, or uint8 of the same
+    shape, 0 where no corner is wanted. options: a FeatureOptions, or its fields as keywords.
+    Returns keypoints (n,) of twoview.KEYPOINT and descriptors (n, 128) uint8.
+    Raises as detect does."""
     wanted = to_struct(check_context(context).library, FeatureOptions, options, keywords)
     capacity = _room(context, wanted)
     keypoints = np.empty(capacity, _abi.KEYPOINT)
@@ -101,8 +119,15 @@ def _features(context: Context, keypoints: Optional[np.ndarray], descriptors: np
 
 def keypoint_sigmas(keypoints: np.ndarray, exponent: float,
                     size_of_one: float = FeatureOptions.keypoint_size) -> np.ndarray:
-    """tv_keypoint_sigmas: (n,) float32, (size / size_of_one)^exponent of each keypoint. Gather
-    them by a match's indices for estimate_two_view."""
+    """tv_keypoint_sigmas: (size / size_of_one)^exponent of each keypoint: the standard deviation of
+    its position in units of that of a keypoint of `size_of_one`. Gather them by a match's indices
+    for estimate_two_view.
+
+    keypoints: (n,) of twoview.KEYPOINT. exponent: [0, 2]; 1 is in proportion to the size.
+    size_of_one: pixels, above 0.
+    Returns (n,) float32, without a unit.
+    Raises TV_ERR_ARGUMENT or TV_ERR_NOT_FINITE for a number out of its range, TypeError for another
+    dtype."""
     keypoints = _abi.check_array("keypoints", keypoints, _abi.KEYPOINT)
     sigmas = np.empty(len(keypoints), np.float32)
     _abi.default_library().call(
@@ -132,9 +157,14 @@ def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
           keypoints1: Optional[np.ndarray] = None, **keywords: Any) -> np.ndarray:
     """tv_match: mutual nearest neighbours that pass the ratio test in both directions.
 
-    descriptors: (n, 128) uint8; keypoints: (n,) of twoview.KEYPOINT, without any, as for
-    descriptors of other programs, neighbourhood_px counts as 0. Returns (m,) of
-    twoview.CORRESPONDENCE: idx0, idx1, dist_sq, ratio."""
+    context: of enough keypoints. descriptors0, descriptors1: (n0, 128) and (n1, 128) uint8.
+    options: a MatchOptions, or its fields as keywords. keypoints0, keypoints1: (n0,) and (n1,) of
+    twoview.KEYPOINT; None, as for descriptors of other programs: neighbourhood_px counts as 0.
+    Returns (m,) of twoview.CORRESPONDENCE: idx0, idx1 (rows of the descriptors), dist_sq (squared
+    L2 distance), ratio (nearest to second nearest distance, lower is surer).
+    Raises TypeError or ValueError for an array that C could not read, TV_ERR_LIMITS for more
+    descriptors than the context has room for, TV_ERR_ARGUMENT for an option out of its range,
+    TV_ERR_NULL for one of the keypoints without the other."""
     wanted = to_struct(check_context(context).library, MatchOptions, options, keywords)
     descriptors0 = _descriptors("descriptors0", descriptors0)
     descriptors1 = _descriptors("descriptors1", descriptors1)
@@ -152,8 +182,17 @@ def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
     return found[: count.value].copy()
 
 
+def _are_uncalibrated(camera0: Optional[Camera], camera1: Optional[Camera]) -> bool:
+    """Whether both cameras are None. One camera alone serves nothing, as in C."""
+    for name, camera, other in (("0", camera0, "1"), ("1", camera1, "0")):
+        if camera is None and (camera0 is not None or camera1 is not None):
+            raise TypeError(f"camera{name} is None, but camera{other} is given: give both cameras, "
+                            "or None for both, which finds F or H and no pose")
+    return camera0 is None
+
+
 def _two_cameras(camera0: Optional[Camera], camera1: Optional[Camera]) -> list[Any]:
-    if camera0 is None and camera1 is None:
+    if _are_uncalibrated(camera0, camera1):
         return [None, None]
     return [byref(camera_struct("camera0", camera0)), byref(camera_struct("camera1", camera1))]
 
@@ -162,8 +201,15 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
                  epipolar: Sequence[Sequence[float]], keypoints0: np.ndarray,
                  descriptors0: np.ndarray, keypoints1: np.ndarray, descriptors1: np.ndarray,
                  options: Optional[GuidedOptions] = None, **keywords: Any) -> np.ndarray:
-    """tv_match_guided: matches along epipolar lines. `epipolar` is a 3x3 matrix: E with cameras, F
-    without."""
+    """tv_match_guided: matches along epipolar lines.
+
+    context: of enough keypoints. camera0, camera1: both Cameras, or None for both. epipolar: 3x3, E
+    with cameras, F (of the pixels as they are) without. keypoints0, keypoints1: (n0,) and (n1,) of
+    twoview.KEYPOINT. descriptors0, descriptors1: (n0, 128) and (n1, 128) uint8. options: a
+    GuidedOptions, or its fields as keywords.
+    Returns (m,) of twoview.CORRESPONDENCE, as match does.
+    Raises as match does, TypeError for one camera alone, TV_ERR_CAMERA, TV_ERR_NOT_FINITE for a
+    matrix that is not finite."""
     wanted = to_struct(check_context(context).library, GuidedOptions, options, keywords)
     matrix = _abi.small_array("epipolar", epipolar, 3, 3)
     arguments: list[Any] = []
@@ -181,35 +227,36 @@ def match_guided(context: Context, camera0: Optional[Camera], camera1: Optional[
     return found[: count.value].copy()
 
 
-@dataclass(frozen=True)
-class TwoView:
+@dataclass(frozen=True, eq=False, repr=False)
+class TwoView(Record):
     """tv_two_view, with the pose cam1_from_cam0: x1 = R x0 + t, |t| = 1. A value that was not
-    estimated is None."""
+    estimated is None. print shows the pose and the verdict in a few lines; two results are equal
+    (==) when all their fields are."""
 
-    kind: Kind
-    verdict: Verdict
-    reasons: Reason
-    num_matches: int
-    num_inliers: int
-    num_iterations: int
+    kind: Kind  #: the model that explains the matches
+    verdict: Verdict  #: whether the result can be relied on
+    reasons: Reason  #: why the verdict is not OK; Reason(0) where it is
+    num_matches: int  #: how many matches were given
+    num_inliers: int  #: how many of them agree with the model that `kind` names
+    num_iterations: int  #: samples that were drawn
     R: Optional[np.ndarray]  #: (3, 3), rotation
     t: Optional[np.ndarray]  #: (3,), unit translation
     E: Optional[np.ndarray]  #: (3, 3), essential matrix, Frobenius norm 1
     F: Optional[np.ndarray]  #: (3, 3), fundamental matrix for undistorted pixels
     H: Optional[np.ndarray]  #: (3, 3), maps undistorted pixels of image 0 to image 1
     alternative_R: Optional[np.ndarray]  #: the second pose that a planar scene permits
-    alternative_t: Optional[np.ndarray]
+    alternative_t: Optional[np.ndarray]  #: (3,), unit translation of that pose
     covariance: Optional[np.ndarray]  #: (5, 5), radians squared: w0 w1 w2 a b of two_view.h
-    alternative_covariance: Optional[np.ndarray]
-    essential_inliers: Optional[int]  #: the number of inliers of each model, as evidence for it
-    fundamental_inliers: Optional[int]
-    homography_inliers: Optional[int]
-    rotation_inliers: Optional[int]
+    alternative_covariance: Optional[np.ndarray]  #: (5, 5), of that pose
+    essential_inliers: Optional[int]  #: how many matches agree with an essential matrix,
+    fundamental_inliers: Optional[int]  #: a fundamental matrix,
+    homography_inliers: Optional[int]  #: a homography,
+    rotation_inliers: Optional[int]  #: a rotation alone; None: that model was not estimated
     coverage: float  #: share of 8x8 cells with an inlier, the larger of the two images'
-    median_parallax_rad: float
-    rms_error_px: float
-    noise_px: float
-    seed: int
+    median_parallax_rad: float  #: median angle between the two rays of an inlier, radians
+    rms_error_px: float  #: root mean square of the inliers' residuals, pixels
+    noise_px: float  #: standard deviation of a matched pixel along one axis, pixels
+    seed: int  #: of the sampler, as it was used
     #: (2,), pixels to add to cx and cy; all results refer to the cameras with this shift
     principal_point_shift: np.ndarray
     #: Chi-square (2 degrees of freedom) against the given cx and cy; above 13.8 in one pair of a
@@ -231,6 +278,26 @@ class TwoView:
     focal_scale: float
     #: Relative standard deviation of the focal length that the covariance contains. 0: exact.
     focal_sigma: float
+
+    def __str__(self) -> str:
+        rows = [("", f"{judged(self.kind.name.lower(), self.verdict, self.reasons)}: "
+                 f"{self.num_inliers} of {self.num_matches} matches agree")]
+        if self.R is not None:
+            rows.append(("rotation", rotation(self.R)))
+        if self.t is not None:
+            rows.append(("t", vector(self.t) + ", x1 = R x0 + t"))
+            rows.append(("wrong", f"with probability {100 * self.probability_wrong:.2g} %"))
+        if self.covariance is not None:
+            turn, direction = (np.degrees(largest_sigma(part)) for part in
+                               (self.covariance[:3, :3], self.covariance[3:, 3:]))
+            rows.append(("sigma", f"rotation {turn:.2g} deg, direction {direction:.2g} deg"))
+        if self.R is not None and self.t is not None:
+            rows.append(("parallax", f"{np.degrees(self.median_parallax_rad):.2f} deg (median), "
+                         f"noise {self.noise_px:.2f} px"))
+        if self.alternative_R is not None:
+            rows.append(("alternative", f"rotation {rotation(self.alternative_R)}, "
+                         f"t {vector(self.alternative_t)}"))
+        return table(rows)
 
 
 def _two_view(found: Any) -> TwoView:
@@ -262,8 +329,12 @@ def _two_view(found: Any) -> TwoView:
 
 
 def corrected_camera(found: TwoView, camera: Camera) -> Camera:
-    """tv_corrected_camera: the camera that the results in `found` refer to. Use it in calls after
-    the estimate."""
+    """tv_corrected_camera: the Camera that the results in `found` refer to: `camera` with
+    principal_point_shift (pixels) added and multiplied by focal_scale. Use it in calls after the
+    estimate. It is `camera` itself unless an option let the estimate move it.
+
+    found: of estimate_two_view or reconstruct. camera: one of its two cameras.
+    Raises TypeError or AttributeError for other objects."""
     shift = found.principal_point_shift
     scale = found.focal_scale if found.focal_scale > 0 else 1.0
     return replace(camera, fx=camera.fx * scale, fy=camera.fy * scale,
@@ -296,13 +367,19 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
                       options: Optional[EstimateOptions] = None,
                       sigmas0: Optional[np.ndarray] = None, sigmas1: Optional[np.ndarray] = None,
                       **keywords: Any) -> tuple[TwoView, np.ndarray]:
-    """tv_estimate_two_view: returns the geometry and the inlier mask, (n,) bool.
+    """tv_estimate_two_view: the geometry of matched pixels.
 
-    pixels: (n, 2) float64, as in the images (distorted). ratios: (n,) float32; lower means more
-    reliable. sigmas: (n,) float32, the standard deviations of the pixels in units of that of the
-    most precise ones (keypoint_sigmas); None: 1 for all.
-    A pixel that is not finite is never an inlier. Without cameras only F and H are estimated, and
-    the method must be AUTO, EIGHT_POINT or SEVEN_POINT."""
+    context: of enough matches. camera0, camera1: both Cameras, or None for both: then F or H is
+    found and no pose, and the method is AUTO, EIGHT_POINT or SEVEN_POINT. pixels0, pixels1: (n, 2)
+    float64, as in the images (distorted); a pixel that is not finite is never an inlier. ratios:
+    None, or (n,) float32; lower means more reliable. options: an EstimateOptions, or its fields as
+    keywords. sigmas0, sigmas1: None (1 for all), or (n,) float32, the standard deviations of the
+    pixels in units of that of the most precise ones (keypoint_sigmas).
+    Returns a TwoView, and the inlier mask (n,) bool. "No geometry" is a result, not an exception:
+    see TwoView.verdict.
+    Raises TypeError or ValueError for an array that C could not read and for one camera alone,
+    TV_ERR_LIMITS for more matches than the context's max_matches, TV_ERR_CAMERA, TV_ERR_ARGUMENT
+    and TV_ERR_NOT_FINITE for an option or a sigma out of its range."""
     found, inliers = _estimate(context, camera0, camera1, pixels0, pixels1,
                                to_struct(check_context(context).library, EstimateOptions, options,
                                          keywords),
@@ -313,9 +390,15 @@ def estimate_two_view(context: Context, camera0: Optional[Camera], camera1: Opti
 def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
                 t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
                 method: int = Triangulation.ITERATIVE_LS) -> np.ndarray:
-    """tv_triangulate: (n,) of twoview.POINT: position (in camera 0's frame, in the unit of t),
-    angle_rad, error_px, status (a PointStatus). R is 3x3, t has 3 numbers, pixels are (n, 2)
-    float64."""
+    """tv_triangulate: the points that two cameras see.
+
+    camera0, camera1: Cameras; None for both is TV_ERR_NULL. R: 3x3, a rotation, and t: 3 numbers,
+    not zero, of x1 = R x0 + t. pixels0, pixels1: (n, 2) float64, as in the images (distorted).
+    method: a Triangulation.
+    Returns (n,) of twoview.POINT: position (in camera 0's frame, in the unit of t), angle_rad
+    (between the rays), error_px, status (a PointStatus).
+    Raises TypeError or ValueError for an array that C could not read, TV_ERR_ARGUMENT where R is no
+    rotation or t is zero, TV_ERR_NOT_FINITE for R or t, TV_ERR_CAMERA."""
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     points = np.zeros(len(pixels0), _abi.POINT)
@@ -329,8 +412,13 @@ def triangulate(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
 def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
                     t: Sequence[float], pixels0: np.ndarray, pixels1: np.ndarray,
                     cost: int = Triangulation.POLY) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """tv_correct_matches: both pixels (n, 2) moved so that their rays meet, and a (n,) bool array
-    that says which were moved."""
+    """tv_correct_matches: pixels moved as little as possible so that their rays meet.
+
+    camera0, camera1, R, t, pixels0, pixels1: as for triangulate. cost: Triangulation.POLY (least
+    squares) or POLY_ABS (least sum of distances).
+    Returns both pixels (n, 2) float64, distorted as they were, and a (n,) bool array that is True
+    for a match that was moved; the pixels of others are zeros.
+    Raises as triangulate does."""
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     corrected0, corrected1 = np.empty_like(pixels0), np.empty_like(pixels1)
@@ -343,22 +431,28 @@ def correct_matches(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float
     return corrected0, corrected1, valid.view(bool)
 
 
-@dataclass(frozen=True)
-class BundleResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class BundleResult(Record):
     """The result of bundle adjustment: tv_bundle_result with the adjusted pose and points."""
 
-    R: np.ndarray
-    t: np.ndarray
-    points: np.ndarray
-    num_points: int
-    num_iterations: int
-    converged: bool
-    initial_cost: float
-    final_cost: float
-    initial_rms_px: float
-    rms_px: float
-    covariance: Optional[np.ndarray]  #: (5, 5) of the pose, radians squared
-    noise_px: float
+    R: np.ndarray  #: (3, 3), rotation of cam1_from_cam0
+    t: np.ndarray  #: (3,), translation, of the length that it had at the start
+    points: np.ndarray  #: (n,) of POINT, adjusted, in camera 0's frame and in the unit of t
+    num_points: int  #: how many points took part
+    num_iterations: int  #: steps that were tried
+    converged: bool  #: False where max_iterations ended it
+    initial_cost: float  #: sum of the losses over the observations, pixels squared, at the start
+    final_cost: float  #: and at the end
+    initial_rms_px: float  #: root mean square of the reprojection errors in pixels, at the start
+    rms_px: float  #: and at the end
+    covariance: Optional[np.ndarray]  #: (5, 5) of the pose, radians squared, as in TwoView
+    noise_px: float  #: standard deviation of a pixel's coordinate, from the residuals
+
+    def __str__(self) -> str:
+        ended = "converged" if self.converged else "not converged"
+        return table([("", f"{self.num_points} points, {ended} after {self.num_iterations} "
+                           f"iterations: {self.initial_rms_px:.3f} to {self.rms_px:.3f} px rms"),
+                      ("rotation", rotation(self.R)), ("t", vector(self.t))])
 
 
 def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0: np.ndarray,
@@ -366,8 +460,16 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
                     points: np.ndarray, options: Optional[BundleOptions] = None,
                     sigmas0: Optional[np.ndarray] = None, sigmas1: Optional[np.ndarray] = None,
                     **keywords: Any) -> BundleResult:
-    """tv_adjust_two_view: bundle adjustment from a given start, which is not modified. `points` are
-    those of triangulate; sigmas as for estimate_two_view."""
+    """tv_adjust_two_view: bundle adjustment of a pose and its points from a given start, which is
+    not modified.
+
+    context: of enough matches. camera0, camera1: Cameras; None for both is TV_ERR_NULL. pixels0,
+    pixels1: (n, 2) float64, as in the images. R: 3x3 and t: 3 numbers, the start; the length of t
+    is kept. points: (n,) of twoview.POINT, of triangulate, in the unit of t. options: a
+    BundleOptions, or its fields as keywords. sigmas0, sigmas1: as for estimate_two_view.
+    Returns a BundleResult.
+    Raises as triangulate does, ValueError for counts that differ, TV_ERR_LIMITS for more points
+    than the context's max_matches."""
     wanted = to_struct(check_context(context).library, BundleOptions, options, keywords)
     pixels0, pixels1 = _pixels(pixels0, pixels1)
     rotation, translation = (
@@ -391,8 +493,14 @@ def adjust_two_view(context: Context, camera0: Camera, camera1: Camera, pixels0:
 def point_covariances(camera0: Camera, camera1: Camera, R: Sequence[Sequence[float]],
                       t: Sequence[float], points: np.ndarray, noise_px: float,
                       pose_covariance: Optional[Sequence[Sequence[float]]] = None) -> np.ndarray:
-    """tv_point_covariances: (n, 3, 3) in camera 0's frame, in the unit of t squared; zeros where
-    unknown."""
+    """tv_point_covariances: how sure each point's position is, to first order.
+
+    camera0, camera1: Cameras; None for both is TV_ERR_NULL. R: 3x3 and t: 3 numbers, the pose.
+    points: (n,) of twoview.POINT. noise_px: standard deviation of a pixel's coordinate (TwoView and
+    BundleResult have it). pose_covariance: None (the pose is exact), or 5x5, radians squared, of a
+    TwoView or BundleResult.
+    Returns (n, 3, 3) float64 in camera 0's frame, in the unit of t squared; zeros where unknown.
+    Raises as triangulate does."""
     rotation, translation = _abi.small_array("R", R, 3, 3), _abi.small_array("t", t, 3)
     points = _abi.check_array("points", points, _abi.POINT)
     given = pose_covariance
@@ -405,18 +513,23 @@ def point_covariances(camera0: Camera, camera1: Camera, R: Sequence[Sequence[flo
     return covariances
 
 
-@dataclass(frozen=True)
-class Reconstruction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reconstruction(Record):
     """tv_reconstruction: the features of both views, the matches, and one point for each match."""
 
-    keypoints: tuple[np.ndarray, np.ndarray]
-    descriptors: tuple[np.ndarray, np.ndarray]
+    keypoints: tuple[np.ndarray, np.ndarray]  #: (n0,) and (n1,) of KEYPOINT
+    descriptors: tuple[np.ndarray, np.ndarray]  #: (n0, 128) and (n1, 128) uint8
     matches: np.ndarray  #: (m,) of dtype CORRESPONDENCE
     inlier_mask: np.ndarray  #: (m,) bool, True for an inlier
     points: np.ndarray  #: (m,) of POINT; INVALID where the match is no inlier
-    num_points: int
+    num_points: int  #: how many of the points have the status OK
     #: Matches that exceed the context's max_matches; those with the highest ratios are left out.
     num_matches_left_out: int
+
+    def __str__(self) -> str:
+        return (f"{self.num_points} points of {int(self.inlier_mask.sum())} inliers among "
+                f"{len(self.matches)} matches; {len(self.keypoints[0])} and "
+                f"{len(self.keypoints[1])} keypoints")
 
 
 def _copied(address: Optional[int], count: int, dtype: Any) -> np.ndarray:
@@ -426,36 +539,52 @@ def _copied(address: Optional[int], count: int, dtype: Any) -> np.ndarray:
     return np.frombuffer(ctypes.string_at(address, size), dtype).copy()
 
 
-def reconstruct(context: Context, image0: np.ndarray, camera0: Camera, image1: np.ndarray,
-                camera1: Camera, *, mask0: Optional[np.ndarray] = None,
-                mask1: Optional[np.ndarray] = None, feature: Optional[FeatureOptions] = None,
+def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
+                image1: np.ndarray, camera1: Optional[Camera], *,
+                mask0: Optional[np.ndarray] = None, mask1: Optional[np.ndarray] = None,
+                feature: Optional[FeatureOptions] = None,
                 match: Optional[MatchOptions] = None, estimate: Optional[EstimateOptions] = None,
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False,
-                sigma_by_size: float = 1.0) -> tuple[TwoView, Reconstruction]:
-    """tv_reconstruct: from two images to a pose and points. Images are (height, width) uint8 and
-    are read without a copy; TV_ERR_CAMERA is raised for one that is not of its camera's size.
-    feature, match and estimate are the options of the stages; sigma_by_size is the exponent of
-    keypoint_sigmas."""
+                sigma_by_size: float = 1.0,
+                align_matches: bool = False) -> tuple[TwoView, Reconstruction]:
+    """tv_reconstruct: from two images to a pose and points.
+
+    context: as large as both images. image0, image1: (height, width) uint8, read without a copy.
+    camera0, camera1: a Camera of each image's size; or None for both, which finds the fundamental
+    matrix F or a homography H, and no pose or points. mask0, mask1: None, or uint8 of the image's
+    shape, 0 where no corner is wanted. feature, match, estimate: the options of the stages, None
+    for the defaults. triangulation: a Triangulation. guided_matching: whether a second matching
+    follows along the epipolar lines. bundle_adjustment: whether pose and points are adjusted
+    together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches: whether the
+    keypoints of each match are moved by the pixels around them.
+    Returns a TwoView and a Reconstruction. "No geometry" is a result, not an exception: see
+    TwoView.verdict.
+    Raises TypeError or ValueError for an array that C could not read and for one camera alone,
+    TV_ERR_CAMERA for an image that is not of its camera's size, TV_ERR_LIMITS for an image above
+    the context's limits, TV_ERR_ARGUMENT for an option out of its range."""
     library = check_context(context).library
     kept = [to_struct(library, kind, options, {}) for kind, options in
             ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
     wanted = library.make(_abi.tv_reconstruct_options, {
         "triangulation": triangulation, "guided_matching": guided_matching,
-        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size})
+        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size,
+        "align_matches": align_matches})
     wanted.feature, wanted.match, wanted.estimate = map(ctypes.addressof, kept)
     views = []
+    is_calibrated = not _are_uncalibrated(camera0, camera1)
     for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
-        kept.append(camera_struct("camera" + name, camera))
         view = library.make(_abi.tv_view)
-        view.image, view.camera = _abi.check_image("image" + name, image), ctypes.addressof(
-            kept[-1]
-        )
-        if (kept[-1].height, kept[-1].width) != image.shape:
-            raise _abi.TV_ERR_CAMERA(
-                f"image{name} is {image.shape[1]}x{image.shape[0]}, but camera{name} is for "
-                f"{kept[-1].width}x{kept[-1].height}: resize the image, or its camera by "
-                "twoview.camera_scale")
+        view.image = _abi.check_image("image" + name, image)
+        if is_calibrated:
+            lens = camera_struct("camera" + name, camera)
+            kept.append(lens)
+            view.camera = ctypes.addressof(lens)
+            if (lens.height, lens.width) != image.shape:
+                raise _abi.TV_ERR_CAMERA(
+                    f"image{name} is {image.shape[1]}x{image.shape[0]}, but camera{name} is for "
+                    f"{lens.width}x{lens.height}: resize the image, or its camera by "
+                    "twoview.camera_scale")
         if mask is not None:
             kept.append(_abi.check_image("mask" + name, mask))
             view.mask = ctypes.addressof(kept[-1])

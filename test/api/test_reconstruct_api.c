@@ -189,6 +189,15 @@ static void test_what_the_stages_refuse_is_refused(void) {
   refused(TV_ERR_NOT_FINITE, &o.all);
   o.all.sigma_by_size = INFINITY;
   refused(TV_ERR_NOT_FINITE, &o.all);
+  default_stages(&o);
+  o.all.align_matches = 2;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  o.all.align_matches = -1;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  default_stages(&o);
+  o.all.reserved = 1;
+  refused(TV_ERR_ARGUMENT, &o.all);
+  default_stages(&o);
   views[1].mask = &mask;
   refused(TV_ERR_ARGUMENT, NULL);
   views[1].mask = NULL;
@@ -434,6 +443,84 @@ static void test_sigmas_by_size_are_those_of_the_stages_by_hand(void) {
   api_release(&c);
 }
 
+/* With align_matches, only keypoints of matches move, one of each match at most; the estimate is
+   that of the moved positions with halved sigmas; and exchanged views give the same positions. */
+static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
+  static tv_keypoint plain[2][2048], aligned[2][2048];
+  static double pixels[2][2 * 2048];
+  static float ratios[2048], sigmas[2][2048];
+  static uint8_t mask[2048];
+  real_pair pair;
+  tv_limits limits;
+  tv_reconstruct_options options;
+  tv_pixel_pairs pairs;
+  tv_two_view by_hand;
+  api_context b, c;
+  int32_t num[2];
+  int v, k, n, moved = 0, expected = 0;
+  if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
+  limits = limits_of(pair.width, pair.height, 2048);
+  b = api_make(&limits);
+  c = api_make(&limits);
+  view_real_pair(&pair);
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(b.context));
+  n = reconstruction.num_matches;
+  for (v = 0; v < 2; ++v) {
+    num[v] = reconstruction.num_keypoints[v];
+    memcpy(plain[v], reconstruction.keypoints[v], (size_t)num[v] * sizeof plain[v][0]);
+  }
+  tv_reconstruct_options_init(&options);
+  options.align_matches = 1;
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &options, &two_view, &reconstruction));
+  TEST_ASSERT_EQUAL_INT(n, reconstruction.num_matches);
+  for (v = 0; v < 2; ++v) {
+    memcpy(aligned[v], reconstruction.keypoints[v], (size_t)num[v] * sizeof aligned[v][0]);
+  }
+  for (k = 0; k < n; ++k) {
+    const int32_t i[2] = {reconstruction.matches[k].idx0, reconstruction.matches[k].idx1};
+    int changed[2];
+    for (v = 0; v < 2; ++v) {
+      const tv_keypoint *before = &plain[v][i[v]], *after = &aligned[v][i[v]];
+      changed[v] = before->x != after->x || before->y != after->y;
+      TEST_ASSERT_TRUE(fabs(before->x - after->x) < 1.2 * after->size / 4 + 1e-4);
+      pixels[v][2 * k] = after->x;
+      pixels[v][2 * k + 1] = after->y;
+      sigmas[v][k] = after->size / 4;
+    }
+    TEST_ASSERT_FALSE(changed[0] && changed[1]);
+    for (v = 0; v < 2 && (changed[0] || changed[1]); ++v) sigmas[v][k] *= 0.5f;
+    moved += changed[0] || changed[1];
+    ratios[k] = reconstruction.matches[k].ratio;
+  }
+  TEST_ASSERT_GREATER_THAN_INT(n / 3, moved);
+  for (v = 0; v < 2; ++v) {
+    for (k = 0; k < num[v]; ++k) {
+      expected += memcmp(&plain[v][k], &aligned[v][k], sizeof plain[v][k]) != 0;
+    }
+  }
+  TEST_ASSERT_EQUAL_INT(expected, moved); /* no other keypoint has moved */
+  pairs = pairs_of(pixels[0], pixels[1], ratios, n);
+  pairs.sigmas0 = sigmas[0];
+  pairs.sigmas1 = sigmas[1];
+  tv_two_view_init(&by_hand);
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_estimate_two_view(c.context, &camera, &camera, &pairs, NULL, &by_hand, mask));
+  TEST_ASSERT_EQUAL_MEMORY(mask, reconstruction.inlier_mask, (size_t)n);
+  TEST_ASSERT_EQUAL_MEMORY(by_hand.R, two_view.R, sizeof two_view.R);
+  TEST_ASSERT_EQUAL_MEMORY(by_hand.t, two_view.t, sizeof two_view.t);
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_reconstruct(b.context, &views[1], &views[0], &options, &two_view, &reconstruction));
+  for (v = 0; v < 2; ++v) {
+    TEST_ASSERT_EQUAL_MEMORY(aligned[v], reconstruction.keypoints[1 - v],
+                             (size_t)num[v] * sizeof aligned[v][0]);
+  }
+  free(pair.luma[0]);
+  free(pair.luma[1]);
+  api_release(&b);
+  api_release(&c);
+}
+
 /* The index of a match among the result's matches, or -1. */
 static int32_t place_of(const tv_correspondence *match) {
   int32_t k;
@@ -572,6 +659,7 @@ int main(void) {
   RUN_TEST(test_a_full_call_uses_most_of_the_memory);
   RUN_TEST(test_a_real_pair_has_the_same_bytes_with_every_kernel_set);
   RUN_TEST(test_sigmas_by_size_are_those_of_the_stages_by_hand);
+  RUN_TEST(test_aligned_matches_are_estimated_from_moved_keypoints);
   RUN_TEST(test_guided_matching_adds_matches_and_keeps_the_verdict);
   RUN_TEST(test_bundle_adjustment_moves_the_pose_and_what_follows_from_it);
   return UNITY_END();

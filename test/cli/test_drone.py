@@ -22,6 +22,11 @@ def has_drone():
     return subprocess.run([PROGRAM, "drone", "--help"], capture_output=True).returncode == 0
 
 
+def reconstruct(recording, output, *arguments):
+    return subprocess.run([PROGRAM, "reconstruct", "--recording", recording, "-o", output,
+                           *arguments], capture_output=True, text=True, timeout=120)
+
+
 class Simulator:
     """A running `drone simulate` on free ports of the loopback; `options` are its command-line
     options."""
@@ -177,6 +182,14 @@ class Drone(unittest.TestCase):
         for name in os.listdir(self.path("frames")):
             self.assertEqual(pathlib.Path(self.path("frames"), name).read_bytes(),
                              pathlib.Path(self.path("again"), name).read_bytes())
+        pair = reconstruct(self.output, self.path("pair"), "--focal-35mm", "30", "--frames", "0",
+                           "3", "--resize", "320", "--json")
+        self.assertIn(pair.returncode, (0, 3), pair.stderr)
+        found = json.loads(pair.stdout)
+        self.assertEqual((found["cameras"][0]["source"], found["image_size0"]),
+                         ("focal_35mm", [320, 180]))
+        self.assert_refused(reconstruct(self.output, self.path("none")),
+                            "--recording needs --camera, or --focal-35mm")
         # Another run into the same folder must not change the recording.
         again = run("record", "--duration", "1", "-o", self.output, *drone.ports())
         self.assert_refused(again, "holds a recording already")

@@ -4,6 +4,7 @@ entries."""
 import json
 import math
 import os
+import shutil
 import sys
 import unittest
 from pathlib import Path
@@ -68,7 +69,29 @@ class Evaluate(cli.CliTest):
         self.assertEqual(report["verdict_counts"], {"ok": 1, "doubtful": 0, "refused": 1})
         self.assertEqual([p["reasons"] for p in report["pairs"]], [[], ["no_motion"], None])
         self.assertIsNone(report["pairs"][1]["covariance"])
-        self.assertIn(b"3 pairs: 1 ok, 0 doubtful, 1 refused; median pose error", done.stdout)
+        self.assertEqual(report["num_unreadable"], 1)
+        self.assertIn(b"3 pairs: 1 ok, 0 doubtful, 1 refused, 1 not readable; median pose error",
+                      done.stdout)
+
+    def test_a_list_of_which_nothing_can_be_read_is_bad_input(self):
+        self.assert_refused(self.evaluate(pair_line("gone.png") + pair_line("off.png")),
+                            "none of the 2 pairs", "gone.png", "No such file")
+
+    def test_names_are_printed_whole(self):
+        name = "a_sequence_of_pictures_with_a_long_name/left_camera_000017.png"
+        self.write(name, self.a.read_bytes())
+        done = self.succeed(self.evaluate(pair_line(name) + pair_line()))
+        lines = done.stdout.decode().splitlines()
+        self.assertTrue(lines[1].startswith(name + " b.png "), lines[1])
+        self.assertEqual(lines[0].index("image 1"), lines[2].index("b.png"))
+
+    def test_large_images_are_brought_to_the_same_size_as_by_reconstruct(self):
+        self.write("wide.png", cli.png(2049, 48, bytes(2049 * 48)))
+        K_wide = [1000, 0, 1024, 0, 1000, 24, 0, 0, 1]
+        line = pair_line("wide.png", "wide.png", K_wide, K_wide)
+        done = self.succeed(self.evaluate(line, "--json"))
+        self.one_line(done, "2049x48 at 1600x37")
+        self.assertEqual(json.loads(done.stdout)["options"]["resize"], 1600)
 
     def test_auc_is_superglues_and_failures_are_infinite(self):
         wrong = lambda deg: [
@@ -195,14 +218,15 @@ class Evaluate(cli.CliTest):
         self.write("set/cameras.yaml", entry("y", 0.4, 999) + entry("z", 0))
         self.assertEqual(error(), straight)
         self.write("set/cameras.yaml", entry("y", 0, 999) + entry("z", 0, 998))
-        self.assertIn("cameras.yaml", self.report(pair_line())["pairs"][0]["error"])
+        shutil.rmtree(self.out)
+        self.assert_refused(self.evaluate(pair_line()), "cameras.yaml")
 
     def test_a_camera_of_another_size_is_told_for_its_pair(self):
         self.write(
             "set/cameras.yaml",
             "c: {fx: 300, fy: 300, cx: 1, cy: 1, image_width: 9, image_height: 9}\n",
         )
-        self.assertIn("9x9", self.report(pair_line())["pairs"][0]["error"])
+        self.assert_refused(self.evaluate(pair_line()), "9x9")
 
     def test_a_broken_cameras_file_is_refused(self):
         self.write(

@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "files/camera_file.h"
+#include "files/camera_formats.h"
 #include "files/camera_set.h"
 #include "files/pairs_file.h"
 
@@ -78,6 +79,16 @@ Json pairs_json(const std::string& text) {
 Json camera_set_json(const std::string& text) {
   Json cameras = Json::array();
   for (const auto& [name, camera] : parse_camera_set(text, "the file")) {
+    Json entry = {{"name", name}};
+    entry.update(camera_json(camera));
+    cameras.push_back(entry);
+  }
+  return cameras;
+}
+
+Json camera_formats_json(const std::string& text) {
+  Json cameras = Json::array();
+  for (const auto& [name, camera] : parse_camera_file(text, "the file").cameras) {
     Json entry = {{"name", name}};
     entry.update(camera_json(camera));
     cameras.push_back(entry);
@@ -175,6 +186,10 @@ void test_camera_sets_are_read_as_the_cases_say() {
   TEST_ASSERT_EQUAL_INT(0, num_wrong("cameras.json", camera_set_json));
 }
 
+void test_files_of_every_format_are_read_as_the_cases_say() {
+  TEST_ASSERT_EQUAL_INT(0, num_wrong("camera_formats.json", camera_formats_json));
+}
+
 void test_the_entry_that_serves_an_image_is_the_cases() {
   TEST_ASSERT_EQUAL_INT(0, num_wrong_choices());
 }
@@ -186,6 +201,7 @@ int main(void) {
   RUN_TEST(test_pairs_files_are_read_as_the_cases_say);
   RUN_TEST(test_camera_files_are_read_as_the_cases_say);
   RUN_TEST(test_camera_sets_are_read_as_the_cases_say);
+  RUN_TEST(test_files_of_every_format_are_read_as_the_cases_say);
   RUN_TEST(test_the_entry_that_serves_an_image_is_the_cases);
   return UNITY_END();
 }

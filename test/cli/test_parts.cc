@@ -57,12 +57,13 @@ void test_percentile_lies_between_its_neighbours() {
 
 // Whether the advice on a pose of low parallax is to calibrate, and not to move farther.
 bool calibrates(double focal_sigma, double parallax_rad) {
-  tv_two_view v;
+  Outcome outcome;
+  tv_two_view& v = outcome.two_view;
   tv_two_view_init(&v);
   v.reasons = TV_REASON_LOW_PARALLAX;
   v.focal_sigma = focal_sigma;
   v.median_parallax_rad = parallax_rad;
-  const std::vector<std::string> advice = advice_on(v);
+  const std::vector<std::string> advice = advice_on(outcome);
   return advice.size() == 1 && advice[0].find("calibrate") != std::string::npos;
 }
 
@@ -74,14 +75,56 @@ void test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibrati
 }
 
 void test_each_reason_has_words_and_advice_and_no_reason_none() {
-  tv_two_view v;
-  tv_two_view_init(&v);
-  TEST_ASSERT_TRUE(reasons_in_words(v).empty() && advice_on(v).empty());
+  Outcome outcome;
+  tv_two_view_init(&outcome.two_view);
+  TEST_ASSERT_TRUE(reasons_in_words(outcome).empty() && advice_on(outcome).empty());
   for (uint32_t bit = 1; bit <= TV_REASON_REPEATED_STRUCTURE; bit *= 2) {
-    v.reasons = bit;
-    TEST_ASSERT_FALSE(reasons_in_words(v).empty());
-    TEST_ASSERT_EQUAL_UINT(1, advice_on(v).size());
+    outcome.two_view.reasons = bit;
+    TEST_ASSERT_FALSE(reasons_in_words(outcome).empty());
+    TEST_ASSERT_EQUAL_UINT(1, advice_on(outcome).size());
   }
+}
+
+// The words for the reason "a second motion" where image 1 shows the scene at this scale.
+std::string words_at_scale(float scale, tv_verdict verdict) {
+  constexpr int count = 40;
+  std::vector<tv_keypoint> keypoints[2] = {std::vector<tv_keypoint>(count),
+                                           std::vector<tv_keypoint>(count)};
+  std::vector<tv_correspondence> matches(count);
+  for (int32_t i = 0; i < count; ++i) {
+    const auto k = static_cast<size_t>(i);
+    keypoints[0][k].x = static_cast<float>(37 * i % 101);
+    keypoints[0][k].y = static_cast<float>(53 * i % 97);
+    // A fifth of the matches is wrong.
+    const float factor = i % 5 == 0 ? 0.1f : scale;
+    keypoints[1][k].x = factor * keypoints[0][k].x + 5;
+    keypoints[1][k].y = factor * keypoints[0][k].y - 3;
+    matches[k].idx0 = matches[k].idx1 = i;
+  }
+  Outcome outcome;
+  outcome.has_cameras = true;
+  outcome.camera[0].fx = outcome.camera[1].fx = 500;
+  tv_two_view_init(&outcome.two_view);
+  outcome.two_view.verdict = verdict;
+  outcome.two_view.reasons = TV_REASON_SECOND_MOTION;
+  for (size_t i = 0; i < 2; ++i) outcome.reconstruction.keypoints[i] = keypoints[i].data();
+  outcome.reconstruction.matches = matches.data();
+  outcome.reconstruction.num_matches = count;
+  return reasons_in_words(outcome);
+}
+
+bool words_name_scale(float scale, tv_verdict verdict) {
+  const std::string words = words_at_scale(scale, verdict);
+  const bool scale_named = words.find("scale") != std::string::npos;
+  const bool motion_named = words.find("second motion") != std::string::npos;
+  return scale_named && !motion_named;
+}
+
+void test_a_zoomed_pair_is_told_of_its_scale_and_of_no_second_motion() {
+  TEST_ASSERT_TRUE(words_name_scale(1.6f, TV_VERDICT_DOUBTFUL));
+  TEST_ASSERT_TRUE(words_name_scale(0.5f, TV_VERDICT_REFUSED));
+  TEST_ASSERT_FALSE(words_name_scale(1.1f, TV_VERDICT_DOUBTFUL));
+  TEST_ASSERT_FALSE(words_name_scale(0.9f, TV_VERDICT_DOUBTFUL));
 }
 
 // What `advise` says of pairs that ask for (x, y) + spread (1, 0), (-1, 0), (1, 0) ..., `asking` of
@@ -409,6 +452,7 @@ int main() {
   RUN_TEST(test_headers_are_read_within_their_bytes);
   RUN_TEST(test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibration);
   RUN_TEST(test_each_reason_has_words_and_advice_and_no_reason_none);
+  RUN_TEST(test_a_zoomed_pair_is_told_of_its_scale_and_of_no_second_motion);
   RUN_TEST(test_base64_has_the_vectors_of_rfc_4648);
   RUN_TEST(test_csv_numbers_are_the_shortest_that_read_back);
   RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);

@@ -8,13 +8,14 @@ import signal
 import subprocess
 import sys
 import unittest
+from pathlib import Path
 
 import cli_support as cli
 
 # Stands in for either program: prints the arguments that it was started with.
 SCRIPT = """import json, os, signal, sys
 json.dump({"argv": sys.argv[1:], "python": sys.executable, "library":
-os.environ.get("TWOVIEW_LIBRARY"),
+os.environ.get("TWOVIEW_LIBRARY"), "verb": os.environ.get("TWOVIEW_VERB"),
            "blocked": [int(s) for s in signal.pthread_sigmask(signal.SIG_BLOCK, [])]}, sys.stdout)
 sys.exit(3)
 """
@@ -26,7 +27,7 @@ class HandOver(cli.CliTest):
         self.tree = self.folder / "a tree"
         tools = self.tree / "tools" / "compare_colmap"
         tools.mkdir(parents=True)
-        for script in ("compare_colmap", "twoview_colmap"):
+        for script in ("compare_colmap", "twoview_colmap", "twoview_rerun"):
             (tools / script).write_text(SCRIPT)
         bin_dir, lib_dir = self.tree / "build" / "x" / "bin", self.tree / "build" / "x" / "lib"
         bin_dir.mkdir(parents=True)
@@ -46,11 +47,12 @@ class HandOver(cli.CliTest):
         self.assertEqual((done.returncode, done.stderr), (3, b""))
         return json.loads(done.stdout)
 
-    def test_both_get_the_arguments_and_this_library_and_their_status_comes_back(self):
-        for verb in ("compare", "colmap"):
+    def test_all_get_the_arguments_and_this_library_and_their_status_comes_back(self):
+        for verb in ("compare", "colmap", "rerun"):
             got = self.report(self.start(verb, "--help", "a b", "", TWOVIEW_PYTHON=sys.executable))
             self.assertEqual(got["argv"], ["--help", "a b", ""])
             self.assertEqual((got["library"], got["blocked"]), (self.library, []))
+            self.assertEqual(got["verb"], f"twoview {verb}")
 
     def test_a_library_that_is_named_stays(self):
         got = self.report(
@@ -90,7 +92,23 @@ class HandOver(cli.CliTest):
 
     def test_help_lists_them(self):
         listed = self.start("--help").stdout.decode()
-        self.assertRegex(listed, r"\n  compare  .*\n  colmap  ")
+        self.assertRegex(listed, r"\n  compare  .*\n  colmap  .*\n  rerun  ")
+
+    def test_compare_has_its_help_without_packages_and_under_its_own_name(self):
+        root = Path(__file__).resolve().parents[2]
+        environment = {"PATH": os.environ["PATH"], "COMPARE_COLMAP_IN_VENV": "1"}
+        script = [sys.executable, "-B", "-S", root / "tools/compare_colmap/compare_colmap"]
+        for name, verb in (("twoview compare", {"TWOVIEW_VERB": "twoview compare"}),
+                           ("compare_colmap", {})):
+            done = subprocess.run([*script, "--help"], env={**environment, **verb},
+                                  capture_output=True, timeout=60)
+            self.assertEqual((done.returncode, done.stderr), (0, b""))
+            self.assertTrue(done.stdout.startswith(f"usage: {name} [-h]".encode()), done.stdout)
+            self.assertIn(b"opencv_sift", done.stdout)
+            done = subprocess.run([*script, "x"], env={**environment, **verb}, capture_output=True,
+                                  timeout=60)
+            self.assertEqual(done.returncode, 2)
+            self.assertTrue(done.stderr.startswith(f"{name}: this Python lacks".encode()))
 
 
 if __name__ == "__main__":

@@ -349,8 +349,32 @@ class Reconstruct(cli.CliTest):
             sigma = math.degrees(math.sqrt(variance))
             self.assertIn(f"<b>{sigma:.3f}<i>deg</i></b><span>1 sigma of the {name}", page)
         self.assertNotIn('class="advice"', page)
+        R, t = self.result()["R"], self.result()["t"]
+        stands = [-sum(R[3 * k + i] * t[k] for k in range(3)) for i in range(3)]
+        self.assertIn("<b>{:+.2f} {:+.2f} {:+.2f}</b><span>camera 1 stands".format(*stands), page)
         data = json.loads(re.search(r'id="cloud-data">(.*?)</script>', page, re.S).group(1))
         self.assertEqual(len(data["cameras"]), 2)
+
+    def test_the_report_has_six_digits_of_each_number_of_F(self):
+        self.succeed(self.reconstruct())
+        page = (self.out / "report.html").read_text()
+        text = re.search(r"<figcaption>F</figcaption><pre>(.*?)</pre>", page, re.S).group(1)
+        shown = [float(number) for number in text.split()]
+        for number, exact in zip(shown, self.result()["F"], strict=True):
+            self.assertAlmostEqual(number, exact, delta=1e-6 * abs(exact))
+
+    def test_on_a_phone_a_matrix_scrolls_in_its_own_box(self):
+        self.succeed(self.reconstruct())
+        page = (self.out / "report.html").read_text()
+        self.assertRegex(page, r"\.matrices figure \{ min-width: 0; max-width: 100%; \}")
+        self.assertIn("minmax(min(330px, 100%), 1fr)", page)
+
+    def test_a_matrix_without_a_pose_is_not_called_ok(self):
+        done = self.reconstruct("--method", "eight-point", camera=False)
+        self.assertEqual(done.returncode, 3)
+        self.assertNotRegex(done.stdout, rb"verdict +ok")
+        if self.result()["verdict"] == "ok":
+            self.assertRegex(done.stdout, rb"verdict +matches ok, no pose: ")
 
     def test_a_ROS_camera_reads_as_the_same_camera(self):
         self.succeed(self.reconstruct())

@@ -319,7 +319,7 @@ void test_the_best_pair_is_found_and_believed() {
   const Options options;
   Session session(options);
   const RecordingPair pair =
-      choose_pair(flight.folder, read, kCamera, CameraMount(), session, options);
+      choose_pair(flight.folder, read, kCamera, CameraMount(), session, options, Progress(false));
   std::printf("    frames %d and %d: %s\n", pair.frame[0].index, pair.frame[1].index,
               pair.why.c_str());
   const Result r = reconstructed(flight, read, pair, session, options);

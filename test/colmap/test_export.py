@@ -434,12 +434,34 @@ def test_images_and_folders_that_are_missing_or_broken(photographs, tmp_path, re
     assert_nothing_else(tmp_path, "images", "cameras.yaml")
 
 
+def test_a_focal_length_and_a_size_stand_in_for_a_camera_file(photographs, tmp_path, call):
+    from twoview_tools.colmap.database import read_cameras, read_keypoints, reading
+    for name in NAMES[:2]:
+        shutil.copy(photographs / "images" / name, tmp_path / name)
+    database = tmp_path / "x.db"
+    status, _, err = call("export", "--database", database, "--images", tmp_path, "--focal-35mm",
+                          "28", "--resize", WIDTH // 2, "--schema", "3.8")
+    assert status == 0, err
+    half, height = WIDTH // 2, HEIGHT // 2
+    with reading(str(database)) as found:
+        (camera,) = read_cameras(found).values()
+        keypoints = read_keypoints(found, str(database), 1)
+    assert (camera.model, camera.width, camera.height) == ("PINHOLE", half, height)
+    focal = 28 * np.hypot(WIDTH, HEIGHT) / np.hypot(36, 24) / 2
+    np.testing.assert_allclose(camera.params, [focal, focal, half / 2, height / 2], atol=1e-9)
+    assert keypoints[:, 0].max() < half and keypoints[:, 1].max() < height
+
+
 def test_bad_arguments_are_one_line(tmp_path, refuse):
     base = ("export", "--database", tmp_path / "x.db", "--images", tmp_path)
     refuse("--orientation", *base, "--orientation", "sideways")
     refuse("--sequential", *base, "--sequential", "0")
     refuse("not allowed with", *base, "--exhaustive", "--sequential", "2")
     refuse("--schema", *base, "--schema", "3.9")
+    for text in ("nan", "32,34", "0"):
+        refuse(("--focal-35mm", "decimal point", text), *base, "--focal-35mm", text)
+    refuse(("--resize", "-3"), *base, "--resize=-3")
+    refuse("either --camera or --focal-35mm", *base, "--camera", "c", "--focal-35mm", "30")
     refuse("--images", "export", "--database", tmp_path / "x.db")
 
 

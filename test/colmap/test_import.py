@@ -328,6 +328,22 @@ def test_a_model_has_the_camera_that_its_points_are_of(bend, tmp_path, call):
     assert np.mean([point.error for point in found.points3D.values()]) < 0.5
 
 
+def test_a_model_of_a_focal_length_and_of_smaller_images(photographs, tmp_path, call):
+    images = [photographs / "images" / name for name in ("a.png", "c.png")]
+    focal_35mm = FX * np.hypot(36, 24) / np.hypot(WIDTH, HEIGHT)
+    status, _, err = call("model", *images, "--focal-35mm", focal_35mm, "--resize", WIDTH // 2,
+                          "-o", tmp_path, "--quiet")
+    assert status == 0, err
+    found = read_model(tmp_path)
+    camera = next(iter(found.cameras.values()))
+    assert (camera.width, camera.height) == (WIDTH // 2, HEIGHT // 2)
+    assert camera.params[0] == pytest.approx(FX / 2)
+    R, _ = relative_pose(0, 2)
+    trace = np.trace(found.images["c.png"].R @ R.T)
+    angle = np.degrees(np.arccos(np.clip((trace - 1) / 2, -1, 1)))
+    assert angle < 1
+
+
 def test_a_model_comes_back_with_half_a_pixel_more(tmp_path):
     pixels = views_of(scene_points(5))
     R, t = relative_pose(0, 1)

@@ -1,6 +1,7 @@
 """Every code block of README.md, examples/README.md and docs/ is sound.
 
-- A block names its language: c, sh, python, yaml, json, or text for what is none.
+- A block names its language: c, sh, python, yaml, json, math, or text for what is none.
+- A formula (math) becomes MathML without an unknown command or an unbalanced brace.
 - C with a main function compiles as it is, as C99 without warnings. Other C compiles as the body of
   a function, after the includes of all public headers and the declarations that an HTML comment
   before the block gives: `<!-- given: tv_two_view pose; -->`.
@@ -10,6 +11,7 @@
 import json
 import subprocess
 import unittest
+from xml.etree import ElementTree
 
 from twoview_tools.docs import headers, markdown_pages
 
@@ -50,7 +52,24 @@ class TestCode(unittest.TestCase):
 
     def test_every_block_names_its_language(self):
         self.assertEqual([f"{page}:{line}" for page, language, line, _ in self.blocks
-                          if language not in ("c", "sh", "python", "yaml", "json", "text")], [])
+                          if language not in ("c", "sh", "python", "yaml", "json", "math",
+                                              "text")], [])
+
+    def test_formulas_become_mathml(self):
+        try:
+            from twoview_tools.docs import formulas
+        except ImportError as missing:
+            self.skipTest(f"{missing}: run scripts/bootstrap test")
+        for page, line, text in self.each("math"):
+            with self.subTest(page=f"{page}:{line}"):
+                drawn = formulas.mathml(text)
+                root = ElementTree.fromstring(drawn)
+                self.assertEqual(root.get("display"), "block")
+                self.assertEqual(text.count("{"), text.count("}"))
+                self.assertNotIn("\\", drawn)  # a command that is not known stays as it is
+                whole = formulas.rendered(f"before\n\n```math\n{text.rstrip()}\n```\n\nafter")
+                self.assertRegex(
+                    whole, r'(?s)before\n\n<div class="formula"><math.*</div>\n\nafter')
 
     def test_c_compiles(self):
         for page, line, text in self.each("c"):

@@ -143,6 +143,14 @@ class TestHeaders(unittest.TestCase):
         }  # docs/algorithms/math.md is about internal code, so no public header names it
         self.assertEqual(algorithms - named, set())
 
+    def test_the_reference_lists_every_header(self):
+        from twoview_tools.docs import reference
+        known = {str(path.relative_to(folder).with_suffix(""))
+                 for folder in headers.FOLDERS for path in folder.rglob("*.h")}
+        listed = {f"twoview/{name}" for name in reference.LIBRARY} | {
+            f"twoview_drivers/{name}" for name in reference.DRIVERS}
+        self.assertEqual(listed, known - {"twoview/twoview"})
+
     def test_every_quantity_has_a_unit(self):
         self.report(
             [

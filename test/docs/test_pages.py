@@ -7,7 +7,8 @@
   found in some source file.
 - The word after `twoview` is a verb of the program, and an option after it is an option of that
   verb.
-- A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test.
+- A page on an algorithm has its six parts: problem, formula, where it is valid, paper, file, test,
+  under headings, with formulas as blocks of math.
 """
 
 import itertools
@@ -148,9 +149,9 @@ class TestPages(unittest.TestCase):
                     if verb not in verbs:
                         wrong.append(f"{page}:{first}: twoview {verb}")
                         continue
-                    if verb in ("compare", "colmap"):
-                        # These verbs are Python programs. The tests python/compare_* and
-                        # python/colmap_* run the commands of their pages.
+                    if verb in ("compare", "colmap", "rerun"):
+                        # These verbs are Python programs. The tests python/compare_*,
+                        # python/colmap_* and cli/rerun run their commands.
                         continue
                     path = [verb] + (
                         [rest[0]]
@@ -163,19 +164,56 @@ class TestPages(unittest.TestCase):
         self.assertGreater(count, 20)
         self.report(wrong, "verbs or options that the program does not have")
 
+    def test_the_table_of_verbs_has_every_verb(self):
+        if not PROGRAM or not os.path.exists(PROGRAM):
+            self.skipTest("TWOVIEW_PROGRAM names no program")
+        verbs = set(re.findall(r"^  (\w+) ", self.help().split("Subcommands:")[1], re.M))
+        drone = re.findall(r"^  (\w+) ", self.help("drone").split("Subcommands:")[1], re.M)
+        page = (ROOT / "docs" / "cli.md").read_text()
+        rows = re.findall(r"(?m)^\| `([^|]*)\|", page.split("## Exit status")[0])
+        listed = {row.split()[0].strip("`,") for row in rows}
+        self.assertEqual(listed, verbs)
+        self.assertEqual([row.split()[1].strip("`,") for row in rows if row.startswith("drone")],
+                         drone)
+        # each verb has a heading, and each verb of the drone a description under its own
+        headings = " ".join(re.findall(r"(?m)^## (.*)$", page)).split()
+        self.assertEqual(verbs - set(headings), set())
+        described = page.split("## drone\n")[1].split("\n## ")[0]
+        self.assertEqual([verb for verb in drone if not re.search(rf"[`*]{verb}\b", described)], [])
+        for key in re.findall(r"(?m)^    case '(.)': return", (
+                ROOT / "tools" / "twoview" / "drone" / "fly.cc").read_text()):
+            self.assertIn("space" if key == " " else f"`{key}`", described)
+
+    def test_levels_and_scale_are_on_a_page_for_users(self):
+        page = (ROOT / "docs" / "your_camera.md").read_text()
+        for option in ("--levels", "--scale-factor"):
+            self.assertIn(option, page)
+
     def test_an_algorithm_has_its_six_parts(self):
+        heading = r"(?m)^##+ (?:%s)\b"
         parts = {
-            "problem": r"\*\*Problem",
-            "where it is valid": r"\*\*(Where it is valid|Valid)",
-            "paper": r"\*\*Papers?\b",
-            "file": r"\*\*Files?\b",
-            "test": r"\*\*Tests?\b",
-            "formula": r"(?m)^    \S|\*\*Formula",
+            "problem": heading % "Problem",
+            "where it is valid": heading % "Where it is valid|Valid region",
+            "paper": heading % "Papers?",
+            "file": heading % "Files?",
+            "test": heading % "Tests?",
+            "formula": heading % "Formulas?" + r"|^ *```math$",
         }
         pages = sorted((ROOT / "docs" / "algorithms").glob("*.md"))
         self.assertGreaterEqual(len(pages), 9)
         self.report([f"{path.name}: no {part}" for path in pages for part, pattern in parts.items()
                      if not re.search(pattern, path.read_text())], "parts that are missing")
+
+    def test_an_algorithm_has_headings_and_formulas_that_are_drawn(self):
+        wrong = []
+        for path in sorted((ROOT / "docs" / "algorithms").glob("*.md")):
+            text = re.sub(r"(?ms)^( *)```.*?^ *```$", "", path.read_text())
+            for number, line in enumerate(text.split("\n"), 1):
+                if re.match(r"\*\*[^*]+\*\*", line):
+                    wrong.append(f"{path.name}: a bold word in place of a heading: {line[:40]}")
+                if re.match(r"    \S", line) and not re.match(r"\s+([-*]|\d+\.) ", line):
+                    wrong.append(f"{path.name}: a formula as preformatted text: {line[:60]}")
+        self.report(wrong, "places that are not drawn")
 
 
 if __name__ == "__main__":

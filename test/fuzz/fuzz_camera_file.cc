@@ -1,8 +1,9 @@
-// Camera files and cameras.yaml: any text gives a camera that the library accepts, or BadInput.
+// Camera files of every format: any text gives a camera that the library accepts, or BadInput.
 #include <string>
 
 #include "base/error.h"
 #include "files/camera_file.h"
+#include "files/camera_formats.h"
 #include "files/camera_set.h"
 #include "fuzz.h"
 
@@ -17,6 +18,11 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   try {
     for (const auto& entry : cli::parse_camera_set(text, "f"))
+      FUZZ_REQUIRE(tv_camera_check(&entry.second) == TV_OK);
+  } catch (const cli::BadInput&) {
+  }
+  try {
+    for (const auto& entry : cli::parse_camera_file(text, "f").cameras)
       FUZZ_REQUIRE(tv_camera_check(&entry.second) == TV_OK);
   } catch (const cli::BadInput&) {
   }

@@ -655,7 +655,8 @@ static void digest_bundle(const pair *p, tv_context *context, const matched *m,
 }
 
 /* Digests tv_reconstruct with the options switched on that are off by default. */
-static void digest_reconstruct(const pair *p, tv_context *context) {
+static void digest_reconstruct(const pair *p, tv_context *context, int32_t align_matches,
+                               const char *stage) {
   tv_reconstruct_options options;
   tv_feature_options feature;
   tv_view view[2];
@@ -667,6 +668,7 @@ static void digest_reconstruct(const pair *p, tv_context *context) {
   tv_reconstruct_options_init(&options);
   options.feature = &feature;
   options.guided_matching = options.bundle_adjustment = 1;
+  options.align_matches = align_matches;
   for (v = 0; v < 2; ++v) {
     view[v] = view_of(p->image[v], &p->camera[v], NULL);
   }
@@ -682,7 +684,7 @@ static void digest_reconstruct(const pair *p, tv_context *context) {
   add_bytes(cloud.inlier_mask, (size_t)cloud.num_matches);
   add_points(cloud.points, cloud.num_matches);
   add_int(cloud.num_points);
-  print(p, context, "reconstruct");
+  print(p, context, stage);
 }
 
 /* The context's size depends on the limits only, and the high water mark on the data only. */
@@ -721,7 +723,8 @@ static void digest_pair(const pair *p, int32_t kernels) {
   digest_bundle(p, context, &m, &pose, points);
   digest_absolute_pose(p, context);
   digest_window(p, context);
-  digest_reconstruct(p, context);
+  digest_reconstruct(p, context, 0, "reconstruct");
+  digest_reconstruct(p, context, 1, "aligned");
   digest_memory(p, context, &limits);
   tv_context_free(context);
 }

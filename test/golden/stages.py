@@ -36,6 +36,7 @@ STAGES = {
     "absolute_pose": ["absolute_pose"],
     "window": ["window"],
     "reconstruct": ["reconstruct"],
+    "align": ["aligned"],
 }
 NOT_A_RESULT = {"memory"}
 

@@ -106,16 +106,20 @@ static void case_hessian_determinants(trial *t) {
   enum { REACH = TVK_HESSIAN_REACH, LEAST = 2 * REACH + 1 };
   const int32_t stride = pick(t, LEAST, 40, 640), height = pick(t, LEAST, 20, 480);
   const int32_t width = pick(t, LEAST, stride, stride);
-  const int32_t last = random_int(&t->seed, 0, 3) == 0;
-  const int32_t x = last ? width - REACH - 1 : random_int(&t->seed, REACH, width - REACH - 1);
-  const int32_t y = last ? height - REACH - 1 : random_int(&t->seed, REACH, height - REACH - 1);
   /* The image ends with its last pixel, and in some trials that is the last one the kernel reads.
    */
   const uint8_t *image = row_of_bytes(t, (height - 1) * stride + width);
-  int32_t *determinants = OUTPUT(t, int32_t, 7 * 8), k;
-  REPEAT(t, t->set->hessian_determinants(image + y * stride + x, stride, determinants));
+  int32_t *determinants = OUTPUT(t, int32_t, 2 * TVK_HESSIAN_PLACES), k;
+  const uint8_t *centres[2];
+  for (k = 0; k < 2; ++k) {
+    const int32_t last = random_int(&t->seed, 0, 3) == 0;
+    const int32_t x = last ? width - REACH - 1 : random_int(&t->seed, REACH, width - REACH - 1);
+    const int32_t y = last ? height - REACH - 1 : random_int(&t->seed, REACH, height - REACH - 1);
+    centres[k] = image + y * stride + x;
+  }
+  REPEAT(t, t->set->hessian_determinants(centres, stride, determinants));
   /* The eighth entry of a row may hold anything, so it is not compared. */
-  for (k = 0; k < 7; ++k) determinants[8 * k + 7] = 0;
+  for (k = 0; k < 2 * 7; ++k) determinants[8 * k + 7] = 0;
 }
 
 static void case_suppress_row(trial *t) {
@@ -229,6 +233,10 @@ static void case_sample_patch(trial *t) {
     x = random_int(&t->seed, 0, width) << 16;
     y = random_int(&t->seed, 0, height) << 16;
     du_x = 1 << 16;
+    du_y = 0;
+  }
+  if (!t->typical && random_int(&t->seed, 0, 2) == 0) { /* upright */
+    du_x = random_int(&t->seed, 0, 5 << 15);
     du_y = 0;
   }
   REPEAT(t, t->set->sample_patch(pairs, width, height, x, y, du_x, du_y, num_rows, patch));

@@ -6,6 +6,7 @@ stage is bounded by its counts (docs/contract.md, bounded work), and these are."
 
 import os
 import unittest
+from unittest import mock
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # one thread; set before importing numpy
     os.environ.setdefault(_name, "1")
@@ -18,6 +19,7 @@ except ImportError:
 
 if cv2 is not None:
     import twoview as tv
+    from twoview_tools import ROOT
     from twoview_tools.accuracy import bad_input, datasets, metrics, pictures, scenes
 
 RIGHT_DEG = 5.0
@@ -394,6 +396,25 @@ class TestTable(unittest.TestCase):
             "| a | 6 | 1 | 2 | 1 | 1 | 1 | `low_parallax` 2, `no_motion` 1, `second_motion` 1 |"])
         self.assertEqual(tables[1].splitlines()[2:], ["| b | 2 | 1 | 0 | 1 |  |"])
         self.assertEqual([table.splitlines()[0].count("|") for table in tables], [9, 7])
+
+    def test_the_page_has_every_line(self):
+        page = (ROOT / "docs" / "verdict.md").read_text(encoding="utf-8")
+        few = mock.patch.multiple(bad_input, SEEDS=1, PERIODS=(40,))  # the names are the same
+        few.start()
+        self.addCleanup(few.stop)
+        for group, lines in (("rendered", bad_input.rendered_lines),
+                             ("scene", lambda: dict.fromkeys(scenes.SCENES)),
+                             ("picture", lambda: dict.fromkeys([
+                                 *bad_input.CHANGES, *bad_input.MIRRORS, *bad_input.MISTAKES])),
+                             ("pair", lambda: dict.fromkeys([
+                                 *bad_input.CHANGES, *bad_input.MIRRORS, *bad_input.MISTAKES,
+                                 "both mirrored", "a moving person before half of both"]))):
+            found = []
+            for table in page.split("\n\n"):
+                head, *rows = table.strip().split("\n")
+                if head.startswith(f"| {bad_input.TITLES[group]} |"):
+                    found += [row.split("|")[1].strip() for row in rows[1:]]
+            self.assertEqual(sorted(found), sorted(lines()), group)
 
 
 if __name__ == "__main__":

@@ -136,6 +136,10 @@ class TestShift(unittest.TestCase):
             self.assertGreater(rows[system]["num_in_front"], 390)
             self.assertLess(rows[system]["median_error_px"], 0.12)
 
+    def test_the_parser_names_the_pipelines_that_there_are(self):
+        from twoview_tools.compare import arguments, systems
+        self.assertEqual(list(arguments.PIPELINES), systems.PIPELINES)
+
 
 if __name__ == "__main__":
     unittest.main()

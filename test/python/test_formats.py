@@ -73,6 +73,12 @@ class TestReaders(unittest.TestCase):
             for name, camera in formats.parse_camera_set(text, "the file").items()])
 
 
+    def test_camera_files_of_any_format(self):
+        self.run_cases("camera_formats", lambda text: [
+            {"name": name, **camera_values(camera)}
+            for name, camera in formats.parse_cameras(text, "the file").items()])
+
+
 class TestChoice(unittest.TestCase):
     def chosen(self, cameras, image, K):
         try:

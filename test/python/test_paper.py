@@ -136,6 +136,13 @@ class Figure7(Case):
             cosine = (own * (own - off)).sum() / (np.linalg.norm(own) * np.linalg.norm(own - off))
             self.assertGreater(cosine, 0.99, kind)
 
+    def test_figure_5s_corner_is_among_them(self):
+        image = self.pair.grey[0]
+        keypoints, _ = descriptor.described_keypoints(image, 500)
+        corner, found = corners.example_corner(image), descriptor.example(image, keypoints)
+        self.assertEqual([keypoints[found][axis] for axis in ("x", "y")],
+                         [corner["x"], corner["y"]])
+
     def test_a_ramp_to_the_right_is_direction_0_and_one_upwards_direction_2(self):
         ramp = np.tile(np.arange(16.0), (16, 1))
         for samples, direction in ((ramp, 0), (ramp.T[::-1], 2), (ramp[:, ::-1], 4), (ramp.T, 6)):

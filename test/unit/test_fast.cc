@@ -244,6 +244,48 @@ void test_the_best_corners_are_kept_within_a_budget() {
   }
 }
 
+// A level's scan begins at the score that sufficed for the finer one. The corners of noise are much
+// weaker on the halved image, so that this leaves too few of them; those of the dots are not.
+void test_a_coarser_level_has_its_best_corners() {
+  static uint8_t halved[75 * 30];
+  constexpr int kBudget = 60;
+  tv_feature_options options;
+  memset(&options, 0, sizeof options);
+  options.arc = 9;
+  options.threshold = 60;
+  options.min_threshold = 2;
+  options.levels = 2;
+  options.scale_factor = 2.0f;
+  options.keypoint_size = 4.0f;
+  noise_state = 5;
+  int (*const values[])(int, int) = {noise, black_and_white, single_dots};
+  for (auto value : values) {
+    const tv_image image = filled(150, 60, value), half = {halved, 75, 30, 75};
+    for (int y = 0; y < half.height; ++y) {
+      for (int x = 0; x < half.width; ++x) {
+        const uint8_t* at = pixels + 2 * y * image.width + 2 * x;
+        halved[y * half.width + x] =
+            static_cast<uint8_t>((at[0] + at[1] + at[image.width] + at[image.width + 1] + 2) / 4);
+      }
+    }
+    fill_expected(half, options.arc);
+    const std::vector<Peak> peaks = all_peaks(half, options.min_threshold);
+    tv::Arena arena = tv::arena_over(arena_memory, sizeof arena_memory);
+    const int32_t count = tv::find_corners(*tvk_select(TV_KERNELS_AUTO), image, nullptr, options,
+                                           kBudget, arena, keypoints);
+    size_t of_level = 0;
+    for (int32_t k = 0; k < count; ++k) {
+      if (keypoints[k].level != 1) continue;
+      TEST_ASSERT_TRUE(of_level < peaks.size());
+      const Peak& p = peaks[of_level++];
+      TEST_ASSERT_EQUAL_INT(p.score, static_cast<int>(keypoints[k].score));
+      TEST_ASSERT_TRUE(keypoints[k].y == 2 * p.y + 0.5f && keypoints[k].x == 2 * p.x + 0.5f);
+    }
+    TEST_ASSERT_TRUE(of_level > 0);
+    TEST_ASSERT_TRUE(count == kBudget || of_level == peaks.size());
+  }
+}
+
 void test_corners_equal_the_definition_on_synthetic_images() {
   noise_state = 1;
   int (*const values[])(int, int) = {noise,       black_and_white, faint, checkerboard,
@@ -283,6 +325,7 @@ int main() {
   RUN_TEST(test_corners_equal_the_definition_on_synthetic_images);
   RUN_TEST(test_corners_equal_the_definition_in_images_of_any_size);
   RUN_TEST(test_a_white_dot_on_black_scores_254);
+  RUN_TEST(test_a_coarser_level_has_its_best_corners);
   const bool has_real_image = real_pair_load(&real) != 0;
   RUN_TEST(test_the_best_corners_are_kept_within_a_budget);
   if (has_real_image) RUN_TEST(test_corners_equal_the_definition_on_a_real_image);

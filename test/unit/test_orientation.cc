@@ -123,8 +123,8 @@ void test_a_flat_patch_has_angle_zero() {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, angles_rad[0]);
   uint8_t descriptor[TV_DESCRIPTOR_BYTES], zeros[TV_DESCRIPTOR_BYTES] = {0};
   for (int kind : {TV_NORMALISATION_SIFT, TV_NORMALISATION_ROOTSIFT}) {
-    tv::describe_keypoint(*tvk_select(TV_KERNELS_AUTO), octaves_of_pixels(), middle, kind, 0,
-                          descriptor);
+    tv::describe_keypoints(*tvk_select(TV_KERNELS_AUTO), octaves_of_pixels(), &middle, 1, kind, 0,
+                           descriptor);
     TEST_ASSERT_EQUAL_MEMORY(zeros, descriptor, sizeof zeros);
   }
 }
@@ -148,16 +148,19 @@ void test_a_descriptor_turns_with_its_angle() {
   uint8_t upright[TV_DESCRIPTOR_BYTES], turned[TV_DESCRIPTOR_BYTES];
   const tvk_table& kernels = *tvk_select(TV_KERNELS_AUTO);
   render(0, texture);
-  tv::describe_keypoint(kernels, octaves_of_pixels(), middle, TV_NORMALISATION_SIFT, 0, upright);
+  tv::describe_keypoints(kernels, octaves_of_pixels(), &middle, 1, TV_NORMALISATION_SIFT, 0,
+                         upright);
   for (int degrees = -170; degrees <= 180; degrees += 10) {
     tv_keypoint keypoint = middle;
     keypoint.angle_rad = static_cast<float>(degrees * kPi / 180);
     render(degrees * kPi / 180, texture);
-    tv::describe_keypoint(kernels, octaves_of_pixels(), keypoint, TV_NORMALISATION_SIFT, 0, turned);
+    tv::describe_keypoints(kernels, octaves_of_pixels(), &keypoint, 1, TV_NORMALISATION_SIFT, 0,
+                           turned);
     TEST_ASSERT_TRUE(cosine(upright, turned) > 0.98);
     if (degrees == 0) continue;
     keypoint.angle_rad = 0.0f;
-    tv::describe_keypoint(kernels, octaves_of_pixels(), keypoint, TV_NORMALISATION_SIFT, 0, turned);
+    tv::describe_keypoints(kernels, octaves_of_pixels(), &keypoint, 1, TV_NORMALISATION_SIFT, 0,
+                           turned);
     if (std::abs(degrees) >= 30) {
       TEST_ASSERT_TRUE(cosine(upright, turned) < 0.95);
     }
@@ -179,8 +182,8 @@ void test_the_order_is_ubcs() {
                  : 40 + 20 * (8 + (u - 8) * std::cos(angle) - (v - 8) * std::sin(angle)) / 4;
     });
     tv_keypoint keypoint = middle;
-    tv::describe_keypoint(kernels, octaves_of_pixels(), keypoint, TV_NORMALISATION_SIFT, 0,
-                          descriptor);
+    tv::describe_keypoints(kernels, octaves_of_pixels(), &keypoint, 1, TV_NORMALISATION_SIFT, 0,
+                           descriptor);
     const uint8_t* last_cell = descriptor + 15 * 8;
     for (int k = 0; k < 8; ++k) {
       TEST_ASSERT_TRUE(k == direction || last_cell[k] < last_cell[direction]);
@@ -210,8 +213,8 @@ void test_points_outside_and_of_any_size_are_described() {
     for (int a = 0; a < count; ++a) {
       TEST_ASSERT_TRUE(angles_rad[a] > -3.1415930f && angles_rad[a] <= 3.1415930f);
     }
-    tv::describe_keypoint(*tvk_select(TV_KERNELS_AUTO), octaves, keypoint,
-                          TV_NORMALISATION_ROOTSIFT, 0, descriptor);
+    tv::describe_keypoints(*tvk_select(TV_KERNELS_AUTO), octaves, &keypoint, 1,
+                           TV_NORMALISATION_ROOTSIFT, 0, descriptor);
   }
 }
 

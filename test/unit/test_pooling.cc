@@ -124,7 +124,7 @@ double distance(const tv_keypoint& p, int32_t ours_pooled, bool pooled) {
   const tv::Octaves octaves = tv::make_octaves(kernels, tv_image{pixels, kSide, kSide, kSide},
                                                range.first, range.last, arena);
   uint8_t ours[TV_DESCRIPTOR_BYTES];
-  tv::describe_keypoint(kernels, octaves, p, TV_NORMALISATION_SIFT, ours_pooled, ours);
+  tv::describe_keypoints(kernels, octaves, &p, 1, TV_NORMALISATION_SIFT, ours_pooled, ours);
   double wanted[TV_DESCRIPTOR_BYTES] = {0}, length = 0, clipped = 0, sum = 0;
   add_window(p, pooled ? 0.7 * p.size : p.size, wanted);
   if (pooled) add_window(p, 1.3 * p.size, wanted);

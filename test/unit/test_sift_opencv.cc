@@ -66,8 +66,8 @@ void describe_with_ours(int view) {
   const tv::Octaves octaves = tv::make_octaves(kernels, image_of(view), 0, 0, arena);
   for (int k = 0; k < counts[view]; ++k) {
     TEST_ASSERT_EQUAL_INT(0, tv::octave_of(keypoints[view][k].size));
-    tv::describe_keypoint(kernels, octaves, keypoints[view][k], TV_NORMALISATION_SIFT, 0,
-                          ours[view] + k * TV_DESCRIPTOR_BYTES);
+    tv::describe_keypoints(kernels, octaves, &keypoints[view][k], 1, TV_NORMALISATION_SIFT, 0,
+                           ours[view] + k * TV_DESCRIPTOR_BYTES);
   }
 }
 

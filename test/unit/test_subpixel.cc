@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "feature/subpixel.h"
+#include "image/pyramid.h"
 #include "support/random.h"
 #include "twoview/context.h"
 
@@ -78,7 +79,11 @@ bool find_corner(int arc, int* best_x, int* best_y) {
 
 void refine(int x, int y, double* rx, double* ry) {
   tv::Peak peak{x, y, 1.0 * x, 1.0 * y};
-  tv::find_peak(*tvk_select(TV_KERNELS_AUTO), level, x, y, &peak);
+  const uint8_t* const at = level.data + y * level.stride + x;
+  const uint8_t* const centres[2] = {at, at};
+  int32_t determinants[2 * TVK_HESSIAN_PLACES];
+  tvk_select(TV_KERNELS_AUTO)->hessian_determinants(centres, level.stride, determinants);
+  tv::find_peak(determinants, x, y, &peak);
   *rx = peak.x;
   *ry = peak.y;
 }
@@ -172,15 +177,22 @@ void test_determinants_are_those_of_the_definition() {
       if (trial % 3 == 2) pixel = pixel > 250 ? 255 : 0;
     }
     if (trial % 10 == 4) render_blob(20, 20, 0.6 + 0.1 * trial, 0, 255);
-    const int cx = random_int(&seed, 6, kSide - 7), cy = random_int(&seed, 6, kSide - 7);
+    int cx[2], cy[2];
+    const uint8_t* centres[2];
+    for (int n = 0; n < 2; ++n) {
+      cx[n] = random_int(&seed, 6, kSide - 7);
+      cy[n] = random_int(&seed, 6, kSide - 7);
+      centres[n] = pixels + cy[n] * kSide + cx[n];
+    }
     for (int set = TV_KERNELS_C; set <= TV_KERNELS_AVX512; ++set) {
       const tvk_table* kernels = tvk_select(static_cast<tv_kernels>(set));
       if (kernels == nullptr) continue;
-      int32_t found[56];
-      kernels->hessian_determinants(pixels + cy * kSide + cx, kSide, found);
-      for (int k = 0; k < 49; ++k) {
-        const int64_t expected = determinant_at(cx + k % 7 - 3, cy + k / 7 - 3);
-        TEST_ASSERT_TRUE(expected == found[8 * (k / 7) + k % 7]);
+      int32_t found[2][TVK_HESSIAN_PLACES];
+      kernels->hessian_determinants(centres, kSide, found[0]);
+      for (int k = 0; k < 2 * 49; ++k) {
+        const int n = k / 49, row = k % 49 / 7, column = k % 7;
+        const int64_t expected = determinant_at(cx[n] + column - 3, cy[n] + row - 3);
+        TEST_ASSERT_TRUE(expected == found[n][8 * row + column]);
       }
     }
   }

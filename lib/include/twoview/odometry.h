@@ -138,8 +138,10 @@ typedef struct tv_odometry_state {
   uint8_t has_pose;
   /* 1 where `covariance` was estimated. */
   uint8_t has_covariance;
+  /* 1 where the frame's attitude contradicts the map's vertical and was left out of account. */
+  uint8_t attitude_ignored;
   /* Always 0. */
-  uint8_t reserved[3];
+  uint8_t reserved[2];
   /* How many frames were given so far, this one included. */
   int32_t num_frames;
   /* How many keypoints the frame has. */

@@ -173,11 +173,8 @@ tv_status tv_describe(tv_context* context, const tv_image* image, const tv_featu
   const tv::Octaves octaves =
       tv::octaves_for(context, *image, request.options.pooling, keypoints, num_keypoints);
   tv::StageTimer timer(context, TV_STAGE_DESCRIBE);
-  for (int32_t k = 0; k < num_keypoints; ++k) {
-    tv::describe_keypoint(*context->kernels, octaves, keypoints[k], request.options.descriptor,
-                          request.options.pooling,
-                          descriptors + tv::bytes_of(k, TV_DESCRIPTOR_BYTES));
-  }
+  tv::describe_keypoints(*context->kernels, octaves, keypoints, num_keypoints,
+                         request.options.descriptor, request.options.pooling, descriptors);
   return TV_OK;
 }
 
@@ -210,10 +207,8 @@ tv_status tv_extract(tv_context* context, const tv_image* image, const tv_image*
   *num_keypoints = count;
   if (count > cap_keypoints) return TV_ERR_CAPACITY;
   std::copy(oriented, oriented + count, keypoints);
-  for (int32_t k = 0; k < count; ++k) {
-    tv::describe_keypoint(*context->kernels, octaves, keypoints[k], o.descriptor, o.pooling,
-                          descriptors + tv::bytes_of(k, TV_DESCRIPTOR_BYTES));
-  }
+  tv::describe_keypoints(*context->kernels, octaves, keypoints, count, o.descriptor, o.pooling,
+                         descriptors);
   return TV_OK;
 }
 

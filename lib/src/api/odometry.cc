@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "api/context.h"
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/adjust.h"
+#include "odometry/metric.h"
 #include "odometry/track.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
@@ -95,21 +97,25 @@ void start_anew(tv_odometry* o) {
   o->reference_id = -1;
   o->has_motion = false;
   o->mark = o->num_frames = o->segment = o->num_segments = 0;
-  o->num_relocations = o->num_loops = o->lost_frames = o->next_search = o->next_loop = 0;
+  o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
+      o->next_loop = 0;
   o->status = TV_ODOMETRY_STARTING;
   o->frame.has_pose = o->previous.has_pose = false;
   o->frame.num = o->previous.num = 0;
   o->median_depth = 1;
+  o->turn_sigma = 0;
+  o->is_upright = false;
+  forget_scale(o);
   o->last_time_s = 0;
 }
 
 size_t scratch_bytes(const tv_odometry_options& o) {
   const size_t n = static_cast<size_t>(o.max_keypoints);
-  const size_t choices = 2 * (arena_bytes<tv_keypoint>(n) +
-                              arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
-                              arena_bytes<int32_t>(n)) +
-                         arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) +
-                         arena_bytes<tv_point>(n) + arena_bytes<uint8_t>(3 * n * 128);
+  const size_t choices =
+      2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
+           arena_bytes<int32_t>(n)) +
+      arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) + arena_bytes<tv_point>(n) +
+      arena_bytes<uint8_t>(3 * n * 128);
   const size_t points = static_cast<size_t>(o.max_points);
   const size_t tracking = std::max(choices, arena_bytes<double>(40 * n) + adjust_bytes(o)) +
                           arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
@@ -172,20 +178,23 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   status = tv_context_init(&o->context, &plan.limits,
                            tv::arena_alloc<uint8_t>(arena, plan.context_bytes), plan.context_bytes);
   if (status != TV_OK) return status;
+  o->kernels = o->context->kernels;
+  o->max_matched = plan.limits.max_keypoints;
   o->options = plan.options;
   o->options.struct_size = sizeof(tv_odometry_options);
   o->camera = tv::prepare_camera(plan.camera);
   tv_feature_options_init(&o->features);
   o->features.max_keypoints = plan.options.max_keypoints;
-  o->features.arc=(int)T(20,9); o->features.levels=(int)T(21,4); o->features.scale_factor=(float)T(22,1.41); o->features.threshold=(int)T(23,15); o->features.cell_px=(int)T(24,32);o->features.keypoint_size=(float)T(25,4);
+  // Measured on the sequences: docs/odometry.md.
+  o->features.arc = 9;
+  o->features.cell_px = 32;
   o->grid_columns = plan.columns;
   o->grid_rows = plan.rows;
   tv::make_map(plan.sizes, arena, &o->map);
   tv::make_frame(plan, arena, &o->frame);
   tv::make_frame(plan, arena, &o->previous);
   for (tv::Frame& frame : o->starts) tv::make_frame(plan, arena, &frame);
-  o->local_points =
-      tv::arena_alloc<int32_t>(arena, static_cast<size_t>(plan.limits.max_keypoints));
+  o->local_points = tv::arena_alloc<int32_t>(arena, static_cast<size_t>(plan.limits.max_keypoints));
   const size_t scratch = tv::scratch_bytes(plan.options);
   o->scratch = tv::arena_over(tv::arena_alloc<uint8_t>(arena, scratch), scratch);
   tv::start_anew(o);

@@ -10,6 +10,8 @@
 #include "api/validate.h"
 #include "geometry/essential.h"
 #include "geometry/triangulation.h"
+#include "image/pyramid.h"
+#include "match/align.h"
 #include "robust/verdict.h"
 #include "twoview/bundle.h"
 
@@ -28,6 +30,9 @@ struct Results {
   tv_point* points;
   tv_correspondence* more_matches;  // the matches of tv_match and of guided matching together
   uint8_t* more_inlier_mask;
+  // Of each keypoint of view 0, whether its match was aligned. It lies where `points` lies, and is
+  // valid until there are points.
+  uint8_t* aligned;
   // The cameras of the two views, corrected by the present estimate; set for full poses only.
   tv_camera cameras[2];
   tv_pixel_pairs pairs;  // of the present matches; with sigmas where the option asks for them
@@ -50,8 +55,35 @@ Results alloc_results(Arena& arena, int32_t max_keypoints) {
   r.points = arena_alloc<tv_point>(arena, n);
   r.more_matches = arena_alloc<tv_correspondence>(arena, n);
   r.more_inlier_mask = arena_alloc<uint8_t>(arena, n);
+  static_assert(sizeof(tv_point) >= sizeof *r.aligned, "the points' memory is large enough");
+  r.aligned = reinterpret_cast<uint8_t*>(r.points);
+  std::memset(r.aligned, 0, n);
   return r;
 }
+
+// The sigmas of keypoints that tv_extract made. Those of a level have one size, so that a logarithm
+// and an exponential a level suffice.
+class SigmasOfLevels {
+ public:
+  SigmasOfLevels(float size_of_one, double exponent)
+      : size_of_one_(size_of_one), exponent_(exponent) {}
+  float of(const tv_keypoint& keypoint) {
+    OfLevel& known = levels_[keypoint.level];
+    if (known.size != keypoint.size) {
+      tv_keypoint_sigmas(&keypoint, 1, size_of_one_, exponent_, &known.sigma);
+      known.size = keypoint.size;
+    }
+    return known.sigma;
+  }
+
+ private:
+  struct OfLevel {
+    float size, sigma;
+  };
+  OfLevel levels_[kMaxLevels] = {};
+  float size_of_one_;
+  double exponent_;
+};
 
 // Writes the pixels, ratios and sigmas of the matches, and r.pairs.
 void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_matches) {
@@ -60,6 +92,7 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     r.pairs.sigmas0 = r.sigmas[0];
     r.pairs.sigmas1 = r.sigmas[1];
   }
+  SigmasOfLevels sigmas(r.keypoint_size, r.sigma_by_size);
   for (int32_t k = 0; k < num_matches; ++k) {
     const tv_correspondence& m = matches[k];
     const tv_keypoint& a = r.keypoints[0][m.idx0];
@@ -70,8 +103,23 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     r.pixels[1][2 * k + 1] = b.y;
     r.ratios[k] = m.ratio;
     if (r.pairs.sigmas0 == nullptr) continue;
-    tv_keypoint_sigmas(&a, 1, r.keypoint_size, r.sigma_by_size, r.sigmas[0] + k);
-    tv_keypoint_sigmas(&b, 1, r.keypoint_size, r.sigma_by_size, r.sigmas[1] + k);
+    r.sigmas[0][k] = sigmas.of(a);
+    r.sigmas[1][k] = sigmas.of(b);
+    if (r.aligned[m.idx0] == 0) continue;
+    for (float* of_view : r.sigmas) of_view[k] *= static_cast<float>(kAlignedSigma);
+  }
+}
+
+// Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match,
+// so the order of the matches does not matter. Matches of guided matching are not aligned.
+__attribute__((noinline)) void align_matches(tv_context* context, const tv_view views[2],
+                                             int32_t num_matches, Results& r) {
+  StageTimer timer(context, TV_STAGE_MATCH);
+  for (int32_t k = 0; k < num_matches; ++k) {
+    const tv_correspondence& m = r.matches[k];
+    r.aligned[m.idx0] =
+        align_keypoints(views[0].image, views[1].image, static_cast<double>(r.keypoint_size),
+                        &r.keypoints[0][m.idx0], &r.keypoints[1][m.idx1]);
   }
 }
 
@@ -256,7 +304,9 @@ constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
                                               nullptr,
                                               0,
                                               0,
-                                              1.0};
+                                              1.0,
+                                              0,
+                                              0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
                                    tv_reconstruct_options* checked) {
@@ -267,7 +317,9 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   const bool valid = is_triangulation_method(checked->triangulation) &&
                      (checked->guided_matching == 0 || checked->guided_matching == 1) &&
                      (checked->bundle_adjustment == 0 || checked->bundle_adjustment == 1) &&
-                     checked->sigma_by_size >= 0 && checked->sigma_by_size <= kMostSigmaExponent;
+                     checked->sigma_by_size >= 0 && checked->sigma_by_size <= kMostSigmaExponent &&
+                     (checked->align_matches == 0 || checked->align_matches == 1) &&
+                     checked->reserved == 0;
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
@@ -411,6 +463,7 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   status = tv::extract_and_match(context, views, checked, r, num_keypoints, &num_matches);
   if (status != TV_OK) return status;
   int32_t num_left_out = tv::keep_best(r.matches, context->limits.max_matches, &num_matches);
+  if (checked.align_matches != 0) tv::align_matches(context, views, num_matches, r);
   tv::gather_pixels(r, r.matches, num_matches);
   tv_two_view estimate;
   tv_two_view_init(&estimate);

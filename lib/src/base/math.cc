@@ -33,7 +33,7 @@ double power_of_two(int exponent) {
   return double_of(static_cast<uint64_t>(exponent + 1023) << 52);
 }
 
-int nearest_int(double x) { return static_cast<int>(x < 0 ? x - 0.5 : x + 0.5); }
+int nearest_int(double x) { return static_cast<int>(x + __builtin_copysign(0.5, x)); }
 
 // An unevaluated sum: high is the rounded value and low the rounding error.
 struct Pair {
@@ -207,12 +207,12 @@ void sincos(double angle_rad, double* sine, double* cosine) {
   }
   const double s = sine_series(r, low);
   const double c = cosine_series(r, low);
-  switch (quadrant & 3) {
-    case 0: *sine = s, *cosine = c; break;
-    case 1: *sine = c, *cosine = -s; break;
-    case 2: *sine = -s, *cosine = -c; break;
-    default: *sine = -c, *cosine = s; break;
-  }
+  // A quarter of a turn makes sine and cosine (c, -s). Without a branch, because the quadrants of
+  // keypoints are random.
+  const uint64_t turns = static_cast<uint64_t>(quadrant), odd = 0 - (turns & 1);
+  const uint64_t swapped = (bits_of(s) ^ bits_of(c)) & odd;
+  *sine = double_of((bits_of(s) ^ swapped) ^ (turns & 2) << 62);
+  *cosine = double_of((bits_of(c) ^ swapped) ^ ((turns + 1) & 2) << 62);
 }
 
 double tan(double angle_rad) {

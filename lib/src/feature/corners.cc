@@ -108,7 +108,8 @@ int32_t scan_level(const tvk_table& kernels, const Level& level, const tv_image*
 // a cutoff are left out: the cutoff is the highest score at which at least `wanted` corners remain,
 // limited to [lowest, highest]. Returns the number of corners kept.
 int32_t sort_by_score(const Corner* corners, int32_t count, const Histogram& histogram,
-                      int32_t lowest, int32_t highest, int32_t wanted, Corner* sorted) {
+                      int32_t lowest, int32_t highest, int32_t wanted, Corner* sorted,
+                      int32_t* chosen_cutoff) {
   int32_t starts[256];  // for each score, the place of its next corner in `sorted`
   int32_t cutoff = 255, kept = 0;
   while (cutoff > lowest && (cutoff > highest || kept < wanted)) {
@@ -118,6 +119,7 @@ int32_t sort_by_score(const Corner* corners, int32_t count, const Histogram& his
   for (int32_t k = 0; k < count; ++k) {
     if (corners[k].score >= cutoff) sorted[starts[corners[k].score]++] = corners[k];
   }
+  *chosen_cutoff = cutoff;
   return kept;
 }
 
@@ -181,13 +183,19 @@ bool mark_pixel(uint32_t* marks, const Level& level, int32_t x, int32_t y) {
 int32_t make_keypoints(const tvk_table& kernels, const Corner* corners, int32_t count,
                        const Level& level, int32_t index, const tv_image* mask,
                        const tv_feature_options& options, uint32_t* marks, tv_keypoint* keypoints) {
+  int32_t determinants[2][TVK_HESSIAN_PLACES];  // of corners k and k + 1, for even k
+  const auto at = [&](const Corner& c) { return level.data + c.y * level.stride + c.x; };
   int32_t made = 0;
   memset(marks, 0, marks_count(level.width, level.height) * sizeof marks[0]);
   for (int32_t k = 0; k < count; ++k) {
     const int32_t corner_x = corners[k].x, corner_y = corners[k].y;
     double x = corner_x, y = corner_y;
     Peak peak;
-    if (options.subpixel != 0 && find_peak(kernels, level, corner_x, corner_y, &peak) &&
+    if (options.subpixel != 0 && k % 2 == 0) {
+      const uint8_t* const centres[2] = {at(corners[k]), at(corners[std::min(k + 1, count - 1)])};
+      kernels.hessian_determinants(centres, level.stride, determinants[0]);
+    }
+    if (options.subpixel != 0 && find_peak(determinants[k % 2], corner_x, corner_y, &peak) &&
         !is_masked_out(mask, level, peak.pixel_x, peak.pixel_y)) {
       if (mark_pixel(marks, level, peak.pixel_x, peak.pixel_y)) continue;
       x = peak.x;
@@ -239,19 +247,24 @@ Workspace alloc_workspace(Arena& arena, int32_t width, int32_t height) {
 }
 
 // Writes the best corners of a level, `share` of them at most, as keypoints and returns their
-// number.
+// number. *cutoff is the lowest score that counted on the level before, 0 for the first one: mostly
+// as many corners are above it here. Else the level is scanned a second time. It becomes that of
+// this level.
 int32_t collect_level(const tvk_table& kernels, const Level& level, const tv_image* mask,
                       const tv_feature_options& options, int32_t index, int32_t share,
-                      Workspace& work, tv_keypoint* keypoints) {
+                      int32_t* cutoff, Workspace& work, tv_keypoint* keypoints) {
   const int32_t lowest = options.min_threshold > 0 ? options.min_threshold : options.threshold;
   // Without a grid the threshold may rise, because only the best corners count. With a grid it may
   // not rise above options.threshold, because weaker corners can fill a cell.
   const int32_t highest = options.cell_px == 0 ? 254 : options.threshold;
   Histogram histogram;
-  const int32_t found =
-      scan_level(kernels, level, mask, options, lowest, highest, share, work, histogram);
+  const int32_t start = std::max(lowest, *cutoff);
+  int32_t found = scan_level(kernels, level, mask, options, start, highest, share, work, histogram);
+  if (found < share && start > lowest) {
+    found = scan_level(kernels, level, mask, options, lowest, highest, share, work, histogram);
+  }
   const int32_t sorted =
-      sort_by_score(work.candidates, found, histogram, lowest, highest, share, work.sorted);
+      sort_by_score(work.candidates, found, histogram, lowest, highest, share, work.sorted, cutoff);
   const int32_t kept = spread_over_grid(work.sorted, sorted, share, level, options.cell_px,
                                         work.cell_counts, work.candidates);
   return make_keypoints(kernels, work.sorted, kept, level, index, mask, options, work.marks,
@@ -279,7 +292,7 @@ int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_i
   tv_keypoint* found = arena_alloc<tv_keypoint>(arena, static_cast<size_t>(budget));
   const int32_t levels = count_levels(image, options, factor);
   Level level = full_level(image);
-  int32_t count = 0;
+  int32_t count = 0, cutoff = 0;
   for (int32_t k = 0; k < levels; ++k) {
     // A level may also use what the finer levels left of their shares.
     int32_t share = level_share(budget, k, levels, factor);
@@ -287,7 +300,7 @@ int32_t find_corners(const tvk_table& kernels, const tv_image& image, const tv_i
     for (int32_t j = k + 1; j < levels; ++j) promised += level_share(budget, j, levels, factor);
     share = std::max(share, budget - count - promised);
     share = std::min(share, budget - count);
-    count += collect_level(kernels, level, mask, options, k, share, work, found + count);
+    count += collect_level(kernels, level, mask, options, k, share, &cutoff, work, found + count);
     if (k + 1 < levels) next_level(kernels, level, factor, k, buffers, &level);
   }
   sort_keypoints(found, count, keypoints);

@@ -2,6 +2,8 @@
 // formulas: docs/algorithms/sift.md; tests: test/unit/test_orientation.cc and test_sift_opencv.cc.
 #include "feature/describe.h"
 
+#include <algorithm>
+
 #include "base/math.h"
 
 namespace tv {
@@ -23,6 +25,8 @@ constexpr double kMaxStep = 2.24;
 // by each of these factors (docs/decisions/0018).
 constexpr double kPooledSizes[2] = {0.7, 1.3};
 
+constexpr int32_t kBlock = 32;  // keypoints
+
 // A second peak is a direction of its own if it is above this share of the highest peak (Lowe,
 // section 5).
 constexpr double kSecondPeak = 0.8;
@@ -41,26 +45,32 @@ constexpr double kMaxOutside = 8192.0;
 // have a larger step, which is replaced by this one.
 constexpr double kLargestStep = 256.0;
 
+// Without a branch: the sign is random, and a wrong guess costs as much as ten additions.
 int32_t to_q16(double x) {
   const double scaled = x * 65536.0;
-  return static_cast<int32_t>(scaled < 0 ? scaled - 0.5 : scaled + 0.5);
+  return static_cast<int32_t>(scaled + __builtin_copysign(0.5, scaled));
 }
 
 double near_image(double x, int32_t side) {
   return x < -kMaxOutside ? -kMaxOutside : x > side + kMaxOutside ? side + kMaxOutside : x;
 }
 
+// Of the x axis of a patch.
+struct Direction {
+  double cosine, sine;
+};
+
+constexpr Direction kUpright = {1.0, 0.0};
+
 // Samples a square patch of side x side samples that is centred on the keypoint and whose x axis
-// points along angle_rad, with the step of a keypoint of this size.
+// has this direction, with the step of a keypoint of this size.
 void sample_around(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
-                   double size, double angle_rad, double step_per_size, int32_t side,
+                   double size, Direction direction, double step_per_size, int32_t side,
                    int16_t* patch) {
   const Octave& octave = octave_for(octaves, size);
   const double wanted = size * step_per_size / octave.scale;
   const double step = wanted < kLargestStep ? wanted : kLargestStep;
-  double sine = 0.0, cosine = 1.0;
-  if (angle_rad != 0.0) sincos(angle_rad, &sine, &cosine);
-  const int32_t du_x = to_q16(step * cosine), du_y = to_q16(step * sine);
+  const int32_t du_x = to_q16(step * direction.cosine), du_y = to_q16(step * direction.sine);
   // The position of the first sample, half a patch before the centre along both axes.
   const double half = 0.5 * (side - 1);
   const int32_t x = to_q16(near_image(to_level(octave.scale, keypoint.x), octave.width)) -
@@ -82,6 +92,27 @@ float peak_angle(const int32_t* smooth, int32_t bin) {
   if (turn > 0.5) turn -= 1.0;
   const float angle_rad = static_cast<float>(turn * 2.0 * kPi);
   return angle_rad == 0.0f ? 0.0f : angle_rad;
+}
+
+Direction direction_of(float angle_rad) {
+  Direction direction = kUpright;
+  if (angle_rad != 0) sincos(angle_rad, &direction.sine, &direction.cosine);
+  return direction;
+}
+
+void describe(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
+              Direction direction, int32_t kind, int32_t pooling, uint8_t* descriptor) {
+  constexpr int32_t kPatch = TVK_PATCH_SIDE * TVK_PATCH_SIDE;
+  int16_t patches[2 * kPatch + 1];
+  int32_t histogram[TVK_DESCRIPTOR_SIZE];
+  const int32_t num_patches = pooling != 0 ? 2 : 1;
+  for (int32_t n = 0; n < num_patches; ++n) {
+    const double factor = pooling != 0 ? kPooledSizes[n] : 1.0;
+    sample_around(kernels, octaves, keypoint, keypoint.size * factor, direction, kStepPerSize,
+                  TVK_PATCH_SIDE, patches + n * kPatch);
+  }
+  kernels.gradient_histogram(patches, num_patches, histogram);
+  kernels.quantize_descriptor(histogram, kind == TV_NORMALISATION_ROOTSIFT, descriptor);
 }
 
 }  // namespace
@@ -114,7 +145,7 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint& keypoint, float angles_rad[2]) {
   int16_t patch[TVK_ORIENT_SIDE * TVK_PATCH_SIDE + 1];
   int32_t smooth[TVK_ORIENT_BINS + 2], peaks[2];
-  sample_around(kernels, octaves, keypoint, keypoint.size, 0.0, kOrientStep, TVK_ORIENT_SIDE,
+  sample_around(kernels, octaves, keypoint, keypoint.size, kUpright, kOrientStep, TVK_ORIENT_SIDE,
                 patch);
   kernels.orientation_histogram(patch, smooth, peaks);
   angles_rad[0] = peak_angle(smooth, peaks[0]);
@@ -126,20 +157,22 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
   return 2;
 }
 
-void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
-                       const tv_keypoint& keypoint, int32_t kind, int32_t pooling,
-                       uint8_t* descriptor) {
-  constexpr int32_t kPatch = TVK_PATCH_SIDE * TVK_PATCH_SIDE;
-  int16_t patches[2 * kPatch + 1];
-  int32_t histogram[TVK_DESCRIPTOR_SIZE];
-  const int32_t num_patches = pooling != 0 ? 2 : 1;
-  for (int32_t n = 0; n < num_patches; ++n) {
-    const double factor = pooling != 0 ? kPooledSizes[n] : 1.0;
-    sample_around(kernels, octaves, keypoint, keypoint.size * factor, keypoint.angle_rad,
-                  kStepPerSize, TVK_PATCH_SIDE, patches + n * kPatch);
+void describe_keypoints(const tvk_table& kernels, const Octaves& octaves,
+                        const tv_keypoint* keypoints, int32_t count, int32_t kind, int32_t pooling,
+                        uint8_t* descriptors) {
+  for (int32_t first = 0; first < count; first += kBlock) {
+    const int32_t end = std::min(first + kBlock, count);
+    // The directions of a block are computed together: each is a long chain of operations, and
+    // those of several keypoints overlap.
+    Direction directions[kBlock];
+    for (int32_t k = first; k < end; ++k) {
+      directions[k - first] = direction_of(keypoints[k].angle_rad);
+    }
+    for (int32_t k = first; k < end; ++k) {
+      describe(kernels, octaves, keypoints[k], directions[k - first], kind, pooling,
+               descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES);
+    }
   }
-  kernels.gradient_histogram(patches, num_patches, histogram);
-  kernels.quantize_descriptor(histogram, kind == TV_NORMALISATION_ROOTSIFT, descriptor);
 }
 
 }  // namespace tv

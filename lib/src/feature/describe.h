@@ -22,10 +22,10 @@ OctaveRange octave_range(const tv_keypoint* keypoints, int32_t count, int32_t po
 int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint& keypoint, float angles_rad[2]);
 
-// Writes the TV_DESCRIPTOR_BYTES bytes of `descriptor`. `kind` is a tv_normalisation; `pooling` is
-// as in tv_feature_options.
-void describe_keypoint(const tvk_table& kernels, const Octaves& octaves,
-                       const tv_keypoint& keypoint, int32_t kind, int32_t pooling,
-                       uint8_t* descriptor);
+// Writes the descriptors, TV_DESCRIPTOR_BYTES bytes each. `kind` is a tv_normalisation; `pooling`
+// is as in tv_feature_options.
+void describe_keypoints(const tvk_table& kernels, const Octaves& octaves,
+                        const tv_keypoint* keypoints, int32_t count, int32_t kind, int32_t pooling,
+                        uint8_t* descriptors);
 
 }  // namespace tv

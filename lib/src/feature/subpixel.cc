@@ -2,8 +2,6 @@
 // docs/algorithms/fast.md; test: test/unit/test_subpixel.cc.
 #include "feature/subpixel.h"
 
-#include "kernels/kernels.h"
-
 namespace tv {
 namespace {
 
@@ -26,12 +24,14 @@ int32_t largest_of_nine(const int32_t* determinants, int32_t place) {
 
 }  // namespace
 
-bool find_peak(const tvk_table& kernels, const Level& level, int32_t x, int32_t y, Peak* peak) {
-  int32_t determinants[7 * kPitch];
-  kernels.hessian_determinants(level.data + y * level.stride + x, level.stride, determinants);
+bool find_peak(const int32_t* determinants, int32_t x, int32_t y, Peak* peak) {
   int32_t place = kMiddle * kPitch + kMiddle;
-  for (int32_t step = 0; step < kMaxSteps; ++step) place = largest_of_nine(determinants, place);
-  if (largest_of_nine(determinants, place) != place) return false;
+  for (int32_t step = 0;; ++step) {
+    const int32_t next = largest_of_nine(determinants, place);
+    if (next == place) break;
+    if (step == kMaxSteps) return false;
+    place = next;
+  }
 
   // The quadratic c(u, v) = .. + gx u + gy v + hxx u^2/2 + hxy u v + hyy v^2/2 has central
   // differences of the determinants as its coefficients.

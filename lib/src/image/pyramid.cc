@@ -18,14 +18,13 @@ Footprint footprint(int32_t x, double factor) {
   const double begin = x * factor, end = (x + 1) * factor;
   Footprint f{static_cast<int32_t>(begin), {0, 0, 0}};
   int32_t rest = 256;
-  for (int k = 0; k < 3 && rest > 0; ++k) {
+  for (int k = 0; k < 3; ++k) {
     const double low = begin > f.first + k ? begin : f.first + k;
     const double high = end < f.first + k + 1 ? end : f.first + k + 1;
-    const double share = high > low ? (high - low) / factor : 0.0;
-    int32_t weight = static_cast<int32_t>(256 * share + 0.5);
-    if (weight > rest || high >= end) weight = rest;
-    f.weights[k] = weight;
-    rest -= weight;
+    const double share = (high > low ? high - low : 0.0) / factor;
+    const int32_t weight = static_cast<int32_t>(256 * share + 0.5);
+    f.weights[k] = high >= end ? rest : std::min(weight, rest);
+    rest -= f.weights[k];
   }
   return f;
 }

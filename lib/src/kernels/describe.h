@@ -17,22 +17,29 @@ static inline words gradient_v(const int16_t *at) {
   return words_load(at + 1) - words_load(at + TVK_PATCH_SIDE);
 }
 
-enum { ORIENT_GRADIENTS = TVK_ORIENT_SIDE - 1 };
+/* The gradients of the orientation: those of a grid of 11 x 11 that are within 6 samples of its
+   centre, row by row, 109 in all. Three more have weight 0: two at the start of the last row, which
+   is read from its first column on because nothing follows the patch, and one that fills the last
+   vector. */
+enum { ORIENT_ROWS = TVK_ORIENT_SIDE - 1, ORIENT_COUNT = 112 };
 
-/* The Gaussian weights 65536 * 0.11 exp(-(x^2 + y^2) / (2 * 2^2)) for x^2 + y^2 < 6^2, else 0. The
-   factor 0.11 keeps every bin of a histogram below 65536. */
-static const uint16_t orientation_weights[ORIENT_GRADIENTS][TVK_PATCH_SIDE] = {
-    {0, 0, 103, 192, 280, 317, 280, 192, 103, 0, 0},
-    {0, 132, 317, 592, 861, 976, 861, 592, 317, 132, 0},
-    {103, 317, 760, 1420, 2065, 2340, 2065, 1420, 760, 317, 103},
-    {192, 592, 1420, 2652, 3859, 4372, 3859, 2652, 1420, 592, 192},
-    {280, 861, 2065, 3859, 5614, 6362, 5614, 3859, 2065, 861, 280},
-    {317, 976, 2340, 4372, 6362, 7209, 6362, 4372, 2340, 976, 317},
-    {280, 861, 2065, 3859, 5614, 6362, 5614, 3859, 2065, 861, 280},
-    {192, 592, 1420, 2652, 3859, 4372, 3859, 2652, 1420, 592, 192},
-    {103, 317, 760, 1420, 2065, 2340, 2065, 1420, 760, 317, 103},
-    {0, 132, 317, 592, 861, 976, 861, 592, 317, 132, 0},
-    {0, 0, 103, 192, 280, 317, 280, 192, 103, 0, 0},
+/* The first column of each row, and how many columns count. */
+static const int8_t orientation_columns[ORIENT_ROWS][2] = {
+    {2, 7}, {1, 9}, {0, 11}, {0, 11}, {0, 11}, {0, 11}, {0, 11}, {0, 11}, {0, 11}, {1, 9}, {0, 9}};
+
+/* The Gaussian weights 65536 * 0.11 exp(-(x^2 + y^2) / (2 * 2^2)), a row in each line. The factor
+   0.11 keeps every bin of a histogram below 65536. */
+static const uint16_t orientation_weights[ORIENT_COUNT] = {
+    103,  192,  280,  317,  280,  192,  103,                         /* */
+    132,  317,  592,  861,  976,  861,  592,  317,  132,             /* */
+    103,  317,  760,  1420, 2065, 2340, 2065, 1420, 760,  317,  103, /* */
+    192,  592,  1420, 2652, 3859, 4372, 3859, 2652, 1420, 592,  192,  280,  861,  2065,
+    3859, 5614, 6362, 5614, 3859, 2065, 861,  280,  317,  976,  2340, 4372, 6362, 7209,
+    6362, 4372, 2340, 976,  317,  280,  861,  2065, 3859, 5614, 6362, 5614, 3859, 2065,
+    861,  280,  192,  592,  1420, 2652, 3859, 4372, 3859, 2652, 1420, 592,  192,  103,
+    317,  760,  1420, 2065, 2340, 2065, 1420, 760,  317,  103, /* */
+    132,  317,  592,  861,  976,  861,  592,  317,  132,       /* */
+    0,    0,    103,  192,  280,  317,  280,  192,  103,       /* */
 };
 
 /* span - x in the lanes where the mask is set, x in the others. */
@@ -86,21 +93,21 @@ static direction_shares share_directions(words u, words v, words weights) {
   return shares;
 }
 
-enum { AROUND = TVK_ORIENT_BINS + 5 };
-
-/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. around[3 + k] is the
-   sum of the shares of bin k in itself (low 16 bits) and in the next one (high 16 bits), repeated
-   around the circle. smooth[1 + k] is bin k, and likewise repeated. */
-static void smooth_circle(const uint32_t around[AROUND], int32_t *smooth) {
-  int32_t k;
+/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. sums[1 + k] is the
+   sum of the shares of bin k in itself (low 16 bits) and in the next one (high 16 bits); sums[0] is
+   that of the last bin. smooth[1 + k] is bin k, repeated around the circle. */
+static void smooth_circle(const uint32_t sums[1 + TVK_ORIENT_BINS], int32_t *smooth) {
+  int32_t around[TVK_ORIENT_BINS + 4], k; /* around[2 + k] is bin k */
   TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
-    const uint32_t *const a = around + k;
-    const uint32_t own = (a[1] & 65535) + (a[5] & 65535) + 4 * ((a[2] & 65535) + (a[4] & 65535)) +
-                         6 * (a[3] & 65535);
-    const uint32_t from_before =
-        (a[0] >> 16) + (a[4] >> 16) + 4 * ((a[1] >> 16) + (a[3] >> 16)) + 6 * (a[2] >> 16);
-    smooth[1 + k] = (int32_t)(own + from_before);
+    around[2 + k] = (int32_t)((sums[1 + k] & 65535) + (sums[k] >> 16));
+  }
+  memcpy(around, around + TVK_ORIENT_BINS, 2 * sizeof around[0]);
+  memcpy(around + 2 + TVK_ORIENT_BINS, around + 2, 2 * sizeof around[0]);
+  TVK_ROLLED
+  for (k = 0; k < TVK_ORIENT_BINS; ++k) {
+    const int32_t *const a = around + k;
+    smooth[1 + k] = a[0] + a[4] + 4 * (a[1] + a[3]) + 6 * a[2];
   }
   smooth[0] = smooth[TVK_ORIENT_BINS];
   smooth[TVK_ORIENT_BINS + 1] = smooth[1];
@@ -127,39 +134,39 @@ static void find_peaks(const int32_t *smooth, int32_t peaks[2]) {
 }
 
 static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t peaks[2]) {
-  enum { COUNT = ORIENT_GRADIENTS * ORIENT_GRADIENTS, PADDED = (COUNT + 3) / 4 * 4 };
   /* A single addition adds both shares of a gradient, 16 bits each. Neighbouring samples add to
      different tables, so that no addition waits for the one before. */
   uint32_t tables[4][TVK_ORIENT_BINS] TVK_ALIGNED;
-  /* Of all gradients; what a row writes after its last one, the next row writes over, and after the
-     last row the shares are 0. */
-  uint16_t bin[COUNT + TVK_PATCH_SIDE - ORIENT_GRADIENTS];
-  uint32_t both[COUNT + TVK_PATCH_SIDE - ORIENT_GRADIENTS], around[AROUND];
-  int32_t x, y;
-  for (y = 0; y < 4; ++y) {
-    TVK_ROLLED
-    for (x = 0; x < TVK_ORIENT_BINS; ++x) tables[y][x] = 0;
-  }
-  TVK_ROLLED
-  for (y = 0; y < ORIENT_GRADIENTS; ++y) {
+  /* What a row writes after its last gradient, the next row writes over. */
+  int16_t u[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED,
+      v[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED;
+  uint16_t bin[ORIENT_COUNT] TVK_ALIGNED;
+  uint32_t both[ORIENT_COUNT] TVK_ALIGNED, sums[1 + TVK_ORIENT_BINS];
+  int32_t x, y, count = 0;
+  memset(tables, 0, sizeof tables);
+  for (y = 0; y < ORIENT_ROWS; ++y) {
+    const int16_t *at = patch + y * TVK_PATCH_SIDE + orientation_columns[y][0];
     for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
-      const int16_t *at = patch + y * TVK_PATCH_SIDE + x;
-      const direction_shares shares =
-          share_directions(gradient_u(at), gradient_v(at), words_load(orientation_weights[y] + x));
-      words_store(bin + y * ORIENT_GRADIENTS + x, shares.bin);
-      words_zip(shares.low, shares.high, both + y * ORIENT_GRADIENTS + x);
+      words_store(u + count + x, gradient_u(at + x));
+      words_store(v + count + x, gradient_v(at + x));
     }
+    count += orientation_columns[y][1];
   }
-  for (x = 0; x < PADDED; x += 4) {
+  for (x = 0; x < ORIENT_COUNT; x += TVK_WORDS) {
+    const direction_shares shares =
+        share_directions(words_load(u + x), words_load(v + x), words_load(orientation_weights + x));
+    words_store(bin + x, shares.bin);
+    words_zip(shares.low, shares.high, both + x);
+  }
+  for (x = 0; x < ORIENT_COUNT; x += 4) {
     for (y = 0; y < 4; ++y) tables[y][bin[x + y]] += both[x + y];
   }
   TVK_ROLLED
   for (x = 0; x < TVK_ORIENT_BINS; ++x) {
-    around[3 + x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
+    sums[1 + x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
   }
-  memcpy(around, around + TVK_ORIENT_BINS, 3 * sizeof around[0]);
-  memcpy(around + 3 + TVK_ORIENT_BINS, around + 3, 2 * sizeof around[0]);
-  smooth_circle(around, smooth);
+  sums[0] = sums[TVK_ORIENT_BINS];
+  smooth_circle(sums, smooth);
   find_peaks(smooth, peaks);
 }
 
@@ -190,30 +197,33 @@ static const int16_t column_weights[4][8] = {
     {945, 5100, 8684, 11541, 9441, 5474, 0, 0},
 };
 
-/* Splits each gradient of a row into its shares in the eight directions, counter-clockwise in the
-   image from x: the part along an axis, times sqrt(1/2), and the part along a diagonal. shares[d]
-   is the row of shares in direction d, summed over the patches. A share is below 2^14, so that the
-   sum of two fits 15 bits. */
+/* Splits each gradient into its shares in the eight directions, counter-clockwise in the image from
+   x: the part along an axis, times sqrt(1/2), and the part along a diagonal. A share is below 2^14.
+ */
+static inline void share_gradients(const int16_t *at, words shares[8]) {
+  const words u = gradient_u(at), v = gradient_v(at);
+  const words pu = words_positive(u), nu = pu - u, au = pu + nu;
+  const words pv = words_positive(v), nv = pv - v, av = pv + nv;
+  shares[0] = words_min(pu, pv);
+  shares[1] = words_excess(pv, au);
+  shares[2] = words_min(nu, pv);
+  shares[3] = words_excess(nu, av);
+  shares[4] = words_min(nu, nv);
+  shares[5] = words_excess(nv, au);
+  shares[6] = words_min(pu, nv);
+  shares[7] = words_excess(pu, av);
+}
+
+/* shares[d] is the row of shares in direction d, summed over the one or two patches; a sum fits 15
+   bits. */
 static void share_row(const int16_t *row, int32_t num_patches, int16_t shares[8][TVK_PATCH_SIDE]) {
-  int32_t x;
+  int32_t x, bin;
   for (x = 0; x < TVK_PATCH_SIDE; x += TVK_WORDS) {
-    const int16_t *at = row + x;
-    words sums[8];
-    int32_t bin, n;
-    for (bin = 0; bin < 8; ++bin) sums[bin] = words_of(0);
-    for (n = 0; n < num_patches; ++n, at += TVK_PATCH_SIDE * TVK_PATCH_SIDE) {
-      const words u = gradient_u(at), v = gradient_v(at);
-      const words pu = words_positive(u), nu = words_positive(-u);
-      const words pv = words_positive(v), nv = words_positive(-v);
-      const words au = pu + nu, av = pv + nv;
-      sums[0] += words_min(pu, pv);
-      sums[1] += words_positive(v - au);
-      sums[2] += words_min(nu, pv);
-      sums[3] += words_positive(-u - av);
-      sums[4] += words_min(nu, nv);
-      sums[5] += words_positive(-v - au);
-      sums[6] += words_min(pu, nv);
-      sums[7] += words_positive(u - av);
+    words sums[8], more[8];
+    share_gradients(row + x, sums);
+    if (num_patches == 2) {
+      share_gradients(row + x + TVK_PATCH_SIDE * TVK_PATCH_SIDE, more);
+      for (bin = 0; bin < 8; ++bin) sums[bin] += more[bin];
     }
     for (bin = 0; bin < 8; ++bin) words_store(shares[bin] + x, sums[bin]);
   }

@@ -62,8 +62,9 @@ typedef struct tvk_nearest_shape {
   int32_t row_group, row_bins, column_bins;
 } tvk_nearest_shape;
 
-#define TVK_CIRCLE_RADIUS 3 /* radius of the segment test's circle, in pixels */
-#define TVK_HESSIAN_REACH 6 /* how far from its centre hessian_determinants reads, in pixels */
+#define TVK_CIRCLE_RADIUS 3   /* radius of the segment test's circle, in pixels */
+#define TVK_HESSIAN_REACH 6   /* how far from its centre hessian_determinants reads, in pixels */
+#define TVK_HESSIAN_PLACES 56 /* numbers that hessian_determinants writes for a centre */
 
 #define TVK_PATCH_SIDE 16  /* samples along each side of a descriptor's patch: 15 gradients */
 #define TVK_ORIENT_SIDE 12 /* samples along each side of the orientation's patch */
@@ -128,8 +129,9 @@ typedef struct tvk_triangulate_pair {
    the 3 pixels at each end of the row.
 
    hessian_determinants: the determinant of the Hessian of the smoothed image at the 7 x 7 pixels
-   around `centre`: determinants[8 y + x], y and x in 0..6; determinants[8 y + 7] is unspecified.
-   The 13 x 13 pixels around `centre` (TVK_HESSIAN_REACH) are read, and no others. Smoothed: by (1 4
+   around each of two centres, which may be equal: determinants[TVK_HESSIAN_PLACES n + 8 y + x], y
+   and x in 0..6; those with x = 7 are unspecified. The 13 x 13 pixels around a centre
+   (TVK_HESSIAN_REACH) are read, and no others. Smoothed: by (1 4
    6 4 1) along x and along y, divided by 16 and rounded. In units of these values the second
    derivatives are the products of (1 -2 1) along their axis and (1 2 1) across it, and the mixed
    one is that of (-1 0 1) along both.
@@ -226,7 +228,8 @@ typedef struct tvk_triangulate_pair {
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                  \
      uint8_t *scores))                                                                             \
-  X(hessian_determinants, void, (const uint8_t *centre, int64_t stride, int32_t *determinants))    \
+  X(hessian_determinants, void,                                                                    \
+    (const uint8_t *const centres[2], int64_t stride, int32_t *determinants))                      \
   X(suppress_row, int32_t,                                                                         \
     (const uint8_t *prev, const uint8_t *cur, const uint8_t *next, int32_t width, uint16_t *xs))   \
   X(average_columns, void,                                                                         \

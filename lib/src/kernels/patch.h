@@ -53,6 +53,34 @@ static void sample_row(const sampled_image *image, int32_t x, int32_t y, int32_t
   _mm256_storeu_si256((__m256i *)out, _mm512_cvtepi32_epi16(_mm512_srai_epi32(sums, 8)));
 }
 
+/* Samples an upright patch and returns 1 if a single load of 32 pairs holds each of its rows, which
+   is three times as fast as gathering them. Else returns 0. */
+static int sample_upright(const sampled_image *image, int32_t x, int32_t y, int32_t step,
+                          int32_t num_rows, int16_t *patch) {
+  const __m512i i = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
+  const int32_t first = x >> 16, last = x + (TVK_PATCH_SIDE - 1) * step;
+  if (x < 0 || step < 0 || last > image->right || (last >> 16) - first > 30 ||
+      first + 32 > image->pitch) {
+    return 0;
+  }
+  const __m512i all_x = _mm512_add_epi32(_mm512_set1_epi32(x & 65535),
+                                         _mm512_mullo_epi32(i, _mm512_set1_epi32(step)));
+  const __m512i left = _mm512_srli_epi32(all_x, 16);
+  const __m512i both =
+      _mm512_or_si512(left, _mm512_slli_epi32(_mm512_add_epi32(left, _mm512_set1_epi32(1)), 16));
+  const __m512i shares = word_shares(all_x);
+  int32_t j;
+  for (j = 0; j < num_rows; ++j, y += step) {
+    const int32_t low = y < 0 ? 0 : y, sy = low < image->bottom ? low : image->bottom;
+    const uint16_t *const row = image->pairs + (sy >> 16) * image->pitch + first;
+    const __m512i quads = _mm512_permutexvar_epi16(both, _mm512_loadu_si512(row));
+    const __m512i columns = _mm512_maddubs_epi16(byte_shares(_mm512_set1_epi32(sy)), quads);
+    const __m512i sums = _mm512_srai_epi32(_mm512_madd_epi16(columns, shares), 8);
+    _mm256_storeu_si256((__m256i *)(patch + j * TVK_PATCH_SIDE), _mm512_cvtepi32_epi16(sums));
+  }
+  return 1;
+}
+
 #elif defined(TVK_AVX2)
 
 static inline __m256i byte_shares(__m256i position) {
@@ -135,8 +163,11 @@ static void sample_patch(const uint16_t *pairs, int32_t width, int32_t height, i
                          int32_t du_x, int32_t du_y, int32_t num_rows, int16_t *patch) {
   const sampled_image image = {pairs, width + 1, (width - 1) << 16, (height - 1) << 16};
   int32_t j;
+  patch[num_rows * TVK_PATCH_SIDE] = 0;
+#if defined(TVK_AVX512)
+  if (du_y == 0 && sample_upright(&image, x, y, du_x, num_rows, patch)) return;
+#endif
   for (j = 0; j < num_rows; ++j) {
     sample_row(&image, x - j * du_y, y + j * du_x, du_x, du_y, patch + j * TVK_PATCH_SIDE);
   }
-  patch[num_rows * TVK_PATCH_SIDE] = 0;
 }

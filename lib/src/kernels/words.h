@@ -29,7 +29,8 @@ static inline words words_load(const void *p) { return *(const unaligned_words *
 static inline void words_store(void *p, words a) { *(unaligned_words *)p = a; }
 
 /* words_zip: out[k] = low[k] + 65536 high[k], both read as unsigned. words_scale: a b / 65536,
-   rounded down, both read as unsigned. */
+   rounded down, both read as unsigned. words_excess: a - b, or 0 where b is larger, both read as
+   unsigned. */
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
 static inline words words_min(words a, words b) {
   return (words)_mm256_min_epi16((__m256i)a, (__m256i)b);
@@ -39,6 +40,9 @@ static inline words words_max(words a, words b) {
 }
 static inline words words_scale(words a, words b) {
   return (words)_mm256_mulhi_epu16((__m256i)a, (__m256i)b);
+}
+static inline words words_excess(words a, words b) {
+  return (words)_mm256_subs_epu16((__m256i)a, (__m256i)b);
 }
 static inline void words_zip(words low, words high, uint32_t *out) {
   const __m256i a = _mm256_unpacklo_epi16((__m256i)low, (__m256i)high);
@@ -60,6 +64,9 @@ static inline words words_max(words a, words b) {
 static inline words words_scale(words a, words b) {
   return (words)_mm_mulhi_epu16((__m128i)a, (__m128i)b);
 }
+static inline words words_excess(words a, words b) {
+  return (words)_mm_subs_epu16((__m128i)a, (__m128i)b);
+}
 #elif defined(__ARM_NEON)
 static inline void words_zip(words low, words high, uint32_t *out) {
   const uint16x8x2_t both = vzipq_u16((uint16x8_t)low, (uint16x8_t)high);
@@ -76,6 +83,9 @@ static inline words words_scale(words a, words b) {
   const uint16x8_t ua = (uint16x8_t)a, ub = (uint16x8_t)b;
   return (words)vcombine_u16(vshrn_n_u32(vmull_u16(vget_low_u16(ua), vget_low_u16(ub)), 16),
                              vshrn_n_u32(vmull_u16(vget_high_u16(ua), vget_high_u16(ub)), 16));
+}
+static inline words words_excess(words a, words b) {
+  return (words)vqsubq_u16((uint16x8_t)a, (uint16x8_t)b);
 }
 #else
 static inline void words_zip(words low, words high, uint32_t *out) {
@@ -96,6 +106,13 @@ static inline words words_scale(words a, words b) {
   int k;
   for (k = 0; k < TVK_WORDS; ++k)
     a[k] = (int16_t)(((uint32_t)(uint16_t)a[k] * (uint16_t)b[k]) >> 16);
+  return a;
+}
+static inline words words_excess(words a, words b) {
+  int k;
+  for (k = 0; k < TVK_WORDS; ++k) {
+    a[k] = (uint16_t)a[k] > (uint16_t)b[k] ? (int16_t)(a[k] - b[k]) : 0;
+  }
   return a;
 }
 #endif

@@ -9,7 +9,7 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastShared = 10;
-#define kLargestError T(12,3.0)  // px, of a pixel of sigma 1
+constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
 constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;
 constexpr double kTypicalNoise = 0.7;  // px
 
@@ -43,7 +43,7 @@ struct Around {
   tv_window_view* views;
   int32_t* keyframes;  // of each view
   double* points;
-  int32_t* places;  // of each point in the map
+  int32_t* places;   // of each point in the map
   int32_t* numbers;  // of each place in the map: its point here, or -1
   tv_observation* observations;
   int32_t* keypoints;  // of each observation
@@ -118,8 +118,7 @@ void measure_depths(Odometry* odometry, const Around& around) {
   for (int32_t k = 0; k < around.window.num_points; ++k) {
     MapPoint& point = map.points[around.places[k]];
     const double sine = std::sqrt(static_cast<double>(point.depth_sigma));
-    const double sigma =
-        kTypicalNoise / (odometry->camera.model.fx * std::max(sine, 1e-6));
+    const double sigma = kTypicalNoise / (odometry->camera.model.fx * std::max(sine, 1e-6));
     point.depth_sigma =
         std::min(std::max(static_cast<float>(sigma), kLeastDepthSigma), kLargestDepthSigma);
   }
@@ -217,8 +216,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
       shared[k] += own[i].point != kNoPoint && around.numbers[own[i].point] >= 0;
     }
   }
-  const int32_t num_held =
-      largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
+  const int32_t num_held = largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
   for (int32_t k = 0; k < num_held; ++k) add_view(map, chosen[k], true, &around);
   for (int32_t v = 0; v < around.window.num_views; ++v) {
     add_observations(map, v, most_observations(options), &around);
@@ -226,7 +224,21 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   const size_t num_observations = static_cast<size_t>(around.window.num_observations);
   float* errors = arena_alloc<float>(arena, num_observations);
 
+  tv_gravity_prior* downs =
+      arena_alloc<tv_gravity_prior>(arena, static_cast<size_t>(most_views(options)) + 1);
   tv_window& window = around.window;
+  for (int32_t v = 0; v < num_adjusted && odometry->is_upright; ++v) {
+    const MapKeyframe& view = map.keyframes[around.keyframes[v]];
+    if (view.down_sigma_rad == 0) continue;
+    tv_gravity_prior* down = &downs[window.num_gravity_priors++];
+    *down = tv_gravity_prior{};
+    down->idx_view = v;
+    std::copy_n(view.down, 3, down->down);
+    down->sigma_rad = view.down_sigma_rad;
+  }
+  window.gravity_priors = downs;
+  window.world_down[1] = 0;
+  window.world_down[2] = 1;
   window.num_cameras = 1;
   window.cameras = &odometry->camera.model;
   window.views = around.views;
@@ -235,7 +247,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   tv_window_options how;
   tv_window_options_init(&how);
   how.max_iterations = max_iterations;
-  how.tolerance = T(10,1e-4); how.loss_scale_px = T(11,2.0);
+  how.tolerance = 1e-4;
   size_t bytes = 0;
   tv_adjust_window_size(&window, &bytes);
   void* memory = arena_alloc<uint8_t>(arena, bytes);

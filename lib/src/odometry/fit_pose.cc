@@ -52,9 +52,8 @@ bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, F
   options.max_error_px = max_error_px;
   options.seed = odometry->options.seed;
   tv_absolute_pose_init(&fit->estimate);
-  const tv_status status =
-      tv_estimate_absolute_pose(odometry->context, &odometry->camera.model, &matches, &options,
-                                &fit->estimate, is_inlier);
+  const tv_status status = tv_estimate_absolute_pose(odometry->context, &odometry->camera.model,
+                                                     &matches, &options, &fit->estimate, is_inlier);
   if (status != TV_OK || !fit->estimate.has_pose) return false;
   for (int k = 0; k < 9; ++k) fit->cam_from_world.R[k] = fit->estimate.R[k];
   for (int k = 0; k < 3; ++k) fit->cam_from_world.t[k] = fit->estimate.t[k];

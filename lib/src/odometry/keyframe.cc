@@ -1,6 +1,6 @@
+#include "odometry/keyframe.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
-#include "odometry/keyframe.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,13 +11,13 @@
 namespace tv {
 namespace {
 
-#define kLeastBaseline T(13,0.01)
-  // of the median depth: nearer keyframes make no points
-#define kMostNeighbours static_cast<int32_t>(T(14,4))
-#define kLeastAngle T(15,0.006)
-   // radians
-#define kLargestError T(16,3.0)
-   // px, of a pixel of sigma 1
+constexpr double kLeastBaseline = 0.01;  // of the median depth: nearer keyframes make no points
+constexpr int32_t kMostNeighbours = 4;
+// A point is made where its rays meet at this many times the standard deviation of the attitude:
+// below that, the depths of all points are wrong together.
+constexpr double kLeastTurnSigmas = 5;
+constexpr double kLeastAngle = 0.006;  // radians
+constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
 constexpr double kLargestSizeRatio = 2.2;
 constexpr double kTypicalNoise = 0.7;  // px
 
@@ -42,40 +42,18 @@ double error_of(const Odometry& odometry, const MapKeyframe& keyframe, const Map
   return std::sqrt(dx * dx + dy * dy);
 }
 
-struct Chosen {
-  tv_features features;
-  tv_keypoint* keypoints;
-  uint8_t* descriptors;
-  int32_t* indices;
-};
-
-Chosen make_chosen(Arena& arena, int32_t room) {
-  const size_t n = static_cast<size_t>(room);
-  Chosen chosen;
-  tv_features_init(&chosen.features);
-  chosen.keypoints = arena_alloc<tv_keypoint>(arena, n);
-  chosen.descriptors = arena_alloc<uint8_t>(arena, n * TV_DESCRIPTOR_BYTES);
-  chosen.indices = arena_alloc<int32_t>(arena, n);
-  chosen.features.keypoints = chosen.keypoints;
-  chosen.features.descriptors = chosen.descriptors;
-  return chosen;
-}
-
-// Chooses the keypoints without a point, or, with made_at, also those whose point that keyframe
-// made.
-void choose(const Map& map, const MapKeyframe& keyframe, int32_t made_at, Chosen* chosen) {
+// All keypoints of a keyframe that has its descriptors.
+tv_features features_of(const Map& map, const MapKeyframe& keyframe, tv_keypoint* keypoints) {
   const MapKeypoint* own = keypoints_of(map, keyframe);
-  const uint8_t* descriptors = descriptors_of(map, keyframe);
-  chosen->features.num = 0;
   for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
-    const int32_t point = own[k].point;
-    if (point != kNoPoint && (made_at < 0 || map.points[point].made_at != made_at)) continue;
-    const int32_t n = chosen->features.num++;
-    chosen->keypoints[n] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
-    std::copy_n(descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES, TV_DESCRIPTOR_BYTES,
-                chosen->descriptors + static_cast<size_t>(n) * TV_DESCRIPTOR_BYTES);
-    chosen->indices[n] = k;
+    keypoints[k] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
   }
+  tv_features features;
+  tv_features_init(&features);
+  features.num = keyframe.num_keypoints;
+  features.keypoints = keypoints;
+  features.descriptors = descriptors_of(map, keyframe);
+  return features;
 }
 
 }  // namespace
@@ -88,6 +66,13 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
   keyframe->frame = frame.number;
   keyframe->time_s = frame.time_s;
   keyframe->cam_from_world = orthonormalised(frame.cam_from_world);
+  const Sensors& sensors = frame.sensors;
+  if (odometry->is_upright && sensors.attitude_sigma_rad > 0) {
+    std::copy_n(sensors.world_from_cam + 6, 3, keyframe->down);
+    keyframe->down_sigma_rad = sensors.attitude_sigma_rad;
+  }
+  keyframe->height_m = sensors.height_m;
+  keyframe->height_sigma_m = sensors.height_sigma_m;
   for (int32_t k = 0; k < frame.num; ++k) {
     const int32_t point = frame.points[k];
     if (point == kNoPoint) continue;
@@ -133,14 +118,14 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     const MapKeypoint& b = own1[keypoints1[k]];
     if (a.point != kNoPoint || b.point != kNoPoint) continue;
     const double sigma = std::sqrt(0.5 * (sigma_of(a) * sigma_of(a) + sigma_of(b) * sigma_of(b)));
-    if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad ||
+    if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad * sigma ||
         static_cast<double>(p.error_px) > kLargestError * sigma) {
       continue;
     }
     double x[3], world[3];
     transform(cam1_from_cam0, p.position, x);
-    const double ratio = (static_cast<double>(a.size) * p.position[2]) /
-                         (static_cast<double>(b.size) * x[2]);
+    const double ratio =
+        (static_cast<double>(a.size) * p.position[2]) / (static_cast<double>(b.size) * x[2]);
     if (!(ratio < kLargestSizeRatio && ratio > 1 / kLargestSizeRatio)) continue;
     transform(world_from_cam0, p.position, world);
     const uint8_t* descriptor =
@@ -167,58 +152,55 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   Map& map = odometry->map;
   const MapKeyframe& own = map.keyframes[keyframe];
   const int32_t room = map.sizes.max_keypoints;
-  Chosen mine = make_chosen(arena, room), theirs = make_chosen(arena, room);
-  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, static_cast<size_t>(room));
-  int32_t* keypoints0 = arena_alloc<int32_t>(arena, static_cast<size_t>(room));
-  int32_t* keypoints1 = arena_alloc<int32_t>(arena, static_cast<size_t>(room));
+  const size_t n = static_cast<size_t>(room);
+  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, n);
+  int32_t* keypoints0 = arena_alloc<int32_t>(arena, n);
+  int32_t* keypoints1 = arena_alloc<int32_t>(arena, n);
+  const tv_features mine = features_of(map, own, arena_alloc<tv_keypoint>(arena, n));
+  tv_keypoint* their_room = arena_alloc<tv_keypoint>(arena, n);
   double centre[3];
   centre_of(own.cam_from_world, centre);
-  int32_t num_neighbours = 0;
+  int32_t neighbours[16], num_neighbours = 0;
   for (int32_t k = keyframe - 1; k >= 0 && num_neighbours < kMostNeighbours; --k) {
     const MapKeyframe& other = map.keyframes[k];
     if (other.described < 0 || other.segment != own.segment) continue;
     double there[3];
     centre_of(other.cam_from_world, there);
     if (distance_between(centre, there) < kLeastBaseline * odometry->median_depth) continue;
-    const Rigid relative =
-        orthonormalised(compose(own.cam_from_world, inverse(other.cam_from_world)));
-    if (rotation_angle(relative) > 1.0) continue;
-    ++num_neighbours;
-    choose(map, own, own.id, &mine);
-    choose(map, other, -1, &theirs);
-    const double t[3] = {relative.t[0], relative.t[1], relative.t[2]};
-    const double length = std::sqrt(dot(t, t));
-    const double u[3] = {t[0] / length, t[1] / length, t[2] / length};
-    double E[9];
-    for (int c = 0; c < 3; ++c) {  // [u]x R
-      E[c] = u[1] * relative.R[6 + c] - u[2] * relative.R[3 + c];
-      E[3 + c] = u[2] * relative.R[c] - u[0] * relative.R[6 + c];
-      E[6 + c] = u[0] * relative.R[3 + c] - u[1] * relative.R[c];
-    }
-    tv_guided_options guided;
-    tv_guided_options_init(&guided);
-    guided.max_error_px = static_cast<float>(T(17,4.0)); guided.ratio = static_cast<float>(T(18,0.87));
+    if (rotation_angle(compose(own.cam_from_world, inverse(other.cam_from_world))) > 1.0) continue;
+    neighbours[num_neighbours++] = k;
+  }
+  for (int32_t i = 0; i < num_neighbours; ++i) {
+    const int32_t k = neighbours[i];
+    const MapKeyframe& other = map.keyframes[k];
+    const tv_features theirs = features_of(map, other, their_room);
     int32_t num_found = 0;
-    if (tv_match_guided(odometry->context, &odometry->camera.model, &odometry->camera.model, E,
-                        &theirs.features, &mine.features, &guided, found, room,
-                        &num_found) != TV_OK) {
+    if (tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num_found) != TV_OK) {
       continue;
     }
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
     const MapKeypoint* their_keypoints = keypoints_of(map, other);
     int32_t num = 0;
-    for (int32_t i = 0; i < num_found; ++i) {
-      const int32_t a = theirs.indices[found[i].idx0], b = mine.indices[found[i].idx1];
-      const int32_t point = my_keypoints[b].point;
-      if (point == kNoPoint) {
+    for (int32_t m = 0; m < num_found; ++m) {
+      const int32_t a = found[m].idx0, b = found[m].idx1;
+      const int32_t theirs_point = their_keypoints[a].point, point = my_keypoints[b].point;
+      if (point == kNoPoint && theirs_point == kNoPoint) {
         keypoints0[num] = a;
         keypoints1[num++] = b;
-      } else if (error_of(*odometry, other, their_keypoints[a], map.points[point].position) <=
-                 kLargestError * sigma_of(their_keypoints[a])) {
-        observe(&map, k, a, point);
+      } else if (theirs_point == kNoPoint) {
+        if (error_of(*odometry, other, their_keypoints[a], map.points[point].position) <=
+            kLargestError * sigma_of(their_keypoints[a])) {
+          observe(&map, k, a, point);
+        }
+      } else if (point == kNoPoint) {
+        if (error_of(*odometry, own, my_keypoints[b], map.points[theirs_point].position) <=
+            kLargestError * sigma_of(my_keypoints[b])) {
+          observe(&map, keyframe, b, theirs_point);
+        }
       }
     }
-    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num, kLeastAngle, image);
+    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num,
+                        std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma), image);
   }
 }
 
@@ -240,13 +222,12 @@ void remove_bad_points(Odometry* odometry) {
 void list_local_points(Odometry* odometry, int32_t keyframe) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
-  int32_t* shared =
-      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  int32_t* shared = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   count_shared(odometry, keyframe, shared);
   shared[keyframe] = 1 << 30;
   const int32_t mark = ++odometry->mark;
   odometry->num_local_points = 0;
-  const int32_t most = odometry->context->limits.max_keypoints;
+  const int32_t most = odometry->max_matched;
   for (int32_t n = 0; n < 12; ++n) {
     int32_t best = map.num_keyframes - 1;
     for (int32_t k = best - 1; k >= 0; --k) {

@@ -20,7 +20,6 @@ constexpr double kLargestTurn = 0.4;    // radians
 constexpr double kLargestScale = 1.5;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
 
-
 // The length of the path over the keyframes from..to.
 double path_between(const Map& map, int32_t from, int32_t to) {
   double length = 0;
@@ -42,9 +41,9 @@ bool is_plausible(const Odometry& odometry, const Frame& frame, const LoopEnd& e
   centre_of(frame.cam_from_world, now);
   centre_of(end.cam_from_world, there);
   const double path = path_between(map, end.keyframe, map.num_keyframes - 1);
-  return distance_between(now, there) <= kLargestDrift * path + kLargestShift * odometry.median_depth &&
-         rotation_angle(compose(end.cam_from_world, inverse(frame.cam_from_world))) <=
-             kLargestTurn;
+  return distance_between(now, there) <=
+             kLargestDrift * path + kLargestShift * odometry.median_depth &&
+         rotation_angle(compose(end.cam_from_world, inverse(frame.cam_from_world))) <= kLargestTurn;
 }
 
 // Whether the frame may see what a keyframe saw, if the drift is as large as it may be.
@@ -99,8 +98,7 @@ bool meets(Odometry* odometry, const Frame& frame, int32_t keyframe, Frame* agai
   again->has_pose = false;
   if (match_points(odometry, points, num, 0.87, again) < kLeastMatches) return false;
   PoseFit fit;
-  if (!fit_pose(odometry, 500, 4.0, again, &fit) ||
-      fit.estimate.num_inliers < kLeastMatches / 2 ||
+  if (!fit_pose(odometry, 500, 4.0, again, &fit) || fit.estimate.num_inliers < kLeastMatches / 2 ||
       3 * fit.estimate.num_inliers < fit.estimate.num_matches) {
     return false;
   }
@@ -183,8 +181,10 @@ void fuse_points(Odometry* odometry, const Frame& again) {
   for (int32_t i = 0; i < again.num; ++i) {
     const int32_t old_point = again.points[i], point = own[i].point;
     if (old_point == kNoPoint || old_point == point) continue;
-    if (point == kNoPoint) observe(&map, newest, i, old_point);
-    else instead[point] = old_point;
+    if (point == kNoPoint)
+      observe(&map, newest, i, old_point);
+    else
+      instead[point] = old_point;
   }
   for (int32_t k = 0; k < map.num_keyframes; ++k) {
     MapKeypoint* keypoints = keypoints_of(map, map.keyframes[k]);
@@ -228,8 +228,7 @@ void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end) {
   const int32_t newest = map.num_keyframes - 1;
   const int32_t old_segment = map.keyframes[end.keyframe].segment;
   const int32_t segment = map.keyframes[newest].segment;
-  Node* nodes =
-      arena_alloc<Node>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  Node* nodes = arena_alloc<Node>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   const Rigid now = map.keyframes[newest].cam_from_world;
   const double whole = std::max(path_between(map, end.keyframe, newest), 1e-12);
   double path = 0;

@@ -62,8 +62,10 @@ int32_t find_keyframe(const Map& map, int32_t id) {
   int32_t low = 0, high = map.num_keyframes;
   while (low < high) {
     const int32_t middle = (low + high) / 2;
-    if (map.keyframes[middle].id < id) low = middle + 1;
-    else high = middle;
+    if (map.keyframes[middle].id < id)
+      low = middle + 1;
+    else
+      high = middle;
   }
   return low < map.num_keyframes && map.keyframes[low].id == id ? low : -1;
 }
@@ -167,8 +169,7 @@ void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
     if (own[i].point != kNoPoint) forget_observation(map, keyframe, i);
   }
   map->free_rooms[map->num_free_rooms++] = removed->room;
-  std::memmove(removed, removed + 1,
-               as_size(map->num_keyframes - keyframe - 1) * sizeof *removed);
+  std::memmove(removed, removed + 1, as_size(map->num_keyframes - keyframe - 1) * sizeof *removed);
   --map->num_keyframes;
 }
 

@@ -26,22 +26,21 @@ struct MapKeyframe {
   int32_t has_covariance;
   double time_s;
   Rigid cam_from_world;
-  double down[3], down_sigma_rad;          // gravity in the camera's frame; sigma 0: not known
-  double height_m, height_sigma_m;         // sigma 0: not known
-  double travel_m, travel_sigma_m;         // the way from the keyframe before; sigma 0: not known
-  double scale;            // by which loops have multiplied its surroundings since it was made
-  double covariance[36];                   // of cam_from_world relative to the keyframe before
+  double down[3], down_sigma_rad;   // gravity in the camera's frame; sigma 0: not known
+  double height_m, height_sigma_m;  // sigma 0: not known
+  double scale;           // by which loops have multiplied its surroundings since it was made
+  double covariance[36];  // of cam_from_world relative to the keyframe before
 };
 
 struct MapPoint {
   double position[3];
-  int32_t id;       // -1: the place is free
+  int32_t id;  // -1: the place is free
   int32_t segment;
   int32_t num_observations;
   int32_t num_visible, num_found;  // in frames since it was made
   int32_t mark;                    // the last search that met it
   int32_t made_at;                 // the id of the keyframe that made it
-  float depth_sigma;  // of the logarithm of its distance from `seen_from`
+  float depth_sigma;               // of the logarithm of its distance from `seen_from`
   float seen_from[3];
   int32_t grey;
 };
@@ -65,7 +64,7 @@ struct Map {
   int32_t* free_rooms;
   int32_t num_free_rooms;
   MapPoint* points;
-  uint8_t* point_descriptors;  // TV_DESCRIPTOR_BYTES for each point
+  uint8_t* point_descriptors;      // TV_DESCRIPTOR_BYTES for each point
   int32_t num_points, end_points;  // those that are in use, and the end of the used places
   int32_t* free_points;
   int32_t num_free_points;
@@ -83,8 +82,8 @@ void make_map(const MapSizes& sizes, Arena& arena, Map* map);
 void clear_map(Map* map);
 
 inline MapKeypoint* keypoints_of(const Map& map, const MapKeyframe& keyframe) {
-  return map.keypoints + static_cast<size_t>(keyframe.room) *
-                             static_cast<size_t>(map.sizes.max_keypoints);
+  return map.keypoints +
+         static_cast<size_t>(keyframe.room) * static_cast<size_t>(map.sizes.max_keypoints);
 }
 
 inline uint8_t* descriptors_of(const Map& map, const MapKeyframe& keyframe) {
@@ -117,8 +116,8 @@ void rank_points(const Map& map, int32_t* places, int32_t* ranks);
 // Removes a point from the map and from the keyframes that see it.
 void remove_points(Map* map, const uint8_t* is_removed);
 
-// Removes a keyframe, and the points that fewer than two keyframes see then. The path of frames that
-// are relative to it continues from the keyframe `kept`.
+// Removes a keyframe, and the points that fewer than two keyframes see then. The path of frames
+// that are relative to it continues from the keyframe `kept`.
 void remove_keyframe(Map* map, int32_t keyframe, int32_t kept);
 
 }  // namespace tv

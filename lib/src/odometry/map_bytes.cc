@@ -144,8 +144,6 @@ void pass_keyframe(Stream* s, MapKeyframe* k) {
   pass(s, &k->down_sigma_rad);
   pass(s, &k->height_m);
   pass(s, &k->height_sigma_m);
-  pass(s, &k->travel_m);
-  pass(s, &k->travel_sigma_m);
   pass(s, &k->scale);
   pass(s, &k->covariance);
 }
@@ -197,8 +195,7 @@ bool is_keyframe(const Header& h, const MapKeyframe& k) {
          is_index(k.frame, h.num_frames) && is_count(k.num_keypoints) &&
          is_index(k.has_covariance, 2) && is_finite(k.time_s) && is_pose(k.cam_from_world) &&
          are_lengths(k.down) && is_sigma(k.down_sigma_rad) && is_length(k.height_m) &&
-         is_sigma(k.height_sigma_m) && is_length(k.travel_m) && is_sigma(k.travel_sigma_m) &&
-         is_scale(k.scale) && all_finite(k.covariance, 36);
+         is_sigma(k.height_sigma_m) && is_scale(k.scale) && all_finite(k.covariance, 36);
 }
 
 bool is_keypoint(const Header& h, const MapKeypoint& k) {

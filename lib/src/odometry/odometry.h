@@ -1,13 +1,20 @@
 // The state of the odometry, which all its files work on. docs/odometry.md.
 #pragma once
 
-#include "api/context.h"
 #include "base/arena.h"
 #include "geometry/camera.h"
+#include "kernels/kernels.h"
 #include "odometry/map.h"
 #include "twoview/odometry.h"
 
 namespace tv {
+
+// What is known of a frame beside its picture; what has a sigma of 0 is not known.
+struct Sensors {
+  double world_from_cam[9], attitude_sigma_rad;
+  double height_m, height_sigma_m;
+  double velocity_m_s[3], velocity_sigma_m_s;
+};
 
 // A frame: its keypoints, and the points of the map that they see.
 struct Frame {
@@ -23,6 +30,7 @@ struct Frame {
   double time_s;
   bool has_pose;
   Rigid cam_from_world;
+  Sensors sensors;
 };
 
 inline constexpr int32_t kCellPx = 16;
@@ -33,7 +41,9 @@ inline constexpr int kNumStarts = 4;  // frames that wait for a second view
 struct tv_odometry {
   tv_odometry_options options;
   tv::Camera camera;
-  tv_context* context;
+  tv_context* context;  // of the stages that a frame takes through the public functions
+  const tvk_table* kernels;
+  int32_t max_matched;  // descriptors of one side of a match
   tv_feature_options features;
   tv::Map map;
   tv::Arena scratch;
@@ -52,11 +62,20 @@ struct tv_odometry {
   int32_t mark;
   int32_t num_frames, segment, num_segments, num_relocations, num_loops;
   int32_t status;
-  int32_t lost_frames, next_search, next_loop;
+  int32_t lost_frames, turned_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
-  bool is_locating;  // a frame of tv_odometry_locate, which does not change the map
+  bool is_locating;          // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
+  double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
   double last_time_s;
+  bool is_upright;  // the world's z axis points along gravity
+  // The way since the last keyframe in metres, in the world's axes, and its variance along each.
+  bool travel_is_known;
+  double travel_m[3], travel_variance;
+  // The normal equation of the scale, metres per unit of the map: scale_square scale =
+  // scale_product.
+  double scale_product, scale_square, scale_sigma;
+  int32_t scale_evidence, scale_source;  // tv_scale_source
 };
 
 namespace tv {
@@ -70,6 +89,3 @@ void start_anew(Odometry* odometry);
 size_t scratch_bytes(const tv_odometry_options& options);
 
 }  // namespace tv
-extern "C" __attribute__((visibility("default"))) double tv_tune[32];
-
-inline double T(int k, double v) { return tv_tune[k] == tv_tune[k] ? tv_tune[k] : v; }

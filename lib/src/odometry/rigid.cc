@@ -7,8 +7,6 @@
 #include "geometry/essential.h"
 #include "geometry/vector3.h"
 
-extern "C" __attribute__((visibility("default"))) double tv_tune[32];
-double tv_tune[32];
 namespace tv {
 
 void transform(const Rigid& rigid, const double X[3], double x[3]) {
@@ -22,9 +20,8 @@ Rigid compose(const Rigid& outer, const Rigid& inner) {
   Rigid product;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) {
-      product.R[3 * r + c] =
-          (outer.R[3 * r] * inner.R[c] + outer.R[3 * r + 1] * inner.R[3 + c]) +
-          outer.R[3 * r + 2] * inner.R[6 + c];
+      product.R[3 * r + c] = (outer.R[3 * r] * inner.R[c] + outer.R[3 * r + 1] * inner.R[3 + c]) +
+                             outer.R[3 * r + 2] * inner.R[6 + c];
     }
   }
   transform(outer, inner.t, product.t);

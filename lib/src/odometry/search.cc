@@ -1,6 +1,6 @@
+#include "odometry/search.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
-#include "odometry/search.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,10 @@
 namespace tv {
 namespace {
 
-constexpr int32_t kMostCandidates = 64;
-constexpr float kSameCornerSq = 16.0f;  // px^2: nearer keypoints are of the same corner
+constexpr int32_t kMostCandidates = 400;
+// The keypoints within this radius in pixels are compared: a match is the nearest of them all.
+constexpr double kComparedRadius = 20.0;
+constexpr float kSameCornerSq = 16.0f;       // px^2: nearer keypoints are of the same corner
 constexpr double kLargestDepthError = 40.0;  // px
 
 int32_t clamped_cell(float x, int32_t cells) {
@@ -89,7 +91,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
     const double radius =
         search.radius_px + 2 * depth_error_px(*odometry, point, search.cam_from_world, x[2]);
     const float px = static_cast<float>(pixel.x()), py = static_cast<float>(pixel.y());
-    const float reach = static_cast<float>(radius);
+    const float near_sq = static_cast<float>(radius * radius);
+    const float reach = static_cast<float>(std::max(radius, kComparedRadius));
     const int32_t x0 = clamped_cell(px - reach, columns), x1 = clamped_cell(px + reach, columns);
     const int32_t y0 = clamped_cell(py - reach, odometry->grid_rows);
     const int32_t y1 = clamped_cell(py + reach, odometry->grid_rows);
@@ -104,14 +107,17 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       }
     }
     if (num == 0) continue;
-    odometry->context->kernels->squared_distances(descriptor_of(map, idx), frame->descriptors,
-                                                  candidates, num, distances);
+    odometry->kernels->squared_distances(descriptor_of(map, idx), frame->descriptors, candidates,
+                                         num, distances);
     int32_t best = 0;
     for (int32_t n = 1; n < num; ++n) {
       if (distances[n] < distances[best]) best = n;
     }
     if (distances[best] > most_sq) continue;
     const int32_t keypoint = candidates[best];
+    const float near_x = frame->keypoints[keypoint].x - px;
+    const float near_y = frame->keypoints[keypoint].y - py;
+    if (near_x * near_x + near_y * near_y > near_sq) continue;
     int32_t second_sq = TVK_NEAREST_NONE;
     for (int32_t n = 0; n < num; ++n) {
       const tv_keypoint& other = frame->keypoints[candidates[n]];
@@ -132,7 +138,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
 int32_t match_points(Odometry* odometry, const int32_t* points, int32_t num, double ratio,
                      Frame* frame) {
   ArenaScope scope(odometry->scratch);
-  const int32_t most = odometry->context->limits.max_keypoints;
+  const int32_t most = odometry->max_matched;
   num = std::min(num, most);
   uint8_t* descriptors =
       arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(num) * TV_DESCRIPTOR_BYTES);

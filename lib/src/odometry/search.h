@@ -9,7 +9,7 @@ struct PointSearch {
   const int32_t* points;
   int32_t num;
   Rigid cam_from_world;
-  double radius_px;    // for a point whose place is known exactly
+  double radius_px;     // for a point whose place is known exactly
   double max_distance;  // of descriptors, L2
   double ratio;         // of the nearest one's distance to that of the second
 };

@@ -1,6 +1,6 @@
+#include "odometry/start.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
-#include "odometry/start.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,11 +15,10 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
-#define kLeastParallax T(19,0.015)
-  // radians, the median
-#define kLeastAngle T(15,0.006)
-     // radians
-constexpr int32_t kFramesBetween = 6;     // between frames that wait
+constexpr double kLeastParallax = 0.015;  // radians, the median
+constexpr double kLeastAngle = 0.006;     // radians
+constexpr int32_t kLeastTurnInliers = 50;
+constexpr int32_t kFramesBetween = 6;  // between frames that wait
 
 tv_features features_of(const Frame& frame) {
   tv_features features;
@@ -96,24 +95,30 @@ void drop_start(Odometry* odometry, int n) {
 bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pair& pair,
                        const tv_image& image) {
   Map& map = odometry->map;
+  // With an attitude, the world is that of the attitude, and upright.
   frame0->cam_from_world = kIdentity;
-  std::copy_n(pair.view.R, 9, frame->cam_from_world.R);
-  std::copy_n(pair.view.t, 3, frame->cam_from_world.t);
+  odometry->is_upright = frame0->sensors.attitude_sigma_rad > 0;
+  if (odometry->is_upright) {
+    std::copy_n(frame0->sensors.world_from_cam, 9, frame0->cam_from_world.R);
+    frame0->cam_from_world = inverse(frame0->cam_from_world);
+  }
+  Rigid relative;
+  std::copy_n(pair.view.R, 9, relative.R);
+  std::copy_n(pair.view.t, 3, relative.t);
+  frame->cam_from_world = compose(relative, frame0->cam_from_world);
   forget_points(frame);
   const int32_t first = make_keyframe(odometry, *frame0);
   const int32_t second = make_keyframe(odometry, *frame);
-  int32_t* keypoints0 =
-      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
-  int32_t* keypoints1 =
-      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
+  int32_t* keypoints0 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
+  int32_t* keypoints1 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
   int32_t num = 0;
   for (int32_t k = 0; k < pair.num; ++k) {
     if (!pair.is_inlier[k]) continue;
     keypoints0[num] = pair.keypoints0[k];
     keypoints1[num++] = pair.keypoints1[k];
   }
-  int32_t made = triangulate_matches(odometry, first, second, keypoints0, keypoints1, num,
-                                     kLeastAngle, image);
+  int32_t made =
+      triangulate_matches(odometry, first, second, keypoints0, keypoints1, num, kLeastAngle, image);
   if (made >= kLeastPoints) {
     adjust_around(odometry, second, 20);
     made = map.keyframes[second].num_observations;
@@ -143,6 +148,7 @@ void copy_frame(const Frame& from, Frame* to) {
   to->num = from.num;
   to->number = from.number;
   to->time_s = from.time_s;
+  to->sensors = from.sensors;
   to->cam_from_world = kIdentity;
   forget_points(to);
 }
@@ -154,8 +160,8 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
     ArenaScope scope(odometry->scratch);
     Pair pair;
     Frame* const first = &odometry->starts[n];
-    if (!estimate_pair(odometry, *first, *frame, &pair) ||
-        2 * pair.view.num_inliers < pair.num || pair.view.num_inliers < kLeastMatches) {
+    if (!estimate_pair(odometry, *first, *frame, &pair) || 2 * pair.view.num_inliers < pair.num ||
+        pair.view.num_inliers < kLeastMatches) {
       *reasons |= TV_REASON_TOO_FEW_MATCHES;
       if (pair.num < kLeastMatches || odometry->num_starts > 1) drop_start(odometry, n--);
       continue;
@@ -177,6 +183,18 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
     copy_frame(*frame, &odometry->starts[odometry->num_starts++]);
   }
   return false;
+}
+
+bool estimate_turn(Odometry* odometry, const Frame& frame0, const Frame& frame1, Rigid* turn) {
+  ArenaScope scope(odometry->scratch);
+  Pair pair;
+  if (!estimate_pair(odometry, frame0, frame1, &pair) || !pair.view.has_R ||
+      pair.view.num_inliers < kLeastTurnInliers || 2 * pair.view.num_inliers < pair.num) {
+    return false;
+  }
+  *turn = kIdentity;
+  std::copy_n(pair.view.R, 9, turn->R);
+  return true;
 }
 
 }  // namespace tv

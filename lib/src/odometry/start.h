@@ -13,4 +13,8 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
 // Copies a frame's keypoints, which see no point in the copy.
 void copy_frame(const Frame& from, Frame* to);
 
+// Estimates how the camera turned between two frames from their own matches, for frames that the
+// map does not reach. turn: of cam_from_cam, without a translation.
+bool estimate_turn(Odometry* odometry, const Frame& frame0, const Frame& frame1, Rigid* turn);
+
 }  // namespace tv

@@ -8,18 +8,23 @@
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/loop.h"
+#include "odometry/metric.h"
 #include "odometry/search.h"
 #include "odometry/start.h"
 
 namespace tv {
 namespace {
 
-#define kLeastInliers static_cast<int32_t>(T(0,20))
-constexpr double kMaxDistance_ = 200;
-#define kMaxDistance T(8,200)
-#define kSearchRatio T(9,0.9)
+constexpr int32_t kLeastInliers = 20;
+constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
 constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
+// A frame becomes a keyframe when the camera moved by kFarMoved median depths or turned by
+// kFarTurned radians since the last one, and earlier where few of its points are left.
+constexpr double kFarMoved = 0.10, kFarTurned = 0.25, kLeastMoved = 0.02, kLeastTurned = 0.08;
+constexpr int32_t kFewInliers = 100;
+constexpr int32_t kWindowSteps = 6;        // of the adjustment after a keyframe
 constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
+constexpr int32_t kMostTurnedFrames = 60;  // of status rotation, in a row
 constexpr int32_t kLostBeforeStart = 8;    // frames
 
 void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
@@ -49,8 +54,9 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
 // The pose is known to a few pixels: looks for all points once more, near where they must be.
 bool refine_track(Odometry* odometry, Frame* frame, PoseFit* fit) {
   const PoseFit before = *fit;
-  PointSearch search{odometry->local_points, odometry->num_local_points, fit->cam_from_world, 5.0,
-                     kMaxDistance, kSearchRatio};
+  PointSearch search{odometry->local_points, odometry->num_local_points,
+                     fit->cam_from_world,    5.0,
+                     kMaxDistance,           kSearchRatio};
   find_points(odometry, search, frame);
   frame->cam_from_world = fit->cam_from_world;
   if (!fit_pose(odometry, 50, 3.0, frame, fit)) {
@@ -104,10 +110,10 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
   centre_of(frame.cam_from_world, a);
   centre_of(last.cam_from_world, b);
   const double moved = distance_between(a, b) / odometry.median_depth;
-  const double turned =
-      rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
-  const bool few = num_inliers < T(6,0.7) * odometry.keyframe_inliers || num_inliers < T(5,100);
-  return moved > T(1,0.10) || turned > T(2,0.25) || (few && (moved > T(3,0.02) || turned > T(4,0.08)));
+  const double turned = rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
+  const bool few = 10 * num_inliers < 6 * odometry.keyframe_inliers || num_inliers < kFewInliers;
+  return moved > kFarMoved || turned > kFarTurned ||
+         (few && (moved > kLeastMoved || turned > kLeastTurned));
 }
 
 // Makes room for one more keyframe: removes the one that moved the camera least.
@@ -125,8 +131,8 @@ void make_room(Odometry* odometry) {
         before->segment != map.keyframes[k].segment ? 1e9
         : after->segment != map.keyframes[k].segment
             ? 1e8
-            : distance_between(a, b) + odometry->median_depth *
-                                           rotation_angle(compose(after->cam_from_world,
+            : distance_between(a, b) +
+                  odometry->median_depth * rotation_angle(compose(after->cam_from_world,
                                                                   inverse(before->cam_from_world)));
     if (k == 1 || gap < least) {
       least = gap;
@@ -149,7 +155,7 @@ void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
   const int32_t idx = make_keyframe(odometry, *frame);
   make_points(odometry, idx, image);
   remove_bad_points(odometry);
-  adjust_around(odometry, idx, static_cast<int32_t>(T(7,6)));
+  adjust_around(odometry, idx, kWindowSteps);
   const Map& map = odometry->map;
   odometry->keyframe_inliers = map.keyframes[idx].num_observations;
   odometry->reference_id = map.keyframes[idx].id;
@@ -217,8 +223,8 @@ bool track_map(Odometry* odometry, const tv_odometry_frame& input, Frame* frame,
   if (odometry->has_motion && input.gap == 0) {
     const double factor =
         odometry->motion_s > 0 ? (input.time_s - previous.time_s) / odometry->motion_s : 1;
-    predicted = compose(scaled_motion(odometry->motion, std::min(factor, 3.0)),
-                        previous.cam_from_world);
+    predicted =
+        compose(scaled_motion(odometry->motion, std::min(factor, 3.0)), previous.cam_from_world);
   }
   const int32_t* points = odometry->local_points;
   const int32_t num = odometry->num_local_points;
@@ -255,95 +261,140 @@ void write_fit(const PoseFit& fit, tv_odometry_state* state) {
 
 }  // namespace
 
+namespace {
+
+// The frame's pose is known: keyframe, loops, scale, state.
+void finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const PoseFit& fit,
+                    bool follows, Frame* frame, tv_odometry_state* state) {
+  odometry->lost_frames = odometry->turned_frames = odometry->num_starts = 0;
+  count_found(odometry, *frame);
+  measure_depth(odometry, *frame);
+  write_fit(fit, state);
+  odometry->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
+  odometry->has_motion = follows;
+  if (follows) {
+    odometry->motion = compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
+    odometry->motion_s = frame->time_s - odometry->previous.time_s;
+    add_travel(odometry, *frame);
+  } else {
+    odometry->travel_is_known = false;
+  }
+  state->attitude_ignored = !check_attitude(*odometry, frame);
+  const double* covariance = fit.estimate.covariance;
+  odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
+  if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
+    add_frame_as_keyframe(odometry, frame, input.image);
+    measure_scale(odometry, frame);
+    state->is_keyframe = 1;
+  }
+  search_loops(odometry, frame, input.image, state);
+}
+
+// Looks for a lost frame in a few keyframes, at each frame in the next ones.
+bool search_map(Odometry* odometry, bool is_first, Frame* frame, PoseFit* fit) {
+  const Map& map = odometry->map;
+  if (is_first) odometry->next_search = map.num_keyframes - 1;
+  if (relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, fit)) return true;
+  odometry->next_search = odometry->next_search >= kSearchedKeyframes
+                              ? odometry->next_search - kSearchedKeyframes
+                              : map.num_keyframes - 1;
+  return false;
+}
+
+// The map does not reach the frame. True: it follows the frame before by a turn, so that its
+// attitude is known.
+bool follow_turn(Odometry* odometry, Frame* frame) {
+  Rigid turn;
+  if (odometry->turned_frames >= kMostTurnedFrames ||
+      !estimate_turn(odometry, odometry->previous, *frame, &turn)) {
+    return false;
+  }
+  // The camera's centre stays: cam_from_world is the turn after that of the frame before.
+  frame->cam_from_world = orthonormalised(compose(turn, odometry->previous.cam_from_world));
+  ++odometry->turned_frames;
+  return true;
+}
+
+// Tries to begin a map, or another segment of it.
+bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
+                   tv_odometry_state* state) {
+  const int32_t segment = odometry->segment;
+  odometry->segment = odometry->num_segments;
+  if (!start_map(odometry, frame, image, &state->reasons)) {
+    odometry->segment = segment;
+    return false;
+  }
+  ++odometry->num_segments;
+  odometry->lost_frames = odometry->turned_frames = 0;
+  const int32_t newest = odometry->map.num_keyframes - 1;
+  take_keyframe(*odometry, newest, frame);
+  odometry->reference_id = odometry->map.keyframes[newest].id;
+  odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
+  list_local_points(odometry, newest);
+  measure_depth(odometry, *frame);
+  forget_scale(odometry);
+  state->is_keyframe = 1;
+  odometry->status = TV_ODOMETRY_TRACKING;
+  return true;
+}
+
+void write_counts(const Odometry& odometry, tv_odometry_state* state) {
+  state->status = odometry.status;
+  state->num_frames = odometry.num_frames;
+  state->num_keyframes = odometry.map.num_keyframes;
+  state->num_points = odometry.map.num_points;
+  state->num_segments = odometry.num_segments;
+  state->num_relocations = odometry.num_relocations;
+  state->num_loops = odometry.num_loops;
+  state->scale_source = odometry.scale_source;
+  state->scale_sigma = odometry.scale_sigma;
+}
+
+}  // namespace
+
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state) {
   std::swap(odometry->frame, odometry->previous);
   Frame* frame = &odometry->frame;
   extract_frame(odometry, input.image, frame);
   frame->number = odometry->num_frames++;
   frame->time_s = input.time_s;
+  read_sensors(input, frame);
   state->num_keypoints = frame->num;
-  state->segment = -1;
-  state->reference_id = -1;
+  state->segment = state->reference_id = -1;
 
   PoseFit fit;
+  const bool has_map = odometry->map.num_keyframes > 0;
   const bool had_pose = odometry->previous.has_pose;
-  bool found = false;
-  if (odometry->map.num_keyframes > 0) {
-    found = had_pose && track_map(odometry, input, frame, &fit);
-    if (!found && odometry->map.num_keyframes > 0) {
-      if (had_pose) {
-        odometry->lost_frames = 0;
-        odometry->next_search = odometry->map.num_keyframes - 1;
-        odometry->num_starts = 0;
-      }
-      found = relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, &fit);
-      if (found) {
-        state->relocated = odometry->lost_frames > 0;
-        odometry->num_relocations += odometry->lost_frames > 0;
-      } else {
-        odometry->next_search = odometry->next_search >= kSearchedKeyframes
-                                    ? odometry->next_search - kSearchedKeyframes
-                                    : odometry->map.num_keyframes - 1;
-      }
-      odometry->has_motion = false;
-    }
+  const bool was_tracked = had_pose && odometry->turned_frames == 0;
+  bool has_pose = has_map && had_pose && track_map(odometry, input, frame, &fit);
+  const bool follows = has_pose && was_tracked;
+  if (!has_pose && has_map) {
+    if (was_tracked) odometry->num_starts = 0;
+    has_pose = search_map(odometry, was_tracked, frame, &fit);
+    state->relocated = has_pose && !was_tracked;
+    odometry->num_relocations += state->relocated;
   }
-  if (found) {
-    odometry->lost_frames = 0;
-    odometry->num_starts = 0;
-    count_found(odometry, *frame);
-    measure_depth(odometry, *frame);
-    write_fit(fit, state);
-    odometry->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
-    if (had_pose) {
-      odometry->motion =
-          compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
-      odometry->motion_s = frame->time_s - odometry->previous.time_s;
-      odometry->has_motion = true;
-    }
-    if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
-      add_frame_as_keyframe(odometry, frame, input.image);
-      state->is_keyframe = 1;
-    }
-    search_loops(odometry, frame, input.image, state);
-    frame->has_pose = true;
-    write_pose(*odometry, *frame, state);
+  if (has_pose) {
+    finish_tracked(odometry, input, fit, follows, frame, state);
   } else {
-    frame->has_pose = false;
     odometry->has_motion = false;
-    odometry->status =
-        odometry->map.num_keyframes > 0 ? TV_ODOMETRY_LOST : TV_ODOMETRY_STARTING;
+    has_pose = has_map && had_pose && follow_turn(odometry, frame);
+    odometry->status = has_pose  ? TV_ODOMETRY_ROTATION
+                       : has_map ? TV_ODOMETRY_LOST
+                                 : TV_ODOMETRY_STARTING;
+    if (has_pose) state->reasons = TV_REASON_PURE_ROTATION;
     ++odometry->lost_frames;
-    const int32_t segment = odometry->segment;
-    if (odometry->map.num_keyframes == 0 || odometry->lost_frames > kLostBeforeStart) {
-      odometry->segment = odometry->num_segments;
-      if (start_map(odometry, frame, input.image, &state->reasons)) {
-        ++odometry->num_segments;
-        odometry->lost_frames = 0;
-        const int32_t idx = odometry->map.num_keyframes - 1;
-        frame->cam_from_world = odometry->map.keyframes[idx].cam_from_world;
-        const MapKeypoint* own = keypoints_of(odometry->map, odometry->map.keyframes[idx]);
-        for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
-        odometry->reference_id = odometry->map.keyframes[idx].id;
-        odometry->keyframe_inliers = odometry->map.keyframes[idx].num_observations;
-        list_local_points(odometry, idx);
-        measure_depth(odometry, *frame);
-        frame->has_pose = true;
-        state->is_keyframe = 1;
-        odometry->status = TV_ODOMETRY_TRACKING;
-        write_pose(*odometry, *frame, state);
-      } else {
-        odometry->segment = segment;
-      }
+    if (!has_map || odometry->lost_frames > kLostBeforeStart) {
+      uint32_t reasons = state->reasons;
+      if (begin_segment(odometry, input.image, frame, state))
+        has_pose = true;
+      else if (has_pose)
+        state->reasons = reasons;
     }
   }
-  state->status = odometry->status;
-  state->num_frames = odometry->num_frames;
-  state->num_keyframes = odometry->map.num_keyframes;
-  state->num_points = odometry->map.num_points;
-  state->num_segments = odometry->num_segments;
-  state->num_relocations = odometry->num_relocations;
-  state->num_loops = odometry->num_loops;
+  frame->has_pose = has_pose;
+  if (has_pose) write_pose(*odometry, *frame, state);
+  write_counts(*odometry, state);
   odometry->last_time_s = input.time_s;
 }
 

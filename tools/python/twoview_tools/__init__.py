@@ -6,10 +6,12 @@
 - compare: twoview beside COLMAP, OpenGV, OpenCV and PoseLib (tools/compare_colmap/compare_colmap).
 - colmap: COLMAP databases and models, in and out (tools/compare_colmap/twoview_colmap).
 - paper: the paper's figures and tables (scripts/paper).
+- to_rerun: results and recordings for Rerun's viewer (tools/compare_colmap/twoview_rerun).
+- odometry: visual odometry over sequences, rendered flights and faults (scripts/odometry).
 - docs: what builds and checks the documentation (scripts/docs, test/docs).
 
 `scripts/python -m twoview_tools.accuracy.tune` runs a module of the source tree. The tests get the
-same path from test/CMakeLists.txt, and the two programs of tools/compare_colmap from their
+same path from test/CMakeLists.txt, and the programs of tools/compare_colmap from their
 launch.py.
 """
 

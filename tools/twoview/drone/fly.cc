@@ -1,6 +1,8 @@
 // twoview drone fly: control by keyboard. A movement ends 0.5 s after the last repeat of its
 // key; then the drone hovers. Without --live nothing is sent.
 
+#include <cstdlib>
+#include <cstring>
 #include <memory>
 
 #include "base/error.h"
@@ -100,6 +102,12 @@ int rehearse(const Arguments& a) {
   return 0;
 }
 
+// Goes back to the start of the terminal's line, and erases it where the terminal can.
+std::string line_start() {
+  const char* const terminal = std::getenv("TERM");
+  return terminal && std::strcmp(terminal, "dumb") == 0 ? "\r" : "\r\033[K";
+}
+
 bool is_in_the_air(const ardrone_session* session) {
   const ardrone_navdata* n = ardrone_session_navdata(session);
   return n != nullptr && (n->state & ARDRONE_STATE_FLYING) != 0;
@@ -127,13 +135,12 @@ int fly(const Arguments& a) {
           if (wish.kind == Wish::kNone) continue;
           const tvs_status status = send(link.session(), wish);
           if (status != TVS_OK)
-            print(std::string("\r\033[K") + wish.words + ": not now (" + tvs_status_string(status) +
-                  ")\n");
+            print(line_start() + wish.words + ": not now (" + tvs_status_string(status) + ")\n");
           ends = ends || wish.kind == Wish::kEnd;
         }
         const double seconds = static_cast<double>(ardrone_now_ns() - start) * 1e-9;
         if (seconds >= next_word) {
-          print("\r\033[K" + status_line(link.session()));
+          print(line_start() + status_line(link.session()));
           next_word = seconds + 0.2;
         }
         return ends || keyboard.has_ended();
@@ -144,7 +151,7 @@ int fly(const Arguments& a) {
   ardrone_session_land(link.session());
   static const std::atomic<bool> never{false};
   link.run([&] { return !is_in_the_air(link.session()); }, never, kLandingPatienceS);
-  print("\r\033[K" + status_line(link.session()) + "\n");
+  print(line_start() + status_line(link.session()) + "\n");
   return 0;
 }
 

@@ -3,32 +3,48 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <initializer_list>
 #include <vector>
 
 #include "base/error.h"
-#include "base/output.h"
 #include "files/yaml_values.h"
 
 namespace cli {
 namespace {
 
-constexpr size_t kMaxFileBytes = 1 << 20;
+constexpr size_t kModelled = 8;  // coefficients k1 k2 p1 p2 k3 k4 k5 k6 that tv_camera has
+
+// The names of an entry in the formats that this reader knows: OpenCV's and ROS's files, ROS 1's
+// message (K, D) and ROS 2's (k, d).
+constexpr std::initializer_list<const char*> kMatrixNames = {"camera_matrix", "K", "k"};
+constexpr std::initializer_list<const char*> kDistortionNames = {"distortion_coefficients", "D",
+                                                                 "d"};
+constexpr std::initializer_list<const char*> kWidthNames = {"image_width", "width"};
+constexpr std::initializer_list<const char*> kHeightNames = {"image_height", "height"};
+
+// The first of the names that the file has; without any of them the first, which messages name.
+std::string name_in(const YAML::Node& root, std::initializer_list<const char*> names) {
+  for (const char* name : names)
+    if (root[name] && !root[name].IsNull()) return name;
+  return *names.begin();
+}
 
 void read_matrix(const YAML::Node& root, const std::string& file, tv_camera& camera) {
-  const std::vector<double> K = numbers_at(root, "camera_matrix", file);
+  const std::string entry = name_in(root, kMatrixNames);
+  const std::vector<double> K = numbers_at(root, entry, file);
   if (K.size() != 9)
-    throw BadInput(file + ": camera_matrix has " + std::to_string(K.size()) + " numbers, not 9");
-  const YAML::Node node = root["camera_matrix"];
+    throw BadInput(file + ": " + entry + " has " + std::to_string(K.size()) + " numbers, not 9");
+  const YAML::Node node = root[entry];
   if (node.IsMap()) {
     for (const char* side : {"rows", "cols"})
-      if (node[side] && number_at(node, side, file + ": camera_matrix") != 3)
-        throw BadInput(file + ": camera_matrix: " + side + " is not 3");
+      if (node[side] && number_at(node, side, file + ": " + entry) != 3)
+        throw BadInput(file + ": " + entry + ": " + side + " is not 3");
   }
-  require_focal(K[0], "fx (camera_matrix[0])", file);
-  require_focal(K[4], "fy (camera_matrix[4])", file);
-  if (K[1] != 0) throw BadInput(file + ": camera_matrix[1] is not 0; skew is not supported");
+  require_focal(K[0], "fx (" + entry + "[0])", file);
+  require_focal(K[4], "fy (" + entry + "[4])", file);
+  if (K[1] != 0) throw BadInput(file + ": " + entry + "[1] is not 0; skew is not supported");
   if (K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
-    throw BadInput(file + ": camera_matrix is not [fx 0 cx; 0 fy cy; 0 0 1]");
+    throw BadInput(file + ": " + entry + " is not [fx 0 cx; 0 fy cy; 0 0 1]");
   camera.fx = K[0];
   camera.cx = K[2];
   camera.fy = K[4];
@@ -44,18 +60,29 @@ void read_distortion(const YAML::Node& root, const std::string& file, tv_camera&
   if (std::find(std::begin(known), std::end(known), model) == std::end(known))
     throw BadInput(file + ": distortion_model '" + model +
                    "' is not one of plumb_bob, rational_polynomial, equidistant");
-  const YAML::Node node = root["distortion_coefficients"];
+  const std::string entry = name_in(root, kDistortionNames);
+  const YAML::Node node = root[entry];
   if (!node || node.IsNull() || model == "none") {
     if (model.empty() || model == "none") return;
-    throw BadInput(file + ": distortion_coefficients is missing");
+    throw BadInput(file + ": " + entry + " is missing");
   }
-  const std::vector<double> k = numbers_at(root, "distortion_coefficients", file);
+  std::vector<double> k = numbers_at(root, entry, file);
   const bool equidistant = model == "equidistant";
+  constexpr size_t counts[] = {0, 4, 5, 8, 12, 14};  // OpenCV's, of calibrateCamera
   const bool fits =
-      equidistant ? k.size() == 4 : k.empty() || k.size() == 4 || k.size() == 5 || k.size() == 8;
+      equidistant ? k.size() == 4
+                  : std::find(std::begin(counts), std::end(counts), k.size()) != std::end(counts);
   if (!fits)
-    throw BadInput(file + ": distortion_coefficients has " + std::to_string(k.size()) +
-                   " numbers, not " + (equidistant ? "4" : "4, 5 or 8"));
+    throw BadInput(file + ": " + entry + " has " + std::to_string(k.size()) + " numbers, not " +
+                   (equidistant ? "4" : "4, 5, 8, 12 or 14"));
+  for (size_t i = kModelled; i < k.size(); ++i) {
+    if (k[i] == 0) continue;
+    throw BadInput(file + ": " + entry + " has " + std::to_string(k.size()) +
+                   " numbers, of which " + entry + "[" + std::to_string(i) +
+                   "] is not 0: the lens models here end with " +
+                   "the first 8 (no thin prism, no tilted sensor); calibrate with 5 or 8");
+  }
+  k.resize(std::min(k.size(), kModelled));
   std::copy(k.begin(), k.end(), camera.k);
   // An equidistant lens is no pinhole, even if its four coefficients are zero.
   const bool straight = std::all_of(k.begin(), k.end(), [](double v) { return v == 0; });
@@ -70,23 +97,26 @@ std::string size_text(int width, int height) {
 
 }  // namespace
 
-tv_camera parse_camera(const std::string& text, const std::string& name) {
-  const YAML::Node root = parse_yaml(text, name);
+bool has_camera_matrix(const YAML::Node& root) {
+  return std::any_of(kMatrixNames.begin(), kMatrixNames.end(),
+                     [&](const char* name) { return static_cast<bool>(root[name]); });
+}
+
+tv_camera camera_from_yaml(const YAML::Node& root, const std::string& name) {
   tv_camera camera{};
-  camera.width = side_at(root, "image_width", name);
-  camera.height = side_at(root, "image_height", name);
+  camera.width = side_at(root, name_in(root, kWidthNames), name);
+  camera.height = side_at(root, name_in(root, kHeightNames), name);
   read_matrix(root, name, camera);
   read_distortion(root, name, camera);
   check(tv_camera_check(&camera), name);
   return camera;
 }
 
-tv_camera load_camera(const std::string& path) {
-  return parse_camera(read_file(path, kMaxFileBytes), path);
+tv_camera parse_camera(const std::string& text, const std::string& name) {
+  return camera_from_yaml(parse_yaml(text, name), name);
 }
 
-CalibrationSigmas load_sigmas(const std::string& path) {
-  const YAML::Node root = parse_yaml(read_file(path, kMaxFileBytes), path);
+CalibrationSigmas sigmas_from_yaml(const YAML::Node& root, const std::string& path) {
   CalibrationSigmas sigmas = kPlainFile;
   for (auto [name, value] :
        {std::pair{"focal_sigma", &sigmas.focal}, std::pair{"center_sigma", &sigmas.center}}) {

@@ -1,16 +1,14 @@
-// Reading and writing camera files (OpenCV's YAML and ROS camera_info), and the camera of an image
-// that was resized or turned.
+// Reading and writing a camera in OpenCV's and ROS's format, and the camera of an image that was
+// resized or turned. camera_formats.h reads files of every format.
 #pragma once
+
+#include <yaml-cpp/yaml.h>
 
 #include <string>
 
 #include "twoview/camera.h"
 
 namespace cli {
-
-// Reads a camera file of either format. Throws BadInput that names the file and the entry that is
-// missing, zero, not finite, or of the wrong length.
-tv_camera load_camera(const std::string& path);
 
 // How sure a calibration is: relative standard deviation of the focal length, and standard
 // deviation of the principal point in focal lengths.
@@ -22,10 +20,19 @@ struct CalibrationSigmas {
 inline constexpr CalibrationSigmas kPlainFile{0.01, 0.005}, kFilm{0.1, 0.01};
 
 // Reads the entries focal_sigma and center_sigma of a camera file, each in [0, 0.5]; kPlainFile's
-// where one is missing. Throws BadInput as load_camera does.
-CalibrationSigmas load_sigmas(const std::string& path);
+// where one is missing. Throws BadInput that names the entry.
+CalibrationSigmas sigmas_from_yaml(const YAML::Node& root, const std::string& path);
 
-// Parses the text of a camera file; `name` is used in messages.
+// Whether the map has a 3 x 3 camera matrix under one of its names: camera_matrix, K or k.
+bool has_camera_matrix(const YAML::Node& root);
+
+// Reads a camera in OpenCV's or ROS's format: the size (image_width or width, and so on), the
+// camera matrix, and the lens under distortion_coefficients, D or d. Of OpenCV's 12 or 14
+// coefficients those behind the eighth must be 0. Throws BadInput that names the file and the entry
+// that is missing, zero, not finite, of the wrong length, or of no lens that tv_camera has.
+tv_camera camera_from_yaml(const YAML::Node& root, const std::string& name);
+
+// Parses the text of such a file; `name` is used in messages.
 tv_camera parse_camera(const std::string& text, const std::string& name);
 
 // The text of a camera file in OpenCV's format. Reading it gives the same camera, bit for bit,

@@ -22,9 +22,9 @@ bool is_same(const tv_camera& a, const tv_camera& b) {
 
 }  // namespace
 
-NamedCameras parse_camera_set(const std::string& text, const std::string& name) {
+NamedCameras camera_set_from_yaml(const YAML::Node& root, const std::string& name) {
   NamedCameras cameras;
-  for (const auto& item : parse_yaml(text, name)) {
+  for (const auto& item : root) {
     const std::string key = item.first.IsScalar() ? item.first.Scalar() : "?";
     const std::string where = name + ": " + key;
     if (!item.second.IsMap()) throw BadInput(where + " is not a map of names and values");
@@ -47,6 +47,10 @@ NamedCameras parse_camera_set(const std::string& text, const std::string& name) 
   }
   if (cameras.empty()) throw BadInput(name + ": no camera in it");
   return cameras;
+}
+
+NamedCameras parse_camera_set(const std::string& text, const std::string& name) {
+  return camera_set_from_yaml(parse_yaml(text, name), name);
 }
 
 NamedCameras load_camera_set(const std::string& path) {

@@ -1,6 +1,8 @@
 // cameras.yaml of a data set: its cameras by name, and the choice of the camera of an image.
 #pragma once
 
+#include <yaml-cpp/yaml.h>
+
 #include <array>
 #include <string>
 #include <utility>
@@ -14,6 +16,7 @@ namespace cli {
 using NamedCameras = std::vector<std::pair<std::string, tv_camera>>;
 NamedCameras load_camera_set(const std::string& path);
 NamedCameras parse_camera_set(const std::string& text, const std::string& name);
+NamedCameras camera_set_from_yaml(const YAML::Node& root, const std::string& name);
 
 // The entry of a set that serves an image. One entry serves every image. With several, it is the
 // entry whose name begins the file's name (the longest such name; folders do not count), else the

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "files/exif.h"
 #include "files/image_header.h"
 
 namespace cli {
@@ -43,9 +44,22 @@ std::string size_text(int64_t width, int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
-// Decodes all pixels of a file with the file's depth and channels. Throws BadInput.
-cv::Mat decode(const std::string& path) {
-  const std::string bytes = read_file(path, kMaxFileBytes);
+// What to do about a file that OpenCV does not decode; empty for what is no image.
+std::string foreign_format(std::string_view bytes) {
+  const std::string_view brand = bytes.substr(0, 4096).substr(std::min<size_t>(8, bytes.size()), 4);
+  const bool is_iso_media = bytes.substr(std::min<size_t>(4, bytes.size()), 4) == "ftyp";
+  if (is_iso_media && (brand == "avif" || brand == "avis"))
+    return "is an AVIF picture, which is not read: convert it to PNG or JPEG";
+  for (const char* heic : {"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1"})
+    if (is_iso_media && brand == heic)
+      return "is a HEIC picture, which is not read: convert it to JPEG, or let the phone save JPEG";
+  if (bytes.substr(0, 6) == "GIF87a" || bytes.substr(0, 6) == "GIF89a")
+    return "is a GIF picture, which is not read: convert it to PNG";
+  return "";
+}
+
+// Decodes all pixels of a file's bytes with the file's depth and channels. Throws BadInput.
+cv::Mat decode(const std::string& path, const std::string& bytes) {
   const ImageHeader header = read_image_header(bytes);
   const auto refuse_huge = [&](int64_t width, int64_t height) {
     if (width > kMaxSide || height > kMaxSide)
@@ -64,11 +78,21 @@ cv::Mat decode(const std::string& path) {
     pixels.release();
   }
   if (header.truncated) throw BadInput("image " + path + " is truncated");
-  if (pixels.empty())
+  if (pixels.empty()) {
+    const std::string foreign = foreign_format(bytes);
+    if (!foreign.empty()) throw BadInput("image " + path + " " + foreign);
     throw BadInput("image " + path +
                    (header.width > 0 ? " is damaged" : " is no image that can be read"));
+  }
   refuse_huge(pixels.cols, pixels.rows);
   return pixels;
+}
+
+// How many bits the largest 16-bit sample has.
+int bits_in_use(const cv::Mat& pixels) {
+  double largest = 0;
+  cv::minMaxLoc(pixels.reshape(1), nullptr, &largest);
+  return largest >= 1 ? static_cast<int>(std::floor(std::log2(largest))) + 1 : 0;
 }
 
 // Converts 16-bit samples v to round(v / 257), which maps 0 to 0 and 65535 to 255.
@@ -89,8 +113,10 @@ tv_image Picture::view() const {
   return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};
 }
 
-cv::Mat load_pixels(const std::string& path) {
-  const cv::Mat pixels = decode(path);
+namespace {
+
+cv::Mat checked_pixels(const std::string& path, const std::string& bytes) {
+  const cv::Mat pixels = decode(path, bytes);
   if (pixels.depth() != CV_8U && pixels.depth() != CV_16U)
     throw BadInput("image " + path + " has samples that are not 8 or 16 bits");
   const int channels = pixels.channels();
@@ -99,10 +125,20 @@ cv::Mat load_pixels(const std::string& path) {
   return pixels;
 }
 
+}  // namespace
+
+cv::Mat load_pixels(const std::string& path) {
+  return checked_pixels(path, read_file(path, kMaxFileBytes));
+}
+
 Picture load_picture(const std::string& path) {
-  cv::Mat pixels = load_pixels(path);
-  if (pixels.depth() == CV_16U) pixels = to_8_bits(pixels);
+  const std::string bytes = read_file(path, kMaxFileBytes);
+  cv::Mat pixels = checked_pixels(path, bytes);
   Picture picture;
+  if (pixels.depth() == CV_16U) {
+    picture.used_bits = bits_in_use(pixels);
+    pixels = to_8_bits(pixels);
+  }
   picture.path = path;
   picture.name = std::filesystem::path(path).filename().string();
   switch (pixels.channels()) {
@@ -120,15 +156,21 @@ Picture load_picture(const std::string& path) {
   }
   picture.file_width = pixels.cols;
   picture.file_height = pixels.rows;
+  picture.exif_focal_35mm = exif_focal_35mm(bytes, pixels.cols, pixels.rows);
   return picture;
 }
 
+cv::Size shrunk_size(cv::Size size, int longer) {
+  const int longest = std::max(size.width, size.height);
+  if (longer <= 0 || longest <= longer) return size;
+  const double scale = static_cast<double>(longer) / longest;
+  return {std::max(1, static_cast<int>(std::lround(size.width * scale))),
+          std::max(1, static_cast<int>(std::lround(size.height * scale)))};
+}
+
 void shrink(Picture& picture, int longer) {
-  const int width = picture.luma.cols, height = picture.luma.rows;
-  if (longer <= 0 || std::max(width, height) <= longer) return;
-  const double scale = static_cast<double>(longer) / std::max(width, height);
-  const cv::Size size(std::max(1, static_cast<int>(std::lround(width * scale))),
-                      std::max(1, static_cast<int>(std::lround(height * scale))));
+  const cv::Size size = shrunk_size(picture.luma.size(), longer);
+  if (size == picture.luma.size()) return;
   cv::Mat luma, colour;
   cv::resize(picture.luma, luma, size, 0, 0, cv::INTER_AREA);
   cv::resize(picture.colour, colour, size, 0, 0, cv::INTER_AREA);
@@ -150,7 +192,7 @@ void turn(Picture& picture, int quarters) {
 }
 
 cv::Mat load_depth(const std::string& path) {
-  const cv::Mat depth = decode(path);
+  const cv::Mat depth = decode(path, read_file(path, kMaxFileBytes));
   if (depth.type() != CV_32F)
     throw BadInput("depth map " + path + " is not one 32-bit float a pixel");
   return depth;

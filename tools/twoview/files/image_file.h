@@ -17,6 +17,8 @@ struct Picture {
   cv::Mat luma;                         // 8-bit grey
   cv::Mat colour;                       // 8-bit BGR, of the size of luma
   int file_width = 0, file_height = 0;  // pixels, before resizing
+  double exif_focal_35mm = 0;           // millimetres, as for 35 mm film; 0: unknown
+  int used_bits = 16;  // bits of the largest sample of a 16-bit file: 12 for what is dark at 16
 
   tv_image view() const;
   // The number of pixels of this image for one pixel of the file: 1 unless it was resized.
@@ -34,6 +36,9 @@ Picture load_picture(const std::string& path);
 // Decodes all pixels without conversion: 8 or 16 bits, 1, 3 (BGR) or 4 (BGRA) channels. Throws
 // BadInput like load_picture.
 cv::Mat load_pixels(const std::string& path);
+
+// The size to which shrink() brings an image of this size.
+cv::Size shrunk_size(cv::Size size, int longer);
 
 // Reduces the image by area averaging so that its longer side has `longer` pixels. It never
 // enlarges; 0 means no resizing.

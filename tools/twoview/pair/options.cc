@@ -111,8 +111,9 @@ std::vector<Option> table(Options& o) {
       {"triangulation", kTriangulate, Choice{&o.triangulation, &kTriangulations}, 0, 0, closed,
        "method"},
       {"kernels", kCommon, Choice{&o.kernels, &kKernels}, 0, 0, closed, "kernel set"},
-      {"resize", kCommon, &o.resize, 0, 16384, closed,
-       "scale images down to this longer side, pixels; 0: as they are"},
+      {"resize", static_cast<OptionGroup>(kCommon | kResize), &o.resize, 0, 16384, closed,
+       "scale images down to this longer side, pixels; 0: as they are; without it 1600 where it is "
+       "above 2048"},
   };
 }
 
@@ -272,6 +273,20 @@ void Options::settle() {
   estimate.gravity_sigma_rad = gravity_sigma_deg * 3.14159265358979323846 / 180;
 }
 
+int32_t Options::longer_side(int32_t width, int32_t height) const {
+  if (resize != kByItself) return resize;
+  return std::max(width, height) > kLargeSide ? kUsualSide : 0;
+}
+
+double number_of_flag(const std::string& flag, const std::string& text, double low, double high) {
+  double value = 0;
+  if (parse_number(text, value) && value >= low && value <= high) return value;
+  const bool has_comma = text.find(',') != std::string::npos;
+  throw CLI::ValidationError(flag, "'" + text + "' is not a number in [" + number_text(low) + ", " +
+                                       number_text(high) + "]" +
+                                       (has_comma ? "; one number, with a decimal point" : ""));
+}
+
 void add_options(CLI::App& verb, Options& options, unsigned groups) {
   for (const Option& option : table(options)) {
     if (!(option.group & groups)) continue;
@@ -288,7 +303,8 @@ void add_options(CLI::App& verb, Options& options, unsigned groups) {
     flag->type_name(choice         ? joined(*choice->names, "|")
                     : is_direction ? "x,y,z"
                                    : range_text(option));
-    if (!is_direction) flag->default_str(value_text(option));
+    const bool by_itself = std::string(option.name) == "resize";
+    if (!is_direction && !by_itself) flag->default_str(value_text(option));
     flag->group(group_title(option.group));
   }
 }
@@ -301,6 +317,8 @@ nlohmann::ordered_json options_json(const Options& options, unsigned groups) {
     std::string key = option.name;
     std::replace(key.begin(), key.end(), '-', '_');
     json[key] = value_json(option);
+    if (key == "resize" && options.resize == kByItself)
+      json[key] = options.was_large ? kUsualSide : 0;
   }
   return json;
 }

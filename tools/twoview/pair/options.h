@@ -11,6 +11,8 @@
 
 namespace cli {
 
+constexpr int32_t kByItself = -1, kLargeSide = 2048, kUsualSide = 1600;
+
 struct Options {
   tv_feature_options feature;
   tv_match_options match;
@@ -20,7 +22,10 @@ struct Options {
   int32_t bundle_adjustment = 0;
   double sigma_by_size = 1;
   int32_t kernels = TV_KERNELS_AUTO;
-  int32_t resize = 0;  // longer side of the resized images, pixels; 0: not resized
+  // Longer side of the resized images, pixels; 0: not resized; kByItself: kUsualSide for images
+  // with a longer side than kLargeSide, on which single corners are noise.
+  int32_t resize = kByItself;
+  bool was_large = false;  // kByItself made an image smaller
   bool min_threshold_given = false;
   // Of the calibration (tv_estimate_options); below 0: what the camera file says.
   double focal_sigma = -1, center_sigma = -1;
@@ -29,6 +34,8 @@ struct Options {
   Options();
   // Checks and completes the options that depend on each other. Call it once, after parsing.
   void settle();
+  // The longer side to which an image of this size is scaled down; 0: as it is.
+  int32_t longer_side(int32_t width, int32_t height) const;
 };
 
 // The stage of the work to which an option belongs; a verb adds the groups that it uses.
@@ -39,7 +46,8 @@ enum OptionGroup : unsigned {
   kTriangulate = 8,
   kCommon = 16,
   kAllOptions = 31,
-  kGravity = 32  // --gravity0 and so on, for verbs with one pair
+  kGravity = 32,  // --gravity0 and so on, for verbs with one pair
+  kResize = 64    // --resize alone, which kCommon has, too
 };
 
 // Adds the flags of these groups to a verb. `options` must outlive the parsing.
@@ -54,5 +62,9 @@ double shortest(float value);
 
 // The name of a solver as on the command line, such as "five-point".
 std::string method_name(int32_t method);
+
+// Parses the whole text as one finite number in [low, high]. Throws CLI::ValidationError that names
+// the flag and the range.
+double number_of_flag(const std::string& flag, const std::string& text, double low, double high);
 
 }  // namespace cli

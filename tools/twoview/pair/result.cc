@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "base/error.h"
 
@@ -23,11 +24,11 @@ Json count_or_null(int32_t count) { return count < 0 ? Json(nullptr) : Json(coun
 
 struct Phrase {
   tv_reason reason;
-  const char* words;
+  std::string words;
   const char* advice;  // what to do about it: docs/verdict.md, "what helps"
 };
 
-constexpr Phrase kReasons[] = {
+const Phrase kReasons[] = {
     {TV_REASON_TOO_FEW_MATCHES, "too few matches",
      "take pictures with more overlap or texture, or try --guided-matching 1"},
     {TV_REASON_LOW_INLIER_RATIO, "few of the matches agree",
@@ -48,15 +49,31 @@ constexpr Phrase kReasons[] = {
 };
 
 // Low parallax where the parallax is not low: it is the focal length that leaves the pose open.
-constexpr Phrase kFocalLength = {TV_REASON_LOW_PARALLAX,
-                                 "the focal length is too uncertain for this pose",
-                                 "calibrate the camera (twoview calibrate)"};
+const Phrase kFocalLength = {TV_REASON_LOW_PARALLAX,
+                             "the focal length is too uncertain for this pose",
+                             "calibrate the camera (twoview calibrate)"};
 constexpr double kMuchParallaxRad = 2 / kDegrees;
 
-std::vector<Phrase> phrases_of(const tv_two_view& v) {
+// A zoomed lens, of which the camera file is not, leaves two groups of matches, or a plane.
+constexpr double kZoomed = 1.25;
+
+std::vector<Phrase> phrases_of(const Outcome& outcome) {
+  const tv_two_view& v = outcome.two_view;
+  const double scale = v.verdict == TV_VERDICT_OK ? 0 : magnification(outcome);
+  const bool zoomed = scale > 0 && (scale > kZoomed || scale < 1 / kZoomed);
   std::vector<Phrase> phrases;
+  if (zoomed) {
+    char words[100];
+    std::snprintf(words, sizeof words, "image 1 shows the scene at %.2f times the scale of image 0",
+                  scale);
+    phrases.push_back(
+        {static_cast<tv_reason>(0), words,
+         "if the lens was zoomed, give each picture its own camera (--camera0, --camera1); else "
+         "take both from a similar distance"});
+  }
   for (const Phrase& phrase : kReasons) {
     if ((v.reasons & phrase.reason) == 0) continue;
+    if (zoomed && phrase.reason == TV_REASON_SECOND_MOTION) continue;
     const bool of_focal_length = phrase.reason == TV_REASON_LOW_PARALLAX &&
                                  focal_length_is_uncertain(v) &&
                                  v.median_parallax_rad > kMuchParallaxRad;
@@ -199,7 +216,7 @@ Json result_json(const Outcome& outcome) {
   json["config"] = tv_kind_string(static_cast<tv_kind>(v.kind));
   json["verdict"] = tv_verdict_string(static_cast<tv_verdict>(v.verdict));
   json["reasons"] = reasons_json(v.reasons);
-  json["advice"] = advice_on(v);
+  json["advice"] = advice_on(outcome);
   json["probability_wrong"] = finite_or_null(v.probability_wrong);
   json["R"] = numbers_or_null(v.R, 9, v.has_R);
   const double unit = unit_of(outcome);
@@ -227,6 +244,8 @@ Json result_json(const Outcome& outcome) {
       numbers_or_null(v.principal_point_shift, 2, outcome.has_cameras);
   json["principal_point"] = outcome.has_cameras ? principal_point_json(v) : Json(nullptr);
   json["focal_length"] = focal_length_json(v);
+  const double scale = magnification(outcome);
+  json["magnification"] = scale > 0 ? finite_or_null(scale) : Json(nullptr);
   json["num_points"] = r.num_points;
   json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)
@@ -242,16 +261,45 @@ Json result_json(const Outcome& outcome) {
   return json;
 }
 
-std::string reasons_in_words(const tv_two_view& v) {
+std::string verdict_in_words(const tv_two_view& v) {
+  if (v.verdict == TV_VERDICT_OK && !has_full_pose(v))
+    return v.has_R ? "rotation ok, no full pose" : "matches ok, no pose";
+  return tv_verdict_string(static_cast<tv_verdict>(v.verdict));
+}
+
+double magnification(const Outcome& outcome) {
+  constexpr int32_t fewest = 20;
+  constexpr double far_px = 20;
+  const tv_reconstruction& r = outcome.reconstruction;
+  const auto distance = [&](size_t image, const tv_correspondence& a, const tv_correspondence& b) {
+    const tv_keypoint& p = r.keypoints[image][image == 0 ? a.idx0 : a.idx1];
+    const tv_keypoint& q = r.keypoints[image][image == 0 ? b.idx0 : b.idx1];
+    return std::hypot(static_cast<double>(p.x) - q.x, static_cast<double>(p.y) - q.y);
+  };
+  std::vector<double> ratios;
+  for (int32_t i = 0; i < r.num_matches; ++i) {
+    const tv_correspondence &a = r.matches[i],
+                            &b = r.matches[(i + r.num_matches / 2) % r.num_matches];
+    const double before = distance(0, a, b), after = distance(1, a, b);
+    if (before > far_px && after > 0) ratios.push_back(after / before);
+  }
+  if (static_cast<int32_t>(ratios.size()) < fewest) return 0;
+  const double focal = outcome.has_cameras ? outcome.camera[1].fx / outcome.camera[0].fx
+                                           : static_cast<double>(outcome.picture[1].luma.cols) /
+                                                 outcome.picture[0].luma.cols;
+  return percentile(ratios, 0.5) / focal;
+}
+
+std::string reasons_in_words(const Outcome& outcome) {
   std::string text;
-  for (const Phrase& phrase : phrases_of(v))
-    text += (text.empty() ? "" : "; ") + std::string(phrase.words);
+  for (const Phrase& phrase : phrases_of(outcome))
+    text += (text.empty() ? "" : "; ") + phrase.words;
   return text;
 }
 
-std::vector<std::string> advice_on(const tv_two_view& v) {
+std::vector<std::string> advice_on(const Outcome& outcome) {
   std::vector<std::string> advice;
-  for (const Phrase& phrase : phrases_of(v)) advice.push_back(phrase.advice);
+  for (const Phrase& phrase : phrases_of(outcome)) advice.push_back(phrase.advice);
   return advice;
 }
 

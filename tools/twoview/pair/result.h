@@ -64,6 +64,10 @@ nlohmann::ordered_json result_json(const Outcome& outcome);
 // known) and `shift_px`.
 nlohmann::ordered_json principal_point_json(const tv_two_view& two_view);
 
+// The verdict for people: the word "ok" only where there is a full pose. A fundamental matrix alone
+// that is to be believed is "matches ok, no pose".
+std::string verdict_in_words(const tv_two_view& two_view);
+
 // The names of the reasons, such as "low_parallax".
 nlohmann::ordered_json reasons_json(uint32_t reasons);
 
@@ -77,12 +81,17 @@ bool focal_length_is_uncertain(const tv_two_view& two_view);
 // taken as exact.
 nlohmann::ordered_json focal_length_json(const tv_two_view& two_view);
 
+// How many times larger image 1 shows the scene than image 0, as the matches say and beyond what
+// the cameras' focal lengths explain: the median ratio of the distances between matched points. 0
+// where fewer than 20 matches say so.
+double magnification(const Outcome& outcome);
+
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.
-std::string reasons_in_words(const tv_two_view& two_view);
+std::string reasons_in_words(const Outcome& outcome);
 std::string kind_in_words(int32_t kind);
 
 // What to do about each reason, in the order of reasons_json; empty if there is none.
-std::vector<std::string> advice_on(const tv_two_view& two_view);
+std::vector<std::string> advice_on(const Outcome& outcome);
 
 // The standard deviations of rotation and direction in degrees. Each is the square root of the
 // trace of its block of the covariance: that of the total angle, not of the angle about one axis.

@@ -50,6 +50,19 @@ void read_shift(const YAML::Node& root, const std::string& path, KnownPose& pose
   if (!(pose.image_width > 0)) throw BadInput(path + ": image_size0 is not above 0");
 }
 
+void read_sizes(const YAML::Node& root, const std::string& path, KnownPose& pose) {
+  for (size_t i = 0; i < 2; ++i) {
+    const std::string entry = "image_size" + std::to_string(i);
+    if (!root[entry] || root[entry].IsNull()) continue;
+    const auto size = fixed<2>(root, entry, path);
+    for (size_t k = 0; k < 2; ++k) {
+      if (!(size[k] >= 1 && size[k] <= 1e6))
+        throw BadInput(path + ": " + entry + " is not a size in pixels");
+      pose.sizes[i][k] = static_cast<int>(size[k]);
+    }
+  }
+}
+
 // The depth errors of the cloud's points in per cent. Each depth is compared with the nearest pixel
 // of the depth map.
 std::vector<double> depth_errors_percent(const Truth& truth, const Picture& picture0,
@@ -84,6 +97,7 @@ KnownPose load_pose(const std::string& path) {
   const YAML::Node root = parse_yaml(read_file(path, kMaxFileBytes), path);
   KnownPose pose = read_pose(root, path);
   read_shift(root, path, pose);
+  read_sizes(root, path, pose);
   const cv::SVD svd(cv::Mat(3, 3, CV_64F, pose.R.data()));
   const cv::Mat nearest = svd.u * svd.vt;
   std::copy(nearest.begin<double>(), nearest.end<double>(), pose.R.begin());

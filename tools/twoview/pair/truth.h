@@ -20,6 +20,9 @@ struct KnownPose {
   // image_width is 0, of a camera with images of any size.
   double principal_point_shift_px[2] = {0, 0};
   double image_width = 0;
+  // The sizes of the images that the pose was estimated with (image_size0 and image_size1); 0 where
+  // the file does not say.
+  int sizes[2][2] = {{0, 0}, {0, 0}};
 
   // The camera that the pose refers to: `camera`, of any image size, with the shift added to its
   // principal point.

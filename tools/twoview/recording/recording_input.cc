@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "files/camera_formats.h"
 #include "files/yaml_values.h"
 #include "recording/recording_pair.h"
 
@@ -39,10 +40,19 @@ std::vector<double> optional_numbers(const YAML::Node& root, const std::string& 
   return numbers;
 }
 
+// The entries of a camera file that is YAML; an empty map for other formats and without a file.
+YAML::Node mount_entries(const std::string& file) {
+  if (file.empty()) return YAML::Node(YAML::NodeType::Map);
+  const std::string path = camera_path(file);
+  const std::string text = read_file(path, kMaxFileBytes);
+  if (parse_camera_file(text, path).is_colmap) return YAML::Node(YAML::NodeType::Map);
+  return parse_yaml(text, path);
+}
+
 // The mount from the command line, else from the camera file, else a camera at the body's origin
 // that looks forward.
 CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
-  const YAML::Node root = parse_yaml(read_file(file, kMaxFileBytes), file);
+  const YAML::Node root = mount_entries(file);
   const bool rotation_given = !options.body_from_camera.empty();
   const std::vector<double> rotation = rotation_given
                                            ? options.body_from_camera
@@ -99,12 +109,15 @@ RecordingInput::RecordingInput(const RecordingOptions& options, const std::strin
 
 RecordingInput::~RecordingInput() = default;
 
+int RecordingInput::width() const { return state_->flight.width; }
+int RecordingInput::height() const { return state_->flight.height; }
+
 void RecordingInput::load(const tv_camera& camera, Session& session, const Options& options,
-                          Outcome& outcome) {
+                          const Progress& progress, Outcome& outcome) {
   State& s = *state_;
   const std::vector<int>& frames = s.options.frames;
   if (frames.empty()) {
-    s.pair = choose_pair(s.options.folder, s.flight, camera, s.mount, session, options);
+    s.pair = choose_pair(s.options.folder, s.flight, camera, s.mount, session, options, progress);
     // Discards the times of the choice of frames, which do not belong to the pair.
     session.take_times(0, true);
   } else {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/terminal.h"
 #include "pair/result.h"
 #include "pair/session.h"
 
@@ -26,13 +27,17 @@ struct RecordingOptions {
 class RecordingInput {
  public:
   // Reads the flight and the mount of the camera: from the options, else from the camera file's
-  // body_from_camera and camera_in_body. Throws BadInput.
+  // body_from_camera and camera_in_body. camera_file may be empty. Throws BadInput.
   RecordingInput(const RecordingOptions& options, const std::string& camera_file);
   ~RecordingInput();
 
+  // The size of the recording's pictures, which does not change during a flight.
+  int width() const;
+  int height() const;
   // Puts the two pictures, not resized, into outcome.picture; chooses them if the options name
   // none. `camera` is the camera of these pictures.
-  void load(const tv_camera& camera, Session& session, const Options& options, Outcome& outcome);
+  void load(const tv_camera& camera, Session& session, const Options& options,
+            const Progress& progress, Outcome& outcome);
   // Sets the gravity at both frames as a prior. Does nothing if the caller already gave one, or if
   // an attitude is unknown.
   void add_gravity(tv_estimate_options& options);

@@ -10,7 +10,9 @@ void RecordingOptions::add_to(CLI::App&) {}
 
 RecordingInput::RecordingInput(const RecordingOptions&, const std::string&) {}
 RecordingInput::~RecordingInput() = default;
-void RecordingInput::load(const tv_camera&, Session&, const Options&, Outcome&) {}
+int RecordingInput::width() const { return 0; }
+int RecordingInput::height() const { return 0; }
+void RecordingInput::load(const tv_camera&, Session&, const Options&, const Progress&, Outcome&) {}
 void RecordingInput::add_gravity(tv_estimate_options&) {}
 void RecordingInput::add_scale(Outcome&) const {}
 void RecordingInput::add_json(Outcome&) const {}

@@ -117,6 +117,10 @@ RecordedFlight read_flight(const std::string& folder) {
     if ((imu.valid & TVS_IMU_ATTITUDE) != 0) flight.log.push_back(sample_of(imu));
   };
   listener.on_frame = [&](const tvs_frame& frame) {
+    if (flight.frames.empty()) {
+      flight.width = frame.image.width;
+      flight.height = frame.image.height;
+    }
     const double time_s = static_cast<double>(frame.time.host_ns) * 1e-9;
     // A picture can arrive before the attitude sample that follows its time; the complete log
     // contains that sample.
@@ -153,7 +157,7 @@ RecordingPair pair_of(const std::string& folder, const RecordedFlight& flight, i
 
 RecordingPair choose_pair(const std::string& folder, const RecordedFlight& flight,
                           const tv_camera& camera, const CameraMount& mount, Session& session,
-                          const Options& options) {
+                          const Options& options, const Progress& progress) {
   const std::vector<RecordedFrame> candidates = candidates_of(flight);
   std::set<int> wanted;
   for (const RecordedFrame& frame : candidates) wanted.insert(frame.index);
@@ -163,6 +167,8 @@ RecordingPair choose_pair(const std::string& folder, const RecordedFlight& fligh
   int tried = 0, inliers = 0;
   double parallax_deg = 0;
   for (size_t i = 0; i < candidates.size(); ++i) {
+    progress.tell("frame " + std::to_string(i + 1) + " of " + std::to_string(candidates.size()) +
+                  " beside those after it: " + std::to_string(tried) + " pairs tried");
     for (size_t j = i + 1; j < candidates.size(); ++j) {
       if (candidates[j].time_s - candidates[i].time_s > kFarthestS) break;
       Outcome outcome;
@@ -172,7 +178,8 @@ RecordingPair choose_pair(const std::string& folder, const RecordedFlight& fligh
       for (int k = 0; k < 2; ++k) {
         whole[k] = picture_of(frames[k], pictures.at(frames[k].index));
         outcome.picture[k] = whole[k];
-        shrink(outcome.picture[k], options.resize);
+        const cv::Mat& luma = whole[k].luma;
+        shrink(outcome.picture[k], options.longer_side(luma.cols, luma.rows));
         outcome.camera[k] =
             resized(camera, outcome.picture[k].luma.cols, outcome.picture[k].luma.rows);
       }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/terminal.h"
 #include "pair/result.h"
 #include "pair/session.h"
 #include "recording/metric_scale.h"
@@ -22,6 +23,7 @@ struct RecordedFrame {
 struct RecordedFlight {
   FlightLog log;
   std::vector<RecordedFrame> frames;
+  int width = 0, height = 0;  // of the first picture
 };
 
 // Plays the whole recording once. Throws BadInput where there is none, or no picture in it decodes.
@@ -47,7 +49,7 @@ RecordingPair pair_of(const std::string& folder, const RecordedFlight& flight, i
 // verdict "ok".
 RecordingPair choose_pair(const std::string& folder, const RecordedFlight& flight,
                           const tv_camera& camera, const CameraMount& mount, Session& session,
-                          const Options& options);
+                          const Options& options, const Progress& progress);
 
 // Sets the directions of gravity in both cameras, from the attitudes at the frames' times, as a
 // prior in `options`. Returns false and sets nothing if an attitude is unknown.

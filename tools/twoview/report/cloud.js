@@ -32,6 +32,7 @@
   // radians; with both 0 it looks in camera 0's direction.
   const start = { yaw: -0.45, pitch: 0.22, zoom: 1, x: 0, y: 0 };
   let pose = Object.assign({}, start);
+  let moved = false;
   let turning = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
   let frame = 0;
 
@@ -39,6 +40,7 @@
     const ratio = window.devicePixelRatio || 1;
     canvas.width = Math.round(canvas.clientWidth * ratio);
     canvas.height = Math.round(canvas.clientHeight * ratio);
+    if (!moved) fit();
     draw();
   }
 
@@ -58,6 +60,24 @@
         depth,
       ];
     };
+  }
+
+  // Chooses the first view's zoom so that both cameras are in it, throughout the swing.
+  function fit() {
+    const seen = (point) => {
+      const p = projector()(point[0], point[1], point[2]);
+      return p && p[0] > 0.03 * canvas.width && p[0] < 0.97 * canvas.width &&
+        p[1] > 0.03 * canvas.height && p[1] < 0.97 * canvas.height;
+    };
+    const all = data.cameras.flatMap((camera) => [camera.centre, ...camera.corners]);
+    for (start.zoom = 1; start.zoom > 0.15; start.zoom *= 0.95) {
+      const fits = [-0.45, 0, 0.45].every((yaw) => {
+        pose = Object.assign({}, start, { yaw: yaw });
+        return all.every(seen);
+      });
+      if (fits) break;
+    }
+    pose = Object.assign({}, start);
   }
 
   function line(project, a, b, colour, width) {
@@ -83,7 +103,8 @@
     drawn.sort((a, b) => b[0][2] - a[0][2]);
     const dot = count > 8000 ? 1.3 : count > 2500 ? 1.9 : 2.9;
     const size = dot * (window.devicePixelRatio || 1) * 3.2 * radius;
-    const lift = (c) => Math.round(46 + (c * 209) / 255);
+    // Dark points would not be seen on black: black becomes a grey of 88, white stays white.
+    const lift = (c) => Math.round(88 + 167 * Math.pow(c / 255, 0.8));
     for (const [p, i] of drawn) {
       const r = Math.min(12, Math.max(0.8, size / p[2]));
       const rgb = [0, 1, 2].map((k) => lift(colours[3 * i + k]));
@@ -132,6 +153,7 @@
   let held = new Map();
   canvas.addEventListener("pointerdown", function (event) {
     turning = false;
+    moved = true;
     canvas.setPointerCapture(event.pointerId);
     held.set(event.pointerId, [event.clientX, event.clientY]);
   });
@@ -161,6 +183,7 @@
   canvas.addEventListener("wheel", function (event) {
     event.preventDefault();
     turning = false;
+    moved = true;
     zoom(Math.exp(-0.0012 * event.deltaY));
   }, { passive: false });
   function zoom(factor) {
@@ -169,6 +192,7 @@
   }
   function look(yaw, pitch) {
     turning = false;
+    moved = true;
     pose = Object.assign({}, start, { yaw: yaw, pitch: pitch });
     request();
   }

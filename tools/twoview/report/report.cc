@@ -1,5 +1,6 @@
 #include "report/report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -47,13 +48,24 @@ std::string filled(const std::string& page,
   return result + page.substr(at);
 }
 
-std::string card(const std::string& number, const std::string& unit, const std::string& what) {
-  return "<div class=\"card\"><b>" + number + (unit.empty() ? "" : "<i>" + unit + "</i>") +
-         "</b><span>" + what + "</span></div>\n";
+std::string card(const std::string& number, const std::string& unit, const std::string& what,
+                 const char* classes = "card") {
+  return std::string("<div class=\"") + classes + "\"><b>" + number +
+         (unit.empty() ? "" : "<i>" + unit + "</i>") + "</b><span>" + what + "</span></div>\n";
 }
 
 std::string number_of(const Json& value, const char* format) {
   return value.is_number() ? formatted(format, value.get<double>()) : "&ndash;";
+}
+
+// Where camera 1 stands, in the frame of camera 0.
+std::string direction_card(const Outcome& outcome) {
+  const Vector3 c =
+      applied(transposed(rotation_of(outcome.two_view)), translation_of(outcome.two_view));
+  const double unit = -unit_of(outcome);
+  return card(formatted("%+.2f ", unit * c[0]) + formatted("%+.2f ", unit * c[1]) +
+                  formatted("%+.2f", unit * c[2]),
+              outcome.scale ? "m" : "", "camera 1 stands right, down, forward", "card wide");
 }
 
 std::string cards(const Outcome& outcome) {
@@ -66,6 +78,7 @@ std::string cards(const Outcome& outcome) {
   if (v.has_R)
     text += card(formatted("%.2f", rotation_error_deg(rotation_of(v), {1, 0, 0, 0, 1, 0, 0, 0, 1})),
                  "deg", "rotation between the views");
+  if (has_full_pose(v)) text += direction_card(outcome);
   if (v.has_covariance) {
     const Uncertainty sigma = uncertainty_deg(v);
     text += card(formatted("%.3f", sigma.rotation), "deg", "1 sigma of the rotation");
@@ -102,9 +115,10 @@ std::string cards(const Outcome& outcome) {
 }
 
 // What to do about each reason of the verdict, as a list.
-std::string advice_list(const tv_two_view& v) {
+std::string advice_list(const Outcome& outcome) {
   std::string items;
-  for (const std::string& advice : advice_on(v)) items += "<li>" + escaped(advice) + "</li>\n";
+  for (const std::string& advice : advice_on(outcome))
+    items += "<li>" + escaped(advice) + "</li>\n";
   return items.empty() ? "" : "<ul class=\"advice\">\n" + items + "</ul>\n";
 }
 
@@ -117,9 +131,16 @@ std::string leaf_text(const Json& value) {
 
 // The text of a row-major matrix, one line a row.
 std::string matrix_text(const Json& list, size_t columns) {
+  // Numbers of one size have six decimals; F, of which some are 1e-7, has six digits of each.
+  const auto is_plain = [](const Json& v) {
+    const double size = v.is_number() ? std::abs(v.get<double>()) : 0;
+    return size == 0 || (size >= 1e-3 && size < 1e4);
+  };
+  const bool fixed = list.size() != 9 || std::all_of(list.begin(), list.end(), is_plain);
+
   std::string text;
   for (size_t i = 0; i < list.size(); ++i) {
-    const char* format = columns == 5 ? "%10.2e" : "%12.6f";
+    const char* format = columns == 5 ? "%10.2e" : fixed ? "%12.6f" : "%14.6e";
     text += list[i].is_number() ? formatted(format, list[i].get<double>()) : "     -";
     if (i + 1 < list.size()) text += (i + 1) % columns == 0 ? "\n" : " ";
   }
@@ -210,7 +231,7 @@ std::string cloud_script(const Outcome& outcome, const std::vector<CloudPoint>& 
     for (const uint8_t value : {p.red, p.green, p.blue}) colours += static_cast<char>(value);
     depths.push_back(p.z);
   }
-  const double size = 0.08 * std::abs(percentile(depths, 0.5));
+  const double size = 0.11 * std::abs(percentile(depths, 0.5));
   const Json data = {{"points", base64(points)},
                      {"colours", base64(colours)},
                      {"cameras", {camera_json(outcome, 0, size), camera_json(outcome, 1, size)}}};
@@ -246,7 +267,7 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
   const tv_two_view& v = outcome.two_view;
   const std::string name0 = escaped(outcome.picture[0].name),
                     name1 = escaped(outcome.picture[1].name);
-  const std::string reasons = reasons_in_words(v);
+  const std::string reasons = reasons_in_words(outcome);
   std::string sections;
   for (const Figure& figure : figures) sections += figure_section(figure);
   const char* const classes[] = {"poor", "fair", "good"};
@@ -256,9 +277,9 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
        {"style", kReportStyle},
        {"images", name0 + "<small>and</small>" + name1},
        {"verdict_class", classes[v.verdict]},
-       {"verdict", tv_verdict_string(static_cast<tv_verdict>(v.verdict))},
+       {"verdict", verdict_in_words(v)},
        {"verdict_words", escaped(kind_in_words(v.kind) + (reasons.empty() ? "" : ": " + reasons))},
-       {"advice", advice_list(v)},
+       {"advice", advice_list(outcome)},
        {"cards", cards(outcome)},
        {"cloud", cloud_section(outcome, cloud)},
        {"figures", sections},

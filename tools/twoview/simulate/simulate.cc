@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "drone/drone.h"
-#include "files/camera_file.h"
+#include "files/camera_formats.h"
 #include "files/image_file.h"
 #include "simulator/server.h"
 

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/terminal.h"
 #include "calibration/pictures.h"
 #include "calibration/source.h"
 #include "files/camera_file.h"
@@ -128,7 +129,10 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
   int num_found = 0;
   const bool live = is_live(a.video);
   const int seconds = a.video.empty() ? kImageSeconds : kFrameSeconds;
+  const Progress progress(!a.common.quiet && !live);
+  const std::string of = a.video.empty() ? " of " + std::to_string(a.images.size()) : "";
   const auto take = [&](const cv::Mat& luma, const std::string& name) {
+    progress.tell("looking for the board: " + std::to_string(views.size() + 1) + of + ", " + name);
     if (image.area() > 0 && luma.size() != image)
       throw BadInput("video " + a.video + " changes its frames' size at " + name);
     image = luma.size();

@@ -1,28 +1,105 @@
 #include "verbs/camera_options.h"
 
+#include <cstdio>
+
 #include "base/error.h"
-#include "files/camera_file.h"
+#include "files/camera_formats.h"
+#include "pair/options.h"
 
 namespace cli {
+namespace {
+
+constexpr double kShortestFilm = 1, kLongestFilm = 10000;  // millimetres
+
+ImageCamera film(ImageCamera::Source source, double focal_35mm, const ImageFacts& image) {
+  return {source, film_camera(focal_35mm, image.width, image.height), kFilm, "", focal_35mm};
+}
+
+}  // namespace
+
+ImageFacts facts_of(const Picture& picture) {
+  return {picture.name, picture.file_width, picture.file_height, picture.exif_focal_35mm};
+}
+
+void add_focal_35mm(CLI::App& verb, double& focal_35mm) {
+  verb.add_option_function<std::string>(
+          "--focal-35mm",
+          [&focal_35mm](const std::string& text) {
+            focal_35mm = number_of_flag("--focal-35mm", text, kShortestFilm, kLongestFilm);
+          },
+          "in place of a camera file: the focal length as for 35 mm film; no lens distortion")
+      ->type_name("MM");
+}
 
 void CameraOptions::add_to(CLI::App& verb) {
-  verb.add_option("--camera", both, "camera of both images, OpenCV or ROS YAML")->type_name("FILE");
+  verb.add_option("--camera", both,
+                  "camera of both images: YAML of OpenCV, ROS or Kalibr, cameras.yaml, or COLMAP's "
+                  "cameras.txt; FILE:NAME takes one of several")
+      ->type_name("FILE");
   verb.add_option("--camera0", of[0], "camera of image 0")->type_name("FILE");
   verb.add_option("--camera1", of[1], "camera of image 1")->type_name("FILE");
+  add_focal_35mm(verb, focal_35mm);
 }
 
 std::array<std::string, 2> CameraOptions::files() const {
   if (!both.empty() && (!of[0].empty() || !of[1].empty()))
     throw BadInput("give --camera, or --camera0 and --camera1, not both");
+  if (focal_35mm > 0 && !(both.empty() && of[0].empty() && of[1].empty()))
+    throw BadInput("--focal-35mm is for photographs without a camera file");
   if (!both.empty()) return {both, both};
   if (of[0].empty() != of[1].empty())
     throw BadInput(std::string("--camera") + (of[0].empty() ? "0" : "1") + " is missing");
   return {of[0], of[1]};
 }
 
-std::array<tv_camera, 2> CameraOptions::load(const std::array<std::string, 2>& files) {
-  const tv_camera camera0 = load_camera(files[0]);
-  return {camera0, files[1] == files[0] ? camera0 : load_camera(files[1])};
+ImageCameras CameraOptions::cameras_of(const ImageFacts& image0, const ImageFacts& image1) const {
+  const ImageFacts* const images[2] = {&image0, &image1};
+  const std::array<std::string, 2> given = files();
+  ImageCameras cameras;
+  if (!given[0].empty()) {
+    const CameraFile file0 =
+        load_camera_file(given[0]);  // a file for both may be a pipe: read once
+    const CameraFile file1 = given[1] == given[0] ? file0 : load_camera_file(given[1]);
+    const CameraFile* const read[2] = {&file0, &file1};
+    for (size_t i = 0; i < 2; ++i) {
+      cameras[i] = {ImageCamera::kFile, read[i]->of(images[i]->name), read[i]->sigmas, given[i], 0};
+      if (images[i]->width > 0)
+        require_size(cameras[i].camera, given[i], images[i]->width, images[i]->height,
+                     images[i]->name);
+    }
+  } else if (focal_35mm > 0) {
+    for (size_t i = 0; i < 2; ++i) cameras[i] = film(ImageCamera::kFocal, focal_35mm, *images[i]);
+  } else if (image0.exif_focal_35mm > 0 && image1.exif_focal_35mm > 0) {
+    for (size_t i = 0; i < 2; ++i)
+      cameras[i] = film(ImageCamera::kExif, images[i]->exif_focal_35mm, *images[i]);
+  }
+  return cameras;
+}
+
+std::string exif_note(const ImageCameras& cameras) {
+  if (cameras[0].source != ImageCamera::kExif) return "";
+  char text[160];
+  const double f0 = cameras[0].focal_35mm, f1 = cameras[1].focal_35mm;
+  if (f0 == f1)
+    std::snprintf(text, sizeof text,
+                  "focal length %.4g mm (35 mm equivalent) from EXIF; --camera is better", f0);
+  else
+    std::snprintf(text, sizeof text,
+                  "focal lengths %.4g and %.4g mm (35 mm equivalent) from EXIF; --camera0 and "
+                  "--camera1 are better",
+                  f0, f1);
+  return text;
+}
+
+nlohmann::ordered_json cameras_json(const ImageCameras& cameras) {
+  using Json = nlohmann::ordered_json;
+  const Json names[] = {nullptr, "file", "focal_35mm", "exif"};
+  Json list = Json::array();
+  for (const ImageCamera& camera : cameras)
+    list.push_back({{"source", names[camera.source]},
+                    {"file", camera.file.empty() ? Json() : Json(camera.file)},
+                    {"focal_35mm", camera.focal_35mm > 0 ? Json(camera.focal_35mm) : Json()}});
+  return list;
 }
 
 }  // namespace cli

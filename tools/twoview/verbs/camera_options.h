@@ -1,24 +1,58 @@
-// The options --camera, --camera0 and --camera1, and the camera file of each image.
+// The options --camera, --camera0, --camera1 and --focal-35mm, and the camera of each image: from a
+// file, from the focal length that the user gives, or from the photographs' EXIF data.
 #pragma once
 
 #include <CLI/App.hpp>
 #include <array>
+#include <nlohmann/json.hpp>
 #include <string>
 
-#include "twoview/camera.h"
+#include "files/camera_file.h"
+#include "files/image_file.h"
 
 namespace cli {
 
+// The camera of an image and where it is from.
+struct ImageCamera {
+  enum Source { kNone, kFile, kFocal, kExif } source = kNone;
+  tv_camera camera{};
+  CalibrationSigmas sigmas{0, 0};
+  std::string file;       // the camera file as given
+  double focal_35mm = 0;  // millimetres, where source is kFocal or kExif
+};
+using ImageCameras = std::array<ImageCamera, 2>;
+
+// What a camera is chosen by.
+struct ImageFacts {
+  std::string name;
+  int width = 0, height = 0;  // pixels; 0: unknown, then a camera file is not checked against them
+  double exif_focal_35mm = 0;
+};
+ImageFacts facts_of(const Picture& picture);
+
 struct CameraOptions {
   std::string both, of[2];
+  double focal_35mm = 0;
 
   void add_to(CLI::App& verb);
-  // The camera file of each image; both are empty if no camera is given. Throws BadInput if only
-  // one of --camera0 and --camera1 is given, or either beside --camera.
+  // The camera file of each image; both are empty if no camera file is given. Throws BadInput if
+  // only one of --camera0 and --camera1 is given, if either is given beside --camera, and if
+  // --focal-35mm is given beside a file.
   std::array<std::string, 2> files() const;
-  // Loads the cameras of files(), which must not be empty. A file for both images is read once,
-  // since it may be a pipe.
-  static std::array<tv_camera, 2> load(const std::array<std::string, 2>& files);
+  // Whether a file or --focal-35mm is given.
+  bool given() const { return focal_35mm > 0 || !files()[0].empty(); }
+  // The cameras of two images of these sizes: of the files, else of --focal-35mm, else of the EXIF
+  // data of both; else without a source. Throws BadInput where a camera is for another size.
+  ImageCameras cameras_of(const ImageFacts& image0, const ImageFacts& image1) const;
 };
+
+// Adds --focal-35mm to a verb.
+void add_focal_35mm(CLI::App& verb, double& focal_35mm);
+
+// A line that says which focal length EXIF gave; empty where it gave none.
+std::string exif_note(const ImageCameras& cameras);
+
+// A list of two: `source` ("file", "focal_35mm", "exif" or null), `file`, `focal_35mm`.
+nlohmann::ordered_json cameras_json(const ImageCameras& cameras);
 
 }  // namespace cli

@@ -2,7 +2,18 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdio>
+
+#include "base/output.h"
+#include "base/terminal.h"
+
 namespace cli {
+namespace {
+
+constexpr int kFewBits = 14;  // of 16: cameras of 10, 12 and 14 bits that do not fill the sample
+
+}  // namespace
 
 void add_common(CLI::App& verb, Common& common, unsigned groups, const std::string& output_help) {
   CLI::Option* output = verb.add_option("-o,--output", common.output, output_help);
@@ -16,8 +27,44 @@ void add_common(CLI::App& verb, Common& common, unsigned groups, const std::stri
   add_options(verb, common.options, groups);
 }
 
+void Common::note(const std::string& text) {
+  if (std::find(notes.begin(), notes.end(), text) == notes.end()) notes.push_back(text);
+}
+
+std::string Common::note_lines() const {
+  std::string lines;
+  for (const std::string& text : notes) {
+    if (speaks())
+      lines += summary_line("note", "%s", text.c_str());
+    else
+      std::fprintf(stderr, "twoview: note: %s\n", text.c_str());
+  }
+  return lines;
+}
+
+void bring_to_size(Picture& picture, Common& common) {
+  const int width = picture.luma.cols, height = picture.luma.rows;
+  shrink(picture, common.options.longer_side(width, height));
+  if (common.options.resize == kByItself && picture.luma.cols != width) {
+    common.options.was_large = true;
+    common.note("images above " + std::to_string(kLargeSide) +
+                " pixels a side are used smaller: " + std::to_string(width) + "x" +
+                std::to_string(height) + " at " + std::to_string(picture.luma.cols) + "x" +
+                std::to_string(picture.luma.rows) + " (--resize 0: as they are)");
+  }
+  if (picture.used_bits > 0 && picture.used_bits <= kFewBits)
+    common.note("image " + picture.name + " has 16 bits a sample and uses " +
+                std::to_string(picture.used_bits) +
+                " of them, so it is dark: multiply its samples by " +
+                std::to_string(1 << (16 - picture.used_bits)));
+}
+
+std::string watch_text(const Options& options) {
+  return "at most " + std::to_string(options.feature.max_keypoints) + " keypoints an image";
+}
+
 Style stdout_style() {
-  if (!isatty(STDOUT_FILENO)) return {};
+  if (!takes_colours(STDOUT_FILENO)) return {};
   return {"\033[1m", "\033[2m", "\033[32m", "\033[33m", "\033[31m", "\033[0m"};
 }
 

@@ -5,7 +5,9 @@
 #include <CLI/App.hpp>
 #include <functional>
 #include <string>
+#include <vector>
 
+#include "files/image_file.h"
 #include "pair/options.h"
 
 namespace cli {
@@ -19,12 +21,25 @@ struct Common {
   Options options;
   std::string output;
   bool json = false, quiet = false;
+  // What the user must know of decisions that the program took: lines without an end.
+  std::vector<std::string> notes;
   // Returns true if the summary for the user is printed to stdout.
   bool speaks() const { return !json && !quiet; }
+  void note(const std::string& text);
+  // The notes as lines of the summary. Where none is printed, they go to stderr, and the result is
+  // empty.
+  std::string note_lines() const;
 };
 void add_common(CLI::App& verb, Common& common, unsigned groups, const std::string& output_help);
 
-// Escape codes for the summary; all are empty when stdout is not a terminal.
+// Scales the picture down as --resize says, or a large one by itself, which is noted. A picture
+// of 16-bit samples of which only few bits are used is noted as well.
+void bring_to_size(Picture& picture, Common& common);
+
+// What a long search is doing, for Stopwatch.
+std::string watch_text(const Options& options);
+
+// Escape codes for the summary; all are empty where stdout takes none.
 struct Style {
   const char *bold = "", *dim = "", *good = "", *fair = "", *poor = "", *off = "";
 };

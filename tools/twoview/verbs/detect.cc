@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "base/output.h"
+#include "base/terminal.h"
 #include "pair/session.h"
 #include "pictures/pictures.h"
 #include "report/tables.h"
@@ -21,14 +22,16 @@ int detect(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
   Picture picture = load_picture(a.image);
-  shrink(picture, common.options.resize);
+  bring_to_size(picture, common);
   OutputSet files(common.output);
   files.keep(a.image);
   Session session(common.options);
   tv_context* context = session.context(picture.luma.cols, picture.luma.rows);
+  auto watch = std::make_unique<Stopwatch>(!common.quiet, watch_text(common.options));
   const uint64_t start_ns = now_ns();
   const Features features = extract(context, picture, common.options);
   const uint64_t total_ns = now_ns() - start_ns;
+  watch.reset();
 
   nlohmann::ordered_json json;
   json["image"] = picture.name;
@@ -43,11 +46,13 @@ int detect(Arguments& a) {
   files.add("keypoints.csv", keypoints_csv(features.keypoints.data(), features.keypoints.size()));
   files.add("keypoints.png", png_bytes(keypoints_picture(picture, features.keypoints)));
   if (common.json) print(json_text(json));
+  const std::string notes = common.note_lines();
   if (common.speaks()) {
     char text[128];
     std::snprintf(text, sizeof text, "%zu keypoints in %.1f ms\n", features.keypoints.size(),
                   static_cast<double>(total_ns) * 1e-6);
-    print(text + ("files        " + files.folder().string() + ": keypoints.csv keypoints.png\n"));
+    print(text + notes +
+          ("files        " + files.folder().string() + ": keypoints.csv keypoints.png\n"));
   }
   files.commit();
   return 0;

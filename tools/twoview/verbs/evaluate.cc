@@ -1,16 +1,16 @@
 // twoview evaluate PAIRS.txt: estimates the poses of many pairs and reports SuperGlue's measures of
 // their errors.
 
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <memory>
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/terminal.h"
 #include "files/camera_file.h"
 #include "files/camera_set.h"
 #include "files/pairs_file.h"
@@ -53,8 +53,7 @@ Matrix3 turn_matrix(int quarters) {
   return turn;
 }
 
-void load_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair,
-               Outcome& outcome) {
+void load_pair(Arguments& a, const NamedCameras& cameras, const Pair& pair, Outcome& outcome) {
   const std::string* names[] = {&pair.name0, &pair.name1};
   const std::array<double, 9>* Ks[] = {&pair.K0, &pair.K1};
   const int turns[] = {pair.turns0, pair.turns1};
@@ -66,7 +65,7 @@ void load_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair
                                         pair.has_K ? Ks[i] : nullptr);
     turn(picture, turns[i]);
     outcome.camera[i] = turned(outcome.camera[i], turns[i]);
-    shrink(picture, a.common.options.resize);
+    bring_to_size(picture, a.common);
     outcome.camera[i] = resized(outcome.camera[i], picture.luma.cols, picture.luma.rows);
   }
 }
@@ -88,7 +87,7 @@ void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
       match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
 }
 
-PairReport evaluate_pair(const Arguments& a, const NamedCameras& cameras, const Pair& pair,
+PairReport evaluate_pair(Arguments& a, const NamedCameras& cameras, const Pair& pair,
                          Session& session) {
   PairReport report;
   report.has_truth = pair.has_truth;
@@ -201,6 +200,9 @@ Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
   json["auc_signed"] = auc_json(reports, &Errors::pose_signed);
   json["num_pairs"] = reports.size();
   json["verdict_counts"] = verdict_counts(reports);
+  json["num_unreadable"] =
+      std::count_if(reports.begin(), reports.end(),
+                    [](const PairReport& report) { return report.json.contains("error"); });
   json["median_pose_error_deg"] = median_error(reports);
   for (const char* key : {"num_matches", "num_inliers", "precision", "time_ms"})
     json["mean_" + std::string(key)] = mean_of(reports, key);
@@ -225,9 +227,16 @@ std::string cell(const Json& value, const char* format, int width, double factor
   return text;
 }
 
-std::string padded(std::string text, size_t width) {
-  if (text.size() > width) text = "..." + text.substr(text.size() - (width - 3));
-  return text + std::string(width - text.size(), ' ');
+std::string padded(const std::string& text, size_t width) {
+  return text + std::string(width - std::min(width, text.size()), ' ');
+}
+
+// The width of a column of names, whole: what tells the names of a set apart may be at either end.
+size_t name_width(const Json& pairs, const char* key) {
+  size_t width = std::strlen("image 0");
+  for (const Json& pair : pairs)
+    width = std::max(width, pair[key].get_ref<const std::string&>().size());
+  return width;
 }
 
 // A line for each camera whose pairs agree that its principal point is elsewhere.
@@ -250,12 +259,13 @@ std::string advice_lines(const Json& report) {
 
 std::string table(const Json& report) {
   const Style style = stdout_style();
-  constexpr size_t name = 24;
-  std::string text = style.dim + padded("image 0", name) + " " + padded("image 1", name) +
+  const size_t width[2] = {name_width(report["pairs"], "name0"),
+                           name_width(report["pairs"], "name1")};
+  std::string text = style.dim + padded("image 0", width[0]) + " " + padded("image 1", width[1]) +
                      " matches inliers  prec %  R deg   t deg      ms  config" + style.off + "\n";
   for (const Json& pair : report["pairs"]) {
-    text += padded(pair["name0"].get<std::string>(), name) + " " +
-            padded(pair["name1"].get<std::string>(), name);
+    text += padded(pair["name0"].get<std::string>(), width[0]) + " " +
+            padded(pair["name1"].get<std::string>(), width[1]);
     if (pair.contains("error")) {
       text += std::string(" ") + style.poor + pair["error"].get<std::string>() + style.off + "\n";
       continue;
@@ -277,28 +287,12 @@ std::string table(const Json& report) {
   text += std::to_string(report["num_pairs"].get<size_t>()) + " pairs: ";
   for (const auto& [verdict, count] : counts.items())
     text += std::to_string(count.get<int>()) + " " + verdict + (verdict == "refused" ? "" : ", ");
+  const Json& unread = report["num_unreadable"];
+  if (unread != 0) text += ", " + unread.dump() + " not readable";
   return text + "; median pose error" + cell(report["median_pose_error_deg"], " %.2f deg", 4) +
          ", mean time" + cell(report["mean_time_ms"], " %.1f ms", 4) + style.off + "\n" +
          advice_lines(report);
 }
-
-// Shows progress as one line on stderr if that is a terminal. Each line replaces the last one, and
-// the final line is erased.
-class Progress {
- public:
-  explicit Progress(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
-  ~Progress() {
-    if (shown_) std::fputs("\r\033[K", stderr);
-  }
-  void tell(size_t index, size_t count, const Pair& pair) const {
-    if (shown_)
-      std::fprintf(stderr, "\r\033[K%zu of %zu: %s %s", index + 1, count, pair.name0.c_str(),
-                   pair.name1.c_str());
-  }
-
- private:
-  bool shown_;
-};
 
 // Splits -o: an existing folder is a folder; otherwise a path that ends in .json or exists is a
 // file, and any other path is a folder.
@@ -339,15 +333,21 @@ int evaluate(Arguments& a) {
   {
     const Progress progress(!common.quiet);
     for (size_t i = 0; i < pairs.size(); ++i) {
-      progress.tell(i, pairs.size(), pairs[i]);
+      progress.tell(std::to_string(i + 1) + " of " + std::to_string(pairs.size()) + ": " +
+                    pairs[i].name0 + " " + pairs[i].name1);
       reports.push_back(evaluate_pair(a, cameras, pairs[i], session));
     }
   }
+  const auto is_read = [](const PairReport& report) { return !report.json.contains("error"); };
+  if (std::none_of(reports.begin(), reports.end(), is_read))
+    throw BadInput("none of the " + std::to_string(reports.size()) + " pairs of " + a.pairs +
+                   " could be evaluated: " + reports[0].json["error"].get<std::string>());
   const Json report = report_json(a, reports, session);
   files.add(name, json_text(report));
   if (common.json) print(json_text(report));
+  const std::string notes = common.note_lines();
   if (common.speaks())
-    print(table(report) + "files      " + (files.folder() / name).string() + "\n");
+    print(table(report) + notes + "files      " + (files.folder() / name).string() + "\n");
   files.commit();
   return 0;
 }

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/terminal.h"
 #include "pair/session.h"
 #include "pictures/pictures.h"
 #include "report/tables.h"
@@ -45,19 +46,21 @@ int match(Arguments& a) {
   Picture picture[2];
   for (int i = 0; i < 2; ++i) {
     picture[i] = load_picture(a.image[i]);
-    shrink(picture[i], common.options.resize);
+    bring_to_size(picture[i], common);
   }
   OutputSet files(common.output);
   for (const std::string& image : a.image) files.keep(image);
   Session session(common.options);
   tv_context* context = session.context(std::max(picture[0].luma.cols, picture[1].luma.cols),
                                         std::max(picture[0].luma.rows, picture[1].luma.rows));
+  auto watch = std::make_unique<Stopwatch>(!common.quiet, watch_text(common.options));
   const uint64_t start_ns = now_ns();
   const Features features[2] = {extract(context, picture[0], common.options),
                                 extract(context, picture[1], common.options)};
   const std::vector<tv_correspondence> matches =
       match_features(context, features[0], features[1], common.options.match);
   const uint64_t total_ns = now_ns() - start_ns;
+  watch.reset();
   const tv_keypoint *k0 = features[0].keypoints.data(), *k1 = features[1].keypoints.data();
 
   nlohmann::ordered_json json;
@@ -76,12 +79,14 @@ int match(Arguments& a) {
   files.add("matches.png", png_bytes(matches_picture(picture[0], picture[1], k0, k1, matches.data(),
                                                      static_cast<int>(matches.size()), nullptr)));
   if (common.json) print(json_text(json));
+  const std::string notes = common.note_lines();
   if (common.speaks()) {
     char text[160];
     std::snprintf(text, sizeof text, "%zu matches of %zu and %zu keypoints in %.1f ms\n",
                   matches.size(), features[0].keypoints.size(), features[1].keypoints.size(),
                   static_cast<double>(total_ns) * 1e-6);
-    print(text + ("files        " + files.folder().string() + ": matches.csv matches.png\n"));
+    print(text + notes +
+          ("files        " + files.folder().string() + ": matches.csv matches.png\n"));
   }
   files.commit();
   return 0;

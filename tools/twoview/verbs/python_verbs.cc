@@ -1,8 +1,10 @@
 #include "verbs/python_verbs.h"
 
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -22,6 +24,7 @@ struct PythonVerb {
 constexpr PythonVerb kVerbs[] = {
     {"compare", "compare_colmap", "the same pairs beside COLMAP, OpenGV, OpenCV and PoseLib"},
     {"colmap", "twoview_colmap", "COLMAP databases and models, in and out"},
+    {"rerun", "twoview_rerun", "a result or a recording as a file for Rerun's viewer"},
 };
 
 // The root of the Python verbs: the nearest folder above this program that contains
@@ -55,7 +58,8 @@ void name_library(const fs::path& program) {
   }
 }
 
-[[noreturn]] void become(const PythonVerb& verb, int argc, char** argv) {
+// Replaces this process by the verb's Python program.
+[[noreturn]] void become(const PythonVerb& verb, const std::vector<std::string>& given) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   const fs::path tree = tree_of(program);
@@ -66,10 +70,12 @@ void name_library(const fs::path& program) {
         " of the source tree or of an installed " TWOVIEW_DATA_DIR ", and there is none above " +
         program.string());
   name_library(program);
+  setenv("TWOVIEW_VERB", (std::string("twoview ") + verb.name).c_str(), 1);
 
   std::string python = python_of(tree), path = script.string();
+  std::vector<std::string> texts = given;
   std::vector<char*> arguments{python.data(), path.data()};
-  arguments.insert(arguments.end(), argv + 2, argv + argc);
+  for (std::string& text : texts) arguments.push_back(text.data());
   arguments.push_back(nullptr);
   execvp(python.c_str(), arguments.data());
   throw BadInput("cannot run " + python + ": " + std::strerror(errno) +
@@ -84,7 +90,25 @@ void add_python_verbs(CLI::App& program) {
 
 void hand_over_python_verb(int argc, char** argv) {
   for (const PythonVerb& verb : kVerbs)
-    if (argc > 1 && std::strcmp(argv[1], verb.name) == 0) become(verb, argc, argv);
+    if (argc > 1 && std::strcmp(argv[1], verb.name) == 0) become(verb, {argv + 2, argv + argc});
+}
+
+int run_python_verb(const std::string& name, const std::vector<std::string>& arguments) {
+  const pid_t child = fork();
+  if (child < 0) throw BadInput(std::string("cannot start a process: ") + std::strerror(errno));
+  if (child == 0) {
+    try {
+      for (const PythonVerb& verb : kVerbs)
+        if (name == verb.name) become(verb, arguments);
+    } catch (const std::exception& e) {
+      std::fprintf(stderr, "twoview: %s\n", e.what());
+    }
+    _exit(kExitBadInput);
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : kExitBadInput;
 }
 
 }  // namespace cli

@@ -1,8 +1,10 @@
-// The verbs that are Python programs: compare and colmap. They are found in the source tree, or
-// below share/twoview in an installation.
+// The verbs that are Python programs: compare, colmap and rerun. They are found in the source tree,
+// or below share/twoview in an installation.
 #pragma once
 
 #include <CLI/App.hpp>
+#include <string>
+#include <vector>
 
 namespace cli {
 
@@ -13,5 +15,9 @@ void add_python_verbs(CLI::App& program);
 // arguments; otherwise it returns. Throws BadInput if the tools or Python are missing. Call it
 // before signal handling is set up, because ignored signals stay ignored after exec.
 void hand_over_python_verb(int argc, char** argv);
+
+// Runs one of these verbs as a child process, waits for its end, and returns its exit status (2 if
+// a signal ended it). Throws BadInput if the tools or Python are missing.
+int run_python_verb(const std::string& name, const std::vector<std::string>& arguments);
 
 }  // namespace cli

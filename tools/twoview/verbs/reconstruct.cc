@@ -6,7 +6,8 @@
 
 #include "base/error.h"
 #include "base/output.h"
-#include "files/camera_file.h"
+#include "base/terminal.h"
+#include "files/camera_formats.h"
 #include "pair/reconstruct_pair.h"
 #include "pair/truth.h"
 #include "pictures/canvas.h"
@@ -15,6 +16,7 @@
 #include "report/report.h"
 #include "report/tables.h"
 #include "verbs/camera_options.h"
+#include "verbs/python_verbs.h"
 #include "verbs/verbs.h"
 
 namespace cli {
@@ -25,9 +27,8 @@ const std::vector<std::string> kFiles = {"result.json",  "cloud.ply", "matches.p
 
 struct Arguments {
   Common common;
-  std::string image[2], truth;
+  std::string image[2], truth, rerun;
   CameraOptions cameras;
-  double focal_35mm = 0;
   RecordingOptions recording;
 };
 
@@ -42,78 +43,89 @@ void check_inputs(const Arguments& a) {
     return;
   }
   if (!a.image[0].empty()) throw BadInput("give A and B or --recording, not both");
-  if (a.cameras.both.empty()) throw BadInput("--recording needs --camera");
+  if (a.cameras.both.empty() && !(a.cameras.focal_35mm > 0))
+    throw BadInput("--recording needs --camera, or --focal-35mm");
 }
 
-// The camera file of each image; both are empty with --focal-35mm, and without cameras. Throws
-// BadInput if the solver needs cameras and none are given.
-std::array<std::string, 2> camera_files(const Arguments& a) {
-  const std::array<std::string, 2> files = a.cameras.files();
-  const bool has_focal = a.focal_35mm > 0;
-  if (has_focal && (!files[0].empty() || a.recording.given()))
-    throw BadInput("--focal-35mm is for photographs without a camera file");
+bool can_do_without_cameras(int32_t method) {
+  return method == TV_SOLVER_EIGHT_POINT || method == TV_SOLVER_SEVEN_POINT;
+}
+
+// Throws BadInput if the solver needs cameras and none are known.
+void require_cameras(const ImageCameras& cameras, int32_t method, const Picture pictures[2]) {
+  if (cameras[0].source != ImageCamera::kNone || can_do_without_cameras(method)) return;
+  const Picture& without = pictures[pictures[0].exif_focal_35mm > 0 ? 1 : 0];
+  throw BadInput(
+      "--method " + method_name(method) +
+      " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate, or "
+      "--focal-35mm; " +
+      without.name + " has no focal length in EXIF data");
+}
+
+// The cameras of two images. A method that can do without cameras takes those that are given, and
+// EXIF data are only named.
+ImageCameras choose_cameras(Arguments& a, const Picture pictures[2]) {
+  ImageCameras cameras = a.cameras.cameras_of(facts_of(pictures[0]), facts_of(pictures[1]));
   const int32_t method = a.common.options.estimate.method;
-  const bool can_do_without = method == TV_SOLVER_EIGHT_POINT || method == TV_SOLVER_SEVEN_POINT;
-  if (files[0].empty() && !has_focal && !can_do_without)
-    throw BadInput(
-        "--method " + method_name(method) +
-        " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate,"
-        " or --focal-35mm, from the photographs' EXIF");
-  return files;
+  require_cameras(cameras, method, pictures);
+  if (cameras[0].source != ImageCamera::kExif) return cameras;
+  if (!can_do_without_cameras(method)) {
+    a.common.note(exif_note(cameras));
+    return cameras;
+  }
+  char text[120];
+  std::snprintf(text, sizeof text,
+                "no camera, so no pose: EXIF has a focal length, --focal-35mm %.4g would use it",
+                cameras[0].focal_35mm);
+  a.common.note(text);
+  return {};
 }
 
-// The sigmas of the calibration: those that the command line gives, else those of the camera files
-// or, with --focal-35mm, of such a focal length.
-void set_calibration_sigmas(Arguments& a) {
-  const std::array<std::string, 2> files = camera_files(a);
-  tv_estimate_options& e = a.common.options.estimate;
+// The sigmas of the calibration: those that the command line gives, else those of the cameras.
+void set_calibration_sigmas(Options& options, const ImageCameras& cameras) {
+  tv_estimate_options& e = options.estimate;
   double* const focal[2] = {&e.focal_sigma0, &e.focal_sigma1};
   double* const center[2] = {&e.center_sigma0, &e.center_sigma1};
-  for (int i = 0; i < 2; ++i) {
-    CalibrationSigmas sigmas{0, 0};
-    if (!files[i].empty()) {
-      sigmas = load_sigmas(files[i]);
-    } else if (a.focal_35mm > 0) {
-      sigmas = kFilm;
-    }
-    *focal[i] = a.common.options.focal_sigma >= 0 ? a.common.options.focal_sigma : sigmas.focal;
-    *center[i] = a.common.options.center_sigma >= 0 ? a.common.options.center_sigma : sigmas.center;
+  for (size_t i = 0; i < 2; ++i) {
+    const CalibrationSigmas& sigmas = cameras[i].sigmas;
+    *focal[i] = options.focal_sigma >= 0 ? options.focal_sigma : sigmas.focal;
+    *center[i] = options.center_sigma >= 0 ? options.center_sigma : sigmas.center;
   }
 }
 
-void load_inputs(const Arguments& a, RecordingInput* recording, Session& session,
-                 Outcome& outcome) {
-  const std::array<std::string, 2> files = camera_files(a);
-  const bool has_files = !files[0].empty();
-  outcome.has_cameras = has_files || a.focal_35mm > 0;
-  std::array<tv_camera, 2> camera{};
-  if (has_files) camera = CameraOptions::load(files);
-  if (recording) recording->load(camera[0], session, a.common.options, outcome);
-  for (int i = 0; i < 2; ++i) {
-    Picture& picture = outcome.picture[i];
-    if (!recording) picture = load_picture(a.image[i]);
-    if (!has_files && outcome.has_cameras) {
-      outcome.camera[i] = film_camera(a.focal_35mm, picture.luma.cols, picture.luma.rows);
-    } else if (has_files) {
-      outcome.camera[i] = camera[i];
-      require_size(outcome.camera[i], files[i], picture.luma.cols, picture.luma.rows, picture.path);
-    }
-    shrink(picture, a.common.options.resize);
-    if (outcome.has_cameras)
-      outcome.camera[i] = resized(outcome.camera[i], picture.luma.cols, picture.luma.rows);
+// Loads the pictures and the cameras, and scales both as --resize says.
+ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& session,
+                         Outcome& outcome) {
+  ImageCameras cameras;
+  if (recording) {
+    const ImageFacts frame{"", recording->width(), recording->height(), 0};
+    cameras = a.cameras.cameras_of(frame, frame);
+    const Progress progress(!a.common.quiet);
+    recording->load(cameras[0].camera, session, a.common.options, progress, outcome);
+  } else {
+    for (int i = 0; i < 2; ++i) outcome.picture[i] = load_picture(a.image[i]);
+    cameras = choose_cameras(a, outcome.picture);
   }
+  outcome.has_cameras = cameras[0].source != ImageCamera::kNone;
+  for (size_t i = 0; i < 2; ++i) {
+    Picture& picture = outcome.picture[i];
+    bring_to_size(picture, a.common);
+    if (outcome.has_cameras)
+      outcome.camera[i] = resized(cameras[i].camera, picture.luma.cols, picture.luma.rows);
+  }
+  return cameras;
 }
 
 nlohmann::ordered_json options_of(const Arguments& a) {
   nlohmann::ordered_json json = options_json(a.common.options, kAllOptions | kGravity);
-  const std::array<std::string, 2> files = camera_files(a);
-  for (int i = 0; i < 2; ++i) {
+  const std::array<std::string, 2> files = a.cameras.files();
+  for (size_t i = 0; i < 2; ++i) {
     const std::string key = "camera" + std::to_string(i);
     json[key] =
         files[i].empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(files[i]);
   }
-  json["focal_35mm"] =
-      a.focal_35mm > 0 ? nlohmann::ordered_json(a.focal_35mm) : nlohmann::ordered_json(nullptr);
+  const double focal = a.cameras.focal_35mm;
+  json["focal_35mm"] = focal > 0 ? nlohmann::ordered_json(focal) : nlohmann::ordered_json(nullptr);
   return json;
 }
 
@@ -211,7 +223,7 @@ std::string truth_line(const nlohmann::ordered_json& truth) {
 }
 
 std::string summary(const Outcome& outcome, const RecordingInput* recording, const OutputSet& files,
-                    size_t context_bytes) {
+                    size_t context_bytes, const std::string& notes) {
   const Style style = stdout_style();
   const tv_two_view& v = outcome.two_view;
   const tv_reconstruction& r = outcome.reconstruction;
@@ -219,12 +231,13 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   std::string text;
   text += summary_line("images", "%s %dx%d, %s %dx%d", a.name.c_str(), a.luma.cols, a.luma.rows,
                        b.name.c_str(), b.luma.cols, b.luma.rows);
+  text += notes;
   const char* const colours[] = {style.poor, style.fair, style.good};
-  const std::string reasons = reasons_in_words(v);
-  text += summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict],
-                       tv_verdict_string(static_cast<tv_verdict>(v.verdict)), style.off,
-                       kind_in_words(v.kind).c_str(), reasons.empty() ? "" : "; ", reasons.c_str());
-  for (const std::string& advice : advice_on(v))
+  const std::string reasons = reasons_in_words(outcome);
+  text += summary_line("verdict", "%s%s%s: %s%s%s", colours[v.verdict], verdict_in_words(v).c_str(),
+                       style.off, kind_in_words(v.kind).c_str(), reasons.empty() ? "" : "; ",
+                       reasons.c_str());
+  for (const std::string& advice : advice_on(outcome))
     text += summary_line("advice", "%s", advice.c_str());
   if (v.has_R && v.has_t)
     text += summary_line("belief", "wrong with probability %.2g %%", 100 * v.probability_wrong);
@@ -252,17 +265,38 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   return text + summary_line("files", "%s:%s", files.folder().c_str(), names.c_str());
 }
 
+// Writes the result in the folder as a file for Rerun's viewer. Returns the exit status.
+int write_rerun(const Arguments& a, const Outcome& outcome, const std::string& folder) {
+  std::vector<std::string> arguments{folder, a.rerun};
+  if (!a.recording.given()) arguments.insert(arguments.end(), {"--images", a.image[0], a.image[1]});
+  if (outcome.has_cameras) {
+    arguments.emplace_back("--intrinsics");
+    for (const tv_camera& given : outcome.camera) {
+      tv_camera camera;
+      tv_corrected_camera(&outcome.two_view, &given, &camera);
+      for (const double value : {camera.fx, camera.fy, camera.cx, camera.cy}) {
+        char digits[32];
+        std::snprintf(digits, sizeof digits, "%.17g", value);
+        arguments.emplace_back(digits);
+      }
+    }
+  }
+  return run_python_verb("rerun", arguments);
+}
+
 int reconstruct(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
   check_inputs(a);
+  // A missing package is reported, by the tool itself, before anything is computed or written.
+  if (!a.rerun.empty() && run_python_verb("rerun", {"--check"}) != 0) return kExitBadInput;
   std::unique_ptr<RecordingInput> recording;
   if (a.recording.given())
     recording = std::make_unique<RecordingInput>(a.recording, a.cameras.both);
   Session session(common.options);
   Outcome outcome;
-  load_inputs(a, recording.get(), session, outcome);
-  set_calibration_sigmas(a);
+  const ImageCameras cameras = load_inputs(a, recording.get(), session, outcome);
+  set_calibration_sigmas(common.options, cameras);
   if (recording) recording->add_gravity(common.options.estimate);
   const bool has_truth = !a.truth.empty();
   Truth truth;
@@ -272,9 +306,13 @@ int reconstruct(Arguments& a) {
   }
   OutputSet files(common.output);
   for (const std::string& image : a.image) files.keep(image);
-  for (const std::string& camera : a.cameras.files()) files.keep(camera);
+  for (const std::string& camera : a.cameras.files()) files.keep(camera_path(camera));
   files.keep(a.truth);
-  const uint64_t total_ns = reconstruct_pair(session, common.options, outcome);
+  uint64_t total_ns = 0;
+  {
+    const Stopwatch watch(!common.quiet, watch_text(common.options));
+    total_ns = reconstruct_pair(session, common.options, outcome);
+  }
   if (recording) recording->add_scale(outcome);
 
   outcome.json = result_json(outcome);
@@ -284,16 +322,20 @@ int reconstruct(Arguments& a) {
         truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
   outcome.json["timings_ms"] = session.take_times(total_ns, true);
   outcome.json["context_bytes"] = session.context_bytes();
+  outcome.json["cameras"] = cameras_json(cameras);
   outcome.json["options"] = options_of(a);
   outcome.json["kernels"] = session.kernels();
   make_files(outcome, files);
 
   if (common.json) print(json_text(outcome.json));
-  if (common.speaks()) print(summary(outcome, recording.get(), files, session.context_bytes()));
+  const std::string notes = common.note_lines();
+  if (common.speaks())
+    print(summary(outcome, recording.get(), files, session.context_bytes(), notes));
   files.commit();
   files.remove_others(kFiles);
+  if (!a.rerun.empty() && write_rerun(a, outcome, files.folder()) != 0) return kExitBadInput;
   if (has_full_pose(outcome.two_view)) return kExitPose;
-  const std::string reasons = reasons_in_words(outcome.two_view);
+  const std::string reasons = reasons_in_words(outcome);
   std::fprintf(stderr, "twoview: no full pose: %s%s%s\n",
                kind_in_words(outcome.two_view.kind).c_str(), reasons.empty() ? "" : ": ",
                reasons.c_str());
@@ -310,13 +352,10 @@ void add_reconstruct(CLI::App& program, Run& run) {
   verb->add_option("B", a->image[1], "image 1")->type_name("IMAGE");
   a->recording.add_to(*verb);
   a->cameras.add_to(*verb);
-  verb->add_option("--focal-35mm", a->focal_35mm,
-                   "in place of a camera file: the focal length as for 35 mm film, from EXIF; no "
-                   "lens distortion")
-      ->type_name("MM")
-      ->check(CLI::Range(1.0, 10000.0));
   verb->add_option("--truth", a->truth, "known R, t, baseline, depth0 (YAML) to compare with")
       ->type_name("FILE");
+  verb->add_option("--rerun", a->rerun, "also write a file for Rerun's viewer (needs rerun-sdk)")
+      ->type_name("FILE.rrd");
   add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
 }

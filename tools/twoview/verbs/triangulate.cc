@@ -7,6 +7,8 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "files/camera_formats.h"
+#include "files/image_file.h"
 #include "files/matches_file.h"
 #include "pair/truth.h"
 #include "report/tables.h"
@@ -23,35 +25,100 @@ constexpr double kDegrees = 57.29577951308232;  // degrees in a radian
 struct Arguments {
   Common common;
   std::string matches, pose;
+  std::vector<std::string> images;  // none, or the two that were matched
   CameraOptions cameras;
   double max_error_px = Options().estimate.max_error_px;
 };
 
 // Throws BadInput where a matched pixel is not in the image that its camera is for: then the
-// matches are of images of another size. One pixel is allowed for other conventions of the origin.
-void require_inside(const Arguments& a, const MatchList& matches,
-                    const std::array<tv_camera, 2>& camera,
-                    const std::array<std::string, 2>& camera_files) {
+// matches are of images of another size. Without images to compare with, matches of images that
+// were made smaller show by a large part of the camera's image in which there is no match.
+void require_inside(const Arguments& a, const MatchList& matches, const ImageCameras& cameras) {
+  constexpr size_t telling = 20;  // matches
+  bool leaves_room = matches.size() >= telling && a.images.empty() && a.common.options.resize < 0;
+  double farthest[2][2] = {{0, 0}, {0, 0}};
   for (size_t v = 0; v < 2; ++v) {
+    const tv_camera& camera = cameras[v].camera;
     for (size_t i = 0; i < matches.size(); ++i) {
       const double x = matches.pixels[v][2 * i], y = matches.pixels[v][2 * i + 1];
-      if (!(x < -1 || y < -1 || x > camera[v].width || y > camera[v].height)) continue;
+      farthest[v][0] = std::max(farthest[v][0], x);
+      farthest[v][1] = std::max(farthest[v][1], y);
+      if (!(x < -1 || y < -1 || x > camera.width || y > camera.height)) continue;
       char text[96];
       std::snprintf(text, sizeof text, "has the pixel (%g, %g) in image %d, but camera ", x, y,
                     static_cast<int>(v));
-      throw BadInput(a.matches + " " + text + camera_files[v] + " is for " +
-                     std::to_string(camera[v].width) + "x" + std::to_string(camera[v].height) +
-                     ": give the camera of the images that were matched");
+      throw BadInput(a.matches + " " + text + cameras[v].file + " is for " +
+                     std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                     ": give the camera of the images that were matched, and --resize as there");
     }
+    leaves_room =
+        leaves_room && 2 * farthest[v][0] < camera.width && 2 * farthest[v][1] < camera.height;
   }
+  if (!leaves_room) return;
+  char text[200];
+  std::snprintf(text, sizeof text,
+                " has no pixel beyond (%.0f, %.0f), but the camera is for %dx%d: were the images "
+                "made smaller before? --resize L scales the camera with them, --resize 0 leaves it",
+                farthest[0][0], farthest[0][1], cameras[0].camera.width, cameras[0].camera.height);
+  throw BadInput(a.matches + text);
 }
 
-std::vector<tv_point> triangulated(const Arguments& a, const MatchList& matches,
-                                   const KnownPose& pose,
-                                   const std::array<std::string, 2>& camera_files) {
-  std::array<tv_camera, 2> camera = CameraOptions::load(camera_files);
-  require_inside(a, matches, camera, camera_files);
-  for (tv_camera& c : camera) c = pose.corrected(c);
+// What is known of each image: of the image files, else, for --focal-35mm, of the file with the
+// pose; the width is 0 where nothing is known.
+std::array<ImageFacts, 2> images_of(const Arguments& a, const KnownPose& pose) {
+  std::array<ImageFacts, 2> images;
+  for (size_t v = 0; v < 2; ++v) {
+    if (!a.images.empty()) {
+      images[v] = facts_of(load_picture(a.images[v]));
+    } else if (a.cameras.focal_35mm > 0) {
+      images[v] = {"", pose.sizes[v][0], pose.sizes[v][1], 0};
+    }
+  }
+  return images;
+}
+
+// The cameras of the matched images, scaled as `match` with the same --resize scaled the images.
+ImageCameras matched_cameras(Arguments& a, const KnownPose& pose) {
+  if (!a.cameras.given() && a.images.empty())
+    throw BadInput(
+        "cameras are needed: give --camera, or --camera0 and --camera1, or --focal-35mm; or "
+        "--images A B with a focal length in their EXIF data");
+  const std::array<ImageFacts, 2> images = images_of(a, pose);
+  for (const ImageFacts& image : images)
+    if (image.width == 0 && a.cameras.focal_35mm > 0)
+      throw BadInput(
+          "--focal-35mm needs the size of the images: give --images A B, or a --pose "
+          "with image_size0 and image_size1");
+  ImageCameras cameras = a.cameras.cameras_of(images[0], images[1]);
+  if (cameras[0].source == ImageCamera::kNone)
+    throw BadInput("cameras are needed: " + images[images[0].exif_focal_35mm > 0 ? 1 : 0].name +
+                   " has no focal length in EXIF data");
+  const std::string note = exif_note(cameras);
+  if (!note.empty()) a.common.note(note);
+  for (ImageCamera& camera : cameras) {
+    Options& options = a.common.options;
+    // Without the images only --resize itself says that they were made smaller.
+    const int longer = a.images.empty()
+                           ? std::max(options.resize, 0)
+                           : options.longer_side(camera.camera.width, camera.camera.height);
+    const tv_camera whole = camera.camera;
+    const cv::Size size = shrunk_size({whole.width, whole.height}, longer);
+    camera.camera = resized(whole, size.width, size.height);
+    if (options.resize != kByItself || camera.camera.width == whole.width) continue;
+    options.was_large = true;
+    a.common.note("the matches are taken as of images at " + std::to_string(size.width) + "x" +
+                  std::to_string(size.height) + ", as match makes those of " +
+                  std::to_string(whole.width) + "x" + std::to_string(whole.height) +
+                  " (--resize 0: as they are)");
+  }
+  return cameras;
+}
+
+std::vector<tv_point> triangulated(Arguments& a, const MatchList& matches, const KnownPose& pose,
+                                   const ImageCameras& cameras) {
+  require_inside(a, matches, cameras);
+  const tv_camera camera[2] = {pose.corrected(cameras[0].camera),
+                               pose.corrected(cameras[1].camera)};
   std::vector<tv_point> points(matches.size());
   const auto method = static_cast<tv_triangulation>(a.common.options.triangulation);
   check(tv_triangulate(method, &camera[0], &camera[1], pose.R.data(), pose.t.data(),
@@ -78,7 +145,7 @@ std::vector<CloudPoint> cloud(const std::vector<tv_point>& points, double max_er
 }
 
 Json result(const Arguments& a, const std::vector<tv_point>& points, const KnownPose& pose,
-            const std::array<std::string, 2>& camera_files) {
+            const ImageCameras& cameras) {
   int counts[4] = {};
   int num_wanted = 0;
   double sum_sq = 0;
@@ -105,10 +172,13 @@ Json result(const Arguments& a, const std::vector<tv_point>& points, const Known
                               {"angle_deg", p.angle_rad * kDegrees},
                               {"error_px", shortest(p.error_px)},
                               {"status", point_status_name(p.status)}});
-  json["options"] = options_json(a.common.options, kTriangulate);
+  json["cameras"] = cameras_json(cameras);
+  json["options"] = options_json(a.common.options, kTriangulate | kResize);
   json["options"]["max_error_px"] = a.max_error_px;
-  json["options"]["camera0"] = camera_files[0];
-  json["options"]["camera1"] = camera_files[1];
+  for (size_t v = 0; v < 2; ++v) {
+    const std::string& file = cameras[v].file;
+    json["options"]["camera" + std::to_string(v)] = file.empty() ? Json() : Json(file);
+  }
   json["version"] = tv_version_string();
   return json;
 }
@@ -149,11 +219,10 @@ int triangulate(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
   const std::array<std::string, 2> camera_files = a.cameras.files();
-  if (camera_files[0].empty())
-    throw BadInput("cameras are needed: give --camera, or --camera0 and --camera1");
   const KnownPose pose = load_pose(a.pose);
   const MatchList matches = load_matches(a.matches);
-  const std::vector<tv_point> points = triangulated(a, matches, pose, camera_files);
+  const ImageCameras cameras = matched_cameras(a, pose);
+  const std::vector<tv_point> points = triangulated(a, matches, pose, cameras);
 
   const fs::path output(common.output);
   const std::string kind = output.extension().string();
@@ -161,11 +230,13 @@ int triangulate(Arguments& a) {
   OutputSet files(is_file ? output.parent_path() : output);
   files.keep(a.matches);
   files.keep(a.pose);
-  for (const std::string& camera : camera_files) files.keep(camera);
-  const Json json = result(a, points, pose, camera_files);
+  for (const std::string& camera : camera_files) files.keep(camera_path(camera));
+  for (const std::string& image : a.images) files.keep(image);
+  const Json json = result(a, points, pose, cameras);
   add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px)), files);
   if (common.json) print(json_text(json));
-  if (common.speaks()) print(summary(json, files));
+  const std::string notes = common.note_lines();
+  if (common.speaks()) print(notes + summary(json, files));
   files.commit();
   return 0;
 }
@@ -180,6 +251,11 @@ void add_triangulate(CLI::App& program, Run& run) {
       ->required()
       ->type_name("FILE");
   a->cameras.add_to(*verb);
+  verb->add_option("--images", a->images,
+                   "the two images that were matched, whose sizes are checked and whose EXIF data "
+                   "are read")
+      ->expected(2)
+      ->type_name("A B");
   verb->add_option("--pose", a->pose,
                    "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px is used "
                    "too, or YAML")
@@ -194,7 +270,7 @@ void add_triangulate(CLI::App& program, Run& run) {
       })
       ->type_name("(0, 1e9]")
       ->capture_default_str();
-  add_common(*verb, a->common, kTriangulate,
+  add_common(*verb, a->common, kTriangulate | kResize,
              "folder for points.csv and cloud.ply, or one file ending in .csv or .ply");
   verb->final_callback([a, &run] { run = [a] { return triangulate(*a); }; });
 }

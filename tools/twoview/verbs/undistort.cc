@@ -8,9 +8,11 @@
 
 #include "base/error.h"
 #include "base/output.h"
-#include "files/camera_file.h"
+#include "base/terminal.h"
+#include "files/camera_formats.h"
 #include "files/image_file.h"
 #include "pair/result.h"
+#include "verbs/camera_options.h"
 #include "verbs/verbs.h"
 
 namespace cli {
@@ -23,7 +25,8 @@ struct Arguments {
   Common common;
   std::vector<std::string> images;
   std::string camera;
-  double focal_scale = 1;
+  double focal_35mm = 0, focal_scale = 1;
+  int resize = 0;  // longer side of the results, pixels; 0: as the images are
   bool mask = false;
 };
 
@@ -83,9 +86,26 @@ std::vector<std::string> result_names(const std::vector<std::string>& images, bo
   return names;
 }
 
+// The camera of the images, which are all of one size.
+tv_camera lens_of(const Arguments& a) {
+  if (a.camera.empty() == !(a.focal_35mm > 0))
+    throw BadInput("give either --camera or --focal-35mm");
+  const std::string name = fs::path(a.images[0]).filename().string();
+  if (!a.camera.empty()) return load_camera(a.camera, name);
+  const cv::Mat image = load_pixels(a.images[0]);
+  return film_camera(a.focal_35mm, image.cols, image.rows);
+}
+
+// The camera's name for messages.
+std::string camera_name(const Arguments& a) {
+  return a.camera.empty() ? "of --focal-35mm, of the first image," : a.camera;
+}
+
 int undistort(Arguments& a) {
   Common& common = a.common;
-  const tv_camera lens = load_camera(a.camera);
+  const tv_camera whole = lens_of(a);
+  const cv::Size size = shrunk_size({whole.width, whole.height}, a.resize);
+  const tv_camera lens = resized(whole, size.width, size.height);
   if (lens.width > kMaxSide || lens.height > kMaxSide)
     throw BadInput("camera " + a.camera + " is for images above " + std::to_string(kMaxSide) +
                    " a side");
@@ -96,7 +116,7 @@ int undistort(Arguments& a) {
   pinhole.fy *= a.focal_scale;
   const std::vector<std::string> names = result_names(a.images, a.mask);
   OutputSet files(common.output);
-  files.keep(a.camera);
+  if (!a.camera.empty()) files.keep(camera_path(a.camera));
   for (const std::string& image : a.images) files.keep(image);
   const Map map = map_to(lens, pinhole);
   const double share = cv::countNonZero(map.seen) / static_cast<double>(map.seen.total());
@@ -104,10 +124,17 @@ int undistort(Arguments& a) {
     throw BadInput("camera " + a.camera +
                    " sees no pixel of the result: check its principal point and "
                    "distortion, or --focal-scale");
+  const Progress progress(!common.quiet && a.images.size() > 1);
   for (size_t i = 0; i < a.images.size(); ++i) {
-    const cv::Mat image = load_pixels(a.images[i]);
-    require_size(lens, a.camera, image.cols, image.rows, a.images[i]);
+    cv::Mat image = load_pixels(a.images[i]);
+    require_size(whole, camera_name(a), image.cols, image.rows, a.images[i]);
+    if (size != image.size()) {
+      cv::Mat smaller;
+      cv::resize(image, smaller, size, 0, 0, cv::INTER_AREA);
+      image = smaller;
+    }
     files.add(names[i], png_bytes(undistorted(image, map)));
+    progress.tell(std::to_string(i + 1) + " of " + std::to_string(a.images.size()) + " images");
   }
   if (a.mask) files.add("mask.png", png_bytes(map.seen));
   files.add("camera.yaml", camera_yaml(pinhole));
@@ -119,7 +146,13 @@ int undistort(Arguments& a) {
     json["image_size"] = {pinhole.width, pinhole.height};
     json["camera_matrix"] = {pinhole.fx, 0, pinhole.cx, 0, pinhole.fy, pinhole.cy, 0, 0, 1};
     json["seen_share"] = share;
-    json["options"] = {{"camera", a.camera}, {"focal_scale", a.focal_scale}, {"mask", a.mask}};
+    json["options"] = {
+        {"camera", a.camera.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(a.camera)},
+        {"focal_35mm",
+         a.focal_35mm > 0 ? nlohmann::ordered_json(a.focal_35mm) : nlohmann::ordered_json()},
+        {"resize", a.resize},
+        {"focal_scale", a.focal_scale},
+        {"mask", a.mask}};
     json["version"] = tv_version_string();
     print(json_text(json));
   }
@@ -142,9 +175,20 @@ void add_undistort(CLI::App& program, Run& run) {
   CLI::App* verb =
       program.add_subcommand("undistort", "images without the lens's distortion, and their camera");
   verb->add_option("IMAGE", a->images, "images of one camera")->required()->type_name("IMAGE");
-  verb->add_option("--camera", a->camera, "their camera, OpenCV or ROS YAML")
-      ->required()
+  verb->add_option("--camera", a->camera,
+                   "their camera: YAML of OpenCV, ROS or Kalibr, cameras.yaml, or COLMAP's "
+                   "cameras.txt; FILE:NAME takes one of several")
       ->type_name("FILE");
+  add_focal_35mm(*verb, a->focal_35mm);
+  verb->add_option("--resize", a->resize,
+                   "scale images and camera down to this longer side, pixels; 0: as they are")
+      ->check([](const std::string& text) {
+        int value = 0;
+        const bool good = CLI::detail::lexical_cast(text, value) && value >= 0 && value <= kMaxSide;
+        return good ? std::string() : "'" + text + "' is not a whole number in [0, 16384]";
+      })
+      ->type_name("[0, 16384]")
+      ->capture_default_str();
   verb->add_option("--focal-scale", a->focal_scale,
                    "focal lengths of the result over the camera's; below 1 shows more of the scene")
       ->check([](const std::string& text) {

@@ -7,9 +7,8 @@ import os
 import numpy as np
 
 from .. import ROOT, formats
+from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
 
-MAX_NATIVE_SIDE = 1241  # pixels; by default a set of images with a longer side is resized
-RESIZE_LONG_SIDE = 640  # pixels, the long side of an image after resizing
 # The sets of wide baselines and changes of scale; every other set is of the group "narrow", as the
 # data's README.md defines both.
 WIDE_SETS = ("strecha_fountain_P11", "strecha_Herz_Jesus_P8", "middlebury_templeSR",

@@ -1,6 +1,7 @@
 """The cameras of images: from camera files and cameras.yaml (twoview_tools.formats), or from a
 pair's K."""
 
+import math
 import os
 
 import twoview as tv
@@ -41,12 +42,32 @@ def write_camera_set(cameras):
     return text
 
 
-class CameraChoice:
-    """Chooses the camera of an image from the given or found camera files."""
+def film_camera(focal_35mm, width, height):
+    """A pinhole camera from the focal length as for 35 mm film, in millimetres, as the program's
+    --focal-35mm makes it: of the image's diagonal, with the principal point in its middle."""
+    focal = focal_35mm * math.hypot(width, height) / math.hypot(36, 24)
+    return tv.Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
-    def __init__(self, files, folders):
-        """files: the camera files of --camera. folders: if `files` is empty, the first cameras.yaml
-        in these folders is read."""
+
+def resized(camera, width, height):
+    """The camera of an image that was resized: on each axis, with s = new size / old size, f' = s f
+    and c' = s (c + 0.5) - 0.5."""
+    sx, sy = width / camera.width, height / camera.height
+    return tv.Camera(width, height, sx * camera.fx, sy * camera.fy, sx * (camera.cx + 0.5) - 0.5,
+                     sy * (camera.cy + 0.5) - 0.5, camera.model, camera.k)
+
+
+class CameraChoice:
+    """Chooses the camera of an image from the given or found camera files, or makes it from a focal
+    length as for 35 mm film."""
+
+    def __init__(self, files, folders, focal_35mm=0):
+        """files: the camera files of --camera. folders: if `files` is empty and focal_35mm is 0,
+        the first cameras.yaml in these folders is read."""
+        self.focal_35mm = focal_35mm
+        if focal_35mm:
+            self.cameras = {}
+            return
         paths = list(files)
         for folder in folders if not files else ():
             path = os.path.join(folder, "cameras.yaml")
@@ -60,6 +81,8 @@ class CameraChoice:
         """The camera of an image of this size. formats.choose_entry defines the choice. If the
         pair's line has K, it replaces the camera's intrinsics; without a camera it makes a
         pinhole."""
+        if self.focal_35mm and K is None:
+            return film_camera(self.focal_35mm, width, height)
         with refused(name):
             found = formats.choose_camera(self.cameras, name, K)
         camera = None if found is None else _camera(found)

@@ -28,6 +28,33 @@ def _count(text):
     return value
 
 
+def _focal_35mm(text):
+    value = float(text)
+    if not 1 <= value <= 10000:
+        raise ValueError
+    return value
+
+
+def _longer_side(text):
+    value = int(text)
+    if not 0 <= value <= 16384:
+        raise ValueError
+    return value
+
+
+# argparse names the function in its message: "invalid ... value".
+_focal_35mm.__name__ = "millimetres (1 to 10000, with a decimal point)"
+_longer_side.__name__ = "pixels (0 to 16384)"
+
+
+def _add_size_and_focal(parser):
+    parser.add_argument("--focal-35mm", type=_focal_35mm, default=0.0, metavar="MM",
+                        help="in place of a camera file: the focal length as for 35 mm film")
+    parser.add_argument("--resize", type=_longer_side, default=0, metavar="L",
+                        help="scale images and cameras down to this longer side, pixels; what is "
+                             "written is of such images (default: 0, as they are)")
+
+
 def _choice_of_pairs(parser, required=False):
     which = parser.add_mutually_exclusive_group(required=required)
     which.add_argument("--pairs", default="", metavar="FILE", help="the pairs of a pairs file")
@@ -49,6 +76,7 @@ def _add_export(verbs):
         help="one camera for all images, or several, each for the files whose names begin with its "
              "own",
     )
+    _add_size_and_focal(parser)
     parser.add_argument("--schema", choices=("4", "3.8"), default="4",
                         help="COLMAP 4, or 3.8 as Debian has it (default: 4)")
     parser.add_argument("--append", action="store_true", help="add to a database that is there")
@@ -59,6 +87,8 @@ def _add_export(verbs):
 
 def _export(arguments):
     from .exporter import Job, export
+    if arguments.camera and arguments.focal_35mm:
+        raise BadInput("give either --camera or --focal-35mm")
     job = Job(
         arguments.database,
         arguments.images,
@@ -68,6 +98,8 @@ def _export(arguments):
         arguments.schema,
         arguments.append,
         arguments.quiet or arguments.json,
+        arguments.focal_35mm,
+        arguments.resize,
     )
     counts = export(job, *(settings.options_of(arguments, kind) for kind in
                            (tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))
@@ -155,11 +187,12 @@ def _add_model(verbs):
     )
     parser.add_argument("images", nargs=2, metavar="IMAGE")
     parser.add_argument(
-        "--camera", required=True, metavar="YAML", help="of both images, or of the first"
+        "--camera", default="", metavar="YAML", help="of both images, or of the first"
     )
     parser.add_argument(
         "--camera1", default="", metavar="YAML", help="of the second, where it is another"
     )
+    _add_size_and_focal(parser)
     parser.add_argument("-o", "--output", required=True, metavar="DIR",
                         help="of cameras.txt, images.txt, points3D.txt and trajectory.tum")
     settings.add_options(parser)
@@ -167,13 +200,19 @@ def _add_model(verbs):
 
 
 def _model(arguments):
-    from .cameras import read_camera
+    from .cameras import film_camera, read_camera
+    from .images import read_luma
     from .model import text_model
     from .output import write_files
     from .trajectory import write_trajectory
     from .two_view_model import reconstruct
     a = arguments
-    cameras = [read_camera(path) for path in (a.camera, a.camera1 or a.camera)]
+    if bool(a.camera) == bool(a.focal_35mm) or (a.camera1 and a.focal_35mm):
+        raise BadInput("model needs either --camera or --focal-35mm")
+    if a.focal_35mm:
+        cameras = [film_camera(a.focal_35mm, *read_luma(path).shape[::-1]) for path in a.images]
+    else:
+        cameras = [read_camera(path) for path in (a.camera, a.camera1 or a.camera)]
     names = [os.path.basename(path) for path in a.images]
     if names[0] == names[1]:
         raise BadInput(
@@ -181,7 +220,7 @@ def _model(arguments):
             f"names"
         )
     pose, model = reconstruct(a.images, names, cameras, *(settings.options_of(a, kind) for kind in (
-        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)))
+        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)), resize=a.resize)
     if model is None:
         print(f"twoview: no full pose: {pose.kind.name.lower()}", file=sys.stderr)
         return EXIT_NO_POSE

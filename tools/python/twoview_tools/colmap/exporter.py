@@ -9,7 +9,7 @@ import numpy as np
 import twoview as tv
 
 from . import conventions
-from .cameras import CameraChoice
+from .cameras import CameraChoice, resized
 from .database import (
     SCHEMAS,
     appended_database,
@@ -22,7 +22,7 @@ from .database import (
 )
 from .engine import Engine, pixels_of
 from .errors import BadInput
-from .images import list_images, read_luma
+from .images import list_images, read_luma, shrunk
 from .pairs import exhaustive, read_pairs, sequential
 from .progress import progress
 from .settings import PRINCIPAL_POINT_SIGMA_OF_A_DATABASE
@@ -47,6 +47,8 @@ class Job:
     schema: str = "4"
     append: bool = False
     quiet: bool = False
+    focal_35mm: float = 0  #: makes the cameras, in place of files; 0: not given
+    resize: int = 0  #: longer side to which images and cameras are scaled down; 0: as they are
 
 
 def choose_pairs(job):
@@ -82,11 +84,14 @@ def _intrinsics(job, pairs):
 def _describe_images(job, pairs, engine):
     folders = [os.path.dirname(os.path.abspath(job.pairs))] if job.pairs else []
     folders += [job.images, os.path.dirname(os.path.abspath(job.images))]
-    choice = CameraChoice(job.cameras, folders)
+    choice = CameraChoice(job.cameras, folders, job.focal_35mm)
     views = {}
     for name, K in progress(_intrinsics(job, pairs).items(), "image", job.quiet):
         luma = read_luma(os.path.join(job.images, name))
         camera = choice.of(name, luma.shape[1], luma.shape[0], K)
+        if job.resize:
+            luma = shrunk(luma, job.resize)
+            camera = resized(camera, luma.shape[1], luma.shape[0])
         views[name] = View(camera, *engine.extract(luma, name))
     return views
 

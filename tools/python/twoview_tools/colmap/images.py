@@ -1,5 +1,6 @@
 """Reads image files in the same way as the program `twoview`."""
 
+import math
 import os
 
 import numpy as np
@@ -41,6 +42,24 @@ def _decode(path):
     if image.ndim == 3 and image.shape[2] not in (3, 4):
         raise BadInput(f"image {path}: {image.shape[2]} channels, not 1, 3 or 4")
     return image
+
+
+def shrunk_size(width, height, longer):
+    """The size of an image whose longer side is scaled down to `longer`, as the program's --resize
+    does: never up, 0 leaves it, and the other side is rounded to whole pixels."""
+    if not 0 < longer < max(width, height):
+        return width, height
+    scale = longer / max(width, height)
+    return tuple(max(1, math.floor(side * scale + 0.5)) for side in (width, height))
+
+
+def shrunk(image, longer):
+    """The image, scaled down by area averaging so that its longer side is `longer`."""
+    size = shrunk_size(image.shape[1], image.shape[0], longer)
+    if size == (image.shape[1], image.shape[0]):
+        return image
+    import cv2
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
 
 
 def read_luma(path):

@@ -3,15 +3,17 @@
 import numpy as np
 import twoview as tv
 
+from .cameras import resized
 from .engine import pixels_of
 from .errors import BadInput
-from .images import read_luma, read_rgb
+from .images import read_luma, read_rgb, shrunk
 from .model import TwoViewModel
 
 
-def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
-    """(TwoView, TwoViewModel); the model is None without a full pose. Its cameras are those that
-    pose and points refer to: the given ones with the estimated shift of the principal point
+def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None, resize=0):
+    """(TwoView, TwoViewModel); the model is None without a full pose. Images and cameras are scaled
+    down so that the longer side is `resize`, where it is above 0. The model's cameras are those
+    that pose and points refer to: the given ones with the estimated shift of the principal point
     (twoview.corrected_camera)."""
     lumas = [read_luma(path) for path in paths]
     for path, luma, camera in zip(paths, lumas, cameras):
@@ -20,6 +22,9 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
                 f"image {path} is {luma.shape[1]}x{luma.shape[0]}, but its camera is for "
                 f"{camera.width}x{camera.height}"
             )
+    lumas = [shrunk(luma, resize) for luma in lumas]
+    cameras = [resized(camera, luma.shape[1], luma.shape[0])
+               for camera, luma in zip(cameras, lumas)] if resize else cameras
     feature = feature or tv.FeatureOptions()
     try:
         with tv.Context(
@@ -43,7 +48,7 @@ def reconstruct(paths, names, cameras, feature=None, match=None, estimate=None):
         return pose, None
     good = cloud.inlier_mask & (cloud.points["status"] == tv.PointStatus.OK)
     pixels = tuple(pixels_of(cloud.keypoints[i])[cloud.matches[f"idx{i}"][good]] for i in range(2))
-    rgb = read_rgb(paths[0])
+    rgb = shrunk(read_rgb(paths[0]), resize)
     x, y = np.floor(pixels[0].T + 0.5).astype(int)  # the pixel that contains the keypoint
     colours = rgb[np.clip(y, 0, rgb.shape[0] - 1), np.clip(x, 0, rgb.shape[1] - 1)]
     points = cloud.points[good]

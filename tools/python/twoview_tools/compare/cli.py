@@ -1,6 +1,5 @@
 """compare_colmap: the command line, the run over all pairs, and the files that it writes."""
 
-import argparse
 import contextlib
 import hashlib
 import json
@@ -14,13 +13,10 @@ import numpy as np
 from .. import formats
 from ..accuracy import datasets
 from . import cluster, results, systems
+from .arguments import PROGRAM, make_parser
 
 FORMAT = 1  # increase it if a change here changes the stored result of a pair
 REFERENCE_TIMEOUT_S = 3600
-DESCRIPTION = """Runs twoview, COLMAP, OpenGV, OpenCV and PoseLib on the same image pairs and writes
-a report: index.html, pairs.csv, report.json. See docs/compare.md."""
-
-
 class BadInput(Exception):
     """Bad input: one line for the user and exit status 2."""
 
@@ -28,42 +24,7 @@ class BadInput(Exception):
 # ---- the command line --------------------------------------------------------------------------
 
 def parse(words):
-    parser = argparse.ArgumentParser(
-        prog="compare_colmap", description=DESCRIPTION,
-        epilog="exit status: 0 a report, whatever its rows say; 2 bad input; 130 interrupted "
-               "(the same command goes on)")
-    parser.add_argument("pairs", nargs="+", metavar="PAIRS.txt",
-                        help="lists of pairs: name0 name1 rot0 rot1 K0(9) K1(9) [T_0to1(16)]; "
-                             "cameras.yaml beside one is read")
-    parser.add_argument("--images", metavar="DIR",
-                        help="folder of the images (default: images/ beside each list)")
-    parser.add_argument("-o", "--output", required=True, metavar="REPORT_DIR")
-    parser.add_argument("--reference", choices=("truth", "colmap"), default="truth",
-                        help="errors are against the lists' true poses (default), or against "
-                             "COLMAP's own reconstruction of the images")
-    parser.add_argument("--systems", metavar="A,B,..",
-                        help="only these: ids, families (opengv, opencv, ..), pipelines, solvers, "
-                             "triangulations (default: all)")
-    parser.add_argument("--matches", default="twoview", choices=systems.PIPELINES,
-                        help="whose matches the solvers get (default twoview)")
-    parser.add_argument("--max-error-px", type=float, default=1.0, metavar="E",
-                        help="inlier threshold of every system that takes one (default 1)")
-    parser.add_argument("--resize", type=int, metavar="L",
-                        help="long side of the images; 0: as they are (default: "
-                             f"{datasets.RESIZE_LONG_SIDE} for those with a longer "
-                             f"side than {datasets.MAX_NATIVE_SIDE})")
-    parser.add_argument("--seed", type=int, default=0, metavar="N")
-    parser.add_argument("--max-pairs", type=int, default=0, metavar="N",
-                        help="at most N pairs of each list, evenly spaced")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N",
-                        help="pairs at a time, each in processes of its own (default 1)")
-    parser.add_argument("--scheduler", metavar="ADDRESS",
-                        help="hand the pairs to this dask.distributed cluster, which sees the same "
-                             "folders")
-    parser.add_argument("--timeout", type=float, default=60.0, metavar="S",
-                        help="seconds that a system may take for a pair (default 60)")
-    parser.add_argument("--quiet", action="store_true", help="no progress and no table")
-    arguments = parser.parse_args(words)
+    arguments = make_parser().parse_args(words)
     if arguments.jobs < 1:
         raise BadInput("--jobs: at least 1")
     if not 0 <= arguments.seed < 2**31:
@@ -271,7 +232,7 @@ def run_pairs(tasks, keys, workers, store, quiet):
     found = [store.get(key) for key in keys]
     todo = [i for i, result in enumerate(found) if result is None]
     if len(todo) < len(tasks) and not quiet:
-        print(f"compare_colmap: going on: {len(tasks) - len(todo)} of {len(tasks)} pairs are done",
+        print(f"{PROGRAM}: going on: {len(tasks) - len(todo)} of {len(tasks)} pairs are done",
               file=sys.stderr)
     with tqdm(total=len(tasks), initial=len(tasks) - len(todo), unit="pair", smoothing=0.05,
               disable=quiet or not sys.stderr.isatty(), file=sys.stderr) as bar:
@@ -297,7 +258,7 @@ def compare(arguments):
         raise BadInput(f"-o: {error.filename}: {error.strerror}") from error
     if arguments.reference == "truth" and not any(t["truth"] for t in tasks) \
             and not arguments.quiet:
-        print("compare_colmap: no pair has a true pose, so there are no errors; --reference colmap "
+        print(f"{PROGRAM}: no pair has a true pose, so there are no errors; --reference colmap "
               "takes COLMAP's reconstruction", file=sys.stderr)
     start = time.time()
     try:
@@ -306,7 +267,7 @@ def compare(arguments):
                                            "timeout_s": 120}])
             missing = {m: v["missing"] for m, v in versions.items() if "missing" in v}
             for module, why in missing.items():
-                print(f"compare_colmap: {module} is missing: {why}", file=sys.stderr)
+                print(f"{PROGRAM}: {module} is missing: {why}", file=sys.stderr)
             told = set_references(arguments, tasks, workers, store, hashes)
             for task in tasks:
                 task["missing"] = missing
@@ -342,13 +303,13 @@ def main(words=None):
     try:
         compare(parse(words))
     except BadInput as error:
-        print(f"compare_colmap: {error}", file=sys.stderr)
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("\ncompare_colmap: interrupted; the same command goes on where it stopped",
+        print(f"\n{PROGRAM}: interrupted; the same command goes on where it stopped",
               file=sys.stderr)
         return 130
     except OSError as error:
-        print(f"compare_colmap: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
+        print(f"{PROGRAM}: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
         return 2
     return 0

@@ -74,7 +74,7 @@ def _triangulations():
 
 SYSTEMS = (*_pipelines(), *_solvers(), *_triangulations())
 KINDS = ("pipeline", "solver", "triangulation")
-PIPELINES = [s.id for s in SYSTEMS if s.kind == "pipeline"]
+PIPELINES = [s.id for s in SYSTEMS if s.kind == "pipeline"]  # arguments.PIPELINES
 
 
 def of_kind(kind, ids=None):

@@ -8,7 +8,7 @@ import re
 from mkdocs.structure.files import File
 
 from twoview_tools import ROOT
-from twoview_tools.docs import reference
+from twoview_tools.docs import formulas, reference
 
 # The pages of the site that are made from files outside docs/.
 ELSEWHERE = {"examples/README.md": "examples.md", "CHANGELOG.md": "changelog.md"}
@@ -86,7 +86,7 @@ def on_page_markdown(markdown, page, config, files):
     )
     markdown = re.sub(r"(!?)\[((?:[^][]|\[[^]]*\])*)\]\(([^()\s#]*)(#[^()\s]*)?\)",
                       lambda found: link(found, source, place), markdown)
-    return with_blank_lines(markdown)
+    return with_blank_lines(formulas.rendered(markdown))
 
 
 def link(found, source, place):

@@ -1,0 +1,174 @@
+#!/usr/bin/env python3
+"""Tests of camera files of every format: each gives the same camera as OpenCV's own file."""
+import json
+import unittest
+
+import cli_support as cli
+from cli_support import HEIGHT, WIDTH, camera_yaml
+
+FX, FY, CX, CY = 301.5, 299.25, 158.5, 121.25
+RADTAN = (-0.21, 0.05, 0.001, -0.002)
+FISHEYE = (0.02, -0.01, 0.003, -0.001)
+
+
+def opencv(k, model=""):
+    return camera_yaml(fx=FX, fy=FY, cx=CX, cy=CY, k=k) + model
+
+
+def kalibr(entries="cam0", model="radtan", k=RADTAN, camera_model="pinhole"):
+    return "".join(
+        f"{name}:\n  cam_overlaps: []\n  camera_model: {camera_model}\n"
+        f"  distortion_coeffs: {list(k)}\n  distortion_model: {model}\n"
+        f"  intrinsics: [{FX}, {FY}, {CX}, {CY}]\n  resolution: [{WIDTH}, {HEIGHT}]\n"
+        f"  rostopic: /{name}/image_raw\n" for name in entries.split())
+
+
+# EuRoC's sensor.yaml, with its T_BS.
+EUROC = f"""#Default imu sensor yaml file
+sensor_type: camera
+comment: VI-Sensor cam0 (MT9M034)
+T_BS:
+  cols: 4
+  rows: 4
+  data: [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+rate_hz: 20
+resolution: [{WIDTH}, {HEIGHT}]
+camera_model: pinhole
+intrinsics: [{FX}, {FY}, {CX}, {CY}] #fu, fv, cu, cv
+distortion_model: radial-tangential
+distortion_coefficients: {list(RADTAN)}
+"""
+ROS_MESSAGE = f"""header: {{seq: 0, frame_id: camera}}
+height: {HEIGHT}
+width: {WIDTH}
+distortion_model: plumb_bob
+D: {list(RADTAN) + [0.0]}
+K: [{FX}, 0.0, {CX}, 0.0, {FY}, {CY}, 0.0, 0.0, 1.0]
+R: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+P: [{FX}, 0.0, {CX}, 0.0, 0.0, {FY}, {CY}, 0.0, 0.0, 0.0, 1.0, 0.0]
+"""
+SET = "".join(
+    f"{name}: {{fx: {fx}, fy: {FY}, cx: {CX}, cy: {CY}, image_width: {WIDTH}, "
+    f"image_height: {HEIGHT}, k1: {RADTAN[0]}, k2: {RADTAN[1]}, p1: {RADTAN[2]}, "
+    f"p2: {RADTAN[3]}}}\n" for name, fx in (("a", FX), ("left", 400)))
+
+
+def colmap(*lines):
+    return "# Camera list with one line of data per camera:\n" + "".join(f"{x}\n" for x in lines)
+
+
+def colmap_opencv(number=1, model="OPENCV", k=RADTAN):
+    lens = " ".join(map(str, k))
+    return f"{number} {model} {WIDTH} {HEIGHT} {FX} {FY} {CX + 0.5} {CY + 0.5} {lens}"
+
+
+class CameraFiles(cli.CliTest):
+    def undistorted(self, camera, *more, status=0):
+        """What undistort makes of image a with this camera: the file, and the new camera."""
+        out = self.folder / "u"
+        done = self.run_program("undistort", self.a, "--camera", camera, "-o", out, "--json", *more)
+        self.succeed(done, status)
+        K = json.loads(done.stdout)["camera_matrix"]
+        return (out / "a.png").read_bytes(), K
+
+    def assert_same(self, text, k, model="", name="cam"):
+        given = self.write("given", text)
+        pixels, K = self.undistorted(f"{given}{name.removeprefix('cam')}")
+        expected = self.undistorted(self.write("opencv.yaml", opencv(k, model)))
+        self.assertEqual(K, expected[1])
+        self.assertTrue(pixels == expected[0], "the lens is another one")
+        straight, _ = self.undistorted(self.write("opencv.yaml", opencv((0, 0, 0, 0))))
+        self.assertFalse(pixels == straight, "no lens at all")
+
+    def test_each_format_gives_the_camera_of_opencvs_own_file(self):
+        fisheye = "distortion_model: equidistant\n"
+        for case, text, k, model in (
+                ("Kalibr", kalibr(), RADTAN, ""),
+                ("Kalibr, equidistant", kalibr(model="equidistant", k=FISHEYE), FISHEYE, fisheye),
+                ("EuRoC", EUROC, RADTAN, ""),
+                ("ROS's message", ROS_MESSAGE, RADTAN, ""),
+                ("ROS 2's message", ROS_MESSAGE.replace("D:", "d:").replace("K:", "k:"), RADTAN,
+                 ""),
+                ("cameras.yaml", SET.split("\n")[0], RADTAN, ""),
+                ("COLMAP", colmap(colmap_opencv()), RADTAN, ""),
+                ("COLMAP, fisheye", colmap(colmap_opencv(1, "OPENCV_FISHEYE", FISHEYE)), FISHEYE,
+                 fisheye)):
+            with self.subTest(case=case):
+                self.assert_same(text, k, model)
+
+    def test_colmaps_models_with_one_focal_length(self):
+        for line, k in ((f"3 SIMPLE_RADIAL {WIDTH} {HEIGHT} 300 160 120 -0.1", (-0.1, 0, 0, 0)),
+                        (f"3 RADIAL {WIDTH} {HEIGHT} 300 160 120 -0.1 0.02", (-0.1, 0.02, 0, 0))):
+            with self.subTest(line=line):
+                expected = self.undistorted(
+                    self.write("e.yaml", camera_yaml(fx=300, fy=300, cx=159.5, cy=119.5, k=k)))
+                self.assertEqual(self.undistorted(self.write("c.txt", colmap(line))), expected)
+
+    def test_of_several_cameras_the_images_name_or_the_users_chooses(self):
+        self.assert_same(SET, RADTAN)  # the entry a begins the name a.png
+        self.assert_same(kalibr("cam0 cam1"), RADTAN, name="cam:cam1")
+        self.assert_same(colmap(colmap_opencv(7), colmap_opencv(9)), RADTAN, name="cam:9")
+        two = self.write("chain.yaml", kalibr("cam0 cam1"))
+        done = self.run_program("undistort", self.a, "--camera", two, "-o", self.out)
+        self.assert_refused(done, "2 cameras (cam0, cam1)", "chain.yaml:cam0")
+        done = self.run_program("undistort", self.a, "--camera", f"{two}:cam2", "-o", self.out)
+        self.assert_refused(done, "no camera 'cam2' but cam0, cam1")
+
+    def test_the_ids_of_colmaps_cameras_say_nothing_of_files_names(self):
+        image = self.write("1.png", self.a.read_bytes())
+        cameras = self.write("c.txt", colmap(colmap_opencv(1), colmap_opencv(2)))
+        done = self.run_program("undistort", image, "--camera", cameras, "-o", self.out)
+        self.assert_refused(done, "2 cameras (1, 2)")
+
+    def test_fourteen_coefficients_are_read_where_the_others_are_zero(self):
+        eight = (*RADTAN, 0.01, 0.002, -0.003, 0.004)
+        for zeros in (4, 6):
+            with self.subTest(count=8 + zeros):
+                self.assert_same(opencv((*eight, *[0] * zeros)), eight)
+        for place, count in ((8, 12), (13, 14)):
+            k = [*eight, *[0] * (count - 8)]
+            k[place] = 1e-3
+            with self.subTest(place=place):
+                done = self.run_program("undistort", self.a, "--camera",
+                                        self.write("t.yaml", opencv(k)), "-o", self.out)
+                self.assert_refused(done, f"distortion_coefficients[{place}] is not 0", "first 8")
+
+    def test_errors_name_the_field_and_the_formats_known(self):
+        for case, text, *words in (
+                ("nothing known", "width: 3\n", "camera_matrix is missing", "Kalibr", "COLMAP",
+                 "cameras.yaml", "ROS"),
+                ("no map", "hello\n", "no YAML map", "Kalibr"),
+                ("Kalibr's lens", kalibr(model="fov"), "cam0", "distortion_model 'fov'", "radtan"),
+                ("Kalibr's model", kalibr(camera_model="omni"), "camera_model 'omni'", "pinhole"),
+                ("Kalibr's count", kalibr(k=(1, 2)), "distortion_coeffs has 2 numbers, not 4"),
+                ("no resolution", kalibr().replace("resolution", "size"), "resolution is missing"),
+                ("COLMAP's model", colmap(f"1 FOV {WIDTH} {HEIGHT} 1 2 3 4 5"), "line 2", "FOV",
+                 "OPENCV_FISHEYE"),
+                ("COLMAP's count", colmap(f"1 PINHOLE {WIDTH} {HEIGHT} 1 2 3"), "line 2",
+                 "PINHOLE has 4 parameters, not 3"),
+                ("COLMAP's number", colmap(f"1 PINHOLE {WIDTH} {HEIGHT} 1 2 3 nan"), "'nan'"),
+                ("COLMAP's focal", colmap(f"1 PINHOLE {WIDTH} {HEIGHT} 0 2 3 4"), "fx is 0"),
+                ("K", ROS_MESSAGE.replace(f"K: [{FX}", "K: [0.0"), "fx (K[0]) is 0")):
+            with self.subTest(case=case):
+                done = self.run_program("undistort", self.a, "--camera",
+                                        self.write("bad", text), "-o", self.out)
+                self.assert_refused(done, "bad", *words)
+
+    def test_every_verb_takes_them(self):
+        chain = self.write("chain.yaml", kalibr("a b", "none", ()))
+        self.succeed(self.reconstruct("--camera", chain, camera=False))
+        self.assertEqual(self.result()["cameras"][1]["source"], "file")
+        matches = self.write("m.txt", "160 120 130 120\n")
+        done = self.run_program("triangulate", matches, "--camera0", f"{chain}:a", "--camera1",
+                                f"{chain}:b", "--pose", self.out / "result.json", "-o",
+                                self.folder / "t")
+        self.succeed(done)
+
+    def test_a_camera_on_a_pipe_is_read_once(self):
+        done = self.reconstruct("--camera", "/dev/stdin", camera=False,
+                                input=self.camera.read_bytes())
+        self.succeed(done)
+
+
+if __name__ == "__main__":
+    cli.main()

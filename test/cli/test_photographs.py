@@ -1,0 +1,294 @@
+#!/usr/bin/env python3
+"""Tests of photographs as people have them: EXIF's focal length, large ones, resized ones in every
+verb that takes a camera, and formats that are not read."""
+import json
+import math
+import struct
+import unittest
+
+import cli_support as cli
+from cli_support import FOCAL, HEIGHT, WIDTH, camera_yaml, png, png_chunk
+from test_bad_input import JPEG
+
+FOCAL_35MM = 32  # a whole number, as EXIF has it
+FOCAL_PX = FOCAL_35MM * math.hypot(WIDTH, HEIGHT) / math.hypot(36, 24)
+SHORT, LONG, RATIONAL = 3, 4, 5
+
+
+def exif(order="<", **tags):
+    """EXIF data with these tags of its own directory: name=(tag, type, value)."""
+    head = b"II*\0" if order == "<" else b"MM\0*"
+    entries, extra = b"", b""
+    first = 8 + 18  # behind the header and the first directory of one entry
+    data_at = first + 2 + 12 * len(tags) + 4
+    for tag, kind, value in sorted(tags.values()):
+        if kind == RATIONAL:
+            field = struct.pack(order + "I", data_at + len(extra))
+            extra += struct.pack(order + "II", *value)
+        elif kind == SHORT:
+            field = struct.pack(order + "HH", value, 0)
+        else:
+            field = struct.pack(order + "I", value)
+        entries += struct.pack(order + "HHI", tag, kind, 1) + field
+    return (head + struct.pack(order + "I", 8)
+            + struct.pack(order + "HHHIII", 1, 0x8769, LONG, 1, first, 0)
+            + struct.pack(order + "H", len(tags)) + entries + struct.pack(order + "I", 0) + extra)
+
+
+def film(mm):
+    return {"film": (0xA405, SHORT, mm)}
+
+
+def size(width, height):
+    return {"width": (0xA002, LONG, width), "height": (0xA003, LONG, height)}
+
+
+def with_exif(image, data):
+    """A PNG or JPEG file with EXIF data in it."""
+    if image.startswith(b"\xff\xd8"):
+        segment = b"Exif\0\0" + data
+        return image[:2] + b"\xff\xe1" + struct.pack(">H", len(segment) + 2) + segment + image[2:]
+    return image[:33] + png_chunk(b"eXIf", data) + image[33:]
+
+
+def larger(image, factor):
+    """The grey samples of a WIDTH x HEIGHT image, each repeated factor x factor times."""
+    rows = []
+    for y in range(HEIGHT):
+        row = b"".join(bytes([v]) * factor for v in image[y * WIDTH : (y + 1) * WIDTH])
+        rows += [row] * factor
+    return png(WIDTH * factor, HEIGHT * factor, b"".join(rows))
+
+
+class Exif(cli.CliTest):
+    def photographs(self, *data):
+        """The paths of both images with EXIF data of their own, or of one for both."""
+        return [self.write(path.name, with_exif(path.read_bytes(), block))
+                for path, block in zip((self.a, self.b), data * 2)]
+
+    def test_its_focal_length_is_used_and_said_where_no_camera_is_given(self):
+        for order in "<>":
+            self.a, self.b = self.photographs(exif(order, **film(FOCAL_35MM)))
+            done = self.succeed(self.reconstruct(camera=False))
+            self.assertIn(b"note         focal length 32 mm (35 mm equivalent) from EXIF; --camera "
+                          b"is better\n", done.stdout)
+            found = self.result()
+            self.assertEqual(found["cameras"],
+                             [{"source": "exif", "file": None, "focal_35mm": FOCAL_35MM}] * 2)
+            self.succeed(self.reconstruct("--focal-35mm", "32", camera=False))
+            given = self.result()
+            self.assertEqual(given["cameras"][0]["source"], "focal_35mm")
+            for key in ("R", "t", "covariance", "num_inliers", "verdict"):
+                self.assertEqual(found[key], given[key], key)
+
+    def test_it_is_never_silent(self):
+        self.a, self.b = self.photographs(exif(**film(FOCAL_35MM)))
+        for flag in ("--json", "--quiet"):
+            with self.subTest(flag=flag):
+                done = self.succeed(self.reconstruct(flag, camera=False))
+                self.one_line(done, "note: focal length 32 mm")
+
+    def test_a_camera_that_is_given_comes_before_it(self):
+        plain = self.succeed(self.reconstruct("--json"))
+        self.a, self.b = self.photographs(exif(**film(80)))
+        done = self.succeed(self.reconstruct("--json"))
+        self.assertEqual(done.stderr, b"")
+        self.assertEqual(json.loads(done.stdout)["R"], json.loads(plain.stdout)["R"])
+
+    def test_two_photographs_have_each_their_own(self):
+        self.a, self.b = self.photographs(exif(**film(32)), exif(**film(33)))
+        done = self.succeed(self.reconstruct(camera=False))
+        self.assertIn(b"focal lengths 32 and 33 mm", done.stdout)
+        self.assertEqual([c["focal_35mm"] for c in self.result()["cameras"]], [32, 33])
+
+    def test_the_size_of_the_sensor_serves_where_the_film_is_not_named(self):
+        # 24 mm on a sensor of 22.5 x 15 mm, of 6000 x 4000 pixels: 36 / 22.5 times as on film. The
+        # unit is an inch where no other is named.
+        for unit, per_mm in ((3, 10), (2, 25.4)):
+            data = exif(f=(0x920A, RATIONAL, (24, 1)), unit=(0xA210, SHORT, unit),
+                        x=(0xA20E, RATIONAL, (round(6000 / 22.5 * per_mm * 1000), 1000)),
+                        y=(0xA20F, RATIONAL, (round(4000 / 15 * per_mm * 1000), 1000)),
+                        **size(6000, 4500))
+            # 4:3, as the images are: the diagonal is of 22.5 x 16.875 mm.
+            self.a, self.b = self.photographs(data)
+            self.succeed(self.reconstruct(camera=False))
+            expected = 24 * math.hypot(36, 24) / math.hypot(22.5, 16.875)
+            self.assertAlmostEqual(self.result()["cameras"][0]["focal_35mm"], expected, delta=1e-3)
+
+    def test_a_cropped_photographs_focal_length_is_not_used(self):
+        self.a, self.b = self.photographs(exif(**film(32), **size(6000, 4000)))
+        done = self.reconstruct(camera=False)
+        self.assert_refused(done, "needs cameras", "a.png has no focal length in EXIF")
+        self.a, self.b = self.photographs(exif(**film(32), **size(3000, 4000)))  # turned since
+        self.succeed(self.reconstruct(camera=False))
+
+    def test_one_photograph_without_it_is_named(self):
+        self.a = self.write("with.png", with_exif(self.a.read_bytes(), exif(**film(32))))
+        self.assert_refused(self.reconstruct(camera=False), "b.png has no focal length in EXIF")
+
+    def test_a_method_without_cameras_names_it_and_does_without(self):
+        self.a, self.b = self.photographs(exif(**film(32)))
+        done = self.reconstruct("--method", "eight-point", camera=False)
+        self.assert_no_pose(done)
+        self.assertIn(b"--focal-35mm 32 would use it", done.stdout)
+        self.assertEqual(self.result()["cameras"][0]["source"], None)
+
+    def test_broken_data_are_no_focal_length(self):
+        whole = exif(**film(32), **size(WIDTH, HEIGHT))
+        for case, data in (("empty", b""), ("cut", whole[:30]), ("zero", exif(**film(0))),
+                           ("wild", whole.replace(b"\x69\x87", b"\x69\x88")),
+                           ("far", whole[:18] + b"\xff\xff\xff\x7f" + whole[22:])):
+            with self.subTest(case=case):
+                a, b = (self.write(f"{p.name}", with_exif(p.read_bytes(), data))
+                        for p in (self.a, self.b))
+                self.assert_refused(self.reconstruct(a=a, b=b, camera=False), "no focal length")
+
+    def test_a_jpegs_is_read_and_serves_triangulate(self):
+        image = self.write("p.jpg", with_exif(JPEG, exif(**film(50))))
+        pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [-1, 0, 0]\n")
+        matches = self.write("m.txt", "8 8 7 8\n")
+        done = self.run_program("triangulate", matches, "--pose", pose, "--images", image, image,
+                                "-o", self.out, "--json")
+        self.succeed(done)
+        self.one_line(done, "focal length 50 mm")
+        focal = 50 * math.hypot(16, 16) / math.hypot(36, 24)
+        depth = json.loads(done.stdout)["points"][0]["position"][2]
+        self.assertAlmostEqual(depth, focal, delta=1e-4)
+
+
+class Sizes(cli.CliTest):
+    """a.png and b.png, 320 x 240, stand for photographs; a factor of 8 makes them 2560 x 1920."""
+
+    def large_pair(self, factor=8):
+        self.a, self.b = (self.write(f"l{i}.png", larger(image, factor))
+                          for i, image in enumerate(cli.stereo_pair()))
+
+    def test_large_ones_are_used_at_a_sensible_size_and_one_line_says_so(self):
+        self.large_pair()
+        camera = self.write("c.yaml", camera_yaml(2560, 1920, 8 * FOCAL, 8 * FOCAL, 1279.5, 959.5))
+        done = self.succeed(self.reconstruct("--camera", camera, camera=False))
+        self.assertEqual(done.stdout.count(b"note  "), 1, done.stdout)
+        self.assertIn(b"2560x1920 at 1600x1200 (--resize 0: as they are)", done.stdout)
+        found = self.result()
+        self.assertEqual(found["image_size0"], [1600, 1200])
+        self.assertEqual(found["options"]["resize"], 1600)
+        self.succeed(self.reconstruct("--camera", camera, "--resize", "1600", camera=False))
+        given = self.result()
+        for key in ("R", "t", "covariance", "num_inliers"):
+            self.assertEqual(found[key], given[key])
+        done = self.succeed(self.reconstruct("--camera", camera, "--resize", "0", camera=False))
+        self.assertNotIn(b"note  ", done.stdout)
+        self.assertEqual(self.result()["image_size0"], [2560, 1920])
+        for verb, images in (("detect", [self.a]), ("match", [self.a, self.b])):
+            done = self.succeed(self.run_program(verb, *images, "-o", self.out, "--json"))
+            self.one_line(done, "2560x1920 at 1600x1200")
+            self.assertEqual(json.loads(done.stdout)["options"]["resize"], 1600)
+
+    def test_sizes_that_the_tables_measure_stay_as_they_are(self):
+        image = self.write("n.png", png(2048, 16, bytes(2048 * 16)))
+        done = self.succeed(self.run_program("detect", image, "-o", self.out, "--json"))
+        self.assertEqual(done.stderr, b"")
+        result = json.loads(done.stdout)
+        self.assertEqual((result["image_size"], result["options"]["resize"]), ([2048, 16], 0))
+        image = self.write("n.png", png(2049, 16, bytes(2049 * 16)))
+        done = self.succeed(self.run_program("detect", image, "-o", self.out, "--json"))
+        self.assertEqual(json.loads(done.stdout)["image_size"][0], 1600)
+
+    def test_triangulate_resizes_as_match_does(self):
+        pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [-1, 0, 0]\n")
+        self.succeed(self.run_program("match", self.a, self.b, "--resize", "160", "-o", self.out))
+        matches = self.out / "matches.csv"
+
+        def triangulated(*more):
+            done = self.run_program("triangulate", matches, "--pose", pose, "--camera", self.camera,
+                                    "-o", self.folder / "t", "--json", *more)
+            self.succeed(done)
+            points = [p["position"] for p in json.loads(done.stdout)["points"]
+                      if p["status"] == "ok" and p["error_px"] < 0.3]
+            # What is between two walls is at neither's depth.
+            near = [p for p in points if min(abs(p[2] * s / FOCAL - 1) for s in cli.SHIFTS) < 0.05]
+            return len(near) / max(len(points), 1)
+
+        self.assertGreater(triangulated("--resize", "160"), 0.8)
+        self.assertGreater(triangulated("--resize", "160", "--images", self.a, self.b), 0.8)
+        self.assertLess(triangulated("--resize", "0"), 0.5)
+        done = self.run_program("triangulate", matches, "--pose", pose, "--camera", self.camera,
+                                "-o", self.folder / "n")
+        self.assert_refused(done, "camera is for 320x240", "--resize", out=self.folder / "n")
+
+    def test_triangulate_refuses_images_of_another_size_than_their_camera(self):
+        half = self.write("half.png", png(160, 120, bytes(160 * 120)))
+        pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [-1, 0, 0]\n")
+        done = self.run_program("triangulate", self.write("m.txt", "80 60 70 60\n"), "--pose", pose,
+                                "--camera", self.camera, "--images", half, half, "-o", self.out)
+        self.assert_refused(done, "160x120", "320x240", "half.png")
+
+    def test_triangulate_takes_a_focal_length_with_the_size_of_the_pose_or_the_images(self):
+        matches = self.write("m.txt", "160 120 130 120\n")
+        pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [-1, 0, 0]\n")
+        run = ["triangulate", matches, "--focal-35mm", "32", "-o", self.out, "--json", "--pose"]
+        self.assert_refused(self.run_program(*run, pose), "--focal-35mm needs the size", "--images")
+        pose.write_text(pose.read_text() + f"image_size0: [{WIDTH}, {HEIGHT}]\n"
+                        f"image_size1: [{WIDTH}, {HEIGHT}]\n")
+        for more in ([], ["--images", self.a, self.b]):
+            done = self.succeed(self.run_program(*run, pose, *more))
+            depth = json.loads(done.stdout)["points"][0]["position"][2]
+            self.assertAlmostEqual(depth, FOCAL_PX / 30, delta=1e-5)
+
+    def test_undistort_resizes_images_and_camera(self):
+        lens = self.write("lens.yaml", camera_yaml(k=(-0.2, 0.05, 0, 0, 0)))
+        done = self.run_program("undistort", self.a, "--camera", lens, "--resize", "160", "--json",
+                                "-o", self.out)
+        result = json.loads(self.succeed(done).stdout)
+        self.assertEqual(result["image_size"], [160, 120])
+        self.assertEqual(cli.png_size((self.out / "a.png").read_bytes()), (160, 120))
+        K = result["camera_matrix"]
+        self.assertEqual((K[0], K[2]), (FOCAL / 2, (WIDTH / 2 - 1) / 2))
+
+    def test_undistort_takes_a_focal_length(self):
+        done = self.run_program("undistort", self.a, "--focal-35mm", "32", "--json", "-o", self.out)
+        K = json.loads(self.succeed(done).stdout)["camera_matrix"]
+        self.assertAlmostEqual(K[0], FOCAL_PX, delta=1e-9)
+        self.assertEqual(cli.png_samples((self.out / "a.png").read_bytes()),
+                         cli.png_samples(self.a.read_bytes()))
+        other = self.folder / "other"
+        for more in ([], ["--focal-35mm", "32", "--camera", self.camera]):
+            done = self.run_program("undistort", self.a, *more, "-o", other)
+            self.assert_refused(done, "either --camera or --focal-35mm", out=other)
+
+    def test_a_focal_length_that_is_no_number_is_refused_as_such(self):
+        for text, *words in (("nan", "'nan' is not a number in [1, 10000]"),
+                             ("32,34", "'32,34' is not a number", "decimal point"),
+                             ("0", "'0' is not a number in [1, 10000]"),
+                             ("wide", "'wide'"), ("", "''"), ("26mm", "'26mm'")):
+            with self.subTest(text=text):
+                done = self.reconstruct("--focal-35mm", text, camera=False)
+                self.assert_refused(done, "--focal-35mm", *words)
+
+
+class Formats(cli.CliTest):
+    def test_pictures_that_are_not_read_are_named_as_what_they_are(self):
+        def iso(brand):
+            return struct.pack(">I", 24) + b"ftyp" + brand + b"\0\0\0\0mif1miaf" + bytes(64)
+
+        for name, data, *words in (
+                ("p.heic", iso(b"heic"), "HEIC", "JPEG"), ("p.HEIF", iso(b"mif1"), "HEIC"),
+                ("p.jpg", iso(b"heix"), "HEIC"), ("p.avif", iso(b"avif"), "AVIF", "PNG"),
+                ("p.gif", b"GIF89a\x01\0\x01\0\0\0\0;", "GIF", "PNG")):
+            with self.subTest(name=name):
+                done = self.run_program("detect", self.write(name, data), "-o", self.out)
+                self.assert_refused(done, name, *words)
+
+    def test_a_dark_png_of_twelve_bits_is_explained(self):
+        values = list(cli.stereo_pair()[0])
+        dark = self.write("dark.png", png(WIDTH, HEIGHT, [16 * v for v in values], depth=16))
+        done = self.succeed(self.run_program("detect", dark, "-o", self.out))
+        self.assertIn(b"dark.png has 16 bits a sample and uses 12 of them", done.stdout)
+        self.assertIn(b"multiply its samples by 16", done.stdout)
+        full = self.write("full.png", png(WIDTH, HEIGHT, [257 * v for v in values], depth=16))
+        done = self.succeed(self.run_program("detect", full, "-o", self.out))
+        self.assertNotIn(b"note", done.stdout)
+
+
+if __name__ == "__main__":
+    cli.main()

@@ -1,0 +1,267 @@
+"""What visual odometry is measured with: rendered flights against their own truth, faults, and
+scripts/odometry with a program whose errors are known."""
+import contextlib
+import io
+import json
+import os
+import stat
+import sys
+import tempfile
+import unittest
+
+import cv2
+import numpy as np
+
+from twoview_tools import formats
+from twoview_tools.accuracy import datasets
+from twoview_tools.odometry import cli, faults, flights, poses, sets, surfaces, targets
+
+LIBRARY = os.environ.get("TWOVIEW_LIBRARY", "")
+BUILT = os.path.join(os.path.dirname(os.path.dirname(LIBRARY)), "bin", "twoview_flights")
+if "TWOVIEW_FLIGHTS" not in os.environ and os.access(BUILT, os.X_OK):
+    os.environ["TWOVIEW_FLIGHTS"] = BUILT
+
+# A `twoview odometry` that writes the truth through a similarity, with the flaws that its set's
+# flaws.json names.
+PROGRAM = """#!{python}
+import json, os, sys
+import numpy as np
+from twoview_tools.odometry import poses, sets
+source, out = sys.argv[2], sys.argv[4]
+found = sets.read_set(source)
+flaws = json.load(open(os.path.join(source, "flaws.json")))
+truth = found.truth()
+path = truth.moved((0.5, np.eye(3)[[1, 2, 0]], np.array([1.0, 2.0, 3.0])))
+path.positions[flaws["jump_at"]:] += flaws["jump"]
+first = flaws["start"]
+poses.write_tum(os.path.join(out, "trajectory.txt"), path[first:])
+with open(os.path.join(out, "frames.csv"), "w") as file:
+    file.write("timestamp,name,status,reasons,segment,num_tracked,is_keyframe,time_ms\\n")
+    for k, (time, name) in enumerate(zip(found.times, found.names)):
+        status = "starting" if k < first else flaws["status"]
+        file.write(f"{{time:.9f}},{{name}},{{status}},,0,99,0,{{2 + k % 2}}\\n")
+with open(os.path.join(out, "result.json"), "w") as file:
+    json.dump({{"scale": "unit", "context_bytes": 2 ** 20}}, file)
+sys.exit(flaws.get("exit", 0))
+"""
+
+
+def make_set(folder, count=60, size=(64, 48), flaws=None):
+    """A set folder with pictures that differ from frame to frame."""
+    os.makedirs(os.path.join(folder, "images"))
+    times = [5 + k / 30 for k in range(count)]
+    names = [f"images/{k:05d}.png" for k in range(count)]
+    for k, name in enumerate(names):
+        cv2.imwrite(os.path.join(folder, name), np.full(size[::-1], 100 + k, np.uint8))
+    s = np.linspace(0, 3, count)
+    path = np.stack([np.sin(s), np.cos(2 * s), s], 1)
+    poses.write_tum(os.path.join(folder, "groundtruth.txt"),
+                    poses.Trajectory(times, path, np.tile(np.eye(3), (count, 1, 1))))
+    sets.write_frames(folder, times, names)
+    with open(os.path.join(folder, "cameras.yaml"), "w", encoding="ascii") as file:
+        file.write("cam0: {image_width: 64, image_height: 48, fx: 50, fy: 50, cx: 32, cy: 24}\n")
+    with open(os.path.join(folder, "flaws.json"), "w", encoding="ascii") as file:
+        json.dump({"start": 0, "jump": 0, "jump_at": 0, "status": "tracking", **(flaws or {})},
+                  file)
+    return folder
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def path(self, *names):
+        return os.path.join(self.folder, *names)
+
+
+@unittest.skipUnless(flights.filmer(), "twoview_flights is not built")
+class Flights(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.scratch.cleanup)
+        cls.folder = flights.render(7, os.path.join(cls.scratch.name, "flight"),
+                                    ["--first-frame", "300", "--max-frames", "2",
+                                     "--depth-every", "1"])
+        cls.set = sets.read_set(cls.folder)
+        cls.truth = cls.set.truth()
+        cls.camera = next(iter(formats.read_camera_set(cls.set.file("cameras.yaml")).values()))
+        cls.K = np.array([[cls.camera.fx, 0, cls.camera.cx], [0, cls.camera.fy, cls.camera.cy],
+                          [0, 0, 1]])
+        x, y = np.meshgrid(np.arange(8, 632, 7), np.arange(8, 472, 7))
+        cls.pixels = np.stack([x.ravel(), y.ravel()], 1)
+        rays = datasets.undistort(cls.pixels, cls.K, datasets.distortion_of(cls.camera))
+        depth = cv2.imread(cls.folder + "/depth/00300.png", cv2.IMREAD_UNCHANGED)
+        z = depth[cls.pixels[:, 1], cls.pixels[:, 0]] / 5000.0
+        cls.points = np.column_stack([rays, np.ones(len(rays))]) * z[:, None]  # of camera 0
+
+    def test_a_flight_is_rendered_again_only_when_its_options_change(self):
+        before = os.stat(self.folder).st_ino
+        options = ["--first-frame", "300", "--max-frames", "2", "--depth-every", "1"]
+        self.assertEqual(os.stat(flights.render(7, self.folder, options)).st_ino, before)
+        self.assertNotEqual(flights.made_by(options), flights.made_by())
+
+    def test_depths_and_poses_lie_on_the_surfaces(self):
+        world = self.points @ self.truth.rotations[0].T + self.truth.positions[0]
+        away = surfaces.distances(surfaces.read_boxes(self.set.file("surfaces.json")), world)
+        self.assertLess(np.percentile(away, 99.9), 5e-4)  # the depth has steps of 0.2 mm
+
+    def test_a_picture_is_the_one_before_it_carried_by_depth_and_pose(self):
+        def carried(R, t):
+            seen = (self.points @ R.T + t)
+            pixel, _ = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), self.K,
+                                         np.array(datasets.distortion_of(self.camera)))
+            pixel = pixel.reshape(-1, 2)
+            inside = (seen[:, 2] > 0) & (pixel > 1).all(1) & (pixel < (638, 478)).all(1)
+            image = cv2.GaussianBlur(cv2.imread(self.folder + "/images/00301.jpg", 0), (5, 5), 1)
+            grey = cv2.remap(image, pixel[:, 0].astype(np.float32), pixel[:, 1].astype(np.float32),
+                             cv2.INTER_LINEAR).ravel()
+            return np.abs(grey[inside].astype(float) - before[inside]).mean()
+        image = cv2.GaussianBlur(cv2.imread(self.folder + "/images/00300.jpg", 0), (5, 5), 1)
+        before = image[self.pixels[:, 1], self.pixels[:, 0]].astype(float)
+        R0, R1 = self.truth.rotations
+        t = R1.T @ (self.truth.positions[0] - self.truth.positions[1])
+        self.assertGreater(np.linalg.norm(t), 0.01)
+        right = carried(R1.T @ R0, t)
+        self.assertLess(right, 4)
+        self.assertLess(2 * right, carried(np.eye(3), 0 * t))
+        self.assertLess(1.1 * right, carried(R1.T @ R0, -t))
+
+    def test_the_drones_own_sensors_agree_with_the_truth(self):
+        with open(self.set.file("imu.txt"), encoding="ascii") as file:
+            lines = [line.split() for line in file if not line.startswith("#")]
+        self.assertEqual(lines[0][0], "body_from_cam")
+        w, x, y, z = map(float, lines[0][1:])
+        body_from_cam = poses.rotations_of([[x, y, z, w]])[0]
+        for k, line in enumerate(lines[1:]):
+            values = np.array(line, float)
+            self.assertAlmostEqual(values[0], self.set.times[k], 6)
+            body = poses.rotations_of([values[[2, 3, 4, 1]]])[0]
+            error = body @ body_from_cam @ self.truth.rotations[k].T
+            # Gravity's direction; the yaw drifts.
+            self.assertGreater(error[2, 2], np.cos(4 * values[5]))
+            self.assertLess(values[6], -self.truth.positions[k][2] + 5 * values[7])
+        speed = np.linalg.norm(np.diff(self.truth.positions, axis=0)) / np.diff(self.set.times)[0]
+        self.assertAlmostEqual(np.linalg.norm(values[8:11]), speed, delta=5 * values[11])
+
+
+class Faults(Folder):
+    def setUp(self):
+        super().setUp()
+        self.source = make_set(self.path("source"))
+        self.other = make_set(self.path("other"), size=(32, 24))
+
+    def inject(self, kind):
+        return sets.read_set(faults.inject(kind, self.source, self.path(kind), self.other))
+
+    def picture(self, found, k):
+        return cv2.imread(os.path.join(found.path, found.names[k]), cv2.IMREAD_GRAYSCALE)
+
+    def test_each_keeps_the_truth_and_changes_its_interval_only(self):
+        for kind in ("black", "covered", "other_room", "person"):
+            found = self.inject(kind)
+            first, last = found.json("fault.json")["intervals"][0]
+            self.assertEqual(len(found.times), 60)
+            self.assertEqual(len(found.truth()), 60)
+            for k, time in enumerate(found.times):
+                picture = self.picture(found, k)
+                self.assertEqual(picture.shape, (48, 64))
+                if not first <= time <= last:
+                    self.assertTrue((picture == 100 + k).all(), (kind, k))
+        self.assertEqual(self.inject("black").json("fault.json")["source"], "source")
+
+    def test_black_and_covered_are_dark_and_the_other_room_is_the_others(self):
+        self.assertLess(self.picture(self.inject("black"), 40).mean(), 10)
+        self.assertLess(self.picture(self.inject("covered"), 40).mean(), 70)
+        found = self.inject("other_room")
+        fault = found.json("fault.json")
+        self.assertEqual(fault["elsewhere"], fault["intervals"])
+        start = int(np.flatnonzero(np.array(found.times) >= fault["elsewhere"][0][0])[0])
+        self.assertTrue((self.picture(found, start) == 120).all())  # its frame 20 of 60
+
+    def test_slow_and_dropped_leave_frames_out(self):
+        slow = self.inject("slow")
+        self.assertGreaterEqual(np.diff(slow.times).min(), 0.2 - 1e-6)
+        self.assertEqual(len(slow.times), 10)
+        self.assertAlmostEqual(len(self.inject("dropped").times), 48, delta=8)
+
+    def test_the_person_covers_two_fifths_of_the_picture(self):
+        grey, mask = faults.person_of((480, 640), np.random.default_rng(1))
+        seen = (mask[:480] > 0).sum() / (480 * 640)
+        self.assertAlmostEqual(seen, faults.PERSON_SHARE, delta=0.03)
+        self.assertGreater(grey[mask > 0].std(), 25)  # textured
+
+    def test_an_unknown_fault_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "no fault 'fire'"):
+            faults.inject("fire", self.source, self.path("x"))
+
+
+class Command(Folder):
+    def run_cli(self, *arguments, **flaws):
+        source = self.path("set")
+        if not os.path.isdir(source):
+            make_set(source, flaws=flaws)
+        program = self.path("program")
+        with open(program, "w", encoding="ascii") as file:
+            file.write(PROGRAM.format(python=sys.executable))
+        os.chmod(program, os.stat(program).st_mode | stat.S_IXUSR)
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
+            status = cli.main(["--sets", source, "--program", program, "--json",
+                               self.path("all.json"), *arguments])
+        with open(self.path("all.json"), encoding="utf-8") as file:
+            return status, out.getvalue(), json.load(file)
+
+    def test_a_perfect_run_has_no_error_and_its_coverage(self):
+        status, text, found = self.run_cli(start=6)
+        run = found["runs"][0]
+        self.assertEqual(status, 0, text)
+        self.assertLess(run["truth"]["ate_rmse"], 1e-9)
+        self.assertAlmostEqual(run["truth"]["coverage"], 0.9)
+        self.assertAlmostEqual(run["truth"]["scale_ratio"], 0.5)
+        self.assertEqual(run["status_counts"]["starting"], 6)
+        self.assertAlmostEqual(run["time_ms"]["mean"], 2.5)
+        self.assertGreater(run["peak_rss_mib"], 5)
+        self.assertIn("90.0 %", text)
+
+    def test_a_silent_jump_is_reported_and_fails(self):
+        status, text, found = self.run_cli(jump=2.0, jump_at=40)
+        self.assertEqual(status, 1)
+        self.assertGreater(found["runs"][0]["silent"]["num_wrong"], 0)
+        self.assertEqual(found["runs"][0]["silent"]["unflagged_jumps"], 1)
+        self.assertIn("NO   sets and flights: no unflagged jump: 0 of 1; not set", text)
+
+    def test_a_said_jump_is_not_silent(self):
+        status, _, found = self.run_cli(jump=2.0, jump_at=40, status="weak")
+        self.assertEqual((status, found["runs"][0]["silent"]["num_wrong"]), (0, 0))
+        self.assertGreater(found["runs"][0]["truth"]["ate_rmse"], 0.1)
+
+    def test_a_program_that_fails_is_named(self):
+        status, text, found = self.run_cli(exit=2)
+        self.assertEqual(status, 1)
+        self.assertIn("status 2", found["runs"][0]["error"])
+        self.assertIn("status 2", text)
+
+    def test_a_set_that_is_not_there_is_one_line(self):
+        error = io.StringIO()
+        with contextlib.redirect_stderr(error):
+            self.assertEqual(cli.main(["--sets", self.path("nothing")]), 2)
+        self.assertEqual(len(error.getvalue().splitlines()), 1)
+
+
+class Targets(unittest.TestCase):
+    def test_a_set_needs_both_its_error_and_its_coverage(self):
+        def judged(ate, coverage):
+            run = {"label": "seq_tsukuba", "set": "seq_tsukuba", "kind": "set", "num_segments": 1,
+                   "truth": {"ate_rmse": ate, "coverage": coverage}}
+            return targets.judge([run])[0][0]
+        self.assertTrue(judged(0.0069, 0.95))
+        self.assertFalse(judged(0.0071, 0.95))
+        self.assertFalse(judged(0.001, 0.94))
+        self.assertFalse(judged(None, 0.99))
+
+
+if __name__ == "__main__":
+    unittest.main()

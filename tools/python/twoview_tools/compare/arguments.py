@@ -1,0 +1,51 @@
+"""compare_colmap's options, from the standard library alone, so that --help needs no package."""
+
+import argparse
+import os
+
+from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
+
+# The name under which the user started it: tools/twoview/verbs/python_verbs.cc sets TWOVIEW_VERB.
+PROGRAM = os.environ.get("TWOVIEW_VERB") or "compare_colmap"
+PIPELINES = ("twoview", "pycolmap", "pycolmap_defaults", "colmap", "opencv_fast", "opencv_sift")
+DESCRIPTION = """Runs twoview, COLMAP, OpenGV, OpenCV and PoseLib on the same image pairs and writes
+a report: index.html, pairs.csv, report.json. See docs/compare.md."""
+
+
+def make_parser():
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM, description=DESCRIPTION,
+        epilog="exit status: 0 a report, whatever its rows say; 2 bad input; 130 interrupted "
+               "(the same command goes on)")
+    parser.add_argument("pairs", nargs="+", metavar="PAIRS.txt",
+                        help="lists of pairs: name0 name1 rot0 rot1 K0(9) K1(9) [T_0to1(16)]; "
+                             "cameras.yaml beside one is read")
+    parser.add_argument("--images", metavar="DIR",
+                        help="folder of the images (default: images/ beside each list)")
+    parser.add_argument("-o", "--output", required=True, metavar="REPORT_DIR")
+    parser.add_argument("--reference", choices=("truth", "colmap"), default="truth",
+                        help="errors are against the lists' true poses (default), or against "
+                             "COLMAP's own reconstruction of the images")
+    parser.add_argument("--systems", metavar="A,B,..",
+                        help="only these: ids, families (opengv, opencv, ..), pipelines, solvers, "
+                             "triangulations (default: all)")
+    parser.add_argument("--matches", default="twoview", choices=PIPELINES,
+                        help="whose matches the solvers get (default twoview)")
+    parser.add_argument("--max-error-px", type=float, default=1.0, metavar="E",
+                        help="inlier threshold of every system that takes one (default 1)")
+    parser.add_argument("--resize", type=int, metavar="L",
+                        help="long side of the images; 0: as they are (default: "
+                             f"{RESIZE_LONG_SIDE} for those with a longer "
+                             f"side than {MAX_NATIVE_SIDE})")
+    parser.add_argument("--seed", type=int, default=0, metavar="N")
+    parser.add_argument("--max-pairs", type=int, default=0, metavar="N",
+                        help="at most N pairs of each list, evenly spaced")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N",
+                        help="pairs at a time, each in processes of its own (default 1)")
+    parser.add_argument("--scheduler", metavar="ADDRESS",
+                        help="hand the pairs to this dask.distributed cluster, which sees the same "
+                             "folders")
+    parser.add_argument("--timeout", type=float, default=60.0, metavar="S",
+                        help="seconds that a system may take for a pair (default 60)")
+    parser.add_argument("--quiet", action="store_true", help="no progress and no table")
+    return parser

@@ -1,0 +1,137 @@
+"""scripts/odometry: runs `twoview odometry` over sequences, rendered flights and injected faults,
+prints the figures beside their targets, and, with --peers, ORB-SLAM3's over the same sources."""
+
+import argparse
+import json
+import os
+import shutil
+import sys
+import tempfile
+
+from .. import ROOT
+from . import evaluate, faults, flights, orbslam, poses, runs, sets, tables, targets
+
+FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
+# The sources that faults are put into: one real and quick, one rendered; and what other_room shows.
+FAULT_SET, OTHER_SET = "seq_tsukuba", "seq_icl_of_kt3"
+
+
+def arguments_of(argv):
+    parser = argparse.ArgumentParser(prog="scripts/odometry", description=__doc__)
+    parser.add_argument("--sets", help="sets or folders, separated by commas; 'none': no set "
+                                       "(default: all sequences of $TWOVIEW_DATA)")
+    parser.add_argument("--flights", type=int, default=0, metavar="N",
+                        help="render and run the flights of the seeds 0 to N-1 (.cache/flights)")
+    parser.add_argument("--half-turns", type=int, default=0, metavar="N",
+                        help="the same with half a turn on the spot")
+    parser.add_argument("--faults", action="store_true",
+                        help="black frames, covered lens, other room, 5 Hz, 20 %% dropped frames, "
+                             "a person, in two sources, and a flight with half a turn")
+    parser.add_argument("--fault-sources", metavar="FOLDERS",
+                        help="put the faults into these sets or folders, separated by commas")
+    parser.add_argument("--peers", action="store_true", help="ORB-SLAM3 over the same sources")
+    parser.add_argument("--json", metavar="FILE", help="write every figure")
+    parser.add_argument("--program", help="the program twoview (default: the release build's)")
+    parser.add_argument("--seed", type=int, help="of the program's sampling")
+    parser.add_argument("--option", action="append", default=[], metavar="TEXT",
+                        help="an option for the program, such as --option=--every=2")
+    parser.add_argument("--keep", metavar="DIR", help="keep the runs' files below this folder")
+    parser.add_argument("--evaluate", nargs=2, metavar=("OUT", "SET"),
+                        help="run nothing: print the figures of a run that exists")
+    return parser.parse_args(argv)
+
+
+def sources_of(arguments, scratch):
+    """Yields (kind, label, folder) of everything to run; renders and injects as it goes."""
+    if arguments.sets != "none":
+        for path in sets.set_paths(arguments.sets):
+            yield "set", os.path.basename(os.path.normpath(path)), path
+    for seed in range(arguments.flights):
+        name = f"flight_{seed:02d}"
+        yield "flight", name, flights.render(seed, os.path.join(FLIGHT_FOLDER, name))
+    for seed in range(max(arguments.half_turns, int(arguments.faults))):
+        name = f"half_turn_{seed:02d}"
+        yield "fault", name, flights.render(seed, os.path.join(FLIGHT_FOLDER, name),
+                                            ["--half-turn"])
+    if not (arguments.faults or arguments.fault_sources):
+        return
+    chosen = sets.set_paths(arguments.fault_sources or FAULT_SET)
+    if not arguments.fault_sources:
+        chosen.append(flights.render(0, os.path.join(FLIGHT_FOLDER, "flight_00")))
+    other = sets.set_paths(OTHER_SET)[0]
+    for path in chosen:
+        for kind in faults.KINDS:
+            name = f"{os.path.basename(os.path.normpath(path))}+{kind}"
+            yield "fault", name, faults.inject(kind, path, os.path.join(scratch, "faults", name),
+                                               other)
+
+
+def one_run(system, kind, label, folder, out, arguments):
+    """The figures of one system over one source, or {label, kind, error}."""
+    source = sets.read_set(folder)
+    try:
+        if system == "twoview":
+            options = list(arguments.option)
+            options += ["--seed", str(arguments.seed)] if arguments.seed is not None else []
+            cost = runs.run_odometry(runs.program_path(arguments.program), folder, out, options)
+        else:
+            cost = orbslam.run(source, out)
+        figures = evaluate.evaluate(out, source)
+    except (RuntimeError, OSError, poses.PoseError, ValueError) as error:
+        return {"label": label, "kind": kind, "set": source.name, "system": system,
+                "error": str(error)}
+    return {"label": label, "kind": kind, "system": system, **figures, **cost}
+
+
+def report(found, peers):
+    """Prints the tables and targets. Returns whether every measured target is reached."""
+    for system, rows in (("twoview odometry", found), ("ORB-SLAM3", peers)):
+        if rows:
+            print(f"\n{system}")
+            print(tables.table([tables.row_of(run) for run in rows if "error" not in run]))
+            for run in rows:
+                if "error" in run:
+                    print(f"{run['label']}: {run['error']}")
+    print("\n" + tables.LEGEND + "\n\nTargets")
+    judged = targets.judge([run for run in found if "error" not in run],
+                           [run for run in peers if "error" not in run])
+    for reached, text in judged:
+        print(f"  {'yes' if reached else '-- ' if reached is None else 'NO '}  {text}")
+    return judged, all(reached is not False for reached, _ in judged) and not any(
+        "error" in run for run in found)
+
+
+def main(argv=None):
+    arguments = arguments_of(argv)
+    if arguments.evaluate:
+        out, folder = arguments.evaluate
+        figures = evaluate.evaluate(out, sets.read_set(folder))
+        print(json.dumps(figures, indent=1))
+        return 0
+    scratch = arguments.keep or tempfile.mkdtemp(prefix="twoview-odometry-")
+    try:
+        found, peers = [], []
+        for kind, label, folder in sources_of(arguments, scratch):
+            for system, rows in (("twoview", found), ("orbslam3", peers)):
+                if system == "orbslam3" and not arguments.peers:
+                    continue
+                print(f"{system}: {label}", file=sys.stderr, flush=True)
+                rows.append(one_run(system, kind, label, folder,
+                                    os.path.join(scratch, system, label), arguments))
+        judged, is_good = report(found, peers)
+        if arguments.json:
+            with open(arguments.json, "w", encoding="utf-8") as file:
+                json.dump({"runs": found, "peers": peers,
+                           "targets": [{"reached": reached, "target": text}
+                                       for reached, text in judged]}, file, indent=1)
+    except (ValueError, FileNotFoundError) as error:
+        print(f"scripts/odometry: {error}", file=sys.stderr)
+        return 2
+    finally:
+        if not arguments.keep:
+            shutil.rmtree(scratch, ignore_errors=True)
+    return 0 if is_good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

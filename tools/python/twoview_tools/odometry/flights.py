@@ -1,0 +1,50 @@
+"""Rendered flights (tools/flights): each seed is another room, path, lens and light."""
+
+import glob
+import hashlib
+import os
+import shutil
+import subprocess
+
+from .. import ROOT
+
+SOURCES = ("flights", "room")  # folders of tools/
+FILMER = os.path.join(ROOT, "build", "release", "bin", "twoview_flights")
+
+
+def filmer():
+    """The program that renders flights; TWOVIEW_FLIGHTS overrides the release build's. None where
+    it is not built."""
+    path = os.environ.get("TWOVIEW_FLIGHTS", FILMER)
+    return path if os.access(path, os.X_OK) else None
+
+
+def made_by(options=()):
+    """A digest of what a flight depends on beside its seed: the drawing sources, the options."""
+    digest = hashlib.sha256(repr(tuple(options)).encode())
+    for name in SOURCES:
+        for path in sorted(glob.glob(os.path.join(ROOT, "tools", name, "*.[ch]*"))):
+            with open(path, "rb") as file:
+                digest.update(file.read())
+    return digest.hexdigest()
+
+
+def render(seed, folder, options=()):
+    """Renders a flight into a folder, unless the same one is there already. Returns the folder."""
+    mark = os.path.join(folder, "made_by.txt")
+    if os.path.isfile(mark):
+        with open(mark, encoding="ascii") as file:
+            if file.read() == made_by(options):
+                return folder
+    program = filmer()
+    if program is None:
+        raise FileNotFoundError("twoview_flights is not built (TWOVIEW_TOOLS, TWOVIEW_SIMULATOR)")
+    unfinished = folder + ".unfinished"
+    shutil.rmtree(unfinished, ignore_errors=True)
+    os.makedirs(os.path.dirname(folder), exist_ok=True)
+    subprocess.run([program, "--seed", str(seed), "-o", unfinished, *options], check=True)
+    with open(os.path.join(unfinished, "made_by.txt"), "w", encoding="ascii") as file:
+        file.write(made_by(options))
+    shutil.rmtree(folder, ignore_errors=True)
+    os.rename(unfinished, folder)
+    return folder
