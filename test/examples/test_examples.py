@@ -177,6 +177,28 @@ class Examples(unittest.TestCase):
         symbols = run("nm", "--undefined-only", self.bin / "10_static_memory")
         self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
 
+    def test_odometry(self):
+        if not (self.bin / "13_odometry").exists():
+            self.skipTest("built without odometry")
+        # A flight of 2 m past a wall of tiles with a nearer half.
+        random = np.random.default_rng(13)
+        tiles = random.integers(0, 256, (2, 200, 400)).astype(np.uint8)
+        far, near = (cv2.resize(t, None, fx=8, fy=8, interpolation=cv2.INTER_NEAREST) for t in tiles)
+        frames = []
+        for k in range(40):
+            picture = far[:480, 16 * k : 16 * k + 640].copy()
+            picture[280:] = near[280:480, 28 * k : 28 * k + 640]
+            frames.append(self.folder / f"flight{k:02}.pgm")
+            cv2.imwrite(str(frames[-1]), picture)
+        text = self.example("13_odometry", 500, 500, 320, 240, *frames)
+        self.assertGreater(number(r"(\d+) of 40 poses known", text), 20)
+        self.assertIn("none of the heap", text)
+        x, y, z = map(float, re.findall(r"at \((.*), (.*), (.*)\)", text)[-1])
+        self.assertGreater(x, 10 * max(abs(y), abs(z)))
+        symbols = run("nm", "--undefined-only", self.bin / "13_odometry")
+        self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
+        self.assertIn("usage", self.example("13_odometry", status=2))
+
     def test_ardrone_against_the_simulator(self):
         if not (self.bin / "11_ardrone").exists() or "drone" not in run(PROGRAM, "--help"):
             self.skipTest("built without the drivers")
@@ -232,7 +254,8 @@ class Examples(unittest.TestCase):
                 if not (self.bin / "11_ardrone").exists():
                     continue
                 packages += ["twoview_ardrone", "twoview_h264"]
-            if source.stem == "15_absolute_pose" and not (self.bin / source.stem).exists():
+            odometry = ("13_odometry", "15_absolute_pose")
+            if source.stem in odometry and not (self.bin / source.stem).exists():
                 continue
             flags = run("pkg-config", "--cflags", "--libs", *packages, env=environment).split()
             run(CC, "-std=c11", source, "-o", self.folder / "alone", *flags, "-lm")
