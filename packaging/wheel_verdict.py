@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks a wheel by auditwheel: the tag in its name must not promise an older glibc than the library
-inside runs with. Prints one line.
+"""Checks a wheel by auditwheel: the tag in its name must not promise an older glibc than the
+library inside runs with. Prints one line.
 
 usage: wheel_verdict.py WHEEL
 """
@@ -25,7 +25,7 @@ def main():
         sys.exit(f"wheel_verdict.py: no verdict on {wheel.name}: {text}")
     needed, promised = [(int(found[1]), int(found[2]), found[3]) for found in (verdict, tag)]
     if needed[2] != promised[2] or needed[:2] > promised[:2]:
-        sys.exit(f"wheel_verdict.py: {wheel.name} needs manylinux_{needed[0]}_{needed[1]}_{needed[2]}")
+        sys.exit(f"wheel_verdict.py: {wheel.name} is not what auditwheel says: {text}")
     print(f"{wheel.name}: auditwheel {verdict[0].split()[-1]}")
 
 

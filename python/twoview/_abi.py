@@ -363,7 +363,7 @@ _default: Optional[Library] = None
 
 
 def default_library() -> Library:
-    """The library that TWOVIEW_LIBRARY names, else the one inside the package, else the system's."""
+    """The library that TWOVIEW_LIBRARY names, else that of the package, else the system's."""
     global _default
     if _default is None:
         beside = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libtwoview.so")

@@ -64,11 +64,10 @@ void name_library(const fs::path& program) {
   const fs::path tree = tree_of(program);
   const fs::path script = tree / TWOVIEW_PYTHON_VERBS / verb.script;
   if (tree.empty() || !fs::is_regular_file(script, error))
-    throw BadInput(std::string(verb.name) +
-                   " needs the package python3-twoview (" TWOVIEW_DATA_DIR "/" TWOVIEW_PYTHON_VERBS
-                   "/" +
-                   verb.script + " of an installation or the source tree, above " +
-                   program.string() + ")");
+    throw BadInput(
+        std::string(verb.name) +
+        " needs the package python3-twoview (" TWOVIEW_DATA_DIR "/" TWOVIEW_PYTHON_VERBS "/" +
+        verb.script + " of an installation or the source tree, above " + program.string() + ")");
   name_library(program);
 
   std::string python = python_of(tree), path = script.string();
