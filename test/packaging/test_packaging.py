@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Tests of packaging/ and scripts/release: which package holds which file, equal bytes of the source
-archives, the glibc that a wheel's tag promises, manual pages, completion, SPDX lists and versions.
-The whole of it, on bare systems, is scripts/test_packages.
+"""Tests of packaging/ and scripts/release: which package holds which file, equal bytes of the
+source archives, the glibc that a wheel's tag promises, manual pages, completion, SPDX lists and
+versions. The whole of it, on bare systems, is scripts/test_packages.
 
 usage: test_packaging.py SOURCE_DIR BUILD_DIR CMAKE SOVERSION
 """
@@ -58,8 +58,8 @@ class Versions(Case):
         self.assertIn(f'\nSONAME = "libtwoview.so.{SOVERSION}"\n', abi)
 
     def test_every_recipe_has_the_librarys_version(self):
-        self.assertEqual(json.loads((PACKAGING / "vcpkg/twoview/vcpkg.json").read_text())["version"],
-                         VERSION)
+        port = json.loads((PACKAGING / "vcpkg/twoview/vcpkg.json").read_text())
+        self.assertEqual(port["version"], VERSION)
         self.assertTrue((PACKAGING / f"yocto/twoview_{VERSION}.bb").is_file())
         self.assertIn(f"\nTWOVIEW_VERSION = {VERSION}\n",
                       (PACKAGING / "buildroot/twoview.mk").read_text())
@@ -80,7 +80,8 @@ class Debian(Case):
             libdir.rename(moved)
             triplet.parent.mkdir(parents=True, exist_ok=True)
             moved.rename(triplet)
-        for left_out in re.findall(r"rm -r debian/tmp/(\S+)", (PACKAGING / "debian/rules").read_text()):
+        rules = (PACKAGING / "debian/rules").read_text()
+        for left_out in re.findall(r"rm -r debian/tmp/(\S+)", rules):
             shutil.rmtree(self.folder / left_out)
         files = [str(path.relative_to(self.folder)) for path in self.folder.rglob("*")
                  if not path.is_dir() or path.is_symlink()]
@@ -154,10 +155,11 @@ class Debian(Case):
 class Sources(Case):
     def test_the_source_distribution_has_the_same_bytes_at_any_place_and_time(self):
         first = self.sdist("first").read_bytes()
-        self.assertEqual(first, self.sdist("second", TZ="Pacific/Kiritimati", LC_ALL="C").read_bytes())
+        second = self.sdist("second", TZ="Pacific/Kiritimati", LC_ALL="C").read_bytes()
+        self.assertEqual(first, second)
         self.assertNotEqual(first, self.sdist("third", SOURCE_DATE_EPOCH="1700000001").read_bytes())
 
-    def test_the_source_distribution_configures_with_the_paths_of_its_pyproject(self):
+    def test_the_source_distribution_configures_by_fetchcontent(self):
         with tarfile.open(self.sdist("dist")) as archive:
             archive.extractall(self.folder)  # our own file
         root = self.folder / f"twoview-{VERSION}"
@@ -169,13 +171,25 @@ class Sources(Case):
         self.assertIn(f"\nVersion: {VERSION}\n", (root / "PKG-INFO").read_text())
         defines = re.findall(r'(?m)^(TWOVIEW_\w+|BUILD_TESTING) = "(\w+)"$', settings)
         self.assertIn(("BUILD_TESTING", "OFF"), defines)
-        run(CMAKE, "-S", root, "-B", self.folder / "build",
+        # A project that takes it by FetchContent; Python's build takes the folder itself.
+        (self.folder / "CMakeLists.txt").write_text(f"""cmake_minimum_required(VERSION 3.25)
+project(consumer LANGUAGES C CXX)
+include(FetchContent)
+FetchContent_Declare(twoview SOURCE_DIR "{root}")
+FetchContent_MakeAvailable(twoview)
+foreach(target twoview twoview_static)
+  add_executable(with_${{target}} "{SOURCE}/test/install/consumer.c")
+  target_link_libraries(with_${{target}} PRIVATE twoview::${{target}})
+endforeach()
+""")
+        run(CMAKE, "-S", self.folder, "-B", self.folder / "build",
             *(f"-D{name}={value}" for name, value in defines))
 
     def test_the_source_archive_has_the_same_bytes_and_every_committed_file(self):
         if not shutil.which("git") or not (SOURCE / ".git").exists():
             self.skipTest("no git repository")
-        command = re.search(r"git archive [^|]*\| *\n *xz [^>]*", (SOURCE / "scripts/release").read_text())
+        release = (SOURCE / "scripts/release").read_text()
+        command = re.search(r"git archive [^|]*\| *\n *xz [^>]*", release)
         shell = command.group(0).replace("$version", VERSION).replace("$commit", "HEAD")
         first, second = (run("sh", "-c", shell, cwd=SOURCE, env={**os.environ, "TZ": zone})
                          for zone in ("UTC", "Pacific/Kiritimati"))
@@ -228,4 +242,4 @@ class Spdx(Case):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(argv=[sys.argv[0], *sys.argv[5:]], verbosity=2)
