@@ -9,7 +9,7 @@ bare_base() {
   local base=$TWOVIEW_ROOTS/base mirror
   [ ! -d "$base" ] || return 0
   [ "$(id -u)" = 0 ] || { echo "$0: chroots need root" >&2; exit 2; }
-  command -v debootstrap >/dev/null || { echo "$0: apt install debootstrap" >&2; exit 2; }
+  command -v debootstrap >/dev/null || { echo "$0: no debootstrap: scripts/bootstrap release" >&2; exit 2; }
   mirror=$(cat /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list 2>/dev/null |
     sed -nE 's/^(URIs:|deb) +//p' | head -1 | cut -d' ' -f1)
   echo "making a bare Debian 12 in $base"
