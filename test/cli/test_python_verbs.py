@@ -121,7 +121,7 @@ class HandOver(cli.CliTest):
             done = subprocess.run([*script, "x"], env={**environment, **verb}, capture_output=True,
                                   timeout=60)
             self.assertEqual(done.returncode, 2)
-            self.assertTrue(done.stderr.startswith(f"{name}: this Python lacks".encode()))
+            self.assertTrue(done.stderr.startswith(f"{name}: this Python has no".encode()))
 
 
 if __name__ == "__main__":
