@@ -146,7 +146,7 @@ class Debian(Case):
             return set(run("bash", "-c", text, "bash", PACKAGING / "completion/twoview", PROGRAM,
                            *words).decode().split())
 
-        self.assertEqual(complete("re"), {"reconstruct"})
+        self.assertEqual(complete("re"), {"reconstruct", "rerun"})
         self.assertLessEqual({"detect", "match", "colmap"}, complete(""))
         self.assertEqual(complete("match", "--max-k"), {"--max-keypoints"})
         self.assertEqual(complete("match", "a.png", "--ra"), {"--ratio"})

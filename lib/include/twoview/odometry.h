@@ -249,7 +249,8 @@ typedef struct tv_keyframe {
   int32_t frame;
   /* The time of its frame, in seconds. */
   double time_s;
-  /* The pose world_from_cam, as in tv_odometry_state. */
+  /* The pose world_from_cam, as in tv_odometry_state: a row-major rotation, and a position in the
+     unit of the map. */
   double world_from_cam_R[9], world_from_cam_t[3];
   /* How many keypoints the keyframe has, and how many of them see points of the map. */
   int32_t num_keypoints, num_observations;
@@ -339,7 +340,8 @@ TV_API tv_status tv_odometry_save(const tv_odometry *odometry, uint8_t *bytes, s
    (the map is larger than the options allow). With each of these the odometry is as before. */
 TV_API tv_status tv_odometry_load(tv_odometry *odometry, const uint8_t *bytes, size_t num_bytes);
 
-/* Gives the odometry a clock, for tv_odometry_take_times; see tv_context_set_clock. */
+/* Gives the odometry a clock, as tv_context_set_clock gives one to a context: now_ns is called with
+   the pointer `user`. Returns TV_ERR_NULL. */
 TV_API tv_status tv_odometry_set_clock(tv_odometry *odometry, tv_clock now_ns, void *user);
 
 TV_END_DECLS

@@ -115,7 +115,7 @@ size_t scratch_bytes(const tv_odometry_options& o) {
       2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
            arena_bytes<int32_t>(n)) +
       arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) + arena_bytes<tv_point>(n) +
-      arena_bytes<uint8_t>(3 * n * 128);
+      arena_bytes<tv_two_view>(1) + arena_bytes<uint8_t>(3 * n * 128);
   const size_t points = static_cast<size_t>(o.max_points);
   const size_t tracking = std::max(choices, arena_bytes<double>(40 * n) + adjust_bytes(o)) +
                           arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +

@@ -34,7 +34,7 @@ struct Pair {
   int32_t* keypoints1;
   uint8_t* is_inlier;
   int32_t num;
-  tv_two_view view;
+  tv_two_view* view;
 };
 
 // False: too few matches.
@@ -51,6 +51,8 @@ bool estimate_pair(Odometry* odometry, const Frame& frame0, const Frame& frame1,
   pair->keypoints0 = arena_alloc<int32_t>(arena, n);
   pair->keypoints1 = arena_alloc<int32_t>(arena, n);
   pair->is_inlier = arena_alloc<uint8_t>(arena, n);
+  pair->view = arena_alloc<tv_two_view>(arena, 1);
+  *pair->view = tv_two_view{};
   pair->num = 0;
   const tv_features features0 = features_of(frame0), features1 = features_of(frame1);
   tv_match(odometry->context, &features0, &features1, nullptr, found, room, &pair->num);
@@ -79,9 +81,9 @@ bool estimate_pair(Odometry* odometry, const Frame& frame0, const Frame& frame1,
   tv_estimate_options_init(&options);
   options.seed = odometry->options.seed;
   options.max_iterations = 2000;
-  tv_two_view_init(&pair->view);
+  tv_two_view_init(pair->view);
   return tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
-                              &pairs, &options, &pair->view, pair->is_inlier) == TV_OK;
+                              &pairs, &options, pair->view, pair->is_inlier) == TV_OK;
 }
 
 void drop_start(Odometry* odometry, int n) {
@@ -103,8 +105,8 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
     frame0->cam_from_world = inverse(frame0->cam_from_world);
   }
   Rigid relative;
-  std::copy_n(pair.view.R, 9, relative.R);
-  std::copy_n(pair.view.t, 3, relative.t);
+  std::copy_n(pair.view->R, 9, relative.R);
+  std::copy_n(pair.view->t, 3, relative.t);
   frame->cam_from_world = compose(relative, frame0->cam_from_world);
   forget_points(frame);
   const int32_t first = make_keyframe(odometry, *frame0);
@@ -160,16 +162,16 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
     ArenaScope scope(odometry->scratch);
     Pair pair;
     Frame* const first = &odometry->starts[n];
-    if (!estimate_pair(odometry, *first, *frame, &pair) || 2 * pair.view.num_inliers < pair.num ||
-        pair.view.num_inliers < kLeastMatches) {
+    if (!estimate_pair(odometry, *first, *frame, &pair) || 2 * pair.view->num_inliers < pair.num ||
+        pair.view->num_inliers < kLeastMatches) {
       *reasons |= TV_REASON_TOO_FEW_MATCHES;
       if (pair.num < kLeastMatches || odometry->num_starts > 1) drop_start(odometry, n--);
       continue;
     }
-    *reasons |= pair.view.reasons;
-    if (pair.view.verdict != TV_VERDICT_OK || !pair.view.has_t ||
-        pair.view.median_parallax_rad < kLeastParallax) {
-      if (pair.view.verdict == TV_VERDICT_OK) *reasons |= TV_REASON_LOW_PARALLAX;
+    *reasons |= pair.view->reasons;
+    if (pair.view->verdict != TV_VERDICT_OK || !pair.view->has_t ||
+        pair.view->median_parallax_rad < kLeastParallax) {
+      if (pair.view->verdict == TV_VERDICT_OK) *reasons |= TV_REASON_LOW_PARALLAX;
       continue;
     }
     if (!make_first_points(odometry, first, frame, pair, image)) continue;
@@ -188,12 +190,12 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
 bool estimate_turn(Odometry* odometry, const Frame& frame0, const Frame& frame1, Rigid* turn) {
   ArenaScope scope(odometry->scratch);
   Pair pair;
-  if (!estimate_pair(odometry, frame0, frame1, &pair) || !pair.view.has_R ||
-      pair.view.num_inliers < kLeastTurnInliers || 2 * pair.view.num_inliers < pair.num) {
+  if (!estimate_pair(odometry, frame0, frame1, &pair) || !pair.view->has_R ||
+      pair.view->num_inliers < kLeastTurnInliers || 2 * pair.view->num_inliers < pair.num) {
     return false;
   }
   *turn = kIdentity;
-  std::copy_n(pair.view.R, 9, turn->R);
+  std::copy_n(pair.view->R, 9, turn->R);
   return true;
 }
 
