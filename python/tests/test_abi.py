@@ -2,11 +2,13 @@
 
 import ctypes
 import dataclasses
+import functools
 import inspect
 import os
 import re
 import shutil
 import subprocess
+import sys
 
 import pytest
 import twoview as tv
@@ -131,6 +133,24 @@ def test_every_function_of_the_headers_is_bound_or_known_to_be_left_out():
     bound = {f for f in functions if hasattr(tv, f[len("tv_"):])}
     bound |= {"tv_odometry_" + method for method in vars(tv.Odometry)} & functions
     assert functions - bound - inside == left_out
+
+
+def test_without_a_library_of_its_own_it_is_the_systems(tmp_path):
+    version = re.search(r'TV_VERSION_STRING "(\d+\.\d+)',
+                        (ROOT / "lib/include/twoview/version.h").read_text()).group(1)
+    assert _abi.SONAME == f"libtwoview.so.{version}"
+    shutil.copytree(ROOT / "python/twoview", tmp_path / "twoview")
+    (tmp_path / "lib").mkdir()
+    program = "import twoview as tv; print(tv.default_library().path, tv.version_string())"
+    kept = {k: v for k, v in os.environ.items() if not k.startswith("TWOVIEW")}
+    environment = dict(kept, PYTHONPATH=str(tmp_path), LD_LIBRARY_PATH=str(tmp_path / "lib"))
+    start = functools.partial(subprocess.run, [sys.executable, "-B", "-c", program], text=True,
+                              capture_output=True, env=environment, cwd=tmp_path, check=False)
+    run = start()
+    assert run.returncode == 1 and "ImportError: no library at" in run.stderr
+    shutil.copy(os.environ["TWOVIEW_LIBRARY"], tmp_path / "lib" / _abi.SONAME)
+    run = start()
+    assert run.stdout.split() == [_abi.SONAME, tv.version_string()], run.stderr
 
 
 def test_the_package_has_the_librarys_version():

@@ -17,6 +17,8 @@ import numpy as np
 
 from .enums import Status
 
+# The library of this ABI where it is installed in the system, as Debian's libtwoview0.1 does it.
+SONAME = "libtwoview.so.0.1"
 DESCRIPTOR_BYTES = 128
 CONTEXT_ALIGNMENT = 64
 
@@ -355,7 +357,8 @@ class Library:
     the library inside the package."""
 
     def __init__(self, path: Union[str, os.PathLike[str]]):
-        self.path = os.path.abspath(path)
+        # As dlopen does, a name without a folder is looked for in the system's folders.
+        self.path = os.path.abspath(path) if os.path.dirname(path) else os.fspath(path)
         self.lib = ctypes.CDLL(self.path)
         for name in ("tv_version_string", "tv_status_string"):
             getattr(self.lib, name).restype = c_char_p
@@ -414,16 +417,23 @@ _default: Optional[Library] = None
 
 
 def default_library() -> Library:
-    """Returns the Library that TWOVIEW_LIBRARY names, else the one inside the package. Raises
-    ImportError where there is none."""
+    """Returns the Library that TWOVIEW_LIBRARY names, else the one inside the package, else the
+    system's. Raises ImportError where there is none."""
     global _default
     if _default is None:
         beside = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libtwoview.so")
         path = os.environ.get("TWOVIEW_LIBRARY") or beside
-        if not os.path.isfile(path):
-            raise ImportError(f"no library at {path}: install the package (pip install ./python), "
-                              "or name a libtwoview.so by TWOVIEW_LIBRARY")
-        _default = Library(path)
+        if os.path.isfile(path):
+            _default = Library(path)
+        else:
+            try:
+                if path != beside:
+                    raise OSError(path)
+                _default = Library(SONAME)
+            except OSError:
+                raise ImportError(
+                    f"no library at {path}: install the package (pip install ./python, or Debian's "
+                    "python3-twoview), or name a libtwoview.so by TWOVIEW_LIBRARY") from None
     return _default
 
 

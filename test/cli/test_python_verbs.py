@@ -3,6 +3,8 @@
 source tree and installed."""
 import json
 import os
+import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -11,6 +13,8 @@ import unittest
 from pathlib import Path
 
 import cli_support as cli
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
 
 # Stands in for either program: prints the arguments that it was started with.
 SCRIPT = """import json, os, signal, sys
@@ -84,10 +88,19 @@ class HandOver(cli.CliTest):
         got = self.report(self.start("compare", "x", TWOVIEW_PYTHON=sys.executable))
         self.assertEqual((got["argv"], got["library"]), (["x"], str(library)))
 
+    def test_without_the_headers_package_it_is_the_library_with_a_version(self):
+        library = pathlib.Path(self.library)
+        version = re.search(r"(?m)^#define TV_VERSION_STRING \"(\d+\.\d+)",
+                            (SOURCE / "lib/include/twoview/version.h").read_text()).group(1)
+        library = library.rename(library.with_name(f"libtwoview.so.{version}"))
+        got = self.report(self.start("colmap", TWOVIEW_PYTHON=sys.executable))
+        self.assertEqual(got["library"], str(library))
+
     def test_what_is_missing_is_one_line(self):
         self.assert_refused(self.start("colmap", TWOVIEW_PYTHON="/no/python"), "/no/python")
         shutil.rmtree(self.tree / "tools")
         self.assert_refused(self.start("compare", TWOVIEW_PYTHON=sys.executable),
+                            "needs the package python3-twoview",
                             "tools/compare_colmap/compare_colmap")
 
     def test_help_lists_them(self):
@@ -108,7 +121,7 @@ class HandOver(cli.CliTest):
             done = subprocess.run([*script, "x"], env={**environment, **verb}, capture_output=True,
                                   timeout=60)
             self.assertEqual(done.returncode, 2)
-            self.assertTrue(done.stderr.startswith(f"{name}: this Python lacks".encode()))
+            self.assertTrue(done.stderr.startswith(f"{name}: this Python has no".encode()))
 
 
 if __name__ == "__main__":

@@ -28,6 +28,19 @@ FOLDERS = [str(folder) for folder in (PARENT, ROOT / "python")
            if folder == PARENT or (folder / "twoview" / "__init__.py").is_file()]
 # The library of the release build; TWOVIEW_LIBRARY overrides it.
 DEFAULT_LIBRARY = str(ROOT / "build" / "release" / "lib" / "libtwoview.so")
+# Modules that compare and colmap import, and what installs them: a package of Debian, or None, and
+# one of PyPI.
+PACKAGES = {
+    "cv2": ("python3-opencv", "opencv-python-headless"),
+    "jinja2": ("python3-jinja2", "jinja2"),
+    "numpy": ("python3-numpy", "numpy"),
+    "plotly": ("python3-plotly", "plotly"),
+    "scipy": ("python3-scipy", "scipy"),
+    "pycolmap": (None, "pycolmap"),
+    "tqdm": ("python3-tqdm", "tqdm"),
+    "twoview": ("python3-twoview", "twoview"),
+    "yaml": ("python3-yaml", "pyyaml"),
+}
 
 
 def environment():
@@ -35,3 +48,13 @@ def environment():
     folders = [*FOLDERS, *filter(None, [os.environ.get("PYTHONPATH")])]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(folders),
             "PYTHONSAFEPATH": "1"}  # no import from the current folder
+
+
+def advice(modules):
+    """How to install modules that are missing, for the end of an error's line."""
+    known = [PACKAGES[name] for name in modules if name in PACKAGES]
+    if not known:
+        return "scripts/bootstrap test installs what it needs"
+    debian, pypi = (" ".join(filter(None, names)) for names in zip(*known))
+    apt = f"apt install {debian}, or " if debian else ""
+    return f"{apt}pip install {pypi}, or scripts/bootstrap test"

@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "base/error.h"
-#include "files/camera_file.h"
+#include "files/camera_formats.h"
 #include "files/image_file.h"
 
 namespace cli {

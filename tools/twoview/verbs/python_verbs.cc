@@ -47,14 +47,17 @@ std::string python_of(const fs::path& tree) {
   return access(bootstrapped.c_str(), X_OK) == 0 ? bootstrapped.string() : "python3";
 }
 
-// Makes the package twoview load this program's library, unless the caller named another one.
+// Makes the package twoview load this program's library, unless the caller named another one. The
+// name without a version is there only with the headers.
 void name_library(const fs::path& program) {
   const fs::path prefix = program.parent_path().parent_path();
   for (const char* folder : {"lib", TWOVIEW_LIB_DIR}) {
-    const fs::path library = prefix / folder / "libtwoview.so";
-    if (std::error_code none; !fs::is_regular_file(library, none)) continue;
-    setenv("TWOVIEW_LIBRARY", library.c_str(), 0);
-    return;
+    for (const char* name : {"libtwoview.so", "libtwoview.so." TWOVIEW_SOVERSION}) {
+      const fs::path library = prefix / folder / name;
+      if (std::error_code none; !fs::is_regular_file(library, none)) continue;
+      setenv("TWOVIEW_LIBRARY", library.c_str(), 0);
+      return;
+    }
   }
 }
 
@@ -66,9 +69,9 @@ void name_library(const fs::path& program) {
   const fs::path script = tree / TWOVIEW_PYTHON_VERBS / verb.script;
   if (tree.empty() || !fs::is_regular_file(script, error))
     throw BadInput(
-        std::string(verb.name) + " is a Python program, " TWOVIEW_PYTHON_VERBS "/" + verb.script +
-        " of the source tree or of an installed " TWOVIEW_DATA_DIR ", and there is none above " +
-        program.string());
+        std::string(verb.name) +
+        " needs the package python3-twoview (" TWOVIEW_DATA_DIR "/" TWOVIEW_PYTHON_VERBS "/" +
+        verb.script + " of an installation or the source tree, above " + program.string() + ")");
   name_library(program);
   setenv("TWOVIEW_VERB", (std::string("twoview ") + verb.name).c_str(), 1);
 
@@ -79,7 +82,8 @@ void name_library(const fs::path& program) {
   arguments.push_back(nullptr);
   execvp(python.c_str(), arguments.data());
   throw BadInput("cannot run " + python + ": " + std::strerror(errno) +
-                 " (scripts/bootstrap bench installs one, TWOVIEW_PYTHON names another)");
+                 " (Debian's package python3, or scripts/bootstrap test, installs one; "
+                 "TWOVIEW_PYTHON names another)");
 }
 
 }  // namespace

@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import twoview as tv
 
+from .. import advice
 from . import settings
 from .errors import ENDING_SIGNALS, EXIT_BAD_INPUT, EXIT_DONE, EXIT_NO_POSE, BadInput
 
@@ -284,7 +285,7 @@ def main(arguments=None):
         return parsed.run(parsed)
     except ImportError as error:
         print(
-            f"twoview: {error} (scripts/bootstrap bench installs what colmap needs)",
+            f"twoview: colmap: {error} ({advice([error.name])})",
             file=sys.stderr,
         )
         return EXIT_BAD_INPUT

@@ -107,7 +107,9 @@ def pixels_from_colmap(keypoints):
 def quaternion(R):
     """The quaternion w x y z of a rotation, with w >= 0."""
     from scipy.spatial.transform import Rotation
-    x, y, z, w = Rotation.from_matrix(R).as_quat(canonical=True)
+    x, y, z, w = found = Rotation.from_matrix(R).as_quat()
+    if next((c for c in (w, x, y, z) if c != 0), 1) < 0:  # Debian 12's scipy has no canonical=True
+        x, y, z, w = -found
     return np.array([w, x, y, z])
 
 

@@ -5,6 +5,7 @@ import signal
 import sys
 import threading
 
+from .. import advice
 from ..formats import FormatError
 
 EXIT_DONE = 0
@@ -42,7 +43,7 @@ def need_pycolmap(what):
         import pycolmap
     except ImportError as error:
         raise BadInput(
-            f"{what} needs pycolmap (scripts/bootstrap bench installs it): {error}"
+            f"{what} needs pycolmap ({advice(['pycolmap'])}): {error}"
         ) from error
     finally:
         # Restores the signal handlers: pycolmap's log library replaced them when it was imported.

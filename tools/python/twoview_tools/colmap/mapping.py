@@ -12,7 +12,7 @@ from .errors import BadInput, need_pycolmap
 def _run_colmap(verb, *arguments):
     program = shutil.which("colmap")
     if not program:
-        raise BadInput("no colmap in the PATH (scripts/bootstrap bench installs it)")
+        raise BadInput("no colmap in the PATH (apt install colmap)")
     done = subprocess.run(
         [program, verb, *map(str, arguments)],
         capture_output=True,

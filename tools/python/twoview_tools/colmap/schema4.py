@@ -7,7 +7,7 @@ NAME = "4"
 
 def prepare():
     """Raises BadInput if databases cannot be written because pycolmap is missing."""
-    need_pycolmap("--schema 4")
+    need_pycolmap("--schema 4 (not 3.8, that of Debian's colmap)")
 
 
 def create(path):
