@@ -444,11 +444,16 @@ static void test_a_frame_is_located_without_changing_the_map(void) {
 static uint64_t count_calls(void *user) { return ++*(uint64_t *)user; }
 
 static void test_the_clock_is_read(void) {
-  uint64_t calls = 0, before;
+  uint64_t calls = 0, before, times[TV_NUM_STAGES];
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_set_clock(NULL, count_calls, &calls));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_set_clock(odometry, count_calls, &calls));
   TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, 0));
   TEST_ASSERT_TRUE(calls > 0);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_take_times(odometry, times, TV_NUM_STAGES));
+  TEST_ASSERT_TRUE(times[TV_STAGE_DETECT] > 0 && times[TV_STAGE_DESCRIBE] > 0);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_take_times(NULL, times, TV_NUM_STAGES));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_take_times(odometry, NULL, TV_NUM_STAGES));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_take_times(odometry, times, -1));
   before = calls;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_set_clock(odometry, NULL, NULL));
   TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, 1));
