@@ -17,9 +17,9 @@ enum {
   MEMORY = 6 << 20,
   MAP = 1 << 18,
   /* The sizes of the records of the map's bytes, and where the first point begins. */
-  HEADER = 176,
+  HEADER = 208,
   POINT = 192,
-  KEYFRAME = 488,
+  KEYFRAME = 472,
   KEYPOINT = 16,
   REMOVED = 112
 };
@@ -444,11 +444,16 @@ static void test_a_frame_is_located_without_changing_the_map(void) {
 static uint64_t count_calls(void *user) { return ++*(uint64_t *)user; }
 
 static void test_the_clock_is_read(void) {
-  uint64_t calls = 0, before;
+  uint64_t calls = 0, before, times[TV_NUM_STAGES];
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_set_clock(NULL, count_calls, &calls));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_set_clock(odometry, count_calls, &calls));
   TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, 0));
   TEST_ASSERT_TRUE(calls > 0);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_take_times(odometry, times, TV_NUM_STAGES));
+  TEST_ASSERT_TRUE(times[TV_STAGE_DETECT] > 0 && times[TV_STAGE_DESCRIBE] > 0);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_take_times(NULL, times, TV_NUM_STAGES));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_take_times(odometry, NULL, TV_NUM_STAGES));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_take_times(odometry, times, -1));
   before = calls;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_set_clock(odometry, NULL, NULL));
   TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, 1));
@@ -637,10 +642,12 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   put(8, 2, 4), expect_sealed(TV_ERR_MAP, num_map);    /* the version */
   put(36, 1, 4), expect_sealed(TV_ERR_MAP, num_map);   /* the camera's reserved field */
   put(40, nan, 8), expect_sealed(TV_ERR_MAP, num_map); /* fx */
-  put(172, 1, 4), expect_sealed(TV_ERR_MAP, num_map);  /* the header's reserved field */
+  put(172, 2, 4), expect_sealed(TV_ERR_MAP, num_map);  /* upright or not */
   for (k = 136; k < 172; k += 4) {                     /* the counts */
     put(k, 0xffffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
   }
+  put(176, 4, 4), expect_sealed(TV_ERR_MAP, num_map); /* the scale */
+  put(192, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
   for (k = 136; k < 148; k += 4) { /* one more or one less than there are */
     put(k, number_at(map + k, 4) + 1, 4), expect_sealed(TV_ERR_MAP, num_map);
     put(k, number_at(map + k, 4) - 1, 4), expect_sealed(TV_ERR_MAP, num_map);
@@ -672,8 +679,8 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   put(keyframe + 32, 0x3fe0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 104, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 152, 0xbff0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 192, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 200, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 176, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 184, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
   /* Keypoints: x, size, a point that does not exist. */
   put(keypoint, 0x7fc00000u, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(keypoint + 8, 0, 4), expect_sealed(TV_ERR_MAP, num_map);

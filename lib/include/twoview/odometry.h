@@ -249,8 +249,7 @@ typedef struct tv_keyframe {
   int32_t frame;
   /* The time of its frame, in seconds. */
   double time_s;
-  /* The pose world_from_cam, as in tv_odometry_state: a row-major rotation, and a position in the
-     unit of the map. */
+  /* The pose world_from_cam in the unit of the map, as in tv_odometry_state. */
   double world_from_cam_R[9], world_from_cam_t[3];
   /* How many keypoints the keyframe has, and how many of them see points of the map. */
   int32_t num_keypoints, num_observations;
@@ -333,16 +332,25 @@ TV_API tv_status tv_odometry_save_size(const tv_odometry *odometry, size_t *size
 TV_API tv_status tv_odometry_save(const tv_odometry *odometry, uint8_t *bytes, size_t cap_bytes,
                                   size_t *num_bytes);
 
-/* Replaces the map by one that tv_odometry_save wrote. The next frame is looked for in the whole
-   map, as after a loss.
+/* Replaces the map by one that tv_odometry_save wrote. The frames that follow are looked for in the
+   whole map, as after a loss; their times may begin anew, and num_frames and the other counts of
+   tv_odometry_state go on from those of the map.
+   bytes: num_bytes bytes, read during the call only.
    Returns TV_ERR_NULL, TV_ERR_MAP (the bytes are no map, are cut or altered, or are of a version
    that this library does not know), TV_ERR_CAMERA (the map is of another camera), TV_ERR_LIMITS
    (the map is larger than the options allow). With each of these the odometry is as before. */
 TV_API tv_status tv_odometry_load(tv_odometry *odometry, const uint8_t *bytes, size_t num_bytes);
 
-/* Gives the odometry a clock, as tv_context_set_clock gives one to a context: now_ns is called with
-   the pointer `user`. Returns TV_ERR_NULL. */
+/* Gives the odometry a clock, so that it measures the time of each stage. The clock is called from
+   within tv_odometry_track and tv_odometry_locate with the pointer `user`; both stay valid as long
+   as the odometry is used. A null now_ns removes the clock. Returns TV_ERR_NULL. */
 TV_API tv_status tv_odometry_set_clock(tv_odometry *odometry, tv_clock now_ns, void *user);
+
+/* Writes the nanoseconds spent in each tv_stage since the previous call of this function, as
+   tv_context_take_times does. stage_ns: room for cap_stages numbers. Returns TV_ERR_NULL,
+   TV_ERR_ARGUMENT (cap_stages below 0). */
+TV_API tv_status tv_odometry_take_times(tv_odometry *odometry, uint64_t *stage_ns,
+                                        int32_t cap_stages);
 
 TV_END_DECLS
 

@@ -150,3 +150,8 @@ tv_status tv_odometry_set_clock(tv_odometry* odometry, tv_clock now_ns, void* us
   if (odometry == nullptr) return TV_ERR_NULL;
   return tv_context_set_clock(odometry->context, now_ns, user);
 }
+
+tv_status tv_odometry_take_times(tv_odometry* odometry, uint64_t* stage_ns, int32_t cap_stages) {
+  if (odometry == nullptr) return TV_ERR_NULL;
+  return tv_context_take_times(odometry->context, stage_ns, cap_stages);
+}

@@ -85,6 +85,8 @@ struct Header {
   int32_t num_points, num_keyframes, num_removed;
   int32_t next_point_id, next_keyframe_id;
   int32_t num_frames, num_segments, num_relocations, num_loops;
+  int32_t is_upright, scale_source, scale_evidence;
+  double scale_product, scale_square, scale_sigma;
 };
 
 void pass_header(Stream* s, Header* h) {
@@ -110,7 +112,12 @@ void pass_header(Stream* s, Header* h) {
   pass(s, &h->num_segments);
   pass(s, &h->num_relocations);
   pass(s, &h->num_loops);
-  pass_reserved(s);
+  pass(s, &h->is_upright);
+  pass(s, &h->scale_source);
+  pass(s, &h->scale_evidence);
+  pass(s, &h->scale_product);
+  pass(s, &h->scale_square);
+  pass(s, &h->scale_sigma);
 }
 
 void pass_point(Stream* s, MapPoint* p, uint8_t (*descriptor)[TV_DESCRIPTOR_BYTES]) {
@@ -166,6 +173,7 @@ bool is_count(int32_t n) { return n >= 0 && n <= kMost; }
 bool is_index(int32_t n, int32_t end) { return n >= 0 && n < end; }
 bool is_length(double x) { return std::fabs(x) <= kLargest; }
 bool is_sigma(double x) { return x >= 0 && x <= kLargest; }
+bool is_measure(double x, double sigma) { return is_finite(x) && is_finite(sigma) && sigma >= 0; }
 bool is_scale(double x) { return x >= 1 / kLargest && x <= kLargest; }
 
 template <typename Number>
@@ -179,7 +187,9 @@ bool is_header(const Header& h) {
   return is_count(h.num_points) && is_count(h.num_keyframes) && is_count(h.num_removed) &&
          is_count(h.next_point_id) && is_count(h.next_keyframe_id) && is_count(h.num_frames) &&
          is_count(h.num_segments) && is_count(h.num_relocations) && is_count(h.num_loops) &&
-         tv_camera_check(&h.camera) == TV_OK;
+         is_index(h.is_upright, 2) && is_index(h.scale_source, 4) &&
+         is_index(h.scale_evidence, 4) && is_measure(h.scale_product, h.scale_square) &&
+         is_measure(0, h.scale_sigma) && tv_camera_check(&h.camera) == TV_OK;
 }
 
 bool is_point(const Header& h, const MapPoint& p) {
@@ -194,8 +204,9 @@ bool is_keyframe(const Header& h, const MapKeyframe& k) {
   return is_index(k.id, h.next_keyframe_id) && is_index(k.segment, h.num_segments) &&
          is_index(k.frame, h.num_frames) && is_count(k.num_keypoints) &&
          is_index(k.has_covariance, 2) && is_finite(k.time_s) && is_pose(k.cam_from_world) &&
-         are_lengths(k.down) && is_sigma(k.down_sigma_rad) && is_length(k.height_m) &&
-         is_sigma(k.height_sigma_m) && is_scale(k.scale) && all_finite(k.covariance, 36);
+         are_lengths(k.down) && is_sigma(k.down_sigma_rad) &&
+         is_measure(k.height_m, k.height_sigma_m) && is_scale(k.scale) &&
+         all_finite(k.covariance, 36);
 }
 
 bool is_keypoint(const Header& h, const MapKeypoint& k) {
@@ -291,6 +302,12 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   h.num_segments = odometry.num_segments;
   h.num_relocations = odometry.num_relocations;
   h.num_loops = odometry.num_loops;
+  h.is_upright = odometry.is_upright;
+  h.scale_source = odometry.scale_source;
+  h.scale_evidence = odometry.scale_evidence;
+  h.scale_product = odometry.scale_product;
+  h.scale_square = odometry.scale_square;
+  h.scale_sigma = odometry.scale_sigma;
   Stream s{to, nullptr, 0, 0, false};
   pass_header(&s, &h);
   for (int32_t n = 0; n < map.num_points; ++n) {
@@ -352,6 +369,12 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, Odometry* odometry) {
   odometry->num_segments = h.num_segments;
   odometry->num_relocations = h.num_relocations;
   odometry->num_loops = h.num_loops;
+  odometry->is_upright = h.is_upright != 0;
+  odometry->scale_source = h.scale_source;
+  odometry->scale_evidence = h.scale_evidence;
+  odometry->scale_product = h.scale_product;
+  odometry->scale_square = h.scale_square;
+  odometry->scale_sigma = h.scale_sigma;
   if (map->num_keyframes > 0) {
     odometry->status = TV_ODOMETRY_LOST;
     odometry->lost_frames = 1;

@@ -13,9 +13,12 @@ namespace {
 constexpr double kLargestScaleSigma = 0.1;  // relative
 // What the map's own scale may drift by, relative: added to the standard deviation.
 constexpr double kScaleDrift = 0.007;
-constexpr double kLeastChange = 0.01;   // of the scale, for which the map is rescaled
-constexpr double kLargestTilt = 0.1;    // radians, added to three standard deviations
-constexpr double kDown[3] = {0, 0, 1};  // in an upright world
+constexpr double kLeastChange = 0.01;    // of the scale, for which the map is rescaled
+constexpr double kLargestTilt = 0.1;     // radians, added to three standard deviations
+constexpr double kLargestMeasure = 1e7;  // metres, metres per second: above it, no sensor is right
+constexpr double kDown[3] = {0, 0, 1};   // in an upright world
+
+bool is_usable(double sigma) { return sigma >= 1 / kLargestMeasure && sigma <= kLargestMeasure; }
 
 // The map's unit becomes `scale` of what it was.
 void rescale(Odometry* odometry, double scale, Frame* frame) {
@@ -49,11 +52,12 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame) {
     std::copy_n(input.world_from_cam, 9, s->world_from_cam);
     s->attitude_sigma_rad = std::min(std::max(sigmas[0], 1e-4), 3.0);
   }
-  if (is_finite(sigmas[1]) && sigmas[1] > 0 && is_finite(input.height_m)) {
+  if (is_usable(sigmas[1]) && std::fabs(input.height_m) <= kLargestMeasure) {
     s->height_m = input.height_m;
     s->height_sigma_m = sigmas[1];
   }
-  if (is_finite(sigmas[2]) && sigmas[2] > 0 && all_finite(input.velocity_m_s, 3)) {
+  const double* v = input.velocity_m_s;
+  if (is_usable(sigmas[2]) && all_finite(v, 3) && std::sqrt(dot(v, v)) <= kLargestMeasure) {
     std::copy_n(input.velocity_m_s, 3, s->velocity_m_s);
     s->velocity_sigma_m_s = sigmas[2];
   }
