@@ -260,7 +260,7 @@ void test_a_prior_that_is_not_known_changes_nothing(void) {
       tv::set_ray(pairs, v, i, Vec3(uniform(&random, -1, 1), uniform(&random, -1, 1), 1), jacobian);
     }
   }
-  tv::finish_rays(pairs);
+  tv::finish_rays(pairs, kNum);
   const Pose pose = any_pose(&random);
   const GravityPrior known = any_prior(&random), unknown;
   const tv::RobustLoss loss{tv::Loss::kCauchy, 100};

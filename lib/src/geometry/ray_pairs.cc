@@ -100,10 +100,9 @@ void set_ray(RayPairs& pairs, int view, int i, const double ray[3], const double
   for (int k = 0; k < 6; ++k) pairs.jacobian[view][k][i] = jacobian[k];
 }
 
-void finish_rays(RayPairs& pairs) { finish_rays(pairs, pairs.num); }
-
-void finish_rays(RayPairs& pairs, int num_scored) {
-  for (int i = 0; i < pairs.num; ++i) pairs.pixel_angle[i] = pixel_angle(pairs, i);
+void finish_rays(RayPairs& pairs, int num_all) {
+  const int num_scored = pairs.num;
+  for (int i = 0; i < num_all; ++i) pairs.pixel_angle[i] = pixel_angle(pairs, i);
   const int step = num_scored > 0 ? even_step(num_scored) : 0;
   for (int slot = 0, i = 0; slot < num_scored; ++slot) {
     set_fast(pairs, slot, i);

@@ -64,11 +64,9 @@ inline void turn_ray0(const RayPairs& pairs, int i, const Mat3& R, double turned
 
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian);
 void set_ray(RayPairs& pairs, int view, int i, const double ray[3], const double jacobian[6]);
-// Call this after the last set_ray: it computes pixel_angle and `fast` from the rays. `fast` gets
-// the first num_scored matches, without num_scored all. msac_cost_fast scores pairs.num matches, so
-// pairs.num must be num_scored when it is called.
-void finish_rays(RayPairs& pairs);
-void finish_rays(RayPairs& pairs, int num_scored);
+// Call this after the last set_ray: it computes pixel_angle of the first num_all matches, which is
+// at least pairs.num, and `fast` of the first pairs.num, the matches that msac_cost_fast scores.
+void finish_rays(RayPairs& pairs, int num_all);
 
 // The arguments of the kernels on doubles (kernels/kernels.h): the arrays of the rays, 3 for each
 // view, then those of the Jacobians, 6 for each view.

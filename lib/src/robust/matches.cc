@@ -244,7 +244,7 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   matches->area_px = problem.calibrated
                          ? static_cast<double>(second.width) * second.height
                          : box_area(problem.pixels[1], matches->order, matches->num_unique());
-  finish_rays(matches->pairs);
+  finish_rays(matches->pairs, matches->num_all);
 }
 
 bool ray_curvature(const TwoViewProblem& problem, const Matches& matches, const Camera& camera,
@@ -293,7 +293,7 @@ Camera moved_camera(const TwoViewProblem& problem, int view, const double shift_
 void move_principal_points(const TwoViewProblem& problem, const double shift_px[2],
                            Matches* matches) {
   for (int v = 0; v < 2; ++v) set_rays(problem, v, moved_camera(problem, v, shift_px), matches);
-  finish_rays(matches->pairs);
+  finish_rays(matches->pairs, matches->num_all);
 }
 
 }  // namespace tv

@@ -29,7 +29,7 @@ Matches gathered(const Matches& matches, int32_t* listed, int count, Arena& aren
               jacobian_of(matches.pairs, v, listed[k]));
     }
   }
-  finish_rays(part.pairs);
+  finish_rays(part.pairs, part.num_all);
   for (int k = 0; k < count; ++k) listed[k] = matches.order[listed[k]];
   part.order = listed;
   return part;
