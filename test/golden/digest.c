@@ -583,6 +583,69 @@ static void digest_window(const pair *p, tv_context *context) {
   print(p, context, "window");
 }
 
+/* The odometry over a flight that is made of the pair's first picture: the upper half passes slowly
+   and the lower half faster, as walls at two distances do. */
+static void digest_odometry(const pair *p, tv_context *context) {
+  enum { FRAMES = 16, KEYPOINTS = 300 };
+  static uint8_t saved[1 << 21];
+  const tv_image *from = &p->image[0];
+  const int32_t width = from->width, height = from->height;
+  tv_odometry *odometry;
+  tv_odometry_options options;
+  tv_odometry_frame frame;
+  tv_odometry_state state;
+  tv_camera camera = p->camera[0];
+  size_t bytes;
+  void *memory;
+  uint8_t *allocated;
+  uint8_t *pixels = (uint8_t *)malloc((size_t)width * (size_t)height);
+  int k, x, y;
+  camera.model = TV_CAMERA_PINHOLE;
+  memset(camera.k, 0, sizeof camera.k);
+  tv_odometry_options_init(&options);
+  options.max_keypoints = KEYPOINTS;
+  options.max_keyframes = 12;
+  options.max_points = 2000;
+  options.kernels = (int32_t)tv_context_kernels(context);
+  must("odometry_size", tv_odometry_size(&camera, &options, &bytes));
+  allocated = (uint8_t *)malloc(bytes + TV_CONTEXT_ALIGNMENT);
+  if (!allocated || !pixels) fail("memory", TV_ERR_MEMORY);
+  memset(allocated, (int)options.kernels, bytes); /* what the memory held does not matter */
+  memory = allocated + (TV_CONTEXT_ALIGNMENT - (uintptr_t)allocated % TV_CONTEXT_ALIGNMENT) %
+                           TV_CONTEXT_ALIGNMENT;
+  must("odometry_init", tv_odometry_init(&odometry, &camera, &options, memory, bytes));
+  start();
+  add_int((int64_t)bytes);
+  tv_odometry_frame_init(&frame);
+  frame.image.data = pixels;
+  frame.image.width = width;
+  frame.image.height = height;
+  frame.image.stride_bytes = width;
+  for (k = 0; k < FRAMES; ++k) {
+    for (y = 0; y < height; ++y) {
+      const int shift = (y < height / 2 ? 3 : 8) * k;
+      for (x = 0; x < width; ++x) {
+        pixels[y * width + x] = from->data[y * from->stride_bytes + (x + shift) % width];
+      }
+    }
+    frame.time_s = k;
+    tv_odometry_state_init(&state);
+    must("odometry_track", tv_odometry_track(odometry, &frame, &state));
+    add_int(state.status);
+    add_int(state.reasons);
+    add_int(state.num_inliers);
+    add_doubles(state.world_from_cam_R, 9);
+    add_doubles(state.world_from_cam_t, 3);
+    add_doubles(state.covariance, 36);
+  }
+  if (state.num_keyframes < 3) fail("the odometry has no map", TV_OK);
+  must("odometry_save", tv_odometry_save(odometry, saved, sizeof saved, &bytes));
+  add_bytes(saved, bytes);
+  print(p, context, "odometry");
+  free(allocated);
+  free(pixels);
+}
+
 static void digest_guided(const pair *p, tv_context *context, const features *f,
                           const tv_two_view *pose) {
   static tv_correspondence found[MAX_KEYPOINTS];
@@ -728,6 +791,7 @@ static void digest_pair(const pair *p, int32_t kernels) {
   digest_bundle(p, context, &m, &pose, points);
   digest_absolute_pose(p, context);
   digest_window(p, context);
+  digest_odometry(p, context);
   digest_reconstruct(p, context, 0, "reconstruct");
   digest_reconstruct(p, context, 1, "aligned");
   digest_memory(p, context, &limits);

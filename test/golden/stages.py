@@ -35,6 +35,7 @@ STAGES = {
     "bundle": ["point_covariances", "bundle"],
     "absolute_pose": ["absolute_pose"],
     "window": ["window"],
+    "odometry": ["odometry"],
     "reconstruct": ["reconstruct"],
     "align": ["aligned"],
 }
