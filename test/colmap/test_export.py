@@ -468,7 +468,7 @@ def test_bad_arguments_are_one_line(tmp_path, refuse):
 def test_a_package_that_is_missing_is_told(photographs, tmp_path, refuse, monkeypatch):
     arguments = ("export", "--database", tmp_path / "x.db", "--images", photographs / "images")
     for package, schema, words in (
-        ("pycolmap", "4", "needs pycolmap (scripts/bootstrap"),
+        ("pycolmap", "4", "needs pycolmap (pip install pycolmap"),
         ("cv2", "3.8", "cv2"),
     ):
         monkeypatch.setitem(sys.modules, package, None)
