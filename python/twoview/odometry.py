@@ -19,29 +19,30 @@ from .options import OdometryOptions, to_struct
 class OdometryState:
     """tv_odometry_state: what is known after a frame. A value that is not known is None."""
 
-    status: OdometryStatus
-    reasons: Reason
+    status: OdometryStatus  #: what is known of the frame's pose
+    reasons: Reason  #: why the frame is weak, or the map does not start
     segment: Optional[int]  #: poses of different segments do not compare; None without a pose
-    is_keyframe: bool
-    relocated: bool
-    loop_closed: bool
-    num_frames: int
-    num_keypoints: int
-    num_matches: int
-    num_inliers: int
-    num_keyframes: int
-    num_points: int
-    num_segments: int
-    num_relocations: int
-    num_loops: int
+    is_keyframe: bool  #: the frame became a keyframe
+    relocated: bool  #: the pose was found again after frames without one
+    loop_closed: bool  #: a loop was closed: the keyframes moved
+    attitude_ignored: bool  #: the frame's attitude contradicts the map's vertical
+    num_frames: int  #: given so far, this one included
+    num_keypoints: int  #: of the frame
+    num_matches: int  #: keypoints that were matched with points of the map
+    num_inliers: int  #: of them, those that fit the pose
+    num_keyframes: int  #: of the map, over all segments
+    num_points: int  #: of the map, over all segments
+    num_segments: int  #: begun so far
+    num_relocations: int  #: poses found again so far
+    num_loops: int  #: closed so far
     reference_id: Optional[int]  #: id of the keyframe of reference_R and reference_t
     reference_R: Optional[np.ndarray]  #: (3, 3), reference_from_cam
     reference_t: Optional[np.ndarray]  #: (3,)
     R: Optional[np.ndarray]  #: (3, 3), world_from_cam
     t: Optional[np.ndarray]  #: (3,), the camera's position in the unit of the map
     covariance: Optional[np.ndarray]  #: (6, 6): w0 w1 w2 d0 d1 d2 of absolute_pose.h
-    noise_px: float
-    scale_source: ScaleSource
+    noise_px: float  #: of a pixel of sigma 1, one standard deviation
+    scale_source: ScaleSource  #: where the unit of lengths comes from
     scale_sigma: Optional[float]  #: relative; None where the unit is not the metre
 
 
@@ -49,14 +50,14 @@ class OdometryState:
 class Keyframe:
     """tv_keyframe: a keyframe of the map."""
 
-    id: int
-    segment: int
+    id: int  #: counts all keyframes, those included that were removed
+    segment: int  #: poses of different segments do not compare
     frame: int  #: how many frames were given before it
-    time_s: float
+    time_s: float  #: of its frame, in seconds
     R: np.ndarray  #: (3, 3), world_from_cam
     t: np.ndarray  #: (3,)
-    num_keypoints: int
-    num_observations: int
+    num_keypoints: int  #: of its frame
+    num_observations: int  #: keypoints that see points of the map
     covariance: Optional[np.ndarray]  #: (6, 6), relative to the keyframe before it
 
 
@@ -199,9 +200,9 @@ def _state(s: Any) -> OdometryState:
     scale = ScaleSource(s.scale_source)
     return OdometryState(
         OdometryStatus(s.status), Reason(s.reasons), s.segment if posed else None,
-        bool(s.is_keyframe), bool(s.relocated), bool(s.loop_closed), s.num_frames,
-        s.num_keypoints, s.num_matches, s.num_inliers, s.num_keyframes, s.num_points,
-        s.num_segments, s.num_relocations, s.num_loops,
+        bool(s.is_keyframe), bool(s.relocated), bool(s.loop_closed),
+        bool(s.attitude_ignored), s.num_frames, s.num_keypoints, s.num_matches, s.num_inliers,
+        s.num_keyframes, s.num_points, s.num_segments, s.num_relocations, s.num_loops,
         s.reference_id if posed and s.reference_id >= 0 else None,
         _matrix(s.reference_from_cam_R, 3, 3) if posed else None,
         _matrix(s.reference_from_cam_t, 3) if posed else None,

@@ -16,7 +16,8 @@ except ImportError:
     cv2 = None
 
 if cv2 is not None:
-    sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "python"))
+    root = Path(__file__).resolve().parents[2]
+    sys.path[:0] = [str(root / "tools" / "python"), str(root / "python")]
     from twoview_tools.accuracy import pictures
 
 RIGHT_DEG = 5.0

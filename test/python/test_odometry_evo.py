@@ -13,7 +13,8 @@ import numpy as np
 
 SKIP_CODE = 77
 FRAMES = 45
-DATA = Path(os.environ.get("TWOVIEW_DATA", Path(__file__).parents[3] / "shared" / "data"))
+DATA = Path(os.environ.get("TWOVIEW_DATA",
+                           Path(__file__).resolve().parents[3] / "shared" / "data"))
 SET = DATA / "seq_tsukuba"
 
 
@@ -24,6 +25,9 @@ def program():
         sys.exit(SKIP_CODE)
     if b"odometry" not in subprocess.run([path, "--help"], capture_output=True).stdout:
         print("skipped: the program was built without TWOVIEW_ODOMETRY")
+        sys.exit(SKIP_CODE)
+    if not SET.is_dir():
+        print(f"skipped: there is no {SET}")
         sys.exit(SKIP_CODE)
     return path
 
