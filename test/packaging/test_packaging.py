@@ -183,7 +183,7 @@ foreach(target twoview twoview_static)
   target_link_libraries(with_${{target}} PRIVATE twoview::${{target}})
 endforeach()
 """)
-        run(CMAKE, "-S", self.folder, "-B", self.folder / "build",
+        run(CMAKE, "-G", "Ninja", "-S", self.folder, "-B", self.folder / "build",
             *(f"-D{name}={value}" for name, value in defines))
 
     def test_the_source_archive_has_the_same_bytes_and_every_committed_file(self):
