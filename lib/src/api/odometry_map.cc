@@ -10,9 +10,6 @@
 namespace tv {
 namespace {
 
-// The size of a keypoint of the finest level, of which a pixel's sigma is 1.
-constexpr float kFinestSize = 4.0f;
-
 // Whether an array has room for `needed` elements. Writes how many that is.
 template <typename Element>
 tv_status check_room(const tv_odometry* odometry, const Element* elements, int32_t cap,
@@ -95,8 +92,8 @@ tv_status tv_odometry_observations(const tv_odometry* odometry, int32_t idx,
   const tv::MapKeypoint* own = tv::keypoints_of(map, keyframe);
   for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
     if (own[k].point == tv::kNoPoint) continue;
-    *observations++ = {ranks[own[k].point],           k, own[k].x, own[k].y,
-                       own[k].size / tv::kFinestSize, 0};
+    *observations++ = {
+        ranks[own[k].point], k, own[k].x, own[k].y, static_cast<float>(tv::sigma_of(own[k])), 0};
   }
   return TV_OK;
 }

@@ -9,9 +9,7 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastShared = 10;
-constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
 constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;
-constexpr double kTypicalNoise = 0.7;  // px
 
 int32_t most_views(const tv_odometry_options& o) { return 2 * o.window; }
 int32_t most_points(const tv_odometry_options& o) {
@@ -90,7 +88,7 @@ void add_observations(const Map& map, int32_t view, int32_t most, Around* around
     o->idx_point = around->numbers[own[i].point];
     o->pixel[0] = static_cast<double>(own[i].x);
     o->pixel[1] = static_cast<double>(own[i].y);
-    o->sigma = own[i].size / 4.0f;
+    o->sigma = static_cast<float>(sigma_of(own[i]));
     around->keypoints[n] = i;
   }
 }
@@ -102,11 +100,15 @@ void measure_depths(Odometry* odometry, const Around& around) {
     MapPoint& point = map.points[around.places[k]];
     point.depth_sigma = 0;  // here: the largest squared sine
   }
-  for (int32_t n = 0; n < around.window.num_observations; ++n) {
+  double centre[3];
+  for (int32_t n = 0, view = -1; n < around.window.num_observations; ++n) {
     const tv_observation& o = around.observations[n];
     MapPoint& point = map.points[around.places[o.idx_point]];
-    double centre[3], a[3], b[3], normal[3];
-    centre_of(map.keyframes[around.keyframes[o.idx_view]].cam_from_world, centre);
+    if (o.idx_view != view) {
+      view = o.idx_view;
+      centre_of(map.keyframes[around.keyframes[view]].cam_from_world, centre);
+    }
+    double a[3], b[3], normal[3];
     for (int c = 0; c < 3; ++c) {
       a[c] = point.position[c] - centre[c];
       b[c] = point.position[c] - static_cast<double>(point.seen_from[c]);

@@ -11,6 +11,11 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame);
 // Makes points of the keypoints that match those of earlier keyframes.
 void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image);
 
+// Removes keyframes until there is room for `wanted` more: those between whose neighbours the
+// camera moved and turned least; never the first one of a segment or the one to which poses are
+// relative.
+void make_room(Odometry* odometry, int32_t wanted);
+
 // Makes points of matched pixels of two keyframes. Returns how many.
 int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
                             const int32_t* keypoints0, const int32_t* keypoints1, int32_t num,

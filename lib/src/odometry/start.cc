@@ -1,22 +1,18 @@
 #include "odometry/start.h"
-#include "twoview/match.h"
-#include "twoview/triangulate.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 
-#include "geometry/vector3.h"
 #include "odometry/adjust.h"
 #include "odometry/keyframe.h"
 #include "odometry/search.h"
+#include "twoview/match.h"
+#include "twoview/two_view.h"
 
 namespace tv {
 namespace {
 
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
 constexpr double kLeastParallax = 0.015;  // radians, the median
-constexpr double kLeastAngle = 0.006;     // radians
 constexpr int32_t kLeastTurnInliers = 50;
 constexpr int32_t kFramesBetween = 6;  // between frames that wait
 
@@ -109,6 +105,7 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
   std::copy_n(pair.view->t, 3, relative.t);
   frame->cam_from_world = compose(relative, frame0->cam_from_world);
   forget_points(frame);
+  make_room(odometry, 2);
   const int32_t first = make_keyframe(odometry, *frame0);
   const int32_t second = make_keyframe(odometry, *frame);
   int32_t* keypoints0 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
@@ -157,7 +154,6 @@ void copy_frame(const Frame& from, Frame* to) {
 
 bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons) {
   *reasons = 0;
-  if (odometry->map.num_keyframes + 2 > odometry->map.sizes.max_keyframes) return false;
   for (int n = 0; n < odometry->num_starts; ++n) {
     ArenaScope scope(odometry->scratch);
     Pair pair;

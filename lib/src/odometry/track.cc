@@ -15,7 +15,7 @@
 namespace tv {
 namespace {
 
-constexpr int32_t kLeastInliers = 20;
+constexpr int32_t kLeastInliers = 20, kLeastRelocated = 30;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
 constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
 // A frame becomes a keyframe when the camera moved by kFarMoved median depths or turned by
@@ -53,16 +53,12 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
 
 // The pose is known to a few pixels: looks for all points once more, near where they must be.
 bool refine_track(Odometry* odometry, Frame* frame, PoseFit* fit) {
-  const PoseFit before = *fit;
   PointSearch search{odometry->local_points, odometry->num_local_points,
                      fit->cam_from_world,    5.0,
                      kMaxDistance,           kSearchRatio};
   find_points(odometry, search, frame);
   frame->cam_from_world = fit->cam_from_world;
-  if (!fit_pose(odometry, 50, 3.0, frame, fit)) {
-    *fit = before;
-    return false;
-  }
+  if (!fit_pose(odometry, 50, 3.0, frame, fit)) return false;
   frame->cam_from_world = fit->cam_from_world;
   return fit->estimate.num_inliers >= kLeastInliers;
 }
@@ -116,32 +112,6 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
          (few && (moved > kLeastMoved || turned > kLeastTurned));
 }
 
-// Makes room for one more keyframe: removes the one that moved the camera least.
-void make_room(Odometry* odometry) {
-  Map& map = odometry->map;
-  if (map.num_keyframes < map.sizes.max_keyframes) return;
-  int32_t best = 1;
-  double least = 0;
-  for (int32_t k = 1; k + 2 < map.num_keyframes; ++k) {
-    const MapKeyframe *before = &map.keyframes[k - 1], *after = &map.keyframes[k + 1];
-    double a[3], b[3];
-    centre_of(before->cam_from_world, a);
-    centre_of(after->cam_from_world, b);
-    const double gap =
-        before->segment != map.keyframes[k].segment ? 1e9
-        : after->segment != map.keyframes[k].segment
-            ? 1e8
-            : distance_between(a, b) +
-                  odometry->median_depth * rotation_angle(compose(after->cam_from_world,
-                                                                  inverse(before->cam_from_world)));
-    if (k == 1 || gap < least) {
-      least = gap;
-      best = k;
-    }
-  }
-  remove_keyframe(&map, best, best - 1);
-}
-
 // The frame's pose and points are those of the keyframe that was made of it.
 void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   const MapKeyframe& keyframe = odometry.map.keyframes[idx];
@@ -151,7 +121,7 @@ void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
 }
 
 void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
-  make_room(odometry);
+  make_room(odometry, 1);
   const int32_t idx = make_keyframe(odometry, *frame);
   make_points(odometry, idx, image);
   remove_bad_points(odometry);
@@ -172,14 +142,16 @@ void search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
   Map& map = odometry->map;
   const int32_t end_id = map.keyframes[end.keyframe].id;
   if (state->is_keyframe == 0) {
+    const int32_t next_point_id = map.next_point_id;
     add_frame_as_keyframe(odometry, frame, image);
     state->is_keyframe = 1;
     end.keyframe = find_keyframe(map, end_id);
     if (end.keyframe < 0) return;
     for (int32_t k = 0; k < again->num; ++k) {
-      if (again->points[k] != kNoPoint && map.points[again->points[k]].id < 0) {
-        again->points[k] = kNoPoint;
-      }
+      // The point may be gone, and its place taken by a new one.
+      if (again->points[k] == kNoPoint) continue;
+      const int32_t id = map.points[again->points[k]].id;
+      if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
   }
   close_loop(odometry, *again, end);
@@ -209,8 +181,8 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, Frame* frame, Pos
     }
     if (num < kLeastInliers || !match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);
-    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < 30) continue;
-    odometry->segment = map.keyframes[k].segment;
+    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < kLeastRelocated)
+      continue;
     odometry->reference_id = map.keyframes[k].id;
     return true;
   }
@@ -240,7 +212,7 @@ void write_pose(const Odometry& odometry, const Frame& frame, tv_odometry_state*
   const Rigid world_from_cam = inverse(frame.cam_from_world);
   const Rigid relative = compose(map.keyframes[k].cam_from_world, world_from_cam);
   state->has_pose = 1;
-  state->segment = odometry.segment;
+  state->segment = map.keyframes[k].segment;
   state->reference_id = odometry.reference_id;
   std::copy_n(relative.R, 9, state->reference_from_cam_R);
   for (int c = 0; c < 3; ++c) {
@@ -258,10 +230,6 @@ void write_fit(const PoseFit& fit, tv_odometry_state* state) {
   state->noise_px = fit.estimate.noise_px;
   state->reasons = fit.estimate.reasons;
 }
-
-}  // namespace
-
-namespace {
 
 // The frame's pose is known: keyframe, loops, scale, state.
 void finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const PoseFit& fit,
@@ -294,7 +262,10 @@ void finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
 bool search_map(Odometry* odometry, bool is_first, Frame* frame, PoseFit* fit) {
   const Map& map = odometry->map;
   if (is_first) odometry->next_search = map.num_keyframes - 1;
-  if (relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, fit)) return true;
+  if (relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, fit)) {
+    enter_segment(odometry, map.keyframes[find_keyframe(map, odometry->reference_id)].segment);
+    return true;
+  }
   odometry->next_search = odometry->next_search >= kSearchedKeyframes
                               ? odometry->next_search - kSearchedKeyframes
                               : map.num_keyframes - 1;
@@ -319,9 +290,11 @@ bool follow_turn(Odometry* odometry, Frame* frame) {
 bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
                    tv_odometry_state* state) {
   const int32_t segment = odometry->segment;
+  const bool is_upright = odometry->is_upright;
   odometry->segment = odometry->num_segments;
   if (!start_map(odometry, frame, image, &state->reasons)) {
     odometry->segment = segment;
+    odometry->is_upright = is_upright;
     return false;
   }
   ++odometry->num_segments;
@@ -400,7 +373,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
 
 void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
                   tv_odometry_state* state) {
-  const int32_t segment = odometry->segment, reference = odometry->reference_id;
+  const int32_t reference = odometry->reference_id;
   Frame* frame = &odometry->starts[0];  // has no other use while there is a map
   extract_frame(odometry, image, frame);
   PoseFit fit;
@@ -417,7 +390,6 @@ void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
     write_pose(*odometry, *frame, state);
   }
   odometry->is_locating = false;
-  odometry->segment = segment;
   odometry->reference_id = reference;
   const int32_t k = find_keyframe(odometry->map, reference);
   if (k >= 0) list_local_points(odometry, k);
