@@ -11,6 +11,7 @@
 #include "odometry/adjust.h"
 #include "odometry/loop.h"
 #include "odometry/metric.h"
+#include "odometry/pair.h"
 #include "odometry/track.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
@@ -97,7 +98,8 @@ size_t plan_bytes(const Plan& plan) {
 void start_anew(tv_odometry* o) {
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
-  o->reference_id = -1;
+  o->reference_id = o->confirmed_id = -1;
+  o->sees_one_plane = false;
   o->has_motion = false;
   o->mark = o->num_frames = o->segment = o->num_segments = 0;
   o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
@@ -133,11 +135,11 @@ size_t scratch_bytes(const tv_odometry_options& o) {
                matches = arena_bytes<tv_correspondence>(n);
   // start.cc: a pair, then its points or the adjustment.
   const size_t triangulation = 2 * arena_bytes<double>(2 * n) + arena_bytes<tv_point>(n);
-  const size_t start = matches + 2 * arena_bytes<double>(2 * n) + 3 * arena_bytes<float>(n) +
-                       4 * indices + arena_bytes<uint8_t>(n) + arena_bytes<tv_two_view>(1) +
-                       std::max(triangulation, adjust_bytes(o)) + flags;
+  const size_t start =
+      matches + pair_bytes(o) + 2 * indices + std::max(triangulation, adjust_bytes(o)) + flags;
   // keyframe.cc: the matches of two keyframes, and their points.
-  const size_t new_points = matches + 2 * indices + 2 * arena_bytes<tv_keypoint>(n) + triangulation;
+  const size_t new_points = matches + 2 * indices + 2 * arena_bytes<tv_keypoint>(n) +
+                            std::max(triangulation, pair_bytes(o));
   // track.cc, loop.cc: the points of a keyframe are matched with a frame, and give its pose.
   const size_t matching =
       arena_bytes<uint8_t>(static_cast<size_t>(kMatchedFrames) * n * TV_DESCRIPTOR_BYTES) + matches;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/vector3.h"
+#include "odometry/keyframe.h"
 
 namespace tv {
 namespace {
@@ -276,13 +277,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
     forget_observation(&map, around.keyframes[o.idx_view], around.keypoints[n]);
   }
   measure_depths(odometry, around);
-  uint8_t* is_removed = arena_alloc<uint8_t>(arena, static_cast<size_t>(options.max_points));
-  bool any = false;
-  for (int32_t p = 0; p < map.end_points; ++p) {
-    is_removed[p] = map.points[p].id >= 0 && map.points[p].num_observations < 2;
-    any = any || is_removed[p];
-  }
-  if (any) remove_points(&map, is_removed);
+  remove_lone_points(odometry);
 }
 
 }  // namespace tv

@@ -5,7 +5,6 @@
 
 #include "geometry/vector3.h"
 #include "odometry/adjust.h"
-#include "twoview/match.h"
 #include "twoview/triangulate.h"
 
 namespace tv {
@@ -48,12 +47,7 @@ tv_features features_of(const Map& map, const MapKeyframe& keyframe, tv_keypoint
   for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
     keypoints[k] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
   }
-  tv_features features;
-  tv_features_init(&features);
-  features.num = keyframe.num_keypoints;
-  features.keypoints = keypoints;
-  features.descriptors = descriptors_of(map, keyframe);
-  return features;
+  return as_features(keypoints, descriptors_of(map, keyframe), keyframe.num_keypoints);
 }
 
 }  // namespace
@@ -174,7 +168,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   return num_made;
 }
 
-void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
+MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;
   Map& map = odometry->map;
@@ -200,6 +194,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     }
     neighbours[num_neighbours++] = k;
   }
+  MapVote vote{};
   for (int32_t i = 0; i < num_neighbours; ++i) {
     const int32_t k = neighbours[i];
     const MapKeyframe& other = map.keyframes[k];
@@ -207,6 +202,10 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     int32_t num_found = 0;
     if (tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num_found) != TV_OK) {
       continue;
+    }
+    if (!is_decided(vote)) {
+      add_vote(odometry, theirs.keypoints, mine.keypoints, found, num_found,
+               compose(own.cam_from_world, inverse(other.cam_from_world)), &vote);
     }
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
     const MapKeypoint* their_keypoints = keypoints_of(map, other);
@@ -230,6 +229,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num,
                         std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma), image);
   }
+  return result_of(vote);
 }
 
 void remove_bad_points(Odometry* odometry) {
@@ -242,6 +242,19 @@ void remove_bad_points(Odometry* odometry) {
     const MapPoint& point = map.points[p];
     is_removed[p] =
         point.id >= 0 && point.num_visible >= 8 && 4 * point.num_found < point.num_visible;
+    any = any || is_removed[p];
+  }
+  if (any) remove_points(&map, is_removed);
+}
+
+void remove_lone_points(Odometry* odometry) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  uint8_t* is_removed =
+      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
+  bool any = false;
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    is_removed[p] = map.points[p].id >= 0 && map.points[p].num_observations < 2;
     any = any || is_removed[p];
   }
   if (any) remove_points(&map, is_removed);

@@ -120,10 +120,31 @@ void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
 }
 
-void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
+// Removes the keyframes that were made since the last confirmed one, and what only they saw.
+void remove_unconfirmed(Odometry* odometry) {
+  Map& map = odometry->map;
+  for (int32_t k = map.num_keyframes - 1; k > 0; --k) {
+    if (map.keyframes[k].id <= odometry->confirmed_id ||
+        map.keyframes[k].segment != map.keyframes[k - 1].segment) {
+      break;
+    }
+    remove_keyframe(&map, k, k - 1);
+  }
+  remove_lone_points(odometry);
+  odometry->reference_id = map.keyframes[map.num_keyframes - 1].id;
+}
+
+// False: the map is wrong here. The frame is no keyframe, and has no pose.
+bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
   make_room(odometry, 1);
   const int32_t idx = make_keyframe(odometry, *frame);
-  make_points(odometry, idx, image);
+  const MapCheck check = make_points(odometry, idx, image);
+  if (check == MapCheck::kContradicts) {
+    remove_unconfirmed(odometry);
+    return false;
+  }
+  if (check == MapCheck::kAgrees) odometry->confirmed_id = odometry->map.keyframes[idx].id;
+  odometry->sees_one_plane = check == MapCheck::kOnePlane;
   remove_bad_points(odometry);
   adjust_around(odometry, idx, kWindowSteps);
   const Map& map = odometry->map;
@@ -131,22 +152,23 @@ void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
   odometry->reference_id = map.keyframes[idx].id;
   list_local_points(odometry, idx);
   take_keyframe(*odometry, idx, frame);
+  return true;
 }
 
-// Looks for a loop in a few keyframes, and closes it.
-void search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
+// Looks for a loop in a few keyframes, and closes it. False: the map is wrong here.
+bool search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
                   tv_odometry_state* state) {
   Frame* again = &odometry->starts[0];  // has no other use while the map is tracked
   LoopEnd end;
-  if (!find_loop(odometry, *frame, kLoopKeyframes, again, &end)) return;
+  if (!find_loop(odometry, *frame, kLoopKeyframes, again, &end)) return true;
   Map& map = odometry->map;
   const int32_t end_id = map.keyframes[end.keyframe].id;
   if (state->is_keyframe == 0) {
     const int32_t next_point_id = map.next_point_id;
-    add_frame_as_keyframe(odometry, frame, image);
+    if (!add_frame_as_keyframe(odometry, frame, image)) return false;
     state->is_keyframe = 1;
     end.keyframe = find_keyframe(map, end_id);
-    if (end.keyframe < 0) return;
+    if (end.keyframe < 0) return true;
     for (int32_t k = 0; k < again->num; ++k) {
       // The point may be gone, and its place taken by a new one.
       if (again->points[k] == kNoPoint) continue;
@@ -163,6 +185,7 @@ void search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
   measure_depth(odometry, *frame);
   ++odometry->num_loops;
   state->loop_closed = 1;
+  return true;
 }
 
 // Looks for the frame in the map. True: the frame has its pose, and the keyframe's surroundings are
@@ -231,14 +254,13 @@ void write_fit(const PoseFit& fit, tv_odometry_state* state) {
   state->reasons = fit.estimate.reasons;
 }
 
-// The frame's pose is known: keyframe, loops, scale, state.
-void finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const PoseFit& fit,
+// The frame's pose is known: keyframe, loops, scale, state. False: the map is wrong here.
+bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const PoseFit& fit,
                     bool follows, Frame* frame, tv_odometry_state* state) {
   odometry->lost_frames = odometry->turned_frames = odometry->num_starts = 0;
   count_found(odometry, *frame);
   measure_depth(odometry, *frame);
   write_fit(fit, state);
-  odometry->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   odometry->has_motion = follows;
   if (follows) {
     odometry->motion = compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
@@ -251,11 +273,14 @@ void finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   const double* covariance = fit.estimate.covariance;
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
   if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
-    add_frame_as_keyframe(odometry, frame, input.image);
+    if (!add_frame_as_keyframe(odometry, frame, input.image)) return false;
     measure_scale(odometry, frame);
     state->is_keyframe = 1;
   }
-  search_loops(odometry, frame, input.image, state);
+  if (!search_loops(odometry, frame, input.image, state)) return false;
+  if (odometry->sees_one_plane) state->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
+  return true;
 }
 
 // Looks for a lost frame in a few keyframes, at each frame in the next ones.
@@ -302,6 +327,8 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
   const int32_t newest = odometry->map.num_keyframes - 1;
   take_keyframe(*odometry, newest, frame);
   odometry->reference_id = odometry->map.keyframes[newest].id;
+  odometry->confirmed_id = odometry->reference_id;
+  odometry->sees_one_plane = false;
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   measure_depth(odometry, *frame);
@@ -347,9 +374,15 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     state->relocated = has_pose && !was_tracked;
     odometry->num_relocations += state->relocated;
   }
-  if (has_pose) {
-    finish_tracked(odometry, input, fit, follows, frame, state);
-  } else {
+  if (has_pose && !finish_tracked(odometry, input, fit, follows, frame, state)) {
+    // What the frame was tracked with was wrong.
+    state->num_inliers = 0;
+    state->has_covariance = 0;
+    state->reasons = TV_REASON_TWO_PLANAR_SOLUTIONS;
+    odometry->status = TV_ODOMETRY_LOST;
+    odometry->lost_frames = 1;
+    odometry->has_motion = has_pose = false;
+  } else if (!has_pose) {
     odometry->has_motion = false;
     has_pose = has_map && had_pose && follow_turn(odometry, frame);
     odometry->status = has_pose  ? TV_ODOMETRY_ROTATION
