@@ -203,7 +203,8 @@ MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image
     if (tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num_found) != TV_OK) {
       continue;
     }
-    if (!is_decided(vote)) {
+    // The nearest one is left out: from near by, a wrong motion looks like the right one.
+    if ((i > 0 || num_neighbours == 1) && needs_vote(vote)) {
       add_vote(odometry, theirs.keypoints, mine.keypoints, found, num_found,
                compose(own.cam_from_world, inverse(other.cam_from_world)), &vote);
     }

@@ -69,10 +69,10 @@ struct tv_odometry {
   int32_t status;
   int32_t lost_frames, turned_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
-  // The last keyframe that its own matches with earlier ones confirmed, and whether since then they
-  // saw one plane only.
+  // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
+  // saw one plane only, or contradicted the map.
   int32_t confirmed_id;
-  bool sees_one_plane;
+  bool is_doubtful;
   bool is_locating;  // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians

@@ -8,6 +8,7 @@ namespace {
 
 constexpr int32_t kLeastMatches = 30;
 constexpr int32_t kMostIterations = 2000;
+constexpr int32_t kMostPairs = 3;  // that a keyframe is checked with
 // A map contradicts a pair whose turns differ by more than three standard deviations of the pair's
 // and this angle, in radians. Measured: docs/odometry.md.
 constexpr double kTurnSigmas = 3, kTurnAllowed = 0.026;
@@ -97,15 +98,14 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
     ++vote->num_disagree;
 }
 
-bool is_decided(const MapVote& vote) { return vote.num_agree > vote.num_disagree; }
+bool needs_vote(const MapVote& vote) {
+  return vote.num_agree == 0 && vote.num_disagree < 2 && vote.num_pairs < kMostPairs;
+}
 
 MapCheck result_of(const MapVote& vote) {
-  if (is_decided(vote)) return MapCheck::kAgrees;
-  if (vote.num_disagree >= 2 && vote.num_disagree > vote.num_agree) return MapCheck::kContradicts;
-  if (vote.num_agree + vote.num_disagree == 0 && 2 * vote.num_planar > vote.num_pairs) {
-    return MapCheck::kOnePlane;
-  }
-  return MapCheck::kUnknown;
+  if (vote.num_agree > 0) return MapCheck::kAgrees;
+  if (vote.num_disagree >= 2) return MapCheck::kContradicts;
+  return 2 * vote.num_planar > vote.num_pairs ? MapCheck::kOnePlane : MapCheck::kUnknown;
 }
 
 }  // namespace tv

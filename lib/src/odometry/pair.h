@@ -31,7 +31,7 @@ enum class MapCheck {
   kUnknown,      // the pairs do not determine their motion
   kAgrees,       // a pair that is beyond doubt turned as the map says
   kOnePlane,     // most pairs see one plane, which two motions explain
-  kContradicts,  // most of the pairs that are beyond doubt turned otherwise
+  kContradicts,  // two pairs that are beyond doubt turned otherwise
 };
 
 // Counts the pairs of a keyframe with others, as long as they are needed.
@@ -44,8 +44,8 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
               const tv_correspondence* matches, int32_t num, const Rigid& cam1_from_cam0,
               MapVote* vote);
 
-// Whether more pairs are needed for the result.
-bool is_decided(const MapVote& vote);
+// Whether another pair may change the result.
+bool needs_vote(const MapVote& vote);
 MapCheck result_of(const MapVote& vote);
 
 }  // namespace tv

@@ -141,10 +141,15 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
   const MapCheck check = make_points(odometry, idx, image);
   if (check == MapCheck::kContradicts) {
     remove_unconfirmed(odometry);
+    odometry->is_doubtful = true;
     return false;
   }
-  if (check == MapCheck::kAgrees) odometry->confirmed_id = odometry->map.keyframes[idx].id;
-  odometry->sees_one_plane = check == MapCheck::kOnePlane;
+  if (check == MapCheck::kAgrees) {
+    odometry->confirmed_id = odometry->map.keyframes[idx].id;
+    odometry->is_doubtful = false;
+  } else if (check == MapCheck::kOnePlane) {
+    odometry->is_doubtful = true;
+  }
   remove_bad_points(odometry);
   adjust_around(odometry, idx, kWindowSteps);
   const Map& map = odometry->map;
@@ -278,7 +283,7 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
     state->is_keyframe = 1;
   }
   if (!search_loops(odometry, frame, input.image, state)) return false;
-  if (odometry->sees_one_plane) state->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  if (odometry->is_doubtful) state->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
   odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   return true;
 }
@@ -328,7 +333,7 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
   take_keyframe(*odometry, newest, frame);
   odometry->reference_id = odometry->map.keyframes[newest].id;
   odometry->confirmed_id = odometry->reference_id;
-  odometry->sees_one_plane = false;
+  odometry->is_doubtful = false;
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   measure_depth(odometry, *frame);
