@@ -1,5 +1,5 @@
 // The map: keyframes, points, and which keypoint of a keyframe sees which point. All of it lies in
-// arrays of a fixed size. Tests: test/unit/test_odometry_map.cc.
+// arrays of a fixed size. Tests: test/api/test_odometry_api.c.
 #pragma once
 
 #include "base/arena.h"
@@ -25,13 +25,11 @@ struct MapKeyframe {
   int32_t room;  // which part of the keypoints' array is its own
   int32_t num_keypoints, num_observations;
   int32_t described;  // which part of the descriptors' array is its own; -1: none
-  int32_t has_covariance;
   double time_s;
   Rigid cam_from_world;
   double down[3], down_sigma_rad;   // gravity in the camera's frame; sigma 0: not known
   double height_m, height_sigma_m;  // sigma 0: not known
-  double scale;           // by which loops have multiplied its surroundings since it was made
-  double covariance[36];  // of cam_from_world relative to the keyframe before
+  double scale;                     // by which loops have multiplied its surroundings since then
 };
 
 struct MapPoint {
