@@ -9,6 +9,7 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/adjust.h"
+#include "odometry/fit_pose.h"
 #include "odometry/loop.h"
 #include "odometry/metric.h"
 #include "odometry/pair.h"
@@ -149,7 +150,7 @@ size_t scratch_bytes(const tv_odometry_options& o) {
       keyframe_numbers + indices + std::max(matching, fitting) + keyframe_numbers;
   const size_t closing = close_loop_bytes(o);
   const size_t ranking = 2 * arena_bytes<int32_t>(num_points);
-  return std::max({start, new_points, locating, closing, ranking});
+  return arena_bytes<PoseFit>(1) + std::max({start, new_points, locating, closing, ranking});
 }
 
 }  // namespace tv

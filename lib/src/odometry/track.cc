@@ -367,7 +367,8 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   state->num_keypoints = frame->num;
   state->segment = state->reference_id = -1;
 
-  PoseFit fit;
+  ArenaScope scope(odometry->scratch);
+  PoseFit& fit = *arena_alloc<PoseFit>(odometry->scratch, 1);
   const bool has_map = odometry->map.num_keyframes > 0;
   const bool had_pose = odometry->previous.has_pose;
   const bool was_tracked = had_pose && odometry->turned_frames == 0;
