@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "geometry/vector3.h"
-#include "odometry/keyframe.h"
 
 namespace tv {
 namespace {
@@ -342,7 +341,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
     forget_observation(&map, around.keyframes[o.idx_view], around.keypoints[n]);
   }
   measure_depths(odometry, around);
-  remove_lone_points(odometry);
+  remove_lone_points(&map, odometry->scratch);
 }
 
 }  // namespace tv

@@ -248,19 +248,6 @@ void remove_bad_points(Odometry* odometry) {
   if (any) remove_points(&map, is_removed);
 }
 
-void remove_lone_points(Odometry* odometry) {
-  ArenaScope scope(odometry->scratch);
-  Map& map = odometry->map;
-  uint8_t* is_removed =
-      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
-  bool any = false;
-  for (int32_t p = 0; p < map.end_points; ++p) {
-    is_removed[p] = map.points[p].id >= 0 && map.points[p].num_observations < 2;
-    any = any || is_removed[p];
-  }
-  if (any) remove_points(&map, is_removed);
-}
-
 void list_local_points(Odometry* odometry, int32_t keyframe) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;

@@ -25,9 +25,6 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
 // Removes points that frames do not find where they must appear.
 void remove_bad_points(Odometry* odometry);
 
-// Removes points that fewer than two keyframes see.
-void remove_lone_points(Odometry* odometry);
-
 // Lists the points that are looked for in the next frames: those of the keyframes that share most
 // points with this one.
 void list_local_points(Odometry* odometry, int32_t keyframe);

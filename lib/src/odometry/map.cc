@@ -149,6 +149,17 @@ void remove_points(Map* map, const uint8_t* is_removed) {
   }
 }
 
+void remove_lone_points(Map* map, Arena& scratch) {
+  ArenaScope scope(scratch);
+  uint8_t* is_removed = arena_alloc<uint8_t>(scratch, as_size(map->end_points));
+  bool any = false;
+  for (int32_t p = 0; p < map->end_points; ++p) {
+    is_removed[p] = map->points[p].id >= 0 && map->points[p].num_observations < 2;
+    any = any || is_removed[p];
+  }
+  if (any) remove_points(map, is_removed);
+}
+
 void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
   MapKeyframe* removed = &map->keyframes[keyframe];
   const MapKeyframe& stays = map->keyframes[kept];

@@ -121,6 +121,9 @@ void rank_points(const Map& map, int32_t* places, int32_t* ranks);
 // Removes a point from the map and from the keyframes that see it.
 void remove_points(Map* map, const uint8_t* is_removed);
 
+// Removes the points that fewer than two keyframes see. Takes max_points bytes of scratch.
+void remove_lone_points(Map* map, Arena& scratch);
+
 // Removes a keyframe. Its points stay, also those that only one other keyframe sees then. The path
 // of frames that are relative to it continues from the keyframe `kept`.
 void remove_keyframe(Map* map, int32_t keyframe, int32_t kept);

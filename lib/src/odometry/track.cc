@@ -130,7 +130,7 @@ void remove_unconfirmed(Odometry* odometry) {
     }
     remove_keyframe(&map, k, k - 1);
   }
-  remove_lone_points(odometry);
+  remove_lone_points(&map, odometry->scratch);
   odometry->reference_id = map.keyframes[map.num_keyframes - 1].id;
 }
 
