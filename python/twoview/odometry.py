@@ -159,7 +159,7 @@ class Odometry:
                         _matrix(k.world_from_cam_t, 3), k.num_keypoints, k.num_observations)
 
     def covariance(self, idx: int) -> Optional[np.ndarray]:
-        """tv_odometry_covariance: (6, 6), of the pose of the keyframe number idx relative to that of
+        """tv_odometry_covariance: (6, 6), of the pose of keyframe number idx relative to that of
         the one before; None where it is not known."""
         covariance, is_known = np.zeros((6, 6)), c_int32()
         self._call("tv_odometry_covariance", c_int32(idx), _abi.pointer(covariance),
