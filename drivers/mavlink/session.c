@@ -170,36 +170,48 @@ tvs_status tvm_session_attitude_at(const tvm_session *session, int64_t host_ns, 
 
 /* ---- frames ---- */
 
+/* Takes the frames that the camera has, so that none is lost while an older one waits. */
+static tvs_status fill_held(tvm_session *s) {
+  tvs_status status = TVS_OK;
+  while (s->num_held < QUEUE_FRAMES) {
+    tvs_frame *frame = &s->held[(s->first_held + s->num_held) % QUEUE_FRAMES];
+    memset(frame, 0, sizeof *frame);
+    frame->struct_size = sizeof *frame;
+    status = s->camera.next(s->camera.user, frame);
+    if (status != TVS_OK) break;
+    frame->time.received_ns += s->options.camera_offset_ns;
+    frame->time.host_ns += s->options.camera_offset_ns;
+    frame->time.device_ns = 0;
+    frame->time.clock_id = 0;
+    ++s->num_held;
+  }
+  return s->num_held > 0 ? TVS_OK : status;
+}
+
 static tvs_status next_frame(void *user, tvs_frame *frame) {
   tvm_session *s = user;
+  tvs_frame *first;
   tvs_time time;
   tvs_status status;
   if (!frame) return TVS_ERR_NULL;
   if (frame->struct_size != sizeof *frame) return TVS_ERR_STRUCT_SIZE;
-  if (!s->has_held) {
-    memset(&s->held, 0, sizeof s->held);
-    s->held.struct_size = sizeof s->held;
-    status = s->camera.next(s->camera.user, &s->held);
-    if (status != TVS_OK) return status;
-    s->held.time.received_ns += s->options.camera_offset_ns;
-    s->held.time.host_ns += s->options.camera_offset_ns;
-    s->held.time.device_ns = 0;
-    s->held.time.clock_id = 0;
-    s->has_held = 1;
-  }
-  time = s->held.time;
-  status = tvm_session_attitude_at(s, s->held.time.host_ns, &time, &s->held.attitude);
+  status = fill_held(s);
+  if (status != TVS_OK) return status;
+  first = &s->held[s->first_held];
+  time = first->time;
+  status = tvm_session_attitude_at(s, time.host_ns, &time, &first->attitude);
   /* The sample that follows the frame has velocity and height; the caller is to have it first. */
   if ((status != TVS_OK || s->emitted_device_ns < time.device_ns) &&
-      s->now_ns - s->held.time.host_ns < s->options.hold_frame_ns) {
+      s->now_ns - first->time.host_ns < s->options.hold_frame_ns) {
     return TVS_NONE;
   }
   if (status == TVS_OK) {
-    s->held.flags |= TVS_FRAME_HAS_ATTITUDE;
-    s->held.time = time;
+    first->flags |= TVS_FRAME_HAS_ATTITUDE;
+    first->time = time;
   }
-  *frame = s->held;
-  s->has_held = 0;
+  *frame = *first;
+  s->first_held = (s->first_held + 1) % QUEUE_FRAMES;
+  --s->num_held;
   return TVS_OK;
 }
 
@@ -213,8 +225,10 @@ tvs_status tvm_session_frames(tvm_session *session, const tvs_frame_source *came
   if (!session || !camera || !source) return TVS_ERR_NULL;
   if (camera->struct_size != sizeof *camera) return TVS_ERR_STRUCT_SIZE;
   if (!camera->next || !camera->release) return TVS_ERR_NULL;
-  if (session->has_held) session->camera.release(session->camera.user, &session->held);
-  session->has_held = 0;
+  for (; session->num_held > 0; --session->num_held) {
+    session->camera.release(session->camera.user, &session->held[session->first_held]);
+    session->first_held = (session->first_held + 1) % QUEUE_FRAMES;
+  }
   session->camera = *camera;
   source->struct_size = sizeof *source;
   source->user = session;

@@ -13,7 +13,7 @@
 #define MS INT64_C(1000000)
 #define SECOND INT64_C(1000000000)
 
-enum { QUEUE_IMU = 64, QUEUE_PENDING = 32, NUM_WANTED = 4, NUM_SENT_TIMES = 4 };
+enum { QUEUE_IMU = 64, QUEUE_PENDING = 32, QUEUE_FRAMES = 8, NUM_WANTED = 4, NUM_SENT_TIMES = 4 };
 
 /* The two latest values of a quantity at times of the vehicle's clock. */
 typedef struct track {
@@ -86,8 +86,8 @@ struct tvm_session {
 
   /* frames */
   tvs_frame_source camera;
-  tvs_frame held;
-  int has_held;
+  tvs_frame held[QUEUE_FRAMES];
+  int first_held, num_held;
 };
 
 /* packets.c */

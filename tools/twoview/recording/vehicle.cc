@@ -41,7 +41,7 @@ class PacketLog {
     if (!read(head, sizeof head)) return false;
     uint64_t time_us = 0;
     for (int k = 0; k < 8; ++k) time_us = time_us << 8 | head[k];
-    if (time_us > uint64_t{1} << 50) return false;
+    if (time_us > uint64_t{1} << 51) return false;  // in 2041
     size_t size = 0;
     if (head[8] == 0xfd) {
       size = 12u + head[9] + ((head[10] & 1) != 0 ? 13u : 0u);
@@ -184,7 +184,9 @@ nlohmann::ordered_json play_vehicle(const std::string& folder, LinkListener list
   if (begin == INT64_MAX) throw BadInput("the recording " + folder + " is empty");
   // After the last entry the session goes on until no frame waits for its attitude.
   while (!stop) {
-    const int64_t next = playback.next_ns();
+    int64_t next = playback.next_ns();
+    // A frame that is due and was not taken waits behind others: it is asked for again later.
+    if (next <= playback.now_ns) next = playback.now_ns + 5 * kMs;
     if (next != INT64_MAX)
       last = now = std::max(now, next);
     else if ((now += 20 * kMs) > last + 400 * kMs)

@@ -173,8 +173,9 @@ TV_API tvs_status tvm_session_imu(tvm_session *session, tvs_imu_source *source);
 
 /* Fills *source with the frames of `camera`, each with the vehicle's attitude at its host time plus
    camera_offset_ns. `next` gives TVS_NONE while the sample that follows a frame has not come, at
-   most hold_frame_ns. Times of the frames are then in the session's clock. `camera` is copied, and
-   must be valid as long as the session. Returns TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE. */
+   most hold_frame_ns. Times of the frames are then in the session's clock. `camera` is copied, must
+   be valid as long as the session, and lends up to 8 frames more than the caller holds. Returns
+   TVS_ERR_NULL, TVS_ERR_STRUCT_SIZE. */
 TV_API tvs_status tvm_session_frames(tvm_session *session, const tvs_frame_source *camera,
                                      tvs_frame_source *source);
 
