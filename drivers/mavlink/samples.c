@@ -183,24 +183,30 @@ static void choose_height(tvm_session *s, int64_t device_ns) {
     if (s->heights[k].num == 2) s->height = k;
 }
 
-static void emit_first(tvm_session *s) {
-  const struct pending *p = &s->pending[s->first_pending];
-  tvs_imu sample = p->sample;
+/* Puts what is known by now into a waiting sample. It is done at each message, since a quantity's
+   two latest values are soon later than the sample. */
+static void complete(const tvm_session *s, struct pending *p) {
+  tvs_imu *sample = &p->sample;
   double value[3];
-  if (value_at(&s->velocity, sample.time.device_ns, VELOCITY_GAP_NS, value)) {
-    to_body(p->ned_from_body, value, sample.velocity_m_s);
-    sample.velocity_sigma = s->options.velocity_sigma_m_s;
-    sample.valid |= TVS_IMU_VELOCITY_XY | TVS_IMU_VELOCITY_Z;
+  if ((sample->valid & TVS_IMU_VELOCITY_Z) == 0 &&
+      value_at(&s->velocity, sample->time.device_ns, VELOCITY_GAP_NS, value)) {
+    to_body(p->ned_from_body, value, sample->velocity_m_s);
+    sample->velocity_sigma = s->options.velocity_sigma_m_s;
+    sample->valid |= TVS_IMU_VELOCITY_XY | TVS_IMU_VELOCITY_Z;
   }
-  if (s->height < NUM_HEIGHTS &&
-      value_at(&s->heights[s->height], sample.time.device_ns, HEIGHT_GAP_NS, value)) {
-    sample.altitude_m = value[0];
-    sample.altitude_sigma = height_sigma(s->height, value[0]);
-    sample.valid |= TVS_IMU_ALTITUDE;
+  if ((sample->valid & TVS_IMU_ALTITUDE) == 0 && s->height < NUM_HEIGHTS &&
+      value_at(&s->heights[s->height], sample->time.device_ns, HEIGHT_GAP_NS, value)) {
+    sample->altitude_m = value[0];
+    sample->altitude_sigma = height_sigma(s->height, value[0]);
+    sample->valid |= TVS_IMU_ALTITUDE;
   }
+}
+
+static void emit_first(tvm_session *s) {
+  const tvs_imu sample = s->pending[s->first_pending].sample;
+  s->emitted_device_ns = sample.time.device_ns;
   s->first_pending = (s->first_pending + 1) % QUEUE_PENDING;
   --s->num_pending;
-  s->emitted_device_ns = sample.time.device_ns;
   if (s->num_imu == QUEUE_IMU) {
     s->first_imu = (s->first_imu + 1) % QUEUE_IMU;
     --s->num_imu;
@@ -214,11 +220,16 @@ static void emit_all(tvm_session *s) {
 }
 
 void tvm_drain(tvm_session *s) {
+  int k;
+  choose_height(s, s->newest_device_ns);
+  for (k = 0; k < s->num_pending; ++k)
+    complete(s, &s->pending[(s->first_pending + k) % QUEUE_PENDING]);
   while (s->num_pending > 0) {
-    const tvs_time *time = &s->pending[s->first_pending].sample.time;
-    choose_height(s, time->device_ns);
+    const struct pending *first = &s->pending[s->first_pending];
+    const tvs_time *time = &first->sample.time;
     if (s->now_ns - time->received_ns < WAIT_NS &&
-        (will_come(s, &s->velocity, time->device_ns) ||
+        (((first->sample.valid & TVS_IMU_VELOCITY_Z) == 0 &&
+          will_come(s, &s->velocity, time->device_ns)) ||
          (s->height < NUM_HEIGHTS && will_come(s, &s->heights[s->height], time->device_ns)))) {
       return;
     }
