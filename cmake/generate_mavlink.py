@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Writes MAVLink's C headers with pymavlink's generator.
 usage: generate_mavlink.py PYMAVLINK OUTPUT
-PYMAVLINK is a folder that holds the package pymavlink; where it is missing, the one that Python finds
-is used. Does nothing where OUTPUT holds the headers of the same version already. Exit status 1: there
-is no pymavlink."""
+PYMAVLINK is a folder that holds the package pymavlink; where it is missing, the one that Python
+finds is used. Does nothing where OUTPUT holds the headers of the same version already. Exit status
+1: there is no pymavlink."""
 import os
 import shutil
 import sys

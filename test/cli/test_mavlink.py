@@ -1,5 +1,5 @@
-"""Tests of --mavlink over real sockets: a simulated vehicle (mavlink_vehicle.py) that speaks through
-pymavlink, and a film of a flight through a room whose poses are known."""
+"""Tests of --mavlink over real sockets: a simulated vehicle (mavlink_vehicle.py) that speaks
+through pymavlink, and a film of a flight through a room whose poses are known."""
 import json
 import math
 import os

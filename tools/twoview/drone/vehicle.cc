@@ -8,11 +8,11 @@
 
 #include "base/error.h"
 #include "base/output.h"
-#include "verbs/common.h"
 #include "recording/vehicle_recording.h"
 #include "recording/vehicle_session.h"
 #include "sources/camera_source.h"
 #include "twoview_drivers/mavlink/udp.h"
+#include "verbs/common.h"
 
 namespace cli {
 namespace {
