@@ -52,8 +52,8 @@ ROOMS = {
     "calibration": {"pictures", "files", "base"},
     "recording": {"pair", "files", "base"},
     "verbs": {"recording", "calibration", "report", "pictures", "pair", "files", "base"},
-    "drone": {"recording", "files", "base"},
-    "odometry": {"drone", "recording", "report", "pictures", "pair", "files", "base"},
+    "drone": {"sources", "recording", "files", "base"},
+    "odometry": {"sources", "drone", "recording", "report", "pictures", "pair", "files", "base"},
     "simulate": {"drone", "files", "base"},
     "sources": {"base"},
 }

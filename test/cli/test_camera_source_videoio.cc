@@ -1,5 +1,6 @@
 // A film that is written and read through OpenCV comes out of the frame source unchanged, both when
 // it is read as a file and when it is played as a live camera.
+#include <time.h>
 #include <unistd.h>
 #include <unity.h>
 
@@ -101,8 +102,58 @@ void test_a_live_source_never_waits_and_flags_what_it_left_out() {
   TEST_ASSERT_EQUAL_INT(TVS_END, source.next(source.user, &frame));
 }
 
+void test_a_paced_film_plays_at_its_rate_from_the_first_call_on() {
+  CameraSource camera(film, CameraSource::Kind::kPaced);
+  const tvs_frame_source source = camera.frames();
+  tvs_frame frame = empty_frame();
+  usleep(200000);
+  int64_t first_ns = 0, num = 0;
+  for (;;) {
+    const tvs_status status = source.next(source.user, &frame);
+    if (status == TVS_END) break;
+    if (status == TVS_OK) {
+      check_picture(frame);
+      if (num++ == 0) first_ns = frame.time.host_ns - static_cast<int64_t>(frame.number * 4e7);
+      TEST_ASSERT_INT64_WITHIN(1000, first_ns + static_cast<int64_t>(frame.number * 4e7),
+                               frame.time.host_ns);
+      timespec now{};
+      clock_gettime(CLOCK_MONOTONIC, &now);
+      TEST_ASSERT_TRUE(now.tv_sec * int64_t{1000000000} + now.tv_nsec >= frame.time.host_ns);
+      source.release(source.user, &frame);
+    }
+    usleep(1000);
+  }
+  TEST_ASSERT_TRUE(num > kFrames / 2);
+  TEST_ASSERT_EQUAL_UINT64(kFrames - 1, frame.number);
+}
+
+void test_a_pipeline_is_a_camera_by_its_name() {
+  TEST_ASSERT_TRUE(CameraSource::kind_of("gst:x ! appsink") == CameraSource::Kind::kLive);
+  TEST_ASSERT_TRUE(CameraSource::kind_of("v4l2:/dev/video3") == CameraSource::Kind::kLive);
+  TEST_ASSERT_TRUE(CameraSource::kind_of("film.avi") == CameraSource::Kind::kFile);
+  try {
+    CameraSource camera(
+        "gst:videotestsrc num-buffers=40 ! video/x-raw,width=96,height=64 ! videoconvert ! "
+        "video/x-raw,format=BGR ! appsink");
+    const tvs_frame_source source = camera.frames();
+    tvs_frame frame = empty_frame();
+    tvs_status status = TVS_NONE;
+    for (int k = 0; k < 5000 && status == TVS_NONE; ++k) {
+      status = source.next(source.user, &frame);
+      usleep(1000);
+    }
+    TEST_ASSERT_EQUAL_INT(TVS_OK, status);
+    TEST_ASSERT_EQUAL_INT(kWidth, frame.image.width);
+    source.release(source.user, &frame);
+  } catch (const cli::BadInput& e) {  // no GStreamer in this OpenCV, or no such plug-in
+    std::printf("the pipeline: %s\n", e.what());
+    TEST_ASSERT_TRUE(std::string(e.what()).find("gst:") != std::string::npos);
+  }
+}
+
 void test_what_does_not_open_is_refused() {
-  for (const char* name : {"/no/such/film.avi", "", "999", "/dev/null"}) {
+  for (const char* name :
+       {"/no/such/film.avi", "", "999", "/dev/null", "v4l2:/dev/null", "gst:no_such"}) {
     bool refused = false;
     try {
       CameraSource camera(name);
@@ -132,6 +183,8 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(test_a_film_gives_each_picture_with_its_time);
   RUN_TEST(test_a_live_source_never_waits_and_flags_what_it_left_out);
+  RUN_TEST(test_a_paced_film_plays_at_its_rate_from_the_first_call_on);
+  RUN_TEST(test_a_pipeline_is_a_camera_by_its_name);
   RUN_TEST(test_what_does_not_open_is_refused);
   RUN_TEST(test_bad_arguments);
   unlink(film.c_str());

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "drone/link.h"
+#include "drone/vehicle.h"
 
 namespace cli {
 namespace {
@@ -16,6 +17,7 @@ struct Arguments {
   DroneAddress address;
   double duration = kPatienceS;
   bool json = false;
+  VehicleAddress vehicle;
 };
 
 const char* state_word(uint32_t ctrl_state) {
@@ -48,6 +50,7 @@ std::string printable(const nlohmann::ordered_json& configuration, const char* k
 }
 
 int info(const Arguments& a) {
+  if (a.vehicle.given()) return info_vehicle(a.vehicle, a.duration, a.json);
   ardrone_session_options options;
   ardrone_session_options_init(&options);
   options.video = 0;
@@ -107,6 +110,7 @@ void add_drone_info(CLI::App& drone, Run& run) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = drone.add_subcommand("info", "state, battery, firmware and configuration");
   add_address(*verb, a->address, ARDRONE_DEFAULT_HOST);
+  add_vehicle(*verb, a->vehicle, false);
   verb->add_option("--duration", a->duration, "wait so long for an answer")
       ->check(number_in(0.1, 3600.0))
       ->type_name("S")

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "drone/link.h"
+#include "drone/vehicle.h"
 #include "recording/recording.h"
 
 namespace cli {
@@ -16,6 +17,7 @@ struct Arguments {
   double duration = 0;
   std::string output;
   bool frames = false, json = false, quiet = false;
+  VehicleAddress vehicle;
 };
 
 std::string progress(const ardrone_counters& n, double seconds) {
@@ -28,6 +30,7 @@ std::string progress(const ardrone_counters& n, double seconds) {
 }
 
 int record(const Arguments& a) {
+  if (a.vehicle.given()) return record_vehicle(a.vehicle, a.output, a.duration, a.json, a.quiet);
   ardrone_session_options options;
   ardrone_session_options_init(&options);
   options.skip_to_latest = 0;
@@ -100,6 +103,7 @@ void add_drone_record(CLI::App& drone, Run& run) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = drone.add_subcommand("record", "everything that the drone sends, to a folder");
   add_address(*verb, a->address, ARDRONE_DEFAULT_HOST);
+  add_vehicle(*verb, a->vehicle, true);
   add_duration(*verb, a->duration);
   verb->add_option("-o,--output", a->output, "folder for the recording; made where it is missing")
       ->required()

@@ -8,6 +8,7 @@
 #include "drone/drone.h"
 #include "recording/playback.h"
 #include "recording/recording.h"
+#include "recording/vehicle.h"
 
 namespace cli {
 namespace {
@@ -21,7 +22,7 @@ struct Arguments {
 int replay(const Arguments& a) {
   LinkListener listener;
   int64_t first_ns = INT64_MAX, last_ns = 0;
-  listener.on_navdata = [&](const uint8_t*, size_t, const ardrone_navdata&, const tvs_imu& imu) {
+  listener.on_imu = [&](const tvs_imu& imu) {
     first_ns = std::min(first_ns, imu.time.received_ns);
     last_ns = std::max(last_ns, imu.time.received_ns);
   };
@@ -41,6 +42,20 @@ int replay(const Arguments& a) {
       }
     };
     make_folder(a.frames);
+  }
+  if (is_vehicle_recording(a.recording)) {
+    const nlohmann::ordered_json summary =
+        play_vehicle(a.recording, listener, stop_flag_for_signals(), a.speed);
+    if (!failure.empty()) throw BadInput(failure);
+    if (a.json) print(summary.dump(2) + "\n");
+    if (!a.json && !a.quiet)
+      print(summary_line("recording", "%.1f s of %s: %llu attitudes, %llu frames, %llu gaps",
+                         summary["seconds"].get<double>(),
+                         summary["vehicle"].get<std::string>().c_str(),
+                         summary["attitudes"].get<unsigned long long>(),
+                         summary["frames_decoded"].get<unsigned long long>(),
+                         summary["gaps"].get<unsigned long long>()));
+    return 0;
   }
   const ardrone_counters counters = play(a.recording, listener, stop_flag_for_signals(), a.speed);
   if (!failure.empty()) throw BadInput(failure);

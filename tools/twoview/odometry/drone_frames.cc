@@ -119,7 +119,8 @@ class RecordingFrames : public FrameSource {
   }
   std::vector<std::string> files() const override {
     std::vector<std::string> files;
-    for (const char* name : {"video.pave", "navdata.log", "attitude.tum", "frames.txt"})
+    for (const char* name :
+         {"video.pave", "navdata.log", "vehicle.tlog", "attitude.tum", "frames.txt"})
       files.push_back((std::filesystem::path(folder_) / name).string());
     return files;
   }
@@ -139,7 +140,7 @@ class DroneFrames : public FrameSource {
     Frames frames(wanted, consume, stop);
     std::optional<FlightSample> latest;
     LinkListener listener;
-    listener.on_navdata = [&](const uint8_t*, size_t, const ardrone_navdata&, const tvs_imu& imu) {
+    listener.on_imu = [&](const tvs_imu& imu) {
       if ((imu.valid & TVS_IMU_ATTITUDE) != 0) latest = flight_sample(imu);
     };
     listener.on_frame = [&](const tvs_frame& picture) {
@@ -169,7 +170,49 @@ class DroneFrames : public FrameSource {
   CameraMount mount_;
 };
 
+class VehicleFrames : public FrameSource {
+ public:
+  VehicleFrames(const VehicleAddress& vehicle, double seconds, const std::string& camera_file,
+                bool quiet)
+      : vehicle_(vehicle), seconds_(seconds), mount_(mount_in(camera_file)), quiet_(quiet) {}
+
+  void run(const Wanted& wanted, const Consumer& consume, const std::atomic<bool>& stop) override {
+    Frames frames(wanted, consume, stop);
+    FlightLog log;
+    LinkListener listener;
+    listener.on_imu = [&](const tvs_imu& imu) {
+      if (log.size() > kMostSamples) log.erase(log.begin(), log.begin() + kMostSamples / 2);
+      log.push_back(flight_sample(imu));
+    };
+    listener.on_frame = [&](const tvs_frame& picture) {
+      std::optional<SourceFrame> frame = frames.next(picture);
+      if (!frame) return;
+      if (const auto at = sample_at(log, frame->time_s, kGapS))
+        add_measurements(*at, mount_, *frame);
+      frames.consume(*frame);
+    };
+    fly_vehicle(
+        vehicle_, listener, [&] { return frames.done.load(); }, stop, seconds_, quiet_);
+    frames.rethrow();
+  }
+  bool can_run_again() const override { return false; }
+  int num_frames() const override { return -1; }
+  std::string kind() const override { return "the vehicle at " + vehicle_.address; }
+
+ private:
+  static constexpr size_t kMostSamples = 400;
+  VehicleAddress vehicle_;
+  double seconds_;
+  CameraMount mount_;
+  bool quiet_;
+};
+
 }  // namespace
+
+std::unique_ptr<FrameSource> open_vehicle(const VehicleAddress& vehicle, double seconds,
+                                          const std::string& camera_file, bool quiet) {
+  return std::make_unique<VehicleFrames>(vehicle, seconds, camera_file, quiet);
+}
 
 std::unique_ptr<FrameSource> open_recording(const std::string& folder,
                                             const std::string& camera_file) {

@@ -78,4 +78,9 @@ std::unique_ptr<FrameSource> open_film(const std::string& file, double fps);
 // The camera with this number on this computer.
 std::unique_ptr<FrameSource> open_camera(int number);
 
+// A camera or stream by a name of CameraSource (sources/camera_source.h). A frame that comes while
+// the one before it is tracked is left out, and the next one has its gap set.
+// Only in a program with the drivers.
+std::unique_ptr<FrameSource> open_camera(const std::string& name);
+
 }  // namespace cli

@@ -19,6 +19,9 @@
 #ifdef TWOVIEW_HAS_DRONE
 #include "odometry/drone_frames.h"
 #endif
+#ifdef TWOVIEW_HAS_CAMERA_SOURCE
+#include "sources/camera_source.h"
+#endif
 
 namespace cli {
 namespace {
@@ -37,6 +40,7 @@ struct Arguments {
   FlightOptions flight;
 #ifdef TWOVIEW_HAS_DRONE
   DroneAddress drone;  // without a host: none
+  VehicleAddress vehicle;
 #endif
 };
 
@@ -63,12 +67,27 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
       throw BadInput("--camera is required: the drone does not describe its camera");
     return open_drone(a.drone, a.duration, a.camera);
   }
+  if (a.vehicle.given()) {
+    if (!a.source.empty()) throw BadInput("give SOURCE or --mavlink, not both");
+    if (a.camera.empty())
+      throw BadInput("--camera is required: MAVLink does not describe the camera");
+    return open_vehicle(a.vehicle, a.duration, a.camera, a.common.quiet);
+  }
 #endif
   if (a.source.empty()) throw BadInput("SOURCE is required");
+#ifdef TWOVIEW_HAS_CAMERA_SOURCE
+  if (CameraSource::kind_of(a.source) == CameraSource::Kind::kLive && !is_number(a.source)) {
+    if (a.camera.empty())
+      throw BadInput("--camera is required: a camera does not describe its lens");
+    if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
+    return open_camera(a.source);
+  }
+#endif
   std::error_code error;
   const fs::path path = a.source;
   if (fs::is_directory(path, error)) {
-    const bool is_recording = fs::exists(path / "video.pave", error);
+    const bool is_recording =
+        fs::exists(path / "video.pave", error) || fs::exists(path / "vehicle.tlog", error);
     if (!is_recording) return open_image_folder(a.source, a.fps);
     if (a.fps > 0) throw BadInput("--fps: a recording of a drone has times");
     return open_recording_folder(a);
@@ -80,8 +99,7 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
     if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
     return open_camera(std::stoi(a.source));
   }
-  throw BadInput("cannot read " + a.source +
-                 ": it is neither a folder, a film nor the number of a camera");
+  throw BadInput("cannot read " + a.source + ": it is neither a folder, a film nor a camera");
 }
 
 // The words of the progress line while the flight lasts.
@@ -291,9 +309,11 @@ void add_odometry(CLI::App& program, Run& run) {
   tv_odometry_options_init(&o);
   CLI::App* verb =
       program.add_subcommand("odometry", "the frames of one camera to its path and a map");
-  verb->add_option("SOURCE", a->source,
-                   "folder with frames.txt, of TUM RGB-D, EuRoC or KITTI, or of images with --fps; "
-                   "a film; the number of a camera; a recording of a drone")
+  verb->add_option(
+          "SOURCE", a->source,
+          "folder with frames.txt, of TUM RGB-D, EuRoC or KITTI, or of images with --fps; "
+          "a film; a camera: its number, v4l2:/dev/video0, gst:PIPELINE or rtsp://...; a recording "
+          "of a drone")
       ->type_name("SOURCE");
   verb->add_option("--camera", a->camera, "camera file; without: what the source says of it")
       ->type_name("FILE");
@@ -323,6 +343,7 @@ void add_odometry(CLI::App& program, Run& run) {
   verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")
       ->type_name("HOST");
   add_ports(*verb, a->drone);
+  add_vehicle(*verb, a->vehicle, true);
   add_duration(*verb, a->duration);
 #endif
   add_common(*verb, a->common, 0, "folder for the results");

@@ -17,6 +17,7 @@ void tell_navdata(void* user, const uint8_t* bytes, size_t size, const ardrone_n
                   const tvs_imu* imu) {
   const LinkListener& listener = listener_of(user);
   if (listener.on_navdata) listener.on_navdata(bytes, size, *navdata, *imu);
+  if (listener.on_imu) listener.on_imu(*imu);
 }
 void tell_packet(void* user, const ardrone_pave_packet* packet, const tvs_time* time, int gate) {
   const LinkListener& listener = listener_of(user);

@@ -19,6 +19,8 @@ struct LinkListener {
   std::function<void(const uint8_t* bytes, size_t size, const ardrone_navdata& navdata,
                      const tvs_imu& imu)>
       on_navdata;
+  // Each sample of the vehicle, whatever its driver is.
+  std::function<void(const tvs_imu& imu)> on_imu;
   std::function<void(const ardrone_pave_packet& packet, const tvs_time& time, int gate)> on_packet;
   std::function<void(const tvs_frame& frame)> on_frame;
 };

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "recording/vehicle.h"
 #include "twoview_drivers/ardrone/replay.h"
 #include "twoview_drivers/ardrone/sockets.h"
 
@@ -31,6 +32,10 @@ struct Replay {
 
 ardrone_counters play(const std::string& folder, LinkListener listener,
                       const std::atomic<bool>& stop, double speed) {
+  if (is_vehicle_recording(folder)) {
+    play_vehicle(folder, std::move(listener), stop, speed);
+    return {};
+  }
   const Decoder decoder;
   ardrone_session_options options;
   ardrone_session_options_init(&options);

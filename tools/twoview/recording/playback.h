@@ -1,4 +1,4 @@
-// Plays a recording of `drone record` through the driver as if the drone sent the data again.
+// Plays a recording of `drone record` through its driver as if the drone sent the data again.
 #pragma once
 
 #include <atomic>
@@ -9,8 +9,8 @@
 namespace cli {
 
 // Plays the recording in a folder until its end or until `stop` is set. Speed 0 is as fast as
-// possible; otherwise it is `speed` times the recorded speed. Throws BadInput if there is no
-// recording.
+// possible; otherwise it is `speed` times the recorded speed. A recording of a MAVLink vehicle is
+// played by its own driver, and the counters are then 0. Throws BadInput if there is no recording.
 ardrone_counters play(const std::string& folder, LinkListener listener,
                       const std::atomic<bool>& stop, double speed);
 

@@ -71,6 +71,20 @@ void write_frame(const fs::path& folder, const tvs_frame& frame) {
   GrowingFile(folder / name).append(png.data(), png.size());
 }
 
+const char kAttitudeHead[] =
+    "# time tx ty tz qx qy qz qw, body to world; seconds of the host's clock; tz is "
+    "-altitude where it is known, else 0; tx and ty are 0\n";
+
+std::string attitude_line(const tvs_imu& imu) {
+  if ((imu.valid & TVS_IMU_ATTITUDE) == 0) return "";
+  const double* q = imu.attitude.world_from_body;
+  const double down = (imu.valid & TVS_IMU_ALTITUDE) != 0 ? -imu.altitude_m : 0.0;
+  char line[256];
+  std::snprintf(line, sizeof line, "%.9f 0 0 %.4f %.9f %.9f %.9f %.9f\n",
+                static_cast<double>(imu.time.host_ns) * 1e-9, down + 0.0, q[1], q[2], q[3], q[0]);
+  return line;
+}
+
 Recording::Recording(const fs::path& folder, bool with_frames)
     : folder_(folder), with_frames_(with_frames) {
   make_folder(folder);
@@ -80,9 +94,7 @@ Recording::Recording(const fs::path& folder, bool with_frames)
   navdata_ = std::make_unique<GrowingFile>(folder / "navdata.log");
   attitude_ = std::make_unique<GrowingFile>(folder / "attitude.tum");
   frames_ = std::make_unique<GrowingFile>(folder / "frames.txt");
-  attitude_->append(
-      "# time tx ty tz qx qy qz qw, body to world; seconds of the host's clock; tz is "
-      "-altitude where it is known, else 0; tx and ty are 0\n");
+  attitude_->append(kAttitudeHead);
   if (with_frames) make_folder(folder / "frames");
 }
 
@@ -94,13 +106,7 @@ void Recording::add_navdata(const uint8_t* bytes, size_t size, const tvs_imu& im
   put_little_endian(size, 4, entry);
   entry.append(reinterpret_cast<const char*>(bytes), size);
   navdata_->append(entry);
-  if ((imu.valid & TVS_IMU_ATTITUDE) == 0) return;
-  const double* q = imu.attitude.world_from_body;
-  const double down = (imu.valid & TVS_IMU_ALTITUDE) != 0 ? -imu.altitude_m : 0.0;
-  char line[256];
-  std::snprintf(line, sizeof line, "%.9f 0 0 %.4f %.9f %.9f %.9f %.9f\n",
-                static_cast<double>(imu.time.host_ns) * 1e-9, down + 0.0, q[1], q[2], q[3], q[0]);
-  attitude_->append(line);
+  attitude_->append(attitude_line(imu));
 }
 
 void Recording::add_packet(const ardrone_pave_packet& packet, const tvs_time& time) {

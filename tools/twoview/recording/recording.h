@@ -39,6 +39,10 @@ void make_folder(const std::filesystem::path& folder);
 // restarts; the later picture then replaces the earlier one. Throws BadInput.
 void write_frame(const std::filesystem::path& folder, const tvs_frame& frame);
 
+// The head of attitude.tum, and a line of it; the line is empty without an attitude.
+extern const char kAttitudeHead[];
+std::string attitude_line(const tvs_imu& imu);
+
 class Recording {
  public:
   // Creates the folder if it does not exist. Throws BadInput if it already holds a recording.

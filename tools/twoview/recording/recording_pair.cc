@@ -115,7 +115,7 @@ FlightSample flight_sample(const tvs_imu& imu) { return sample_of(imu); }
 RecordedFlight read_flight(const std::string& folder) {
   RecordedFlight flight;
   LinkListener listener;
-  listener.on_navdata = [&](const uint8_t*, size_t, const ardrone_navdata&, const tvs_imu& imu) {
+  listener.on_imu = [&](const tvs_imu& imu) {
     if ((imu.valid & TVS_IMU_ATTITUDE) != 0) flight.log.push_back(sample_of(imu));
   };
   listener.on_frame = [&](const tvs_frame& frame) {

@@ -1,5 +1,6 @@
 #include "sources/camera_source.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstring>
@@ -7,7 +8,9 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <opencv2/videoio/registry.hpp>
 #include <thread>
+#include <vector>
 
 #include "base/error.h"
 
@@ -19,10 +22,19 @@ bool is_number(const std::string& name) {
          name.find_first_not_of("0123456789") == std::string::npos;
 }
 
-CameraSource::Kind kind_of(const std::string& name) {
-  const bool is_live =
-      is_number(name) || name.rfind("/dev/", 0) == 0 || name.find("://") != std::string::npos;
-  return is_live ? CameraSource::Kind::kLive : CameraSource::Kind::kFile;
+bool begins(const std::string& name, const char* prefix) { return name.rfind(prefix, 0) == 0; }
+
+// Opens a name that the header describes. Throws BadInput for a backend that this OpenCV lacks.
+bool open_capture(cv::VideoCapture& capture, const std::string& name) {
+  if (is_number(name)) return capture.open(std::stoi(name));
+  if (begins(name, "v4l2:")) return capture.open(name.substr(5), cv::CAP_V4L2);
+  if (begins(name, "gst:")) {
+    const std::vector<cv::VideoCaptureAPIs> backends = cv::videoio_registry::getBackends();
+    if (std::find(backends.begin(), backends.end(), cv::CAP_GSTREAMER) == backends.end())
+      throw BadInput("this program's OpenCV was built without GStreamer, which gst: needs");
+    return capture.open(name.substr(4), cv::CAP_GSTREAMER);
+  }
+  return capture.open(name);
 }
 
 int64_t steady_ns() {
@@ -52,6 +64,7 @@ struct CameraSource::State {
   explicit State(Kind given) : kind(given) {}
 
   bool take(Shot& shot);
+  void wait_until(int64_t due_ns) const;
   void film();
   tvs_status next(tvs_frame* frame);
 
@@ -59,6 +72,7 @@ struct CameraSource::State {
   cv::VideoCapture capture;
   cv::Mat colour;
   uint64_t num_taken = 0, next_number = 0;
+  int64_t start_ns = 0;
   // For a live source: the state that the filming thread shares with the reader.
   std::mutex mutex;
   Shot latest;
@@ -85,6 +99,10 @@ bool CameraSource::State::take(Shot& shot) {
   if (kind == Kind::kLive) {
     shot.time.received_ns = shot.time.host_ns = steady_ns();
     shot.time.uncertainty_ns = INT64_MAX;
+  } else if (kind == Kind::kPaced) {
+    const double fps = capture.get(cv::CAP_PROP_FPS);
+    const double seconds = static_cast<double>(shot.number) / (fps > 0 && fps < 1e4 ? fps : 30);
+    shot.time.received_ns = shot.time.host_ns = start_ns + static_cast<int64_t>(seconds * 1e9);
   } else {
     // The time is the frame number divided by the frame rate, because OpenCV's position is that of
     // this picture in one backend and of the next one in another.
@@ -98,9 +116,17 @@ bool CameraSource::State::take(Shot& shot) {
   return true;
 }
 
+void CameraSource::State::wait_until(int64_t due_ns) const {
+  while (!stop && steady_ns() < due_ns)
+    std::this_thread::sleep_for(
+        std::chrono::nanoseconds(std::min<int64_t>(due_ns - steady_ns(), 20000000)));
+}
+
 void CameraSource::State::film() {
   Shot shot;
+  start_ns = steady_ns();
   while (!stop && take(shot)) {
+    if (kind == Kind::kPaced) wait_until(shot.time.host_ns);
     const std::lock_guard<std::mutex> lock(mutex);
     latest = shot;
     has_latest = true;
@@ -116,6 +142,7 @@ tvs_status CameraSource::State::next(tvs_frame* frame) {
   if (kind == Kind::kFile) {
     if (!take(*shot)) return TVS_END;
   } else {
+    if (kind == Kind::kPaced && !thread.joinable()) thread = std::thread([this] { film(); });
     const std::lock_guard<std::mutex> lock(mutex);
     if (!has_latest) return has_ended ? TVS_END : TVS_NONE;
     *shot = std::move(latest);
@@ -133,6 +160,12 @@ tvs_status CameraSource::State::next(tvs_frame* frame) {
   return TVS_OK;
 }
 
+CameraSource::Kind CameraSource::kind_of(const std::string& name) {
+  const bool is_live = is_number(name) || begins(name, "/dev/") || begins(name, "v4l2:") ||
+                       begins(name, "gst:") || name.find("://") != std::string::npos;
+  return is_live ? Kind::kLive : Kind::kFile;
+}
+
 CameraSource::CameraSource(const std::string& name) : CameraSource(name, kind_of(name)) {}
 
 CameraSource::CameraSource(const std::string& name, Kind kind)
@@ -140,7 +173,7 @@ CameraSource::CameraSource(const std::string& name, Kind kind)
   bool is_open = false;
   const Silence silence;
   try {
-    is_open = is_number(name) ? state_->capture.open(std::stoi(name)) : state_->capture.open(name);
+    is_open = open_capture(state_->capture, name);
   } catch (const cv::Exception&) {
   }
   if (!is_open) throw BadInput("no camera or film opens as '" + name + "'");

@@ -17,13 +17,19 @@ class CameraSource {
   // A live source reads pictures in a thread of its own and keeps only the latest; skipped pictures
   // set the gap flag of the next one. Its host times are those of the steady clock on arrival; the
   // unknown delay since the exposure is not included.
-  enum class Kind { kFile, kLive };
+  // A paced source is a file that plays as a camera would: from the first call of `next` on, each
+  // picture comes at its time, which is its host time on the steady clock.
+  enum class Kind { kFile, kLive, kPaced };
 
-  // `name` is "0", "1", ... for a live camera by its number, else any name that cv::VideoCapture
-  // accepts; it is live if it begins with /dev/ or contains "://", and otherwise a file. Throws
-  // BadInput if it cannot be opened.
+  // `name` is "0", "1", ... for a live camera by its number; "v4l2:/dev/video0" for a camera by its
+  // device; "gst:PIPELINE" for a GStreamer pipeline that ends with appsink, where OpenCV has
+  // GStreamer; else any name that cv::VideoCapture accepts. It is live if it begins with /dev/,
+  // v4l2: or gst:, or contains "://", and otherwise a file. Throws BadInput if it cannot be
+  // opened.
   explicit CameraSource(const std::string& name);
   CameraSource(const std::string& name, Kind kind);
+  // What a name's kind is, by the rule above: kLive or kFile.
+  static Kind kind_of(const std::string& name);
   ~CameraSource();
   CameraSource(const CameraSource&) = delete;
   CameraSource& operator=(const CameraSource&) = delete;

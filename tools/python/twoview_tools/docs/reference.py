@@ -30,6 +30,8 @@ DRIVERS = [
     "file_source",
     "h264",
     "status",
+    "mavlink/session",
+    "mavlink/udp",
     "ardrone/session",
     "ardrone/sockets",
     "ardrone/replay",

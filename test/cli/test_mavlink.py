@@ -1,0 +1,243 @@
+"""Tests of --mavlink over real sockets: a simulated vehicle (mavlink_vehicle.py) that speaks
+through pymavlink, and a film of a flight through a room whose poses are known."""
+import json
+import math
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+from cli_support import SKIP_CODE, camera_yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / ".cache/mavlink"))
+try:
+    import numpy as np
+    from pymavlink.dialects.v20 import common as mavlink
+
+    import mavlink_vehicle as world
+except ImportError as error:
+    print(f"skipped: {error} (scripts/bootstrap test)")
+    sys.exit(SKIP_CODE)
+
+PROGRAM = os.environ["TWOVIEW_PROGRAM"]
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def run(*arguments, timeout=60):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True,
+                          timeout=timeout)
+
+
+def has_mavlink():
+    answer = run("drone", "info", "--mavlink", "nonsense")
+    if "--mavlink nonsense" in answer.stderr:
+        return True
+    # What a program without the driver says is one line that names the remedy.
+    assert answer.returncode == 2 and answer.stderr.count("\n") == 1, answer.stderr
+    assert "drone" in answer.stderr or "scripts/bootstrap mavlink" in answer.stderr, answer.stderr
+    return False
+
+
+def angle_deg(a, b):
+    return math.degrees(math.acos(max(-1.0, min(1.0, (np.trace(a @ b.T) - 1) / 2))))
+
+
+def matrix(x, y, z, w):
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
+def trajectory(path):
+    lines = [line.split() for line in Path(path).read_text().splitlines() if line[0] != "#"]
+    return [(float(n[0]), np.array([float(v) for v in n[1:4]]),
+             matrix(*(float(v) for v in n[4:]))) for n in lines]
+
+
+@unittest.skipUnless(has_mavlink(), "this build has no MAVLink (scripts/bootstrap mavlink)")
+class Mavlink(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.film = world.write_film(cls.folder / "film.avi")
+        cls.camera = cls.folder / "camera.yaml"
+        cls.camera.write_text(camera_yaml(world.WIDTH, world.HEIGHT, world.FOCAL, world.FOCAL,
+                                          (world.WIDTH - 1) / 2, (world.HEIGHT - 1) / 2))
+        cls.recording = cls.folder / "recording"
+        cls.port = free_port()
+        cls.address = f"udp://127.0.0.1:{cls.port}"
+        # The flight that most tests use: recorded over a bad link.
+        with world.Vehicle(mavlink, cls.port, faults=True) as cls.vehicle:
+            cls.recorded = run("drone", "record", "--mavlink", cls.address, "--camera-source",
+                               cls.film, "--camera-delay", 0, "-o", cls.recording)
+
+    def assert_refused(self, result, *words):
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+
+    def assert_flown(self, output):
+        """The poses of an odometry are those of the flight, in metres and upright."""
+        result = json.loads((output / "result.json").read_text())
+        self.assertEqual(result["scale"], "metric")
+        poses = trajectory(output / "trajectory.txt")
+        self.assertGreater(len(poses), 0.8 * world.FRAMES)
+        start = poses[0][0]
+        # The first frame of the path may be a later one of the film; it flies at one velocity.
+        travelled = poses[-1][1] - poses[0][1]
+        expected = world.VELOCITY * (poses[-1][0] - start)
+        self.assertLess(np.linalg.norm(travelled - expected),
+                        0.1 * np.linalg.norm(expected), (travelled, expected))
+        for _, _, rotation in (poses[0], poses[len(poses) // 2], poses[-1]):
+            # Of the attitude, what does not depend on the heading: where down is in the camera.
+            down = rotation.T @ [0, 0, 1]
+            true_down = world.world_from_camera(0).T @ [0, 0, 1]
+            self.assertLess(math.degrees(math.acos(min(1, down @ true_down))), 1.0)
+        turned = world.rotation(0, 0, world.TURN * (poses[-1][0] - start))
+        self.assertLess(angle_deg(poses[-1][2] @ poses[0][2].T, turned), 1.0)
+
+    def test_a_recording_over_a_bad_link_is_whole(self):
+        self.assertEqual(self.recorded.returncode, 0, self.recorded.stderr)
+        self.assertEqual(self.recorded.stderr, "")
+        summary = json.loads((self.recording / "summary.json").read_text())
+        self.assertEqual(summary["vehicle"], "PX4, system 7")
+        self.assertGreaterEqual(summary["frames_decoded"], 0.8 * world.FRAMES)
+        self.assertEqual(summary["frames_received"], world.FRAMES)
+        sent = self.vehicle.num_sent
+        # 4 % each, of which some are of the same packets: all of it is seen and counted.
+        for kind in ("lost", "repeated", "late", "corrupted"):
+            self.assertGreater(summary[f"packets_{kind}"], 0.01 * sent, summary)
+            self.assertLess(summary[f"packets_{kind}"], 0.15 * sent, summary)
+        self.assertGreater(summary["packets_of_others"], 0)
+        self.assertGreater(summary["timesyncs"], 0)
+        self.assertEqual((summary["silences"], summary["reboots"]), (0, 0))
+        self.assertGreater(summary["attitudes"], 0.75 * 50 * world.FRAMES / world.FPS)
+
+    def test_the_companion_asks_for_messages_and_never_steers(self):
+        self.assertEqual(self.vehicle.wrong, [])
+        self.assertEqual({m.get_type() for m in self.vehicle.heard},
+                         {"HEARTBEAT", "COMMAND_LONG", "TIMESYNC"})
+        for m in self.vehicle.heard:
+            self.assertEqual((m.get_srcSystem(), m.get_srcComponent()), (7, 191))
+            if m.get_type() == "COMMAND_LONG":
+                self.assertEqual(m.command, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+                self.assertEqual((m.target_system, m.target_component), (7, 1))
+            if m.get_type() == "HEARTBEAT":  # not a ground station, whose absence is a failure
+                self.assertEqual(m.type, mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
+        self.assertAlmostEqual(self.vehicle.requested[mavlink.MAVLINK_MSG_ID_ATTITUDE], 0.02, 6)
+        self.assertIn(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, self.vehicle.requested)
+
+    def test_the_log_is_read_by_pymavlink(self):
+        data = (self.recording / "vehicle.tlog").read_bytes()
+        parser, kinds, at = mavlink.MAVLink(None), {}, 0
+        while at < len(data):
+            size = 12 + data[at + 9]
+            message = parser.decode(bytearray(data[at + 8:at + 8 + size]))
+            kinds[message.get_type()] = kinds.get(message.get_type(), 0) + 1
+            at += 8 + size
+        self.assertGreater(kinds["ATTITUDE"], 100)
+        self.assertIn("TIMESYNC", kinds)
+
+    def test_two_frames_of_the_recording_have_metres_and_gravity(self):
+        output = self.folder / "pair"
+        result = run("reconstruct", "--recording", self.recording, "--camera", self.camera,
+                     "--frames", 8, 24, "-o", output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = json.loads((output / "result.json").read_text())
+        self.assertEqual((result["scale"], result["imu"]["scale_source"]), ("metric", "velocity"))
+        self.assertTrue(result["imu"]["gravity_used"])
+        self.assertLess(result["imu"]["rotation_difference_deg"], 0.3)
+        baseline = np.linalg.norm(result["t"])
+        true = np.linalg.norm(world.VELOCITY) * result["recording"]["seconds_apart"]
+        self.assertLess(abs(baseline / true - 1), 0.02)
+        # The pose of the second frame in the first one's axes, from the true flight.
+        seconds = result["recording"]["seconds_apart"]
+        turned = world.rotation(0, 0, world.TURN * seconds)
+        a = world.world_from_camera(8 / world.FPS)
+        b = turned @ a
+        self.assertLess(angle_deg(np.array(result["R"]).reshape(3, 3), b.T @ a), 0.3)
+        t = -b.T @ (world.VELOCITY * seconds)
+        self.assertLess(np.linalg.norm(np.array(result["t"]) - t), 0.03 * true)
+
+    def test_odometry_of_the_recording_is_metric_and_upright(self):
+        output = self.folder / "flown"
+        result = run("odometry", self.recording, "--camera", self.camera, "-o", output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_flown(output)
+        again = run("drone", "replay", self.recording, "--json")
+        self.assertEqual(again.returncode, 0, again.stderr)
+        summary = json.loads((self.recording / "summary.json").read_text())
+        replayed = json.loads(again.stdout)
+        for name in ("frames_decoded", "attitudes", "timesyncs"):
+            self.assertAlmostEqual(replayed[name], summary[name], delta=1, msg=name)
+
+    def test_odometry_of_the_vehicle_itself_is_metric_and_upright(self):
+        output = self.folder / "live"
+        with world.Vehicle(mavlink, self.port, autopilot="ardupilot"):
+            result = run("odometry", "--mavlink", self.address, "--camera-source", self.film,
+                         "--camera", self.camera, "-o", output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assert_flown(output)
+
+    def test_info_of_an_old_ardupilot(self):
+        with world.Vehicle(mavlink, self.port, autopilot="ardupilot", version=1):
+            result = run("drone", "info", "--mavlink", self.address, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        info = json.loads(result.stdout)
+        self.assertEqual(info["vehicle"], "ArduPilot, system 7")
+        self.assertGreater(info["attitudes_per_second"], 25)
+        self.assertTrue(info["has_velocity"])
+        self.assertAlmostEqual(info["height_m"], world.FLOOR, delta=0.4)
+
+    def test_silence_and_wrong_addresses_have_a_line_of_their_own(self):
+        info = ("drone", "info", "--duration", 0.4, "--mavlink")
+        self.assert_refused(run(*info, self.address), "no MAVLink vehicle was heard")
+        with world.Vehicle(mavlink, self.port, attitudes=False):
+            self.assert_refused(run(*info, self.address), "PX4, system 7", "no ATTITUDE")
+        with world.Vehicle(mavlink, self.port):
+            self.assert_refused(run(*info, self.address, "--vehicle-id", 9),
+                                "no autopilot of system 9")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+            taken.bind(("127.0.0.1", self.port))
+            self.assert_refused(run(*info, self.address), "another program has this port")
+        for wrong in ("tcp://127.0.0.1:5760", "udp://127.0.0.1", "udp://:99999", "udpout://:14550"):
+            self.assert_refused(run(*info, wrong), wrong)
+        record = ("drone", "record", "--mavlink", self.address, "-o", self.folder / "new")
+        self.assert_refused(run(*record, "--camera-source", "no_such_film.avi"), "no_such_film.avi")
+        self.assertFalse((self.folder / "new").exists())
+        self.assert_refused(run("drone", "record", "--mavlink", self.address, "--camera-source",
+                                self.film, "-o", self.recording), "holds a recording already")
+        self.assert_refused(run("odometry", "--mavlink", self.address, "-o", self.folder / "o"),
+                            "--camera is required")
+
+    def test_a_cut_recording_is_read_to_its_last_whole_packet(self):
+        cut = self.folder / "cut"
+        shutil.copytree(self.recording, cut)
+        data = (cut / "vehicle.tlog").read_bytes()
+        (cut / "vehicle.tlog").write_bytes(data[:len(data) // 2 + 3])
+        lines = (cut / "frames.txt").read_text()
+        (cut / "frames.txt").write_text(lines[:len(lines) // 2])
+        result = run("drone", "replay", cut, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        summary = json.loads(result.stdout)
+        self.assertGreater(summary["attitudes"], 50)
+        self.assertEqual(summary["packets_corrupted"], 0)
+        (cut / "vehicle.tlog").write_bytes(b"")
+        (cut / "frames.txt").write_text("")
+        self.assert_refused(run("drone", "replay", cut), "is empty")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
