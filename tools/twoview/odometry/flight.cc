@@ -159,6 +159,7 @@ void Flight::track_frame(SourceFrame frame) {
   record.is_keyframe = state_.is_keyframe != 0;
   record.relocated = state_.relocated != 0;
   record.loop_closed = state_.loop_closed != 0;
+  record.attitude_ignored = state_.attitude_ignored != 0;
   record.num_keypoints = state_.num_keypoints;
   record.num_matches = state_.num_matches;
   record.num_inliers = state_.num_inliers;

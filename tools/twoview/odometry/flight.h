@@ -27,6 +27,7 @@ struct FlightFrame {
   uint32_t reasons = 0;
   bool unreadable = false;
   bool is_keyframe = false, relocated = false, loop_closed = false;
+  bool attitude_ignored = false;
   int32_t num_keypoints = 0, num_matches = 0, num_inliers = 0;
   double time_ms = 0;  // CPU time of tv_odometry_track
   // As known when the frame was tracked; segment -1: no pose.

@@ -130,6 +130,8 @@ int map_export(const std::string& path, const std::string& output) {
   result.keyframes = map.keyframes();
   files.add("cloud.ply", map_ply(map.points()));
   files.add("keyframes.txt", keyframes_text(result));
+  const std::string covariances = covariances_text(result.keyframes);
+  if (!covariances.empty()) files.add("covariances.txt", covariances);
   files.commit();
   return 0;
 }

@@ -183,11 +183,12 @@ Json flight_json(const FlightResult& result) {
   const Flight& flight = *result.flight;
   const tv_odometry_state& state = flight.state();
   std::map<int32_t, int> counts;
-  int num_tracked = 0, num_located = 0;
+  int num_tracked = 0, num_located = 0, num_ignored = 0;
   for (const FlightFrame& frame : flight.frames()) {
     ++counts[frame.status];
     num_tracked += frame.origin != PoseOrigin::kNone;
     num_located += frame.origin == PoseOrigin::kLocated;
+    num_ignored += frame.attitude_ignored;
   }
   const bool is_metric = state.scale_source != TV_SCALE_UNIT;
   Json json;
@@ -200,6 +201,7 @@ Json flight_json(const FlightResult& result) {
   json["num_segments"] = state.num_segments;
   json["num_relocalisations"] = state.num_relocations;
   json["num_loops"] = state.num_loops;
+  json["num_attitudes_ignored"] = num_ignored;
   json["longest_segment"] = result.segment;
   json["path_length"] = path_length(trajectory_of(flight, result.segment, false));
   for (int32_t s = 0; s < TV_ODOMETRY_NUM_STATUSES; ++s)
@@ -247,6 +249,25 @@ std::string keyframes_text(const FlightResult& result) {
   return text;
 }
 
+std::string covariances_text(const std::vector<FlightKeyframe>& keyframes) {
+  std::string text;
+  for (size_t k = 1; k < keyframes.size(); ++k) {
+    const tv_keyframe &before = keyframes[k - 1].keyframe, &own = keyframes[k].keyframe;
+    // Where a keyframe between the two was removed, the covariance is that to the removed one.
+    if (own.has_covariance == 0 || own.segment != before.segment || own.id != before.id + 1)
+      continue;
+    text += seconds(before.time_s) + " " + seconds(own.time_s);
+    for (const double value : own.covariance) text += number_text(value);
+    text += "\n";
+  }
+  if (text.empty()) return text;
+  return "# time0 time1 c00 c01 ... c55: the row-major covariance of cam1_from_cam0 of consecutive "
+         "keyframes in (w, v),\n"
+         "# with x_true = exp([w]x) x + v for a point x in camera 1; radians and units of the "
+         "map\n" +
+         text;
+}
+
 std::string reasons_text(const FlightFrame& frame) {
   if (frame.unreadable) return "unreadable";
   std::string text;
@@ -260,7 +281,7 @@ std::string reasons_text(const FlightFrame& frame) {
 std::string frames_csv(const Flight& flight) {
   std::string text =
       "timestamp,name,status,reasons,segment,num_tracked,is_keyframe,time_ms,relocated,"
-      "loop_closed,pose\n";
+      "loop_closed,pose,attitude_ignored\n";
   const char* const origins[] = {"none", "tracked", "located"};
   for (const FlightFrame& frame : flight.frames()) {
     const auto status = static_cast<tv_odometry_status>(frame.status);
@@ -269,7 +290,7 @@ std::string frames_csv(const Flight& flight) {
             std::to_string(frame.live_segment) + "," + std::to_string(frame.num_inliers) + "," +
             (frame.is_keyframe ? "1," : "0,") + milliseconds(frame.time_ms) +
             (frame.relocated ? ",1" : ",0") + (frame.loop_closed ? ",1," : ",0,") +
-            origins[static_cast<int>(frame.origin)] + "\n";
+            origins[static_cast<int>(frame.origin)] + (frame.attitude_ignored ? ",1\n" : ",0\n");
   }
   return text;
 }
