@@ -107,6 +107,7 @@ void Flight::track(const std::atomic<bool>& stop, const std::function<void()>& a
   const auto consume = [&](const SourceFrame& frame) {
     track_frame(frame);
     if (after_frame) after_frame();
+    picture_.release();
     const int next = frame.index / options_.every + 1;
     return options_.max_frames == 0 || next < options_.max_frames;
   };
@@ -165,11 +166,13 @@ void Flight::track_frame(SourceFrame frame) {
   record.num_inliers = state_.num_inliers;
   if (state_.has_pose) {
     record.live_segment = state_.segment;
+    record.live_metric = state_.scale_source != TV_SCALE_UNIT;
     record.live = pose_of(state_.world_from_cam_R, state_.world_from_cam_t);
     record.reference_id = state_.reference_id;
     record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
   if (frame.world_from_cam) is_upright_ = true;
+  picture_ = frame.luma;
   if (record.is_keyframe) thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
   given_.push_back(frames_.size());
   frames_.push_back(record);

@@ -32,6 +32,7 @@ struct FlightFrame {
   double time_ms = 0;  // CPU time of tv_odometry_track
   // As known when the frame was tracked; segment -1: no pose.
   int32_t live_segment = -1;
+  bool live_metric = false;  // whether the map's unit was the metre then
   Pose live;
   int32_t reference_id = -1;
   Pose reference_from_cam;
@@ -83,6 +84,9 @@ class Flight {
   size_t index_given(int number) const { return given_[static_cast<size_t>(number)]; }
   // The picture of a frame that was given and became a keyframe; null for other frames.
   const Thumbnail* thumbnail(int number) const;
+  // The picture of the last frame, as it was tracked; only within `after_frame` of track(), and
+  // empty for a frame that could not be used.
+  const cv::Mat& picture() const { return picture_; }
   // Whether attitudes were given, so that the map's z axis points down.
   bool is_upright() const { return is_upright_; }
   const tv_odometry_state& state() const { return state_; }
@@ -118,6 +122,7 @@ class Flight {
   tv_odometry* odometry_ = nullptr;
   tv_odometry_state state_;
   std::vector<FlightFrame> frames_;
+  cv::Mat picture_;
   std::vector<size_t> given_;            // indices of frames_
   std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
   bool is_upright_ = false;
