@@ -2,6 +2,7 @@
 """Tests of `twoview odometry`: a rendered flight past five walls, whose path is known, in every
 format of a source, and bad input."""
 import csv
+import http.client
 import json
 import math
 import os
@@ -392,6 +393,61 @@ distortion_coefficients: [0, 0, 0, 0]
                             out=self.folder / "new")
         self.assert_refused(self.odometry("flown", "--drone", "127.0.0.1", *camera, out="new"),
                             "not both", out=self.folder / "new")
+
+    def test_a_page_follows_the_flight(self):
+        source = self.set_folder()
+        names = [COUNT - 1 - abs(COUNT - 1 - j % (2 * (COUNT - 1))) for j in range(40000)]
+        self.write("set/frames.txt", "".join(f"{0.04 * i:.3f} images/{n:05}.png\n"
+                                             for i, n in enumerate(names)))
+        child = subprocess.Popen([program(), "odometry", source, "-o", self.out, "--live"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.communicate)
+        self.addCleanup(child.kill)
+        line = child.stdout.readline()
+        if not line:
+            error = child.stderr.read()
+            self.assertIn("built without libmicrohttpd", error)
+            self.skipTest(error.strip())
+        host, port = re.fullmatch(r"live +http://(127\.0\.0\.1):(\d+)/\n", line).groups()
+
+        def fetched(path, method="GET", **headers):
+            connection = http.client.HTTPConnection(host, int(port), timeout=20)
+            connection.request(method, path, headers=headers)
+            reply = connection.getresponse()
+            body = reply.read()
+            connection.close()
+            return reply.status, reply.getheader("Content-Type"), body
+
+        status, kind, page = fetched("/")
+        self.assertEqual((status, kind), (200, "text/html; charset=utf-8"))
+        self.assertNotRegex(page.decode(), r"""(src|href)=["']?(https?:|//)""")
+        seen = []
+        end = time.monotonic() + 60
+        while len(seen) < 3 and time.monotonic() < end:
+            data = json.loads(fetched("/data.json")[2])
+            if data.get("num_frames", 0) > (seen[-1]["num_frames"] if seen else COUNT):
+                seen.append(data)
+            time.sleep(0.05)
+        self.assertEqual(len(seen), 3, "the page does not follow the flight")
+        self.assertEqual(seen[-1]["status"], "tracking")
+        self.assertEqual((seen[-1]["width"], seen[-1]["height"]), (WIDTH, HEIGHT))
+        self.assertGreater(len(seen[-1]["path"]), 3 * 10)
+        self.assertEqual(len(seen[-1]["points"]), 3 * len(seen[-1]["grey"]))
+        self.assertGreater(len(seen[-1]["grey"]), 100)
+        self.assertEqual(len(seen[-1]["camera"]), 12)
+        self.assertGreater(len(seen[-1]["tracks"]), 50)
+        status, kind, picture = fetched("/picture.jpg")
+        self.assertEqual((status, kind, picture[:2]), (200, "image/jpeg", b"\xff\xd8"))
+        self.assertEqual(fetched("/frames.csv")[0], 404)
+        self.assertEqual(fetched("/data.json", Host="elsewhere.example")[0], 403)
+        with self.assertRaises((http.client.HTTPException, ConnectionError)):
+            fetched("/", "POST")
+        taken = self.odometry(source, "--live-port", port, out=self.folder / "other")
+        self.assert_refused(taken, "--live", port, "in use", out=self.folder / "other")
+        child.send_signal(signal.SIGINT)
+        self.assertEqual(child.wait(timeout=60), 0)
+        self.assertEqual(self.files(), FILES)
+        self.assertGreaterEqual(self.result()["num_frames"], seen[-1]["num_frames"])
 
     # -- what goes wrong ----------------------------------------------------------------------
 

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "odometry/flight.h"
+#include "odometry/live.h"
 #include "odometry/outputs.h"
 #include "odometry/report.h"
 #include "pair/result.h"
@@ -35,6 +36,8 @@ struct Arguments {
   std::string source, camera, truth;
   double fps = 0, duration = 0;
   bool ignores_imu = false;
+  bool is_live = false;
+  int live_port = 0;
   FlightOptions flight;
 #ifdef TWOVIEW_HAS_DRONE
   DroneAddress drone;  // without a host: none
@@ -222,7 +225,7 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
 }
 
 int exit_status(const Flight& flight, const FlightResult& result) {
-  if (result.live_segment < 0) {
+  if (result.live_stretch.segment < 0) {
     std::fprintf(stderr, "twoview: nothing could be tracked: no two frames determine a map\n");
     return kExitNoPose;
   }
@@ -249,9 +252,21 @@ int odometry(Arguments& a) {
   files.keep(a.camera);
   files.keep(truth_file);
   const int wanted = num_wanted(*source, a.flight);
+  std::optional<LivePage> live;
+  if (a.is_live || a.live_port > 0) {
+    live.emplace(a.live_port);
+    const std::string line = summary_line("live", "%s", live->address().c_str());
+    if (common.speaks())
+      print(line);
+    else
+      std::fputs(line.c_str(), stderr);
+  }
   {
     Progress progress(flight, wanted, common.speaks() && stdout_style().bold[0] != '\0');
-    flight.track(stop, [&] { progress.show(); });
+    flight.track(stop, [&] {
+      progress.show();
+      if (live) live->update(flight);
+    });
   }
   if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
   flight.finish(stop);
@@ -310,6 +325,10 @@ void add_odometry(CLI::App& program, Run& run) {
       ->type_name("F");
   verb->add_flag("--no-imu", a->ignores_imu,
                  "leave the attitudes, heights and velocities of a set folder's imu.txt out");
+  verb->add_flag("--live", a->is_live, "serve a page at 127.0.0.1 that follows the flight");
+  verb->add_option("--live-port", a->live_port, "the page's port; without: a free one, printed")
+      ->check(CLI::Range(1, 65535))
+      ->type_name("PORT");
   constexpr int kMany = 1 << 30;
   add_count(*verb, "--max-frames", a->flight.max_frames, 0, kMany, "end after so many; 0: all");
   add_count(*verb, "--every", a->flight.every, 1, kMany, "track every K-th frame only");
