@@ -254,8 +254,7 @@ class tv_keyframe(Structure):
     _fields_ = [("struct_size", c_uint32), ("id", c_int32), ("segment", c_int32),
                 ("frame", c_int32), ("time_s", c_double), ("world_from_cam_R", c_double * 9),
                 ("world_from_cam_t", c_double * 3), ("num_keypoints", c_int32),
-                ("num_observations", c_int32), ("has_covariance", c_int32), ("reserved", c_int32),
-                ("covariance", c_double * 36)]
+                ("num_observations", c_int32)]
 
 
 class tv_map_point(Structure):

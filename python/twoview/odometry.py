@@ -58,7 +58,6 @@ class Keyframe:
     t: np.ndarray  #: (3,)
     num_keypoints: int  #: of its frame
     num_observations: int  #: keypoints that see points of the map
-    covariance: Optional[np.ndarray]  #: (6, 6), relative to the keyframe before it
 
 
 def _matrix(values: Any, *shape: int) -> np.ndarray:
@@ -157,8 +156,15 @@ class Odometry:
         k = self.library.make(_abi.tv_keyframe)
         self._call("tv_odometry_keyframe", c_int32(idx), byref(k))
         return Keyframe(k.id, k.segment, k.frame, k.time_s, _matrix(k.world_from_cam_R, 3, 3),
-                        _matrix(k.world_from_cam_t, 3), k.num_keypoints, k.num_observations,
-                        _matrix(k.covariance, 6, 6) if k.has_covariance else None)
+                        _matrix(k.world_from_cam_t, 3), k.num_keypoints, k.num_observations)
+
+    def covariance(self, idx: int) -> Optional[np.ndarray]:
+        """tv_odometry_covariance: (6, 6), of the pose of the keyframe number idx relative to the one
+        before it; None where it is not known."""
+        covariance, is_known = np.zeros((6, 6)), c_int32()
+        self._call("tv_odometry_covariance", c_int32(idx), _abi.pointer(covariance),
+                   byref(is_known))
+        return covariance if is_known.value else None
 
     def points(self) -> np.ndarray:
         """tv_odometry_points: the points of the map, of dtype twoview.MAP_POINT."""

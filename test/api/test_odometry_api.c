@@ -19,7 +19,7 @@ enum {
   /* The sizes of the records of the map's bytes, and where the first point begins. */
   HEADER = 208,
   POINT = 192,
-  KEYFRAME = 472,
+  KEYFRAME = 176,
   KEYPOINT = 16,
   REMOVED = 112
 };
@@ -106,7 +106,7 @@ static void test_init_functions_write_defaults_and_sizes(void) {
   memset(&keyframe, 1, sizeof keyframe);
   tv_keyframe_init(&keyframe);
   TEST_ASSERT_EQUAL_UINT32(sizeof keyframe, keyframe.struct_size);
-  TEST_ASSERT_TRUE(keyframe.id == 0 && keyframe.covariance[35] == 0);
+  TEST_ASSERT_TRUE(keyframe.id == 0 && keyframe.num_observations == 0);
   tv_odometry_options_init_sized(NULL, 8);
   tv_odometry_frame_init_sized(NULL, 8);
   tv_odometry_state_init_sized(NULL, 8);
@@ -294,6 +294,95 @@ static void test_the_map_holds_together(void) {
   }
   for (i = 0; i < num_points; ++i) TEST_ASSERT_EQUAL_INT(counts[i], points[i].num_observations);
   TEST_ASSERT_TRUE(total > 100 && near_ones > 0.9 * total);
+}
+
+/* The pose of the room's flight at a keyframe, world_from_cam. */
+static void true_pose(const tv_keyframe *keyframe, double R[9]) {
+  const double yaw = 0.12 * sin(0.06 * keyframe->frame), c = cos(yaw), s = sin(yaw);
+  const double turn[9] = {c, 0, s, 0, 1, 0, -s, 0, c};
+  memcpy(R, turn, sizeof turn);
+}
+
+/* The rotation vector, to first order, by which the turn between two keyframes differs from the
+   true one, in the frame of the second. */
+static void turn_error(const tv_keyframe *before, const tv_keyframe *after, double w[3]) {
+  double R0[9], R1[9], relative[9], truth[9], error[9];
+  const double *A = before->world_from_cam_R, *B = after->world_from_cam_R;
+  int r, c, k;
+  true_pose(before, R0), true_pose(after, R1);
+  for (r = 0; r < 3; ++r) {
+    for (c = 0; c < 3; ++c) {
+      relative[3 * r + c] = truth[3 * r + c] = 0;
+      for (k = 0; k < 3; ++k) {
+        relative[3 * r + c] += B[3 * k + r] * A[3 * k + c];
+        truth[3 * r + c] += R1[3 * k + r] * R0[3 * k + c];
+      }
+    }
+  }
+  for (r = 0; r < 3; ++r) {
+    for (c = 0; c < 3; ++c) {
+      error[3 * r + c] = 0;
+      for (k = 0; k < 3; ++k) error[3 * r + c] += truth[3 * r + k] * relative[3 * c + k];
+    }
+  }
+  w[0] = error[7], w[1] = error[2], w[2] = error[3];
+}
+
+static void test_covariances_hold_the_true_turns(void) {
+  double covariance[36], w[3];
+  int32_t is_known, k, r, c, num_known = 0, num_held = 0;
+  tv_keyframe keyframes[KEYFRAMES];
+  fly(odometry, KEYFRAMES);
+  save(odometry, map, &num_map);
+  for (k = 0; k < KEYFRAMES; ++k) {
+    tv_keyframe_init(&keyframes[k]);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, k, &keyframes[k]));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_covariance(odometry, k, covariance, &is_known));
+    if (!is_known) {
+      for (r = 0; r < 36; ++r) TEST_ASSERT_TRUE(covariance[r] == 0);
+      continue;
+    }
+    TEST_ASSERT_TRUE(k > 0);
+    ++num_known;
+    turn_error(&keyframes[k - 1], &keyframes[k], w);
+    for (r = 0; r < 6; ++r) {
+      TEST_ASSERT_TRUE(covariance[7 * r] > 0);
+      for (c = 0; c < 6; ++c) TEST_ASSERT_TRUE(covariance[6 * r + c] == covariance[6 * c + r]);
+    }
+    /* Between a hundredth of a degree and a degree, and at most three of it in error. */
+    for (r = 0; r < 3; ++r) {
+      const double sigma = sqrt(covariance[7 * r]);
+      TEST_ASSERT_TRUE(sigma > 2e-4 && sigma < 2e-2);
+      num_held += fabs(w[r]) < 3 * sigma;
+    }
+  }
+  TEST_ASSERT_TRUE(num_known >= KEYFRAMES - 2);
+  TEST_ASSERT_TRUE(10 * num_held >= 9 * 3 * num_known);
+  expect_unchanged();
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_covariance(NULL, 0, covariance, &is_known));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_covariance(odometry, 0, NULL, &is_known));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_covariance(odometry, 0, covariance, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_odometry_covariance(odometry, KEYFRAMES, covariance, &is_known));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT,
+                        tv_odometry_covariance(odometry, -1, covariance, &is_known));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_odometry_covariance(odometry, 0, covariance, (int32_t *)covariance));
+}
+
+/* A point's covariance is longest along the ray from where it was first seen. */
+static void test_points_have_covariances(void) {
+  int32_t num, n, k;
+  fly(odometry, KEYFRAMES);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_points(odometry, points, POINTS, &num));
+  for (n = 0; n < num; ++n) {
+    const double *C = points[n].covariance;
+    const double trace = C[0] + C[4] + C[8];
+    TEST_ASSERT_TRUE(trace > 0 && C[0] > 0 && C[4] > 0 && C[8] > 0);
+    for (k = 0; k < 3; ++k) TEST_ASSERT_TRUE(C[3 * k + (k + 1) % 3] == C[3 * ((k + 1) % 3) + k]);
+    /* The flight looks forward: depth is known less well than place. */
+    TEST_ASSERT_TRUE(C[8] > 0.2 * trace);
+  }
 }
 
 static void test_the_last_frame_is_shown(void) {
@@ -517,8 +606,8 @@ static void test_the_bytes_are_as_documented(void) {
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, k, &keyframe));
     TEST_ASSERT_EQUAL_UINT64(keyframe.id, number_at(p, 4));
     TEST_ASSERT_EQUAL_UINT64(keyframe.num_keypoints, number_at(p + 12, 4));
-    TEST_ASSERT_TRUE(double_at(p + 24) == keyframe.time_s);
-    TEST_ASSERT_TRUE(double_at(p + 40) == keyframe.world_from_cam_R[3]); /* its transpose */
+    TEST_ASSERT_TRUE(double_at(p + 16) == keyframe.time_s);
+    TEST_ASSERT_TRUE(double_at(p + 32) == keyframe.world_from_cam_R[3]); /* its transpose */
     TEST_ASSERT_EQUAL_INT(TV_OK,
                           tv_odometry_observations(odometry, k, observations, KEYPOINTS, &num));
     for (i = 0, c = 0; i < keyframe.num_keypoints; ++i, keypoint += KEYPOINT) {
@@ -666,21 +755,17 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   put(HEADER + 44, 256, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(HEADER + 48, 0xbf800000u, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(HEADER + 52, 0x7f800000u, 4), expect_sealed(TV_ERR_MAP, num_map);
-  /* Keyframes: id, segment, frame, keypoints, flag, reserved, time, R, t, sigma, scale, covariance.
-   */
+  /* Keyframes: id, segment, frame, keypoints, time, R, t, sigma, scale. */
   put(keyframe, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 4, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 8, 1000, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 12, 0xffffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(keyframe + 12, 0x3fffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 16, 2, 4), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 20, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 24, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 32, 0x3fe0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 104, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 152, 0xbff0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 176, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
-  put(keyframe + 184, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 16, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 24, 0x3fe0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 96, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 144, 0xbff0000000000000u, 8), expect_sealed(TV_ERR_MAP, num_map);
+  put(keyframe + 168, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
   /* Keypoints: x, size, a point that does not exist. */
   put(keypoint, 0x7fc00000u, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(keypoint + 8, 0, 4), expect_sealed(TV_ERR_MAP, num_map);
@@ -729,6 +814,8 @@ int main(void) {
   RUN_TEST(test_bad_frames_are_refused);
   RUN_TEST(test_wrong_sensors_are_left_out_of_account);
   RUN_TEST(test_the_map_holds_together);
+  RUN_TEST(test_covariances_hold_the_true_turns);
+  RUN_TEST(test_points_have_covariances);
   RUN_TEST(test_the_last_frame_is_shown);
   RUN_TEST(test_accessors_refuse_bad_arguments);
   RUN_TEST(test_poses_are_found_again_from_their_keyframes);

@@ -45,7 +45,7 @@ LAYOUT(tv_window_options, 40, reserved, 36);
 LAYOUT(tv_window_result, 80, noise_px, 72);
 LAYOUT(tv_odometry_options, 32, seed, 24);
 LAYOUT(tv_odometry_state, 568, scale_sigma, 560);
-LAYOUT(tv_keyframe, 424, covariance, 136);
+LAYOUT(tv_keyframe, 128, num_observations, 124);
 LAYOUT(tv_map_point, 112, covariance, 40);
 LAYOUT(tv_map_observation, 24, reserved, 20);
 

@@ -253,13 +253,6 @@ typedef struct tv_keyframe {
   double world_from_cam_R[9], world_from_cam_t[3];
   /* How many keypoints the keyframe has, and how many of them see points of the map. */
   int32_t num_keypoints, num_observations;
-  /* 1 where `covariance` is known, else 0. */
-  int32_t has_covariance;
-  /* Always 0. */
-  int32_t reserved;
-  /* The covariance of cam_from_world relative to the keyframe before it, in the parameters of
-     tv_adjust_window, row-major 6x6, in the unit of the map. */
-  double covariance[36];
 } tv_keyframe;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
@@ -273,6 +266,18 @@ TV_API void tv_keyframe_init_sized(tv_keyframe *keyframe, size_t struct_size);
 TV_API tv_status tv_odometry_keyframe(const tv_odometry *odometry, int32_t idx,
                                       tv_keyframe *keyframe);
 
+/* Estimates the covariance of the pose of the keyframe number idx relative to the keyframe before
+   it, from the keyframes around both and the points that they see: marginal over these
+   (tv_adjust_window), four times as large as for independent errors of the keypoints, and with a
+   drift of the map's scale of 1.5 % (docs/odometry.md has the measurements). covariance: room for a
+   row-major 6x6, in the parameters (w, v) with x_true = exp([w]x) x + v for a point x in the frame
+   of the camera, in radians and units of the map; zeros where it is not known. is_known: 1, or 0
+   where the keyframe is the first of its segment, shares too few points with the one before, or
+   where these do not determine the pose. Returns TV_ERR_NULL, TV_ERR_ARGUMENT (idx),
+   TV_ERR_OVERLAP. Time: about that of an adjustment. The map does not change. */
+TV_API tv_status tv_odometry_covariance(tv_odometry *odometry, int32_t idx, double covariance[36],
+                                        int32_t *is_known);
+
 /* A point of the map. */
 typedef struct tv_map_point {
   /* The number of the point, in the order in which they were made. */
@@ -285,7 +290,10 @@ typedef struct tv_map_point {
   int32_t grey;
   /* The position in the world, in the unit of the map. */
   double position[3];
-  /* The covariance of the position, row-major symmetric 3x3, for exact poses of the keyframes. */
+  /* The covariance of the position, row-major symmetric 3x3, for exact poses of the keyframes:
+     along the ray from where it was first seen the uncertainty of its distance, from the largest
+     angle between two rays to it; across the ray that of one pixel; for a pixel's error of 0.7 px.
+   */
   double covariance[9];
 } tv_map_point;
 

@@ -9,7 +9,10 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/adjust.h"
+#include "odometry/fit_pose.h"
+#include "odometry/loop.h"
 #include "odometry/metric.h"
+#include "odometry/pair.h"
 #include "odometry/track.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
@@ -19,6 +22,8 @@ namespace {
 
 constexpr tv_odometry_options kDefaults = {
     sizeof(tv_odometry_options), 1000, 200, 20000, 10, TV_KERNELS_AUTO, 20130814};
+// So many times the keypoints of a frame are points of the map that one frame is matched with.
+constexpr int32_t kMatchedFrames = 3;
 constexpr size_t kOdometryBytes = 4096;  // with 64-bit and with 32-bit pointers alike
 static_assert(sizeof(tv_odometry) <= kOdometryBytes);
 
@@ -48,11 +53,11 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   tv_limits_init(&plan->limits);
   plan->limits.max_width = camera->width;
   plan->limits.max_height = camera->height;
-  plan->limits.max_keypoints = 3 * o.max_keypoints;
+  plan->limits.max_keypoints = kMatchedFrames * o.max_keypoints;
   plan->limits.max_matches = o.max_keypoints;
   plan->limits.kernels = o.kernels;
-  plan->limits.purposes = TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE |
-                          TV_PURPOSE_MATCH_GUIDED | TV_PURPOSE_ABSOLUTE_POSE;
+  plan->limits.purposes =
+      TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE | TV_PURPOSE_ABSOLUTE_POSE;
   plan->columns = (camera->width + kCellPx - 1) / kCellPx;
   plan->rows = (camera->height + kCellPx - 1) / kCellPx;
   plan->sizes = {o.max_keypoints, o.max_keyframes, o.max_points};
@@ -94,7 +99,8 @@ size_t plan_bytes(const Plan& plan) {
 void start_anew(tv_odometry* o) {
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
-  o->reference_id = -1;
+  o->reference_id = o->confirmed_id = -1;
+  o->is_doubtful = false;
   o->has_motion = false;
   o->mark = o->num_frames = o->segment = o->num_segments = 0;
   o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
@@ -109,18 +115,42 @@ void start_anew(tv_odometry* o) {
   o->last_time_s = 0;
 }
 
+void enter_segment(tv_odometry* o, int32_t segment) {
+  if (segment != o->segment) forget_scale(o);
+  o->segment = segment;
+  o->is_upright = false;
+  for (int32_t k = 0; k < o->map.num_keyframes; ++k) {
+    if (o->map.keyframes[k].segment != segment) continue;
+    o->is_upright = o->map.keyframes[k].down_sigma_rad > 0;
+    break;
+  }
+}
+
 size_t scratch_bytes(const tv_odometry_options& o) {
-  const size_t n = static_cast<size_t>(o.max_keypoints);
-  const size_t choices =
-      2 * (arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
-           arena_bytes<int32_t>(n)) +
-      arena_bytes<tv_correspondence>(n) + 16 * arena_bytes<double>(n) + arena_bytes<tv_point>(n) +
-      arena_bytes<tv_two_view>(1) + arena_bytes<uint8_t>(3 * n * 128);
-  const size_t points = static_cast<size_t>(o.max_points);
-  const size_t tracking = std::max(choices, arena_bytes<double>(40 * n) + adjust_bytes(o)) +
-                          arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
-                          arena_bytes<uint8_t>(points);
-  return std::max(tracking, 2 * arena_bytes<int32_t>(points));  // for rank_points
+  const size_t n = static_cast<size_t>(o.max_keypoints),
+               num_points = static_cast<size_t>(o.max_points);
+  const size_t num_keyframes = static_cast<size_t>(o.max_keyframes);
+  const size_t indices = arena_bytes<int32_t>(n),
+               keyframe_numbers = arena_bytes<double>(num_keyframes);
+  const size_t flags = arena_bytes<uint8_t>(num_points),
+               matches = arena_bytes<tv_correspondence>(n);
+  // start.cc: a pair, then its points or the adjustment.
+  const size_t triangulation = 2 * arena_bytes<double>(2 * n) + arena_bytes<tv_point>(n);
+  const size_t start =
+      matches + pair_bytes(o) + 2 * indices + std::max(triangulation, adjust_bytes(o)) + flags;
+  // keyframe.cc: the matches of two keyframes, and their points.
+  const size_t new_points = matches + 2 * indices + 2 * arena_bytes<tv_keypoint>(n) +
+                            std::max(triangulation, pair_bytes(o));
+  // track.cc, loop.cc: the points of a keyframe are matched with a frame, and give its pose.
+  const size_t matching =
+      arena_bytes<uint8_t>(static_cast<size_t>(kMatchedFrames) * n * TV_DESCRIPTOR_BYTES) + matches;
+  const size_t fitting = arena_bytes<double>(2 * n) + arena_bytes<double>(3 * n) +
+                         arena_bytes<float>(n) + indices + arena_bytes<uint8_t>(n);
+  const size_t locating =
+      keyframe_numbers + indices + std::max(matching, fitting) + keyframe_numbers;
+  const size_t closing = close_loop_bytes(o);
+  const size_t ranking = 2 * arena_bytes<int32_t>(num_points);
+  return arena_bytes<PoseFit>(1) + std::max({start, new_points, locating, closing, ranking});
 }
 
 }  // namespace tv

@@ -4,14 +4,12 @@
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
+#include "odometry/adjust.h"
 #include "odometry/map_bytes.h"
 #include "twoview/odometry.h"
 
 namespace tv {
 namespace {
-
-// The size of a keypoint of the finest level, of which a pixel's sigma is 1.
-constexpr float kFinestSize = 4.0f;
 
 // Whether an array has room for `needed` elements. Writes how many that is.
 template <typename Element>
@@ -36,6 +34,24 @@ int32_t* points_in_order(const tv_odometry& odometry, int32_t** ranks) {
   return places;
 }
 
+// Of a point's position: its distance along the ray from where it was first seen, and a pixel
+// across.
+void write_covariance(double focal_px, const MapPoint& point, double covariance[9]) {
+  double ray[3], distance_sq = 0;
+  for (int c = 0; c < 3; ++c) {
+    ray[c] = point.position[c] - static_cast<double>(point.seen_from[c]);
+    distance_sq += ray[c] * ray[c];
+  }
+  const double along = static_cast<double>(point.depth_sigma);
+  const double across = kTypicalNoise / focal_px;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      covariance[3 * r + c] = (along * along - across * across) * (ray[r] * ray[c]) +
+                              (r == c ? across * across * distance_sq : 0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tv
 
@@ -55,9 +71,19 @@ tv_status tv_odometry_keyframe(const tv_odometry* odometry, int32_t idx, tv_keyf
   std::copy_n(world_from_cam.t, 3, packed.world_from_cam_t);
   packed.num_keypoints = k.num_keypoints;
   packed.num_observations = k.num_observations;
-  packed.has_covariance = k.has_covariance;
-  std::copy_n(k.covariance, 36, packed.covariance);
   tv::write_sized(packed, keyframe);
+  return TV_OK;
+}
+
+tv_status tv_odometry_covariance(tv_odometry* odometry, int32_t idx, double covariance[36],
+                                 int32_t* is_known) {
+  if (odometry == nullptr || covariance == nullptr || is_known == nullptr) return TV_ERR_NULL;
+  if (!tv::within(idx, 0, odometry->map.num_keyframes - 1)) return TV_ERR_ARGUMENT;
+  if (tv::overlap(covariance, 36 * sizeof *covariance, is_known, sizeof *is_known)) {
+    return TV_ERR_OVERLAP;
+  }
+  *is_known = tv::estimate_covariance(odometry, idx, covariance);
+  if (*is_known == 0) std::fill(covariance, covariance + 36, 0.0);
   return TV_OK;
 }
 
@@ -76,6 +102,7 @@ tv_status tv_odometry_points(const tv_odometry* odometry, tv_map_point* points, 
     points[n].num_observations = point.num_observations;
     points[n].grey = point.grey;
     std::copy_n(point.position, 3, points[n].position);
+    tv::write_covariance(odometry->camera.model.fx, point, points[n].covariance);
   }
   return TV_OK;
 }
@@ -95,8 +122,8 @@ tv_status tv_odometry_observations(const tv_odometry* odometry, int32_t idx,
   const tv::MapKeypoint* own = tv::keypoints_of(map, keyframe);
   for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
     if (own[k].point == tv::kNoPoint) continue;
-    *observations++ = {ranks[own[k].point],           k, own[k].x, own[k].y,
-                       own[k].size / tv::kFinestSize, 0};
+    *observations++ = {
+        ranks[own[k].point], k, own[k].x, own[k].y, static_cast<float>(tv::sigma_of(own[k])), 0};
   }
   return TV_OK;
 }

@@ -4,14 +4,17 @@
 #include <cmath>
 
 #include "geometry/vector3.h"
+#include "odometry/keyframe.h"
 
 namespace tv {
 namespace {
 
 constexpr int32_t kLeastShared = 10;
-constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
+// The errors of a keypoint in successive keyframes are alike, so that the standard deviation is
+// this many times that of independent ones; and the map's scale drifts by this share from window to
+// window. Measured: docs/odometry.md.
+constexpr double kCorrelation = 2, kDrift = 0.015;
 constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;
-constexpr double kTypicalNoise = 0.7;  // px
 
 int32_t most_views(const tv_odometry_options& o) { return 2 * o.window; }
 int32_t most_points(const tv_odometry_options& o) {
@@ -46,7 +49,9 @@ struct Around {
   int32_t* places;   // of each point in the map
   int32_t* numbers;  // of each place in the map: its point here, or -1
   tv_observation* observations;
-  int32_t* keypoints;  // of each observation
+  int32_t* keypoints;    // of each observation
+  int32_t* shared;       // for each keyframe, how many points it shares with the one in the middle
+  int32_t num_adjusted;  // views; the other ones are held
 };
 
 void add_view(const Map& map, int32_t keyframe, bool fixed, Around* around) {
@@ -90,9 +95,102 @@ void add_observations(const Map& map, int32_t view, int32_t most, Around* around
     o->idx_point = around->numbers[own[i].point];
     o->pixel[0] = static_cast<double>(own[i].x);
     o->pixel[1] = static_cast<double>(own[i].y);
-    o->sigma = own[i].size / 4.0f;
+    o->sigma = static_cast<float>(sigma_of(own[i]));
     around->keypoints[n] = i;
   }
+}
+
+Around make_around(Odometry* odometry) {
+  Arena& arena = odometry->scratch;
+  const tv_odometry_options& options = odometry->options;
+  const size_t views = static_cast<size_t>(most_views(options));
+  const size_t points = static_cast<size_t>(most_points(options));
+  const size_t observations = static_cast<size_t>(most_observations(options));
+  Around around{};
+  tv_window_init(&around.window);
+  around.views = arena_alloc<tv_window_view>(arena, views);
+  around.keyframes = arena_alloc<int32_t>(arena, views);
+  around.points = arena_alloc<double>(arena, 3 * points);
+  around.places = arena_alloc<int32_t>(arena, points);
+  around.numbers = arena_alloc<int32_t>(arena, static_cast<size_t>(options.max_points));
+  around.observations = arena_alloc<tv_observation>(arena, observations);
+  around.keypoints = arena_alloc<int32_t>(arena, observations);
+  around.shared = arena_alloc<int32_t>(arena, static_cast<size_t>(odometry->map.num_keyframes));
+  return around;
+}
+
+// The keyframes that are adjusted: those that share most points with this one, in ascending order.
+int32_t* choose_adjusted(Odometry* odometry, int32_t keyframe, Around* around) {
+  const int32_t window = odometry->options.window;
+  int32_t* chosen = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(window) + 1);
+  count_shared(odometry, keyframe, around->shared);
+  around->shared[keyframe] = 1 << 30;
+  around->num_adjusted =
+      largest(around->shared, odometry->map.num_keyframes, kLeastShared, window, chosen);
+  std::sort(chosen, chosen + around->num_adjusted);
+  return chosen;
+}
+
+// Adds the points of the views, those of the newest view first.
+void add_points(const Odometry& odometry, Around* around) {
+  const Map& map = odometry.map;
+  const int32_t most = most_points(odometry.options);
+  std::fill(around->numbers, around->numbers + odometry.options.max_points, -1);
+  for (int32_t v = around->num_adjusted - 1; v >= 0; --v) {
+    const MapKeyframe& view = map.keyframes[around->keyframes[v]];
+    const MapKeypoint* own = keypoints_of(map, view);
+    for (int32_t i = 0; i < view.num_keypoints; ++i) {
+      const int32_t p = own[i].point;
+      if (p == kNoPoint || around->numbers[p] >= 0) continue;
+      if (around->window.num_points == most) break;
+      const int32_t n = around->window.num_points++;
+      around->numbers[p] = n;
+      around->places[n] = p;
+      std::copy_n(map.points[p].position, 3, around->points + 3 * n);
+    }
+  }
+}
+
+void add_all_observations(const Odometry& odometry, Around* around) {
+  for (int32_t v = 0; v < around->window.num_views; ++v) {
+    add_observations(odometry.map, v, most_observations(odometry.options), around);
+  }
+}
+
+// Adjusts what was collected, with the measured directions of gravity. False: nothing has changed.
+bool solve_window(Odometry* odometry, int32_t max_iterations, Around* around, double* covariances,
+                  float* errors, tv_window_result* result) {
+  const Map& map = odometry->map;
+  tv_window& window = around->window;
+  tv_gravity_prior* downs = arena_alloc<tv_gravity_prior>(
+      odometry->scratch, static_cast<size_t>(most_views(odometry->options)));
+  for (int32_t v = 0; v < around->num_adjusted && odometry->is_upright; ++v) {
+    const MapKeyframe& view = map.keyframes[around->keyframes[v]];
+    if (view.down_sigma_rad == 0) continue;
+    tv_gravity_prior* down = &downs[window.num_gravity_priors++];
+    *down = tv_gravity_prior{};
+    down->idx_view = v;
+    std::copy_n(view.down, 3, down->down);
+    down->sigma_rad = view.down_sigma_rad;
+  }
+  window.gravity_priors = downs;
+  window.world_down[1] = 0;
+  window.world_down[2] = 1;
+  window.num_cameras = 1;
+  window.cameras = &odometry->camera.model;
+  window.views = around->views;
+  window.points = around->points;
+  window.observations = around->observations;
+  tv_window_options how;
+  tv_window_options_init(&how);
+  how.max_iterations = max_iterations;
+  how.tolerance = 1e-4;
+  size_t bytes = 0;
+  tv_adjust_window_size(&window, &bytes);
+  void* memory = arena_alloc<uint8_t>(odometry->scratch, bytes);
+  tv_window_result_init(result);
+  return memory != nullptr &&
+         tv_adjust_window(&window, &how, memory, bytes, covariances, errors, result) == TV_OK;
 }
 
 // Sets how uncertain the points' depths are from the largest angle between the rays to them.
@@ -102,11 +200,15 @@ void measure_depths(Odometry* odometry, const Around& around) {
     MapPoint& point = map.points[around.places[k]];
     point.depth_sigma = 0;  // here: the largest squared sine
   }
-  for (int32_t n = 0; n < around.window.num_observations; ++n) {
+  double centre[3];
+  for (int32_t n = 0, view = -1; n < around.window.num_observations; ++n) {
     const tv_observation& o = around.observations[n];
     MapPoint& point = map.points[around.places[o.idx_point]];
-    double centre[3], a[3], b[3], normal[3];
-    centre_of(map.keyframes[around.keyframes[o.idx_view]].cam_from_world, centre);
+    if (o.idx_view != view) {
+      view = o.idx_view;
+      centre_of(map.keyframes[around.keyframes[view]].cam_from_world, centre);
+    }
+    double a[3], b[3], normal[3];
     for (int c = 0; c < 3; ++c) {
       a[c] = point.position[c] - centre[c];
       b[c] = point.position[c] - static_cast<double>(point.seen_from[c]);
@@ -131,13 +233,13 @@ size_t adjust_bytes(const tv_odometry_options& o) {
   const size_t points = static_cast<size_t>(most_points(o));
   const size_t observations = static_cast<size_t>(most_observations(o));
   const size_t keyframes = static_cast<size_t>(o.max_keyframes);
-  return arena_bytes<tv_window_view>(views) + 3 * arena_bytes<int32_t>(views) +
-         2 * arena_bytes<int32_t>(keyframes) + arena_bytes<double>(3 * points) +
+  return arena_bytes<tv_window_view>(views) + 2 * arena_bytes<int32_t>(views) +
+         arena_bytes<int32_t>(keyframes) + arena_bytes<double>(3 * points) +
          arena_bytes<int32_t>(points) + arena_bytes<int32_t>(static_cast<size_t>(o.max_points)) +
          arena_bytes<tv_observation>(observations) + arena_bytes<int32_t>(observations) +
          arena_bytes<float>(observations) + arena_bytes<double>(36 * views) +
          arena_bytes<tv_gravity_prior>(views) +
-         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points)) +
+         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points)) +  // of remove_lone_points
          arena_bytes<uint8_t>(window_bytes(o));
 }
 
@@ -158,55 +260,54 @@ void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared) {
   }
 }
 
+bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance[36]) {
+  ArenaScope scope(odometry->scratch);
+  const Map& map = odometry->map;
+  Around around = make_around(odometry);
+  int32_t* chosen = choose_adjusted(odometry, keyframe, &around);
+  bool holds_before = false;
+  int32_t view = -1;
+  for (int32_t k = 0; k < around.num_adjusted; ++k) {
+    holds_before = holds_before || chosen[k] == keyframe - 1;
+    if (chosen[k] == keyframe) view = k;
+    add_view(map, chosen[k], chosen[k] == keyframe - 1, &around);
+  }
+  if (!holds_before) return false;
+  add_points(*odometry, &around);
+  add_all_observations(*odometry, &around);
+  double* covariances = arena_alloc<double>(
+      odometry->scratch, 36 * static_cast<size_t>(most_views(odometry->options)));
+  tv_window_result result;
+  if (!solve_window(odometry, 1, &around, covariances, nullptr, &result)) return false;
+  std::copy_n(covariances + 36 * view, 36, covariance);
+  const Rigid moved = compose(map.keyframes[keyframe].cam_from_world,
+                              inverse(map.keyframes[keyframe - 1].cam_from_world));
+  for (int r = 0; r < 6; ++r) {
+    for (int c = 0; c < 6; ++c) {
+      double* entry = &covariance[6 * r + c];
+      *entry *= kCorrelation * kCorrelation;
+      if (r >= 3 && c >= 3) *entry += kDrift * kDrift * moved.t[r - 3] * moved.t[c - 3];
+    }
+  }
+  return result.has_covariance != 0;
+}
+
 void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations) {
   ArenaScope scope(odometry->scratch);
-  Arena& arena = odometry->scratch;
   Map& map = odometry->map;
   const tv_odometry_options& options = odometry->options;
-  const size_t num_keyframes = static_cast<size_t>(map.num_keyframes);
-  const size_t room = static_cast<size_t>(most_observations(options));
-  Around around{};
-  tv_window_init(&around.window);
-  around.views = arena_alloc<tv_window_view>(arena, static_cast<size_t>(most_views(options)) + 1);
-  around.keyframes = arena_alloc<int32_t>(arena, static_cast<size_t>(most_views(options)) + 1);
-  around.points = arena_alloc<double>(arena, 3 * static_cast<size_t>(most_points(options)));
-  around.places = arena_alloc<int32_t>(arena, static_cast<size_t>(most_points(options)));
-  around.numbers = arena_alloc<int32_t>(arena, static_cast<size_t>(options.max_points));
-  around.observations = arena_alloc<tv_observation>(arena, room);
-  around.keypoints = arena_alloc<int32_t>(arena, room);
-  int32_t* shared = arena_alloc<int32_t>(arena, num_keyframes);
-  int32_t* chosen = arena_alloc<int32_t>(arena, static_cast<size_t>(options.window) + 1);
-
-  // The keyframes that are adjusted, in ascending order, so that the first one is held where none
-  // is fixed.
-  count_shared(odometry, keyframe, shared);
-  shared[keyframe] = 1 << 30;
-  const int32_t num_adjusted =
-      largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
-  std::sort(chosen, chosen + num_adjusted);
+  Around around = make_around(odometry);
+  int32_t* chosen = choose_adjusted(odometry, keyframe, &around);
+  int32_t* shared = around.shared;
   const int32_t segment = map.keyframes[keyframe].segment;
   int32_t first = 0;
   while (map.keyframes[first].segment != segment) ++first;
-  for (int32_t k = 0; k < num_adjusted; ++k) {
+  for (int32_t k = 0; k < around.num_adjusted; ++k) {
     add_view(map, chosen[k], chosen[k] == first, &around);
     shared[chosen[k]] = -1;
   }
-  // Their points.
-  std::fill(around.numbers, around.numbers + options.max_points, -1);
-  for (int32_t v = num_adjusted - 1; v >= 0; --v) {
-    const MapKeyframe& view = map.keyframes[around.keyframes[v]];
-    const MapKeypoint* own = keypoints_of(map, view);
-    for (int32_t i = 0; i < view.num_keypoints; ++i) {
-      const int32_t p = own[i].point;
-      if (p == kNoPoint || around.numbers[p] >= 0) continue;
-      if (around.window.num_points == most_points(options)) break;
-      const int32_t n = around.window.num_points++;
-      around.numbers[p] = n;
-      around.places[n] = p;
-      std::copy_n(map.points[p].position, 3, around.points + 3 * n);
-    }
-  }
-  // The other keyframes that see them are held.
+  add_points(*odometry, &around);
+  // The other keyframes that see the points are held.
   for (int32_t k = 0; k < map.num_keyframes; ++k) {
     if (shared[k] == -1) continue;
     shared[k] = 0;
@@ -218,45 +319,12 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   }
   const int32_t num_held = largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
   for (int32_t k = 0; k < num_held; ++k) add_view(map, chosen[k], true, &around);
-  for (int32_t v = 0; v < around.window.num_views; ++v) {
-    add_observations(map, v, most_observations(options), &around);
-  }
-  const size_t num_observations = static_cast<size_t>(around.window.num_observations);
-  float* errors = arena_alloc<float>(arena, num_observations);
-
-  tv_gravity_prior* downs =
-      arena_alloc<tv_gravity_prior>(arena, static_cast<size_t>(most_views(options)) + 1);
-  tv_window& window = around.window;
-  for (int32_t v = 0; v < num_adjusted && odometry->is_upright; ++v) {
-    const MapKeyframe& view = map.keyframes[around.keyframes[v]];
-    if (view.down_sigma_rad == 0) continue;
-    tv_gravity_prior* down = &downs[window.num_gravity_priors++];
-    *down = tv_gravity_prior{};
-    down->idx_view = v;
-    std::copy_n(view.down, 3, down->down);
-    down->sigma_rad = view.down_sigma_rad;
-  }
-  window.gravity_priors = downs;
-  window.world_down[1] = 0;
-  window.world_down[2] = 1;
-  window.num_cameras = 1;
-  window.cameras = &odometry->camera.model;
-  window.views = around.views;
-  window.points = around.points;
-  window.observations = around.observations;
-  tv_window_options how;
-  tv_window_options_init(&how);
-  how.max_iterations = max_iterations;
-  how.tolerance = 1e-4;
-  size_t bytes = 0;
-  tv_adjust_window_size(&window, &bytes);
-  void* memory = arena_alloc<uint8_t>(arena, bytes);
+  add_all_observations(*odometry, &around);
+  const tv_window& window = around.window;
+  float* errors =
+      arena_alloc<float>(odometry->scratch, static_cast<size_t>(window.num_observations));
   tv_window_result result;
-  tv_window_result_init(&result);
-  if (memory == nullptr ||
-      tv_adjust_window(&window, &how, memory, bytes, nullptr, errors, &result) != TV_OK) {
-    return;
-  }
+  if (!solve_window(odometry, max_iterations, &around, nullptr, errors, &result)) return;
   for (int32_t v = 0; v < window.num_views; ++v) {
     if (around.views[v].fixed) continue;
     Rigid pose;
@@ -274,13 +342,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
     forget_observation(&map, around.keyframes[o.idx_view], around.keypoints[n]);
   }
   measure_depths(odometry, around);
-  uint8_t* is_removed = arena_alloc<uint8_t>(arena, static_cast<size_t>(options.max_points));
-  bool any = false;
-  for (int32_t p = 0; p < map.end_points; ++p) {
-    is_removed[p] = map.points[p].id >= 0 && map.points[p].num_observations < 2;
-    any = any || is_removed[p];
-  }
-  if (any) remove_points(&map, is_removed);
+  remove_lone_points(odometry);
 }
 
 }  // namespace tv

@@ -11,6 +11,10 @@ size_t adjust_bytes(const tv_odometry_options& options);
 // observations that do not fit, and removes the points that fewer than two keyframes see.
 void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations);
 
+// Estimates the covariance of a keyframe's pose relative to the keyframe before it. False: they do
+// not determine it.
+bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance[36]);
+
 // How many points each keyframe shares with one of them; 0 for keyframes of other segments.
 void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared);
 

@@ -6,11 +6,6 @@
 #include "odometry/search.h"
 
 namespace tv {
-namespace {
-
-constexpr double kTypicalNoise = 0.5;  // px
-
-}  // namespace
 
 bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
               PoseFit* fit) {
@@ -21,6 +16,8 @@ bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, F
   float* sigmas = arena_alloc<float>(odometry->scratch, room);
   int32_t* keypoints = arena_alloc<int32_t>(odometry->scratch, room);
   uint8_t* is_inlier = arena_alloc<uint8_t>(odometry->scratch, room);
+  double centre[3];
+  centre_of(frame->cam_from_world, centre);
   tv_pixel_points matches;
   tv_pixel_points_init(&matches);
   for (int32_t k = 0; k < frame->num; ++k) {
@@ -35,8 +32,7 @@ bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, F
       double x[3];
       transform(frame->cam_from_world, point.position, x);
       const double error =
-          depth_error_px(*odometry, point, frame->cam_from_world, std::max(x[2], 1e-9)) /
-          kTypicalNoise;
+          depth_error_px(*odometry, point, centre, std::max(x[2], 1e-9)) / kTypicalNoise;
       sigma = std::sqrt(sigma * sigma + error * error);
     }
     sigmas[n] = static_cast<float>(std::min(sigma, 1000.0));

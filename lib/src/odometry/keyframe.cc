@@ -1,12 +1,11 @@
 #include "odometry/keyframe.h"
-#include "twoview/match.h"
-#include "twoview/triangulate.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "geometry/vector3.h"
 #include "odometry/adjust.h"
+#include "twoview/triangulate.h"
 
 namespace tv {
 namespace {
@@ -16,12 +15,12 @@ constexpr int32_t kMostNeighbours = 4;
 // A point is made where its rays meet at this many times the standard deviation of the attitude:
 // below that, the depths of all points are wrong together.
 constexpr double kLeastTurnSigmas = 5;
-constexpr double kLeastAngle = 0.006;  // radians
-constexpr double kLargestError = 3.0;  // px, of a pixel of sigma 1
 constexpr double kLargestSizeRatio = 2.2;
-constexpr double kTypicalNoise = 0.7;  // px
-
-double sigma_of(const MapKeypoint& keypoint) { return static_cast<double>(keypoint.size) / 4.0; }
+constexpr double kMostTurned = 1.0;  // radians between keyframes that make points together
+// In place of a gap's length: the first keyframe of a segment, and the last one.
+constexpr double kNeverRemoved = 1e300, kRarelyRemoved = 1e299;
+// A frame's surroundings are the points of this many keyframes that share at least so many with it.
+constexpr int32_t kSurroundingKeyframes = 12, kLeastShared = 5;
 
 int32_t grey_at(const tv_image& image, const MapKeypoint& keypoint) {
   const int64_t x = std::min(std::max(static_cast<int32_t>(keypoint.x + 0.5f), 0), image.width - 1);
@@ -30,16 +29,16 @@ int32_t grey_at(const tv_image& image, const MapKeypoint& keypoint) {
   return image.data[y * image.stride_bytes + x];
 }
 
-// The distance in pixels between a keypoint and the image of a point; huge behind the camera.
-double error_of(const Odometry& odometry, const MapKeyframe& keyframe, const MapKeypoint& keypoint,
-                const double point[3]) {
+// Whether the image of a point lies where a keypoint does, up to the largest error.
+bool is_seen_at(const Odometry& odometry, const MapKeyframe& keyframe, const MapKeypoint& keypoint,
+                const MapPoint& point) {
   double x[3];
-  transform(keyframe.cam_from_world, point, x);
+  transform(keyframe.cam_from_world, point.position, x);
   Vec2 pixel;
-  if (!project(odometry.camera, Vec3(x[0], x[1], x[2]), &pixel, nullptr)) return 1e9;
+  if (!project(odometry.camera, Vec3(x[0], x[1], x[2]), &pixel, nullptr)) return false;
   const double dx = pixel.x() - static_cast<double>(keypoint.x);
   const double dy = pixel.y() - static_cast<double>(keypoint.y);
-  return std::sqrt(dx * dx + dy * dy);
+  return std::sqrt(dx * dx + dy * dy) <= kLargestError * sigma_of(keypoint);
 }
 
 // All keypoints of a keyframe that has its descriptors.
@@ -48,15 +47,38 @@ tv_features features_of(const Map& map, const MapKeyframe& keyframe, tv_keypoint
   for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
     keypoints[k] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
   }
-  tv_features features;
-  tv_features_init(&features);
-  features.num = keyframe.num_keypoints;
-  features.keypoints = keypoints;
-  features.descriptors = descriptors_of(map, keyframe);
-  return features;
+  return as_features(keypoints, descriptors_of(map, keyframe), keyframe.num_keypoints);
 }
 
 }  // namespace
+
+void make_room(Odometry* odometry, int32_t wanted) {
+  Map& map = odometry->map;
+  while (map.num_keyframes + wanted > map.sizes.max_keyframes) {
+    int32_t best = -1;
+    double least = 0;
+    for (int32_t k = 1; k + 2 < map.num_keyframes; ++k) {
+      const MapKeyframe &before = map.keyframes[k - 1], &own = map.keyframes[k];
+      const MapKeyframe& after = map.keyframes[k + 1];
+      if (own.id == odometry->reference_id) continue;
+      double a[3], b[3];
+      centre_of(before.cam_from_world, a);
+      centre_of(after.cam_from_world, b);
+      double gap = distance_between(a, b) +
+                   odometry->median_depth * rotation_angle(compose(after.cam_from_world,
+                                                                   inverse(before.cam_from_world)));
+      if (before.segment != own.segment)
+        gap = kNeverRemoved;
+      else if (after.segment != own.segment)
+        gap = kRarelyRemoved;
+      if (best < 0 || gap < least) {
+        least = gap;
+        best = k;
+      }
+    }
+    remove_keyframe(&map, best, best - 1);
+  }
+}
 
 int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
   Map& map = odometry->map;
@@ -146,7 +168,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   return num_made;
 }
 
-void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
+MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;
   Map& map = odometry->map;
@@ -160,16 +182,19 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   tv_keypoint* their_room = arena_alloc<tv_keypoint>(arena, n);
   double centre[3];
   centre_of(own.cam_from_world, centre);
-  int32_t neighbours[16], num_neighbours = 0;
+  int32_t neighbours[kMostNeighbours], num_neighbours = 0;
   for (int32_t k = keyframe - 1; k >= 0 && num_neighbours < kMostNeighbours; --k) {
     const MapKeyframe& other = map.keyframes[k];
     if (other.described < 0 || other.segment != own.segment) continue;
     double there[3];
     centre_of(other.cam_from_world, there);
     if (distance_between(centre, there) < kLeastBaseline * odometry->median_depth) continue;
-    if (rotation_angle(compose(own.cam_from_world, inverse(other.cam_from_world))) > 1.0) continue;
+    if (rotation_angle(compose(own.cam_from_world, inverse(other.cam_from_world))) > kMostTurned) {
+      continue;
+    }
     neighbours[num_neighbours++] = k;
   }
+  MapVote vote{};
   for (int32_t i = 0; i < num_neighbours; ++i) {
     const int32_t k = neighbours[i];
     const MapKeyframe& other = map.keyframes[k];
@@ -177,6 +202,11 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     int32_t num_found = 0;
     if (tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num_found) != TV_OK) {
       continue;
+    }
+    // The nearest one is left out: from near by, a wrong motion looks like the right one.
+    if ((i > 0 || num_neighbours == 1) && needs_vote(vote)) {
+      add_vote(odometry, theirs.keypoints, mine.keypoints, found, num_found,
+               compose(own.cam_from_world, inverse(other.cam_from_world)), &vote);
     }
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
     const MapKeypoint* their_keypoints = keypoints_of(map, other);
@@ -188,13 +218,11 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
         keypoints0[num] = a;
         keypoints1[num++] = b;
       } else if (theirs_point == kNoPoint) {
-        if (error_of(*odometry, other, their_keypoints[a], map.points[point].position) <=
-            kLargestError * sigma_of(their_keypoints[a])) {
+        if (is_seen_at(*odometry, other, their_keypoints[a], map.points[point])) {
           observe(&map, k, a, point);
         }
       } else if (point == kNoPoint) {
-        if (error_of(*odometry, own, my_keypoints[b], map.points[theirs_point].position) <=
-            kLargestError * sigma_of(my_keypoints[b])) {
+        if (is_seen_at(*odometry, own, my_keypoints[b], map.points[theirs_point])) {
           observe(&map, keyframe, b, theirs_point);
         }
       }
@@ -202,6 +230,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num,
                         std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma), image);
   }
+  return result_of(vote);
 }
 
 void remove_bad_points(Odometry* odometry) {
@@ -219,6 +248,19 @@ void remove_bad_points(Odometry* odometry) {
   if (any) remove_points(&map, is_removed);
 }
 
+void remove_lone_points(Odometry* odometry) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  uint8_t* is_removed =
+      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
+  bool any = false;
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    is_removed[p] = map.points[p].id >= 0 && map.points[p].num_observations < 2;
+    any = any || is_removed[p];
+  }
+  if (any) remove_points(&map, is_removed);
+}
+
 void list_local_points(Odometry* odometry, int32_t keyframe) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
@@ -228,12 +270,12 @@ void list_local_points(Odometry* odometry, int32_t keyframe) {
   const int32_t mark = ++odometry->mark;
   odometry->num_local_points = 0;
   const int32_t most = odometry->max_matched;
-  for (int32_t n = 0; n < 12; ++n) {
+  for (int32_t n = 0; n < kSurroundingKeyframes; ++n) {
     int32_t best = map.num_keyframes - 1;
     for (int32_t k = best - 1; k >= 0; --k) {
       if (shared[k] > shared[best]) best = k;
     }
-    if (shared[best] < 5) break;
+    if (shared[best] < kLeastShared) break;
     shared[best] = 0;
     const MapKeypoint* own = keypoints_of(map, map.keyframes[best]);
     for (int32_t i = 0; i < map.keyframes[best].num_keypoints; ++i) {

@@ -1,15 +1,21 @@
 // Keyframes: when a frame becomes one, and the points that it adds to the map.
 #pragma once
 
-#include "odometry/odometry.h"
+#include "odometry/pair.h"
 
 namespace tv {
 
 // Makes the frame a keyframe, with the points that it sees, and returns its index.
 int32_t make_keyframe(Odometry* odometry, const Frame& frame);
 
-// Makes points of the keypoints that match those of earlier keyframes.
-void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image);
+// Makes points of the keypoints that match those of earlier keyframes, and returns what these
+// matches say of the map.
+MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image);
+
+// Removes keyframes until there is room for `wanted` more: those between whose neighbours the
+// camera moved and turned least; never the first one of a segment or the one to which poses are
+// relative.
+void make_room(Odometry* odometry, int32_t wanted);
 
 // Makes points of matched pixels of two keyframes. Returns how many.
 int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
@@ -18,6 +24,9 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
 
 // Removes points that frames do not find where they must appear.
 void remove_bad_points(Odometry* odometry);
+
+// Removes points that fewer than two keyframes see.
+void remove_lone_points(Odometry* odometry);
 
 // Lists the points that are looked for in the next frames: those of the keyframes that share most
 // points with this one.

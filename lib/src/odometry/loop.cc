@@ -17,46 +17,47 @@ constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 15;
 constexpr double kLargestDrift = 0.05;  // of the path, in position
 constexpr double kLargestShift = 0.15;  // of the median depth, added to it
 constexpr double kLargestTurn = 0.4;    // radians
+// Cameras farther from each other, in median depths, or turned by more see nothing in common.
+constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
 constexpr double kLargestScale = 1.5;
-constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
+constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
 
-// The length of the path over the keyframes from..to.
-double path_between(const Map& map, int32_t from, int32_t to) {
-  double length = 0;
-  for (int32_t k = from; k < to; ++k) {
-    double a[3], b[3];
-    centre_of(map.keyframes[k].cam_from_world, a);
-    centre_of(map.keyframes[k + 1].cam_from_world, b);
-    length += distance_between(a, b);
+// Writes for each keyframe the length of the path from it to the newest one.
+void measure_paths(const Map& map, double* lengths) {
+  double length = 0, after[3], centre[3];
+  for (int32_t k = map.num_keyframes - 1; k >= 0; --k) {
+    centre_of(map.keyframes[k].cam_from_world, centre);
+    if (k + 1 < map.num_keyframes) length += distance_between(centre, after);
+    std::copy_n(centre, 3, after);
+    lengths[k] = length;
   }
-  return length;
 }
 
 // Whether drift can explain where the camera is now and where it must be for a loop.
-bool is_plausible(const Odometry& odometry, const Frame& frame, const LoopEnd& end) {
+bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end) {
   const Map& map = odometry.map;
   if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
   if (!(end.scale < kLargestScale && end.scale > 1 / kLargestScale)) return false;
   double now[3], there[3];
   centre_of(frame.cam_from_world, now);
   centre_of(end.cam_from_world, there);
-  const double path = path_between(map, end.keyframe, map.num_keyframes - 1);
   return distance_between(now, there) <=
              kLargestDrift * path + kLargestShift * odometry.median_depth &&
          rotation_angle(compose(end.cam_from_world, inverse(frame.cam_from_world))) <= kLargestTurn;
 }
 
-// Whether the frame may see what a keyframe saw, if the drift is as large as it may be.
-bool may_meet(const Odometry& odometry, const Frame& frame, int32_t keyframe) {
+// Whether the frame may see what a keyframe saw, if the drift is as large as it may be after a path
+// of this length.
+bool may_meet(const Odometry& odometry, const Frame& frame, double path, int32_t keyframe) {
   const Map& map = odometry.map;
   const MapKeyframe& other = map.keyframes[keyframe];
   if (other.segment != odometry.segment) return true;
   double now[3], there[3];
   centre_of(frame.cam_from_world, now);
   centre_of(other.cam_from_world, there);
-  const double path = path_between(map, keyframe, map.num_keyframes - 1);
-  return distance_between(now, there) <= kLargestDrift * path + 2 * odometry.median_depth &&
-         rotation_angle(compose(other.cam_from_world, inverse(frame.cam_from_world))) < 1.2;
+  return distance_between(now, there) <=
+             kLargestDrift * path + kFarthestSeen * odometry.median_depth &&
+         rotation_angle(compose(other.cam_from_world, inverse(frame.cam_from_world))) < kMostTurned;
 }
 
 // The median of the depths of the same keypoints among the old points over those among the new
@@ -78,7 +79,8 @@ double scale_between(Odometry* odometry, const Frame& frame, const Frame& again)
   return ratios[num / 2];
 }
 
-bool meets(Odometry* odometry, const Frame& frame, int32_t keyframe, Frame* again, LoopEnd* end) {
+bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe, Frame* again,
+           LoopEnd* end) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
   int32_t* points =
@@ -96,7 +98,7 @@ bool meets(Odometry* odometry, const Frame& frame, int32_t keyframe, Frame* agai
   }
   if (num < kLeastInliers || 10 * num_known > num) return false;
   again->has_pose = false;
-  if (match_points(odometry, points, num, 0.87, again) < kLeastMatches) return false;
+  if (match_points(odometry, points, num, kMatchRatio, again) < kLeastMatches) return false;
   PoseFit fit;
   if (!fit_pose(odometry, 500, 4.0, again, &fit) || fit.estimate.num_inliers < kLeastMatches / 2 ||
       3 * fit.estimate.num_inliers < fit.estimate.num_matches) {
@@ -119,7 +121,7 @@ bool meets(Odometry* odometry, const Frame& frame, int32_t keyframe, Frame* agai
   end->keyframe = keyframe;
   end->cam_from_world = fit.cam_from_world;
   end->scale = scale_between(odometry, frame, *again);
-  return end->scale > 0 && is_plausible(*odometry, frame, *end);
+  return end->scale > 0 && is_plausible(*odometry, frame, path, *end);
 }
 
 struct Node {
@@ -205,6 +207,10 @@ void fuse_points(Odometry* odometry, const Frame& again) {
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end) {
   const Map& map = odometry->map;
   const int32_t last = map.num_keyframes - 1 - kLeastKeyframesBetween;
+  if (map.num_keyframes == 0) return false;
+  ArenaScope scope(odometry->scratch);
+  double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  measure_paths(map, paths);
   bool copied = false, found = false;
   for (int32_t tried = 0, n = 0; tried < count && n < map.num_keyframes && !found; ++n) {
     if (odometry->next_loop <= 0 || odometry->next_loop > map.num_keyframes) {
@@ -212,14 +218,21 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
     }
     const int32_t k = --odometry->next_loop;
     if (k > last && map.keyframes[k].segment == odometry->segment) continue;
-    if (!may_meet(*odometry, frame, k)) continue;
+    if (!may_meet(*odometry, frame, paths[k], k)) continue;
     if (!copied) copy_frame(frame, again);
     copied = true;
     ++tried;
-    found = meets(odometry, frame, k, again, end);
+    found = meets(odometry, frame, paths[k], k, again, end);
   }
   if (copied) list_local_points(odometry, find_keyframe(map, odometry->reference_id));
   return found;
+}
+
+size_t close_loop_bytes(const tv_odometry_options& o) {
+  const size_t keyframes = static_cast<size_t>(o.max_keyframes);
+  const size_t points = static_cast<size_t>(o.max_points);
+  return arena_bytes<Node>(keyframes) + arena_bytes<double>(keyframes) +
+         arena_bytes<int32_t>(points) + arena_bytes<uint8_t>(points);
 }
 
 void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end) {
@@ -230,19 +243,19 @@ void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end) {
   const int32_t segment = map.keyframes[newest].segment;
   Node* nodes = arena_alloc<Node>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   const Rigid now = map.keyframes[newest].cam_from_world;
-  const double whole = std::max(path_between(map, end.keyframe, newest), 1e-12);
-  double path = 0;
+  double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  measure_paths(map, paths);
+  const double whole = std::max(paths[end.keyframe], 1e-12);
   for (int32_t k = 0; k <= newest; ++k) {
     const MapKeyframe& keyframe = map.keyframes[k];
     nodes[k] = {keyframe.cam_from_world, 0};
-    if (k > end.keyframe) path += path_between(map, k - 1, k);
     if (keyframe.segment != segment) continue;
     if (segment == old_segment && k <= end.keyframe) continue;
     // As the loop's end says: the way from the newest keyframe, in the other scale.
     Rigid relative = compose(keyframe.cam_from_world, inverse(now));
     for (double& t : relative.t) t *= end.scale;
     const Rigid from_end = compose(relative, end.cam_from_world);
-    const double share = segment == old_segment ? path / whole : 1;
+    const double share = segment == old_segment ? 1 - paths[k] / whole : 1;
     nodes[k] = blend(keyframe.cam_from_world, from_end, end.scale, share);
   }
   move_points(&map, nodes);
@@ -255,7 +268,7 @@ void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end) {
   for (int32_t p = 0; p < map.end_points; ++p) {
     if (map.points[p].segment == segment) map.points[p].segment = old_segment;
   }
-  odometry->segment = old_segment;
+  enter_segment(odometry, old_segment);
   fuse_points(odometry, again);
 }
 

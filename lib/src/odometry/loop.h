@@ -20,6 +20,9 @@ struct LoopEnd {
 // known, and `again`, with the frame's keypoints, has the old points that they see.
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end);
 
+// How many bytes of scratch close_loop takes.
+size_t close_loop_bytes(const tv_odometry_options& options);
+
 // Corrects the keyframes and points. The newest keyframe has the frame's keypoints.
 void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end);
 

@@ -1,5 +1,5 @@
 // The map: keyframes, points, and which keypoint of a keyframe sees which point. All of it lies in
-// arrays of a fixed size. Tests: test/unit/test_odometry_map.cc.
+// arrays of a fixed size. Tests: test/api/test_odometry_api.c.
 #pragma once
 
 #include "base/arena.h"
@@ -12,6 +12,8 @@ inline constexpr int32_t kNoPoint = -1;
 // How many keyframes keep all their descriptors: the last ones, with which new points are made.
 // The others keep those of the points that they see.
 inline constexpr int32_t kDescribedKeyframes = 16;
+// The size of a keypoint of the finest level, of which a pixel's sigma is 1.
+inline constexpr float kFinestSize = 4.0f;
 
 struct MapKeypoint {
   float x, y, size;
@@ -23,13 +25,11 @@ struct MapKeyframe {
   int32_t room;  // which part of the keypoints' array is its own
   int32_t num_keypoints, num_observations;
   int32_t described;  // which part of the descriptors' array is its own; -1: none
-  int32_t has_covariance;
   double time_s;
   Rigid cam_from_world;
   double down[3], down_sigma_rad;   // gravity in the camera's frame; sigma 0: not known
   double height_m, height_sigma_m;  // sigma 0: not known
-  double scale;           // by which loops have multiplied its surroundings since it was made
-  double covariance[36];  // of cam_from_world relative to the keyframe before
+  double scale;                     // by which loops have multiplied its surroundings since then
 };
 
 struct MapPoint {
@@ -81,6 +81,11 @@ size_t map_bytes(const MapSizes& sizes);
 void make_map(const MapSizes& sizes, Arena& arena, Map* map);
 void clear_map(Map* map);
 
+// The sigma of a keypoint's pixel, relative to that of a keypoint of the finest level.
+inline double sigma_of(const MapKeypoint& keypoint) {
+  return static_cast<double>(keypoint.size / kFinestSize);
+}
+
 inline MapKeypoint* keypoints_of(const Map& map, const MapKeyframe& keyframe) {
   return map.keypoints +
          static_cast<size_t>(keyframe.room) * static_cast<size_t>(map.sizes.max_keypoints);
@@ -116,8 +121,8 @@ void rank_points(const Map& map, int32_t* places, int32_t* ranks);
 // Removes a point from the map and from the keyframes that see it.
 void remove_points(Map* map, const uint8_t* is_removed);
 
-// Removes a keyframe, and the points that fewer than two keyframes see then. The path of frames
-// that are relative to it continues from the keyframe `kept`.
+// Removes a keyframe. Its points stay, also those that only one other keyframe sees then. The path
+// of frames that are relative to it continues from the keyframe `kept`.
 void remove_keyframe(Map* map, int32_t keyframe, int32_t kept);
 
 }  // namespace tv

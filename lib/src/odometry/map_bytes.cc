@@ -70,13 +70,6 @@ void pass(Stream* s, Number (*numbers)[kNum]) {
   pass_numbers(s, numbers, sizeof(Number), sizeof *numbers);
 }
 
-// Keeps the numbers of 8 bytes at multiples of 8.
-void pass_reserved(Stream* s) {
-  int32_t reserved = 0;
-  pass(s, &reserved);
-  s->is_bad = s->is_bad || reserved != 0;
-}
-
 struct Header {
   uint8_t magic[8];
   uint32_t version, checksum;
@@ -143,8 +136,6 @@ void pass_keyframe(Stream* s, MapKeyframe* k) {
   pass(s, &k->segment);
   pass(s, &k->frame);
   pass(s, &k->num_keypoints);
-  pass(s, &k->has_covariance);
-  pass_reserved(s);
   pass(s, &k->time_s);
   pass_pose(s, &k->cam_from_world);
   pass(s, &k->down);
@@ -152,7 +143,6 @@ void pass_keyframe(Stream* s, MapKeyframe* k) {
   pass(s, &k->height_m);
   pass(s, &k->height_sigma_m);
   pass(s, &k->scale);
-  pass(s, &k->covariance);
 }
 
 void pass_keypoint(Stream* s, MapKeypoint* k) {
@@ -202,11 +192,9 @@ bool is_point(const Header& h, const MapPoint& p) {
 
 bool is_keyframe(const Header& h, const MapKeyframe& k) {
   return is_index(k.id, h.next_keyframe_id) && is_index(k.segment, h.num_segments) &&
-         is_index(k.frame, h.num_frames) && is_count(k.num_keypoints) &&
-         is_index(k.has_covariance, 2) && is_finite(k.time_s) && is_pose(k.cam_from_world) &&
-         are_lengths(k.down) && is_sigma(k.down_sigma_rad) &&
-         is_measure(k.height_m, k.height_sigma_m) && is_scale(k.scale) &&
-         all_finite(k.covariance, 36);
+         is_index(k.frame, h.num_frames) && is_count(k.num_keypoints) && is_finite(k.time_s) &&
+         is_pose(k.cam_from_world) && are_lengths(k.down) && is_sigma(k.down_sigma_rad) &&
+         is_measure(k.height_m, k.height_sigma_m) && is_scale(k.scale);
 }
 
 bool is_keypoint(const Header& h, const MapKeypoint& k) {
@@ -379,6 +367,8 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, Odometry* odometry) {
     odometry->status = TV_ODOMETRY_LOST;
     odometry->lost_frames = 1;
     odometry->next_search = map->num_keyframes - 1;
+    odometry->confirmed_id = map->keyframes[odometry->next_search].id;
+    odometry->segment = map->keyframes[odometry->next_search].segment;
     odometry->keyframe_inliers = map->keyframes[odometry->next_search].num_observations;
   }
   return TV_OK;

@@ -1,10 +1,10 @@
 #include "odometry/metric.h"
-#include "geometry/essential.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/math.h"
+#include "geometry/essential.h"
 #include "geometry/vector3.h"
 
 namespace tv {

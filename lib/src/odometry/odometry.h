@@ -34,6 +34,11 @@ struct Frame {
 };
 
 inline constexpr int32_t kCellPx = 16;
+// The error of a pixel of sigma 1 along one axis before one was measured, and the largest one that
+// a point of the map may have, in pixels.
+inline constexpr double kTypicalNoise = 0.7, kLargestError = 3.0;
+// The least angle between the rays to a new point, in radians, for pixels of sigma 1.
+inline constexpr double kLeastAngle = 0.006;
 inline constexpr int kNumStarts = 4;  // frames that wait for a second view
 
 }  // namespace tv
@@ -64,11 +69,15 @@ struct tv_odometry {
   int32_t status;
   int32_t lost_frames, turned_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
-  bool is_locating;          // a frame of tv_odometry_locate, which does not change the map
+  // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
+  // saw one plane only, or contradicted the map.
+  int32_t confirmed_id;
+  bool is_doubtful;
+  bool is_locating;  // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
   double last_time_s;
-  bool is_upright;  // the world's z axis points along gravity
+  bool is_upright;  // the segment's z axis points along gravity
   // The way since the last keyframe in metres, in the world's axes, and its variance along each.
   bool travel_is_known;
   double travel_m[3], travel_variance;
@@ -84,6 +93,10 @@ using Odometry = tv_odometry;
 
 // Forgets the map and every frame.
 void start_anew(Odometry* odometry);
+
+// The frames that follow belong to this segment: whether it is upright is read from the map, and
+// what was known of the scale of another segment is forgotten.
+void enter_segment(Odometry* odometry, int32_t segment);
 
 // How many bytes of scratch the stages take.
 size_t scratch_bytes(const tv_odometry_options& options);

@@ -1,11 +1,10 @@
 #include "odometry/search.h"
-#include "twoview/match.h"
-#include "twoview/triangulate.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "geometry/vector3.h"
+#include "twoview/match.h"
 
 namespace tv {
 namespace {
@@ -51,11 +50,9 @@ void forget_points(Frame* frame) {
   }
 }
 
-double depth_error_px(const Odometry& odometry, const MapPoint& point, const Rigid& cam_from_world,
+double depth_error_px(const Odometry& odometry, const MapPoint& point, const double centre[3],
                       double depth) {
-  double centre[3], ray[3], across[3];
-  centre_of(cam_from_world, centre);
-  double moved[3];
+  double ray[3], across[3], moved[3];
   for (int k = 0; k < 3; ++k) {
     moved[k] = centre[k] - static_cast<double>(point.seen_from[k]);
     ray[k] = point.position[k] - static_cast<double>(point.seen_from[k]);
@@ -75,6 +72,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
   const int32_t columns = odometry->grid_columns;
   const int32_t most_sq = static_cast<int32_t>(search.max_distance * search.max_distance);
   const double ratio_sq = search.ratio * search.ratio;
+  double centre[3];
+  centre_of(search.cam_from_world, centre);
   for (int32_t i = 0; i < search.num; ++i) {
     const int32_t idx = search.points[i];
     MapPoint& point = map.points[idx];
@@ -88,8 +87,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       continue;
     }
     if (!odometry->is_locating) ++point.num_visible;
-    const double radius =
-        search.radius_px + 2 * depth_error_px(*odometry, point, search.cam_from_world, x[2]);
+    const double radius = search.radius_px + 2 * depth_error_px(*odometry, point, centre, x[2]);
     const float px = static_cast<float>(pixel.x()), py = static_cast<float>(pixel.y());
     const float near_sq = static_cast<float>(radius * radius);
     const float reach = static_cast<float>(std::max(radius, kComparedRadius));

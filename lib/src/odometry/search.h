@@ -27,8 +27,9 @@ int32_t match_points(Odometry* odometry, const int32_t* points, int32_t num, dou
 
 void forget_points(Frame* frame);
 
-// By how many pixels the error of a point's depth may move its image, one standard deviation.
-double depth_error_px(const Odometry& odometry, const MapPoint& point, const Rigid& cam_from_world,
+// By how many pixels the error of a point's depth may move its image, one standard deviation, for a
+// camera at `centre`, from which it is `depth` away.
+double depth_error_px(const Odometry& odometry, const MapPoint& point, const double centre[3],
                       double depth);
 
 }  // namespace tv

@@ -1,14 +1,10 @@
 #include "odometry/start.h"
-#include "twoview/match.h"
-#include "twoview/triangulate.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 
-#include "geometry/vector3.h"
 #include "odometry/adjust.h"
 #include "odometry/keyframe.h"
+#include "odometry/pair.h"
 #include "odometry/search.h"
 
 namespace tv {
@@ -16,74 +12,19 @@ namespace {
 
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
 constexpr double kLeastParallax = 0.015;  // radians, the median
-constexpr double kLeastAngle = 0.006;     // radians
 constexpr int32_t kLeastTurnInliers = 50;
 constexpr int32_t kFramesBetween = 6;  // between frames that wait
 
-tv_features features_of(const Frame& frame) {
-  tv_features features;
-  tv_features_init(&features);
-  features.num = frame.num;
-  features.keypoints = frame.keypoints;
-  features.descriptors = frame.descriptors;
-  return features;
-}
-
-struct Pair {
-  int32_t* keypoints0;
-  int32_t* keypoints1;
-  uint8_t* is_inlier;
-  int32_t num;
-  tv_two_view* view;
-};
-
-// False: too few matches.
-bool estimate_pair(Odometry* odometry, const Frame& frame0, const Frame& frame1, Pair* pair) {
-  Arena& arena = odometry->scratch;
+// Matches two frames and estimates the motion between them. False: there are too few matches.
+bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, Pair* pair) {
   const int32_t room = std::min(frame0.num, frame1.num);
-  const size_t n = static_cast<size_t>(std::max(room, 1));
-  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, n);
-  double* pixels0 = arena_alloc<double>(arena, 2 * n);
-  double* pixels1 = arena_alloc<double>(arena, 2 * n);
-  float* ratios = arena_alloc<float>(arena, n);
-  float* sigmas0 = arena_alloc<float>(arena, n);
-  float* sigmas1 = arena_alloc<float>(arena, n);
-  pair->keypoints0 = arena_alloc<int32_t>(arena, n);
-  pair->keypoints1 = arena_alloc<int32_t>(arena, n);
-  pair->is_inlier = arena_alloc<uint8_t>(arena, n);
-  pair->view = arena_alloc<tv_two_view>(arena, 1);
-  *pair->view = tv_two_view{};
-  pair->num = 0;
-  const tv_features features0 = features_of(frame0), features1 = features_of(frame1);
-  tv_match(odometry->context, &features0, &features1, nullptr, found, room, &pair->num);
-  if (pair->num < kLeastMatches) return false;
-  for (int32_t k = 0; k < pair->num; ++k) {
-    const int32_t a = found[k].idx0, b = found[k].idx1;
-    pixels0[2 * k] = static_cast<double>(frame0.keypoints[a].x);
-    pixels0[2 * k + 1] = static_cast<double>(frame0.keypoints[a].y);
-    pixels1[2 * k] = static_cast<double>(frame1.keypoints[b].x);
-    pixels1[2 * k + 1] = static_cast<double>(frame1.keypoints[b].y);
-    ratios[k] = found[k].ratio;
-    sigmas0[k] = frame0.sigmas[a];
-    sigmas1[k] = frame1.sigmas[b];
-    pair->keypoints0[k] = a;
-    pair->keypoints1[k] = b;
-  }
-  tv_pixel_pairs pairs;
-  tv_pixel_pairs_init(&pairs);
-  pairs.num = pair->num;
-  pairs.pixels0 = pixels0;
-  pairs.pixels1 = pixels1;
-  pairs.ratios = ratios;
-  pairs.sigmas0 = sigmas0;
-  pairs.sigmas1 = sigmas1;
-  tv_estimate_options options;
-  tv_estimate_options_init(&options);
-  options.seed = odometry->options.seed;
-  options.max_iterations = 2000;
-  tv_two_view_init(pair->view);
-  return tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
-                              &pairs, &options, pair->view, pair->is_inlier) == TV_OK;
+  tv_correspondence* found =
+      arena_alloc<tv_correspondence>(odometry->scratch, static_cast<size_t>(std::max(room, 1)));
+  const tv_features features0 = as_features(frame0.keypoints, frame0.descriptors, frame0.num);
+  const tv_features features1 = as_features(frame1.keypoints, frame1.descriptors, frame1.num);
+  int32_t num = 0;
+  tv_match(odometry->context, &features0, &features1, nullptr, found, room, &num);
+  return estimate_pair(odometry, frame0.keypoints, frame1.keypoints, found, num, pair);
 }
 
 void drop_start(Odometry* odometry, int n) {
@@ -109,6 +50,7 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
   std::copy_n(pair.view->t, 3, relative.t);
   frame->cam_from_world = compose(relative, frame0->cam_from_world);
   forget_points(frame);
+  make_room(odometry, 2);
   const int32_t first = make_keyframe(odometry, *frame0);
   const int32_t second = make_keyframe(odometry, *frame);
   int32_t* keypoints0 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
@@ -116,8 +58,8 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
   int32_t num = 0;
   for (int32_t k = 0; k < pair.num; ++k) {
     if (!pair.is_inlier[k]) continue;
-    keypoints0[num] = pair.keypoints0[k];
-    keypoints1[num++] = pair.keypoints1[k];
+    keypoints0[num] = pair.matches[k].idx0;
+    keypoints1[num++] = pair.matches[k].idx1;
   }
   int32_t made =
       triangulate_matches(odometry, first, second, keypoints0, keypoints1, num, kLeastAngle, image);
@@ -157,12 +99,11 @@ void copy_frame(const Frame& from, Frame* to) {
 
 bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons) {
   *reasons = 0;
-  if (odometry->map.num_keyframes + 2 > odometry->map.sizes.max_keyframes) return false;
   for (int n = 0; n < odometry->num_starts; ++n) {
     ArenaScope scope(odometry->scratch);
     Pair pair;
     Frame* const first = &odometry->starts[n];
-    if (!estimate_pair(odometry, *first, *frame, &pair) || 2 * pair.view->num_inliers < pair.num ||
+    if (!match_frames(odometry, *first, *frame, &pair) || 2 * pair.view->num_inliers < pair.num ||
         pair.view->num_inliers < kLeastMatches) {
       *reasons |= TV_REASON_TOO_FEW_MATCHES;
       if (pair.num < kLeastMatches || odometry->num_starts > 1) drop_start(odometry, n--);
@@ -190,7 +131,7 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
 bool estimate_turn(Odometry* odometry, const Frame& frame0, const Frame& frame1, Rigid* turn) {
   ArenaScope scope(odometry->scratch);
   Pair pair;
-  if (!estimate_pair(odometry, frame0, frame1, &pair) || !pair.view->has_R ||
+  if (!match_frames(odometry, frame0, frame1, &pair) || !pair.view->has_R ||
       pair.view->num_inliers < kLeastTurnInliers || 2 * pair.view->num_inliers < pair.num) {
     return false;
   }

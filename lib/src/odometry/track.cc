@@ -15,7 +15,7 @@
 namespace tv {
 namespace {
 
-constexpr int32_t kLeastInliers = 20;
+constexpr int32_t kLeastInliers = 20, kLeastRelocated = 30;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
 constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
 // A frame becomes a keyframe when the camera moved by kFarMoved median depths or turned by
@@ -53,16 +53,12 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
 
 // The pose is known to a few pixels: looks for all points once more, near where they must be.
 bool refine_track(Odometry* odometry, Frame* frame, PoseFit* fit) {
-  const PoseFit before = *fit;
   PointSearch search{odometry->local_points, odometry->num_local_points,
                      fit->cam_from_world,    5.0,
                      kMaxDistance,           kSearchRatio};
   find_points(odometry, search, frame);
   frame->cam_from_world = fit->cam_from_world;
-  if (!fit_pose(odometry, 50, 3.0, frame, fit)) {
-    *fit = before;
-    return false;
-  }
+  if (!fit_pose(odometry, 50, 3.0, frame, fit)) return false;
   frame->cam_from_world = fit->cam_from_world;
   return fit->estimate.num_inliers >= kLeastInliers;
 }
@@ -116,32 +112,6 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
          (few && (moved > kLeastMoved || turned > kLeastTurned));
 }
 
-// Makes room for one more keyframe: removes the one that moved the camera least.
-void make_room(Odometry* odometry) {
-  Map& map = odometry->map;
-  if (map.num_keyframes < map.sizes.max_keyframes) return;
-  int32_t best = 1;
-  double least = 0;
-  for (int32_t k = 1; k + 2 < map.num_keyframes; ++k) {
-    const MapKeyframe *before = &map.keyframes[k - 1], *after = &map.keyframes[k + 1];
-    double a[3], b[3];
-    centre_of(before->cam_from_world, a);
-    centre_of(after->cam_from_world, b);
-    const double gap =
-        before->segment != map.keyframes[k].segment ? 1e9
-        : after->segment != map.keyframes[k].segment
-            ? 1e8
-            : distance_between(a, b) +
-                  odometry->median_depth * rotation_angle(compose(after->cam_from_world,
-                                                                  inverse(before->cam_from_world)));
-    if (k == 1 || gap < least) {
-      least = gap;
-      best = k;
-    }
-  }
-  remove_keyframe(&map, best, best - 1);
-}
-
 // The frame's pose and points are those of the keyframe that was made of it.
 void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   const MapKeyframe& keyframe = odometry.map.keyframes[idx];
@@ -150,10 +120,36 @@ void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
 }
 
-void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
-  make_room(odometry);
+// Removes the keyframes that were made since the last confirmed one, and what only they saw.
+void remove_unconfirmed(Odometry* odometry) {
+  Map& map = odometry->map;
+  for (int32_t k = map.num_keyframes - 1; k > 0; --k) {
+    if (map.keyframes[k].id <= odometry->confirmed_id ||
+        map.keyframes[k].segment != map.keyframes[k - 1].segment) {
+      break;
+    }
+    remove_keyframe(&map, k, k - 1);
+  }
+  remove_lone_points(odometry);
+  odometry->reference_id = map.keyframes[map.num_keyframes - 1].id;
+}
+
+// False: the map is wrong here. The frame is no keyframe, and has no pose.
+bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
+  make_room(odometry, 1);
   const int32_t idx = make_keyframe(odometry, *frame);
-  make_points(odometry, idx, image);
+  const MapCheck check = make_points(odometry, idx, image);
+  if (check == MapCheck::kContradicts) {
+    remove_unconfirmed(odometry);
+    odometry->is_doubtful = true;
+    return false;
+  }
+  if (check == MapCheck::kAgrees) {
+    odometry->confirmed_id = odometry->map.keyframes[idx].id;
+    odometry->is_doubtful = false;
+  } else if (check == MapCheck::kOnePlane) {
+    odometry->is_doubtful = true;
+  }
   remove_bad_points(odometry);
   adjust_around(odometry, idx, kWindowSteps);
   const Map& map = odometry->map;
@@ -161,25 +157,28 @@ void add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
   odometry->reference_id = map.keyframes[idx].id;
   list_local_points(odometry, idx);
   take_keyframe(*odometry, idx, frame);
+  return true;
 }
 
-// Looks for a loop in a few keyframes, and closes it.
-void search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
+// Looks for a loop in a few keyframes, and closes it. False: the map is wrong here.
+bool search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
                   tv_odometry_state* state) {
   Frame* again = &odometry->starts[0];  // has no other use while the map is tracked
   LoopEnd end;
-  if (!find_loop(odometry, *frame, kLoopKeyframes, again, &end)) return;
+  if (!find_loop(odometry, *frame, kLoopKeyframes, again, &end)) return true;
   Map& map = odometry->map;
   const int32_t end_id = map.keyframes[end.keyframe].id;
   if (state->is_keyframe == 0) {
-    add_frame_as_keyframe(odometry, frame, image);
+    const int32_t next_point_id = map.next_point_id;
+    if (!add_frame_as_keyframe(odometry, frame, image)) return false;
     state->is_keyframe = 1;
     end.keyframe = find_keyframe(map, end_id);
-    if (end.keyframe < 0) return;
+    if (end.keyframe < 0) return true;
     for (int32_t k = 0; k < again->num; ++k) {
-      if (again->points[k] != kNoPoint && map.points[again->points[k]].id < 0) {
-        again->points[k] = kNoPoint;
-      }
+      // The point may be gone, and its place taken by a new one.
+      if (again->points[k] == kNoPoint) continue;
+      const int32_t id = map.points[again->points[k]].id;
+      if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
   }
   close_loop(odometry, *again, end);
@@ -191,6 +190,7 @@ void search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
   measure_depth(odometry, *frame);
   ++odometry->num_loops;
   state->loop_closed = 1;
+  return true;
 }
 
 // Looks for the frame in the map. True: the frame has its pose, and the keyframe's surroundings are
@@ -209,8 +209,8 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, Frame* frame, Pos
     }
     if (num < kLeastInliers || !match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);
-    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < 30) continue;
-    odometry->segment = map.keyframes[k].segment;
+    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < kLeastRelocated)
+      continue;
     odometry->reference_id = map.keyframes[k].id;
     return true;
   }
@@ -240,7 +240,7 @@ void write_pose(const Odometry& odometry, const Frame& frame, tv_odometry_state*
   const Rigid world_from_cam = inverse(frame.cam_from_world);
   const Rigid relative = compose(map.keyframes[k].cam_from_world, world_from_cam);
   state->has_pose = 1;
-  state->segment = odometry.segment;
+  state->segment = map.keyframes[k].segment;
   state->reference_id = odometry.reference_id;
   std::copy_n(relative.R, 9, state->reference_from_cam_R);
   for (int c = 0; c < 3; ++c) {
@@ -259,18 +259,13 @@ void write_fit(const PoseFit& fit, tv_odometry_state* state) {
   state->reasons = fit.estimate.reasons;
 }
 
-}  // namespace
-
-namespace {
-
-// The frame's pose is known: keyframe, loops, scale, state.
-void finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const PoseFit& fit,
+// The frame's pose is known: keyframe, loops, scale, state. False: the map is wrong here.
+bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const PoseFit& fit,
                     bool follows, Frame* frame, tv_odometry_state* state) {
   odometry->lost_frames = odometry->turned_frames = odometry->num_starts = 0;
   count_found(odometry, *frame);
   measure_depth(odometry, *frame);
   write_fit(fit, state);
-  odometry->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   odometry->has_motion = follows;
   if (follows) {
     odometry->motion = compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
@@ -283,18 +278,24 @@ void finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   const double* covariance = fit.estimate.covariance;
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
   if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
-    add_frame_as_keyframe(odometry, frame, input.image);
+    if (!add_frame_as_keyframe(odometry, frame, input.image)) return false;
     measure_scale(odometry, frame);
     state->is_keyframe = 1;
   }
-  search_loops(odometry, frame, input.image, state);
+  if (!search_loops(odometry, frame, input.image, state)) return false;
+  if (odometry->is_doubtful) state->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
+  return true;
 }
 
 // Looks for a lost frame in a few keyframes, at each frame in the next ones.
 bool search_map(Odometry* odometry, bool is_first, Frame* frame, PoseFit* fit) {
   const Map& map = odometry->map;
   if (is_first) odometry->next_search = map.num_keyframes - 1;
-  if (relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, fit)) return true;
+  if (relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, fit)) {
+    enter_segment(odometry, map.keyframes[find_keyframe(map, odometry->reference_id)].segment);
+    return true;
+  }
   odometry->next_search = odometry->next_search >= kSearchedKeyframes
                               ? odometry->next_search - kSearchedKeyframes
                               : map.num_keyframes - 1;
@@ -319,9 +320,11 @@ bool follow_turn(Odometry* odometry, Frame* frame) {
 bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
                    tv_odometry_state* state) {
   const int32_t segment = odometry->segment;
+  const bool is_upright = odometry->is_upright;
   odometry->segment = odometry->num_segments;
   if (!start_map(odometry, frame, image, &state->reasons)) {
     odometry->segment = segment;
+    odometry->is_upright = is_upright;
     return false;
   }
   ++odometry->num_segments;
@@ -329,6 +332,8 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
   const int32_t newest = odometry->map.num_keyframes - 1;
   take_keyframe(*odometry, newest, frame);
   odometry->reference_id = odometry->map.keyframes[newest].id;
+  odometry->confirmed_id = odometry->reference_id;
+  odometry->is_doubtful = false;
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   measure_depth(odometry, *frame);
@@ -362,7 +367,8 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   state->num_keypoints = frame->num;
   state->segment = state->reference_id = -1;
 
-  PoseFit fit;
+  ArenaScope scope(odometry->scratch);
+  PoseFit& fit = *arena_alloc<PoseFit>(odometry->scratch, 1);
   const bool has_map = odometry->map.num_keyframes > 0;
   const bool had_pose = odometry->previous.has_pose;
   const bool was_tracked = had_pose && odometry->turned_frames == 0;
@@ -374,9 +380,15 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     state->relocated = has_pose && !was_tracked;
     odometry->num_relocations += state->relocated;
   }
-  if (has_pose) {
-    finish_tracked(odometry, input, fit, follows, frame, state);
-  } else {
+  if (has_pose && !finish_tracked(odometry, input, fit, follows, frame, state)) {
+    // What the frame was tracked with was wrong.
+    state->num_inliers = 0;
+    state->has_covariance = 0;
+    state->reasons = TV_REASON_TWO_PLANAR_SOLUTIONS;
+    odometry->status = TV_ODOMETRY_LOST;
+    odometry->lost_frames = 1;
+    odometry->has_motion = has_pose = false;
+  } else if (!has_pose) {
     odometry->has_motion = false;
     has_pose = has_map && had_pose && follow_turn(odometry, frame);
     odometry->status = has_pose  ? TV_ODOMETRY_ROTATION
@@ -400,7 +412,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
 
 void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
                   tv_odometry_state* state) {
-  const int32_t segment = odometry->segment, reference = odometry->reference_id;
+  const int32_t reference = odometry->reference_id;
   Frame* frame = &odometry->starts[0];  // has no other use while there is a map
   extract_frame(odometry, image, frame);
   PoseFit fit;
@@ -417,7 +429,6 @@ void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
     write_pose(*odometry, *frame, state);
   }
   odometry->is_locating = false;
-  odometry->segment = segment;
   odometry->reference_id = reference;
   const int32_t k = find_keyframe(odometry->map, reference);
   if (k >= 0) list_local_points(odometry, k);

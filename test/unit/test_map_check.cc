@@ -1,0 +1,136 @@
+// Pairs of keyframes that check the map's relative poses (odometry/pair.h), with the pixels of a
+// scene whose motion is known.
+
+#include <unity.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "odometry/pair.h"
+#include "support/random.h"
+
+namespace {
+
+constexpr int kNum = 300;
+alignas(64) uint8_t memory[24 << 20];
+tv_odometry* odometry;
+tv_keypoint keypoints0[kNum], keypoints1[kNum];
+tv_correspondence matches[kNum];
+uint64_t random_state;
+
+double uniform(double low, double high) { return low + (high - low) * random_unit(&random_state); }
+
+// A camera that moves sideways and turns by 0.1 radians to the right.
+tv::Rigid motion() {
+  const double c = std::cos(0.1), s = std::sin(0.1);
+  return tv::Rigid{{c, 0, -s, 0, 1, 0, s, 0, c}, {-0.4, 0.02, 0.05}};
+}
+
+tv::Rigid turned(const tv::Rigid& pose, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return tv::compose(tv::Rigid{{c, 0, -s, 0, 1, 0, s, 0, c}, {0, 0, 0}}, pose);
+}
+
+tv_keypoint seen(const double x[3]) {
+  tv_keypoint k{};
+  k.x = static_cast<float>(500 * x[0] / x[2] + 320 + uniform(-0.3, 0.3));
+  k.y = static_cast<float>(500 * x[1] / x[2] + 240 + uniform(-0.3, 0.3));
+  k.size = tv::kFinestSize;
+  return k;
+}
+
+// Points between `nearest` and 4 in depth, within `reach` of the axis per unit of depth.
+void draw(double nearest, double reach) {
+  const tv::Rigid pose = motion();
+  for (int n = 0; n < kNum; ++n) {
+    const double z = uniform(nearest, 4);
+    const double x[3] = {z * uniform(-reach, reach), z * uniform(-reach, reach), z};
+    double moved[3];
+    tv::transform(pose, x, moved);
+    keypoints0[n] = seen(x);
+    keypoints1[n] = seen(moved);
+    matches[n] = tv_correspondence{};
+    matches[n].idx0 = matches[n].idx1 = n;
+    matches[n].ratio = 0.5f;
+  }
+}
+
+tv::MapVote vote_on(const tv::Rigid& cam1_from_cam0, int num_votes) {
+  tv::MapVote vote{};
+  for (int n = 0; n < num_votes; ++n) {
+    tv::add_vote(odometry, keypoints0, keypoints1, matches, kNum, cam1_from_cam0, &vote);
+  }
+  return vote;
+}
+
+void test_a_right_pose_is_confirmed_by_one_pair() {
+  draw(1.5, 0.5);
+  const tv::MapVote vote = vote_on(motion(), 1);
+  TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kAgrees);
+  TEST_ASSERT_FALSE(tv::needs_vote(vote));
+  // Neither does an error of the turn of less than a degree contradict, nor another length of t.
+  TEST_ASSERT_TRUE(tv::result_of(vote_on(turned(motion(), 0.015), 1)) == tv::MapCheck::kAgrees);
+  tv::Rigid longer = motion();
+  for (double& t : longer.t) t *= 7;
+  TEST_ASSERT_TRUE(tv::result_of(vote_on(longer, 1)) == tv::MapCheck::kAgrees);
+}
+
+void test_two_pairs_contradict_a_wrong_turn() {
+  draw(1.5, 0.5);
+  for (const double angle : {-0.08, 0.05, 0.5}) {
+    const tv::MapVote one = vote_on(turned(motion(), angle), 1);
+    TEST_ASSERT_TRUE(tv::result_of(one) == tv::MapCheck::kUnknown && tv::needs_vote(one));
+    const tv::MapVote two = vote_on(turned(motion(), angle), 2);
+    TEST_ASSERT_TRUE(tv::result_of(two) == tv::MapCheck::kContradicts && !tv::needs_vote(two));
+  }
+}
+
+void test_one_agreeing_pair_is_enough() {
+  draw(1.5, 0.5);
+  tv::MapVote vote = vote_on(turned(motion(), 0.2), 1);
+  tv::add_vote(odometry, keypoints0, keypoints1, matches, kNum, motion(), &vote);
+  TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kAgrees);
+}
+
+// One plane in a small part of the picture: two motions explain it, whatever the map says.
+void test_a_plane_decides_nothing() {
+  draw(4, 0.12);
+  for (const double angle : {0.0, 0.1}) {
+    const tv::MapVote vote = vote_on(turned(motion(), angle), 3);
+    TEST_ASSERT_EQUAL_INT(3, vote.num_planar);
+    TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kOnePlane && !tv::needs_vote(vote));
+  }
+}
+
+void test_few_matches_decide_nothing() {
+  draw(1.5, 0.5);
+  tv::MapVote vote{};
+  tv::add_vote(odometry, keypoints0, keypoints1, matches, 29, motion(), &vote);
+  tv::add_vote(odometry, keypoints0, keypoints1, matches, 0, motion(), &vote);
+  TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kUnknown && tv::needs_vote(vote));
+  TEST_ASSERT_EQUAL_INT(2, vote.num_pairs);
+}
+
+}  // namespace
+
+extern "C" void setUp(void) {
+  const tv_camera camera = {TV_CAMERA_PINHOLE, 640, 480, 0, 500, 500, 320, 240, {0}};
+  random_state = 5;
+  size_t size = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_size(&camera, nullptr, &size));
+  TEST_ASSERT_TRUE(size <= sizeof memory);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_init(&odometry, &camera, nullptr, memory, size));
+}
+
+extern "C" void tearDown(void) {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_right_pose_is_confirmed_by_one_pair);
+  RUN_TEST(test_two_pairs_contradict_a_wrong_turn);
+  RUN_TEST(test_one_agreeing_pair_is_enough);
+  RUN_TEST(test_a_plane_decides_nothing);
+  RUN_TEST(test_few_matches_decide_nothing);
+  return UNITY_END();
+}
