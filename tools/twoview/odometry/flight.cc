@@ -51,6 +51,16 @@ Pose pose_of(const double R[9], const double t[3]) {
 
 }  // namespace
 
+void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes) {
+  for (size_t k = 0; k < keyframes.size(); ++k) {
+    int32_t is_known = 0;
+    check(tv_odometry_covariance(odometry, static_cast<int32_t>(k), keyframes[k].covariance.data(),
+                                 &is_known),
+          "keyframe " + std::to_string(k));
+    keyframes[k].has_covariance = is_known != 0;
+  }
+}
+
 void Flight::Free::operator()(void* memory) const { std::free(memory); }
 
 Flight::Flight(FrameSource& source, const FlightOptions& options)

@@ -2,6 +2,7 @@
 // of each frame while the flight lasts and in the last state of the map.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -46,7 +47,15 @@ struct FlightFrame {
 struct FlightKeyframe {
   tv_keyframe keyframe;
   std::vector<tv_map_observation> observations;
+  // Of its pose relative to the keyframe before it, as tv_odometry_covariance gives it; only after
+  // add_covariances.
+  bool has_covariance = false;
+  std::array<double, 36> covariance{};
 };
+
+// Fills the covariances of the keyframes, which are all of the odometry's map in their order. It
+// takes about as long as an adjustment each.
+void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes);
 
 // A small picture of a keyframe, for the report.
 struct Thumbnail {

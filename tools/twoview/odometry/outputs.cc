@@ -189,6 +189,7 @@ FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& tr
   result.flight = &flight;
   result.num_source_frames = num_source_frames;
   result.keyframes = flight.keyframes();
+  add_covariances(flight.odometry(), result.keyframes);
   result.points = flight.points();
   result.segment = longest_segment(flight);
   result.live_stretch = longest_stretch(flight);
@@ -281,11 +282,9 @@ std::string covariances_text(const std::vector<FlightKeyframe>& keyframes) {
   std::string text;
   for (size_t k = 1; k < keyframes.size(); ++k) {
     const tv_keyframe &before = keyframes[k - 1].keyframe, &own = keyframes[k].keyframe;
-    // Where a keyframe between the two was removed, the covariance is that to the removed one.
-    if (own.has_covariance == 0 || own.segment != before.segment || own.id != before.id + 1)
-      continue;
+    if (!keyframes[k].has_covariance || own.segment != before.segment) continue;
     text += seconds(before.time_s) + " " + seconds(own.time_s);
-    for (const double value : own.covariance) text += number_text(value);
+    for (const double value : keyframes[k].covariance) text += number_text(value);
     text += "\n";
   }
   if (text.empty()) return text;

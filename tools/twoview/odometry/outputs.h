@@ -50,8 +50,8 @@ nlohmann::ordered_json flight_json(const FlightResult& result);
 // trajectory.txt, or with `live` live.txt. A comment says where a segment begins.
 std::string trajectory_text(const Flight& flight, bool live);
 std::string keyframes_text(const FlightResult& result);
-// covariances.txt: of each keyframe relative to the one before it, where both are in the map and it
-// is known; empty where none is.
+// covariances.txt: of each keyframe relative to the one before it, where it is known; empty where
+// none is.
 std::string covariances_text(const std::vector<FlightKeyframe>& keyframes);
 std::string frames_csv(const Flight& flight);
 // The words for a frame's reasons: those of the verdict, or "unreadable".
