@@ -7,6 +7,8 @@ find_package(nlohmann_json QUIET)
 find_package(PkgConfig QUIET)
 if(PkgConfig_FOUND)
   pkg_check_modules(libexif QUIET IMPORTED_TARGET GLOBAL libexif)
+  # Optional: the page of `twoview odometry --live`.
+  pkg_check_modules(libmicrohttpd QUIET IMPORTED_TARGET GLOBAL libmicrohttpd)
 endif()
 
 set(missing "")

@@ -2,12 +2,14 @@
 """Tests of `twoview odometry`: a rendered flight past five walls, whose path is known, in every
 format of a source, and bad input."""
 import csv
+import http.client
 import json
 import math
 import os
 import random
 import re
 import resource
+import shutil
 import signal
 import struct
 import subprocess
@@ -75,6 +77,17 @@ class OdometryTest(CliTest):
     def odometry(self, source, *more, out=None, **options):
         return self.run_program("odometry", source, "-o", out or self.out, *more, **options)
 
+    def files(self):
+        """What the run wrote. covariances.txt is there where a keyframe has a covariance."""
+        return [name for name in self.listing() if name != "covariances.txt"]
+
+    def imu(self, name="set", lines=None):
+        """The imu.txt of the flight: the camera looks along the nose and flies to the right."""
+        if lines is None:
+            lines = [f"{t:.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02" for t in TIMES]
+        return self.write(f"{name}/imu.txt", "# as docs/formats.md says\n"
+                          "body_from_cam 0.5 0.5 0.5 0.5\n" + "\n".join(lines) + "\n")
+
     def trajectory(self, out=None):
         return ((out or self.out) / "trajectory.txt").read_bytes()
 
@@ -82,7 +95,7 @@ class OdometryTest(CliTest):
 
     def test_a_set_folder_gives_all_files_and_the_flown_path(self):
         done = self.succeed(self.odometry(self.set_folder()))
-        self.assertEqual(self.listing(), FILES)
+        self.assertEqual(self.files(), FILES)
         self.assertIn(f"{COUNT} frames", done.stdout.decode())
         result = self.result()
         self.assertEqual(result["num_frames"], COUNT)
@@ -213,6 +226,77 @@ class OdometryTest(CliTest):
         self.assertTrue(all(key["tracks"] for key in data["keyframes"]))
         self.assertEqual(len(data["frames"]["error"]), COUNT)
 
+    def test_the_sensors_of_a_set_folder_make_the_map_metric_and_upright(self):
+        source = self.set_folder()
+        self.imu()
+        self.succeed(self.odometry(source))
+        result = self.result()
+        self.assertEqual(result["scale"], "metric")
+        self.assertAlmostEqual(result["truth"]["scale_ratio"], 1,
+                               delta=max(0.02, 2 * result["scale_sigma"]))
+        self.assertAlmostEqual(result["path_length"], 0.1 * (COUNT - 1), delta=0.05)
+        # The world's z axis points down: the camera's y axis, and so does not change on the way.
+        for x, y, z, *q in poses(self.out / "trajectory.txt")[0].values():
+            down = [2 * (q[0] * q[1] - q[3] * q[2]), 1 - 2 * (q[0] ** 2 + q[2] ** 2),
+                    2 * (q[1] * q[2] + q[3] * q[0])]
+            self.assertGreater(down[2], 0.999)
+        first = self.trajectory()
+        # Samples between the frames give the same quantities; nan means not measured.
+        self.imu(lines=[f"{(i - 0.5) / 50:.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02"
+                        for i in range(2 * COUNT + 2)])
+        self.succeed(self.odometry(source))
+        self.assertEqual(self.trajectory(), first)
+        self.imu(lines=[f"{t:.9f} 1 0 0 0 0.01 nan nan nan 0 0 nan" for t in TIMES])
+        self.succeed(self.odometry(source))
+        self.assertEqual(self.result()["scale"], "unit")
+        self.imu(lines=[f"{t + 9:.9f} 1 0 0 0 0.01 1.5 0.015 0 0 0 0.02" for t in TIMES])
+        self.succeed(self.odometry(source))
+        unmeasured = self.trajectory()
+        self.assertEqual(self.result()["scale"], "unit")
+        self.imu(lines=["no sample"])
+        self.succeed(self.odometry(source, "--no-imu"))
+        self.assertEqual(self.trajectory(), unmeasured)
+        self.assertTrue(self.result()["options"]["no_imu"])
+
+    def test_a_lying_attitude_is_reported_and_left_out(self):
+        source = self.set_folder()
+        lines = [f"{t:.9f} 1 0 0 0 0.01 1.5 0.015 0 {0.1 * FPS} 0 0.02" for t in TIMES]
+        half = math.sqrt(0.5)
+        lines[14] = lines[14].replace(" 1 0 0 0 ", f" {half} {half} 0 0 ", 1)
+        self.imu(lines=lines)
+        done = self.succeed(self.odometry(source))
+        self.assertIn("contradicts the map", done.stdout.decode())
+        result = self.result()
+        self.assertEqual(result["num_attitudes_ignored"], 1)
+        with open(self.out / "frames.csv", newline="") as file:
+            ignored = [row["attitude_ignored"] for row in csv.DictReader(file)]
+        self.assertEqual(ignored, ["0"] * 14 + ["1"] + ["0"] * (COUNT - 15))
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 0.5)
+        self.assertEqual(result["truth"]["coverage"], 1)
+
+    def test_known_covariances_are_written(self):
+        self.succeed(self.odometry(self.set_folder()))
+        keyframes = sorted(poses(self.out / "keyframes.txt")[0])
+        lines = (self.out / "covariances.txt").read_text().splitlines()
+        rows = [list(map(float, line.split())) for line in lines if not line.startswith("#")]
+        self.assertGreater(len(rows), 1)
+        for row in rows:
+            self.assertEqual(len(row), 38)
+            self.assertEqual(keyframes.index(row[0]) + 1, keyframes.index(row[1]))
+            matrix = [row[2 + 6 * i:8 + 6 * i] for i in range(6)]
+            for i in range(6):
+                self.assertGreater(matrix[i][i], 0)
+                for k in range(i):
+                    self.assertAlmostEqual(matrix[i][k] / math.sqrt(
+                        matrix[i][i] * matrix[k][k]), matrix[k][i] / math.sqrt(
+                        matrix[i][i] * matrix[k][k]), 9)
+            # A step of a few pixels: well below a degree, and below the step itself.
+            self.assertLess(matrix[0][0], 0.02 ** 2)
+        self.succeed(self.run_program("map", "export", self.out / "map.twm", "-o",
+                                      self.folder / "known"))
+        self.assertEqual((self.folder / "known" / "covariances.txt").read_text().splitlines(),
+                         lines)
+
     # -- the formats --------------------------------------------------------------------------
 
     def test_every_folder_gives_the_same_path(self):
@@ -310,6 +394,61 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assert_refused(self.odometry("flown", "--drone", "127.0.0.1", *camera, out="new"),
                             "not both", out=self.folder / "new")
 
+    def test_a_page_follows_the_flight(self):
+        source = self.set_folder()
+        names = [COUNT - 1 - abs(COUNT - 1 - j % (2 * (COUNT - 1))) for j in range(40000)]
+        self.write("set/frames.txt", "".join(f"{0.04 * i:.3f} images/{n:05}.png\n"
+                                             for i, n in enumerate(names)))
+        child = subprocess.Popen([program(), "odometry", source, "-o", self.out, "--live"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.communicate)
+        self.addCleanup(child.kill)
+        line = child.stdout.readline()
+        if not line:
+            error = child.stderr.read()
+            self.assertIn("built without libmicrohttpd", error)
+            self.skipTest(error.strip())
+        host, port = re.fullmatch(r"live +http://(127\.0\.0\.1):(\d+)/\n", line).groups()
+
+        def fetched(path, method="GET", **headers):
+            connection = http.client.HTTPConnection(host, int(port), timeout=20)
+            connection.request(method, path, headers=headers)
+            reply = connection.getresponse()
+            body = reply.read()
+            connection.close()
+            return reply.status, reply.getheader("Content-Type"), body
+
+        status, kind, page = fetched("/")
+        self.assertEqual((status, kind), (200, "text/html; charset=utf-8"))
+        self.assertNotRegex(page.decode(), r"""(src|href)=["']?(https?:|//)""")
+        seen = []
+        end = time.monotonic() + 60
+        while len(seen) < 3 and time.monotonic() < end:
+            data = json.loads(fetched("/data.json")[2])
+            if data.get("num_frames", 0) > (seen[-1]["num_frames"] if seen else COUNT):
+                seen.append(data)
+            time.sleep(0.05)
+        self.assertEqual(len(seen), 3, "the page does not follow the flight")
+        self.assertEqual(seen[-1]["status"], "tracking")
+        self.assertEqual((seen[-1]["width"], seen[-1]["height"]), (WIDTH, HEIGHT))
+        self.assertGreater(len(seen[-1]["path"]), 3 * 10)
+        self.assertEqual(len(seen[-1]["points"]), 3 * len(seen[-1]["grey"]))
+        self.assertGreater(len(seen[-1]["grey"]), 100)
+        self.assertEqual(len(seen[-1]["camera"]), 12)
+        self.assertGreater(len(seen[-1]["tracks"]), 50)
+        status, kind, picture = fetched("/picture.jpg")
+        self.assertEqual((status, kind, picture[:2]), (200, "image/jpeg", b"\xff\xd8"))
+        self.assertEqual(fetched("/frames.csv")[0], 404)
+        self.assertEqual(fetched("/data.json", Host="elsewhere.example")[0], 403)
+        with self.assertRaises((http.client.HTTPException, ConnectionError)):
+            fetched("/", "POST")
+        taken = self.odometry(source, "--live-port", port, out=self.folder / "other")
+        self.assert_refused(taken, "--live", port, "in use", out=self.folder / "other")
+        child.send_signal(signal.SIGINT)
+        self.assertEqual(child.wait(timeout=60), 0)
+        self.assertEqual(self.files(), FILES)
+        self.assertGreaterEqual(self.result()["num_frames"], seen[-1]["num_frames"])
+
     # -- what goes wrong ----------------------------------------------------------------------
 
     def test_a_frame_that_cannot_be_read_is_left_out(self):
@@ -338,6 +477,45 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assertNotIn("cloud.ply", self.listing())
         self.assertIn("no map", (self.out / "report.html").read_text())
 
+    def test_many_frames_of_a_blank_wall_take_no_memory_each(self):
+        self.write("set/images/wall.png", png(48, 40, bytes([90]) * 48 * 40))
+        self.write("set/cameras.yaml", CAMERAS.replace(str(WIDTH), "48").replace(str(HEIGHT), "40"))
+        peaks = []
+        for count in (200, 4000):
+            self.write("set/frames.txt", "".join(f"{i} images/wall.png\n" for i in range(count)))
+            command = [program(), "odometry", "set", "-o", str(self.out), "--quiet"]
+            child = subprocess.Popen(command, cwd=self.folder, stderr=subprocess.PIPE)
+            child.stderr.read()
+            _, status, usage = os.wait4(child.pid, 0)
+            child.returncode = os.waitstatus_to_exitcode(status)
+            child.stderr.close()
+            self.assertEqual(child.returncode, 3)
+            self.assertEqual(self.result()["status_counts"]["starting"], count)
+            peaks.append(usage.ru_maxrss)
+        # A frame's record, its line of frames.csv and its share of the page: below 1 KiB each.
+        self.assertLess(peaks[1] - peaks[0], 3800)
+
+    def test_a_single_frame_and_one_frame_a_second(self):
+        source = self.set_folder()
+        done = self.odometry(source, "--max-frames", 1)
+        self.assertEqual(done.returncode, 3)
+        self.one_line(done, "nothing could be tracked")
+        self.assertEqual(self.result()["num_frames"], 1)
+        self.assertEqual(self.result()["status_counts"]["starting"], 1)
+        # The frames of a second apart, in which the walls move by up to 45 pixels.
+        names = range(0, COUNT, 5)
+        self.write("set/frames.txt", "".join(f"{k} images/{i:05}.png\n"
+                                             for k, i in enumerate(names)))
+        self.write("set/groundtruth.txt", "".join(f"{k} {0.1 * i} 0 0 0 0 0 1\n"
+                                                  for k, i in enumerate(names)))
+        done = self.odometry(source)
+        self.assertIn(done.returncode, (0, 3), done.stderr.decode())
+        result = self.result()
+        self.assertEqual(result["num_frames"], len(names))
+        self.assertEqual(sum(result["status_counts"].values()), len(names))
+        if result["status_counts"]["tracking"] > 2:
+            self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 5)
+
     def test_a_source_that_ends_lost_says_so(self):
         source = self.set_folder()
         for i in range(12, COUNT):
@@ -346,7 +524,7 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assertEqual(done.returncode, 3)
         self.one_line(done, "ended lost")
         self.assertGreaterEqual(self.result()["num_tracked"], 10)
-        self.assertEqual(self.listing(), FILES)
+        self.assertEqual(self.files(), FILES)
 
     def test_ctrl_c_keeps_what_there_is(self):
         source = self.set_folder()
@@ -362,12 +540,47 @@ distortion_coefficients: [0, 0, 0, 0]
         child.send_signal(signal.SIGINT)
         error = child.communicate(timeout=120)[1].decode()
         self.assertEqual(child.returncode, 0, error)
-        self.assertEqual(self.listing(), FILES)
+        self.assertEqual(self.files(), FILES)
         result = self.result()
         self.assertTrue(result["interrupted"])
         self.assertGreater(result["num_frames"], 8)
         self.assertLess(result["num_frames"], 40000)
         self.assertLess(result["truth"]["coverage"], 0.5)
+
+    def test_ctrl_c_at_any_moment_leaves_all_files_or_none(self):
+        source = self.set_folder()
+        names = [COUNT - 1 - abs(COUNT - 1 - j % (2 * (COUNT - 1))) for j in range(120)]
+        self.write("set/frames.txt", "".join(f"{0.04 * i:.3f} images/{n:05}.png\n"
+                                             for i, n in enumerate(names)))
+        begin = time.monotonic()
+        self.succeed(self.odometry(source))
+        whole = time.monotonic() - begin
+        ends = []
+        for k in range(9):
+            shutil.rmtree(self.out)
+            child = subprocess.Popen([program(), "odometry", source, "-o", self.out, "--quiet"],
+                                     stderr=subprocess.PIPE)
+            time.sleep(whole * k / 8)
+            child.send_signal(signal.SIGINT)
+            # A second one ends the program without results, while it writes them, too.
+            while k % 3 == 2 and child.poll() is None:
+                if (self.out / "colmap").exists():
+                    child.send_signal(signal.SIGINT)
+                    break
+            error = child.communicate(timeout=60)[1].decode()
+            ends.append(child.returncode)
+            self.assertIn(child.returncode, (0, 2, 3, -signal.SIGINT, 128 + signal.SIGINT), error)
+            self.assertLessEqual(error.count("\n"), 1, error)
+            if child.returncode in (0, 3):
+                self.assertEqual(sum(self.result()["status_counts"].values()),
+                                 self.result()["num_frames"])
+                if self.result()["num_keyframes"]:
+                    self.assertEqual(self.files(), FILES)
+                    self.succeed(self.run_program("map", "info", self.out / "map.twm"))
+            else:
+                self.assertFalse(self.out.exists(), self.listing() if self.out.exists() else "")
+            self.out.mkdir(exist_ok=True)
+        self.assertIn(0, ends)
 
     def test_a_full_disk_is_one_line(self):
         done = self.odometry(self.set_folder(), preexec_fn=lambda: resource.setrlimit(
@@ -401,6 +614,20 @@ distortion_coefficients: [0, 0, 0, 0]
         refused("line 2", "not later", name="groundtruth.txt",
                 text="0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n")
         refused("line 1", "length 0", name="groundtruth.txt", text="0 0 0 0 0 0 0 0\n")
+        sample = "0 1 0 0 0 0.01 1 0.1 0 0 0 0.1\n"
+        mount = "body_from_cam 1 0 0 0\n"
+        for text, words in (("# none\n", ("no line body_from_cam",)),
+                            (sample, ("line 1", "not body_from_cam")),
+                            ("body_from_cam 0 0 0 0\n", ("line 1", "not body_from_cam")),
+                            (mount + sample[:-4] + "x\n", ("line 2", "neither a finite number")),
+                            (mount + sample[2:], ("line 2", "11 numbers, not 12")),
+                            (mount + "nan" + sample[1:], ("line 2", "no time")),
+                            (mount + sample.replace("0.01", "-1"), ("line 2", "negative")),
+                            (mount + sample.replace(" 1 ", " 0 ", 1), ("line 2", "length 0")),
+                            (mount + sample + sample, ("line 3", "not later"))):
+            self.write("set/imu.txt", text)
+            self.assert_refused(self.odometry(source), "imu.txt", *words)
+        (source / "imu.txt").unlink()
         refused("--fps", "has times", more=("--fps", 30))
         refused("--every", more=("--every", 0))
         refused("--max-keypoints", more=("--max-keypoints", 5))

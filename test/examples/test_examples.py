@@ -3,6 +3,7 @@ their README says.
 
 Arguments: the project's folder, its build folder, cmake, the C compiler.
 """
+import json
 import os
 import pathlib
 import re
@@ -199,10 +200,11 @@ class Examples(unittest.TestCase):
         self.assertNotRegex(symbols, r"\b(malloc|calloc|realloc)\b")
         self.assertIn("usage", self.example("13_odometry", status=2))
 
-    def test_ardrone_against_the_simulator(self):
-        if not (self.bin / "11_ardrone").exists() or "drone" not in run(PROGRAM, "--help"):
+    def against_the_simulator(self, name, *before, seconds=5, options=()):
+        """What an example prints that receives a simulated drone for some seconds."""
+        if not (self.bin / name).exists() or "drone" not in run(PROGRAM, "--help"):
             self.skipTest("built without the drivers")
-        command = [PROGRAM, "drone", "simulate", "--duration", "30"]
+        command = [PROGRAM, "drone", "simulate", "--duration", "30", *options]
         for channel in ("at", "navdata", "video", "control", "recording"):
             command += [f"--{channel}-port", "0"]
         drone = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -211,12 +213,27 @@ class Examples(unittest.TestCase):
             ports = [
                 words[words.index(name) + 1] for name in ("commands", "navdata", "video", "control")
             ]
-            text = self.example("11_ardrone", "127.0.0.1", "5", *ports)
-            self.assertGreater(number(r"(\d+) pictures", text), 20)
-            self.assertIn("heading", text)
+            return self.example(name, *before, "127.0.0.1", seconds, *ports)
         finally:
             drone.kill()
             drone.communicate()
+
+    def test_ardrone_against_the_simulator(self):
+        text = self.against_the_simulator("11_ardrone")
+        self.assertGreater(number(r"(\d+) pictures", text), 20)
+        self.assertIn("heading", text)
+
+    def test_drone_map_against_the_simulator(self):
+        path = self.folder / "map.twm"
+        text = self.against_the_simulator("14_drone_map", path, seconds=8,
+                                          options=("--tour", "--fps", "10"))
+        self.assertGreater(number(r"(\d+) pictures", text), 20)
+        # The drone has taken off, and flies at 1.2 to 1.5 m: the map knows the metre.
+        self.assertRegex(text, r"tracking at \(.*\) m, \d+ points")
+        info = json.loads(run(PROGRAM, "map", "info", path, "--json"))
+        self.assertGreater(info["num_points"], 300)
+        self.assertGreater(info["num_keyframes"], 5)
+        self.assertIn("usage", self.example("14_drone_map", status=2))
 
     def test_absolute_pose(self):
         if not (self.bin / "15_absolute_pose").exists():
@@ -250,8 +267,8 @@ class Examples(unittest.TestCase):
         environment = dict(os.environ, PKG_CONFIG_PATH=":".join(sorted(set(paths))))
         for source in sorted(EXAMPLES.glob("*.c")):
             packages = ["twoview"]
-            if source.stem == "11_ardrone":
-                if not (self.bin / "11_ardrone").exists():
+            if source.stem in ("11_ardrone", "14_drone_map"):
+                if not (self.bin / source.stem).exists():
                     continue
                 packages += ["twoview_ardrone", "twoview_h264"]
             odometry = ("13_odometry", "15_absolute_pose")

@@ -14,7 +14,8 @@ import numpy as np
 
 from twoview_tools import formats
 from twoview_tools.accuracy import datasets
-from twoview_tools.odometry import cli, faults, flights, poses, sets, surfaces, targets
+from twoview_tools.odometry import (cli, endurance, evaluate, faults, flights, mapper, poses, sets,
+                                    surfaces, targets)
 
 LIBRARY = os.environ.get("TWOVIEW_LIBRARY", "")
 BUILT = os.path.join(os.path.dirname(os.path.dirname(LIBRARY)), "bin", "twoview_flights")
@@ -244,6 +245,33 @@ class Command(Folder):
         self.assertIn("status 2", found["runs"][0]["error"])
         self.assertIn("status 2", text)
 
+    def test_every_seed_is_run_and_the_worst_one_judged(self):
+        _, text, found = self.run_cli("--seeds", "3")
+        self.assertEqual([run["seed"] for run in found["runs"]], [None, 1, 2])
+        self.assertEqual(len({run["label"] for run in found["runs"]}), 3)
+        self.assertRegex(text, r"(?m)^set +3 +0.0000 / 0.0000 / 0.0000")
+        self.assertEqual(len(self.run_cli("--seeds", "2", "--seed", "1")[2]["runs"]), 2)
+
+    def test_live_poses_of_another_unit_are_compared_among_themselves(self):
+        self.run_cli("--keep", self.path("kept"))
+        out = self.path("kept", "twoview", "set")
+        live = poses.read_tum(os.path.join(out, "trajectory.txt"))
+        live.positions[:25] *= 3  # before the metre is known
+        poses.write_tum(os.path.join(out, "live.txt"), live)
+        source = sets.read_set(self.path("set"))
+        self.assertGreater(evaluate.evaluate(out, source)["silent_live"]["num_wrong"], 0)
+        known = {round(float(time), 6) for time in live.times[25:]}
+        with open(os.path.join(out, "frames.csv"), encoding="utf-8") as file:
+            head, *rows = file.read().splitlines()
+        with open(os.path.join(out, "frames.csv"), "w", encoding="utf-8") as file:
+            file.write(head + ",scale\n")
+            for row in rows:
+                is_metric = round(float(row.split(",")[0]), 6) in known
+                file.write(row + (",metric\n" if is_metric else ",unit\n"))
+        found = evaluate.evaluate(out, source)
+        self.assertEqual(found["silent_live"]["num_wrong"], 0)
+        self.assertLess(found["live"]["ate_rmse"], 1e-9)
+
     def test_a_set_that_is_not_there_is_one_line(self):
         error = io.StringIO()
         with contextlib.redirect_stderr(error):
@@ -251,7 +279,57 @@ class Command(Folder):
         self.assertEqual(len(error.getvalue().splitlines()), 1)
 
 
+class Endurance(Folder):
+    def test_the_way_leads_there_and_back(self):
+        self.assertEqual(endurance.there_and_back(4, 9).tolist(), [0, 1, 2, 3, 2, 1, 0, 1, 2])
+        source = sets.read_set(make_set(self.path("source")))
+        found = sets.read_set(endurance.repeat(source.path, self.path("long"), 150))
+        self.assertEqual(len(found.times), 150)
+        self.assertTrue((np.diff(found.times) > 0).all())
+        self.assertEqual(found.names[59 + 7], os.path.abspath(
+            os.path.join(source.path, source.names[59 - 7])))
+        np.testing.assert_allclose(found.truth().positions[59 + 7],
+                                   source.truth().positions[59 - 7])
+
+    def test_more_time_at_the_end_is_not_flat(self):
+        run = {"truth": {"coverage": 1.0}, "num_keyframes": 9, "num_segments": 1,
+               "peak_rss_mib": 50.0}
+        flat = [5.0] * 10000
+        self.assertTrue(endurance.judged({**run, "times_ms": flat})[0])
+        self.assertFalse(endurance.judged({**run, "times_ms": flat[:9000] + [5.6] * 1000})[0])
+        self.assertIsNone(endurance.judged({**run, "times_ms": flat[:1999]})[0])
+
+
+class Mapper(Folder):
+    def test_positions_come_out_of_colmaps_text(self):
+        os.makedirs(self.path("colmap"))
+        with open(self.path("colmap", "images.txt"), "w", encoding="ascii") as file:
+            # Half a turn about z, and nothing seen by the second image.
+            file.write("# comment\n1 0 0 0 1 1 2 3 1 images/a b.png\n5 6 1\n"
+                       "2 1 0 0 0 1 2 3 1 images/c.png\n\n")
+        found = mapper.keyframes_of(self.folder)
+        np.testing.assert_allclose(found["images/a b.png"], [1, 2, -3], atol=1e-12)
+        np.testing.assert_allclose(found["images/c.png"], [-1, -2, -3], atol=1e-12)
+
+
 class Targets(unittest.TestCase):
+    def test_only_an_exact_truth_judges_the_covariance(self):
+        def judged(**changes):
+            run = {"label": "x", "set": "x", "kind": "flight", "num_unsaid_losses": 0,
+                   "covariance": {"inside_share": 0.95, "num_pairs": 100, "is_truth_exact": True,
+                                  **changes}}
+            return [reached for reached, text in targets.judge([run]) if "covariance" in text][0]
+        self.assertTrue(judged())
+        self.assertFalse(judged(inside_share=0.5))
+        self.assertFalse(judged(inside_share=0.99))
+        self.assertIsNone(judged(is_truth_exact=False))
+
+    def test_the_worst_seed_counts(self):
+        runs = [{"label": "seq_tsukuba", "set": "seq_tsukuba", "kind": "set", "num_segments": 1,
+                 "truth": {"ate_rmse": ate, "coverage": 1.0}} for ate in (0.001, 0.0071, 0.002)]
+        self.assertFalse(targets.judge(runs)[0][0])
+        self.assertTrue(targets.judge([runs[0], runs[2]])[0][0])
+
     def test_a_set_needs_both_its_error_and_its_coverage(self):
         def judged(ate, coverage):
             run = {"label": "seq_tsukuba", "set": "seq_tsukuba", "kind": "set", "num_segments": 1,

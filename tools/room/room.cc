@@ -170,6 +170,12 @@ double Room::height_above_ground(const Vec3& position) const {
   return ground - position[2];
 }
 
+std::vector<std::array<Vec3, 2>> Room::surfaces() const {
+  std::vector<std::array<Vec3, 2>> all = {{walls_.low, walls_.high}};
+  for (const Box& box : boxes_) all.push_back({box.low, box.high});
+  return all;
+}
+
 bool Room::is_free(const Vec3& position, double radius) const {
   for (size_t k = 0; k < 3; ++k) {
     if (position[k] - radius < walls_.low[k] || position[k] + radius > walls_.high[k]) return false;

@@ -69,6 +69,10 @@ class Room {
   // measures this height.
   double height_above_ground(const Vec3& position) const;
 
+  // The low and the high corner of the walls, which are seen from inside, and then of every piece
+  // of furniture: boxes with sides parallel to the axes.
+  std::vector<std::array<Vec3, 2>> surfaces() const;
+
   // Returns true if a ball of this radius at this position touches nothing.
   bool is_free(const Vec3& position, double radius) const;
 

@@ -211,7 +211,12 @@ void Firmware::obey(std::string_view line, int64_t now_ns) {
   if (name == "COMWDG") watchdog_ = false;
 }
 
+void Firmware::begin_tour() {
+  if (!tour_) tour_.emplace(flight_.state().position);
+}
+
 void Firmware::obey_ref(const std::vector<std::string>& arguments) {
+  if (tour_) return;
   const std::optional<int32_t> bits = arguments.empty() ? std::nullopt : to_int(arguments[0]);
   if (!bits) return;
   const bool emergency = (*bits & 256) != 0, fly = (*bits & 512) != 0;
@@ -228,6 +233,7 @@ void Firmware::obey_ref(const std::vector<std::string>& arguments) {
 }
 
 void Firmware::obey_move(const std::vector<std::string>& arguments) {
+  if (tour_) return;
   if (arguments.size() < 5) return;
   const std::optional<int32_t> flags = to_int(arguments[0]);
   if (!flags || (*flags & 1) == 0) {
@@ -294,6 +300,7 @@ void Firmware::apply_limits() {
 bool Firmware::wants_720p() const { return configuration_.at("video:video_codec") == "131"; }
 
 void Firmware::advance(int64_t now_ns) {
+  if (tour_) tour_->steer(flight_, static_cast<double>(now_ns - advanced_ns_) * 1e-9);
   flight_.advance(static_cast<double>(now_ns - advanced_ns_) * 1e-9);
   advanced_ns_ = now_ns;
   watch_link(now_ns);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "simulator/flight.h"
+#include "simulator/tour.h"
 
 struct ardrone_navdata;
 
@@ -53,6 +54,8 @@ class Firmware {
   // Sets the reported firmware version. From then on navdata also has options with tags that no
   // known firmware uses.
   void set_version(const std::string& version);
+  // From now on the drone flies the tour, and obeys no command that flies it.
+  void begin_tour();
   // Sets the sequence number of the next packet, to test the wrap to 0.
   void set_sequence(uint32_t sequence) { sequence_ = sequence; }
 
@@ -91,6 +94,7 @@ class Firmware {
   void watch_link(int64_t now_ns);
 
   Flight flight_;
+  std::optional<Tour> tour_;
   Sensors sensors_;
   std::string version_;  // empty: use the factory configuration's version
   std::map<std::string, std::string> configuration_;

@@ -206,6 +206,7 @@ void Server::State::expose(int64_t now) {
   if (now < next_exposure_ns || !(video.has_client() || recording.has_client())) return;
   const int64_t period = kSecond / options.frames_per_second;
   next_exposure_ns = std::max(next_exposure_ns + period, now - period);
+  if (options.has_tour) firmware.begin_tour();
   camera.expose(firmware.truth(), firmware.uptime_ns(now), firmware.wants_720p());
 }
 

@@ -35,6 +35,7 @@ struct ServerOptions {
   int frames_per_second = 30;
   int pave_header_bytes = 68;  // size of the PaVE header: 64 or 68 bytes
   Painter painter;             // draws the pictures; empty: the room is rendered
+  bool has_tour = false;       // once a client receives its video, the drone flies simulator/tour.h
   std::string truth_file;  // path of the output with the true states; empty: no file. It has a line
                            // for each picture: frame number, seconds since boot, x y z qx qy qz qw
                            // (world_from_body), vx vy vz (world)

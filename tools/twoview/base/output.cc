@@ -224,7 +224,9 @@ void clean_up_on_signals() {
       if (::sigwait(&awaited, &signal) != 0) return;
     } while (asks_first() && !stop_flag().exchange(true));
     living().mutex.lock();  // stays locked: no thread may write another file
-    for (OutputSet* set : living().sets) set->discard();
+    // The newest first: its folder may lie in an older one's.
+    std::vector<OutputSet*>& sets = living().sets;
+    for (auto set = sets.rbegin(); set != sets.rend(); ++set) (*set)->discard();
     ::signal(signal, SIG_DFL);
     sigset_t one;
     sigemptyset(&one);

@@ -51,6 +51,16 @@ Pose pose_of(const double R[9], const double t[3]) {
 
 }  // namespace
 
+void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes) {
+  for (size_t k = 0; k < keyframes.size(); ++k) {
+    int32_t is_known = 0;
+    check(tv_odometry_covariance(odometry, static_cast<int32_t>(k), keyframes[k].covariance.data(),
+                                 &is_known),
+          "keyframe " + std::to_string(k));
+    keyframes[k].has_covariance = is_known != 0;
+  }
+}
+
 void Flight::Free::operator()(void* memory) const { std::free(memory); }
 
 Flight::Flight(FrameSource& source, const FlightOptions& options)
@@ -107,6 +117,7 @@ void Flight::track(const std::atomic<bool>& stop, const std::function<void()>& a
   const auto consume = [&](const SourceFrame& frame) {
     track_frame(frame);
     if (after_frame) after_frame();
+    picture_.release();
     const int next = frame.index / options_.every + 1;
     return options_.max_frames == 0 || next < options_.max_frames;
   };
@@ -159,16 +170,19 @@ void Flight::track_frame(SourceFrame frame) {
   record.is_keyframe = state_.is_keyframe != 0;
   record.relocated = state_.relocated != 0;
   record.loop_closed = state_.loop_closed != 0;
+  record.attitude_ignored = state_.attitude_ignored != 0;
   record.num_keypoints = state_.num_keypoints;
   record.num_matches = state_.num_matches;
   record.num_inliers = state_.num_inliers;
   if (state_.has_pose) {
     record.live_segment = state_.segment;
+    record.live_metric = state_.scale_source != TV_SCALE_UNIT;
     record.live = pose_of(state_.world_from_cam_R, state_.world_from_cam_t);
     record.reference_id = state_.reference_id;
     record.reference_from_cam = pose_of(state_.reference_from_cam_R, state_.reference_from_cam_t);
   }
   if (frame.world_from_cam) is_upright_ = true;
+  picture_ = frame.luma;
   if (record.is_keyframe) thumbnails_[static_cast<int>(given_.size())] = thumbnail_of(frame.luma);
   given_.push_back(frames_.size());
   frames_.push_back(record);

@@ -2,6 +2,7 @@
 // of each frame while the flight lasts and in the last state of the map.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -27,10 +28,12 @@ struct FlightFrame {
   uint32_t reasons = 0;
   bool unreadable = false;
   bool is_keyframe = false, relocated = false, loop_closed = false;
+  bool attitude_ignored = false;
   int32_t num_keypoints = 0, num_matches = 0, num_inliers = 0;
   double time_ms = 0;  // CPU time of tv_odometry_track
   // As known when the frame was tracked; segment -1: no pose.
   int32_t live_segment = -1;
+  bool live_metric = false;  // whether the map's unit was the metre then
   Pose live;
   int32_t reference_id = -1;
   Pose reference_from_cam;
@@ -44,7 +47,15 @@ struct FlightFrame {
 struct FlightKeyframe {
   tv_keyframe keyframe;
   std::vector<tv_map_observation> observations;
+  // Of its pose relative to the keyframe before it, as tv_odometry_covariance gives it; only after
+  // add_covariances.
+  bool has_covariance = false;
+  std::array<double, 36> covariance{};
 };
+
+// Fills the covariances of the keyframes, which are all of the odometry's map in their order. It
+// takes about as long as an adjustment each.
+void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes);
 
 // A small picture of a keyframe, for the report.
 struct Thumbnail {
@@ -82,6 +93,9 @@ class Flight {
   size_t index_given(int number) const { return given_[static_cast<size_t>(number)]; }
   // The picture of a frame that was given and became a keyframe; null for other frames.
   const Thumbnail* thumbnail(int number) const;
+  // The picture of the last frame, as it was tracked; only within `after_frame` of track(), and
+  // empty for a frame that could not be used.
+  const cv::Mat& picture() const { return picture_; }
   // Whether attitudes were given, so that the map's z axis points down.
   bool is_upright() const { return is_upright_; }
   const tv_odometry_state& state() const { return state_; }
@@ -117,6 +131,7 @@ class Flight {
   tv_odometry* odometry_ = nullptr;
   tv_odometry_state state_;
   std::vector<FlightFrame> frames_;
+  cv::Mat picture_;
   std::vector<size_t> given_;            // indices of frames_
   std::map<int, Thumbnail> thumbnails_;  // by the number of the frame that was given
   bool is_upright_ = false;

@@ -11,6 +11,7 @@
 #include "files/image_file.h"
 #include "files/yaml_values.h"
 #include "odometry/frames.h"
+#include "odometry/measurements.h"
 #include "odometry/numbers.h"
 
 namespace cli {
@@ -42,6 +43,7 @@ struct Folder {
   std::string camera_name;  // in messages
   std::string truth;
   std::optional<std::array<double, 12>> body_from_camera;
+  std::optional<Measurements> measurements;
   std::vector<std::string> files;
 };
 
@@ -62,6 +64,7 @@ class ImageFolder : public FrameSource {
       } catch (const BadInput& e) {
         frame.problem = e.what();
       }
+      if (folder_.measurements) folder_.measurements->add_to(frame);
       if (!consume(frame)) return;
     }
   }
@@ -131,6 +134,13 @@ void add_truth(Folder& folder, const std::string& name) {
   const std::string path = (fs::path(folder.path) / name).string();
   if (!is_file(path)) return;
   folder.truth = path;
+  folder.files.push_back(path);
+}
+
+void add_measurements(Folder& folder) {
+  const std::string path = (fs::path(folder.path) / "imu.txt").string();
+  if (!is_file(path)) return;
+  folder.measurements = Measurements::read(path);
   folder.files.push_back(path);
 }
 
@@ -276,7 +286,7 @@ void refuse_fps(double fps, const Folder& folder) {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double fps) {
+std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double fps, bool with_imu) {
   Folder folder;
   folder.path = path;
   const fs::path root = path;
@@ -286,6 +296,7 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
     read_list(folder, "frames.txt", 1, "", {"", "images"});
     add_cameras(folder);
     add_truth(folder, "groundtruth.txt");
+    if (with_imu) add_measurements(folder);
   } else if (is_file(root / "rgb.txt")) {
     folder.kind = "a TUM RGB-D folder (rgb.txt)";
     refuse_fps(fps, folder);

@@ -74,10 +74,16 @@ class LoadedMap {
       if (tv_odometry_keyframe(odometry, idx, &key.keyframe) != TV_OK) break;
       keyframes_.push_back(key);
     }
+    odometry_ = odometry;
   }
   const tv_camera& camera() const { return camera_; }
   const std::vector<tv_map_point>& points() const { return points_; }
   const std::vector<FlightKeyframe>& keyframes() const { return keyframes_; }
+  std::vector<FlightKeyframe> keyframes_with_covariances() const {
+    std::vector<FlightKeyframe> keyframes = keyframes_;
+    add_covariances(odometry_, keyframes);
+    return keyframes;
+  }
 
   nlohmann::ordered_json json() const {
     int32_t segments = 0;
@@ -102,6 +108,7 @@ class LoadedMap {
 
  private:
   tv_camera camera_{};
+  tv_odometry* odometry_ = nullptr;  // in the memory below
   std::unique_ptr<void, FreeMemory> memory_;
   std::vector<tv_map_point> points_;
   std::vector<FlightKeyframe> keyframes_;
@@ -127,9 +134,11 @@ int map_export(const std::string& path, const std::string& output) {
   OutputSet files(output);
   files.keep(path);
   FlightResult result;
-  result.keyframes = map.keyframes();
+  result.keyframes = map.keyframes_with_covariances();
   files.add("cloud.ply", map_ply(map.points()));
   files.add("keyframes.txt", keyframes_text(result));
+  const std::string covariances = covariances_text(result.keyframes);
+  if (!covariances.empty()) files.add("covariances.txt", covariances);
   files.commit();
   return 0;
 }

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "odometry/flight.h"
+#include "odometry/live.h"
 #include "odometry/outputs.h"
 #include "odometry/report.h"
 #include "pair/result.h"
@@ -28,15 +29,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kFiles = {"trajectory.txt", "live.txt",   "keyframes.txt",
-                                         "frames.csv",     "cloud.ply",  "map.twm",
-                                         "report.html",    "result.json"};
+const std::vector<std::string> kFiles = {"trajectory.txt",  "live.txt",    "keyframes.txt",
+                                         "covariances.txt", "frames.csv",  "cloud.ply",
+                                         "map.twm",         "report.html", "result.json"};
 const std::vector<std::string> kColmapFiles = {"cameras.txt", "images.txt", "points3D.txt"};
 
 struct Arguments {
   Common common;
   std::string source, camera, truth;
   double fps = 0, duration = 0;
+  bool ignores_imu = false;
+  bool is_live = false;
+  int live_port = 0;
   FlightOptions flight;
 #ifdef TWOVIEW_HAS_DRONE
   DroneAddress drone;  // without a host: none
@@ -88,7 +92,7 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
   if (fs::is_directory(path, error)) {
     const bool is_recording =
         fs::exists(path / "video.pave", error) || fs::exists(path / "vehicle.tlog", error);
-    if (!is_recording) return open_image_folder(a.source, a.fps);
+    if (!is_recording) return open_image_folder(a.source, a.fps, !a.ignores_imu);
     if (a.fps > 0) throw BadInput("--fps: a recording of a drone has times");
     return open_recording_folder(a);
   }
@@ -160,6 +164,7 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
                                  {"every", a.flight.every},
                                  {"fps", a.fps}};
   json["resize"] = a.flight.resize;
+  json["no_imu"] = a.ignores_imu;
   json["kernels"] = tv_kernels_string(static_cast<tv_kernels>(o.kernels));
   json["camera"] = text_or_null(a.camera);
   json["truth"] = text_or_null(truth_file);
@@ -175,6 +180,8 @@ void make_files(const FlightResult& result, const std::string& name, OutputSet& 
   files.add("report.html", flight_report(result, name));
   if (result.keyframes.empty()) return;
   files.add("keyframes.txt", keyframes_text(result));
+  const std::string covariances = covariances_text(result.keyframes);
+  if (!covariances.empty()) files.add("covariances.txt", covariances);
   files.add("cloud.ply", map_ply(result.points));
   files.add("map.twm", flight.map_bytes());
 }
@@ -209,6 +216,8 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
   text += summary_line("tracking", "%s", counts.c_str());
   text += summary_line("path", "%d frames with a pose, %d of them found in the map afterwards",
                        j["num_tracked"].get<int>(), j["num_located"].get<int>());
+  if (const int ignored = j["num_attitudes_ignored"].get<int>(); ignored > 0)
+    text += summary_line("attitude", "of %d frames contradicts the map and was left out", ignored);
   const int segments = j["num_segments"].get<int>();
   text += summary_line("map", "%d keyframes, %d points in %d segment%s; %d found again, %d loops",
                        j["num_keyframes"].get<int>(), j["num_points"].get<int>(), segments,
@@ -234,7 +243,7 @@ std::string summary(const FlightResult& result, const FrameSource& source, const
 }
 
 int exit_status(const Flight& flight, const FlightResult& result) {
-  if (result.live_segment < 0) {
+  if (result.live_stretch.segment < 0) {
     std::fprintf(stderr, "twoview: nothing could be tracked: no two frames determine a map\n");
     return kExitNoPose;
   }
@@ -261,9 +270,21 @@ int odometry(Arguments& a) {
   files.keep(a.camera);
   files.keep(truth_file);
   const int wanted = num_wanted(*source, a.flight);
+  std::optional<LivePage> live;
+  if (a.is_live || a.live_port > 0) {
+    live.emplace(a.live_port);
+    const std::string line = summary_line("live", "%s", live->address().c_str());
+    if (common.speaks())
+      print(line);
+    else
+      std::fputs(line.c_str(), stderr);
+  }
   {
     Progress progress(flight, wanted, common.speaks() && stdout_style().bold[0] != '\0');
-    flight.track(stop, [&] { progress.show(); });
+    flight.track(stop, [&] {
+      progress.show();
+      if (live) live->update(flight);
+    });
   }
   if (flight.frames().empty()) throw BadInput("no frame came from " + source->kind());
   flight.finish(stop);
@@ -322,6 +343,12 @@ void add_odometry(CLI::App& program, Run& run) {
   verb->add_option("--fps", a->fps, "frames a second, of images without times and of films")
       ->check(CLI::Range(0.001, 10000.0))
       ->type_name("F");
+  verb->add_flag("--no-imu", a->ignores_imu,
+                 "leave the attitudes, heights and velocities of a set folder's imu.txt out");
+  verb->add_flag("--live", a->is_live, "serve a page at 127.0.0.1 that follows the flight");
+  verb->add_option("--live-port", a->live_port, "the page's port; without: a free one, printed")
+      ->check(CLI::Range(1, 65535))
+      ->type_name("PORT");
   constexpr int kMany = 1 << 30;
   add_count(*verb, "--max-frames", a->flight.max_frames, 0, kMany, "end after so many; 0: all");
   add_count(*verb, "--every", a->flight.every, 1, kMany, "track every K-th frame only");

@@ -20,13 +20,27 @@ int32_t segment_of(const FlightFrame& frame, bool live) {
 }
 
 // The segment with the most frames; the first one on a tie, -1 without any pose.
-int32_t longest_segment(const Flight& flight, bool live) {
+int32_t longest_segment(const Flight& flight) {
   std::map<int32_t, int> counts;
   for (const FlightFrame& frame : flight.frames())
-    if (segment_of(frame, live) >= 0) ++counts[segment_of(frame, live)];
+    if (segment_of(frame, false) >= 0) ++counts[segment_of(frame, false)];
   int32_t best = -1;
   for (const auto& [segment, count] : counts)
     if (best < 0 || count > counts[best]) best = segment;
+  return best;
+}
+
+LiveStretch longest_stretch(const Flight& flight) {
+  std::map<std::pair<int32_t, bool>, int> counts;
+  for (const FlightFrame& frame : flight.frames())
+    if (frame.live_segment >= 0) ++counts[{frame.live_segment, frame.live_metric}];
+  LiveStretch best;
+  int most = 0;
+  for (const auto& [stretch, count] : counts) {
+    if (count <= most) continue;
+    most = count;
+    best = {stretch.first, stretch.second};
+  }
   return best;
 }
 
@@ -89,7 +103,7 @@ Json truth_json(const FlightResult& result, bool is_metric) {
   const Accuracy& a = result.accuracy;
   const Accuracy& live = result.live_accuracy;
   Json json;
-  const Trajectory best = trajectory_of(*result.flight, result.segment, false);
+  const Trajectory best = trajectory_of(*result.flight, result.segment);
   json["coverage"] =
       result.num_source_frames > 0
           ? static_cast<double>(best.size()) / static_cast<double>(result.num_source_frames)
@@ -152,11 +166,20 @@ std::string colmap_cameras(const tv_camera& c) {
 
 }  // namespace
 
-Trajectory trajectory_of(const Flight& flight, int32_t segment, bool live) {
+Trajectory trajectory_of(const Flight& flight, int32_t segment) {
   Trajectory trajectory;
   for (const FlightFrame& frame : flight.frames())
-    if (segment >= 0 && segment_of(frame, live) == segment)
-      trajectory.push_back({frame.time_s, pose_of(frame, live)});
+    if (segment >= 0 && segment_of(frame, false) == segment)
+      trajectory.push_back({frame.time_s, frame.pose});
+  return trajectory;
+}
+
+Trajectory live_trajectory_of(const Flight& flight, const LiveStretch& stretch) {
+  Trajectory trajectory;
+  for (const FlightFrame& frame : flight.frames())
+    if (stretch.segment >= 0 && frame.live_segment == stretch.segment &&
+        frame.live_metric == stretch.is_metric)
+      trajectory.push_back({frame.time_s, frame.live});
   return trajectory;
 }
 
@@ -166,14 +189,15 @@ FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& tr
   result.flight = &flight;
   result.num_source_frames = num_source_frames;
   result.keyframes = flight.keyframes();
+  add_covariances(flight.odometry(), result.keyframes);
   result.points = flight.points();
-  result.segment = longest_segment(flight, false);
-  result.live_segment = longest_segment(flight, true);
+  result.segment = longest_segment(flight);
+  result.live_stretch = longest_stretch(flight);
   if (truth) {
     result.has_truth = true;
     result.truth = *truth;
-    result.accuracy = accuracy_of(trajectory_of(flight, result.segment, false), *truth);
-    result.live_accuracy = accuracy_of(trajectory_of(flight, result.live_segment, true), *truth);
+    result.accuracy = accuracy_of(trajectory_of(flight, result.segment), *truth);
+    result.live_accuracy = accuracy_of(live_trajectory_of(flight, result.live_stretch), *truth);
   }
   result.json = flight_json(result);
   return result;
@@ -183,11 +207,12 @@ Json flight_json(const FlightResult& result) {
   const Flight& flight = *result.flight;
   const tv_odometry_state& state = flight.state();
   std::map<int32_t, int> counts;
-  int num_tracked = 0, num_located = 0;
+  int num_tracked = 0, num_located = 0, num_ignored = 0;
   for (const FlightFrame& frame : flight.frames()) {
     ++counts[frame.status];
     num_tracked += frame.origin != PoseOrigin::kNone;
     num_located += frame.origin == PoseOrigin::kLocated;
+    num_ignored += frame.attitude_ignored;
   }
   const bool is_metric = state.scale_source != TV_SCALE_UNIT;
   Json json;
@@ -200,8 +225,9 @@ Json flight_json(const FlightResult& result) {
   json["num_segments"] = state.num_segments;
   json["num_relocalisations"] = state.num_relocations;
   json["num_loops"] = state.num_loops;
+  json["num_attitudes_ignored"] = num_ignored;
   json["longest_segment"] = result.segment;
-  json["path_length"] = path_length(trajectory_of(flight, result.segment, false));
+  json["path_length"] = path_length(trajectory_of(flight, result.segment));
   for (int32_t s = 0; s < TV_ODOMETRY_NUM_STATUSES; ++s)
     json["status_counts"][tv_odometry_status_string(static_cast<tv_odometry_status>(s))] =
         counts[s];
@@ -219,13 +245,18 @@ std::string trajectory_text(const Flight& flight, bool live) {
              "tracked\n"
            : "# timestamp tx ty tz qx qy qz qw, world_from_cam, in the last state of the map\n";
   int32_t segment = -1;
+  bool is_metric = false;
   for (const FlightFrame& frame : flight.frames()) {
     const int32_t own = segment_of(frame, live);
     if (own < 0) continue;
     if (own != segment)
       text += "# segment " + std::to_string(own) +
               ": its poses do not compare with those of another segment\n";
+    if (live && (own != segment ? frame.live_metric : frame.live_metric != is_metric))
+      text += frame.live_metric ? "# the unit is the metre from here on\n"
+                                : "# the unit is not the metre from here on\n";
     segment = own;
+    is_metric = frame.live_metric;
     text += tum_line(frame.time_s, pose_of(frame, live));
   }
   return text;
@@ -247,6 +278,23 @@ std::string keyframes_text(const FlightResult& result) {
   return text;
 }
 
+std::string covariances_text(const std::vector<FlightKeyframe>& keyframes) {
+  std::string text;
+  for (size_t k = 1; k < keyframes.size(); ++k) {
+    const tv_keyframe &before = keyframes[k - 1].keyframe, &own = keyframes[k].keyframe;
+    if (!keyframes[k].has_covariance || own.segment != before.segment) continue;
+    text += seconds(before.time_s) + " " + seconds(own.time_s);
+    for (const double value : keyframes[k].covariance) text += number_text(value);
+    text += "\n";
+  }
+  if (text.empty()) return text;
+  return "# time0 time1 c00 c01 ... c55: the row-major covariance of cam1_from_cam0 of consecutive "
+         "keyframes in (w, v),\n"
+         "# with x_true = exp([w]x) x + v for a point x in camera 1; radians and units of the "
+         "map\n" +
+         text;
+}
+
 std::string reasons_text(const FlightFrame& frame) {
   if (frame.unreadable) return "unreadable";
   std::string text;
@@ -260,7 +308,7 @@ std::string reasons_text(const FlightFrame& frame) {
 std::string frames_csv(const Flight& flight) {
   std::string text =
       "timestamp,name,status,reasons,segment,num_tracked,is_keyframe,time_ms,relocated,"
-      "loop_closed,pose\n";
+      "loop_closed,pose,attitude_ignored,scale\n";
   const char* const origins[] = {"none", "tracked", "located"};
   for (const FlightFrame& frame : flight.frames()) {
     const auto status = static_cast<tv_odometry_status>(frame.status);
@@ -269,7 +317,11 @@ std::string frames_csv(const Flight& flight) {
             std::to_string(frame.live_segment) + "," + std::to_string(frame.num_inliers) + "," +
             (frame.is_keyframe ? "1," : "0,") + milliseconds(frame.time_ms) +
             (frame.relocated ? ",1" : ",0") + (frame.loop_closed ? ",1," : ",0,") +
-            origins[static_cast<int>(frame.origin)] + "\n";
+            origins[static_cast<int>(frame.origin)] + (frame.attitude_ignored ? ",1," : ",0,") +
+            (frame.live_segment < 0 ? "none"
+             : frame.live_metric    ? "metric"
+                                    : "unit") +
+            "\n";
   }
   return text;
 }

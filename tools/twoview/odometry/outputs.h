@@ -12,18 +12,26 @@
 
 namespace cli {
 
+// A segment, -1 for none, and whether its unit is the metre.
+struct LiveStretch {
+  int32_t segment = -1;
+  bool is_metric = false;
+};
+
 // What the outputs are made from.
 struct FlightResult {
   const Flight* flight = nullptr;
   int num_source_frames = 0;  // that the run was to track: after --every and --max-frames
   std::vector<FlightKeyframe> keyframes;
   std::vector<tv_map_point> points;
-  // The segment that the most frames have their final pose in, -1 without any pose; and the one
-  // that the most frames had when they were tracked.
-  int32_t segment = -1, live_segment = -1;
+  // The segment that the most frames have their final pose in, -1 without any pose.
+  int32_t segment = -1;
+  // The segment and unit that the most frames had when they were tracked: poses from before the
+  // metre was known do not compare with later ones.
+  LiveStretch live_stretch;
   bool has_truth = false;
   Trajectory truth;
-  Accuracy accuracy, live_accuracy;  // of these two segments
+  Accuracy accuracy, live_accuracy;  // of the segment, and of that stretch
   nlohmann::ordered_json json;
 };
 
@@ -31,8 +39,10 @@ struct FlightResult {
 FlightResult result_of(const Flight& flight, const std::optional<Trajectory>& truth,
                        int num_source_frames);
 
-// The frames of one segment with their final poses, or as they were known when tracked.
-Trajectory trajectory_of(const Flight& flight, int32_t segment, bool live);
+// The frames of one segment with their final poses, and those of a stretch as they were known when
+// tracked.
+Trajectory trajectory_of(const Flight& flight, int32_t segment);
+Trajectory live_trajectory_of(const Flight& flight, const LiveStretch& stretch);
 
 // The content of result.json but for `options`, `seed`, `version` and `kernels`.
 nlohmann::ordered_json flight_json(const FlightResult& result);
@@ -40,6 +50,9 @@ nlohmann::ordered_json flight_json(const FlightResult& result);
 // trajectory.txt, or with `live` live.txt. A comment says where a segment begins.
 std::string trajectory_text(const Flight& flight, bool live);
 std::string keyframes_text(const FlightResult& result);
+// covariances.txt: of each keyframe relative to the one before it, where it is known; empty where
+// none is.
+std::string covariances_text(const std::vector<FlightKeyframe>& keyframes);
 std::string frames_csv(const Flight& flight);
 // The words for a frame's reasons: those of the verdict, or "unreadable".
 std::string reasons_text(const FlightFrame& frame);

@@ -85,7 +85,7 @@ Json paths_json(const FlightResult& result, const View& view) {
 // The length of the path's box along its largest side.
 double extent_of(const FlightResult& result) {
   double extent = 0;
-  const Trajectory path = trajectory_of(*result.flight, result.segment, false);
+  const Trajectory path = trajectory_of(*result.flight, result.segment);
   for (size_t axis = 0; axis < 3; ++axis) {
     double low = INFINITY, high = -INFINITY;
     for (const TimedPose& at : path) {
@@ -158,7 +158,7 @@ Json frames_json(const FlightResult& result) {
   if (result.accuracy.num_poses < 3) return json;
   std::map<double, size_t> index;
   for (size_t i = 0; i < frames.size(); ++i) index[frames[i].time_s] = i;
-  const Trajectory path = trajectory_of(*result.flight, result.segment, false);
+  const Trajectory path = trajectory_of(*result.flight, result.segment);
   for (size_t i = 0; i < result.accuracy.pairs.size(); ++i)
     error[index[path[result.accuracy.pairs[i].idx_estimate].time_s]] =
         six_digits(result.accuracy.errors[i]);

@@ -23,7 +23,8 @@ struct Arguments {
   DroneAddress address;
   int recording_port = 5553;
   double duration = 0;
-  std::string camera, truth;
+  std::string camera, truth, surfaces;
+  bool has_tour = false;
   std::vector<std::string> images;
   std::vector<double> start = {0, 0};
   double yaw_deg = 0;
@@ -80,6 +81,7 @@ simulator::ServerOptions server_options(const Arguments& a) {
   o.pave_header_bytes = a.pave_header;
   if (!a.images.empty()) o.painter = film_of(a.images);
   o.truth_file = a.truth;
+  o.has_tour = a.has_tour;
   o.faults = a.faults;
   o.video_garbage = a.garbage;
   o.cut_video_every_s = a.cut_every;
@@ -94,6 +96,21 @@ std::string ports_line(const std::string& host, const simulator::Ports& ports) {
   return "drone        " + host + ", commands " + std::to_string(ports.at) + ", navdata " +
          std::to_string(ports.navdata) + ", video " + std::to_string(ports.video) + ", control " +
          std::to_string(ports.control) + ", recording " + std::to_string(ports.recording) + "\n";
+}
+
+// The room in the form of a rendered flight's surfaces.json (docs/formats.md).
+std::string surfaces_text(const room::Room& room) {
+  nlohmann::ordered_json boxes = nlohmann::ordered_json::array();
+  for (const auto& [low, high] : room.surfaces()) {
+    room::Vec3 centre, half;
+    for (size_t k = 0; k < 3; ++k) {
+      centre[k] = (low[k] + high[k]) / 2;
+      half[k] = (high[k] - low[k]) / 2;
+    }
+    boxes.push_back(
+        {{"centre", centre}, {"half", half}, {"yaw_rad", 0.0}, {"is_room", boxes.empty()}});
+  }
+  return nlohmann::ordered_json{{"boxes", boxes}}.dump(1) + "\n";
 }
 
 nlohmann::ordered_json counts_json(const simulator::ServerCounts& n) {
@@ -112,6 +129,12 @@ int simulate(const Arguments& a) {
   const room::Room room(a.seed);
   if (!room.is_free({a.start[0], a.start[1], -0.3}, 0.299))
     throw BadInput("--start is inside a wall or a piece of furniture");
+  if (!a.surfaces.empty()) {
+    const std::filesystem::path path = a.surfaces;
+    OutputSet file(path.parent_path());
+    file.add(path.filename().string(), surfaces_text(room));
+    file.commit();
+  }
   simulator::Server server(server_options(a));
   const bool speaks = !a.json && !a.quiet;
   if (speaks) print(ports_line(a.address.host, server.ports()));
@@ -174,6 +197,11 @@ void add_world(CLI::App& verb, Arguments& a) {
   verb.add_option("--truth", a.truth,
                   "write a line a picture: number, seconds, x y z, qx qy qz qw, vx vy vz")
       ->type_name("FILE");
+  verb.add_option("--surfaces", a.surfaces, "write the room's walls and furniture as JSON")
+      ->type_name("FILE");
+  verb.add_flag("--tour", a.has_tour,
+                "once its video is received, fly through the whole room and land: along the "
+                "walls, round a pillar and back; commands that fly are ignored");
   verb.add_option("--start", a.start, "x and y in the room, metres; x in [-2, 7], y in [-3.5, 3.5]")
       ->delimiter(',')
       ->expected(2)

@@ -9,7 +9,8 @@ import sys
 import tempfile
 
 from .. import ROOT
-from . import evaluate, faults, flights, orbslam, poses, runs, sets, tables, targets
+from . import (endurance, evaluate, faults, flights, instructions, mapper, orbslam, poses, runs,
+               sets, tables, targets, tour)
 
 FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 # The sources that faults are put into: one real and quick, one rendered; and what other_room shows.
@@ -33,6 +34,19 @@ def arguments_of(argv):
     parser.add_argument("--json", metavar="FILE", help="write every figure")
     parser.add_argument("--program", help="the program twoview (default: the release build's)")
     parser.add_argument("--seed", type=int, help="of the program's sampling")
+    parser.add_argument("--seeds", type=int, default=1, metavar="N",
+                        help="run everything with N seeds: the program's own (or --seed), 1, 2, "
+                             "and so on, and print a table of what they change")
+    parser.add_argument("--endurance", type=int, nargs="?", const=endurance.NUM_FRAMES,
+                        metavar="N", help="a flight there and back, again and again, of N frames "
+                                          f"({endurance.NUM_FRAMES}): whether the time a frame "
+                                          "stays the same")
+    parser.add_argument("--tour", action="store_true",
+                        help="a simulated drone's flight through a room, mapped while it flies")
+    parser.add_argument("--instructions", action="store_true",
+                        help="instructions a frame on ARM, under qemu")
+    parser.add_argument("--colmap", action="store_true",
+                        help="the keyframes of each set and flight through COLMAP's mapper (slow)")
     parser.add_argument("--option", action="append", default=[], metavar="TEXT",
                         help="an option for the program, such as --option=--every=2")
     parser.add_argument("--keep", metavar="DIR", help="keep the runs' files below this folder")
@@ -66,25 +80,68 @@ def sources_of(arguments, scratch):
                                                other)
 
 
-def one_run(system, kind, label, folder, out, arguments):
+def one_run(system, kind, label, folder, out, arguments, seed=None):
     """The figures of one system over one source, or {label, kind, error}."""
     source = sets.read_set(folder)
+    base = {"label": label if seed in (None, arguments.seed) else f"{label} seed {seed}",
+            "source": label, "seed": seed, "kind": kind, "system": system}
     try:
         if system == "twoview":
             options = list(arguments.option)
-            options += ["--seed", str(arguments.seed)] if arguments.seed is not None else []
+            options += ["--seed", str(seed)] if seed is not None else []
             cost = runs.run_odometry(runs.program_path(arguments.program), folder, out, options)
         else:
             cost = orbslam.run(source, out)
         figures = evaluate.evaluate(out, source)
     except (RuntimeError, OSError, poses.PoseError, ValueError) as error:
-        return {"label": label, "kind": kind, "set": source.name, "system": system,
-                "error": str(error)}
-    return {"label": label, "kind": kind, "system": system, **figures, **cost}
+        return {**base, "set": source.name, "error": str(error)}
+    return {**base, **figures, **cost}
 
 
-def report(found, peers):
-    """Prints the tables and targets. Returns whether every measured target is reached."""
+def seeds_of(arguments):
+    """The seeds to run: None is the program's own."""
+    first = arguments.seed
+    others = [seed for seed in range(1, arguments.seeds + 1) if seed != first]
+    return [first, *others][:max(arguments.seeds, 1)]
+
+
+def more_figures(arguments, runs_of, scratch):
+    """Yields (reached, sentence) of what is measured apart from the sequences, as it is asked for.
+    runs_of: [(run, source folder, out)] of the program's own runs with the first seed."""
+    if arguments.colmap:
+        for run, folder, out in runs_of:
+            if run["kind"] == "fault" or not run.get("num_keyframes") or not run.get("truth"):
+                continue
+            print(f"colmap: {run['label']}", file=sys.stderr, flush=True)
+            run["colmap"] = mapper.compare(sets.read_set(folder), out,
+                                           os.path.join(scratch, "colmap", run["label"]))
+            yield mapper.sentence(run["label"], run["colmap"], run["cpu_s"], run["num_frames"])
+    if arguments.endurance:
+        flight = flights.render(0, os.path.join(FLIGHT_FOLDER, "flight_00"))
+        folder = endurance.repeat(flight, os.path.join(scratch, "endurance"), arguments.endurance)
+        print("twoview: endurance", file=sys.stderr, flush=True)
+        run = one_run("twoview", "endurance", "endurance", folder,
+                      os.path.join(scratch, "twoview", "endurance"), arguments, arguments.seed)
+        yield (False, f"endurance: {run['error']}") if "error" in run else endurance.judged(run)
+    if arguments.tour:
+        print("twoview: tour", file=sys.stderr, flush=True)
+        folder = os.path.join(scratch, "tour")
+        done = tour.fly(runs.program_path(arguments.program), folder, options=arguments.option)
+        if done.returncode in runs.EXIT_STATUSES:
+            yield from tour.sentences(tour.judge(folder))
+        else:
+            yield False, f"drone's tour: status {done.returncode}: {done.stderr.strip()}"
+    if arguments.instructions:
+        name = FAULT_SET
+        print("instructions", file=sys.stderr, flush=True)
+        yield from instructions.sentences(
+            instructions.measure(sets.set_paths(name)[0], os.path.join(scratch, "instructions")),
+            name)
+
+
+def report(found, peers, more=()):
+    """Prints the tables and targets; `more`: further (reached, sentence). Returns the judgements,
+    and whether every measured target is reached."""
     for system, rows in (("twoview odometry", found), ("ORB-SLAM3", peers)):
         if rows:
             print(f"\n{system}")
@@ -92,9 +149,11 @@ def report(found, peers):
             for run in rows:
                 if "error" in run:
                     print(f"{run['label']}: {run['error']}")
+    if len({run["seed"] for run in found}) > 1:
+        print("\nAll seeds\n" + tables.seeds_table(found))
     print("\n" + tables.LEGEND + "\n\nTargets")
     judged = targets.judge([run for run in found if "error" not in run],
-                           [run for run in peers if "error" not in run])
+                           [run for run in peers if "error" not in run]) + list(more)
     for reached, text in judged:
         print(f"  {'yes' if reached else '-- ' if reached is None else 'NO '}  {text}")
     return judged, all(reached is not False for reached, _ in judged) and not any(
@@ -110,15 +169,23 @@ def main(argv=None):
         return 0
     scratch = arguments.keep or tempfile.mkdtemp(prefix="twoview-odometry-")
     try:
-        found, peers = [], []
+        found, peers, first = [], [], []
         for kind, label, folder in sources_of(arguments, scratch):
-            for system, rows in (("twoview", found), ("orbslam3", peers)):
-                if system == "orbslam3" and not arguments.peers:
-                    continue
-                print(f"{system}: {label}", file=sys.stderr, flush=True)
-                rows.append(one_run(system, kind, label, folder,
-                                    os.path.join(scratch, system, label), arguments))
-        judged, is_good = report(found, peers)
+            for seed in seeds_of(arguments):
+                print(f"twoview: {label}" + ("" if seed is None else f", seed {seed}"),
+                      file=sys.stderr, flush=True)
+                out = os.path.join(scratch, "twoview", label if seed == arguments.seed else
+                                   f"{label}_seed_{seed}")
+                found.append(one_run("twoview", kind, label, folder, out, arguments, seed))
+                if seed == arguments.seed and "error" not in found[-1]:
+                    first.append((found[-1], folder, out))
+            if arguments.peers:
+                print(f"orbslam3: {label}", file=sys.stderr, flush=True)
+                peers.append(one_run("orbslam3", kind, label, folder,
+                                     os.path.join(scratch, "orbslam3", label), arguments))
+        judged, is_good = report(found, peers, list(more_figures(arguments, first, scratch)))
+        for run in found:
+            run.pop("times_ms", None)
         if arguments.json:
             with open(arguments.json, "w", encoding="utf-8") as file:
                 json.dump({"runs": found, "peers": peers,

@@ -44,6 +44,16 @@ def _times_ms(rows):
             "p99": float(np.percentile(times, 99)), "max": float(times.max())}
 
 
+def _by_unit(live, rows):
+    """Live poses with a segment of its own for each unit: the map's first unit is arbitrary, and
+    where its program says (`scale` in frames.csv) that it is the metre from a frame on, earlier
+    poses do not compare with later ones."""
+    units = {round(float(row["timestamp"]), 6): row.get("scale") == "metric" for row in rows}
+    live.segments = 2 * live.segments + np.array(
+        [units.get(round(float(time), 6), False) for time in live.times], int)
+    return live
+
+
 def evaluate(out, source):
     """The figures of the run in the folder `out` over a sets.SetFolder, as a dict for JSON."""
     truth = source.truth()
@@ -51,6 +61,7 @@ def evaluate(out, source):
     live = _read(os.path.join(out, "live.txt"), poses.read_tum)
     live = final if live is None else live
     states, rows = read_states(os.path.join(out, "frames.csv"))
+    live = _by_unit(live[np.arange(len(live))], rows)
     result = _read(os.path.join(out, "result.json"), _read_json) or {}
     num_frames = len(source.times)
     known = {round(float(time), 6) for time in final.times}
@@ -63,6 +74,7 @@ def evaluate(out, source):
         "status_counts": {status: sum(s.status == status for s in states.values())
                           for status in ("starting", "tracking", "weak", "rotation", "lost")},
         "time_ms": _times_ms(rows),
+        "times_ms": [float(row["time_ms"]) for row in rows if row.get("time_ms")],
         **{key: result.get(key) for key in ("num_keyframes", "num_points", "num_relocalisations",
                                             "num_loops", "scale", "scale_sigma",
                                             "context_bytes")},
@@ -105,7 +117,8 @@ def _against_truth(final, live, states, truth, source, out):
     if stated and keyframes is not None:
         share, count = covariance.of_keyframes(
             stated, keyframes[keyframes.segments == segment], truth, similarity[0])
-        figures["covariance"] = {"inside_share": share, "num_pairs": count}
+        figures["covariance"] = {"inside_share": share, "num_pairs": count,
+                                 "is_truth_exact": not any(sigma)}
     return figures
 
 

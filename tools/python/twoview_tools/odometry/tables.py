@@ -41,10 +41,44 @@ def table(rows, columns=COLUMNS):
                      for line in (columns, *rows))
 
 
+def _span(values, form):
+    """Minimum, median and maximum; "none" stands for a run without the figure, the worst one."""
+    known = sorted(value for value in values if value is not None)
+    if not known:
+        return "none"
+    worst = "none" if len(known) < len(values) else format(known[-1], form)
+    return f"{known[0]:{form}} / {known[len(known) // 2]:{form}} / {worst}"
+
+
+SEED_COLUMNS = ("run", "seeds", "ATE m: min / median / max", "% path", "coverage %", "segments",
+                "silent", "jumps")
+
+
+def seeds_table(runs):
+    """A row for each source that ran with several seeds."""
+    groups = {}
+    for run in runs:
+        if run.get("truth"):
+            groups.setdefault(run["source"], []).append(run)
+    rows = []
+    for label, own in groups.items():
+        truths = [run["truth"] for run in own]
+        rows.append((label, len(own), _span([t["ate_rmse"] for t in truths], ".4f"),
+                     _span([t.get("ate_rmse_percent_of_path") for t in truths], ".2f"),
+                     _span([100 * t["coverage"] for t in truths], ".1f"),
+                     _span([run["num_segments"] for run in own], "d"),
+                     sum(run["silent"]["num_wrong"] + run["silent_live"]["num_wrong"]
+                         for run in own),
+                     sum(run["silent"]["unflagged_jumps"] + run["silent_live"]["unflagged_jumps"]
+                         for run in own)))
+    return table(rows, SEED_COLUMNS)
+
+
 LEGEND = """known: frames with a pose. coverage: frames of the longest segment. ATE: after a
 similarity, over that segment; live: of the poses as they were known when their frames were tracked.
 silent, jumps: frames with status "tracking" that are off by 5 % of the path or 5 degrees, and
-steps as large without a flag, of the final / live poses. loop %: error of the motion from the first
+steps as large without a flag, of the final / live poses (live ones from before the metre was known
+are compared among themselves). loop %: error of the motion from the first
 pose to the last, of the path. scale: metric estimate / truth. map %, out %: median distance of the
 points to the surfaces in per cent of the room's longest side; points farther than 3 % of it. ms:
 CPU time a frame (ORB-SLAM3: of all its threads, without reading the images). RSS: peak memory of

@@ -1,0 +1,65 @@
+"""A long flight: a set folder's frames there and back, again and again, and whether the work a
+frame stays the same."""
+
+import os
+import shutil
+
+import numpy as np
+
+from . import poses
+from .sets import read_set, write_frames
+
+NUM_FRAMES, NUM_COMPARED = 10000, 1000
+GROWTH = 1.10  # of the mean time a frame that counts as flat
+
+
+def there_and_back(count, num):
+    """The indices of `num` frames of a way there and back through `count` of them."""
+    period = max(2 * (count - 1), 1)
+    along = np.arange(num) % period
+    return np.where(along < count, along, period - along)
+
+
+def repeat(source_path, folder, num=NUM_FRAMES):
+    """Writes a set folder of `num` frames that lead through those of another one, there and back.
+    What a vehicle measured is left out: its velocities would be wrong on the way back."""
+    source = read_set(source_path)
+    order = there_and_back(len(source.names), num)
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    step = float(np.median(np.diff(source.times)))
+    times = [source.times[0] + step * k for k in range(num)]
+    write_frames(folder, times, [os.path.abspath(os.path.join(source.path, source.names[k]))
+                                 for k in order])
+    for name in ("cameras.yaml", "surfaces.json"):
+        if source.file(name):
+            shutil.copy(source.file(name), folder)
+    truth = source.truth()
+    if truth is not None:
+        nearest = [int(np.abs(truth.times - source.times[k]).argmin())
+                   for k in range(len(source.times))]
+        there = truth[np.array([nearest[k] for k in order])]
+        there.times = np.array(times)
+        poses.write_tum(os.path.join(folder, "groundtruth.txt"), there)
+    return folder
+
+
+def growth(times_ms, num=NUM_COMPARED):
+    """(mean of the first `num` times, mean of the last `num`); (None, None) for fewer than twice as
+    many."""
+    times = np.asarray(times_ms, float)
+    if len(times) < 2 * num:
+        return None, None
+    return float(times[:num].mean()), float(times[-num:].mean())
+
+
+def judged(run):
+    """(reached, sentence) of the run over repeat()'s folder."""
+    first, last = growth(run["times_ms"])
+    if first is None:
+        return None, f"CPU time over {NUM_FRAMES} frames: not measured (too few frames)"
+    return last <= GROWTH * first, (
+        f"CPU time flat over {len(run['times_ms'])} frames (at most {100 * (GROWTH - 1):.0f} % "
+        f"more): first {NUM_COMPARED} {first:.2f} ms, last {NUM_COMPARED} {last:.2f} ms a frame; "
+        f"coverage {100 * run['truth']['coverage']:.1f} %, {run['num_keyframes']} keyframes, "
+        f"{run['num_segments']} segments, peak memory {run['peak_rss_mib']:.0f} MiB")

@@ -1,0 +1,39 @@
+// What a vehicle measured beside its pictures, as the file imu.txt of a set folder has it
+// (docs/formats.md): attitudes, heights and velocities with their standard deviations.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "odometry/frames.h"
+#include "odometry/poses.h"
+
+namespace cli {
+
+class Measurements {
+ public:
+  // Reads the file. Throws BadInput that names the line.
+  static Measurements read(const std::string& file);
+
+  // Adds what was measured at the frame's time, in the camera's terms, between the two samples
+  // around it. A quantity that one of the two does not have, or two samples more than 0.25 s apart,
+  // add nothing.
+  void add_to(SourceFrame& frame) const;
+
+ private:
+  struct Sample {
+    double time_s = 0;
+    // A standard deviation of 0: not measured.
+    std::array<double, 4> world_from_body{};  // quaternion x y z w
+    double attitude_sigma_rad = 0;
+    double height_m = 0, height_sigma_m = 0;
+    Vector3 velocity_m_s{};  // along the axes of the body
+    double velocity_sigma_m_s = 0;
+  };
+  static Sample sample_of(const std::vector<double>& numbers, const std::string& where);
+
+  Matrix3 body_from_camera_{};
+  std::vector<Sample> samples_;  // sorted by time
+};
+
+}  // namespace cli
