@@ -20,8 +20,8 @@
 
 TV_BEGIN_DECLS
 
-/* Options of tv_densify. Filled by tv_dense_options_init. Parallax is the angle, in radians, between
-   the rays of both cameras to a point. */
+/* Options of tv_densify. Filled by tv_dense_options_init. Parallax is the angle, in radians,
+   between the rays of both cameras to a point. */
 typedef struct tv_dense_options {
   /* The caller's sizeof, set by tv_dense_options_init. */
   uint32_t struct_size;
@@ -64,9 +64,9 @@ typedef struct tv_dense_point {
   int32_t grey;
 } tv_dense_point;
 
-/* Writes to *size_bytes how much memory tv_densify needs for images of these sizes (width and height
-   of each camera). options: null means the defaults. The number depends on the sizes, on the options
-   and on the library's version alone: about 6 MB for the defaults and images of 640 x 480.
+/* Writes to *size_bytes how much memory tv_densify needs for images of these sizes (width and
+   height of each camera). options: null means the defaults. The number depends on the sizes, on the
+   options and on the library's version alone: about 6 MB for the defaults and images of 640 x 480.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option), TV_ERR_NOT_FINITE (an
    option), TV_ERR_CAMERA. */
 TV_API tv_status tv_dense_size(const tv_camera *camera0, const tv_camera *camera1,

@@ -27,12 +27,12 @@ tv_status read_options(const tv_dense_options* given, tv_dense_options* options)
       !is_finite(options->max_relative_sigma)) {
     return TV_ERR_NOT_FINITE;
   }
-  const bool valid = within(options->max_cells, 1024, 1 << 24) &&
-                     within(options->max_steps, 16, 512) && options->reserved == 0 &&
-                     options->min_parallax_rad >= 0 && options->max_parallax_rad <= kPi &&
-                     (options->max_parallax_rad == 0 ||
-                      options->max_parallax_rad > options->min_parallax_rad) &&
-                     options->max_relative_sigma > 0 && options->max_relative_sigma <= 1;
+  const bool valid =
+      within(options->max_cells, 1024, 1 << 24) && within(options->max_steps, 16, 512) &&
+      options->reserved == 0 && options->min_parallax_rad >= 0 &&
+      options->max_parallax_rad <= kPi &&
+      (options->max_parallax_rad == 0 || options->max_parallax_rad > options->min_parallax_rad) &&
+      options->max_relative_sigma > 0 && options->max_relative_sigma <= 1;
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
@@ -45,18 +45,15 @@ tv_status check_cameras(const tv_camera* camera0, const tv_camera* camera1) {
   return TV_OK;
 }
 
-// The most pixels of the two resampled images; image 1 has max_steps columns more.
-size_t most_pixels(const tv_dense_options& o) {
-  const size_t cells = static_cast<size_t>(o.max_cells);
-  return 2 * cells + static_cast<size_t>(o.max_steps) * cells / 8;
-}
-
 size_t dense_bytes(const tv_camera& camera0, const tv_camera& camera1, const tv_dense_options& o) {
   const size_t cells = static_cast<size_t>(o.max_cells);
-  const size_t matching = match_rows_bytes(most_columns(o.max_cells), o.max_steps);
+  const size_t steps = static_cast<size_t>(o.max_steps);
+  const size_t side = static_cast<size_t>(longest_side(o.max_cells));
+  const size_t matching = match_rows_bytes(longest_side(o.max_cells), o.max_steps);
   return halved_bytes(camera0.width, camera0.height) + halved_bytes(camera1.width, camera1.height) +
-         2 * arena_bytes<uint8_t>(1) + arena_bytes<uint8_t>(most_pixels(o)) +
-         2 * arena_bytes<int16_t>(cells) + std::max(make_grid_bytes(), matching);
+         arena_bytes<uint8_t>(cells) + arena_bytes<uint8_t>(cells + side * steps) +
+         2 * arena_bytes<int16_t>(cells) + arena_bytes<double>(2 * side) +
+         arena_bytes<double>(2 * (side + steps)) + std::max(make_grid_bytes(), matching);
 }
 
 tv_status check_view(const tv_image* image, const tv_camera& camera) {
@@ -148,13 +145,12 @@ tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_ca
   if (!tv::is_rotation(R) || (t[0] == 0.0 && t[1] == 0.0 && t[2] == 0.0)) return TV_ERR_ARGUMENT;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   if (size_bytes < tv::dense_bytes(*camera0, *camera1, checked)) return TV_ERR_MEMORY;
-  const tv::Bytes arrays[6] = {
-      {points, static_cast<size_t>(cap_points) * sizeof(tv_dense_point)},
-      {num_points, sizeof *num_points},
-      {memory, size_bytes},
-      {image0->data, tv::image_bytes(*image0)},
-      {image1->data, tv::image_bytes(*image1)},
-      {sparse, static_cast<size_t>(num_sparse) * sizeof(tv_point)}};
+  const tv::Bytes arrays[6] = {{points, static_cast<size_t>(cap_points) * sizeof(tv_dense_point)},
+                               {num_points, sizeof *num_points},
+                               {memory, size_bytes},
+                               {image0->data, tv::image_bytes(*image0)},
+                               {image1->data, tv::image_bytes(*image1)},
+                               {sparse, static_cast<size_t>(num_sparse) * sizeof(tv_point)}};
   if (tv::outputs_overlap(arrays, 3, 6)) return TV_ERR_OVERLAP;
 
   tv::Arena arena = tv::arena_over(memory, size_bytes);
@@ -188,24 +184,24 @@ tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_ca
   uint8_t* pixels0 = tv::arena_alloc<uint8_t>(arena, cells);
   uint8_t* pixels1 = tv::arena_alloc<uint8_t>(
       arena, static_cast<size_t>(columns1) * static_cast<size_t>(grid.height));
-  tv::resample(grid, scene.views[0], grid.first_angle, grid.width, pixels0);
-  tv::resample(grid, scene.views[1], grid.first_angle + grid.first_step * grid.step, columns1,
-               pixels1);
+  double* sines0 = tv::arena_alloc<double>(arena, 2 * static_cast<size_t>(grid.width));
+  double* sines1 = tv::arena_alloc<double>(arena, 2 * static_cast<size_t>(columns1));
+  tv::tabulate(grid, 0, grid.width, sines0);
+  tv::tabulate(grid, grid.first_step, columns1, sines1);
+  tv::resample(grid, scene.views[0], sines0, grid.width, pixels0);
+  tv::resample(grid, scene.views[1], sines1, columns1, pixels1);
   int16_t* found = tv::arena_alloc<int16_t>(arena, cells);
   int16_t* kept = tv::arena_alloc<int16_t>(arena, cells);
   scene.rows = {pixels0, pixels1, grid.width, grid.height, grid.num_steps};
   tv::match_rows(scene.rows, arena, found);
   tv::keep_supported(found, grid.width, grid.height, kept);
 
+  if (cap_points > checked.max_cells) cap_points = checked.max_cells;
   // First the points are counted, then as many as there is room for are written. A cell counts as
   // much as it is wide in the image, which is less near an epipole.
   int64_t total = 0;
   tv_dense_point point;
-  const auto weight_of = [&](int32_t x) {
-    double sine, cosine;
-    tv::sincos(grid.first_angle + x * grid.step, &sine, &cosine);
-    return 1 + static_cast<int64_t>(sine * 1000);
-  };
+  const auto weight_of = [&](int32_t x) { return 1 + static_cast<int64_t>(sines0[2 * x] * 1000); };
   for (int32_t y = 0; y < grid.height; ++y) {
     for (int32_t x = 0; x < grid.width; ++x) {
       int16_t& step = kept[static_cast<ptrdiff_t>(y) * grid.width + x];

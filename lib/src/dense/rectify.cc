@@ -9,17 +9,15 @@
 namespace tv {
 namespace {
 
-constexpr int32_t kProbes = 33;     // rays across and down image 0 that tell the grid's extent
-constexpr int32_t kSectors = 64;    // of the circle around the baseline
-constexpr int32_t kBins = 4096;     // of the histogram of parallax
-constexpr double kEpipoleSteps = 4; // columns this near an epipole have no parallax to measure
-constexpr double kMargin = 1.3;     // of the range of parallax
+constexpr int32_t kProbes = 33;      // rays across and down image 0 that tell the grid's extent
+constexpr int32_t kSectors = 64;     // of the circle around the baseline
+constexpr int32_t kBins = 4096;      // of the histogram of parallax
+constexpr double kEpipoleSteps = 4;  // columns this near an epipole have no parallax to measure
+constexpr double kMargin = 1.3;      // of the range of parallax
 
 double angle_between_0_and_2pi(double angle) { return angle < 0 ? angle + 2 * kPi : angle; }
 
-int32_t columns_of(double extent, double step) {
-  return static_cast<int32_t>(extent / step) + 1;
-}
+int32_t columns_of(double extent, double step) { return static_cast<int32_t>(extent / step) + 1; }
 
 // The extent of image 0 in the grid's angles.
 struct Extent {
@@ -79,7 +77,7 @@ double widest_sine(double low, double high) {
 
 }  // namespace
 
-int32_t most_columns(int32_t max_cells) {
+int32_t longest_side(int32_t max_cells) {
   return static_cast<int32_t>(4 * std::sqrt(static_cast<double>(max_cells)));
 }
 
@@ -131,8 +129,8 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
   for (int i = 0; i < 9; ++i) back(i / 3, i % 3) = R(i % 3, i / 3);
   const Vec3 other = rotate(back, t);
   grid->length = std::sqrt(dot(t, t));
-  grid->baseline = Vec3(-other[0] / grid->length, -other[1] / grid->length,
-                        -other[2] / grid->length);
+  grid->baseline =
+      Vec3(-other[0] / grid->length, -other[1] / grid->length, -other[2] / grid->length);
   const double norm = std::sqrt(dot(grid->baseline, grid->baseline));
   for (int i = 0; i < 3; ++i) grid->baseline[i] /= norm;
   complete_basis(grid->baseline, &grid->side, &grid->up);
@@ -142,7 +140,7 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
   // cells and the columns.
   double step = std::max(pixel_angle, (range.most - range.least) / (max_steps - 2));
   double low = 0, high = 0, sine = 1;
-  const double columns = most_columns(max_cells);
+  const double longest = longest_side(max_cells);
   for (int pass = 0; pass < 2; ++pass) {
     low = std::max(extent.least_angle, kEpipoleSteps * step);
     high = std::min(extent.most_angle, kPi - kEpipoleSteps * step);
@@ -151,19 +149,29 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
     const double across = (high - low) / step + 1, down = extent.planes * sine / step + 1;
     if (pass == 0) {
       step *= std::max(1.0, std::max(std::sqrt(across * down / max_cells),
-                                     across / (columns - 1)));
+                                     std::max(across, down) / (longest - 1)));
     }
   }
   grid->step = step;
   grid->first_angle = low;
-  grid->width = std::min(columns_of(high - low, step), static_cast<int32_t>(columns));
+  grid->width = std::min(columns_of(high - low, step), static_cast<int32_t>(longest));
   grid->plane_step = step / sine;
   grid->first_plane = extent.first_plane;
-  grid->height = std::min(columns_of(extent.planes, grid->plane_step), max_cells / grid->width);
+  grid->height =
+      std::min(std::min(columns_of(extent.planes, grid->plane_step), static_cast<int32_t>(longest)),
+               max_cells / grid->width);
   grid->first_step = static_cast<int32_t>(range.least / step);
   const int32_t last = static_cast<int32_t>(range.most / step) + 1;
   grid->num_steps = std::min((last - grid->first_step + 8) / 8 * 8, max_steps / 8 * 8);
   return grid->height > 0;
+}
+
+void tabulate(const DenseGrid& grid, int32_t first, int32_t count, double* sines) {
+  for (int32_t k = 0; k < count; ++k) {
+    const double angle = grid.first_angle + (first + k) * grid.step;
+    sincos(angle, sines + 2 * k, sines + 2 * k + 1);
+    if (!(angle <= kPi)) sines[2 * k] = -1;
+  }
 }
 
 void halve(const DenseGrid& grid, double pixel_angle, Arena& arena, DenseView* view) {
@@ -207,7 +215,7 @@ bool pixel_at(const DenseView& view, const Vec3& ray, Vec2* pixel) {
          (*pixel)[1] <= view.camera.model.height - 1;
 }
 
-void resample(const DenseGrid& grid, const DenseView& view, double first_angle, int32_t columns,
+void resample(const DenseGrid& grid, const DenseView& view, const double* sines, int32_t columns,
               uint8_t* pixels) {
   const tv_image& image = view.image;
   const double scale = 1.0 / (1 << view.halvings);
@@ -220,16 +228,15 @@ void resample(const DenseGrid& grid, const DenseView& view, double first_angle, 
     uint8_t* const row = pixels + static_cast<ptrdiff_t>(y) * columns;
     for (int32_t x = 0; x < columns; ++x) {
       row[x] = 0;
-      const double angle = first_angle + x * grid.step;
-      if (!(angle >= 0 && angle <= kPi)) continue;
-      double sine, cosine;
-      sincos(angle, &sine, &cosine);
+      const double sine = sines[2 * x], cosine = sines[2 * x + 1];
+      if (sine < 0) continue;
       Vec2 at;
       if (!project(view.camera, combine(cosine, along, sine, across), &at, nullptr)) continue;
       const double u = (at[0] + 0.5) * scale - 0.5, v = (at[1] + 0.5) * scale - 0.5;
       if (!(u >= 0 && v >= 0 && u <= image.width - 1 && v <= image.height - 1)) continue;
       const int32_t u16 = static_cast<int32_t>(u * 65536), v16 = static_cast<int32_t>(v * 65536);
-      const uint8_t* p = image.data + static_cast<int64_t>(v16 >> 16) * image.stride_bytes + (u16 >> 16);
+      const uint8_t* p =
+          image.data + static_cast<int64_t>(v16 >> 16) * image.stride_bytes + (u16 >> 16);
       const ptrdiff_t right = (u16 >> 16) + 1 < image.width ? 1 : 0;
       const uint8_t* q = (v16 >> 16) + 1 < image.height ? p + image.stride_bytes : p;
       const int32_t du = u16 >> 8 & 255, dv = v16 >> 8 & 255;

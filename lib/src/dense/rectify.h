@@ -37,15 +37,15 @@ struct ParallaxRange {
   double least, most;
 };
 
-// The most columns of a grid of at most max_cells cells.
-int32_t most_columns(int32_t max_cells);
+// The most columns, and the most rows, of a grid of at most max_cells cells.
+int32_t longest_side(int32_t max_cells);
 
 // Bytes of arena that make_grid takes for itself, and those that halved images need.
 size_t make_grid_bytes();
 size_t halved_bytes(int32_t width, int32_t height);
 
-// The range of parallax that points of status TV_POINT_OK have, without the outermost 1 % and with a
-// margin. pixel_angle: the angle of a pixel. Returns false without such points.
+// The range of parallax that points of status TV_POINT_OK have, without the outermost 1 % and with
+// a margin. pixel_angle: the angle of a pixel. Returns false without such points.
 bool range_of_points(const tv_point* points, int32_t num_points, double pixel_angle, Arena& arena,
                      ParallaxRange* range);
 
@@ -60,9 +60,13 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
 // Halves the view's image as often as the grid's cells are wide. The halved image is in the arena.
 void halve(const DenseGrid& grid, double pixel_angle, Arena& arena, DenseView* view);
 
-// Resamples an image at `columns` columns of the grid, the first of which has the angle
-// first_angle. 0 where the image has no pixel; other values are at least 1.
-void resample(const DenseGrid& grid, const DenseView& view, double first_angle, int32_t columns,
+// Writes sine and cosine of the angles of `count` columns from the column `first` on, which may be
+// beyond the grid's width. The sine is -1 beyond the epipole.
+void tabulate(const DenseGrid& grid, int32_t first, int32_t count, double* sines);
+
+// Resamples an image at the columns that tabulate wrote. 0 where the image has no pixel; other
+// values are at least 1.
+void resample(const DenseGrid& grid, const DenseView& view, const double* sines, int32_t columns,
               uint8_t* pixels);
 
 // The ray at a row and an angle, in the frame of camera 0; the pixel of the unhalved image at which

@@ -12,7 +12,7 @@ constexpr double kMostChange = 1.0;
 // The standard deviation is multiplied by kExcess, since residuals of neighbouring pixels are
 // correlated, and has a floor that stands for what the model leaves out (measured:
 // docs/decisions/0027-dense.md).
-constexpr double kExcess = 1.0, kFloor = 0.0;
+constexpr double kExcess = 2.0, kFloor = 0.12;
 
 }  // namespace
 

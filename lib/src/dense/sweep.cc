@@ -9,14 +9,17 @@ namespace {
 // The window of the census: kAcross x kDown pixels; each pixel before the middle one is compared
 // with that opposite to it, which makes 31 bits.
 constexpr int32_t kHalfAcross = 4, kHalfDown = 3;
-// Costs of a change of parallax along a path, by one step and by more; the latter is lower where the
-// image has an edge.
+// Costs of a change of parallax along a path, by one step and by more; the latter is lower where
+// the image has an edge.
 constexpr int32_t kSmall = 5, kLeastLarge = 10, kLarge = 48, kEdge = 12;
 constexpr int16_t kOutside = 15;  // the cost of a pixel outside image 1: that of a chance match
 constexpr int16_t kNever = 8000;
 // The winner's cost is below this share of the cost of any step that is not its neighbour.
 constexpr int32_t kUnique = 97;
 constexpr int32_t kPad = 8;  // entries before and behind a line of costs
+// Loops over costs run in blocks of this many: a loop of known length becomes vector code in any
+// build, and a small one.
+constexpr int32_t kBlock = 8;
 
 // A line of costs of one pixel: num_steps entries with kPad entries of kNever on both sides.
 struct Lines {
@@ -44,7 +47,8 @@ Lines make_lines(int32_t width, int32_t num_steps, Arena& arena) {
 }
 
 // The census of a row: 0 where the window is not wholly inside.
-void census_row(const uint8_t* pixels, int32_t width, int32_t height, int32_t y, uint32_t* census) {
+__attribute__((noinline)) void census_row(const uint8_t* pixels, int32_t width, int32_t height,
+                                          int32_t y, uint32_t* census) {
   for (int32_t x = 0; x < width; ++x) census[x] = 0;
   if (y < kHalfDown || y + kHalfDown >= height) return;
   const uint8_t* middle = pixels + static_cast<ptrdiff_t>(y) * width;
@@ -61,58 +65,87 @@ void census_row(const uint8_t* pixels, int32_t width, int32_t height, int32_t y,
 }
 
 // The number of bits in which a word differs from each of `count` others.
-void count_bits(uint32_t word, const uint32_t* others, int32_t count, int16_t* bits) {
-  for (int32_t k = 0; k < count; ++k) {
-    uint32_t v = word ^ others[k];
-    v = v - (v >> 1 & 0x55555555u);
-    v = (v & 0x33333333u) + (v >> 2 & 0x33333333u);
-    v = (v + (v >> 4)) & 0x0f0f0f0fu;
-    v = v + (v >> 8);
-    bits[k] = static_cast<int16_t>((v + (v >> 16)) & 63u);
+__attribute__((noinline)) void count_bits(uint32_t word, const uint32_t* others, int32_t count,
+                                          int16_t* bits) {
+  for (int32_t k = 0; k < count; k += kBlock) {
+    for (int32_t i = 0; i < kBlock; ++i) {
+      uint32_t v = word ^ others[k + i];
+      v = v - (v >> 1 & 0x55555555u);
+      v = (v & 0x33333333u) + (v >> 2 & 0x33333333u);
+      v = (v + (v >> 4)) & 0x0f0f0f0fu;
+      v = v + (v >> 8);
+      bits[k + i] = static_cast<int16_t>((v + (v >> 16)) & 63u);
+    }
   }
+}
+
+int16_t least_of(const int16_t* block) {
+  int16_t least = block[0];
+  for (int32_t i = 1; i < kBlock; ++i) least = block[i] < least ? block[i] : least;
+  return least;
 }
 
 // One step of a path: the costs of a pixel from those of the pixel before, which are added to
 // `sums`. least_before is the least of `before`. Returns the least of `after`.
-int16_t follow(const int16_t* cost, const int16_t* before, int16_t least_before, int16_t large,
-               int32_t count, int16_t* __restrict after, int16_t* __restrict sums) {
+__attribute__((noinline)) int16_t follow(const int16_t* cost, const int16_t* before,
+                                         int16_t least_before, int16_t large, int32_t count,
+                                         int16_t* __restrict after, int16_t* __restrict sums) {
   const int16_t jump = static_cast<int16_t>(least_before + large);
-  int16_t least = kNever;
-  for (int32_t k = 0; k < count; ++k) {
-    const int16_t beside = before[k - 1] < before[k + 1] ? before[k - 1] : before[k + 1];
-    int16_t way = static_cast<int16_t>(beside + kSmall);
-    way = before[k] < way ? before[k] : way;
-    way = jump < way ? jump : way;
-    const int16_t total = static_cast<int16_t>(cost[k] + way - least_before);
-    after[k] = total;
-    sums[k] = static_cast<int16_t>(sums[k] + total);
-    least = total < least ? total : least;
+  int16_t least[kBlock];
+  for (int16_t& value : least) value = kNever;
+  for (int32_t k = 0; k < count; k += kBlock) {
+    for (int32_t i = 0; i < kBlock; ++i) {
+      const int16_t left = before[k + i - 1], right = before[k + i + 1], same = before[k + i];
+      int16_t way = left < right ? left : right;
+      way = static_cast<int16_t>(way + kSmall);
+      way = same < way ? same : way;
+      way = jump < way ? jump : way;
+      way = static_cast<int16_t>(way + cost[k + i] - least_before);
+      after[k + i] = way;
+      sums[k + i] = static_cast<int16_t>(sums[k + i] + way);
+      least[i] = way < least[i] ? way : least[i];
+    }
   }
-  return least;
+  return least_of(least);
 }
 
 int16_t large_cost(const uint8_t* pixels, ptrdiff_t before) {
-  const int32_t change = pixels[0] > pixels[before] ? pixels[0] - pixels[before]
-                                                    : pixels[before] - pixels[0];
+  const int32_t change =
+      pixels[0] > pixels[before] ? pixels[0] - pixels[before] : pixels[before] - pixels[0];
   return static_cast<int16_t>(std::max(kLeastLarge, kLarge * kEdge / (kEdge + change)));
 }
 
-int32_t least_at(const int16_t* sums, int32_t count) {
-  int16_t least = sums[0];
-  for (int32_t k = 1; k < count; ++k) least = sums[k] < least ? sums[k] : least;
+__attribute__((noinline)) int16_t least_of_line(const int16_t* line, int32_t count) {
+  int16_t block[kBlock];
+  for (int16_t& value : block) value = kNever;
+  for (int32_t k = 0; k < count; k += kBlock) {
+    for (int32_t i = 0; i < kBlock; ++i) {
+      block[i] = line[k + i] < block[i] ? line[k + i] : block[i];
+    }
+  }
+  return least_of(block);
+}
+
+// The step of the least sum, the first of several. *next is the least sum of the steps that are no
+// neighbours of it. line: room for the sums.
+int32_t least_step(const int16_t* sums, int32_t count, int16_t* line, int32_t* next) {
+  const int16_t least = least_of_line(sums, count);
   int32_t at = 0;
   while (sums[at] != least) ++at;
+  for (int32_t k = 0; k < count; ++k) line[k] = sums[k];
+  for (int32_t k = at - 1; k <= at + 1; ++k) line[k] = kNever;  // at the ends, in the padding
+  *next = least_of_line(line, count);
   return at;
 }
 
-bool is_unique(const int16_t* sums, int32_t count, int32_t winner) {
-  const auto least_of = [&](int32_t from, int32_t to) {
-    int16_t least = 32767;
-    for (int32_t k = from; k < to; ++k) least = sums[k] < least ? sums[k] : least;
-    return least;
-  };
-  const int16_t other = std::min(least_of(0, winner - 1), least_of(winner + 2, count));
-  return 100 * sums[winner] < kUnique * other;
+// Lowers each of `least` to the sum beside it.
+__attribute__((noinline)) void lower(const int16_t* sums, int32_t count, int16_t* least) {
+  for (int32_t k = 0; k < count; k += kBlock) {
+    for (int32_t i = 0; i < kBlock; ++i) {
+      const int16_t old = least[k + i];
+      least[k + i] = sums[k + i] < old ? sums[k + i] : old;
+    }
+  }
 }
 
 // The rows of the paths that come from above: from the left, from straight above, from the right.
@@ -128,7 +161,7 @@ size_t match_rows_bytes(int32_t width, int32_t num_steps) {
   const size_t n = static_cast<size_t>(width), steps = static_cast<size_t>(num_steps);
   return 8 * lines_bytes(width, num_steps) + lines_bytes(2, num_steps) +
          6 * arena_bytes<int16_t>(n) + arena_bytes<uint32_t>(n) + arena_bytes<uint32_t>(n + steps) +
-         2 * arena_bytes<int16_t>(n + steps);
+         arena_bytes<int16_t>(n + steps);
 }
 
 void match_rows(const RowPair& rows, Arena& arena, int16_t* steps) {
@@ -148,7 +181,6 @@ void match_rows(const RowPair& rows, Arena& arena, int16_t* steps) {
   uint32_t* const census0 = arena_alloc<uint32_t>(arena, n);
   uint32_t* const census1 = arena_alloc<uint32_t>(arena, n1);
   int16_t* const least1 = arena_alloc<int16_t>(arena, n1);
-  int16_t* const winner1 = arena_alloc<int16_t>(arena, n1);
 
   for (int32_t y = 0; y < rows.height; ++y) {
     const uint8_t* row0 = rows.pixels0 + static_cast<ptrdiff_t>(y) * width;
@@ -162,7 +194,9 @@ void match_rows(const RowPair& rows, Arena& arena, int16_t* steps) {
         for (int32_t k = 0; k < count; ++k) cost[k] = 0;
       } else {
         count_bits(census0[x], census1 + x, count, cost);
-        for (int32_t k = 0; k < count; ++k) cost[k] = row1[x + k] == 0 ? kOutside : cost[k];
+        for (int32_t k = 0; k < count; ++k) {
+          if (row1[x + k] == 0) cost[k] = kOutside;
+        }
       }
       for (int32_t k = 0; k < count; ++k) sum[k] = 0;
     }
@@ -190,34 +224,30 @@ void match_rows(const RowPair& rows, Arena& arena, int16_t* steps) {
     least = 0;
     for (int32_t k = 0; k < count; ++k) pair.at(width & 1)[k] = 0;
     for (int32_t x = width - 1; x >= 0; --x) {
-      const int16_t large =
-          x < width - 1 ? large_cost(row0 + x, 1) : static_cast<int16_t>(kLarge);
+      const int16_t large = x < width - 1 ? large_cost(row0 + x, 1) : static_cast<int16_t>(kLarge);
       least = follow(costs.at(x), pair.at(1 - (x & 1)), least, large, count, pair.at(x & 1),
                      sums.at(x));
     }
-    // The choice of each pixel of image 1.
-    for (int32_t x = 0; x < width1; ++x) least1[x] = 32767;
+    // The least sum of each pixel of image 1: the choice of the opposite direction has it.
+    for (int32_t x = 0; x < width1; ++x) least1[x] = kNever;
+    for (int32_t x = 0; x < width; ++x) lower(sums.at(x), count, least1 + x);
     for (int32_t x = 0; x < width; ++x) {
-      const int16_t* sum = sums.at(x);
-      int16_t *least_to = least1 + x, *winner_to = winner1 + x;
-      for (int32_t k = 0; k < count; ++k) {
-        const bool better = sum[k] < least_to[k];
-        least_to[k] = better ? sum[k] : least_to[k];
-        winner_to[k] = better ? static_cast<int16_t>(k) : winner_to[k];
+      const int16_t* const sum = sums.at(x);
+      int32_t next;
+      const int32_t k = least_step(sum, count, pair.at(0), &next);
+      bool good = row0[x] != 0 && row1[x + k] != 0 && k > 0 && k < count - 1 &&
+                  100 * sum[k] < kUnique * next;
+      if (good && sum[k] != least1[x + k]) {
+        good = (x > 0 && sums.at(x - 1)[k + 1] == least1[x + k]) ||
+               (x < width - 1 && sums.at(x + 1)[k - 1] == least1[x + k]);
       }
-    }
-    for (int32_t x = 0; x < width; ++x) {
-      const int32_t k = least_at(sums.at(x), count);
-      const int32_t change = winner1[x + k] - k;
-      const bool good = row0[x] != 0 && row1[x + k] != 0 && k > 0 && k < count - 1 && change >= -1 &&
-                        change <= 1 && is_unique(sums.at(x), count, k);
       found[x] = static_cast<int16_t>(good ? k : -1);
     }
   }
 }
 
 void keep_supported(const int16_t* steps, int32_t width, int32_t height, int16_t* kept) {
-  constexpr int32_t kReach = 4, kLeastShare = 3;  // one third of a window of 9 x 9
+  constexpr int32_t kReach = 4, kLeastShare = 60;  // per cent of a window of 9 x 9
   for (int32_t y = 0; y < height; ++y) {
     const int32_t top = std::max(0, y - kReach), bottom = std::min(height - 1, y + kReach);
     for (int32_t x = 0; x < width; ++x) {
@@ -233,7 +263,8 @@ void keep_supported(const int16_t* steps, int32_t width, int32_t height, int16_t
           alike += change >= -1 && change <= 1 ? 1 : 0;
         }
       }
-      if (kLeastShare * alike >= (bottom - top + 1) * (right - left + 1)) kept[at] = steps[at];
+      if (100 * alike >= kLeastShare * (bottom - top + 1) * (right - left + 1))
+        kept[at] = steps[at];
     }
   }
 }
