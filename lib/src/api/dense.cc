@@ -8,7 +8,7 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "dense/rectify.h"
-#include "dense/refine.h"
+#include "dense/fraction.h"
 #include "dense/sweep.h"
 #include "geometry/essential.h"
 #include "geometry/triangulation_frame.h"

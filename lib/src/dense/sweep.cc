@@ -3,23 +3,18 @@
 
 #include <algorithm>
 
+#include "dense/lines.h"
+
 namespace tv {
 namespace {
 
-// The window of the census: kAcross x kDown pixels; each pixel before the middle one is compared
-// with that opposite to it, which makes 31 bits.
-constexpr int32_t kHalfAcross = 4, kHalfDown = 3;
 // Costs of a change of parallax along a path, by one step and by more; the latter is lower where
 // the image has an edge.
 constexpr int32_t kSmall = 5, kLeastLarge = 10, kLarge = 48, kEdge = 12;
 constexpr int16_t kOutside = 15;  // the cost of a pixel outside image 1: that of a chance match
-constexpr int16_t kNever = 8000;
 // The winner's cost is below this share of the cost of any step that is not its neighbour.
 constexpr int32_t kUnique = 97;
 constexpr int32_t kPad = 8;  // entries before and behind a line of costs
-// Loops over costs run in blocks of this many: a loop of known length becomes vector code in any
-// build, and a small one.
-constexpr int32_t kBlock = 8;
 
 // A line of costs of one pixel: num_steps entries with kPad entries of kNever on both sides.
 struct Lines {
@@ -46,84 +41,10 @@ Lines make_lines(int32_t width, int32_t num_steps, Arena& arena) {
   return lines;
 }
 
-// The census of a row: 0 where the window is not wholly inside.
-__attribute__((noinline)) void census_row(const uint8_t* pixels, int32_t width, int32_t height,
-                                          int32_t y, uint32_t* census) {
-  for (int32_t x = 0; x < width; ++x) census[x] = 0;
-  if (y < kHalfDown || y + kHalfDown >= height) return;
-  const uint8_t* middle = pixels + static_cast<ptrdiff_t>(y) * width;
-  for (int32_t dy = -kHalfDown; dy <= 0; ++dy) {
-    const int32_t last = dy < 0 ? kHalfAcross : -1;
-    for (int32_t dx = -kHalfAcross; dx <= last; ++dx) {
-      const ptrdiff_t offset = static_cast<ptrdiff_t>(dy) * width + dx;
-      const uint8_t *before = middle + offset, *after = middle - offset;
-      for (int32_t x = kHalfAcross; x < width - kHalfAcross; ++x) {
-        census[x] = census[x] << 1 | (before[x] < after[x] ? 1u : 0u);
-      }
-    }
-  }
-}
-
-// The number of bits in which a word differs from each of `count` others.
-__attribute__((noinline)) void count_bits(uint32_t word, const uint32_t* others, int32_t count,
-                                          int16_t* bits) {
-  for (int32_t k = 0; k < count; k += kBlock) {
-    for (int32_t i = 0; i < kBlock; ++i) {
-      uint32_t v = word ^ others[k + i];
-      v = v - (v >> 1 & 0x55555555u);
-      v = (v & 0x33333333u) + (v >> 2 & 0x33333333u);
-      v = (v + (v >> 4)) & 0x0f0f0f0fu;
-      v = v + (v >> 8);
-      bits[k + i] = static_cast<int16_t>((v + (v >> 16)) & 63u);
-    }
-  }
-}
-
-int16_t least_of(const int16_t* block) {
-  int16_t least = block[0];
-  for (int32_t i = 1; i < kBlock; ++i) least = block[i] < least ? block[i] : least;
-  return least;
-}
-
-// One step of a path: the costs of a pixel from those of the pixel before, which are added to
-// `sums`. least_before is the least of `before`. Returns the least of `after`.
-__attribute__((noinline)) int16_t follow(const int16_t* cost, const int16_t* before,
-                                         int16_t least_before, int16_t large, int32_t count,
-                                         int16_t* __restrict after, int16_t* __restrict sums) {
-  const int16_t jump = static_cast<int16_t>(least_before + large);
-  int16_t least[kBlock];
-  for (int16_t& value : least) value = kNever;
-  for (int32_t k = 0; k < count; k += kBlock) {
-    for (int32_t i = 0; i < kBlock; ++i) {
-      const int16_t left = before[k + i - 1], right = before[k + i + 1], same = before[k + i];
-      int16_t way = left < right ? left : right;
-      way = static_cast<int16_t>(way + kSmall);
-      way = same < way ? same : way;
-      way = jump < way ? jump : way;
-      way = static_cast<int16_t>(way + cost[k + i] - least_before);
-      after[k + i] = way;
-      sums[k + i] = static_cast<int16_t>(sums[k + i] + way);
-      least[i] = way < least[i] ? way : least[i];
-    }
-  }
-  return least_of(least);
-}
-
 int16_t large_cost(const uint8_t* pixels, ptrdiff_t before) {
   const int32_t change =
       pixels[0] > pixels[before] ? pixels[0] - pixels[before] : pixels[before] - pixels[0];
   return static_cast<int16_t>(std::max(kLeastLarge, kLarge * kEdge / (kEdge + change)));
-}
-
-__attribute__((noinline)) int16_t least_of_line(const int16_t* line, int32_t count) {
-  int16_t block[kBlock];
-  for (int16_t& value : block) value = kNever;
-  for (int32_t k = 0; k < count; k += kBlock) {
-    for (int32_t i = 0; i < kBlock; ++i) {
-      block[i] = line[k + i] < block[i] ? line[k + i] : block[i];
-    }
-  }
-  return least_of(block);
 }
 
 // The step of the least sum, the first of several. *next is the least sum of the steps that are no
@@ -136,16 +57,6 @@ int32_t least_step(const int16_t* sums, int32_t count, int16_t* line, int32_t* n
   for (int32_t k = at - 1; k <= at + 1; ++k) line[k] = kNever;  // at the ends, in the padding
   *next = least_of_line(line, count);
   return at;
-}
-
-// Lowers each of `least` to the sum beside it.
-__attribute__((noinline)) void lower(const int16_t* sums, int32_t count, int16_t* least) {
-  for (int32_t k = 0; k < count; k += kBlock) {
-    for (int32_t i = 0; i < kBlock; ++i) {
-      const int16_t old = least[k + i];
-      least[k + i] = sums[k + i] < old ? sums[k + i] : old;
-    }
-  }
 }
 
 // The rows of the paths that come from above: from the left, from straight above, from the right.

@@ -1,4 +1,4 @@
-#include "dense/refine.h"
+#include "dense/fraction.h"
 
 #include <cmath>
 
