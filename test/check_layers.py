@@ -19,7 +19,8 @@ LAYERS = {
     "robust": {"geometry", "kernels", "base"},
     "odometry": {"match", "robust", "feature", "image", "geometry", "kernels", "base"},
     "dense": {"geometry", "kernels", "base"},
-    "api": {"dense", "odometry", "match", "robust", "feature", "image", "geometry", "kernels", "base"},
+    "api": {"dense", "odometry", "match", "robust", "feature", "image", "geometry", "kernels",
+            "base"},
 }
 WITHOUT_EIGEN = {"base", "kernels", "image", "feature", "match"}
 WITHOUT_PIXELS = {"geometry", "robust"}

@@ -29,7 +29,8 @@ def main():
     carried = sorted(taken & parts)
     if carried:
         sys.exit(f"a program without odometry and dense cloud carries {', '.join(carried)}")
-    print(f"{len(taken)} of {len(members)} members, none of the {len(parts)} of odometry and dense cloud")
+    print(f"{len(taken)} of {len(members)} members, none of the {len(parts)} of odometry and dense "
+          "cloud")
 
 
 if __name__ == "__main__":

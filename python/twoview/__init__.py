@@ -11,7 +11,8 @@ context), TV_ERR_CAMERA, TV_ERR_OUTSIDE (beyond what a lens model is valid for) 
 
 import typing as _typing
 
-from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR, GRAVITY_PRIOR, KEYPOINT,
+from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR,
+                   GRAVITY_PRIOR, KEYPOINT,
                    MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT,
                    TV_ERR_ARGUMENT,
                    TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP,
@@ -70,8 +71,8 @@ __all__ = [
     "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view", "adjust_window",
     "camera_check", "camera_project_points", "camera_scale", "camera_undistort",
     "camera_unproject_points", "camera_valid_angle", "correct_matches", "corrected_camera",
-    "default_library", "densify", "describe", "detect", "estimate_absolute_pose", "estimate_two_view",
-    "extract", "format_cameras", "keypoint_sigmas", "match", "match_guided", "orient",
-    "parse_cameras", "point_covariances", "read_camera", "read_cameras", "read_sigmas",
+    "default_library", "densify", "describe", "detect", "estimate_absolute_pose",
+    "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match",
+    "match_guided", "orient", "parse_cameras", "point_covariances", "read_camera", "read_cameras", "read_sigmas",
     "reconstruct", "triangulate", "version_string", "write_cameras",
 ]

@@ -46,7 +46,7 @@ struct CloudPoint {
   double x, y, z;  // in camera 0's frame, in metres or baselines (unit_of)
   uint8_t red, green, blue;
   float angle_deg;
-  float error_px;  // of a dense point: the standard deviation of its match
+  float error_px;   // of a dense point: the standard deviation of its match
   float sigma = 0;  // standard deviation of the distance from camera 0; 0: not known
 };
 // The points of the matches, and behind them the dense ones.

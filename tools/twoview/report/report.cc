@@ -155,10 +155,10 @@ std::string matrices(const Json& j) {
 
 std::string tables(const Json& j) {
   std::string found;
-  for (const char* key :
-       {"num_keypoints", "num_matches", "num_inliers", "config", "verdict", "reasons",
-        "probability_wrong", "num_points", "num_dense_points", "median_parallax_deg", "rms_reprojection_px",
-        "principal_point_shift_px", "scale", "scale_sigma", "num_iterations"})
+  for (const char* key : {"num_keypoints", "num_matches", "num_inliers", "config", "verdict",
+                          "reasons", "probability_wrong", "num_points", "num_dense_points",
+                          "median_parallax_deg", "rms_reprojection_px", "principal_point_shift_px",
+                          "scale", "scale_sigma", "num_iterations"})
     found += row(key, j[key]);
   std::string text = table("What was found", found);
   if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);
