@@ -72,7 +72,7 @@ __all__ = [
     "camera_check", "camera_project_points", "camera_scale", "camera_undistort",
     "camera_unproject_points", "camera_valid_angle", "correct_matches", "corrected_camera",
     "default_library", "densify", "describe", "detect", "estimate_absolute_pose",
-    "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match",
-    "match_guided", "orient", "parse_cameras", "point_covariances", "read_camera", "read_cameras", "read_sigmas",
+    "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match", "match_guided",
+    "orient", "parse_cameras", "point_covariances", "read_camera", "read_cameras", "read_sigmas",
     "reconstruct", "triangulate", "version_string", "write_cameras",
 ]
