@@ -66,7 +66,7 @@ typedef struct tv_dense_point {
 
 /* Writes to *size_bytes how much memory tv_densify needs for images of these sizes (width and
    height of each camera). options: null means the defaults. The number depends on the sizes, on the
-   options and on the library's version alone: about 6 MB for the defaults and images of 640 x 480.
+   options and on the library's version alone: about 9 MB for the defaults and images of 640 x 480.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option), TV_ERR_NOT_FINITE (an
    option), TV_ERR_CAMERA. */
 TV_API tv_status tv_dense_size(const tv_camera *camera0, const tv_camera *camera1,
