@@ -90,7 +90,7 @@ TV_API tv_status tv_dense_size(const tv_camera *camera0, const tv_camera *camera
    end of the range, is not that of the opposite direction (from image 1 to image 0) or has few
    neighbours of like parallax, where the windows are not alike, or where the standard deviation is
    above max_relative_sigma.
-   The result has the same bits on every CPU. Takes at most max_cells x max_steps steps; 0.3 s for
+   The result has the same bits on every CPU. Takes at most max_cells x max_steps steps; 0.4 s for
    the defaults on a desktop core. Needs no context. Thread-safe.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (an option, a count, an image, R or t),
    TV_ERR_NOT_FINITE (an option, R or t), TV_ERR_CAMERA, TV_ERR_ALIGNMENT, TV_ERR_MEMORY,
