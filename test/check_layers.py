@@ -18,7 +18,9 @@ LAYERS = {
     "geometry": {"kernels", "base"},
     "robust": {"geometry", "kernels", "base"},
     "odometry": {"match", "robust", "feature", "image", "geometry", "kernels", "base"},
-    "api": {"odometry", "match", "robust", "feature", "image", "geometry", "kernels", "base"},
+    "dense": {"geometry", "kernels", "base"},
+    "api": {"dense", "odometry", "match", "robust", "feature", "image", "geometry", "kernels",
+            "base"},
 }
 WITHOUT_EIGEN = {"base", "kernels", "image", "feature", "match"}
 WITHOUT_PIXELS = {"geometry", "robust"}

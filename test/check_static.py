@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Checks that a program with the static library carries only the parts that it calls: of a program
-that calls no odometry, no member of the archive that the linker took is one of odometry.
+that calls no odometry and no dense cloud, no member of the archive that the linker took is one of
+these parts.
 usage: check_static.py --ar AR ARCHIVE MAP OBJECT...   MAP is the linker's map of the program, and
-each OBJECT an object file of odometry"""
+each OBJECT an object file of such a part"""
 import argparse
 import pathlib
 import re
@@ -22,13 +23,14 @@ def main():
     name = re.escape(pathlib.Path(args.archive).name)
     text = pathlib.Path(args.map).read_text(encoding="utf-8", errors="replace")
     taken = set(re.findall(name + r"\(([^)]+)\)", text))
-    odometry = {pathlib.Path(path).name for path in args.objects}
-    if not taken or not odometry <= set(members):
+    parts = {pathlib.Path(path).name for path in args.objects}
+    if not taken or not parts <= set(members):
         sys.exit(f"{args.map}: the linker's map, or {args.archive}, is not understood")
-    carried = sorted(taken & odometry)
+    carried = sorted(taken & parts)
     if carried:
-        sys.exit(f"a program without odometry carries {', '.join(carried)}")
-    print(f"{len(taken)} of {len(members)} members, none of the {len(odometry)} of odometry")
+        sys.exit(f"a program without odometry and dense cloud carries {', '.join(carried)}")
+    print(f"{len(taken)} of {len(members)} members, none of the {len(parts)} of odometry and dense "
+          "cloud")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ context), TV_ERR_CAMERA, TV_ERR_OUTSIDE (beyond what a lens model is valid for) 
 
 import typing as _typing
 
-from ._abi import (CORRESPONDENCE, DESCRIPTOR_BYTES, DISTANCE_PRIOR, GRAVITY_PRIOR, KEYPOINT,
+from ._abi import (CORRESPONDENCE, DENSE_POINT, DESCRIPTOR_BYTES, DISTANCE_PRIOR,
+                   GRAVITY_PRIOR, KEYPOINT,
                    MAP_OBSERVATION, MAP_POINT, OBSERVATION, POINT, POSE_PRIOR, TV_ERR_ALIGNMENT,
                    TV_ERR_ARGUMENT,
                    TV_ERR_CAMERA, TV_ERR_CAPACITY, TV_ERR_KERNELS, TV_ERR_LIMITS, TV_ERR_MAP,
@@ -24,12 +25,13 @@ from .camera import (Camera, camera_check, camera_project_points, camera_scale,
 from .camera_files import (FILM, PLAIN_FILE, CalibrationSigmas, FormatError, format_cameras,
                            parse_cameras, read_camera, read_cameras, read_sigmas, write_cameras)
 from .context import Context
+from .dense import densify
 from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, OdometryStatus, Orientation,
                     PointStatus, Purpose, Reason, ScaleSource, Solver, Stage, Status,
                     Triangulation, Verdict)
 from .odometry import Keyframe, Odometry, OdometryState
-from .options import (AbsolutePoseOptions, BundleOptions, EstimateOptions, FeatureOptions,
-                      GuidedOptions, MatchOptions, OdometryOptions, WindowOptions)
+from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, EstimateOptions,
+                      FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions, WindowOptions)
 from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,
                      corrected_camera, describe, detect, estimate_two_view, extract,
                      keypoint_sigmas, match, match_guided, orient, point_covariances,
@@ -56,8 +58,8 @@ if not _typing.TYPE_CHECKING:  # or a type checker would accept every unknown na
 # A type checker reads this list; a test compares it with the imports above.
 __all__ = [
     "AbsolutePose", "AbsolutePoseOptions", "BundleOptions", "BundleResult", "CORRESPONDENCE",
-    "CalibrationSigmas", "Camera", "CameraModel", "Context", "DESCRIPTOR_BYTES",
-    "DISTANCE_PRIOR", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
+    "CalibrationSigmas", "Camera", "CameraModel", "Context", "DENSE_POINT", "DESCRIPTOR_BYTES",
+    "DISTANCE_PRIOR", "DenseOptions", "EstimateOptions", "FILM", "FeatureOptions", "FormatError",
     "GRAVITY_PRIOR", "GuidedOptions", "KEYPOINT", "Kernels", "Keyframe", "Kind", "Library",
     "Loss", "MAP_OBSERVATION", "MAP_POINT", "MatchOptions", "Normalisation", "OBSERVATION",
     "Odometry", "OdometryOptions", "OdometryState", "OdometryStatus", "Orientation",
@@ -69,8 +71,8 @@ __all__ = [
     "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view", "adjust_window",
     "camera_check", "camera_project_points", "camera_scale", "camera_undistort",
     "camera_unproject_points", "camera_valid_angle", "correct_matches", "corrected_camera",
-    "default_library", "describe", "detect", "estimate_absolute_pose", "estimate_two_view",
-    "extract", "format_cameras", "keypoint_sigmas", "match", "match_guided", "orient",
-    "parse_cameras", "point_covariances", "read_camera", "read_cameras", "read_sigmas",
+    "default_library", "densify", "describe", "detect", "estimate_absolute_pose",
+    "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match", "match_guided",
+    "orient", "parse_cameras", "point_covariances", "read_camera", "read_cameras", "read_sigmas",
     "reconstruct", "triangulate", "version_string", "write_cameras",
 ]

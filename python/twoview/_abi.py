@@ -267,6 +267,17 @@ class tv_map_observation(Structure):
                 ("sigma", c_float), ("reserved", c_int32)]
 
 
+class tv_dense_options(Structure):
+    _fields_ = [("struct_size", c_uint32), ("max_cells", c_int32), ("max_steps", c_int32),
+                ("reserved", c_int32), ("min_parallax_rad", c_double),
+                ("max_parallax_rad", c_double), ("max_relative_sigma", c_double)]
+
+
+class tv_dense_point(Structure):
+    _fields_ = [("position", c_float * 3), ("pixel0", c_float * 2), ("pixel1", c_float * 2),
+                ("sigma", c_float), ("similarity", c_float), ("grey", c_int32)]
+
+
 STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_options,
            tv_correspondence, tv_match_options, tv_guided_options, tv_pixel_pairs,
            tv_estimate_options, tv_two_view, tv_point, tv_view, tv_reconstruct_options,
@@ -274,11 +285,12 @@ STRUCTS = [tv_limits, tv_image, tv_camera, tv_keypoint, tv_features, tv_feature_
            tv_absolute_pose_options, tv_absolute_pose, tv_window_view, tv_observation,
            tv_pose_prior, tv_gravity_prior, tv_distance_prior, tv_window, tv_window_options,
            tv_window_result, tv_odometry_options, tv_odometry_frame, tv_odometry_state,
-           tv_keyframe, tv_map_point, tv_map_observation]
+           tv_keyframe, tv_map_point, tv_map_observation, tv_dense_options, tv_dense_point]
 
 KEYPOINT = np.dtype(tv_keypoint)
 CORRESPONDENCE = np.dtype(tv_correspondence)
 POINT = np.dtype(tv_point)
+DENSE_POINT = np.dtype(tv_dense_point)
 WINDOW_VIEW = np.dtype(tv_window_view)
 OBSERVATION = np.dtype(tv_observation)
 POSE_PRIOR = np.dtype(tv_pose_prior)
@@ -366,7 +378,7 @@ class Library:
         for struct in STRUCTS:
             if struct._fields_[0][0] == "struct_size":
                 init = getattr(self.lib, struct.__name__ + "_init_sized", None)
-                if init is not None:  # a library without odometry does not have all of them
+                if init is not None:  # a library without odometry or dense clouds lacks some
                     init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
     def make(self, struct: Any, fields: Optional[dict[str, Any]] = None) -> Any:

@@ -135,11 +135,24 @@ class OdometryOptions:
     seed: Optional[int] = None  #: seed of every sampler; None: the library's constant
 
 
+@dataclass(frozen=True)
+class DenseOptions:
+    """The options of densify, as in tv_dense_options."""
+
+    max_cells: int = 400000  #: most cells of the grid, [1024, 16777216]
+    max_steps: int = 128  #: most steps of parallax, [16, 512]
+    reserved: int = 0  #: must be 0
+    min_parallax_rad: float = 0.0  #: least parallax, radians
+    max_parallax_rad: float = 0.0  #: largest parallax, radians; 0: the range of the sparse points
+    max_relative_sigma: float = 0.05  #: largest sigma of a distance, as a share of it
+
+
 _STRUCTS = {FeatureOptions: _abi.tv_feature_options, MatchOptions: _abi.tv_match_options,
             GuidedOptions: _abi.tv_guided_options, EstimateOptions: _abi.tv_estimate_options,
             BundleOptions: _abi.tv_bundle_options,
             AbsolutePoseOptions: _abi.tv_absolute_pose_options,
-            WindowOptions: _abi.tv_window_options, OdometryOptions: _abi.tv_odometry_options}
+            WindowOptions: _abi.tv_window_options, OdometryOptions: _abi.tv_odometry_options,
+            DenseOptions: _abi.tv_dense_options}
 
 
 def to_struct(library: _abi.Library, kind: type, options: Any, keywords: dict[str, Any]) -> Any:

@@ -15,6 +15,7 @@ RESULT_KEYS = (
   reasons R t E F H
 alternative evidence covariance noise_px principal_point_shift_px principal_point num_points
 median_parallax_deg rms_reprojection_px scale
+num_dense_points dense_sigma_median_percent
 scale_sigma imu truth timings_ms context_bytes options seed version kernels""".split()
 )
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
@@ -30,7 +31,8 @@ def read_ply(path):
     header = data[:end].decode()
     properties = re.findall(r"^property (\w+) (\w+)$", header, re.M)
     count = int(re.search(r"^element vertex (\d+)$", header, re.M).group(1))
-    points = list(struct.iter_unpack("<fffBBBff", data[end:]))
+    layout = "<fffBBBfff" if ("float", "sigma") in properties else "<fffBBBff"
+    points = list(struct.iter_unpack(layout, data[end:]))
     return header, properties, count, points
 
 
@@ -110,6 +112,42 @@ class Reconstruct(cli.CliTest):
             errors["depth_error_p95_percent"], errors["depth_error_median_percent"]
         )
         self.assertIn("truth", done.stdout.decode())
+
+    def test_a_dense_cloud_is_dense_and_right(self):
+        self.write("depth.pfm", cli.pfm(WIDTH, HEIGHT, lambda x, y: 0.5 * cli.true_depth(x, y)))
+        truth = self.write("truth.yaml", TRUTH)
+        done = self.reconstruct("--truth", truth, "--dense", "4000")
+        if b"--dense" in done.stderr:
+            self.skipTest("the program was built without TWOVIEW_DENSE")
+        self.succeed(done)
+        self.assertIn("dense ", done.stdout.decode())
+        result = self.result()
+        self.assertEqual(result["options"]["dense"], 4000)
+        self.assertTrue(2000 < result["num_dense_points"] <= 4000)
+        self.assertTrue(0 < result["dense_sigma_median_percent"] < 3)
+        self.assertGreater(result["timings_ms"]["dense"], 0)
+        errors = result["truth"]
+        self.assertGreater(errors["num_dense_depths"], 1500)
+        self.assertLess(errors["dense_depth_error_median_percent"], 1)
+        _, properties, count, points = read_ply(self.out / "cloud.ply")
+        self.assertEqual(properties[-1], ("float", "sigma"))
+        self.assertEqual(count, result["num_points"] + result["num_dense_points"])
+        self.assertEqual(len(points), count)
+        within = 0
+        for x, y, z, red, green, blue, angle, error, sigma in points:
+            self.assertTrue(sigma > 0 and error >= 0 and 0 < angle < 30)
+            self.assertLess(sigma, 0.2 * z)
+            self.assertEqual((green, blue), (red, red))  # of a grey image
+            row = round(FOCAL * y / z + (HEIGHT - 1) / 2)
+            known = cli.true_depth(0, min(max(row, 0), HEIGHT - 1))
+            within += abs(z - known) < 4 * sigma + 0.01 * z
+        self.assertGreater(within, 0.95 * count)
+
+    def test_a_dense_cloud_needs_a_pose_and_a_sensible_number(self):
+        for wrong in ("-1", "nan", "many", "4000001", ""):
+            self.one_line(self.succeed(self.reconstruct("--dense", wrong), 2), "--dense")
+        self.succeed(self.reconstruct("--dense", "0"))
+        self.assertIsNone(self.result()["num_dense_points"])
 
     def test_unknown_depths_are_left_out(self):
         self.write(

@@ -1,6 +1,7 @@
 """Checks that the pages and the picture of the demo show what the program gives: the summary in
 docs/start.md, the row of docs/paper.md and docs/images/demo_views.png are those of scripts/demo."""
 
+import json
 import os
 import pathlib
 import re
@@ -34,7 +35,7 @@ class TestDemo(unittest.TestCase):
         cls.summary = subprocess.run(
             [PROGRAM, "reconstruct", *(PAIR / f"motorcycle_{s}.png" for s in ("left", "right")),
              "--camera0", inputs / "camera0.yaml", "--camera1", inputs / "camera1.yaml",
-             "--truth", inputs / "truth.yaml", "-o", cls.out / "demo"],
+             "--truth", inputs / "truth.yaml", "--dense", "30000", "-o", cls.out / "demo"],
             check=True, capture_output=True, text=True).stdout
         cls.agree = re.search(r"matches +(\d+), of which (\d+) agree", cls.summary)
 
@@ -43,6 +44,13 @@ class TestDemo(unittest.TestCase):
         block = re.search(r"```text\n(verdict.*?)```", page, re.S)[1]
         for line in block.splitlines():
             self.assertIn(line.removesuffix("..."), self.summary)
+
+    def test_the_dense_cloud_is_dense_and_right(self):
+        result = json.loads((self.out / "demo" / "result.json").read_text(encoding="utf-8"))
+        truth = result["truth"]
+        self.assertGreaterEqual(truth["num_dense_depths"], 20000)
+        self.assertLessEqual(truth["dense_depth_error_median_percent"], 1.0)
+        self.assertLess(truth["dense_depth_error_p95_percent"], 5.0)
 
     def test_the_row_of_the_papers_page(self):
         page = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")

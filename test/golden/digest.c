@@ -48,6 +48,8 @@ LAYOUT(tv_odometry_state, 568, scale_sigma, 560);
 LAYOUT(tv_keyframe, 128, num_observations, 124);
 LAYOUT(tv_map_point, 112, covariance, 40);
 LAYOUT(tv_map_observation, 24, reserved, 20);
+LAYOUT(tv_dense_options, 40, max_relative_sigma, 32);
+LAYOUT(tv_dense_point, 40, grey, 36);
 
 enum { MAX_KEYPOINTS = 600, NUM_METHODS = TV_TRIANGULATION_MIDPOINT + 1 };
 
@@ -698,6 +700,33 @@ static void digest_points(const pair *p, tv_context *context, const matched *m,
   print(p, context, "point_covariances");
 }
 
+static void digest_dense(const pair *p, tv_context *context, const matched *m,
+                         const tv_two_view *pose, const tv_point *sparse) {
+  enum { MOST = 20000 };
+  static tv_dense_point points[MOST];
+  tv_dense_options options;
+  size_t bytes;
+  uint8_t *block;
+  uintptr_t start_of_memory;
+  int32_t num;
+  start();
+  tv_dense_options_init(&options);
+  options.max_cells = 60000;
+  options.max_steps = 64;
+  must("dense_size", tv_dense_size(&p->camera[0], &p->camera[1], &options, &bytes));
+  block = (uint8_t *)malloc(bytes + TV_CONTEXT_ALIGNMENT);
+  if (block == NULL) fail("dense", TV_ERR_MEMORY);
+  start_of_memory = (uintptr_t)block + TV_CONTEXT_ALIGNMENT - 1;
+  start_of_memory -= start_of_memory % TV_CONTEXT_ALIGNMENT;
+  must("densify",
+       tv_densify(&p->image[0], &p->image[1], &p->camera[0], &p->camera[1], pose->R, pose->t,
+                  sparse, m->count, &options, (void *)start_of_memory, bytes, points, MOST, &num));
+  add_bytes(&num, sizeof num);
+  add_bytes(points, (size_t)num * sizeof *points);
+  free(block);
+  print(p, context, "dense");
+}
+
 static void digest_bundle(const pair *p, tv_context *context, const matched *m,
                           const tv_two_view *pose, const tv_point *points) {
   static tv_point adjusted[MAX_KEYPOINTS];
@@ -789,6 +818,7 @@ static void digest_pair(const pair *p, int32_t kernels) {
   if (!pose.has_R || !pose.has_t) fail("this pair has no pose", TV_OK);
   digest_guided(p, context, &f, &pose);
   digest_points(p, context, &m, &pose, points);
+  digest_dense(p, context, &m, &pose, points);
   digest_bundle(p, context, &m, &pose, points);
   digest_absolute_pose(p, context);
   digest_window(p, context);

@@ -33,6 +33,7 @@ STAGES = {
     "triangulate": ["poly", "poly_abs", "linear_eigen", "linear_ls", "iterative_eigen",
                     "iterative_ls", "midpoint"],
     "bundle": ["point_covariances", "bundle"],
+    "dense": ["dense"],
     "absolute_pose": ["absolute_pose"],
     "window": ["window"],
     "odometry": ["odometry"],

@@ -6,6 +6,7 @@
 #include "twoview/bundle.h"
 #include "twoview/camera.h"
 #include "twoview/context.h"
+#include "twoview/dense.h"
 #include "twoview/feature.h"
 #include "twoview/image.h"
 #include "twoview/match.h"

@@ -28,6 +28,7 @@ PROGRAM = "twoview rerun"
 MISSING = "needs the package rerun-sdk (pip install rerun-sdk)"
 VERTEX = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3), ("angle_deg", "<f4"),
                    ("error_px", "<f4")])  # of cloud.ply (docs/formats.md)
+DENSE_VERTEX = np.dtype(VERTEX.descr + [("sigma", "<f4")])  # with reconstruct --dense
 PLANE_SHARE = 0.5  # distance of the drawn picture from its camera, in units of the result
 FILM_DIAGONAL_MM = math.hypot(36, 24)
 
@@ -44,7 +45,7 @@ def read_json(path):
 
 
 def read_cloud(path):
-    """The vertices of a cloud.ply of twoview, (n,) of VERTEX."""
+    """The vertices of a cloud.ply of twoview, (n,) of VERTEX or DENSE_VERTEX."""
     data = path.read_bytes()
     head, mark, body = data.partition(b"end_header\n")
     counts = [line.split()[2] for line in head.split(b"\n") if line.startswith(b"element vertex")]
@@ -53,9 +54,11 @@ def read_cloud(path):
         raise BadInput(f"{path}: no cloud of twoview")
     count = int(counts[0])
     names = [b"x", b"y", b"z", b"red", b"green", b"blue", b"angle_deg", b"error_px"]
-    if kinds != names or len(body) < count * VERTEX.itemsize:
+    vertex = DENSE_VERTEX if kinds == names + [b"sigma"] else VERTEX
+    if kinds[:8] != names or kinds[8:] not in ([], [b"sigma"]) or (
+            len(body) < count * vertex.itemsize):
         raise BadInput(f"{path}: its properties are not those of twoview, or it ends early")
-    return np.frombuffer(body, VERTEX, count)
+    return np.frombuffer(body, vertex, count)
 
 
 def read_table(path, columns):

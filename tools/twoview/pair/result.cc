@@ -95,6 +95,29 @@ double rms_reprojection_px(const tv_reconstruction& reconstruction) {
   return count ? std::sqrt(sum / count) : NAN;
 }
 
+// The angle of a pixel of image 0, radians.
+double pixel_angle(const Outcome& outcome) {
+  return 1 / std::sqrt(outcome.camera[0].fx * outcome.camera[0].fy);
+}
+
+// The angle between the rays to a point, and how much its distance from camera 0 changes with that
+// angle.
+struct Parallax {
+  double angle_rad, lever;
+};
+Parallax parallax_of(const tv_two_view& v, const Vector3& point) {
+  const Vector3 away = applied(transposed(rotation_of(v)), translation_of(v));
+  Vector3 other{};
+  double cosine = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    other[i] = point[i] + away[i];  // from camera 1, in the frame of camera 0
+    cosine += point[i] * other[i];
+  }
+  cosine /= norm(point) * norm(other);
+  const double angle = std::acos(std::min(std::max(cosine, -1.0), 1.0));
+  return {angle, norm(other) / std::max(std::sin(angle), 1e-12)};
+}
+
 // Writes JSON as nlohmann's dump(2) does, except that a list of plain values stays on one line.
 void append_json(std::string& text, const Json& json, size_t depth) {
   if (json.is_primitive() || json.empty()) {
@@ -133,21 +156,48 @@ double unit_of(const Outcome& outcome) { return outcome.scale ? outcome.scale->b
 std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
   std::vector<CloudPoint> cloud;
   const tv_reconstruction& r = outcome.reconstruction;
-  const cv::Mat& colour = outcome.picture[0].colour;
   const double unit = unit_of(outcome);
+  const auto colour_at = [&](double column, double row) {
+    const cv::Mat& colour = outcome.picture[0].colour;
+    const int x = std::min(std::max(static_cast<int>(std::lround(column)), 0), colour.cols - 1);
+    const int y = std::min(std::max(static_cast<int>(std::lround(row)), 0), colour.rows - 1);
+    return colour.at<cv::Vec3b>(y, x);
+  };
+  const double noise_rad = 1.4142135623730951 * outcome.two_view.noise_px * pixel_angle(outcome);
   for (int32_t i = 0; i < r.num_matches; ++i) {
     const tv_point& point = r.points[i];
     if (point.status != TV_POINT_OK) continue;
     const tv_keypoint& keypoint = r.keypoints[0][r.matches[i].idx0];
-    const int x = std::min(std::max(static_cast<int>(std::lround(keypoint.x)), 0), colour.cols - 1);
-    const int y = std::min(std::max(static_cast<int>(std::lround(keypoint.y)), 0), colour.rows - 1);
-    const cv::Vec3b bgr = colour.at<cv::Vec3b>(y, x);
+    const cv::Vec3b bgr = colour_at(keypoint.x, keypoint.y);
+    const Parallax parallax =
+        parallax_of(outcome.two_view, {point.position[0], point.position[1], point.position[2]});
     cloud.push_back({unit * point.position[0], unit * point.position[1], unit * point.position[2],
                      bgr[2], bgr[1], bgr[0],
                      static_cast<float>(static_cast<double>(point.angle_rad) * kDegrees),
-                     point.error_px});
+                     point.error_px, static_cast<float>(unit * noise_rad * parallax.lever)});
+  }
+  if (!outcome.dense) return cloud;
+  for (const tv_dense_point& point : *outcome.dense) {
+    const Vector3 at = {point.position[0], point.position[1], point.position[2]};
+    const cv::Vec3b bgr = colour_at(point.pixel0[0], point.pixel0[1]);
+    const Parallax parallax = parallax_of(outcome.two_view, at);
+    const double sigma = point.sigma;
+    cloud.push_back({unit * at[0], unit * at[1], unit * at[2], bgr[2], bgr[1], bgr[0],
+                     static_cast<float>(parallax.angle_rad * kDegrees),
+                     static_cast<float>(sigma / parallax.lever / pixel_angle(outcome)),
+                     static_cast<float>(unit * sigma)});
   }
   return cloud;
+}
+
+double dense_sigma_percent(const Outcome& outcome) {
+  std::vector<double> shares;
+  if (outcome.dense)
+    for (const tv_dense_point& point : *outcome.dense) {
+      const Vector3 at = {point.position[0], point.position[1], point.position[2]};
+      shares.push_back(100 * static_cast<double>(point.sigma) / norm(at));
+    }
+  return shares.empty() ? NAN : percentile(shares, 0.5);
 }
 
 Frustum frustum_of(const Outcome& outcome, int camera, double size) {
@@ -247,6 +297,8 @@ Json result_json(const Outcome& outcome) {
   const double scale = magnification(outcome);
   json["magnification"] = scale > 0 ? finite_or_null(scale) : Json(nullptr);
   json["num_points"] = r.num_points;
+  json["num_dense_points"] = outcome.dense ? Json(outcome.dense->size()) : Json(nullptr);
+  json["dense_sigma_median_percent"] = finite_or_null(dense_sigma_percent(outcome));
   json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)
                                     : Json(nullptr);

@@ -28,8 +28,9 @@ struct Outcome {
   tv_camera camera[2]{};
   tv_two_view two_view{};
   tv_reconstruction reconstruction{};  // its arrays are valid until the context's next call
-  std::optional<MetricScale> scale;    // empty: outputs are in baselines, else in metres
-  nlohmann::ordered_json json;         // the content of result.json
+  std::optional<std::vector<tv_dense_point>> dense;  // empty: not asked for, or no full pose
+  std::optional<MetricScale> scale;  // empty: outputs are in baselines, else in metres
+  nlohmann::ordered_json json;       // the content of result.json
 };
 
 // The camera that pose and points refer to: the camera file's, with the estimated shift added to
@@ -44,9 +45,15 @@ double unit_of(const Outcome& outcome);
 struct CloudPoint {
   double x, y, z;  // in camera 0's frame, in metres or baselines (unit_of)
   uint8_t red, green, blue;
-  float angle_deg, error_px;
+  float angle_deg;
+  float error_px;   // of a dense point: the standard deviation of its match
+  float sigma = 0;  // standard deviation of the distance from camera 0; 0: not known
 };
+// The points of the matches, and behind them the dense ones.
 std::vector<CloudPoint> cloud_of(const Outcome& outcome);
+
+// The median of sigma / distance over the dense points, per cent; NaN without points.
+double dense_sigma_percent(const Outcome& outcome);
 
 // A camera drawn as a pyramid of depth `size`, in the frame of camera 0. For camera 1 the result
 // must have a full pose.

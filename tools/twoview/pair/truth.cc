@@ -63,8 +63,19 @@ void read_sizes(const YAML::Node& root, const std::string& path, KnownPose& pose
   }
 }
 
-// The depth errors of the cloud's points in per cent. Each depth is compared with the nearest pixel
-// of the depth map.
+// The error of a depth, given in baselines, in per cent of that of the nearest pixel of the depth
+// map; NaN where it is unknown.
+double depth_error_percent(const Truth& truth, const Picture& picture0, double column, double row,
+                           double depth) {
+  const long x = std::lround((column + 0.5) / picture0.scale_x() - 0.5);
+  const long y = std::lround((row + 0.5) / picture0.scale_y() - 0.5);
+  if (x < 0 || y < 0 || x >= truth.depth0.cols || y >= truth.depth0.rows) return NAN;
+  const double known = truth.depth0.at<float>(static_cast<int>(y), static_cast<int>(x));
+  if (!std::isfinite(known) || known <= 0) return NAN;
+  return 100 * std::abs(depth * truth.baseline - known) / known;
+}
+
+// The depth errors of the cloud's points in per cent.
 std::vector<double> depth_errors_percent(const Truth& truth, const Picture& picture0,
                                          const tv_reconstruction& reconstruction) {
   std::vector<double> errors;
@@ -73,12 +84,9 @@ std::vector<double> depth_errors_percent(const Truth& truth, const Picture& pict
     const tv_point& point = reconstruction.points[i];
     if (point.status != TV_POINT_OK) continue;
     const tv_keypoint& keypoint = reconstruction.keypoints[0][reconstruction.matches[i].idx0];
-    const long x = std::lround((keypoint.x + 0.5) / picture0.scale_x() - 0.5);
-    const long y = std::lround((keypoint.y + 0.5) / picture0.scale_y() - 0.5);
-    if (x < 0 || y < 0 || x >= truth.depth0.cols || y >= truth.depth0.rows) continue;
-    const double known = truth.depth0.at<float>(static_cast<int>(y), static_cast<int>(x));
-    if (!std::isfinite(known) || known <= 0) continue;
-    errors.push_back(100 * std::abs(point.position[2] * truth.baseline - known) / known);
+    const double error =
+        depth_error_percent(truth, picture0, keypoint.x, keypoint.y, point.position[2]);
+    if (std::isfinite(error)) errors.push_back(error);
   }
   return errors;
 }
@@ -148,6 +156,23 @@ nlohmann::ordered_json truth_json(const Truth& truth, const Picture& picture0,
     json["depth_error_p95_percent"] = percentile(errors, 0.95);
   }
   return json;
+}
+
+void add_dense_truth(const Truth& truth, const Picture& picture0,
+                     const std::vector<tv_dense_point>& points, nlohmann::ordered_json& json) {
+  std::vector<double> errors;
+  if (!truth.depth0.empty())
+    for (const tv_dense_point& point : points) {
+      const double error =
+          depth_error_percent(truth, picture0, point.pixel0[0], point.pixel0[1], point.position[2]);
+      if (std::isfinite(error)) errors.push_back(error);
+    }
+  json["num_dense_depths"] = errors.size();
+  const bool known = !errors.empty();
+  json["dense_depth_error_median_percent"] =
+      known ? nlohmann::ordered_json(percentile(errors, 0.5)) : nlohmann::ordered_json(nullptr);
+  json["dense_depth_error_p95_percent"] =
+      known ? nlohmann::ordered_json(percentile(errors, 0.95)) : nlohmann::ordered_json(nullptr);
 }
 
 }  // namespace cli

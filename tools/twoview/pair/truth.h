@@ -47,6 +47,11 @@ nlohmann::ordered_json truth_json(const Truth& truth, const Picture& picture0,
                                   const tv_two_view& two_view,
                                   const tv_reconstruction& reconstruction);
 
+// Adds the errors of the dense points' depths: `num_dense_depths`,
+// `dense_depth_error_median_percent` and `dense_depth_error_p95_percent` (null without depths).
+void add_dense_truth(const Truth& truth, const Picture& picture0,
+                     const std::vector<tv_dense_point>& points, nlohmann::ordered_json& json);
+
 // Throws BadInput if the size of the depth map is not that of image 0's file.
 void check_truth(const Truth& truth, const Picture& picture0);
 

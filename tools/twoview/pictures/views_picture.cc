@@ -11,6 +11,8 @@
 namespace cli {
 namespace {
 
+constexpr size_t kDense = 8000;  // points of a cloud whose points need no dark rim to be told apart
+
 struct Range {
   double low = 0, high = 1;
   double length() const { return high - low; }
@@ -121,7 +123,7 @@ int draw_cloud(Plot& plot, const std::vector<CloudPoint>& cloud, double CloudPoi
       continue;
     }
     const cv::Point2d at = plot.at(point.*across, point.y);
-    put_disc(part, at, radius + 0.9, ink::panel);
+    if (cloud.size() < kDense) put_disc(part, at, radius + 0.9, ink::panel);
     put_disc(part, at, radius, shown(point));
   }
   return outside;
@@ -157,8 +159,9 @@ cv::Mat views_picture(const Outcome& outcome, const std::vector<CloudPoint>& clo
   const double wanted = std::max(width * y.length() / x.length(), width * y.length() / z.length());
   const int height = static_cast<int>(std::min(std::max(wanted, 380.0), 720.0));
   cv::Mat sheet(top + height + bottom, 2 * (left + width) + right, CV_8UC3, ink::paper);
+  const double least = cloud.size() < kDense ? 1.8 : 1.1;
   const double radius =
-      std::min(std::max(std::sqrt(0.12 * width * height / double(cloud.size())) / 2, 1.8), 5.0);
+      std::min(std::max(std::sqrt(0.12 * width * height / double(cloud.size())) / 2, least), 5.0);
 
   Plot front(sheet, {left, top, width, height}, x, y);
   const std::string unit = outcome.scale ? " [m]" : " [baselines]";

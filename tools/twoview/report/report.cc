@@ -31,6 +31,12 @@ std::string cards(const Outcome& outcome) {
   const Json& j = outcome.json;
   std::string text =
       card(std::to_string(outcome.reconstruction.num_points), "", "points in the cloud");
+  if (outcome.dense) {
+    text += card(std::to_string(outcome.dense->size()), "", "dense points");
+    if (!outcome.dense->empty())
+      text += card(number_of(j["dense_sigma_median_percent"], "%.2f"), "%",
+                   "1 sigma of a dense point's distance, median");
+  }
   text += card(std::to_string(outcome.two_view.num_inliers),
                "of " + std::to_string(outcome.two_view.num_matches), "matches that agree");
   const tv_two_view& v = outcome.two_view;
@@ -61,6 +67,9 @@ std::string cards(const Outcome& outcome) {
     if (truth["depth_error_median_percent"].is_number())
       text +=
           card(number_of(truth["depth_error_median_percent"], "%.2f"), "%", "depth error, median");
+    if (truth.contains("dense_depth_error_median_percent"))
+      text += card(number_of(truth["dense_depth_error_median_percent"], "%.2f"), "%",
+                   "depth error of the dense points, median");
   }
   if (j["imu"].is_object())
     text += card(number_of(j["imu"]["rotation_difference_deg"], "%.2f"), "deg",
@@ -146,10 +155,10 @@ std::string matrices(const Json& j) {
 
 std::string tables(const Json& j) {
   std::string found;
-  for (const char* key :
-       {"num_keypoints", "num_matches", "num_inliers", "config", "verdict", "reasons",
-        "probability_wrong", "num_points", "median_parallax_deg", "rms_reprojection_px",
-        "principal_point_shift_px", "scale", "scale_sigma", "num_iterations"})
+  for (const char* key : {"num_keypoints", "num_matches", "num_inliers", "config", "verdict",
+                          "reasons", "probability_wrong", "num_points", "num_dense_points",
+                          "median_parallax_deg", "rms_reprojection_px", "principal_point_shift_px",
+                          "scale", "scale_sigma", "num_iterations"})
     found += row(key, j[key]);
   std::string text = table("What was found", found);
   if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);

@@ -65,7 +65,7 @@ void append_float(std::string& bytes, float value) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(bits >> shift & 255);
 }
 
-std::string cloud_ply(const std::vector<CloudPoint>& cloud) {
+std::string cloud_ply(const std::vector<CloudPoint>& cloud, bool with_sigma) {
   std::string bytes =
       "ply\nformat binary_little_endian 1.0\n"
       "comment twoview " +
@@ -77,7 +77,8 @@ std::string cloud_ply(const std::vector<CloudPoint>& cloud) {
       "\n"
       "property float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-      "property float angle_deg\nproperty float error_px\nend_header\n";
+      "property float angle_deg\nproperty float error_px\n" +
+      std::string(with_sigma ? "property float sigma\n" : "") + "end_header\n";
   for (const CloudPoint& point : cloud) {
     for (const double value : {point.x, point.y, point.z})
       append_float(bytes, static_cast<float>(value));
@@ -85,6 +86,7 @@ std::string cloud_ply(const std::vector<CloudPoint>& cloud) {
       bytes += static_cast<char>(value);
     append_float(bytes, point.angle_deg);
     append_float(bytes, point.error_px);
+    if (with_sigma) append_float(bytes, point.sigma);
   }
   return bytes;
 }

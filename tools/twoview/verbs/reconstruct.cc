@@ -8,6 +8,9 @@
 #include "base/output.h"
 #include "base/terminal.h"
 #include "files/camera_formats.h"
+#ifdef TWOVIEW_HAS_DENSE
+#include "pair/dense_cloud.h"
+#endif
 #include "pair/reconstruct_pair.h"
 #include "pair/truth.h"
 #include "pictures/canvas.h"
@@ -30,6 +33,7 @@ struct Arguments {
   std::string image[2], truth, rerun;
   CameraOptions cameras;
   RecordingOptions recording;
+  int32_t dense = 0;  // most dense points; 0: no dense cloud
 };
 
 // Throws BadInput unless either two images, or a recording with its --camera, is given.
@@ -125,6 +129,7 @@ nlohmann::ordered_json options_of(const Arguments& a) {
         files[i].empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(files[i]);
   }
   const double focal = a.cameras.focal_35mm;
+  json["dense"] = a.dense;
   json["focal_35mm"] = focal > 0 ? nlohmann::ordered_json(focal) : nlohmann::ordered_json(nullptr);
   return json;
 }
@@ -143,7 +148,7 @@ void make_files(const Outcome& outcome, OutputSet& files) {
                                      : "Each point in its colour in image 0. One baseline is the "
                                        "distance between the cameras.",
                        views_picture(outcome, cloud), false});
-    files.add("cloud.ply", cloud_ply(cloud));
+    files.add("cloud.ply", cloud_ply(cloud, outcome.dense.has_value()));
     files.add("views.png", png_bytes(figures.back().picture));
   }
   figures.push_back({"Matches",
@@ -219,7 +224,13 @@ std::string truth_line(const nlohmann::ordered_json& truth) {
   part("translation_error_deg", ", direction by %.3f deg");
   part("depth_error_median_percent", ", depth by %.2f %% (median)");
   part("depth_error_p95_percent", ", %.2f %% (95th percentile)");
-  return summary_line("truth", "%s", text.c_str());
+  std::string lines = summary_line("truth", "%s", text.c_str());
+  text.clear();
+  if (!truth.contains("num_dense_depths")) return lines;
+  part("num_dense_depths", "%.0f dense points of known depth");
+  part("dense_depth_error_median_percent", ", depth off by %.2f %% (median)");
+  part("dense_depth_error_p95_percent", ", %.2f %% (95th percentile)");
+  return lines + summary_line("", "%s", text.c_str());
 }
 
 std::string summary(const Outcome& outcome, const RecordingInput* recording, const OutputSet& files,
@@ -256,6 +267,11 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   if (r.num_points > 0)
     text += summary_line("cloud", "%d points, reprojection %.2f px rms", r.num_points,
                          j["rms_reprojection_px"].get<double>());
+  if (outcome.dense)
+    text += summary_line(
+        "dense", "%zu points in %.0f ms, distance known to %.2f %% (median of 1 sigma)",
+        outcome.dense->size(), j["timings_ms"]["dense"].get<double>(),
+        outcome.dense->empty() ? 0.0 : j["dense_sigma_median_percent"].get<double>());
   if (j["truth"].is_object()) text += truth_line(j["truth"]);
   text += summary_line(
       "work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
@@ -313,6 +329,10 @@ int reconstruct(Arguments& a) {
     const Stopwatch watch(!common.quiet, watch_text(common.options));
     total_ns = reconstruct_pair(session, common.options, outcome);
   }
+  uint64_t dense_ns = 0;
+#ifdef TWOVIEW_HAS_DENSE
+  if (a.dense > 0) dense_ns = densify_pair(a.dense, outcome);
+#endif
   if (recording) recording->add_scale(outcome);
 
   outcome.json = result_json(outcome);
@@ -320,7 +340,10 @@ int reconstruct(Arguments& a) {
   if (has_truth)
     outcome.json["truth"] =
         truth_json(truth, outcome.picture[0], outcome.two_view, outcome.reconstruction);
-  outcome.json["timings_ms"] = session.take_times(total_ns, true);
+  if (has_truth && outcome.dense)
+    add_dense_truth(truth, outcome.picture[0], *outcome.dense, outcome.json["truth"]);
+  outcome.json["timings_ms"] = session.take_times(total_ns + dense_ns, true);
+  if (outcome.dense) outcome.json["timings_ms"]["dense"] = static_cast<double>(dense_ns) * 1e-6;
   outcome.json["context_bytes"] = session.context_bytes();
   outcome.json["cameras"] = cameras_json(cameras);
   outcome.json["options"] = options_of(a);
@@ -356,6 +379,11 @@ void add_reconstruct(CLI::App& program, Run& run) {
       ->type_name("FILE");
   verb->add_option("--rerun", a->rerun, "also write a file for Rerun's viewer (needs rerun-sdk)")
       ->type_name("FILE.rrd");
+#ifdef TWOVIEW_HAS_DENSE
+  verb->add_option("--dense", a->dense, "also up to N dense points, by matching all of the images")
+      ->type_name("N")
+      ->check(CLI::Range(0, kMostDensePoints));
+#endif
   add_common(*verb, a->common, kAllOptions | kGravity, "folder for the results");
   verb->final_callback([a, &run] { run = [a] { return reconstruct(*a); }; });
 }

@@ -15,6 +15,7 @@ LIBRARY = [
     "camera",
     "two_view",
     "triangulate",
+    "dense",
     "bundle",
     "absolute_pose",
     "window",

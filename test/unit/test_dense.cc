@@ -1,0 +1,406 @@
+// Tests of the dense cloud: the matcher against its definition, written out as plainly as it can
+// be, and the points against scenes whose depth is known exactly, through every lens and for
+// sideways, oblique, forward and backward motion.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <vector>
+
+#include "base/random.h"
+#include "dense/sweep.h"
+#include "support/scene.h"
+#include "twoview/twoview.h"
+#include "unity.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+namespace {
+
+using scene::uniform;
+using tv::Mat3;
+using tv::Vec2;
+using tv::Vec3;
+
+// The memory outlives a failing test, which leaves by longjmp.
+alignas(64) uint8_t memory[24 << 20];
+uint8_t pixels[2][640 * 640];
+tv_dense_point points[400000];
+
+// ---- The definition of the matcher.
+
+struct Plain {
+  int width, height, steps;
+  std::vector<uint8_t> a, b;
+
+  int width1() const { return width + steps - 1; }
+  int at0(int x, int y) const { return a[static_cast<size_t>(y * width + x)]; }
+  int at1(int x, int y) const { return b[static_cast<size_t>(y * width1() + x)]; }
+
+  // The bits of a census as a list; all 0 where the window leaves the image.
+  template <typename At>
+  std::vector<int> census(const At& at, int wide, int x, int y) const {
+    std::vector<int> bits(31, 0);
+    if (x < 4 || y < 3 || x + 4 >= wide || y + 3 >= height) return bits;
+    size_t n = 0;
+    for (int dy = -3; dy <= 3; ++dy) {
+      for (int dx = -4; dx <= 4; ++dx) {
+        if (dy > 0 || (dy == 0 && dx >= 0)) continue;
+        bits[n++] = at(x + dx, y + dy) < at(x - dx, y - dy);
+      }
+    }
+    return bits;
+  }
+
+  int cost(int x, int y, int k) const {
+    if (at0(x, y) == 0) return 0;
+    if (at1(x + k, y) == 0) return 15;
+    const auto p = census([&](int u, int v) { return at0(u, v); }, width, x, y);
+    const auto q = census([&](int u, int v) { return at1(u, v); }, width1(), x + k, y);
+    int differ = 0;
+    for (size_t i = 0; i < 31; ++i) differ += p[i] != q[i];
+    return differ;
+  }
+
+  // The winners, by the definition of semi-global matching: Hirschmueller's equation 13 for the
+  // five directions whose paths come from the left, from above and from the right.
+  std::vector<int> winners() const {
+    const int directions[5][2] = {{-1, 0}, {-1, -1}, {0, -1}, {1, -1}, {1, 0}};
+    std::vector<int> sums(static_cast<size_t>(width * height * steps), 0), costs = sums;
+    const auto index = [&](int x, int y, int k) {
+      return static_cast<size_t>((y * width + x) * steps + k);
+    };
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        for (int k = 0; k < steps; ++k) costs[index(x, y, k)] = cost(x, y, k);
+    for (const auto& d : directions) {
+      std::vector<int> path(sums.size(), 0);
+      for (int y = 0; y < height; ++y) {
+        for (int i = 0; i < width; ++i) {
+          const int x = d[0] > 0 && d[1] == 0 ? width - 1 - i : i;
+          int u = x + d[0];
+          const int v = y + d[1];
+          // A path from above begins anew at the first row; at the sides it runs along the border.
+          if (d[1] != 0) u = std::min(std::max(u, 0), width - 1);
+          const bool begins = v < 0 || u < 0 || u >= width;
+          int least = 1 << 20;
+          for (int k = 0; k < steps && !begins; ++k) least = std::min(least, path[index(u, v, k)]);
+          const int change = begins ? 0 : std::abs(at0(x, y) - at0(u, v));
+          const int large = std::max(10, 48 * 12 / (12 + change));
+          for (int k = 0; k < steps; ++k) {
+            int way = 0;
+            if (!begins) {
+              way = std::min(path[index(u, v, k)], least + large);
+              if (k > 0) way = std::min(way, path[index(u, v, k - 1)] + 5);
+              if (k + 1 < steps) way = std::min(way, path[index(u, v, k + 1)] + 5);
+              way -= least;
+            }
+            path[index(x, y, k)] = costs[index(x, y, k)] + way;
+            sums[index(x, y, k)] += path[index(x, y, k)];
+          }
+        }
+      }
+    }
+    std::vector<int> found;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        int best = 0, next = 8000;
+        for (int k = 1; k < steps; ++k)
+          if (sums[index(x, y, k)] < sums[index(x, y, best)]) best = k;
+        for (int k = 0; k < steps; ++k)
+          if (std::abs(k - best) > 1) next = std::min(next, sums[index(x, y, k)]);
+        int least1 = 1 << 20;  // over all pixels of image 0 that may be at this one of image 1
+        for (int u = 0; u < width; ++u) {
+          const int k = x + best - u;
+          if (k >= 0 && k < steps) least1 = std::min(least1, sums[index(u, y, k)]);
+        }
+        bool agrees = false;  // one of those within a step has it
+        for (int k = best - 1; k <= best + 1; ++k) {
+          const int u = x + best - k;
+          if (k >= 0 && k < steps && u >= 0 && u < width)
+            agrees = agrees || sums[index(u, y, k)] == least1;
+        }
+        const bool good = at0(x, y) != 0 && at1(x + best, y) != 0 && best > 0 && best < steps - 1 &&
+                          agrees && 100 * sums[index(x, y, best)] < 97 * next;
+        found.push_back(good ? best : -1);
+      }
+    }
+    return found;
+  }
+};
+
+void test_the_matcher_is_its_definition() {
+  tv::Random random = tv::random_seeded(20260101);
+  int believed = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    Plain plain;
+    plain.width = 16 + static_cast<int>(uniform(&random, 0, 30));
+    plain.height = 9 + static_cast<int>(uniform(&random, 0, 14));
+    plain.steps = 8 * (1 + trial % 3);
+    plain.a.resize(static_cast<size_t>(plain.width * plain.height));
+    plain.b.resize(static_cast<size_t>(plain.width1() * plain.height));
+    for (uint8_t& v : plain.a) v = static_cast<uint8_t>(uniform(&random, trial % 2 ? 0 : 1, 256));
+    for (uint8_t& v : plain.b) v = static_cast<uint8_t>(uniform(&random, 0, 256));
+    // A part of image 1 is image 0 at two parallaxes, so that there is something to find.
+    for (int y = 0; y < plain.height; ++y)
+      for (int x = 0; x < plain.width; ++x)
+        plain.b[static_cast<size_t>(y * plain.width1() + x + (y < 6 ? 2 : 4))] =
+            plain.a[static_cast<size_t>(y * plain.width + x)];
+    const tv::RowPair rows = {plain.a.data(), plain.b.data(), plain.width, plain.height,
+                              plain.steps};
+    TEST_ASSERT_TRUE(tv::match_rows_bytes(plain.width, plain.steps) <= sizeof memory);
+    tv::Arena arena = tv::arena_over(memory, tv::match_rows_bytes(plain.width, plain.steps));
+    std::vector<int16_t> steps(plain.a.size());
+    tv::match_rows(rows, arena, steps.data());
+    const std::vector<int> expected = plain.winners();
+    for (size_t i = 0; i < steps.size(); ++i) {
+      TEST_ASSERT_EQUAL_INT_MESSAGE(expected[i], steps[i], "winner");
+      believed += steps[i] >= 0;
+    }
+    TEST_ASSERT_EQUAL_UINT64(arena.size_bytes, arena.high_water_bytes);  // and no byte more
+
+    std::vector<int16_t> kept(steps.size());
+    tv::keep_supported(steps.data(), plain.width, plain.height, kept.data());
+    for (int y = 0; y < plain.height; ++y) {
+      for (int x = 0; x < plain.width; ++x) {
+        const int own = expected[static_cast<size_t>(y * plain.width + x)];
+        int alike = 0, all = 0;
+        for (int v = y - 4; v <= y + 4; ++v)
+          for (int u = x - 4; u <= x + 4; ++u) {
+            if (u < 0 || v < 0 || u >= plain.width || v >= plain.height) continue;
+            const int other = expected[static_cast<size_t>(v * plain.width + u)];
+            ++all;
+            alike += other >= 0 && std::abs(other - own) <= 1;
+          }
+        const bool supported = own >= 0 && 100 * alike >= 60 * all;
+        TEST_ASSERT_EQUAL_INT(supported ? own : -1, kept[static_cast<size_t>(y * plain.width + x)]);
+      }
+    }
+  }
+  TEST_ASSERT_GREATER_THAN(200, believed);
+}
+
+// ---- Scenes of known depth: a slanted wall, and before it a ball.
+
+double hashed(int x, int y, int z) {
+  uint32_t h = static_cast<uint32_t>(x) * 73856093u ^ static_cast<uint32_t>(y) * 19349663u ^
+               static_cast<uint32_t>(z) * 83492791u;
+  h = (h ^ h >> 15) * 2246822519u;
+  h = (h ^ h >> 13) * 3266489917u;
+  return (h ^ h >> 16) * 0x1p-32;
+}
+
+// Trilinear noise of the scene's surfaces, [0, 1].
+double noise(const Vec3& at, double cell) {
+  int base[3];
+  double part[3], sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    base[i] = static_cast<int>(std::floor(at[i] / cell));
+    part[i] = at[i] / cell - base[i];
+  }
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1;
+    int where[3];
+    for (int i = 0; i < 3; ++i) {
+      const int on = corner >> i & 1;
+      weight *= on ? part[i] : 1 - part[i];
+      where[i] = base[i] + on;
+    }
+    sum += weight * hashed(where[0], where[1], where[2]);
+  }
+  return sum;
+}
+
+const Vec3 kBall(0.3, -0.2, 3.0);
+constexpr double kRadius = 0.7;
+
+// The distance along a unit ray from `from` to the scene.
+double distance_to_scene(const Vec3& from, const Vec3& ray) {
+  const Vec3 normal(0.25, -0.15, 1);  // of the wall normal . X = 5
+  const double along = normal.dot(ray);
+  double best = along > 1e-9 ? (5 - normal.dot(from)) / along : 1e9;
+  if (best < 0) best = 1e9;
+  const Vec3 to = kBall - from;
+  const double middle = to.dot(ray);
+  const double under = kRadius * kRadius - to.dot(to) + middle * middle;
+  if (under > 0 && middle - std::sqrt(under) > 0) best = std::min(best, middle - std::sqrt(under));
+  return best;
+}
+
+void render(const tv_camera& camera, const Mat3& R, const Vec3& t, tv::Random* random,
+            uint8_t* image) {
+  const tv::Camera prepared = tv::prepare_camera(camera);
+  const Vec3 centre = -(R.transpose() * t);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      double sum = 0;
+      for (int part = 0; part < 4; ++part) {
+        Vec3 ray;
+        const Vec2 pixel(x + 0.5 * (part % 2) - 0.25, y + 0.5 * (part / 2) - 0.25);
+        if (!tv::unproject(prepared, pixel, &ray, nullptr)) continue;
+        ray = R.transpose() * ray;
+        const double distance = distance_to_scene(centre, ray);
+        if (distance > 100) continue;
+        const Vec3 at = centre + distance * ray;
+        sum += 40 + 110 * noise(at, 0.05) + 60 * noise(at, 0.3);
+      }
+      const double grey = sum / 4 + scene::normal(random);
+      image[y * camera.width + x] = static_cast<uint8_t>(std::min(std::max(grey, 0.0), 255.0));
+    }
+  }
+}
+
+struct Expected {
+  int least_points;
+  double median_percent, outlier_share;
+};
+
+Mat3 rotation_about(const Vec3& axis, double angle) {
+  return Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+}
+
+void check_scene(const char* name, const tv_camera& camera0, const tv_camera& camera1,
+                 const Mat3& R, const Vec3& t, const Expected& expected) {
+  tv::Random random = tv::random_seeded(5);
+  render(camera0, Mat3::Identity(), Vec3::Zero(), &random, pixels[0]);
+  render(camera1, R, t, &random, pixels[1]);
+  // What the sparse points of a pair would tell: some points of the scene, as a user has them.
+  std::vector<tv_point> sparse;
+  const tv::Camera prepared0 = tv::prepare_camera(camera0), prepared1 = tv::prepare_camera(camera1);
+  const Vec3 centre1 = -(R.transpose() * t);
+  for (int i = 0; i < 200; ++i) {
+    const Vec2 pixel(uniform(&random, 0, camera0.width - 1),
+                     uniform(&random, 0, camera0.height - 1));
+    Vec3 ray;
+    Vec2 other;
+    if (!tv::unproject(prepared0, pixel, &ray, nullptr)) continue;
+    const Vec3 at = distance_to_scene(Vec3::Zero(), ray) * ray;
+    if (at.norm() > 100 || !tv::project(prepared1, R * at + t, &other, nullptr)) continue;
+    if (other[0] < 0 || other[1] < 0 || other[0] >= camera1.width || other[1] >= camera1.height)
+      continue;
+    tv_point point = {};
+    for (int k = 0; k < 3; ++k) point.position[k] = at[k];
+    const double cosine = at.normalized().dot((at - centre1).normalized());
+    point.angle_rad = static_cast<float>(std::acos(std::min(1.0, cosine)));
+    sparse.push_back(point);
+  }
+  size_t bytes = 0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_dense_size(&camera0, &camera1, nullptr, &bytes));
+  TEST_ASSERT_TRUE(bytes <= sizeof memory);
+  const tv_image images[2] = {{pixels[0], camera0.width, camera0.height, camera0.width},
+                              {pixels[1], camera1.width, camera1.height, camera1.width}};
+  double rotation[9], translation[3];
+  for (int i = 0; i < 9; ++i) rotation[i] = R(i / 3, i % 3);
+  for (int i = 0; i < 3; ++i) translation[i] = t[i];
+  int32_t num = 0;
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_densify(&images[0], &images[1], &camera0, &camera1, rotation, translation,
+                        sparse.data(), static_cast<int32_t>(sparse.size()), nullptr, memory, bytes,
+                        points, 400000, &num));
+  std::vector<double> errors, pulls;
+  double worst_pixel = 0, worst_ray = 0;
+  for (int32_t i = 0; i < num; ++i) {
+    const tv_dense_point& p = points[i];
+    const Vec3 at(p.position[0], p.position[1], p.position[2]);
+    Vec2 pixel0, pixel1;
+    Vec3 ray;
+    TEST_ASSERT_TRUE(tv::project(prepared0, at, &pixel0, nullptr));
+    TEST_ASSERT_TRUE(tv::project(prepared1, R * at + t, &pixel1, nullptr));
+    for (int k = 0; k < 2; ++k) {
+      worst_pixel = std::max(worst_pixel, std::fabs(pixel0[k] - p.pixel0[k]));
+      worst_pixel = std::max(worst_pixel, std::fabs(pixel1[k] - p.pixel1[k]));
+    }
+    TEST_ASSERT_TRUE(tv::unproject(prepared0, Vec2(p.pixel0[0], p.pixel0[1]), &ray, nullptr));
+    worst_ray = std::max(worst_ray, (at.normalized() - ray).norm());
+    const double known = distance_to_scene(Vec3::Zero(), ray);
+    errors.push_back(100 * std::fabs(at.norm() - known) / known);
+    pulls.push_back(std::fabs(at.norm() - known) / p.sigma);
+    TEST_ASSERT_TRUE(p.similarity > 0 && p.similarity <= 1);
+    const int x = static_cast<int>(p.pixel0[0] + 0.5f), y = static_cast<int>(p.pixel0[1] + 0.5f);
+    TEST_ASSERT_EQUAL_INT(pixels[0][y * camera0.width + x], p.grey);
+  }
+  TEST_ASSERT_GREATER_OR_EQUAL_INT_MESSAGE(expected.least_points, num, name);
+  const auto outliers = std::count_if(errors.begin(), errors.end(), [](double e) { return e > 5; });
+  const auto beyond = std::count_if(pulls.begin(), pulls.end(), [](double p) { return p > 3; });
+  std::nth_element(errors.begin(), errors.begin() + num / 2, errors.end());
+  std::nth_element(pulls.begin(), pulls.begin() + num / 2, pulls.end());
+  const double median = errors[static_cast<size_t>(num / 2)];
+  std::printf(
+      "%s: %d points, distance off by %.3f %% (median), %.2f %% by more than 5 %%; error / "
+      "sigma %.2f (median), %.2f %% above 3\n",
+      name, num, median, 100.0 * static_cast<double>(outliers) / num,
+      pulls[static_cast<size_t>(num / 2)], 100.0 * static_cast<double>(beyond) / num);
+  // A point is where its pixels say, but for the rounding of floats.
+  TEST_ASSERT_TRUE(worst_pixel < 2e-3);
+  TEST_ASSERT_TRUE(worst_ray < 1e-5);
+  TEST_ASSERT_TRUE_MESSAGE(median < expected.median_percent, name);
+  TEST_ASSERT_TRUE_MESSAGE(static_cast<double>(outliers) <= expected.outlier_share * num, name);
+  TEST_ASSERT_TRUE_MESSAGE(pulls[static_cast<size_t>(num / 2)] < 1, name);
+  TEST_ASSERT_TRUE_MESSAGE(static_cast<double>(beyond) <= 0.03 * num, name);
+}
+
+tv_camera small_pinhole() {
+  return tv_camera{TV_CAMERA_PINHOLE, 320, 240, 0, 260, 262, 161, 118, {}};
+}
+
+tv_camera small_distorted() {
+  tv_camera camera;
+  const tv_camera whole = scene::distorted();
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_scale(&whole, 0.5, &camera));
+  return camera;
+}
+
+tv_camera small_fisheye() {
+  tv_camera camera;
+  const tv_camera whole = scene::fisheye();
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_camera_scale(&whole, 0.5, &camera));
+  return camera;
+}
+
+void test_sideways_motion_gives_the_scenes_depth() {
+  check_scene("sideways", small_pinhole(), small_pinhole(), Mat3::Identity(), Vec3(-0.3, 0, 0),
+              {40000, 0.5, 0.01});
+}
+
+void test_an_oblique_and_turned_camera_of_another_focal_length() {
+  tv_camera other = small_pinhole();
+  other.fx = other.fy = 230;
+  other.cx = 150;
+  const Mat3 R = rotation_about(Vec3(0.2, 1, 0.3), 0.12);
+  check_scene("oblique", small_pinhole(), other, R, R * Vec3(-0.35, 0.2, -0.1), {25000, 0.6, 0.01});
+}
+
+void test_upward_motion_through_a_distorting_lens() {
+  check_scene("distorted", small_distorted(), small_distorted(),
+              rotation_about(Vec3(1, 0, 0), -0.05), Vec3(0.02, 0.35, 0.03), {35000, 0.8, 0.01});
+}
+
+void test_a_fisheye_lens() {
+  check_scene("fisheye", small_fisheye(), small_fisheye(), rotation_about(Vec3(0, 1, 0), 0.04),
+              Vec3(-0.4, 0.05, 0.1), {12000, 1.6, 0.03});
+}
+
+void test_forward_motion() {
+  check_scene("forward", small_pinhole(), small_pinhole(), Mat3::Identity(), Vec3(0.02, 0, -0.5),
+              {80000, 1.2, 0.08});
+}
+
+void test_backward_motion() {
+  check_scene("backward", small_pinhole(), small_pinhole(), Mat3::Identity(), Vec3(0, 0.03, 0.5),
+              {80000, 1.6, 0.08});
+}
+
+}  // namespace
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_the_matcher_is_its_definition);
+  RUN_TEST(test_sideways_motion_gives_the_scenes_depth);
+  RUN_TEST(test_an_oblique_and_turned_camera_of_another_focal_length);
+  RUN_TEST(test_upward_motion_through_a_distorting_lens);
+  RUN_TEST(test_a_fisheye_lens);
+  RUN_TEST(test_forward_motion);
+  RUN_TEST(test_backward_motion);
+  return UNITY_END();
+}

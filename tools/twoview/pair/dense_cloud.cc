@@ -1,0 +1,51 @@
+#include "pair/dense_cloud.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "pair/session.h"
+
+namespace cli {
+namespace {
+
+// The default options, or more cells where they would be too few for so many points.
+tv_dense_options options_for(int32_t most) {
+  constexpr int32_t cells_of_a_point = 4, most_steps = 512;
+  tv_dense_options options;
+  tv_dense_options_init(&options);
+  const int32_t wanted = cells_of_a_point * most;
+  if (wanted <= options.max_cells) return options;
+  const double finer = std::sqrt(static_cast<double>(wanted) / options.max_cells);
+  options.max_cells = wanted;
+  options.max_steps = std::min(most_steps, static_cast<int32_t>(options.max_steps * finer));
+  return options;
+}
+
+}  // namespace
+
+uint64_t densify_pair(int32_t most, Outcome& outcome) {
+  const tv_two_view& v = outcome.two_view;
+  if (!has_full_pose(v)) return 0;
+  const tv_dense_options options = options_for(most);
+  const tv_camera camera0 = corrected_camera(outcome, 0), camera1 = corrected_camera(outcome, 1);
+  const tv_image image0 = outcome.picture[0].view(), image1 = outcome.picture[1].view();
+  size_t bytes = 0;
+  check(tv_dense_size(&camera0, &camera1, &options, &bytes), "cannot make a dense cloud");
+  std::vector<uint8_t> room(bytes + TV_CONTEXT_ALIGNMENT);
+  const size_t over = reinterpret_cast<uintptr_t>(room.data()) % TV_CONTEXT_ALIGNMENT;
+  uint8_t* const memory = room.data() + (over == 0 ? 0 : TV_CONTEXT_ALIGNMENT - over);
+  std::vector<tv_dense_point> points(static_cast<size_t>(most));
+  int32_t count = 0;
+  const tv_reconstruction& r = outcome.reconstruction;
+  const uint64_t start_ns = now_ns();
+  check(tv_densify(&image0, &image1, &camera0, &camera1, v.R, v.t, r.points, r.num_matches,
+                   &options, memory, bytes, points.data(), most, &count),
+        "cannot make a dense cloud");
+  const uint64_t time_ns = now_ns() - start_ns;
+  points.resize(static_cast<size_t>(count));
+  outcome.dense = std::move(points);
+  return time_ns;
+}
+
+}  // namespace cli
