@@ -382,6 +382,7 @@ static void test_sigmas_by_size_are_those_of_the_stages_by_hand(void) {
   o.feature.levels = 4;
   o.feature.scale_factor = 1.5f;
   o.feature.keypoint_size = 5;
+  o.all.align_matches = 0;
   tv_two_view_init(&without);
   TEST_ASSERT_EQUAL_INT(
       TV_OK, tv_reconstruct(b.context, &views[0], &views[1], &o.all, &without, &reconstruction));

@@ -4,6 +4,7 @@
 #include "twoview/reconstruct.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 
 #include "api/sized.h"
@@ -330,7 +331,7 @@ constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
                                               0,
                                               0,
                                               1.0,
-                                              0,
+                                              1,
                                               0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
@@ -338,6 +339,8 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   *checked = kDefaults;
   const tv_status status = read_sized(options, checked);
   if (status != TV_OK) return status;
+  constexpr size_t kWithAlignment = offsetof(tv_reconstruct_options, align_matches) + 4;
+  if (options != nullptr && options->struct_size < kWithAlignment) checked->align_matches = 0;
   if (!is_finite(checked->sigma_by_size)) return TV_ERR_NOT_FINITE;
   const bool valid = is_triangulation_method(checked->triangulation) &&
                      (checked->guided_matching == 0 || checked->guided_matching == 1) &&
