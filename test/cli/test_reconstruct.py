@@ -242,7 +242,8 @@ class Reconstruct(cli.CliTest):
         noise = {}
         for levels in ("1", "3"):
             for power in ("0", "1"):
-                self.succeed(self.reconstruct("--levels", levels, "--sigma-by-size", power))
+                self.succeed(self.reconstruct("--levels", levels, "--sigma-by-size", power,
+                                              "--align-matches", "0"))
                 noise[levels, power] = self.result()["noise_px"]
         self.assertEqual(noise["1", "0"], noise["1", "1"])
         self.assertNotEqual(noise["3", "0"], noise["3", "1"])
