@@ -572,7 +572,8 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
 
 
 def _reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
-                 image1: np.ndarray, camera1: Optional[Camera], masks: tuple, options: tuple,
+                 image1: np.ndarray, camera1: Optional[Camera], masks: Sequence[Any],
+                 options: Sequence[Any],
                  **fields: Any) -> tuple[Any, Reconstruction]:
     """The tv_two_view, as ctypes has it, and the Reconstruction of tv_reconstruct. options: of
     features, matching and estimate; fields: of tv_reconstruct_options."""
