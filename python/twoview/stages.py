@@ -547,7 +547,7 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
                 triangulation: int = Triangulation.ITERATIVE_LS, guided_matching: bool = False,
                 bundle_adjustment: bool = False,
                 sigma_by_size: float = 1.0,
-                align_matches: bool = False) -> tuple[TwoView, Reconstruction]:
+                align_matches: bool = True) -> tuple[TwoView, Reconstruction]:
     """tv_reconstruct: from two images to a pose and points.
 
     context: as large as both images. image0, image1: (height, width) uint8, read without a copy.
@@ -556,24 +556,36 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
     shape, 0 where no corner is wanted. feature, match, estimate: the options of the stages, None
     for the defaults. triangulation: a Triangulation. guided_matching: whether a second matching
     follows along the epipolar lines. bundle_adjustment: whether pose and points are adjusted
-    together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches: whether the
-    keypoints of each match are moved by the pixels around them.
+    together. sigma_by_size: the exponent of keypoint_sigmas, [0, 2]. align_matches: whether one
+    keypoint of each match is moved by the pixels around both.
     Returns a TwoView and a Reconstruction. "No geometry" is a result, not an exception: see
     TwoView.verdict.
     Raises TypeError or ValueError for an array that C could not read and for one camera alone,
     TV_ERR_CAMERA for an image that is not of its camera's size, TV_ERR_LIMITS for an image above
     the context's limits, TV_ERR_ARGUMENT for an option out of its range."""
+    found, cloud = _reconstruct(
+        context, image0, camera0, image1, camera1, (mask0, mask1), (feature, match, estimate),
+        triangulation=triangulation, guided_matching=guided_matching,
+        bundle_adjustment=bundle_adjustment, sigma_by_size=sigma_by_size,
+        align_matches=align_matches)
+    return _two_view(found), cloud
+
+
+def _reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
+                 image1: np.ndarray, camera1: Optional[Camera], masks: Sequence[Any],
+                 options: Sequence[Any],
+                 **fields: Any) -> tuple[Any, Reconstruction]:
+    """The tv_two_view, as ctypes has it, and the Reconstruction of tv_reconstruct. options: of
+    features, matching and estimate; fields: of tv_reconstruct_options."""
     library = check_context(context).library
     kept = [to_struct(library, kind, options, {}) for kind, options in
-            ((FeatureOptions, feature), (MatchOptions, match), (EstimateOptions, estimate))]
-    wanted = library.make(_abi.tv_reconstruct_options, {
-        "triangulation": triangulation, "guided_matching": guided_matching,
-        "bundle_adjustment": bundle_adjustment, "sigma_by_size": sigma_by_size,
-        "align_matches": align_matches})
+            zip((FeatureOptions, MatchOptions, EstimateOptions), options)]
+    wanted = library.make(_abi.tv_reconstruct_options, fields)
     wanted.feature, wanted.match, wanted.estimate = map(ctypes.addressof, kept)
     views = []
     is_calibrated = not _are_uncalibrated(camera0, camera1)
-    for name, image, camera, mask in (("0", image0, camera0, mask0), ("1", image1, camera1, mask1)):
+    for name, image, camera, mask in (("0", image0, camera0, masks[0]),
+                                      ("1", image1, camera1, masks[1])):
         view = library.make(_abi.tv_view)
         view.image = _abi.check_image("image" + name, image)
         if is_calibrated:
@@ -604,4 +616,4 @@ def reconstruct(context: Context, image0: np.ndarray, camera0: Optional[Camera],
                                 _copied(cloud.inlier_mask, m, np.uint8).view(bool),
                                 _copied(cloud.points, m, _abi.POINT), cloud.num_points,
                                 cloud.num_matches_left_out)
-    return _two_view(found), result
+    return found, result

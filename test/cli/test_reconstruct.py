@@ -21,7 +21,8 @@ scale_sigma imu truth timings_ms context_bytes options seed version kernels""".s
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
 OPTIONS = """max_keypoints arc threshold levels scale_factor orientation descriptor ratio method
 max_error_px confidence max_iterations fixed_iterations seed kernels triangulation guided_matching
-bundle_adjustment sigma_by_size principal_point_sigma camera0 camera1 focal_35mm resize""".split()
+align_matches bundle_adjustment sigma_by_size principal_point_sigma
+camera0 camera1 focal_35mm resize""".split()
 TRUTH = "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [-1, 0, 0]\nbaseline: 0.5\ndepth0: depth.pfm\n"
 
 
@@ -259,6 +260,7 @@ class Reconstruct(cli.CliTest):
             "kernels": "c",
             "triangulation": "midpoint",
             "guided_matching": 1,
+            "align_matches": 0,
             "bundle_adjustment": 1,
             "sigma_by_size": 0.75,
             "principal_point_sigma": 0.02,
@@ -278,10 +280,19 @@ class Reconstruct(cli.CliTest):
         noise = {}
         for levels in ("1", "3"):
             for power in ("0", "1"):
-                self.succeed(self.reconstruct("--levels", levels, "--sigma-by-size", power))
+                self.succeed(self.reconstruct("--levels", levels, "--sigma-by-size", power,
+                                              "--align-matches", "0"))
                 noise[levels, power] = self.result()["noise_px"]
         self.assertEqual(noise["1", "0"], noise["1", "1"])
         self.assertNotEqual(noise["3", "0"], noise["3", "1"])
+
+    def test_matches_are_aligned_unless_they_shall_not_be(self):
+        noise = {}
+        for flags in ((), ("--align-matches", "1"), ("--align-matches", "0")):
+            self.succeed(self.reconstruct(*flags))
+            noise[flags] = self.result()["noise_px"]
+        self.assertEqual(noise[()], noise["--align-matches", "1"])
+        self.assertNotEqual(noise[()], noise["--align-matches", "0"])
 
     def test_powers_of_a_size_out_of_range_are_refused(self):
         for text in ("-0.1", "2.1", "nan"):

@@ -283,6 +283,63 @@ static void case_gradient_histogram(trial *t) {
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) TEST_ASSERT_TRUE(histogram[k] >= 0);
 }
 
+/* An image that ends with its last pixel, as long rows as it is wide in some trials. */
+static const uint8_t *window_image(trial *t, int32_t *width, int32_t *height, int32_t *stride) {
+  *width = pick(t, 18, 60, 640);
+  *height = pick(t, 18, 60, 480);
+  *stride = *width + pick(t, 0, 3, 0);
+  return row_of_bytes(t, (*height - 1) * *stride + *width);
+}
+
+/* Random, or as far as the first sample may lie with `reach` to the last one; in 1/65536 pixel. */
+static int32_t window_start(trial *t, int32_t pixels, int32_t reach_below, int32_t reach) {
+  const int32_t low = 65536 + reach_below, high = ((pixels - 2) << 16) - 1 - reach;
+  const int32_t extreme = random_int(&t->seed, 0, 5);
+  const int32_t x = random_int(&t->seed, low, high);
+  return extreme == 0 ? low : extreme == 1 ? high : x;
+}
+
+static void case_window_template(trial *t) {
+  int32_t width, height, stride;
+  const uint8_t *pixels = window_image(t, &width, &height, &stride);
+  const int32_t step = random_int(&t->seed, 0, 3) == 0 ? 65536 : pick(t, 40000, 98304, 80000);
+  const int32_t x = window_start(t, width, 0, 9 * step), y = window_start(t, height, 0, 9 * step);
+  int16_t *channels = OUTPUT(t, int16_t, TVK_WINDOW_CHANNELS * TVK_WINDOW_SAMPLES);
+  int32_t *products = OUTPUT(t, int32_t, TVK_WINDOW_PRODUCTS);
+  REPEAT(t, t->set->window_template(pixels, stride, width, x, y, step, channels, products));
+}
+
+/* How far the samples lie from the first one, before and after it, along one axis. */
+static void window_reach(const int32_t *map, int32_t reach[2]) {
+  int k;
+  reach[0] = reach[1] = 0;
+  for (k = 0; k < 2; ++k) {
+    if (map[k] < 0) reach[0] -= (TVK_WINDOW_SIDE - 1) * map[k];
+    if (map[k] > 0) reach[1] += (TVK_WINDOW_SIDE - 1) * map[k];
+  }
+}
+
+static void case_window_sums(trial *t) {
+  enum { LIMIT = TVK_WINDOW_CHANNELS * TVK_WINDOW_SAMPLES };
+  int32_t width, height, stride, k, map[4], reach[2][2];
+  const uint8_t *pixels = window_image(t, &width, &height, &stride);
+  const int32_t largest = random_int(&t->seed, 0, 1) ? 65536 : 1000; /* of 7 map + 7 map <= 15 px */
+  int16_t *channels = INPUT(t, int16_t, LIMIT);
+  int32_t *sums = OUTPUT(t, int32_t, TVK_WINDOW_SUMS);
+  for (k = 0; k < 4; ++k) map[k] = pick(t, -largest, largest, k == 1 ? -20000 : 60000);
+  for (k = 0; k < LIMIT; ++k) {
+    channels[k] = (int16_t)(k < TVK_WINDOW_SAMPLES ? random_int(&t->seed, 600, 3947)
+                                                   : random_int(&t->seed, -4032, 4032));
+  }
+  window_reach(map, reach[0]);
+  window_reach(map + 2, reach[1]);
+  {
+    const int32_t x = window_start(t, width, reach[0][0], reach[0][1]);
+    const int32_t y = window_start(t, height, reach[1][0], reach[1][1]);
+    REPEAT(t, t->set->window_sums(pixels, stride, x, y, map, channels, sums));
+  }
+}
+
 static void case_quantize_descriptor(trial *t) {
   static const int32_t highest[6] = {0, 1, 300, 4096, 1 << 18, INT32_MAX};
   const int32_t high = t->typical ? 1 << 18 : highest[random_int(&t->seed, 0, 5)];

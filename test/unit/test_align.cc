@@ -52,7 +52,8 @@ tv_keypoint keypoint_at(double x, double y, double size, double angle) {
 }
 
 bool align(tv_keypoint* a, tv_keypoint* b) {
-  return tv::align_keypoints(image_of(pixels0), image_of(pixels1), 4, a, b);
+  return tv::align_keypoints(*tvk_select(TV_KERNELS_AUTO), image_of(pixels0), image_of(pixels1), 4,
+                             a, b);
 }
 
 const Map kShear{1.03, 0.12, -0.05, 0.95, 3.3, 4.6};
@@ -103,7 +104,8 @@ void test_exchanged_images_give_the_same_bytes() {
     tv_keypoint a = keypoint_at(60, 50, 4, 0), c = a;
     tv_keypoint b = keypoint_at(kShear.x1(60, 50) + 0.3, kShear.y1(60, 50) + 0.1, 4 + n, 0), d = b;
     TEST_ASSERT_TRUE(align(&a, &b));
-    TEST_ASSERT_TRUE(tv::align_keypoints(image_of(pixels1), image_of(pixels0), 4, &d, &c));
+    TEST_ASSERT_TRUE(tv::align_keypoints(*tvk_select(TV_KERNELS_AUTO), image_of(pixels1),
+                                         image_of(pixels0), 4, &d, &c));
     TEST_ASSERT_EQUAL_MEMORY(&a, &c, sizeof a);
     TEST_ASSERT_EQUAL_MEMORY(&b, &d, sizeof b);
   }

@@ -4,6 +4,7 @@
 #include "twoview/reconstruct.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 
 #include "api/sized.h"
@@ -110,16 +111,52 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
   }
 }
 
+// The rank of a match: by its ratio, then by its lower and its higher index, so that exchanged
+// views give the same rank. Only (i, j) and (j, i) with the same ratio have equal ranks.
+uint64_t rank_of(const tv_correspondence& m) {
+  uint32_t ratio;
+  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // ratios >= 0 have the order of their bits
+  const bool ascending = m.idx0 < m.idx1;
+  const uint32_t low = static_cast<uint32_t>(ascending ? m.idx0 : m.idx1);
+  const uint32_t high = static_cast<uint32_t>(ascending ? m.idx1 : m.idx0);
+  return static_cast<uint64_t>(ratio) << 32 | low << 16 | high;
+}
+
+bool is_at_same_place(const tv_keypoint& a, const tv_keypoint& b) {
+  return a.x == b.x && a.y == b.y && a.size == b.size;
+}
+
 // Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match,
-// so the order of the matches does not matter. Matches of guided matching are not aligned.
+// so the order of the matches does not matter. Matches of guided matching are not aligned. A corner
+// with two directions has two keypoints in turn, and two corners may have two matches, which are
+// one to the estimate: the match of lower rank is aligned, and the other one moves with it.
 __attribute__((noinline)) void align_matches(tv_context* context, const tv_view views[2],
                                              int32_t num_matches, Results& r) {
   StageTimer timer(context, TV_STAGE_MATCH);
   for (int32_t k = 0; k < num_matches; ++k) {
-    const tv_correspondence& m = r.matches[k];
-    r.aligned[m.idx0] =
-        align_keypoints(views[0].image, views[1].image, static_cast<double>(r.keypoint_size),
-                        &r.keypoints[0][m.idx0], &r.keypoints[1][m.idx1]);
+    const tv_correspondence* m = &r.matches[k];
+    const tv_correspondence* other = nullptr;
+    if (k + 1 < num_matches && rank_of(m[0]) != rank_of(m[1]) &&
+        is_at_same_place(r.keypoints[0][m[0].idx0], r.keypoints[0][m[1].idx0]) &&
+        is_at_same_place(r.keypoints[1][m[0].idx1], r.keypoints[1][m[1].idx1])) {
+      const bool first = rank_of(m[0]) < rank_of(m[1]);
+      other = m + first;
+      m += !first;
+      ++k;
+    }
+    tv_keypoint& a = r.keypoints[0][m->idx0];
+    tv_keypoint& b = r.keypoints[1][m->idx1];
+    const bool aligned = align_keypoints(*context->kernels, views[0].image, views[1].image,
+                                         static_cast<double>(r.keypoint_size), &a, &b);
+    r.aligned[m->idx0] = aligned;
+    if (other == nullptr) continue;
+    r.aligned[other->idx0] = aligned;
+    for (int v = 0; v < 2; ++v) {
+      const tv_keypoint& moved = v == 0 ? a : b;
+      tv_keypoint& follower = r.keypoints[v][v == 0 ? other->idx0 : other->idx1];
+      follower.x = moved.x;
+      follower.y = moved.y;
+    }
   }
 }
 
@@ -145,17 +182,6 @@ int32_t join_matches(const tv_correspondence* matches, int32_t num_matches, Aren
     found[k] = b >= 0 && found[b].idx0 > matches[a].idx0 ? found[b--] : matches[a--];
   }
   return num_matches + num_new;
-}
-
-// The rank of a match: by its ratio, then by its lower and its higher index, so that exchanged
-// views give the same rank. Only (i, j) and (j, i) with the same ratio have equal ranks.
-uint64_t rank_of(const tv_correspondence& m) {
-  uint32_t ratio;
-  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // ratios >= 0 have the order of their bits
-  const bool ascending = m.idx0 < m.idx1;
-  const uint32_t low = static_cast<uint32_t>(ascending ? m.idx0 : m.idx1);
-  const uint32_t high = static_cast<uint32_t>(ascending ? m.idx1 : m.idx0);
-  return static_cast<uint64_t>(ratio) << 32 | low << 16 | high;
 }
 
 // Keeps the best matches, at most `most`, in their order; returns how many it left out. Where two
@@ -305,7 +331,7 @@ constexpr tv_reconstruct_options kDefaults = {sizeof(tv_reconstruct_options),
                                               0,
                                               0,
                                               1.0,
-                                              0,
+                                              1,
                                               0};
 
 tv_status read_reconstruct_options(const tv_reconstruct_options* options,
@@ -313,6 +339,8 @@ tv_status read_reconstruct_options(const tv_reconstruct_options* options,
   *checked = kDefaults;
   const tv_status status = read_sized(options, checked);
   if (status != TV_OK) return status;
+  constexpr size_t kWithAlignment = offsetof(tv_reconstruct_options, align_matches) + 4;
+  if (options != nullptr && options->struct_size < kWithAlignment) checked->align_matches = 0;
   if (!is_finite(checked->sigma_by_size)) return TV_ERR_NOT_FINITE;
   const bool valid = is_triangulation_method(checked->triangulation) &&
                      (checked->guided_matching == 0 || checked->guided_matching == 1) &&

@@ -71,6 +71,12 @@ typedef struct tvk_nearest_shape {
 #define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
 
+#define TVK_WINDOW_SIDE 8 /* samples along each side of a window of least-squares matching */
+#define TVK_WINDOW_SAMPLES 64
+#define TVK_WINDOW_CHANNELS 8
+#define TVK_WINDOW_PRODUCTS 40
+#define TVK_WINDOW_SUMS 9
+
 /* Scratch of nearest_groups. It prepares up to TVK_NEAREST_PANEL columns at once, each of
    TVK_NEAREST_COLUMN_BYTES. The sets without products of bytes store 16-bit numbers and use the two
    _16 constants instead. */
@@ -176,6 +182,22 @@ typedef struct tvk_triangulate_pair {
    quantize_descriptor: writes the 128 bytes of a histogram by SIFT's normalisation with clipping at
    0.2, or by RootSIFT's if `root` is not 0.
 
+   window_template: samples the window that stays, TVK_WINDOW_SIDE samples on a side and one more
+   around it, and writes its channels and their products. Sample (i, j) of the 10 x 10 lies at (x +
+   i step, y + j step), in 1/65536 pixel, and is 127^2 / 1024 (grey level - 127.5), rounded down.
+   The channels of the inner 8 x 8 samples S are, with the slopes gx and gy (the next sample less
+   the one before), u = 2 i - 7 and v = 2 j - 7: the constant 4096, S, gx, gy, gx u / 8, gx v / 8,
+   gy u / 8 and gy v / 8. channels[64 p + 8 j + i] is channel p times the Gaussian weight of sigma
+   2.6 samples, rounded. products holds for p = 0 .. 7 and q = 0 .. p the sum of the weighted
+   channel p times channel q, row by row, then that of the weighted constant times S, then three
+   zeros. step is 1 to 1.5 pixels. Every sample lies at least a pixel within the image, which is at
+   least 16 pixels wide.
+
+   window_sums: samples the window that moves, (i, j) at (x + i map[0] + j map[1], y + i map[2] + j
+   map[3]), in the same units, and writes to sums[p] the sum of the weighted channel p times the
+   samples, and to sums[8] the weighted sum of their squares. Every sample lies at least a pixel
+   within the image, and the products of `stride` and their vertical distances fit 32 bits.
+
    nearest_groups: of_rows[i] lists the groups of columns that are nearest to row i, an index, and
    of_columns, of TVK_NEAREST_LISTS(columns->num), the groups of rows that are nearest to each
    column. The groups and bins are returned; they depend on the set. scratch has
@@ -246,6 +268,12 @@ typedef struct tvk_triangulate_pair {
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram, int32_t peaks[2]))     \
   X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
   X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
+  X(window_template, void,                                                                         \
+    (const uint8_t *pixels, int64_t stride, int32_t width, int32_t x, int32_t y, int32_t step,     \
+     int16_t *channels, int32_t *products))                                                        \
+  X(window_sums, void,                                                                             \
+    (const uint8_t *pixels, int64_t stride, int32_t x, int32_t y, const int32_t map[4],            \
+     const int16_t *channels, int32_t *sums))                                                      \
   X(nearest_groups, tvk_nearest_shape,                                                             \
     (const tvk_descriptors *rows, const tvk_descriptors *columns, void *scratch,                   \
      tvk_nearest_lists *of_columns, tvk_nearest *of_rows))                                         \

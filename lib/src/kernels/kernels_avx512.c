@@ -22,4 +22,6 @@
 #define orientation_histogram tvk_orientation_histogram_avx2
 #define gradient_histogram tvk_gradient_histogram_avx2
 #define quantize_descriptor tvk_quantize_descriptor_avx2
+#define window_template tvk_window_template_avx2
+#define window_sums tvk_window_sums_avx2
 #include "kernels/kernels_table.h"

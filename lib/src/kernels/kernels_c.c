@@ -10,5 +10,7 @@ TVK_LEND(sample_patch, c);
 TVK_LEND(quantize_descriptor, c);
 TVK_LEND(nearest_groups, c);
 TVK_LEND(squared_distances, c);
+TVK_LEND(window_template, c);
+TVK_LEND(window_sums, c);
 #endif
 #include "kernels/kernels_table.h"

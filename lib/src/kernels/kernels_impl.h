@@ -19,6 +19,7 @@
 #include "kernels/patch.h"
 #include "kernels/describe.h"
 #include "kernels/nearest.h"
+#include "kernels/window.h"
 /* clang-format on */
 
 /* Exports a kernel of this file under a name by which the tables of other sets can use it. */

@@ -11,4 +11,6 @@
 #define quantize_descriptor tvk_quantize_descriptor_c
 #define nearest_groups tvk_nearest_groups_c
 #define squared_distances tvk_squared_distances_c
+#define window_template tvk_window_template_c
+#define window_sums tvk_window_sums_c
 #include "kernels/kernels_table.h"

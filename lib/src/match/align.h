@@ -2,6 +2,7 @@
 // pixels around them.
 #pragma once
 
+#include "kernels/kernels.h"
 #include "twoview/feature.h"
 #include "twoview/image.h"
 
@@ -19,7 +20,7 @@ inline constexpr double kAlignedSigma = 0.5;
 // 1.2 samples.
 // A. W. Gruen, Adaptive least squares correlation, 1985; S. Baker, I. Matthews, IJCV 2004 (inverse
 // composition). docs/algorithms/match.md.
-bool align_keypoints(const tv_image& image0, const tv_image& image1, double size_of_one,
-                     tv_keypoint* keypoint0, tv_keypoint* keypoint1);
+bool align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_image& image1,
+                     double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1);
 
 }  // namespace tv

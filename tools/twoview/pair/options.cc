@@ -93,6 +93,8 @@ std::vector<Option> table(Options& o) {
        "0.01; 0: it is where the camera file has it"},
       {"guided-matching", kEstimate, &o.guided_matching, 0, 1, closed,
        "1: match again along the epipolar lines, and estimate from all matches"},
+      {"align-matches", kEstimate, &o.align_matches, 0, 1, closed,
+       "1: move one keypoint of each match by the pixels around both; 0: leave them"},
       {"bundle-adjustment", kEstimate, &o.bundle_adjustment, 0, 1, closed,
        "1: adjust pose and points together"},
       {"sigma-by-size", kEstimate, &o.sigma_by_size, 0, 2, closed,

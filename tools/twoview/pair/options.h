@@ -19,6 +19,7 @@ struct Options {
   tv_estimate_options estimate;
   int32_t triangulation = TV_TRIANGULATION_ITERATIVE_LS;
   int32_t guided_matching = 0;
+  int32_t align_matches = 1;
   int32_t bundle_adjustment = 0;
   double sigma_by_size = 1;
   int32_t kernels = TV_KERNELS_AUTO;

@@ -22,6 +22,7 @@ uint64_t reconstruct_pair(Session& session, const Options& options, Outcome& out
   tv_reconstruct_options_init(&stages);
   stages.triangulation = options.triangulation;
   stages.guided_matching = options.guided_matching;
+  stages.align_matches = options.align_matches;
   stages.bundle_adjustment = options.bundle_adjustment;
   stages.sigma_by_size = options.sigma_by_size;
   stages.feature = &options.feature;

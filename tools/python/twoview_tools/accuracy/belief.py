@@ -8,7 +8,7 @@
 Pairs. Every set and sequence of $TWOVIEW_DATA with true poses and an entry in truth.py, whether or
 not anything can be matched. --pairs is shared out: a set with few images gives all its pairs, the
 others equal shares, half of a share at the gaps 1, 2, 4, 8 .. in turn, half at random.
-Each pair goes from the images to the pose with the library's defaults and the set's camera.
+Each pair goes from the images to the pose by tv_reconstruct with its defaults and the set's camera.
 
 A pose is WRONG IN ROTATION when its rotation is off by more than 5 degrees plus the truth's stated
 error, and WRONG when that is so or its direction is off by more than 10 degrees plus the truth's
@@ -44,8 +44,8 @@ import sys
 
 import numpy as np
 
-from . import (belief_fit, belief_tables, datasets, estimators, match_evidence, metrics, parallel,
-               pipeline, reliability, tables, truth, twoview_ctypes, verdicts)
+from . import (belief_fit, belief_tables, datasets, match_evidence, metrics, parallel, pipeline,
+               reliability, tables, truth, twoview_ctypes, verdicts)
 
 ZOOMS = (1.25, 1.5, 2.0)
 UNRELATED_IMAGES = 15  # of each set, evenly spaced
@@ -150,7 +150,7 @@ def enlarged(gray, zoom):
 
 
 class Views:
-    """The features and cameras of images, each image read and extracted once."""
+    """The pixels and cameras of images, each image read once."""
 
     def __init__(self, sets, library, options):
         self.sets, self.library, self.options = sets, library, options
@@ -162,7 +162,7 @@ class Views:
         self.found = {}
 
     def view(self, name, image, change=("", 1.0)):
-        """((keypoints, descriptors), camera, (width, height)) of an image, changed if so asked."""
+        """(pixels, camera) of an image, changed if so asked."""
         key = name, image, change
         if key not in self.found:
             gray, camera = self.sets[name].view(image)
@@ -170,8 +170,7 @@ class Views:
                 gray = mirrored(gray)
             elif "zoomed" in change[0]:
                 gray = enlarged(gray, change[1])
-            features = self.context.extract(gray, self.options[0])
-            self.found[key] = features, camera, gray.shape[::-1]
+            self.found[key] = np.ascontiguousarray(gray), camera
         return self.found[key]
 
 
@@ -216,12 +215,17 @@ def run_pair(views, job):
     """The row of one job, and the matches with their inlier mask."""
     kind, name0, image0, name1, image1, zoom = job
     change = (kind, zoom) if kind in ("mirrored", "zoomed", "self-zoomed") else ("", 1.0)
-    (f0, camera0, size0), (f1, camera1, size1) = (views.view(name0, image0),
-                                                  views.view(name1, image1, change))
-    links = views.context.match(f0[1], f1[1], views.options[1], f0[0], f1[0])
-    matches = pipeline.make_matches(f0, f1, links, (camera0, camera1), (size0, size1),
-                                    views.size_of_one)
-    R, t, result, inliers = estimators.estimate(views.context, matches, views.options[2])
+    (gray0, camera0), (gray1, camera1) = (views.view(name0, image0),
+                                          views.view(name1, image1, change))
+    sizes = gray0.shape[::-1], gray1.shape[::-1]
+    lenses = [twoview_ctypes.make_camera(K, *size, distortion)
+              for (K, distortion), size in zip((camera0, camera1), sizes)]
+    result, cloud = views.context.reconstruct(gray0, lenses[0], gray1, lenses[1], views.options)
+    f0, f1 = zip(cloud.keypoints, cloud.descriptors)
+    links, inliers = cloud.matches, cloud.inlier_mask
+    matches = pipeline.make_matches(f0, f1, links, (camera0, camera1), sizes, views.size_of_one)
+    R = np.array(result.R).reshape(3, 3) if result.has_R else None
+    t = np.array(result.t) if result.has_R and result.has_t else None
     row = {"kind": kind, "set": name0, "image0": image0, "image1": image1, "zoom": zoom,
            "num_keypoints": [len(f0[0]), len(f1[0])], **row_of_result(result)}
     if kind == "unrelated":

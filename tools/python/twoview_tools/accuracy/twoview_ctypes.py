@@ -117,3 +117,18 @@ class Context(twoview.Context):
         return stages._estimate(self, camera0, camera1, np.ascontiguousarray(pixels0, np.float64),
                                 np.ascontiguousarray(pixels1, np.float64),
                                 self.library.estimate_options(options), **values)
+
+    def reconstruct(self, gray0, camera0, gray1, camera1, options=({}, {}, {}), **fields):
+        """(tv_two_view, twoview.Reconstruction) of two images. options: dicts of the features',
+        matching's and estimate's options, of which the last may hold sigma_by_size and
+        align_matches; fields: of tv_reconstruct_options."""
+        feature, match, estimate = map(dict, options)
+        fields["sigma_by_size"] = self.library.take_sigma_by_size(estimate)
+        if "align_matches" in estimate:
+            fields["align_matches"] = int(estimate.pop("align_matches"))
+        structs = (self.library.feature_options(feature), self.library.match_options(match),
+                   self.library.estimate_options(estimate))
+        kinds = (twoview.FeatureOptions, twoview.MatchOptions, twoview.EstimateOptions)
+        return stages._reconstruct(self, gray0, camera0, gray1, camera1, (None, None),
+                                   [kind(**_keywords(s)) for kind, s in zip(kinds, structs)],
+                                   **fields)
