@@ -129,6 +129,9 @@ static void init_all(void) {
   INIT(tv_bundle_options_init, &bundle);
   INIT(tv_bundle_result_init, &adjusted);
   INIT(tv_reconstruct_options_init, &options);
+#ifdef TWOVIEW_ABI_GROWN
+  options.it.align_matches = 0; /* 1 by default; a caller of 0.1.0 has no alignment */
+#endif
   INIT(tv_reconstruction_init, &cloud);
   for (v = 0; v < 2; ++v) {
     INIT(tv_features_init, &features[v]);
