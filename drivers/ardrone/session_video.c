@@ -109,14 +109,6 @@ static tvs_time time_of(ardrone_session *session, const ardrone_pave_header *hea
   return time;
 }
 
-static double angle_between(const tvs_attitude *a, const tvs_attitude *b) {
-  double dot = 0;
-  int k;
-  for (k = 0; k < 4; ++k) dot += a->world_from_body[k] * b->world_from_body[k];
-  dot = fabs(dot);
-  return dot < 1 ? 2 * acos(dot) : 0;
-}
-
 tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs_time *time,
                                        tvs_attitude *attitude) {
   tvs_attitude found, earlier;
@@ -141,7 +133,8 @@ tvs_status ardrone_session_attitude_at(const ardrone_session *session, const tvs
     status = tvs_attitudes_at(&session->attitudes, clock_id, device_ns - uncertainty_ns, gap_ns,
                               &earlier);
     if (status != TVS_OK) return status;
-    found.sigma_rad = hypot(found.sigma_rad, angle_between(&found, &earlier));
+    found.sigma_rad =
+        hypot(found.sigma_rad, tvs_angle_between(found.world_from_body, earlier.world_from_body));
   }
   *attitude = found;
   return TVS_OK;

@@ -136,14 +136,6 @@ tvs_status tvm_session_imu(tvm_session *session, tvs_imu_source *source) {
   return TVS_OK;
 }
 
-static double angle_between(const tvs_attitude *a, const tvs_attitude *b) {
-  double dot = 0;
-  int k;
-  for (k = 0; k < 4; ++k) dot += a->world_from_body[k] * b->world_from_body[k];
-  dot = fabs(dot);
-  return dot < 1 ? 2 * acos(dot) : 0;
-}
-
 tvs_status tvm_session_attitude_at(const tvm_session *session, int64_t host_ns, tvs_time *time,
                                    tvs_attitude *attitude) {
   tvs_attitude found, earlier;
@@ -158,7 +150,8 @@ tvs_status tvm_session_attitude_at(const tvm_session *session, int64_t host_ns, 
   /* The angle that the vehicle turned within the time's uncertainty is an error of its own. */
   if (tvs_attitudes_at(&session->attitudes, session->clock_id, device_ns - uncertainty_ns,
                        session->options.max_gap_ns, &earlier) == TVS_OK)
-    found.sigma_rad = hypot(found.sigma_rad, angle_between(&found, &earlier));
+    found.sigma_rad =
+        hypot(found.sigma_rad, tvs_angle_between(found.world_from_body, earlier.world_from_body));
   if (time) {
     time->device_ns = device_ns;
     time->clock_id = session->clock_id;

@@ -13,6 +13,14 @@ void tvs_quaternion_from_euler(double yaw, double pitch, double roll, double q[4
   q[3] = sz * cy * cx - cz * sy * sx;
 }
 
+double tvs_angle_between(const double a[4], const double b[4]) {
+  double dot = 0;
+  int k;
+  for (k = 0; k < 4; ++k) dot += a[k] * b[k];
+  dot = fabs(dot);
+  return dot < 1 ? 2 * acos(dot) : 0;
+}
+
 void tvs_slerp(const double a[4], const double b[4], double s, double q[4]) {
   double dot = 0, sign = 1, weight_a = 1 - s, weight_b = s, norm_sq = 0, norm;
   int k;

@@ -43,6 +43,9 @@ TV_API tvs_status tvs_attitudes_at(const tvs_attitudes *attitudes, uint32_t cloc
    are positive. */
 TV_API void tvs_quaternion_from_euler(double yaw, double pitch, double roll, double q[4]);
 
+/* Returns the angle in radians, [0, pi], of the turn between the unit quaternions a and b. */
+TV_API double tvs_angle_between(const double a[4], const double b[4]);
+
 /* Writes to q the unit quaternion at the share s in [0, 1] of the shorter great circle from a (s =
    0) to b (s = 1). q may be a or b. */
 TV_API void tvs_slerp(const double a[4], const double b[4], double s, double q[4]);
