@@ -1,4 +1,4 @@
-// Pairs of keyframes that check the map's relative poses (odometry/pair.h), with the pixels of a
+// Pairs of keyframes that check the map's relative poses (odometry/map_check.h), with the pixels of a
 // scene whose motion is known.
 
 #include <unity.h>
@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "odometry/pair.h"
+#include "odometry/map_check.h"
 #include "support/random.h"
 
 namespace {
@@ -67,22 +67,22 @@ tv::MapVote vote_on(const tv::Rigid& cam1_from_cam0, int num_votes) {
 void test_a_right_pose_is_confirmed_by_one_pair() {
   draw(1.5, 0.5);
   const tv::MapVote vote = vote_on(motion(), 1);
-  TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kAgrees);
+  TEST_ASSERT_TRUE(tv::verdict_of(vote) == tv::MapVerdict::kAgrees);
   TEST_ASSERT_FALSE(tv::needs_vote(vote));
   // Neither does an error of the turn of less than a degree contradict, nor another length of t.
-  TEST_ASSERT_TRUE(tv::result_of(vote_on(turned(motion(), 0.015), 1)) == tv::MapCheck::kAgrees);
+  TEST_ASSERT_TRUE(tv::verdict_of(vote_on(turned(motion(), 0.015), 1)) == tv::MapVerdict::kAgrees);
   tv::Rigid longer = motion();
   for (double& t : longer.t) t *= 7;
-  TEST_ASSERT_TRUE(tv::result_of(vote_on(longer, 1)) == tv::MapCheck::kAgrees);
+  TEST_ASSERT_TRUE(tv::verdict_of(vote_on(longer, 1)) == tv::MapVerdict::kAgrees);
 }
 
 void test_two_pairs_contradict_a_wrong_turn() {
   draw(1.5, 0.5);
   for (const double angle : {-0.08, 0.05, 0.5}) {
     const tv::MapVote one = vote_on(turned(motion(), angle), 1);
-    TEST_ASSERT_TRUE(tv::result_of(one) == tv::MapCheck::kUnknown && tv::needs_vote(one));
+    TEST_ASSERT_TRUE(tv::verdict_of(one) == tv::MapVerdict::kUnknown && tv::needs_vote(one));
     const tv::MapVote two = vote_on(turned(motion(), angle), 2);
-    TEST_ASSERT_TRUE(tv::result_of(two) == tv::MapCheck::kContradicts && !tv::needs_vote(two));
+    TEST_ASSERT_TRUE(tv::verdict_of(two) == tv::MapVerdict::kContradicts && !tv::needs_vote(two));
   }
 }
 
@@ -90,7 +90,7 @@ void test_one_agreeing_pair_is_enough() {
   draw(1.5, 0.5);
   tv::MapVote vote = vote_on(turned(motion(), 0.2), 1);
   tv::add_vote(odometry, keypoints0, keypoints1, matches, kNum, motion(), &vote);
-  TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kAgrees);
+  TEST_ASSERT_TRUE(tv::verdict_of(vote) == tv::MapVerdict::kAgrees);
 }
 
 // One plane in a small part of the picture: two motions explain it, whatever the map says.
@@ -99,7 +99,7 @@ void test_a_plane_decides_nothing() {
   for (const double angle : {0.0, 0.1}) {
     const tv::MapVote vote = vote_on(turned(motion(), angle), 3);
     TEST_ASSERT_EQUAL_INT(3, vote.num_planar);
-    TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kOnePlane && !tv::needs_vote(vote));
+    TEST_ASSERT_TRUE(tv::verdict_of(vote) == tv::MapVerdict::kOnePlane && !tv::needs_vote(vote));
   }
 }
 
@@ -108,7 +108,7 @@ void test_few_matches_decide_nothing() {
   tv::MapVote vote{};
   tv::add_vote(odometry, keypoints0, keypoints1, matches, 29, motion(), &vote);
   tv::add_vote(odometry, keypoints0, keypoints1, matches, 0, motion(), &vote);
-  TEST_ASSERT_TRUE(tv::result_of(vote) == tv::MapCheck::kUnknown && tv::needs_vote(vote));
+  TEST_ASSERT_TRUE(tv::verdict_of(vote) == tv::MapVerdict::kUnknown && tv::needs_vote(vote));
   TEST_ASSERT_EQUAL_INT(2, vote.num_pairs);
 }
 

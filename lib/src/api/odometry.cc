@@ -11,8 +11,8 @@
 #include "odometry/adjust.h"
 #include "odometry/fit_pose.h"
 #include "odometry/loop.h"
+#include "odometry/map_check.h"
 #include "odometry/metric.h"
-#include "odometry/pair.h"
 #include "odometry/track.h"
 #include "twoview/match.h"
 #include "twoview/triangulate.h"
@@ -56,8 +56,7 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   plan->limits.max_keypoints = kMatchedFrames * o.max_keypoints;
   plan->limits.max_matches = o.max_keypoints;
   plan->limits.kernels = o.kernels;
-  plan->limits.purposes =
-      TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE | TV_PURPOSE_ABSOLUTE_POSE;
+  plan->limits.purposes = TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE;
   plan->columns = (camera->width + kCellPx - 1) / kCellPx;
   plan->rows = (camera->height + kCellPx - 1) / kCellPx;
   plan->sizes = {o.max_keypoints, o.max_keyframes, o.max_points};
@@ -101,6 +100,7 @@ void start_anew(tv_odometry* o) {
   o->num_starts = o->num_local_points = 0;
   o->reference_id = o->confirmed_id = -1;
   o->is_doubtful = false;
+  o->check = MapCheck{};
   o->has_motion = false;
   o->mark = o->num_frames = o->segment = o->num_segments = 0;
   o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
@@ -144,13 +144,13 @@ size_t scratch_bytes(const tv_odometry_options& o) {
   // track.cc, loop.cc: the points of a keyframe are matched with a frame, and give its pose.
   const size_t matching =
       arena_bytes<uint8_t>(static_cast<size_t>(kMatchedFrames) * n * TV_DESCRIPTOR_BYTES) + matches;
-  const size_t fitting = arena_bytes<double>(2 * n) + arena_bytes<double>(3 * n) +
-                         arena_bytes<float>(n) + indices + arena_bytes<uint8_t>(n);
-  const size_t locating =
-      keyframe_numbers + indices + std::max(matching, fitting) + keyframe_numbers;
+  const size_t locating = keyframe_numbers + indices +
+                          std::max(matching, fit_bytes(o.max_keypoints)) + keyframe_numbers;
+  const size_t checking = check_bytes(o);
   const size_t closing = close_loop_bytes(o);
   const size_t ranking = 2 * arena_bytes<int32_t>(num_points);
-  return arena_bytes<PoseFit>(1) + std::max({start, new_points, locating, closing, ranking});
+  return arena_bytes<PoseFit>(1) +
+         std::max({start, new_points, locating, checking, closing, ranking});
 }
 
 }  // namespace tv

@@ -355,14 +355,6 @@ double largest_sigma(const Candidate& c, double distance) {
   return std::sqrt(std::max(rotation, position / (distance * distance)));
 }
 
-// Writes a pose of the caller's points.
-void store(const Sightings& s, const Pose& pose, double R[9], double t[3]) {
-  double turned[3];
-  rotate(pose.R, s.centre, turned);
-  for (int k = 0; k < 9; ++k) R[k] = pose.R(k / 3, k % 3);
-  for (int k = 0; k < 3; ++k) t[k] = pose.t[k] / s.scale - turned[k];
-}
-
 // The covariance in the caller's parameters, (w, d') with d' = (d + t x w) / scale: a turn about
 // the camera instead of the middle of the points.
 void store_covariance(const Sightings& s, const Candidate& c, double out[36]) {
@@ -481,7 +473,7 @@ void finish_absolute_pose(const SightingInput& input, const Sightings& s,
       if (std::fabs(difference) < kEvidence) {
         out->has_alternative = 1;
         out->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
-        store(s, other.pose, out->alternative_R, out->alternative_t);
+        write_pose(s, other.pose, out->alternative_R, out->alternative_t);
       }
       if (difference < 0) best = twin;
     }
@@ -489,7 +481,7 @@ void finish_absolute_pose(const SightingInput& input, const Sightings& s,
   out->num_inliers = 0;
   different = count_inliers(f, best.pose, out, mask);
   out->has_pose = 1;
-  store(s, best.pose, out->R, out->t);
+  write_pose(s, best.pose, out->R, out->t);
   out->has_covariance = best.has_covariance;
   if (best.has_covariance) {
     out->noise_px = best.noise_px;

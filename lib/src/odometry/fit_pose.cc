@@ -3,61 +3,139 @@
 #include <algorithm>
 #include <cmath>
 
+#include "odometry/absolute_pose.h"
+#include "odometry/reprojection.h"
 #include "odometry/search.h"
 
 namespace tv {
+namespace {
 
-bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
-              PoseFit* fit) {
-  ArenaScope scope(odometry->scratch);
-  const size_t room = static_cast<size_t>(frame->num);
-  double* pixels = arena_alloc<double>(odometry->scratch, 2 * room);
-  double* points = arena_alloc<double>(odometry->scratch, 3 * room);
-  float* sigmas = arena_alloc<float>(odometry->scratch, room);
-  int32_t* keypoints = arena_alloc<int32_t>(odometry->scratch, room);
-  uint8_t* is_inlier = arena_alloc<uint8_t>(odometry->scratch, room);
+// The keypoints of a frame that have a point, as the absolute pose takes them.
+struct FrameMatches {
+  SightingInput input;
+  Sightings sightings;
+  int32_t* keypoints;  // of each match
+  uint8_t* is_inlier;
+  tv_absolute_pose_options options;
+};
+
+// False: they are too few for a pose.
+bool gather_matches(Odometry* odometry, double max_error_px, const Frame& frame,
+                    FrameMatches* matches) {
+  Arena& arena = odometry->scratch;
+  const size_t room = static_cast<size_t>(frame.num);
+  double* pixels = arena_alloc<double>(arena, 2 * room);
+  double* points = arena_alloc<double>(arena, 3 * room);
+  float* sigmas = arena_alloc<float>(arena, room);
+  matches->keypoints = arena_alloc<int32_t>(arena, room);
+  matches->is_inlier = arena_alloc<uint8_t>(arena, room);
   double centre[3];
-  centre_of(frame->cam_from_world, centre);
-  tv_pixel_points matches;
-  tv_pixel_points_init(&matches);
-  for (int32_t k = 0; k < frame->num; ++k) {
-    if (frame->points[k] == kNoPoint) continue;
-    const MapPoint& point = odometry->map.points[frame->points[k]];
-    const int32_t n = matches.num++;
-    pixels[2 * n] = static_cast<double>(frame->keypoints[k].x);
-    pixels[2 * n + 1] = static_cast<double>(frame->keypoints[k].y);
-    for (int c = 0; c < 3; ++c) points[3 * n + c] = point.position[c];
-    double sigma = static_cast<double>(frame->sigmas[k]);
-    if (frame->has_pose) {
+  centre_of(frame.cam_from_world, centre);
+  int num = 0;
+  for (int32_t k = 0; k < frame.num; ++k) {
+    if (frame.points[k] == kNoPoint) continue;
+    const MapPoint& point = odometry->map.points[frame.points[k]];
+    pixels[2 * num] = static_cast<double>(frame.keypoints[k].x);
+    pixels[2 * num + 1] = static_cast<double>(frame.keypoints[k].y);
+    for (int c = 0; c < 3; ++c) points[3 * num + c] = point.position[c];
+    double sigma = static_cast<double>(frame.sigmas[k]);
+    if (frame.has_pose) {
       double x[3];
-      transform(frame->cam_from_world, point.position, x);
+      transform(frame.cam_from_world, point.position, x);
       const double error =
           depth_error_px(*odometry, point, centre, std::max(x[2], 1e-9)) / kTypicalNoise;
       sigma = std::sqrt(sigma * sigma + error * error);
     }
-    sigmas[n] = static_cast<float>(std::min(sigma, 1000.0));
-    keypoints[n] = k;
+    sigmas[num] = static_cast<float>(std::min(sigma, 1000.0));
+    matches->is_inlier[num] = 0;
+    matches->keypoints[num++] = k;
   }
-  if (matches.num < 4) return false;
-  matches.pixels = pixels;
-  matches.points = points;
-  matches.sigmas = sigmas;
-  tv_absolute_pose_options options;
-  tv_absolute_pose_options_init(&options);
-  options.max_iterations = max_iterations;
-  options.max_error_px = max_error_px;
-  options.seed = odometry->options.seed;
-  tv_absolute_pose_init(&fit->estimate);
-  const tv_status status = tv_estimate_absolute_pose(odometry->context, &odometry->camera.model,
-                                                     &matches, &options, &fit->estimate, is_inlier);
-  if (status != TV_OK || !fit->estimate.has_pose) return false;
-  for (int k = 0; k < 9; ++k) fit->cam_from_world.R[k] = fit->estimate.R[k];
-  for (int k = 0; k < 3; ++k) fit->cam_from_world.t[k] = fit->estimate.t[k];
-  for (int32_t n = 0; n < matches.num; ++n) {
-    if (is_inlier[n]) continue;
-    frame->points[keypoints[n]] = kNoPoint;
-    frame->distances[keypoints[n]] = TVK_NEAREST_NONE;
+  if (num < 4) return false;
+  matches->input = SightingInput{odometry->camera, pixels, points, nullptr, sigmas, num};
+  prepare_sightings(matches->input, arena, &matches->sightings);
+  tv_absolute_pose_options_init(&matches->options);
+  matches->options.max_error_px = max_error_px;
+  matches->options.seed = odometry->options.seed;
+  return true;
+}
+
+void search(Odometry* odometry, int32_t max_iterations, FrameMatches* matches,
+            AbsolutePoseSearch* found) {
+  matches->options.max_iterations = max_iterations;
+  search_absolute_pose(matches->sightings, matches->options, false, odometry->scratch, found);
+}
+
+bool finish(Odometry* odometry, const AbsolutePoseSearch& found, FrameMatches* matches,
+            PoseFit* fit) {
+  tv_absolute_pose* estimate = &fit->estimate;
+  tv_absolute_pose_init(estimate);
+  estimate->num_matches = matches->input.num;
+  finish_absolute_pose(matches->input, matches->sightings, matches->options, found,
+                       odometry->scratch, estimate, matches->is_inlier);
+  if (!estimate->has_pose) return false;
+  std::copy_n(estimate->R, 9, fit->cam_from_world.R);
+  std::copy_n(estimate->t, 3, fit->cam_from_world.t);
+  return true;
+}
+
+void forget_outliers(const FrameMatches& matches, Frame* frame) {
+  for (int k = 0; k < matches.input.num; ++k) {
+    if (matches.is_inlier[k]) continue;
+    frame->points[matches.keypoints[k]] = kNoPoint;
+    frame->distances[matches.keypoints[k]] = TVK_NEAREST_NONE;
   }
+}
+
+}  // namespace
+
+size_t fit_bytes(int32_t max_keypoints) {
+  const size_t n = static_cast<size_t>(max_keypoints);
+  return arena_bytes<double>(2 * n) + arena_bytes<double>(3 * n) + arena_bytes<float>(n) +
+         arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) + absolute_pose_bytes(max_keypoints);
+}
+
+bool search_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
+                 PoseFit* fit) {
+  ArenaScope scope(odometry->scratch);
+  FrameMatches matches;
+  if (!gather_matches(odometry, max_error_px, *frame, &matches)) return false;
+  AbsolutePoseSearch found;
+  search(odometry, max_iterations, &matches, &found);
+  if (!found.found) return false;
+  fit->estimate.num_matches = matches.input.num;
+  const Sightings& s = matches.sightings;
+  fit->estimate.num_inliers = 0;
+  for (int k = 0; k < s.num_all; ++k) {
+    if (!(reprojection_sq(s.all[k], found.pose) <= max_error_px * max_error_px)) continue;
+    matches.is_inlier[s.order[k]] = 1;
+    ++fit->estimate.num_inliers;
+  }
+  write_pose(s, found.pose, fit->cam_from_world.R, fit->cam_from_world.t);
+  forget_outliers(matches, frame);
+  return true;
+}
+
+bool refine_pose(Odometry* odometry, double max_error_px, Frame* frame, PoseFit* fit) {
+  ArenaScope scope(odometry->scratch);
+  FrameMatches matches;
+  if (!gather_matches(odometry, max_error_px, *frame, &matches)) return false;
+  AbsolutePoseSearch known;
+  known.found = true;
+  known.pose = read_pose(matches.sightings, fit->cam_from_world.R, fit->cam_from_world.t);
+  if (!finish(odometry, known, &matches, fit)) return false;
+  forget_outliers(matches, frame);
+  return true;
+}
+
+bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
+              PoseFit* fit) {
+  ArenaScope scope(odometry->scratch);
+  FrameMatches matches;
+  if (!gather_matches(odometry, max_error_px, *frame, &matches)) return false;
+  AbsolutePoseSearch found;
+  search(odometry, max_iterations, &matches, &found);
+  if (!finish(odometry, found, &matches, fit)) return false;
+  forget_outliers(matches, frame);
   return true;
 }
 

@@ -10,8 +10,21 @@ struct PoseFit {
   Rigid cam_from_world;
 };
 
-// Estimates the pose, and forgets the points that do not fit it. False: there is no pose, and the
-// frame is as before.
+// How many bytes of scratch each of the following takes, for at most max_keypoints matches.
+size_t fit_bytes(int32_t max_keypoints);
+
+// Each estimates the pose from the keypoints that have a point, and forgets the points farther than
+// max_error_px from their keypoint. False: there is no pose, and the frame is as before.
+
+// Searches the pose: one that a refinement can start from. Only the numbers of matches and inliers
+// of fit->estimate are written.
+bool search_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
+                 PoseFit* fit);
+
+// Refines the pose fit->cam_from_world over all matches near it.
+bool refine_pose(Odometry* odometry, double max_error_px, Frame* frame, PoseFit* fit);
+
+// Searches the pose, and refines it.
 bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
               PoseFit* fit);
 

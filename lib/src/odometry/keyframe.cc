@@ -5,6 +5,7 @@
 
 #include "geometry/vector3.h"
 #include "odometry/adjust.h"
+#include "odometry/map_check.h"
 #include "twoview/triangulate.h"
 
 namespace tv {
@@ -39,15 +40,6 @@ bool is_seen_at(const Odometry& odometry, const MapKeyframe& keyframe, const Map
   const double dx = pixel.x() - static_cast<double>(keypoint.x);
   const double dy = pixel.y() - static_cast<double>(keypoint.y);
   return std::sqrt(dx * dx + dy * dy) <= kLargestError * sigma_of(keypoint);
-}
-
-// All keypoints of a keyframe that has its descriptors.
-tv_features features_of(const Map& map, const MapKeyframe& keyframe, tv_keypoint* keypoints) {
-  const MapKeypoint* own = keypoints_of(map, keyframe);
-  for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
-    keypoints[k] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
-  }
-  return as_features(keypoints, descriptors_of(map, keyframe), keyframe.num_keypoints);
 }
 
 }  // namespace
@@ -168,7 +160,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   return num_made;
 }
 
-MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
+void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;
   Map& map = odometry->map;
@@ -194,7 +186,10 @@ MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image
     }
     neighbours[num_neighbours++] = k;
   }
-  MapVote vote{};
+  begin_check(odometry, own.id);
+  MapCheck* check = &odometry->check;
+  // The nearest one is left out: from near by, a wrong motion looks like the right one.
+  const int32_t first_checked = num_neighbours > 1 ? 1 : 0;
   for (int32_t i = 0; i < num_neighbours; ++i) {
     const int32_t k = neighbours[i];
     const MapKeyframe& other = map.keyframes[k];
@@ -203,10 +198,11 @@ MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image
     if (tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num_found) != TV_OK) {
       continue;
     }
-    // The nearest one is left out: from near by, a wrong motion looks like the right one.
-    if ((i > 0 || num_neighbours == 1) && needs_vote(vote)) {
+    if (i == first_checked || (i > first_checked && is_urgent(check->vote))) {
       add_vote(odometry, theirs.keypoints, mine.keypoints, found, num_found,
-               compose(own.cam_from_world, inverse(other.cam_from_world)), &vote);
+               compose(own.cam_from_world, inverse(other.cam_from_world)), &check->vote);
+    } else if (i > first_checked && needs_vote(check->vote)) {
+      add_pair(check, other.id);
     }
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
     const MapKeypoint* their_keypoints = keypoints_of(map, other);
@@ -230,7 +226,6 @@ MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image
     triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num,
                         std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma), image);
   }
-  return result_of(vote);
 }
 
 void remove_bad_points(Odometry* odometry) {

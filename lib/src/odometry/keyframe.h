@@ -1,16 +1,16 @@
 // Keyframes: when a frame becomes one, and the points that it adds to the map.
 #pragma once
 
-#include "odometry/pair.h"
+#include "odometry/odometry.h"
 
 namespace tv {
 
 // Makes the frame a keyframe, with the points that it sees, and returns its index.
 int32_t make_keyframe(Odometry* odometry, const Frame& frame);
 
-// Makes points of the keypoints that match those of earlier keyframes, and returns what these
-// matches say of the map.
-MapCheck make_points(Odometry* odometry, int32_t keyframe, const tv_image& image);
+// Makes points of the keypoints that match those of earlier keyframes, and begins to check the map
+// by these matches.
+void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image);
 
 // Removes keyframes until there is room for `wanted` more: those between whose neighbours the
 // camera moved and turned least; never the first one of a segment or the one to which poses are

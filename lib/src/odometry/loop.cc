@@ -112,7 +112,7 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
     find_points(odometry, search, again);
     again->cam_from_world = fit.cam_from_world;
     again->has_pose = true;
-    if (!fit_pose(odometry, 50, 3.0, again, &fit)) return false;
+    if (!refine_pose(odometry, 3.0, again, &fit)) return false;
   }
   again->cam_from_world = fit.cam_from_world;
   if (fit.estimate.num_inliers < kLeastInliers || fit.estimate.verdict != TV_VERDICT_OK) {

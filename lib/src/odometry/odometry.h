@@ -33,6 +33,21 @@ struct Frame {
   Sensors sensors;
 };
 
+inline constexpr int32_t kMostPairs = 3;  // that a keyframe is checked with
+
+// What pairs of a keyframe with earlier ones said of their relative poses (odometry/map_check.h).
+struct MapVote {
+  int32_t num_pairs, num_agree, num_disagree, num_planar;
+};
+
+// The check of the newest keyframe: its pairs from other_ids[next] on are still to be estimated.
+struct MapCheck {
+  int32_t keyframe_id;
+  int32_t other_ids[kMostPairs - 1];
+  int32_t num_others, next;
+  MapVote vote;
+};
+
 inline constexpr int32_t kCellPx = 16;
 // The error of a pixel of sigma 1 along one axis before one was measured, and the largest one that
 // a point of the map may have, in pixels.
@@ -71,6 +86,7 @@ struct tv_odometry {
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
   // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
   // saw one plane only, or contradicted the map.
+  tv::MapCheck check;
   int32_t confirmed_id;
   bool is_doubtful;
   bool is_locating;  // a frame of tv_odometry_locate, which does not change the map

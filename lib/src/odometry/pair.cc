@@ -8,10 +8,6 @@ namespace {
 
 constexpr int32_t kLeastMatches = 30;
 constexpr int32_t kMostIterations = 2000;
-constexpr int32_t kMostPairs = 3;  // that a keyframe is checked with
-// A map contradicts a pair whose turns differ by more than three standard deviations of the pair's
-// and this angle, in radians. Measured: docs/odometry.md.
-constexpr double kTurnSigmas = 3, kTurnAllowed = 0.026;
 
 }  // namespace
 
@@ -28,6 +24,14 @@ tv_features as_features(const tv_keypoint* keypoints, const uint8_t* descriptors
   features.keypoints = keypoints;
   features.descriptors = descriptors;
   return features;
+}
+
+tv_features features_of(const Map& map, const MapKeyframe& keyframe, tv_keypoint* keypoints) {
+  const MapKeypoint* own = keypoints_of(map, keyframe);
+  for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
+    keypoints[k] = tv_keypoint{own[k].x, own[k].y, own[k].size, 0, 1, 0};
+  }
+  return as_features(keypoints, descriptors_of(map, keyframe), keyframe.num_keypoints);
 }
 
 bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
@@ -71,41 +75,6 @@ bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_k
   tv_two_view_init(pair->view);
   return tv_estimate_two_view(odometry->context, &odometry->camera.model, &odometry->camera.model,
                               &pairs, &options, pair->view, pair->is_inlier) == TV_OK;
-}
-
-void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
-              const tv_correspondence* matches, int32_t num, const Rigid& cam1_from_cam0,
-              MapVote* vote) {
-  ArenaScope scope(odometry->scratch);
-  Pair pair;
-  ++vote->num_pairs;
-  if (!estimate_pair(odometry, keypoints0, keypoints1, matches, num, &pair)) return;
-  const tv_two_view& view = *pair.view;
-  if (view.verdict == TV_VERDICT_DOUBTFUL && (view.reasons & TV_REASON_TWO_PLANAR_SOLUTIONS) != 0) {
-    ++vote->num_planar;
-  }
-  if (view.verdict != TV_VERDICT_OK || !view.has_R || !view.has_covariance) return;
-  Rigid turn = kIdentity, map_turn = cam1_from_cam0;
-  std::copy_n(view.R, 9, turn.R);
-  std::fill(map_turn.t, map_turn.t + 3, 0.0);
-  // The variances of the rotation vector: elements 0, 6 and 12 of the 5x5 covariance.
-  const double* c = view.covariance;
-  const double sigma = std::sqrt(std::max({c[0], c[6], c[12]}));
-  const double difference = rotation_angle(compose(turn, inverse(map_turn)));
-  if (difference <= kTurnSigmas * sigma + kTurnAllowed)
-    ++vote->num_agree;
-  else
-    ++vote->num_disagree;
-}
-
-bool needs_vote(const MapVote& vote) {
-  return vote.num_agree == 0 && vote.num_disagree < 2 && vote.num_pairs < kMostPairs;
-}
-
-MapCheck result_of(const MapVote& vote) {
-  if (vote.num_agree > 0) return MapCheck::kAgrees;
-  if (vote.num_disagree >= 2) return MapCheck::kContradicts;
-  return 2 * vote.num_planar > vote.num_pairs ? MapCheck::kOnePlane : MapCheck::kUnknown;
 }
 
 }  // namespace tv

@@ -154,6 +154,22 @@ void unit_ray(const Sighting& s, double ray[3]) {
   for (int k = 0; k < 3; ++k) ray[k] *= scale;
 }
 
+void write_pose(const Sightings& s, const Pose& pose, double R[9], double t[3]) {
+  double turned[3];
+  rotate(pose.R, s.centre, turned);
+  for (int k = 0; k < 9; ++k) R[k] = pose.R(k / 3, k % 3);
+  for (int k = 0; k < 3; ++k) t[k] = pose.t[k] / s.scale - turned[k];
+}
+
+Pose read_pose(const Sightings& s, const double R[9], const double t[3]) {
+  Pose pose;
+  for (int k = 0; k < 9; ++k) pose.R(k / 3, k % 3) = R[k];
+  double turned[3];
+  rotate(pose.R, s.centre, turned);
+  for (int k = 0; k < 3; ++k) pose.t[k] = (t[k] + turned[k]) * s.scale;
+  return pose;
+}
+
 void prepare_sightings(const SightingInput& in, Arena& arena, Sightings* s) {
   const size_t n = static_cast<size_t>(in.num);
   s->all = arena_alloc<Sighting>(arena, n);

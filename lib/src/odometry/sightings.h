@@ -54,6 +54,10 @@ inline size_t sightings_bytes(size_t n) {
 // times the median distance of all points from their middle.
 void prepare_sightings(const SightingInput& input, Arena& arena, Sightings* sightings);
 
+// A pose of the caller's points from one of the points as Sightings has them, and back.
+void write_pose(const Sightings& sightings, const Pose& pose, double R[9], double t[3]);
+Pose read_pose(const Sightings& sightings, const double R[9], const double t[3]);
+
 void unit_ray(const Sighting& sighting, double ray[3]);  // that of the pixel
 
 // The middle one of `count` > 0 values, whose order it changes.

@@ -8,6 +8,7 @@
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/loop.h"
+#include "odometry/map_check.h"
 #include "odometry/metric.h"
 #include "odometry/search.h"
 #include "odometry/start.h"
@@ -22,7 +23,8 @@ constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
 // kFarTurned radians since the last one, and earlier where few of its points are left.
 constexpr double kFarMoved = 0.10, kFarTurned = 0.25, kLeastMoved = 0.02, kLeastTurned = 0.08;
 constexpr int32_t kFewInliers = 100;
-constexpr int32_t kWindowSteps = 6;        // of the adjustment after a keyframe
+constexpr int32_t kWindowSteps = 4;        // of the adjustment after a keyframe
+constexpr int32_t kLoopSteps = 8;          // and after a loop
 constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
 constexpr int32_t kMostTurnedFrames = 60;  // of status rotation, in a row
 constexpr int32_t kLostBeforeStart = 8;    // frames
@@ -45,7 +47,7 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
   frame->cam_from_world = predicted;
   frame->has_pose = true;
   if (find_points(odometry, search, frame) < kLeastInliers) return false;
-  if (!fit_pose(odometry, 100, 4.0, frame, fit)) return false;
+  if (!search_pose(odometry, 100, 4.0, frame, fit)) return false;
   if (fit->estimate.num_inliers < kLeastInliers) return false;
   frame->cam_from_world = fit->cam_from_world;
   return true;
@@ -58,7 +60,7 @@ bool refine_track(Odometry* odometry, Frame* frame, PoseFit* fit) {
                      kMaxDistance,           kSearchRatio};
   find_points(odometry, search, frame);
   frame->cam_from_world = fit->cam_from_world;
-  if (!fit_pose(odometry, 50, 3.0, frame, fit)) return false;
+  if (!refine_pose(odometry, 3.0, frame, fit)) return false;
   frame->cam_from_world = fit->cam_from_world;
   return fit->estimate.num_inliers >= kLeastInliers;
 }
@@ -134,62 +136,60 @@ void remove_unconfirmed(Odometry* odometry) {
   odometry->reference_id = map.keyframes[map.num_keyframes - 1].id;
 }
 
-// False: the map is wrong here. The frame is no keyframe, and has no pose.
-bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image) {
-  make_room(odometry, 1);
-  const int32_t idx = make_keyframe(odometry, *frame);
-  const MapCheck check = make_points(odometry, idx, image);
-  if (check == MapCheck::kContradicts) {
+// What the pairs of the newest keyframe say of the map. False: it is wrong here, and what was made
+// since the last confirmed keyframe is removed.
+bool heed_check(Odometry* odometry) {
+  const MapVerdict verdict = verdict_of(odometry->check.vote);
+  if (verdict == MapVerdict::kAgrees) {
+    odometry->confirmed_id = odometry->check.keyframe_id;
+    odometry->is_doubtful = false;
+  } else if (verdict == MapVerdict::kContradicts) {
     remove_unconfirmed(odometry);
     odometry->is_doubtful = true;
-    return false;
-  }
-  if (check == MapCheck::kAgrees) {
-    odometry->confirmed_id = odometry->map.keyframes[idx].id;
-    odometry->is_doubtful = false;
-  } else if (check == MapCheck::kOnePlane) {
+  } else if (verdict == MapVerdict::kOnePlane && !is_checking(odometry->check)) {
     odometry->is_doubtful = true;
   }
-  remove_bad_points(odometry);
-  adjust_around(odometry, idx, kWindowSteps);
-  const Map& map = odometry->map;
-  odometry->keyframe_inliers = map.keyframes[idx].num_observations;
-  odometry->reference_id = map.keyframes[idx].id;
-  list_local_points(odometry, idx);
-  take_keyframe(*odometry, idx, frame);
-  return true;
+  return verdict != MapVerdict::kContradicts;
 }
 
-// Looks for a loop in a few keyframes, and closes it. False: the map is wrong here.
-bool search_loops(Odometry* odometry, Frame* frame, const tv_image& image,
-                  tv_odometry_state* state) {
-  Frame* again = &odometry->starts[0];  // has no other use while the map is tracked
-  LoopEnd end;
-  if (!find_loop(odometry, *frame, kLoopKeyframes, again, &end)) return true;
+// The frame becomes a keyframe, and closes a loop where *end is not null. False: the map is wrong
+// here, and the frame is no keyframe.
+bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image,
+                           const LoopEnd* loop, tv_odometry_state* state) {
   Map& map = odometry->map;
-  const int32_t end_id = map.keyframes[end.keyframe].id;
-  if (state->is_keyframe == 0) {
-    const int32_t next_point_id = map.next_point_id;
-    if (!add_frame_as_keyframe(odometry, frame, image)) return false;
-    state->is_keyframe = 1;
+  Frame* again = &odometry->starts[0];  // of the loop
+  const int32_t end_id = loop != nullptr ? map.keyframes[loop->keyframe].id : -1;
+  const int32_t next_point_id = map.next_point_id;
+  make_room(odometry, 1);
+  make_points(odometry, make_keyframe(odometry, *frame), image);
+  if (!heed_check(odometry)) return false;
+  remove_bad_points(odometry);
+  const int32_t newest = map.num_keyframes - 1;
+  odometry->reference_id = map.keyframes[newest].id;
+  LoopEnd end;
+  if (loop != nullptr) {
+    end = *loop;
     end.keyframe = find_keyframe(map, end_id);
-    if (end.keyframe < 0) return true;
+  }
+  const bool closes = loop != nullptr && end.keyframe >= 0;
+  if (closes) {
     for (int32_t k = 0; k < again->num; ++k) {
       // The point may be gone, and its place taken by a new one.
       if (again->points[k] == kNoPoint) continue;
       const int32_t id = map.points[again->points[k]].id;
       if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
+    close_loop(odometry, *again, end);
+    for (double& t : odometry->motion.t) t *= end.scale;
+    ++odometry->num_loops;
+    state->loop_closed = 1;
   }
-  close_loop(odometry, *again, end);
-  const int32_t newest = map.num_keyframes - 1;
-  adjust_around(odometry, newest, 10);
+  adjust_around(odometry, newest, closes ? kLoopSteps : kWindowSteps);
+  odometry->keyframe_inliers = map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   take_keyframe(*odometry, newest, frame);
-  for (double& t : odometry->motion.t) t *= end.scale;
-  measure_depth(odometry, *frame);
-  ++odometry->num_loops;
-  state->loop_closed = 1;
+  if (closes) measure_depth(odometry, *frame);
+  state->is_keyframe = 1;
   return true;
 }
 
@@ -277,12 +277,18 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   state->attitude_ignored = !check_attitude(*odometry, frame);
   const double* covariance = fit.estimate.covariance;
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
-  if (needs_keyframe(*odometry, *frame, fit.estimate.num_inliers)) {
-    if (!add_frame_as_keyframe(odometry, frame, input.image)) return false;
+  const bool is_due = needs_keyframe(*odometry, *frame, fit.estimate.num_inliers);
+  LoopEnd loop;
+  const bool found_loop =
+      find_loop(odometry, *frame, kLoopKeyframes, &odometry->starts[0], &loop);
+  if (is_due || found_loop) {
+    if (!add_frame_as_keyframe(odometry, frame, input.image, found_loop ? &loop : nullptr, state))
+      return false;
     measure_scale(odometry, frame);
-    state->is_keyframe = 1;
+  } else if (is_checking(odometry->check)) {
+    check_next_pair(odometry);
+    if (!heed_check(odometry)) return false;
   }
-  if (!search_loops(odometry, frame, input.image, state)) return false;
   if (odometry->is_doubtful) state->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
   odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   return true;

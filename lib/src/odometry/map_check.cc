@@ -1,0 +1,99 @@
+#include "odometry/map_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tv {
+namespace {
+
+// A map contradicts a pair whose turns differ by more than three standard deviations of the pair's
+// and this angle, in radians. Measured: docs/odometry.md.
+constexpr double kTurnSigmas = 3, kTurnAllowed = 0.026;
+constexpr int32_t kContradicting = 2;  // pairs that disagree
+
+}  // namespace
+
+void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
+              const tv_correspondence* matches, int32_t num, const Rigid& cam1_from_cam0,
+              MapVote* vote) {
+  ArenaScope scope(odometry->scratch);
+  Pair pair;
+  ++vote->num_pairs;
+  if (!estimate_pair(odometry, keypoints0, keypoints1, matches, num, &pair)) return;
+  const tv_two_view& view = *pair.view;
+  if (view.verdict == TV_VERDICT_DOUBTFUL && (view.reasons & TV_REASON_TWO_PLANAR_SOLUTIONS) != 0) {
+    ++vote->num_planar;
+  }
+  if (view.verdict != TV_VERDICT_OK || !view.has_R || !view.has_covariance) return;
+  Rigid turn = kIdentity, map_turn = cam1_from_cam0;
+  std::copy_n(view.R, 9, turn.R);
+  std::fill(map_turn.t, map_turn.t + 3, 0.0);
+  // The variances of the rotation vector: elements 0, 6 and 12 of the 5x5 covariance.
+  const double* c = view.covariance;
+  const double sigma = std::sqrt(std::max({c[0], c[6], c[12]}));
+  const double difference = rotation_angle(compose(turn, inverse(map_turn)));
+  if (difference <= kTurnSigmas * sigma + kTurnAllowed)
+    ++vote->num_agree;
+  else
+    ++vote->num_disagree;
+}
+
+bool needs_vote(const MapVote& vote) {
+  return vote.num_agree == 0 && vote.num_disagree < kContradicting && vote.num_pairs < kMostPairs;
+}
+
+MapVerdict verdict_of(const MapVote& vote) {
+  if (vote.num_agree > 0) return MapVerdict::kAgrees;
+  if (vote.num_disagree >= kContradicting) return MapVerdict::kContradicts;
+  return 2 * vote.num_planar > vote.num_pairs ? MapVerdict::kOnePlane : MapVerdict::kUnknown;
+}
+
+bool is_urgent(const MapVote& vote) {
+  return needs_vote(vote) && vote.num_disagree + vote.num_planar > 0;
+}
+
+void begin_check(Odometry* odometry, int32_t keyframe_id) {
+  // A disagreement counts until a pair agrees, or the map was mended.
+  const MapVote& before = odometry->check.vote;
+  const int32_t num_disagree =
+      before.num_agree == 0 && before.num_disagree < kContradicting ? before.num_disagree : 0;
+  odometry->check = MapCheck{};
+  odometry->check.keyframe_id = keyframe_id;
+  odometry->check.vote.num_disagree = num_disagree;
+}
+
+void add_pair(MapCheck* check, int32_t other_id) {
+  if (check->num_others < kMostPairs - 1) check->other_ids[check->num_others++] = other_id;
+}
+
+bool is_checking(const MapCheck& check) {
+  return check.next < check.num_others && needs_vote(check.vote);
+}
+
+size_t check_bytes(const tv_odometry_options& options) {
+  const size_t n = static_cast<size_t>(options.max_keypoints);
+  return 2 * arena_bytes<tv_keypoint>(n) + arena_bytes<tv_correspondence>(n) + pair_bytes(options);
+}
+
+void check_next_pair(Odometry* odometry) {
+  ArenaScope scope(odometry->scratch);
+  Arena& arena = odometry->scratch;
+  const Map& map = odometry->map;
+  MapCheck* check = &odometry->check;
+  const int32_t keyframe = find_keyframe(map, check->keyframe_id);
+  const int32_t other = find_keyframe(map, check->other_ids[check->next++]);
+  if (keyframe < 0 || other < 0) return;
+  const MapKeyframe &k0 = map.keyframes[other], &k1 = map.keyframes[keyframe];
+  if (k0.described < 0 || k1.described < 0 || k0.segment != k1.segment) return;
+  const int32_t room = map.sizes.max_keypoints;
+  const size_t n = static_cast<size_t>(room);
+  const tv_features theirs = features_of(map, k0, arena_alloc<tv_keypoint>(arena, n));
+  const tv_features mine = features_of(map, k1, arena_alloc<tv_keypoint>(arena, n));
+  tv_correspondence* found = arena_alloc<tv_correspondence>(arena, n);
+  int32_t num = 0;
+  tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num);
+  add_vote(odometry, theirs.keypoints, mine.keypoints, found, num,
+           compose(k1.cam_from_world, inverse(k0.cam_from_world)), &check->vote);
+}
+
+}  // namespace tv
