@@ -180,8 +180,8 @@ bool set_variance(const Finish& f, Candidate* c) {
   return true;
 }
 
-PoseProblem problem_of(const Finish& f, const Candidate& c, int count) {
-  const bool exact = f.input.camera.model.model != TV_CAMERA_PINHOLE;
+PoseProblem problem_of(const Finish& f, const Candidate& c, int count, bool is_last = true) {
+  const bool exact = is_last && f.input.camera.model.model != TV_CAMERA_PINHOLE;
   return PoseProblem{exact ? &f.input : nullptr, f.s, f.indices, count, c.scale_px, {}, 0};
 }
 
@@ -216,8 +216,8 @@ Candidate refined(const Finish& f, const Pose& start) {
     // Half of chi-square with two degrees of freedom lies below 2 log 2.
     c.noise_px = std::sqrt(median(f.values, count) / 1.3862943611198906);
     c.scale_px = best_scale(f, c.noise_px, count);
-    refine_absolute(problem_of(f, c, count), kFinalIterations, kFinalGains[round], &c.pose,
-                    &c.equations);
+    refine_absolute(problem_of(f, c, count, round == kFinalRounds - 1), kFinalIterations,
+                    kFinalGains[round], &c.pose, &c.equations);
   }
   PoseProblem with_gravity = problem_of(f, c, count);
   with_gravity.noise_sq = c.equations.slope > 0 ? c.equations.psi_sq / (2 * c.equations.slope) : 0;
