@@ -59,31 +59,57 @@ bool gather_matches(Odometry* odometry, double max_error_px, const Frame& frame,
   return true;
 }
 
-void search(Odometry* odometry, int32_t max_iterations, FrameMatches* matches,
-            AbsolutePoseSearch* found) {
-  matches->options.max_iterations = max_iterations;
-  search_absolute_pose(matches->sightings, matches->options, false, odometry->scratch, found);
-}
-
-bool finish(Odometry* odometry, const AbsolutePoseSearch& found, FrameMatches* matches,
+void finish(Odometry* odometry, const AbsolutePoseSearch& found, const FrameMatches& matches,
             PoseFit* fit) {
   tv_absolute_pose* estimate = &fit->estimate;
   tv_absolute_pose_init(estimate);
-  estimate->num_matches = matches->input.num;
-  finish_absolute_pose(matches->input, matches->sightings, matches->options, found,
-                       odometry->scratch, estimate, matches->is_inlier);
-  if (!estimate->has_pose) return false;
+  estimate->num_matches = matches.input.num;
+  finish_absolute_pose(matches.input, matches.sightings, matches.options, found, odometry->scratch,
+                       estimate, matches.is_inlier);
   std::copy_n(estimate->R, 9, fit->cam_from_world.R);
   std::copy_n(estimate->t, 3, fit->cam_from_world.t);
-  return true;
 }
 
-void forget_outliers(const FrameMatches& matches, Frame* frame) {
+void count_inliers(const Pose& pose, const FrameMatches& matches, PoseFit* fit) {
+  const Sightings& s = matches.sightings;
+  const double most = matches.options.max_error_px;
+  fit->estimate.num_matches = matches.input.num;
+  fit->estimate.num_inliers = 0;
+  for (int k = 0; k < s.num_all; ++k) {
+    if (!(reprojection_sq(s.all[k], pose) <= most * most)) continue;
+    matches.is_inlier[s.order[k]] = 1;
+    ++fit->estimate.num_inliers;
+  }
+  write_pose(s, pose, fit->cam_from_world.R, fit->cam_from_world.t);
+}
+
+// Searches the pose in max_iterations, unless that is 0: then it is known. Refines it if asked to.
+bool fit_matches(Odometry* odometry, int32_t max_iterations, bool refines, double max_error_px,
+                 Frame* frame, PoseFit* fit) {
+  ArenaScope scope(odometry->scratch);
+  FrameMatches matches;
+  if (!gather_matches(odometry, max_error_px, *frame, &matches)) return false;
+  AbsolutePoseSearch found;
+  if (max_iterations > 0) {
+    matches.options.max_iterations = max_iterations;
+    search_absolute_pose(matches.sightings, matches.options, false, odometry->scratch, &found);
+    if (!found.found) return false;
+  } else {
+    found.found = true;
+    found.pose = read_pose(matches.sightings, fit->cam_from_world.R, fit->cam_from_world.t);
+  }
+  if (refines) {
+    finish(odometry, found, matches, fit);
+    if (!fit->estimate.has_pose) return false;
+  } else {
+    count_inliers(found.pose, matches, fit);
+  }
   for (int k = 0; k < matches.input.num; ++k) {
     if (matches.is_inlier[k]) continue;
     frame->points[matches.keypoints[k]] = kNoPoint;
     frame->distances[matches.keypoints[k]] = TVK_NEAREST_NONE;
   }
+  return true;
 }
 
 }  // namespace
@@ -96,47 +122,16 @@ size_t fit_bytes(int32_t max_keypoints) {
 
 bool search_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
                  PoseFit* fit) {
-  ArenaScope scope(odometry->scratch);
-  FrameMatches matches;
-  if (!gather_matches(odometry, max_error_px, *frame, &matches)) return false;
-  AbsolutePoseSearch found;
-  search(odometry, max_iterations, &matches, &found);
-  if (!found.found) return false;
-  fit->estimate.num_matches = matches.input.num;
-  const Sightings& s = matches.sightings;
-  fit->estimate.num_inliers = 0;
-  for (int k = 0; k < s.num_all; ++k) {
-    if (!(reprojection_sq(s.all[k], found.pose) <= max_error_px * max_error_px)) continue;
-    matches.is_inlier[s.order[k]] = 1;
-    ++fit->estimate.num_inliers;
-  }
-  write_pose(s, found.pose, fit->cam_from_world.R, fit->cam_from_world.t);
-  forget_outliers(matches, frame);
-  return true;
+  return fit_matches(odometry, max_iterations, false, max_error_px, frame, fit);
 }
 
 bool refine_pose(Odometry* odometry, double max_error_px, Frame* frame, PoseFit* fit) {
-  ArenaScope scope(odometry->scratch);
-  FrameMatches matches;
-  if (!gather_matches(odometry, max_error_px, *frame, &matches)) return false;
-  AbsolutePoseSearch known;
-  known.found = true;
-  known.pose = read_pose(matches.sightings, fit->cam_from_world.R, fit->cam_from_world.t);
-  if (!finish(odometry, known, &matches, fit)) return false;
-  forget_outliers(matches, frame);
-  return true;
+  return fit_matches(odometry, 0, true, max_error_px, frame, fit);
 }
 
 bool fit_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
               PoseFit* fit) {
-  ArenaScope scope(odometry->scratch);
-  FrameMatches matches;
-  if (!gather_matches(odometry, max_error_px, *frame, &matches)) return false;
-  AbsolutePoseSearch found;
-  search(odometry, max_iterations, &matches, &found);
-  if (!finish(odometry, found, &matches, fit)) return false;
-  forget_outliers(matches, frame);
-  return true;
+  return fit_matches(odometry, max_iterations, true, max_error_px, frame, fit);
 }
 
 }  // namespace tv
