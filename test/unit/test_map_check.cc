@@ -1,5 +1,5 @@
-// Pairs of keyframes that check the map's relative poses (odometry/map_check.h), with the pixels of a
-// scene whose motion is known.
+// Pairs of keyframes that check the map's relative poses (odometry/map_check.h), with the pixels of
+// a scene whose motion is known.
 
 #include <unity.h>
 
@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "odometry/keyframe.h"
 #include "odometry/map_check.h"
 #include "support/random.h"
 
@@ -112,6 +113,72 @@ void test_few_matches_decide_nothing() {
   TEST_ASSERT_EQUAL_INT(2, vote.num_pairs);
 }
 
+// A keyframe of the map that sees these keypoints, each with a descriptor of its own.
+int32_t keyframe_of(const tv_keypoint* keypoints, const tv::Rigid& cam_from_world) {
+  tv::Frame* frame = &odometry->frame;
+  uint64_t state = 9;
+  frame->num = kNum;
+  frame->cam_from_world = cam_from_world;
+  for (int n = 0; n < kNum; ++n) {
+    frame->keypoints[n] = keypoints[n];
+    frame->points[n] = tv::kNoPoint;
+    for (int b = 0; b < TV_DESCRIPTOR_BYTES; ++b) {
+      frame->descriptors[n * TV_DESCRIPTOR_BYTES + b] =
+          static_cast<uint8_t>(90 * random_unit(&state));
+    }
+  }
+  return odometry->map.keyframes[tv::make_keyframe(odometry, *frame)].id;
+}
+
+// The map's keyframes 0 to 2 see what keypoints0 are, the last one keypoints1, turned by `angle`
+// too much; each of the first three is matched with it, one a call.
+tv::MapVote check_of_keyframes(double angle, int num_pairs) {
+  tv_odometry_reset(odometry);
+  draw(1.5, 0.5);
+  int32_t ids[3];
+  for (int32_t& id : ids) id = keyframe_of(keypoints0, tv::kIdentity);
+  tv::begin_check(odometry, keyframe_of(keypoints1, turned(motion(), angle)));
+  for (const int32_t id : ids) tv::add_pair(&odometry->check, id);
+  for (int n = 0; n < num_pairs && tv::is_checking(odometry->check); ++n) {
+    tv::check_next_pair(odometry);
+  }
+  return odometry->check.vote;
+}
+
+void test_waiting_pairs_are_estimated_one_a_call() {
+  tv::MapVote vote = check_of_keyframes(0, 1);
+  TEST_ASSERT_TRUE(tv::verdict_of(vote) == tv::MapVerdict::kAgrees);
+  TEST_ASSERT_FALSE(tv::is_checking(odometry->check));
+  vote = check_of_keyframes(0.2, 1);
+  TEST_ASSERT_EQUAL_INT(1, vote.num_disagree);
+  TEST_ASSERT_TRUE(tv::is_urgent(vote) && tv::is_checking(odometry->check));
+  vote = check_of_keyframes(0.2, 3);
+  TEST_ASSERT_TRUE(tv::verdict_of(vote) == tv::MapVerdict::kContradicts);
+  TEST_ASSERT_FALSE(tv::is_checking(odometry->check));
+}
+
+void test_a_removed_keyframe_does_not_vote() {
+  check_of_keyframes(0.2, 0);
+  tv::remove_keyframe(&odometry->map, 0, 1);
+  tv::check_next_pair(odometry);
+  TEST_ASSERT_EQUAL_INT(0, odometry->check.vote.num_pairs);
+  TEST_ASSERT_TRUE(tv::is_checking(odometry->check));
+}
+
+void test_a_disagreement_lasts_until_a_pair_agrees() {
+  check_of_keyframes(0.2, 1);
+  tv::begin_check(odometry, 4);
+  TEST_ASSERT_EQUAL_INT(1, odometry->check.vote.num_disagree);
+  TEST_ASSERT_EQUAL_INT(0, odometry->check.vote.num_pairs);
+  odometry->check.vote.num_agree = 1;
+  tv::begin_check(odometry, 5);
+  TEST_ASSERT_EQUAL_INT(0, odometry->check.vote.num_disagree);
+  // A contradiction mends the map: what follows begins anew.
+  odometry->check.vote.num_disagree = 2;
+  tv::begin_check(odometry, 6);
+  TEST_ASSERT_EQUAL_INT(0, odometry->check.vote.num_disagree);
+}
+
 }  // namespace
 
 extern "C" void setUp(void) {
@@ -132,5 +199,8 @@ int main() {
   RUN_TEST(test_one_agreeing_pair_is_enough);
   RUN_TEST(test_a_plane_decides_nothing);
   RUN_TEST(test_few_matches_decide_nothing);
+  RUN_TEST(test_waiting_pairs_are_estimated_one_a_call);
+  RUN_TEST(test_a_removed_keyframe_does_not_vote);
+  RUN_TEST(test_a_disagreement_lasts_until_a_pair_agrees);
   return UNITY_END();
 }
