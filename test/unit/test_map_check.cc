@@ -163,6 +163,9 @@ void test_a_removed_keyframe_does_not_vote() {
   tv::check_next_pair(odometry);
   TEST_ASSERT_EQUAL_INT(0, odometry->check.vote.num_pairs);
   TEST_ASSERT_TRUE(tv::is_checking(odometry->check));
+  tv::check_next_pair(odometry);
+  TEST_ASSERT_EQUAL_INT(1, odometry->check.vote.num_pairs);
+  TEST_ASSERT_FALSE(tv::is_checking(odometry->check));
 }
 
 void test_a_disagreement_lasts_until_a_pair_agrees() {

@@ -285,7 +285,7 @@ bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance
     for (int c = 0; c < 6; ++c) {
       double* entry = &covariance[6 * r + c];
       *entry *= kCorrelation * kCorrelation;
-      if (r >= 3 && c >= 3) *entry += kDrift * kDrift * moved.t[r - 3] * moved.t[c - 3];
+      if (r >= 3 && c >= 3) *entry += (kDrift * moved.t[r - 3]) * (kDrift * moved.t[c - 3]);
     }
   }
   return result.has_covariance != 0;

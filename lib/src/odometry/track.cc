@@ -279,8 +279,7 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
   const bool is_due = needs_keyframe(*odometry, *frame, fit.estimate.num_inliers);
   LoopEnd loop;
-  const bool found_loop =
-      find_loop(odometry, *frame, kLoopKeyframes, &odometry->starts[0], &loop);
+  const bool found_loop = find_loop(odometry, *frame, kLoopKeyframes, &odometry->starts[0], &loop);
   if (is_due || found_loop) {
     if (!add_frame_as_keyframe(odometry, frame, input.image, found_loop ? &loop : nullptr, state))
       return false;
