@@ -112,6 +112,19 @@ def test_bad_input_is_refused(frames):
         tv.Odometry(CAMERA, keypoints=5)
 
 
+def test_a_map_is_added(flight):
+    odometry, _ = flight
+    data = odometry.save()
+    with tv.Odometry(CAMERA, max_keypoints=800, max_keyframes=400) as other:
+        assert other.add(data) == 0  # there is nothing to meet
+        assert other.save() == data
+        assert other.add(data) == 1  # the same place
+        assert len(other.keyframes()) == 2 * len(odometry.keyframes())
+        assert {key.segment for key in other.keyframes()} == {0}
+        with pytest.raises(tv.TV_ERR_MAP):
+            other.add(data[:-1])
+
+
 def test_a_map_is_saved_and_loaded(frames, flight):
     odometry, states = flight
     data = odometry.save()

@@ -200,6 +200,14 @@ class Odometry:
         array = np.frombuffer(data, np.uint8)
         self._call("tv_odometry_load", _abi.pointer(array), c_size_t(array.size))
 
+    def add(self, data: bytes) -> int:
+        """tv_odometry_add: adds a map that save returned, of the same camera, and looks for its
+        segments in the map that was there. Returns how many were found."""
+        array = np.frombuffer(data, np.uint8)
+        joined = c_int32()
+        self._call("tv_odometry_add", _abi.pointer(array), c_size_t(array.size), byref(joined))
+        return joined.value
+
 
 def _state(s: Any) -> OdometryState:
     posed = bool(s.has_pose)

@@ -653,6 +653,124 @@ static void test_a_loaded_map_is_the_same_and_is_found_again(void) {
   TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_STARTING, state.status);
 }
 
+/* Writes a length and a checksum that are right to the altered bytes. */
+static void put_seal(size_t num) {
+  uint32_t crc;
+  int k;
+  for (k = 0; k < 8; ++k) altered[16 + k] = (uint8_t)((uint64_t)num >> (8 * k));
+  crc = crc_of(altered + 16, num - 16);
+  for (k = 0; k < 4; ++k) altered[12 + k] = (uint8_t)(crc >> (8 * k));
+}
+
+/* The turn from the map's axes to those of the truth, of a keyframe of a flight that began at frame
+   `first` of the room's and has the numbers from `number` on. It is the same for all keyframes of a
+   segment. */
+static double turn_to_truth(const tv_odometry *of, int32_t idx, int32_t number, int first) {
+  tv_keyframe keyframe;
+  double yaw;
+  tv_keyframe_init(&keyframe);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(of, idx, &keyframe));
+  yaw = 0.12 * sin(0.06 * (keyframe.frame - number + first));
+  return atan2(keyframe.world_from_cam_R[2], keyframe.world_from_cam_R[0]) - yaw;
+}
+
+static void test_a_map_that_is_added_joins_where_it_is_seen_again(void) {
+  enum { FIRST = 6 }; /* frame of the room's flight at which the second one begins */
+  int32_t num_joined = -1, num_first, k, i, num;
+  size_t num_two, num_all, size;
+  tv_keyframe keyframe;
+  fly(odometry, KEYFRAMES);
+  num_first = state.num_frames;
+  save(odometry, map, &num_map);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  for (k = FIRST; k < FIRST + 40; ++k) TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, k));
+  save(odometry, altered, &num_two);
+  TEST_ASSERT_TRUE(state.num_keyframes >= 4);
+  num = state.num_keyframes;
+
+  options.max_keyframes = 3 * KEYFRAMES;
+  options.max_points = 3 * POINTS;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_size(&camera, &options, &size));
+  begin(1, &other);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(other, map, num_map, &num_joined));
+  TEST_ASSERT_EQUAL_INT(0, num_joined); /* there was nothing to meet: as if it were loaded */
+  save(other, again, &num_all);
+  TEST_ASSERT_EQUAL_UINT64(num_map, num_all);
+  TEST_ASSERT_EQUAL_MEMORY(map, again, num_map);
+
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(other, altered, num_two, &num_joined));
+  TEST_ASSERT_EQUAL_INT(1, num_joined);
+  tv_keyframe_init(&keyframe);
+  for (k = 0; k < KEYFRAMES + num; ++k) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(other, k, &keyframe));
+    TEST_ASSERT_EQUAL_INT(0, keyframe.segment);
+    TEST_ASSERT_TRUE(k < KEYFRAMES || keyframe.frame >= num_first);
+    /* All of one segment: one turn, to half a degree. */
+    TEST_ASSERT_DOUBLE_WITHIN(
+        0.01, turn_to_truth(other, 0, 0, 0),
+        turn_to_truth(other, k, k < KEYFRAMES ? 0 : num_first, k < KEYFRAMES ? 0 : FIRST));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_observations(other, k, observations, KEYPOINTS, &i));
+    TEST_ASSERT_EQUAL_INT(keyframe.num_observations, i);
+  }
+  TEST_ASSERT_EQUAL_INT(TV_ERR_ARGUMENT, tv_odometry_keyframe(other, k, &keyframe));
+  /* What was joined is a map like others, in which frames are found. */
+  save(other, again, &num_all);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_load(other, again, num_all));
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(other, FIRST + 30));
+  TEST_ASSERT_TRUE(state.has_pose && state.segment == 0);
+}
+
+static void test_a_map_that_meets_nothing_is_a_segment_of_its_own(void) {
+  int32_t num_joined = -1;
+  size_t k, num, keyframe;
+  fly(odometry, 3);
+  save(odometry, altered, &num);
+  for (k = HEADER; k < HEADER + POINT * number_at(altered + 136, 4); k += POINT) {
+    memset(altered + k + POINT - TV_DESCRIPTOR_BYTES, (int)(k % 200), TV_DESCRIPTOR_BYTES);
+  }
+  keyframe = HEADER + POINT * number_at(altered + 136, 4);
+  TEST_ASSERT_EQUAL_INT(0, number_at(altered + keyframe + 4, 4));
+  put_seal(num);
+  options.max_keyframes = 2 * KEYFRAMES;
+  begin(1, &other);
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(other, 0));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(other, altered, num, &num_joined));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(other, altered, num, &num_joined));
+  TEST_ASSERT_EQUAL_INT(0, num_joined);
+  save(other, again, &k);
+  TEST_ASSERT_EQUAL_INT(2, number_at(again + 160, 4));
+  TEST_ASSERT_EQUAL_INT(6, number_at(again + 140, 4));
+}
+
+static void test_add_refuses_what_load_refuses(void) {
+  int32_t num_joined = 7;
+  size_t num, k;
+  fly(odometry, KEYFRAMES);
+  save(odometry, map, &num_map);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_add(NULL, map, num_map, &num_joined));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_add(odometry, NULL, num_map, &num_joined));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_add(odometry, map, num_map, NULL));
+  TEST_ASSERT_EQUAL_INT(TV_ERR_OVERLAP,
+                        tv_odometry_add(odometry, map, num_map, (int32_t *)(map + 64)));
+  /* As many keyframes again as the map may have. */
+  TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS, tv_odometry_add(odometry, map, num_map, &num_joined));
+  memcpy(altered, map, num_map);
+  for (k = 0; k < num_map; k += 97) {
+    altered[k] ^= 5;
+    TEST_ASSERT_EQUAL_INT(TV_ERR_MAP, tv_odometry_add(odometry, altered, num_map, &num_joined));
+    altered[k] = map[k];
+    TEST_ASSERT_EQUAL_INT(TV_ERR_MAP, tv_odometry_add(odometry, altered, k, &num_joined));
+  }
+  camera.fx += 1e-9;
+  begin(1, &other);
+  save(other, altered, &num);
+  TEST_ASSERT_EQUAL_INT(TV_ERR_CAMERA, tv_odometry_add(odometry, altered, num, &num_joined));
+  TEST_ASSERT_EQUAL_INT(7, num_joined);
+  expect_unchanged();
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown));
+  TEST_ASSERT_TRUE(state.has_pose);
+}
+
 static void test_save_refuses_bad_arguments(void) {
   size_t num = 0, needed;
   fly(odometry, 2);
@@ -707,11 +825,7 @@ static void test_a_map_that_is_cut_or_altered_at_any_byte_is_refused(void) {
 
 /* Expects the status for the altered bytes with a length and a checksum that are right. */
 static void expect_sealed(tv_status expected, size_t num) {
-  uint32_t crc;
-  int k;
-  for (k = 0; k < 8; ++k) altered[16 + k] = (uint8_t)((uint64_t)num >> (8 * k));
-  crc = crc_of(altered + 16, num - 16);
-  for (k = 0; k < 4; ++k) altered[12 + k] = (uint8_t)(crc >> (8 * k));
+  put_seal(num);
   expect_load(expected, num);
   memcpy(altered, map, num_map);
   if (expected != TV_OK) expect_unchanged();
@@ -823,6 +937,9 @@ int main(void) {
   RUN_TEST(test_the_clock_is_read);
   RUN_TEST(test_the_bytes_are_as_documented);
   RUN_TEST(test_a_loaded_map_is_the_same_and_is_found_again);
+  RUN_TEST(test_a_map_that_is_added_joins_where_it_is_seen_again);
+  RUN_TEST(test_a_map_that_meets_nothing_is_a_segment_of_its_own);
+  RUN_TEST(test_add_refuses_what_load_refuses);
   RUN_TEST(test_save_refuses_bad_arguments);
   RUN_TEST(test_a_map_that_is_cut_or_altered_at_any_byte_is_refused);
   RUN_TEST(test_a_map_of_wrong_content_is_refused);

@@ -213,6 +213,34 @@ class OdometryTest(CliTest):
             self.assertEqual(done.returncode, 2)
             self.one_line(done, "wrong.twm")
 
+    def test_maps_are_merged_where_one_sees_what_another_saw(self):
+        whole = self.set_folder()
+        self.succeed(self.odometry(whole))
+        first = self.folder / "first.twm"
+        first.write_bytes((self.out / "map.twm").read_bytes())
+        lines = (whole / "frames.txt").read_text().splitlines()
+        (whole / "frames.txt").write_text("\n".join(lines[6:]) + "\n")
+        self.succeed(self.odometry(whole))
+        second, merged = self.out / "map.twm", self.folder / "merged.twm"
+        counts = [json.loads(self.succeed(self.run_program("map", "info", path, "--json")).stdout)
+                  for path in (first, second)]
+        done = self.succeed(self.run_program("map", "merge", first, second, "-o", merged))
+        self.assertIn(b"1 segment was seen again", done.stdout)
+        info = json.loads(self.succeed(self.run_program("map", "info", merged, "--json")).stdout)
+        self.assertEqual(info["num_keyframes"], sum(c["num_keyframes"] for c in counts))
+        self.assertEqual(info["num_segments"], 1)
+        # What both saw is one point now.
+        self.assertLess(info["num_points"], sum(c["num_points"] for c in counts))
+        before = merged.read_bytes()
+        for arguments, word in ((("map", "merge", first, "-o", merged), "FILES"),
+                                (("map", "merge", first, second, "-o", first), "first.twm"),
+                                (("map", "merge", first, self.write("wrong.twm", before[:-1]), "-o",
+                                  merged), "wrong.twm")):
+            done = self.run_program(*arguments)
+            self.assertEqual(done.returncode, 2, arguments)
+            self.one_line(done, word)
+            self.assertEqual(merged.read_bytes(), before)
+
     def test_the_report_holds_all_that_it_shows(self):
         self.succeed(self.odometry(self.set_folder()))
         page = (self.out / "report.html").read_text()

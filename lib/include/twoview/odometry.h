@@ -349,6 +349,19 @@ TV_API tv_status tv_odometry_save(const tv_odometry *odometry, uint8_t *bytes, s
    (the map is larger than the options allow). With each of these the odometry is as before. */
 TV_API tv_status tv_odometry_load(tv_odometry *odometry, const uint8_t *bytes, size_t num_bytes);
 
+/* Adds a map of the same camera to the one that is there: its keyframes and points follow, as
+   segments of their own with numbers and ids after those that exist. Then each of its segments is
+   looked for in the former keyframes, and becomes part of the segment that it meets, in its unit
+   and frame of coordinates. The time grows with the product of both numbers of keyframes, about a
+   quarter of a millisecond for each pair. The frames that follow are looked for in all of it, as
+   after tv_odometry_load.
+   bytes: num_bytes bytes, read during the call only. *num_joined: how many segments have met a
+   former one.
+   Returns TV_ERR_NULL, TV_ERR_MAP, TV_ERR_CAMERA and TV_ERR_LIMITS as tv_odometry_load does, and
+   TV_ERR_OVERLAP. With each of these the odometry is as before. */
+TV_API tv_status tv_odometry_add(tv_odometry *odometry, const uint8_t *bytes, size_t num_bytes,
+                                 int32_t *num_joined);
+
 /* Gives the odometry a clock, so that it measures the time of each stage. The clock is called from
    within tv_odometry_track and tv_odometry_locate with the pointer `user`; both stay valid as long
    as the odometry is used. A null now_ns removes the clock. Returns TV_ERR_NULL. */

@@ -5,6 +5,7 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/adjust.h"
+#include "odometry/loop.h"
 #include "odometry/map_bytes.h"
 #include "twoview/odometry.h"
 
@@ -170,7 +171,17 @@ tv_status tv_odometry_save(const tv_odometry* odometry, uint8_t* bytes, size_t c
 
 tv_status tv_odometry_load(tv_odometry* odometry, const uint8_t* bytes, size_t num_bytes) {
   if (odometry == nullptr || bytes == nullptr) return TV_ERR_NULL;
-  return tv::read_map(bytes, num_bytes, odometry);
+  return tv::read_map(bytes, num_bytes, true, odometry);
+}
+
+tv_status tv_odometry_add(tv_odometry* odometry, const uint8_t* bytes, size_t num_bytes,
+                          int32_t* num_joined) {
+  if (odometry == nullptr || bytes == nullptr || num_joined == nullptr) return TV_ERR_NULL;
+  if (tv::overlap(num_joined, sizeof *num_joined, bytes, num_bytes)) return TV_ERR_OVERLAP;
+  const int32_t num_keyframes = odometry->map.num_keyframes;
+  const tv_status status = tv::read_map(bytes, num_bytes, false, odometry);
+  if (status == TV_OK) *num_joined = tv::join_segments(odometry, num_keyframes);
+  return status;
 }
 
 tv_status tv_odometry_set_clock(tv_odometry* odometry, tv_clock now_ns, void* user) {

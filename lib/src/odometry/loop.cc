@@ -4,9 +4,11 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "odometry/adjust.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/search.h"
+#include "odometry/sightings.h"
 #include "odometry/start.h"
 
 namespace tv {
@@ -20,6 +22,7 @@ constexpr double kLargestTurn = 0.4;    // radians
 // Cameras farther from each other, in median depths, or turned by more see nothing in common.
 constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
 constexpr double kLargestScale = 1.5;
+constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
 
 // Writes for each keyframe the length of the path from it to the newest one.
@@ -75,8 +78,7 @@ double scale_between(Odometry* odometry, const Frame& frame, const Frame& again)
     if (x_new[2] > 0 && x_old[2] > 0) ratios[num++] = x_old[2] / x_new[2];
   }
   if (num < kLeastCommon) return 0;
-  std::nth_element(ratios, ratios + num / 2, ratios + num);
-  return ratios[num / 2];
+  return median(ratios, num);
 }
 
 bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe, Frame* again,
@@ -172,19 +174,18 @@ void move_points(Map* map, const Node* nodes) {
 }
 
 // The keypoints that see a new point and an old one see the old one from now on, in every keyframe.
-void fuse_points(Odometry* odometry, const Frame& again) {
+void fuse_points(Odometry* odometry, int32_t keyframe, const Frame& again) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
   const size_t room = static_cast<size_t>(map.end_points);
   int32_t* instead = arena_alloc<int32_t>(odometry->scratch, room);
   std::fill(instead, instead + room, kNoPoint);
-  const int32_t newest = map.num_keyframes - 1;
-  const MapKeypoint* own = keypoints_of(map, map.keyframes[newest]);
+  const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
   for (int32_t i = 0; i < again.num; ++i) {
     const int32_t old_point = again.points[i], point = own[i].point;
     if (old_point == kNoPoint || old_point == point) continue;
     if (point == kNoPoint)
-      observe(&map, newest, i, old_point);
+      observe(&map, keyframe, i, old_point);
     else
       instead[point] = old_point;
   }
@@ -235,28 +236,28 @@ size_t close_loop_bytes(const tv_odometry_options& o) {
          arena_bytes<int32_t>(points) + arena_bytes<uint8_t>(points);
 }
 
-void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end) {
+void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
   const int32_t newest = map.num_keyframes - 1;
   const int32_t old_segment = map.keyframes[end.keyframe].segment;
-  const int32_t segment = map.keyframes[newest].segment;
+  const int32_t segment = map.keyframes[keyframe].segment;
   Node* nodes = arena_alloc<Node>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
-  const Rigid now = map.keyframes[newest].cam_from_world;
+  const Rigid now = map.keyframes[keyframe].cam_from_world;
   double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   measure_paths(map, paths);
   const double whole = std::max(paths[end.keyframe], 1e-12);
   for (int32_t k = 0; k <= newest; ++k) {
-    const MapKeyframe& keyframe = map.keyframes[k];
-    nodes[k] = {keyframe.cam_from_world, 0};
-    if (keyframe.segment != segment) continue;
+    const MapKeyframe& own = map.keyframes[k];
+    nodes[k] = {own.cam_from_world, 0};
+    if (own.segment != segment) continue;
     if (segment == old_segment && k <= end.keyframe) continue;
     // As the loop's end says: the way from the newest keyframe, in the other scale.
-    Rigid relative = compose(keyframe.cam_from_world, inverse(now));
+    Rigid relative = compose(own.cam_from_world, inverse(now));
     for (double& t : relative.t) t *= end.scale;
     const Rigid from_end = compose(relative, end.cam_from_world);
     const double share = segment == old_segment ? 1 - paths[k] / whole : 1;
-    nodes[k] = blend(keyframe.cam_from_world, from_end, end.scale, share);
+    nodes[k] = blend(own.cam_from_world, from_end, end.scale, share);
   }
   move_points(&map, nodes);
   for (int32_t k = 0; k <= newest; ++k) {
@@ -269,7 +270,60 @@ void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end) {
     if (map.points[p].segment == segment) map.points[p].segment = old_segment;
   }
   enter_segment(odometry, old_segment);
-  fuse_points(odometry, again);
+  fuse_points(odometry, keyframe, again);
+}
+
+namespace {
+
+// A keyframe as a frame. Descriptors are those of its points; keypoints that see none have zeros,
+// which nothing matches.
+void copy_keyframe(const Odometry& odometry, int32_t keyframe, Frame* frame) {
+  const Map& map = odometry.map;
+  const MapKeyframe& from = map.keyframes[keyframe];
+  const MapKeypoint* own = keypoints_of(map, from);
+  frame->num = from.num_keypoints;
+  frame->cam_from_world = from.cam_from_world;
+  for (int32_t i = 0; i < frame->num; ++i) {
+    frame->keypoints[i] = tv_keypoint{own[i].x, own[i].y, own[i].size, 0, 1, 0};
+    frame->sigmas[i] = static_cast<float>(sigma_of(own[i]));
+    uint8_t* to = frame->descriptors + static_cast<size_t>(i) * TV_DESCRIPTOR_BYTES;
+    if (own[i].point == kNoPoint)
+      std::fill_n(to, TV_DESCRIPTOR_BYTES, uint8_t{0});
+    else
+      std::copy_n(descriptor_of(map, own[i].point), TV_DESCRIPTOR_BYTES, to);
+  }
+  make_grid(odometry, frame);
+  for (int32_t i = 0; i < frame->num; ++i) frame->points[i] = own[i].point;
+}
+
+}  // namespace
+
+int32_t join_segments(Odometry* odometry, int32_t first) {
+  Map& map = odometry->map;
+  Frame *frame = &odometry->starts[0], *again = &odometry->starts[1];
+  odometry->num_starts = 0;
+  int32_t num_joined = 0;
+  for (int32_t k = first; k < map.num_keyframes; ++k) {
+    bool is_joined = false;
+    for (int32_t i = 0; i < first; ++i) {
+      is_joined = is_joined || map.keyframes[i].segment == map.keyframes[k].segment;
+    }
+    if (is_joined || map.keyframes[k].num_observations < kLeastInliers) continue;
+    copy_keyframe(*odometry, k, frame);
+    odometry->segment = map.keyframes[k].segment;
+    for (int32_t i = 0; i < first && !is_joined; ++i) {
+      LoopEnd end;
+      copy_frame(*frame, again);
+      is_joined = meets(odometry, *frame, 0, i, again, &end);
+      if (!is_joined) continue;
+      close_loop(odometry, k, *again, end);
+      adjust_around(odometry, k, kJoinSteps);
+      ++odometry->num_loops;
+      ++num_joined;
+    }
+  }
+  odometry->segment = map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : 0;
+  return num_joined;
 }
 
 }  // namespace tv

@@ -23,7 +23,12 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
 // How many bytes of scratch close_loop takes.
 size_t close_loop_bytes(const tv_odometry_options& options);
 
-// Corrects the keyframes and points. The newest keyframe has the frame's keypoints.
-void close_loop(Odometry* odometry, const Frame& again, const LoopEnd& end);
+// Corrects the keyframes and points. `keyframe` has the keypoints of `again`; it is the newest one
+// where it is of the same segment as the loop's end.
+void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
+
+// Looks for the segments of the keyframes from number `first` on in the keyframes before it. Those
+// that meet them become part of theirs. Returns how many.
+int32_t join_segments(Odometry* odometry, int32_t first);
 
 }  // namespace tv

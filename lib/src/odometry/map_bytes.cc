@@ -214,11 +214,21 @@ tv_camera camera_of(const Odometry& odometry) {
   return camera;
 }
 
-// Reads what follows the header, and stores it unless `map` is null. False: it is no map. *fits:
-// whether no count is above those of `sizes`.
-bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool* fits) {
-  *fits = h.num_points <= sizes.max_points && h.num_keyframes <= sizes.max_keyframes &&
-          h.num_removed <= max_removed(sizes);
+// What the numbers of a map that is added to another one begin with.
+struct Base {
+  int32_t place, point_id, keyframe_id, segment, frame;
+};
+
+// Reads what follows the header, and adds it to `map` if `stores`. False: it is no map. *fits:
+// whether there is room for it.
+bool read_body(const Header& h, Stream* s, bool stores, Map* map, const Base& base, bool* fits) {
+  const MapSizes& sizes = map->sizes;
+  *fits = h.num_points <= sizes.max_points - base.place &&
+          h.num_keyframes <= sizes.max_keyframes - map->num_keyframes &&
+          h.num_removed <= max_removed(sizes) - map->num_removed &&
+          h.next_point_id <= kMost - base.point_id &&
+          h.next_keyframe_id <= kMost - base.keyframe_id &&
+          h.num_segments <= kMost - base.segment && h.num_frames <= kMost - base.frame;
   int32_t last_id = -1;
   for (int32_t n = 0; n < h.num_points; ++n) {
     MapPoint point{};
@@ -226,10 +236,14 @@ bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool
     pass_point(s, &point, &descriptor);
     if (s->is_bad || !is_point(h, point) || point.id <= last_id) return false;
     last_id = point.id;
-    if (map == nullptr) continue;
-    map->points[n] = point;
-    std::memcpy(descriptor_of(*map, n), descriptor, sizeof descriptor);
-    map->num_points = map->end_points = n + 1;
+    if (!stores) continue;
+    point.id += base.point_id;
+    point.segment += base.segment;
+    point.made_at += base.keyframe_id;
+    const int32_t place = map->end_points++;
+    map->points[place] = point;
+    std::memcpy(descriptor_of(*map, place), descriptor, sizeof descriptor);
+    ++map->num_points;
   }
   last_id = -1;
   for (int32_t n = 0; n < h.num_keyframes; ++n) {
@@ -239,20 +253,23 @@ bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool
     last_id = keyframe.id;
     *fits = *fits && keyframe.num_keypoints <= sizes.max_keypoints;
     MapKeypoint* own = nullptr;
-    if (map != nullptr) {
+    if (stores) {
       keyframe.room = map->free_rooms[--map->num_free_rooms];
       keyframe.described = -1;
-      map->keyframes[n] = keyframe;
-      map->num_keyframes = n + 1;
+      keyframe.id += base.keyframe_id;
+      keyframe.segment += base.segment;
+      keyframe.frame += base.frame;
+      map->keyframes[map->num_keyframes++] = keyframe;
       own = keypoints_of(*map, keyframe);
     }
     for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
       MapKeypoint keypoint;
       pass_keypoint(s, &keypoint);
       if (s->is_bad || !is_keypoint(h, keypoint)) return false;
-      if (map == nullptr) continue;
+      if (!stores) continue;
       own[k] = keypoint;
-      if (keypoint.point != kNoPoint) observe(map, n, k, keypoint.point);
+      if (keypoint.point == kNoPoint) continue;
+      observe(map, map->num_keyframes - 1, k, base.place + keypoint.point);
     }
   }
   last_id = -1;
@@ -261,9 +278,10 @@ bool read_body(const Header& h, const MapSizes& sizes, Stream* s, Map* map, bool
     pass_removed(s, &removed);
     if (s->is_bad || !is_removed(h, removed) || removed.id <= last_id) return false;
     last_id = removed.id;
-    if (map == nullptr) continue;
-    map->removed[n] = removed;
-    map->num_removed = n + 1;
+    if (!stores) continue;
+    removed.id += base.keyframe_id;
+    removed.kept_id += base.keyframe_id;
+    map->removed[map->num_removed++] = removed;
   }
   return s->at == s->end;
 }
@@ -330,8 +348,8 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   return num_bytes;
 }
 
-tv_status read_map(const uint8_t* bytes, size_t num_bytes, Odometry* odometry) {
-  const MapSizes& sizes = odometry->map.sizes;
+tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odometry* odometry) {
+  Map* map = &odometry->map;
   Header h;
   Stream s{nullptr, bytes, 0, num_bytes, false};
   pass_header(&s, &h);
@@ -341,30 +359,40 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, Odometry* odometry) {
     return TV_ERR_MAP;
   }
   const size_t begin = s.at;
+  Base base{};
+  Map nothing{};
+  nothing.sizes = map->sizes;
+  if (!replaces) {
+    base = {map->end_points, map->next_point_id, map->next_keyframe_id, odometry->num_segments,
+            odometry->num_frames};
+  }
   bool fits;
-  if (!read_body(h, sizes, &s, nullptr, &fits)) return TV_ERR_MAP;
+  if (!read_body(h, &s, false, replaces ? &nothing : map, base, &fits)) return TV_ERR_MAP;
   const tv_camera camera = camera_of(*odometry);
   if (std::memcmp(&h.camera, &camera, sizeof camera) != 0) return TV_ERR_CAMERA;
   if (!fits) return TV_ERR_LIMITS;
-  start_anew(odometry);
+  if (replaces) start_anew(odometry);
+  const bool is_first = map->num_keyframes == 0;
   odometry->last_time_s = -HUGE_VAL;  // the next frame may have any time
   s.at = begin;
-  Map* map = &odometry->map;
-  read_body(h, sizes, &s, map, &fits);
-  map->next_point_id = h.next_point_id;
-  map->next_keyframe_id = h.next_keyframe_id;
-  odometry->num_frames = h.num_frames;
-  odometry->num_segments = h.num_segments;
-  odometry->num_relocations = h.num_relocations;
-  odometry->num_loops = h.num_loops;
-  odometry->is_upright = h.is_upright != 0;
-  odometry->scale_source = h.scale_source;
-  odometry->scale_evidence = h.scale_evidence;
-  odometry->scale_product = h.scale_product;
-  odometry->scale_square = h.scale_square;
-  odometry->scale_sigma = h.scale_sigma;
+  read_body(h, &s, true, map, base, &fits);
+  map->next_point_id += h.next_point_id;
+  map->next_keyframe_id += h.next_keyframe_id;
+  odometry->num_frames += h.num_frames;
+  odometry->num_segments += h.num_segments;
+  odometry->num_relocations += h.num_relocations;
+  odometry->num_loops += h.num_loops;
+  if (is_first) {
+    odometry->is_upright = h.is_upright != 0;
+    odometry->scale_source = h.scale_source;
+    odometry->scale_evidence = h.scale_evidence;
+    odometry->scale_product = h.scale_product;
+    odometry->scale_square = h.scale_square;
+    odometry->scale_sigma = h.scale_sigma;
+  }
   if (map->num_keyframes > 0) {
     odometry->status = TV_ODOMETRY_LOST;
+    odometry->frame.has_pose = odometry->has_motion = false;
     odometry->lost_frames = 1;
     odometry->next_search = map->num_keyframes - 1;
     odometry->confirmed_id = map->keyframes[odometry->next_search].id;

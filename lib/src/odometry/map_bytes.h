@@ -9,8 +9,8 @@ namespace tv {
 // Returns how many bytes the map takes, and writes them to `to` unless it is null.
 size_t write_map(const Odometry& odometry, uint8_t* to);
 
-// Replaces the map. On any status but TV_OK, which are those of tv_odometry_load, the odometry is
-// as before.
-tv_status read_map(const uint8_t* bytes, size_t num_bytes, Odometry* odometry);
+// Replaces the map, or adds the map of the bytes to it, with numbers that follow its own. On any
+// status but TV_OK, which are those of tv_odometry_load, the odometry is as before.
+tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odometry* odometry);
 
 }  // namespace tv

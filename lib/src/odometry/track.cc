@@ -11,6 +11,7 @@
 #include "odometry/map_check.h"
 #include "odometry/metric.h"
 #include "odometry/search.h"
+#include "odometry/sightings.h"
 #include "odometry/start.h"
 
 namespace tv {
@@ -90,8 +91,7 @@ void measure_depth(Odometry* odometry, const Frame& frame) {
     depths[num++] = x[2];
   }
   if (num == 0) return;
-  std::nth_element(depths, depths + num / 2, depths + num);
-  odometry->median_depth = depths[num / 2];
+  odometry->median_depth = median(depths, num);
 }
 
 void count_found(Odometry* odometry, const Frame& frame) {
@@ -179,7 +179,7 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
       const int32_t id = map.points[again->points[k]].id;
       if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
-    close_loop(odometry, *again, end);
+    close_loop(odometry, newest, *again, end);
     for (double& t : odometry->motion.t) t *= end.scale;
     ++odometry->num_loops;
     state->loop_closed = 1;

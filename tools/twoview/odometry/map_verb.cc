@@ -1,8 +1,12 @@
-// twoview map info FILE and twoview map export FILE -o OUT: what a map holds, without its frames.
+// twoview map info FILE, twoview map export FILE -o OUT and twoview map merge FILES -o OUT: what
+// maps hold, without their frames.
 
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/output.h"
@@ -35,46 +39,62 @@ T little_endian(const std::string& bytes, size_t at) {
   return value;
 }
 
-// A map that the library has read and checked.
-class LoadedMap {
- public:
-  explicit LoadedMap(const std::string& path) {
-    const std::string bytes = read_file(path, kMaxMapBytes);
+// The bytes of a map, and what their header says: the library has not checked them yet.
+struct MapFile {
+  explicit MapFile(const std::string& path) : path(path), bytes(read_file(path, kMaxMapBytes)) {
     if (bytes.size() < kHeaderBytes || bytes.compare(0, 5, "TVMAP") != 0)
       throw BadInput(path + " is no map of twoview odometry");
-    camera_.model = little_endian<int32_t>(bytes, kCameraAt);
-    camera_.width = little_endian<int32_t>(bytes, kCameraAt + 4);
-    camera_.height = little_endian<int32_t>(bytes, kCameraAt + 8);
-    double* const numbers[] = {&camera_.fx, &camera_.fy, &camera_.cx, &camera_.cy};
+    camera.model = little_endian<int32_t>(bytes, kCameraAt);
+    camera.width = little_endian<int32_t>(bytes, kCameraAt + 4);
+    camera.height = little_endian<int32_t>(bytes, kCameraAt + 8);
+    double* const numbers[] = {&camera.fx, &camera.fy, &camera.cx, &camera.cy};
     for (size_t k = 0; k < 4; ++k)
       *numbers[k] = little_endian<double>(bytes, kCameraAt + 16 + 8 * k);
     for (size_t k = 0; k < 8; ++k)
-      camera_.k[k] = little_endian<double>(bytes, kCameraAt + 48 + 8 * k);
+      camera.k[k] = little_endian<double>(bytes, kCameraAt + 48 + 8 * k);
+    num_points = little_endian<int32_t>(bytes, kCountsAt);
+    num_keyframes = little_endian<int32_t>(bytes, kCountsAt + 4);
+  }
+  const uint8_t* data() const { return reinterpret_cast<const uint8_t*>(bytes.data()); }
+
+  std::string path, bytes;
+  tv_camera camera{};
+  int64_t num_points = 0, num_keyframes = 0;
+};
+
+// Maps that the library has read and checked, as one.
+class LoadedMap {
+ public:
+  explicit LoadedMap(const std::vector<std::string>& paths) {
+    std::vector<MapFile> files(paths.begin(), paths.end());
+    camera_ = files[0].camera;
+    int64_t num_points = 0, num_keyframes = 0;
+    for (const MapFile& file : files) {
+      num_points += file.num_points;
+      num_keyframes += file.num_keyframes;
+    }
     tv_odometry_options options;
     tv_odometry_options_init(&options);
     options.max_keypoints = 4096;
-    options.max_points = std::clamp(little_endian<int32_t>(bytes, kCountsAt), 500, 200000);
-    options.max_keyframes = std::clamp(little_endian<int32_t>(bytes, kCountsAt + 4), 8, 2000);
+    options.max_points = static_cast<int32_t>(std::clamp<int64_t>(num_points, 500, 200000));
+    options.max_keyframes = static_cast<int32_t>(std::clamp<int64_t>(num_keyframes, 8, 2000));
     size_t size = 0;
-    check(tv_odometry_size(&camera_, &options, &size), path);
+    check(tv_odometry_size(&camera_, &options, &size), paths[0]);
     const size_t unit = TV_CONTEXT_ALIGNMENT;
     memory_.reset(std::aligned_alloc(unit, (size + unit - 1) / unit * unit));
-    if (!memory_) throw BadInput("not enough memory for the map " + path);
-    tv_odometry* odometry = nullptr;
-    check(tv_odometry_init(&odometry, &camera_, &options, memory_.get(), size), path);
-    check(tv_odometry_load(odometry, reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()),
-          path);
+    if (!memory_) throw BadInput("not enough memory for the map " + paths[0]);
+    check(tv_odometry_init(&odometry_, &camera_, &options, memory_.get(), size), paths[0]);
+    for (const MapFile& file : files) add(file);
     int32_t count = 0;
     points_.resize(static_cast<size_t>(options.max_points));
-    check(tv_odometry_points(odometry, points_.data(), options.max_points, &count), path);
+    check(tv_odometry_points(odometry_, points_.data(), options.max_points, &count), paths[0]);
     points_.resize(static_cast<size_t>(count));
     for (int32_t idx = 0;; ++idx) {
       FlightKeyframe key;
       tv_keyframe_init(&key.keyframe);
-      if (tv_odometry_keyframe(odometry, idx, &key.keyframe) != TV_OK) break;
+      if (tv_odometry_keyframe(odometry_, idx, &key.keyframe) != TV_OK) break;
       keyframes_.push_back(key);
     }
-    odometry_ = odometry;
   }
   const tv_camera& camera() const { return camera_; }
   const std::vector<tv_map_point>& points() const { return points_; }
@@ -83,6 +103,18 @@ class LoadedMap {
     std::vector<FlightKeyframe> keyframes = keyframes_;
     add_covariances(odometry_, keyframes);
     return keyframes;
+  }
+
+  // How many segments of the maps after the first one met one before.
+  int32_t num_joined() const { return num_joined_; }
+
+  std::string bytes() const {
+    size_t size = 0;
+    check(tv_odometry_save_size(odometry_, &size), "the map");
+    std::string bytes(size, '\0');
+    check(tv_odometry_save(odometry_, reinterpret_cast<uint8_t*>(&bytes[0]), size, &size),
+          "the map");
+    return bytes;
   }
 
   nlohmann::ordered_json json() const {
@@ -107,30 +139,57 @@ class LoadedMap {
   }
 
  private:
+  void add(const MapFile& file) {
+    int32_t joined = 0;
+    const tv_status status = tv_odometry_add(odometry_, file.data(), file.bytes.size(), &joined);
+    if (status == TV_ERR_LIMITS)
+      throw BadInput(file.path + ": more than 2000 keyframes or 200000 points in one map");
+    check(status, file.path);
+    num_joined_ += joined;
+  }
+
   tv_camera camera_{};
+  int32_t num_joined_ = 0;
   tv_odometry* odometry_ = nullptr;  // in the memory below
   std::unique_ptr<void, FreeMemory> memory_;
   std::vector<tv_map_point> points_;
   std::vector<FlightKeyframe> keyframes_;
 };
 
-int map_info(const std::string& path, bool as_json) {
-  const nlohmann::ordered_json json = LoadedMap(path).json();
-  if (as_json) {
-    print(json_text(json));
-    return 0;
-  }
+void print_info(const nlohmann::ordered_json& json) {
   print(summary_line("camera", "%d x %d, fx %.6g", json["image_size"][0].get<int>(),
                      json["image_size"][1].get<int>(), json["camera"]["fx"].get<double>()) +
         summary_line("map", "%d keyframes over %.3f s, %d points, %d observations, %d segments",
                      json["num_keyframes"].get<int>(), json["seconds"].get<double>(),
                      json["num_points"].get<int>(), json["num_observations"].get<int>(),
                      json["num_segments"].get<int>()));
+}
+
+int map_info(const std::string& path, bool as_json) {
+  const nlohmann::ordered_json json = LoadedMap({path}).json();
+  if (as_json)
+    print(json_text(json));
+  else
+    print_info(json);
+  return 0;
+}
+
+int map_merge(const std::vector<std::string>& paths, const std::string& output) {
+  const std::filesystem::path target(output);
+  OutputSet files(target.has_parent_path() ? target.parent_path() : ".");
+  for (const std::string& path : paths) files.keep(path);
+  const LoadedMap map(paths);
+  files.add(target.filename().string(), map.bytes());
+  files.commit();
+  print_info(map.json());
+  const int32_t joined = map.num_joined();
+  print(summary_line(
+      "merge", joined == 1 ? "%d segment was seen again" : "%d segments were seen again", joined));
   return 0;
 }
 
 int map_export(const std::string& path, const std::string& output) {
-  const LoadedMap map(path);
+  const LoadedMap map({path});
   OutputSet files(output);
   files.keep(path);
   FlightResult result;
@@ -148,6 +207,7 @@ int map_export(const std::string& path, const std::string& output) {
 void add_map(CLI::App& program, Run& run) {
   struct Arguments {
     std::string path, output;
+    std::vector<std::string> paths;
     bool json = false;
   };
   auto a = std::make_shared<Arguments>();
@@ -161,6 +221,15 @@ void add_map(CLI::App& program, Run& run) {
   files->add_option("FILE", a->path, "map.twm")->required()->type_name("FILE");
   files->add_option("-o,--output", a->output, "folder for the files")->required()->type_name("DIR");
   files->final_callback([a, &run] { run = [a] { return map_export(a->path, a->output); }; });
+  CLI::App* merge = verb->add_subcommand("merge", "several maps of one camera as one");
+  merge->add_option("FILES", a->paths, "map.twm of each")
+      ->required()
+      ->expected(2, 1000)
+      ->type_name("FILE");
+  merge->add_option("-o,--output", a->output, "the map that is written")
+      ->required()
+      ->type_name("FILE");
+  merge->final_callback([a, &run] { run = [a] { return map_merge(a->paths, a->output); }; });
 }
 
 }  // namespace cli
