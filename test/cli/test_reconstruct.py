@@ -236,7 +236,7 @@ class Reconstruct(cli.CliTest):
         self.assertNotIn("\033", text)
 
     def test_equal_runs_give_equal_bytes(self):
-        self.succeed(self.plain())
+        self.succeed(self.reconstruct())
         first = {name: (self.out / name).read_bytes() for name in self.listing()}
         self.succeed(self.reconstruct())
         for name in ("cloud.ply", "matches.png", "epipolar.png", "views.png"):
