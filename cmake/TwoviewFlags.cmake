@@ -20,12 +20,14 @@ if(TWOVIEW_SANITIZE)
 endif()
 
 # tv_precompile(target header...) has the target's C++ sources begin with these headers, parsed once.
-# Only in debug builds, of which one is the sanitizers' and one the fuzz targets': a release build has
-# several -O levels in a target, and compiles each source with what it includes itself, so it still
-# finds a forgotten #include. Not with a launcher, because ccache would not keep the objects.
+# This is for debug builds, such as those of the sanitizers and of the fuzz targets. A release build
+# has several -O levels in a target, and it must find a forgotten #include. A launcher turns this
+# off, because ccache would not keep the objects. clang refuses the headers where a source has
+# options of its own that change code.
 function(tv_precompile target)
   if(CMAKE_BUILD_TYPE STREQUAL "Debug" AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-    list(TRANSFORM ARGN REPLACE "^(.+)$" "$<$<COMPILE_LANGUAGE:CXX>:<\\1$<ANGLE-R>>" OUTPUT_VARIABLE headers)
+    list(TRANSFORM ARGN REPLACE "^(.+)$" "$<$<COMPILE_LANGUAGE:CXX>:<\\1$<ANGLE-R>>"
+      OUTPUT_VARIABLE headers)
     target_precompile_headers(${target} PRIVATE ${headers})
   endif()
 endfunction()
