@@ -11,8 +11,23 @@ target_compile_options(twoview_flags INTERFACE
   # a * b + c is rounded twice on every CPU, so that results have the same bytes everywhere.
   -ffp-contract=off)
 
+# A sanitizer's report names functions, files and lines, which -g1 gives; -g would take half as much
+# time again to compile.
 if(TWOVIEW_SANITIZE)
   string(REPLACE ";" "," sanitizers "${TWOVIEW_SANITIZE}")
-  add_compile_options(-fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+  add_compile_options(-fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
   add_link_options(-fsanitize=${sanitizers})
 endif()
+
+# tv_precompile(target header...) has the target's C++ sources begin with these headers, parsed once.
+# This is for debug builds, such as those of the sanitizers and of the fuzz targets. A release build
+# has several -O levels in a target, and it must find a forgotten #include. A launcher turns this
+# off, because ccache would not keep the objects. clang refuses the headers where a source has
+# options of its own that change code.
+function(tv_precompile target)
+  if(CMAKE_BUILD_TYPE STREQUAL "Debug" AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+    list(TRANSFORM ARGN REPLACE "^(.+)$" "$<$<COMPILE_LANGUAGE:CXX>:<\\1$<ANGLE-R>>"
+      OUTPUT_VARIABLE headers)
+    target_precompile_headers(${target} PRIVATE ${headers})
+  endif()
+endfunction()

@@ -28,7 +28,13 @@ def test_the_wheel_installs_and_works(tmp_path):
     pytest.importorskip("scikit_build_core")
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
     kept = os.environ.get("TWOVIEW_WHEEL_BUILD")
-    settings = ["--config-settings", f"build-dir={kept}"] if kept else []
+    # The package is what is tested here, so its library is compiled as fast as it can be. The
+    # optimised library has its own tests, and scripts/test_packages those of a release's wheels.
+    settings = ["--config-settings", "cmake.build-type=Debug"]
+    for language in ("C", "CXX"):
+        settings += ["--config-settings", f"cmake.define.CMAKE_{language}_FLAGS_DEBUG=-O0 -DNDEBUG"]
+    if kept:
+        settings += ["--config-settings", f"build-dir={kept}"]
     build = subprocess.run(
         [
             *pip,

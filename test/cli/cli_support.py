@@ -2,6 +2,7 @@
 Python's standard library is used. The program is the one that TWOVIEW_PROGRAM names, or the first
 argument.
 """
+import functools
 import json
 import os
 import random
@@ -117,6 +118,7 @@ WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
 SHIFTS = (24, 6, 15, 10, 20)
 
 
+@functools.lru_cache
 def stereo_pair(seed=7):
     """A pair of textured images, left and right, each as bytes row by row."""
     wide = texture(WIDTH + max(SHIFTS), HEIGHT, seed)

@@ -4,8 +4,11 @@ import json
 import math
 import os
 import re
+import shutil
 import struct
+import tempfile
 import unittest
+from pathlib import Path
 
 import cli_support as cli
 from cli_support import FOCAL, HEIGHT, WIDTH
@@ -38,8 +41,21 @@ def read_ply(path):
 
 
 class Reconstruct(cli.CliTest):
+    plain_run = None
+
+    def plain(self):
+        """The run of the default pair without an option, which many tests look at: the program runs
+        once, and each test gets a copy of the output folder."""
+        if Reconstruct.plain_run is None:
+            kept = tempfile.TemporaryDirectory(prefix="twoview_cli_plain_")
+            out = Path(kept.name) / "out"
+            Reconstruct.plain_run = (kept, out, self.reconstruct(out=out))
+        _, out, done = Reconstruct.plain_run
+        shutil.copytree(out, self.out)
+        return done
+
     def test_a_sideways_flight_gives_a_full_pose_and_every_file(self):
-        done = self.succeed(self.reconstruct())
+        done = self.succeed(self.plain())
         self.assertEqual(done.stderr, b"")
         self.assertEqual(self.listing(), cli.RESULT_FILES)
         result = self.result()
@@ -89,7 +105,7 @@ class Reconstruct(cli.CliTest):
             self.assertIn(f"<li>{advice}</li>", page)
 
     def test_E_is_t_cross_R_with_its_sign(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         result = self.result()
         R, t = result["R"], result["t"]
         skew = [0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0]
@@ -214,7 +230,7 @@ class Reconstruct(cli.CliTest):
         self.assertEqual((done.stdout, done.stderr), (b"", b""))
 
     def test_the_summary_is_a_dozen_lines_without_colour_codes(self):
-        text = self.succeed(self.reconstruct()).stdout.decode()
+        text = self.succeed(self.plain()).stdout.decode()
         self.assertTrue(8 <= text.count("\n") <= 14, text)
         self.assertNotIn("advice", text)
         self.assertNotIn("\033", text)
@@ -230,7 +246,7 @@ class Reconstruct(cli.CliTest):
         self.assertEqual(before, after)
 
     def test_swapped_images_give_the_inverse(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         self.succeed(self.reconstruct(a=self.b, b=self.a, out=self.folder / "swapped"))
         one, two = self.result(), self.result(self.folder / "swapped")
         transposed = [one["R"][3 * j + i] for i in range(3) for j in range(3)]
@@ -240,7 +256,7 @@ class Reconstruct(cli.CliTest):
             self.assertAlmostEqual(two["t"][i], inverse, delta=1e-12)
 
     def test_every_option_is_obeyed_and_echoed(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         for key in OPTIONS:
             self.assertIn(key, self.result()["options"])
         chosen = {
@@ -335,7 +351,7 @@ class Reconstruct(cli.CliTest):
 
     def test_a_focal_length_of_35mm_film_is_a_pinhole_with_the_same_diagonal(self):
         focal_35mm = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         known = self.result()
         self.succeed(self.reconstruct("--focal-35mm", repr(focal_35mm), camera=False))
         result = self.result()
@@ -368,7 +384,7 @@ class Reconstruct(cli.CliTest):
                                 entry.split(":")[0], out=self.folder / "other")
 
     def test_files_of_an_earlier_pair_do_not_stay_beside_new_ones(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         (self.out / "mine.txt").write_text("kept")
         self.reconstruct(b=self.a)
         self.assertNotIn("cloud.ply", self.listing())
@@ -376,7 +392,7 @@ class Reconstruct(cli.CliTest):
         self.assertIn("mine.txt", self.listing())
 
     def test_pictures_are_whole_and_of_a_size_to_look_at(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         for name in ("matches.png", "epipolar.png", "views.png"):
             width, height = cli.png_size((self.out / name).read_bytes())
             self.assertTrue(400 <= width <= 2400 and 300 <= height <= 2400, (name, width, height))
@@ -405,7 +421,7 @@ class Reconstruct(cli.CliTest):
         self.assertEqual(len(data["cameras"]), 2)
 
     def test_the_report_has_six_digits_of_each_number_of_F(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         page = (self.out / "report.html").read_text()
         text = re.search(r"<figcaption>F</figcaption><pre>(.*?)</pre>", page, re.S).group(1)
         shown = [float(number) for number in text.split()]
@@ -413,7 +429,7 @@ class Reconstruct(cli.CliTest):
             self.assertAlmostEqual(number, exact, delta=1e-6 * abs(exact))
 
     def test_on_a_phone_a_matrix_scrolls_in_its_own_box(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         page = (self.out / "report.html").read_text()
         self.assertRegex(page, r"\.matrices figure \{ min-width: 0; max-width: 100%; \}")
         self.assertIn("minmax(min(330px, 100%), 1fr)", page)
@@ -426,7 +442,7 @@ class Reconstruct(cli.CliTest):
             self.assertRegex(done.stdout, rb"verdict +matches ok, no pose: ")
 
     def test_a_ROS_camera_reads_as_the_same_camera(self):
-        self.succeed(self.reconstruct())
+        self.succeed(self.plain())
         expected = self.result()
         ros = f"""image_width: {WIDTH}
 image_height: {HEIGHT}

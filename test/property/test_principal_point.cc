@@ -2,7 +2,7 @@
 // the evidence: a chi-square that is one, and the shift that the matches ask for. With a sigma: how
 // well the matches determine the shift, how much more accurate the pose becomes, whether the
 // covariance still contains the truth as often as it should, and that a right principal point
-// stays. TWOVIEW_PAIRS: pairs of each case, default 300.
+// stays. TWOVIEW_PAIRS: pairs of each case, default 300, or 30 under sanitizers.
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstdlib>
@@ -13,6 +13,7 @@
 #include "robust/principal_point.h"
 #include "support/api.h"
 #include "support/calls.h"
+#include "support/sanitized.h"
 #include "support/scene.h"
 
 void setUp(void) {}
@@ -24,7 +25,7 @@ using scene::uniform;
 using tv::Mat3;
 using tv::Vec3;
 
-int num_pairs = 300;
+int num_pairs = kSanitized ? 30 : 300;
 api_context api;
 scene::Scene pair;
 
@@ -136,6 +137,7 @@ void check_chi_square(const char* title, const tv_camera& right) {
       "%% outside the 95 %% ellipse\n",
       title, known, 100.0 * above_median / known, 100.0 * above_95 / known,
       100.0 * above_999 / known, 100.0 * outside_95 / known);
+  if (kSanitized) return;
   TEST_ASSERT_TRUE(known > 0.95 * total);
   TEST_ASSERT_TRUE(above_median > 0.43 * known && above_median < 0.60 * known);
   TEST_ASSERT_TRUE(above_95 > 0.025 * known && above_95 < 0.08 * known);
@@ -165,6 +167,7 @@ void check_asked(const char* title, const tv_camera& right) {
       "%s, off by %.1f, %.1f px: asked for within the 95 %% ellipse in %.1f %% of %d, "
       "contradicted in %.1f %%\n",
       title, x, y, 100.0 * within / known, known, 100.0 * contradicted / known);
+  if (kSanitized) return;
   TEST_ASSERT_TRUE(known > 0.95 * num_pairs);
   TEST_ASSERT_TRUE(within > 0.88 * known && within < 0.99 * known);
   TEST_ASSERT_TRUE(contradicted > 0.2 * known);
@@ -265,6 +268,7 @@ void test_a_principal_point_as_told_stays(void) {
   // By design the estimate moves a right principal point in one pair in a thousand, and the
   // approximation in its test adds to that share; nine of 1000 pairs then have a probability of
   // 2e-7.
+  if (kSanitized) return;
   TEST_ASSERT_TRUE(shifts < 2 + 5 * num_pairs * 7 / 1000);
 }
 
@@ -295,6 +299,7 @@ void compare(const char* title, const tv_camera& right, double most_error_px, do
       "sigma 0), truth within the 95 %% ellipsoid in %.1f %%\n",
       title, shifts, num_pairs, off / shifts, sum[1] / num_pairs, sum[0] / num_pairs,
       100.0 * within / shifts);
+  if (kSanitized) return;
   TEST_ASSERT_TRUE(shifts > num_pairs / 8);
   TEST_ASSERT_TRUE(off / shifts < most_error_px);
   TEST_ASSERT_TRUE(sum[1] < least_gain * sum[0]);

@@ -57,17 +57,19 @@ static int is_far(const tv_keypoint *keypoints, int best, int j, double radius) 
 static int nearest(const uint8_t *query, const uint8_t *rows, const tv_keypoint *keypoints,
                    int num_rows, const tv_match_options *options, int64_t *best, double *ratio) {
   const double largest = (double)options->max_distance * options->max_distance;
+  static int64_t distances[MANY];
   double second = largest > 0 ? largest : -1;
   int idx = -1, j;
   for (j = 0; j < num_rows; ++j) {
     const int64_t d = distance_sq(query, rows + j * SIZE);
+    distances[j] = d;
     if (idx < 0 || d < *best) {
       *best = d;
       idx = j;
     }
   }
   for (j = 0; j < num_rows; ++j) {
-    const double d = (double)distance_sq(query, rows + j * SIZE);
+    const double d = (double)distances[j];
     if (!is_far(keypoints, idx, j, options->neighbourhood_px)) continue;
     if (second < 0 || d < second) second = d;
   }

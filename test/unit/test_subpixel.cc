@@ -17,16 +17,10 @@ constexpr int kOversampling = 16;
 uint8_t pixels[kSide * kSide];
 const tv::Level level{pixels, kSide, kSide, kSide, 1.0};
 
-// Whether a point lies inside a wedge with this opening (radians). The wedge's tip is at the
-// origin, and its axis is turned by `turn`.
-bool in_wedge(double x, double y, double turn, double opening) {
-  const double along = x * std::cos(turn) + y * std::sin(turn);
-  const double across = std::fabs(y * std::cos(turn) - x * std::sin(turn));
-  return along > 0 && across < along * std::tan(opening / 2);
-}
-
-// A pixel is the average over its area, as on a sensor, and then blurred slightly as by a lens.
+// Renders a wedge with this opening, its axis turned by `turn` (radians). A pixel is the average
+// over its area, as on a sensor, and then blurred slightly as by a lens.
 void render_wedge(double tip_x, double tip_y, double turn, double opening, int dark, int bright) {
+  const double cosine = std::cos(turn), sine = std::sin(turn), slope = std::tan(opening / 2);
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
       int inside = 0;
@@ -35,7 +29,9 @@ void render_wedge(double tip_x, double tip_y, double turn, double opening, int d
           // Averages over two pixels: the pixel and half of each neighbour.
           const double sx = x - 1 + 2 * (i + 0.5) / kOversampling;
           const double sy = y - 1 + 2 * (j + 0.5) / kOversampling;
-          inside += in_wedge(sx - tip_x, sy - tip_y, turn, opening);
+          const double along = (sx - tip_x) * cosine + (sy - tip_y) * sine;
+          const double across = std::fabs((sy - tip_y) * cosine - (sx - tip_x) * sine);
+          inside += along > 0 && across < along * slope;
         }
       }
       const double share = static_cast<double>(inside) / (kOversampling * kOversampling);
@@ -54,22 +50,17 @@ void render_blob(double centre_x, double centre_y, double sigma, int base, int h
   }
 }
 
-int score_at(int x, int y, int arc) {
-  const uint8_t* rows[7];
-  uint8_t scores[kSide];
-  for (int k = 0; k < 7; ++k) rows[k] = pixels + (y - 3 + k) * kSide;
-  tvk_select(TV_KERNELS_C)->fast_score_row(rows, kSide, arc, 1, scores);
-  return scores[x];
-}
-
 // The pixel with the highest score, the first of equal ones; false where there is no corner.
 bool find_corner(int arc, int* best_x, int* best_y) {
   int best = 0;
   for (int y = 3; y < kSide - 3; ++y) {
+    const uint8_t* rows[7];
+    uint8_t scores[kSide];
+    for (int k = 0; k < 7; ++k) rows[k] = pixels + (y - 3 + k) * kSide;
+    tvk_select(TV_KERNELS_C)->fast_score_row(rows, kSide, arc, 1, scores);
     for (int x = 3; x < kSide - 3; ++x) {
-      const int score = score_at(x, y, arc);
-      if (score <= best) continue;
-      best = score;
+      if (scores[x] <= best) continue;
+      best = scores[x];
       *best_x = x;
       *best_y = y;
     }
