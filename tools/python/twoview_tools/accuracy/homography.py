@@ -92,9 +92,11 @@ def our_matches(library, gray0, gray1, feature_options, match_options):
         library, max_width=max(g.shape[1] for g in (gray0, gray1)),
         max_height=max(g.shape[0] for g in (gray0, gray1)), max_keypoints=cap)
     features = [(*context.extract(gray, feature_options), 0.0) for gray in (gray0, gray1)]
-    links, _ = pipeline.match_features(context, *features, match_options)
-    return [np.column_stack([f[0]["x"], f[0]["y"]])[links[i]].astype(float)
-            for f, i in zip(features, ("idx0", "idx1"))]
+    keypoints, links, _, _ = pipeline.match_features(
+        context, (gray0, gray1), features, match_options,
+        library.feature_options(feature_options).keypoint_size)
+    return [np.column_stack([k["x"], k["y"]])[links[i]].astype(float)
+            for k, i in zip(keypoints, ("idx0", "idx1"))]
 
 
 def opencv_matches(gray0, gray1, contrast, ratios, cap):

@@ -24,7 +24,7 @@ import sys
 
 import numpy as np
 
-from . import datasets, estimators, metrics, parallel, pipeline, tables, twoview_ctypes
+from . import datasets, metrics, parallel, tables, twoview_ctypes
 
 VERDICTS = ("ok", "doubtful", "refused")
 BOUNDS_DEG = (1.0, 2.0, 5.0, 10.0)
@@ -66,7 +66,7 @@ def images_of(data):
 # ---- evaluation ----------------------------------------------------------------------------------
 
 class Pictures:
-    """The features and cameras of images of several sets, each image extracted once."""
+    """The images and cameras of several sets."""
 
     def __init__(self, folders, library_path, options, flagged):
         self.library = twoview_ctypes.Library(library_path)
@@ -81,30 +81,25 @@ class Pictures:
         self.context = twoview_ctypes.Context(
             self.library, max_width=max(s[0] for s in sizes), max_height=max(s[1] for s in sizes),
             max_keypoints=max(cap, 1))
-        self.features = {}
 
     def view(self, name, image):
-        """((keypoints, descriptors, ms), camera, (width, height)) of an image of a set."""
+        """(grey levels, tv_camera) of an image of a set."""
         data = self.sets[name]
-        if (name, image) not in self.features:
-            self.features[name, image] = pipeline.extract_images(
-                self.context, data, [image], self.options[0])[image]
-        return (self.features[name, image], data.camera(*self.pairs[name][image]),
-                data.gray(image)[0].shape[::-1])
+        gray = data.gray(image)[0]
+        K, distortion = data.camera(*self.pairs[name][image])
+        return gray, twoview_ctypes.make_camera(K, *gray.shape[::-1], distortion)
 
     def run(self, pair):
-        """A row of two (set, image)."""
-        (f0, camera0, size0), (f1, camera1, size1) = (self.view(*image) for image in pair)
-        links, _ = pipeline.match_features(self.context, f0, f1, self.options[1])
-        size_of_one = self.context.library.feature_options(self.options[0]).keypoint_size
-        matches = pipeline.make_matches(f0, f1, links, (camera0, camera1), (size0, size1),
-                                        size_of_one)
-        R, t, inliers, result = estimators.run_twoview(self.context, matches, self.options[2])
+        """(R or None, t or None, row) of tv_reconstruct of two (set, image)."""
+        views = [part for image in pair for part in self.view(*image)]
+        result, cloud = self.context.reconstruct(*views, self.options)
+        R = np.array(result.R).reshape(3, 3) if result.has_R else None
+        t = np.array(result.t) if result.has_R and result.has_t else None
         return R, t, {"image0": "/".join(pair[0]), "image1": "/".join(pair[1]),
                       "verdict": twoview_ctypes.enum_name("verdict", result.verdict),
                       "kind": twoview_ctypes.enum_name("kind", result.kind),
-                      "reasons": int(result.reasons), "num_matches": len(matches),
-                      "num_inliers": inliers}
+                      "reasons": int(result.reasons), "num_matches": len(cloud.matches),
+                      "num_inliers": result.num_inliers}
 
 
 @functools.lru_cache(maxsize=1)
