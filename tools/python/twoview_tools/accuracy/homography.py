@@ -24,9 +24,11 @@ from . import datasets, peers, pipeline, tables, twoview_ctypes
 
 LIMITS_PX = (1.0, 3.0, 5.0)
 CORRECT_PX = 3.0
+ZOOM = "zoom and rotation"
 # By folder; every other folder shows a change of viewpoint.
-KINDS = {"homogr_city": "light", "homogr_boat": "zoom and rotation",
-         "homogr_WhiteBoard": "zoom and rotation", "homogr_CapitalRegion": "zoom and rotation"}
+KINDS = {"homogr_city": "light", "homogr_boat": ZOOM,
+         "homogr_WhiteBoard": ZOOM, "homogr_CapitalRegion": ZOOM}
+REST = "all but " + ZOOM
 
 
 def kind_of(name):
@@ -184,6 +186,9 @@ def main(argv=None):
         kinds.setdefault(kind_of(pair[0]), []).append(name)
         print_table(f"{name} ({kind_of(pair[0])}): {gray0.shape[1]}x{gray0.shape[0]}, "
                     f"{gray1.shape[1]}x{gray1.shape[0]}", rows[name])
+    rest = [name for kind, names in kinds.items() if kind != ZOOM for name in names]
+    if rest:
+        kinds = {REST: rest, **kinds}
     means = {kind: {system: average([rows[name][system] for name in names])
                     for system in rows[names[0]]} for kind, names in kinds.items()}
     for kind, systems in means.items():
