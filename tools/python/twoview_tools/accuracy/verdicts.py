@@ -23,8 +23,9 @@ import json
 import sys
 
 import numpy as np
+import twoview
 
-from . import datasets, metrics, parallel, tables, twoview_ctypes
+from . import datasets, estimators, metrics, parallel, pipeline, tables, twoview_ctypes
 
 VERDICTS = ("ok", "doubtful", "refused")
 BOUNDS_DEG = (1.0, 2.0, 5.0, 10.0)
@@ -66,7 +67,7 @@ def images_of(data):
 # ---- evaluation ----------------------------------------------------------------------------------
 
 class Pictures:
-    """The images and cameras of several sets."""
+    """The features and cameras of images of several sets, each image extracted once."""
 
     def __init__(self, folders, library_path, options, flagged):
         self.library = twoview_ctypes.Library(library_path)
@@ -81,25 +82,39 @@ class Pictures:
         self.context = twoview_ctypes.Context(
             self.library, max_width=max(s[0] for s in sizes), max_height=max(s[1] for s in sizes),
             max_keypoints=max(cap, 1))
+        self.features = {}
 
     def view(self, name, image):
-        """(grey levels, tv_camera) of an image of a set."""
+        """((keypoints, descriptors, ms), grey levels, camera) of an image of a set."""
         data = self.sets[name]
-        gray = data.gray(image)[0]
-        K, distortion = data.camera(*self.pairs[name][image])
-        return gray, twoview_ctypes.make_camera(K, *gray.shape[::-1], distortion)
+        if (name, image) not in self.features:
+            self.features[name, image] = pipeline.extract_images(
+                self.context, data, [image], self.options[0])[image]
+        return (self.features[name, image], data.gray(image)[0],
+                data.camera(*self.pairs[name][image]))
 
     def run(self, pair):
-        """(R or None, t or None, row) of tv_reconstruct of two (set, image)."""
-        views = [part for image in pair for part in self.view(*image)]
-        result, cloud = self.context.reconstruct(*views, self.options)
-        R = np.array(result.R).reshape(3, 3) if result.has_R else None
-        t = np.array(result.t) if result.has_R and result.has_t else None
+        """(R or None, t or None, row) of two (set, image). The pose is that of tv_reconstruct, and
+        so is the verdict: tv_reconstruct itself runs where the stages do not refuse, because it
+        has reasons for doubt that tv_estimate_two_view does not have."""
+        features, grays, cameras = zip(*(self.view(*image) for image in pair))
+        sizes = [gray.shape[::-1] for gray in grays]
+        size_of_one = self.library.feature_options(self.options[0]).keypoint_size
+        keypoints, links, aligned, _ = pipeline.match_features(
+            self.context, grays, features, self.options[1], size_of_one)
+        matches = pipeline.make_matches(*zip(keypoints), links, cameras, sizes, size_of_one,
+                                        aligned)
+        R, t, inliers, result = estimators.run_twoview(self.context, matches, self.options[2])
+        if result.verdict != twoview.Verdict.REFUSED:
+            lenses = [twoview_ctypes.make_camera(K, *size, distortion)
+                      for (K, distortion), size in zip(cameras, sizes)]
+            result, _ = self.context.reconstruct(grays[0], lenses[0], grays[1], lenses[1],
+                                                 self.options)
         return R, t, {"image0": "/".join(pair[0]), "image1": "/".join(pair[1]),
                       "verdict": twoview_ctypes.enum_name("verdict", result.verdict),
                       "kind": twoview_ctypes.enum_name("kind", result.kind),
-                      "reasons": int(result.reasons), "num_matches": len(cloud.matches),
-                      "num_inliers": result.num_inliers}
+                      "reasons": int(result.reasons), "num_matches": len(matches),
+                      "num_inliers": inliers}
 
 
 @functools.lru_cache(maxsize=1)
