@@ -179,9 +179,6 @@ static int run_stages(tv_context *context, const tv_camera *camera) {
                                      CAP, &num_matches));
   REFUSES_UNKNOWN(features[1].it, tv_match(context, &features[0].it, &features[1].it, &match.it,
                                            matches, CAP, &num_matches));
-  CHECK(tv_align_matches(context, &views[0].it.image, &views[1].it.image, feature.it.keypoint_size,
-                         keypoints[0], features[0].it.num, keypoints[1], features[1].it.num,
-                         matches, num_matches, mask) == TV_OK);
   for (k = 0; k < num_matches; ++k) {
     pixels[0][2 * k] = keypoints[0][matches[k].idx0].x;
     pixels[0][2 * k + 1] = keypoints[0][matches[k].idx0].y;
