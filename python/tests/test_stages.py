@@ -173,6 +173,34 @@ def test_keypoint_sigmas_are_powers_of_the_size(context, image):
         tv.keypoint_sigmas(keypoints, 3)
 
 
+def test_aligned_matches_are_those_of_reconstruct(context, image):
+    shifted = np.ascontiguousarray(np.roll(image, (3, 5), (0, 1)))
+    (points0, rows0), (points1, rows1) = (tv.extract(context, picture, max_keypoints=500)
+                                          for picture in (image, shifted))
+    links = tv.match(context, rows0, rows1, keypoints0=points0, keypoints1=points1)
+    before = points0.tobytes(), points1.tobytes()
+    points1["x"][links["idx1"]] += 0.2
+    moved0, moved1, aligned = tv.align_matches(context, image, shifted, points0, points1, links)
+    assert aligned.dtype == bool and aligned.mean() > 0.5
+    assert points0.tobytes() == before[0] and points1.tobytes() != before[1]
+    changed = (moved0 != points0)[links["idx0"]].astype(int) + (moved1 != points1)[links["idx1"]]
+    assert (changed == aligned).all()
+    offsets = np.hypot(moved1["x"][links["idx1"]] - moved0["x"][links["idx0"]] - 5,
+                       moved1["y"][links["idx1"]] - moved0["y"][links["idx0"]] - 3)
+    assert np.median(offsets[aligned]) < 0.02
+    _, cloud = tv.reconstruct(context, image, None, shifted, None,
+                              feature=tv.FeatureOptions(max_keypoints=500))
+    points1 = np.frombuffer(before[1], tv.KEYPOINT)
+    moved = tv.align_matches(context, image, shifted, points0, points1, links)
+    assert all(np.array_equal(a, b) for a, b in zip(moved, cloud.keypoints))
+    with pytest.raises(tv.TV_ERR_ARGUMENT):
+        tv.align_matches(context, image, shifted, points0, points1[:3], links)
+    with pytest.raises(tv.TV_ERR_ARGUMENT):
+        tv.align_matches(context, image, shifted, points0, points1, links, size_of_one=0)
+    with pytest.raises(TypeError):
+        tv.align_matches(context, image, shifted, rows0, points1, links)
+
+
 def test_triangulate_adjust_and_covariances(context, scene):
     points = tv.triangulate(scene.camera, scene.camera, scene.R, scene.t, scene.pixels0,
                             scene.pixels1)

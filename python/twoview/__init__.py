@@ -32,9 +32,9 @@ from .enums import (CameraModel, Kernels, Kind, Loss, Normalisation, OdometrySta
 from .odometry import Keyframe, Odometry, OdometryState
 from .options import (AbsolutePoseOptions, BundleOptions, DenseOptions, EstimateOptions,
                       FeatureOptions, GuidedOptions, MatchOptions, OdometryOptions, WindowOptions)
-from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, correct_matches,
-                     corrected_camera, describe, detect, estimate_two_view, extract,
-                     keypoint_sigmas, match, match_guided, orient, point_covariances,
+from .stages import (BundleResult, Reconstruction, TwoView, adjust_two_view, align_matches,
+                     correct_matches, corrected_camera, describe, detect, estimate_two_view,
+                     extract, keypoint_sigmas, match, match_guided, orient, point_covariances,
                      reconstruct, triangulate)
 from .window import WindowResult, adjust_window
 
@@ -69,7 +69,7 @@ __all__ = [
     "TV_ERR_MAP", "TV_ERR_MEMORY", "TV_ERR_NOT_FINITE", "TV_ERR_NULL", "TV_ERR_OUTSIDE",
     "TV_ERR_OVERLAP", "TV_ERR_STRUCT_SIZE", "Triangulation", "TwoView", "Verdict",
     "WINDOW_VIEW", "WindowOptions", "WindowResult", "adjust_two_view", "adjust_window",
-    "camera_check", "camera_project_points", "camera_scale", "camera_undistort",
+    "align_matches", "camera_check", "camera_project_points", "camera_scale", "camera_undistort",
     "camera_unproject_points", "camera_valid_angle", "correct_matches", "corrected_camera",
     "default_library", "densify", "describe", "detect", "estimate_absolute_pose",
     "estimate_two_view", "extract", "format_cameras", "keypoint_sigmas", "match", "match_guided",

@@ -182,6 +182,31 @@ def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
     return found[: count.value].copy()
 
 
+def align_matches(context: Context, image0: np.ndarray, image1: np.ndarray, keypoints0: np.ndarray,
+                  keypoints1: np.ndarray, matches: np.ndarray,
+                  size_of_one: float = FeatureOptions.keypoint_size,
+                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """tv_align_matches: one keypoint of each match is moved by the pixels around both.
+
+    context: as large as the images. image0, image1: (height, width) uint8, of the keypoints.
+    keypoints0, keypoints1: (n0,) and (n1,) of twoview.KEYPOINT, of extract. matches: (m,) of
+    twoview.CORRESPONDENCE, of match. size_of_one: the option keypoint_size of extract, pixels.
+    Returns both keypoints, copies in which x and y of the moved ones are new, and which matches
+    were aligned, (m,) bool. reconstruct halves both sigmas (keypoint_sigmas) of an aligned match.
+    Raises TypeError or ValueError for an array that C could not read, TV_ERR_LIMITS for an image
+    above the context's limits, TV_ERR_ARGUMENT for an index or a size out of its range,
+    TV_ERR_NOT_FINITE for a keypoint that is not finite."""
+    views = check_context(context) and (_images(image0, None)[0], _images(image1, None)[0])
+    moved = [_abi.check_array(name, array, _abi.KEYPOINT).copy()
+             for name, array in (("keypoints0", keypoints0), ("keypoints1", keypoints1))]
+    matches = _abi.check_array("matches", matches, _abi.CORRESPONDENCE)
+    aligned = np.zeros(len(matches), np.uint8)
+    context.call("tv_align_matches", *views, ctypes.c_float(size_of_one), _abi.pointer(moved[0]),
+                 c_int32(len(moved[0])), _abi.pointer(moved[1]), c_int32(len(moved[1])),
+                 _abi.pointer(matches), c_int32(len(matches)), _abi.pointer(aligned))
+    return moved[0], moved[1], aligned.astype(bool)
+
+
 def _are_uncalibrated(camera0: Optional[Camera], camera1: Optional[Camera]) -> bool:
     """Whether both cameras are None. One camera alone serves nothing, as in C."""
     for name, camera, other in (("0", camera0, "1"), ("1", camera1, "0")):

@@ -1,4 +1,4 @@
-// Fuzzes tv_extract and tv_match with small images of any content and any options.
+// Fuzzes tv_extract, tv_match and tv_align_matches: small images of any content and any options.
 #include <algorithm>
 #include <vector>
 
@@ -56,11 +56,12 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   match_options.ratio = static_cast<float>(bytes.wild(0.01, 1));
   match_options.neighbourhood_px = static_cast<float>(bytes.whole(0, 40));
   tv_keypoint keypoints_of[2][kMaxKeypoints];
-  std::vector<uint8_t> descriptors[2];
+  std::vector<uint8_t> pixels[2], descriptors[2];
+  tv_image images[2];
   int32_t counts[2] = {0, 0};
   for (int v = 0; v < 2; ++v) {
-    tv_image image;
-    const std::vector<uint8_t> pixels = pixels_of(bytes, image);
+    tv_image& image = images[v];
+    pixels[v] = pixels_of(bytes, image);
     const bool masked = bytes.whole(0, 3) == 0;
     tv_keypoint* const keypoints = keypoints_of[v];
     descriptors[v].resize(kMaxKeypoints * TV_DESCRIPTOR_BYTES);
@@ -89,5 +90,10 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     FUZZ_REQUIRE(matches[i].idx1 >= 0 && matches[i].idx1 < counts[1]);
     FUZZ_REQUIRE(i == 0 || matches[i].idx0 > matches[i - 1].idx0);
   }
+  uint8_t aligned[kMaxKeypoints];
+  FUZZ_REQUIRE(tv_align_matches(context, &images[0], &images[1], options.keypoint_size,
+                                keypoints_of[0], counts[0], keypoints_of[1], counts[1], matches,
+                                count, aligned) == TV_OK);
+  for (int i = 0; i < count; ++i) FUZZ_REQUIRE(aligned[i] <= 1);
   return 0;
 }

@@ -11,7 +11,7 @@ except ImportError:
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 if np is not None:
-    from twoview_tools.accuracy import twoview_ctypes as tv
+    from twoview_tools.accuracy import datasets, estimators, pipeline, twoview_ctypes as tv
 
 
 def setUpModule():
@@ -45,6 +45,33 @@ class TestLibrary(unittest.TestCase):
         links = context.match(descriptors, descriptors)
         np.testing.assert_array_equal(links["idx0"], links["idx1"])
         self.assertTrue((links["dist_sq"] == 0).all())
+
+
+class TestPipeline(unittest.TestCase):
+    """The stages one by one, as tuning runs them, give the poses of tv_reconstruct."""
+
+    def test_the_poses_are_those_of_tv_reconstruct(self):
+        folder = os.path.join(datasets.data_dir(), "strecha_Herz_Jesus_P8")
+        if not os.path.isfile(tv.DEFAULT_LIBRARY) or not os.path.isdir(folder):
+            self.skipTest("build/release is not built, or there is no data")
+        data = datasets.Set(folder, max_pairs=2)
+        context = pipeline.make_context(tv.Library(), data)
+        poses = []
+        for match, estimate in (({}, {}), ({"align_matches": "0"}, {}), ({}, {"sigma_by_size": 0}),
+                                ({"align_matches": 1, "ratio": 0.8}, {"sigma_by_size": "0.5"})):
+            matched = pipeline.match_pairs(context, data, None, match)
+            for pair, (matches, _) in zip(data.pairs, matched):
+                R, t, result, inliers = estimators.estimate(context, matches, estimate)
+                views = [part for side, name in enumerate((pair.name0, pair.name1)) for part in (
+                    data.gray(name)[0],
+                    tv.make_camera(data.camera(pair, side)[0], *matches.sizes[side],
+                                   data.camera(pair, side)[1]))]
+                whole, cloud = context.reconstruct(*views, ({}, match, estimate))
+                self.assertEqual(bytes(result.R), bytes(whole.R))
+                self.assertEqual(bytes(result.t), bytes(whole.t))
+                np.testing.assert_array_equal(inliers, cloud.inlier_mask)
+                poses.append(bytes(result.R))
+        self.assertEqual(len(set(poses)), len(poses))
 
 
 if __name__ == "__main__":

@@ -85,6 +85,11 @@ class TestGridFile(unittest.TestCase):
     def test_only_points_make_no_product(self):
         self.assertEqual(grid.read_grid(["point match.ratio=0.9"]), [({}, {"ratio": "0.9"}, {})])
 
+    def test_a_title_names_options_and_build(self):
+        self.assertEqual(grid.title(({}, {}, {})), "defaults")
+        self.assertEqual(grid.title(({}, {"ratio": "0.9"}, {}, {"lib": "b.so"})),
+                         "match ratio=0.9 | with lib=b.so")
+
     def test_a_wrong_line_is_named(self):
         for line, words in (("feature levels", "not KEY=VALUE"), ("levels=2", "begins with"),
                             ("point levels=2", "begins with none"), ("match ratio=", "not KEY")):

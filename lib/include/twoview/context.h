@@ -41,7 +41,7 @@ typedef enum tv_kernels {
    these purposes alone; every other call that takes a context and is listed here returns
    TV_ERR_LIMITS. Calls that are not listed need no purpose. */
 typedef enum tv_purpose {
-  /* tv_detect, tv_orient, tv_describe and tv_extract. */
+  /* tv_detect, tv_orient, tv_describe, tv_extract and tv_align_matches. */
   TV_PURPOSE_EXTRACT = 1 << 0,
   /* tv_match. */
   TV_PURPOSE_MATCH = 1 << 1,

@@ -127,6 +127,31 @@ TV_API tv_status tv_match_guided(tv_context *context, const tv_camera *camera0,
                                  tv_correspondence *correspondences, int32_t cap_correspondences,
                                  int32_t *num_correspondences);
 
+/* Moves one keypoint of each match to where the 8 x 8 samples around it fit best to those around
+   the other keypoint, under an affine map, a gain and an offset (least-squares matching; A. W.
+   Gruen, South African Journal of Photogrammetry 14(3), 1985). tv_reconstruct calls it between
+   tv_match and tv_estimate_two_view unless align_matches is 0. The keypoint of the larger size
+   stays. The other one moves by at most 1.2 times its size over size_of_one, in pixels; only x and
+   y change. Neither moves where the samples leave the image, have too little texture, or do not
+   fit. Exchanged images give the same positions. Two matches one after the other whose keypoints
+   are at the same places, as of a corner with two orientations, move together. image0, image1: the
+   images of the keypoints, within the context's limits. size_of_one: the size of a keypoint of the
+   full image, (0, 4096], best tv_feature_options.keypoint_size. keypoints0, keypoints1:
+   num_keypoints0 and num_keypoints1; every field is checked as tv_describe checks it. matches:
+   num_matches, as tv_match returns them; where a keypoint is part of several matches, they are
+   aligned in their order, and exchanged images may give other positions. aligned: room for
+   num_matches bytes; a byte is 1 where the match was aligned. tv_reconstruct halves the sigmas of
+   both keypoints (tv_keypoint_sigmas) of such a match. Returns TV_ERR_NULL, TV_ERR_ARGUMENT (also
+   an index out of its range), TV_ERR_NOT_FINITE, TV_ERR_LIMITS, TV_ERR_OVERLAP; nothing is written
+   then. The context is one made for TV_PURPOSE_EXTRACT. Time: at most four fits of 64 samples a
+   match. docs/algorithms/match.md, docs/decisions/0026-precision.md. */
+TV_API tv_status tv_align_matches(tv_context *context, const tv_image *image0,
+                                  const tv_image *image1, float size_of_one,
+                                  tv_keypoint *keypoints0, int32_t num_keypoints0,
+                                  tv_keypoint *keypoints1, int32_t num_keypoints1,
+                                  const tv_correspondence *matches, int32_t num_matches,
+                                  uint8_t *aligned);
+
 TV_END_DECLS
 
 #endif

@@ -13,6 +13,7 @@
 #include "geometry/triangulation.h"
 #include "image/pyramid.h"
 #include "match/align.h"
+#include "match/rank.h"
 #include "robust/verdict.h"
 #include "twoview/bundle.h"
 
@@ -111,53 +112,19 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
   }
 }
 
-// The rank of a match: by its ratio, then by its lower and its higher index, so that exchanged
-// views give the same rank. Only (i, j) and (j, i) with the same ratio have equal ranks.
-uint64_t rank_of(const tv_correspondence& m) {
-  uint32_t ratio;
-  std::memcpy(&ratio, &m.ratio, sizeof ratio);  // ratios >= 0 have the order of their bits
-  const bool ascending = m.idx0 < m.idx1;
-  const uint32_t low = static_cast<uint32_t>(ascending ? m.idx0 : m.idx1);
-  const uint32_t high = static_cast<uint32_t>(ascending ? m.idx1 : m.idx0);
-  return static_cast<uint64_t>(ratio) << 32 | low << 16 | high;
-}
-
-bool is_at_same_place(const tv_keypoint& a, const tv_keypoint& b) {
-  return a.x == b.x && a.y == b.y && a.size == b.size;
-}
-
-// Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match,
-// so the order of the matches does not matter. Matches of guided matching are not aligned. A corner
-// with two directions has two keypoints in turn, and two corners may have two matches, which are
-// one to the estimate: the match of lower rank is aligned, and the other one moves with it.
-__attribute__((noinline)) void align_matches(tv_context* context, const tv_view views[2],
-                                             int32_t num_matches, Results& r) {
-  StageTimer timer(context, TV_STAGE_MATCH);
-  for (int32_t k = 0; k < num_matches; ++k) {
-    const tv_correspondence* m = &r.matches[k];
-    const tv_correspondence* other = nullptr;
-    if (k + 1 < num_matches && rank_of(m[0]) != rank_of(m[1]) &&
-        is_at_same_place(r.keypoints[0][m[0].idx0], r.keypoints[0][m[1].idx0]) &&
-        is_at_same_place(r.keypoints[1][m[0].idx1], r.keypoints[1][m[1].idx1])) {
-      const bool first = rank_of(m[0]) < rank_of(m[1]);
-      other = m + first;
-      m += !first;
-      ++k;
-    }
-    tv_keypoint& a = r.keypoints[0][m->idx0];
-    tv_keypoint& b = r.keypoints[1][m->idx1];
-    const bool aligned = align_keypoints(*context->kernels, views[0].image, views[1].image,
-                                         static_cast<double>(r.keypoint_size), &a, &b);
-    r.aligned[m->idx0] = aligned;
-    if (other == nullptr) continue;
-    r.aligned[other->idx0] = aligned;
-    for (int v = 0; v < 2; ++v) {
-      const tv_keypoint& moved = v == 0 ? a : b;
-      tv_keypoint& follower = r.keypoints[v][v == 0 ? other->idx0 : other->idx1];
-      follower.x = moved.x;
-      follower.y = moved.y;
-    }
-  }
+// Moves the keypoints of the matches by the pixels around them. A keypoint has at most one match.
+// Matches of guided matching are not aligned. It is called before the estimate, whose inlier mask
+// serves as scratch.
+__attribute__((noinline)) tv_status align_matches(tv_context* context, const tv_view views[2],
+                                                  const int32_t num_keypoints[2],
+                                                  int32_t num_matches, Results& r) {
+  uint8_t* const aligned = r.inlier_mask;
+  const tv_status status = tv_align_matches(
+      context, &views[0].image, &views[1].image, r.keypoint_size, r.keypoints[0], num_keypoints[0],
+      r.keypoints[1], num_keypoints[1], r.matches, num_matches, aligned);
+  if (status != TV_OK) return status;
+  for (int32_t k = 0; k < num_matches; ++k) r.aligned[r.matches[k].idx0] = aligned[k];
+  return TV_OK;
 }
 
 // Merges `matches` into `found`, which has room for both: removes the found matches that use a
@@ -491,7 +458,10 @@ tv_status tv_reconstruct(tv_context* context, const tv_view* view0, const tv_vie
   status = tv::extract_and_match(context, views, checked, r, num_keypoints, &num_matches);
   if (status != TV_OK) return status;
   int32_t num_left_out = tv::keep_best(r.matches, context->limits.max_matches, &num_matches);
-  if (checked.align_matches != 0) tv::align_matches(context, views, num_matches, r);
+  if (checked.align_matches != 0) {
+    status = tv::align_matches(context, views, num_keypoints, num_matches, r);
+    if (status != TV_OK) return status;
+  }
   tv::gather_pixels(r, r.matches, num_matches);
   tv_two_view estimate;
   tv_two_view_init(&estimate);

@@ -172,7 +172,7 @@ def write_report(arguments, names, extra):
     """Runs compare_colmap, which writes its report, and returns its exit status."""
     program = os.path.join(datasets.ROOT, "tools", "compare_colmap", "compare_colmap")
     lists = [os.path.join(datasets.data_dir(), name, "pairs.txt") for name in names]
-    some = ["--max-pairs", str(QUICK_PAIRS)] if arguments.quick else []
+    some = ["--max-pairs", str(arguments.max_pairs)] if arguments.max_pairs else []
     jobs = ["--jobs", str(len(os.sched_getaffinity(0)))]
     return subprocess.run([sys.executable, program, *lists, "-o", arguments.report, *some, *jobs,
                            *extra], check=False).returncode
@@ -199,6 +199,8 @@ def main():
     parser.add_argument("--groups", help="only the sets of the group narrow, or wide")
     parser.add_argument("--quick", action="store_true",
                         help=f"at most {QUICK_PAIRS} pairs a set, evenly spaced")
+    parser.add_argument("--max-pairs", type=int, metavar="N",
+                        help="at most N pairs a set, evenly spaced (default: all)")
     parser.add_argument("--flagged", action=argparse.BooleanOptionalAction, default=True,
                         help="also pairs_flagged.txt of " + " and ".join(datasets.FLAGGED_SETS)
                         + " (default; --no-flagged leaves them out)")
@@ -240,6 +242,8 @@ def main():
         sys.exit(0 if robust500.run(arguments.lib) else 1)
     arguments.extra = extra
     arguments.thresholds = [float(t) for t in arguments.thresholds.split(",")]
+    if arguments.quick and not arguments.max_pairs:
+        arguments.max_pairs = QUICK_PAIRS
     if not arguments.resamples:
         arguments.resamples = QUICK_RESAMPLES if arguments.quick else 2000
 
@@ -253,13 +257,13 @@ def main():
         if not os.access(arguments.program, os.X_OK):
             sys.exit(f"accuracy: {arguments.program} is not built: scripts/test builds it")
     sets = [datasets.Set(os.path.join(datasets.data_dir(), name), flagged=arguments.flagged,
-                         max_pairs=QUICK_PAIRS if arguments.quick else None) for name in names]
+                         max_pairs=arguments.max_pairs) for name in names]
     result = (identical.compare if arguments.estimators else compare_pipelines)(arguments, sets)
     result["machine"] = machine()
     result["protocol"] = {
         "cap": arguments.cap, "peer_options": arguments.peer_options, "seeds": arguments.seeds,
         "resamples": arguments.resamples, "flagged": arguments.flagged,
-        "quick": arguments.quick, "resize": {d.name: d.resize for d in sets}}
+        "max_pairs": arguments.max_pairs, "resize": {d.name: d.resize for d in sets}}
     if arguments.json:
         with open(arguments.json + ".part", "w", encoding="utf-8") as f:
             json.dump(metrics.finite(result), f, allow_nan=False)

@@ -14,19 +14,22 @@ CONFIDENCE = 0.9999
 MAX_ITERATIONS = 10000
 # OpenGV's own default; with ten times as many it took longer than all other peers
 OPENGV_MAX_ITERATIONS = 1000
+ALIGNED_SIGMA = 0.5  # of an aligned match over that of its keypoints, as in tv_reconstruct
 
 
 class Matches:
     """The matched points of a pair, with the cameras of both views. relative_sizes: None, or for
-    each view the size of each match's keypoint over that of a keypoint of level 0."""
+    each view the size of each match's keypoint over that of a keypoint of level 0. aligned: None,
+    or which of the matches tv_align_matches aligned."""
 
-    relative_sizes = None  # of matches that an earlier version saved
+    relative_sizes = aligned = None  # of matches that an earlier version saved
 
-    def __init__(self, pixels0, pixels1, cameras, sizes, ratios=None, relative_sizes=None):
+    def __init__(self, pixels0, pixels1, cameras, sizes, ratios=None, relative_sizes=None,
+                 aligned=None):
         self.pixels0 = np.asarray(pixels0, float).reshape(-1, 2)
         self.pixels1 = np.asarray(pixels1, float).reshape(-1, 2)
         self.cameras, self.sizes = cameras, sizes  # each a pair: (K, distortion), (width, height)
-        self.ratios, self.relative_sizes = ratios, relative_sizes
+        self.ratios, self.relative_sizes, self.aligned = ratios, relative_sizes, aligned
         self.rays0 = datasets.undistort(self.pixels0, *cameras[0])
         self.rays1 = datasets.undistort(self.pixels1, *cameras[1])
 
@@ -233,7 +236,10 @@ def estimate(context, matches, options=None, seed_step=0):
     exponent = context.library.take_sigma_by_size(wanted)
     sigmas = (None, None)
     if exponent and matches.relative_sizes is not None:
-        sigmas = [np.clip(ratio ** exponent, 0.01, 1000) for ratio in matches.relative_sizes]
+        sigmas = [context.keypoint_sigmas(sizes, exponent) for sizes in matches.relative_sizes]
+        if matches.aligned is not None:
+            for of_view in sigmas:
+                of_view[matches.aligned] *= np.float32(ALIGNED_SIGMA)
     if seed_step:
         default = context.library.estimate_options(wanted).seed
         wanted["seed"] = default + seed_step

@@ -16,6 +16,9 @@ alternative with every estimate alternative. FILE holds the same, one alternativ
   estimate principal_point_sigma=0
   point feature.levels=4 match.ratio=0.9  # besides the product: this point (commas work here, too)
 
+--lib A.so --lib B.so takes every point with each of these builds: so constants are varied that are
+no options.
+
 For each set, the point is chosen that is best on all other sets: the largest mean of AUC5, 10 and
 20, averaged within the groups narrow and wide, then over both. Its score on the set itself is the
 left-out score. The tuned score is that of the point chosen on all sets. Results are kept in
@@ -40,7 +43,7 @@ from . import (datasets, leaveout, metrics, parallel, peers, pipeline, tables,
                twoview_ctypes)
 
 STAGES = ("feature", "match", "estimate")
-CACHE_FORMAT = 1  # increase it if a change here or in pipeline.py changes results
+CACHE_FORMAT = 2  # increase it if a change here or in pipeline.py changes results
 COLUMNS = ("rotation_error_deg", "translation_error_deg", "pose_error_deg", "num_matches",
            "num_inliers", "precision", "verdict")
 LIMIT = 0.7  # points: the left-out mean is to be within this of the tuned mean
@@ -96,6 +99,8 @@ def canonical(library, point):
     texts = []
     for stage, options in zip(STAGES, point):
         fields, options = {}, dict(options)
+        if stage == "match":
+            fields["align_matches"] = library.take_align_matches(options)
         if stage == "estimate":
             fields["sigma_by_size"] = library.take_sigma_by_size(options)
         struct = getattr(library, stage + "_options")(options)
@@ -117,7 +122,8 @@ def distinct(library, points):
 def title(point):
     """A point in words, as on the command line."""
     parts = [" ".join(f"{k}={v}" for k, v in options.items()) for options in point]
-    return " | ".join(f"{stage} {part}" for stage, part in zip(STAGES, parts) if part) or "defaults"
+    return (" | ".join(f"{stage} {part}" for stage, part in zip((*STAGES, "with"), parts) if part)
+            or "defaults")
 
 
 # ---- evaluation ----------------------------------------------------------------------------------
@@ -322,7 +328,8 @@ def main(argv=None):
         parser.add_argument("--" + stage, nargs="*", action="append", metavar="KEY=VALUE,VALUE..")
     parser.add_argument("--sets", help="names, separated by commas (default: all)")
     parser.add_argument("--groups", help="only the sets of narrow or wide")
-    parser.add_argument("--lib", help="libtwoview.so (default: build/release/lib)")
+    parser.add_argument("--lib", action="append",
+                        help="libtwoview.so (default: build/release/lib); may be repeated")
     parser.add_argument("--max-pairs", type=int, help="of each set, evenly spaced")
     parser.add_argument("--no-flagged", dest="flagged", action="store_false",
                         help="without pairs_flagged.txt of " + " and ".join(datasets.FLAGGED_SETS))
@@ -344,19 +351,23 @@ def main(argv=None):
         points = read_grid(lines)
         if not points:
             parser.error("no grid: give --grid FILE, or --feature, --match, --estimate")
-        points = distinct(_library(arguments.lib)[0], points)
+        libraries = arguments.lib or [None]
+        points = distinct(_library(libraries[0])[0], points)
         names = datasets.select_sets(arguments.sets, arguments.groups)
     except (ValueError, OSError, twoview_ctypes.TwoviewError) as error:
         sys.exit(f"accuracy.grid: {error}")
     try:
-        rows = evaluate(names, points, arguments.lib, arguments.flagged, arguments.max_pairs,
-                        arguments.jobs, not arguments.no_cache)
+        parts = [evaluate(names, points, path, arguments.flagged, arguments.max_pairs,
+                          arguments.jobs, not arguments.no_cache) for path in libraries]
     except RuntimeError as error:
         sys.exit(f"accuracy.grid: {error}")
+    rows = {name: [row for part in parts for row in part[name]] for name in names}
+    if len(libraries) > 1:
+        points = [(*point, {"lib": path}) for path in libraries for point in points]
     table = score_table(rows)
     sizes = {name: len(parts[0]) for name, parts in rows.items()}
     print_points(points, table, arguments.top)
-    result = {"points": [dict(zip(STAGES, p)) for p in points], "sizes": sizes,
+    result = {"points": [dict(zip((*STAGES, "library"), p)) for p in points], "sizes": sizes,
               "auc": {name: scores.tolist() for name, scores in table.items()}}
     reached = True
     if len(names) > 1:

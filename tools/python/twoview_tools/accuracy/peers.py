@@ -17,6 +17,7 @@ from . import datasets, estimators, leaveout, metrics, parallel, tables
 
 CAP = 2048  # most descriptors of an image; a keypoint with two orientations has two
 RATIO = 0.8
+BLOCK = 64  # rows of a matrix of distances that are processed together
 CACHE_FORMAT = 3  # increase it if a change here changes the cached results
 
 CACHE_DIR = os.path.join(datasets.ROOT, ".cache", "accuracy")
@@ -173,19 +174,40 @@ def _extract_pycolmap(gray, cap):
     return points, (keypoints, descriptors)
 
 
+def _two_nearest(products, distances):
+    """For each row the nearest column, its distance and the smallest distance to another column;
+    for each column the nearest row. distances(rows, products of these rows): their distances, an
+    array that is overwritten. Blocks of rows stay in the CPU's cache."""
+    num0, num1 = products.shape
+    nearest, back = np.empty(num0, int), np.zeros(num1, int)
+    first, second = np.empty(num0, np.float32), np.empty(num0, np.float32)
+    least = np.full(num1, np.inf, np.float32)
+    for start in range(0, num0, BLOCK):
+        rows = slice(start, min(start + BLOCK, num0))
+        block = distances(rows, products[rows])
+        index = np.arange(len(block))
+        smallest = block.min(axis=0)
+        nearer = np.nonzero(smallest < least)[0]  # of equal distances the first row counts
+        least[nearer] = smallest[nearer]
+        back[nearer] = start + block[:, nearer].argmin(axis=0)
+        nearest[rows] = block.argmin(axis=1)
+        first[rows] = block[index, nearest[rows]]
+        block[index, nearest[rows]] = np.inf
+        second[rows] = block.min(axis=1)
+    return nearest, first, second, back
+
+
 def match(descriptors0, descriptors1, ratio=RATIO):
     """(idx0, idx1, ratio) of mutual nearest neighbours; the ratio test is from image 0 to image
     1."""
     if len(descriptors0) < 2 or len(descriptors1) < 2:
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
     d0, d1 = descriptors0.astype(np.float32), descriptors1.astype(np.float32)
-    squared = np.maximum((d0**2).sum(1)[:, None] + (d1**2).sum(1) - 2 * (d0 @ d1.T), 0)
-    nearest = squared.argmin(axis=1)
-    back = squared.argmin(axis=0)
+    lengths0, lengths1 = (d0**2).sum(1)[:, None], (d1**2).sum(1)
+    nearest, first, second, back = _two_nearest(
+        d0 @ d1.T,
+        lambda rows, part: np.maximum(lengths0[rows] + lengths1 - 2 * part, 0))
     index = np.arange(len(d0))
-    first = squared[index, nearest]
-    squared[index, nearest] = np.inf
-    second = squared.min(axis=1)
     keep = (back[nearest] == index) & (first < ratio**2 * second)
     return (index[keep], nearest[keep],
             np.sqrt(first[keep] / np.maximum(second[keep], 1e-30)))

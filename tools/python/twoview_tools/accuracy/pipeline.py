@@ -27,20 +27,31 @@ def extract_images(context, data, names, feature_options=None):
     return features
 
 
-def match_features(context, features0, features1, match_options=None):
-    """(array of dtype CORRESPONDENCE, ms) of two images' (keypoints, descriptors, ms)."""
+def match_features(context, grays, features, match_options=None, size_of_one=4.0):
+    """Matches and aligns as tv_reconstruct does. grays: both images; features: (keypoints,
+    descriptors, ms) of each; match_options may hold align_matches of tv_reconstruct_options.
+    size_of_one: the size of a keypoint of level 0, the feature option keypoint_size. Returns
+    (the keypoints of both images, an array of dtype CORRESPONDENCE, which matches were aligned,
+    ms)."""
     start = time.perf_counter()
-    links = context.match(features0[1], features1[1], match_options, features0[0], features1[0])
-    return links, 1e3 * (time.perf_counter() - start)
+    wanted = dict(match_options or {})
+    align = context.library.take_align_matches(wanted)
+    keypoints = [f[0] for f in features]
+    links = context.match(features[0][1], features[1][1], wanted, *keypoints)
+    aligned = np.zeros(len(links), bool)
+    if align:
+        *keypoints, aligned = context.align_matches(*grays, *keypoints, links, size_of_one)
+    return keypoints, links, aligned, 1e3 * (time.perf_counter() - start)
 
 
-def make_matches(features0, features1, links, cameras, sizes, size_of_one):
-    """The estimators.Matches of two images' (keypoints, descriptors, ms). size_of_one: the size of
-    a keypoint of level 0, the feature option keypoint_size."""
+def make_matches(features0, features1, links, cameras, sizes, size_of_one, aligned=None):
+    """The estimators.Matches of two images' (keypoints, ..). size_of_one and aligned: as of
+    match_features."""
     chosen = [f[0][links[i]] for f, i in ((features0, "idx0"), (features1, "idx1"))]
     pixels = [np.column_stack([k["x"], k["y"]]).astype(float) for k in chosen]
     relative = [(k["size"] / size_of_one).astype(float) for k in chosen]
-    return estimators.Matches(*pixels, cameras, sizes, links["ratio"].copy(), relative)
+    return estimators.Matches(*pixels, cameras, sizes, links["ratio"].copy(), relative,
+                              aligned)
 
 
 def match_pairs(context, data, feature_options=None, match_options=None, features=None):
@@ -54,10 +65,11 @@ def match_pairs(context, data, feature_options=None, match_options=None, feature
     found = []
     for pair in data.pairs:
         both = features[pair.name0], features[pair.name1]
-        links, match_ms = match_features(context, *both, match_options)
-        sizes = [data.gray(n)[0].shape[::-1] for n in (pair.name0, pair.name1)]
-        matches = make_matches(*both, links, (data.camera(pair, 0), data.camera(pair, 1)), sizes,
-                               size_of_one)
+        grays = [data.gray(n)[0] for n in (pair.name0, pair.name1)]
+        keypoints, links, aligned, match_ms = match_features(context, grays, both, match_options,
+                                                             size_of_one)
+        matches = make_matches(*zip(keypoints), links, (data.camera(pair, 0), data.camera(pair, 1)),
+                               [gray.shape[::-1] for gray in grays], size_of_one, aligned)
         found.append((matches, {"extract": both[0][2] + both[1][2], "match": match_ms,
                                 "keypoints": (len(both[0][0]) + len(both[1][0])) / 2}))
     return found
@@ -103,8 +115,9 @@ def evaluate_pairs(set_dir, feature_options=None, match_options=None, estimate_o
     seed: the error keys of report.json, num_matches, num_inliers, num_keypoints, precision, and
     ms {extract (both images), match, estimate}.
 
-    Options are dicts of the C structs' fields; values may be text. estimate_options may hold
-    sigma_by_size, of tv_reconstruct_options, too. estimator: "twoview" or a key of
+    Options are dicts of the C structs' fields; values may be text. Of tv_reconstruct_options
+    match_options may hold align_matches, and estimate_options sigma_by_size, too; with their
+    defaults the poses are those of tv_reconstruct. estimator: "twoview" or a key of
     estimators.PEERS, which reads max_error_px only. resize: None is the tables' rule, 0 native.
     library: a twoview_ctypes.Library or a path. save/load: a file for the matches (pickle, our own
     files only), so that estimators can be tuned on fixed matches.

@@ -7,7 +7,8 @@ library.
       --estimator twoview --max-pairs 15
 
 Options are the fields of tv_feature_options, tv_match_options, tv_estimate_options; those not named
-keep the library's defaults; --estimate takes sigma_by_size of tv_reconstruct_options, too.
+keep the library's defaults. Of tv_reconstruct_options --match takes align_matches, and --estimate
+sigma_by_size, too; with their defaults the poses are those of tv_reconstruct.
 Estimators: twoview, magsac, usac, accurate, poselib, pycolmap,
 pycolmap_tvg (these read max_error_px only, and get the library's own matches).
 """

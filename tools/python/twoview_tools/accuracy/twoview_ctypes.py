@@ -78,6 +78,12 @@ class Library(twoview.Library):
         default = self._init_struct("tv_reconstruct_options").sigma_by_size
         return float(options.pop("sigma_by_size", default))
 
+    def take_align_matches(self, options):
+        """Removes tv_reconstruct_options.align_matches from a dict of tv_match_options, with which
+        tuning gives it; returns it, or the library's default."""
+        default = self._init_struct("tv_reconstruct_options").align_matches
+        return int(options.pop("align_matches", default))
+
 
 def _keywords(struct):
     """The fields of an options struct as keywords for the package's functions."""
@@ -101,6 +107,20 @@ class Context(twoview.Context):
                              keypoints0=keypoints0, keypoints1=keypoints1,
                              **_keywords(self.library.match_options(options)))
 
+    def align_matches(self, gray0, gray1, keypoints0, keypoints1, links, size_of_one):
+        """(keypoints 0, keypoints 1, which matches were aligned) of tv_align_matches."""
+        return twoview.align_matches(self, gray0, gray1, keypoints0, keypoints1, links, size_of_one)
+
+    def keypoint_sigmas(self, relative_sizes, exponent):
+        """tv_keypoint_sigmas, from the sizes over that of a keypoint of the full image."""
+        keypoints = np.zeros(len(relative_sizes), KEYPOINT)
+        keypoints["size"] = relative_sizes
+        sigmas = np.empty(len(keypoints), np.float32)
+        self.library.call("tv_keypoint_sigmas", _abi.pointer(keypoints),
+                          ctypes.c_int32(len(keypoints)), ctypes.c_float(1),
+                          ctypes.c_double(exponent), _abi.pointer(sigmas))
+        return sigmas
+
     def match_guided(self, camera0, camera1, epipolar, features0, features1, options=None):
         """The matches as an array of dtype CORRESPONDENCE. Features are (keypoints, descriptors) as
         extract returns them; `epipolar` is E, or F without cameras."""
@@ -120,12 +140,11 @@ class Context(twoview.Context):
 
     def reconstruct(self, gray0, camera0, gray1, camera1, options=({}, {}, {}), **fields):
         """(tv_two_view, twoview.Reconstruction) of two images. options: dicts of the features',
-        matching's and estimate's options, of which the last may hold sigma_by_size and
-        align_matches; fields: of tv_reconstruct_options."""
+        matching's and estimate's options, of which the second may hold align_matches and the last
+        sigma_by_size; fields: of tv_reconstruct_options."""
         feature, match, estimate = map(dict, options)
+        fields["align_matches"] = self.library.take_align_matches(match)
         fields["sigma_by_size"] = self.library.take_sigma_by_size(estimate)
-        if "align_matches" in estimate:
-            fields["align_matches"] = int(estimate.pop("align_matches"))
         structs = (self.library.feature_options(feature), self.library.match_options(match),
                    self.library.estimate_options(estimate))
         kinds = (twoview.FeatureOptions, twoview.MatchOptions, twoview.EstimateOptions)

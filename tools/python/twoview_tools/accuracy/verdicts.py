@@ -23,6 +23,7 @@ import json
 import sys
 
 import numpy as np
+import twoview
 
 from . import datasets, estimators, metrics, parallel, pipeline, tables, twoview_ctypes
 
@@ -84,22 +85,31 @@ class Pictures:
         self.features = {}
 
     def view(self, name, image):
-        """((keypoints, descriptors, ms), camera, (width, height)) of an image of a set."""
+        """((keypoints, descriptors, ms), grey levels, camera) of an image of a set."""
         data = self.sets[name]
         if (name, image) not in self.features:
             self.features[name, image] = pipeline.extract_images(
                 self.context, data, [image], self.options[0])[image]
-        return (self.features[name, image], data.camera(*self.pairs[name][image]),
-                data.gray(image)[0].shape[::-1])
+        return (self.features[name, image], data.gray(image)[0],
+                data.camera(*self.pairs[name][image]))
 
     def run(self, pair):
-        """A row of two (set, image)."""
-        (f0, camera0, size0), (f1, camera1, size1) = (self.view(*image) for image in pair)
-        links, _ = pipeline.match_features(self.context, f0, f1, self.options[1])
-        size_of_one = self.context.library.feature_options(self.options[0]).keypoint_size
-        matches = pipeline.make_matches(f0, f1, links, (camera0, camera1), (size0, size1),
-                                        size_of_one)
+        """(R or None, t or None, row) of two (set, image). The pose is that of tv_reconstruct, and
+        so is the verdict: tv_reconstruct itself runs where the stages do not refuse, because it
+        has reasons for doubt that tv_estimate_two_view does not have."""
+        features, grays, cameras = zip(*(self.view(*image) for image in pair))
+        sizes = [gray.shape[::-1] for gray in grays]
+        size_of_one = self.library.feature_options(self.options[0]).keypoint_size
+        keypoints, links, aligned, _ = pipeline.match_features(
+            self.context, grays, features, self.options[1], size_of_one)
+        matches = pipeline.make_matches(*zip(keypoints), links, cameras, sizes, size_of_one,
+                                        aligned)
         R, t, inliers, result = estimators.run_twoview(self.context, matches, self.options[2])
+        if result.verdict != twoview.Verdict.REFUSED:
+            lenses = [twoview_ctypes.make_camera(K, *size, distortion)
+                      for (K, distortion), size in zip(cameras, sizes)]
+            result, _ = self.context.reconstruct(grays[0], lenses[0], grays[1], lenses[1],
+                                                 self.options)
         return R, t, {"image0": "/".join(pair[0]), "image1": "/".join(pair[1]),
                       "verdict": twoview_ctypes.enum_name("verdict", result.verdict),
                       "kind": twoview_ctypes.enum_name("kind", result.kind),
