@@ -103,6 +103,50 @@ void test_errors_that_neighbours_share_are_in_the_covariance(void) {
   TEST_ASSERT_TRUE(within > 0.80 * total);
 }
 
+// The third power of the share of matches that are no inliers, over 0.3; at least 1.
+double growth_of(const tv_two_view& r) {
+  const double others = 1 - r.num_inliers / static_cast<double>(r.num_matches);
+  return std::max(1.0, std::pow(others / 0.3, 3));
+}
+
+// Matches far from the pose's epipolar lines leave the pose where it is. Up to 30 per cent of them
+// leave the covariance as well; with more it grows by the documented factor.
+void test_the_covariance_grows_with_the_share_of_wrong_matches(void) {
+  int grown = 0;
+  for (int k = 0; k < 12; ++k) {
+    draw(500 + static_cast<uint64_t>(k), 0.3, 120, false);
+    const tv_two_view alone = estimate(pair.camera[0], pair.camera[1], defaults());
+    if (alone.has_covariance == 0 || alone.kind != TV_KIND_CALIBRATED) continue;
+    TEST_ASSERT_TRUE(growth_of(alone) == 1);
+    tv::Random random = tv::random_seeded(base_seed * 91 + static_cast<uint64_t>(k));
+    const int wrong = k % 2 == 0 ? 25 : 180;
+    for (int i = 0; i < wrong;) {
+      const double x = scene::uniform(&random, 0, 639), y = scene::uniform(&random, 0, 479);
+      const double u = scene::uniform(&random, 0, 639), v = scene::uniform(&random, 0, 479);
+      const double* F = alone.F;
+      const double a = F[0] * x + F[1] * y + F[2], b = F[3] * x + F[4] * y + F[5];
+      const double c = F[6] * x + F[7] * y + F[8];
+      if (std::fabs(a * u + b * v + c) < 30 * std::hypot(a, b)) continue;
+      const double both[2][2] = {{x, y}, {u, v}};
+      for (int view = 0; view < 2; ++view) {
+        for (int d = 0; d < 2; ++d) pair.pixels[view][2 * pair.num + d] = both[view][d];
+      }
+      ++pair.num;
+      ++i;
+    }
+    const tv_two_view r = estimate(pair.camera[0], pair.camera[1], defaults());
+    TEST_ASSERT_TRUE(r.has_covariance != 0 && r.num_inliers < 130);
+    const double growth = growth_of(r);
+    TEST_ASSERT_TRUE(wrong == 25 ? growth == 1 : growth > 6 && growth < 10);
+    grown += growth > 1;
+    for (int i = 0; i < 25; i += 6) {
+      TEST_ASSERT_DOUBLE_WITHIN(0.1 * growth * alone.covariance[i], growth * alone.covariance[i],
+                                r.covariance[i]);
+    }
+  }
+  TEST_ASSERT_TRUE(grown >= 4);
+}
+
 // The covariance with one sigma less the one without it is sigma^2 g g', where g is what the
 // estimate does when the camera is changed, by differences of two estimates.
 void check_slopes(bool plane, bool one_camera, int parameter) {
@@ -273,6 +317,7 @@ int main(void) {
   estimator::read_environment(1, &num_pairs, &base_seed);
   UNITY_BEGIN();
   RUN_TEST(test_errors_that_neighbours_share_are_in_the_covariance);
+  RUN_TEST(test_the_covariance_grows_with_the_share_of_wrong_matches);
   RUN_TEST(test_a_calibrations_sigmas_propagate_as_changed_cameras_do);
   RUN_TEST(test_a_planes_pose_follows_the_cameras_as_well);
   RUN_TEST(test_an_uncertain_focal_length_is_refined_and_its_error_covered);

@@ -1,5 +1,6 @@
-"""Tests of twoview_tools.accuracy.belief, truth, reliability, belief_tables and match_evidence: the
-choice of pairs, errors, the ellipsoid test and the counting, against values computed otherwise."""
+"""Tests of twoview_tools.accuracy.belief, truth, lens, reliability, belief_tables and
+match_evidence: the choice of pairs, errors, the ellipsoid test and the counting, against values
+computed otherwise."""
 
 import itertools
 import json
@@ -18,7 +19,7 @@ except ImportError:
 
 if np is not None:
     from twoview_tools import DEFAULT_LIBRARY
-    from twoview_tools.accuracy import (belief, belief_fit, belief_tables, datasets,
+    from twoview_tools.accuracy import (belief, belief_fit, belief_tables, datasets, lens,
                                         match_evidence, reliability, truth)
 
 
@@ -395,6 +396,20 @@ class TestFit(unittest.TestCase):
         self.assertEqual(*(belief_fit.place_of(n) for n in ("kitti00_turn",
                                                             "seq_kitti00_first200")))
 
+    def test_a_wrong_lens_is_fitted_and_not_judged(self):
+        rows = self.drawn(np.array([6.0, 1.2, 3.0, -2.5, 0.5, 1.3]), 600)
+        for row in rows:
+            row["probability_wrong"] = 0.2
+        wrong = [{**r, "kind": "file-lens", "wrong_rotation": True} for r in rows
+                 if r["set"] == "s1"]
+        by_set = belief_fit.left_out_tables(rows)[0][2]
+        with_wrong = belief_fit.left_out_tables(rows + wrong)[0][2]
+        self.assertEqual([line[1] for line in by_set], [line[1] for line in with_wrong])
+        at = [line[0] for line in by_set].index("s1")
+        self.assertEqual(by_set[at], with_wrong[at])  # of one place: left out together
+        self.assertGreater(sum(line[2] for line in by_set), sum(line[2] for line in with_wrong))
+        self.assertNotEqual(belief_fit.constants(rows), belief_fit.constants(rows + wrong))
+
     def test_no_set_outweighs_the_others(self):
         weights = belief_fit.weights_of(["a"] * 1000 + ["b"] * 5)
         self.assertAlmostEqual(weights[:1000].sum(), belief_fit.MOST_WEIGHT)
@@ -405,12 +420,80 @@ class TestFit(unittest.TestCase):
             limit = re.search(r"kMostProbabilityWrong = ([0-9.]+);", file.read())[1]
         self.assertEqual(float(limit), belief_fit.MOST_PROBABILITY_WRONG)
 
+    def test_what_is_certain_is_not_believed_whatever_the_probability(self):
+        row = {"reasons": [], "num_inliers": 100, "probability_wrong": 0.3,
+               "region_shift_rad": 0.04}
+        self.assertTrue(belief_fit.believed(row, 0.01))
+        self.assertFalse(belief_fit.believed(row, 0.9))
+        for change in ({"reasons": ["second_motion"]}, {"num_inliers": 14},
+                       {"probability_wrong": 0.5},  # doubted for its descriptors
+                       {"region_shift_rad": 0.044}):
+            self.assertFalse(belief_fit.believed({**row, **change}, 0.01), change)
+
     def test_tenths_count_each_pose_once(self):
         rows = [{"wrong_rotation": k >= 25} for k in range(30)]
         lines = belief_tables.tenths(rows, [0.01 * k for k in range(30)])
         self.assertEqual([line[1] for line in lines], [3] * 10)
         self.assertEqual([line[3] for line in lines], [0] * 8 + [2, 3])
         self.assertAlmostEqual(lines[3][2], 10)
+
+
+class TestLens(unittest.TestCase):
+    """The lens that matches ask for under true poses: drawn points, seen through a known lens."""
+    LENS = (-0.28, 0.08, 0.001, -0.002, -0.01)
+    K = np.array([[420.0, 0, 355], [0, 420, 250], [0, 0, 1]]) if np is not None else None
+
+    def seen(self, points):
+        """Brown and Conrady's model, forward, as OpenCV documents it."""
+        x, y = (points[:, :2] / points[:, 2:]).T
+        k1, k2, p1, p2, k3 = self.LENS
+        r = x ** 2 + y ** 2
+        radial = 1 + k1 * r + k2 * r ** 2 + k3 * r ** 3
+        return np.column_stack([
+            420 * (x * radial + 2 * p1 * x * y + p2 * (r + 2 * x * x)) + 355,
+            420 * (y * radial + p1 * (r + 2 * y * y) + 2 * p2 * x * y) + 250])
+
+    def sample(self, num_pairs, seed):
+        random = np.random.default_rng(seed)
+        pixels, E = ([], []), []
+        for _ in range(num_pairs):
+            R, t = exponential(random.normal(0, 0.05, 3)), random.normal(0, 0.2, 3)
+            points = random.uniform((-4, -2.5, 2), (4, 2.5, 5), (300, 3))
+            both = points, points @ R.T + t
+            near = np.all([(np.abs(p[:, :2]) < np.array([0.9, 0.6]) * p[:, 2:]).all(axis=1)
+                           for p in both], axis=0)
+            for view, p in zip(pixels, both):
+                view.append(self.seen(p[near]) + random.normal(0, 0.2, (near.sum(), 2)))
+            E.append(np.repeat(lens.essential(R, t)[None], near.sum(), axis=0))
+        wrong = random.uniform(size=sum(map(len, E))) < 0.1
+        pixels = [np.concatenate(view) for view in pixels]
+        pixels[1][wrong] += random.normal(0, 50, (wrong.sum(), 2))
+        return lens.Sample(*pixels, np.concatenate(E), self.K)
+
+    def test_the_lens_is_found_and_judged_on_other_pairs(self):
+        start = (-0.3, 0.09, 0, 0, 0)
+        found = lens.fit(self.sample(20, 1), start)
+        other = self.sample(20, 2)
+        outer = other.outer(0.6)
+
+        def residual(coefficients):
+            return np.median(np.abs(other.residuals_px(coefficients)[outer]))
+
+        self.assertLess(residual(self.LENS), 0.25)
+        self.assertLess(residual(found), 1.05 * residual(self.LENS))
+        self.assertGreater(residual(start), 1.3 * residual(self.LENS))
+
+    def test_a_set_has_the_better_lens_unless_the_file_s_is_asked_for(self):
+        for name, coefficients in truth.LENSES.items():
+            root = os.path.join(datasets.data_dir(), name)
+            if not os.path.isdir(root):
+                self.skipTest(f"no {name} in {datasets.data_dir()}")
+            data = truth.PosedSet(root)
+            image = data.images[0]
+            self.assertEqual(tuple(data.view(image)[1][1]), coefficients)
+            self.assertNotEqual(tuple(data.view(image, file_lens=True)[1][1]), coefficients)
+            kinds = [job[0] for job in belief.plan({name: data}, 6, 3, 1)]
+            self.assertEqual((kinds.count("related"), kinds.count("file-lens")), (6, 6))
 
 
 class TestBelievedPairs(unittest.TestCase):

@@ -221,7 +221,8 @@ typedef struct tv_two_view {
   double alternative_R[9], alternative_t[3];
   /* The covariance of the pose, 5x5, in radians^2, in the order (w0 w1 w2 a b): R_true =
      exp([w]x) R, t_true = normalise(t + a b1 + b b2), b1 = normalise(e_k x t), b2 = t x b1, where k
-     is the index of the smallest |t_k| (the lowest one on a tie). */
+     is the index of the smallest |t_k| (the lowest one on a tie). It grows where more than 30 per
+     cent of the matches are no inliers (docs/algorithms/covariance.md). */
   double covariance[25];
   /* The covariance of the alternative pose, in radians^2 and in the same parameters. */
   double alternative_covariance[25];

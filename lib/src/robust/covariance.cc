@@ -122,6 +122,12 @@ bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, 
   return all_finite(uncertainty->covariance, 25);
 }
 
+double growth_by_disagreement(int num_inliers, int num_matches) {
+  constexpr double kUsual = 0.3;
+  const double ratio = (num_matches - num_inliers) / (kUsual * num_matches);
+  return ratio > 1 ? ratio * ratio * ratio : 1;
+}
+
 bool plane_uncertainty(const RayPairs& pairs, const int32_t* indices, int count,
                        const PlaneModel& model, double scale_px, PoseUncertainty* uncertainty) {
   constexpr int P = PlaneModel::kParameters;

@@ -33,6 +33,12 @@ double largest_sigma(const double covariance[25]);
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                       double scale_px, double limit_px, PoseUncertainty* uncertainty);
 
+// By how much the variances grow because of wrong matches among the inliers. Where more than 30 per
+// cent of the matches are no inliers, those that happen to lie near the epipolar lines, or agree
+// with one another, turn the pose by more than their residuals tell: the third power of that share
+// over 0.3, at least 1. docs/decisions/0028-verdict-after-alignment.md.
+double growth_by_disagreement(int num_inliers, int num_matches);
+
 // Like pose_uncertainty, for a pose that is fitted together with a plane (PlaneModel). Its
 // residuals have two dimensions: with w the loss's weight, E[psi'] is the mean of w^2.
 inline constexpr double kPlaneScale = 2;  // scale of the loss, in standard deviations of the noise

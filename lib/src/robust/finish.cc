@@ -5,6 +5,7 @@
 
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
+#include "robust/covariance.h"
 #include "robust/evidence.h"
 #include "robust/fit.h"
 #include "robust/kind.h"
@@ -130,6 +131,12 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
   }
   measure_evidence(f, arena);
   out.judgement = judge(out.evidence);
+  const double growth =
+      growth_by_disagreement(out.evidence.num_different_inliers, out.evidence.num_different);
+  for (int k = 0; k < 25; ++k) {
+    out.covariance[k] *= growth;
+    out.alternative_covariance[k] *= growth;
+  }
 }
 
 }  // namespace tv

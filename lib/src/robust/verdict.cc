@@ -46,14 +46,17 @@ bool low_parallax(const Evidence& e) {
 
 // CROWDED_MATCHES: the inliers lie in at most 4 of the 64 cells of a grid on each of the two
 // images; or, where there is a full pose, on a line of one of the images, to a root mean square of
-// 3 thresholds. Both leave part of the pose to be extrapolated. One image in which the inliers are
-// spread is enough, since its rays then constrain the pose: after a forward move or a change of
-// scale by 2 the other image's lie in a quarter of the area, and the pose is as accurate
-// (docs/decisions/0016-one-verdict.md).
+// 3 thresholds; or the rotation turns by more than 2.5 degrees, half of what counts as wrong, when
+// one region is left out. All three leave part of the pose to be extrapolated. One image in which
+// the inliers are spread is enough, since its rays then constrain the pose: after a forward move or
+// a change of scale by 2 the other image's lie in a quarter of the area, and the pose is as
+// accurate (docs/decisions/0016-one-verdict.md).
 bool crowded_matches(const Evidence& e) {
   const bool few_cells = e.num_inliers > 0 && coverage_of(e) < 4.5 / 64;
   const double nearest = std::min(e.line_distance_px[0], e.line_distance_px[1]);
-  return few_cells || (has_full_pose(e) && nearest < 3 * e.threshold_px);
+  constexpr double kMostShift = 2.5 * kPi / 180;
+  return few_cells ||
+         (has_full_pose(e) && (nearest < 3 * e.threshold_px || e.region_shift_rad > kMostShift));
 }
 
 // The points lie as on a lattice: of the neighbours of a point, more have another point opposite

@@ -5,7 +5,9 @@ The event is: the rotation of a full pose is off by more than 5 degrees plus the
 error. A logistic model, whose coefficients must have the sign that their evidence has (more
 agreement never raises the probability); where the fit asks for the other sign, that part is left
 out. No set weighs more than MOST_WEIGHT pairs, so that the large sequences do not decide alone;
-sets of the same place are left out together."""
+sets of the same place are left out together. A set that is run with a wrong lens as well
+("file-lens") is two sets of one place in the fit: users have wrong lenses, too. It is judged with
+the better lens alone."""
 
 import numpy as np
 
@@ -16,12 +18,14 @@ ENOUGH_PLACES = 20
 SHIFT_DEG = (0.05, 20.0)
 MOST_WEIGHT = 300
 RIDGE = 1.0  # on coefficients of standardised parts
-MOST_PROBABILITY_WRONG = 0.12  # kMostProbabilityWrong of belief.h
+MOST_PROBABILITY_WRONG = 0.15  # kMostProbabilityWrong of belief.h
 # name: the sign of its coefficient
 PARTS = {"disagreement": 1, "noise": 1, "places": -1, "region_shift": 1, "alternative": 1}
 # Reasons that the verdict has for other evidence than probability_wrong
 CERTAIN = ("two_planar_solutions", "second_motion", "repeated_structure", "low_parallax")
 FEW_INLIERS = 15
+MOST_SHIFT_DEG = 2.5  # kMostShift of verdict.cc
+DOUBTED = 0.5  # probability_wrong where tv_reconstruct doubts a pose for what its descriptors say
 
 
 def parts_of(row):
@@ -70,6 +74,17 @@ def usable(rows):
     return [r for r in belief_tables.related(rows) if r["rotation_error_deg"] is not None]
 
 
+def fitted_rows(rows):
+    """The rows that the model is fitted on: usable ones, and those with a wrong lens."""
+    return usable(rows) + [r for r in rows if r["kind"] == "file-lens" and r["trusted"]
+                           and r["rotation_error_deg"] is not None]
+
+
+def name_of(row):
+    """The set of a row, by which it is weighed."""
+    return row["set"] + (" file-lens" if row["kind"] == "file-lens" else "")
+
+
 def weights_of(sets):
     names, counts = np.unique(sets, return_counts=True)
     share = dict(zip(names, np.minimum(1, MOST_WEIGHT / counts)))
@@ -84,8 +99,8 @@ def left_out(rows):
     """The probability of each row, from the model that was fitted without its place."""
     X = np.array([parts_of(r) for r in rows])
     y = np.array([bool(r["wrong_rotation"]) for r in rows], float)
-    sets = np.array([r["set"] for r in rows])
-    places = np.array([place_of(s) for s in sets])
+    sets = np.array([name_of(r) for r in rows])
+    places = np.array([place_of(r["set"]) for r in rows])
     found = np.zeros(len(rows))
     if len(np.unique(places)) < 2:
         raise ValueError("at least two places are needed")
@@ -98,18 +113,20 @@ def left_out(rows):
 def believed(row, probability):
     """Whether a row would be "ok" with another probability_wrong: no reason is certain. The reasons
     that the verdict gives for a probability that is too high do not count."""
-    certain = set(CERTAIN) & set(row["reasons"]) or row["num_inliers"] < FEW_INLIERS
+    certain = (set(CERTAIN) & set(row["reasons"]) or row["num_inliers"] < FEW_INLIERS
+               or row["probability_wrong"] == DOUBTED
+               or np.degrees(row["region_shift_rad"]) > MOST_SHIFT_DEG)
     return probability <= MOST_PROBABILITY_WRONG and not certain
 
 
 def constants(rows):
     """The lines of belief.cc: the model that is fitted on all rows, and the medians of its parts
     over the right poses."""
-    rows = usable(rows)
+    rows = fitted_rows(rows)
     X = np.array([parts_of(r) for r in rows])
     y = np.array([bool(r["wrong_rotation"]) for r in rows], float)
-    bias, *weights = fit(X, y, weights_of(np.array([r["set"] for r in rows])))
-    usual = np.median(X[[bool(r["right"]) for r in rows]], axis=0)
+    bias, *weights = fit(X, y, weights_of(np.array([name_of(r) for r in rows])))
+    usual = np.median(X[[bool(r["right"]) and r["kind"] == "related" for r in rows]], axis=0)
     lines = [f"bias {bias:.3f}"]
     return lines + [f"{name} {weight:.3f}, usual {value:.3f}"
                     for name, weight, value in zip(PARTS, weights, usual)]
@@ -117,8 +134,8 @@ def constants(rows):
 
 def left_out_tables(rows):
     """[(title, header, lines)] of the left-out judgement: by set, and by tenths."""
-    rows = usable(rows)
-    p = left_out(rows)
+    fitted, rows = fitted_rows(rows), usable(rows)
+    p = left_out(fitted)[:len(rows)]
     groups = belief_tables.by_set(rows)
     of_row = {id(r): q for r, q in zip(rows, p)}
     by_set = []

@@ -252,8 +252,16 @@ def _others(style, rows):
         if some:
             lines.append([kind, len(some)] + [sum(r["verdict"] == v for r in some)
                                               for v in VERDICTS])
+    wrong_lens = [r for r in rows if r["kind"] == "file-lens" and r["trusted"]]
     text = style.table("Pairs without a translation to be known: every \"ok\" is wrong",
                        ["kind", "pairs"] + list(VERDICTS), lines) if lines else ""
+    if wrong_lens:
+        s = summary(wrong_lens)
+        text += "\n" + style.table(
+            "Pairs with the lens of the camera file, where that is wrong",
+            ["pairs", "ok", "wrong in rotation", "wrong", "right", "of these ok"],
+            [[str(s[key]) for key in ("pairs", "ok", "wrong_rotation", "wrong", "right",
+                                      "right_ok")]])
     zoomed = [r for r in rows if r["kind"] == "zoomed" and r["trusted"]]
     if zoomed:
         text += "\n" + _errors(style, "Zoomed pairs: verdict against the rotation's error [deg]",
