@@ -41,7 +41,7 @@ T little_endian(const std::string& bytes, size_t at) {
 
 // The bytes of a map, and what their header says: the library has not checked them yet.
 struct MapFile {
-  explicit MapFile(const std::string& path) : path(path), bytes(read_file(path, kMaxMapBytes)) {
+  explicit MapFile(const std::string& file) : path(file), bytes(read_file(file, kMaxMapBytes)) {
     if (bytes.size() < kHeaderBytes || bytes.compare(0, 5, "TVMAP") != 0)
       throw BadInput(path + " is no map of twoview odometry");
     camera.model = little_endian<int32_t>(bytes, kCameraAt);
