@@ -21,11 +21,13 @@ import uuid
 import zipfile
 
 NO = "NOASSERTION"
-# Header libraries: Debian's package, name, licence, and which artefacts contain their code.
+# Header libraries: the package with their version (Debian's, or PyPI's for MAVLink, whose headers
+# pymavlink generates), name, licence, and which artefacts contain their code.
 COMPONENTS = {
     "libeigen3-dev": ("Eigen", "MPL-2.0", r"libtwoview0|libtwoview-dev|\.whl$"),
     "libcli11-dev": ("CLI11", "BSD-3-Clause", r"^twoview_.*deb$"),
     "nlohmann-json3-dev": ("nlohmann-json", "MIT", r"^twoview_.*deb$"),
+    "pymavlink": ("MAVLink", "MIT", r"^(libtwoview-drivers0|libtwoview-dev|twoview_).*deb$"),
 }
 
 
@@ -89,10 +91,10 @@ def document(path, components, commit, created):
                   hasFiles=[f["SPDXID"] for f in files])
     packages = [own]
     relations = [("SPDXRef-DOCUMENT", "DESCRIBES", "SPDXRef-Package")]
-    for debian, (name, licence, where) in COMPONENTS.items():
+    for source, (name, licence, where) in COMPONENTS.items():
         if re.search(where, path.name):
             identity = f"SPDXRef-Component-{name}"
-            packages.append(package(identity, name, components.get(debian, NO), licence))
+            packages.append(package(identity, name, components.get(source, NO), licence))
             relations.append(("SPDXRef-Package", "STATIC_LINK", identity))
     for number, needed in enumerate(depends_of(path, contents)):
         identity = f"SPDXRef-Dependency-{number}"
