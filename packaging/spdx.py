@@ -21,6 +21,9 @@ import uuid
 import zipfile
 
 NO = "NOASSERTION"
+COPYRIGHT = re.search(r"Copyright \(c\) (.*)", (pathlib.Path(__file__).resolve().parents[1] /
+                                               "LICENSE").read_text()).group(1)
+HOLDER = COPYRIGHT.split(", ", 1)[1]
 # Header libraries: the package with their version (Debian's, or PyPI's for MAVLink, whose headers
 # pymavlink generates), name, licence, and which artefacts contain their code.
 COMPONENTS = {
@@ -86,7 +89,7 @@ def document(path, components, commit, created):
                         .encode()).hexdigest()
     own = package("SPDXRef-Package", path.name, commit, "BSD-3-Clause", packageFileName=path.name,
                   checksums=sums(data, "sha256"), filesAnalyzed=True,
-                  copyrightText="2026, twoview authors", licenseInfoFromFiles=[NO],
+                  copyrightText=COPYRIGHT, licenseInfoFromFiles=[NO],
                   packageVerificationCode={"packageVerificationCodeValue": code},
                   hasFiles=[f["SPDXID"] for f in files])
     packages = [own]
@@ -105,7 +108,7 @@ def document(path, components, commit, created):
         "spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT",
         "name": path.name, "documentNamespace": f"urn:uuid:{namespace}",
         "creationInfo": {"created": created,
-                         "creators": ["Organization: twoview authors", "Tool: packaging/spdx.py"]},
+                         "creators": [f"Organization: {HOLDER}", "Tool: packaging/spdx.py"]},
         "packages": packages, "files": files,
         "relationships": [{"spdxElementId": a, "relationshipType": kind, "relatedSpdxElement": b}
                           for a, kind, b in relations],
