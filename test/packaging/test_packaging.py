@@ -131,7 +131,8 @@ class Debian(Case):
             return run(PROGRAM, *words, "--help").decode()
 
         run(sys.executable, PACKAGING / "man_pages.py", "-o", self.folder, SOURCE / "docs/cli.md",
-            "--", PROGRAM, env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000"})
+            "--", PROGRAM, env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000",
+                                "TWOVIEW_PYTHON": "/no/python"})  # a build system has no numpy
         verbs = re.findall(r"(?m)^  ([a-z]+) ", run_help().split("Subcommands:")[1])
         self.assertGreaterEqual(len(verbs), 9)
         pages = {page.name: page.read_text() for page in self.folder.glob("*.1")}
@@ -139,7 +140,7 @@ class Debian(Case):
         num_options = 0
         for verb in verbs:
             self.assertIn(f"twoview {verb}", pages["twoview.1"])
-            if verb in ("compare", "colmap"):
+            if verb in ("compare", "colmap", "rerun"):
                 continue
             shown = pages[f"twoview-{verb}.1"].replace("\\-", "-")
             helps = [run_help(verb)]
