@@ -21,7 +21,7 @@ tv_dense_options options_of(fuzz::Bytes& bytes) {
     options.min_parallax_rad = bytes.whole(0, 1) * bytes.wild(0, 1);
     options.max_parallax_rad = bytes.wild(0, 3.2);
   }
-  options.max_relative_sigma = bytes.whole(0, 1) == 0 ? 1 : bytes.wild(0, 1);
+  options.max_relative_sigma = bytes.whole(0, 1) == 0 ? 1 : bytes.wild(0, 0.05);
   return options;
 }
 
