@@ -17,7 +17,8 @@ import subprocess
 import sys
 
 LEFT_OUT = ("Where it is",)  # sections about the source tree
-PYTHON_VERBS = ("compare", "colmap")  # their --help needs packages that a build may not have
+# Their --help needs packages that a build may not have.
+PYTHON_VERBS = ("compare", "colmap", "rerun")
 
 
 def run_help(program, words):

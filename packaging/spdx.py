@@ -21,11 +21,16 @@ import uuid
 import zipfile
 
 NO = "NOASSERTION"
-# Header libraries: Debian's package, name, licence, and which artefacts contain their code.
+COPYRIGHT = re.search(r"Copyright \(c\) (.*)", (pathlib.Path(__file__).resolve().parents[1] /
+                                               "LICENSE").read_text()).group(1)
+HOLDER = COPYRIGHT.split(", ", 1)[1]
+# Header libraries: the package with their version (Debian's, or PyPI's for MAVLink, whose headers
+# pymavlink generates), name, licence, and which artefacts contain their code.
 COMPONENTS = {
     "libeigen3-dev": ("Eigen", "MPL-2.0", r"libtwoview0|libtwoview-dev|\.whl$"),
     "libcli11-dev": ("CLI11", "BSD-3-Clause", r"^twoview_.*deb$"),
     "nlohmann-json3-dev": ("nlohmann-json", "MIT", r"^twoview_.*deb$"),
+    "pymavlink": ("MAVLink", "MIT", r"^(libtwoview-drivers0|libtwoview-dev|twoview_).*deb$"),
 }
 
 
@@ -84,15 +89,15 @@ def document(path, components, commit, created):
                         .encode()).hexdigest()
     own = package("SPDXRef-Package", path.name, commit, "BSD-3-Clause", packageFileName=path.name,
                   checksums=sums(data, "sha256"), filesAnalyzed=True,
-                  copyrightText="2026, twoview authors", licenseInfoFromFiles=[NO],
+                  copyrightText=COPYRIGHT, licenseInfoFromFiles=[NO],
                   packageVerificationCode={"packageVerificationCodeValue": code},
                   hasFiles=[f["SPDXID"] for f in files])
     packages = [own]
     relations = [("SPDXRef-DOCUMENT", "DESCRIBES", "SPDXRef-Package")]
-    for debian, (name, licence, where) in COMPONENTS.items():
+    for source, (name, licence, where) in COMPONENTS.items():
         if re.search(where, path.name):
             identity = f"SPDXRef-Component-{name}"
-            packages.append(package(identity, name, components.get(debian, NO), licence))
+            packages.append(package(identity, name, components.get(source, NO), licence))
             relations.append(("SPDXRef-Package", "STATIC_LINK", identity))
     for number, needed in enumerate(depends_of(path, contents)):
         identity = f"SPDXRef-Dependency-{number}"
@@ -103,7 +108,7 @@ def document(path, components, commit, created):
         "spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT",
         "name": path.name, "documentNamespace": f"urn:uuid:{namespace}",
         "creationInfo": {"created": created,
-                         "creators": ["Organization: twoview authors", "Tool: packaging/spdx.py"]},
+                         "creators": [f"Organization: {HOLDER}", "Tool: packaging/spdx.py"]},
         "packages": packages, "files": files,
         "relationships": [{"spdxElementId": a, "relationshipType": kind, "relatedSpdxElement": b}
                           for a, kind, b in relations],

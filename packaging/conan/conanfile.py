@@ -18,8 +18,8 @@ class Twoview(ConanFile):
     topics = ("computer-vision", "geometry", "embedded")
     package_type = "library"
     settings = "os", "arch", "compiler", "build_type"
-    options = {"shared": [True, False], "odometry": [True, False]}
-    default_options = {"shared": False, "odometry": True}
+    options = {"shared": [True, False], "odometry": [True, False], "dense": [True, False]}
+    default_options = {"shared": False, "odometry": True, "dense": True}
 
     def set_version(self):
         header = load(self, os.path.join(ROOT, "lib", "include", "twoview", "version.h"))
@@ -40,7 +40,8 @@ class Twoview(ConanFile):
         toolchain = CMakeToolchain(self)
         toolchain.cache_variables.update({
             "TWOVIEW_TOOLS": "OFF", "TWOVIEW_DRIVERS": "OFF", "BUILD_TESTING": "OFF",
-            "TWOVIEW_ODOMETRY": bool(self.options.odometry)})
+            "TWOVIEW_ODOMETRY": bool(self.options.odometry),
+            "TWOVIEW_DENSE": bool(self.options.dense)})
         toolchain.generate()
 
     def build(self):

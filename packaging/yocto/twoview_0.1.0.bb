@@ -8,6 +8,10 @@ SRC_URI = "file://twoview-${PV}.tar.xz"
 DEPENDS = "libeigen"
 inherit cmake pkgconfig
 
+PACKAGECONFIG ??= "dense odometry"
+PACKAGECONFIG[dense] = "-DTWOVIEW_DENSE=ON,-DTWOVIEW_DENSE=OFF"
+PACKAGECONFIG[odometry] = "-DTWOVIEW_ODOMETRY=ON,-DTWOVIEW_ODOMETRY=OFF"
+
 EXTRA_OECMAKE = "-DTWOVIEW_TOOLS=OFF -DTWOVIEW_DRIVERS=OFF -DBUILD_TESTING=OFF"
 
 # FILES:${PN}, -dev and -staticdev are Yocto's defaults: the image gets libtwoview.so.0.1 alone.

@@ -14,6 +14,12 @@ os.environ.setdefault("TWOVIEW_LIBRARY", str(ROOT / "build" / "release" / "lib" 
 import twoview as tv  # noqa: E402  (sys.path must be extended before)
 
 
+def needs(function):
+    """A mark: the test is skipped where the library was built without this function."""
+    missing = not hasattr(tv.default_library().lib, function)
+    return pytest.mark.skipif(missing, reason=f"the library was built without {function}")
+
+
 class Scene:
     """A textured wall with boxes in front of it, seen by two cameras with a sideways motion."""
 

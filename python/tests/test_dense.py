@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 import twoview as tv
+from conftest import needs
+
+pytestmark = needs("tv_densify")
 
 SHIFT = 8
 

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 import twoview as tv
+from conftest import needs
+
+pytestmark = needs("tv_odometry_track")
 
 WIDTH, HEIGHT, FOCAL, STEP = 320, 240, 300.0, 0.08
 DEPTHS = (2.5, 6.0, 3.5, 8.0, 4.5)  # of the walls, one above the other in the image, in units

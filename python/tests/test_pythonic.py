@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 import twoview as tv
-from conftest import ROOT
+from conftest import ROOT, needs
 
 FUNCTIONS = {name: value for name, value in vars(tv).items()
              if inspect.isfunction(value) and name in tv.__all__}
@@ -100,6 +100,7 @@ def test_a_refused_pair_prints_its_reasons(context, image, scene):
     assert str(nothing).startswith("degenerate, refused (") and "\n" not in str(nothing)
 
 
+@needs("tv_estimate_absolute_pose")
 def test_every_result_prints_in_a_few_lines(context, scene, pose):
     points = tv.triangulate(scene.camera, scene.camera, pose.R, pose.t, scene.pixels0,
                             scene.pixels1)

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 import twoview as tv
+from conftest import needs
+
+pytestmark = needs("tv_adjust_window")
 
 CAMERA = tv.Camera(640, 480, 500, 500, 320, 240)
 

@@ -381,18 +381,27 @@ class Library:
                 if init is not None:  # a library without odometry or dense clouds lacks some
                     init.restype, init.argtypes = None, [c_void_p, c_size_t]
 
+    def function(self, name: str) -> Any:
+        """The C function of that name; NotImplementedError where the library was built without."""
+        try:
+            return getattr(self.lib, name)
+        except AttributeError:
+            part = "TWOVIEW_DENSE" if "dens" in name else "TWOVIEW_ODOMETRY"
+            raise NotImplementedError(f"{self.path} has no {name}: it was built with {part}=OFF, "
+                                      "or is of an older release") from None
+
     def make(self, struct: Any, fields: Optional[dict[str, Any]] = None) -> Any:
         """Returns a struct with the defaults of its tv_..._init_sized; `fields` then replaces some
         of them. The library may be of another release whose structs are shorter or longer."""
         made = struct()
-        init = getattr(self.lib, struct.__name__ + "_init_sized")
+        init = self.function(struct.__name__ + "_init_sized")
         init(ctypes.byref(made), ctypes.sizeof(struct))
         for name, value in (fields or {}).items():
             set_field(made, name, value)
         return made
 
     def call(self, function: str, *arguments: Any) -> None:
-        status = getattr(self.lib, function)(*arguments)
+        status = self.function(function)(*arguments)
         if status != 0:
             kind = ERRORS.get(status, StatusError)
             text = self.lib.tv_status_string(status).decode()

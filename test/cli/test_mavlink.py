@@ -48,6 +48,10 @@ def has_mavlink():
     return False
 
 
+NEEDS_ODOMETRY = unittest.skipUnless("\n  odometry " in run("--help").stdout,
+                                     "the program was built without TWOVIEW_ODOMETRY")
+
+
 def angle_deg(a, b):
     return math.degrees(math.acos(max(-1.0, min(1.0, (np.trace(a @ b.T) - 1) / 2))))
 
@@ -171,6 +175,7 @@ class Mavlink(unittest.TestCase):
         t = -b.T @ (world.VELOCITY * seconds)
         self.assertLess(np.linalg.norm(np.array(result["t"]) - t), 0.03 * true)
 
+    @NEEDS_ODOMETRY
     def test_odometry_of_the_recording_is_metric_and_upright(self):
         output = self.folder / "flown"
         result = run("odometry", self.recording, "--camera", self.camera, "-o", output)
@@ -183,6 +188,7 @@ class Mavlink(unittest.TestCase):
         for name in ("frames_decoded", "attitudes", "timesyncs"):
             self.assertAlmostEqual(replayed[name], summary[name], delta=1, msg=name)
 
+    @NEEDS_ODOMETRY
     def test_odometry_of_the_vehicle_itself_is_metric_and_upright(self):
         output = self.folder / "live"
         with world.Vehicle(mavlink, self.port, autopilot="ardupilot"):
@@ -219,6 +225,9 @@ class Mavlink(unittest.TestCase):
         self.assertFalse((self.folder / "new").exists())
         self.assert_refused(run("drone", "record", "--mavlink", self.address, "--camera-source",
                                 self.film, "-o", self.recording), "holds a recording already")
+
+    @NEEDS_ODOMETRY
+    def test_odometry_of_a_vehicle_requires_a_camera(self):
         self.assert_refused(run("odometry", "--mavlink", self.address, "-o", self.folder / "o"),
                             "--camera is required")
 

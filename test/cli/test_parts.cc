@@ -55,6 +55,77 @@ void test_percentile_lies_between_its_neighbours() {
   TEST_ASSERT_EQUAL_DOUBLE(4, percentile({4, 1, 3, 2}, 1));
 }
 
+// exp([w]x) R, by Rodrigues' formula.
+Matrix3 turned_by(const Vector3& w, const Matrix3& R) {
+  const double angle = norm(w);
+  if (angle == 0) return R;
+  const Matrix3 K = {0, -w[2] / angle, w[1] / angle,  w[2] / angle,
+                     0, -w[0] / angle, -w[1] / angle, w[0] / angle,
+                     0};
+  const Matrix3 KK = product(K, K);
+  Matrix3 turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  for (size_t i = 0; i < 9; ++i) turn[i] += std::sin(angle) * K[i] + (1 - std::cos(angle)) * KK[i];
+  return product(turn, R);
+}
+
+double angle_between(const Vector3& a, const Vector3& b) {
+  return std::acos(dot(a, b) / (norm(a) * norm(b)));
+}
+
+// The distance of a point from camera 0 by the sine rule, of a ray of each camera in its own frame.
+double distance_of(const Matrix3& R, const Vector3& t, const Vector3& ray0, const Vector3& ray1) {
+  const Vector3 backward = applied(transposed(R), t);
+  const Vector3 base = {-backward[0], -backward[1], -backward[2]};
+  const double angle0 = angle_between(ray0, base);
+  const double angle1 = angle_between(applied(transposed(R), ray1), base);
+  return norm(base) * std::sin(angle1) / std::sin(angle1 - angle0);
+}
+
+// The pose's covariance, carried to a distance, is that of differences of the distance.
+void test_a_distance_has_the_sigma_that_the_pose_gives_it() {
+  tv_two_view v;
+  tv_two_view_init(&v);
+  const Matrix3 R = turned_by({0.1, -0.2, 0.05}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
+  std::copy(R.begin(), R.end(), v.R);
+  const Vector3 t = {-0.9, 0.3, std::sqrt(1 - 0.81 - 0.09)};
+  std::copy(t.begin(), t.end(), v.t);
+  const Vector3 point = {0.4, -0.3, 5};
+  TEST_ASSERT_EQUAL_DOUBLE(0, distance_sigma_of_pose(v, point));  // without a covariance
+  v.has_covariance = 1;
+  double factor[5][5];  // the covariance is F F^T
+  for (int i = 0; i < 5; ++i)
+    for (int k = 0; k < 5; ++k) factor[i][k] = 1e-3 * std::sin(1 + 7 * i + 3 * k * k);
+  for (int i = 0; i < 5; ++i)
+    for (int k = 0; k < 5; ++k) {
+      double sum = 0;
+      for (int n = 0; n < 5; ++n) sum += factor[i][n] * factor[k][n];
+      v.covariance[5 * i + k] = sum;
+    }
+  const Vector3 at0 = applied(R, point), ray1 = {at0[0] + t[0], at0[1] + t[1], at0[2] + t[2]};
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, norm(point), distance_of(R, t, point, ray1));
+  // The smallest |t_k| is the second: b1 = normalise(e_1 x t), b2 = t x b1.
+  const double length = std::sqrt(t[0] * t[0] + t[2] * t[2]);
+  const Vector3 b1 = {t[2] / length, 0, -t[0] / length}, b2 = cross(t, b1);
+  double variance = 0;
+  for (int n = 0; n < 5; ++n) {  // along each column of F
+    double ends[2];
+    for (int end = 0; end < 2; ++end) {
+      const double h = end ? 1e-3 : -1e-3;
+      Vector3 moved = t;
+      for (size_t i = 0; i < 3; ++i) moved[i] += h * (factor[3][n] * b1[i] + factor[4][n] * b2[i]);
+      const double size = norm(moved);
+      for (double& part : moved) part /= size;
+      const Vector3 w = {h * factor[0][n], h * factor[1][n], h * factor[2][n]};
+      ends[end] = distance_of(turned_by(w, R), moved, point, ray1);
+    }
+    const double slope = (ends[1] - ends[0]) / 2e-3;
+    variance += slope * slope;
+  }
+  const double expected = std::sqrt(variance);
+  TEST_ASSERT_TRUE(expected > 0.001);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4 * expected, expected, distance_sigma_of_pose(v, point));
+}
+
 // Whether the advice on a pose of low parallax is to calibrate, and not to move farther.
 bool calibrates(double focal_sigma, double parallax_rad) {
   Outcome outcome;
@@ -437,6 +508,7 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(test_auc_is_the_area_under_straight_lines_of_recall);
   RUN_TEST(test_percentile_lies_between_its_neighbours);
+  RUN_TEST(test_a_distance_has_the_sigma_that_the_pose_gives_it);
   RUN_TEST(test_pairs_that_agree_on_a_shift_ask_for_a_calibration);
   RUN_TEST(test_pairs_that_are_few_or_do_not_agree_ask_for_nothing);
   RUN_TEST(test_each_camera_gets_its_own_advice);

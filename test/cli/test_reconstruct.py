@@ -18,7 +18,7 @@ RESULT_KEYS = (
   reasons R t E F H
 alternative evidence covariance noise_px principal_point_shift_px principal_point num_points
 median_parallax_deg rms_reprojection_px scale
-num_dense_points dense_sigma_median_percent
+num_dense_points dense_sigma_median_percent dense_pose_sigma_median_percent
 scale_sigma imu truth timings_ms context_bytes options seed version kernels""".split()
 )
 STAGES = "pyramid detect describe match estimate refine triangulate total".split()
@@ -35,7 +35,7 @@ def read_ply(path):
     header = data[:end].decode()
     properties = re.findall(r"^property (\w+) (\w+)$", header, re.M)
     count = int(re.search(r"^element vertex (\d+)$", header, re.M).group(1))
-    layout = "<fffBBBfff" if ("float", "sigma") in properties else "<fffBBBff"
+    layout = "<fffBBBffff" if ("float", "sigma") in properties else "<fffBBBff"
     points = list(struct.iter_unpack(layout, data[end:]))
     return header, properties, count, points
 
@@ -147,12 +147,13 @@ class Reconstruct(cli.CliTest):
         self.assertGreater(errors["num_dense_depths"], 1500)
         self.assertLess(errors["dense_depth_error_median_percent"], 1)
         _, properties, count, points = read_ply(self.out / "cloud.ply")
-        self.assertEqual(properties[-1], ("float", "sigma"))
+        self.assertEqual(properties[-2:], [("float", "sigma"), ("float", "sigma_pose")])
+        self.assertTrue(0 < result["dense_pose_sigma_median_percent"] < 3)
         self.assertEqual(count, result["num_points"] + result["num_dense_points"])
         self.assertEqual(len(points), count)
         within = 0
-        for x, y, z, red, green, blue, angle, error, sigma in points:
-            self.assertTrue(sigma > 0 and error >= 0 and 0 < angle < 30)
+        for x, y, z, red, green, blue, angle, error, sigma, sigma_pose in points:
+            self.assertTrue(sigma > 0 and sigma_pose > 0 and error >= 0 and 0 < angle < 30)
             self.assertLess(sigma, 0.2 * z)
             self.assertEqual((green, blue), (red, red))  # of a grey image
             row = round(FOCAL * y / z + (HEIGHT - 1) / 2)
@@ -163,6 +164,8 @@ class Reconstruct(cli.CliTest):
     def test_a_dense_cloud_needs_a_pose_and_a_sensible_number(self):
         for wrong in ("-1", "nan", "many", "4000001", ""):
             self.one_line(self.succeed(self.reconstruct("--dense", wrong), 2), "--dense")
+        if b"--dense" in self.reconstruct("--dense", "0").stderr:
+            self.skipTest("the program was built without TWOVIEW_DENSE")
         self.succeed(self.reconstruct("--dense", "0"))
         self.assertIsNone(self.result()["num_dense_points"])
 

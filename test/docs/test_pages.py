@@ -92,6 +92,7 @@ class TestPages(unittest.TestCase):
     def test_every_test_of_the_contract_is_known(self):
         if not self.tests:
             self.skipTest("no build: TWOVIEW_PROGRAM names none")
+        self.need_the_whole_program()
         page = self.pages[ROOT / "docs" / "contract.md"]
         labels = {name.split("/")[0] for name in self.tests}
         wrong = []
@@ -114,6 +115,14 @@ class TestPages(unittest.TestCase):
                      if re.fullmatch(r"test_\w+", text) and not re.search(rf"\b{text}\b", sources)],
                     "test functions that are in no source")
 
+    def need_the_whole_program(self):
+        if not PROGRAM or not os.path.exists(PROGRAM):
+            self.skipTest("TWOVIEW_PROGRAM names no program")
+        if not re.search(r"(?m)^  odometry ", self.help()):
+            self.skipTest("the program was built without TWOVIEW_ODOMETRY")
+        if "--dense" not in self.help("reconstruct"):
+            self.skipTest("the program was built without TWOVIEW_DENSE")
+
     def help(self, *verb):
         if verb not in self.helps:
             run = subprocess.run([PROGRAM, *verb, "--help"], capture_output=True, text=True)
@@ -121,8 +130,7 @@ class TestPages(unittest.TestCase):
         return self.helps[verb]
 
     def test_every_verb_and_option_is_the_programs(self):
-        if not PROGRAM or not os.path.exists(PROGRAM):
-            self.skipTest("TWOVIEW_PROGRAM names no program")
+        self.need_the_whole_program()
         verbs = set(re.findall(r"^  (\w+) ", self.help(), re.M))
         self.assertIn("reconstruct", verbs)
         wrong, count = [], 0
@@ -165,8 +173,7 @@ class TestPages(unittest.TestCase):
         self.report(wrong, "verbs or options that the program does not have")
 
     def test_the_table_of_verbs_has_every_verb(self):
-        if not PROGRAM or not os.path.exists(PROGRAM):
-            self.skipTest("TWOVIEW_PROGRAM names no program")
+        self.need_the_whole_program()
         verbs = set(re.findall(r"^  (\w+) ", self.help().split("Subcommands:")[1], re.M))
         drone = re.findall(r"^  (\w+) ", self.help("drone").split("Subcommands:")[1], re.M)
         page = (ROOT / "docs" / "cli.md").read_text()

@@ -65,6 +65,25 @@ class Versions(Case):
         self.assertIn(f"\nTWOVIEW_VERSION = {VERSION}\n",
                       (PACKAGING / "buildroot/twoview.mk").read_text())
 
+    def test_every_recipe_can_leave_out_the_dense_cloud_and_odometry(self):
+        cmake = (SOURCE / "CMakeLists.txt").read_text()
+        for recipe in ("conan/conanfile.py", "vcpkg/twoview/portfile.cmake",
+                       f"yocto/twoview_{VERSION}.bb", "buildroot/twoview.mk"):
+            text = (PACKAGING / recipe).read_text()
+            for option in ("TWOVIEW_DENSE", "TWOVIEW_ODOMETRY"):
+                self.assertIn(f"option({option} ", cmake)
+                self.assertIn(option, text, recipe)
+        port = json.loads((PACKAGING / "vcpkg/twoview/vcpkg.json").read_text())
+        self.assertEqual(set(port["default-features"]), set(port["features"]))
+
+    def test_the_maintainer_is_the_licences_holder(self):
+        licence = (SOURCE / "LICENSE").read_text()
+        holder = re.search(r"Copyright \(c\) \d+, (.*)", licence).group(1)
+        control = (PACKAGING / "debian/control").read_text()
+        self.assertEqual(re.findall(r"(?m)^Maintainer: (.*) <", control), [holder])
+        self.assertRegex((PACKAGING / "debian/copyright").read_text(),
+                         rf"(?m)^Copyright: \d+, {holder}$")
+
     def test_yoctos_sum_is_that_of_the_licence(self):
         found = hashlib.md5((SOURCE / "LICENSE").read_bytes()).hexdigest()
         self.assertIn(f"md5={found}", (PACKAGING / f"yocto/twoview_{VERSION}.bb").read_text())
@@ -113,7 +132,8 @@ class Debian(Case):
             return run(PROGRAM, *words, "--help").decode()
 
         run(sys.executable, PACKAGING / "man_pages.py", "-o", self.folder, SOURCE / "docs/cli.md",
-            "--", PROGRAM, env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000"})
+            "--", PROGRAM, env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000",
+                                "TWOVIEW_PYTHON": "/no/python"})  # a build system has no numpy
         verbs = re.findall(r"(?m)^  ([a-z]+) ", run_help().split("Subcommands:")[1])
         self.assertGreaterEqual(len(verbs), 9)
         pages = {page.name: page.read_text() for page in self.folder.glob("*.1")}
@@ -121,7 +141,7 @@ class Debian(Case):
         num_options = 0
         for verb in verbs:
             self.assertIn(f"twoview {verb}", pages["twoview.1"])
-            if verb in ("compare", "colmap"):
+            if verb in ("compare", "colmap", "rerun"):
                 continue
             shown = pages[f"twoview-{verb}.1"].replace("\\-", "-")
             helps = [run_help(verb)]
@@ -239,6 +259,31 @@ class Spdx(Case):
         self.assertEqual(package["checksums"][0]["checksumValue"],
                          hashlib.sha256(archive.read_bytes()).hexdigest())
         self.assertEqual(listed["creationInfo"]["created"], "2023-11-14T22:13:20Z")
+
+    def test_each_package_lists_what_is_compiled_into_it(self):
+        if not shutil.which("dpkg-deb"):
+            self.skipTest("no dpkg-deb")
+        expected = {f"libtwoview{SOVERSION}": {"Eigen"},
+                    f"libtwoview-drivers{SOVERSION}": {"MAVLink"},
+                    "libtwoview-dev": {"Eigen", "MAVLink"},
+                    "twoview": {"CLI11", "nlohmann-json", "MAVLink"}}
+        for name in expected:
+            (self.folder / name / "DEBIAN").mkdir(parents=True)
+            (self.folder / name / "DEBIAN/control").write_text(
+                f"Package: {name}\nVersion: 1\nArchitecture: amd64\nMaintainer: x <x@y.z>\n"
+                "Description: x\n")
+            run("dpkg-deb", "--build", "--root-owner-group", self.folder / name,
+                self.folder / f"{name}_1_amd64.deb")
+            shutil.rmtree(self.folder / name)
+        (self.folder / "components.txt").write_text(
+            "libeigen3-dev 3\nlibcli11-dev 2\nnlohmann-json3-dev 4\npymavlink 5\n")
+        run(sys.executable, PACKAGING / "spdx.py", "--commit", "abc", "--epoch", "1700000000",
+            self.folder)
+        for name, components in expected.items():
+            listed = json.loads((self.folder / f"{name}_1_amd64.deb.spdx.json").read_text())
+            found = {package["name"]: package["versionInfo"] for package in listed["packages"][1:]}
+            self.assertEqual(set(found), components, name)
+            self.assertNotIn("NOASSERTION", found.values())
 
 
 if __name__ == "__main__":

@@ -28,7 +28,8 @@ PROGRAM = "twoview rerun"
 MISSING = "needs the package rerun-sdk (pip install rerun-sdk)"
 VERTEX = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3), ("angle_deg", "<f4"),
                    ("error_px", "<f4")])  # of cloud.ply (docs/formats.md)
-DENSE_VERTEX = np.dtype(VERTEX.descr + [("sigma", "<f4")])  # with reconstruct --dense
+DENSE = ("sigma", "sigma_pose")  # with reconstruct --dense
+DENSE_VERTEX = np.dtype(VERTEX.descr + [(name, "<f4") for name in DENSE])
 PLANE_SHARE = 0.5  # distance of the drawn picture from its camera, in units of the result
 FILM_DIAGONAL_MM = math.hypot(36, 24)
 
@@ -54,8 +55,9 @@ def read_cloud(path):
         raise BadInput(f"{path}: no cloud of twoview")
     count = int(counts[0])
     names = [b"x", b"y", b"z", b"red", b"green", b"blue", b"angle_deg", b"error_px"]
-    vertex = DENSE_VERTEX if kinds == names + [b"sigma"] else VERTEX
-    if kinds[:8] != names or kinds[8:] not in ([], [b"sigma"]) or (
+    dense = [name.encode() for name in DENSE]
+    vertex = DENSE_VERTEX if kinds == names + dense else VERTEX
+    if kinds[:8] != names or kinds[8:] not in ([], dense) or (
             len(body) < count * vertex.itemsize):
         raise BadInput(f"{path}: its properties are not those of twoview, or it ends early")
     return np.frombuffer(body, vertex, count)

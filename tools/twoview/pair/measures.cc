@@ -101,4 +101,39 @@ Vector3 translation_of(const tv_two_view& two_view) {
   return {two_view.t[0], two_view.t[1], two_view.t[2]};
 }
 
+double distance_sigma_of_pose(const tv_two_view& two_view, const Vector3& point) {
+  if (!two_view.has_covariance) return 0;
+  // Both rays and the baseline t, in the axes of camera 1.
+  const Vector3 t = translation_of(two_view), from0 = applied(rotation_of(two_view), point);
+  Vector3 ray0, ray1;
+  const Vector3 from1 = {from0[0] + t[0], from0[1] + t[1], from0[2] + t[2]};
+  for (size_t i = 0; i < 3; ++i) {
+    ray0[i] = from0[i] / norm(from0);
+    ray1[i] = from1[i] / norm(from1);
+  }
+  const Vector3 normal = cross(t, ray0);
+  const double sine0 = norm(normal), sine1 = norm(cross(ray1, t));
+  const double sine = norm(cross(ray0, ray1)), cosine = dot(ray0, ray1);
+  const double by_ray0 = sine1 * cosine / (sine * sine * sine0);
+  const double by_ray1 = sine0 / (sine * sine * sine1);
+  // The basis in which the covariance has the direction of t (tv_two_view.covariance).
+  size_t least = 0;
+  for (size_t i = 1; i < 3; ++i)
+    if (std::abs(t[i]) < std::abs(t[least])) least = i;
+  Vector3 axis = {0, 0, 0};
+  axis[least] = 1;
+  Vector3 side = cross(axis, t);
+  const double length = norm(side);
+  for (double& part : side) part /= length;
+  const Vector3 up = cross(t, side);
+  double slope[5];
+  for (size_t i = 0; i < 3; ++i) slope[i] = -by_ray0 * normal[i];
+  slope[3] = by_ray0 * dot(ray0, side) - by_ray1 * dot(ray1, side);
+  slope[4] = by_ray0 * dot(ray0, up) - by_ray1 * dot(ray1, up);
+  double variance = 0;
+  for (size_t i = 0; i < 5; ++i)
+    for (size_t k = 0; k < 5; ++k) variance += slope[i] * two_view.covariance[5 * i + k] * slope[k];
+  return std::sqrt(std::max(variance, 0.0));
+}
+
 }  // namespace cli

@@ -38,4 +38,9 @@ bool has_full_pose(const tv_two_view& two_view);
 Matrix3 rotation_of(const tv_two_view& two_view);
 Vector3 translation_of(const tv_two_view& two_view);
 
+// The standard deviation of a point's distance from camera 0 that the pose's covariance causes, to
+// first order, in baselines; 0 where there is no covariance. `point`: in camera 0's frame, in
+// baselines. The formula is in docs/algorithms/dense.md.
+double distance_sigma_of_pose(const tv_two_view& two_view, const Vector3& point);
+
 }  // namespace cli

@@ -118,6 +118,18 @@ Parallax parallax_of(const tv_two_view& v, const Vector3& point) {
   return {angle, norm(other) / std::max(std::sin(angle), 1e-12)};
 }
 
+// The median over the dense points of sigma(point, position) / distance, per cent.
+template <typename Sigma>
+double median_share(const Outcome& outcome, const Sigma& sigma) {
+  std::vector<double> shares;
+  if (outcome.dense)
+    for (const tv_dense_point& point : *outcome.dense) {
+      const Vector3 at = {point.position[0], point.position[1], point.position[2]};
+      shares.push_back(100 * sigma(point, at) / norm(at));
+    }
+  return shares.empty() ? NAN : percentile(shares, 0.5);
+}
+
 // Writes JSON as nlohmann's dump(2) does, except that a list of plain values stays on one line.
 void append_json(std::string& text, const Json& json, size_t depth) {
   if (json.is_primitive() || json.empty()) {
@@ -169,12 +181,12 @@ std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
     if (point.status != TV_POINT_OK) continue;
     const tv_keypoint& keypoint = r.keypoints[0][r.matches[i].idx0];
     const cv::Vec3b bgr = colour_at(keypoint.x, keypoint.y);
-    const Parallax parallax =
-        parallax_of(outcome.two_view, {point.position[0], point.position[1], point.position[2]});
-    cloud.push_back({unit * point.position[0], unit * point.position[1], unit * point.position[2],
-                     bgr[2], bgr[1], bgr[0],
+    const Vector3 at = {point.position[0], point.position[1], point.position[2]};
+    const Parallax parallax = parallax_of(outcome.two_view, at);
+    cloud.push_back({unit * at[0], unit * at[1], unit * at[2], bgr[2], bgr[1], bgr[0],
                      static_cast<float>(static_cast<double>(point.angle_rad) * kDegrees),
-                     point.error_px, static_cast<float>(unit * noise_rad * parallax.lever)});
+                     point.error_px, static_cast<float>(unit * noise_rad * parallax.lever),
+                     static_cast<float>(unit * distance_sigma_of_pose(outcome.two_view, at))});
   }
   if (!outcome.dense) return cloud;
   for (const tv_dense_point& point : *outcome.dense) {
@@ -185,19 +197,22 @@ std::vector<CloudPoint> cloud_of(const Outcome& outcome) {
     cloud.push_back({unit * at[0], unit * at[1], unit * at[2], bgr[2], bgr[1], bgr[0],
                      static_cast<float>(parallax.angle_rad * kDegrees),
                      static_cast<float>(sigma / parallax.lever / pixel_angle(outcome)),
-                     static_cast<float>(unit * sigma)});
+                     static_cast<float>(unit * sigma),
+                     static_cast<float>(unit * distance_sigma_of_pose(outcome.two_view, at))});
   }
   return cloud;
 }
 
 double dense_sigma_percent(const Outcome& outcome) {
-  std::vector<double> shares;
-  if (outcome.dense)
-    for (const tv_dense_point& point : *outcome.dense) {
-      const Vector3 at = {point.position[0], point.position[1], point.position[2]};
-      shares.push_back(100 * static_cast<double>(point.sigma) / norm(at));
-    }
-  return shares.empty() ? NAN : percentile(shares, 0.5);
+  return median_share(outcome, [](const tv_dense_point& point, const Vector3&) {
+    return static_cast<double>(point.sigma);
+  });
+}
+
+double dense_pose_sigma_percent(const Outcome& outcome) {
+  return median_share(outcome, [&](const tv_dense_point&, const Vector3& at) {
+    return distance_sigma_of_pose(outcome.two_view, at);
+  });
 }
 
 Frustum frustum_of(const Outcome& outcome, int camera, double size) {
@@ -299,6 +314,7 @@ Json result_json(const Outcome& outcome) {
   json["num_points"] = r.num_points;
   json["num_dense_points"] = outcome.dense ? Json(outcome.dense->size()) : Json(nullptr);
   json["dense_sigma_median_percent"] = finite_or_null(dense_sigma_percent(outcome));
+  json["dense_pose_sigma_median_percent"] = finite_or_null(dense_pose_sigma_percent(outcome));
   json["median_parallax_deg"] = v.num_inliers > 0 && outcome.has_cameras
                                     ? finite_or_null(v.median_parallax_rad * kDegrees)
                                     : Json(nullptr);

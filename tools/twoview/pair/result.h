@@ -46,14 +46,18 @@ struct CloudPoint {
   double x, y, z;  // in camera 0's frame, in metres or baselines (unit_of)
   uint8_t red, green, blue;
   float angle_deg;
-  float error_px;   // of a dense point: the standard deviation of its match
-  float sigma = 0;  // standard deviation of the distance from camera 0; 0: not known
+  float error_px;  // of a dense point: the standard deviation of its match
+  // Standard deviations of the distance from camera 0: by the noise of the match, and by the
+  // covariance of the pose, which all points share; 0: not known.
+  float sigma = 0, sigma_pose = 0;
 };
 // The points of the matches, and behind them the dense ones.
 std::vector<CloudPoint> cloud_of(const Outcome& outcome);
 
-// The median of sigma / distance over the dense points, per cent; NaN without points.
+// The medians over the dense points of both standard deviations over the distance, per cent; NaN
+// without points.
 double dense_sigma_percent(const Outcome& outcome);
+double dense_pose_sigma_percent(const Outcome& outcome);
 
 // A camera drawn as a pyramid of depth `size`, in the frame of camera 0. For camera 1 the result
 // must have a full pose.

@@ -33,9 +33,12 @@ std::string cards(const Outcome& outcome) {
       card(std::to_string(outcome.reconstruction.num_points), "", "points in the cloud");
   if (outcome.dense) {
     text += card(std::to_string(outcome.dense->size()), "", "dense points");
-    if (!outcome.dense->empty())
+    if (!outcome.dense->empty()) {
       text += card(number_of(j["dense_sigma_median_percent"], "%.2f"), "%",
-                   "1 sigma of a dense point's distance, median");
+                   "1 sigma of a dense point's distance by its match, median");
+      text += card(number_of(j["dense_pose_sigma_median_percent"], "%.2f"), "%",
+                   "1 sigma of a dense point's distance by the pose, median");
+    }
   }
   text += card(std::to_string(outcome.two_view.num_inliers),
                "of " + std::to_string(outcome.two_view.num_matches), "matches that agree");

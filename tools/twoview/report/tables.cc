@@ -78,7 +78,8 @@ std::string cloud_ply(const std::vector<CloudPoint>& cloud, bool with_sigma) {
       "property float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n"
       "property float angle_deg\nproperty float error_px\n" +
-      std::string(with_sigma ? "property float sigma\n" : "") + "end_header\n";
+      std::string(with_sigma ? "property float sigma\nproperty float sigma_pose\n" : "") +
+      "end_header\n";
   for (const CloudPoint& point : cloud) {
     for (const double value : {point.x, point.y, point.z})
       append_float(bytes, static_cast<float>(value));
@@ -86,7 +87,10 @@ std::string cloud_ply(const std::vector<CloudPoint>& cloud, bool with_sigma) {
       bytes += static_cast<char>(value);
     append_float(bytes, point.angle_deg);
     append_float(bytes, point.error_px);
-    if (with_sigma) append_float(bytes, point.sigma);
+    if (with_sigma) {
+      append_float(bytes, point.sigma);
+      append_float(bytes, point.sigma_pose);
+    }
   }
   return bytes;
 }

@@ -267,11 +267,15 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   if (r.num_points > 0)
     text += summary_line("cloud", "%d points, reprojection %.2f px rms", r.num_points,
                          j["rms_reprojection_px"].get<double>());
-  if (outcome.dense)
-    text += summary_line(
-        "dense", "%zu points in %.0f ms, distance known to %.2f %% (median of 1 sigma)",
-        outcome.dense->size(), j["timings_ms"]["dense"].get<double>(),
-        outcome.dense->empty() ? 0.0 : j["dense_sigma_median_percent"].get<double>());
+  if (outcome.dense) {
+    text += summary_line("dense", "%zu points in %.0f ms", outcome.dense->size(),
+                         j["timings_ms"]["dense"].get<double>());
+    if (!outcome.dense->empty())
+      text +=
+          summary_line("", "distance known to %.2f %% by the match, %.2f %% by the pose (1 sigma)",
+                       j["dense_sigma_median_percent"].get<double>(),
+                       j["dense_pose_sigma_median_percent"].get<double>());
+  }
   if (j["truth"].is_object()) text += truth_line(j["truth"]);
   text += summary_line(
       "work", "%.1f ms with %s kernels in %.1f MiB", j["timings_ms"]["total"].get<double>(),
