@@ -116,14 +116,18 @@ def test_bad_input_is_refused(frames):
 
 
 def test_a_map_is_added(flight):
-    odometry, _ = flight
+    odometry, states = flight
     data = odometry.save()
     with tv.Odometry(CAMERA, max_keypoints=800, max_keyframes=400) as other:
         assert other.add(data) == 0  # there is nothing to meet
         assert other.save() == data
         assert other.add(data) == 1  # the same place
-        assert len(other.keyframes()) == 2 * len(odometry.keyframes())
-        assert {key.segment for key in other.keyframes()} == {0}
+        num = states[-1].num_keyframes
+        keys = [other.keyframe(k) for k in range(2 * num)]
+        assert {key.segment for key in keys} == {0}
+        assert [key.id for key in keys] == list(range(2 * num))
+        assert [np.linalg.norm(a.t - b.t) < 1e-2
+                for a, b in zip(keys[:num], keys[num:])] == [True] * num
         with pytest.raises(tv.TV_ERR_MAP):
             other.add(data[:-1])
 

@@ -163,7 +163,7 @@ class TestPages(unittest.TestCase):
                         continue
                     path = [verb] + (
                         [rest[0]]
-                        if verb == "drone" and rest and re.fullmatch("[a-z]+", rest[0])
+                        if verb in ("drone", "map") and rest and re.fullmatch("[a-z]+", rest[0])
                         else []
                     )
                     for option in re.findall(r"(?<!\S)(--?[a-z][\w-]*)", " ".join(rest)):
