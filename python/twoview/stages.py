@@ -196,7 +196,8 @@ def align_matches(context: Context, image0: np.ndarray, image1: np.ndarray, keyp
     Raises TypeError or ValueError for an array that C could not read, TV_ERR_LIMITS for an image
     above the context's limits, TV_ERR_ARGUMENT for an index or a size out of its range,
     TV_ERR_NOT_FINITE for a keypoint that is not finite."""
-    views = check_context(context) and (_images(image0, None)[0], _images(image1, None)[0])
+    check_context(context)
+    views = [byref(_abi.check_image("image", image)) for image in (image0, image1)]
     moved = [_abi.check_array(name, array, _abi.KEYPOINT).copy()
              for name, array in (("keypoints0", keypoints0), ("keypoints1", keypoints1))]
     matches = _abi.check_array("matches", matches, _abi.CORRESPONDENCE)
