@@ -53,15 +53,20 @@ static void render(void) {
   }
 }
 
-void setUp(void) {
+static api_context make_context(uint32_t purposes) {
   tv_limits limits;
-  tv_features features[2];
-  int v;
   tv_limits_init(&limits);
   limits.max_width = WIDTH;
   limits.max_height = HEIGHT;
   limits.max_keypoints = MOST;
-  a = api_make(&limits);
+  limits.purposes = purposes;
+  return api_make(&limits);
+}
+
+void setUp(void) {
+  tv_features features[2];
+  int v;
+  a = make_context(0);
   render();
   for (v = 0; v < 2; ++v) {
     TEST_ASSERT_EQUAL_INT(TV_OK, tv_extract(a.context, &images[v], NULL, NULL, found[v],
@@ -218,13 +223,7 @@ static void test_wrong_arguments_are_refused_and_nothing_is_written(void) {
 }
 
 static void test_a_context_that_is_made_for_other_calls_is_refused(void) {
-  tv_limits limits;
-  api_context other;
-  tv_limits_init(&limits);
-  limits.max_width = WIDTH;
-  limits.max_height = HEIGHT;
-  limits.purposes = TV_PURPOSE_MATCH;
-  other = api_make(&limits);
+  api_context other = make_context(TV_PURPOSE_MATCH);
   TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS,
                         tv_align_matches(other.context, &images[0], &images[1], 4, moved[0], num[0],
                                          moved[1], num[1], matches, num_matches, aligned));

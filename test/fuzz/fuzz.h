@@ -3,6 +3,7 @@
 #ifndef TEST_FUZZ_FUZZ_H
 #define TEST_FUZZ_FUZZ_H
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -59,6 +60,21 @@ inline bool all_finite(const double* values, int count) {
     if (!std::isfinite(values[i])) return false;
   }
   return true;
+}
+
+// The rotation of a quaternion of any length. One of length 0 gives no rotation.
+inline void rotation_of(const double quaternion[4], double R[9]) {
+  double norm_sq = 0;
+  for (int i = 0; i < 4; ++i) norm_sq += quaternion[i] * quaternion[i];
+  const double norm = std::sqrt(norm_sq > 0 ? norm_sq : 1);
+  double q[4];
+  for (int i = 0; i < 4; ++i) q[i] = quaternion[i] / norm;
+  const double w = q[0], x = q[1], y = q[2], z = q[3];
+  const double rotation[9] = {
+      1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+  std::copy_n(rotation, 9, R);
 }
 
 inline tv_camera camera(Bytes& bytes) {

@@ -38,19 +38,12 @@ tv_camera camera_of(fuzz::Bytes& bytes, int width, int height) {
 }
 
 // No rotation, one by a small or any angle, or in 1 of 32 inputs any nine numbers.
-void rotation_of(fuzz::Bytes& bytes, double R[9]) {
+void any_rotation(fuzz::Bytes& bytes, double R[9]) {
   constexpr double kSizes[5] = {1, 0.05, 0.01, 0, 0};
   const double size = kSizes[bytes.whole(0, 4)];
-  double q[4] = {1, 0, 0, 0}, norm = 0;
+  double q[4] = {1, 0, 0, 0};
   for (int i = 1; i < 4; ++i) q[i] = size * bytes.between(-1, 1);
-  for (const double value : q) norm += value * value;
-  norm = std::sqrt(norm);
-  const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
-  const double rotation[9] = {
-      1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-  std::memcpy(R, rotation, sizeof rotation);
+  fuzz::rotation_of(q, R);
   if (bytes.whole(0, 31) == 0)
     for (int i = 0; i < 9; ++i) R[i] = bytes.wild(-1, 1);
 }
@@ -120,7 +113,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const tv_camera camera0 = camera_of(bytes, image0.width, image0.height);
   const tv_camera camera1 = camera_of(bytes, image1.width, image1.height);
   double R[9], t[3] = {-1, 0, 0};
-  rotation_of(bytes, R);
+  any_rotation(bytes, R);
   if (bytes.whole(0, 2) == 0)
     for (double& value : t) value = bytes.wild(-1, 1);
   tv_point sparse[kNumSparse];

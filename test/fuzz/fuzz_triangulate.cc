@@ -8,15 +8,9 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const tv_camera camera0 = lens ? fuzz::camera(bytes) : plain;
   const tv_camera camera1 = lens ? fuzz::camera(bytes) : plain;
   // R is a rotation, made from a quaternion, or in 1 of 16 inputs any nine numbers.
-  double R[9], q[4], norm = 0;
-  for (double& value : q) value = bytes.between(-1, 1), norm += value * value;
-  norm = std::sqrt(norm > 0 ? norm : 1);
-  const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
-  const double rotation[9] = {
-      1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-  std::memcpy(R, rotation, sizeof R);
+  double R[9], q[4];
+  for (double& value : q) value = bytes.between(-1, 1);
+  fuzz::rotation_of(q, R);
   if (bytes.whole(0, 15) == 0)
     for (double& value : R) value = bytes.wild(-1, 1);
   const double t[3] = {bytes.wild(-1, 1), bytes.wild(-1, 1), bytes.wild(-1, 1)};

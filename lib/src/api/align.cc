@@ -12,12 +12,6 @@ bool is_at_same_place(const tv_keypoint& a, const tv_keypoint& b) {
   return a.x == b.x && a.y == b.y && a.size == b.size;
 }
 
-Bytes bytes_of(const tv_image& image) {
-  return {image.data,
-          static_cast<size_t>(image.height - 1) * static_cast<size_t>(image.stride_bytes) +
-              static_cast<size_t>(image.width)};
-}
-
 // A corner with two directions has two keypoints in turn, and two corners may have two matches,
 // which are one to the estimate: the match of lower rank is aligned, and the other one moves with
 // it.
@@ -75,7 +69,7 @@ tv_status tv_align_matches(tv_context* context, const tv_image* image0, const tv
     status = tv::check_keypoints(keypoints[v], num_keypoints[v]);
     if (status != TV_OK) return status;
     arrays[v] = {keypoints[v], static_cast<size_t>(num_keypoints[v]) * sizeof(tv_keypoint)};
-    arrays[3 + v] = tv::bytes_of(*images[v]);
+    arrays[3 + v] = {images[v]->data, tv::image_bytes(*images[v])};
   }
   arrays[2] = {aligned, static_cast<size_t>(num_matches)};
   arrays[5] = {matches, static_cast<size_t>(num_matches) * sizeof(tv_correspondence)};

@@ -56,17 +56,6 @@ size_t dense_bytes(const tv_camera& camera0, const tv_camera& camera1, const tv_
          arena_bytes<double>(2 * (side + steps)) + std::max(make_grid_bytes(), matching);
 }
 
-tv_status check_view(const tv_image* image, const tv_camera& camera) {
-  if (image->data == nullptr) return TV_ERR_NULL;
-  if (image->width != camera.width || image->height != camera.height) return TV_ERR_CAMERA;
-  return image->stride_bytes >= image->width ? TV_OK : TV_ERR_ARGUMENT;
-}
-
-size_t image_bytes(const tv_image& image) {
-  return static_cast<size_t>(image.stride_bytes) * static_cast<size_t>(image.height - 1) +
-         static_cast<size_t>(image.width);
-}
-
 struct Scene {
   DenseGrid grid;
   DenseView views[2];
@@ -138,8 +127,8 @@ tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_ca
   if (status == TV_OK) status = tv::check_cameras(camera0, camera1);
   if (status != TV_OK) return status;
   if (num_sparse < 0 || cap_points < 0) return TV_ERR_ARGUMENT;
-  status = tv::check_view(image0, *camera0);
-  if (status == TV_OK) status = tv::check_view(image1, *camera1);
+  status = tv::check_camera_image(*camera0, *image0);
+  if (status == TV_OK) status = tv::check_camera_image(*camera1, *image1);
   if (status != TV_OK) return status;
   if (!tv::all_finite(R, 9) || !tv::all_finite(t, 3)) return TV_ERR_NOT_FINITE;
   if (!tv::is_rotation(R) || (t[0] == 0.0 && t[1] == 0.0 && t[2] == 0.0)) return TV_ERR_ARGUMENT;

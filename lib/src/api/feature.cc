@@ -76,11 +76,6 @@ int32_t orient_keypoints(const tv_context& context, const Octaves& octaves, int3
   return total;
 }
 
-size_t image_bytes(const tv_image& image) {
-  return static_cast<size_t>(image.height - 1) * static_cast<size_t>(image.stride_bytes) +
-         static_cast<size_t>(image.width);
-}
-
 size_t bytes_of(int32_t count, size_t element) { return static_cast<size_t>(count) * element; }
 
 Bytes bytes_of(const tv_keypoint* keypoints, int32_t count) {

@@ -238,39 +238,19 @@ tv_status tv_odometry_reset(tv_odometry* odometry) {
   return TV_OK;
 }
 
-namespace tv {
-namespace {
-
-tv_status check_odometry_image(const tv_odometry& odometry, const tv_image& image) {
-  if (image.data == nullptr) return TV_ERR_NULL;
-  const tv_camera& camera = odometry.camera.model;
-  if (image.width != camera.width || image.height != camera.height) return TV_ERR_CAMERA;
-  return image.stride_bytes >= image.width && image.stride_bytes <= INT64_MAX / 65536
-             ? TV_OK
-             : TV_ERR_ARGUMENT;
-}
-
-bool overlaps_image(const tv_odometry_state& state, const tv_image& image) {
-  const int64_t bytes = (image.height - 1) * image.stride_bytes + image.width;
-  return overlap(&state, state.struct_size, image.data, static_cast<size_t>(bytes));
-}
-
-}  // namespace
-}  // namespace tv
-
 tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* frame,
                             tv_odometry_state* state) {
   if (odometry == nullptr || frame == nullptr || state == nullptr) return TV_ERR_NULL;
   tv_odometry_frame input{};
   tv_status status = tv::read_sized(frame, &input);
   if (status == TV_OK) status = tv::check_sized(state);
-  if (status == TV_OK) status = tv::check_odometry_image(*odometry, input.image);
+  if (status == TV_OK) status = tv::check_camera_image(odometry->camera.model, input.image);
   if (status != TV_OK) return status;
   if (!tv::is_finite(input.time_s)) return TV_ERR_NOT_FINITE;
   if (!tv::within(input.gap, 0, 1)) return TV_ERR_ARGUMENT;
   if (odometry->num_frames > 0 && !(input.time_s > odometry->last_time_s)) return TV_ERR_ARGUMENT;
   if (tv::overlap(state, state->struct_size, frame, frame->struct_size) ||
-      tv::overlaps_image(*state, input.image)) {
+      tv::overlap(state, state->struct_size, input.image.data, tv::image_bytes(input.image))) {
     return TV_ERR_OVERLAP;
   }
   tv_odometry_state packed{};
@@ -283,10 +263,10 @@ tv_status tv_odometry_locate(tv_odometry* odometry, const tv_image* image, int32
                              tv_odometry_state* state) {
   if (odometry == nullptr || image == nullptr || state == nullptr) return TV_ERR_NULL;
   tv_status status = tv::check_sized(state);
-  if (status == TV_OK) status = tv::check_odometry_image(*odometry, *image);
+  if (status == TV_OK) status = tv::check_camera_image(odometry->camera.model, *image);
   if (status != TV_OK) return status;
   if (tv::overlap(state, state->struct_size, image, sizeof *image) ||
-      tv::overlaps_image(*state, *image)) {
+      tv::overlap(state, state->struct_size, image->data, tv::image_bytes(*image))) {
     return TV_ERR_OVERLAP;
   }
   tv_odometry_state packed{};

@@ -37,6 +37,17 @@ tv_status check_mask(const tv_image* mask, const tv_image& image) {
   return same_size && is_stride(mask->stride_bytes, mask->width) ? TV_OK : TV_ERR_ARGUMENT;
 }
 
+tv_status check_camera_image(const tv_camera& camera, const tv_image& image) {
+  if (image.data == nullptr) return TV_ERR_NULL;
+  if (image.width != camera.width || image.height != camera.height) return TV_ERR_CAMERA;
+  return is_stride(image.stride_bytes, image.width) ? TV_OK : TV_ERR_ARGUMENT;
+}
+
+size_t image_bytes(const tv_image& image) {
+  return static_cast<size_t>(image.height - 1) * static_cast<size_t>(image.stride_bytes) +
+         static_cast<size_t>(image.width);
+}
+
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked) {
   tv_feature_options_init(checked);

@@ -20,6 +20,13 @@ tv_status check_image(const tv_context& context, const tv_image* image);
 // Whether a mask is null or a valid image of the same size.
 tv_status check_mask(const tv_image* mask, const tv_image& image);
 
+// Whether an image has its data, its camera's size and a valid stride: TV_ERR_NULL, TV_ERR_CAMERA
+// or TV_ERR_ARGUMENT.
+tv_status check_camera_image(const tv_camera& camera, const tv_image& image);
+
+// How many bytes an image spans, from its first pixel to its last.
+size_t image_bytes(const tv_image& image);
+
 // Copies the options (or the defaults for null) after checking them.
 tv_status read_feature_options(const tv_context& context, const tv_feature_options* options,
                                tv_feature_options* checked);

@@ -84,9 +84,9 @@ struct tv_odometry {
   int32_t status;
   int32_t lost_frames, turned_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
+  tv::MapCheck check;
   // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
   // saw one plane only, or contradicted the map.
-  tv::MapCheck check;
   int32_t confirmed_id;
   bool is_doubtful;
   bool is_locating;  // a frame of tv_odometry_locate, which does not change the map

@@ -339,6 +339,7 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
   odometry->reference_id = odometry->map.keyframes[newest].id;
   odometry->confirmed_id = odometry->reference_id;
   odometry->is_doubtful = false;
+  odometry->check = MapCheck{};
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   measure_depth(odometry, *frame);
