@@ -10,8 +10,10 @@ bare_base() {
   [ ! -d "$base" ] || return 0
   [ "$(id -u)" = 0 ] || { echo "$0: chroots need root" >&2; exit 2; }
   command -v debootstrap >/dev/null || { echo "$0: no debootstrap: scripts/bootstrap release" >&2; exit 2; }
-  mirror=$(cat /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list 2>/dev/null |
-    sed -nE 's/^(URIs:|deb) +//p' | head -1 | cut -d' ' -f1)
+  # Of the two files a Debian has one, or both.
+  mirror=$({ cat /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list 2>/dev/null || true; } |
+    sed -nE 's/^(URIs:|deb) +//p' | sed -n '1s/ .*//;1p')
+  [ -n "$mirror" ] || { echo "$0: no mirror in /etc/apt" >&2; exit 2; }
   echo "making a bare Debian 12 in $base"
   mkdir -p "$TWOVIEW_ROOTS"
   rm -rf --one-file-system "$base.part"
