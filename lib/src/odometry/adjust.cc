@@ -64,21 +64,14 @@ void add_view(const Map& map, int32_t keyframe, bool fixed, Around* around) {
   view->fixed = fixed;
 }
 
-// The indices of at most `count` keyframes with the largest numbers above `least`, the later of
-// equal ones first.
-int32_t largest(const int32_t* numbers, int32_t num, int32_t least, int32_t count,
-                int32_t* chosen) {
-  int32_t num_chosen = 0;
-  for (int32_t k = num - 1; k >= 0; --k) {
-    if (numbers[k] < least) continue;
-    int32_t at = num_chosen;
-    while (at > 0 && numbers[chosen[at - 1]] < numbers[k]) --at;
-    if (at >= count) continue;
-    num_chosen = std::min(num_chosen + 1, count);
-    for (int32_t i = num_chosen - 1; i > at; --i) chosen[i] = chosen[i - 1];
-    chosen[at] = k;
+// How many marked points each keyframe of a segment sees; 0 for those of other segments. A keyframe
+// whose number is -1 is left out.
+void count_marked_of(const Map& map, int32_t segment, int32_t* numbers) {
+  for (int32_t k = 0; k < map.num_keyframes; ++k) {
+    if (numbers[k] == -1) continue;
+    const MapKeyframe& keyframe = map.keyframes[k];
+    numbers[k] = keyframe.segment == segment ? count_marked(map, keyframe) : 0;
   }
-  return num_chosen;
 }
 
 void add_observations(const Map& map, int32_t view, int32_t most, Around* around) {
@@ -123,7 +116,6 @@ int32_t* choose_adjusted(Odometry* odometry, int32_t keyframe, Around* around) {
   const int32_t window = odometry->options.window;
   int32_t* chosen = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(window) + 1);
   count_shared(odometry, keyframe, around->shared);
-  around->shared[keyframe] = 1 << 30;
   around->num_adjusted =
       largest(around->shared, odometry->map.num_keyframes, kLeastShared, window, chosen);
   std::sort(chosen, chosen + around->num_adjusted);
@@ -243,20 +235,27 @@ size_t adjust_bytes(const tv_odometry_options& o) {
 }
 
 void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared) {
-  Map& map = odometry->map;
-  const int32_t mark = ++odometry->mark;
-  const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
-  for (int32_t i = 0; i < map.keyframes[keyframe].num_keypoints; ++i) {
-    if (own[i].point != kNoPoint) map.points[own[i].point].mark = mark;
+  Map* map = &odometry->map;
+  clear_marks(map);
+  mark_points_of(map, map->keyframes[keyframe]);
+  std::fill_n(shared, map->num_keyframes, 0);
+  count_marked_of(*map, map->keyframes[keyframe].segment, shared);
+  shared[keyframe] = 1 << 30;
+}
+
+int32_t largest(const int32_t* numbers, int32_t num, int32_t least, int32_t count,
+                int32_t* chosen) {
+  int32_t num_chosen = 0;
+  for (int32_t k = num - 1; k >= 0; --k) {
+    if (numbers[k] < least) continue;
+    int32_t at = num_chosen;
+    while (at > 0 && numbers[chosen[at - 1]] < numbers[k]) --at;
+    if (at >= count) continue;
+    num_chosen = std::min(num_chosen + 1, count);
+    for (int32_t i = num_chosen - 1; i > at; --i) chosen[i] = chosen[i - 1];
+    chosen[at] = k;
   }
-  for (int32_t k = 0; k < map.num_keyframes; ++k) {
-    shared[k] = 0;
-    if (map.keyframes[k].segment != map.keyframes[keyframe].segment) continue;
-    const MapKeypoint* other = keypoints_of(map, map.keyframes[k]);
-    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
-      shared[k] += other[i].point != kNoPoint && map.points[other[i].point].mark == mark;
-    }
-  }
+  return num_chosen;
 }
 
 bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance[36]) {
@@ -307,15 +306,9 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   }
   add_points(*odometry, &around);
   // The other keyframes that see the points are held.
-  for (int32_t k = 0; k < map.num_keyframes; ++k) {
-    if (shared[k] == -1) continue;
-    shared[k] = 0;
-    if (map.keyframes[k].segment != segment) continue;
-    const MapKeypoint* own = keypoints_of(map, map.keyframes[k]);
-    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
-      shared[k] += own[i].point != kNoPoint && around.numbers[own[i].point] >= 0;
-    }
-  }
+  clear_marks(&map);
+  for (int32_t n = 0; n < around.window.num_points; ++n) mark_point(&map, around.places[n]);
+  count_marked_of(map, segment, shared);
   const int32_t num_held = largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
   for (int32_t k = 0; k < num_held; ++k) add_view(map, chosen[k], true, &around);
   add_all_observations(*odometry, &around);

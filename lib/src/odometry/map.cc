@@ -16,6 +16,8 @@ size_t num_described(const MapSizes& sizes) {
   return as_size(kDescribedKeyframes) * as_size(sizes.max_keypoints) * TV_DESCRIPTOR_BYTES;
 }
 
+size_t num_marks(const MapSizes& sizes) { return 1 + (as_size(sizes.max_points) + 31) / 32; }
+
 void release_point(Map* map, int32_t point) {
   map->points[point].id = -1;
   map->free_points[map->num_free_points++] = point;
@@ -30,6 +32,7 @@ size_t map_bytes(const MapSizes& sizes) {
          arena_bytes<MapKeypoint>(num_map_keypoints(sizes)) +
          arena_bytes<int32_t>(as_size(sizes.max_keyframes)) + arena_bytes<MapPoint>(points) +
          arena_bytes<uint8_t>(points * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(points) +
+         arena_bytes<uint32_t>(num_marks(sizes)) +
          arena_bytes<uint8_t>(num_described(sizes)) +
          arena_bytes<RemovedKeyframe>(as_size(max_removed(sizes)));
 }
@@ -43,6 +46,7 @@ void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   map->points = arena_alloc<MapPoint>(arena, points);
   map->point_descriptors = arena_alloc<uint8_t>(arena, points * TV_DESCRIPTOR_BYTES);
   map->free_points = arena_alloc<int32_t>(arena, points);
+  map->marks = arena_alloc<uint32_t>(arena, num_marks(sizes));
   map->descriptors = arena_alloc<uint8_t>(arena, num_described(sizes));
   map->removed = arena_alloc<RemovedKeyframe>(arena, as_size(max_removed(sizes)));
   clear_map(map);
@@ -56,6 +60,22 @@ void clear_map(Map* map) {
     map->free_rooms[k] = map->num_free_rooms - 1 - k;
   }
   map->num_free_points = 0;
+}
+
+void clear_marks(Map* map) { std::fill_n(map->marks, num_marks(map->sizes), 0u); }
+
+void mark_points_of(Map* map, const MapKeyframe& keyframe) {
+  const MapKeypoint* own = keypoints_of(*map, keyframe);
+  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
+    if (own[i].point != kNoPoint) mark_point(map, own[i].point);
+  }
+}
+
+int32_t count_marked(const Map& map, const MapKeyframe& keyframe) {
+  const MapKeypoint* own = keypoints_of(map, keyframe);
+  int32_t num = 0;
+  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) num += is_marked(map, own[i].point);
+  return num;
 }
 
 int32_t find_keyframe(const Map& map, int32_t id) {
