@@ -52,6 +52,8 @@ struct Radial {
 Radial brown_radial(const double k[8], double u) {
   const double numerator = 1.0 + u * (k[0] + u * (k[1] + u * k[4]));
   const double d_numerator = k[0] + u * (2.0 * k[1] + u * (3.0 * k[4]));
+  // Without a denominator the division by 1 would change no bit; 0 times infinity is no number.
+  if (k[5] == 0.0 && k[6] == 0.0 && k[7] == 0.0) return {numerator, d_numerator - numerator * 0.0};
   const double denominator = 1.0 + u * (k[5] + u * (k[6] + u * k[7]));
   const double d_denominator = k[5] + u * (2.0 * k[6] + u * (3.0 * k[7]));
   if (!(denominator > 0.0)) return {std::numeric_limits<double>::quiet_NaN(), 0.0};
