@@ -118,7 +118,11 @@ int32_t* choose_adjusted(Odometry* odometry, int32_t keyframe, Around* around) {
   count_shared(odometry, keyframe, around->shared);
   around->num_adjusted =
       largest(around->shared, odometry->map.num_keyframes, kLeastShared, window, chosen);
-  std::sort(chosen, chosen + around->num_adjusted);
+  for (int32_t i = 1; i < around->num_adjusted; ++i) {  // few: std::sort is half a kilobyte
+    for (int32_t k = i; k > 0 && chosen[k] < chosen[k - 1]; --k) {
+      std::swap(chosen[k], chosen[k - 1]);
+    }
+  }
   return chosen;
 }
 
