@@ -98,7 +98,7 @@ size_t plan_bytes(const Plan& plan) {
 void start_anew(tv_odometry* o) {
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
-  o->local_id = o->reference_id = o->confirmed_id = -1;
+  o->local_id = o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
   o->is_doubtful = false;
   o->check = MapCheck{};
   o->has_motion = false;

@@ -84,6 +84,8 @@ struct tv_odometry {
   int32_t status;
   int32_t lost_frames, turned_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
+  int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
+  bool closed_loop;          // with it
   tv::MapCheck check;
   // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
   // saw one plane only, or contradicted the map.
