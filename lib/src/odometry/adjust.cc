@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/vector3.h"
+#include "odometry/window.h"
 
 namespace tv {
 namespace {
@@ -34,9 +35,7 @@ tv_window largest_window(const tv_odometry_options& options) {
 
 size_t window_bytes(const tv_odometry_options& options) {
   const tv_window window = largest_window(options);
-  size_t bytes = 0;
-  tv_adjust_window_size(&window, &bytes);
-  return bytes;
+  return window_scratch_bytes(window);
 }
 
 // What is adjusted, with the arrays that tv_window points to.
@@ -49,6 +48,7 @@ struct Around {
   int32_t* numbers;  // of each place in the map: its point here, or -1
   tv_observation* observations;
   int32_t* keypoints;    // of each observation
+  double* planes;        // two of each observation, as adjust_window takes them
   int32_t* shared;       // for each keyframe, how many points it shares with the one in the middle
   int32_t num_adjusted;  // views; the other ones are held
 };
@@ -74,7 +74,8 @@ void count_marked_of(const Map& map, int32_t segment, int32_t* numbers) {
   }
 }
 
-void add_observations(const Map& map, int32_t view, int32_t most, Around* around) {
+void add_observations(const Odometry& odometry, int32_t view, int32_t most, Around* around) {
+  const Map& map = odometry.map;
   const MapKeyframe& keyframe = map.keyframes[around->keyframes[view]];
   const MapKeypoint* own = keypoints_of(map, keyframe);
   for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
@@ -89,6 +90,13 @@ void add_observations(const Map& map, int32_t view, int32_t most, Around* around
     o->pixel[1] = static_cast<double>(own[i].y);
     o->sigma = static_cast<float>(sigma_of(own[i]));
     around->keypoints[n] = i;
+    Vec2 plane(__builtin_nan(""), 0);
+    double* known = keyframe.described < 0 ? plane.data() : planes_of(map, keyframe) + 2 * i;
+    if (keyframe.described >= 0 && !(known[0] == known[0]) &&
+        undistort(odometry.camera, Vec2(o->pixel[0], o->pixel[1]), &plane)) {
+      std::copy_n(plane.data(), 2, known);
+    }
+    std::copy_n(known, 2, around->planes + 2 * n);
   }
 }
 
@@ -107,6 +115,7 @@ Around make_around(Odometry* odometry) {
   around.numbers = arena_alloc<int32_t>(arena, static_cast<size_t>(options.max_points));
   around.observations = arena_alloc<tv_observation>(arena, observations);
   around.keypoints = arena_alloc<int32_t>(arena, observations);
+  around.planes = arena_alloc<double>(arena, 2 * observations);
   around.shared = arena_alloc<int32_t>(arena, static_cast<size_t>(odometry->map.num_keyframes));
   return around;
 }
@@ -148,7 +157,7 @@ void add_points(const Odometry& odometry, Around* around) {
 
 void add_all_observations(const Odometry& odometry, Around* around) {
   for (int32_t v = 0; v < around->window.num_views; ++v) {
-    add_observations(odometry.map, v, most_observations(odometry.options), around);
+    add_observations(odometry, v, most_observations(odometry.options), around);
   }
 }
 
@@ -180,12 +189,8 @@ bool solve_window(Odometry* odometry, int32_t max_iterations, Around* around, do
   tv_window_options_init(&how);
   how.max_iterations = max_iterations;
   how.tolerance = 1e-4;
-  size_t bytes = 0;
-  tv_adjust_window_size(&window, &bytes);
-  void* memory = arena_alloc<uint8_t>(odometry->scratch, bytes);
-  tv_window_result_init(result);
-  return memory != nullptr &&
-         tv_adjust_window(&window, &how, memory, bytes, covariances, errors, result) == TV_OK;
+  *result = tv_window_result{};
+  return adjust_window(window, how, around->planes, odometry->scratch, covariances, errors, result);
 }
 
 // Sets how uncertain the points' depths are from the largest angle between the rays to them.
@@ -232,6 +237,7 @@ size_t adjust_bytes(const tv_odometry_options& o) {
          arena_bytes<int32_t>(keyframes) + arena_bytes<double>(3 * points) +
          arena_bytes<int32_t>(points) + arena_bytes<int32_t>(static_cast<size_t>(o.max_points)) +
          arena_bytes<tv_observation>(observations) + arena_bytes<int32_t>(observations) +
+         arena_bytes<double>(2 * observations) +
          arena_bytes<float>(observations) + arena_bytes<double>(36 * views) +
          arena_bytes<tv_gravity_prior>(views) +
          arena_bytes<uint8_t>(static_cast<size_t>(o.max_points)) +  // of remove_lone_points

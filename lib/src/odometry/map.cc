@@ -18,6 +18,10 @@ size_t num_described(const MapSizes& sizes) {
 
 size_t num_marks(const MapSizes& sizes) { return 1 + (as_size(sizes.max_points) + 31) / 32; }
 
+size_t num_planes(const MapSizes& sizes) {
+  return 2 * as_size(kDescribedKeyframes) * as_size(sizes.max_keypoints);
+}
+
 void release_point(Map* map, int32_t point) {
   map->points[point].id = -1;
   map->free_points[map->num_free_points++] = point;
@@ -33,7 +37,7 @@ size_t map_bytes(const MapSizes& sizes) {
          arena_bytes<int32_t>(as_size(sizes.max_keyframes)) + arena_bytes<MapPoint>(points) +
          arena_bytes<uint8_t>(points * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(points) +
          arena_bytes<uint32_t>(num_marks(sizes)) +
-         arena_bytes<uint8_t>(num_described(sizes)) +
+         arena_bytes<uint8_t>(num_described(sizes)) + arena_bytes<double>(num_planes(sizes)) +
          arena_bytes<RemovedKeyframe>(as_size(max_removed(sizes)));
 }
 
@@ -48,6 +52,7 @@ void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   map->free_points = arena_alloc<int32_t>(arena, points);
   map->marks = arena_alloc<uint32_t>(arena, num_marks(sizes));
   map->descriptors = arena_alloc<uint8_t>(arena, num_described(sizes));
+  map->planes = arena_alloc<double>(arena, num_planes(sizes));
   map->removed = arena_alloc<RemovedKeyframe>(arena, as_size(max_removed(sizes)));
   clear_map(map);
 }
@@ -109,6 +114,7 @@ int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* desc
     own[k] = {keypoints[k].x, keypoints[k].y, keypoints[k].size, kNoPoint};
   }
   std::memcpy(descriptors_of(*map, *keyframe), descriptors, as_size(num) * TV_DESCRIPTOR_BYTES);
+  std::fill_n(planes_of(*map, *keyframe), 2 * num, __builtin_nan(""));
   return idx;
 }
 

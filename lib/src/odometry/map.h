@@ -69,6 +69,8 @@ struct Map {
   int32_t* free_points;
   int32_t num_free_points;
   uint8_t* descriptors;  // kDescribedKeyframes times max_keypoints times TV_DESCRIPTOR_BYTES
+  double* planes;  // as many times two: where each keypoint's ray meets the plane z = 1, once it was
+                   // computed for a window, else not a number
   int32_t next_described;
   RemovedKeyframe* removed;  // in ascending order of id
   int32_t num_removed;
@@ -94,6 +96,11 @@ inline MapKeypoint* keypoints_of(const Map& map, const MapKeyframe& keyframe) {
 inline uint8_t* descriptors_of(const Map& map, const MapKeyframe& keyframe) {
   return map.descriptors + static_cast<size_t>(keyframe.described) *
                                static_cast<size_t>(map.sizes.max_keypoints) * TV_DESCRIPTOR_BYTES;
+}
+
+inline double* planes_of(const Map& map, const MapKeyframe& keyframe) {
+  return map.planes + 2 * static_cast<size_t>(keyframe.described) *
+                          static_cast<size_t>(map.sizes.max_keypoints);
 }
 
 inline uint8_t* descriptor_of(const Map& map, int32_t point) {
