@@ -237,9 +237,8 @@ size_t adjust_bytes(const tv_odometry_options& o) {
          arena_bytes<int32_t>(keyframes) + arena_bytes<double>(3 * points) +
          arena_bytes<int32_t>(points) + arena_bytes<int32_t>(static_cast<size_t>(o.max_points)) +
          arena_bytes<tv_observation>(observations) + arena_bytes<int32_t>(observations) +
-         arena_bytes<double>(2 * observations) +
-         arena_bytes<float>(observations) + arena_bytes<double>(36 * views) +
-         arena_bytes<tv_gravity_prior>(views) +
+         arena_bytes<double>(2 * observations) + arena_bytes<float>(observations) +
+         arena_bytes<double>(36 * views) + arena_bytes<tv_gravity_prior>(views) +
          arena_bytes<uint8_t>(static_cast<size_t>(o.max_points)) +  // of remove_lone_points
          arena_bytes<uint8_t>(window_bytes(o));
 }

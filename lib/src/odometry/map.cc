@@ -36,8 +36,8 @@ size_t map_bytes(const MapSizes& sizes) {
          arena_bytes<MapKeypoint>(num_map_keypoints(sizes)) +
          arena_bytes<int32_t>(as_size(sizes.max_keyframes)) + arena_bytes<MapPoint>(points) +
          arena_bytes<uint8_t>(points * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(points) +
-         arena_bytes<uint32_t>(num_marks(sizes)) +
-         arena_bytes<uint8_t>(num_described(sizes)) + arena_bytes<double>(num_planes(sizes)) +
+         arena_bytes<uint32_t>(num_marks(sizes)) + arena_bytes<uint8_t>(num_described(sizes)) +
+         arena_bytes<double>(num_planes(sizes)) +
          arena_bytes<RemovedKeyframe>(as_size(max_removed(sizes)));
 }
 

@@ -69,8 +69,8 @@ struct Map {
   int32_t* free_points;
   int32_t num_free_points;
   uint8_t* descriptors;  // kDescribedKeyframes times max_keypoints times TV_DESCRIPTOR_BYTES
-  double* planes;  // as many times two: where each keypoint's ray meets the plane z = 1, once it was
-                   // computed for a window, else not a number
+  double* planes;  // as many times two: where each keypoint's ray meets the plane z = 1, once it
+                   // was computed for a window, else not a number
   int32_t next_described;
   RemovedKeyframe* removed;  // in ascending order of id
   int32_t num_removed;
@@ -99,8 +99,8 @@ inline uint8_t* descriptors_of(const Map& map, const MapKeyframe& keyframe) {
 }
 
 inline double* planes_of(const Map& map, const MapKeyframe& keyframe) {
-  return map.planes + 2 * static_cast<size_t>(keyframe.described) *
-                          static_cast<size_t>(map.sizes.max_keypoints);
+  return map.planes +
+         2 * static_cast<size_t>(keyframe.described) * static_cast<size_t>(map.sizes.max_keypoints);
 }
 
 inline uint8_t* descriptor_of(const Map& map, int32_t point) {
@@ -110,8 +110,8 @@ inline uint8_t* descriptor_of(const Map& map, int32_t point) {
 // The index of the keyframe of this id among the keyframes; -1 where the map has none.
 int32_t find_keyframe(const Map& map, int32_t id);
 
-// A set of points that passes over the map build up and ask for: a bit each, because they go through
-// all keypoints of all keyframes.
+// A set of points that passes over the map build up and ask for: a bit each, because they go
+// through all keypoints of all keyframes.
 void clear_marks(Map* map);
 inline void mark_point(Map* map, int32_t point) {
   map->marks[1 + (point >> 5)] |= uint32_t{1} << (point & 31);

@@ -41,8 +41,8 @@ inline bool is_before(const SightingInput& in, const SortKey& a, const SortKey& 
   return a.key != b.key ? a.key < b.key : is_before(in, a.index, b.index);
 }
 
-// Sorts by merging runs, which is as fast as std::sort and a kilobyte shorter. Behind the keys there
-// is room for as many more.
+// Sorts by merging runs, which is as fast as std::sort and a kilobyte shorter. Behind the keys
+// there is room for as many more.
 void sort(const SightingInput& in, SortKey* keys, int count) {
   SortKey *from = keys, *to = keys + count;
   for (int length = 1; length < count; length *= 2) {
