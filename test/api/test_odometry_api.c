@@ -415,6 +415,25 @@ static void test_the_last_frame_is_shown(void) {
   TEST_ASSERT_EQUAL_INT(0, num);
 }
 
+/* So that no call takes the time of a new keyframe and that of its adjustment. */
+static void test_a_keyframe_is_adjusted_when_the_next_frame_comes(void) {
+  tv_keyframe tracked, adjusted;
+  int32_t newest;
+  fly(odometry, 4);
+  newest = state.num_keyframes - 1;
+  tv_keyframe_init(&tracked);
+  tv_keyframe_init(&adjusted);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &tracked));
+  TEST_ASSERT_EQUAL_INT(num_flown - 1, tracked.frame);
+  TEST_ASSERT_EQUAL_INT(tracked.id, state.reference_id);
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown));
+  TEST_ASSERT_FALSE(state.is_keyframe);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &adjusted));
+  TEST_ASSERT_EQUAL_INT(tracked.id, adjusted.id);
+  TEST_ASSERT_TRUE(memcmp(&tracked.world_from_cam_t, &adjusted.world_from_cam_t,
+                          sizeof tracked.world_from_cam_t) != 0);
+}
+
 static void test_accessors_refuse_bad_arguments(void) {
   tv_keyframe keyframe;
   int32_t num = 0, k;
@@ -931,6 +950,7 @@ int main(void) {
   RUN_TEST(test_covariances_hold_the_true_turns);
   RUN_TEST(test_points_have_covariances);
   RUN_TEST(test_the_last_frame_is_shown);
+  RUN_TEST(test_a_keyframe_is_adjusted_when_the_next_frame_comes);
   RUN_TEST(test_accessors_refuse_bad_arguments);
   RUN_TEST(test_poses_are_found_again_from_their_keyframes);
   RUN_TEST(test_a_frame_is_located_without_changing_the_map);

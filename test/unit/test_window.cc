@@ -83,8 +83,34 @@ tv::WindowObservation random_observation(Random* random, const tv_camera& model,
     given.sigma = static_cast<float>(random->uniform(0.5, 2));
     tv::WindowObservation o{};
     if (tv_camera_unproject(&model, given.pixel, ray, nullptr) == TV_OK &&
-        tv::make_observation(camera, given, &o)) {
+        tv::make_observation(camera, given, nullptr, &o)) {
       return o;
+    }
+  }
+}
+
+// Where the ray is known, the lens is not inverted again, and the bytes are the same.
+void test_a_known_ray_gives_the_same_observation() {
+  Random random(7);
+  for (const tv_camera& model : {window_scene::pinhole(), brown(), fisheye()}) {
+    const tv::Camera camera = tv::prepare_camera(model);
+    for (int k = 0; k < 200; ++k) {
+      tv_observation given{};
+      given.pixel[0] = random.uniform(5, model.width - 6);
+      given.pixel[1] = random.uniform(5, model.height - 6);
+      given.sigma = 1.5f;
+      tv::Vec2 plane(0, 0);
+      const bool known = tv::undistort(camera, tv::Vec2(given.pixel[0], given.pixel[1]), &plane);
+      TEST_ASSERT_EQUAL(model.model != TV_CAMERA_KANNALA_BRANDT, known);
+      if (!known) continue;
+      tv::WindowObservation o{}, from_plane{};
+      TEST_ASSERT_TRUE(tv::make_observation(camera, given, nullptr, &o));
+      TEST_ASSERT_TRUE(tv::make_observation(camera, given, plane.data(), &from_plane));
+      TEST_ASSERT_EQUAL_MEMORY(&o, &from_plane, sizeof o);
+      if (model.model != TV_CAMERA_BROWN_CONRADY) continue;
+      plane[0] += 1e-3;  // it is the plane that is read
+      TEST_ASSERT_TRUE(tv::make_observation(camera, given, plane.data(), &from_plane));
+      TEST_ASSERT_TRUE(std::memcmp(&o, &from_plane, sizeof o) != 0);
     }
   }
 }
@@ -717,6 +743,7 @@ void test_a_linearised_lens_gives_the_poses_of_the_lens() {
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_a_known_ray_gives_the_same_observation);
   RUN_TEST(test_a_residual_is_the_projection_near_its_pixel);
   RUN_TEST(test_derivatives_of_an_observation_agree_with_differences);
   RUN_TEST(test_derivatives_of_priors_agree_with_differences);

@@ -204,7 +204,9 @@ TV_API tv_status tv_odometry_init(tv_odometry **odometry, const tv_camera *camer
    TV_ERR_NULL. */
 TV_API tv_status tv_odometry_reset(tv_odometry *odometry);
 
-/* Tracks a frame, and extends and adjusts the map.
+/* Tracks a frame, and extends the map. A frame that becomes a keyframe (is_keyframe) is adjusted
+   with its surroundings at the beginning of the next call, so that no call takes the time of both;
+   until then the map holds it as it was tracked.
    frame: initialised by tv_odometry_frame_init. An attitude, a height or a velocity that is not
    finite, and an attitude that is not a rotation, are left out of account; the call succeeds.
    state: initialised by tv_odometry_state_init. That the pose is not known is TV_OK, and reported

@@ -12,6 +12,8 @@
 namespace tv {
 namespace {
 
+constexpr uint32_t kSigmaSlots = 8;  // levels of keypoints, modulo this
+
 constexpr tv_feature_options kDefaults = {
     sizeof(tv_feature_options), 0,    12, 15, 3, 4, 1.41f, 48, 1, TV_ORIENTATION_GRADIENT,
     TV_NORMALISATION_ROOTSIFT,  4.0f, 0,  0};
@@ -221,10 +223,18 @@ tv_status tv_keypoint_sigmas(const tv_keypoint* keypoints, int32_t num_keypoints
   if (tv::overlap(sigmas, n * sizeof(float), keypoints, n * sizeof(tv_keypoint))) {
     return TV_ERR_OVERLAP;
   }
+  // Keypoints of a level have the same size: the last one of each level gives the next one's sigma.
+  float sizes[tv::kSigmaSlots] = {}, of_sizes[tv::kSigmaSlots] = {};
   for (size_t k = 0; k < n; ++k) {
-    const double ratio = static_cast<double>(keypoints[k].size) / size_of_one;
-    const float sigma = static_cast<float>(tv::exp(exponent * tv::log(ratio)));
-    sigmas[k] = std::max(tv::kLeastSigma, std::min(sigma, tv::kLargestSigma));
+    const float size = keypoints[k].size;
+    const uint32_t slot = static_cast<uint32_t>(keypoints[k].level) % tv::kSigmaSlots;
+    if (!(size == sizes[slot])) {
+      const double ratio = static_cast<double>(size) / size_of_one;
+      const float sigma = static_cast<float>(tv::exp(exponent * tv::log(ratio)));
+      sizes[slot] = size;
+      of_sizes[slot] = std::max(tv::kLeastSigma, std::min(sigma, tv::kLargestSigma));
+    }
+    sigmas[k] = of_sizes[slot];
   }
   return TV_OK;
 }

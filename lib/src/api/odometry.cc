@@ -98,11 +98,11 @@ size_t plan_bytes(const Plan& plan) {
 void start_anew(tv_odometry* o) {
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
-  o->reference_id = o->confirmed_id = -1;
+  o->local_id = o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
   o->is_doubtful = false;
   o->check = MapCheck{};
   o->has_motion = false;
-  o->mark = o->num_frames = o->segment = o->num_segments = 0;
+  o->num_frames = o->segment = o->num_segments = 0;
   o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
       o->next_loop = 0;
   o->status = TV_ODOMETRY_STARTING;

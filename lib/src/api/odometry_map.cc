@@ -7,6 +7,7 @@
 #include "odometry/adjust.h"
 #include "odometry/loop.h"
 #include "odometry/map_bytes.h"
+#include "odometry/track.h"
 #include "twoview/odometry.h"
 
 namespace tv {
@@ -180,8 +181,10 @@ tv_status tv_odometry_add(tv_odometry* odometry, const uint8_t* bytes, size_t nu
   if (tv::overlap(num_joined, sizeof *num_joined, bytes, num_bytes)) return TV_ERR_OVERLAP;
   const int32_t num_keyframes = odometry->map.num_keyframes;
   const tv_status status = tv::read_map(bytes, num_bytes, false, odometry);
-  if (status == TV_OK) *num_joined = tv::join_segments(odometry, num_keyframes);
-  return status;
+  if (status != TV_OK) return status;
+  tv::finish_keyframe(odometry, &odometry->frame);
+  *num_joined = tv::join_segments(odometry, num_keyframes);
+  return TV_OK;
 }
 
 tv_status tv_odometry_set_clock(tv_odometry* odometry, tv_clock now_ns, void* user) {

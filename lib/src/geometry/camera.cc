@@ -52,6 +52,8 @@ struct Radial {
 Radial brown_radial(const double k[8], double u) {
   const double numerator = 1.0 + u * (k[0] + u * (k[1] + u * k[4]));
   const double d_numerator = k[0] + u * (2.0 * k[1] + u * (3.0 * k[4]));
+  // Without a denominator the division by 1 would change no bit; 0 times infinity is no number.
+  if (k[5] == 0.0 && k[6] == 0.0 && k[7] == 0.0) return {numerator, d_numerator - numerator * 0.0};
   const double denominator = 1.0 + u * (k[5] + u * (k[6] + u * k[7]));
   const double d_denominator = k[5] + u * (2.0 * k[6] + u * (3.0 * k[7]));
   if (!(denominator > 0.0)) return {std::numeric_limits<double>::quiet_NaN(), 0.0};
@@ -347,25 +349,28 @@ bool brown_invert_safe(const Camera& camera, const Point2& target, double target
   return true;
 }
 
-bool unproject_central(const Camera& camera, const Point2& target, Vec3* ray, Mat32* jacobian) {
-  const tv_camera& model = camera.model;
+bool undistort_central(const Camera& camera, const Point2& target, Point2* p) {
   const double target_sq = target.x * target.x + target.y * target.y;
   const double limit = camera.valid_radius_distorted * kEdgeSlack;
   if (!(target_sq <= limit * limit)) return false;
-  Point2 p = target;
-  if (model.model == TV_CAMERA_BROWN_CONRADY) {
+  *p = target;
+  if (camera.model.model == TV_CAMERA_BROWN_CONRADY) {
     // The results of both inversions lie within the valid disc, up to a last step of 1e-11.
-    if (!brown_invert_fast(camera, target, target_sq, &p) &&
-        !brown_invert_safe(camera, target, target_sq, &p)) {
+    if (!brown_invert_fast(camera, target, target_sq, p) &&
+        !brown_invert_safe(camera, target, target_sq, p)) {
       return false;
     }
   }
-  const double length_sq = 1.0 + p.x * p.x + p.y * p.y;
-  if (!(length_sq < kInfinity)) return false;
-  const double inverse = 1.0 / std::sqrt(length_sq);
-  const double x = p.x * inverse, y = p.y * inverse, z = inverse;
-  *ray = Vec3(x, y, z);
+  return 1.0 + p->x * p->x + p->y * p->y < kInfinity;
+}
+
+bool unproject_central(const Camera& camera, const Point2& target, Vec3* ray, Mat32* jacobian) {
+  const tv_camera& model = camera.model;
+  Point2 p;
+  if (!undistort_central(camera, target, &p)) return false;
+  *ray = ray_through(Vec2(p.x, p.y));
   if (jacobian) {
+    const double x = (*ray)[0], y = (*ray)[1], z = (*ray)[2], inverse = z;
     Symmetric2 d{1.0, 0.0, 1.0};
     if (model.model == TV_CAMERA_BROWN_CONRADY) brown_distort(model.k, p, &d);
     const double det = d.xx * d.yy - d.xy * d.xy;
@@ -457,9 +462,28 @@ bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobi
   return ok;
 }
 
+static Point2 in_focal_lengths(const tv_camera& model, const Vec2& pixel) {
+  return {(pixel[0] - model.cx) / model.fx, (pixel[1] - model.cy) / model.fy};
+}
+
+bool undistort(const Camera& camera, const Vec2& pixel, Vec2* plane) {
+  Point2 p;
+  if (camera.model.model == TV_CAMERA_KANNALA_BRANDT ||
+      !undistort_central(camera, in_focal_lengths(camera.model, pixel), &p)) {
+    return false;
+  }
+  *plane = Vec2(p.x, p.y);
+  return true;
+}
+
+Vec3 ray_through(const Vec2& plane) {
+  const double inverse = 1.0 / std::sqrt(1.0 + plane[0] * plane[0] + plane[1] * plane[1]);
+  return Vec3(plane[0] * inverse, plane[1] * inverse, inverse);
+}
+
 bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobian) {
   const tv_camera& model = camera.model;
-  const Point2 target{(pixel[0] - model.cx) / model.fx, (pixel[1] - model.cy) / model.fy};
+  const Point2 target = in_focal_lengths(model, pixel);
   return model.model == TV_CAMERA_KANNALA_BRANDT ? unproject_kannala(camera, target, ray, jacobian)
                                                  : unproject_central(camera, target, ray, jacobian);
 }

@@ -41,4 +41,9 @@ Camera prepare_camera(const tv_camera& camera);
 bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobian);
 bool unproject(const Camera& camera, const Vec2& pixel, Vec3* ray, Mat32* jacobian);
 
+// unproject in two steps: where the pixel's ray meets the plane z = 1, and the unit ray to there.
+// undistort returns false for Kannala-Brandt, too.
+bool undistort(const Camera& camera, const Vec2& pixel, Vec2* plane);
+Vec3 ray_through(const Vec2& plane);
+
 }  // namespace tv

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/vector3.h"
+#include "odometry/window.h"
 
 namespace tv {
 namespace {
@@ -34,9 +35,7 @@ tv_window largest_window(const tv_odometry_options& options) {
 
 size_t window_bytes(const tv_odometry_options& options) {
   const tv_window window = largest_window(options);
-  size_t bytes = 0;
-  tv_adjust_window_size(&window, &bytes);
-  return bytes;
+  return window_scratch_bytes(window);
 }
 
 // What is adjusted, with the arrays that tv_window points to.
@@ -49,6 +48,7 @@ struct Around {
   int32_t* numbers;  // of each place in the map: its point here, or -1
   tv_observation* observations;
   int32_t* keypoints;    // of each observation
+  double* planes;        // two of each observation, as adjust_window takes them
   int32_t* shared;       // for each keyframe, how many points it shares with the one in the middle
   int32_t num_adjusted;  // views; the other ones are held
 };
@@ -64,24 +64,18 @@ void add_view(const Map& map, int32_t keyframe, bool fixed, Around* around) {
   view->fixed = fixed;
 }
 
-// The indices of at most `count` keyframes with the largest numbers above `least`, the later of
-// equal ones first.
-int32_t largest(const int32_t* numbers, int32_t num, int32_t least, int32_t count,
-                int32_t* chosen) {
-  int32_t num_chosen = 0;
-  for (int32_t k = num - 1; k >= 0; --k) {
-    if (numbers[k] < least) continue;
-    int32_t at = num_chosen;
-    while (at > 0 && numbers[chosen[at - 1]] < numbers[k]) --at;
-    if (at >= count) continue;
-    num_chosen = std::min(num_chosen + 1, count);
-    for (int32_t i = num_chosen - 1; i > at; --i) chosen[i] = chosen[i - 1];
-    chosen[at] = k;
+// How many marked points each keyframe of a segment sees; 0 for those of other segments. A keyframe
+// whose number is -1 is left out.
+void count_marked_of(const Map& map, int32_t segment, int32_t* numbers) {
+  for (int32_t k = 0; k < map.num_keyframes; ++k) {
+    if (numbers[k] == -1) continue;
+    const MapKeyframe& keyframe = map.keyframes[k];
+    numbers[k] = keyframe.segment == segment ? count_marked(map, keyframe) : 0;
   }
-  return num_chosen;
 }
 
-void add_observations(const Map& map, int32_t view, int32_t most, Around* around) {
+void add_observations(const Odometry& odometry, int32_t view, int32_t most, Around* around) {
+  const Map& map = odometry.map;
   const MapKeyframe& keyframe = map.keyframes[around->keyframes[view]];
   const MapKeypoint* own = keypoints_of(map, keyframe);
   for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
@@ -96,6 +90,13 @@ void add_observations(const Map& map, int32_t view, int32_t most, Around* around
     o->pixel[1] = static_cast<double>(own[i].y);
     o->sigma = static_cast<float>(sigma_of(own[i]));
     around->keypoints[n] = i;
+    Vec2 plane(__builtin_nan(""), 0);
+    double* known = keyframe.described < 0 ? plane.data() : planes_of(map, keyframe) + 2 * i;
+    if (keyframe.described >= 0 && !(known[0] == known[0]) &&
+        undistort(odometry.camera, Vec2(o->pixel[0], o->pixel[1]), &plane)) {
+      std::copy_n(plane.data(), 2, known);
+    }
+    std::copy_n(known, 2, around->planes + 2 * n);
   }
 }
 
@@ -114,6 +115,7 @@ Around make_around(Odometry* odometry) {
   around.numbers = arena_alloc<int32_t>(arena, static_cast<size_t>(options.max_points));
   around.observations = arena_alloc<tv_observation>(arena, observations);
   around.keypoints = arena_alloc<int32_t>(arena, observations);
+  around.planes = arena_alloc<double>(arena, 2 * observations);
   around.shared = arena_alloc<int32_t>(arena, static_cast<size_t>(odometry->map.num_keyframes));
   return around;
 }
@@ -123,10 +125,13 @@ int32_t* choose_adjusted(Odometry* odometry, int32_t keyframe, Around* around) {
   const int32_t window = odometry->options.window;
   int32_t* chosen = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(window) + 1);
   count_shared(odometry, keyframe, around->shared);
-  around->shared[keyframe] = 1 << 30;
   around->num_adjusted =
       largest(around->shared, odometry->map.num_keyframes, kLeastShared, window, chosen);
-  std::sort(chosen, chosen + around->num_adjusted);
+  for (int32_t i = 1; i < around->num_adjusted; ++i) {  // few: std::sort is half a kilobyte
+    for (int32_t k = i; k > 0 && chosen[k] < chosen[k - 1]; --k) {
+      std::swap(chosen[k], chosen[k - 1]);
+    }
+  }
   return chosen;
 }
 
@@ -152,7 +157,7 @@ void add_points(const Odometry& odometry, Around* around) {
 
 void add_all_observations(const Odometry& odometry, Around* around) {
   for (int32_t v = 0; v < around->window.num_views; ++v) {
-    add_observations(odometry.map, v, most_observations(odometry.options), around);
+    add_observations(odometry, v, most_observations(odometry.options), around);
   }
 }
 
@@ -184,12 +189,8 @@ bool solve_window(Odometry* odometry, int32_t max_iterations, Around* around, do
   tv_window_options_init(&how);
   how.max_iterations = max_iterations;
   how.tolerance = 1e-4;
-  size_t bytes = 0;
-  tv_adjust_window_size(&window, &bytes);
-  void* memory = arena_alloc<uint8_t>(odometry->scratch, bytes);
-  tv_window_result_init(result);
-  return memory != nullptr &&
-         tv_adjust_window(&window, &how, memory, bytes, covariances, errors, result) == TV_OK;
+  *result = tv_window_result{};
+  return adjust_window(window, how, around->planes, odometry->scratch, covariances, errors, result);
 }
 
 // Sets how uncertain the points' depths are from the largest angle between the rays to them.
@@ -236,27 +237,34 @@ size_t adjust_bytes(const tv_odometry_options& o) {
          arena_bytes<int32_t>(keyframes) + arena_bytes<double>(3 * points) +
          arena_bytes<int32_t>(points) + arena_bytes<int32_t>(static_cast<size_t>(o.max_points)) +
          arena_bytes<tv_observation>(observations) + arena_bytes<int32_t>(observations) +
-         arena_bytes<float>(observations) + arena_bytes<double>(36 * views) +
-         arena_bytes<tv_gravity_prior>(views) +
+         arena_bytes<double>(2 * observations) + arena_bytes<float>(observations) +
+         arena_bytes<double>(36 * views) + arena_bytes<tv_gravity_prior>(views) +
          arena_bytes<uint8_t>(static_cast<size_t>(o.max_points)) +  // of remove_lone_points
          arena_bytes<uint8_t>(window_bytes(o));
 }
 
 void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared) {
-  Map& map = odometry->map;
-  const int32_t mark = ++odometry->mark;
-  const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
-  for (int32_t i = 0; i < map.keyframes[keyframe].num_keypoints; ++i) {
-    if (own[i].point != kNoPoint) map.points[own[i].point].mark = mark;
+  Map* map = &odometry->map;
+  clear_marks(map);
+  mark_points_of(map, map->keyframes[keyframe]);
+  std::fill_n(shared, map->num_keyframes, 0);
+  count_marked_of(*map, map->keyframes[keyframe].segment, shared);
+  shared[keyframe] = 1 << 30;
+}
+
+int32_t largest(const int32_t* numbers, int32_t num, int32_t least, int32_t count,
+                int32_t* chosen) {
+  int32_t num_chosen = 0;
+  for (int32_t k = num - 1; k >= 0; --k) {
+    if (numbers[k] < least) continue;
+    int32_t at = num_chosen;
+    while (at > 0 && numbers[chosen[at - 1]] < numbers[k]) --at;
+    if (at >= count) continue;
+    num_chosen = std::min(num_chosen + 1, count);
+    for (int32_t i = num_chosen - 1; i > at; --i) chosen[i] = chosen[i - 1];
+    chosen[at] = k;
   }
-  for (int32_t k = 0; k < map.num_keyframes; ++k) {
-    shared[k] = 0;
-    if (map.keyframes[k].segment != map.keyframes[keyframe].segment) continue;
-    const MapKeypoint* other = keypoints_of(map, map.keyframes[k]);
-    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
-      shared[k] += other[i].point != kNoPoint && map.points[other[i].point].mark == mark;
-    }
-  }
+  return num_chosen;
 }
 
 bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance[36]) {
@@ -307,15 +315,9 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   }
   add_points(*odometry, &around);
   // The other keyframes that see the points are held.
-  for (int32_t k = 0; k < map.num_keyframes; ++k) {
-    if (shared[k] == -1) continue;
-    shared[k] = 0;
-    if (map.keyframes[k].segment != segment) continue;
-    const MapKeypoint* own = keypoints_of(map, map.keyframes[k]);
-    for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
-      shared[k] += own[i].point != kNoPoint && around.numbers[own[i].point] >= 0;
-    }
-  }
+  clear_marks(&map);
+  for (int32_t n = 0; n < around.window.num_points; ++n) mark_point(&map, around.places[n]);
+  count_marked_of(map, segment, shared);
   const int32_t num_held = largest(shared, map.num_keyframes, kLeastShared, options.window, chosen);
   for (int32_t k = 0; k < num_held; ++k) add_view(map, chosen[k], true, &around);
   add_all_observations(*odometry, &around);

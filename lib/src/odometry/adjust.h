@@ -15,7 +15,12 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
 // not determine it.
 bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance[36]);
 
-// How many points each keyframe shares with one of them; 0 for keyframes of other segments.
+// How many points each keyframe shares with one of them, which itself has 2^30; 0 for keyframes of
+// other segments.
 void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared);
+
+// The indices of at most `count` of `num` numbers, the largest first, none below `least`; the later
+// of equal ones first. Returns how many.
+int32_t largest(const int32_t* numbers, int32_t num, int32_t least, int32_t count, int32_t* chosen);
 
 }  // namespace tv

@@ -248,23 +248,20 @@ void list_local_points(Odometry* odometry, int32_t keyframe) {
   Map& map = odometry->map;
   int32_t* shared = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   count_shared(odometry, keyframe, shared);
-  shared[keyframe] = 1 << 30;
-  const int32_t mark = ++odometry->mark;
+  int32_t chosen[kSurroundingKeyframes];
+  const int32_t num_chosen =
+      largest(shared, map.num_keyframes, kLeastShared, kSurroundingKeyframes, chosen);
+  clear_marks(&map);
   odometry->num_local_points = 0;
-  const int32_t most = odometry->max_matched;
-  for (int32_t n = 0; n < kSurroundingKeyframes; ++n) {
-    int32_t best = map.num_keyframes - 1;
-    for (int32_t k = best - 1; k >= 0; --k) {
-      if (shared[k] > shared[best]) best = k;
-    }
-    if (shared[best] < kLeastShared) break;
-    shared[best] = 0;
-    const MapKeypoint* own = keypoints_of(map, map.keyframes[best]);
-    for (int32_t i = 0; i < map.keyframes[best].num_keypoints; ++i) {
+  odometry->local_id = map.keyframes[keyframe].id;
+  for (int32_t n = 0; n < num_chosen; ++n) {
+    const MapKeyframe& other = map.keyframes[chosen[n]];
+    const MapKeypoint* own = keypoints_of(map, other);
+    for (int32_t i = 0; i < other.num_keypoints; ++i) {
       const int32_t p = own[i].point;
-      if (p == kNoPoint || map.points[p].mark == mark) continue;
-      if (odometry->num_local_points == most) return;
-      map.points[p].mark = mark;
+      if (p == kNoPoint || is_marked(map, p)) continue;
+      if (odometry->num_local_points == odometry->max_matched) return;
+      mark_point(&map, p);
       odometry->local_points[odometry->num_local_points++] = p;
     }
   }

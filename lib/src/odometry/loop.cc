@@ -89,13 +89,13 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
       arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.sizes.max_keypoints));
   const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
   int32_t num = 0, num_known = 0;
-  const int32_t mark = ++odometry->mark;
+  clear_marks(&map);
   for (int32_t k = 0; k < frame.num; ++k) {
-    if (frame.points[k] != kNoPoint) map.points[frame.points[k]].mark = mark;
+    if (frame.points[k] != kNoPoint) mark_point(&map, frame.points[k]);
   }
   for (int32_t i = 0; i < map.keyframes[keyframe].num_keypoints; ++i) {
     if (own[i].point == kNoPoint) continue;
-    num_known += map.points[own[i].point].mark == mark;
+    num_known += is_marked(map, own[i].point);
     points[num++] = own[i].point;
   }
   if (num < kLeastInliers || 10 * num_known > num) return false;
@@ -225,7 +225,9 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
     ++tried;
     found = meets(odometry, frame, paths[k], k, again, end);
   }
-  if (copied) list_local_points(odometry, find_keyframe(map, odometry->reference_id));
+  if (odometry->local_id != odometry->reference_id) {
+    list_local_points(odometry, find_keyframe(map, odometry->reference_id));
+  }
   return found;
 }
 

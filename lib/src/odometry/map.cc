@@ -16,6 +16,12 @@ size_t num_described(const MapSizes& sizes) {
   return as_size(kDescribedKeyframes) * as_size(sizes.max_keypoints) * TV_DESCRIPTOR_BYTES;
 }
 
+size_t num_marks(const MapSizes& sizes) { return 1 + (as_size(sizes.max_points) + 31) / 32; }
+
+size_t num_planes(const MapSizes& sizes) {
+  return 2 * as_size(kDescribedKeyframes) * as_size(sizes.max_keypoints);
+}
+
 void release_point(Map* map, int32_t point) {
   map->points[point].id = -1;
   map->free_points[map->num_free_points++] = point;
@@ -30,7 +36,8 @@ size_t map_bytes(const MapSizes& sizes) {
          arena_bytes<MapKeypoint>(num_map_keypoints(sizes)) +
          arena_bytes<int32_t>(as_size(sizes.max_keyframes)) + arena_bytes<MapPoint>(points) +
          arena_bytes<uint8_t>(points * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(points) +
-         arena_bytes<uint8_t>(num_described(sizes)) +
+         arena_bytes<uint32_t>(num_marks(sizes)) + arena_bytes<uint8_t>(num_described(sizes)) +
+         arena_bytes<double>(num_planes(sizes)) +
          arena_bytes<RemovedKeyframe>(as_size(max_removed(sizes)));
 }
 
@@ -43,7 +50,9 @@ void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   map->points = arena_alloc<MapPoint>(arena, points);
   map->point_descriptors = arena_alloc<uint8_t>(arena, points * TV_DESCRIPTOR_BYTES);
   map->free_points = arena_alloc<int32_t>(arena, points);
+  map->marks = arena_alloc<uint32_t>(arena, num_marks(sizes));
   map->descriptors = arena_alloc<uint8_t>(arena, num_described(sizes));
+  map->planes = arena_alloc<double>(arena, num_planes(sizes));
   map->removed = arena_alloc<RemovedKeyframe>(arena, as_size(max_removed(sizes)));
   clear_map(map);
 }
@@ -56,6 +65,22 @@ void clear_map(Map* map) {
     map->free_rooms[k] = map->num_free_rooms - 1 - k;
   }
   map->num_free_points = 0;
+}
+
+void clear_marks(Map* map) { std::fill_n(map->marks, num_marks(map->sizes), 0u); }
+
+void mark_points_of(Map* map, const MapKeyframe& keyframe) {
+  const MapKeypoint* own = keypoints_of(*map, keyframe);
+  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
+    if (own[i].point != kNoPoint) mark_point(map, own[i].point);
+  }
+}
+
+int32_t count_marked(const Map& map, const MapKeyframe& keyframe) {
+  const MapKeypoint* own = keypoints_of(map, keyframe);
+  int32_t num = 0;
+  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) num += is_marked(map, own[i].point);
+  return num;
 }
 
 int32_t find_keyframe(const Map& map, int32_t id) {
@@ -89,6 +114,7 @@ int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* desc
     own[k] = {keypoints[k].x, keypoints[k].y, keypoints[k].size, kNoPoint};
   }
   std::memcpy(descriptors_of(*map, *keyframe), descriptors, as_size(num) * TV_DESCRIPTOR_BYTES);
+  std::fill_n(planes_of(*map, *keyframe), 2 * num, __builtin_nan(""));
   return idx;
 }
 

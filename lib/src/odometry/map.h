@@ -38,7 +38,6 @@ struct MapPoint {
   int32_t segment;
   int32_t num_observations;
   int32_t num_visible, num_found;  // in frames since it was made
-  int32_t mark;                    // the last search that met it
   int32_t made_at;                 // the id of the keyframe that made it
   float depth_sigma;               // of the logarithm of its distance from `seen_from`
   float seen_from[3];
@@ -66,9 +65,12 @@ struct Map {
   MapPoint* points;
   uint8_t* point_descriptors;      // TV_DESCRIPTOR_BYTES for each point
   int32_t num_points, end_points;  // those that are in use, and the end of the used places
+  uint32_t* marks;  // a bit for each point, and before them those of kNoPoint, which stay 0
   int32_t* free_points;
   int32_t num_free_points;
   uint8_t* descriptors;  // kDescribedKeyframes times max_keypoints times TV_DESCRIPTOR_BYTES
+  double* planes;  // as many times two: where each keypoint's ray meets the plane z = 1, once it
+                   // was computed for a window, else not a number
   int32_t next_described;
   RemovedKeyframe* removed;  // in ascending order of id
   int32_t num_removed;
@@ -96,12 +98,29 @@ inline uint8_t* descriptors_of(const Map& map, const MapKeyframe& keyframe) {
                                static_cast<size_t>(map.sizes.max_keypoints) * TV_DESCRIPTOR_BYTES;
 }
 
+inline double* planes_of(const Map& map, const MapKeyframe& keyframe) {
+  return map.planes +
+         2 * static_cast<size_t>(keyframe.described) * static_cast<size_t>(map.sizes.max_keypoints);
+}
+
 inline uint8_t* descriptor_of(const Map& map, int32_t point) {
   return map.point_descriptors + static_cast<size_t>(point) * TV_DESCRIPTOR_BYTES;
 }
 
 // The index of the keyframe of this id among the keyframes; -1 where the map has none.
 int32_t find_keyframe(const Map& map, int32_t id);
+
+// A set of points that passes over the map build up and ask for: a bit each, because they go
+// through all keypoints of all keyframes.
+void clear_marks(Map* map);
+inline void mark_point(Map* map, int32_t point) {
+  map->marks[1 + (point >> 5)] |= uint32_t{1} << (point & 31);
+}
+inline bool is_marked(const Map& map, int32_t point) {
+  return (map.marks[1 + (point >> 5)] >> (point & 31) & 1) != 0;
+}
+void mark_points_of(Map* map, const MapKeyframe& keyframe);
+int32_t count_marked(const Map& map, const MapKeyframe& keyframe);
 
 // Adds a keyframe with the keypoints and descriptors of a frame, none of which sees a point, and
 // returns its index. The map must have room for it.

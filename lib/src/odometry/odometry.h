@@ -74,16 +74,18 @@ struct tv_odometry {
   // The points that are looked for in the next frame, and the keyframe whose surroundings they are.
   int32_t* local_points;
   int32_t num_local_points;
+  int32_t local_id;  // of the keyframe around which they were listed
   int32_t reference_id;
   // The motion from the frame before last to the last: cam_from_cam, in motion_s seconds.
   bool has_motion;
   tv::Rigid motion;
   double motion_s;
-  int32_t mark;
   int32_t num_frames, segment, num_segments, num_relocations, num_loops;
   int32_t status;
   int32_t lost_frames, turned_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
+  int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
+  bool closed_loop;          // with it
   tv::MapCheck check;
   // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
   // saw one plane only, or contradicted the map.

@@ -10,6 +10,7 @@ namespace tv {
 namespace {
 
 constexpr int32_t kMostCandidates = 400;
+constexpr int32_t kAhead = 8;  // points: their places in the map are far from each other
 // The keypoints within this radius in pixels are compared: a match is the nearest of them all.
 constexpr double kComparedRadius = 20.0;
 constexpr float kSameCornerSq = 16.0f;       // px^2: nearer keypoints are of the same corner
@@ -77,6 +78,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
   for (int32_t i = 0; i < search.num; ++i) {
     const int32_t idx = search.points[i];
     MapPoint& point = map.points[idx];
+    if (i + kAhead < search.num) __builtin_prefetch(&map.points[search.points[i + kAhead]]);
     if (point.id < 0) continue;
     double x[3];
     transform(search.cam_from_world, point.position, x);
@@ -86,6 +88,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
           pixel.y() < model.height)) {
       continue;
     }
+    __builtin_prefetch(descriptor_of(map, idx));
+    __builtin_prefetch(descriptor_of(map, idx) + TV_DESCRIPTOR_BYTES / 2);
     if (!odometry->is_locating) ++point.num_visible;
     const double radius = search.radius_px + 2 * depth_error_px(*odometry, point, centre, x[2]);
     const float px = static_cast<float>(pixel.x()), py = static_cast<float>(pixel.y());

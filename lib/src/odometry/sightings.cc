@@ -29,14 +29,33 @@ int compare(const SightingInput& in, int32_t i, int32_t j) {
   return 0;
 }
 
+// Of two different matches with the same key.
+bool is_before(const SightingInput& in, int32_t i, int32_t j) {
+  const int order = compare(in, i, j);
+  if (order != 0) return order < 0;
+  const double s = in.sigma(i), t = in.sigma(j);
+  return s != t ? s < t : i < j;
+}
+
+inline bool is_before(const SightingInput& in, const SortKey& a, const SortKey& b) {
+  return a.key != b.key ? a.key < b.key : is_before(in, a.index, b.index);
+}
+
+// Sorts by merging runs, which is as fast as std::sort and a kilobyte shorter. Behind the keys
+// there is room for as many more.
 void sort(const SightingInput& in, SortKey* keys, int count) {
-  std::sort(keys, keys + count, [&in](const SortKey& a, const SortKey& b) {
-    if (a.key != b.key) return a.key < b.key;
-    const int order = compare(in, a.index, b.index);
-    if (order != 0) return order < 0;
-    const double s = in.sigma(a.index), t = in.sigma(b.index);
-    return s != t ? s < t : a.index < b.index;
-  });
+  SortKey *from = keys, *to = keys + count;
+  for (int length = 1; length < count; length *= 2) {
+    for (int begin = 0; begin < count; begin += 2 * length) {
+      const int middle = std::min(begin + length, count), end = std::min(middle + length, count);
+      for (int k = begin, a = begin, b = middle; k < end; ++k) {
+        const bool first = b == end || (a < middle && is_before(in, from[a], from[b]));
+        to[k] = from[first ? a++ : b++];
+      }
+    }
+    std::swap(from, to);
+  }
+  if (from != keys) std::copy_n(from, count, keys);
 }
 
 // The matches in order[0 .. count), the most precise of equal ones first; the others last. Returns
@@ -177,8 +196,8 @@ void prepare_sightings(const SightingInput& in, Arena& arena, Sightings* s) {
   const size_t padded = (n + kSightingBlock - 1) / kSightingBlock * kSightingBlock;
   for (float*& numbers : s->fast) numbers = arena_alloc<float>(arena, padded);
   ArenaScope scope(arena);
-  double* values = arena_alloc<double>(arena, 2 * n);
-  SortKey* keys = reinterpret_cast<SortKey*>(values);
+  double* values = arena_alloc<double>(arena, 4 * n);
+  SortKey* keys = reinterpret_cast<SortKey*>(values);  // and room for as many
   static_assert(sizeof(SortKey) <= 2 * sizeof(double), "the keys and the values share their bytes");
   int count = 0;
   for (int i = 0; i < in.num; ++i) {

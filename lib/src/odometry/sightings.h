@@ -47,7 +47,7 @@ struct Sightings {
 inline size_t sightings_bytes(size_t n) {
   const size_t padded = (n + kSightingBlock - 1) / kSightingBlock * kSightingBlock;
   return arena_bytes<Sighting>(n) + arena_bytes<int32_t>(n) + 12 * arena_bytes<float>(padded) +
-         arena_bytes<double>(2 * n);
+         arena_bytes<double>(4 * n);
 }
 
 // Drops matches that are not finite or outside the lens model, or whose point is farther than 1e9

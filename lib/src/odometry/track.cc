@@ -184,11 +184,9 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
     ++odometry->num_loops;
     state->loop_closed = 1;
   }
-  adjust_around(odometry, newest, closes ? kLoopSteps : kWindowSteps);
-  odometry->keyframe_inliers = map.keyframes[newest].num_observations;
-  list_local_points(odometry, newest);
   take_keyframe(*odometry, newest, frame);
-  if (closes) measure_depth(odometry, *frame);
+  odometry->unadjusted_id = odometry->reference_id;
+  odometry->closed_loop = closes;
   state->is_keyframe = 1;
   return true;
 }
@@ -283,7 +281,6 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   if (is_due || found_loop) {
     if (!add_frame_as_keyframe(odometry, frame, input.image, found_loop ? &loop : nullptr, state))
       return false;
-    measure_scale(odometry, frame);
   } else if (is_checking(odometry->check)) {
     check_next_pair(odometry);
     if (!heed_check(odometry)) return false;
@@ -363,8 +360,22 @@ void write_counts(const Odometry& odometry, tv_odometry_state* state) {
 
 }  // namespace
 
+void finish_keyframe(Odometry* odometry, Frame* frame) {
+  const int32_t newest = find_keyframe(odometry->map, odometry->unadjusted_id);
+  odometry->unadjusted_id = -1;
+  if (newest < 0) return;
+  adjust_around(odometry, newest, odometry->closed_loop ? kLoopSteps : kWindowSteps);
+  odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
+  list_local_points(odometry, newest);
+  take_keyframe(*odometry, newest, frame);
+  if (odometry->closed_loop) measure_depth(odometry, *frame);
+  // Not between keyframes of two maps, where one was added meanwhile.
+  if (newest == odometry->map.num_keyframes - 1) measure_scale(odometry, frame);
+}
+
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state) {
   std::swap(odometry->frame, odometry->previous);
+  finish_keyframe(odometry, &odometry->previous);
   Frame* frame = &odometry->frame;
   extract_frame(odometry, input.image, frame);
   frame->number = odometry->num_frames++;

@@ -8,6 +8,10 @@ namespace tv {
 // The frame and the state have been checked; *state is zeros but for struct_size.
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state);
 
+// A keyframe is adjusted when the next frame comes, before that is tracked, so that no frame takes
+// the time of both. `frame`: the one that became the keyframe. Nothing if none waits.
+void finish_keyframe(Odometry* odometry, Frame* frame);
+
 void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
                   tv_odometry_state* state);
 

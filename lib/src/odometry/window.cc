@@ -322,8 +322,8 @@ size_t window_scratch_bytes(const tv_window& window) {
          arena_bytes<int32_t>(std::max(views, points) + 1);
 }
 
-bool adjust_window(const tv_window& given, const tv_window_options& options, Arena& arena,
-                   double* covariances, float* errors_px, tv_window_result* result) {
+bool adjust_window(const tv_window& given, const tv_window_options& options, const double* planes,
+                   Arena& arena, double* covariances, float* errors_px, tv_window_result* result) {
   const size_t views = count_of(given.num_views), points = count_of(given.num_points);
   const size_t observations = count_of(given.num_observations);
   Window window{given, options};
@@ -348,7 +348,7 @@ bool adjust_window(const tv_window& given, const tv_window_options& options, Are
     for (int k = 0; k < given.num_cameras; ++k) cameras[k] = prepare_camera(given.cameras[k]);
     int32_t* order = arena_alloc<int32_t>(arena, observations);
     int32_t* begin = arena_alloc<int32_t>(arena, std::max(views, points) + 1);
-    gather_points(&window, cameras, order, begin, result);
+    gather_points(&window, cameras, planes, order, begin, result);
   }
   choose_views(&window, result);
   window.system = block_matrix(window.num_blocks, arena);

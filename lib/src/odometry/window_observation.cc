@@ -4,7 +4,8 @@
 
 namespace tv {
 
-bool make_observation(const Camera& camera, const tv_observation& given, WindowObservation* out) {
+bool make_observation(const Camera& camera, const tv_observation& given, const double* plane,
+                      WindowObservation* out) {
   if (!all_finite(given.pixel, 2)) return false;
   const tv_camera& model = camera.model;
   const double sigma = given.sigma == 0.0f ? 1.0 : static_cast<double>(given.sigma);
@@ -20,10 +21,11 @@ bool make_observation(const Camera& camera, const tv_observation& given, WindowO
   Vec3 ray;
   Vec2 pixel;
   Mat23 J;
-  if (!unproject(camera, Vec2(given.pixel[0], given.pixel[1]), &ray, nullptr) ||
-      !project(camera, ray, &pixel, &J)) {
+  if (plane != nullptr && plane[0] == plane[0])
+    ray = ray_through(Vec2(plane[0], plane[1]));
+  else if (!unproject(camera, Vec2(given.pixel[0], given.pixel[1]), &ray, nullptr))
     return false;
-  }
+  if (!project(camera, ray, &pixel, &J)) return false;
   const bool sphere = model.model == TV_CAMERA_KANNALA_BRANDT;
   // The derivative by a point is in inverse proportion to its depth: at the plane z = 1 it is ray z
   // times that at the unit ray.

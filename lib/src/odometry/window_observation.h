@@ -23,8 +23,10 @@ struct WindowObservation {
   int32_t reserved;
 };
 
-// False where the pixel has no ray in the lens model.
-bool make_observation(const Camera& camera, const tv_observation& given, WindowObservation* out);
+// False where the pixel has no ray in the lens model. plane: where that meets the plane z = 1, if
+// it is known, else null or not a number.
+bool make_observation(const Camera& camera, const tv_observation& given, const double* plane,
+                      WindowObservation* out);
 
 struct Residual {
   double e[2];

@@ -27,8 +27,8 @@ void counting_sort(const tv_window& given, int32_t tv_observation::*key, int num
 
 // Appends the observations [first, last) of a point in `order`, as far as they can be used. Returns
 // from how many views they are.
-int append_observations(Window* window, const Camera* cameras, const int32_t* order, int first,
-                        int last, tv_window_result* result) {
+int append_observations(Window* window, const Camera* cameras, const double* planes,
+                        const int32_t* order, int first, int last, tv_window_result* result) {
   const tv_window& given = window->given;
   int num_views = 0, previous = -1;
   for (int k = first; k < last; ++k) {
@@ -38,7 +38,8 @@ int append_observations(Window* window, const Camera* cameras, const int32_t* or
     o.view = from.idx_view;
     o.idx = order[k];
     const Camera& camera = cameras[given.views[o.view].idx_camera];
-    if (!all_finite(X, 3) || !make_observation(camera, from, &o)) {
+    const double* plane = planes != nullptr ? planes + 2 * count_of(o.idx) : nullptr;
+    if (!all_finite(X, 3) || !make_observation(camera, from, plane, &o)) {
       ++result->num_invalid;
       continue;
     }
@@ -58,8 +59,8 @@ int append_observations(Window* window, const Camera* cameras, const int32_t* or
 
 }  // namespace
 
-void gather_points(Window* window, const Camera* cameras, int32_t* order, int32_t* begin,
-                   tv_window_result* result) {
+void gather_points(Window* window, const Camera* cameras, const double* planes, int32_t* order,
+                   int32_t* begin, tv_window_result* result) {
   const tv_window& given = window->given;
   counting_sort(given, &tv_observation::idx_view, given.num_views, nullptr, begin,
                 window->slot_block);
@@ -70,7 +71,7 @@ void gather_points(Window* window, const Camera* cameras, int32_t* order, int32_
     const int first = last;
     last = begin[p];
     const int start = window->num_observations;
-    const int num_views = append_observations(window, cameras, order, first, last, result);
+    const int num_views = append_observations(window, cameras, planes, order, first, last, result);
     if (num_views < 2) {
       result->num_single += window->num_observations - start;
       window->num_observations = start;

@@ -53,8 +53,8 @@ struct Window {
 // Gathers the observations, as far as they can be used, by point and view, and counts the others.
 // `order` has as many entries as there are observations; `begin` one more than there are views and
 // points.
-void gather_points(Window* window, const Camera* cameras, int32_t* order, int32_t* begin,
-                   tv_window_result* result);
+void gather_points(Window* window, const Camera* cameras, const double* planes, int32_t* order,
+                   int32_t* begin, tv_window_result* result);
 
 // How the terms are weighed: for a step, or for the covariance.
 struct Weighing {
