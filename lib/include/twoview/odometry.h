@@ -107,7 +107,8 @@ typedef struct tv_odometry_frame {
      there is no height. The ground is taken as level from frame to frame of a window. */
   double height_m, height_sigma_m;
   /* The camera's velocity over ground in metres per second, along the axes of the camera, and the
-     standard deviation of each component; 0 (default): there is no velocity. */
+     standard deviation of each component; 0 (default): there is no velocity. Once velocities have
+     agreed with the map, they also check it. */
   double velocity_m_s[3], velocity_sigma_m_s;
 } tv_odometry_frame;
 
@@ -123,7 +124,9 @@ typedef struct tv_odometry_state {
   uint32_t struct_size;
   /* A tv_odometry_status. */
   int32_t status;
-  /* The bits of tv_reason that make the frame weak, or that keep the map from starting. */
+  /* The bits of tv_reason that make the frame weak, or that keep the map from starting.
+     TV_REASON_SECOND_MOTION: the camera moved otherwise in the map than the velocities say, so that
+     the map may follow something that moves. */
   uint32_t reasons;
   /* Which segment the pose belongs to, from 0; -1 where no pose is known. A segment is a stretch
      within one frame of coordinates: poses of different segments do not compare. */

@@ -12,7 +12,7 @@
 namespace tv {
 namespace {
 
-constexpr uint32_t kSigmaSlots = 8;  // levels of keypoints, modulo this
+constexpr uint32_t kSigmaSlots = 8;  // levels whose last sigma tv_keypoint_sigmas remembers
 
 constexpr tv_feature_options kDefaults = {
     sizeof(tv_feature_options), 0,    12, 15, 3, 4, 1.41f, 48, 1, TV_ORIENTATION_GRADIENT,
@@ -228,7 +228,7 @@ tv_status tv_keypoint_sigmas(const tv_keypoint* keypoints, int32_t num_keypoints
   for (size_t k = 0; k < n; ++k) {
     const float size = keypoints[k].size;
     const uint32_t slot = static_cast<uint32_t>(keypoints[k].level) % tv::kSigmaSlots;
-    if (!(size == sizes[slot])) {
+    if (size != sizes[slot]) {
       const double ratio = static_cast<double>(size) / size_of_one;
       const float sigma = static_cast<float>(tv::exp(exponent * tv::log(ratio)));
       sizes[slot] = size;

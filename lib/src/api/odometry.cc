@@ -111,12 +111,13 @@ void start_anew(tv_odometry* o) {
   o->median_depth = 1;
   o->turn_sigma = 0;
   o->is_upright = false;
-  forget_scale(o);
+  o->velocity_trust = o->num_contrary = 0;
+  o->scale = o->other_scale = MetricScale{};
   o->last_time_s = 0;
 }
 
 void enter_segment(tv_odometry* o, int32_t segment) {
-  if (segment != o->segment) forget_scale(o);
+  if (segment != o->segment) change_scale(o, o->segment, segment);
   o->segment = segment;
   o->is_upright = false;
   for (int32_t k = 0; k < o->map.num_keyframes; ++k) {

@@ -52,7 +52,8 @@ struct Radial {
 Radial brown_radial(const double k[8], double u) {
   const double numerator = 1.0 + u * (k[0] + u * (k[1] + u * k[4]));
   const double d_numerator = k[0] + u * (2.0 * k[1] + u * (3.0 * k[4]));
-  // Without a denominator the division by 1 would change no bit; 0 times infinity is no number.
+  // Without a denominator nothing is divided. The product with 0 keeps a numerator that is not
+  // finite as it would be with one: no number.
   if (k[5] == 0.0 && k[6] == 0.0 && k[7] == 0.0) return {numerator, d_numerator - numerator * 0.0};
   const double denominator = 1.0 + u * (k[5] + u * (k[6] + u * k[7]));
   const double d_denominator = k[5] + u * (2.0 * k[6] + u * (3.0 * k[7]));
@@ -349,6 +350,10 @@ bool brown_invert_safe(const Camera& camera, const Point2& target, double target
   return true;
 }
 
+Point2 in_focal_lengths(const tv_camera& model, const Vec2& pixel) {
+  return {(pixel[0] - model.cx) / model.fx, (pixel[1] - model.cy) / model.fy};
+}
+
 bool undistort_central(const Camera& camera, const Point2& target, Point2* p) {
   const double target_sq = target.x * target.x + target.y * target.y;
   const double limit = camera.valid_radius_distorted * kEdgeSlack;
@@ -460,10 +465,6 @@ bool project(const Camera& camera, const Vec3& point, Vec2* pixel, Mat23* jacobi
                       : project_central(camera, scaled, pixel, jacobian);
   if (ok && jacobian && scale != 1.0) *jacobian *= scale;
   return ok;
-}
-
-static Point2 in_focal_lengths(const tv_camera& model, const Vec2& pixel) {
-  return {(pixel[0] - model.cx) / model.fx, (pixel[1] - model.cy) / model.fy};
 }
 
 bool undistort(const Camera& camera, const Vec2& pixel, Vec2* plane) {

@@ -312,7 +312,7 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
     }
     if (is_joined || map.keyframes[k].num_observations < kLeastInliers) continue;
     copy_keyframe(*odometry, k, frame);
-    odometry->segment = map.keyframes[k].segment;
+    enter_segment(odometry, map.keyframes[k].segment);
     for (int32_t i = 0; i < first && !is_joined; ++i) {
       LoopEnd end;
       copy_frame(*frame, again);
@@ -324,7 +324,7 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
       ++num_joined;
     }
   }
-  odometry->segment = map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : 0;
+  enter_segment(odometry, map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : 0);
   return num_joined;
 }
 

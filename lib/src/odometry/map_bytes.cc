@@ -309,11 +309,11 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   h.num_relocations = odometry.num_relocations;
   h.num_loops = odometry.num_loops;
   h.is_upright = odometry.is_upright;
-  h.scale_source = odometry.scale_source;
-  h.scale_evidence = odometry.scale_evidence;
-  h.scale_product = odometry.scale_product;
-  h.scale_square = odometry.scale_square;
-  h.scale_sigma = odometry.scale_sigma;
+  h.scale_source = odometry.scale.source;
+  h.scale_evidence = odometry.scale.evidence;
+  h.scale_product = odometry.scale.product;
+  h.scale_square = odometry.scale.square;
+  h.scale_sigma = odometry.scale.sigma;
   Stream s{to, nullptr, 0, 0, false};
   pass_header(&s, &h);
   for (int32_t n = 0; n < map.num_points; ++n) {
@@ -384,11 +384,11 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   odometry->num_loops += h.num_loops;
   if (is_first) {
     odometry->is_upright = h.is_upright != 0;
-    odometry->scale_source = h.scale_source;
-    odometry->scale_evidence = h.scale_evidence;
-    odometry->scale_product = h.scale_product;
-    odometry->scale_square = h.scale_square;
-    odometry->scale_sigma = h.scale_sigma;
+    odometry->scale.source = h.scale_source;
+    odometry->scale.evidence = h.scale_evidence;
+    odometry->scale.product = h.scale_product;
+    odometry->scale.square = h.scale_square;
+    odometry->scale.sigma = h.scale_sigma;
   }
   if (map->num_keyframes > 0) {
     odometry->status = TV_ODOMETRY_LOST;

@@ -13,10 +13,13 @@ namespace {
 constexpr double kLargestScaleSigma = 0.1;  // relative
 // What the map's own scale may drift by, relative: added to the standard deviation.
 constexpr double kScaleDrift = 0.007;
-constexpr double kLeastChange = 0.01;    // of the scale, for which the map is rescaled
+constexpr double kLeastChange = 0.01;  // of the scale, for which the map is rescaled
+// A way contradicts the velocities where it differs from theirs by more than this share, so many of
+// their standard deviations, taken as equal errors, and this share of the median depth, which is
+// the map's error. They are clear where they say this many standard deviations.
+constexpr double kLargestShare = 0.25, kBounds = 2, kSeen = 0.003, kClear = 5;
 constexpr double kLargestTilt = 0.1;     // radians, added to three standard deviations
 constexpr double kLargestMeasure = 1e7;  // metres, metres per second: above it, no sensor is right
-constexpr double kDown[3] = {0, 0, 1};   // in an upright world
 
 bool is_usable(double sigma) { return sigma >= 1 / kLargestMeasure && sigma <= kLargestMeasure; }
 
@@ -40,6 +43,43 @@ void rescale(Odometry* odometry, double scale, Frame* frame) {
   odometry->median_depth *= scale;
 }
 
+// The map's way since a travel began beside that of the velocities: its products with itself and
+// with theirs, and theirs with itself.
+struct Ways {
+  double way[3], square, product, travel_sq;
+};
+
+Ways ways_to(const Travel& travel, const Rigid& cam_from_world) {
+  Ways ways;
+  centre_of(cam_from_world, ways.way);
+  for (int c = 0; c < 3; ++c) ways.way[c] -= travel.from[c];
+  ways.square = dot(ways.way, ways.way);
+  ways.product = dot(travel.way_m, ways.way);
+  ways.travel_sq = dot(travel.way_m, travel.way_m);
+  return ways;
+}
+
+void add_evidence(double product, double square, double variance, int32_t source,
+                  MetricScale* scale) {
+  scale->product += product / variance;
+  scale->square += square / variance;
+  scale->evidence |= source;
+}
+
+// Gives the segment the metre as its unit once the scale is known to a tenth.
+void settle_scale(Odometry* odometry, Frame* frame) {
+  MetricScale* known = &odometry->scale;
+  const double variance = known->square / (known->product * known->product);  // relative
+  if (!(known->product > 0) || !(variance <= kLargestScaleSigma * kLargestScaleSigma)) return;
+  const double scale = known->product / known->square;
+  known->sigma = std::sqrt(variance + kScaleDrift * kScaleDrift);
+  known->source = known->evidence;
+  if (std::fabs(scale - 1) < kLeastChange) return;
+  rescale(odometry, scale, frame);
+  known->product *= scale;
+  known->square *= scale * scale;
+}
+
 }  // namespace
 
 void read_sensors(const tv_odometry_frame& input, Frame* frame) {
@@ -47,8 +87,7 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame) {
                             input.velocity_sigma_m_s};
   frame->sensors = Sensors{};
   Sensors* s = &frame->sensors;
-  if (is_finite(sigmas[0]) && sigmas[0] > 0 && all_finite(input.world_from_cam, 9) &&
-      is_rotation(input.world_from_cam)) {
+  if (sigmas[0] > 0 && sigmas[0] <= kLargestMeasure && is_rotation(input.world_from_cam)) {
     std::copy_n(input.world_from_cam, 9, s->world_from_cam);
     s->attitude_sigma_rad = std::min(std::max(sigmas[0], 1e-4), 3.0);
   }
@@ -57,7 +96,7 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame) {
     s->height_sigma_m = sigmas[1];
   }
   const double* v = input.velocity_m_s;
-  if (is_usable(sigmas[2]) && all_finite(v, 3) && std::sqrt(dot(v, v)) <= kLargestMeasure) {
+  if (is_usable(sigmas[2]) && dot(v, v) <= kLargestMeasure * kLargestMeasure) {
     std::copy_n(input.velocity_m_s, 3, s->velocity_m_s);
     s->velocity_sigma_m_s = sigmas[2];
   }
@@ -66,82 +105,85 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame) {
 bool check_attitude(const Odometry& odometry, Frame* frame) {
   Sensors* s = &frame->sensors;
   if (!odometry.is_upright || s->attitude_sigma_rad == 0) return true;
-  const double* R = frame->cam_from_world.R;
-  const double here[3] = {R[2], R[5], R[8]};  // down in the camera's frame
-  double across[3];
-  cross(here, s->world_from_cam + 6, across);
-  const double tilt = atan2(length_of(across), dot(here, s->world_from_cam + 6));
+  // Between down in the camera's frame by the map and by the attitude.
+  const double *R = frame->cam_from_world.R, *down = s->world_from_cam + 6;
+  const double tilt = acos(R[2] * down[0] + R[5] * down[1] + R[8] * down[2]);
   if (tilt <= kLargestTilt + 3 * s->attitude_sigma_rad) return true;
   s->attitude_sigma_rad = 0;
   return false;
 }
 
+bool is_contrary(const Odometry& odometry, const Frame& frame) {
+  const Travel& travel = odometry.travel;
+  if (!travel.is_known) return false;
+  const Ways ways = ways_to(travel, frame.cam_from_world);
+  const MetricScale& known = odometry.scale;
+  double scale = 0;  // a way against the velocities fits none
+  if (known.source != TV_SCALE_UNIT)
+    scale = known.product / known.square;
+  else if (ways.product > 0)
+    scale = ways.product / ways.square;
+  const double allowed = kBounds * travel.bound_m + kLargestShare * std::sqrt(ways.travel_sq) +
+                         kSeen * odometry.median_depth * scale;
+  return ways.travel_sq - scale * (2 * ways.product - scale * ways.square) > allowed * allowed;
+}
+
 void add_travel(Odometry* odometry, const Frame& frame) {
   const double seconds = frame.time_s - odometry->previous.time_s;
   const Sensors& s = frame.sensors;
-  if (s.velocity_sigma_m_s == 0) {
-    odometry->travel_is_known = false;
-    return;
-  }
-  const Rigid world_from_cam = inverse(frame.cam_from_world);
+  Travel* travel = &odometry->travel;
+  travel->is_known = travel->is_known && s.velocity_sigma_m_s > 0;
+  const double *R = frame.cam_from_world.R, *v = s.velocity_m_s;
   for (int c = 0; c < 3; ++c) {
-    odometry->travel_m[c] += seconds * dot(world_from_cam.R + 3 * c, s.velocity_m_s);
+    travel->way_m[c] += seconds * (R[c] * v[0] + R[3 + c] * v[1] + R[6 + c] * v[2]);
   }
   const double sigma = seconds * s.velocity_sigma_m_s;
-  odometry->travel_variance += sigma * sigma;
+  travel->variance += sigma * sigma;
+  travel->bound_m += sigma;
 }
 
-void forget_travel(Odometry* odometry) {
-  std::fill(odometry->travel_m, odometry->travel_m + 3, 0.0);
-  odometry->travel_variance = 0;
-  odometry->travel_is_known = true;
+void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyframe_id) {
+  odometry->travel = Travel{};
+  odometry->travel.is_known = true;
+  odometry->travel.keyframe_id = keyframe_id;
+  centre_of(cam_from_world, odometry->travel.from);
 }
 
-void forget_scale(Odometry* odometry) {
-  odometry->scale_product = odometry->scale_square = 0;
-  odometry->scale_evidence = odometry->scale_source = TV_SCALE_UNIT;
-  odometry->scale_sigma = 0;
-  forget_travel(odometry);
+void change_scale(Odometry* odometry, int32_t from, int32_t to) {
+  const bool is_known = odometry->other_segment == to;
+  if (is_known || odometry->scale.source != TV_SCALE_UNIT) {
+    std::swap(odometry->scale, odometry->other_scale);
+    odometry->other_segment = from;
+  }
+  if (!is_known) odometry->scale = MetricScale{};
+  odometry->travel.keyframe_id = -1;  // its axes were those of the other segment
+  odometry->num_contrary = 0;
 }
 
 void measure_scale(Odometry* odometry, Frame* frame) {
   Map& map = odometry->map;
-  if (map.num_keyframes < 2) return;
-  MapKeyframe& newest = map.keyframes[map.num_keyframes - 1];
+  const MapKeyframe& newest = map.keyframes[map.num_keyframes - 1];
   const MapKeyframe& before = map.keyframes[map.num_keyframes - 2];
-  newest.height_m = frame->sensors.height_m;
-  newest.height_sigma_m = frame->sensors.height_sigma_m;
-  double a[3], b[3], way[3];
-  centre_of(before.cam_from_world, a);
-  centre_of(newest.cam_from_world, b);
-  for (int c = 0; c < 3; ++c) way[c] = b[c] - a[c];
-  const bool follows = newest.segment == before.segment;
-  if (follows && odometry->travel_is_known && odometry->travel_variance > 0) {
+  MetricScale* known = &odometry->scale;
+  Travel* travel = &odometry->travel;
+  centre_of(before.cam_from_world, travel->from);  // was adjusted
+  const Ways ways = ways_to(*travel, newest.cam_from_world);
+  if (travel->keyframe_id == before.id && travel->is_known && travel->variance > 0) {
     // Least squares of travel = scale way, along each axis.
-    odometry->scale_product += dot(odometry->travel_m, way) / odometry->travel_variance;
-    odometry->scale_square += dot(way, way) / odometry->travel_variance;
-    odometry->scale_evidence |= TV_SCALE_VELOCITY;
+    add_evidence(ways.product, ways.square, travel->variance, TV_SCALE_VELOCITY, known);
+    const double clear = kClear * travel->bound_m;
+    odometry->velocity_trust += ways.travel_sq > clear * clear;
   }
-  forget_travel(odometry);
-  if (follows && odometry->is_upright && newest.height_sigma_m > 0 && before.height_sigma_m > 0) {
-    const double variance = newest.height_sigma_m * newest.height_sigma_m +
-                            before.height_sigma_m * before.height_sigma_m;
-    const double climb = -dot(kDown, way);
-    odometry->scale_product += (newest.height_m - before.height_m) * climb / variance;
-    odometry->scale_square += climb * climb / variance;
-    odometry->scale_evidence |= TV_SCALE_HEIGHT;
+  if (newest.segment == before.segment && odometry->is_upright && newest.height_sigma_m > 0 &&
+      before.height_sigma_m > 0) {
+    const double climb = -ways.way[2];
+    add_evidence((newest.height_m - before.height_m) * climb, climb * climb,
+                 newest.height_sigma_m * newest.height_sigma_m +
+                     before.height_sigma_m * before.height_sigma_m,
+                 TV_SCALE_HEIGHT, known);
   }
-  if (!(odometry->scale_square > 0)) return;
-  const double scale = odometry->scale_product / odometry->scale_square;
-  const double sigma = 1 / std::sqrt(odometry->scale_square);
-  if (!(scale > 0) || !(sigma <= kLargestScaleSigma * scale)) return;
-  odometry->scale_sigma = std::sqrt(sigma * sigma / (scale * scale) + kScaleDrift * kScaleDrift);
-  const bool is_new = odometry->scale_source == TV_SCALE_UNIT;
-  odometry->scale_source = odometry->scale_evidence;
-  if (!is_new && std::fabs(scale - 1) < kLeastChange) return;
-  rescale(odometry, scale, frame);
-  odometry->scale_product *= scale;
-  odometry->scale_square *= scale * scale;
+  settle_scale(odometry, frame);
+  begin_travel(odometry, newest.cam_from_world, newest.id);
 }
 
 }  // namespace tv

@@ -13,14 +13,18 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame);
 // forgotten.
 bool check_attitude(const Odometry& odometry, Frame* frame);
 
-// Adds the way from the frame before, which was tracked, to that since the last keyframe.
+// Adds the way from the frame before, which was tracked, to the travel; or begins another one.
 void add_travel(Odometry* odometry, const Frame& frame);
-void forget_travel(Odometry* odometry);
+void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyframe_id);
+
+// Whether the way of the map since the travel began is another one than that of the velocities.
+bool is_contrary(const Odometry& odometry, const Frame& frame);
 
 // Adds what the newest keyframe and the one before say of the scale, and gives the segment the
 // metre as its unit once the scale is known to a tenth.
 void measure_scale(Odometry* odometry, Frame* frame);
 
-void forget_scale(Odometry* odometry);
+// What is known of the scale is kept, and what was known of the segment's is taken up.
+void change_scale(Odometry* odometry, int32_t from, int32_t to);
 
 }  // namespace tv

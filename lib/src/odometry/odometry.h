@@ -48,6 +48,21 @@ struct MapCheck {
   MapVote vote;
 };
 
+// The way since a frame in metres, in the world's axes, as the velocities say.
+struct Travel {
+  bool is_known;
+  int32_t keyframe_id;  // that it began at; -1: a frame that is no keyframe
+  double from[3];       // the camera's centre there
+  double way_m[3], variance;
+  double bound_m;  // its standard deviation if all errors are equal
+};
+
+// The normal equation of the scale, metres per unit of the map: square scale = product.
+struct MetricScale {
+  double product, square, sigma;
+  int32_t evidence, source;  // tv_scale_source
+};
+
 inline constexpr int32_t kCellPx = 16;
 // The error of a pixel of sigma 1 along one axis before one was measured, and the largest one that
 // a point of the map may have, in pixels.
@@ -96,13 +111,14 @@ struct tv_odometry {
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
   double last_time_s;
   bool is_upright;  // the segment's z axis points along gravity
-  // The way since the last keyframe in metres, in the world's axes, and its variance along each.
-  bool travel_is_known;
-  double travel_m[3], travel_variance;
-  // The normal equation of the scale, metres per unit of the map: scale_square scale =
-  // scale_product.
-  double scale_product, scale_square, scale_sigma;
-  int32_t scale_evidence, scale_source;  // tv_scale_source
+  tv::Travel travel;
+  // Ways between keyframes that the velocities agreed with, half as many after each removal because
+  // of them; and frames in a row that they contradict while they are trusted so.
+  int32_t velocity_trust, num_contrary;
+  tv::MetricScale scale;
+  // What is known of another segment's scale.
+  tv::MetricScale other_scale;
+  int32_t other_segment;
 };
 
 namespace tv {

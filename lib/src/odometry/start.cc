@@ -68,13 +68,7 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
     made = map.keyframes[second].num_observations;
   }
   if (made >= kLeastPoints) return true;
-  ArenaScope scope(odometry->scratch);
-  uint8_t* is_removed =
-      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
-  for (int32_t p = 0; p < map.end_points; ++p) {
-    is_removed[p] = map.points[p].id >= 0 && map.points[p].segment == odometry->segment;
-  }
-  remove_points(&map, is_removed);
+  remove_segment_points(odometry);
   map.free_rooms[map.num_free_rooms++] = map.keyframes[second].room;
   map.free_rooms[map.num_free_rooms++] = map.keyframes[first].room;
   map.num_keyframes -= 2;
@@ -83,6 +77,17 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
 }
 
 }  // namespace
+
+void remove_segment_points(Odometry* odometry) {
+  ArenaScope scope(odometry->scratch);
+  Map& map = odometry->map;
+  uint8_t* is_removed =
+      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    is_removed[p] = map.points[p].segment == odometry->segment;
+  }
+  remove_points(&map, is_removed);
+}
 
 void copy_frame(const Frame& from, Frame* to) {
   const size_t n = static_cast<size_t>(from.num);

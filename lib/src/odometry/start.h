@@ -17,4 +17,7 @@ void copy_frame(const Frame& from, Frame* to);
 // map does not reach. turn: of cam_from_cam, without a translation.
 bool estimate_turn(Odometry* odometry, const Frame& frame0, const Frame& frame1, Rigid* turn);
 
+// Removes all points of the segment, so that nothing is found in it any more.
+void remove_segment_points(Odometry* odometry);
+
 }  // namespace tv

@@ -29,6 +29,9 @@ constexpr int32_t kLoopSteps = 8;          // and after a loop
 constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
 constexpr int32_t kMostTurnedFrames = 60;  // of status rotation, in a row
 constexpr int32_t kLostBeforeStart = 8;    // frames
+// Velocities are believed against the map once so many of its ways agreed with them. The map is
+// wrong where so many frames in a row contradict velocities that are believed.
+constexpr int32_t kLeastTrust = 5, kMostContrary = 5;
 
 void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
   frame->num = 0;
@@ -123,29 +126,45 @@ void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
 }
 
 // Removes the keyframes that were made since the last confirmed one, and what only they saw.
+// Frames are doubtful until one is confirmed.
 void remove_unconfirmed(Odometry* odometry) {
   Map& map = odometry->map;
-  for (int32_t k = map.num_keyframes - 1; k > 0; --k) {
-    if (map.keyframes[k].id <= odometry->confirmed_id ||
-        map.keyframes[k].segment != map.keyframes[k - 1].segment) {
-      break;
-    }
-    remove_keyframe(&map, k, k - 1);
+  const MapKeyframe* last = map.keyframes + map.num_keyframes - 1;
+  for (; last > map.keyframes; --last) {
+    if (last->id <= odometry->confirmed_id || last->segment != last[-1].segment) break;
+    remove_keyframe(&map, map.num_keyframes - 1, map.num_keyframes - 2);
   }
   remove_lone_points(&map, odometry->scratch);
-  odometry->reference_id = map.keyframes[map.num_keyframes - 1].id;
+  odometry->is_doubtful = true;
+  odometry->reference_id = last->id;
+}
+
+// Compares the map's way with that of the velocities. False: the map is wrong here, and what was
+// made since the last confirmed keyframe is removed, and all of a segment that was never in metres.
+bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) {
+  if (!is_contrary(*odometry, frame)) {
+    odometry->num_contrary = 0;
+    return true;
+  }
+  *reasons |= TV_REASON_SECOND_MOTION;
+  odometry->travel.keyframe_id = -1;  // says nothing of the scale
+  if (odometry->velocity_trust < kLeastTrust || ++odometry->num_contrary < kMostContrary)
+    return true;
+  odometry->velocity_trust /= 2;
+  if (odometry->scale.source == TV_SCALE_UNIT) remove_segment_points(odometry);
+  remove_unconfirmed(odometry);
+  return false;
 }
 
 // What the pairs of the newest keyframe say of the map. False: it is wrong here, and what was made
 // since the last confirmed keyframe is removed.
 bool heed_check(Odometry* odometry) {
   const MapVerdict verdict = verdict_of(odometry->check.vote);
-  if (verdict == MapVerdict::kAgrees) {
+  if (verdict == MapVerdict::kAgrees && odometry->num_contrary == 0) {
     odometry->confirmed_id = odometry->check.keyframe_id;
     odometry->is_doubtful = false;
   } else if (verdict == MapVerdict::kContradicts) {
     remove_unconfirmed(odometry);
-    odometry->is_doubtful = true;
   } else if (verdict == MapVerdict::kOnePlane && !is_checking(odometry->check)) {
     odometry->is_doubtful = true;
   }
@@ -270,14 +289,16 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
     odometry->motion_s = frame->time_s - odometry->previous.time_s;
     add_travel(odometry, *frame);
   } else {
-    odometry->travel_is_known = false;
+    begin_travel(odometry, frame->cam_from_world, -1);
   }
+  if (!heed_velocities(odometry, *frame, &state->reasons)) return false;
   state->attitude_ignored = !check_attitude(*odometry, frame);
   const double* covariance = fit.estimate.covariance;
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
   const bool is_due = needs_keyframe(*odometry, *frame, fit.estimate.num_inliers);
   LoopEnd loop;
-  const bool found_loop = find_loop(odometry, *frame, kLoopKeyframes, &odometry->starts[0], &loop);
+  const bool found_loop = odometry->num_contrary == 0 &&
+                          find_loop(odometry, *frame, kLoopKeyframes, &odometry->starts[0], &loop);
   if (is_due || found_loop) {
     if (!add_frame_as_keyframe(odometry, frame, input.image, found_loop ? &loop : nullptr, state))
       return false;
@@ -329,6 +350,7 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
     odometry->is_upright = is_upright;
     return false;
   }
+  change_scale(odometry, segment, odometry->segment);
   ++odometry->num_segments;
   odometry->lost_frames = odometry->turned_frames = 0;
   const int32_t newest = odometry->map.num_keyframes - 1;
@@ -340,7 +362,7 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   measure_depth(odometry, *frame);
-  forget_scale(odometry);
+  begin_travel(odometry, frame->cam_from_world, odometry->reference_id);
   state->is_keyframe = 1;
   odometry->status = TV_ODOMETRY_TRACKING;
   return true;
@@ -354,8 +376,8 @@ void write_counts(const Odometry& odometry, tv_odometry_state* state) {
   state->num_segments = odometry.num_segments;
   state->num_relocations = odometry.num_relocations;
   state->num_loops = odometry.num_loops;
-  state->scale_source = odometry.scale_source;
-  state->scale_sigma = odometry.scale_sigma;
+  state->scale_source = odometry.scale.source;
+  state->scale_sigma = odometry.scale.sigma;
 }
 
 }  // namespace

@@ -1,0 +1,181 @@
+/* Tests of the odometry with velocities: they give the metre, and contradict a map that is carried
+   away. It flies through the room of support/room_scene.h. */
+#include <math.h>
+
+#include "support/api.h"
+#include "support/room_scene.h"
+#include "twoview/odometry.h"
+
+enum { MEMORY = 12 << 20, LEARNT = 60 };
+
+static const double RIGHT[3] = {1, 1, 1}, REVERSED[3] = {-1, -1, -1}, SIDEWAYS[3] = {0.1, 1, 8};
+static tv_odometry_frame frame;
+static tv_odometry_state state;
+static tv_odometry *odometry;
+static _Alignas(64) uint8_t block[MEMORY];
+static uint8_t pixels[ROOM_WIDTH * ROOM_HEIGHT];
+
+static void centre_at(int n, double centre[3]) { /* of room_flight */
+  centre[0] = 0.9 * sin(0.07 * n) - 0.3, centre[1] = 0.15 * sin(0.11 * n);
+  centre[2] = 0.3 * sin(0.05 * n);
+}
+
+/* The frame with the camera's true velocity, each component times a factor. */
+static void give(int n, const double factors[3]) {
+  const double yaw = 0.12 * sin(0.06 * n), c = cos(yaw), s = sin(yaw);
+  double here[3], before[3], v[3];
+  int k;
+  centre_at(n, here), centre_at(n - 1, before);
+  for (k = 0; k < 3; ++k) v[k] = 30 * (here[k] - before[k]);
+  frame.velocity_m_s[0] = factors[0] * (c * v[0] - s * v[2]);
+  frame.velocity_m_s[1] = factors[1] * v[1];
+  frame.velocity_m_s[2] = factors[2] * (s * v[0] + c * v[2]);
+  frame.velocity_sigma_m_s = 0.02;
+  room_flight(n, pixels);
+  frame.time_s = n / 30.0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+}
+
+static int is_contrary(void) { return (state.reasons & TV_REASON_SECOND_MOTION) != 0; }
+
+void setUp(void) {
+  const tv_camera camera = room_camera();
+  tv_odometry_options options;
+  size_t size;
+  tv_odometry_options_init(&options);
+  options.max_keypoints = 400;
+  options.max_keyframes = 40;
+  options.max_points = 2000;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_size(&camera, &options, &size));
+  TEST_ASSERT_TRUE(size <= MEMORY);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_init(&odometry, &camera, &options, block, size));
+  tv_odometry_frame_init(&frame);
+  frame.image = api_image(pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH);
+  tv_odometry_state_init(&state);
+}
+
+void tearDown(void) {}
+
+/* Flies with right velocities to a frame that is no keyframe, since a keyframe says what it adds to
+   the scale at the next frame; returns the number of the next frame. */
+static int learn(void) {
+  int n;
+  for (n = 0; n < LEARNT || state.is_keyframe; ++n) {
+    give(n, RIGHT);
+    TEST_ASSERT_FALSE(is_contrary());
+  }
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_VELOCITY, state.scale_source);
+  return n;
+}
+
+static void test_right_velocities_give_the_metre(void) {
+  double first[3], last[3], truth = 0, way = 0;
+  const int begin = learn();
+  int n, k;
+  for (k = 0; k < 3; ++k) first[k] = state.world_from_cam_t[k];
+  for (n = begin; n < begin + 15; ++n) give(n, RIGHT);
+  for (k = 0; k < 3; ++k) way += pow(state.world_from_cam_t[k] - first[k], 2);
+  centre_at(begin - 1, first), centre_at(n - 1, last);
+  for (k = 0; k < 3; ++k) truth += pow(last[k] - first[k], 2);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03 * sqrt(truth), sqrt(truth), sqrt(way));
+}
+
+/* A map that follows something that moves: to it, the camera flies another way than it does. */
+static void expect_lost_after_learning(const double factors[3]) {
+  const int begin = learn();
+  int n, num_weak = 0;
+  for (n = begin; state.status != TV_ODOMETRY_LOST && n < begin + 10; ++n) {
+    give(n, factors);
+    num_weak += state.status == TV_ODOMETRY_WEAK && is_contrary();
+  }
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, state.status);
+  TEST_ASSERT_FALSE(state.has_pose);
+  TEST_ASSERT_EQUAL_INT(4, num_weak);
+  /* The map from before is found again, and is in metres. */
+  for (; state.status != TV_ODOMETRY_TRACKING && n < begin + 40; ++n) give(n, RIGHT);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  TEST_ASSERT_EQUAL_INT(1, state.num_relocations);
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_VELOCITY, state.scale_source);
+}
+
+static void test_velocities_that_were_right_contradict_the_map(void) {
+  expect_lost_after_learning(REVERSED);
+}
+
+static void test_another_direction_contradicts_the_map(void) {
+  expect_lost_after_learning(SIDEWAYS);
+}
+
+/* Nothing is removed because of velocities that never agreed, and they give no scale. */
+static void test_velocities_that_were_never_right_are_not_believed(void) {
+  int n, num_weak = 0;
+  for (n = 0; n < LEARNT; ++n) {
+    give(n, REVERSED);
+    num_weak += is_contrary();
+    TEST_ASSERT_TRUE(n <= 20 || state.has_pose);
+  }
+  TEST_ASSERT_TRUE(num_weak > 20);
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_UNIT, state.scale_source);
+}
+
+/* Velocities that turn wrong for good are believed at most four times. */
+static void test_wrong_velocities_are_not_believed_for_ever(void) {
+  const int begin = learn();
+  int n, num_lost = 0;
+  for (n = begin; n < begin + 90; ++n) {
+    give(n, REVERSED);
+    num_lost += state.status == TV_ODOMETRY_LOST;
+  }
+  TEST_ASSERT_TRUE(state.has_pose && num_lost > 0 && num_lost <= 12);
+  TEST_ASSERT_TRUE(is_contrary());
+}
+
+/* Without a velocity; another room is this one upside down. */
+static void give_picture(int n, int is_another_room) {
+  int k;
+  room_flight(n, pixels);
+  for (k = 0; is_another_room && k < ROOM_WIDTH * ROOM_HEIGHT / 2; ++k) {
+    const uint8_t upper = pixels[k];
+    const int below = (ROOM_HEIGHT - 1 - k / ROOM_WIDTH) * ROOM_WIDTH + k % ROOM_WIDTH;
+    pixels[k] = pixels[below], pixels[below] = upper;
+  }
+  frame.velocity_sigma_m_s = 0;
+  frame.time_s = n / 30.0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+}
+
+static void test_a_gap_in_the_velocities_contradicts_nothing(void) {
+  const int begin = learn();
+  int n;
+  for (n = begin; n < begin + 10; ++n) {
+    give_picture(n, 0);
+    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  }
+}
+
+static void test_the_metre_is_known_again_after_another_segment(void) {
+  const int begin = learn();
+  const double sigma = state.scale_sigma;
+  int n;
+  for (n = begin; n < begin + 30; ++n) give_picture(n, 1);
+  TEST_ASSERT_EQUAL_INT(2, state.num_segments);
+  TEST_ASSERT_EQUAL_INT(1, state.segment);
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_UNIT, state.scale_source);
+  for (; n < begin + 60 && state.segment != 0; ++n) give_picture(n, 0);
+  TEST_ASSERT_EQUAL_INT(0, state.segment);
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_VELOCITY, state.scale_source);
+  TEST_ASSERT_EQUAL_DOUBLE(sigma, state.scale_sigma);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_right_velocities_give_the_metre);
+  RUN_TEST(test_velocities_that_were_right_contradict_the_map);
+  RUN_TEST(test_another_direction_contradicts_the_map);
+  RUN_TEST(test_velocities_that_were_never_right_are_not_believed);
+  RUN_TEST(test_wrong_velocities_are_not_believed_for_ever);
+  RUN_TEST(test_a_gap_in_the_velocities_contradicts_nothing);
+  RUN_TEST(test_the_metre_is_known_again_after_another_segment);
+  return UNITY_END();
+}
