@@ -145,29 +145,42 @@ struct PoseEquations {
   double upper[kPacked], gradient[PoseModel::kParameters];
 };
 
+// Writes the support to f.indices, region by region: those of region r are starts[r] to
+// starts[r + 1] - 1.
+void sort_by_region(Fit& f, int view, int side, int* starts) {
+  const Box box = image_box(f, view);
+  const int grid[2] = {side, side}, num_regions = side * side;
+  for (int region = 0; region <= num_regions; ++region) starts[region] = 0;
+  for (int k = 0; k < f.num_support; ++k) {
+    int cell[2];
+    find_cell(f, view, box, grid, f.support[k], cell);
+    const int region = cell[1] * side + cell[0];
+    f.values[k] = region;
+    ++starts[region];
+  }
+  for (int region = 1; region <= num_regions; ++region) starts[region] += starts[region - 1];
+  for (int k = f.num_support - 1; k >= 0; --k) {
+    f.indices[--starts[static_cast<int>(f.values[k])]] = f.support[k];
+  }
+}
+
 // The largest squared turn of the rotation when the inliers of one region are left out, by one
 // Gauss-Newton step without them: a deletion diagnostic (D. Belsley, E. Kuh, R. Welsch, "Regression
 // diagnostics", 1980). The regions are the cells of a 4x4 grid on the view's image. whole: the step
 // with all of them. At most kPi^2, also where the others do not determine the pose.
 double largest_turn_sq(Fit& f, int view, const PoseModel& model, const RobustLoss& loss,
                        const PoseEquations& all, const double* whole) {
-  constexpr int kSide = 4, grid[2] = {kSide, kSide};
-  const Box box = image_box(f, view);
-  for (int k = 0; k < f.num_support; ++k) {
-    int cell[2];
-    find_cell(f, view, box, grid, f.support[k], cell);
-    f.values[k] = cell[1] * kSide + cell[0];
-  }
+  constexpr int kSide = 4, kRegions = kSide * kSide;
+  int starts[kRegions + 1];
+  sort_by_region(f, view, kSide, starts);
   double largest = 0;
-  for (int region = 0; region < kSide * kSide; ++region) {
-    int count = 0;
-    for (int k = 0; k < f.num_support; ++k) {
-      if (f.values[k] == region) f.indices[count++] = f.support[k];
-    }
+  for (int region = 0; region < kRegions; ++region) {
+    const int32_t* const listed = f.indices + starts[region];
+    const int count = starts[region + 1] - starts[region];
     if (count == 0) continue;
     PoseEquations rest;
     double step[PoseModel::kParameters], turn_sq = 0;
-    model.normal_equations(f.matches.pairs, f.indices, count, loss, rest.upper, rest.gradient);
+    model.normal_equations(f.matches.pairs, listed, count, loss, rest.upper, rest.gradient);
     for (int k = 0; k < PoseEquations::kPacked; ++k) rest.upper[k] = all.upper[k] - rest.upper[k];
     for (int k = 0; k < PoseModel::kParameters; ++k) {
       rest.gradient[k] = all.gradient[k] - rest.gradient[k];
