@@ -1,5 +1,6 @@
 // Parts of the robust loop: sampler, stopping rule, preparation of matches, the test against
 // chance, covariance.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -160,6 +161,26 @@ void test_covariance_of_the_inverse_of_the_inverse_is_itself(void) {
   }
 }
 
+// Of a pose and of its inverse the direction's sigma is the same: the larger of the two, each the
+// root of the trace of its covariance's block.
+void test_sigma_of_the_direction_is_the_larger_of_the_pose_and_its_inverse(void) {
+  tv::Random random = tv::random_seeded(14);
+  for (int trial = 0; trial < 100; ++trial) {
+    const tv::Pose pose{tv::rotation_about(scene::direction(&random), uniform(&random, 0, 3)),
+                        scene::direction(&random)};
+    const tv::Pose inverse{pose.R.transpose(), -(pose.R.transpose() * pose.t)};
+    Eigen::Matrix<double, 5, 5, Eigen::RowMajor> A;
+    for (int k = 0; k < 25; ++k) A(k / 5, k % 5) = uniform(&random, -1, 1);
+    A = (A * A.transpose()).eval();
+    double there[25];
+    tv::invert_covariance(pose, inverse, A.data(), there);
+    const double sums[2] = {A(3, 3) + A(4, 4), there[18] + there[24]};
+    const double expected = std::sqrt(std::max(sums[0], sums[1]));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-11, expected, tv::direction_sigma(pose.t, A.data()));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-11, expected, tv::direction_sigma(inverse.t, there));
+  }
+}
+
 // Reference: the Jacobian of the map from the pose's parameters to the inverse's, by a small step.
 void test_covariance_of_the_inverse_follows_a_step_of_the_pose(void) {
   tv::Random random = tv::random_seeded(13);
@@ -207,6 +228,7 @@ int main(void) {
   RUN_TEST(test_binomials_and_false_alarms_follow_their_formulas);
   RUN_TEST(test_chance_of_agreement_is_near_a_bands_share_of_the_image);
   RUN_TEST(test_covariance_of_the_inverse_of_the_inverse_is_itself);
+  RUN_TEST(test_sigma_of_the_direction_is_the_larger_of_the_pose_and_its_inverse);
   RUN_TEST(test_covariance_of_the_inverse_follows_a_step_of_the_pose);
   return UNITY_END();
 }

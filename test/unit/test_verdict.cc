@@ -27,6 +27,7 @@ Evidence good() {
   e.agreement = 0.85;
   e.region_shift_rad = 0.002;
   e.sigma_rad = 0.005;
+  e.direction_sigma_rad = 0.02;
   e.median_parallax_rad = 0.05;
   e.pixel_angle_rad = 0.002;
   e.line_distance_px[0] = e.line_distance_px[1] = 50;
@@ -64,6 +65,11 @@ void test_each_reason_has_its_threshold(void) {
   assert_reason(TV_REASON_LOW_PARALLAX, e);
   e.sigma_rad = tv::kUnknown;
   assert_reason(TV_REASON_LOW_PARALLAX, e);
+  for (const double stated : {0.2355, 0.2357}) {  // the limit is 13.5 degrees, 0.23562
+    e = good();
+    e.direction_sigma_rad = stated;
+    assert_reason(stated > 0.23562 ? TV_REASON_LOW_PARALLAX : 0, e);
+  }
   e = good();
   e.has_alternative = true;
   assert_reason(TV_REASON_TWO_PLANAR_SOLUTIONS, e);

@@ -9,7 +9,7 @@
 namespace tv {
 
 // A pose that is believed ("ok") is wrong with at most this probability.
-inline constexpr double kMostProbabilityWrong = 0.15;
+inline constexpr double kMostProbabilityWrong = 0.16;
 
 struct Belief {
   double probability_wrong;

@@ -63,6 +63,19 @@ double largest_sigma(const double covariance[25]) {
   return std::sqrt(std::max(rotation, direction));
 }
 
+double direction_sigma(const Vec3& t, const double covariance[25]) {
+  // The inverse's direction moves by R' (w x t - a b1 - b b2).
+  Vec3 b1, b2;
+  tangent_basis(t, &b1, &b2);
+  const Mat3 of_rotation = -cross_matrix(t);
+  double inverse = 0;
+  for (int r = 0; r < 3; ++r) {
+    const double row[5] = {of_rotation(r, 0), of_rotation(r, 1), of_rotation(r, 2), -b1[r], -b2[r]};
+    for (int k = 0; k < 25; ++k) inverse += row[k / 5] * covariance[k] * row[k % 5];
+  }
+  return std::sqrt(std::max(covariance[18] + covariance[24], inverse));
+}
+
 bool pose_uncertainty(const RayPairs& pairs, const int32_t* indices, int count, const Pose& pose,
                       double scale_px, double limit_px, PoseUncertainty* uncertainty) {
   constexpr int P = PoseModel::kParameters;

@@ -14,11 +14,15 @@ struct PoseUncertainty {
   double focal_sigma;  // relative standard deviation of a refined focal length; else the given one
   double sigma_rad;    // of the verdict: largest_sigma before errors that matches share
                        // and a calibration that is not refined are added
+  double
+      direction_sigma_rad;  // of the verdict: direction_sigma, with the errors that matches share
 };
 
 // An upper bound of the standard deviations of the rotation and of the direction about any axis:
 // the root of the larger trace of their two blocks.
 double largest_sigma(const double covariance[25]);
+// The same of the direction alone: of that of t or of the inverse pose's, whichever is larger.
+double direction_sigma(const Vec3& t, const double covariance[25]);
 
 // The covariance of the M-estimate that minimises Cauchy's loss with scale_px over the listed
 // matches (P. Huber, "Robust Statistics", 1981, 7.6): with psi the derivative of the loss and p = 5

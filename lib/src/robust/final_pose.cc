@@ -314,12 +314,13 @@ bool step_focal_length(const PoseRefiner& f, double* growth, Pose* pose, double*
 bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* uncertainty) {
   const GravityPrior gravity = tested_gravity(f, pose);
   Listed listed;
-  double *const noise = uncertainty->covariance, all[25];
+  double *const noise = uncertainty->covariance, shared[25], all[25];
   if (f.problem.focal_is_ambiguous) return false;
   if (!uncertainty_without_gravity(f, pose, uncertainty, &listed)) return false;
-  std::copy(noise, noise + 25, all);
+  std::copy(noise, noise + 25, shared);
   const double growth =
-      add_correlation(f, listed.count, PoseModel{pose}, listed.loss, *uncertainty, all);
+      add_correlation(f, listed.count, PoseModel{pose}, listed.loss, *uncertainty, shared);
+  std::copy(shared, shared + 25, all);
   const double sigma = f.problem.options.focal_sigma0;
   uncertainty->focal_sigma = sigma;
   CalibrationEquations e;
@@ -334,16 +335,16 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
                                                uncertainty->variance_px);
       variance = std::min(1 / (of_matches + 1 / (sigma * sigma)) + kFocalFloor * (sigma * sigma),
                           sigma * sigma);
-      add_calibration(f.problem, slopes, variance, true, noise);
+      for (double* c : {noise, shared}) add_calibration(f.problem, slopes, variance, true, c);
       uncertainty->focal_sigma = std::sqrt(variance);
     }
     add_calibration(f.problem, slopes, variance, false, all);
   }
   if (gravity.known) {
-    add_gravity_information(gravity, pose.R, noise);
-    add_gravity_information(gravity, pose.R, all);
+    for (double* c : {noise, shared, all}) add_gravity_information(gravity, pose.R, c);
   }
   uncertainty->sigma_rad = largest_sigma(noise);
+  uncertainty->direction_sigma_rad = direction_sigma(pose.t, shared);
   std::copy(all, all + 25, noise);
   return all_finite(noise, 25);
 }
@@ -374,9 +375,10 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
   for (int k = 0; k < num; ++k) {
     if (!fit->certain[k]) continue;
     PoseUncertainty& uncertainty = fit->uncertainty[k];
-    double *const noise = uncertainty.covariance, all[25];
-    std::copy(noise, noise + 25, all);
-    add_correlation(f, count, twins[k], loss, uncertainty, all);
+    double *const noise = uncertainty.covariance, shared[25], all[25];
+    std::copy(noise, noise + 25, shared);
+    add_correlation(f, count, twins[k], loss, uncertainty, shared);
+    std::copy(shared, shared + 25, all);
     uncertainty.focal_sigma = f.problem.options.focal_sigma0;
     if (has_calibration_sigmas(f.problem)) {
       CalibrationSlopes slopes;
@@ -387,11 +389,13 @@ int refine_on_plane(const PoseRefiner& f, const Mat3& H, const Vec3& mean_ray0, 
       GravityPrior gravity = f.gravity;
       from_gravity[k] = gravity_distance_sq(gravity, twins[k].pose.R, noise);
       gravity.weight = gravity_weight(gravity, twins[k].pose.R, noise);
-      Pose with_all = fit->pose[k];
+      Pose with_shared = fit->pose[k], with_all = fit->pose[k];
       add_gravity(gravity, &fit->pose[k], noise);
+      add_gravity(gravity, &with_shared, shared);
       add_gravity(gravity, &with_all, all);
     }
     uncertainty.sigma_rad = largest_sigma(noise);
+    uncertainty.direction_sigma_rad = direction_sigma(fit->pose[k].t, shared);
     std::copy(all, all + 25, noise);
     fit->certain[k] = all_finite(noise, 25);
   }

@@ -130,9 +130,10 @@ void finish_two_view(TwoViewProblem& problem, const TwoViewModel& model, Arena& 
     case TV_KIND_UNCALIBRATED: break;
   }
   measure_evidence(f, arena);
-  out.judgement = judge(out.evidence);
   const double growth =
       growth_by_disagreement(out.evidence.num_different_inliers, out.evidence.num_different);
+  out.evidence.direction_sigma_rad *= std::sqrt(growth);
+  out.judgement = judge(out.evidence);
   for (int k = 0; k < 25; ++k) {
     out.covariance[k] *= growth;
     out.alternative_covariance[k] *= growth;

@@ -28,6 +28,7 @@ void store_uncertainty(const PoseUncertainty& uncertainty, TwoViewOutcome* out) 
   out->evidence.noise_px = uncertainty.noise_px;
   out->focal_sigma = uncertainty.focal_sigma;
   out->evidence.sigma_rad = uncertainty.sigma_rad;
+  out->evidence.direction_sigma_rad = uncertainty.direction_sigma_rad;
   std::copy(uncertainty.covariance, uncertainty.covariance + 25, out->covariance);
 }
 

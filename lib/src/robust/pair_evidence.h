@@ -23,9 +23,11 @@ struct Evidence {
   bool has_second_model = false;
   double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
   // The fields from here on are measured of a full pose (calibrated or planar).
-  bool has_alternative = false;    // whether a second motion of the plane fits
-  double noise_px = 0;             // noise of a matched pixel; 0 where there is no covariance
-  double sigma_rad = kUnknown;     // the largest standard deviation of rotation and direction
+  bool has_alternative = false;  // whether a second motion of the plane fits
+  double noise_px = 0;           // noise of a matched pixel; 0 where there is no covariance
+  double sigma_rad = kUnknown;   // the largest standard deviation of rotation and direction
+  // The stated standard deviation of the direction, without what the calibration adds to it.
+  double direction_sigma_rad = kUnknown;
   double median_parallax_rad = 0;  // median parallax of the inliers
   double pixel_angle_rad = 0;      // the parallax that a pixel of noise in both images makes
   // By how much the rotation turns when the inliers of one region are left out; at most kPi.

@@ -34,14 +34,19 @@ bool low_inlier_ratio(const Evidence& e) {
 }
 
 // LOW_PARALLAX: the direction of t is not determined well enough. The median parallax is below 3
-// thresholds or 10 standard deviations of the noise, or a standard deviation of the rotation or of
-// the direction is above 1.25 degrees or unknown: a pose that is "ok" is off by 5 degrees only by
-// an accident of four standard deviations (docs/decisions/0007-verdict-and-covariance.md).
+// thresholds or 10 standard deviations of the noise; or the noise gives the rotation or the
+// direction a standard deviation above 1.25 degrees or an unknown one: a pose that is "ok" is off
+// by 5 degrees only by an accident of four of them
+// (docs/decisions/0007-verdict-and-covariance.md); or the direction's standard deviation, with the
+// errors that matches share, is above 13.5 degrees: by its own covariance it is then about as
+// likely as not off by more than 10 degrees (46 per cent where the error has one axis, 58 where it
+// has none; docs/decisions/0028-verdict-after-alignment.md).
 bool low_parallax(const Evidence& e) {
-  constexpr double kMostSigma = 1.25 * kPi / 180;
+  constexpr double kMostSigma = 1.25 * kPi / 180, kMostDirectionSigma = 13.5 * kPi / 180;
   const double least_px = std::max(3 * e.threshold_px, 10 * e.noise_px);
   return has_full_pose(e) &&
-         (e.median_parallax_rad < least_px * e.pixel_angle_rad || !(e.sigma_rad <= kMostSigma));
+         (e.median_parallax_rad < least_px * e.pixel_angle_rad || !(e.sigma_rad <= kMostSigma) ||
+          !(e.direction_sigma_rad <= kMostDirectionSigma));
 }
 
 // CROWDED_MATCHES: the inliers lie in at most 4 of the 64 cells of a grid on each of the two
