@@ -198,7 +198,7 @@ void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
   for (; at > 0 && map->removed[at - 1].id > removed->id; --at) {
     map->removed[at] = map->removed[at - 1];
   }
-  Rigid kept_from_removed = compose(stays.cam_from_world, inverse(removed->cam_from_world));
+  Rigid kept_from_removed = motion_between(removed->cam_from_world, stays.cam_from_world);
   for (double& t : kept_from_removed.t) t /= stays.scale;
   map->removed[at] = {removed->id, stays.id, kept_from_removed, removed->scale / stays.scale};
   MapKeypoint* own = keypoints_of(*map, *removed);
