@@ -234,28 +234,33 @@ double add_point(const Window& window, Weighing weighing, int p) {
   return dot(e.y, e.y);
 }
 
-// Calls use(term, view of its first gradient, view of its second one or -1) for every prior.
-template <typename Use>
-void for_each_prior(const Window& window, const WindowPose* pose, const Use& use) {
+// The sum of the priors' costs. With a weight, also adds their terms to the system.
+double visit_priors(const Window& window, const WindowPose* pose, const double* weight) {
   const tv_window& given = window.given;
   PriorTerm term;
+  double sum = 0.0;
+  const auto use = [&](int low, int high) {
+    sum += term.cost;
+    if (weight != nullptr) add_term(window, *weight, term, low, high);
+  };
   for (int k = 0; k < given.num_pose_priors; ++k) {
     const tv_pose_prior& prior = given.pose_priors[k];
     pose_term(prior, pose[prior.idx_view], &term);
-    use(term, prior.idx_view, -1);
+    use(prior.idx_view, -1);
   }
   for (int k = 0; k < given.num_gravity_priors; ++k) {
     const tv_gravity_prior& prior = given.gravity_priors[k];
     gravity_term(prior, given.world_down, pose[prior.idx_view], &term);
-    use(term, prior.idx_view, -1);
+    use(prior.idx_view, -1);
   }
   for (int k = 0; k < given.num_distance_priors; ++k) {
     const tv_distance_prior& prior = given.distance_priors[k];
     const int32_t low = std::min(prior.idx_view0, prior.idx_view1);
     const int32_t high = std::max(prior.idx_view0, prior.idx_view1);
     distance_term(prior, pose[low], pose[high], &term);
-    use(term, low, high);
+    use(low, high);
   }
+  return sum;
 }
 
 // Writes the point's sum of rho and that of its squared residuals. False where a view does not see
@@ -308,9 +313,7 @@ double build_system(const Window& window, const Weighing& weighing) {
   std::fill(window.system.entries, window.system.entries + size * size, 0.0);
   std::fill(window.system.diagonal, window.system.diagonal + size, 0.0);
   std::fill(window.gradient, window.gradient + size, 0.0);
-  for_each_prior(window, window.pose, [&](const PriorTerm& term, int low, int high) {
-    add_term(window, weighing.prior_weight, term, low, high);
-  });
+  visit_priors(window, window.pose, &weighing.prior_weight);
   double sum = 0.0;
   for (int p = 0; p < window.num_points; ++p) sum += add_point(window, weighing, p);
   return sum;
@@ -329,9 +332,7 @@ double observations_cost(const Window& window, double* sum_sq) {
 }
 
 double priors_cost(const Window& window, const WindowPose* pose) {
-  double sum = 0.0;
-  for_each_prior(window, pose, [&](const PriorTerm& term, int, int) { sum += term.cost; });
-  return sum;
+  return visit_priors(window, pose, nullptr);
 }
 
 namespace {
