@@ -32,7 +32,6 @@ void add_to_view(const Window& window, int block, const ViewRow rows[2], const V
   double* U = block_at(window.system, block, block);
   Pair* g = reinterpret_cast<Pair*>(window.gradient + kBlock * block);
   Pair* diagonal = reinterpret_cast<Pair*>(window.system.diagonal + kBlock * block);
-  TV_UNROLL
   for (int c = 0; c < kBlockPairs; ++c) {
     const Pair a = rows[0].at[c], b = rows[1].at[c];
     g[c] += gradient.at[c];
@@ -72,7 +71,6 @@ void add_to_slot(const Window& window, const LinearObservation& part, int place,
   const ViewRow rows[2] = {view_row(part.x, part.h[0]), view_row(part.x, part.h[1])};
   add_to_view(window, window.slot_block[place], rows, view_row(part.x, part.q));
   Pair* W = window.Z[place].at;
-  TV_UNROLL
   for (int m = 0; m < 3; ++m) {
     TV_UNROLL
     for (int c = 0; c < kBlockPairs; ++c) {
@@ -197,7 +195,6 @@ void eliminate(const Window& window, const WindowPose* pose, const WindowPoint& 
 // Z = L^-1 W' in place of W', and its part of the reduced gradient.
 void reduce_slot(const EliminatedPoint& e, Pair* Z, double* gradient) {
   Pair* g = reinterpret_cast<Pair*>(gradient);
-  TV_UNROLL
   for (int c = 0; c < kBlockPairs; ++c) {
     const Pair z0 = Z[c] * e.inverses[0];
     const Pair z1 = (Z[3 + c] - e.l10 * z0) * e.inverses[1];
@@ -359,7 +356,6 @@ void joint_step(const Window& window, int p, double next[3], double* damped) {
     const int place = point.begin + k;
     const double* Z = reinterpret_cast<const double*>(window.Z[place].at);
     const double* of_view = window.step + kBlock * window.slot_block[place];
-    TV_UNROLL
     for (int m = 0; m < 3; ++m) {
       const double* z = Z + kBlock * m;
       y[m] += (z[0] * of_view[0] + z[1] * of_view[1] + z[2] * of_view[2]) +
