@@ -7,6 +7,7 @@
 #include "odometry/adjust.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
+#include "odometry/metric.h"
 #include "odometry/search.h"
 #include "odometry/sightings.h"
 #include "odometry/start.h"
@@ -117,6 +118,17 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
   end->cam_from_world = fit.cam_from_world;
   end->scale = scale_between(odometry, frame, *again);
   return end->scale > 0 && is_plausible(*odometry, frame, path, *end);
+}
+
+// The length of a segment's path.
+double segment_length(const Map& map, int32_t segment) {
+  double length = 0;
+  for (int32_t k = 1; k < map.num_keyframes; ++k) {
+    const MapKeyframe &before = map.keyframes[k - 1], &own = map.keyframes[k];
+    if (before.segment != segment || own.segment != segment) continue;
+    length += way_between(before.cam_from_world, own.cam_from_world);
+  }
+  return length;
 }
 
 struct Node {
@@ -255,11 +267,15 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
     nodes[k] = blend(own.cam_from_world, from_end, end.scale, share);
   }
   move_points(&map, nodes);
+  const double length = segment_length(map, segment);
   for (int32_t k = 0; k <= newest; ++k) {
     if (nodes[k].scale == 0) continue;
     map.keyframes[k].cam_from_world = orthonormalised(nodes[k].cam_from_world);
     map.keyframes[k].scale *= nodes[k].scale;
     map.keyframes[k].segment = old_segment;
+  }
+  if (segment == old_segment && length > 0) {
+    stretch_ways(odometry, segment_length(map, segment) / length);
   }
   for (int32_t p = 0; p < map.end_points; ++p) {
     if (map.points[p].segment == segment) map.points[p].segment = old_segment;
