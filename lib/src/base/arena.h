@@ -27,18 +27,16 @@ constexpr size_t arena_bytes(size_t count) {
   return (count * sizeof(T) + kArenaAlignment - 1) / kArenaAlignment * kArenaAlignment;
 }
 
+// What arena_alloc does with the size of an element: one function for all types.
+void* arena_take(Arena& arena, size_t count, size_t element_bytes);
+
 // Uninitialised memory for `count` elements, aligned to kArenaAlignment bytes; null when the arena
 // is full. Callers do not check: every function that allocates has a size query, and the context
 // reserves what the queries return.
 template <typename T>
 T* arena_alloc(Arena& arena, size_t count) {
   static_assert(__is_trivially_copyable(T), "the arena runs no constructors");
-  const size_t bytes = arena_bytes<T>(count);
-  if (bytes > arena.size_bytes - arena.used_bytes) return nullptr;
-  T* memory = reinterpret_cast<T*>(arena.memory + arena.used_bytes);
-  arena.used_bytes += bytes;
-  if (arena.used_bytes > arena.high_water_bytes) arena.high_water_bytes = arena.used_bytes;
-  return memory;
+  return static_cast<T*>(arena_take(arena, count, sizeof(T)));
 }
 
 // On destruction, gives back everything that was taken from the arena since construction.

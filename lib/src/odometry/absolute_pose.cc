@@ -180,11 +180,6 @@ bool set_variance(const Finish& f, Candidate* c) {
   return true;
 }
 
-PoseProblem problem_of(const Finish& f, const Candidate& c, int count, bool is_last = true) {
-  const bool exact = is_last && f.input.camera.model.model != TV_CAMERA_PINHOLE;
-  return PoseProblem{exact ? &f.input : nullptr, f.s, f.indices, count, c.scale_px, {}, 0};
-}
-
 // The scale of least estimated variance for the squared errors in f.values.
 double best_scale(const Finish& f, double noise_px, int count) {
   double least = 0, best = 0;
@@ -208,21 +203,25 @@ double best_scale(const Finish& f, double noise_px, int count) {
 Candidate refined(const Finish& f, const Pose& start) {
   Candidate c{};
   c.pose = start;
-  int count = 0;
+  PoseProblem problem{nullptr, f.s, f.indices, 0, 0, {}, 0};
   for (int round = 0; round < kFinalRounds; ++round) {
-    count = near_sightings(f.s, c.pose, kNear * f.threshold_px, f.indices);
+    const int count = near_sightings(f.s, c.pose, kNear * f.threshold_px, f.indices);
     if (count < 3) return c;
     for (int k = 0; k < count; ++k) f.values[k] = reprojection_sq(f.s.all[f.indices[k]], c.pose);
     // Half of chi-square with two degrees of freedom lies below 2 log 2.
     c.noise_px = std::sqrt(median(f.values, count) / 1.3862943611198906);
-    c.scale_px = best_scale(f, c.noise_px, count);
-    refine_absolute(problem_of(f, c, count, round == kFinalRounds - 1), kFinalIterations,
-                    kFinalGains[round], &c.pose, &c.equations);
+    problem.count = count;
+    problem.scale_px = best_scale(f, c.noise_px, count);
+    if (round == kFinalRounds - 1 && f.input.camera.model.model != TV_CAMERA_PINHOLE) {
+      problem.exact = &f.input;
+    }
+    refine_absolute(problem, kFinalIterations, kFinalGains[round], &c.pose, &c.equations);
   }
-  PoseProblem with_gravity = problem_of(f, c, count);
-  with_gravity.noise_sq = c.equations.slope > 0 ? c.equations.psi_sq / (2 * c.equations.slope) : 0;
-  c.scale_px = std::max(kScale * c.noise_px, kLeastScale * f.threshold_px);
-  pose_equations(problem_of(f, c, count), c.pose, &c.equations);
+  const double scale_px = problem.scale_px;
+  problem.noise_sq = c.equations.slope > 0 ? c.equations.psi_sq / (2 * c.equations.slope) : 0;
+  problem.scale_px = std::max(kScale * c.noise_px, kLeastScale * f.threshold_px);
+  c.scale_px = problem.scale_px;
+  pose_equations(problem, c.pose, &c.equations);
   c.has_covariance = set_variance(f, &c);
   if (!c.has_covariance) c.variance_px = c.scale_px * c.scale_px;
   c.determined = covariance_of(c, GravitySight{}, c.covariance);
@@ -235,8 +234,9 @@ Candidate refined(const Finish& f, const Pose& start) {
     gravity.weight *= ratio * ratio;
     c.gravity_sq = std::min(z_sq, 2 * kEvidence);
   }
-  with_gravity.gravity = gravity;
-  refine_absolute(with_gravity, kFinalIterations, kFinalGains[1], &c.pose, nullptr);
+  problem.scale_px = scale_px;
+  problem.gravity = gravity;
+  refine_absolute(problem, kFinalIterations, kFinalGains[1], &c.pose, nullptr);
   c.determined = covariance_of(c, gravity, c.covariance);
   return c;
 }
@@ -311,6 +311,16 @@ Pose mirrored(const Pose& pose, const Spread& spread) {
   return twin;
 }
 
+// The sum of the squared differences of the rotations' entries.
+double turn_sq(const Pose& a, const Pose& b) {
+  double sum = 0;
+  for (int k = 0; k < 9; ++k) {
+    const double difference = a.R.data()[k] - b.R.data()[k];
+    sum += difference * difference;
+  }
+  return sum;
+}
+
 // The probability that a wrong match agrees with the pose: by pairings of points with the pixels of
 // other matches, and by the share of the image that the threshold's disc covers (robust/chance.h).
 double chance_of(const Finish& f, const Pose& pose, uint64_t seed) {
@@ -332,7 +342,7 @@ double chance_of(const Finish& f, const Pose& pose, uint64_t seed) {
     const uint32_t i = random_below(random, static_cast<uint32_t>(n));
     const uint32_t j = random_below(random, static_cast<uint32_t>(n - 1));
     Sighting wrong = f.s.all[j + (j >= i)];
-    std::copy(f.s.all[i].point, f.s.all[i].point + 3, wrong.point);
+    std::copy_n(f.s.all[i].point, 3, wrong.point);
     agreeing += reprojection_sq(wrong, pose) <= f.threshold_px * f.threshold_px;
   }
   const double weight = std::min(0.5 * n * (n - 1.0), double(kPairings));
@@ -358,7 +368,8 @@ double largest_sigma(const Candidate& c, double distance) {
 // The covariance in the caller's parameters, (w, d') with d' = (d + t x w) / scale: a turn about
 // the camera instead of the middle of the points.
 void store_covariance(const Sightings& s, const Candidate& c, double out[36]) {
-  const Mat3 lever = cross_matrix(c.pose.t) / s.scale;
+  Mat3 lever = cross_matrix(c.pose.t);
+  for (int k = 0; k < 9; ++k) lever.data()[k] /= s.scale;
   double half[36];
   for (int i = 0; i < 36; ++i) {
     const int row = i / 6, column = i % 6;
@@ -441,17 +452,13 @@ void finish_absolute_pose(const SightingInput& input, const Sightings& s,
       gravity_prior(options.gravity_in_world, options.gravity_in_camera, options.gravity_sigma_rad);
   if (prior.known)
     f.gravity = {1 / (prior.sigma_rad * prior.sigma_rad), prior.down[0], prior.down[1]};
-  Candidate best{};
-  int different = 0;
-  if (search.found) {
-    best = refined(f, search.pose);
-    different = count_inliers(f, best.pose, out, nullptr);
-  }
+  const Candidate found = search.found ? refined(f, search.pose) : Candidate{};
+  int different = search.found ? count_inliers(f, found.pose, out, nullptr) : 0;
   const double log_alarms = different > 3
                                 ? log_false_alarms(s.num, different, 3, kMaxAbsolutePose3pt,
-                                                   chance_of(f, best.pose, options.seed))
+                                                   chance_of(f, found.pose, options.seed))
                                 : 0;
-  if (!best.determined || !(log_alarms < kLogMeaningful)) {
+  if (!found.determined || !(log_alarms < kLogMeaningful)) {
     // No pose: too few matches, points on a line, or no more inliers than chance explains.
     out->num_inliers = 0;
     out->coverage = out->rms_error_px = 0;
@@ -464,20 +471,20 @@ void finish_absolute_pose(const SightingInput& input, const Sightings& s,
   }
   const Spread spread = spread_of(f, different);
   const Vec3& sizes = spread.svd.s;
-  if (sizes[2] < 0.01 * sizes[1]) {
-    const Candidate twin = refined(f, mirrored(best.pose, spread));
-    const double turn_sq = (twin.pose.R - best.pose.R).squaredNorm();
-    if (twin.determined && turn_sq > 1e-6) {
-      const double difference = evidence_against(f, twin, best) - evidence_against(f, best, best);
-      const Candidate& other = difference < 0 ? best : twin;
-      if (std::fabs(difference) < kEvidence) {
-        out->has_alternative = 1;
-        out->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
-        write_pose(s, other.pose, out->alternative_R, out->alternative_t);
-      }
-      if (difference < 0) best = twin;
+  const bool is_flat = sizes[2] < 0.01 * sizes[1];
+  const Candidate twin = is_flat ? refined(f, mirrored(found.pose, spread)) : Candidate{};
+  bool takes_twin = false;
+  if (twin.determined && turn_sq(twin.pose, found.pose) > 1e-6) {
+    const double difference = evidence_against(f, twin, found) - evidence_against(f, found, found);
+    takes_twin = difference < 0;
+    if (std::fabs(difference) < kEvidence) {
+      const Candidate& other = takes_twin ? found : twin;
+      out->has_alternative = 1;
+      out->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+      write_pose(s, other.pose, out->alternative_R, out->alternative_t);
     }
   }
+  const Candidate& best = takes_twin ? twin : found;
   out->num_inliers = 0;
   different = count_inliers(f, best.pose, out, mask);
   out->has_pose = 1;

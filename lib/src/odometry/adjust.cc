@@ -287,8 +287,8 @@ bool estimate_covariance(Odometry* odometry, int32_t keyframe, double covariance
   tv_window_result result;
   if (!solve_window(odometry, 1, &around, covariances, nullptr, &result)) return false;
   std::copy_n(covariances + 36 * view, 36, covariance);
-  const Rigid moved = compose(map.keyframes[keyframe].cam_from_world,
-                              inverse(map.keyframes[keyframe - 1].cam_from_world));
+  const Rigid moved = motion_between(map.keyframes[keyframe - 1].cam_from_world,
+                                     map.keyframes[keyframe].cam_from_world);
   for (int r = 0; r < 6; ++r) {
     for (int c = 0; c < 6; ++c) {
       double* entry = &covariance[6 * r + c];

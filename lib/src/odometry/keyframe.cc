@@ -53,12 +53,9 @@ void make_room(Odometry* odometry, int32_t wanted) {
       const MapKeyframe &before = map.keyframes[k - 1], &own = map.keyframes[k];
       const MapKeyframe& after = map.keyframes[k + 1];
       if (own.id == odometry->reference_id) continue;
-      double a[3], b[3];
-      centre_of(before.cam_from_world, a);
-      centre_of(after.cam_from_world, b);
-      double gap = distance_between(a, b) +
-                   odometry->median_depth * rotation_angle(compose(after.cam_from_world,
-                                                                   inverse(before.cam_from_world)));
+      double gap =
+          way_between(before.cam_from_world, after.cam_from_world) +
+          odometry->median_depth * turn_between(before.cam_from_world, after.cam_from_world);
       if (before.segment != own.segment)
         gap = kNeverRemoved;
       else if (after.segment != own.segment)
@@ -118,7 +115,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     pixels1[2 * k + 1] = static_cast<double>(own1[keypoints1[k]].y);
   }
   const Rigid cam1_from_cam0 =
-      orthonormalised(compose(k1.cam_from_world, inverse(k0.cam_from_world)));
+      orthonormalised(motion_between(k0.cam_from_world, k1.cam_from_world));
   const tv_camera* camera = &odometry->camera.model;
   if (tv_triangulate(TV_TRIANGULATION_ITERATIVE_LS, camera, camera, cam1_from_cam0.R,
                      cam1_from_cam0.t, pixels0, pixels1, num, points) != TV_OK) {
@@ -172,18 +169,15 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
   int32_t* keypoints1 = arena_alloc<int32_t>(arena, n);
   const tv_features mine = features_of(map, own, arena_alloc<tv_keypoint>(arena, n));
   tv_keypoint* their_room = arena_alloc<tv_keypoint>(arena, n);
-  double centre[3];
-  centre_of(own.cam_from_world, centre);
   int32_t neighbours[kMostNeighbours], num_neighbours = 0;
   for (int32_t k = keyframe - 1; k >= 0 && num_neighbours < kMostNeighbours; --k) {
     const MapKeyframe& other = map.keyframes[k];
     if (other.described < 0 || other.segment != own.segment) continue;
-    double there[3];
-    centre_of(other.cam_from_world, there);
-    if (distance_between(centre, there) < kLeastBaseline * odometry->median_depth) continue;
-    if (rotation_angle(compose(own.cam_from_world, inverse(other.cam_from_world))) > kMostTurned) {
+    if (way_between(other.cam_from_world, own.cam_from_world) <
+        kLeastBaseline * odometry->median_depth) {
       continue;
     }
+    if (turn_between(other.cam_from_world, own.cam_from_world) > kMostTurned) continue;
     neighbours[num_neighbours++] = k;
   }
   begin_check(odometry, own.id);
@@ -200,7 +194,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     }
     if (i == first_checked || (i > first_checked && is_urgent(check->vote))) {
       add_vote(odometry, theirs.keypoints, mine.keypoints, found, num_found,
-               compose(own.cam_from_world, inverse(other.cam_from_world)), &check->vote);
+               motion_between(other.cam_from_world, own.cam_from_world), &check->vote);
     } else if (i > first_checked && needs_vote(check->vote)) {
       add_pair(check, other.id);
     }

@@ -7,6 +7,7 @@
 #include "odometry/adjust.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
+#include "odometry/metric.h"
 #include "odometry/search.h"
 #include "odometry/sightings.h"
 #include "odometry/start.h"
@@ -27,12 +28,11 @@ constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
 
 // Writes for each keyframe the length of the path from it to the newest one.
 void measure_paths(const Map& map, double* lengths) {
-  double length = 0, after[3], centre[3];
+  const MapKeyframe* keyframes = map.keyframes;
+  double length = 0;
   for (int32_t k = map.num_keyframes - 1; k >= 0; --k) {
-    centre_of(map.keyframes[k].cam_from_world, centre);
-    if (k + 1 < map.num_keyframes) length += distance_between(centre, after);
-    std::copy_n(centre, 3, after);
     lengths[k] = length;
+    if (k > 0) length += way_between(keyframes[k - 1].cam_from_world, keyframes[k].cam_from_world);
   }
 }
 
@@ -41,12 +41,9 @@ bool is_plausible(const Odometry& odometry, const Frame& frame, double path, con
   const Map& map = odometry.map;
   if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
   if (!(end.scale < kLargestScale && end.scale > 1 / kLargestScale)) return false;
-  double now[3], there[3];
-  centre_of(frame.cam_from_world, now);
-  centre_of(end.cam_from_world, there);
-  return distance_between(now, there) <=
+  return way_between(frame.cam_from_world, end.cam_from_world) <=
              kLargestDrift * path + kLargestShift * odometry.median_depth &&
-         rotation_angle(compose(end.cam_from_world, inverse(frame.cam_from_world))) <= kLargestTurn;
+         turn_between(frame.cam_from_world, end.cam_from_world) <= kLargestTurn;
 }
 
 // Whether the frame may see what a keyframe saw, if the drift is as large as it may be after a path
@@ -55,12 +52,9 @@ bool may_meet(const Odometry& odometry, const Frame& frame, double path, int32_t
   const Map& map = odometry.map;
   const MapKeyframe& other = map.keyframes[keyframe];
   if (other.segment != odometry.segment) return true;
-  double now[3], there[3];
-  centre_of(frame.cam_from_world, now);
-  centre_of(other.cam_from_world, there);
-  return distance_between(now, there) <=
+  return way_between(frame.cam_from_world, other.cam_from_world) <=
              kLargestDrift * path + kFarthestSeen * odometry.median_depth &&
-         rotation_angle(compose(other.cam_from_world, inverse(frame.cam_from_world))) < kMostTurned;
+         turn_between(frame.cam_from_world, other.cam_from_world) < kMostTurned;
 }
 
 // The median of the depths of the same keypoints among the old points over those among the new
@@ -126,6 +120,17 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
   return end->scale > 0 && is_plausible(*odometry, frame, path, *end);
 }
 
+// The length of a segment's path.
+double segment_length(const Map& map, int32_t segment) {
+  double length = 0;
+  for (int32_t k = 1; k < map.num_keyframes; ++k) {
+    const MapKeyframe &before = map.keyframes[k - 1], &own = map.keyframes[k];
+    if (before.segment != segment || own.segment != segment) continue;
+    length += way_between(before.cam_from_world, own.cam_from_world);
+  }
+  return length;
+}
+
 struct Node {
   Rigid cam_from_world;
   double scale;
@@ -134,7 +139,7 @@ struct Node {
 // The pose of a keyframe between what the loop's beginning says of it and what its end says.
 Node blend(const Rigid& from_begin, const Rigid& from_end, double scale, double share) {
   Node node;
-  const Rigid turn = scaled_motion(compose(from_end, inverse(from_begin)), share);
+  const Rigid turn = scaled_motion(motion_between(from_begin, from_end), share);
   Rigid rotation = turn;
   for (double& t : rotation.t) t = 0;
   double a[3], b[3];
@@ -255,18 +260,22 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
     if (own.segment != segment) continue;
     if (segment == old_segment && k <= end.keyframe) continue;
     // As the loop's end says: the way from the newest keyframe, in the other scale.
-    Rigid relative = compose(own.cam_from_world, inverse(now));
+    Rigid relative = motion_between(now, own.cam_from_world);
     for (double& t : relative.t) t *= end.scale;
     const Rigid from_end = compose(relative, end.cam_from_world);
     const double share = segment == old_segment ? 1 - paths[k] / whole : 1;
     nodes[k] = blend(own.cam_from_world, from_end, end.scale, share);
   }
   move_points(&map, nodes);
+  const double length = segment_length(map, segment);
   for (int32_t k = 0; k <= newest; ++k) {
     if (nodes[k].scale == 0) continue;
     map.keyframes[k].cam_from_world = orthonormalised(nodes[k].cam_from_world);
     map.keyframes[k].scale *= nodes[k].scale;
     map.keyframes[k].segment = old_segment;
+  }
+  if (segment == old_segment && length > 0) {
+    stretch_ways(odometry, segment_length(map, segment) / length);
   }
   for (int32_t p = 0; p < map.end_points; ++p) {
     if (map.points[p].segment == segment) map.points[p].segment = old_segment;

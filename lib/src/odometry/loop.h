@@ -1,7 +1,7 @@
 // Loops: the camera sees again what it saw long before. The keyframes in between are corrected by
 // what the path drifted in position, attitude and scale, as in the pose chain of G. Dubbelman,
 // B. Browning, "COP-SLAM: closed-form online pose-chain optimization for visual SLAM", 2015; and a
-// segment that meets another one becomes part of it.
+// segment that meets another one becomes part of it. Tests: test/unit/test_loop.cc.
 #pragma once
 
 #include "odometry/odometry.h"

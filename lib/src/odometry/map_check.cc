@@ -31,7 +31,7 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
   // The variances of the rotation vector: elements 0, 6 and 12 of the 5x5 covariance.
   const double* c = view.covariance;
   const double sigma = std::sqrt(std::max({c[0], c[6], c[12]}));
-  const double difference = rotation_angle(compose(turn, inverse(map_turn)));
+  const double difference = turn_between(map_turn, turn);
   if (difference <= kTurnSigmas * sigma + kTurnAllowed)
     ++vote->num_agree;
   else
@@ -93,7 +93,7 @@ void check_next_pair(Odometry* odometry) {
   int32_t num = 0;
   tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num);
   add_vote(odometry, theirs.keypoints, mine.keypoints, found, num,
-           compose(k1.cam_from_world, inverse(k0.cam_from_world)), &check->vote);
+           motion_between(k0.cam_from_world, k1.cam_from_world), &check->vote);
 }
 
 }  // namespace tv

@@ -11,9 +11,10 @@ namespace tv {
 namespace {
 
 constexpr double kLargestScaleSigma = 0.1;  // relative
-// What the map's own scale may drift by, relative: added to the standard deviation.
-constexpr double kScaleDrift = 0.007;
-constexpr double kLeastChange = 0.01;  // of the scale, for which the map is rescaled
+// What the scales of the velocities and of the map itself may be off by, relative: added to the
+// standard deviation.
+constexpr double kScaleError = 0.01;
+constexpr double kLeastChange = 0.002;  // of the scale, for which the map is rescaled
 // A way contradicts the velocities where it differs from theirs by more than this share, so many of
 // their standard deviations, taken as equal errors, and this share of the median depth, which is
 // the map's error. They are clear where they say this many standard deviations.
@@ -72,12 +73,11 @@ void settle_scale(Odometry* odometry, Frame* frame) {
   const double variance = known->square / (known->product * known->product);  // relative
   if (!(known->product > 0) || !(variance <= kLargestScaleSigma * kLargestScaleSigma)) return;
   const double scale = known->product / known->square;
-  known->sigma = std::sqrt(variance + kScaleDrift * kScaleDrift);
+  known->sigma = std::sqrt(variance + kScaleError * kScaleError);
   known->source = known->evidence;
   if (std::fabs(scale - 1) < kLeastChange) return;
   rescale(odometry, scale, frame);
-  known->product *= scale;
-  known->square *= scale * scale;
+  stretch_ways(odometry, scale);
 }
 
 }  // namespace
@@ -147,6 +147,11 @@ void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyfr
   odometry->travel.is_known = true;
   odometry->travel.keyframe_id = keyframe_id;
   centre_of(cam_from_world, odometry->travel.from);
+}
+
+void stretch_ways(Odometry* odometry, double factor) {
+  odometry->scale.product *= factor;
+  odometry->scale.square *= factor * factor;
 }
 
 void change_scale(Odometry* odometry, int32_t from, int32_t to) {

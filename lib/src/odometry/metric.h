@@ -24,6 +24,9 @@ bool is_contrary(const Odometry& odometry, const Frame& frame);
 // metre as its unit once the scale is known to a tenth.
 void measure_scale(Odometry* odometry, Frame* frame);
 
+// The segment's ways became `factor` of what they were, by a loop: so did those of the evidence.
+void stretch_ways(Odometry* odometry, double factor);
+
 // What is known of the scale is kept, and what was known of the segment's is taken up.
 void change_scale(Odometry* odometry, int32_t from, int32_t to);
 

@@ -53,10 +53,26 @@ double distance_between(const double a[3], const double b[3]) {
   return length_of(difference);
 }
 
+Rigid motion_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world) {
+  return compose(cam1_from_world, inverse(cam0_from_world));
+}
+
+double turn_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world) {
+  return rotation_angle(motion_between(cam0_from_world, cam1_from_world));
+}
+
+double way_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world) {
+  double centre0[3], centre1[3];
+  centre_of(cam0_from_world, centre0);
+  centre_of(cam1_from_world, centre1);
+  return distance_between(centre0, centre1);
+}
+
 Rigid orthonormalised(const Rigid& rigid) {
   Rigid result = rigid;
-  Eigen::Map<Mat3> R(result.R);
-  R = orthonormalised(Mat3(R));
+  Mat3 R;
+  std::copy_n(rigid.R, 9, R.data());
+  std::copy_n(orthonormalised(R).data(), 9, result.R);
   return result;
 }
 
@@ -67,8 +83,7 @@ Rigid scaled_motion(const Rigid& rigid, double factor) {
   Rigid result = kIdentity;
   if (length > 1e-12) {
     const Vec3 unit = axis / length;
-    Eigen::Map<Mat3> turned(result.R);
-    turned = rotation_about(unit, factor * rotation_angle(rigid));
+    std::copy_n(rotation_about(unit, factor * rotation_angle(rigid)).data(), 9, result.R);
   }
   for (int k = 0; k < 3; ++k) result.t[k] = factor * rigid.t[k];
   return result;

@@ -20,6 +20,12 @@ void centre_of(const Rigid& cam_from_world, double centre[3]);
 double rotation_angle(const Rigid& rigid);  // in radians
 double distance_between(const double a[3], const double b[3]);
 
+// Of two cameras: cam1_from_cam0, the angle of its rotation in radians, and the distance of the
+// centres.
+Rigid motion_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world);
+double turn_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world);
+double way_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world);
+
 // `rigid` with the rotation's rounding errors removed.
 Rigid orthonormalised(const Rigid& rigid);
 

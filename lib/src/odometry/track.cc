@@ -107,11 +107,9 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
   const Map& map = odometry.map;
   const MapKeyframe& last = map.keyframes[map.num_keyframes - 1];
   if (frame.number == last.frame) return false;
-  double a[3], b[3];
-  centre_of(frame.cam_from_world, a);
-  centre_of(last.cam_from_world, b);
-  const double moved = distance_between(a, b) / odometry.median_depth;
-  const double turned = rotation_angle(compose(frame.cam_from_world, inverse(last.cam_from_world)));
+  const double moved =
+      way_between(last.cam_from_world, frame.cam_from_world) / odometry.median_depth;
+  const double turned = turn_between(last.cam_from_world, frame.cam_from_world);
   const bool few = 10 * num_inliers < 6 * odometry.keyframe_inliers || num_inliers < kFewInliers;
   return moved > kFarMoved || turned > kFarTurned ||
          (few && (moved > kLeastMoved || turned > kLeastTurned));
@@ -285,7 +283,7 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   write_fit(fit, state);
   odometry->has_motion = follows;
   if (follows) {
-    odometry->motion = compose(frame->cam_from_world, inverse(odometry->previous.cam_from_world));
+    odometry->motion = motion_between(odometry->previous.cam_from_world, frame->cam_from_world);
     odometry->motion_s = frame->time_s - odometry->previous.time_s;
     add_travel(odometry, *frame);
   } else {

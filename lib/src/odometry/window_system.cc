@@ -32,7 +32,6 @@ void add_to_view(const Window& window, int block, const ViewRow rows[2], const V
   double* U = block_at(window.system, block, block);
   Pair* g = reinterpret_cast<Pair*>(window.gradient + kBlock * block);
   Pair* diagonal = reinterpret_cast<Pair*>(window.system.diagonal + kBlock * block);
-  TV_UNROLL
   for (int c = 0; c < kBlockPairs; ++c) {
     const Pair a = rows[0].at[c], b = rows[1].at[c];
     g[c] += gradient.at[c];
@@ -72,7 +71,6 @@ void add_to_slot(const Window& window, const LinearObservation& part, int place,
   const ViewRow rows[2] = {view_row(part.x, part.h[0]), view_row(part.x, part.h[1])};
   add_to_view(window, window.slot_block[place], rows, view_row(part.x, part.q));
   Pair* W = window.Z[place].at;
-  TV_UNROLL
   for (int m = 0; m < 3; ++m) {
     TV_UNROLL
     for (int c = 0; c < kBlockPairs; ++c) {
@@ -197,7 +195,6 @@ void eliminate(const Window& window, const WindowPose* pose, const WindowPoint& 
 // Z = L^-1 W' in place of W', and its part of the reduced gradient.
 void reduce_slot(const EliminatedPoint& e, Pair* Z, double* gradient) {
   Pair* g = reinterpret_cast<Pair*>(gradient);
-  TV_UNROLL
   for (int c = 0; c < kBlockPairs; ++c) {
     const Pair z0 = Z[c] * e.inverses[0];
     const Pair z1 = (Z[3 + c] - e.l10 * z0) * e.inverses[1];
@@ -234,28 +231,33 @@ double add_point(const Window& window, Weighing weighing, int p) {
   return dot(e.y, e.y);
 }
 
-// Calls use(term, view of its first gradient, view of its second one or -1) for every prior.
-template <typename Use>
-void for_each_prior(const Window& window, const WindowPose* pose, const Use& use) {
+// The sum of the priors' costs. With a weight, also adds their terms to the system.
+double visit_priors(const Window& window, const WindowPose* pose, const double* weight) {
   const tv_window& given = window.given;
   PriorTerm term;
+  double sum = 0.0;
+  const auto use = [&](int low, int high) {
+    sum += term.cost;
+    if (weight != nullptr) add_term(window, *weight, term, low, high);
+  };
   for (int k = 0; k < given.num_pose_priors; ++k) {
     const tv_pose_prior& prior = given.pose_priors[k];
     pose_term(prior, pose[prior.idx_view], &term);
-    use(term, prior.idx_view, -1);
+    use(prior.idx_view, -1);
   }
   for (int k = 0; k < given.num_gravity_priors; ++k) {
     const tv_gravity_prior& prior = given.gravity_priors[k];
     gravity_term(prior, given.world_down, pose[prior.idx_view], &term);
-    use(term, prior.idx_view, -1);
+    use(prior.idx_view, -1);
   }
   for (int k = 0; k < given.num_distance_priors; ++k) {
     const tv_distance_prior& prior = given.distance_priors[k];
     const int32_t low = std::min(prior.idx_view0, prior.idx_view1);
     const int32_t high = std::max(prior.idx_view0, prior.idx_view1);
     distance_term(prior, pose[low], pose[high], &term);
-    use(term, low, high);
+    use(low, high);
   }
+  return sum;
 }
 
 // Writes the point's sum of rho and that of its squared residuals. False where a view does not see
@@ -308,9 +310,7 @@ double build_system(const Window& window, const Weighing& weighing) {
   std::fill(window.system.entries, window.system.entries + size * size, 0.0);
   std::fill(window.system.diagonal, window.system.diagonal + size, 0.0);
   std::fill(window.gradient, window.gradient + size, 0.0);
-  for_each_prior(window, window.pose, [&](const PriorTerm& term, int low, int high) {
-    add_term(window, weighing.prior_weight, term, low, high);
-  });
+  visit_priors(window, window.pose, &weighing.prior_weight);
   double sum = 0.0;
   for (int p = 0; p < window.num_points; ++p) sum += add_point(window, weighing, p);
   return sum;
@@ -329,9 +329,7 @@ double observations_cost(const Window& window, double* sum_sq) {
 }
 
 double priors_cost(const Window& window, const WindowPose* pose) {
-  double sum = 0.0;
-  for_each_prior(window, pose, [&](const PriorTerm& term, int, int) { sum += term.cost; });
-  return sum;
+  return visit_priors(window, pose, nullptr);
 }
 
 namespace {
@@ -358,7 +356,6 @@ void joint_step(const Window& window, int p, double next[3], double* damped) {
     const int place = point.begin + k;
     const double* Z = reinterpret_cast<const double*>(window.Z[place].at);
     const double* of_view = window.step + kBlock * window.slot_block[place];
-    TV_UNROLL
     for (int m = 0; m < 3; ++m) {
       const double* z = Z + kBlock * m;
       y[m] += (z[0] * of_view[0] + z[1] * of_view[1] + z[2] * of_view[2]) +
