@@ -97,9 +97,8 @@ typedef enum tv_reason {
      images match better when one of them is mirrored. */
   TV_REASON_LOW_INLIER_RATIO = 1 << 1,
   /* The direction of t is poorly determined: the median parallax is below 3 max_error_px or below
-     10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees; or
-     that of the direction exceeds 13.5 degrees with the errors that matches share (in the covariance;
-     calibration apart). */
+     10 times the noise, or the largest standard deviation of the pose exceeds 1.25 degrees by the
+     noise alone, or that of the direction 13.5 degrees with the errors that matches share. */
   TV_REASON_LOW_PARALLAX = 1 << 2,
   /* The matches lie on a plane, and two different poses explain them equally well. Both are in the
      result. */
