@@ -387,6 +387,14 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assertEqual(self.result()["num_frames"], COUNT)
         self.assertLess(self.result()["truth"]["ate_rmse_percent_of_path"], 1)
         self.assertIn("frame_000003.png", (self.out / "frames.csv").read_text())
+        # The camera's focal length as for 35 mm film: the same camera.
+        focal = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)
+        self.succeed(self.odometry(path, "--focal-35mm", focal,
+                                   "--truth", self.write("truth", TUM_TRUTH)))
+        self.assertLess(self.result()["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertEqual(self.result()["options"]["focal_35mm"], focal)
+        self.assertIn(f"fx {FOCAL:g}", self.succeed(self.run_program(
+            "map", "info", self.out / "map.twm")).stdout.decode())
 
     def test_a_drone_and_its_recording_are_tracked(self):
         if self.run_program("drone", "simulate", "--help").returncode != 0:
@@ -661,6 +669,8 @@ distortion_coefficients: [0, 0, 0, 0]
         refused("--max-keypoints", more=("--max-keypoints", 5))
         refused("cannot read", more=("--truth", "absent"))
         refused("cannot read", more=("--camera", "absent"))
+        refused("without a camera file", more=("--camera", "absent", "--focal-35mm", 26))
+        refused("--focal-35mm: 'nan' is not a number", more=("--focal-35mm", "nan"))
         (source / "cameras.yaml").unlink()
         self.assert_refused(self.odometry(source), "--camera is required", "set folder")
         self.assert_refused(self.odometry(source / "images"), "--fps is required")
