@@ -192,7 +192,8 @@ class Rerun(cli.CliTest):
                             (MAP_HEADER, "fewer points than its header says"),
                             (MAP_HEADER.replace(b"red", b"rot"), "fewer points"),
                             (MAP_HEADER.replace(b"red", b"rot") + bytes(56), "no cloud of twoview"),
-                            (MAP_HEADER.replace(b"uchar", b"half"), "not read: 'property half red'")):
+                            (MAP_HEADER.replace(b"uchar", b"half"),
+                             "not read: 'property half red'")):
             (folder / "cloud.ply").write_bytes(data)
             self.assert_refused(self.tool(folder, self.folder / "d.rrd"), words)
         (folder / "trajectory.txt").write_text("1 2 3\n")

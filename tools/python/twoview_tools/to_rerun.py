@@ -44,7 +44,7 @@ def read_json(path):
 
 
 def read_cloud(path):
-    """Positions (n, 3) and colours (n, 3) of a cloud.ply, of a pair or of a map (docs/formats.md)."""
+    """Positions (n, 3) and colours (n, 3) of a pair's or a map's cloud.ply (docs/formats.md)."""
     try:
         cloud = ply.read_ply(path)
     except ValueError as error:

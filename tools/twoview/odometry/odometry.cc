@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/terminal.h"
 #include "odometry/flight.h"
 #include "odometry/live.h"
 #include "odometry/outputs.h"
@@ -109,14 +110,12 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
 }
 
 // The words of the progress line while the flight lasts.
-class Progress {
+class FlightProgress {
  public:
-  Progress(const Flight& flight, int num_frames, bool is_shown)
-      : flight_(flight), num_frames_(num_frames), is_shown_(is_shown), start_ns_(now_ns()) {}
-  ~Progress() { end(); }
+  FlightProgress(const Flight& flight, int num_frames, bool wanted)
+      : flight_(flight), num_frames_(num_frames), line_(wanted), start_ns_(now_ns()) {}
 
   void show() {
-    if (!is_shown_) return;
     const double now = static_cast<double>(now_ns() - start_ns_) * 1e-9;
     if (now < next_) return;
     next_ = now + 0.2;
@@ -125,22 +124,17 @@ class Progress {
     char line[200], of[32] = "";
     if (num_frames_ >= 0) std::snprintf(of, sizeof of, " of %d", num_frames_);
     std::snprintf(line, sizeof line,
-                  "\r%zu%s frames, %.1f frames a second, %s, %d keyframes, %d points\033[K", count,
-                  of, now > 0 ? static_cast<double>(count) / now : 0.0,
+                  "%zu%s frames, %.1f frames a second, %s, %d keyframes, %d points", count, of,
+                  now > 0 ? static_cast<double>(count) / now : 0.0,
                   tv_odometry_status_string(static_cast<tv_odometry_status>(state.status)),
                   state.num_keyframes, state.num_points);
-    print(line);
-    is_open_ = true;
-  }
-  void end() {
-    if (is_open_) print("\n");
-    is_open_ = false;
+    line_.tell(line);
   }
 
  private:
   const Flight& flight_;
   int num_frames_;
-  bool is_shown_, is_open_ = false;
+  Progress line_;
   uint64_t start_ns_;
   double next_ = 0;
 };
@@ -288,7 +282,7 @@ int odometry(Arguments& a) {
       std::fputs(line.c_str(), stderr);
   }
   {
-    Progress progress(flight, wanted, common.speaks() && stdout_style().bold[0] != '\0');
+    FlightProgress progress(flight, wanted, !common.quiet);
     flight.track(stop, [&] {
       progress.show();
       if (live) live->update(flight);
