@@ -178,6 +178,27 @@ class Rerun(cli.CliTest):
         self.assertEqual(found["/world/points", "Points3D:colors"], [[0x0A141EFF] * 2])
 
     @NEEDS_RERUN
+    def test_a_file_that_cannot_be_is_refused_before_anything_is_computed(self):
+        (self.folder / "folder.rrd").mkdir()
+        before = self.a.read_bytes()
+        for name, words in ((self.a, "does not end in .rrd"),
+                            ("folder.rrd", "it is a folder"),
+                            ("nowhere/a.rrd", "there is no folder nowhere")):
+            done = subprocess.run(
+                [cli.program(), "reconstruct", self.a, self.b, "--camera", self.camera,
+                 f"--rerun={name}", "-o", self.out], cwd=self.folder, capture_output=True,
+                timeout=120, env={**os.environ, "TWOVIEW_PYTHON": sys.executable})
+            self.assert_refused(done, words)
+        self.assertEqual(self.a.read_bytes(), before)
+        (self.folder / "trajectory.txt").write_text("5 1 2 3 0 0 0 1\n")
+        self.assert_refused(self.tool(self.folder, self.a), "does not end in .rrd")
+        self.assertEqual(self.a.read_bytes(), before)
+        for arguments in ((), ("--images", "a"), ("--nonsense",)):
+            done = self.tool(*arguments)
+            self.one_line(done, "see twoview rerun --help")
+            self.assertEqual(done.returncode, 2)
+
+    @NEEDS_RERUN
     def test_bad_input_is_one_line_and_leaves_no_file(self):
         folder = self.folder / "bad"
         self.assert_refused(self.tool(folder, self.folder / "d.rrd"), "no folder")

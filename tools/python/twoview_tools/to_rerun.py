@@ -25,8 +25,9 @@ import numpy as np
 import twoview as tv
 from twoview_tools import ply
 from twoview_tools.odometry import poses
+from twoview_tools.parser import Parser
 
-PROGRAM = "twoview rerun"
+PROGRAM, SPEAKER = "twoview rerun", "twoview: rerun"
 MISSING = "needs the package rerun-sdk (pip install rerun-sdk)"
 PLANE_SHARE = 0.5  # distance of the drawn picture from its camera, in units of the result
 FILM_DIAGONAL_MM = math.hypot(36, 24)
@@ -242,8 +243,21 @@ def package():
     return rerun
 
 
+def check_output(file):
+    """BadInput where the file cannot be written, or is named as an input might be."""
+    if file.suffix != ".rrd":
+        raise BadInput(f"{file}: the name does not end in .rrd")
+    if file.is_dir():
+        raise BadInput(f"cannot write {file}: it is a folder")
+    if not file.parent.is_dir():
+        raise BadInput(f"cannot write {file}: there is no folder {file.parent}")
+    if not os.access(file.parent, os.W_OK):
+        raise BadInput(f"cannot write {file}: the folder does not allow it")
+
+
 def write(folder, file, arguments):
     rr = package()
+    check_output(file)
     kind = next((log for name, log in KINDS if (folder / name).is_file()), None)
     if kind is None:
         raise BadInput(f"{folder}: none of " + ", ".join(name for name, _ in KINDS) + " is in it")
@@ -255,19 +269,21 @@ def write(folder, file, arguments):
         recording.flush()
         recording.disconnect()
         os.replace(temporary, file)
+    except RuntimeError as error:  # of rerun-sdk
+        raise BadInput(f"cannot write {file}: {error}") from None
     finally:
         temporary.unlink(missing_ok=True)
 
 
 def main(argv=None):
-    parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(speaker=SPEAKER, prog=PROGRAM, description=__doc__,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="DIR", type=pathlib.Path, nargs="?",
                         help="what twoview wrote")
     parser.add_argument("file", metavar="FILE.rrd", type=pathlib.Path, nargs="?",
                         help="an existing file is replaced")
-    parser.add_argument("--check", action="store_true",
-                        help="only say whether rerun-sdk is there")
+    parser.add_argument("--check", metavar="FILE.rrd", type=pathlib.Path,
+                        help="only say whether rerun-sdk is there and FILE.rrd can be written")
     parser.add_argument("--images", nargs=2, metavar=("A", "B"), help="the pictures of a pair")
     parser.add_argument("--intrinsics", nargs=8, type=float, metavar="N",
                         help="fx fy cx cy of image 0 and of image 1, in pixels of the result")
@@ -275,6 +291,7 @@ def main(argv=None):
     try:
         if arguments.check:
             package()
+            check_output(arguments.check)
             return 0
         if arguments.file is None:
             parser.error("DIR and FILE.rrd are required")
@@ -282,7 +299,7 @@ def main(argv=None):
             raise BadInput(f"{arguments.folder}: no folder")
         write(arguments.folder, arguments.file, arguments)
     except (BadInput, OSError, tv.FormatError) as error:
-        print(f"twoview: rerun: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"{SPEAKER}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     return 0
 
