@@ -5,12 +5,15 @@ argument.
 import functools
 import json
 import os
+import pty
 import random
+import select
 import shutil
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import zlib
 from pathlib import Path
@@ -201,6 +204,28 @@ class CliTest(unittest.TestCase):
     def succeed(self, done, status=0):
         self.assertEqual(done.returncode, status, done.stderr.decode())
         return done
+
+    def on_terminal(self, *arguments, **environment):
+        """(exit status, what stdout and stderr showed) of the program on a terminal."""
+        master, slave = pty.openpty()
+        kept = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")}
+        process = subprocess.Popen([program(), *map(str, arguments)], stdin=subprocess.DEVNULL,
+                                   stdout=slave, stderr=slave, cwd=self.folder,
+                                   env={**kept, "TERM": "xterm", **environment})
+        os.close(slave)
+        shown, deadline = b"", time.monotonic() + 120
+        while time.monotonic() < deadline:
+            if not select.select([master], [], [], 1)[0]:
+                continue
+            try:
+                block = os.read(master, 1 << 16)
+            except OSError:  # the program has ended
+                break
+            if not block:
+                break
+            shown += block
+        os.close(master)
+        return process.wait(60), shown
 
     def one_line(self, done, *words):
         """Requires exactly one line on stderr, and that it contains the words."""

@@ -378,6 +378,18 @@ distortion_coefficients: [0, 0, 0, 0]
                                    found[0]["rpe_translation_rmse"], 9)
             self.assertAlmostEqual(truth["scale_ratio"], found[0]["scale_ratio"], 9)
 
+    def test_progress_is_erased_and_a_dumb_terminal_gets_none(self):
+        source = self.set_folder()
+        for environment, is_shown in (({}, True), ({"NO_COLOR": "1"}, True),
+                                      ({"TERM": "dumb"}, False)):
+            status, shown = self.on_terminal("odometry", source, "-o", self.out, **environment)
+            self.assertEqual(status, 0, shown)
+            self.assertEqual(b"\r\033[K1 of 20 frames, " in shown, is_shown, shown)
+            if is_shown:
+                self.assertRegex(shown, rb"points\r\033\[K[^\r]*source")
+            else:
+                self.assertNotIn(b"\033", shown)
+
     def test_a_film_is_tracked(self):
         film = b"YUV4MPEG2 W%d H%d F25:1 Ip A1:1 Cmono\n" % (WIDTH, HEIGHT)
         film += b"".join(b"FRAME\n" + luma for luma in LUMA)
@@ -387,6 +399,14 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assertEqual(self.result()["num_frames"], COUNT)
         self.assertLess(self.result()["truth"]["ate_rmse_percent_of_path"], 1)
         self.assertIn("frame_000003.png", (self.out / "frames.csv").read_text())
+        # The camera's focal length as for 35 mm film: the same camera.
+        focal = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)
+        self.succeed(self.odometry(path, "--focal-35mm", focal,
+                                   "--truth", self.write("truth", TUM_TRUTH)))
+        self.assertLess(self.result()["truth"]["ate_rmse_percent_of_path"], 1)
+        self.assertEqual(self.result()["options"]["focal_35mm"], focal)
+        self.assertIn(f"fx {FOCAL:g}", self.succeed(self.run_program(
+            "map", "info", self.out / "map.twm")).stdout.decode())
 
     def test_a_drone_and_its_recording_are_tracked(self):
         if self.run_program("drone", "simulate", "--help").returncode != 0:
@@ -417,6 +437,12 @@ distortion_coefficients: [0, 0, 0, 0]
             self.assertIn(done.returncode, (0, 3), done.stderr.decode())  # the film begins again
             self.assertGreater(result["num_frames"], 12)
             self.assertGreater(result["num_tracked"], 8)
+        # How far it is, on a terminal.
+        _, shown = self.on_terminal("odometry", "flown", *camera, "-o", self.out)
+        self.assertRegex(shown, rb"\r\033\[K\d+ of \d+ frames, ")
+        _, shown = self.on_terminal("reconstruct", "--recording", "flown", *camera, "-o",
+                                    self.folder / "pair")
+        self.assertRegex(shown, rb"\r\033\[Kframe 1 of \d+")
         self.assert_refused(self.odometry("flown", out="new"), "--camera is required",
                             out=self.folder / "new")
         self.assert_refused(self.odometry("flown", "--drone", "127.0.0.1", *camera, out="new"),
@@ -661,6 +687,8 @@ distortion_coefficients: [0, 0, 0, 0]
         refused("--max-keypoints", more=("--max-keypoints", 5))
         refused("cannot read", more=("--truth", "absent"))
         refused("cannot read", more=("--camera", "absent"))
+        refused("without a camera file", more=("--camera", "absent", "--focal-35mm", 26))
+        refused("--focal-35mm: 'nan' is not a number", more=("--focal-35mm", "nan"))
         (source / "cameras.yaml").unlink()
         self.assert_refused(self.odometry(source), "--camera is required", "set folder")
         self.assert_refused(self.odometry(source / "images"), "--fps is required")

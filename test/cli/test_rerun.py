@@ -22,6 +22,23 @@ except ImportError:
 NEEDS_RERUN = unittest.skipIf(RrdReader is None, "no rerun-sdk: run scripts/bootstrap test")
 
 
+# Of the cloud.ply of `odometry -o`, for two points.
+MAP_HEADER = b"""ply
+format binary_little_endian 1.0
+element vertex 2
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+property int num_observations
+property float sigma
+property int segment
+end_header
+"""
+
+
 def read_back(path):
     """{(entity, component): its rows as lists} of a file."""
     found = {}
@@ -146,13 +163,40 @@ class Rerun(cli.CliTest):
     def test_a_trajectory_reads_back(self):
         folder = self.folder / "odometry"
         folder.mkdir()
-        (folder / "trajectory.txt").write_text("5 1 2 3 0 0 0 1\n6 4 5 6 0 0 0 1\n")
-        self.assertEqual(self.tool(folder, self.folder / "c.rrd").returncode, 0)
+        (folder / "trajectory.txt").write_text(
+            "# segment 0\n5 1 2 3 0 0 0 1\n6 4 5 6 0 0 0 1\n# segment 1\n7 0 0 9 0 0 0 1\n")
+        (folder / "cloud.ply").write_bytes(MAP_HEADER + b"".join(
+            struct.pack("<3f3Bifi", x, 2, 3, 10, 20, 30, 5, 0.1, 0) for x in (1, 4)))
+        done = self.tool(folder, self.folder / "c.rrd")
+        self.assertEqual((done.returncode, done.stderr), (0, b""))
         found = read_back(self.folder / "c.rrd")
         self.assertEqual(found["/world/camera", "Transform3D:translation"],
-                         [[[1, 2, 3]], [[4, 5, 6]]])
-        self.assertEqual(only(found, "/world/camera_path", "LineStrips3D:strips"),
-                         [[1, 2, 3], [4, 5, 6]])
+                         [[[1, 2, 3]], [[4, 5, 6]], [[0, 0, 9]]])
+        self.assertEqual(found["/world/camera_path", "LineStrips3D:strips"],
+                         [[[[1, 2, 3], [4, 5, 6]], [[0, 0, 9]]]])
+        self.assertEqual(found["/world/points", "Points3D:positions"], [[[1, 2, 3], [4, 2, 3]]])
+        self.assertEqual(found["/world/points", "Points3D:colors"], [[0x0A141EFF] * 2])
+
+    @NEEDS_RERUN
+    def test_a_file_that_cannot_be_is_refused_before_anything_is_computed(self):
+        (self.folder / "folder.rrd").mkdir()
+        before = self.a.read_bytes()
+        for name, words in ((self.a, "does not end in .rrd"),
+                            ("folder.rrd", "it is a folder"),
+                            ("nowhere/a.rrd", "there is no folder nowhere")):
+            done = subprocess.run(
+                [cli.program(), "reconstruct", self.a, self.b, "--camera", self.camera,
+                 f"--rerun={name}", "-o", self.out], cwd=self.folder, capture_output=True,
+                timeout=120, env={**os.environ, "TWOVIEW_PYTHON": sys.executable})
+            self.assert_refused(done, words)
+        self.assertEqual(self.a.read_bytes(), before)
+        (self.folder / "trajectory.txt").write_text("5 1 2 3 0 0 0 1\n")
+        self.assert_refused(self.tool(self.folder, self.a), "does not end in .rrd")
+        self.assertEqual(self.a.read_bytes(), before)
+        for arguments in ((), ("--images", "a"), ("--nonsense",)):
+            done = self.tool(*arguments)
+            self.one_line(done, "see twoview rerun --help")
+            self.assertEqual(done.returncode, 2)
 
     @NEEDS_RERUN
     def test_bad_input_is_one_line_and_leaves_no_file(self):
@@ -164,8 +208,17 @@ class Rerun(cli.CliTest):
         self.assert_refused(self.tool(folder, self.folder / "d.rrd"), "no JSON")
         (folder / "result.json").write_text(
             '{"image_size0": [8, 8], "image_size1": [8, 8], "R": null}')
-        (folder / "cloud.ply").write_bytes(b"ply\nend_header\n")
-        self.assert_refused(self.tool(folder, self.folder / "d.rrd"), "no cloud of twoview")
+        for data, words in ((b"ply\nend_header\n", "no points"),
+                            (b"ply", "no PLY header"),
+                            (MAP_HEADER, "fewer points than its header says"),
+                            (MAP_HEADER.replace(b"red", b"rot"), "fewer points"),
+                            (MAP_HEADER.replace(b"red", b"rot") + bytes(56), "no cloud of twoview"),
+                            (MAP_HEADER.replace(b"uchar", b"half"),
+                             "not read: 'property half red'")):
+            (folder / "cloud.ply").write_bytes(data)
+            self.assert_refused(self.tool(folder, self.folder / "d.rrd"), words)
+        (folder / "trajectory.txt").write_text("1 2 3\n")
+        self.assert_refused(self.tool(folder, self.folder / "d.rrd"), "trajectory.txt: line 1")
         self.assertEqual([path.name for path in self.folder.glob("*.rrd*")], [])
 
     def test_a_missing_package_is_one_line_before_anything_is_written(self):

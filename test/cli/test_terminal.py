@@ -1,10 +1,5 @@
 #!/usr/bin/env python3
 """Tests of what the program shows on a terminal: colours, NO_COLOR, TERM=dumb and progress."""
-import os
-import pty
-import select
-import subprocess
-import time
 import unittest
 
 import cli_support as cli
@@ -15,28 +10,6 @@ ESCAPE = b"\033["
 
 
 class Terminal(cli.CliTest):
-    def on_terminal(self, *arguments, **environment):
-        """(exit status, what stdout and stderr showed) of the program on a terminal."""
-        master, slave = pty.openpty()
-        kept = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")}
-        process = subprocess.Popen([cli.program(), *map(str, arguments)], stdin=subprocess.DEVNULL,
-                                   stdout=slave, stderr=slave, cwd=self.folder,
-                                   env={**kept, "TERM": "xterm", **environment})
-        os.close(slave)
-        shown, deadline = b"", time.monotonic() + 120
-        while time.monotonic() < deadline:
-            if not select.select([master], [], [], 1)[0]:
-                continue
-            try:
-                block = os.read(master, 1 << 16)
-            except OSError:  # the program has ended
-                break
-            if not block:
-                break
-            shown += block
-        os.close(master)
-        return process.wait(60), shown
-
     def evaluate(self, **environment):
         pairs = self.write("pairs.txt", pair_line())
         status, shown = self.on_terminal("evaluate", pairs, "--images", self.folder, "-o", self.out,

@@ -76,6 +76,8 @@ class TestLists(BadInputTest):
         pairs = self.list_of(support.LINE)
         self.refused(self.compare(pairs, "--systems", "vlfeat"), "no system 'vlfeat'", "twoview")
         self.refused(self.compare(pairs, "--jobs", 0), "--jobs")
+        self.refused(self.compare(pairs, "--jobs", "many"), "--jobs", "--help")
+        self.refused(support.run(pairs), "-o/--output", "--help")
         self.refused(self.compare(pairs, "--seed", -1), "--seed")
         support.write(self.folder.name, "report", "")
         done = self.compare(pairs)

@@ -6,6 +6,7 @@ import unittest
 
 import numpy as np
 
+from twoview_tools import ply
 from twoview_tools.odometry import alignment, covariance, errors, poses, surfaces
 from twoview_tools.odometry.errors import FrameState
 
@@ -296,10 +297,10 @@ class Surfaces(unittest.TestCase):
                             [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1")])
             with open(path, "wb") as file:
                 file.write(header.format("binary_little_endian 1.0").encode() + rows.tobytes())
-            self.assertEqual(surfaces.read_ply(path)["z"].tolist(), [3, 7])
+            self.assertEqual(ply.read_ply(path)["z"].tolist(), [3, 7])
             with open(path, "w", encoding="utf-8") as file:
                 file.write(header.format("ascii 1.0") + "1 2 3 4\n5 6 7 8\n")
-            self.assertEqual(surfaces.read_ply(path)["red"].tolist(), [4, 8])
+            self.assertEqual(ply.read_ply(path)["red"].tolist(), [4, 8])
 
 
 class Readers(unittest.TestCase):

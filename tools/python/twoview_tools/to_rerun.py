@@ -7,7 +7,7 @@ DIR is one of
 - the folder of `reconstruct -o`: both cameras with their pictures, the cloud, the alternative pose
   of a plane, and the summary. The cameras' lens comes from --intrinsics, else from the camera files
   or the focal length that result.json names;
-- the folder of `odometry -o`: the camera's way and the cloud;
+- the folder of `odometry -o`: the camera's way, a line for each segment, and the cloud;
 - the folder of `drone record`: the attitude and the height over time, and the pictures that
   `--frames` wrote, in the drone's own frames (x forward, y right, z down).
 
@@ -23,13 +23,12 @@ import sys
 
 import numpy as np
 import twoview as tv
+from twoview_tools import ply
+from twoview_tools.odometry import poses
+from twoview_tools.parser import Parser
 
-PROGRAM = "twoview rerun"
+PROGRAM, SPEAKER = "twoview rerun", "twoview: rerun"
 MISSING = "needs the package rerun-sdk (pip install rerun-sdk)"
-VERTEX = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3), ("angle_deg", "<f4"),
-                   ("error_px", "<f4")])  # of cloud.ply (docs/formats.md)
-DENSE = ("sigma", "sigma_pose")  # with reconstruct --dense
-DENSE_VERTEX = np.dtype(VERTEX.descr + [(name, "<f4") for name in DENSE])
 PLANE_SHARE = 0.5  # distance of the drawn picture from its camera, in units of the result
 FILM_DIAGONAL_MM = math.hypot(36, 24)
 
@@ -46,21 +45,15 @@ def read_json(path):
 
 
 def read_cloud(path):
-    """The vertices of a cloud.ply of twoview, (n,) of VERTEX or DENSE_VERTEX."""
-    data = path.read_bytes()
-    head, mark, body = data.partition(b"end_header\n")
-    counts = [line.split()[2] for line in head.split(b"\n") if line.startswith(b"element vertex")]
-    kinds = [line.split()[-1] for line in head.split(b"\n") if line.startswith(b"property")]
-    if not mark or len(counts) != 1 or kinds[:3] != [b"x", b"y", b"z"]:
+    """Positions (n, 3) and colours (n, 3) of a pair's or a map's cloud.ply (docs/formats.md)."""
+    try:
+        cloud = ply.read_ply(path)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    if not {"x", "y", "z", "red", "green", "blue"} <= set(cloud.dtype.names):
         raise BadInput(f"{path}: no cloud of twoview")
-    count = int(counts[0])
-    names = [b"x", b"y", b"z", b"red", b"green", b"blue", b"angle_deg", b"error_px"]
-    dense = [name.encode() for name in DENSE]
-    vertex = DENSE_VERTEX if kinds == names + dense else VERTEX
-    if kinds[:8] != names or kinds[8:] not in ([], dense) or (
-            len(body) < count * vertex.itemsize):
-        raise BadInput(f"{path}: its properties are not those of twoview, or it ends early")
-    return np.frombuffer(body, vertex, count)
+    return [np.column_stack([cloud[name] for name in names])
+            for names in (("x", "y", "z"), ("red", "green", "blue"))]
 
 
 def read_table(path, columns):
@@ -155,9 +148,9 @@ def summary_of(result):
 def log_cloud(rr, recording, folder):
     path = folder / "cloud.ply"
     if path.is_file():
-        cloud = read_cloud(path)
+        positions, colours = read_cloud(path)
         recording.log("world/points", rr.Points3D(
-            cloud["xyz"], colors=cloud["rgb"], radii=rr.Radius.ui_points(2.0)), static=True)
+            positions, colors=colours, radii=rr.Radius.ui_points(2.0)), static=True)
 
 
 def log_pair(rr, recording, folder, arguments):
@@ -165,14 +158,14 @@ def log_pair(rr, recording, folder, arguments):
     recording.log("world", rr.ViewCoordinates.RDF, static=True)
     recording.log("summary", rr.TextDocument(summary_of(result), media_type="text/markdown"),
                   static=True)
-    poses = [("world/camera0", (np.eye(3), np.zeros(3)), 0)]
+    views = [("world/camera0", (np.eye(3), np.zeros(3)), 0)]
     alternative = result.get("alternative") or {}
     for entity, found in (("world/camera1", result), ("world/alternative_camera1", alternative)):
         if found.get("R") is not None:
             R = np.array(found["R"], float).reshape(3, 3)
             t = np.array(found.get("t") or (0, 0, 0), float)  # a rotation only: at the same place
-            poses.append((entity, (R.T, -R.T @ t), 1))
-    for entity, pose, view in poses:
+            views.append((entity, (R.T, -R.T @ t), 1))
+    for entity, pose, view in views:
         size = result[f"image_size{view}"]
         path = arguments.images[view] if arguments.images else None
         log_camera(rr, recording, entity, pose, size,
@@ -181,21 +174,27 @@ def log_pair(rr, recording, folder, arguments):
     log_cloud(rr, recording, folder)
 
 
-def log_way(rr, recording, entity, table):
-    """Poses of a TUM file (n, 8) over time, and the line through them. Returns the first time."""
+def log_way(rr, recording, entity, table, segments):
+    """Poses of a TUM file (n, 8) over time, and a line through those of each segment, whose number
+    `segments` (n,) has. Returns the first time."""
     seconds = table[:, 0] - table[0, 0]
     recording.send_columns(
         entity, indexes=[rr.TimeColumn("time", duration=seconds)],
         columns=rr.Transform3D.columns(translation=table[:, 1:4], quaternion=table[:, 4:8]))
-    recording.log(f"{entity}_path", rr.LineStrips3D([table[:, 1:4]]), static=True)
+    recording.log(f"{entity}_path", rr.LineStrips3D(
+        [table[segments == segment, 1:4] for segment in np.unique(segments)]), static=True)
     return table[0, 0]
 
 
 def log_odometry(rr, recording, folder, arguments):
     recording.log("world", rr.ViewCoordinates.RDF, static=True)
-    table = read_table(folder / "trajectory.txt", 8)
-    if len(table):
-        log_way(rr, recording, "world/camera", table)
+    try:
+        way = poses.read_tum(folder / "trajectory.txt")
+    except (poses.PoseError, UnicodeDecodeError) as error:
+        raise BadInput(str(error)) from None
+    if len(way):
+        table = np.column_stack([way.times, way.positions, poses.quaternions_of(way.rotations)])
+        log_way(rr, recording, "world/camera", table, way.segments)
     log_cloud(rr, recording, folder)
     if (folder / "result.json").is_file():
         recording.log("summary", rr.TextDocument(summary_of(read_json(folder / "result.json")),
@@ -217,7 +216,7 @@ def log_flight(rr, recording, folder, arguments):
     frames = read_table(folder / "frames.txt", 4) if (folder / "frames.txt").is_file() else []
     if not len(table):
         raise BadInput(f"{folder / 'attitude.tum'}: no attitude in it")
-    start = log_way(rr, recording, "world/body", table)
+    start = log_way(rr, recording, "world/body", table, np.zeros(len(table)))
     index = [rr.TimeColumn("time", duration=table[:, 0] - start)]
     for name, values in (("height_m", -table[:, 3]),
                          *zip(("roll_deg", "pitch_deg", "yaw_deg"), angles_deg(table[:, 4:8]).T)):
@@ -244,8 +243,21 @@ def package():
     return rerun
 
 
+def check_output(file):
+    """BadInput where the file cannot be written, or is named as an input might be."""
+    if file.suffix != ".rrd":
+        raise BadInput(f"{file}: the name does not end in .rrd")
+    if file.is_dir():
+        raise BadInput(f"cannot write {file}: it is a folder")
+    if not file.parent.is_dir():
+        raise BadInput(f"cannot write {file}: there is no folder {file.parent}")
+    if not os.access(file.parent, os.W_OK):
+        raise BadInput(f"cannot write {file}: the folder does not allow it")
+
+
 def write(folder, file, arguments):
     rr = package()
+    check_output(file)
     kind = next((log for name, log in KINDS if (folder / name).is_file()), None)
     if kind is None:
         raise BadInput(f"{folder}: none of " + ", ".join(name for name, _ in KINDS) + " is in it")
@@ -257,19 +269,21 @@ def write(folder, file, arguments):
         recording.flush()
         recording.disconnect()
         os.replace(temporary, file)
+    except RuntimeError as error:  # of rerun-sdk
+        raise BadInput(f"cannot write {file}: {error}") from None
     finally:
         temporary.unlink(missing_ok=True)
 
 
 def main(argv=None):
-    parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(speaker=SPEAKER, prog=PROGRAM, description=__doc__,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="DIR", type=pathlib.Path, nargs="?",
                         help="what twoview wrote")
     parser.add_argument("file", metavar="FILE.rrd", type=pathlib.Path, nargs="?",
                         help="an existing file is replaced")
-    parser.add_argument("--check", action="store_true",
-                        help="only say whether rerun-sdk is there")
+    parser.add_argument("--check", metavar="FILE.rrd", type=pathlib.Path,
+                        help="only say whether rerun-sdk is there and FILE.rrd can be written")
     parser.add_argument("--images", nargs=2, metavar=("A", "B"), help="the pictures of a pair")
     parser.add_argument("--intrinsics", nargs=8, type=float, metavar="N",
                         help="fx fy cx cy of image 0 and of image 1, in pixels of the result")
@@ -277,6 +291,7 @@ def main(argv=None):
     try:
         if arguments.check:
             package()
+            check_output(arguments.check)
             return 0
         if arguments.file is None:
             parser.error("DIR and FILE.rrd are required")
@@ -284,7 +299,7 @@ def main(argv=None):
             raise BadInput(f"{arguments.folder}: no folder")
         write(arguments.folder, arguments.file, arguments)
     except (BadInput, OSError, tv.FormatError) as error:
-        print(f"twoview: rerun: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"{SPEAKER}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     return 0
 

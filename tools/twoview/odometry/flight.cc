@@ -89,7 +89,9 @@ void Flight::prepare(SourceFrame& frame) {
 
 void Flight::start(const SourceFrame& first) {
   SourceFrame frame = first;
-  if (options_.camera_file.empty()) {
+  if (options_.focal_35mm > 0) {
+    file_camera_ = film_camera(options_.focal_35mm, frame.luma.cols, frame.luma.rows);
+  } else if (options_.camera_file.empty()) {
     const auto camera = source_.camera(frame, frame.luma.cols, frame.luma.rows);
     if (!camera)
       throw BadInput("--camera is required: " + source_.kind() + " does not describe its camera");

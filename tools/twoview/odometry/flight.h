@@ -68,7 +68,8 @@ struct FlightOptions {
   int max_frames = 0;  // 0: all
   int every = 1;
   int resize = 0;           // longer side, pixels; 0: as they are
-  std::string camera_file;  // empty: the source's own camera
+  std::string camera_file;  // empty: the source's own camera, or
+  double focal_35mm = 0;    // a pinhole's of this focal length, millimetres; 0: none
 };
 
 class Flight {

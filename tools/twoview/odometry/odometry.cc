@@ -10,10 +10,12 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/terminal.h"
 #include "odometry/flight.h"
 #include "odometry/live.h"
 #include "odometry/outputs.h"
 #include "odometry/report.h"
+#include "pair/options.h"
 #include "pair/result.h"
 #include "pair/session.h"
 #include "verbs/common.h"
@@ -53,10 +55,15 @@ bool is_number(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+// For a source that says nothing of its camera: `why`.
+void require_camera(const Arguments& a, const char* why) {
+  if (a.camera.empty() && a.flight.focal_35mm == 0)
+    throw BadInput(std::string("--camera is required: ") + why);
+}
+
 std::unique_ptr<FrameSource> open_recording_folder(const Arguments& a) {
 #ifdef TWOVIEW_HAS_DRONE
-  if (a.camera.empty())
-    throw BadInput("--camera is required: a recording of a drone does not describe its camera");
+  require_camera(a, "a recording of a drone does not describe its camera");
   return open_recording(a.source, a.camera);
 #else
   throw BadInput("cannot read " + a.source + ": this program was built without the drone's driver");
@@ -67,22 +74,19 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
 #ifdef TWOVIEW_HAS_DRONE
   if (!a.drone.host.empty()) {
     if (!a.source.empty()) throw BadInput("give SOURCE or --drone, not both");
-    if (a.camera.empty())
-      throw BadInput("--camera is required: the drone does not describe its camera");
+    require_camera(a, "the drone does not describe its camera");
     return open_drone(a.drone, a.duration, a.camera);
   }
   if (a.vehicle.given()) {
     if (!a.source.empty()) throw BadInput("give SOURCE or --mavlink, not both");
-    if (a.camera.empty())
-      throw BadInput("--camera is required: MAVLink does not describe the camera");
+    require_camera(a, "MAVLink does not describe the camera");
     return open_vehicle(a.vehicle, a.duration, a.camera, a.common.quiet);
   }
 #endif
   if (a.source.empty()) throw BadInput("SOURCE is required");
 #ifdef TWOVIEW_HAS_CAMERA_SOURCE
   if (CameraSource::kind_of(a.source) == CameraSource::Kind::kLive && !is_number(a.source)) {
-    if (a.camera.empty())
-      throw BadInput("--camera is required: a camera does not describe its lens");
+    require_camera(a, "a camera does not describe its lens");
     if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
     return open_camera(a.source);
   }
@@ -98,8 +102,7 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
   }
   if (fs::is_regular_file(path, error)) return open_film(a.source, a.fps);
   if (is_number(a.source)) {
-    if (a.camera.empty())
-      throw BadInput("--camera is required: a camera does not describe its lens");
+    require_camera(a, "a camera does not describe its lens");
     if (a.fps > 0) throw BadInput("--fps: the frames of a camera have times");
     return open_camera(std::stoi(a.source));
   }
@@ -107,14 +110,12 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
 }
 
 // The words of the progress line while the flight lasts.
-class Progress {
+class FlightProgress {
  public:
-  Progress(const Flight& flight, int num_frames, bool is_shown)
-      : flight_(flight), num_frames_(num_frames), is_shown_(is_shown), start_ns_(now_ns()) {}
-  ~Progress() { end(); }
+  FlightProgress(const Flight& flight, int num_frames, bool wanted)
+      : flight_(flight), num_frames_(num_frames), line_(wanted), start_ns_(now_ns()) {}
 
   void show() {
-    if (!is_shown_) return;
     const double now = static_cast<double>(now_ns() - start_ns_) * 1e-9;
     if (now < next_) return;
     next_ = now + 0.2;
@@ -123,22 +124,17 @@ class Progress {
     char line[200], of[32] = "";
     if (num_frames_ >= 0) std::snprintf(of, sizeof of, " of %d", num_frames_);
     std::snprintf(line, sizeof line,
-                  "\r%zu%s frames, %.1f frames a second, %s, %d keyframes, %d points\033[K", count,
-                  of, now > 0 ? static_cast<double>(count) / now : 0.0,
+                  "%zu%s frames, %.1f frames a second, %s, %d keyframes, %d points", count, of,
+                  now > 0 ? static_cast<double>(count) / now : 0.0,
                   tv_odometry_status_string(static_cast<tv_odometry_status>(state.status)),
                   state.num_keyframes, state.num_points);
-    print(line);
-    is_open_ = true;
-  }
-  void end() {
-    if (is_open_) print("\n");
-    is_open_ = false;
+    line_.tell(line);
   }
 
  private:
   const Flight& flight_;
   int num_frames_;
-  bool is_shown_, is_open_ = false;
+  Progress line_;
   uint64_t start_ns_;
   double next_ = 0;
 };
@@ -167,6 +163,10 @@ nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_f
   json["no_imu"] = a.ignores_imu;
   json["kernels"] = tv_kernels_string(static_cast<tv_kernels>(o.kernels));
   json["camera"] = text_or_null(a.camera);
+  if (a.flight.focal_35mm > 0)
+    json["focal_35mm"] = a.flight.focal_35mm;
+  else
+    json["focal_35mm"] = nullptr;
   json["truth"] = text_or_null(truth_file);
   return json;
 }
@@ -256,6 +256,8 @@ int odometry(Arguments& a) {
   Common& common = a.common;
   common.options.kernels = a.flight.odometry.kernels;
   a.flight.camera_file = a.camera;
+  if (a.flight.focal_35mm > 0 && !a.camera.empty())
+    throw BadInput("--focal-35mm is for films and photographs without a camera file");
   const std::unique_ptr<FrameSource> source = open_source(a);
   const std::string truth_file = a.truth.empty() ? source->truth_file() : a.truth;
   std::optional<Trajectory> truth;
@@ -280,7 +282,7 @@ int odometry(Arguments& a) {
       std::fputs(line.c_str(), stderr);
   }
   {
-    Progress progress(flight, wanted, common.speaks() && stdout_style().bold[0] != '\0');
+    FlightProgress progress(flight, wanted, !common.quiet);
     flight.track(stop, [&] {
       progress.show();
       if (live) live->update(flight);
@@ -338,6 +340,7 @@ void add_odometry(CLI::App& program, Run& run) {
       ->type_name("SOURCE");
   verb->add_option("--camera", a->camera, "camera file; without: what the source says of it")
       ->type_name("FILE");
+  add_focal_35mm(*verb, a->flight.focal_35mm);
   verb->add_option("--truth", a->truth, "true poses of TUM, EuRoC or KITTI to compare with")
       ->type_name("FILE");
   verb->add_option("--fps", a->fps, "frames a second, of images without times and of films")

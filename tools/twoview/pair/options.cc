@@ -17,6 +17,8 @@ namespace {
 // The names of an enumeration's values on the command line; the values are consecutive.
 using Names = std::vector<std::string>;
 
+constexpr double kShortestFilm = 1, kLongestFilm = 10000;  // millimetres
+
 const Names kOrientations = {"upright", "gradient"};
 const Names kDescriptors = {"sift", "rootsift"};
 const Names kMethods = {"five-point", "eight-point", "seven-point", "upright"};
@@ -287,6 +289,16 @@ double number_of_flag(const std::string& flag, const std::string& text, double l
   throw CLI::ValidationError(flag, "'" + text + "' is not a number in [" + number_text(low) + ", " +
                                        number_text(high) + "]" +
                                        (has_comma ? "; one number, with a decimal point" : ""));
+}
+
+void add_focal_35mm(CLI::App& verb, double& focal_35mm) {
+  verb.add_option_function<std::string>(
+          "--focal-35mm",
+          [&focal_35mm](const std::string& text) {
+            focal_35mm = number_of_flag("--focal-35mm", text, kShortestFilm, kLongestFilm);
+          },
+          "in place of a camera file: the focal length as for 35 mm film; no lens distortion")
+      ->type_name("MM");
 }
 
 void add_options(CLI::App& verb, Options& options, unsigned groups) {

@@ -68,4 +68,7 @@ std::string method_name(int32_t method);
 // the flag and the range.
 double number_of_flag(const std::string& flag, const std::string& text, double low, double high);
 
+// Adds --focal-35mm to a verb, in millimetres.
+void add_focal_35mm(CLI::App& verb, double& focal_35mm);
+
 }  // namespace cli

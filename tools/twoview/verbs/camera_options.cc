@@ -9,8 +9,6 @@
 namespace cli {
 namespace {
 
-constexpr double kShortestFilm = 1, kLongestFilm = 10000;  // millimetres
-
 ImageCamera film(ImageCamera::Source source, double focal_35mm, const ImageFacts& image) {
   return {source, film_camera(focal_35mm, image.width, image.height), kFilm, "", focal_35mm};
 }
@@ -19,16 +17,6 @@ ImageCamera film(ImageCamera::Source source, double focal_35mm, const ImageFacts
 
 ImageFacts facts_of(const Picture& picture) {
   return {picture.name, picture.file_width, picture.file_height, picture.exif_focal_35mm};
-}
-
-void add_focal_35mm(CLI::App& verb, double& focal_35mm) {
-  verb.add_option_function<std::string>(
-          "--focal-35mm",
-          [&focal_35mm](const std::string& text) {
-            focal_35mm = number_of_flag("--focal-35mm", text, kShortestFilm, kLongestFilm);
-          },
-          "in place of a camera file: the focal length as for 35 mm film; no lens distortion")
-      ->type_name("MM");
 }
 
 void CameraOptions::add_to(CLI::App& verb) {

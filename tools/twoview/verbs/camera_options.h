@@ -46,9 +46,6 @@ struct CameraOptions {
   ImageCameras cameras_of(const ImageFacts& image0, const ImageFacts& image1) const;
 };
 
-// Adds --focal-35mm to a verb.
-void add_focal_35mm(CLI::App& verb, double& focal_35mm);
-
 // A line that says which focal length EXIF gave; empty where it gave none.
 std::string exif_note(const ImageCameras& cameras);
 

@@ -308,8 +308,10 @@ int reconstruct(Arguments& a) {
   Common& common = a.common;
   common.options.settle();
   check_inputs(a);
-  // A missing package is reported, by the tool itself, before anything is computed or written.
-  if (!a.rerun.empty() && run_python_verb("rerun", {"--check"}) != 0) return kExitBadInput;
+  // A missing package and a file that cannot be written are reported, by the tool itself, before
+  // anything is computed or written.
+  if (!a.rerun.empty() && run_python_verb("rerun", {"--check=" + a.rerun}) != 0)
+    return kExitBadInput;
   std::unique_ptr<RecordingInput> recording;
   if (a.recording.given())
     recording = std::make_unique<RecordingInput>(a.recording, a.cameras.both);

@@ -11,6 +11,7 @@
 #include "base/terminal.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
+#include "pair/options.h"
 #include "pair/result.h"
 #include "verbs/camera_options.h"
 #include "verbs/verbs.h"

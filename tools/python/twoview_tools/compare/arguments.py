@@ -1,8 +1,8 @@
 """compare_colmap's options, from the standard library alone, so that --help needs no package."""
 
-import argparse
 import os
 
+from ..parser import Parser
 from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
 
 # The name under which the user started it: tools/twoview/verbs/python_verbs.cc sets TWOVIEW_VERB.
@@ -13,7 +13,7 @@ a report: index.html, pairs.csv, report.json. See docs/compare.md."""
 
 
 def make_parser():
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog=PROGRAM, description=DESCRIPTION,
         epilog="exit status: 0 a report, whatever its rows say; 2 bad input; 130 interrupted "
                "(the same command goes on)")

@@ -9,6 +9,7 @@ import os
 
 import numpy as np
 
+from .. import ply
 from . import covariance, errors, poses, surfaces
 from .errors import FrameState
 
@@ -104,7 +105,7 @@ def _against_truth(final, live, states, truth, source, out):
         return figures
     segment = found["segment"]
     boxes = source.file("surfaces.json")
-    cloud = _read(os.path.join(out, "cloud.ply"), surfaces.read_ply)
+    cloud = _read(os.path.join(out, "cloud.ply"), ply.read_ply)
     if boxes and cloud is not None:
         if "segment" in cloud.dtype.names:
             cloud = cloud[cloud["segment"] == segment]

@@ -7,6 +7,7 @@ import subprocess
 
 import numpy as np
 
+from .. import ply
 from . import errors, evaluate, poses, surfaces
 
 # The simulator's usual lens (OpenCV's coefficients), which has the size of its pictures.
@@ -100,7 +101,7 @@ def judge(folder):
     figures["silent"] = errors.silent_errors(path, truth, states)
     if similarity is None:
         return figures
-    cloud = surfaces.read_ply(os.path.join(out, "cloud.ply"))
+    cloud = ply.read_ply(os.path.join(out, "cloud.ply"))
     cloud = cloud[cloud["segment"] == figures["segment"]]
     points = np.column_stack([cloud["x"], cloud["y"], cloud["z"]]).astype(float)
     scale, R, t = similarity
