@@ -145,15 +145,27 @@ void test_chance_of_agreement_is_near_a_bands_share_of_the_image(void) {
   TEST_ASSERT_TRUE(tv::chance_of_agreement(matches, E, 1e6, 1) > 0.9);
 }
 
+// A pose with a covariance, and its inverse.
+struct Known {
+  tv::Pose pose, inverse;
+  Eigen::Matrix<double, 5, 5, Eigen::RowMajor> covariance;
+};
+
+Known random_pose(tv::Random* random) {
+  Known known;
+  known.pose = {tv::rotation_about(scene::direction(random), uniform(random, 0, 3)),
+                scene::direction(random)};
+  known.inverse = {known.pose.R.transpose(), -(known.pose.R.transpose() * known.pose.t)};
+  Eigen::Matrix<double, 5, 5, Eigen::RowMajor> A;
+  for (int k = 0; k < 25; ++k) A(k / 5, k % 5) = uniform(random, -1, 1);
+  known.covariance = A * A.transpose();
+  return known;
+}
+
 void test_covariance_of_the_inverse_of_the_inverse_is_itself(void) {
   tv::Random random = tv::random_seeded(12);
   for (int trial = 0; trial < 100; ++trial) {
-    const tv::Pose pose{tv::rotation_about(scene::direction(&random), uniform(&random, 0, 3)),
-                        scene::direction(&random)};
-    const tv::Pose inverse{pose.R.transpose(), -(pose.R.transpose() * pose.t)};
-    Eigen::Matrix<double, 5, 5, Eigen::RowMajor> A;
-    for (int k = 0; k < 25; ++k) A(k / 5, k % 5) = uniform(&random, -1, 1);
-    A = (A * A.transpose()).eval();
+    const auto [pose, inverse, A] = random_pose(&random);
     double there[25], back[25];
     tv::invert_covariance(pose, inverse, A.data(), there);
     tv::invert_covariance(inverse, pose, there, back);
@@ -166,12 +178,7 @@ void test_covariance_of_the_inverse_of_the_inverse_is_itself(void) {
 void test_sigma_of_the_direction_is_the_larger_of_the_pose_and_its_inverse(void) {
   tv::Random random = tv::random_seeded(14);
   for (int trial = 0; trial < 100; ++trial) {
-    const tv::Pose pose{tv::rotation_about(scene::direction(&random), uniform(&random, 0, 3)),
-                        scene::direction(&random)};
-    const tv::Pose inverse{pose.R.transpose(), -(pose.R.transpose() * pose.t)};
-    Eigen::Matrix<double, 5, 5, Eigen::RowMajor> A;
-    for (int k = 0; k < 25; ++k) A(k / 5, k % 5) = uniform(&random, -1, 1);
-    A = (A * A.transpose()).eval();
+    const auto [pose, inverse, A] = random_pose(&random);
     double there[25];
     tv::invert_covariance(pose, inverse, A.data(), there);
     const double sums[2] = {A(3, 3) + A(4, 4), there[18] + there[24]};

@@ -69,9 +69,8 @@ Mat3 rotation_about(const Vec3& unit_axis, double angle_rad) {
   double sine, cosine;
   sincos(angle_rad, &sine, &cosine);
   const Mat3 K = cross_matrix(unit_axis);
-  Mat3 R;
-  for (int r = 0; r < 3;
-       ++r) {  // I + sine K + (1 - cosine) K^2; the loops are a third of Eigen's code
+  Mat3 R;  // I + sine K + (1 - cosine) K^2; the loops are a third of Eigen's code
+  for (int r = 0; r < 3; ++r) {
     const Vec3 scaled = (1 - cosine) * K.row(r).transpose();
     for (int c = 0; c < 3; ++c) {
       R(r, c) = ((r == c ? 1.0 : 0.0) + sine * K(r, c)) + scaled.dot(K.col(c));
