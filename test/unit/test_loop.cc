@@ -1,10 +1,14 @@
-// What a loop does to the scale that sensors gave (odometry/loop.h), with keyframes that see no
-// points.
+// What a loop does (odometry/loop.h): to the scale that sensors gave, with keyframes that see no
+// points; to the keyframes and points of an invented room (odometry/adjust_segment.h); and when few
+// points are believed.
 
 #include <unity.h>
 
+#include <cmath>
 #include <cstdint>
+#include <cstdlib>
 
+#include "odometry/adjust_segment.h"
 #include "odometry/loop.h"
 #include "odometry/map.h"
 
@@ -51,12 +55,224 @@ void test_the_metre_keeps_its_length_when_a_loop_stretches_the_path() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 50.0 / (40 * 40), odometry->scale.square / (product * product));
 }
 
+// ---- a room ----
+
+constexpr int kViews = 40, kPoints = 700;
+constexpr double kPi = 3.14159265358979323846;
+double true_points[kPoints][3];
+tv::Rigid true_poses[kViews];
+
+double uniform() { return rand() / (RAND_MAX + 1.0); }
+
+tv::Rigid turned(double angle) {
+  return {{cos(angle), 0, -sin(angle), 0, 1, 0, sin(angle), 0, cos(angle)}, {0, 0, 0}};
+}
+
+// Looks outward along a circle of radius 1, at walls 3 to 4 from its centre.
+void invent_room() {
+  srand(7);
+  for (auto& point : true_points) {
+    const double angle = 2 * kPi * uniform(), distance = 3 + uniform();
+    point[0] = distance * sin(angle);
+    point[1] = 2 * uniform() - 1;
+    point[2] = distance * cos(angle);
+  }
+  for (int k = 0; k < kViews; ++k) {
+    const double angle = 2 * kPi * k / kViews;
+    tv::Rigid there = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {-sin(angle), 0, -cos(angle)}};
+    true_poses[k] = tv::compose(turned(angle), there);
+  }
+}
+
+// What a drift of up to 7 cm and 2 degrees makes of a pose, none at the first keyframe.
+tv::Rigid drifted(int k) {
+  const double share = sin(kPi * k / kViews);
+  tv::Rigid drift = turned(0.035 * share);
+  drift.t[0] = 0.06 * share;
+  drift.t[1] = -0.04 * share;
+  return tv::compose(true_poses[k], drift);
+}
+
+// The map of the room: exact pixels, poses that drifted, and points that drifted with the keyframe
+// that sees them first. Returns how many observations there are.
+int map_room() {
+  tv::Map& map = odometry->map;
+  int num = 0;
+  int32_t place_of[kPoints];
+  for (int32_t& place : place_of) place = tv::kNoPoint;
+  for (int k = 0; k < kViews; ++k) {
+    tv_keypoint keypoints[100] = {};
+    int seen[100], num_seen = 0;
+    for (int p = 0; p < kPoints && num_seen < 100; ++p) {
+      double x[3];
+      tv::transform(true_poses[k], true_points[p], x);
+      const double u = 500 * x[0] / x[2] + 320, v = 500 * x[1] / x[2] + 240;
+      if (x[2] < 0.5 || u < 0 || u > 639 || v < 0 || v > 479) continue;
+      keypoints[num_seen] = {static_cast<float>(u), static_cast<float>(v), 4, 0, 1, 0};
+      seen[num_seen++] = p;
+    }
+    static const uint8_t descriptors[100 * TV_DESCRIPTOR_BYTES] = {};
+    const int32_t at = tv::add_keyframe(&map, keypoints, descriptors, num_seen);
+    map.keyframes[at].cam_from_world = drifted(k);
+    for (int i = 0; i < num_seen; ++i) {
+      int32_t* place = &place_of[seen[i]];
+      if (*place == tv::kNoPoint) {
+        double x[3], world[3];
+        tv::transform(true_poses[k], true_points[seen[i]], x);
+        tv::transform(tv::inverse(drifted(k)), x, world);
+        *place = tv::add_point(&map, world, descriptors, 0);
+        map.points[*place].made_at = map.keyframes[at].id;
+      }
+      tv::observe(&map, at, i, *place);
+      ++num;
+    }
+  }
+  return num;
+}
+
+// The largest distance of a keyframe from where it is, in the unit that the path's length gives.
+double worst_position() {
+  double worst = 0, truth = 0;
+  for (int k = 1; k < kViews; ++k) truth += tv::way_between(true_poses[k - 1], true_poses[k]);
+  const double scale = truth / tv::segment_length(odometry->map, 0);
+  double first[3];
+  tv::centre_of(true_poses[0], first);
+  for (int k = 0; k < kViews; ++k) {
+    double a[3], b[3];
+    tv::centre_of(true_poses[k], a);
+    tv::centre_of(odometry->map.keyframes[k].cam_from_world, b);
+    for (int c = 0; c < 3; ++c) b[c] = first[c] + scale * (b[c] - first[c]);
+    worst = fmax(worst, tv::distance_between(a, b));
+  }
+  return worst;
+}
+
+// The mean distance in pixels between the keypoints and the images of their points.
+double mean_error() {
+  const tv::Map& map = odometry->map;
+  double sum = 0;
+  int num = 0;
+  for (int k = 0; k < kViews; ++k) {
+    const tv::MapKeypoint* own = tv::keypoints_of(map, map.keyframes[k]);
+    for (int i = 0; i < map.keyframes[k].num_keypoints; ++i) {
+      if (own[i].point == tv::kNoPoint) continue;
+      double x[3];
+      tv::transform(map.keyframes[k].cam_from_world, map.points[own[i].point].position, x);
+      sum += hypot(500 * x[0] / x[2] + 320 - static_cast<double>(own[i].x),
+                   500 * x[1] / x[2] + 240 - static_cast<double>(own[i].y));
+      ++num;
+    }
+  }
+  return sum / num;
+}
+
+// A window holds fewer observations than the room has, so that some points only move with their
+// keyframes.
+void test_all_keyframes_of_a_segment_are_adjusted_together() {
+  const int num = map_room();
+  TEST_ASSERT_TRUE(num > 22 * odometry->options.max_keypoints);
+  TEST_ASSERT_TRUE(worst_position() > 0.04);
+  const double before = mean_error();
+  TEST_ASSERT_TRUE(before > 2);
+  double factor;
+  int steps = 1;
+  while (steps < 12 && tv::adjust_segment(odometry, 0, 1, &factor)) ++steps;
+  TEST_ASSERT_TRUE(steps < 8);
+  TEST_ASSERT_TRUE(worst_position() < 1e-4);
+  const double between = mean_error();
+  TEST_ASSERT_TRUE(between > 0.2 && between < before);
+  int32_t place = 0, calls = 0;
+  for (; place < odometry->map.end_points; ++calls) {
+    place = tv::adjust_points(odometry, 0, place, 5);
+  }
+  TEST_ASSERT_TRUE(calls > 1);
+  TEST_ASSERT_TRUE(mean_error() < 0.02);
+  TEST_ASSERT_TRUE(worst_position() < 1e-4);
+}
+
+// The path becomes as much longer as the factor says, to what bending changes of it.
+void test_the_factor_is_that_of_the_path() {
+  map_room();
+  const double before = tv::segment_length(odometry->map, 0);
+  double all = 1;
+  for (int i = 0; i < 5; ++i) {
+    double factor;
+    tv::adjust_segment(odometry, 0, 1, &factor);
+    all *= factor;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.002, tv::segment_length(odometry->map, 0) / before, all);
+}
+
+void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
+  map_room();
+  constexpr int kReference = 20;
+  tv::MapKeyframe* reference = &odometry->map.keyframes[kReference];
+  odometry->reference_id = reference->id;
+  tv::Frame frame{};
+  frame.cam_from_world = reference->cam_from_world;
+  tv::centre_of(reference->cam_from_world, odometry->travel.from);
+  odometry->spread = {12, 0};
+  while (odometry->spread.num_steps > 0) tv::spread_loop(odometry, &frame);
+  double centre[3];
+  tv::centre_of(reference->cam_from_world, centre);
+  TEST_ASSERT_TRUE(tv::way_between(drifted(kReference), reference->cam_from_world) > 0.01);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0,
+                            tv::way_between(frame.cam_from_world, reference->cam_from_world));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, tv::distance_between(odometry->travel.from, centre));
+  TEST_ASSERT_EQUAL_INT(0, odometry->spread.num_steps);
+  TEST_ASSERT_TRUE(tv::is_spreading(*odometry));
+  for (int i = 0; i < 10; ++i) {
+    if (tv::is_spreading(*odometry)) tv::spread_loop(odometry, &frame);
+  }
+  TEST_ASSERT_FALSE(tv::is_spreading(*odometry));
+}
+
+void test_small_corrections_are_not_spread() {
+  add_keyframes();
+  tv::LoopEnd end = {0, tv::kIdentity, 1};
+  end.cam_from_world.t[0] = -1.901;  // it was at 1.9
+  const tv::Frame nothing{};
+  tv::close_loop(odometry, kNum - 1, nothing, end);
+  TEST_ASSERT_FALSE(tv::is_spreading(*odometry));
+  end.cam_from_world.t[0] = -1.93;
+  tv::close_loop(odometry, kNum - 1, nothing, end);
+  TEST_ASSERT_TRUE(odometry->spread.num_steps > 0);
+}
+
+void test_few_points_close_a_loop_only_twice() {
+  odometry->median_depth = 2;
+  tv::Frame frame{};
+  frame.number = 100;
+  frame.cam_from_world = tv::kIdentity;
+  tv::LoopEnd end = {0, tv::kIdentity, 1.1};
+  end.cam_from_world.t[0] = 0.3;
+  TEST_ASSERT_FALSE(tv::is_seen_twice(odometry, frame, end));
+  // The camera moves by 0.1, which is 0.11 beside the loop's end.
+  frame.number = 104;
+  frame.cam_from_world.t[2] = -0.1;
+  end.cam_from_world.t[2] = -0.11;
+  TEST_ASSERT_TRUE(tv::is_seen_twice(odometry, frame, end));
+  end.cam_from_world.t[0] = 0.37;  // 3.5 % of the median depth farther
+  TEST_ASSERT_FALSE(tv::is_seen_twice(odometry, frame, end));
+  TEST_ASSERT_TRUE(tv::is_seen_twice(odometry, frame, end));
+  end.cam_from_world = tv::compose(turned(0.02), end.cam_from_world);
+  TEST_ASSERT_FALSE(tv::is_seen_twice(odometry, frame, end));
+  frame.number = 120;
+  TEST_ASSERT_FALSE(tv::is_seen_twice(odometry, frame, end));
+}
+
 }  // namespace
 
 extern "C" void setUp(void) {
   const tv_camera camera = {TV_CAMERA_PINHOLE, 640, 480, 0, 500, 500, 320, 240, {0}};
+  tv_odometry_options options;
+  tv_odometry_options_init(&options);
+  options.max_keypoints = 100;
+  options.max_keyframes = kViews;
+  options.max_points = 2000;
   TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_odometry_init(&odometry, &camera, nullptr, memory, sizeof memory));
+                        tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
+  invent_room();
 }
 
 extern "C" void tearDown(void) {}
@@ -64,5 +280,10 @@ extern "C" void tearDown(void) {}
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_the_metre_keeps_its_length_when_a_loop_stretches_the_path);
+  RUN_TEST(test_all_keyframes_of_a_segment_are_adjusted_together);
+  RUN_TEST(test_the_factor_is_that_of_the_path);
+  RUN_TEST(test_a_frame_and_the_measured_way_move_with_their_keyframe);
+  RUN_TEST(test_small_corrections_are_not_spread);
+  RUN_TEST(test_few_points_close_a_loop_only_twice);
   return UNITY_END();
 }

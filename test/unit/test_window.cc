@@ -333,37 +333,62 @@ void test_the_cost_of_an_exact_half_turn_is_not_zero() {
   }
 }
 
+Eigen::MatrixXd random_matrix(Random* random, int rows, int columns) {
+  Eigen::MatrixXd matrix(rows, columns);
+  for (int i = 0; i < matrix.size(); ++i) matrix.data()[i] = random->normal();
+  return matrix;
+}
+
+// Solves with a matrix of blocks, and checks the solution with the whole matrix.
+void expect_solution(const Eigen::MatrixXd& whole, int blocks, Random* random) {
+  const int n = 6 * blocks;
+  const Eigen::VectorXd b = random_matrix(random, n, 1);
+  memory.resize(tv::block_matrix_bytes(blocks) + 64);
+  void* aligned = memory.data() + (64 - reinterpret_cast<uintptr_t>(memory.data()) % 64) % 64;
+  tv::Arena arena = tv::arena_over(aligned, tv::block_matrix_bytes(blocks));
+  const tv::BlockMatrix A = tv::block_matrix(blocks, arena);
+  for (int i = 0; i < n; ++i) {
+    A.diagonal[i] = whole(i, i);
+    const int row = i / 6;  // the blocks of the diagonal are full
+    double* entries = tv::block_at(A, row, 0) + i % 6 * tv::row_entries(row);
+    for (int j = 0; j < 6 * (row + 1); ++j) entries[j] = whole(i, j);
+    TEST_ASSERT_EQUAL_DOUBLE(whole(i, i), *tv::diagonal_at(A, i));
+  }
+  TEST_ASSERT_EQUAL_INT(0, tv::factorise(A, 1e-14));
+  std::vector<double> x(b.data(), b.data() + n);
+  tv::solve_lower(A, 0, x.data());
+  tv::solve_upper(A, x.data());
+  const Eigen::VectorXd difference = whole * Eigen::Map<Eigen::VectorXd>(x.data(), n) - b;
+  TEST_ASSERT_TRUE(difference.norm() <= 1e-8 * b.norm());
+}
+
 void test_the_factorisation_solves_like_a_dense_one() {
   Random random(4);
   for (int blocks : {1, 2, 5, 20}) {
-    const int n = 6 * blocks;
-    Eigen::MatrixXd root(n, n + 3);
-    for (int i = 0; i < root.size(); ++i) root.data()[i] = random.normal();
-    const Eigen::MatrixXd dense = root * root.transpose();
-    Eigen::VectorXd b(n);
-    for (int i = 0; i < n; ++i) b[i] = random.normal();
-    memory.resize(tv::block_matrix_bytes(blocks) + 64);
-    void* aligned = memory.data() + (64 - reinterpret_cast<uintptr_t>(memory.data()) % 64) % 64;
-    tv::Arena arena = tv::arena_over(aligned, tv::block_matrix_bytes(blocks));
-    const tv::BlockMatrix A = tv::block_matrix(blocks, arena);
-    for (int i = 0; i < n; ++i) {
-      A.diagonal[i] = dense(i, i);
-      for (int j = 0; j < n; ++j) A.entries[i * n + j] = j <= i ? dense(i, j) : 1e300;
-    }
-    for (int k = 0; k < blocks; ++k) {  // the blocks of the diagonal are full
-      for (int i = 0; i < 6; ++i) {
-        for (int j = i; j < 6; ++j) {
-          A.entries[(6 * k + i) * n + 6 * k + j] = dense(6 * k + i, 6 * k + j);
-        }
-      }
-    }
-    TEST_ASSERT_EQUAL_INT(0, tv::factorise(A, 1e-14));
-    std::vector<double> x(b.data(), b.data() + n);
-    tv::solve_lower(A, 0, x.data());
-    tv::solve_upper(A, x.data());
-    const Eigen::VectorXd difference = dense * Eigen::Map<Eigen::VectorXd>(x.data(), n) - b;
-    TEST_ASSERT_TRUE(difference.norm() <= 1e-8 * b.norm());
+    const Eigen::MatrixXd root = random_matrix(&random, 6 * blocks, 6 * blocks + 3);
+    expect_solution(root * root.transpose(), blocks, &random);
   }
+}
+
+// Each view shares points with the next one, and three pairs closed a loop: the other blocks are
+// zero at first, and some of them stay so.
+void test_blocks_of_zeros_change_no_solution() {
+  constexpr int kBlocks = 30;
+  Random random(5);
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(6 * kBlocks, 6 * kBlocks);
+  const auto share = [&](int a, int b) {
+    const Eigen::MatrixXd root = random_matrix(&random, 12, 15);
+    const Eigen::MatrixXd part = root * root.transpose();
+    whole.block<6, 6>(6 * a, 6 * a) += part.topLeftCorner<6, 6>();
+    whole.block<6, 6>(6 * b, 6 * b) += part.bottomRightCorner<6, 6>();
+    whole.block<6, 6>(6 * a, 6 * b) += part.topRightCorner<6, 6>();
+    whole.block<6, 6>(6 * b, 6 * a) += part.bottomLeftCorner<6, 6>();
+  };
+  for (int k = 1; k < kBlocks; ++k) share(k - 1, k);
+  share(2, 27);
+  share(4, 15);
+  share(15, 29);
+  expect_solution(whole, kBlocks, &random);
 }
 
 // The covariances are those of the dense inverse, for least squares: variance (J'J + variance
@@ -750,6 +775,7 @@ int main() {
   RUN_TEST(test_the_cost_of_a_pose_prior_of_half_a_turn_is_known);
   RUN_TEST(test_the_cost_of_an_exact_half_turn_is_not_zero);
   RUN_TEST(test_the_factorisation_solves_like_a_dense_one);
+  RUN_TEST(test_blocks_of_zeros_change_no_solution);
   RUN_TEST(test_covariances_are_those_of_the_dense_inverse);
   RUN_TEST(test_covariances_without_a_fixed_view_are_relative);
   RUN_TEST(test_covariances_hold_the_truth);

@@ -204,7 +204,7 @@ TV_API void tv_window_result_init_sized(tv_window_result *result, size_t struct_
 
 /* Writes to *size_bytes how much memory tv_adjust_window needs for a window of these counts, and so
    for each one with no larger counts: about 250 bytes for each observation, 160 for each point, and
-   288 for the square of the number of views. Only the counts are read, the arrays may be null.
+   144 for the square of the number of views. Only the counts are read, the arrays may be null.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_ARGUMENT (a count is out of its range). */
 TV_API tv_status tv_adjust_window_size(const tv_window *window, size_t *size_bytes);
 

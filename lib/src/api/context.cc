@@ -38,14 +38,6 @@ tv_status read_limits(const tv_limits* given, tv_limits* limits) {
   return TV_OK;
 }
 
-// The size of a tv_context with 64-bit pointers. CPUs with 32-bit pointers reserve as much, because
-// tv_context_size depends on the limits alone.
-constexpr size_t kContextBytes = 192;
-static_assert(arena_bytes<tv_context>(1) <= kContextBytes &&
-              (sizeof(void*) < 8 || arena_bytes<tv_context>(1) == kContextBytes));
-
-size_t context_bytes() { return kContextBytes; }
-
 }  // namespace
 }  // namespace tv
 
@@ -58,7 +50,7 @@ tv_status tv_context_size(const tv_limits* limits, size_t* size_bytes) {
   const tv_status status = tv::read_limits(limits, &read);
   if (status != TV_OK) return status;
   if (size_bytes == nullptr) return TV_ERR_NULL;
-  *size_bytes = tv::context_bytes() + tv::scratch_bytes(read);
+  *size_bytes = tv::kContextBytes + tv::scratch_bytes(read);
   return TV_OK;
 }
 
@@ -67,7 +59,7 @@ tv_status tv_context_init(tv_context** context, const tv_limits* limits, void* m
   tv_limits read;
   const tv_status status = tv::read_limits(limits, &read);
   if (status != TV_OK) return status;
-  const size_t needed = tv::context_bytes() + tv::scratch_bytes(read);
+  const size_t needed = tv::kContextBytes + tv::scratch_bytes(read);
   if (context == nullptr || memory == nullptr) return TV_ERR_NULL;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   if (size_bytes < needed) return TV_ERR_MEMORY;
@@ -77,8 +69,8 @@ tv_status tv_context_init(tv_context** context, const tv_limits* limits, void* m
   *made = tv_context{};
   made->limits = read;
   made->kernels = kernels;
-  made->arena = tv::arena_over(static_cast<uint8_t*>(memory) + tv::context_bytes(),
-                               needed - tv::context_bytes());
+  made->arena =
+      tv::arena_over(static_cast<uint8_t*>(memory) + tv::kContextBytes, needed - tv::kContextBytes);
   *context = made;
   return TV_OK;
 }
@@ -88,7 +80,7 @@ tv_kernels tv_context_kernels(const tv_context* context) {
 }
 
 size_t tv_context_high_water(const tv_context* context) {
-  return context == nullptr ? 0 : tv::context_bytes() + context->arena.high_water_bytes;
+  return context == nullptr ? 0 : tv::kContextBytes + context->arena.high_water_bytes;
 }
 
 tv_status tv_context_set_clock(tv_context* context, tv_clock now_ns, void* user) {

@@ -17,6 +17,12 @@ struct tv_context {
 
 namespace tv {
 
+// The size of a tv_context with 64-bit pointers, before its arena. CPUs with 32-bit pointers
+// reserve as much, because tv_context_size depends on the limits alone.
+inline constexpr size_t kContextBytes = 192;
+static_assert(arena_bytes<tv_context>(1) <= kContextBytes &&
+              (sizeof(void*) < 8 || arena_bytes<tv_context>(1) == kContextBytes));
+
 // Whether the context has the memory for calls of all these purposes (TV_PURPOSE_ bits).
 inline bool made_for(const tv_context& context, uint32_t purposes) {
   return (context.limits.purposes & purposes) == purposes;

@@ -9,6 +9,7 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "odometry/adjust.h"
+#include "odometry/adjust_segment.h"
 #include "odometry/fit_pose.h"
 #include "odometry/loop.h"
 #include "odometry/map_check.h"
@@ -88,9 +89,17 @@ size_t local_points_bytes(const Plan& plan) {
   return arena_bytes<int32_t>(static_cast<size_t>(plan.limits.max_keypoints));
 }
 
+// The scratch memory beside the context's, which adjust_segment takes, too.
+size_t own_scratch_bytes(const Plan& plan) {
+  const size_t segment = adjust_segment_bytes(plan.options);
+  const size_t shared = plan.context_bytes - kContextBytes;
+  return std::max(scratch_bytes(plan.options), segment - std::min(segment, shared));
+}
+
 size_t plan_bytes(const Plan& plan) {
   return kOdometryBytes + arena_bytes<uint8_t>(plan.context_bytes) + map_bytes(plan.sizes) +
-         kNumFrames * frame_bytes(plan) + local_points_bytes(plan) + scratch_bytes(plan.options);
+         kNumFrames * frame_bytes(plan) + local_points_bytes(plan) +
+         arena_bytes<uint8_t>(own_scratch_bytes(plan));
 }
 
 }  // namespace
@@ -100,6 +109,8 @@ void start_anew(tv_odometry* o) {
   o->num_starts = o->num_local_points = 0;
   o->local_id = o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
   o->is_doubtful = false;
+  o->weak_loop.frame = -1;
+  o->spread = {0, o->map.sizes.max_points};
   o->check = MapCheck{};
   o->has_motion = false;
   o->num_frames = o->segment = o->num_segments = 0;
@@ -209,6 +220,12 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   status = tv_context_init(&o->context, &plan.limits,
                            tv::arena_alloc<uint8_t>(arena, plan.context_bytes), plan.context_bytes);
   if (status != TV_OK) return status;
+  const size_t scratch = tv::own_scratch_bytes(plan);
+  o->scratch = tv::arena_over(tv::arena_alloc<uint8_t>(arena, scratch), scratch);
+  // They follow each other.
+  uint8_t* begin = o->context->arena.memory;
+  o->whole_scratch =
+      tv::arena_over(begin, static_cast<size_t>(o->scratch.memory + scratch - begin));
   o->kernels = o->context->kernels;
   o->max_matched = plan.limits.max_keypoints;
   o->options = plan.options;
@@ -226,8 +243,6 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   tv::make_frame(plan, arena, &o->previous);
   for (tv::Frame& frame : o->starts) tv::make_frame(plan, arena, &frame);
   o->local_points = tv::arena_alloc<int32_t>(arena, static_cast<size_t>(plan.limits.max_keypoints));
-  const size_t scratch = tv::scratch_bytes(plan.options);
-  o->scratch = tv::arena_over(tv::arena_alloc<uint8_t>(arena, scratch), scratch);
   tv::start_anew(o);
   *odometry = o;
   return TV_OK;

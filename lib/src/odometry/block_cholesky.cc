@@ -13,7 +13,7 @@ void subtract_row(const BlockMatrix& A, const Columns* Z, const int32_t* blocks,
   const double* za = reinterpret_cast<const double*>(Z[a].at);
   for (int r = 0; r < kBlock; ++r) {
     const Pair z0 = both(za[r]), z1 = both(za[kBlock + r]), z2 = both(za[2 * kBlock + r]);
-    double* row = block_at(A, blocks[a], 0) + r * kBlock * A.num_blocks;
+    double* row = block_at(A, blocks[a], 0) + r * row_entries(blocks[a]);
     for (int b = 0; b <= a; ++b) {
       Pair* entry = reinterpret_cast<Pair*>(row + kBlock * blocks[b]);
       const Pair* zb = Z[b].at;
@@ -49,13 +49,13 @@ int factorise_block(double* block, int stride, const double* diagonal, double sm
 
 // A block below the diagonal becomes that of the factor, of which `halves` receives a copy, the
 // columns 0 to 2 and 3 to 5.
-void solve_block(const double* factor, int stride, const double* inverses, double* block,
-                 Columns* const halves[2]) {
+void solve_block(const double* factor, int factor_stride, const double* inverses, double* block,
+                 int stride, Columns* const halves[2]) {
   for (int c = 0; c < kBlock; ++c) {
     double* column = reinterpret_cast<double*>(halves[c / 3]->at) + c % 3 * kBlock;
     for (int r = 0; r < kBlock; ++r) {
       double value = block[r * stride + c];
-      for (int k = 0; k < c; ++k) value -= block[r * stride + k] * factor[c * stride + k];
+      for (int k = 0; k < c; ++k) value -= block[r * stride + k] * factor[c * factor_stride + k];
       value *= inverses[c];
       block[r * stride + c] = value;
       column[r] = value;
@@ -63,11 +63,22 @@ void solve_block(const double* factor, int stride, const double* inverses, doubl
   }
 }
 
+const double* row_at(const BlockMatrix& A, int i) { return diagonal_at(A, i) - i; }
+
+bool is_zero(const double* block, int stride) {
+  for (int r = 0; r < kBlock; ++r) {
+    for (int c = 0; c < kBlock; ++c) {
+      if (block[r * stride + c] != 0.0) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 size_t block_matrix_bytes(int num_blocks) {
   const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
-  return arena_bytes<double>(n * n) + 2 * arena_bytes<double>(n) +
+  return arena_bytes<double>(block_entries(num_blocks)) + 2 * arena_bytes<double>(n) +
          arena_bytes<Columns>(2 * blocks) + arena_bytes<int32_t>(blocks);
 }
 
@@ -75,12 +86,11 @@ BlockMatrix block_matrix(int num_blocks, Arena& arena) {
   const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
   BlockMatrix A;
   A.num_blocks = num_blocks;
-  A.entries = arena_alloc<double>(arena, n * n);
+  A.entries = arena_alloc<double>(arena, block_entries(num_blocks));
   A.inverses = arena_alloc<double>(arena, n);
   A.diagonal = arena_alloc<double>(arena, n);
   A.panel = arena_alloc<Columns>(arena, 2 * blocks);
-  A.sequence = arena_alloc<int32_t>(arena, blocks);
-  for (int i = 0; i < num_blocks; ++i) A.sequence[i] = i;
+  A.below = arena_alloc<int32_t>(arena, blocks);
   return A;
 }
 
@@ -89,19 +99,22 @@ void subtract_products(const BlockMatrix& A, const Columns* Z, const int32_t* bl
 }
 
 int factorise(const BlockMatrix& A, double smallest) {
-  const int stride = kBlock * A.num_blocks;
   int vanished = 0;
   for (int j = 0; j < A.num_blocks; ++j) {
     double* corner = block_at(A, j, j);
     double* inverses = A.inverses + kBlock * j;
+    const int stride = row_entries(j);
     vanished += factorise_block(corner, stride, A.diagonal + kBlock * j, smallest, inverses);
+    int num = 0;
     for (int i = j + 1; i < A.num_blocks; ++i) {
-      Columns* const halves[2] = {A.panel + i, A.panel + A.num_blocks + i};
-      solve_block(corner, stride, inverses, block_at(A, i, j), halves);
+      double* block = block_at(A, i, j);
+      if (is_zero(block, row_entries(i))) continue;
+      Columns* const halves[2] = {A.panel + num, A.panel + A.num_blocks + num};
+      solve_block(corner, stride, inverses, block, row_entries(i), halves);
+      A.below[num++] = i;
     }
-    const int first = j + 1, num = A.num_blocks - first;
-    subtract_products(A, A.panel + first, A.sequence + first, num);
-    subtract_products(A, A.panel + A.num_blocks + first, A.sequence + first, num);
+    subtract_products(A, A.panel, A.below, num);
+    subtract_products(A, A.panel + A.num_blocks, A.below, num);
   }
   return vanished;
 }
@@ -109,7 +122,7 @@ int factorise(const BlockMatrix& A, double smallest) {
 void solve_lower(const BlockMatrix& A, int first_block, double* x) {
   const int size = kBlock * A.num_blocks;
   for (int r = kBlock * first_block; r < size; ++r) {
-    const double* row = A.entries + static_cast<size_t>(r) * static_cast<size_t>(size);
+    const double* row = row_at(A, r);
     double value = x[r];
     for (int k = kBlock * first_block; k < r; ++k) value -= row[k] * x[k];
     x[r] = value * A.inverses[r];
@@ -119,7 +132,7 @@ void solve_lower(const BlockMatrix& A, int first_block, double* x) {
 void solve_upper(const BlockMatrix& A, double* x) {
   const int size = kBlock * A.num_blocks;
   for (int r = size - 1; r >= 0; --r) {
-    const double* row = A.entries + static_cast<size_t>(r) * static_cast<size_t>(size);
+    const double* row = row_at(A, r);
     x[r] *= A.inverses[r];
     for (int k = 0; k < r; ++k) x[k] -= row[k] * x[r];
   }

@@ -28,20 +28,33 @@ struct Columns {
 
 struct BlockMatrix {
   int num_blocks;
-  double* entries;    // num_blocks * 6 rows of as many entries, 16-byte aligned; lower triangle
-  double* inverses;   // of the factor's diagonal, or 0 where a pivot vanished
-  double* diagonal;   // of A, which decides when a pivot has vanished
-  Columns* panel;     // scratch: 2 for each block
-  int32_t* sequence;  // 0, 1, 2, ...: all blocks
+  double* entries;  // the rows of blocks down to the diagonal, one after the other; 16-byte aligned
+  double* inverses;  // of the factor's diagonal, or 0 where a pivot vanished
+  double* diagonal;  // of A, which decides when a pivot has vanished
+  Columns* panel;    // scratch: 2 for each block
+  int32_t* below;    // scratch: the blocks of a column that are not zero
 };
 
 size_t block_matrix_bytes(int num_blocks);
 BlockMatrix block_matrix(int num_blocks, Arena& arena);
 
+// How many entries so many rows of blocks have.
+inline size_t block_entries(int num_blocks) {
+  const size_t n = static_cast<size_t>(num_blocks);
+  return kBlock * kBlock * (n * (n + 1) / 2);
+}
+
+// How many entries follow each other in each of the six rows of a row of blocks.
+inline int row_entries(int row) { return kBlock * (row + 1); }
+
 inline double* block_at(const BlockMatrix& A, int row, int column) {
-  return A.entries + (static_cast<size_t>(kBlock * row) * static_cast<size_t>(A.num_blocks) +
-                      static_cast<size_t>(column)) *
-                         kBlock;
+  return A.entries + block_entries(row) + static_cast<size_t>(kBlock * column);
+}
+
+// The entry (i, i) of a matrix of scalars.
+inline double* diagonal_at(const BlockMatrix& A, int i) {
+  const int row = i / kBlock, k = i % kBlock;
+  return block_at(A, row, row) + k * row_entries(row) + k;
 }
 
 // Subtracts Z_a Z_b' from the blocks (blocks[a], blocks[b]) for all a and all b <= a, where blocks

@@ -5,6 +5,7 @@
 
 #include "base/math.h"
 #include "odometry/adjust.h"
+#include "odometry/adjust_segment.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/metric.h"
@@ -17,13 +18,22 @@ namespace {
 
 constexpr int32_t kLeastKeyframesBetween = 12;
 constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 15;
-constexpr double kLargestDrift = 0.05;  // of the path, in position
+// With fewer inliers a loop of the same segment needs another one of the last frames that agrees
+// with it, and most of the matches.
+constexpr int32_t kLeastWeakInliers = 24, kMostFramesBetween = 15;
+constexpr double kWeakShare = 0.75, kWeakWay = 0.03, kWeakTurn = 0.015;  // median depths, radians
+constexpr double kLeastWeakPath = 4;                                     // median depths
+constexpr double kLargestDrift = 0.05;                                   // of the path, in position
 constexpr double kLargestShift = 0.15;  // of the median depth, added to it
 constexpr double kLargestTurn = 0.4;    // radians
 // Cameras farther from each other, in median depths, or turned by more see nothing in common.
 constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
 constexpr double kLargestScale = 1.5;
 constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
+// After a loop: steps of the adjustment of all keyframes, one at each frame, and of the points.
+constexpr int32_t kSpreadSteps = 12, kPointSteps = 3;
+// Smaller corrections are not spread: median depths, radians.
+constexpr double kLeastWay = 0.005, kLeastTurn = 0.005;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
 
 // Writes for each keyframe the length of the path from it to the newest one.
@@ -75,6 +85,21 @@ double scale_between(Odometry* odometry, const Frame& frame, const Frame& again)
   return median(ratios, num);
 }
 
+}  // namespace
+
+bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end) {
+  const WeakLoop before = odometry->weak_loop;
+  odometry->weak_loop = {frame.number, frame.cam_from_world, end.cam_from_world};
+  if (before.frame < 0 || frame.number - before.frame > kMostFramesBetween) return false;
+  Rigid moved = motion_between(before.cam_from_world, frame.cam_from_world);
+  for (double& t : moved.t) t *= end.scale;
+  const Rigid expected = compose(moved, before.end_from_world);
+  return way_between(expected, end.cam_from_world) <= kWeakWay * odometry->median_depth &&
+         turn_between(expected, end.cam_from_world) <= kWeakTurn;
+}
+
+namespace {
+
 bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe, Frame* again,
            LoopEnd* end) {
   ArenaScope scope(odometry->scratch);
@@ -94,7 +119,8 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
   }
   if (num < kLeastInliers || 10 * num_known > num) return false;
   again->has_pose = false;
-  if (match_points(odometry, points, num, kMatchRatio, again) < kLeastMatches) return false;
+  const int32_t num_matches = match_points(odometry, points, num, kMatchRatio, again);
+  if (num_matches < kLeastMatches) return false;
   PoseFit fit;
   if (!fit_pose(odometry, 500, 4.0, again, &fit) || fit.estimate.num_inliers < kLeastMatches / 2 ||
       3 * fit.estimate.num_inliers < fit.estimate.num_matches) {
@@ -111,34 +137,21 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
     if (!refine_pose(odometry, 3.0, again, &fit)) return false;
   }
   again->cam_from_world = fit.cam_from_world;
-  if (fit.estimate.num_inliers < kLeastInliers || fit.estimate.verdict != TV_VERDICT_OK) {
-    return false;
-  }
+  const int32_t num_inliers = fit.estimate.num_inliers;
+  if (num_inliers < kLeastWeakInliers || fit.estimate.verdict != TV_VERDICT_OK) return false;
   end->keyframe = keyframe;
   end->cam_from_world = fit.cam_from_world;
   end->scale = scale_between(odometry, frame, *again);
-  return end->scale > 0 && is_plausible(*odometry, frame, path, *end);
+  if (!(end->scale > 0 && is_plausible(*odometry, frame, path, *end))) return false;
+  return num_inliers >= kLeastInliers ||
+         (map.keyframes[keyframe].segment == odometry->segment &&
+          num_inliers >= kWeakShare * num_matches &&
+          path >= kLeastWeakPath * odometry->median_depth && is_seen_twice(odometry, frame, *end));
 }
-
-// The length of a segment's path.
-double segment_length(const Map& map, int32_t segment) {
-  double length = 0;
-  for (int32_t k = 1; k < map.num_keyframes; ++k) {
-    const MapKeyframe &before = map.keyframes[k - 1], &own = map.keyframes[k];
-    if (before.segment != segment || own.segment != segment) continue;
-    length += way_between(before.cam_from_world, own.cam_from_world);
-  }
-  return length;
-}
-
-struct Node {
-  Rigid cam_from_world;
-  double scale;
-};
 
 // The pose of a keyframe between what the loop's beginning says of it and what its end says.
-Node blend(const Rigid& from_begin, const Rigid& from_end, double scale, double share) {
-  Node node;
+MovedKeyframe blend(const Rigid& from_begin, const Rigid& from_end, double scale, double share) {
+  MovedKeyframe moved;
   const Rigid turn = scaled_motion(motion_between(from_begin, from_end), share);
   Rigid rotation = turn;
   for (double& t : rotation.t) t = 0;
@@ -147,35 +160,9 @@ Node blend(const Rigid& from_begin, const Rigid& from_end, double scale, double 
   centre_of(from_end, b);
   Rigid world_from_cam = inverse(compose(rotation, from_begin));
   for (int c = 0; c < 3; ++c) world_from_cam.t[c] = a[c] + share * (b[c] - a[c]);
-  node.cam_from_world = inverse(world_from_cam);
-  node.scale = exp(share * log(scale));
-  return node;
-}
-
-void move_points(Map* map, const Node* nodes) {
-  // A point moves with the keyframe that made it, or the next one that is left.
-  for (int32_t p = 0; p < map->end_points; ++p) {
-    MapPoint& point = map->points[p];
-    if (point.id < 0) continue;
-    int32_t k = 0;
-    while (k + 1 < map->num_keyframes && map->keyframes[k].id < point.made_at) ++k;
-    const Node& node = nodes[k];
-    if (node.scale == 0) continue;  // a keyframe that stays
-    const Rigid world_from_cam = inverse(node.cam_from_world);
-    double x[3], seen[3];
-    const double from[3] = {static_cast<double>(point.seen_from[0]),
-                            static_cast<double>(point.seen_from[1]),
-                            static_cast<double>(point.seen_from[2])};
-    transform(map->keyframes[k].cam_from_world, point.position, x);
-    transform(map->keyframes[k].cam_from_world, from, seen);
-    for (int c = 0; c < 3; ++c) {
-      x[c] *= node.scale;
-      seen[c] *= node.scale;
-    }
-    transform(world_from_cam, x, point.position);
-    transform(world_from_cam, seen, seen);
-    for (int c = 0; c < 3; ++c) point.seen_from[c] = static_cast<float>(seen[c]);
-  }
+  moved.cam_from_world = inverse(world_from_cam);
+  moved.scale = exp(share * log(scale));
+  return moved;
 }
 
 // The keypoints that see a new point and an old one see the old one from now on, in every keyframe.
@@ -239,7 +226,7 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
 size_t close_loop_bytes(const tv_odometry_options& o) {
   const size_t keyframes = static_cast<size_t>(o.max_keyframes);
   const size_t points = static_cast<size_t>(o.max_points);
-  return arena_bytes<Node>(keyframes) + arena_bytes<double>(keyframes) +
+  return arena_bytes<MovedKeyframe>(keyframes) + arena_bytes<double>(keyframes) +
          arena_bytes<int32_t>(points) + arena_bytes<uint8_t>(points);
 }
 
@@ -249,14 +236,15 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   const int32_t newest = map.num_keyframes - 1;
   const int32_t old_segment = map.keyframes[end.keyframe].segment;
   const int32_t segment = map.keyframes[keyframe].segment;
-  Node* nodes = arena_alloc<Node>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  MovedKeyframe* moved =
+      arena_alloc<MovedKeyframe>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   const Rigid now = map.keyframes[keyframe].cam_from_world;
   double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   measure_paths(map, paths);
   const double whole = std::max(paths[end.keyframe], 1e-12);
   for (int32_t k = 0; k <= newest; ++k) {
     const MapKeyframe& own = map.keyframes[k];
-    nodes[k] = {own.cam_from_world, 0};
+    moved[k] = {own.cam_from_world, 0};
     if (own.segment != segment) continue;
     if (segment == old_segment && k <= end.keyframe) continue;
     // As the loop's end says: the way from the newest keyframe, in the other scale.
@@ -264,15 +252,12 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
     for (double& t : relative.t) t *= end.scale;
     const Rigid from_end = compose(relative, end.cam_from_world);
     const double share = segment == old_segment ? 1 - paths[k] / whole : 1;
-    nodes[k] = blend(own.cam_from_world, from_end, end.scale, share);
+    moved[k] = blend(own.cam_from_world, from_end, end.scale, share);
   }
-  move_points(&map, nodes);
   const double length = segment_length(map, segment);
+  move_keyframes(&map, moved);
   for (int32_t k = 0; k <= newest; ++k) {
-    if (nodes[k].scale == 0) continue;
-    map.keyframes[k].cam_from_world = orthonormalised(nodes[k].cam_from_world);
-    map.keyframes[k].scale *= nodes[k].scale;
-    map.keyframes[k].segment = old_segment;
+    if (moved[k].scale != 0) map.keyframes[k].segment = old_segment;
   }
   if (segment == old_segment && length > 0) {
     stretch_ways(odometry, segment_length(map, segment) / length);
@@ -282,6 +267,37 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   }
   enter_segment(odometry, old_segment);
   fuse_points(odometry, keyframe, again);
+  odometry->weak_loop.frame = -1;
+  const bool is_small = way_between(now, end.cam_from_world) < kLeastWay * odometry->median_depth &&
+                        turn_between(now, end.cam_from_world) < kLeastTurn;
+  if (segment != old_segment || !is_small) odometry->spread = {kSpreadSteps, 0};
+}
+
+bool is_spreading(const Odometry& odometry) {
+  return odometry.spread.num_steps > 0 || odometry.spread.next_place < odometry.map.end_points;
+}
+
+void spread_loop(Odometry* odometry, Frame* frame) {
+  Spread* spread = &odometry->spread;
+  if (spread->num_steps == 0) {
+    spread->next_place =
+        adjust_points(odometry, odometry->segment, spread->next_place, kPointSteps);
+    return;
+  }
+  --spread->num_steps;
+  const int32_t k = find_keyframe(odometry->map, odometry->reference_id);
+  if (k < 0) return;
+  const MapKeyframe& reference = odometry->map.keyframes[k];
+  const Rigid before = reference.cam_from_world;
+  const Rigid relative = compose(frame->cam_from_world, inverse(before));
+  double factor;
+  if (!adjust_segment(odometry, reference.segment, 1, &factor)) spread->num_steps = 0;
+  frame->cam_from_world = compose(relative, reference.cam_from_world);
+  // So does the beginning of the way that is compared with the velocities.
+  double from[3];
+  transform(before, odometry->travel.from, from);
+  transform(inverse(reference.cam_from_world), from, odometry->travel.from);
+  if (reference.segment == odometry->segment) stretch_ways(odometry, factor);
 }
 
 namespace {
@@ -329,6 +345,12 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
       if (!is_joined) continue;
       close_loop(odometry, k, *again, end);
       adjust_around(odometry, k, kJoinSteps);
+      double factor;
+      adjust_segment(odometry, odometry->segment, kSpreadSteps, &factor);
+      stretch_ways(odometry, factor);
+      odometry->spread.num_steps = 0;
+      while (is_spreading(*odometry)) spread_loop(odometry, frame);
+      remove_lone_points(&map, odometry->scratch);
       ++odometry->num_loops;
       ++num_joined;
     }

@@ -1,7 +1,8 @@
 // Loops: the camera sees again what it saw long before. The keyframes in between are corrected by
 // what the path drifted in position, attitude and scale, as in the pose chain of G. Dubbelman,
-// B. Browning, "COP-SLAM: closed-form online pose-chain optimization for visual SLAM", 2015; and a
-// segment that meets another one becomes part of it. Tests: test/unit/test_loop.cc.
+// B. Browning, "COP-SLAM: closed-form online pose-chain optimization for visual SLAM", 2015, and
+// then adjusted together in the frames that follow. A segment that meets another one becomes part
+// of it. Tests: test/unit/test_loop.cc.
 #pragma once
 
 #include "odometry/odometry.h"
@@ -16,6 +17,10 @@ struct LoopEnd {
   double scale;
 };
 
+// Whether a loop that few points speak for agrees with the last such loop, of which it takes the
+// place. `frame` has its pose.
+bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end);
+
 // Looks for the tracked frame in `count` keyframes that do not share its points. True: *end is
 // known, and `again`, with the frame's keypoints, has the old points that they see.
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end);
@@ -23,9 +28,16 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
 // How many bytes of scratch close_loop takes.
 size_t close_loop_bytes(const tv_odometry_options& options);
 
-// Corrects the keyframes and points. `keyframe` has the keypoints of `again`; it is the newest one
-// where it is of the same segment as the loop's end.
+// Corrects the keyframes and points, roughly: the rest is spread_loop's. `keyframe` has the
+// keypoints of `again`; it is the newest one where it is of the same segment as the loop's end.
 void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
+
+// Whether a closed loop is still to be spread over the keyframes of its segment.
+bool is_spreading(const Odometry& odometry);
+
+// One more step towards what all keyframes of a closed loop ask for together, and after the last
+// one what all points do. `frame`, whose pose is relative to the reference keyframe, moves with it.
+void spread_loop(Odometry* odometry, Frame* frame);
 
 // Looks for the segments of the keyframes from number `first` on in the keyframes before it. Those
 // that meet them become part of theirs. Returns how many.

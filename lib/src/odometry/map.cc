@@ -22,6 +22,19 @@ size_t num_planes(const MapSizes& sizes) {
   return 2 * as_size(kDescribedKeyframes) * as_size(sizes.max_keypoints);
 }
 
+// The first keyframe whose id is at least this one; num_keyframes where there is none.
+int32_t first_from(const Map& map, int32_t id) {
+  int32_t low = 0, high = map.num_keyframes;
+  while (low < high) {
+    const int32_t middle = (low + high) / 2;
+    if (map.keyframes[middle].id < id)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
 void release_point(Map* map, int32_t point) {
   map->points[point].id = -1;
   map->free_points[map->num_free_points++] = point;
@@ -84,14 +97,7 @@ int32_t count_marked(const Map& map, const MapKeyframe& keyframe) {
 }
 
 int32_t find_keyframe(const Map& map, int32_t id) {
-  int32_t low = 0, high = map.num_keyframes;
-  while (low < high) {
-    const int32_t middle = (low + high) / 2;
-    if (map.keyframes[middle].id < id)
-      low = middle + 1;
-    else
-      high = middle;
-  }
+  const int32_t low = first_from(map, id);
   return low < map.num_keyframes && map.keyframes[low].id == id ? low : -1;
 }
 
@@ -181,6 +187,45 @@ void remove_points(Map* map, const uint8_t* is_removed) {
   for (int32_t p = 0; p < map->end_points; ++p) {
     if (is_removed[p] && map->points[p].id >= 0) release_point(map, p);
   }
+}
+
+void move_keyframes(Map* map, const MovedKeyframe* moved) {
+  for (int32_t p = 0; p < map->end_points; ++p) {
+    MapPoint& point = map->points[p];
+    if (point.id < 0) continue;
+    // The keyframe that made it, or the next one that is left.
+    const int32_t k = std::min(first_from(*map, point.made_at), map->num_keyframes - 1);
+    if (moved[k].scale == 0) continue;
+    const Rigid world_from_cam = inverse(moved[k].cam_from_world);
+    double x[3], seen[3];
+    const double from[3] = {static_cast<double>(point.seen_from[0]),
+                            static_cast<double>(point.seen_from[1]),
+                            static_cast<double>(point.seen_from[2])};
+    transform(map->keyframes[k].cam_from_world, point.position, x);
+    transform(map->keyframes[k].cam_from_world, from, seen);
+    for (int c = 0; c < 3; ++c) {
+      x[c] *= moved[k].scale;
+      seen[c] *= moved[k].scale;
+    }
+    transform(world_from_cam, x, point.position);
+    transform(world_from_cam, seen, seen);
+    for (int c = 0; c < 3; ++c) point.seen_from[c] = static_cast<float>(seen[c]);
+  }
+  for (int32_t k = 0; k < map->num_keyframes; ++k) {
+    if (moved[k].scale == 0) continue;
+    map->keyframes[k].cam_from_world = orthonormalised(moved[k].cam_from_world);
+    map->keyframes[k].scale *= moved[k].scale;
+  }
+}
+
+double segment_length(const Map& map, int32_t segment) {
+  double length = 0;
+  for (int32_t k = 1; k < map.num_keyframes; ++k) {
+    const MapKeyframe &before = map.keyframes[k - 1], &own = map.keyframes[k];
+    if (before.segment != segment || own.segment != segment) continue;
+    length += way_between(before.cam_from_world, own.cam_from_world);
+  }
+  return length;
 }
 
 void remove_lone_points(Map* map, Arena& scratch) {

@@ -137,6 +137,19 @@ void forget_observation(Map* map, int32_t keyframe, int32_t keypoint);
 // its point in that order. Both arrays have room for end_points.
 void rank_points(const Map& map, int32_t* places, int32_t* ranks);
 
+// The pose that a keyframe is to have, and the factor of the distances of its points; 0 where it
+// stays.
+struct MovedKeyframe {
+  Rigid cam_from_world;
+  double scale;
+};
+
+// Moves the keyframes, and each point with the keyframe that made it.
+void move_keyframes(Map* map, const MovedKeyframe* moved);
+
+// The length of the path along a segment's keyframes.
+double segment_length(const Map& map, int32_t segment);
+
 // Removes a point from the map and from the keyframes that see it.
 void remove_points(Map* map, const uint8_t* is_removed);
 

@@ -48,6 +48,19 @@ struct MapCheck {
   MapVote vote;
 };
 
+// A frame that seems to close a loop, but with few points: where it is, and where the loop's end
+// says that it is.
+struct WeakLoop {
+  int32_t frame;  // its number; -1: there is none
+  Rigid cam_from_world, end_from_world;
+};
+
+// What is left to do after a loop, a part at each frame that has no keyframe to adjust.
+struct Spread {
+  int32_t num_steps;   // of the adjustment of all keyframes together
+  int32_t next_place;  // then: of the points, from which on they are still to be adjusted
+};
+
 // The way since a frame in metres, in the world's axes, as the velocities say.
 struct Travel {
   bool is_known;
@@ -82,6 +95,7 @@ struct tv_odometry {
   tv_feature_options features;
   tv::Map map;
   tv::Arena scratch;
+  tv::Arena whole_scratch;  // the context's and `scratch` as one, for when neither is in use
   int32_t grid_columns, grid_rows;
   tv::Frame frame, previous;
   tv::Frame starts[tv::kNumStarts];
@@ -101,6 +115,8 @@ struct tv_odometry {
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
   int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
   bool closed_loop;          // with it
+  tv::WeakLoop weak_loop;
+  tv::Spread spread;
   tv::MapCheck check;
   // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
   // saw one plane only, or contradicted the map.

@@ -295,7 +295,7 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
   const bool is_due = needs_keyframe(*odometry, *frame, fit.estimate.num_inliers);
   LoopEnd loop;
-  const bool found_loop = odometry->num_contrary == 0 &&
+  const bool found_loop = odometry->num_contrary == 0 && !is_spreading(*odometry) &&
                           find_loop(odometry, *frame, kLoopKeyframes, &odometry->starts[0], &loop);
   if (is_due || found_loop) {
     if (!add_frame_as_keyframe(odometry, frame, input.image, found_loop ? &loop : nullptr, state))
@@ -380,10 +380,10 @@ void write_counts(const Odometry& odometry, tv_odometry_state* state) {
 
 }  // namespace
 
-void finish_keyframe(Odometry* odometry, Frame* frame) {
+bool finish_keyframe(Odometry* odometry, Frame* frame) {
   const int32_t newest = find_keyframe(odometry->map, odometry->unadjusted_id);
   odometry->unadjusted_id = -1;
-  if (newest < 0) return;
+  if (newest < 0) return false;
   adjust_around(odometry, newest, odometry->closed_loop ? kLoopSteps : kWindowSteps);
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
@@ -391,11 +391,14 @@ void finish_keyframe(Odometry* odometry, Frame* frame) {
   if (odometry->closed_loop) measure_depth(odometry, *frame);
   // Not between keyframes of two maps, where one was added meanwhile.
   if (newest == odometry->map.num_keyframes - 1) measure_scale(odometry, frame);
+  return true;
 }
 
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state) {
   std::swap(odometry->frame, odometry->previous);
-  finish_keyframe(odometry, &odometry->previous);
+  if (!finish_keyframe(odometry, &odometry->previous) && is_spreading(*odometry)) {
+    spread_loop(odometry, &odometry->previous);
+  }
   Frame* frame = &odometry->frame;
   extract_frame(odometry, input.image, frame);
   frame->number = odometry->num_frames++;

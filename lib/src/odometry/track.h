@@ -9,8 +9,8 @@ namespace tv {
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state);
 
 // A keyframe is adjusted when the next frame comes, before that is tracked, so that no frame takes
-// the time of both. `frame`: the one that became the keyframe. Nothing if none waits.
-void finish_keyframe(Odometry* odometry, Frame* frame);
+// the time of both. `frame`: the one that became the keyframe. False: none waits.
+bool finish_keyframe(Odometry* odometry, Frame* frame);
 
 void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
                   tv_odometry_state* state);

@@ -15,7 +15,7 @@ constexpr double kNearChange = 0.1;  // below this relative change, the loss's c
 constexpr double kLeastKept = 0.03;
 constexpr double kLargestFactor = 0.9;  // of two gains that follow each other
 constexpr double kNoErrorSq = 1e-20;    // px^2 for each observation; smaller errors count as none
-constexpr double kFirstDamping = 1e-4, kMinDamping = 1e-12, kMaxDamping = 1e8;
+constexpr double kMinDamping = 1e-12, kMaxDamping = 1e8;
 // With more damping, a small change of the cost is no evidence for a minimum.
 constexpr double kHonestDamping = 1e-2;
 // A view's parameter that no term depends on is damped as if it had this share of the largest entry
@@ -84,7 +84,7 @@ double solve_views(const Window& window, double damping, double* damped) {
     for (int i = group; i < group + 3; ++i) largest = std::max(largest, A.diagonal[i]);
     for (int i = group; i < group + 3; ++i) {
       A.diagonal[i] = std::max(A.diagonal[i], kLeastEntry * largest);
-      A.entries[count_of(i) * count_of(size + 1)] += damping * A.diagonal[i];
+      *diagonal_at(A, i) += damping * A.diagonal[i];
       window.step[i] = -window.gradient[i];
     }
   }
@@ -107,11 +107,11 @@ void step_views(const Window& window) {
   }
 }
 
-void minimise(Window* window, double prior_weight, double cost, double* sum_sq,
+void minimise(Window* window, double damping, double prior_weight, double cost, double* sum_sq,
               tv_window_result* result) {
   const tv_window_options& options = window->options;
   const double no_error = kNoErrorSq * window->num_observations;
-  double damping = kFirstDamping, growth = 2.0, previous = 0.0;
+  double growth = 2.0, previous = 0.0;
   double kept = 1.0;  // of the curvature in the direction of a residual, least squares'
   result->final_cost = cost;
   while (result->num_iterations < options.max_iterations && result->converged == 0) {
@@ -209,7 +209,7 @@ int reference_view(const Window& window) {
 // farthest view.
 void hold_free_parameters(const Window& window, bool scale_is_free) {
   const BlockMatrix& A = window.system;
-  const int size = kBlock * window.num_blocks, reference = reference_view(window);
+  const int reference = reference_view(window);
   if (reference < 0) return;
   const double* from = window.pose[reference].centre;
   if (scale_is_free) {
@@ -235,7 +235,7 @@ void hold_free_parameters(const Window& window, bool scale_is_free) {
     const int row = kBlock * window.block[reference] + i;
     const double more = kHeld * A.diagonal[row];
     A.diagonal[row] += more;
-    A.entries[count_of(row) * count_of(size + 1)] += more;
+    *diagonal_at(A, row) += more;
   }
 }
 
@@ -322,8 +322,9 @@ size_t window_scratch_bytes(const tv_window& window) {
          arena_bytes<int32_t>(std::max(views, points) + 1);
 }
 
-bool adjust_window(const tv_window& given, const tv_window_options& options, const double* planes,
-                   Arena& arena, double* covariances, float* errors_px, tv_window_result* result) {
+bool adjust_window(const tv_window& given, const tv_window_options& options,
+                   const WindowStart& start, Arena& arena, double* covariances, float* errors_px,
+                   tv_window_result* result) {
   const size_t views = count_of(given.num_views), points = count_of(given.num_points);
   const size_t observations = count_of(given.num_observations);
   Window window{given, options};
@@ -348,7 +349,7 @@ bool adjust_window(const tv_window& given, const tv_window_options& options, con
     for (int k = 0; k < given.num_cameras; ++k) cameras[k] = prepare_camera(given.cameras[k]);
     int32_t* order = arena_alloc<int32_t>(arena, observations);
     int32_t* begin = arena_alloc<int32_t>(arena, std::max(views, points) + 1);
-    gather_points(&window, cameras, planes, order, begin, result);
+    gather_points(&window, cameras, start.planes, order, begin, result);
   }
   choose_views(&window, result);
   window.system = block_matrix(window.num_blocks, arena);
@@ -363,7 +364,7 @@ bool adjust_window(const tv_window& given, const tv_window_options& options, con
       observations_cost(window, &sum_sq) + prior_weight * priors_cost(window, window.pose);
   if (!is_finite(result->initial_cost)) return false;
   result->initial_rms_px = rms(sum_sq, window.num_observations);
-  minimise(&window, prior_weight, result->initial_cost, &sum_sq, result);
+  minimise(&window, start.damping, prior_weight, result->initial_cost, &sum_sq, result);
   result->rms_px = rms(sum_sq, window.num_observations);
   if (covariances != nullptr) measure_covariances(window, covariances, result);
   write_results(window, errors_px);

@@ -10,10 +10,16 @@ namespace tv {
 // How many bytes of arena one adjustment takes; reads the counts only.
 size_t window_scratch_bytes(const tv_window& window);
 
-// The window has been checked. planes: two numbers for each observation, as make_observation takes
-// them, or null. covariances, errors_px: as for tv_adjust_window; `result` is zeros.
+// Where the adjustment begins.
+struct WindowStart {
+  const double* planes = nullptr;  // two for each observation, as make_observation takes them
+  double damping = 1e-4;           // of the first step, a share of the Hessian's diagonal
+};
+
+// The window has been checked. covariances, errors_px: as for tv_adjust_window; `result` is zeros.
 // False, and nothing is written, where the cost at the start is not finite.
-bool adjust_window(const tv_window& window, const tv_window_options& options, const double* planes,
-                   Arena& arena, double* covariances, float* errors_px, tv_window_result* result);
+bool adjust_window(const tv_window& window, const tv_window_options& options,
+                   const WindowStart& start, Arena& arena, double* covariances, float* errors_px,
+                   tv_window_result* result);
 
 }  // namespace tv

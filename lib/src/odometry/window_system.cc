@@ -28,7 +28,7 @@ struct PointSums {
 };
 
 void add_to_view(const Window& window, int block, const ViewRow rows[2], const ViewRow& gradient) {
-  const int stride = kBlock * window.num_blocks;
+  const int stride = row_entries(block);
   double* U = block_at(window.system, block, block);
   Pair* g = reinterpret_cast<Pair*>(window.gradient + kBlock * block);
   Pair* diagonal = reinterpret_cast<Pair*>(window.system.diagonal + kBlock * block);
@@ -298,7 +298,7 @@ void add_term(const Window& window, double weight, const PriorTerm& term, int lo
       double* block = block_at(window.system, row, column);
       for (int i = 0; i < kBlock; ++i) {
         for (int j = 0; j < kBlock; ++j) {
-          block[i * kBlock * window.num_blocks + j] += weight * term.H[a][b][kBlock * i + j];
+          block[i * row_entries(row) + j] += weight * term.H[a][b][kBlock * i + j];
         }
       }
     }
@@ -307,7 +307,7 @@ void add_term(const Window& window, double weight, const PriorTerm& term, int lo
 
 double build_system(const Window& window, const Weighing& weighing) {
   const size_t size = static_cast<size_t>(kBlock * window.num_blocks);
-  std::fill(window.system.entries, window.system.entries + size * size, 0.0);
+  std::fill_n(window.system.entries, block_entries(window.num_blocks), 0.0);
   std::fill(window.system.diagonal, window.system.diagonal + size, 0.0);
   std::fill(window.gradient, window.gradient + size, 0.0);
   visit_priors(window, window.pose, &weighing.prior_weight);

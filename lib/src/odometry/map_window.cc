@@ -1,0 +1,194 @@
+#include "odometry/map_window.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/vector3.h"
+#include "odometry/window.h"
+
+namespace tv {
+namespace {
+
+constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;
+
+size_t count_of(int32_t n) { return static_cast<size_t>(n); }
+
+tv_window largest_window(const WindowSizes& sizes) {
+  tv_window window;
+  tv_window_init(&window);
+  window.num_cameras = 1;
+  window.num_views = window.num_gravity_priors = sizes.views;
+  window.num_points = sizes.points;
+  window.num_observations = sizes.observations;
+  return window;
+}
+
+void add_observations_of(const Odometry& odometry, int32_t view, MapWindow* window) {
+  const Map& map = odometry.map;
+  const MapKeyframe& keyframe = map.keyframes[window->keyframes[view]];
+  const MapKeypoint* own = keypoints_of(map, keyframe);
+  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
+    if (own[i].point == kNoPoint || window->numbers[own[i].point] < 0) continue;
+    if (window->model.num_observations == window->sizes.observations) return;
+    const int32_t n = window->model.num_observations++;
+    tv_observation* o = &window->observations[n];
+    *o = tv_observation{};
+    o->idx_view = view;
+    o->idx_point = window->numbers[own[i].point];
+    o->pixel[0] = static_cast<double>(own[i].x);
+    o->pixel[1] = static_cast<double>(own[i].y);
+    o->sigma = static_cast<float>(sigma_of(own[i]));
+    window->keypoints[n] = i;
+    Vec2 plane(__builtin_nan(""), 0);
+    double* known = keyframe.described < 0 ? plane.data() : planes_of(map, keyframe) + 2 * i;
+    if (keyframe.described >= 0 && !(known[0] == known[0]) &&
+        undistort(odometry.camera, Vec2(o->pixel[0], o->pixel[1]), &plane)) {
+      std::copy_n(plane.data(), 2, known);
+    }
+    std::copy_n(known, 2, window->planes + 2 * n);
+  }
+}
+
+// Sets how uncertain the points' depths are from the largest angle between the rays to them.
+void measure_depths(const MapWindow& window, Odometry* odometry) {
+  Map& map = odometry->map;
+  for (int32_t k = 0; k < window.model.num_points; ++k) {
+    MapPoint& point = map.points[window.places[k]];
+    point.depth_sigma = 0;  // here: the largest squared sine
+  }
+  double centre[3];
+  for (int32_t n = 0, view = -1; n < window.model.num_observations; ++n) {
+    const tv_observation& o = window.observations[n];
+    MapPoint& point = map.points[window.places[o.idx_point]];
+    if (o.idx_view != view) {
+      view = o.idx_view;
+      centre_of(map.keyframes[window.keyframes[view]].cam_from_world, centre);
+    }
+    double a[3], b[3], normal[3];
+    for (int c = 0; c < 3; ++c) {
+      a[c] = point.position[c] - centre[c];
+      b[c] = point.position[c] - static_cast<double>(point.seen_from[c]);
+    }
+    cross(a, b, normal);
+    const double sine_sq = dot(normal, normal) / std::max(dot(a, a) * dot(b, b), 1e-300);
+    point.depth_sigma = std::max(point.depth_sigma, static_cast<float>(sine_sq));
+  }
+  for (int32_t k = 0; k < window.model.num_points; ++k) {
+    MapPoint& point = map.points[window.places[k]];
+    const double sine = std::sqrt(static_cast<double>(point.depth_sigma));
+    const double sigma = kTypicalNoise / (odometry->camera.model.fx * std::max(sine, 1e-6));
+    point.depth_sigma =
+        std::min(std::max(static_cast<float>(sigma), kLeastDepthSigma), kLargestDepthSigma);
+  }
+}
+
+}  // namespace
+
+size_t map_window_bytes(const tv_odometry_options& options, const WindowSizes& sizes) {
+  const size_t views = count_of(sizes.views), points = count_of(sizes.points);
+  const size_t observations = count_of(sizes.observations);
+  return arena_bytes<tv_window_view>(views) + arena_bytes<int32_t>(views) +
+         arena_bytes<double>(3 * points) + arena_bytes<int32_t>(points) +
+         arena_bytes<int32_t>(count_of(options.max_points)) +
+         arena_bytes<tv_observation>(observations) + arena_bytes<int32_t>(observations) +
+         arena_bytes<double>(2 * observations) + arena_bytes<tv_gravity_prior>(views) +
+         arena_bytes<float>(observations) + window_scratch_bytes(largest_window(sizes));
+}
+
+MapWindow make_map_window(const Odometry& odometry, const WindowSizes& sizes, Arena& arena) {
+  const size_t views = count_of(sizes.views), points = count_of(sizes.points);
+  const size_t observations = count_of(sizes.observations);
+  const int32_t places = odometry.options.max_points;
+  MapWindow window{};
+  window.sizes = sizes;
+  window.damping = WindowStart{}.damping;
+  tv_window_init(&window.model);
+  window.views = arena_alloc<tv_window_view>(arena, views);
+  window.keyframes = arena_alloc<int32_t>(arena, views);
+  window.points = arena_alloc<double>(arena, 3 * points);
+  window.places = arena_alloc<int32_t>(arena, points);
+  window.numbers = arena_alloc<int32_t>(arena, count_of(places));
+  window.observations = arena_alloc<tv_observation>(arena, observations);
+  window.keypoints = arena_alloc<int32_t>(arena, observations);
+  window.planes = arena_alloc<double>(arena, 2 * observations);
+  window.gravity = arena_alloc<tv_gravity_prior>(arena, views);
+  window.errors = arena_alloc<float>(arena, observations);
+  std::fill(window.numbers, window.numbers + places, -1);
+  return window;
+}
+
+void add_view(const Map& map, int32_t keyframe, bool fixed, MapWindow* window) {
+  const int32_t v = window->model.num_views++;
+  window->keyframes[v] = keyframe;
+  tv_window_view* view = &window->views[v];
+  const Rigid& pose = map.keyframes[keyframe].cam_from_world;
+  std::copy_n(pose.R, 9, view->R);
+  std::copy_n(pose.t, 3, view->t);
+  view->idx_camera = 0;
+  view->fixed = fixed;
+}
+
+void add_map_point(const Map& map, int32_t place, MapWindow* window) {
+  const int32_t n = window->model.num_points++;
+  window->numbers[place] = n;
+  window->places[n] = place;
+  std::copy_n(map.points[place].position, 3, window->points + 3 * n);
+}
+
+void add_observations(const Odometry& odometry, MapWindow* window) {
+  for (int32_t v = 0; v < window->model.num_views; ++v) add_observations_of(odometry, v, window);
+}
+
+bool adjust_map_window(const Odometry& odometry, MapWindow* window, Arena& arena) {
+  const Map& map = odometry.map;
+  tv_window& model = window->model;
+  for (int32_t v = 0; v < model.num_views && odometry.is_upright; ++v) {
+    const MapKeyframe& view = map.keyframes[window->keyframes[v]];
+    if (window->views[v].fixed != 0 || view.down_sigma_rad == 0) continue;
+    tv_gravity_prior* down = &window->gravity[model.num_gravity_priors++];
+    *down = tv_gravity_prior{};
+    down->idx_view = v;
+    std::copy_n(view.down, 3, down->down);
+    down->sigma_rad = view.down_sigma_rad;
+  }
+  model.gravity_priors = window->gravity;
+  model.world_down[1] = 0;
+  model.world_down[2] = 1;
+  model.num_cameras = 1;
+  model.cameras = &odometry.camera.model;
+  model.views = window->views;
+  model.points = window->points;
+  model.observations = window->observations;
+  tv_window_options how;
+  tv_window_options_init(&how);
+  how.max_iterations = window->max_iterations;
+  how.tolerance = 1e-4;
+  return adjust_window(model, how, {window->planes, window->damping}, arena, window->covariances,
+                       window->errors, &window->result);
+}
+
+Rigid pose_of(const MapWindow& window, int32_t view) {
+  Rigid pose;
+  std::copy_n(window.views[view].R, 9, pose.R);
+  std::copy_n(window.views[view].t, 3, pose.t);
+  return pose;
+}
+
+void keep_positions(const MapWindow& window, Map* map) {
+  for (int32_t k = 0; k < window.model.num_points; ++k) {
+    std::copy_n(window.points + 3 * k, 3, map->points[window.places[k]].position);
+  }
+}
+
+void drop_outliers(const MapWindow& window, Odometry* odometry) {
+  for (int32_t n = 0; n < window.model.num_observations; ++n) {
+    const tv_observation& o = window.observations[n];
+    const double largest_error = kLargestError * static_cast<double>(o.sigma);
+    const float error = window.errors[n];
+    if (error >= 0 && static_cast<double>(error) <= largest_error) continue;
+    forget_observation(&odometry->map, window.keyframes[o.idx_view], window.keypoints[n]);
+  }
+  measure_depths(window, odometry);
+}
+
+}  // namespace tv
