@@ -38,28 +38,30 @@ double add_up(SumsKernel kernel, int num_sums, const RayPairs& pairs, const int3
   return cauchy ? cost : over_lanes(sums[num_sums - 2]);
 }
 
+// Without a loop, whose additions would wait for one another; not inlined, for its size.
+__attribute__((noinline)) double dot9(const double* a, const double* b) {
+  return (((((((a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]) + a[3] * b[3]) + a[4] * b[4]) +
+            a[5] * b[5]) +
+           a[6] * b[6]) +
+          a[7] * b[7]) +
+         a[8] * b[8];
+}
+
 // From the normal equations of the matrix's nine entries (full, slope) to those of `num`
 // parameters, where d matrix / d parameter p = columns[p].
 void project(const double full[9][9], const double slope[9], const Mat3* columns, int num,
              double* upper, double* gradient) {
   double flat[9][9];
   for (int p = 0; p < num; ++p) {
-    for (int i = 0; i < 9; ++i) flat[p][i] = columns[p](i / 3, i % 3);
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) flat[p][3 * r + c] = columns[p](r, c);
+    }
   }
-  int slot = 0;
   for (int p = 0; p < num; ++p) {
     double product[9];
-    gradient[p] = 0;
-    for (int i = 0; i < 9; ++i) {
-      gradient[p] += flat[p][i] * slope[i];
-      product[i] = 0;
-      for (int j = 0; j < 9; ++j) product[i] += full[i][j] * flat[p][j];
-    }
-    for (int r = p; r < num; ++r) {
-      double sum = 0;
-      for (int i = 0; i < 9; ++i) sum += flat[r][i] * product[i];
-      upper[slot++] = sum;
-    }
+    for (int i = 0; i < 9; ++i) product[i] = dot9(full[i], flat[p]);
+    gradient[p] = dot9(flat[p], slope);
+    for (int r = p; r < num; ++r) *upper++ = dot9(flat[r], product);
   }
 }
 

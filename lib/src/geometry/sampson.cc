@@ -67,22 +67,25 @@ bool sampson_slopes(const RayPairs& pairs, int i, const Mat3& M, const double cu
   // c / sqrt(n) has the slopes (d c - c / n (s0' d s0 + s1' d s1)) / sqrt(n), s0 = J0' M' f1 and s1
   // = J1' M f0. Its slopes by the entries of M are those of the form f1' M q0 + (q1 - f1)' M f0,
   // divided by sqrt(n).
-  double q0[3], q1[3];
-  for (int r = 0; r < 3; ++r) {
+  double q0[3], q1[3], along[2][3];
+  const auto set_q = [&](int r) {
     double* const* J = pairs.jacobian[0] + 2 * r;
     q0[r] = e.f0[r] - share * (J[0][i] * e.s0[0] + J[1][i] * e.s0[1]);
     J = pairs.jacobian[1] + 2 * r;
     q1[r] = e.f1[r] - share * (J[0][i] * e.s1[0] + J[1][i] * e.s1[1]);
-  }
+  };
   // M' q1, M q0: sqrt(n) times the slopes by ray 0 and by ray 1, here over the rays' sigmas.
-  double along[2][3];
-  for (int r = 0; r < 3; ++r) {
+  const auto set_slopes = [&](int r) {
     along[0][r] = ((M(0, r) * q1[0] + M(1, r) * q1[1]) + M(2, r) * q1[2]) / sigmas[0];
     along[1][r] = ((M(r, 0) * q0[0] + M(r, 1) * q0[1]) + M(r, 2) * q0[2]) / sigmas[1];
-    for (int c = 0; c < 3; ++c) {
-      slopes->by_entry[3 * r + c] = inverse * (e.f1[r] * q0[c] + (q1[r] - e.f1[r]) * e.f0[c]);
-    }
-  }
+    const double rest = q1[r] - e.f1[r];
+    double* const by_entry = slopes->by_entry + 3 * r;
+    by_entry[0] = inverse * (e.f1[r] * q0[0] + rest * e.f0[0]);
+    by_entry[1] = inverse * (e.f1[r] * q0[1] + rest * e.f0[1]);
+    by_entry[2] = inverse * (e.f1[r] * q0[2] + rest * e.f0[2]);
+  };
+  set_q(0), set_q(1), set_q(2);  // gcc does not unroll loops at -O2
+  set_slopes(0), set_slopes(1), set_slopes(2);
   for (int k = 0; k < 2; ++k) {
     double slope = 0;
     for (int r = 0; r < 3; ++r) {

@@ -150,6 +150,13 @@ bool sane(const PixelRay& p) {
   return is_finite(sum) && sum < 1e200;
 }
 
+// Whether every pixel of which prepare_matches does not drop the match has a sane ray.
+bool has_all_rays(const Camera& camera, bool on_plane) {
+  const tv_camera& model = camera.model;
+  return on_plane && model.model == TV_CAMERA_PINHOLE && std::min(model.fx, model.fy) > 1e-6 &&
+         std::max(std::fabs(model.cx), std::fabs(model.cy)) < kMaxCoordinates;
+}
+
 // Without cameras: a pinhole that puts the centroid on the axis and the mean squared distance of
 // the points from it at 2 (Hartley 1997).
 Camera normalising_camera(const double* pixels, const int32_t* order, int count) {
@@ -172,10 +179,11 @@ Camera normalising_camera(const double* pixels, const int32_t* order, int count)
 }
 
 void set_rays(const TwoViewProblem& problem, int view, const Camera& camera, Matches* matches) {
+  const bool has_all = has_all_rays(camera, matches->pairs.on_plane);
   for (int k = 0; k < matches->num_all; ++k) {
     PixelRay p;
     const double* pixel = problem.pixels[view] + 2 * matches->order[k];
-    if (ray_of_pixel(camera, pixel, matches->pairs.on_plane, &p) && sane(p)) {
+    if (ray_of_pixel(camera, pixel, matches->pairs.on_plane, &p) && (has_all || sane(p))) {
       for (double& slope : p.jacobian) slope *= matches->sigma(view, k);
       set_ray(matches->pairs, view, k, p.ray, p.jacobian);
     }
@@ -216,6 +224,10 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
   SortKey* keys = arena_alloc<SortKey>(arena, n);
   const uint32_t table_size = table_size_for(problem.num);
   int32_t* table = arena_alloc<int32_t>(arena, table_size);
+  bool is_seen[2];  // whether no ray of the view needs to be examined
+  for (int v = 0; v < 2; ++v) {
+    is_seen[v] = !problem.calibrated || has_all_rays(problem.camera[v], on_plane);
+  }
   int count = 0;
   for (int32_t i = 0; i < problem.num; ++i) {
     const Coordinates c = coordinates(problem, i);
@@ -224,8 +236,9 @@ void prepare_matches(const TwoViewProblem& problem, Arena& arena, Matches* match
     if (!(sum < kMaxCoordinates)) continue;  // drops NaN, infinities, huge values
     PixelRay ray;
     bool usable = true;
-    for (int v = 0; v < 2 && usable && problem.calibrated; ++v) {
-      usable = ray_of_pixel(problem.camera[v], &c.v[2 * v], on_plane, &ray) && sane(ray);
+    for (int v = 0; v < 2 && usable; ++v) {
+      usable =
+          is_seen[v] || (ray_of_pixel(problem.camera[v], &c.v[2 * v], on_plane, &ray) && sane(ray));
     }
     if (usable) keys[count++] = SortKey{sort_ratio(problem, i), i, c.v[0]};
   }

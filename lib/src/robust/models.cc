@@ -2,17 +2,35 @@
 
 namespace tv {
 
+namespace {
+
+// [a]x M.
+void cross_columns(const Vec3& a, const Mat3& M, Mat3* product) {
+  for (int c = 0; c < 3; ++c) {
+    const double x = M(0, c), y = M(1, c), z = M(2, c);
+    (*product)(0, c) = a[1] * z - a[2] * y;
+    (*product)(1, c) = a[2] * x - a[0] * z;
+    (*product)(2, c) = a[0] * y - a[1] * x;
+  }
+}
+
+}  // namespace
+
 void pose_columns(const Pose& pose, Mat3 columns[5]) {
-  const Mat3 translation = cross_matrix(pose.t);
   Vec3 b1, b2;
   tangent_basis(pose.t, &b1, &b2);
   for (int k = 0; k < 3; ++k) {
-    Vec3 axis = Vec3::Zero();
-    axis[k] = 1;
-    columns[k] = translation * (cross_matrix(axis) * pose.R);
+    const int next = (k + 1) % 3, last = (k + 2) % 3;
+    Mat3 turned;  // [axis k]x R
+    for (int c = 0; c < 3; ++c) {
+      turned(k, c) = 0;
+      turned(next, c) = -pose.R(last, c);
+      turned(last, c) = pose.R(next, c);
+    }
+    cross_columns(pose.t, turned, columns + k);
   }
-  columns[3] = cross_matrix(b1) * pose.R;
-  columns[4] = cross_matrix(b2) * pose.R;
+  cross_columns(b1, pose.R, columns + 3);
+  cross_columns(b2, pose.R, columns + 4);
 }
 
 double PoseModel::normal_equations(const RayPairs& pairs, const int32_t* indices, int count,
