@@ -267,6 +267,31 @@ void test_an_uncertain_focal_length_is_refined_and_its_error_covered(void) {
   TEST_ASSERT_TRUE(left_off[left_off.size() / 2] < 0.5 * given_off[given_off.size() / 2]);
 }
 
+// The focal lengths of two cameras are not refined. A pose that is "ok" is then sure of its
+// rotation and direction by the covariance that it states, as any other "ok" pose is.
+void test_two_uncertain_focal_lengths_count_in_the_verdict(void) {
+  constexpr double kDegree = 3.14159265358979324 / 180;
+  int doubtful = 0, ok = 0;
+  for (int k = 0; k < 24; ++k) {
+    draw(9000 + static_cast<uint64_t>(k), 0.3, 200, false);
+    tv_camera other = pair.camera[0];
+    other.width += 2;
+    tv_estimate_options options = defaults();
+    TEST_ASSERT_EQUAL_INT(TV_VERDICT_OK, estimate(pair.camera[0], other, options).verdict);
+    options.focal_sigma0 = options.focal_sigma1 = k < 12 ? 0.1 : 0.021;
+    const tv_two_view r = estimate(pair.camera[0], other, options);
+    TEST_ASSERT_TRUE(r.focal_scale == 0 && r.has_covariance != 0);
+    const double* const c = r.covariance;
+    const bool sure = std::sqrt(c[0] + c[6] + c[12]) <= 1.25 * kDegree &&
+                      std::sqrt(c[18] + c[24]) <= 13.5 * kDegree;
+    TEST_ASSERT_TRUE(
+        sure || (r.verdict == TV_VERDICT_DOUBTFUL && (r.reasons & TV_REASON_LOW_PARALLAX) != 0));
+    ++(r.verdict == TV_VERDICT_OK ? ok : doubtful);
+  }
+  std::printf("two uncertain focal lengths: %d doubtful, %d ok\n", doubtful, ok);
+  TEST_ASSERT_TRUE(doubtful > 0 && ok > 0);
+}
+
 void test_exchanged_views_have_the_same_focal_length(void) {
   for (int k = 0; k < 12; ++k) {
     draw(7000 + static_cast<uint64_t>(k), 0.3, 150, false);
@@ -321,6 +346,7 @@ int main(void) {
   RUN_TEST(test_a_calibrations_sigmas_propagate_as_changed_cameras_do);
   RUN_TEST(test_a_planes_pose_follows_the_cameras_as_well);
   RUN_TEST(test_an_uncertain_focal_length_is_refined_and_its_error_covered);
+  RUN_TEST(test_two_uncertain_focal_lengths_count_in_the_verdict);
   RUN_TEST(test_exchanged_views_have_the_same_focal_length);
   RUN_TEST(test_sigmas_out_of_range_are_refused);
   return UNITY_END();

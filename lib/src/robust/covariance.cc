@@ -57,10 +57,12 @@ void multiply5(const double A[25], const double B[25], double C[25]) {
 
 }  // namespace
 
+double rotation_sigma(const double covariance[25]) {
+  return std::sqrt(covariance[0] + covariance[6] + covariance[12]);
+}
+
 double largest_sigma(const double covariance[25]) {
-  const double rotation = covariance[0] + covariance[6] + covariance[12];
-  const double direction = covariance[18] + covariance[24];
-  return std::sqrt(std::max(rotation, direction));
+  return std::max(rotation_sigma(covariance), std::sqrt(covariance[18] + covariance[24]));
 }
 
 double direction_sigma(const Vec3& t, const double covariance[25]) {

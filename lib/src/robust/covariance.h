@@ -12,15 +12,17 @@ struct PoseUncertainty {
   double variance_px;  // variance of the M-estimate for a residual: C = variance_px (J' J)^-1, px^2
   double mean_weight, mean_slope;  // means of the loss's weight and of psi' over the matches
   double focal_sigma;  // relative standard deviation of a refined focal length; else the given one
-  double sigma_rad;    // of the verdict: largest_sigma before errors that matches share
-                       // and a calibration that is not refined are added
-  double
-      direction_sigma_rad;  // of the verdict: direction_sigma, with the errors that matches share
+  // Of the verdict: largest_sigma before errors that matches share and a calibration that is not
+  // refined are added, and direction_sigma with the former. With two cameras of uncertain focal
+  // length, rotation_sigma and direction_sigma with all of them.
+  double sigma_rad, direction_sigma_rad;
 };
 
 // An upper bound of the standard deviations of the rotation and of the direction about any axis:
 // the root of the larger trace of their two blocks.
 double largest_sigma(const double covariance[25]);
+// The same of the rotation alone.
+double rotation_sigma(const double covariance[25]);
 // The same of the direction alone: of that of t or of the inverse pose's, whichever is larger.
 double direction_sigma(const Vec3& t, const double covariance[25]);
 

@@ -145,6 +145,18 @@ struct PoseEquations {
   double upper[kPacked], gradient[PoseModel::kParameters];
 };
 
+// What these equations take of the pose, for one region after another.
+struct FixedPose {
+  Mat3 essential, columns[PoseModel::kParameters];
+  RobustLoss loss;
+
+  void write_equations(const RayPairs& pairs, const int32_t* listed, int count,
+                       PoseEquations* out) const {
+    sampson_normal_equations(pairs, listed, count, essential, columns, PoseModel::kParameters, loss,
+                             out->upper, out->gradient);
+  }
+};
+
 // Writes the support to f.indices, region by region: those of region r are starts[r] to
 // starts[r + 1] - 1.
 void sort_by_region(Fit& f, int view, int side, int* starts) {
@@ -168,8 +180,8 @@ void sort_by_region(Fit& f, int view, int side, int* starts) {
 // Gauss-Newton step without them: a deletion diagnostic (D. Belsley, E. Kuh, R. Welsch, "Regression
 // diagnostics", 1980). The regions are the cells of a 4x4 grid on the view's image. whole: the step
 // with all of them. At most kPi^2, also where the others do not determine the pose.
-double largest_turn_sq(Fit& f, int view, const PoseModel& model, const RobustLoss& loss,
-                       const PoseEquations& all, const double* whole) {
+double largest_turn_sq(Fit& f, int view, const FixedPose& pose, const PoseEquations& all,
+                       const double* whole) {
   constexpr int kSide = 4, kRegions = kSide * kSide;
   int starts[kRegions + 1];
   sort_by_region(f, view, kSide, starts);
@@ -180,7 +192,7 @@ double largest_turn_sq(Fit& f, int view, const PoseModel& model, const RobustLos
     if (count == 0) continue;
     PoseEquations rest;
     double step[PoseModel::kParameters], turn_sq = 0;
-    model.normal_equations(f.matches.pairs, listed, count, loss, rest.upper, rest.gradient);
+    pose.write_equations(f.matches.pairs, listed, count, &rest);
     for (int k = 0; k < PoseEquations::kPacked; ++k) rest.upper[k] = all.upper[k] - rest.upper[k];
     for (int k = 0; k < PoseModel::kParameters; ++k) {
       rest.gradient[k] = all.gradient[k] - rest.gradient[k];
@@ -198,15 +210,17 @@ double largest_turn_sq(Fit& f, int view, const PoseModel& model, const RobustLos
 
 // tv_two_view.region_shift_rad: the mean of both views' largest turns.
 double region_shift_rad(Fit& f) {
-  const PoseModel model{f.out->epipolar.pose};
   const double noise_px = std::max(f.out->evidence.noise_px, 0.1 * f.threshold);
-  const RobustLoss loss{Loss::kCauchy, 2 * noise_px};
+  FixedPose pose;
+  pose.essential = essential_from_pose(f.out->epipolar.pose);
+  pose_columns(f.out->epipolar.pose, pose.columns);
+  pose.loss = RobustLoss{Loss::kCauchy, 2 * noise_px};
   PoseEquations all;
   double whole[PoseModel::kParameters];
-  model.normal_equations(f.matches.pairs, f.support, f.num_support, loss, all.upper, all.gradient);
+  pose.write_equations(f.matches.pairs, f.support, f.num_support, &all);
   if (!solve_damped(PoseModel::kParameters, all.upper, all.gradient, 0, whole)) return kPi;
   double sum = 0;
-  for (int v = 0; v < 2; ++v) sum += std::sqrt(largest_turn_sq(f, v, model, loss, all, whole));
+  for (int v = 0; v < 2; ++v) sum += std::sqrt(largest_turn_sq(f, v, pose, all, whole));
   return 0.5 * sum;
 }
 

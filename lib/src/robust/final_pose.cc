@@ -343,8 +343,11 @@ bool uncertainty_of(const PoseRefiner& f, const Pose& pose, PoseUncertainty* unc
   if (gravity.known) {
     for (double* c : {noise, shared, all}) add_gravity_information(gravity, pose.R, c);
   }
-  uncertainty->sigma_rad = largest_sigma(noise);
-  uncertainty->direction_sigma_rad = direction_sigma(pose.t, shared);
+  // The focal lengths of two cameras are not refined, and count in the verdict where uncertain.
+  const bool counts =
+      !f.problem.one_camera && std::max(sigma, f.problem.options.focal_sigma1) > kUncertainFocal;
+  uncertainty->sigma_rad = std::max(largest_sigma(noise), counts ? rotation_sigma(all) : 0);
+  uncertainty->direction_sigma_rad = direction_sigma(pose.t, counts ? all : shared);
   std::copy(all, all + 25, noise);
   return all_finite(noise, 25);
 }
