@@ -89,6 +89,7 @@ int main(int argc, char **argv) {
     ardrone_session_wait(session, end);
   }
   ardrone_session_close(session);
+  tv_odometry_finish(odometry);
   file = fopen(argv[1], "wb");
   if (!file || tv_odometry_save(odometry, bytes, sizeof bytes, &num_bytes) != TV_OK ||
       fwrite(bytes, 1, num_bytes, file) != num_bytes || fclose(file))

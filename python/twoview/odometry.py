@@ -131,6 +131,11 @@ class Odometry:
         self._call("tv_odometry_track", byref(frame), byref(state))
         return _state(state)
 
+    def finish(self) -> None:
+        """tv_odometry_finish: does what tracking left for the frames to come. To be called after
+        the last frame, before poses, keyframes, points or the map's bytes are read."""
+        self._call("tv_odometry_finish")
+
     def locate(self, image: np.ndarray, near_id: int = -1) -> OdometryState:
         """tv_odometry_locate: the pose of a frame in the map as it is. near_id: a keyframe whose
         surroundings are searched first."""

@@ -434,6 +434,31 @@ static void test_a_keyframe_is_adjusted_when_the_next_frame_comes(void) {
                           sizeof tracked.world_from_cam_t) != 0);
 }
 
+static void test_finish_adjusts_the_newest_keyframe(void) {
+  tv_keyframe tracked, adjusted;
+  int32_t newest;
+  TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_finish(NULL));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry)); /* without a map */
+  fly(odometry, 4);
+  newest = state.num_keyframes - 1;
+  tv_keyframe_init(&tracked);
+  tv_keyframe_init(&adjusted);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &tracked));
+  TEST_ASSERT_EQUAL_INT(num_flown - 1, tracked.frame);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &adjusted));
+  TEST_ASSERT_TRUE(memcmp(&tracked.world_from_cam_t, &adjusted.world_from_cam_t,
+                          sizeof tracked.world_from_cam_t) != 0);
+  /* Nothing is left, and the next frame finds the map as it would have made it. */
+  tracked = adjusted;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown));
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &adjusted));
+  TEST_ASSERT_EQUAL_MEMORY(&tracked.world_from_cam_t, &adjusted.world_from_cam_t,
+                           sizeof tracked.world_from_cam_t);
+}
+
 static void test_accessors_refuse_bad_arguments(void) {
   tv_keyframe keyframe;
   int32_t num = 0, k;
@@ -951,6 +976,7 @@ int main(void) {
   RUN_TEST(test_points_have_covariances);
   RUN_TEST(test_the_last_frame_is_shown);
   RUN_TEST(test_a_keyframe_is_adjusted_when_the_next_frame_comes);
+  RUN_TEST(test_finish_adjusts_the_newest_keyframe);
   RUN_TEST(test_accessors_refuse_bad_arguments);
   RUN_TEST(test_poses_are_found_again_from_their_keyframes);
   RUN_TEST(test_a_frame_is_located_without_changing_the_map);

@@ -211,7 +211,7 @@ void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
   tv::Frame frame{};
   frame.cam_from_world = reference->cam_from_world;
   tv::centre_of(reference->cam_from_world, odometry->travel.from);
-  odometry->spread = {12, 0};
+  odometry->spread = {12, 0, 0};
   while (odometry->spread.num_steps > 0) tv::spread_loop(odometry, &frame);
   double centre[3];
   tv::centre_of(reference->cam_from_world, centre);
@@ -225,6 +225,26 @@ void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
     if (tv::is_spreading(*odometry)) tv::spread_loop(odometry, &frame);
   }
   TEST_ASSERT_FALSE(tv::is_spreading(*odometry));
+}
+
+void test_finish_takes_all_steps_that_are_left() {
+  map_room();
+  odometry->reference_id = odometry->map.keyframes[kViews - 1].id;
+  odometry->spread = {12, 0, 0};
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
+  TEST_ASSERT_FALSE(tv::is_spreading(*odometry));
+  TEST_ASSERT_TRUE(worst_position() < 1e-4);
+  TEST_ASSERT_TRUE(mean_error() < 0.02);
+}
+
+// A frame of another segment may have come meanwhile.
+void test_the_points_of_the_loops_segment_are_adjusted() {
+  map_room();
+  odometry->reference_id = odometry->map.keyframes[kViews - 1].id;
+  odometry->segment = 1;
+  odometry->spread = {12, 0, 0};
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
+  TEST_ASSERT_TRUE(mean_error() < 0.02);
 }
 
 void test_small_corrections_are_not_spread() {
@@ -283,6 +303,8 @@ int main() {
   RUN_TEST(test_all_keyframes_of_a_segment_are_adjusted_together);
   RUN_TEST(test_the_factor_is_that_of_the_path);
   RUN_TEST(test_a_frame_and_the_measured_way_move_with_their_keyframe);
+  RUN_TEST(test_finish_takes_all_steps_that_are_left);
+  RUN_TEST(test_the_points_of_the_loops_segment_are_adjusted);
   RUN_TEST(test_small_corrections_are_not_spread);
   RUN_TEST(test_few_points_close_a_loop_only_twice);
   return UNITY_END();

@@ -222,6 +222,13 @@ TV_API tv_status tv_odometry_reset(tv_odometry *odometry);
 TV_API tv_status tv_odometry_track(tv_odometry *odometry, const tv_odometry_frame *frame,
                                    tv_odometry_state *state);
 
+/* Does what tracking left for the frames to come: the adjustment of the newest keyframe, and what a
+   closed loop asks of the rest of the map. To be called after the last frame, before poses,
+   keyframes, points or the map's bytes are read. Frames may follow all the same; without such work
+   the map stays as it is.
+   Returns TV_ERR_NULL. Time: bounded by the options; after a loop some tenths of a second. */
+TV_API tv_status tv_odometry_finish(tv_odometry *odometry);
+
 /* Estimates the pose of a frame from the map as it is, without changing it: for a frame from before
    the map began, or of another flight.
    image: as tv_odometry_frame.image. state: as for tv_odometry_track; its status is

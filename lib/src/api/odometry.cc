@@ -110,7 +110,7 @@ void start_anew(tv_odometry* o) {
   o->local_id = o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
   o->is_doubtful = false;
   o->weak_loop.frame = -1;
-  o->spread = {0, o->map.sizes.max_points};
+  o->spread = {0, o->map.sizes.max_points, 0};
   o->check = MapCheck{};
   o->has_motion = false;
   o->num_frames = o->segment = o->num_segments = 0;
@@ -272,6 +272,12 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
   tv_odometry_state packed{};
   tv::track_frame(odometry, input, &packed);
   tv::write_sized(packed, state);
+  return TV_OK;
+}
+
+tv_status tv_odometry_finish(tv_odometry* odometry) {
+  if (odometry == nullptr) return TV_ERR_NULL;
+  tv::finish_map(odometry);
   return TV_OK;
 }
 

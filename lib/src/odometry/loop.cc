@@ -23,7 +23,8 @@ constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 15;
 constexpr int32_t kLeastWeakInliers = 24, kMostFramesBetween = 15;
 constexpr double kWeakShare = 0.75, kWeakWay = 0.03, kWeakTurn = 0.015;  // median depths, radians
 constexpr double kLeastWeakPath = 4;                                     // median depths
-constexpr double kLargestDrift = 0.05;                                   // of the path, in position
+
+constexpr double kLargestDrift = 0.05;  // of the path, in position
 constexpr double kLargestShift = 0.15;  // of the median depth, added to it
 constexpr double kLargestTurn = 0.4;    // radians
 // Cameras farther from each other, in median depths, or turned by more see nothing in common.
@@ -270,7 +271,7 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   odometry->weak_loop.frame = -1;
   const bool is_small = way_between(now, end.cam_from_world) < kLeastWay * odometry->median_depth &&
                         turn_between(now, end.cam_from_world) < kLeastTurn;
-  if (segment != old_segment || !is_small) odometry->spread = {kSpreadSteps, 0};
+  if (segment != old_segment || !is_small) odometry->spread = {kSpreadSteps, 0, old_segment};
 }
 
 bool is_spreading(const Odometry& odometry) {
@@ -280,8 +281,7 @@ bool is_spreading(const Odometry& odometry) {
 void spread_loop(Odometry* odometry, Frame* frame) {
   Spread* spread = &odometry->spread;
   if (spread->num_steps == 0) {
-    spread->next_place =
-        adjust_points(odometry, odometry->segment, spread->next_place, kPointSteps);
+    spread->next_place = adjust_points(odometry, spread->segment, spread->next_place, kPointSteps);
     return;
   }
   --spread->num_steps;
@@ -291,13 +291,13 @@ void spread_loop(Odometry* odometry, Frame* frame) {
   const Rigid before = reference.cam_from_world;
   const Rigid relative = compose(frame->cam_from_world, inverse(before));
   double factor;
-  if (!adjust_segment(odometry, reference.segment, 1, &factor)) spread->num_steps = 0;
+  if (!adjust_segment(odometry, spread->segment, 1, &factor)) spread->num_steps = 0;
   frame->cam_from_world = compose(relative, reference.cam_from_world);
   // So does the beginning of the way that is compared with the velocities.
   double from[3];
   transform(before, odometry->travel.from, from);
   transform(inverse(reference.cam_from_world), from, odometry->travel.from);
-  if (reference.segment == odometry->segment) stretch_ways(odometry, factor);
+  if (spread->segment == odometry->segment) stretch_ways(odometry, factor);
 }
 
 namespace {

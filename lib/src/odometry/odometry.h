@@ -59,6 +59,7 @@ struct WeakLoop {
 struct Spread {
   int32_t num_steps;   // of the adjustment of all keyframes together
   int32_t next_place;  // then: of the points, from which on they are still to be adjusted
+  int32_t segment;     // of the loop
 };
 
 // The way since a frame in metres, in the world's axes, as the velocities say.

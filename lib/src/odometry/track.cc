@@ -394,6 +394,11 @@ bool finish_keyframe(Odometry* odometry, Frame* frame) {
   return true;
 }
 
+void finish_map(Odometry* odometry) {
+  finish_keyframe(odometry, &odometry->frame);
+  while (is_spreading(*odometry)) spread_loop(odometry, &odometry->frame);
+}
+
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state) {
   std::swap(odometry->frame, odometry->previous);
   if (!finish_keyframe(odometry, &odometry->previous) && is_spreading(*odometry)) {

@@ -12,6 +12,9 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
 // the time of both. `frame`: the one that became the keyframe. False: none waits.
 bool finish_keyframe(Odometry* odometry, Frame* frame);
 
+// Does the work that was left for the frames to come.
+void finish_map(Odometry* odometry);
+
 void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
                   tv_odometry_state* state);
 

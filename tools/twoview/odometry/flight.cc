@@ -192,6 +192,7 @@ void Flight::track_frame(SourceFrame frame) {
 
 void Flight::finish(const std::atomic<bool>& stop) {
   if (odometry_ == nullptr) return;
+  check(tv_odometry_finish(odometry_), "the map");
   for (FlightFrame& frame : frames_) {
     if (frame.reference_id < 0) continue;
     double R[9], t[3];
