@@ -2,6 +2,7 @@
 Python's standard library is used. The program is the one that TWOVIEW_PROGRAM names, or the first
 argument.
 """
+import fcntl
 import functools
 import json
 import os
@@ -13,6 +14,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 import unittest
 import zlib
@@ -205,9 +207,11 @@ class CliTest(unittest.TestCase):
         self.assertEqual(done.returncode, status, done.stderr.decode())
         return done
 
-    def on_terminal(self, *arguments, **environment):
-        """(exit status, what stdout and stderr showed) of the program on a terminal."""
+    def on_terminal(self, *arguments, columns=0, **environment):
+        """(exit status, what stdout and stderr showed) of the program on a terminal, which has no
+        known width unless `columns` is given."""
         master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("4H", 24, columns, 0, 0))
         kept = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")}
         process = subprocess.Popen([program(), *map(str, arguments)], stdin=subprocess.DEVNULL,
                                    stdout=slave, stderr=slave, cwd=self.folder,

@@ -206,7 +206,11 @@ class Drone(unittest.TestCase):
         self.assertGreater(summary["navdata_rejected"], 0)
         self.assertGreater(summary["reconnects"], 0)
         self.assertGreater(summary["gaps"], 0)
-        self.assertGreater(summary["frames_decoded"], 10)
+        # A cut costs the frames up to the next complete picture. How many frames come in the time
+        # depends on the machine, what part of them is decoded does not.
+        self.assertEqual(summary["frames_decoded"] + summary["frames_dropped"],
+                         summary["frames_received"])
+        self.assertGreater(4 * summary["frames_decoded"], summary["frames_received"])
         packets, rest = packets_of(self.path("video.pave"))
         self.assertEqual((len(packets), rest), (summary["frames_received"], 0))
 

@@ -156,18 +156,20 @@ void test_each_reason_has_words_and_advice_and_no_reason_none() {
   }
 }
 
-// The words for the reason "a second motion" where image 1 shows the scene at this scale.
-std::string words_at_scale(float scale, tv_verdict verdict) {
-  constexpr int count = 40;
+// The words for the reason "a second motion" of 100 matches, of which the first `num_inliers` are
+// right and show the scene of image 1 at this scale, and all others at 0.1.
+std::string words_at_scale(float scale, tv_verdict verdict, int num_inliers) {
+  constexpr int count = 100;
   std::vector<tv_keypoint> keypoints[2] = {std::vector<tv_keypoint>(count),
                                            std::vector<tv_keypoint>(count)};
   std::vector<tv_correspondence> matches(count);
+  std::vector<uint8_t> mask(count);
   for (int32_t i = 0; i < count; ++i) {
     const auto k = static_cast<size_t>(i);
     keypoints[0][k].x = static_cast<float>(37 * i % 101);
     keypoints[0][k].y = static_cast<float>(53 * i % 97);
-    // A fifth of the matches is wrong.
-    const float factor = i % 5 == 0 ? 0.1f : scale;
+    mask[k] = i < num_inliers;
+    const float factor = mask[k] ? scale : 0.1f;
     keypoints[1][k].x = factor * keypoints[0][k].x + 5;
     keypoints[1][k].y = factor * keypoints[0][k].y - 3;
     matches[k].idx0 = matches[k].idx1 = i;
@@ -180,12 +182,13 @@ std::string words_at_scale(float scale, tv_verdict verdict) {
   outcome.two_view.reasons = TV_REASON_SECOND_MOTION;
   for (size_t i = 0; i < 2; ++i) outcome.reconstruction.keypoints[i] = keypoints[i].data();
   outcome.reconstruction.matches = matches.data();
+  outcome.reconstruction.inlier_mask = mask.data();
   outcome.reconstruction.num_matches = count;
   return reasons_in_words(outcome);
 }
 
-bool words_name_scale(float scale, tv_verdict verdict) {
-  const std::string words = words_at_scale(scale, verdict);
+bool words_name_scale(float scale, tv_verdict verdict, int num_inliers = 80) {
+  const std::string words = words_at_scale(scale, verdict, num_inliers);
   const bool scale_named = words.find("scale") != std::string::npos;
   const bool motion_named = words.find("second motion") != std::string::npos;
   return scale_named && !motion_named;
@@ -196,6 +199,13 @@ void test_a_zoomed_pair_is_told_of_its_scale_and_of_no_second_motion() {
   TEST_ASSERT_TRUE(words_name_scale(0.5f, TV_VERDICT_REFUSED));
   TEST_ASSERT_FALSE(words_name_scale(1.1f, TV_VERDICT_DOUBTFUL));
   TEST_ASSERT_FALSE(words_name_scale(0.9f, TV_VERDICT_DOUBTFUL));
+}
+
+void test_the_scale_is_of_the_inliers_and_not_of_what_the_geometry_rejects() {
+  const std::string words = words_at_scale(3.5f, TV_VERDICT_DOUBTFUL, 30);
+  TEST_ASSERT_NOT_NULL(std::strstr(words.c_str(), "image 1 shows the scene at 3.50 times"));
+  TEST_ASSERT_FALSE(words_name_scale(3.5f, TV_VERDICT_REFUSED, 0));
+  TEST_ASSERT_FALSE(words_name_scale(3.5f, TV_VERDICT_DOUBTFUL, 12));
 }
 
 // What `advise` says of pairs that ask for (x, y) + spread (1, 0), (-1, 0), (1, 0) ..., `asking` of
@@ -525,6 +535,7 @@ int main() {
   RUN_TEST(test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibration);
   RUN_TEST(test_each_reason_has_words_and_advice_and_no_reason_none);
   RUN_TEST(test_a_zoomed_pair_is_told_of_its_scale_and_of_no_second_motion);
+  RUN_TEST(test_the_scale_is_of_the_inliers_and_not_of_what_the_geometry_rejects);
   RUN_TEST(test_base64_has_the_vectors_of_rfc_4648);
   RUN_TEST(test_csv_numbers_are_the_shortest_that_read_back);
   RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);

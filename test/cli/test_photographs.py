@@ -78,8 +78,24 @@ class Exif(cli.CliTest):
             self.succeed(self.reconstruct("--focal-35mm", "32", camera=False))
             given = self.result()
             self.assertEqual(given["cameras"][0]["source"], "focal_35mm")
+            self.assertIn("<tr><th>camera 0</th><td>--focal-35mm: 32 mm as for 35 mm film</td>",
+                          (self.out / "report.html").read_text())
             for key in ("R", "t", "covariance", "num_inliers", "verdict"):
                 self.assertEqual(found[key], given[key], key)
+
+    def test_the_report_says_which_camera_was_used_and_where_it_is_from(self):
+        self.a, self.b = self.photographs(exif(**film(FOCAL_35MM)))
+        self.succeed(self.reconstruct(camera=False))
+        page = (self.out / "report.html").read_text()
+        self.assertIn("<li>focal length 32 mm (35 mm equivalent) from EXIF; "
+                      "--camera is better</li>",
+                      page.split("<main>")[0])
+        self.assertIn("<tr><th>camera 1</th><td>EXIF data: 32 mm as for 35 mm film</td></tr>\n"
+                      f"<tr><th>fx</th><td>{FOCAL_PX:.2f} px</td></tr>", page)
+        self.succeed(self.reconstruct("--resize", "160"))
+        page = (self.out / "report.html").read_text()
+        self.assertIn(f"<tr><th>camera 0</th><td>file {self.camera}</td></tr>\n"
+                      f"<tr><th>fx</th><td>{FOCAL / 2:.2f} px</td></tr>", page)
 
     def test_it_is_never_silent(self):
         self.a, self.b = self.photographs(exif(**film(FOCAL_35MM)))
@@ -118,9 +134,32 @@ class Exif(cli.CliTest):
     def test_a_cropped_photographs_focal_length_is_not_used(self):
         self.a, self.b = self.photographs(exif(**film(32), **size(6000, 4000)))
         done = self.reconstruct(camera=False)
-        self.assert_refused(done, "needs cameras", "a.png has no focal length in EXIF")
+        self.assert_refused(done, "needs cameras", "a.png was cropped", "--focal-35mm")
         self.a, self.b = self.photographs(exif(**film(32), **size(3000, 4000)))  # turned since
         self.succeed(self.reconstruct(camera=False))
+
+    def test_a_focal_length_without_the_size_of_the_sensor_is_said_to_lack_that(self):
+        image = self.write("f.png", with_exif(self.a.read_bytes(),
+                                              exif(f=(0x920A, RATIONAL, (42, 10)))))
+        words = ["f.png has the focal length of its lens in EXIF data, but not the size of its "
+                 "sensor", "--focal-35mm"]
+        self.assert_refused(self.reconstruct(a=image, b=image, camera=False), *words)
+        pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [-1, 0, 0]\n")
+        done = self.run_program("triangulate", self.write("m.txt", "8 8 7 8\n"), "--pose", pose,
+                                "--images", image, image, "-o", self.out)
+        self.assert_refused(done, *words)
+
+    def test_pixels_outside_the_image_name_the_camera_that_is_not_from_a_file(self):
+        self.a, self.b = self.photographs(exif(**film(FOCAL_35MM)))
+        pose = self.write("pose.yaml", "R: [1,0,0, 0,1,0, 0,0,1]\nt: [-1, 0, 0]\n")
+        run = ["triangulate", self.write("m.txt", "8 8 400 8\n"), "--pose", pose, "--images",
+               self.a, self.b, "-o", self.out]
+        self.assert_refused(self.run_program(*run, "--focal-35mm", "25"),
+                            "in image 1, but the camera of --focal-35mm 25 is for 320x240")
+        done = self.run_program(*run, "--quiet")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn(b"in image 1, but the camera of EXIF's focal length, 32 mm, is for 320x240",
+                      done.stderr)
 
     def test_one_photograph_without_it_is_named(self):
         self.a = self.write("with.png", with_exif(self.a.read_bytes(), exif(**film(32))))
@@ -169,6 +208,7 @@ class Sizes(cli.CliTest):
         done = self.succeed(self.reconstruct("--camera", camera, camera=False))
         self.assertEqual(done.stdout.count(b"note  "), 1, done.stdout)
         self.assertIn(b"2560x1920 at 1600x1200 (--resize 0: as they are)", done.stdout)
+        self.assertIn("2560x1920 at 1600x1200", (self.out / "report.html").read_text())
         found = self.result()
         self.assertEqual(found["image_size0"], [1600, 1200])
         self.assertEqual(found["options"]["resize"], 1600)
@@ -264,6 +304,49 @@ class Sizes(cli.CliTest):
             with self.subTest(text=text):
                 done = self.reconstruct("--focal-35mm", text, camera=False)
                 self.assert_refused(done, "--focal-35mm", *words)
+
+
+class Scale(cli.CliTest):
+    """How many times larger image 1 shows the scene, where most matches are wrong."""
+
+    ZOOM = 3.5
+
+    def zoomed_pair(self):
+        """A picture, and its middle at ZOOM times the scale."""
+        wide, high = int(self.ZOOM * WIDTH), int(self.ZOOM * HEIGHT)
+        rows = cli.texture(wide, high, seed=3)
+        edges = [int(self.ZOOM * i) for i in range(WIDTH + 1)]
+        small = bytearray()
+        for top, bottom in zip(edges[:HEIGHT], edges[1:]):
+            sums = [sum(column) for column in zip(*rows[top:bottom])]
+            for left, right in zip(edges, edges[1:]):
+                small.append(sum(sums[left:right]) // ((right - left) * (bottom - top)))
+        x, y = (wide - WIDTH) // 2, (high - HEIGHT) // 2
+        middle = b"".join(bytes(row[x : x + WIDTH]) for row in rows[y : y + HEIGHT])
+        return [self.write(f"{name}.png", png(WIDTH, HEIGHT, data))
+                for name, data in (("small", bytes(small)), ("middle", middle))]
+
+    def test_a_real_zoom_is_named_in_the_right_direction(self):
+        small, middle = self.zoomed_pair()
+        for a, b, scale in ((small, middle, self.ZOOM), (middle, small, 1 / self.ZOOM)):
+            done = self.reconstruct("--ratio", "0.97", a=a, b=b)
+            result = self.result()
+            self.assertLess(result["num_inliers"], 0.5 * result["num_matches"])
+            self.assertAlmostEqual(result["magnification"] / scale, 1, delta=0.05)
+            said = f"image 1 shows the scene at {result['magnification']:.2f} times the scale"
+            self.assertIn(said, done.stdout.decode())
+
+    def test_pictures_without_a_common_scene_have_no_scale(self):
+        images = [self.write(f"t{seed}.png", png(WIDTH, HEIGHT, b"".join(cli.texture(
+            WIDTH, HEIGHT, seed)))) for seed in range(1, 7)]
+        for a, b in zip(images[::2], images[1::2]):
+            done = self.reconstruct("--ratio", "0.97", a=a, b=b)
+            self.assertEqual(done.returncode, 3)
+            result = self.result()
+            self.assertGreater(result["num_matches"], 40)
+            self.assertIsNone(result["magnification"])
+            self.assertNotIn(b"times the scale", done.stdout)
+            self.assertIn(b"that both show the scene from a similar distance", done.stdout)
 
 
 class Formats(cli.CliTest):

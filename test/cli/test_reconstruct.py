@@ -351,6 +351,9 @@ class Reconstruct(cli.CliTest):
         self.assertIsNone(result["median_parallax_deg"])
         self.assertIsNone(result["options"]["camera0"])
         self.assertIn("matches.png", self.listing())
+        note = "no camera, so no pose: give --camera or --focal-35mm"
+        self.assertIn(f"note         {note}\n", done.stdout.decode())
+        self.assertIn(f"<li>{note}</li>", (self.out / "report.html").read_text())
 
     def test_a_focal_length_of_35mm_film_is_a_pinhole_with_the_same_diagonal(self):
         focal_35mm = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)
@@ -419,7 +422,9 @@ class Reconstruct(cli.CliTest):
         self.assertNotIn('class="advice"', page)
         R, t = self.result()["R"], self.result()["t"]
         stands = [-sum(R[3 * k + i] * t[k] for k in range(3)) for i in range(3)]
-        self.assertIn("<b>{:+.2f} {:+.2f} {:+.2f}</b><span>camera 1 stands".format(*stands), page)
+        words = [f"{abs(distance):.2f} {names[distance < 0]}" for distance, names in zip(
+            stands, (("right", "left"), ("down", "up"), ("forward", "back")), strict=True)]
+        self.assertIn(f"<b>{', '.join(words)}</b><span>where camera 1 stands", page)
         data = json.loads(re.search(r'id="cloud-data">(.*?)</script>', page, re.S).group(1))
         self.assertEqual(len(data["cameras"]), 2)
 
@@ -436,6 +441,23 @@ class Reconstruct(cli.CliTest):
         page = (self.out / "report.html").read_text()
         self.assertRegex(page, r"\.matrices figure \{ min-width: 0; max-width: 100%; \}")
         self.assertIn("minmax(min(330px, 100%), 1fr)", page)
+
+    def test_a_missing_image_is_named_and_the_help_too(self):
+        self.assert_refused(self.run_program("reconstruct", self.a, "-o", self.out),
+                            "B is required (see twoview reconstruct --help)")
+
+    def test_the_summary_says_what_the_belief_is_of(self):
+        done = self.succeed(self.plain())
+        self.assertRegex(done.stdout.decode(), r"(?m)^belief +rotation off by more than 5 deg with "
+                                               r"probability [\d.e-]+ %$")
+        self.assertIn("probability that the rotation is off by more than 5 deg",
+                      (self.out / "report.html").read_text())
+
+    def test_the_report_says_in_words_on_which_side_the_other_camera_stands(self):
+        for a, b, side in ((self.a, self.b, "right"), (self.b, self.a, "left")):
+            self.succeed(self.reconstruct(a=a, b=b))
+            self.assertRegex((self.out / "report.html").read_text(),
+                             rf"<b>1\.00 {side}, 0\.0\d (up|down), 0\.0\d (back|forward)")
 
     def test_a_matrix_without_a_pose_is_not_called_ok(self):
         done = self.reconstruct("--method", "eight-point", camera=False)

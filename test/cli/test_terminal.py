@@ -22,6 +22,14 @@ class Terminal(cli.CliTest):
         self.assertIn(b"\033[1m", shown)
         self.assertIn(b"\r\033[K1 of 1: a.png b.png\r\033[K", shown)
 
+    def test_progress_is_cut_to_the_width_of_the_terminal(self):
+        pairs = self.write("pairs.txt", pair_line())
+        for columns, shown in ((80, b"1 of 1: a.png b.png"), (19, b"1 of 1: a.png b.pn"),
+                               (12, b"1 of 1: a.p")):
+            _, text = self.on_terminal("evaluate", pairs, "--images", self.folder, "-o", self.out,
+                                       columns=columns)
+            self.assertIn(b"\r\033[K" + shown + b"\r\033[K", text)
+
     def test_no_color_is_obeyed_where_it_is_not_empty(self):
         self.assertNotIn(b"\033[1m", self.evaluate(NO_COLOR="1"))
         self.assertNotIn(b"\033[2m", self.evaluate(NO_COLOR="1"))

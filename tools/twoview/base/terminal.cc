@@ -1,5 +1,6 @@
 #include "base/terminal.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -13,6 +14,19 @@ namespace {
 bool is_dumb() {
   const char* const terminal = std::getenv("TERM");
   return terminal && std::strcmp(terminal, "dumb") == 0;
+}
+
+// The beginning of the text, of UTF-8 characters, that stays on one line of the terminal at stderr.
+// A line that wraps could not be erased.
+std::string cut_to_terminal(const std::string& text) {
+  winsize size{};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return text;
+  size_t characters = 0;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const bool begins_one = (static_cast<unsigned char>(text[i]) & 0xc0) != 0x80;
+    if (begins_one && ++characters >= size.ws_col) return text.substr(0, i);
+  }
+  return text;
 }
 
 bool shows_progress() { return isatty(STDERR_FILENO) && !is_dumb(); }
@@ -31,7 +45,7 @@ Progress::~Progress() {
 }
 
 void Progress::tell(const std::string& text) const {
-  if (shown_) std::fprintf(stderr, "\r\033[K%s", text.c_str());
+  if (shown_) std::fprintf(stderr, "\r\033[K%s", cut_to_terminal(text).c_str());
 }
 
 Stopwatch::Stopwatch(bool wanted, const std::string& text) : progress_(wanted) {

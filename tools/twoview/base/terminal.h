@@ -12,8 +12,9 @@ namespace cli {
 // NO_COLOR is missing or empty.
 bool takes_colours(int descriptor);
 
-// Shows the progress of long work as one line on stderr: each line replaces the last one, and the
-// destructor erases it. Shows nothing unless stderr is a terminal and TERM is not "dumb".
+// Shows the progress of long work as one line on stderr: each line replaces the last one, is cut to
+// the terminal's width, and the destructor erases it. Shows nothing unless stderr is a terminal and
+// TERM is not "dumb".
 class Progress {
  public:
   explicit Progress(bool wanted);

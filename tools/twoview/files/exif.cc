@@ -92,15 +92,24 @@ double from_sensor(ExifData* data, double full_width, double full_height) {
 
 }  // namespace
 
-double exif_focal_35mm(std::string_view bytes, int width, int height) {
+ExifFocal exif_focal(std::string_view bytes, int width, int height) {
+  constexpr const char* none = "has no focal length in EXIF data";
   const Data data = parsed(bytes);
-  if (!data || width < 1 || height < 1) return 0;
+  if (!data || width < 1 || height < 1) return {0, none};
   const double full_width = number_of(data.get(), EXIF_TAG_PIXEL_X_DIMENSION);
   const double full_height = number_of(data.get(), EXIF_TAG_PIXEL_Y_DIMENSION);
-  if (is_cropped(full_width, full_height, width, height)) return 0;
+  const double of_lens = number_of(data.get(), EXIF_TAG_FOCAL_LENGTH);
   double focal = number_of(data.get(), EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
+  if (!(focal > 0 || of_lens > 0)) return {0, none};
+  if (is_cropped(full_width, full_height, width, height))
+    return {0,
+            "was cropped or is of another shape than its EXIF data say, so that their focal "
+            "length is not of it"};
   if (!(focal > 0)) focal = from_sensor(data.get(), full_width, full_height);
-  return focal >= kShortest && focal <= kLongest ? focal : 0;
+  if (!(focal > 0))
+    return {0, "has the focal length of its lens in EXIF data, but not the size of its sensor"};
+  if (!(focal >= kShortest && focal <= kLongest)) return {0, none};
+  return {focal, ""};
 }
 
 }  // namespace cli

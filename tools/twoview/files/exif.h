@@ -5,11 +5,17 @@
 
 namespace cli {
 
-// The focal length as for 35 mm film, in millimetres, from the EXIF data of a JPEG or PNG file;
-// 0 where there is none. It is FocalLengthIn35mmFilm, else FocalLength over the size of the sensor
-// that FocalPlaneXResolution and FocalPlaneYResolution give. 0, too, where the picture was cropped:
-// where its sides are not in the ratio of PixelXDimension and PixelYDimension, to one per cent.
-// It never fails.
-double exif_focal_35mm(std::string_view bytes, int width, int height);
+// The focal length as for 35 mm film, in millimetres, or 0, and then why there is none.
+struct ExifFocal {
+  double focal_35mm = 0;
+  // Continues "The picture ...", such as "has no focal length in EXIF data".
+  const char* gap = "";
+};
+
+// The focal length from the EXIF data of a JPEG or PNG file. It is FocalLengthIn35mmFilm, else
+// FocalLength over the size of the sensor that FocalPlaneXResolution and FocalPlaneYResolution
+// give. There is none where the picture was cropped: where its sides are not in the ratio of
+// PixelXDimension and PixelYDimension, to one per cent. It never fails.
+ExifFocal exif_focal(std::string_view bytes, int width, int height);
 
 }  // namespace cli

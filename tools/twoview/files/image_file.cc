@@ -156,7 +156,7 @@ Picture load_picture(const std::string& path) {
   }
   picture.file_width = pixels.cols;
   picture.file_height = pixels.rows;
-  picture.exif_focal_35mm = exif_focal_35mm(bytes, pixels.cols, pixels.rows);
+  picture.exif = exif_focal(bytes, pixels.cols, pixels.rows);
   return picture;
 }
 

@@ -4,6 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "files/exif.h"
 #include "twoview/image.h"
 
 namespace cli {
@@ -17,7 +18,7 @@ struct Picture {
   cv::Mat luma;                         // 8-bit grey
   cv::Mat colour;                       // 8-bit BGR, of the size of luma
   int file_width = 0, file_height = 0;  // pixels, before resizing
-  double exif_focal_35mm = 0;           // millimetres, as for 35 mm film; 0: unknown
+  ExifFocal exif;
   int used_bits = 16;  // bits of the largest sample of a 16-bit file: 12 for what is dark at 16
 
   tv_image view() const;

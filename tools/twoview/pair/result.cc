@@ -32,7 +32,9 @@ const Phrase kReasons[] = {
     {TV_REASON_TOO_FEW_MATCHES, "too few matches",
      "take pictures with more overlap or texture, or try --guided-matching 1"},
     {TV_REASON_LOW_INLIER_RATIO, "few of the matches agree",
-     "check that the camera file is of these pictures and that none is mirrored; more overlap"},
+     "check that the camera file is of these pictures, that none is mirrored, and that both show "
+     "the "
+     "scene from a similar distance at a similar zoom; more overlap"},
     {TV_REASON_LOW_PARALLAX, "low parallax: the camera hardly moved for this depth",
      "move farther between the pictures; the rotation can be used"},
     {TV_REASON_TWO_PLANAR_SOLUTIONS, "the scene is a plane, which two poses explain",
@@ -336,22 +338,27 @@ std::string verdict_in_words(const tv_two_view& v) {
 }
 
 double magnification(const Outcome& outcome) {
-  constexpr int32_t fewest = 20;
+  constexpr size_t fewest = 20;
   constexpr double far_px = 20;
+  constexpr double widest = 1.5;  // upper quartile over lower one
   const tv_reconstruction& r = outcome.reconstruction;
+  std::vector<tv_correspondence> inliers;
+  for (int32_t i = 0; i < r.num_matches; ++i)
+    if (r.inlier_mask[i]) inliers.push_back(r.matches[i]);
   const auto distance = [&](size_t image, const tv_correspondence& a, const tv_correspondence& b) {
     const tv_keypoint& p = r.keypoints[image][image == 0 ? a.idx0 : a.idx1];
     const tv_keypoint& q = r.keypoints[image][image == 0 ? b.idx0 : b.idx1];
     return std::hypot(static_cast<double>(p.x) - q.x, static_cast<double>(p.y) - q.y);
   };
   std::vector<double> ratios;
-  for (int32_t i = 0; i < r.num_matches; ++i) {
-    const tv_correspondence &a = r.matches[i],
-                            &b = r.matches[(i + r.num_matches / 2) % r.num_matches];
+  for (size_t i = 0; i < inliers.size(); ++i) {
+    const tv_correspondence &a = inliers[i],
+                            &b = inliers[(i + inliers.size() / 2) % inliers.size()];
     const double before = distance(0, a, b), after = distance(1, a, b);
     if (before > far_px && after > 0) ratios.push_back(after / before);
   }
-  if (static_cast<int32_t>(ratios.size()) < fewest) return 0;
+  if (ratios.size() < fewest) return 0;
+  if (percentile(ratios, 0.75) > widest * percentile(ratios, 0.25)) return 0;
   const double focal = outcome.has_cameras ? outcome.camera[1].fx / outcome.camera[0].fx
                                            : static_cast<double>(outcome.picture[1].luma.cols) /
                                                  outcome.picture[0].luma.cols;

@@ -31,6 +31,7 @@ struct Outcome {
   std::optional<std::vector<tv_dense_point>> dense;  // empty: not asked for, or no full pose
   std::optional<MetricScale> scale;  // empty: outputs are in baselines, else in metres
   nlohmann::ordered_json json;       // the content of result.json
+  std::vector<std::string> notes;    // what the program decided by itself, for the report
 };
 
 // The camera that pose and points refer to: the camera file's, with the estimated shift added to
@@ -92,9 +93,10 @@ bool focal_length_is_uncertain(const tv_two_view& two_view);
 // taken as exact.
 nlohmann::ordered_json focal_length_json(const tv_two_view& two_view);
 
-// How many times larger image 1 shows the scene than image 0, as the matches say and beyond what
-// the cameras' focal lengths explain: the median ratio of the distances between matched points. 0
-// where fewer than 20 matches say so.
+// How many times larger image 1 shows the scene than image 0, beyond what the cameras' focal
+// lengths explain: the median ratio of the distances between inliers. 0 where it is not known: with
+// fewer than 20 ratios, or where the upper quartile is above 1.5 times the lower one. Matches that
+// the geometry rejects are not used, since those of unrelated pictures have a median of 0.4 to 1.7.
 double magnification(const Outcome& outcome);
 
 // The reasons of the verdict as a phrase such as "the camera only rotated"; empty if there is none.

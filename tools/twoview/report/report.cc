@@ -17,14 +17,19 @@ std::string number_of(const Json& value, const char* format) {
   return value.is_number() ? formatted(format, value.get<double>()) : "&ndash;";
 }
 
-// Where camera 1 stands, in the frame of camera 0.
+// Where camera 1 stands, in the frame of camera 0: each distance with its direction in words.
 std::string direction_card(const Outcome& outcome) {
   const Vector3 c =
       applied(transposed(rotation_of(outcome.two_view)), translation_of(outcome.two_view));
   const double unit = -unit_of(outcome);
-  return card(formatted("%+.2f ", unit * c[0]) + formatted("%+.2f ", unit * c[1]) +
-                  formatted("%+.2f", unit * c[2]),
-              outcome.scale ? "m" : "", "camera 1 stands right, down, forward", "card wide");
+  const char* const directions[3][2] = {{"right", "left"}, {"down", "up"}, {"forward", "back"}};
+  std::string text;
+  for (size_t i = 0; i < 3; ++i) {
+    const double distance = unit * c[i];
+    text += (i > 0 ? ", " : "") + formatted("%.2f", std::abs(distance)) +
+            (outcome.scale ? " m " : " ") + directions[i][distance < 0];
+  }
+  return card(text, "", "where camera 1 stands, seen from camera 0", "card wide");
 }
 
 std::string cards(const Outcome& outcome) {
@@ -53,7 +58,8 @@ std::string cards(const Outcome& outcome) {
     text += card(formatted("%.3f", sigma.direction), "deg", "1 sigma of the direction");
   }
   if (v.has_R && v.has_t)
-    text += card(formatted("%.2g", 100 * v.probability_wrong), "%", "probability to be wrong");
+    text += card(formatted("%.2g", 100 * v.probability_wrong), "%",
+                 "probability that the rotation is off by more than 5 deg");
   text += card(number_of(j["median_parallax_deg"], "%.2f"), "deg", "median parallax");
   text += card(number_of(j["rms_reprojection_px"], "%.2f"), "px", "reprojection, rms");
   const double* shift = outcome.two_view.principal_point_shift;
@@ -85,12 +91,11 @@ std::string cards(const Outcome& outcome) {
   return text;
 }
 
-// What to do about each reason of the verdict, as a list.
-std::string advice_list(const Outcome& outcome) {
+// A list with a line of each text; nothing without texts.
+std::string bullets(const std::string& css_class, const std::vector<std::string>& texts) {
   std::string items;
-  for (const std::string& advice : advice_on(outcome))
-    items += "<li>" + escaped(advice) + "</li>\n";
-  return items.empty() ? "" : "<ul class=\"advice\">\n" + items + "</ul>\n";
+  for (const std::string& text : texts) items += "<li>" + escaped(text) + "</li>\n";
+  return items.empty() ? "" : "<ul class=\"" + css_class + "\">\n" + items + "</ul>\n";
 }
 
 std::string leaf_text(const Json& value) {
@@ -156,14 +161,42 @@ std::string matrices(const Json& j) {
   return text.empty() ? "" : "<div class=\"matrices\">\n" + text + "</div>\n";
 }
 
-std::string tables(const Json& j) {
+// The camera of each image as used, at the size of the image as used, and where it is from.
+std::string camera_table(const Outcome& outcome) {
+  std::string rows;
+  for (size_t i = 0; i < 2; ++i) {
+    const std::string name = "camera " + std::to_string(i);
+    if (!outcome.has_cameras) {
+      rows += row(name, "none given");
+      continue;
+    }
+    const Json& origin = outcome.json["cameras"][i];
+    if (origin["source"] == "file") {
+      rows += row(name, "file " + origin["file"].get<std::string>());
+    } else {
+      const std::string focal =
+          formatted("%.4g mm as for 35 mm film", origin["focal_35mm"].get<double>());
+      rows += row(name, (origin["source"] == "exif" ? "EXIF data: " : "--focal-35mm: ") + focal);
+    }
+    const tv_camera& camera = outcome.camera[i];
+    const double values[] = {camera.fx, camera.fy, camera.cx, camera.cy};
+    const char* const names[] = {"fx", "fy", "cx", "cy"};
+    for (size_t k = 0; k < 4; ++k) rows += row(names[k], formatted("%.2f px", values[k]));
+  }
+  return table("Cameras as given, at the size used", rows);
+}
+
+std::string tables(const Outcome& outcome) {
+  const Json& j = outcome.json;
   std::string found;
-  for (const char* key : {"num_keypoints", "num_matches", "num_inliers", "config", "verdict",
-                          "reasons", "probability_wrong", "num_points", "num_dense_points",
-                          "median_parallax_deg", "rms_reprojection_px", "principal_point_shift_px",
-                          "scale", "scale_sigma", "num_iterations"})
+  for (const char* key :
+       {"image_size0", "image_size1", "num_keypoints", "num_matches", "num_inliers", "config",
+        "verdict", "reasons", "probability_wrong", "num_points", "num_dense_points",
+        "median_parallax_deg", "rms_reprojection_px", "principal_point_shift_px", "scale",
+        "scale_sigma", "num_iterations"})
     found += row(key, j[key]);
   std::string text = table("What was found", found);
+  text += camera_table(outcome);
   if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);
   if (j["imu"].is_object()) text += object_table("Against the IMU", j["imu"]);
   if (j.contains("recording")) text += object_table("Out of the recording", j["recording"]);
@@ -236,12 +269,13 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
        {"verdict_class", classes[v.verdict]},
        {"verdict", verdict_in_words(v)},
        {"verdict_words", escaped(kind_in_words(v.kind) + (reasons.empty() ? "" : ": " + reasons))},
-       {"advice", advice_list(outcome)},
+       {"advice", bullets("advice", advice_on(outcome))},
+       {"notes", bullets("notes", outcome.notes)},
        {"cards", cards(outcome)},
        {"cloud", cloud_section(outcome, cloud)},
        {"figures", sections},
        {"matrices", matrices(outcome.json)},
-       {"tables", tables(outcome.json)},
+       {"tables", tables(outcome)},
        {"json", escaped(json_text(outcome.json))},
        {"version", tv_version_string()},
        {"script", cloud_script(outcome, cloud)}});

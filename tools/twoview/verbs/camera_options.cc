@@ -16,7 +16,7 @@ ImageCamera film(ImageCamera::Source source, double focal_35mm, const ImageFacts
 }  // namespace
 
 ImageFacts facts_of(const Picture& picture) {
-  return {picture.name, picture.file_width, picture.file_height, picture.exif_focal_35mm};
+  return {picture.name, picture.file_width, picture.file_height, picture.exif};
 }
 
 void CameraOptions::add_to(CLI::App& verb) {
@@ -57,9 +57,9 @@ ImageCameras CameraOptions::cameras_of(const ImageFacts& image0, const ImageFact
     }
   } else if (focal_35mm > 0) {
     for (size_t i = 0; i < 2; ++i) cameras[i] = film(ImageCamera::kFocal, focal_35mm, *images[i]);
-  } else if (image0.exif_focal_35mm > 0 && image1.exif_focal_35mm > 0) {
+  } else if (image0.exif.focal_35mm > 0 && image1.exif.focal_35mm > 0) {
     for (size_t i = 0; i < 2; ++i)
-      cameras[i] = film(ImageCamera::kExif, images[i]->exif_focal_35mm, *images[i]);
+      cameras[i] = film(ImageCamera::kExif, images[i]->exif.focal_35mm, *images[i]);
   }
   return cameras;
 }

@@ -26,7 +26,7 @@ using ImageCameras = std::array<ImageCamera, 2>;
 struct ImageFacts {
   std::string name;
   int width = 0, height = 0;  // pixels; 0: unknown, then a camera file is not checked against them
-  double exif_focal_35mm = 0;
+  ExifFocal exif;
 };
 ImageFacts facts_of(const Picture& picture);
 

@@ -40,7 +40,9 @@ struct Arguments {
 void check_inputs(const Arguments& a) {
   if (!a.recording.given()) {
     for (int i = 0; i < 2; ++i)
-      if (a.image[i].empty()) throw BadInput(std::string(i == 0 ? "A" : "B") + " is required");
+      if (a.image[i].empty())
+        throw BadInput(std::string(i == 0 ? "A" : "B") +
+                       " is required (see twoview reconstruct --help)");
     if (!a.recording.frames.empty() || !a.recording.body_from_camera.empty() ||
         !a.recording.camera_in_body.empty())
       throw BadInput("--frames, --body-from-camera and --camera-in-body go with --recording");
@@ -58,12 +60,12 @@ bool can_do_without_cameras(int32_t method) {
 // Throws BadInput if the solver needs cameras and none are known.
 void require_cameras(const ImageCameras& cameras, int32_t method, const Picture pictures[2]) {
   if (cameras[0].source != ImageCamera::kNone || can_do_without_cameras(method)) return;
-  const Picture& without = pictures[pictures[0].exif_focal_35mm > 0 ? 1 : 0];
+  const Picture& without = pictures[pictures[0].exif.focal_35mm > 0 ? 1 : 0];
   throw BadInput(
       "--method " + method_name(method) +
       " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate, or "
       "--focal-35mm; " +
-      without.name + " has no focal length in EXIF data");
+      without.name + " " + without.exif.gap);
 }
 
 // The cameras of two images. A method that can do without cameras takes those that are given, and
@@ -72,6 +74,8 @@ ImageCameras choose_cameras(Arguments& a, const Picture pictures[2]) {
   ImageCameras cameras = a.cameras.cameras_of(facts_of(pictures[0]), facts_of(pictures[1]));
   const int32_t method = a.common.options.estimate.method;
   require_cameras(cameras, method, pictures);
+  if (cameras[0].source == ImageCamera::kNone)
+    a.common.note("no camera, so no pose: give --camera or --focal-35mm");
   if (cameras[0].source != ImageCamera::kExif) return cameras;
   if (!can_do_without_cameras(method)) {
     a.common.note(exif_note(cameras));
@@ -102,7 +106,7 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
                          Outcome& outcome) {
   ImageCameras cameras;
   if (recording) {
-    const ImageFacts frame{"", recording->width(), recording->height(), 0};
+    const ImageFacts frame{"", recording->width(), recording->height(), {}};
     cameras = a.cameras.cameras_of(frame, frame);
     const Progress progress(!a.common.quiet);
     recording->load(cameras[0].camera, session, a.common.options, progress, outcome);
@@ -251,7 +255,8 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   for (const std::string& advice : advice_on(outcome))
     text += summary_line("advice", "%s", advice.c_str());
   if (v.has_R && v.has_t)
-    text += summary_line("belief", "wrong with probability %.2g %%", 100 * v.probability_wrong);
+    text += summary_line("belief", "rotation off by more than 5 deg with probability %.2g %%",
+                         100 * v.probability_wrong);
   text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
   text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
                        v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
@@ -354,6 +359,7 @@ int reconstruct(Arguments& a) {
   outcome.json["cameras"] = cameras_json(cameras);
   outcome.json["options"] = options_of(a);
   outcome.json["kernels"] = session.kernels();
+  outcome.notes = common.notes;
   make_files(outcome, files);
 
   if (common.json) print(json_text(outcome.json));

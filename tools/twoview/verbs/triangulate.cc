@@ -30,6 +30,16 @@ struct Arguments {
   double max_error_px = Options().estimate.max_error_px;
 };
 
+std::string camera_in_words(const ImageCamera& camera) {
+  if (camera.source == ImageCamera::kFile) return "camera " + camera.file;
+  char text[80];
+  std::snprintf(text, sizeof text,
+                camera.source == ImageCamera::kExif ? "the camera of EXIF's focal length, %.4g mm,"
+                                                    : "the camera of --focal-35mm %.4g",
+                camera.focal_35mm);
+  return text;
+}
+
 // Throws BadInput where a matched pixel is not in the image that its camera is for: then the
 // matches are of images of another size. Without images to compare with, matches of images that
 // were made smaller show by a large part of the camera's image in which there is no match.
@@ -45,9 +55,9 @@ void require_inside(const Arguments& a, const MatchList& matches, const ImageCam
       farthest[v][1] = std::max(farthest[v][1], y);
       if (!(x < -1 || y < -1 || x > camera.width || y > camera.height)) continue;
       char text[96];
-      std::snprintf(text, sizeof text, "has the pixel (%g, %g) in image %d, but camera ", x, y,
+      std::snprintf(text, sizeof text, " has the pixel (%g, %g) in image %d, but ", x, y,
                     static_cast<int>(v));
-      throw BadInput(a.matches + " " + text + cameras[v].file + " is for " +
+      throw BadInput(a.matches + text + camera_in_words(cameras[v]) + " is for " +
                      std::to_string(camera.width) + "x" + std::to_string(camera.height) +
                      ": give the camera of the images that were matched, and --resize as there");
     }
@@ -71,7 +81,7 @@ std::array<ImageFacts, 2> images_of(const Arguments& a, const KnownPose& pose) {
     if (!a.images.empty()) {
       images[v] = facts_of(load_picture(a.images[v]));
     } else if (a.cameras.focal_35mm > 0) {
-      images[v] = {"", pose.sizes[v][0], pose.sizes[v][1], 0};
+      images[v] = {"", pose.sizes[v][0], pose.sizes[v][1], {}};
     }
   }
   return images;
@@ -90,9 +100,11 @@ ImageCameras matched_cameras(Arguments& a, const KnownPose& pose) {
           "--focal-35mm needs the size of the images: give --images A B, or a --pose "
           "with image_size0 and image_size1");
   ImageCameras cameras = a.cameras.cameras_of(images[0], images[1]);
-  if (cameras[0].source == ImageCamera::kNone)
-    throw BadInput("cameras are needed: " + images[images[0].exif_focal_35mm > 0 ? 1 : 0].name +
-                   " has no focal length in EXIF data");
+  if (cameras[0].source == ImageCamera::kNone) {
+    const ImageFacts& without = images[images[0].exif.focal_35mm > 0 ? 1 : 0];
+    throw BadInput("cameras are needed: " + without.name + " " + without.exif.gap +
+                   "; give --camera or --focal-35mm");
+  }
   const std::string note = exif_note(cameras);
   if (!note.empty()) a.common.note(note);
   for (ImageCamera& camera : cameras) {
