@@ -78,8 +78,11 @@ def write_film(path):
 
 class Vehicle(threading.Thread):
     """Sends HEARTBEAT to a port of this computer; from the first packet of the companion on it
-    flies and sends what was requested. `faults`: packets are lost, repeated, swapped and corrupted,
-    and a second vehicle with other attitudes sends to the same port."""
+    flies and sends what was requested. `faults`: of every 25 packets one each is lost, repeated,
+    corrupted, and sent after the next one; `num_faults` counts them. A second vehicle with other
+    attitudes sends to the same port, and so does something that is no vehicle (`num_garbage`)."""
+
+    FAULTS = {5: "lost", 10: "repeated", 15: "corrupted", 20: "late"}
 
     def __init__(self, mavlink, port, autopilot="px4", faults=False, version=2, system=7,
                  attitudes=True, lives=60.0):
@@ -96,6 +99,7 @@ class Vehicle(threading.Thread):
         self.requested, self.heard, self.wrong = {}, [], []
         self.random = np.random.default_rng(3)
         self.stop_event, self.lives, self.held, self.num_sent = threading.Event(), lives, None, 0
+        self.num_faults, self.num_garbage = dict.fromkeys(self.FAULTS.values(), 0), 0
 
     def __enter__(self):
         self.start()
@@ -111,17 +115,19 @@ class Vehicle(threading.Thread):
         data = message.pack(link, force_mavlink1=self.version1)
         link.seq = (link.seq + 1) % 256
         packets = [data]
-        if self.faults and message.get_type() != "HEARTBEAT":
+        if self.faults and link is self.link and message.get_type() != "HEARTBEAT":
             self.num_sent += 1
-            kind = self.random.random()
-            if kind < 0.04:
+            fault = self.FAULTS.get(self.num_sent % 25)
+            if fault:
+                self.num_faults[fault] += 1
+            if fault == "lost":
                 packets = []
-            elif kind < 0.08:
+            elif fault == "repeated":
                 packets = [data, data]
-            elif kind < 0.12:
+            elif fault == "corrupted":
                 at = self.random.integers(10, len(data))
                 packets = [data[:at] + bytes([data[at] ^ 0x55]) + data[at + 1:]]
-            elif kind < 0.16 and self.held is None:
+            elif fault == "late":
                 self.held, packets = data, []
             elif self.held is not None:
                 packets, self.held = [data, self.held], None
@@ -181,5 +187,6 @@ class Vehicle(threading.Thread):
         if self.faults and self.random.random() < 0.1:
             self.send(mav.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3), self.other)
             self.send(mav.MAVLink_attitude_message(5, 1.5, 1.0, -2.0, 0, 0, 0), self.other)
+            self.num_garbage += 1
             self.socket.sendto(b"\xfd\x09garbage" + self.random.bytes(40),
                                ("127.0.0.1", self.port))

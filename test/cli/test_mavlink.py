@@ -119,11 +119,15 @@ class Mavlink(unittest.TestCase):
         self.assertEqual(summary["vehicle"], "PX4, system 7")
         self.assertGreaterEqual(summary["frames_decoded"], 0.8 * world.FRAMES)
         self.assertEqual(summary["frames_received"], world.FRAMES)
-        sent = self.vehicle.num_sent
-        # 4 % each, of which some are of the same packets: all of it is seen and counted.
-        for kind in ("lost", "repeated", "late", "corrupted"):
-            self.assertGreater(summary[f"packets_{kind}"], 0.01 * sent, summary)
-            self.assertLess(summary[f"packets_{kind}"], 0.15 * sent, summary)
+        # The faults are counted, but for those after the film's end. A corrupted packet is lost,
+        # too, and what is no packet looks like a corrupted one and may hide the packet after it.
+        made, garbage = dict(self.vehicle.num_faults), self.vehicle.num_garbage
+        made["lost"] += made["corrupted"]
+        for kind, number in made.items():
+            most = number + (garbage if kind in ("lost", "corrupted") else 0)
+            self.assertGreater(number, 0)
+            self.assertLessEqual(summary[f"packets_{kind}"], most, summary)
+            self.assertGreaterEqual(summary[f"packets_{kind}"], 0.5 * number, (summary, made))
         self.assertGreater(summary["packets_of_others"], 0)
         self.assertGreater(summary["timesyncs"], 0)
         self.assertEqual((summary["silences"], summary["reboots"]), (0, 0))

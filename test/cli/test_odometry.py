@@ -240,6 +240,25 @@ class OdometryTest(CliTest):
             self.assertEqual(done.returncode, 2, arguments)
             self.one_line(done, word)
             self.assertEqual(merged.read_bytes(), before)
+        self.assertIn(b"twoview map merge [OPTIONS] FILES...",
+                      self.run_program("map", "merge", "--help").stdout)
+
+    def test_options_are_written_and_refused_as_those_of_the_other_verbs(self):
+        text = " ".join(self.run_program("odometry", "--help").stdout.decode().split())
+        for words in ("--max-points [500, 200000]=20000 most", "--fps [0.001, 10000] frames",
+                      "--live-port [1, 65535] the page's", "--seed [0, 2^64 - 1]=",
+                      "--focal-35mm [1, 10000]",
+                      "--kernels auto|c|sse2|avx2|avx512|neon=auto kernel"):
+            self.assertIn(words, text)
+        for flag, value, words in (
+                ("--max-keypoints", "99", "99 is not in [100, 4096]"),
+                ("--window", "1e9", "'1e9' is not a whole number in [3, 20]"),
+                ("--fps", "nan", "nan is not in [0.001, 10000]"),
+                ("--live-port", "0", "0 is not in [1, 65535]"),
+                ("--kernels", "mmx", "'mmx' is none of this version's auto, c, sse2")):
+            done = self.odometry(self.set_folder(), flag, value)
+            self.assertEqual(done.returncode, 2)
+            self.one_line(done, f"{flag}: {words}")
 
     def test_the_report_holds_all_that_it_shows(self):
         self.succeed(self.odometry(self.set_folder()))

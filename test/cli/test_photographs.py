@@ -78,6 +78,9 @@ class Exif(cli.CliTest):
             self.succeed(self.reconstruct("--focal-35mm", "32", camera=False))
             given = self.result()
             self.assertEqual(given["cameras"][0]["source"], "focal_35mm")
+            self.assertRegex(done.stdout, rb"(?m)^belief .* %, if the focal length is right$")
+            self.assertIn("off by more than 5 deg, if the focal length is right",
+                          (self.out / "report.html").read_text())
             self.assertIn("<tr><th>camera 0</th><td>--focal-35mm: 32 mm as for 35 mm film</td>",
                           (self.out / "report.html").read_text())
             for key in ("R", "t", "covariance", "num_inliers", "verdict"):

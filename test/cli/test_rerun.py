@@ -71,7 +71,7 @@ class Rerun(cli.CliTest):
              self.folder / "a.rrd", "-o", self.out, "--quiet"],
             capture_output=True, timeout=120,
             env={**os.environ, "TWOVIEW_PYTHON": sys.executable})
-        self.assertEqual((done.returncode, done.stderr), (0, b""))
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, b"", b""))
         result = json.loads((self.out / "result.json").read_text())
         found = read_back(self.folder / "a.rrd")
         R = np.array(result["R"]).reshape(3, 3)
@@ -145,6 +145,7 @@ class Rerun(cli.CliTest):
         (folder / "summary.json").write_text('{"frames_received": 2}')
         done = self.tool(folder, self.folder / "b.rrd")
         self.assertEqual((done.returncode, done.stderr), (0, b""))
+        self.assertEqual(done.stdout.decode(), f"files        {self.folder / 'b.rrd'}\n")
         found = read_back(self.folder / "b.rrd")
         self.assertEqual([row[0] for row in found["/height_m", "Scalars:scalars"]], [1.25, 1.5, 2])
         self.assertTrue(np.allclose(np.ravel(found["/yaw_deg", "Scalars:scalars"]), [0, 90, 0]))

@@ -284,6 +284,7 @@ def main(argv=None):
                         help="an existing file is replaced")
     parser.add_argument("--check", metavar="FILE.rrd", type=pathlib.Path,
                         help="only say whether rerun-sdk is there and FILE.rrd can be written")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     parser.add_argument("--images", nargs=2, metavar=("A", "B"), help="the pictures of a pair")
     parser.add_argument("--intrinsics", nargs=8, type=float, metavar="N",
                         help="fx fy cx cy of image 0 and of image 1, in pixels of the result")
@@ -298,6 +299,8 @@ def main(argv=None):
         if not arguments.folder.is_dir():
             raise BadInput(f"{arguments.folder}: no folder")
         write(arguments.folder, arguments.file, arguments)
+        if not arguments.quiet:
+            print(f"files        {arguments.file}")
     except (BadInput, OSError, tv.FormatError) as error:
         print(f"{SPEAKER}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2

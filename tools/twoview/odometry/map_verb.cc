@@ -224,7 +224,7 @@ void add_map(CLI::App& program, Run& run) {
   CLI::App* merge = verb->add_subcommand("merge", "several maps of one camera as one");
   merge->add_option("FILES", a->paths, "map.twm of each")
       ->required()
-      ->expected(2, 1000)
+      ->expected(-2)
       ->type_name("FILE");
   merge->add_option("-o,--output", a->output, "the map that is written")
       ->required()

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 
 #include "base/error.h"
 #include "base/output.h"
@@ -42,7 +41,7 @@ struct Arguments {
   double fps = 0, duration = 0;
   bool ignores_imu = false;
   bool is_live = false;
-  int live_port = 0;
+  int32_t live_port = 0;
   FlightOptions flight;
 #ifdef TWOVIEW_HAS_DRONE
   DroneAddress drone;  // without a host: none
@@ -316,14 +315,6 @@ int odometry(Arguments& a) {
   return exit_status(flight, result);
 }
 
-CLI::Option* add_count(CLI::App& verb, const char* name, int32_t& value, int low, int high,
-                       const char* help) {
-  return verb.add_option(name, value, help)
-      ->check(CLI::Range(low, high))
-      ->type_name("N")
-      ->capture_default_str();
-}
-
 }  // namespace
 
 void add_odometry(CLI::App& program, Run& run) {
@@ -343,32 +334,26 @@ void add_odometry(CLI::App& program, Run& run) {
   add_focal_35mm(*verb, a->flight.focal_35mm);
   verb->add_option("--truth", a->truth, "true poses of TUM, EuRoC or KITTI to compare with")
       ->type_name("FILE");
-  verb->add_option("--fps", a->fps, "frames a second, of images without times and of films")
-      ->check(CLI::Range(0.001, 10000.0))
-      ->type_name("F");
+  add_number(*verb, "fps", &a->fps, 0.001, 10000,
+             "frames a second, of images without times and of films")
+      ->default_str("");
   verb->add_flag("--no-imu", a->ignores_imu,
                  "leave the attitudes, heights and velocities of a set folder's imu.txt out");
   verb->add_flag("--live", a->is_live, "serve a page at 127.0.0.1 that follows the flight");
-  verb->add_option("--live-port", a->live_port, "the page's port; without: a free one, printed")
-      ->check(CLI::Range(1, 65535))
-      ->type_name("PORT");
+  add_number(*verb, "live-port", &a->live_port, 1, 65535,
+             "the page's port; without: a free one, printed")
+      ->default_str("");
   constexpr int kMany = 1 << 30;
-  add_count(*verb, "--max-frames", a->flight.max_frames, 0, kMany, "end after so many; 0: all");
-  add_count(*verb, "--every", a->flight.every, 1, kMany, "track every K-th frame only");
-  add_count(*verb, "--max-keypoints", o.max_keypoints, 100, 4096, "most keypoints of a frame");
-  add_count(*verb, "--max-keyframes", o.max_keyframes, 8, 2000, "most keyframes of the map");
-  add_count(*verb, "--max-points", o.max_points, 500, 200000, "most points of the map");
-  add_count(*verb, "--window", o.window, 3, 20, "keyframes that are adjusted together");
-  verb->add_option("--seed", o.seed, "of the samplers")->type_name("N")->capture_default_str();
-  add_count(*verb, "--resize", a->flight.resize, 0, kMaxSide,
-            "scale frames down to this longer side, pixels; 0: as they are");
-  std::map<std::string, int32_t> kernels;
-  for (int32_t k = 0; k <= TV_KERNELS_NEON; ++k)
-    kernels[tv_kernels_string(static_cast<tv_kernels>(k))] = k;
-  verb->add_option("--kernels", o.kernels, "kernel set")
-      ->transform(CLI::CheckedTransformer(kernels))
-      ->type_name("auto|c|sse2|avx2|avx512|neon")
-      ->default_str("auto");
+  add_number(*verb, "max-frames", &a->flight.max_frames, 0, kMany, "end after so many; 0: all");
+  add_number(*verb, "every", &a->flight.every, 1, kMany, "track every K-th frame only");
+  add_number(*verb, "max-keypoints", &o.max_keypoints, 100, 4096, "most keypoints of a frame");
+  add_number(*verb, "max-keyframes", &o.max_keyframes, 8, 2000, "most keyframes of the map");
+  add_number(*verb, "max-points", &o.max_points, 500, 200000, "most points of the map");
+  add_number(*verb, "window", &o.window, 3, 20, "keyframes that are adjusted together");
+  add_number(*verb, "seed", &o.seed, 0, kLargestSeed, "of the samplers");
+  add_number(*verb, "resize", &a->flight.resize, 0, kMaxSide,
+             "scale frames down to this longer side, pixels; 0: as they are");
+  add_kernels(*verb, o.kernels);
 #ifdef TWOVIEW_HAS_DRONE
   verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")
       ->type_name("HOST");

@@ -47,8 +47,6 @@ struct Option {
   const char* help;
 };
 
-constexpr double kMaxSeed = 18446744073709551615.0;
-
 std::vector<Option> table(Options& o) {
   using E = Option::Ends;
   constexpr E closed = E::kClosed, open_low = E::kOpenLow, open_high = E::kOpenHigh;
@@ -89,7 +87,7 @@ std::vector<Option> table(Options& o) {
       {"max-iterations", kEstimate, &e.max_iterations, 1, 1e6, closed, "hard bound on samples"},
       {"fixed-iterations", kEstimate, &e.fixed_iterations, 0, 1e6, closed,
        "exactly this many samples; 0: adaptive stop"},
-      {"seed", kEstimate, &e.seed, 0, kMaxSeed, closed, "of the sampler"},
+      {"seed", kEstimate, &e.seed, 0, kLargestSeed, closed, "of the sampler"},
       {"principal-point-sigma", kEstimate, &e.principal_point_sigma, 0, 0.1, closed,
        "how far the principal point may be moved: standard deviation in focal lengths, such as "
        "0.01; 0: it is where the camera file has it"},
@@ -123,13 +121,16 @@ std::vector<Option> table(Options& o) {
 
 std::string number_text(double value) {
   char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  const bool is_whole = value == std::round(value) && std::abs(value) < 1e15;
+  const auto end = is_whole
+                       ? std::to_chars(text, text + sizeof text, static_cast<int64_t>(value)).ptr
+                       : std::to_chars(text, text + sizeof text, value).ptr;
   return {text, end};
 }
 
 std::string range_text(const Option& option) {
   return std::string(option.ends == Option::kOpenLow ? "(" : "[") + number_text(option.low) + ", " +
-         (option.high == kMaxSeed ? "2^64 - 1" : number_text(option.high)) +
+         (option.high == kLargestSeed ? "2^64 - 1" : number_text(option.high)) +
          (option.ends == Option::kOpenHigh ? ")" : "]");
 }
 
@@ -235,6 +236,22 @@ std::string value_text(const Option& option) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
+// The words to choose from, or the numbers that an option accepts.
+std::string type_text(const Option& option) {
+  if (const Choice* choice = std::get_if<Choice>(&option.target))
+    return joined(*choice->names, "|");
+  return std::holds_alternative<Direction>(option.target) ? "x,y,z" : range_text(option);
+}
+
+CLI::Option* add_option(CLI::App& verb, const Option& option) {
+  CLI::Option* flag = verb.add_option_function<std::string>(
+      "--" + std::string(option.name), [option](const std::string& text) { set(option, text); },
+      option.help);
+  flag->type_name(type_text(option));
+  if (!std::holds_alternative<Direction>(option.target)) flag->default_str(value_text(option));
+  return flag;
+}
+
 const char* group_title(OptionGroup group) {
   switch (group) {
     case kFeature: return "Corners and descriptors";
@@ -298,28 +315,29 @@ void add_focal_35mm(CLI::App& verb, double& focal_35mm) {
             focal_35mm = number_of_flag("--focal-35mm", text, kShortestFilm, kLongestFilm);
           },
           "in place of a camera file: the focal length as for 35 mm film; no lens distortion")
-      ->type_name("MM");
+      ->type_name("[" + number_text(kShortestFilm) + ", " + number_text(kLongestFilm) + "]");
+}
+
+CLI::Option* add_number(CLI::App& verb, const char* name,
+                        std::variant<int32_t*, uint64_t*, double*> value, double low, double high,
+                        const char* help) {
+  Option option{name, kCommon, static_cast<double*>(nullptr), low, high, Option::kClosed, help};
+  std::visit([&option](auto target) { option.target = target; }, value);
+  return add_option(verb, option);
+}
+
+CLI::Option* add_kernels(CLI::App& verb, int32_t& kernels) {
+  return add_option(
+      verb, {"kernels", kCommon, Choice{&kernels, &kKernels}, 0, 0, Option::kClosed, "kernel set"});
 }
 
 void add_options(CLI::App& verb, Options& options, unsigned groups) {
   for (const Option& option : table(options)) {
     if (!(option.group & groups)) continue;
-    const bool is_floor = std::string(option.name) == "min-threshold";
-    CLI::Option* flag = verb.add_option_function<std::string>(
-        "--" + std::string(option.name),
-        [option, is_floor, &options](const std::string& text) {
-          set(option, text);
-          if (is_floor) options.min_threshold_given = true;
-        },
-        option.help);
-    const Choice* choice = std::get_if<Choice>(&option.target);
-    const bool is_direction = std::holds_alternative<Direction>(option.target);
-    flag->type_name(choice         ? joined(*choice->names, "|")
-                    : is_direction ? "x,y,z"
-                                   : range_text(option));
-    const bool by_itself = std::string(option.name) == "resize";
-    if (!is_direction && !by_itself) flag->default_str(value_text(option));
-    flag->group(group_title(option.group));
+    CLI::Option* flag = add_option(verb, option)->group(group_title(option.group));
+    if (std::string(option.name) == "resize") flag->default_str("");  // the help text says it
+    if (std::string(option.name) == "min-threshold")
+      flag->each([&options](const std::string&) { options.min_threshold_given = true; });
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <variant>
 
 #include "twoview/twoview.h"
 
@@ -70,5 +71,15 @@ double number_of_flag(const std::string& flag, const std::string& text, double l
 
 // Adds --focal-35mm to a verb, in millimetres.
 void add_focal_35mm(CLI::App& verb, double& focal_35mm);
+
+// Adds --name to a verb: a number in [low, high], by default the value as it is now.
+CLI::Option* add_number(CLI::App& verb, const char* name,
+                        std::variant<int32_t*, uint64_t*, double*> value, double low, double high,
+                        const char* help);
+
+// Adds --kernels to a verb.
+CLI::Option* add_kernels(CLI::App& verb, int32_t& kernels);
+
+constexpr double kLargestSeed = 18446744073709551615.0;
 
 }  // namespace cli

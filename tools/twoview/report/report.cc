@@ -59,7 +59,8 @@ std::string cards(const Outcome& outcome) {
   }
   if (v.has_R && v.has_t)
     text += card(formatted("%.2g", 100 * v.probability_wrong), "%",
-                 "probability that the rotation is off by more than 5 deg");
+                 std::string("probability that the rotation is off by more than 5 deg") +
+                     (focal_length_is_uncertain(v) ? ", if the focal length is right" : ""));
   text += card(number_of(j["median_parallax_deg"], "%.2f"), "deg", "median parallax");
   text += card(number_of(j["rms_reprojection_px"], "%.2f"), "px", "reprojection, rms");
   const double* shift = outcome.two_view.principal_point_shift;

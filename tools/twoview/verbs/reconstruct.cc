@@ -255,8 +255,9 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
   for (const std::string& advice : advice_on(outcome))
     text += summary_line("advice", "%s", advice.c_str());
   if (v.has_R && v.has_t)
-    text += summary_line("belief", "rotation off by more than 5 deg with probability %.2g %%",
-                         100 * v.probability_wrong);
+    text += summary_line("belief", "rotation off by more than 5 deg with probability %.2g %%%s",
+                         100 * v.probability_wrong,
+                         focal_length_is_uncertain(v) ? ", if the focal length is right" : "");
   text += summary_line("keypoints", "%d and %d", r.num_keypoints[0], r.num_keypoints[1]);
   text += summary_line("matches", "%d, of which %d agree (%.0f %%)", v.num_matches, v.num_inliers,
                        v.num_matches ? 100.0 * v.num_inliers / v.num_matches : 0.0);
@@ -293,6 +294,7 @@ std::string summary(const Outcome& outcome, const RecordingInput* recording, con
 // Writes the result in the folder as a file for Rerun's viewer. Returns the exit status.
 int write_rerun(const Arguments& a, const Outcome& outcome, const std::string& folder) {
   std::vector<std::string> arguments{folder, a.rerun};
+  if (!a.common.speaks()) arguments.emplace_back("--quiet");
   if (!a.recording.given()) arguments.insert(arguments.end(), {"--images", a.image[0], a.image[1]});
   if (outcome.has_cameras) {
     arguments.emplace_back("--intrinsics");

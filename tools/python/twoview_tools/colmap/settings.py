@@ -14,7 +14,7 @@ MAPPING_KEYPOINTS = 8192
 PRINCIPAL_POINT_SIGMA_OF_A_DATABASE = 0.0
 # Defaults that are automatic in the library have explicit values here, as in the C++ program.
 _EXPLICIT = {"max_keypoints": 2048, "method": tv.Solver.FIVE_POINT}
-_NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad")
+_NOT_HERE = ("gravity0", "gravity1", "gravity_sigma_rad", "reserved")
 
 
 def _spelt(value):
@@ -36,8 +36,8 @@ def _choice(enum):
 
 
 def add_options(parser, kinds=_KINDS, **defaults):
-    """Adds a flag for each field of the options, except those of gravity. `defaults` are those that
-    differ from the library's."""
+    """Adds a flag for each field of the options, except those of gravity and `reserved`.
+    `defaults` are those that differ from the library's."""
     group = parser.add_argument_group("options of the stages (docs/cli.md)")
     for kind in kinds:
         for field in dataclasses.fields(kind):
