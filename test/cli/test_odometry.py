@@ -243,6 +243,16 @@ class OdometryTest(CliTest):
         self.assertIn(b"twoview map merge [OPTIONS] FILES...",
                       self.run_program("map", "merge", "--help").stdout)
 
+    def test_frames_are_scaled_down_with_their_camera(self):
+        self.succeed(self.odometry(self.set_folder(), "--resize", WIDTH // 2))
+        result = self.result()
+        info = self.succeed(self.run_program("map", "info", self.out / "map.twm", "--json"))
+        self.assertEqual(json.loads(info.stdout)["image_size"], [WIDTH // 2, HEIGHT // 2])
+        self.assertEqual(json.loads(info.stdout)["camera"]["fx"], FOCAL / 2)
+        self.assertEqual(result["options"]["resize"], WIDTH // 2)
+        self.assertEqual(result["num_tracked"], COUNT)
+        self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
+
     def test_options_are_written_and_refused_as_those_of_the_other_verbs(self):
         text = " ".join(self.run_program("odometry", "--help").stdout.decode().split())
         for words in ("--max-points [500, 200000]=20000 most", "--fps [0.001, 10000] frames",

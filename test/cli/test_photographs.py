@@ -223,6 +223,8 @@ class Sizes(cli.CliTest):
         self.assertNotIn(b"note  ", done.stdout)
         self.assertEqual(self.result()["image_size0"], [2560, 1920])
         for verb, images in (("detect", [self.a]), ("match", [self.a, self.b])):
+            done = self.succeed(self.run_program(verb, *images, "-o", self.out))
+            self.assertRegex(done.stdout, rb"\Anote .*\n[0-9]+ (keypoints|matches)")
             done = self.succeed(self.run_program(verb, *images, "-o", self.out, "--json"))
             self.one_line(done, "2560x1920 at 1600x1200")
             self.assertEqual(json.loads(done.stdout)["options"]["resize"], 1600)

@@ -176,7 +176,11 @@ CameraSource::CameraSource(const std::string& name, Kind kind)
     is_open = open_capture(state_->capture, name);
   } catch (const cv::Exception&) {
   }
-  if (!is_open) throw BadInput("no camera or film opens as '" + name + "'");
+  if (!is_open)
+    throw BadInput("no camera or film opens as '" + name + "'" +
+                   (begins(name, "gst:") ? "; Debian's packages gstreamer1.0-plugins-base and "
+                                           "-good have most of GStreamer's elements"
+                                         : ""));
   if (kind == Kind::kLive) state_->thread = std::thread([this] { state_->film(); });
 }
 

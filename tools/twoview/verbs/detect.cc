@@ -51,7 +51,7 @@ int detect(Arguments& a) {
     char text[128];
     std::snprintf(text, sizeof text, "%zu keypoints in %.1f ms\n", features.keypoints.size(),
                   static_cast<double>(total_ns) * 1e-6);
-    print(text + notes +
+    print(notes + text +
           ("files        " + files.folder().string() + ": keypoints.csv keypoints.png\n"));
   }
   files.commit();

@@ -347,7 +347,7 @@ int evaluate(Arguments& a) {
   if (common.json) print(json_text(report));
   const std::string notes = common.note_lines();
   if (common.speaks())
-    print(table(report) + notes + "files      " + (files.folder() / name).string() + "\n");
+    print(notes + table(report) + "files      " + (files.folder() / name).string() + "\n");
   files.commit();
   return 0;
 }

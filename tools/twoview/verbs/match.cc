@@ -85,7 +85,7 @@ int match(Arguments& a) {
     std::snprintf(text, sizeof text, "%zu matches of %zu and %zu keypoints in %.1f ms\n",
                   matches.size(), features[0].keypoints.size(), features[1].keypoints.size(),
                   static_cast<double>(total_ns) * 1e-6);
-    print(text + notes +
+    print(notes + text +
           ("files        " + files.folder().string() + ": matches.csv matches.png\n"));
   }
   files.commit();
