@@ -187,6 +187,7 @@ class Vehicle(threading.Thread):
         if self.faults and self.random.random() < 0.1:
             self.send(mav.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3), self.other)
             self.send(mav.MAVLink_attitude_message(5, 1.5, 1.0, -2.0, 0, 0, 0), self.other)
+        if self.faults and self.random.random() < 0.02:
             self.num_garbage += 1
             self.socket.sendto(b"\xfd\x09garbage" + self.random.bytes(40),
                                ("127.0.0.1", self.port))
