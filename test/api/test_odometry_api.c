@@ -415,16 +415,20 @@ static void test_the_last_frame_is_shown(void) {
   TEST_ASSERT_EQUAL_INT(0, num);
 }
 
+/* Flies until the last frame is a keyframe, which waits for its adjustment. Returns its index. */
+static int32_t fly_to_a_keyframe(tv_keyframe *keyframe) {
+  fly(odometry, 4);
+  tv_keyframe_init(keyframe);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, state.num_keyframes - 1, keyframe));
+  TEST_ASSERT_EQUAL_INT(num_flown - 1, keyframe->frame);
+  return state.num_keyframes - 1;
+}
+
 /* So that no call takes the time of a new keyframe and that of its adjustment. */
 static void test_a_keyframe_is_adjusted_when_the_next_frame_comes(void) {
   tv_keyframe tracked, adjusted;
-  int32_t newest;
-  fly(odometry, 4);
-  newest = state.num_keyframes - 1;
-  tv_keyframe_init(&tracked);
+  const int32_t newest = fly_to_a_keyframe(&tracked);
   tv_keyframe_init(&adjusted);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &tracked));
-  TEST_ASSERT_EQUAL_INT(num_flown - 1, tracked.frame);
   TEST_ASSERT_EQUAL_INT(tracked.id, state.reference_id);
   TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown));
   TEST_ASSERT_FALSE(state.is_keyframe);
@@ -437,14 +441,10 @@ static void test_a_keyframe_is_adjusted_when_the_next_frame_comes(void) {
 static void test_finish_adjusts_the_newest_keyframe(void) {
   tv_keyframe tracked, adjusted;
   int32_t newest;
+  tv_keyframe_init(&adjusted);
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_finish(NULL));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry)); /* without a map */
-  fly(odometry, 4);
-  newest = state.num_keyframes - 1;
-  tv_keyframe_init(&tracked);
-  tv_keyframe_init(&adjusted);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &tracked));
-  TEST_ASSERT_EQUAL_INT(num_flown - 1, tracked.frame);
+  newest = fly_to_a_keyframe(&tracked);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &adjusted));
   TEST_ASSERT_TRUE(memcmp(&tracked.world_from_cam_t, &adjusted.world_from_cam_t,

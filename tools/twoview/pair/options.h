@@ -80,6 +80,6 @@ CLI::Option* add_number(CLI::App& verb, const char* name,
 // Adds --kernels to a verb.
 CLI::Option* add_kernels(CLI::App& verb, int32_t& kernels);
 
-constexpr double kLargestSeed = 18446744073709551615.0;
+constexpr double kLargestSeed = 18446744073709551615.0;  // 2^64 - 1
 
 }  // namespace cli

@@ -33,8 +33,7 @@ const Phrase kReasons[] = {
      "take pictures with more overlap or texture, or try --guided-matching 1"},
     {TV_REASON_LOW_INLIER_RATIO, "few of the matches agree",
      "check that the camera file is of these pictures, that none is mirrored, and that both show "
-     "the "
-     "scene from a similar distance at a similar zoom; more overlap"},
+     "the scene from a similar distance at a similar zoom; more overlap"},
     {TV_REASON_LOW_PARALLAX, "low parallax: the camera hardly moved for this depth",
      "move farther between the pictures; the rotation can be used"},
     {TV_REASON_TWO_PLANAR_SOLUTIONS, "the scene is a plane, which two poses explain",
