@@ -23,7 +23,7 @@
    NEAREST_LANES, _VECTORS, _QUERIES, _SHIFT (a tile has 1 << _SHIFT places of rows), _ROWS (rows of
    a chunk) and _PANEL; the structs nearest_rows and nearest_block; make_rows and make_block, which
    fill them; largest_byte where these need it (AVX2); and tile_products, which writes -a . b of all
-   pairs of a tile, row by row. */
+   pairs of a tile, row by row. The AVX-512 set has a meet_tile of its own in its place. */
 
 #define NEAREST_FAR INT32_MAX
 #define NEAREST_COLUMNS (NEAREST_LANES * NEAREST_VECTORS)
@@ -36,6 +36,7 @@
    is larger. */
 static inline int32_t nearest_term(int32_t norm, int32_t place) { return norm * 256 + place; }
 
+#if !defined(TVK_AVX512)
 /* Not inlined, like the other functions that run once per descriptor or tile instead of once per
    pair: -O3 would copy them to each call. */
 static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
@@ -45,6 +46,7 @@ static TVK_NOINLINE int32_t squared_norm(const uint8_t *a) {
   for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += wide[k] * wide[k];
   return sum;
 }
+#endif
 
 /* The descriptor of that rank; null after the last one. */
 static inline const uint8_t *ranked(const tvk_descriptors *set, int32_t rank) {
@@ -261,6 +263,9 @@ static inline void update_two(int_lanes keys, int32_t *best, int32_t *second) {
   store_ints(best, min_lanes(keys, old));
 }
 
+#if defined(TVK_AVX512)
+#include "kernels/nearest_tile_avx512.h"
+#else
 /* Scales a row's products of a tile by 512, and updates the row's lists, one per lane, with its
    keys: the smallest key of each lane. */
 static inline void update_row(int32_t *products, const int32_t *terms, int32_t *best,
@@ -297,6 +302,7 @@ static void meet_tile(nearest_rows *rows, nearest_block *block) {
   }
   update_columns(products, rows->terms, block->best, block->second);
 }
+#endif
 
 static void forget_columns(nearest_block *block) {
   int32_t k;

@@ -1,6 +1,6 @@
-/* The tile of nearest.h for AVX-512 VNNI. A lane is a column; a register holds four bytes each of
-   16 columns, and 24 sums stay in registers. vpdpbusd multiplies unsigned by signed bytes, so rows
-   are stored as 127 - a: the sum of b (127 - a) is 127 sum b - a . b. */
+/* Rows and blocks of nearest.h for AVX-512 VNNI; nearest_tile_avx512.h has the tile. A lane is a
+   column; a register holds four bytes each of 16 columns. vpdpbusd multiplies unsigned by signed
+   bytes, so rows are stored as 127 - a: the sum of b (127 - a) is 127 sum b - a . b. */
 #include <immintrin.h>
 
 enum { NEAREST_LANES = 16, NEAREST_VECTORS = 4, NEAREST_QUERIES = 6, NEAREST_ROWS = 192 };
@@ -21,94 +21,57 @@ typedef struct nearest_block {
   int32_t best[NEAREST_COLUMNS], second[NEAREST_COLUMNS];
 } nearest_block;
 
+/* What a descriptor is stored as, and its sums. */
+typedef struct prepared_descriptor {
+  __m512i low, high; /* 127 - byte */
+  int32_t norm, start;
+} prepared_descriptor;
+
+/* `start` is -127 times the sum of the bytes b. The sum of b (127 - b) is 127 sum b - |b|^2. */
+static TVK_NOINLINE prepared_descriptor prepare_descriptor(const uint8_t *bytes) {
+  const __m512i most = _mm512_set1_epi8(127), zero = _mm512_setzero_si512();
+  const __m512i low = _mm512_loadu_si512(bytes), high = _mm512_loadu_si512(bytes + 64);
+  prepared_descriptor d;
+  d.low = _mm512_sub_epi8(most, low);
+  d.high = _mm512_sub_epi8(most, high);
+  d.start = -_mm512_reduce_add_epi32(
+      _mm512_dpbusd_epi32(_mm512_dpbusd_epi32(zero, low, most), high, most));
+  d.norm = -d.start - _mm512_reduce_add_epi32(
+                          _mm512_dpbusd_epi32(_mm512_dpbusd_epi32(zero, low, d.low), high, d.high));
+  return d;
+}
+
 static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
                       nearest_rows *tile) {
-  int32_t i, k;
+  const uint8_t none[TVK_DESCRIPTOR_SIZE] = {0};
+  int32_t i;
   (void)largest;
   for (i = 0; i < NEAREST_QUERIES; ++i) {
     const uint8_t *const row = ranked(rows, first + i);
-    tile->norms[i] = row ? squared_norm(row) : 0;
-    tile->terms[i] = row ? nearest_term(tile->norms[i], place + i) : NEAREST_FAR;
-    for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = 127;
-    if (row) {
-      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) tile->bytes[i][k] = (int8_t)(127 - row[k]);
-    }
+    const prepared_descriptor d = prepare_descriptor(row ? row : none);
+    tile->norms[i] = d.norm;
+    tile->terms[i] = row ? nearest_term(d.norm, place + i) : NEAREST_FAR;
+    _mm512_storeu_si512(tile->bytes[i], d.low);
+    _mm512_storeu_si512(tile->bytes[i] + 64, d.high);
   }
 }
 
 static void make_block(const tvk_descriptors *columns, int32_t first, int32_t place,
                        int32_t largest, nearest_block *block) {
+  const uint8_t none[TVK_DESCRIPTOR_SIZE] = {0};
   int32_t j, k;
   (void)largest;
-  if (first + NEAREST_COLUMNS > columns->num) memset(block->bytes, 0, sizeof block->bytes);
   for (j = 0; j < NEAREST_COLUMNS; ++j) {
     const uint8_t *const column = ranked(columns, column_rank(first, j));
-    int32_t sum = 0;
-    if (column) {
-      for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) sum += column[k];
-      TVK_ROLLED
-      for (k = 0; k < NEAREST_GROUPS; ++k) memcpy(block->bytes[k][j], column + 4 * k, 4);
+    const uint8_t *const bytes = column ? column : none;
+    const prepared_descriptor d = prepare_descriptor(bytes);
+    TVK_ROLLED
+    for (k = 0; k < NEAREST_GROUPS; ++k) {
+      memcpy(block->bytes[k][j], bytes + 4 * k, 4);
+      __asm__("" : "+r"(k)); /* keeps gcc 12 from writing out all 32 copies: 0.4 KB */
     }
-    block->norms[j] = column ? squared_norm(column) : 0;
-    block->terms[j] =
-        column ? nearest_term(block->norms[j], place + j / NEAREST_LANES) : NEAREST_FAR;
-    block->starts[j] = -127 * sum;
+    block->norms[j] = d.norm;
+    block->terms[j] = column ? nearest_term(d.norm, place + j / NEAREST_LANES) : NEAREST_FAR;
+    block->starts[j] = d.start;
   }
 }
-
-/* The type of the sums. With __m512i, a vector of 64-bit numbers, gcc 12 holds each sum twice. */
-typedef int32_t int32x16 __attribute__((vector_size(64)));
-
-static inline int32x16 load_avx512(const void *from) { return (int32x16)_mm512_loadu_si512(from); }
-
-static inline int32x16 four_avx512(const int8_t *row) {
-  int32_t four;
-  memcpy(&four, row, 4);
-  return (int32x16)_mm512_set1_epi32(four);
-}
-
-static inline int32x16 add_avx512(int32x16 sum, int32x16 columns, int32x16 row) {
-  return (int32x16)_mm512_dpbusd_epi32((__m512i)sum, (__m512i)columns, (__m512i)row);
-}
-
-/* Each sum is a variable with its own name (s20: row 2, first 16 columns), because gcc 12 keeps
-   arrays of sums in memory, which halves the speed. */
-#define EACH_ROW(do) \
-  do (0) do(1) do(2) do(3) do(4) do(5)
-
-#define START(i) \
-  int32x16 s##i##0 = columns0, s##i##1 = columns1, s##i##2 = columns2, s##i##3 = columns3;
-
-#define ADD(i)                                  \
-  row = four_avx512(rows->bytes[i] + 4 * g);    \
-  s##i##0 = add_avx512(s##i##0, columns0, row); \
-  s##i##1 = add_avx512(s##i##1, columns1, row); \
-  s##i##2 = add_avx512(s##i##2, columns2, row); \
-  s##i##3 = add_avx512(s##i##3, columns3, row);
-
-#define STORE(i)                                                 \
-  _mm512_storeu_si512(products + 64 * i, (__m512i)s##i##0);      \
-  _mm512_storeu_si512(products + 64 * i + 16, (__m512i)s##i##1); \
-  _mm512_storeu_si512(products + 64 * i + 32, (__m512i)s##i##2); \
-  _mm512_storeu_si512(products + 64 * i + 48, (__m512i)s##i##3);
-
-static void tile_products(const nearest_rows *rows, const nearest_block *block, int32_t *products) {
-  int32x16 columns0 = load_avx512(block->starts), columns1 = load_avx512(block->starts + 16);
-  int32x16 columns2 = load_avx512(block->starts + 32), columns3 = load_avx512(block->starts + 48);
-  int32x16 row;
-  int32_t g;
-  EACH_ROW(START)
-  for (g = 0; g < NEAREST_GROUPS; ++g) {
-    columns0 = load_avx512(block->bytes[g]);
-    columns1 = load_avx512(block->bytes[g] + 16);
-    columns2 = load_avx512(block->bytes[g] + 32);
-    columns3 = load_avx512(block->bytes[g] + 48);
-    EACH_ROW(ADD)
-  }
-  EACH_ROW(STORE)
-}
-
-#undef EACH_ROW
-#undef START
-#undef ADD
-#undef STORE
