@@ -190,6 +190,12 @@ class Drone(unittest.TestCase):
                          ("focal_35mm", [320, 180]))
         self.assert_refused(reconstruct(self.output, self.path("none")),
                             "--recording needs --camera, or --focal-35mm")
+        with open(self.path("other.yaml"), "w", encoding="utf-8") as file:
+            file.write("image_width: 640\nimage_height: 480\n"
+                       "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n")
+        self.assert_refused(reconstruct(self.output, self.path("none"), "--camera",
+                                        self.path("other.yaml")),
+                            "the recording is 640x360, but camera", "for 640x480", "same video")
         # Another run into the same folder must not change the recording.
         again = run("record", "--duration", "1", "-o", self.output, *drone.ports())
         self.assert_refused(again, "holds a recording already")

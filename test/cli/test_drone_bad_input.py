@@ -191,6 +191,7 @@ class DroneBadInput(unittest.TestCase):
             with self.subTest(arguments=arguments):
                 self.assert_refused(run(*arguments, cwd=self.folder.name, stdin=subprocess.DEVNULL))
         self.assertEqual(os.listdir(self.folder.name), [])
+        self.assert_refused(run("info", HOST), HOST, "(see twoview drone info --help)")
 
     def test_ports_in_use_are_named(self):
         with Simulator() as drone:

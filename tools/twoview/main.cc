@@ -81,8 +81,14 @@ int run_program(int argc, char** argv) {
     cli::print(chosen->help(path));
     return 0;
   } catch (const CLI::ParseError& e) {
-    const auto chosen = std::find_if(verbs.begin(), verbs.end(), is_named_first);
-    const std::string verb = chosen == verbs.end() ? "" : (*chosen)->get_name() + " ";
+    std::string verb;  // "drone info "
+    const CLI::App* app = &program;
+    for (int i = 1; i < argc && app != nullptr; ++i) {
+      const auto named = app->get_subcommands(
+          [&](const CLI::App* candidate) { return candidate->get_name() == argv[i]; });
+      app = named.empty() ? nullptr : named[0];
+      if (app != nullptr) verb += app->get_name() + " ";
+    }
     return refuse(std::string(e.what()) + " (see twoview " + verb + "--help)");
   }
   return run();

@@ -165,9 +165,14 @@ std::string camera_yaml(const tv_camera& camera) {
 void require_size(const tv_camera& camera, const std::string& camera_name, int width, int height,
                   const std::string& image_name) {
   if (camera.width == width && camera.height == height) return;
-  throw BadInput("image " + image_name + " is " + size_text(width, height) + ", but camera " +
-                 camera_name + " is for " + size_text(camera.width, camera.height) +
-                 ": give the picture as the camera took it (--resize L makes both smaller), or a "
+  const std::string found = " is " + size_text(width, height) + ", but camera " + camera_name +
+                            " is for " + size_text(camera.width, camera.height) + ": ";
+  if (image_name.empty())
+    throw BadInput(
+        "the recording" + found +
+        "calibrate with pictures of the same video, or give a camera file for this size");
+  throw BadInput("image " + image_name + found +
+                 "give the picture as the camera took it (--resize L makes both smaller), or a "
                  "camera file for this size");
 }
 
