@@ -111,7 +111,7 @@ void test_null_space_is_orthonormal_and_orthogonal_to_the_rows(void) {
     for (int r = 0; r < 5; ++r) {
       for (int i = 0; i < 9; ++i) rows[r][i] = kept[r][i] = uniform(&random, -1, 1);
     }
-    TEST_ASSERT_TRUE(tv::null_space<5>(rows, basis));
+    TEST_ASSERT_TRUE(tv::null_space(rows, 5, basis));
     for (int b = 0; b < 4; ++b) {
       for (int r = 0; r < 5; ++r) {
         double dot = 0;

@@ -150,7 +150,7 @@ void test_roots_of_known_polynomials_are_found(void) {
     }
   }
   double roots[10];
-  TEST_ASSERT_EQUAL_INT(6, tv::real_roots<10>(p, roots));
+  TEST_ASSERT_EQUAL_INT(6, tv::real_roots(p, 10, roots));
   for (int k = 0; k < 6; ++k) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-8 * std::fabs(wanted[k]), wanted[k], roots[k]);
   }
@@ -159,15 +159,15 @@ void test_roots_of_known_polynomials_are_found(void) {
 void test_polynomials_without_a_leading_coefficient_have_no_roots(void) {
   const double zero[4] = {1, 2, 3, 0}, nan[4] = {1, 2, 3, NAN}, huge[4] = {1, 2, 3, INFINITY};
   double roots[3];
-  TEST_ASSERT_EQUAL_INT(0, tv::real_roots<3>(zero, roots));
-  TEST_ASSERT_EQUAL_INT(0, tv::real_roots<3>(nan, roots));
-  TEST_ASSERT_EQUAL_INT(0, tv::real_roots<3>(huge, roots));
+  TEST_ASSERT_EQUAL_INT(0, tv::real_roots(zero, 3, roots));
+  TEST_ASSERT_EQUAL_INT(0, tv::real_roots(nan, 3, roots));
+  TEST_ASSERT_EQUAL_INT(0, tv::real_roots(huge, 3, roots));
 }
 
 void test_a_repeated_root_ends_the_search(void) {
   const double p[4] = {-1, 3, -3, 1};  // (z - 1)^3, with a triple root at 1
   double roots[3];
-  const int count = tv::real_roots<3>(p, roots);
+  const int count = tv::real_roots(p, 3, roots);
   TEST_ASSERT_LESS_OR_EQUAL_INT(3, count);
   for (int k = 0; k < count; ++k) TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1, roots[k]);
 }

@@ -12,7 +12,7 @@ int fundamental_7pt(const Vec3 rays0[7], const Vec3 rays1[7], Mat3 models[3]) {
   for (int k = 0; k < 7; ++k) {
     epipolar_row(rays0[k].normalized(), rays1[k].normalized(), rows[k]);
   }
-  if (!null_space<7>(rows, basis)) return 0;
+  if (!null_space(rows, 7, basis)) return 0;
   Mat3 A, B;
   for (int i = 0; i < 9; ++i) {
     A(i / 3, i % 3) = basis[0][i];
@@ -26,7 +26,7 @@ int fundamental_7pt(const Vec3 rays0[7], const Vec3 rays1[7], Mat3 models[3]) {
       a0.dot(a1.cross(a2)), (b0.dot(a1.cross(a2)) + a0.dot(b1.cross(a2))) + a0.dot(a1.cross(b2)),
       (a0.dot(b1.cross(b2)) + b0.dot(a1.cross(b2))) + b0.dot(b1.cross(a2)), b0.dot(b1.cross(b2))};
   double roots[3];
-  const int num_roots = real_roots<3>(cubic, roots);
+  const int num_roots = real_roots(cubic, 3, roots);
   for (int r = 0; r < num_roots; ++r) models[r] = (A + roots[r] * B).normalized();
   return num_roots;
 }

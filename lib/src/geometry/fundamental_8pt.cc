@@ -44,7 +44,7 @@ bool fundamental_8pt(const Vec3 rays0[8], const Vec3 rays1[8], Mat3* M) {
   for (int k = 0; k < 8; ++k) {
     epipolar_row((T0 * rays0[k]).normalized(), (T1 * rays1[k]).normalized(), rows[k]);
   }
-  if (!null_space<8>(rows, basis)) return false;
+  if (!null_space(rows, 8, basis)) return false;
   Mat3 full, normalised;
   for (int i = 0; i < 9; ++i) full(i / 3, i % 3) = basis[0][i];
   if (!nearest_rank2(full, &normalised)) return false;

@@ -19,7 +19,7 @@ bool homography_4pt(const Vec3 rays0[4], const Vec3 rays1[4], Mat3* H) {
     epipolar_row(f0, across, rows[2 * k]);
     epipolar_row(f0, other, rows[2 * k + 1]);
   }
-  if (!null_space<8>(rows, basis)) return false;
+  if (!null_space(rows, 8, basis)) return false;
   for (int i = 0; i < 9; ++i) (*H)(i / 3, i % 3) = basis[0][i];
   int positive = 0;
   for (int k = 0; k < 4; ++k) positive += rays1[k].dot(*H * rays0[k]) > 0;

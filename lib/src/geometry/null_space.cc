@@ -1,5 +1,8 @@
-// One-sided Jacobi: J. Demmel, K. Veselic, "Jacobi's method is more accurate than QR", 1992.
+// svd3 is a one-sided Jacobi: J. Demmel, K. Veselic, "Jacobi's method is more accurate than QR",
+// 1992.
 #include "geometry/null_space.h"
+
+#include <cmath>
 
 namespace tv {
 namespace {
@@ -41,6 +44,43 @@ void swap_columns(Mat3& A, Mat3& V, int p, int q) {
 }
 
 }  // namespace
+
+bool null_space(double rows[][9], int num_rows, double basis[][9]) {
+  double largest = 0;
+  for (int k = 0; k < num_rows; ++k) {
+    double sum = 0;
+    for (int i = 0; i < 9; ++i) sum += rows[k][i] * rows[k][i];
+    if (sum > largest) largest = sum;
+  }
+  double scale[8];  // 2 / |v|^2; v, Householder's vector, is in rows[k][k..8]
+  for (int k = 0; k < num_rows; ++k) {
+    double* v = rows[k];
+    double sum = 0;
+    for (int i = k; i < 9; ++i) sum += v[i] * v[i];
+    if (!(sum > 1e-20 * largest)) return false;
+    const double length = std::sqrt(sum);
+    const double head = v[k];
+    v[k] = head + (head < 0 ? -length : length);
+    scale[k] = 1.0 / (sum + std::fabs(head) * length);
+    for (int c = k + 1; c < num_rows; ++c) {
+      double dot = 0;
+      for (int i = k; i < 9; ++i) dot += v[i] * rows[c][i];
+      dot *= scale[k];
+      for (int i = k; i < 9; ++i) rows[c][i] -= dot * v[i];
+    }
+  }
+  for (int b = 0; b < 9 - num_rows; ++b) {
+    for (int i = 0; i < 9; ++i) basis[b][i] = i == num_rows + b ? 1.0 : 0.0;
+    for (int k = num_rows - 1; k >= 0; --k) {
+      const double* v = rows[k];
+      double dot = 0;
+      for (int i = k; i < 9; ++i) dot += v[i] * basis[b][i];
+      dot *= scale[k];
+      for (int i = k; i < 9; ++i) basis[b][i] -= dot * v[i];
+    }
+  }
+  return true;
+}
 
 Svd3 svd3(const Mat3& M) {
   Svd3 result;

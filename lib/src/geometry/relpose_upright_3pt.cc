@@ -133,7 +133,7 @@ int relpose_upright_3pt(const Vec3 rays0[3], const Vec3 rays1[3], const Mat3& le
   const double quartic[5] = {g.c + g.cc, 2 * (g.s + g.cs), 4 * g.ss - 2 * g.cc, 2 * (g.s - g.cs),
                              g.cc - g.c};
   double roots[4];
-  const int num_roots = real_roots<4>(quartic, roots);
+  const int num_roots = real_roots(quartic, 4, roots);
   int num_poses = 0;
   for (int r = 0; r < num_roots; ++r) {
     const double x = roots[r], scale = 1 / (1 + x * x);
