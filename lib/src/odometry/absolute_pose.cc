@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "base/order.h"
 #include "base/random.h"
 #include "geometry/null_space.h"
 #include "odometry/absolute_pose_3pt.h"

@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "base/order.h"
 #include "odometry/adjust.h"
 #include "odometry/adjust_segment.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/metric.h"
 #include "odometry/search.h"
-#include "odometry/sightings.h"
 #include "odometry/start.h"
 
 namespace tv {

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "base/math.h"
+#include "base/order.h"
 #include "geometry/vector3.h"
 
 namespace tv {
@@ -160,12 +161,6 @@ void set_fast(Sightings* s) {
 }
 
 }  // namespace
-
-double median(double* values, int count) {
-  double* middle = values + count / 2;
-  std::nth_element(values, middle, values + count);
-  return *middle;
-}
 
 void unit_ray(const Sighting& s, double ray[3]) {
   cross(s.rows[0], s.rows[1], ray);

@@ -60,7 +60,4 @@ Pose read_pose(const Sightings& sightings, const double R[9], const double t[3])
 
 void unit_ray(const Sighting& sighting, double ray[3]);  // that of the pixel
 
-// The middle one of `count` > 0 values, whose order it changes.
-double median(double* values, int count);
-
 }  // namespace tv

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/order.h"
 #include "geometry/vector3.h"
 #include "odometry/adjust.h"
 #include "odometry/fit_pose.h"
@@ -11,7 +12,6 @@
 #include "odometry/map_check.h"
 #include "odometry/metric.h"
 #include "odometry/search.h"
-#include "odometry/sightings.h"
 #include "odometry/start.h"
 
 namespace tv {

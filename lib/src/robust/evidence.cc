@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "base/order.h"
 #include "geometry/sampson.h"
 #include "geometry/transfer.h"
 #include "robust/lattice.h"
@@ -237,9 +238,8 @@ void measure_pose(Fit& f) {
     sum += weight * f.matches.pairs.pixel_angle[f.support[k]];
     weights += weight;
   }
-  double* middle = f.values + (f.num_support - 1) / 2;
-  std::nth_element(f.values, middle, f.values + f.num_support);
-  evidence.median_parallax_rad = angle_of_pseudo(*middle);
+  evidence.median_parallax_rad =
+      angle_of_pseudo(nth_smallest(f.values, f.num_support, (f.num_support - 1) / 2));
   evidence.pixel_angle_rad = sum / weights;
   for (int v = 0; v < 2; ++v) evidence.line_distance_px[v] = line_distance_px(f, v);
   evidence.region_shift_rad = region_shift_rad(f);

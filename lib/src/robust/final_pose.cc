@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/math.h"
+#include "base/order.h"
 #include "geometry/homography_4pt.h"
 #include "geometry/parallax.h"
 #include "geometry/sampson.h"
@@ -56,13 +57,13 @@ int near_pose(const PoseRefiner& f, const Pose& pose) {
                                  kFinalNear * f.threshold_px, f.threshold_px, f.indices);
   if (count < 10) return count;
   const int sampled = std::min(count, kParallaxSample);
-  double sample[kParallaxSample], *nine_tenths = sample + sampled * 9 / 10;
+  double sample[kParallaxSample];
   squared_sines(f.matches.pairs, f.indices, count, pose.R, f.values);
   for (int k = 0; k < sampled; ++k) {
     sample[k] = f.values[static_cast<int64_t>(k) * count / sampled];
   }
-  std::nth_element(sample, nine_tenths, sample + sampled);
-  const double limit = kFarParallax * kFarParallax * *nine_tenths;
+  const double limit =
+      kFarParallax * kFarParallax * nth_smallest(sample, sampled, sampled * 9 / 10);
   int kept = 0;
   for (int k = 0; k < count; ++k) {
     const int i = f.indices[k];
@@ -171,9 +172,7 @@ int near_plane(const PoseRefiner& f, const Mat3& H) {
 // The loss for two-dimensional residuals, half of which lie within 1.1774 deviations.
 RobustLoss plane_loss(const PoseRefiner& f, const Mat3& H, int count) {
   transfer_squares(f.matches.pairs, f.indices, count, H, f.values);
-  double* middle = f.values + count / 2;
-  std::nth_element(f.values, middle, f.values + count);
-  const double scale = kPlaneScale * std::sqrt(*middle) / 1.1774100225154747;
+  const double scale = kPlaneScale * std::sqrt(median(f.values, count)) / 1.1774100225154747;
   return RobustLoss{Loss::kCauchy,
                     std::max(0.02 * f.threshold_px, std::min(scale, 2 * f.threshold_px))};
 }
@@ -192,9 +191,7 @@ double median_noise_px(const PoseRefiner& f, const Mat3& M, int count) {
     if (r_sq <= f.threshold_px * f.threshold_px) f.values[within++] = r_sq;
   }
   if (within == 0) return f.threshold_px;
-  double* middle = f.values + within / 2;
-  std::nth_element(f.values, middle, f.values + within);
-  return 1.4826 * std::sqrt(*middle);
+  return 1.4826 * std::sqrt(median(f.values, within));
 }
 
 RobustLoss final_loss(const PoseRefiner& f, const Mat3& M, int count) {
