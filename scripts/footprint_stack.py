@@ -12,7 +12,7 @@ import re
 import sys
 
 NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "([^"]*)"')
-EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"(?: label: "([^":]*))?')
 FRAME = re.compile(r"(\d+) bytes \((\S+)\)")
 INDIRECT = "__indirect_call"
 SOURCES = pathlib.Path(__file__).resolve().parent.parent / "lib/src"
@@ -32,7 +32,8 @@ class Graph:
     def __init__(self):
         self.frame, self.calls, self.unbounded = {}, {}, []
 
-    def read(self, path, indirect=INDIRECT):
+    def read(self, path, file=None):
+        """`file`: whose indirect calls these are. None: of the file that gcc names for each."""
         for line in path.read_text().splitlines():
             node = NODE.match(line)
             if node:
@@ -44,7 +45,9 @@ class Graph:
                 continue
             edge = EDGE.match(line)
             if edge:
-                target = indirect if edge[2] == INDIRECT else edge[2]
+                target = edge[2]
+                if target == INDIRECT:
+                    target += " " + (file or "/".join(pathlib.Path(edge[3] or "none").parts[-2:]))
                 self.calls.setdefault(edge[1], set()).add(target)
 
 
@@ -99,9 +102,11 @@ def read_graphs(folder):
     for path in files:
         is_kernel_file = path.parent.name == "kernels" and not path.name.startswith("select.")
         if is_kernel_file:
-            kernels.read(path)
+            kernels.read(path, "kernels")
+        elif path.name.endswith(".ltrans.ci"):  # written as a library was linked, of many files
+            graph.read(path)
         else:
-            graph.read(path, f"{INDIRECT} {path.parent.name}/{path.name.removesuffix('.ci')}")
+            graph.read(path, f"{path.parent.name}/{path.name.removesuffix('.ci')}")
     return graph, kernels
 
 
