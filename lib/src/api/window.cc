@@ -57,8 +57,6 @@ tv_status read_counts(const tv_window* given, tv_window* window) {
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
-bool is_missing(const void* array, int32_t count) { return array == nullptr && count > 0; }
-
 bool is_index(int32_t idx, int32_t count) { return idx >= 0 && idx < count; }
 
 // Whether a direction has a length whose square is neither 0 nor infinite.
@@ -185,13 +183,22 @@ tv_status tv_adjust_window(const tv_window* window, const tv_window_options* opt
   tv_status status = tv::read_counts(window, &w);
   if (status == TV_OK && result != nullptr) status = tv::check_sized(result);
   if (status != TV_OK) return status;
-  if (memory == nullptr || tv::is_missing(w.cameras, w.num_cameras) ||
-      tv::is_missing(w.views, w.num_views) || tv::is_missing(w.points, w.num_points) ||
-      tv::is_missing(w.observations, w.num_observations) ||
-      tv::is_missing(w.pose_priors, w.num_pose_priors) ||
-      tv::is_missing(w.gravity_priors, w.num_gravity_priors) ||
-      tv::is_missing(w.distance_priors, w.num_distance_priors)) {
-    return TV_ERR_NULL;
+  const size_t needed = tv::window_scratch_bytes(w);
+  const tv::Bytes arrays[13] = {tv::bytes_of(covariances, 36 * w.num_views),
+                                tv::bytes_of(errors_px, w.num_observations),
+                                {result, result != nullptr ? result->struct_size : 0},
+                                {memory, needed},  // from here on: null only where it is empty
+                                tv::bytes_of(w.views, w.num_views),
+                                tv::bytes_of(w.points, 3 * w.num_points),
+                                tv::bytes_of(w.cameras, w.num_cameras),  // no output from here on
+                                tv::bytes_of(w.observations, w.num_observations),
+                                tv::bytes_of(w.pose_priors, w.num_pose_priors),
+                                tv::bytes_of(w.gravity_priors, w.num_gravity_priors),
+                                tv::bytes_of(w.distance_priors, w.num_distance_priors),
+                                {window, window->struct_size},
+                                {options, options != nullptr ? options->struct_size : 0}};
+  for (const tv::Bytes* array = arrays + 3; array < arrays + 13; ++array) {
+    if (array->data == nullptr && array->size > 0) return TV_ERR_NULL;
   }
   tv_window_options read;
   status = tv::read_window_options(options, &read);
@@ -199,22 +206,8 @@ tv_status tv_adjust_window(const tv_window* window, const tv_window_options* opt
   if (status == TV_OK) status = tv::check_observations(w);
   if (status == TV_OK) status = tv::check_priors(w);
   if (status != TV_OK) return status;
-  const size_t needed = tv::window_scratch_bytes(w);
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
   if (size_bytes < needed) return TV_ERR_MEMORY;
-  const tv::Bytes arrays[13] = {{memory, needed},
-                                tv::bytes_of(w.views, w.num_views),
-                                tv::bytes_of(w.points, 3 * w.num_points),
-                                tv::bytes_of(covariances, 36 * w.num_views),
-                                tv::bytes_of(errors_px, w.num_observations),
-                                {result, result != nullptr ? result->struct_size : 0},
-                                tv::bytes_of(w.cameras, w.num_cameras),
-                                tv::bytes_of(w.observations, w.num_observations),
-                                tv::bytes_of(w.pose_priors, w.num_pose_priors),
-                                tv::bytes_of(w.gravity_priors, w.num_gravity_priors),
-                                tv::bytes_of(w.distance_priors, w.num_distance_priors),
-                                {window, window->struct_size},
-                                {options, options != nullptr ? options->struct_size : 0}};
   if (tv::outputs_overlap(arrays, 6, 13)) return TV_ERR_OVERLAP;
   tv::Arena arena = tv::arena_over(memory, needed);
   tv_window_result packed{};

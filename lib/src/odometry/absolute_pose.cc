@@ -200,10 +200,11 @@ double best_scale(const Finish& f, double noise_px, int count) {
   return best;
 }
 
-// Refines a pose over all matches near it, and judges it.
-Candidate refined(const Finish& f, const Pose& start) {
+// Refines a pose over all matches near it, and judges it. Null: a candidate that is not determined.
+Candidate refined(const Finish& f, const Pose* start) {
   Candidate c{};
-  c.pose = start;
+  if (start == nullptr) return c;
+  c.pose = *start;
   PoseProblem problem{nullptr, f.s, f.indices, 0, 0, {}, 0};
   for (int round = 0; round < kFinalRounds; ++round) {
     const int count = near_sightings(f.s, c.pose, kNear * f.threshold_px, f.indices);
@@ -453,7 +454,7 @@ void finish_absolute_pose(const SightingInput& input, const Sightings& s,
       gravity_prior(options.gravity_in_world, options.gravity_in_camera, options.gravity_sigma_rad);
   if (prior.known)
     f.gravity = {1 / (prior.sigma_rad * prior.sigma_rad), prior.down[0], prior.down[1]};
-  const Candidate found = search.found ? refined(f, search.pose) : Candidate{};
+  const Candidate found = refined(f, search.found ? &search.pose : nullptr);
   int different = search.found ? count_inliers(f, found.pose, out, nullptr) : 0;
   const double log_alarms = different > 3
                                 ? log_false_alarms(s.num, different, 3, kMaxAbsolutePose3pt,
@@ -473,7 +474,8 @@ void finish_absolute_pose(const SightingInput& input, const Sightings& s,
   const Spread spread = spread_of(f, different);
   const Vec3& sizes = spread.svd.s;
   const bool is_flat = sizes[2] < 0.01 * sizes[1];
-  const Candidate twin = is_flat ? refined(f, mirrored(found.pose, spread)) : Candidate{};
+  const Pose mirror = mirrored(found.pose, spread);
+  const Candidate twin = refined(f, is_flat ? &mirror : nullptr);
   bool takes_twin = false;
   if (twin.determined && turn_sq(twin.pose, found.pose) > 1e-6) {
     const double difference = evidence_against(f, twin, found) - evidence_against(f, found, found);

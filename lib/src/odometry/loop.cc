@@ -52,9 +52,8 @@ bool is_plausible(const Odometry& odometry, const Frame& frame, double path, con
   const Map& map = odometry.map;
   if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
   if (!(end.scale < kLargestScale && end.scale > 1 / kLargestScale)) return false;
-  return way_between(frame.cam_from_world, end.cam_from_world) <=
-             kLargestDrift * path + kLargestShift * odometry.median_depth &&
-         turn_between(frame.cam_from_world, end.cam_from_world) <= kLargestTurn;
+  return are_near(frame.cam_from_world, end.cam_from_world,
+                  kLargestDrift * path + kLargestShift * odometry.median_depth, kLargestTurn);
 }
 
 // Whether the frame may see what a keyframe saw, if the drift is as large as it may be after a path
@@ -63,9 +62,8 @@ bool may_meet(const Odometry& odometry, const Frame& frame, double path, int32_t
   const Map& map = odometry.map;
   const MapKeyframe& other = map.keyframes[keyframe];
   if (other.segment != odometry.segment) return true;
-  return way_between(frame.cam_from_world, other.cam_from_world) <=
-             kLargestDrift * path + kFarthestSeen * odometry.median_depth &&
-         turn_between(frame.cam_from_world, other.cam_from_world) < kMostTurned;
+  return are_near(frame.cam_from_world, other.cam_from_world,
+                  kLargestDrift * path + kFarthestSeen * odometry.median_depth, kMostTurned);
 }
 
 // The median of the depths of the same keypoints among the old points over those among the new
@@ -95,8 +93,7 @@ bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end) {
   Rigid moved = motion_between(before.cam_from_world, frame.cam_from_world);
   for (double& t : moved.t) t *= end.scale;
   const Rigid expected = compose(moved, before.end_from_world);
-  return way_between(expected, end.cam_from_world) <= kWeakWay * odometry->median_depth &&
-         turn_between(expected, end.cam_from_world) <= kWeakTurn;
+  return are_near(expected, end.cam_from_world, kWeakWay * odometry->median_depth, kWeakTurn);
 }
 
 namespace {
@@ -269,8 +266,8 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   enter_segment(odometry, old_segment);
   fuse_points(odometry, keyframe, again);
   odometry->weak_loop.frame = -1;
-  const bool is_small = way_between(now, end.cam_from_world) < kLeastWay * odometry->median_depth &&
-                        turn_between(now, end.cam_from_world) < kLeastTurn;
+  const bool is_small =
+      are_near(now, end.cam_from_world, kLeastWay * odometry->median_depth, kLeastTurn);
   if (segment != old_segment || !is_small) odometry->spread = {kSpreadSteps, 0, old_segment};
 }
 

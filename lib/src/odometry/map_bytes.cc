@@ -60,14 +60,10 @@ void pass_numbers(Stream* s, void* numbers, size_t width, size_t bytes) {
   s->at += bytes;
 }
 
+// The numbers of one type from `first` to `last`, members that follow each other in their struct.
 template <typename Number>
-void pass(Stream* s, Number* number) {
-  pass_numbers(s, number, sizeof *number, sizeof *number);
-}
-
-template <typename Number, size_t kNum>
-void pass(Stream* s, Number (*numbers)[kNum]) {
-  pass_numbers(s, numbers, sizeof(Number), sizeof *numbers);
+void pass(Stream* s, Number* first, Number* last) {
+  pass_numbers(s, first, sizeof(Number), sizeof(Number) * static_cast<size_t>(last + 1 - first));
 }
 
 struct Header {
@@ -83,80 +79,39 @@ struct Header {
 };
 
 void pass_header(Stream* s, Header* h) {
-  pass(s, &h->magic);
-  pass(s, &h->version);
-  pass(s, &h->checksum);
-  pass(s, &h->num_bytes);
-  pass(s, &h->camera.model);
-  pass(s, &h->camera.width);
-  pass(s, &h->camera.height);
-  pass(s, &h->camera.reserved);
-  pass(s, &h->camera.fx);
-  pass(s, &h->camera.fy);
-  pass(s, &h->camera.cx);
-  pass(s, &h->camera.cy);
-  pass(s, &h->camera.k);
-  pass(s, &h->num_points);
-  pass(s, &h->num_keyframes);
-  pass(s, &h->num_removed);
-  pass(s, &h->next_point_id);
-  pass(s, &h->next_keyframe_id);
-  pass(s, &h->num_frames);
-  pass(s, &h->num_segments);
-  pass(s, &h->num_relocations);
-  pass(s, &h->num_loops);
-  pass(s, &h->is_upright);
-  pass(s, &h->scale_source);
-  pass(s, &h->scale_evidence);
-  pass(s, &h->scale_product);
-  pass(s, &h->scale_square);
-  pass(s, &h->scale_sigma);
+  tv_camera* camera = &h->camera;
+  pass(s, h->magic, h->magic + 7);
+  pass(s, &h->version, &h->checksum);
+  pass(s, &h->num_bytes, &h->num_bytes);
+  pass(s, &camera->model, &camera->reserved);
+  pass(s, &camera->fx, &camera->k[7]);
+  pass(s, &h->num_points, &h->scale_evidence);
+  pass(s, &h->scale_product, &h->scale_sigma);
 }
 
 void pass_point(Stream* s, MapPoint* p, uint8_t (*descriptor)[TV_DESCRIPTOR_BYTES]) {
-  pass(s, &p->position);
-  pass(s, &p->id);
-  pass(s, &p->segment);
-  pass(s, &p->num_visible);
-  pass(s, &p->num_found);
-  pass(s, &p->made_at);
-  pass(s, &p->grey);
-  pass(s, &p->depth_sigma);
-  pass(s, &p->seen_from);
-  pass(s, descriptor);
-}
-
-void pass_pose(Stream* s, Rigid* pose) {
-  pass(s, &pose->R);
-  pass(s, &pose->t);
+  pass(s, p->position, p->position + 2);
+  pass(s, &p->id, &p->segment);
+  pass(s, &p->num_visible, &p->made_at);
+  pass(s, &p->grey, &p->grey);
+  pass(s, &p->depth_sigma, &p->seen_from[2]);
+  pass(s, *descriptor, *descriptor + TV_DESCRIPTOR_BYTES - 1);
 }
 
 void pass_keyframe(Stream* s, MapKeyframe* k) {
-  pass(s, &k->id);
-  pass(s, &k->segment);
-  pass(s, &k->frame);
-  pass(s, &k->num_keypoints);
-  pass(s, &k->time_s);
-  pass_pose(s, &k->cam_from_world);
-  pass(s, &k->down);
-  pass(s, &k->down_sigma_rad);
-  pass(s, &k->height_m);
-  pass(s, &k->height_sigma_m);
-  pass(s, &k->scale);
+  pass(s, &k->id, &k->frame);
+  pass(s, &k->num_keypoints, &k->num_keypoints);
+  pass(s, &k->time_s, &k->scale);
 }
 
 void pass_keypoint(Stream* s, MapKeypoint* k) {
-  pass(s, &k->x);
-  pass(s, &k->y);
-  pass(s, &k->size);
-  pass(s, &k->point);
+  pass(s, &k->x, &k->size);
+  pass(s, &k->point, &k->point);
 }
 
 void pass_removed(Stream* s, RemovedKeyframe* r) {
-  pass(s, &r->id);
-  pass(s, &r->kept_id);
-  pass_pose(s, &r->kept_from_removed);
-  pass(s, &r->scale);
+  pass(s, &r->id, &r->kept_id);
+  pass(s, r->kept_from_removed.R, &r->scale);
 }
 
 bool is_count(int32_t n) { return n >= 0 && n <= kMost; }

@@ -68,6 +68,12 @@ double way_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world) {
   return distance_between(centre0, centre1);
 }
 
+bool are_near(const Rigid& cam0_from_world, const Rigid& cam1_from_world, double way,
+              double turn_rad) {
+  return way_between(cam0_from_world, cam1_from_world) <= way &&
+         turn_between(cam0_from_world, cam1_from_world) <= turn_rad;
+}
+
 Rigid orthonormalised(const Rigid& rigid) {
   Rigid result = rigid;
   Mat3 R;

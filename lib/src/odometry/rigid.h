@@ -25,6 +25,9 @@ double distance_between(const double a[3], const double b[3]);
 Rigid motion_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world);
 double turn_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world);
 double way_between(const Rigid& cam0_from_world, const Rigid& cam1_from_world);
+// Whether they are no farther from each other than these two.
+bool are_near(const Rigid& cam0_from_world, const Rigid& cam1_from_world, double way,
+              double turn_rad);
 
 // `rigid` with the rotation's rounding errors removed.
 Rigid orthonormalised(const Rigid& rigid);
