@@ -40,6 +40,16 @@ Mat3 orthonormalised(const Mat3& R) {
   return result;
 }
 
+Mat3 orthonormal_product(const Mat3& A, const Mat3& B) {
+  Mat3 product;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {  // in the order in which Eigen adds
+      product(i, j) = A(i, 0) * B(0, j) + (A(i, 1) * B(1, j) + A(i, 2) * B(2, j));
+    }
+  }
+  return orthonormalised(product);
+}
+
 bool is_rotation(const double R[9]) {
   for (int i = 0; i < 3; ++i) {
     for (int j = i; j < 3; ++j) {

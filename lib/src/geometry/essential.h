@@ -20,6 +20,7 @@ Mat3 rotation_step(const Vec3& w);
 // R with its rows made orthonormal by Gram-Schmidt. It removes the rounding errors that products of
 // rotations accumulate.
 Mat3 orthonormalised(const Mat3& R);
+Mat3 orthonormal_product(const Mat3& A, const Mat3& B);  // of A B
 
 // Whether every entry of R R' is within 1e-6 of that of I, and det R > 0.
 bool is_rotation(const double R[9]);

@@ -183,7 +183,7 @@ void refine_absolute(const PoseProblem& problem, int max_iterations, double smal
     const double most = kMostStretch * now.slope;
     const double stretch = now.weight < most ? now.weight / now.slope : kMostStretch;
     for (double& x : step) x *= stretch;
-    const Pose moved{orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * pose->R),
+    const Pose moved{orthonormal_product(rotation_step(Vec3(step[0], step[1], step[2])), pose->R),
                      pose->t + Vec3(step[3], step[4], step[5])};
     PoseEquations& next = of[1 - current];
     pose_equations(problem, moved, &next);

@@ -72,12 +72,8 @@ void rotation_vector(const double R[9], double w[3], double jacobian[9]) {
 WindowPose stepped(const WindowPose& pose, const double step[6]) {
   const Mat3 turn = rotation_step(vector(step));
   Mat3 R;
-  for (int i = 0; i < 9; ++i) {
-    const double* row = turn.data() + 3 * (i / 3);
-    const double column[3] = {pose.R[i % 3], pose.R[3 + i % 3], pose.R[6 + i % 3]};
-    R.data()[i] = product_of(row, column);
-  }
-  R = orthonormalised(R);
+  std::copy_n(pose.R, 9, R.data());
+  R = orthonormal_product(turn, R);
   WindowPose result;
   std::copy_n(R.data(), 9, result.R);
   multiply(turn.data(), pose.t, result.t);

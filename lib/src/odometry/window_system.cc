@@ -148,9 +148,7 @@ void factorise(const PointSums& sums, const double diagonal[3], EliminatedPoint*
 // V grows by `across` in each direction across the ray and by `along` in that of the ray.
 void damp(const double ray[3], double scale, double across, double along, PointSums* sums) {
   const double more = (along - across) * scale;
-  TV_UNROLL
   for (int i = 0, slot = 0; i < 3; ++i) {
-    TV_UNROLL
     for (int j = i; j < 3; ++j, ++slot) {
       sums->V[slot] += more * ray[i] * ray[j] + (i == j ? across : 0.0);
     }

@@ -45,7 +45,7 @@ PoseModel PoseModel::stepped(const double* step) const {
   Vec3 b1, b2;
   tangent_basis(pose.t, &b1, &b2);
   PoseModel result;
-  result.pose.R = orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * pose.R);
+  result.pose.R = orthonormal_product(rotation_step(Vec3(step[0], step[1], step[2])), pose.R);
   result.pose.t = (pose.t + step[3] * b1 + step[4] * b2).normalized();
   return result;
 }
@@ -80,8 +80,8 @@ double FundamentalModel::normal_equations(const RayPairs& pairs, const int32_t* 
 
 FundamentalModel FundamentalModel::stepped(const double* step) const {
   FundamentalModel result;
-  result.U = orthonormalised(U * rotation_step(Vec3(step[0], step[1], step[2])));
-  result.V = orthonormalised(V * rotation_step(Vec3(step[3], step[4], step[5])));
+  result.U = orthonormal_product(U, rotation_step(Vec3(step[0], step[1], step[2])));
+  result.V = orthonormal_product(V, rotation_step(Vec3(step[3], step[4], step[5])));
   result.s = s + step[6];
   return result;
 }
@@ -114,7 +114,7 @@ double RotationModel::normal_equations(const RayPairs& pairs, const int32_t* ind
 }
 
 RotationModel RotationModel::stepped(const double* step) const {
-  return RotationModel{orthonormalised(rotation_step(Vec3(step[0], step[1], step[2])) * R)};
+  return RotationModel{orthonormal_product(rotation_step(Vec3(step[0], step[1], step[2])), R)};
 }
 
 Mat3 PlaneModel::matrix() const { return pose.R + pose.t * plane.transpose(); }
