@@ -15,6 +15,8 @@ __attribute__((always_inline)) inline double dot(const double a[3], const double
   return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 
+inline double length_sq_of(const double v[3]) { return dot(v, v); }
+
 inline double length_of(const double v[3]) { return std::sqrt(dot(v, v)); }
 
 inline void cross(const double a[3], const double b[3], double product[3]) {

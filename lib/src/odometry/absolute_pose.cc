@@ -288,7 +288,7 @@ __attribute__((noinline)) Spread spread_of(const Finish& f, int count) {
 
 // v becomes its mirror image on the plane through 0 across `normal`.
 void reflect(const double normal[3], double v[3]) {
-  const double factor = 2 * dot(normal, v) / dot(normal, normal);
+  const double factor = 2 * dot(normal, v) / length_sq_of(normal);
   for (int k = 0; k < 3; ++k) v[k] -= factor * normal[k];
 }
 

@@ -181,8 +181,8 @@ bool frame_of(const double points[3][3], double frame[3][3]) {
     side[1][k] = points[2][k] - points[0][k];
   }
   cross(side[0], side[1], frame[2]);
-  const double normal_sq = dot(frame[2], frame[2]), side_sq = dot(side[0], side[0]);
-  if (!(normal_sq > 1e-24 * side_sq * dot(side[1], side[1])) || !is_finite(normal_sq)) return false;
+  const double normal_sq = length_sq_of(frame[2]), side_sq = length_sq_of(side[0]);
+  if (!(normal_sq > 1e-24 * side_sq * length_sq_of(side[1])) || !is_finite(normal_sq)) return false;
   const double of_side = 1 / std::sqrt(side_sq), of_normal = 1 / std::sqrt(normal_sq);
   for (int k = 0; k < 3; ++k) {
     frame[0][k] = side[0][k] * of_side;
@@ -249,7 +249,7 @@ int absolute_pose_3pt(const double rays_in[3][3], const double points_in[3][3],
   for (int l = 0; l < num_depths; ++l) {
     double* d = depths[l];
     const double sum_sq =
-        2 * (dot(d, d) - c[0] * d[0] * d[1] - c[1] * d[0] * d[2] - c[2] * d[1] * d[2]);
+        2 * (length_sq_of(d) - c[0] * d[0] * d[1] - c[1] * d[0] * d[2] - c[2] * d[1] * d[2]);
     double scale = std::sqrt(sides / sum_sq);
     if (d[0] < 0) scale = -scale;
     if (!is_finite(scale)) continue;

@@ -70,7 +70,8 @@ void measure_depths(const MapWindow& window, Odometry* odometry) {
       b[c] = point.position[c] - static_cast<double>(point.seen_from[c]);
     }
     cross(a, b, normal);
-    const double sine_sq = dot(normal, normal) / std::max(dot(a, a) * dot(b, b), 1e-300);
+    const double sine_sq =
+        length_sq_of(normal) / std::max(length_sq_of(a) * length_sq_of(b), 1e-300);
     point.depth_sigma = std::max(point.depth_sigma, static_cast<float>(sine_sq));
   }
   for (int32_t k = 0; k < window.model.num_points; ++k) {

@@ -54,9 +54,9 @@ Ways ways_to(const Travel& travel, const Rigid& cam_from_world) {
   Ways ways;
   centre_of(cam_from_world, ways.way);
   for (int c = 0; c < 3; ++c) ways.way[c] -= travel.from[c];
-  ways.square = dot(ways.way, ways.way);
+  ways.square = length_sq_of(ways.way);
   ways.product = dot(travel.way_m, ways.way);
-  ways.travel_sq = dot(travel.way_m, travel.way_m);
+  ways.travel_sq = length_sq_of(travel.way_m);
   return ways;
 }
 
@@ -96,7 +96,7 @@ void read_sensors(const tv_odometry_frame& input, Frame* frame) {
     s->height_sigma_m = sigmas[1];
   }
   const double* v = input.velocity_m_s;
-  if (is_usable(sigmas[2]) && dot(v, v) <= kLargestMeasure * kLargestMeasure) {
+  if (is_usable(sigmas[2]) && length_sq_of(v) <= kLargestMeasure * kLargestMeasure) {
     std::copy_n(input.velocity_m_s, 3, s->velocity_m_s);
     s->velocity_sigma_m_s = sigmas[2];
   }

@@ -58,10 +58,10 @@ double depth_error_px(const Odometry& odometry, const MapPoint& point, const dou
     moved[k] = centre[k] - static_cast<double>(point.seen_from[k]);
     ray[k] = point.position[k] - static_cast<double>(point.seen_from[k]);
   }
-  const double length = std::sqrt(dot(ray, ray));
+  const double length = length_of(ray);
   if (!(length > 0)) return 0;
   cross(ray, moved, across);
-  const double shift = std::sqrt(dot(across, across)) / length;
+  const double shift = length_of(across) / length;
   const double error =
       odometry.camera.model.fx * shift * static_cast<double>(point.depth_sigma) / depth;
   return std::min(error, kLargestDepthError);
