@@ -64,13 +64,6 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   return tv_context_size(&plan->limits, &plan->context_bytes);
 }
 
-size_t frame_bytes(const Plan& plan) {
-  const size_t n = static_cast<size_t>(plan.options.max_keypoints);
-  const size_t cells = static_cast<size_t>(plan.columns) * static_cast<size_t>(plan.rows);
-  return arena_bytes<tv_keypoint>(n) + arena_bytes<uint8_t>(n * TV_DESCRIPTOR_BYTES) +
-         3 * arena_bytes<int32_t>(n) + arena_bytes<float>(n) + arena_bytes<int32_t>(cells + 1);
-}
-
 void make_frame(const Plan& plan, Arena& arena, Frame* frame) {
   const size_t n = static_cast<size_t>(plan.options.max_keypoints);
   const size_t cells = static_cast<size_t>(plan.columns) * static_cast<size_t>(plan.rows);
@@ -81,6 +74,13 @@ void make_frame(const Plan& plan, Arena& arena, Frame* frame) {
   frame->cell_items = arena_alloc<int32_t>(arena, n);
   frame->sigmas = arena_alloc<float>(arena, n);
   frame->cell_starts = arena_alloc<int32_t>(arena, cells + 1);
+}
+
+size_t frame_bytes(const Plan& plan) {
+  Frame frame;
+  Arena arena = measuring_arena();
+  make_frame(plan, arena, &frame);
+  return arena.used_bytes;
 }
 
 constexpr int kNumFrames = 2 + kNumStarts;

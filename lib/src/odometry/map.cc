@@ -43,17 +43,6 @@ void release_point(Map* map, int32_t point) {
 
 }  // namespace
 
-size_t map_bytes(const MapSizes& sizes) {
-  const size_t points = as_size(sizes.max_points);
-  return arena_bytes<MapKeyframe>(as_size(sizes.max_keyframes)) +
-         arena_bytes<MapKeypoint>(num_map_keypoints(sizes)) +
-         arena_bytes<int32_t>(as_size(sizes.max_keyframes)) + arena_bytes<MapPoint>(points) +
-         arena_bytes<uint8_t>(points * TV_DESCRIPTOR_BYTES) + arena_bytes<int32_t>(points) +
-         arena_bytes<uint32_t>(num_marks(sizes)) + arena_bytes<uint8_t>(num_described(sizes)) +
-         arena_bytes<double>(num_planes(sizes)) +
-         arena_bytes<RemovedKeyframe>(as_size(max_removed(sizes)));
-}
-
 void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   const size_t points = as_size(sizes.max_points);
   map->sizes = sizes;
@@ -67,7 +56,13 @@ void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   map->descriptors = arena_alloc<uint8_t>(arena, num_described(sizes));
   map->planes = arena_alloc<double>(arena, num_planes(sizes));
   map->removed = arena_alloc<RemovedKeyframe>(arena, as_size(max_removed(sizes)));
-  clear_map(map);
+}
+
+size_t map_bytes(const MapSizes& sizes) {
+  Map map;
+  Arena arena = measuring_arena();
+  make_map(sizes, arena, &map);
+  return arena.used_bytes;
 }
 
 void clear_map(Map* map) {

@@ -80,7 +80,7 @@ struct Map {
 inline int32_t max_removed(const MapSizes& sizes) { return 16 * sizes.max_keyframes; }
 
 size_t map_bytes(const MapSizes& sizes);
-void make_map(const MapSizes& sizes, Arena& arena, Map* map);
+void make_map(const MapSizes& sizes, Arena& arena, Map* map);  // its arrays; clear_map comes next
 void clear_map(Map* map);
 
 // The sigma of a keypoint's pixel, relative to that of a keypoint of the finest level.

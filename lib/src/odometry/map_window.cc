@@ -23,6 +23,21 @@ tv_window largest_window(const WindowSizes& sizes) {
   return window;
 }
 
+void take_arrays(const WindowSizes& sizes, int32_t max_points, Arena& arena, MapWindow* window) {
+  const size_t views = count_of(sizes.views), points = count_of(sizes.points);
+  const size_t observations = count_of(sizes.observations);
+  window->views = arena_alloc<tv_window_view>(arena, views);
+  window->keyframes = arena_alloc<int32_t>(arena, views);
+  window->points = arena_alloc<double>(arena, 3 * points);
+  window->places = arena_alloc<int32_t>(arena, points);
+  window->numbers = arena_alloc<int32_t>(arena, count_of(max_points));
+  window->observations = arena_alloc<tv_observation>(arena, observations);
+  window->keypoints = arena_alloc<int32_t>(arena, observations);
+  window->planes = arena_alloc<double>(arena, 2 * observations);
+  window->gravity = arena_alloc<tv_gravity_prior>(arena, views);
+  window->errors = arena_alloc<float>(arena, observations);
+}
+
 void add_observations_of(const Odometry& odometry, int32_t view, MapWindow* window) {
   const Map& map = odometry.map;
   const MapKeyframe& keyframe = map.keyframes[window->keyframes[view]];
@@ -86,34 +101,19 @@ void measure_depths(const MapWindow& window, Odometry* odometry) {
 }  // namespace
 
 size_t map_window_bytes(const tv_odometry_options& options, const WindowSizes& sizes) {
-  const size_t views = count_of(sizes.views), points = count_of(sizes.points);
-  const size_t observations = count_of(sizes.observations);
-  return arena_bytes<tv_window_view>(views) + arena_bytes<int32_t>(views) +
-         arena_bytes<double>(3 * points) + arena_bytes<int32_t>(points) +
-         arena_bytes<int32_t>(count_of(options.max_points)) +
-         arena_bytes<tv_observation>(observations) + arena_bytes<int32_t>(observations) +
-         arena_bytes<double>(2 * observations) + arena_bytes<tv_gravity_prior>(views) +
-         arena_bytes<float>(observations) + window_scratch_bytes(largest_window(sizes));
+  MapWindow window{};
+  Arena arena = measuring_arena();
+  take_arrays(sizes, options.max_points, arena, &window);
+  return arena.used_bytes + window_scratch_bytes(largest_window(sizes));
 }
 
 MapWindow make_map_window(const Odometry& odometry, const WindowSizes& sizes, Arena& arena) {
-  const size_t views = count_of(sizes.views), points = count_of(sizes.points);
-  const size_t observations = count_of(sizes.observations);
   const int32_t places = odometry.options.max_points;
   MapWindow window{};
   window.sizes = sizes;
   window.damping = WindowStart{}.damping;
   tv_window_init(&window.model);
-  window.views = arena_alloc<tv_window_view>(arena, views);
-  window.keyframes = arena_alloc<int32_t>(arena, views);
-  window.points = arena_alloc<double>(arena, 3 * points);
-  window.places = arena_alloc<int32_t>(arena, points);
-  window.numbers = arena_alloc<int32_t>(arena, count_of(places));
-  window.observations = arena_alloc<tv_observation>(arena, observations);
-  window.keypoints = arena_alloc<int32_t>(arena, observations);
-  window.planes = arena_alloc<double>(arena, 2 * observations);
-  window.gravity = arena_alloc<tv_gravity_prior>(arena, views);
-  window.errors = arena_alloc<float>(arena, observations);
+  take_arrays(sizes, places, arena, &window);
   std::fill(window.numbers, window.numbers + places, -1);
   return window;
 }
