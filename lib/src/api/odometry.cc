@@ -8,6 +8,7 @@
 #include "api/sized.h"
 #include "api/validate.h"
 #include "api/within.h"
+#include "geometry/vector3.h"
 #include "odometry/adjust.h"
 #include "odometry/adjust_segment.h"
 #include "odometry/fit_pose.h"
@@ -311,9 +312,7 @@ tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
                                {reference_from_cam_R, 72},
                                {reference_from_cam_t, 24}};
   if (tv::outputs_overlap(arrays, 3, 5)) return TV_ERR_OVERLAP;
-  tv::Rigid pose;
-  std::copy_n(reference_from_cam_R, 9, pose.R);
-  std::copy_n(reference_from_cam_t, 3, pose.t);
+  tv::Rigid pose = tv::rigid_of(reference_from_cam_R, reference_from_cam_t);
   const tv::Map& map = odometry->map;
   int32_t id = reference_id;
 
@@ -322,16 +321,15 @@ tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
     int32_t n = 0;
     while (n < map.num_removed && map.removed[n].id != id) ++n;
     if (n == map.num_removed) return TV_ERR_ARGUMENT;
-    for (double& x : pose.t) x *= map.removed[n].scale;
+    tv::scale_by(map.removed[n].scale, pose.t);
     pose = tv::compose(map.removed[n].kept_from_removed, pose);
     id = map.removed[n].kept_id;
     k = tv::find_keyframe(map, id);
   }
   if (k < 0) return TV_ERR_ARGUMENT;
-  for (double& x : pose.t) x *= map.keyframes[k].scale;
+  tv::scale_by(map.keyframes[k].scale, pose.t);
   pose = tv::compose(tv::inverse(map.keyframes[k].cam_from_world), pose);
-  std::copy_n(pose.R, 9, R);
-  std::copy_n(pose.t, 3, t);
+  tv::write_rigid(pose, R, t);
   if (segment != nullptr) *segment = map.keyframes[k].segment;
   return TV_OK;
 }

@@ -69,8 +69,7 @@ tv_status tv_odometry_keyframe(const tv_odometry* odometry, int32_t idx, tv_keyf
   packed.segment = k.segment;
   packed.frame = k.frame;
   packed.time_s = k.time_s;
-  std::copy_n(world_from_cam.R, 9, packed.world_from_cam_R);
-  std::copy_n(world_from_cam.t, 3, packed.world_from_cam_t);
+  tv::write_rigid(world_from_cam, packed.world_from_cam_R, packed.world_from_cam_t);
   packed.num_keypoints = k.num_keypoints;
   packed.num_observations = k.num_observations;
   tv::write_sized(packed, keyframe);

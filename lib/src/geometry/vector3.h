@@ -25,6 +25,10 @@ inline void cross(const double a[3], const double b[3], double product[3]) {
   product[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+inline void scale_by(double factor, double v[3]) {
+  for (int k = 0; k < 3; ++k) v[k] *= factor;
+}
+
 inline void rotate(const Mat3& R, const double v[3], double rotated[3]) {
   for (int r = 0; r < 3; ++r) rotated[r] = (R(r, 0) * v[0] + R(r, 1) * v[1]) + R(r, 2) * v[2];
 }

@@ -253,7 +253,7 @@ int absolute_pose_3pt(const double rays_in[3][3], const double points_in[3][3],
     double scale = std::sqrt(sides / sum_sq);
     if (d[0] < 0) scale = -scale;
     if (!is_finite(scale)) continue;
-    for (int k = 0; k < 3; ++k) d[k] *= scale;
+    scale_by(scale, d);
     if (!(d[0] > 0 && d[1] > 0 && d[2] > 0)) continue;
     polish(triangle, d);
     double at[3][3], camera[3][3];

@@ -66,8 +66,7 @@ void finish(Odometry* odometry, const AbsolutePoseSearch& found, const FrameMatc
   estimate->num_matches = matches.input.num;
   finish_absolute_pose(matches.input, matches.sightings, matches.options, found, odometry->scratch,
                        estimate, matches.is_inlier);
-  std::copy_n(estimate->R, 9, fit->cam_from_world.R);
-  std::copy_n(estimate->t, 3, fit->cam_from_world.t);
+  fit->cam_from_world = rigid_of(estimate->R, estimate->t);
 }
 
 void count_inliers(const Pose& pose, const FrameMatches& matches, PoseFit* fit) {

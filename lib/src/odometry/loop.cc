@@ -5,6 +5,7 @@
 
 #include "base/math.h"
 #include "base/order.h"
+#include "geometry/vector3.h"
 #include "odometry/adjust.h"
 #include "odometry/adjust_segment.h"
 #include "odometry/fit_pose.h"
@@ -91,7 +92,7 @@ bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end) {
   odometry->weak_loop = {frame.number, frame.cam_from_world, end.cam_from_world};
   if (before.frame < 0 || frame.number - before.frame > kMostFramesBetween) return false;
   Rigid moved = motion_between(before.cam_from_world, frame.cam_from_world);
-  for (double& t : moved.t) t *= end.scale;
+  scale_by(end.scale, moved.t);
   const Rigid expected = compose(moved, before.end_from_world);
   return are_near(expected, end.cam_from_world, kWeakWay * odometry->median_depth, kWeakTurn);
 }
@@ -247,7 +248,7 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
     if (segment == old_segment && k <= end.keyframe) continue;
     // As the loop's end says: the way from the newest keyframe, in the other scale.
     Rigid relative = motion_between(now, own.cam_from_world);
-    for (double& t : relative.t) t *= end.scale;
+    scale_by(end.scale, relative.t);
     const Rigid from_end = compose(relative, end.cam_from_world);
     const double share = segment == old_segment ? 1 - paths[k] / whole : 1;
     moved[k] = blend(own.cam_from_world, from_end, end.scale, share);

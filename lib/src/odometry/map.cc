@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "geometry/vector3.h"
+
 namespace tv {
 namespace {
 
@@ -198,10 +200,8 @@ void move_keyframes(Map* map, const MovedKeyframe* moved) {
                             static_cast<double>(point.seen_from[2])};
     transform(map->keyframes[k].cam_from_world, point.position, x);
     transform(map->keyframes[k].cam_from_world, from, seen);
-    for (int c = 0; c < 3; ++c) {
-      x[c] *= moved[k].scale;
-      seen[c] *= moved[k].scale;
-    }
+    scale_by(moved[k].scale, x);
+    scale_by(moved[k].scale, seen);
     transform(world_from_cam, x, point.position);
     transform(world_from_cam, seen, seen);
     for (int c = 0; c < 3; ++c) point.seen_from[c] = static_cast<float>(seen[c]);

@@ -122,9 +122,7 @@ void add_view(const Map& map, int32_t keyframe, bool fixed, MapWindow* window) {
   const int32_t v = window->model.num_views++;
   window->keyframes[v] = keyframe;
   tv_window_view* view = &window->views[v];
-  const Rigid& pose = map.keyframes[keyframe].cam_from_world;
-  std::copy_n(pose.R, 9, view->R);
-  std::copy_n(pose.t, 3, view->t);
+  write_rigid(map.keyframes[keyframe].cam_from_world, view->R, view->t);
   view->idx_camera = 0;
   view->fixed = fixed;
 }
@@ -169,10 +167,7 @@ bool adjust_map_window(const Odometry& odometry, MapWindow* window, Arena& arena
 }
 
 Rigid pose_of(const MapWindow& window, int32_t view) {
-  Rigid pose;
-  std::copy_n(window.views[view].R, 9, pose.R);
-  std::copy_n(window.views[view].t, 3, pose.t);
-  return pose;
+  return rigid_of(window.views[view].R, window.views[view].t);
 }
 
 void keep_positions(const MapWindow& window, Map* map) {

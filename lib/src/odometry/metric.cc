@@ -30,17 +30,17 @@ void rescale(Odometry* odometry, double scale, Frame* frame) {
   for (int32_t k = 0; k < map.num_keyframes; ++k) {
     MapKeyframe& keyframe = map.keyframes[k];
     if (keyframe.segment != odometry->segment) continue;
-    for (double& t : keyframe.cam_from_world.t) t *= scale;
+    scale_by(scale, keyframe.cam_from_world.t);
     keyframe.scale *= scale;
   }
   for (int32_t p = 0; p < map.end_points; ++p) {
     MapPoint& point = map.points[p];
     if (point.id < 0 || point.segment != odometry->segment) continue;
-    for (double& x : point.position) x *= scale;
+    scale_by(scale, point.position);
     for (float& x : point.seen_from) x = static_cast<float>(static_cast<double>(x) * scale);
   }
-  for (double& t : frame->cam_from_world.t) t *= scale;
-  for (double& t : odometry->motion.t) t *= scale;
+  scale_by(scale, frame->cam_from_world.t);
+  scale_by(scale, odometry->motion.t);
   odometry->median_depth *= scale;
 }
 

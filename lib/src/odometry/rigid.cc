@@ -9,6 +9,18 @@
 
 namespace tv {
 
+Rigid rigid_of(const double R[9], const double t[3]) {
+  Rigid rigid;
+  std::copy_n(R, 9, rigid.R);
+  std::copy_n(t, 3, rigid.t);
+  return rigid;
+}
+
+void write_rigid(const Rigid& rigid, double R[9], double t[3]) {
+  std::copy_n(rigid.R, 9, R);
+  std::copy_n(rigid.t, 3, t);
+}
+
 void transform(const Rigid& rigid, const double X[3], double x[3]) {
   const double* R = rigid.R;
   const double y[3] = {dot(R, X) + rigid.t[0], dot(R + 3, X) + rigid.t[1],

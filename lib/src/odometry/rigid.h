@@ -13,6 +13,9 @@ struct Rigid {
 
 inline constexpr Rigid kIdentity = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
 
+Rigid rigid_of(const double R[9], const double t[3]);
+void write_rigid(const Rigid& rigid, double R[9], double t[3]);
+
 void transform(const Rigid& rigid, const double X[3], double x[3]);
 Rigid compose(const Rigid& outer, const Rigid& inner);  // x = outer(inner(X))
 Rigid inverse(const Rigid& rigid);

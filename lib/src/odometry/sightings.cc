@@ -165,7 +165,7 @@ void set_fast(Sightings* s) {
 void unit_ray(const Sighting& s, double ray[3]) {
   cross(s.rows[0], s.rows[1], ray);
   const double length = length_of(ray), scale = 1 / (dot(ray, s.axis) < 0 ? -length : length);
-  for (int k = 0; k < 3; ++k) ray[k] *= scale;
+  scale_by(scale, ray);
 }
 
 void write_pose(const Sightings& s, const Pose& pose, double R[9], double t[3]) {

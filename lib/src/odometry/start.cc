@@ -45,9 +45,7 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
     std::copy_n(frame0->sensors.world_from_cam, 9, frame0->cam_from_world.R);
     frame0->cam_from_world = inverse(frame0->cam_from_world);
   }
-  Rigid relative;
-  std::copy_n(pair.view->R, 9, relative.R);
-  std::copy_n(pair.view->t, 3, relative.t);
+  const Rigid relative = rigid_of(pair.view->R, pair.view->t);
   frame->cam_from_world = compose(relative, frame0->cam_from_world);
   forget_points(frame);
   make_room(odometry, 2);

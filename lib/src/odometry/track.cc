@@ -197,7 +197,7 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& ima
       if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
     close_loop(odometry, newest, *again, end);
-    for (double& t : odometry->motion.t) t *= end.scale;
+    scale_by(end.scale, odometry->motion.t);
     ++odometry->num_loops;
     state->loop_closed = 1;
   }
@@ -261,8 +261,7 @@ void write_pose(const Odometry& odometry, const Frame& frame, tv_odometry_state*
   for (int c = 0; c < 3; ++c) {
     state->reference_from_cam_t[c] = relative.t[c] / map.keyframes[k].scale;
   }
-  std::copy_n(world_from_cam.R, 9, state->world_from_cam_R);
-  std::copy_n(world_from_cam.t, 3, state->world_from_cam_t);
+  write_rigid(world_from_cam, state->world_from_cam_R, state->world_from_cam_t);
 }
 
 void write_fit(const PoseFit& fit, tv_odometry_state* state) {

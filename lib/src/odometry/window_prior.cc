@@ -54,7 +54,7 @@ void rotation_vector(const double R[9], double w[3], double jacobian[9]) {
     for (int i = 0; i < 3; ++i) w[i] = column[i] * scale;
   } else if (sine > 0.0) {
     const double scale = angle / sine;
-    for (int i = 0; i < 3; ++i) w[i] *= scale;
+    scale_by(scale, w);
   }
   if (angle > 1e-3) square = 1.0 / (angle * angle) - (1.0 + cosine) / (2.0 * angle * sine);
   if (near_half_turn) square = 1.0 / (angle * angle);
