@@ -294,21 +294,30 @@ bool has_second_model(Fit& f, Arena& arena) {
 }
 
 // Examines the neighbours of all points where there is a second model, else those of the inliers.
+// These count only where more than half of them, in the mean of both images, are as on a lattice
+// (robust/verdict.cc). Where that cannot be, as for most pairs, both measures stay 0.
 void measure_lattices(Fit& f, Arena& arena) {
   ArenaScope scope(arena);
   Evidence& evidence = f.out->evidence;
   const int n = f.matches.num_unique();
-  double* xy = arena_alloc<double>(arena, 2 * static_cast<size_t>(n));
+  double* const xy[2] = {arena_alloc<double>(arena, 2 * static_cast<size_t>(n)),
+                         arena_alloc<double>(arena, 2 * static_cast<size_t>(n))};
   int count = 0;
   for (int i = 0; i < n; ++i) {
     if (f.out->inlier[i] != 0) f.indices[count++] = i;
+    for (int v = 0; v < 2; ++v) {
+      for (int d = 0; d < 2; ++d) {
+        xy[v][2 * i + d] = f.problem.pixels[v][2 * f.matches.order[i] + d];
+      }
+    }
+  }
+  if (!evidence.has_second_model) {
+    const double first = opposite_share(xy[0], n, f.indices, count, 0, arena);
+    if (opposite_share(xy[1], n, f.indices, count, 1 - first, arena) <= 1 - first) return;
   }
   for (int v = 0; v < 2; ++v) {
-    for (int i = 0; i < n; ++i) {
-      for (int d = 0; d < 2; ++d) xy[2 * i + d] = f.problem.pixels[v][2 * f.matches.order[i] + d];
-    }
     const Lattice lattice =
-        find_lattice(xy, n, evidence.has_second_model ? nullptr : f.indices, count, arena);
+        find_lattice(xy[v], n, evidence.has_second_model ? nullptr : f.indices, count, arena);
     evidence.lattice_share[v] = lattice.share;
     evidence.lattice_sigmas[v] = lattice.sigmas;
   }
@@ -319,7 +328,7 @@ void measure_lattices(Fit& f, Arena& arena) {
 size_t evidence_bytes(int max_matches) {
   const size_t n = static_cast<size_t>(max_matches);
   const size_t second = arena_bytes<uint8_t>(n) + second_model_bytes(max_matches);
-  const size_t lattice = arena_bytes<double>(2 * n) + lattice_bytes(max_matches);
+  const size_t lattice = 2 * arena_bytes<double>(2 * n) + lattice_bytes(max_matches);
   return std::max(second, lattice);
 }
 

@@ -145,6 +145,39 @@ int count_partners(const Grid& grid, Place from, const Nearest& nearest, double 
   return partners;
 }
 
+struct Counts {
+  int neighbours = 0, opposite = 0, control = 0;
+};
+
+// Counts the partners of the neighbours: of the listed points, or of all if listed is null. Without
+// `bound`, also those of the control; with it, ends with zeros as soon as at most `bound` of the
+// neighbours can have an opposite partner.
+Counts count_all(const double* xy, int num, const int32_t* listed, int num_listed,
+                 const double* bound, Arena& arena) {
+  Counts counts;
+  const int asked = listed != nullptr ? num_listed : num;
+  if (asked == 0 || num < 3) return counts;
+  ArenaScope scope(arena);
+  const Grid grid = make_grid(xy, num, arena);
+  const int taken = std::min(asked, listed != nullptr ? kMostListed : kMostAsked);
+  for (int k = 0; k < taken; ++k) {
+    const int left = kNeighbours * (taken - k);
+    if (bound != nullptr && counts.opposite + left <= *bound * (counts.neighbours + left)) {
+      return {};
+    }
+    const int place = static_cast<int>(static_cast<int64_t>(k) * asked / taken);
+    const int i = listed != nullptr ? listed[place] : place;
+    const Place from{xy[2 * i], xy[2 * i + 1]};
+    const Nearest nearest = nearest_points(grid, from);
+    counts.neighbours += nearest.num;
+    counts.opposite += count_partners(grid, from, nearest, -1, 0);
+    if (bound == nullptr) {
+      counts.control += count_partners(grid, from, nearest, kControlCosine, kControlSine);
+    }
+  }
+  return counts;
+}
+
 }  // namespace
 
 size_t lattice_bytes(int max_points) {
@@ -153,27 +186,18 @@ size_t lattice_bytes(int max_points) {
          arena_bytes<Place>(static_cast<size_t>(max_points));
 }
 
+double opposite_share(const double* xy, int num, const int32_t* listed, int num_listed,
+                      double least, Arena& arena) {
+  const Counts counts = count_all(xy, num, listed, num_listed, &least, arena);
+  return counts.opposite > 0 ? static_cast<double>(counts.opposite) / counts.neighbours : 0;
+}
+
 Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_listed,
                      Arena& arena) {
-  const int asked = listed != nullptr ? num_listed : num;
-  if (asked == 0 || num < 3) return {0, 0};
-  ArenaScope scope(arena);
-  const Grid grid = make_grid(xy, num, arena);
-  const int most = listed != nullptr ? kMostListed : kMostAsked;
-  const int taken = asked < most ? asked : most;
-  int opposite = 0, control = 0, num_neighbours = 0;
-  for (int k = 0; k < taken; ++k) {
-    const int place = static_cast<int>(static_cast<int64_t>(k) * asked / taken);
-    const int i = listed != nullptr ? listed[place] : place;
-    const Place from{xy[2 * i], xy[2 * i + 1]};
-    const Nearest nearest = nearest_points(grid, from);
-    opposite += count_partners(grid, from, nearest, -1, 0);
-    control += count_partners(grid, from, nearest, kControlCosine, kControlSine);
-    num_neighbours += nearest.num;
-  }
-  if (opposite <= control) return {0, 0};
-  const double excess = opposite - control;
-  return {excess / num_neighbours, excess / std::sqrt(1.0 + opposite + control)};
+  const Counts counts = count_all(xy, num, listed, num_listed, nullptr, arena);
+  if (counts.opposite <= counts.control) return {0, 0};
+  const double excess = counts.opposite - counts.control;
+  return {excess / counts.neighbours, excess / std::sqrt(1.0 + counts.opposite + counts.control)};
 }
 
 }  // namespace tv

@@ -22,4 +22,10 @@ Lattice find_lattice(const double* xy, int num, const int32_t* listed, int num_l
                      Arena& arena);
 size_t lattice_bytes(int max_points);
 
+// The share of the neighbours of the listed points that have another point at the opposite place, a
+// bound of find_lattice's share in half of its time; 0 as soon as it is known to be at most
+// `least`.
+double opposite_share(const double* xy, int num, const int32_t* listed, int num_listed,
+                      double least, Arena& arena);
+
 }  // namespace tv
