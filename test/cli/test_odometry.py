@@ -683,7 +683,7 @@ distortion_coefficients: [0, 0, 0, 0]
 
         refused("nowhere", "neither a folder", where="nowhere")
         refused("no film", where=self.write("film.avi", "no film"))
-        refused("--camera is required", where="0")
+        refused("--camera is required, or --focal-35mm: a camera", where="0")
         refused("it is empty", text="")
         refused("no frame in it", text="# none\n")
         refused("line 2", "not a time and a file's name", text="0 a.png\n1\n")
@@ -723,7 +723,8 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assert_refused(self.odometry(source / "images"), "--fps is required")
         (self.folder / "void").mkdir()
         self.assert_refused(self.odometry("void"), "neither frames.txt")
-        self.assert_refused(self.run_program("odometry", "-o", self.out), "SOURCE is required")
+        self.assert_refused(self.run_program("odometry", "-o", self.out), "SOURCE is required",
+                            "(see twoview odometry --help)")
         for i in range(3):
             self.write(f"kitti/image_0/{i}.png", PICTURES[i])
         self.write("kitti/times.txt", "0\n1\n")
