@@ -311,6 +311,13 @@ class Arguments(cli.CliTest):
         self.assert_refused(self.run_program("reconstruct", self.a, "-o", self.out), "B")
         self.assert_refused(self.run_program("detect", self.a), "-o")
 
+    def test_the_folder_of_a_calibration_is_answered_with_its_camera(self):
+        self.write("mine/camera.yaml", camera_yaml())
+        self.assert_refused(self.reconstruct("--camera", "mine", camera=False),
+                            "it is a folder; its camera is mine/camera.yaml")
+        self.assert_refused(self.reconstruct("--camera", self.folder, camera=False),
+                            "it is a folder\n")
+
     def test_a_misspelt_option_or_verb_is_named_beside_what_is_near_it(self):
         run = ("reconstruct", self.a, self.b)
         help_ = "(see twoview reconstruct --help)"

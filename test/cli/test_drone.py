@@ -211,7 +211,7 @@ class Drone(unittest.TestCase):
                             "the recording is 640x360, but camera", "for 640x480", "same video")
         # Another run into the same folder must not change the recording.
         again = run("record", "--duration", "1", "-o", self.output, *drone.ports())
-        self.assert_refused(again, "holds a recording already")
+        self.assert_refused(again, "holds a recording already: name another folder")
         self.assertEqual(summary, self.summary())
 
     def test_a_bad_link_costs_packets_and_nothing_else(self):

@@ -16,10 +16,9 @@ namespace {
 // The open files of a recording, which the destructor closes.
 struct Replay {
   explicit Replay(const std::string& folder) {
-    const tvs_status status = ardrone_replay_open(&files, folder.c_str(), &transport);
-    if (status != TVS_OK)
-      throw BadInput("no recording in " + folder +
-                     " (navdata.log, video.pave): " + tvs_status_string(status));
+    if (ardrone_replay_open(&files, folder.c_str(), &transport) != TVS_OK)
+      throw BadInput("no recording in " + folder + ": neither navdata.log, video.pave nor " +
+                     "vehicle.tlog is there");
   }
   ~Replay() { ardrone_replay_close(&files); }
   Replay(const Replay&) = delete;
