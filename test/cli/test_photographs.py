@@ -94,6 +94,8 @@ class Exif(cli.CliTest):
         self.a, self.b = self.photographs(exif(**film(FOCAL_35MM)))
         self.succeed(self.reconstruct(camera=False))
         page = (self.out / "report.html").read_text()
+        # With blanks, where a narrow page breaks the line, and not within a name.
+        self.assertIn("<h1>a.png <small>and</small> b.png</h1>", page)
         self.assertIn("<li>focal length 32 mm (35 mm equivalent) from EXIF; "
                       "--camera is better</li>",
                       page.split("<main>")[0])
