@@ -236,7 +236,7 @@ class Cameras(cli.CliTest):
         self.refuse_camera("image_width: 320\nimage_height: [240\n", "line")
 
     def test_no_camera_is_refused_where_the_method_needs_one(self):
-        self.assert_refused(self.reconstruct(camera=False), "five-point", "--camera")
+        self.assert_refused(self.reconstruct(camera=False), "no camera is known", "--camera")
         done = self.reconstruct("--camera0", self.camera, camera=False)
         self.assert_refused(done, "--camera1")
         self.assert_refused(self.reconstruct("--camera0", self.camera), "not both")
@@ -310,6 +310,36 @@ class Arguments(cli.CliTest):
         self.assert_refused(self.run_program())
         self.assert_refused(self.run_program("reconstruct", self.a, "-o", self.out), "B")
         self.assert_refused(self.run_program("detect", self.a), "-o")
+
+    def test_the_folder_of_a_calibration_is_answered_with_its_camera(self):
+        self.write("mine/camera.yaml", camera_yaml())
+        self.assert_refused(self.reconstruct("--camera", "mine", camera=False),
+                            "it is a folder; its camera is mine/camera.yaml")
+        self.assert_refused(self.reconstruct("--camera", self.folder, camera=False),
+                            "it is a folder\n")
+
+    def test_a_misspelt_option_or_verb_is_named_beside_what_is_near_it(self):
+        run = ("reconstruct", self.a, self.b)
+        help_ = "(see twoview reconstruct --help)"
+        for words, *told in (
+                # Named before what is missing: -o.
+                ((*run, "--focal", "26"),
+                 "no option --focal; did you mean --focal-35mm or --focal-sigma? " + help_),
+                ((*run, "--focal_35mm=26", "-o", self.out), "did you mean --focal-35mm? "),
+                ((*run, "--output-dir", self.out), "did you mean --output? "),
+                ((*run, "--colour", "red", "-o", self.out), "no option --colour " + help_),
+                ((*run, "-f", "26", "-o", self.out), "no option -f " + help_),
+                ((*run, "c.png", "d.png", "-o", self.out), "not expected: c.png d.png " + help_),
+                ((), "a verb is required: reconstruct, detect, ", " (see twoview --help)"),
+                (("map",), "a verb is required after map: info, export or merge (see twoview map "),
+                (("reconstuct", self.a, self.b), "no verb 'reconstuct'; did you mean reconstruct?"),
+                (("unknown", "--help"), "no verb 'unknown' (see twoview --help)"),
+                (("map", "inf", "x.twm"), "no verb 'map inf'; did you mean info? (see twoview map ")
+        ):
+            with self.subTest(words=words):
+                self.assert_refused(self.run_program(*words), *told)
+        self.succeed(self.reconstruct("--gravity0=-0.1,1,0", "--gravity1", "-0.1,1,0",
+                                      "--gravity-sigma-deg", "5"))
 
     def test_kernels_that_this_machine_lacks_are_refused(self):
         wrong = "neon" if os.uname().machine == "x86_64" else "avx2"

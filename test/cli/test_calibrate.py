@@ -6,6 +6,7 @@ import os
 import sys
 import time
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import cli_support as cli
@@ -333,6 +334,21 @@ class Views(CalibrateTest):
         self.refuse(*self.names, board="8x5", words=["in 8 images", "--board 9x6"])
         self.calibrated(*self.names, board="6x9")
 
+    def test_a_larger_board_in_some_views_is_noted_where_the_others_serve(self):
+        rng = np.random.default_rng(11)
+        with unittest.mock.patch.object(boards, "INNER", (10, 7)):
+            wide = [self.save(f"w{i}.png", boards.render(self.rays, R, 1.4 * t, rng))
+                    for i, (R, t) in enumerate(self.poses[:2])]
+        done = self.succeed(self.calibrate(*self.names, *wide))
+        self.assertIn(b"\nnote         2 views show a board of 10x7 inner corners: "
+                      b"is it --board 10x7?\n", done.stdout)
+        done = self.succeed(self.calibrate(*self.names, wide[0], "--json"))
+        self.assertIn(b"note: 1 view shows a board of 10x7", done.stderr)
+        self.assertNotIn(b"note  ", self.succeed(self.calibrate(*self.names)).stdout)
+
+    def test_a_folder_in_place_of_its_pictures(self):
+        self.refuse(self.folder, words=["is a folder", f"{self.folder}/*.jpg"])
+
     def test_images_of_different_sizes(self):
         small = self.save("small.png", cv2.resize(self.images[0], (320, 240)))
         self.refuse(
@@ -340,7 +356,7 @@ class Views(CalibrateTest):
         )
 
     def test_one_view_only(self):
-        self.refuse(self.names[0], words=["only 1 different view", "at least 3"])
+        self.refuse(self.names[0], words=["only 1 different view", "in 1 image:", "at least 3"])
         self.refuse(*self.names[:2], words=["only 2 different views", "at least 3"])
 
     def test_all_views_alike(self):

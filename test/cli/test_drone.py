@@ -139,6 +139,19 @@ class Drone(unittest.TestCase):
             result = run("simulate", "--at-port", drone.port["commands"], "--duration", "1")
             self.assert_refused(result, "port " + drone.port["commands"], "in use")
 
+    def test_the_lens_is_written_as_a_camera_file(self):
+        texts = []
+        for more in ([], ["--camera", self.path("lens0.yaml")]):
+            lens = self.path(f"lens{len(texts)}.yaml")
+            ports = [word for c in ("at", "navdata", "video", "control", "recording")
+                     for word in (f"--{c}-port", "0")]
+            result = run("simulate", *ports, "--duration", "0.1", "--write-camera", lens, *more)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            texts.append(pathlib.Path(lens).read_text())
+        self.assertEqual(*texts)
+        self.assertIn("568, 0, 320, 0, 567, 180, 0, 0, 1", " ".join(texts[0].split()))
+        self.assertIn("-0.52, 0.27, 0, 0, 0", " ".join(texts[0].split()))
+
     def test_a_recording_holds_what_was_sent(self):
         with Simulator() as drone:
             result = run("record", "--duration", "4", "-o", self.output, "--frames", "--json",
@@ -198,7 +211,7 @@ class Drone(unittest.TestCase):
                             "the recording is 640x360, but camera", "for 640x480", "same video")
         # Another run into the same folder must not change the recording.
         again = run("record", "--duration", "1", "-o", self.output, *drone.ports())
-        self.assert_refused(again, "holds a recording already")
+        self.assert_refused(again, "holds a recording already: name another folder")
         self.assertEqual(summary, self.summary())
 
     def test_a_bad_link_costs_packets_and_nothing_else(self):

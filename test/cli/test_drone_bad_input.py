@@ -124,9 +124,17 @@ class DroneBadInput(unittest.TestCase):
                 run("info", "--duration", "2", *host.ports()), "no AR.Drone answers"
             )
             self.assert_refused(
-                run("record", "-o", self.path("r"), "--duration", "2", "--quiet", *host.ports()),
+                run("record", "-o", self.path("r"), "--duration", "2", "--frames", *host.ports()),
                 "nothing came from",
             )
+            # Nothing is left, so that the same command serves when the drone is there.
+            self.assertFalse(os.path.exists(self.path("r")))
+            os.mkdir(self.path("r"))
+            self.assert_refused(
+                run("record", "-o", self.path("r"), "--duration", "1", *host.ports()),
+                "nothing came from",
+            )
+            self.assertEqual(os.listdir(self.path("r")), [])
             self.assertEqual(host.commands, [])
 
     def test_an_unknown_firmware(self):

@@ -221,6 +221,25 @@ class Evaluate(cli.CliTest):
         shutil.rmtree(self.out)
         self.assert_refused(self.evaluate(pair_line()), "cameras.yaml")
 
+    def test_a_camera_file_serves_a_list_of_names(self):
+        expected = self.report(pair_line())["pairs"][0]
+        self.write("set/cameras.yaml", "not: read\n")
+        camera = self.write("mine.yaml", cli.camera_yaml())
+        names = "a.png b.png\n"
+        half = [v / 2 for v in K[:8]] + [1]
+        for text in (names, pair_line(K0=half, K1=half)):  # the file comes before the list's K
+            found = self.report(text, "--camera", camera)
+            self.assertEqual(found["options"]["camera"], str(camera))
+            for key in ("num_matches", "num_inliers", "verdict", "covariance"):
+                self.assertEqual(found["pairs"][0][key], expected[key], key)
+        (self.folder / "set" / "cameras.yaml").unlink()
+        self.assertIsNone(self.report(pair_line())["options"]["camera"])
+        self.assert_refused(self.evaluate(names, out=self.folder / "new"), "no K", "--camera",
+                            out=self.folder / "new")
+        small = self.write("small.yaml", cli.camera_yaml(WIDTH // 2, HEIGHT // 2))
+        done = self.evaluate(names, "--camera", small, out=self.folder / "new")
+        self.assert_refused(done, "small.yaml", "160x120", out=self.folder / "new")
+
     def test_a_camera_of_another_size_is_told_for_its_pair(self):
         self.write(
             "set/cameras.yaml",

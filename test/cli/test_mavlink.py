@@ -224,6 +224,7 @@ class Mavlink(unittest.TestCase):
             self.assert_refused(run(*info, self.address), "another program has this port")
         for wrong in ("tcp://127.0.0.1:5760", "udp://127.0.0.1", "udp://:99999", "udpout://:14550"):
             self.assert_refused(run(*info, wrong), wrong)
+        self.assert_refused(run(*info, "/dev/ttyAMA0"), "a serial line needs a router to UDP")
         record = ("drone", "record", "--mavlink", self.address, "-o", self.folder / "new")
         self.assert_refused(run(*record, "--camera-source", "no_such_film.avi"), "no_such_film.avi")
         self.assertFalse((self.folder / "new").exists())

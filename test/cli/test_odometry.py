@@ -466,6 +466,19 @@ distortion_coefficients: [0, 0, 0, 0]
             self.assertIn(done.returncode, (0, 3), done.stderr.decode())  # the film begins again
             self.assertGreater(result["num_frames"], 12)
             self.assertGreater(result["num_tracked"], 8)
+        # A recording is played by the clock that it was recorded by: the same each time, and what
+        # is read in one playing belongs to the pictures of the next.
+        texts = [(self.out / name).read_bytes() for name in ("trajectory.txt", "keyframes.txt")]
+        self.odometry("flown", *camera)
+        self.assertEqual(texts, [(self.out / name).read_bytes()
+                                 for name in ("trajectory.txt", "keyframes.txt")])
+        lines = (self.folder / "flown" / "frames.txt").read_text().splitlines()
+        recorded = [1e-9 * int(line.split()[0]) for line in lines]
+        rows = (self.out / "frames.csv").read_text().splitlines()[1:]
+        for row in rows:
+            number = int(row.split(",")[1][len("frame_"):-len(".png")])
+            at = [t for t, line in zip(recorded, lines) if int(line.split()[2]) == number]
+            self.assertAlmostEqual(float(row.split(",")[0]), at[0], delta=1)
         # How far it is, on a terminal.
         _, shown = self.on_terminal("odometry", "flown", *camera, "-o", self.out)
         self.assertRegex(shown, rb"\r\033\[K\d+ of \d+ frames, ")
@@ -683,7 +696,7 @@ distortion_coefficients: [0, 0, 0, 0]
 
         refused("nowhere", "neither a folder", where="nowhere")
         refused("no film", where=self.write("film.avi", "no film"))
-        refused("--camera is required", where="0")
+        refused("--camera is required, or --focal-35mm: a camera", where="0")
         refused("it is empty", text="")
         refused("no frame in it", text="# none\n")
         refused("line 2", "not a time and a file's name", text="0 a.png\n1\n")
@@ -723,7 +736,8 @@ distortion_coefficients: [0, 0, 0, 0]
         self.assert_refused(self.odometry(source / "images"), "--fps is required")
         (self.folder / "void").mkdir()
         self.assert_refused(self.odometry("void"), "neither frames.txt")
-        self.assert_refused(self.run_program("odometry", "-o", self.out), "SOURCE is required")
+        self.assert_refused(self.run_program("odometry", "-o", self.out), "SOURCE is required",
+                            "(see twoview odometry --help)")
         for i in range(3):
             self.write(f"kitti/image_0/{i}.png", PICTURES[i])
         self.write("kitti/times.txt", "0\n1\n")

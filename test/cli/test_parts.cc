@@ -145,6 +145,49 @@ void test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibrati
   TEST_ASSERT_FALSE(calibrates(0, 0.5));
 }
 
+// The advice on a reason, for two images of these widths whose cameras are not from files.
+std::string advice_without_files(tv_reason reason, int width0, int width1) {
+  Outcome outcome;
+  tv_two_view& v = outcome.two_view;
+  tv_two_view_init(&v);
+  v.reasons = reason;
+  v.focal_sigma = 0.1;
+  v.median_parallax_rad = 0.5;
+  outcome.has_cameras = true;
+  outcome.camera[0].width = width0;
+  outcome.camera[1].width = width1;
+  return advice_on(outcome).at(0);
+}
+
+bool holds(const std::string& text, const char* words) {
+  return text.find(words) != std::string::npos;
+}
+
+void test_the_advice_without_a_camera_file_names_none() {
+  const auto few = [] { return advice_without_files(TV_REASON_LOW_INLIER_RATIO, 640, 640); };
+  TEST_ASSERT_FALSE(holds(few(), "camera file"));
+  TEST_ASSERT_TRUE(holds(few(), "more overlap"));
+  const auto focal = [](int width1) {
+    return advice_without_files(TV_REASON_LOW_PARALLAX, 640, width1);
+  };
+  TEST_ASSERT_FALSE(holds(focal(640), "one size"));
+  TEST_ASSERT_TRUE(holds(focal(480), "one size"));
+}
+
+double focal_change_of(double scale) {
+  tv_two_view v;
+  tv_two_view_init(&v);
+  v.focal_scale = scale;
+  return focal_change_percent(v);
+}
+
+void test_a_focal_length_that_hardly_changed_has_no_sign() {
+  TEST_ASSERT_FALSE(std::signbit(focal_change_of(0.99999)));
+  TEST_ASSERT_EQUAL_DOUBLE(0, focal_change_of(0.99999));
+  TEST_ASSERT_EQUAL_DOUBLE(0, focal_change_of(0));
+  TEST_ASSERT_EQUAL_DOUBLE(-1.3, focal_change_of(0.98701));
+}
+
 void test_each_reason_has_words_and_advice_and_no_reason_none() {
   Outcome outcome;
   tv_two_view_init(&outcome.two_view);
@@ -534,6 +577,8 @@ int main() {
   RUN_TEST(test_headers_are_read_within_their_bytes);
   RUN_TEST(test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibration);
   RUN_TEST(test_each_reason_has_words_and_advice_and_no_reason_none);
+  RUN_TEST(test_the_advice_without_a_camera_file_names_none);
+  RUN_TEST(test_a_focal_length_that_hardly_changed_has_no_sign);
   RUN_TEST(test_a_zoomed_pair_is_told_of_its_scale_and_of_no_second_motion);
   RUN_TEST(test_the_scale_is_of_the_inliers_and_not_of_what_the_geometry_rejects);
   RUN_TEST(test_base64_has_the_vectors_of_rfc_4648);

@@ -1,7 +1,6 @@
 // The program twoview: parses the command line, runs the chosen verb and reports errors.
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +11,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "verbs/python_verbs.h"
+#include "verbs/usage_errors.h"
 #include "verbs/verbs.h"
 #ifdef TWOVIEW_HAS_DRONE
 #include "drone/drone.h"
@@ -59,12 +59,8 @@ int run_program(int argc, char** argv) {
   cli::add_drone(program, run, kAddSimulate);
 #endif
   cli::add_python_verbs(program);
-  const auto verbs = program.get_subcommands([](const CLI::App*) { return true; });
-  const auto is_named_first = [&](const CLI::App* verb) {
-    return argc > 1 && verb->get_name() == argv[1];
-  };
-  if (argc > 1 && argv[1][0] != '-' && std::none_of(verbs.begin(), verbs.end(), is_named_first))
-    return refuse("no verb '" + std::string(argv[1]) + "' (see twoview --help)");
+  const std::string mistyped = cli::mistyped_verb(program, argc, argv);
+  if (!mistyped.empty()) return refuse(mistyped);  // also with --help
   try {
     program.parse(argc, argv);
   } catch (const CLI::CallForVersion& e) {
@@ -81,15 +77,7 @@ int run_program(int argc, char** argv) {
     cli::print(chosen->help(path));
     return 0;
   } catch (const CLI::ParseError& e) {
-    std::string verb;  // "drone info "
-    const CLI::App* app = &program;
-    for (int i = 1; i < argc && app != nullptr; ++i) {
-      const auto named = app->get_subcommands(
-          [&](const CLI::App* candidate) { return candidate->get_name() == argv[i]; });
-      app = named.empty() ? nullptr : named[0];
-      if (app != nullptr) verb += app->get_name() + " ";
-    }
-    return refuse(std::string(e.what()) + " (see twoview " + verb + "--help)");
+    return refuse(cli::usage_error(program, argc, argv, e));
   }
   return run();
 }

@@ -145,6 +145,7 @@ void put_bars(cv::Mat& sheet, cv::Rect place, const std::vector<BoardView>& view
   const double left = place.x + 12, right = place.br().x - 12;
   const double bottom = place.br().y - 28, top = place.y + 52;
   const double step = (right - left) / static_cast<double>(c.fits.size());
+  const double line = bottom - (bottom - top) * c.rms_px / most;
   for (size_t i = 0; i < c.fits.size(); ++i) {
     const ViewFit& fit = c.fits[i];
     const double x = left + static_cast<double>(i) * step;
@@ -153,11 +154,13 @@ void put_bars(cv::Mat& sheet, cv::Rect place, const std::vector<BoardView>& view
                   cv::Point(cvRound(x + 0.88 * step), cvRound(bottom)),
                   distinct(static_cast<int>(fit.view)), cv::FILLED);
     if (step < 34) continue;
-    put_text(sheet, words("%.2f", fit.rms_px), {x + step / 2, y - 6}, 8, ink::text, Align::kCentre);
+    // The number stands above its bar, and above the line where that would go through it.
+    const bool is_crossed = line < y && line > y - 18;
+    put_text(sheet, words("%.2f", fit.rms_px), {x + step / 2, (is_crossed ? line : y) - 6}, 8,
+             ink::text, Align::kCentre);
     put_text(sheet, fitted(plain_letters(views[fit.view].name), 8, step - 6),
              {x + step / 2, bottom + 17}, 8, ink::faint, Align::kCentre);
   }
-  const double line = bottom - (bottom - top) * c.rms_px / most;
   put_line(sheet, {left, line}, {right, line}, ink::text);
   put_text(sheet, words("RMS by view, px; the line is that of all, %.2f", c.rms_px),
            Pixel(place.x + 12.0, place.y + 22.0), kText, ink::text);

@@ -79,6 +79,13 @@ int record(const Arguments& a) {
   const ardrone_counters counters = link.counters();
   const std::string summary = summary_json(counters, seconds()).dump(2) + "\n";
   if (!failure.empty()) throw BadInput(failure);
+  const bool is_drone =
+      counters.navdata_received > counters.navdata_rejected || counters.packets > 0;
+  if (!is_drone && counters.navdata_rejected == 0 && counters.bytes_skipped == 0) {
+    recording->discard();
+    throw BadInput("nothing came from " + a.address.host +
+                   ": is the drone on, and this computer in its network?");
+  }
   recording->add_summary(summary);
   if (a.json) print(summary);
   if (speaks) {
@@ -89,11 +96,7 @@ int record(const Arguments& a) {
           "summary.json" +
           (a.frames ? " frames/" : "") + "\n");
   }
-  if (counters.navdata_received == counters.navdata_rejected && counters.packets == 0) {
-    throw BadInput(counters.navdata_rejected == 0 && counters.bytes_skipped == 0
-                       ? "nothing came from " + a.address.host
-                       : "what came from " + a.address.host + " is not an AR.Drone's");
-  }
+  if (!is_drone) throw BadInput("what came from " + a.address.host + " is not an AR.Drone's");
   return 0;
 }
 

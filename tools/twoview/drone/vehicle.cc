@@ -33,7 +33,10 @@ struct Udp {
       case TVS_ERR_ARGUMENT:
         throw BadInput("--mavlink " + address +
                        ": not udp://HOST:PORT, udpin://HOST:PORT or udpout://HOST:PORT of a host "
-                       "that is known");
+                       "that is known" +
+                       (address.compare(0, 5, "/dev/") == 0
+                            ? "; a serial line needs a router to UDP, such as mavproxy.py"
+                            : ""));
       case TVS_ERR_STATE:
         throw BadInput("--mavlink " + address +
                        ": another program has this port, perhaps a ground station");

@@ -281,6 +281,10 @@ CameraFile parse_camera_file(const std::string& text, const std::string& path) {
 CameraFile load_camera_file(const std::string& given) {
   const size_t colon = colon_of(given);
   const std::string path = camera_path(given);
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::path(path) / "camera.yaml", error))
+    throw BadInput("cannot read " + path + ": it is a folder; its camera is " +
+                   (std::filesystem::path(path) / "camera.yaml").string());
   CameraFile file = parse_camera_file(read_file(path, kMaxFileBytes), path);
   if (colon == std::string::npos) return file;
   const std::string name = given.substr(colon + 1);

@@ -53,8 +53,8 @@ Data parsed(std::string_view bytes) {
 }
 
 // The first number of a tag; 0 where the tag is missing or of another type.
-double number_of(ExifData* data, ExifTag tag) {
-  ExifEntry* const entry = exif_content_get_entry(data->ifd[EXIF_IFD_EXIF], tag);
+double number_of(ExifData* data, ExifTag tag, ExifIfd directory = EXIF_IFD_EXIF) {
+  ExifEntry* const entry = exif_content_get_entry(data->ifd[directory], tag);
   if (!entry || !entry->data || entry->components < 1) return 0;
   const unsigned size = exif_format_get_size(entry->format);
   if (size == 0 || entry->size < size) return 0;
@@ -91,6 +91,20 @@ double from_sensor(ExifData* data, double full_width, double full_height) {
 }
 
 }  // namespace
+
+int exif_turn_deg(std::string_view bytes) {
+  const Data data = parsed(bytes);
+  if (!data) return 0;
+  switch (static_cast<int>(number_of(data.get(), EXIF_TAG_ORIENTATION, EXIF_IFD_0))) {
+    case 3:
+    case 4: return 180;
+    case 5:
+    case 6: return 90;
+    case 7:
+    case 8: return 270;
+    default: return 0;
+  }
+}
 
 ExifFocal exif_focal(std::string_view bytes, int width, int height) {
   constexpr const char* none = "has no focal length in EXIF data";

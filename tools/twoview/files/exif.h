@@ -1,4 +1,5 @@
-// The focal length that a photograph's EXIF data hold. libexif parses them.
+// What a photograph's EXIF data hold: its focal length, and how it is to be turned. libexif parses
+// them.
 #pragma once
 
 #include <string_view>
@@ -17,5 +18,9 @@ struct ExifFocal {
 // give. There is none where the picture was cropped: where its sides are not in the ratio of
 // PixelXDimension and PixelYDimension, to one per cent. It never fails.
 ExifFocal exif_focal(std::string_view bytes, int width, int height);
+
+// By how many degrees a viewer turns the picture clockwise, as EXIF's Orientation says: 0, 90, 180
+// or 270; 0 where it is not said. It never fails.
+int exif_turn_deg(std::string_view bytes);
 
 }  // namespace cli

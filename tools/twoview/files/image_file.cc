@@ -55,6 +55,11 @@ std::string foreign_format(std::string_view bytes) {
       return "is a HEIC picture, which is not read: convert it to JPEG, or let the phone save JPEG";
   if (bytes.substr(0, 6) == "GIF87a" || bytes.substr(0, 6) == "GIF89a")
     return "is a GIF picture, which is not read: convert it to PNG";
+  const bool is_avi =
+      bytes.substr(0, 4) == "RIFF" && bytes.substr(std::min<size_t>(8, bytes.size()), 4) == "AVI ";
+  if (is_iso_media || is_avi || bytes.substr(0, 4) == "\x1a\x45\xdf\xa3")
+    return "is a film: take two of its frames (ffmpeg -i FILM -vf fps=2 frame%03d.png), or give it "
+           "to twoview odometry";
   return "";
 }
 
@@ -157,6 +162,7 @@ Picture load_picture(const std::string& path) {
   picture.file_width = pixels.cols;
   picture.file_height = pixels.rows;
   picture.exif = exif_focal(bytes, pixels.cols, pixels.rows);
+  picture.turn_deg = exif_turn_deg(bytes);
   return picture;
 }
 

@@ -19,6 +19,7 @@ struct Picture {
   cv::Mat colour;                       // 8-bit BGR, of the size of luma
   int file_width = 0, file_height = 0;  // pixels, before resizing
   ExifFocal exif;
+  int turn_deg = 0;    // how far a viewer turns it clockwise, which is not done here
   int used_bits = 16;  // bits of the largest sample of a 16-bit file: 12 for what is dark at 16
 
   tv_image view() const;

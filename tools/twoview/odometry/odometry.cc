@@ -57,7 +57,7 @@ bool is_number(const std::string& text) {
 // For a source that says nothing of its camera: `why`.
 void require_camera(const Arguments& a, const char* why) {
   if (a.camera.empty() && a.flight.focal_35mm == 0)
-    throw BadInput(std::string("--camera is required: ") + why);
+    throw BadInput(std::string("--camera is required, or --focal-35mm: ") + why);
 }
 
 std::unique_ptr<FrameSource> open_recording_folder(const Arguments& a) {
@@ -82,7 +82,7 @@ std::unique_ptr<FrameSource> open_source(const Arguments& a) {
     return open_vehicle(a.vehicle, a.duration, a.camera, a.common.quiet);
   }
 #endif
-  if (a.source.empty()) throw BadInput("SOURCE is required");
+  if (a.source.empty()) throw BadInput("SOURCE is required (see twoview odometry --help)");
 #ifdef TWOVIEW_HAS_CAMERA_SOURCE
   if (CameraSource::kind_of(a.source) == CameraSource::Kind::kLive && !is_number(a.source)) {
     require_camera(a, "a camera does not describe its lens");

@@ -25,7 +25,7 @@ Json count_or_null(int32_t count) { return count < 0 ? Json(nullptr) : Json(coun
 struct Phrase {
   tv_reason reason;
   std::string words;
-  const char* advice;  // what to do about it: docs/verdict.md, "what helps"
+  std::string advice;  // what to do about it: docs/verdict.md, "what helps"
 };
 
 const Phrase kReasons[] = {
@@ -55,6 +55,14 @@ const Phrase kFocalLength = {TV_REASON_LOW_PARALLAX,
                              "calibrate the camera (twoview calibrate)"};
 constexpr double kMuchParallaxRad = 2 / kDegrees;
 
+// The advice of these where it is the focal length that was given, and not a camera file.
+constexpr const char* kNoFileFewAgree =
+    "take pictures with more overlap, from a similar distance and at the same zoom; check that the "
+    "focal length is theirs and that none is mirrored";
+constexpr const char* kTwoFocalLengths =
+    "take both pictures at one size and held the same way, so that one focal length serves both; "
+    "or calibrate the camera (twoview calibrate)";
+
 // A zoomed lens, of which the camera file is not, leaves two groups of matches, or a plane.
 constexpr double kZoomed = 1.25;
 
@@ -79,6 +87,11 @@ std::vector<Phrase> phrases_of(const Outcome& outcome) {
                                  focal_length_is_uncertain(v) &&
                                  v.median_parallax_rad > kMuchParallaxRad;
     phrases.push_back(of_focal_length ? kFocalLength : phrase);
+    const bool same_size = outcome.camera[0].width == outcome.camera[1].width &&
+                           outcome.camera[0].height == outcome.camera[1].height;
+    if (!outcome.has_cameras || outcome.has_camera_files) continue;
+    if (of_focal_length && !same_size) phrases.back().advice = kTwoFocalLengths;
+    if (phrase.reason == TV_REASON_LOW_INLIER_RATIO) phrases.back().advice = kNoFileFewAgree;
   }
   return phrases;
 }
@@ -259,6 +272,11 @@ Json principal_point_json(const tv_two_view& v) {
 }
 
 bool focal_length_is_uncertain(const tv_two_view& v) { return v.focal_sigma > 0.02; }
+
+double focal_change_percent(const tv_two_view& v) {
+  const double percent = v.focal_scale > 0 ? 100 * (v.focal_scale - 1) : 0;
+  return std::round(10 * percent) / 10 + 0.0;  // -0 + 0 is 0
+}
 
 Json focal_length_json(const tv_two_view& v) {
   if (!(v.focal_sigma > 0)) return nullptr;

@@ -24,6 +24,7 @@ struct MetricScale {
 struct Outcome {
   Picture picture[2];
   bool has_cameras = false;
+  bool has_camera_files = false;  // the cameras are from files, not from a focal length alone
   // The cameras of the images as used: those of the camera files, scaled if the image was resized.
   tv_camera camera[2]{};
   tv_two_view two_view{};
@@ -88,6 +89,9 @@ nlohmann::ordered_json covariance_json(const tv_two_view& two_view);
 
 // Whether the covariance contains a focal length that is uncertain by more than 2 per cent.
 bool focal_length_is_uncertain(const tv_two_view& two_view);
+
+// By how much the focal length was changed, in per cent, rounded to tenths; never -0.
+double focal_change_percent(const tv_two_view& two_view);
 
 // `scale` (1 where it is as given), `sigma` and `uncertain` of the focal length; null where it is
 // taken as exact.

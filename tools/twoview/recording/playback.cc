@@ -16,10 +16,9 @@ namespace {
 // The open files of a recording, which the destructor closes.
 struct Replay {
   explicit Replay(const std::string& folder) {
-    const tvs_status status = ardrone_replay_open(&files, folder.c_str(), &transport);
-    if (status != TVS_OK)
-      throw BadInput("no recording in " + folder +
-                     " (navdata.log, video.pave): " + tvs_status_string(status));
+    if (ardrone_replay_open(&files, folder.c_str(), &transport) != TVS_OK)
+      throw BadInput("no recording in " + folder + ": neither navdata.log, video.pave nor " +
+                     "vehicle.tlog is there");
   }
   ~Replay() { ardrone_replay_close(&files); }
   Replay(const Replay&) = delete;
@@ -47,7 +46,10 @@ ardrone_counters play(const std::string& folder, LinkListener listener,
   Replay replay(folder);
   SessionMemory memory;
   ardrone_session* session = make_session(options, replay.transport, memory);
-  const int64_t start = ardrone_now_ns();
+  // The session's clock is the recorded host's, so that each playing gives the same times: the
+  // measurements of one playing belong to the pictures of another.
+  const int64_t start = ardrone_replay_host_ns(&replay.files, 0);
+  const int64_t began = ardrone_now_ns();
   int64_t now = start;
   ardrone_replay_advance(&replay.files, now);
   ardrone_session_step(session, now);
@@ -56,7 +58,7 @@ ardrone_counters play(const std::string& folder, LinkListener listener,
     if (next == INT64_MAX) break;
     now = std::max(now, std::min(next, ardrone_session_next_ns(session)));
     if (speed > 0) {
-      const int64_t due = start + static_cast<int64_t>(static_cast<double>(now - start) / speed);
+      const int64_t due = began + static_cast<int64_t>(static_cast<double>(now - start) / speed);
       const int64_t wait = due - ardrone_now_ns();
       const timespec pause{wait / 1000000000, wait % 1000000000};
       if (wait > 0) ::nanosleep(&pause, nullptr);

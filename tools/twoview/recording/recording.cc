@@ -52,6 +52,10 @@ void GrowingFile::append(const void* bytes, size_t size) {
   size_ += static_cast<int64_t>(size);
 }
 
+void refuse_second_recording(const fs::path& folder) {
+  throw BadInput(folder.string() + " holds a recording already: name another folder");
+}
+
 void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -86,10 +90,10 @@ std::string attitude_line(const tvs_imu& imu) {
 }
 
 Recording::Recording(const fs::path& folder, bool with_frames)
-    : folder_(folder), with_frames_(with_frames) {
+    : folder_(folder), with_frames_(with_frames), made_folder_(!fs::exists(folder)) {
   make_folder(folder);
   if (fs::exists(folder / "video.pave") || fs::exists(folder / "navdata.log"))
-    throw BadInput(folder.string() + " holds a recording already");
+    refuse_second_recording(folder);
   video_ = std::make_unique<GrowingFile>(folder / "video.pave");
   navdata_ = std::make_unique<GrowingFile>(folder / "navdata.log");
   attitude_ = std::make_unique<GrowingFile>(folder / "attitude.tum");
@@ -120,6 +124,15 @@ void Recording::add_packet(const ardrone_pave_packet& packet, const tvs_time& ti
 
 void Recording::add_frame(const tvs_frame& frame) {
   if (with_frames_) write_frame(folder_ / "frames", frame);
+}
+
+void Recording::discard() {
+  std::error_code ignored;
+  for (auto* file : {&video_, &navdata_, &attitude_, &frames_}) file->reset();
+  for (const char* name : {"video.pave", "navdata.log", "attitude.tum", "frames.txt"})
+    fs::remove(folder_ / name, ignored);
+  if (with_frames_) fs::remove(folder_ / "frames", ignored);  // not where a picture is in it
+  if (made_folder_) fs::remove(folder_, ignored);
 }
 
 void Recording::add_summary(const std::string& json) {

@@ -32,6 +32,9 @@ class GrowingFile {
   int64_t size_ = 0;
 };
 
+// Throws BadInput: the folder holds a recording already.
+[[noreturn]] void refuse_second_recording(const std::filesystem::path& folder);
+
 // Creates a folder if it does not exist. Throws BadInput.
 void make_folder(const std::filesystem::path& folder);
 
@@ -55,10 +58,12 @@ class Recording {
   void add_frame(const tvs_frame& frame);
   // Writes summary.json; call it last. The file appears complete or not at all.
   void add_summary(const std::string& json);
+  // Removes the files, and the folder where it was made here: for a recording of nothing.
+  void discard();
 
  private:
   std::filesystem::path folder_;
-  bool with_frames_;
+  bool with_frames_, made_folder_;
   std::unique_ptr<GrowingFile> video_, navdata_, attitude_, frames_;
 };
 

@@ -206,7 +206,7 @@ nlohmann::ordered_json play_vehicle(const std::string& folder, LinkListener list
 VehicleRecording::VehicleRecording(const fs::path& folder) : folder_(folder) {
   make_folder(folder);
   for (const char* name : {"video.pave", "navdata.log", "vehicle.tlog"})
-    if (fs::exists(folder / name)) throw BadInput(folder.string() + " holds a recording already");
+    if (fs::exists(folder / name)) refuse_second_recording(folder);
   log_ = std::make_unique<GrowingFile>(folder / "vehicle.tlog");
   attitude_ = std::make_unique<GrowingFile>(folder / "attitude.tum");
   frames_ = std::make_unique<GrowingFile>(folder / "frames.txt");

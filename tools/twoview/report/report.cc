@@ -266,7 +266,7 @@ std::string report_html(const Outcome& outcome, const std::vector<CloudPoint>& c
       kReportPage,
       {{"title", name0 + " and " + name1 + ": twoview"},
        {"style", kReportStyle},
-       {"images", name0 + "<small>and</small>" + name1},
+       {"images", name0 + " <small>and</small> " + name1},
        {"verdict_class", classes[v.verdict]},
        {"verdict", verdict_in_words(v)},
        {"verdict_words", escaped(kind_in_words(v.kind) + (reasons.empty() ? "" : ": " + reasons))},

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "drone/drone.h"
+#include "files/camera_file.h"
 #include "files/camera_formats.h"
 #include "files/image_file.h"
 #include "simulator/server.h"
@@ -23,7 +24,7 @@ struct Arguments {
   DroneAddress address;
   int recording_port = 5553;
   double duration = 0;
-  std::string camera, truth, surfaces;
+  std::string camera, written_camera, truth, surfaces;
   bool has_tour = false;
   std::vector<std::string> images;
   std::vector<double> start = {0, 0};
@@ -113,6 +114,12 @@ std::string surfaces_text(const room::Room& room) {
   return nlohmann::ordered_json{{"boxes", boxes}}.dump(1) + "\n";
 }
 
+void write_one(const std::filesystem::path& path, const std::string& text) {
+  OutputSet file(path.parent_path());
+  file.add(path.filename().string(), text);
+  file.commit();
+}
+
 nlohmann::ordered_json counts_json(const simulator::ServerCounts& n) {
   return {{"commands_obeyed", n.commands_obeyed},
           {"commands_refused", n.commands_refused},
@@ -129,13 +136,10 @@ int simulate(const Arguments& a) {
   const room::Room room(a.seed);
   if (!room.is_free({a.start[0], a.start[1], -0.3}, 0.299))
     throw BadInput("--start is inside a wall or a piece of furniture");
-  if (!a.surfaces.empty()) {
-    const std::filesystem::path path = a.surfaces;
-    OutputSet file(path.parent_path());
-    file.add(path.filename().string(), surfaces_text(room));
-    file.commit();
-  }
-  simulator::Server server(server_options(a));
+  const simulator::ServerOptions options = server_options(a);
+  if (!a.surfaces.empty()) write_one(a.surfaces, surfaces_text(room));
+  if (!a.written_camera.empty()) write_one(a.written_camera, camera_yaml(options.camera));
+  simulator::Server server(options);
   const bool speaks = !a.json && !a.quiet;
   if (speaks) print(ports_line(a.address.host, server.ports()));
   server.run(stop_flag_for_signals(), a.duration);
@@ -192,6 +196,9 @@ void add_faults(CLI::App& verb, Arguments& a) {
 void add_world(CLI::App& verb, Arguments& a) {
   verb.add_option("--camera", a.camera, "lens of the 640 x 360 camera, OpenCV or ROS YAML")
       ->type_name("FILE");
+  verb.add_option("--write-camera", a.written_camera,
+                  "write that lens, for --camera of the verbs that read a recording")
+      ->type_name("FILE");
   verb.add_option("--images", a.images, "film these instead of the rendered room")
       ->type_name("IMAGE");
   verb.add_option("--truth", a.truth,
@@ -224,11 +231,11 @@ void add_world(CLI::App& verb, Arguments& a) {
       ->check(number_in(0.0, 40.0))
       ->type_name("SIGMA")
       ->capture_default_str();
-  verb.add_option("--altitude-factor", a.sensors.altitude_factor, "altimeter over truth")
+  verb.add_option("--altitude-factor", a.sensors.altitude_factor, "reported altitude over truth")
       ->check(number_in(0.5, 2.0))
       ->type_name("FACTOR")
       ->capture_default_str();
-  verb.add_option("--velocity-factor", a.sensors.velocity_factor, "velocity told over truth")
+  verb.add_option("--velocity-factor", a.sensors.velocity_factor, "reported velocity over truth")
       ->check(number_in(0.5, 2.0))
       ->type_name("FACTOR")
       ->capture_default_str();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -92,7 +93,9 @@ std::pair<cv::Size, int> other_board(const std::vector<BoardView>& views) {
 // Throws BadInput with advice to the user if there are too few views for a calibration.
 void require_views(const std::vector<BoardView>& views, const Arguments& a) {
   const std::string board = board_name(a.board.inner);
-  const std::string what = a.video.empty() ? " images" : " frames looked at";
+  const bool is_one = views.size() == 1;
+  const std::string what = a.video.empty() ? (is_one ? " image" : " images")
+                                           : (is_one ? " frame looked at" : " frames looked at");
   const std::string all = std::to_string(views.size()) + what;
   const size_t num_used = count_of(views, Reason::kUsed);
   const size_t num_alike = count_of(views, Reason::kDuplicate);
@@ -114,6 +117,17 @@ void require_views(const std::vector<BoardView>& views, const Arguments& a) {
   throw BadInput(only + reasons_text(views) +
                  (a.video.empty() ? "" : " of the video, which ended too soon") +
                  ": at least 3 are needed, 15 are better, each tilted another way");
+}
+
+// Notes that some views were left out because a larger board is in them: a part of it was then
+// found in the others, and served.
+void note_larger_board(const std::vector<BoardView>& views, Common& common) {
+  const auto [seen, times] = other_board(views);
+  const size_t num_left_out = count_of(views, Reason::kOtherBoard);
+  if (num_left_out == 0 || times == 0) return;
+  common.note(std::to_string(num_left_out) + (num_left_out == 1 ? " view shows" : " views show") +
+              " a board of " + board_name(seen) + " inner corners: is it --board " +
+              board_name(seen) + "?");
 }
 
 // The other board that at least kTellingViews views show while none shows the requested one; an
@@ -299,13 +313,14 @@ std::string views_table(const std::vector<BoardView>& views, const Calibration& 
 }
 
 std::string summary(const std::vector<BoardView>& views, const Calibration& c,
-                    const std::vector<Warning>& warnings, const OutputSet& files) {
+                    const std::vector<Warning>& warnings, const std::string& notes,
+                    const OutputSet& files) {
   const Style style = stdout_style();
   std::string text = views_table(views, c, style);
   char line[256];
   std::snprintf(line, sizeof line, "\n%sviews        %zu of %zu used%s\n", style.bold,
                 c.fits.size(), views.size(), style.off);
-  text += line;
+  text += line + notes;
   const std::vector<std::string> names = intrinsic_names(c.lens);
   const std::vector<double> values = intrinsic_values(c);
   std::snprintf(line, sizeof line, "camera       %s, %dx%d\n", lens_name(c.lens), c.camera.width,
@@ -343,6 +358,9 @@ int calibrate(Arguments& a) {
   if (a.images.empty() == a.video.empty())
     throw BadInput("give either images or --video (see twoview calibrate --help)");
   a.board.inner = parse_board(a.board_text);
+  for (const std::string& image : a.images)
+    if (std::error_code error; std::filesystem::is_directory(image, error))
+      throw BadInput(image + " is a folder: name the pictures in it, as " + image + "/*.jpg does");
   OutputSet files(a.common.output);
   for (const std::string& image : a.images) files.keep(image);
   if (!a.video.empty()) files.keep(a.video);
@@ -351,6 +369,7 @@ int calibrate(Arguments& a) {
   cv::Size image;
   std::vector<BoardView> views = find_views(a, image);
   require_views(views, a);
+  note_larger_board(views, a.common);
   const Calibration calibration = calibrate_camera(views, a.board, image, lens_of(a.model));
   const std::vector<Warning> warnings = warnings_of(calibration);
 
@@ -362,7 +381,8 @@ int calibrate(Arguments& a) {
   files.add("coverage.png", png_bytes(coverage_picture(views, a.board, calibration)));
   files.add("residuals.png", png_bytes(residuals_picture(views, calibration)));
   if (a.common.json) print(json_text(json));
-  if (a.common.speaks()) print(summary(views, calibration, warnings, files));
+  const std::string notes = a.common.note_lines();
+  if (a.common.speaks()) print(summary(views, calibration, warnings, notes, files));
   files.commit();
   return 0;
 }

@@ -12,6 +12,7 @@
 #include "base/output.h"
 #include "base/terminal.h"
 #include "files/camera_file.h"
+#include "files/camera_formats.h"
 #include "files/camera_set.h"
 #include "files/pairs_file.h"
 #include "pair/camera_advice.h"
@@ -29,7 +30,7 @@ constexpr int kThresholdsDeg[] = {5, 10, 20};
 
 struct Arguments {
   Common common;
-  std::string pairs, images;
+  std::string pairs, images, camera;
   int max_pairs = 0;
 };
 
@@ -53,7 +54,22 @@ Matrix3 turn_matrix(int quarters) {
   return turn;
 }
 
-void load_pair(Arguments& a, const NamedCameras& cameras, const Pair& pair, Outcome& outcome) {
+// What the cameras of the images are taken from: the file of --camera, else cameras.yaml and K.
+struct Cameras {
+  std::optional<CameraFile> file;
+  NamedCameras set;
+
+  tv_camera of(const std::string& name, const Picture& picture,
+               const std::array<double, 9>* K) const {
+    const int width = picture.luma.cols, height = picture.luma.rows;
+    if (!file) return camera_of_image(set, name, width, height, K);
+    const tv_camera camera = file->of(name);
+    require_size(camera, file->path, width, height, name);
+    return camera;
+  }
+};
+
+void load_pair(Arguments& a, const Cameras& cameras, const Pair& pair, Outcome& outcome) {
   const std::string* names[] = {&pair.name0, &pair.name1};
   const std::array<double, 9>* Ks[] = {&pair.K0, &pair.K1};
   const int turns[] = {pair.turns0, pair.turns1};
@@ -61,8 +77,7 @@ void load_pair(Arguments& a, const NamedCameras& cameras, const Pair& pair, Outc
   for (int i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
     picture = load_picture((fs::path(a.images) / *names[i]).string());
-    outcome.camera[i] = camera_of_image(cameras, *names[i], picture.luma.cols, picture.luma.rows,
-                                        pair.has_K ? Ks[i] : nullptr);
+    outcome.camera[i] = cameras.of(*names[i], picture, pair.has_K ? Ks[i] : nullptr);
     turn(picture, turns[i]);
     outcome.camera[i] = turned(outcome.camera[i], turns[i]);
     bring_to_size(picture, a.common);
@@ -87,8 +102,7 @@ void compare(const Pair& pair, const Outcome& outcome, PairReport& report) {
       match_precision(outcome.camera[0], outcome.camera[1], R_true, t_true, outcome.reconstruction);
 }
 
-PairReport evaluate_pair(Arguments& a, const NamedCameras& cameras, const Pair& pair,
-                         Session& session) {
+PairReport evaluate_pair(Arguments& a, const Cameras& cameras, const Pair& pair, Session& session) {
   PairReport report;
   report.has_truth = pair.has_truth;
   Json& json = report.json;
@@ -211,6 +225,7 @@ Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
   for (const PairReport& report : reports) json["pairs"].push_back(report.json);
   json["options"] = options_json(options, kAllOptions);
   json["options"]["max_pairs"] = a.max_pairs;
+  json["options"]["camera"] = a.camera.empty() ? Json(nullptr) : Json(a.camera);
   json["seed"] = options.estimate.seed;
   json["version"] = tv_version_string();
   json["kernels"] = session.get() ? Json(session.kernels()) : Json(nullptr);
@@ -318,9 +333,12 @@ int evaluate(Arguments& a) {
   std::vector<Pair> pairs = load_pairs(a.pairs);
   if (a.max_pairs > 0 && pairs.size() > static_cast<size_t>(a.max_pairs))
     pairs.resize(static_cast<size_t>(a.max_pairs));
-  NamedCameras cameras;
+  Cameras cameras;
   const fs::path cameras_path = fs::path(a.pairs).parent_path() / "cameras.yaml";
-  if (fs::exists(cameras_path)) cameras = load_camera_set(cameras_path.string());
+  if (!a.camera.empty())
+    cameras.file = load_camera_file(a.camera);
+  else if (fs::exists(cameras_path))
+    cameras.set = load_camera_set(cameras_path.string());
 
   fs::path folder;
   std::string name;
@@ -328,6 +346,7 @@ int evaluate(Arguments& a) {
   // Before the long work, so that an unwritable folder is reported at once.
   OutputSet files(folder);
   files.keep(a.pairs);
+  files.keep(camera_path(a.camera));
   Session session(common.options);
   std::vector<PairReport> reports;
   {
@@ -361,6 +380,9 @@ void add_evaluate(CLI::App& program, Run& run) {
       ->required()
       ->type_name("FILE");
   verb->add_option("--images", a->images, "folder of the images")->required()->type_name("DIR");
+  verb->add_option("--camera", a->camera,
+                   "camera file of all images, in place of cameras.yaml and of the Ks in the list")
+      ->type_name("FILE");
   verb->add_option("--max-pairs", a->max_pairs, "take the first N pairs; 0: all")
       ->check([](const std::string& count) {
         return count[0] == '-' ? count + " is negative" : std::string();

@@ -61,11 +61,20 @@ bool can_do_without_cameras(int32_t method) {
 void require_cameras(const ImageCameras& cameras, int32_t method, const Picture pictures[2]) {
   if (cameras[0].source != ImageCamera::kNone || can_do_without_cameras(method)) return;
   const Picture& without = pictures[pictures[0].exif.focal_35mm > 0 ? 1 : 0];
-  throw BadInput(
-      "--method " + method_name(method) +
-      " needs cameras: give --camera (or --camera0 and --camera1), made by twoview calibrate, or "
-      "--focal-35mm; " +
-      without.name + " " + without.exif.gap);
+  throw BadInput("no camera is known: " + without.name + " " + without.exif.gap +
+                 "; give --focal-35mm, or --camera, which twoview calibrate makes");
+}
+
+// Notes that the pictures are not used as a viewer shows them: a camera that is held upright stores
+// its pictures lying on their side.
+void note_turns(const Picture pictures[2], Common& common) {
+  const int turn = pictures[0].turn_deg, other = pictures[1].turn_deg;
+  if (turn != other)
+    common.note(pictures[0].name + " and " + pictures[1].name +
+                " were taken with the camera held differently (EXIF): hold it the same way");
+  else if (turn != 0)
+    common.note(std::string("the pictures are used as they are stored, ") +
+                (turn == 180 ? "upside down" : "lying on their side") + " (EXIF): so is the cloud");
 }
 
 // The cameras of two images. A method that can do without cameras takes those that are given, and
@@ -112,9 +121,11 @@ ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& sessi
     recording->load(cameras[0].camera, session, a.common.options, progress, outcome);
   } else {
     for (int i = 0; i < 2; ++i) outcome.picture[i] = load_picture(a.image[i]);
+    note_turns(outcome.picture, a.common);
     cameras = choose_cameras(a, outcome.picture);
   }
   outcome.has_cameras = cameras[0].source != ImageCamera::kNone;
+  outcome.has_camera_files = cameras[0].source == ImageCamera::kFile;
   for (size_t i = 0; i < 2; ++i) {
     Picture& picture = outcome.picture[i];
     bring_to_size(picture, a.common);
@@ -211,7 +222,7 @@ std::string pose_lines(const Outcome& outcome) {
   if (v.has_covariance) text += uncertainty_line(v);
   if (focal_length_is_uncertain(v))
     text += summary_line("camera", "focal length uncertain: %+.1f %% of the given one, +- %.1f %%",
-                         v.focal_scale > 0 ? 100 * (v.focal_scale - 1) : 0.0, 100 * v.focal_sigma);
+                         focal_change_percent(v), 100 * v.focal_sigma);
   return text + camera_line(v);
 }
 
