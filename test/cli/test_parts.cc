@@ -188,6 +188,13 @@ void test_a_focal_length_that_hardly_changed_has_no_sign() {
   TEST_ASSERT_EQUAL_DOUBLE(-1.3, focal_change_of(0.98701));
 }
 
+void test_a_sigma_of_which_nothing_is_known_is_no_number() {
+  const auto words = [](double sigma) { return sigma_in_words(sigma); };
+  TEST_ASSERT_TRUE(words(0.13349) == "0.133");
+  TEST_ASSERT_TRUE(words(90) == "90.000");
+  TEST_ASSERT_TRUE(words(310.1) == "above 90");
+}
+
 void test_each_reason_has_words_and_advice_and_no_reason_none() {
   Outcome outcome;
   tv_two_view_init(&outcome.two_view);
@@ -578,6 +585,7 @@ int main() {
   RUN_TEST(test_a_pose_that_an_uncertain_focal_length_leaves_open_asks_for_a_calibration);
   RUN_TEST(test_each_reason_has_words_and_advice_and_no_reason_none);
   RUN_TEST(test_the_advice_without_a_camera_file_names_none);
+  RUN_TEST(test_a_sigma_of_which_nothing_is_known_is_no_number);
   RUN_TEST(test_a_focal_length_that_hardly_changed_has_no_sign);
   RUN_TEST(test_a_zoomed_pair_is_told_of_its_scale_and_of_no_second_motion);
   RUN_TEST(test_the_scale_is_of_the_inliers_and_not_of_what_the_geometry_rejects);

@@ -400,6 +400,13 @@ Uncertainty uncertainty_deg(const tv_two_view& v) {
   return {std::sqrt(c[0] + c[6] + c[12]) * kDegrees, std::sqrt(c[18] + c[24]) * kDegrees};
 }
 
+std::string sigma_in_words(double sigma_deg) {
+  if (sigma_deg > 90) return "above 90";
+  char text[40];
+  std::snprintf(text, sizeof text, "%.3f", sigma_deg);
+  return text;
+}
+
 std::string kind_in_words(int32_t kind) {
   switch (kind) {
     case TV_KIND_CALIBRATED: return "a general scene, full pose";

@@ -117,6 +117,10 @@ struct Uncertainty {
 };
 Uncertainty uncertainty_deg(const tv_two_view& two_view);
 
+// A standard deviation in degrees with three digits behind the point, or "above 90": a larger one
+// says that nothing is known.
+std::string sigma_in_words(double sigma_deg);
+
 // The number as JSON; null if it is not finite.
 nlohmann::ordered_json finite_or_null(double value);
 

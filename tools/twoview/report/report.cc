@@ -54,8 +54,8 @@ std::string cards(const Outcome& outcome) {
   if (has_full_pose(v)) text += direction_card(outcome);
   if (v.has_covariance) {
     const Uncertainty sigma = uncertainty_deg(v);
-    text += card(formatted("%.3f", sigma.rotation), "deg", "1 sigma of the rotation");
-    text += card(formatted("%.3f", sigma.direction), "deg", "1 sigma of the direction");
+    text += card(sigma_in_words(sigma.rotation), "deg", "1 sigma of the rotation");
+    text += card(sigma_in_words(sigma.direction), "deg", "1 sigma of the direction");
   }
   if (v.has_R && v.has_t)
     text += card(formatted("%.2g", 100 * v.probability_wrong), "%",

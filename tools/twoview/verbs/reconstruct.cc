@@ -188,8 +188,9 @@ void make_files(const Outcome& outcome, OutputSet& files) {
 
 std::string uncertainty_line(const tv_two_view& v) {
   const Uncertainty sigma = uncertainty_deg(v);
-  return summary_line("uncertainty", "rotation %.3f deg, direction %.3f deg (1 sigma)",
-                      sigma.rotation, sigma.direction);
+  return summary_line("uncertainty", "rotation %s deg, direction %s deg (1 sigma)",
+                      sigma_in_words(sigma.rotation).c_str(),
+                      sigma_in_words(sigma.direction).c_str());
 }
 
 // The line that reports the shift of the principal point; empty if there is none.
