@@ -438,6 +438,22 @@ static void test_a_keyframe_is_adjusted_when_the_next_frame_comes(void) {
                           sizeof tracked.world_from_cam_t) != 0);
 }
 
+static void test_a_segment_is_weak_until_a_pair_of_keyframes_confirms_it(void) {
+  fly(odometry, 2);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_WEAK, state.status);
+  TEST_ASSERT_EQUAL_UINT32(TV_REASON_LOW_PARALLAX, state.reasons);
+  for (; num_flown < MOST_FRAMES && !give(odometry, num_flown) && state.num_keyframes == 2;) {
+    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_WEAK, state.status);
+    TEST_ASSERT_EQUAL_UINT32(TV_REASON_LOW_PARALLAX, state.reasons);
+    ++num_flown;
+  }
+  TEST_ASSERT_EQUAL_INT(3, state.num_keyframes);
+  while (state.status == TV_ODOMETRY_WEAK && num_flown < MOST_FRAMES) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, ++num_flown));
+  }
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+}
+
 static void test_finish_adjusts_the_newest_keyframe(void) {
   tv_keyframe tracked, adjusted;
   int32_t newest;
@@ -976,6 +992,7 @@ int main(void) {
   RUN_TEST(test_points_have_covariances);
   RUN_TEST(test_the_last_frame_is_shown);
   RUN_TEST(test_a_keyframe_is_adjusted_when_the_next_frame_comes);
+  RUN_TEST(test_a_segment_is_weak_until_a_pair_of_keyframes_confirms_it);
   RUN_TEST(test_finish_adjusts_the_newest_keyframe);
   RUN_TEST(test_accessors_refuse_bad_arguments);
   RUN_TEST(test_poses_are_found_again_from_their_keyframes);

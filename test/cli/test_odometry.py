@@ -137,7 +137,7 @@ class OdometryTest(CliTest):
         data = (self.out / "cloud.ply").read_bytes()
         head, body = data.split(b"end_header\n", 1)
         count = int(re.search(rb"element vertex (\d+)", head)[1])
-        self.assertEqual(count, self.result()["num_points"])
+        self.assertTrue(0.8 * self.result()["num_points"] < count <= self.result()["num_points"])
         self.assertEqual(len(body), 27 * count)
         points = [struct.unpack_from("<fff", body, 27 * i) for i in range(count)]
         # The first keyframe is the world: a wall's depth is one over its shift.

@@ -12,6 +12,7 @@
 #include "files/image_header.h"
 #include "files/matches_file.h"
 #include "files/pairs_file.h"
+#include "odometry/outputs.h"
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
 #include "pair/options.h"
@@ -553,6 +554,28 @@ void test_matches_come_with_commas_blanks_and_names() {
 
 bool plain_is(const char* text, const char* expected) { return plain_letters(text) == expected; }
 
+// Of a point 4 m away in a direction that is none of the axes, as tv_odometry_points writes it.
+tv_map_point point_at_angle(double degrees) {
+  const double ray[3] = {1, 2, 2},
+               across = 0.7 / 500 * 4 / 3;  // for each unit of the ray's length 3
+  const double sine = std::sin(degrees * 3.14159265358979323846 / 180), along = across / sine;
+  tv_map_point point{};
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c)
+      point.covariance[3 * r + c] =
+          (along * along - across * across) * ray[r] * ray[c] + (r == c ? 9 * across * across : 0);
+  return point;
+}
+
+void test_the_cloud_has_the_points_whose_rays_meet_at_an_angle() {
+  TEST_ASSERT_TRUE(is_in_cloud(point_at_angle(90)));
+  TEST_ASSERT_TRUE(is_in_cloud(point_at_angle(1.51)));
+  TEST_ASSERT_FALSE(is_in_cloud(point_at_angle(1.49)));
+  TEST_ASSERT_FALSE(is_in_cloud(point_at_angle(0.1)));
+  const std::string cloud = map_ply({point_at_angle(1), point_at_angle(3), point_at_angle(2)});
+  TEST_ASSERT_TRUE(cloud.find("element vertex 2\n") != std::string::npos);
+}
+
 void test_the_font_gets_letters_that_it_has() {
   TEST_ASSERT_TRUE(plain_is("left_01 (2).png", "left_01 (2).png"));
   TEST_ASSERT_TRUE(plain_is("\u00dcbung-\u015alask\u0142\u00e9\u00df.png", "Ubung-Slaskles.png"));
@@ -593,6 +616,7 @@ int main() {
   RUN_TEST(test_csv_numbers_are_the_shortest_that_read_back);
   RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);
   RUN_TEST(test_matches_come_with_commas_blanks_and_names);
+  RUN_TEST(test_the_cloud_has_the_points_whose_rays_meet_at_an_angle);
   RUN_TEST(test_the_font_gets_letters_that_it_has);
   return UNITY_END();
 }

@@ -11,6 +11,7 @@
 #include "odometry/adjust_segment.h"
 #include "odometry/loop.h"
 #include "odometry/map.h"
+#include "odometry/metric.h"
 
 namespace {
 
@@ -38,21 +39,70 @@ double path_length() {
   return length;
 }
 
+// The metres in a unit of the map, as the ways of the keyframes say.
+double scale_of_ways() {
+  const tv::MetricScale kept = odometry->scale;
+  odometry->scale = tv::MetricScale{};
+  tv::add_ways(odometry, 1);
+  const double scale = odometry->scale.product / odometry->scale.square;
+  odometry->scale = kept;
+  return scale;
+}
+
+double known_scale() { return odometry->scale.product / odometry->scale.square; }
+
+// The velocities say that each way is `metres` long for a unit of the map.
+void measure_ways(double metres) {
+  tv::Map& map = odometry->map;
+  for (int32_t k = 1; k < map.num_keyframes; ++k) {
+    const tv::Rigid back =
+        tv::motion_between(map.keyframes[k - 1].cam_from_world, map.keyframes[k].cam_from_world);
+    for (int c = 0; c < 3; ++c) map.keyframes[k].way_m[c] = -metres * back.t[c];
+    map.keyframes[k].way_variance = 0.01;
+  }
+  odometry->scale = tv::MetricScale{};
+  tv::add_ways(odometry, 1);
+}
+
 void test_the_metre_keeps_its_length_when_a_loop_stretches_the_path() {
   add_keyframes();
-  odometry->scale.product = 40;
-  odometry->scale.square = 50;
+  measure_ways(0.8);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.8, known_scale());
   const double before_m = 0.8 * path_length();
   tv::LoopEnd end = {0, tv::kIdentity, 1.2};
   end.cam_from_world.t[0] = -2.2;  // it was at 1.9
   const tv::Frame nothing{};
   tv::close_loop(odometry, kNum - 1, nothing, end);
   TEST_ASSERT_TRUE(path_length() > 2.1);
-  const double scale = odometry->scale.product / odometry->scale.square;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, before_m, scale * path_length());
-  // The relative precision of the scale is the same.
-  const double product = odometry->scale.product;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 50.0 / (40 * 40), odometry->scale.square / (product * product));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, scale_of_ways(), known_scale());
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, before_m, known_scale() * path_length());
+}
+
+// A segment's ways count in the one that it becomes a part of, whose own are not known here.
+void test_the_metre_goes_with_a_segment_that_joins_another_one() {
+  add_keyframes();
+  measure_ways(0.8);
+  for (int k = 0; k < 5; ++k) odometry->map.keyframes[k].segment = 1;
+  const tv::LoopEnd end = {2, tv::kIdentity, 2};
+  const tv::Frame nothing{};
+  tv::close_loop(odometry, kNum - 1, nothing, end);
+  TEST_ASSERT_EQUAL_INT(1, odometry->segment);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.4, known_scale());
+}
+
+void test_a_way_goes_on_over_a_keyframe_that_is_removed() {
+  add_keyframes();
+  measure_ways(0.8);
+  odometry->map.keyframes[7].cam_from_world.R[0] = odometry->map.keyframes[7].cam_from_world.R[8] =
+      -1;  // half a turn, after which its way to the next one points backwards
+  measure_ways(0.8);
+  tv::remove_keyframe(&odometry->map, 7, 6);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.8, scale_of_ways());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.16, odometry->map.keyframes[7].way_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02, odometry->map.keyframes[7].way_variance);
+  odometry->map.keyframes[9].way_variance = 0;
+  tv::remove_keyframe(&odometry->map, 9, 8);
+  TEST_ASSERT_TRUE(odometry->map.keyframes[9].way_variance == 0);
 }
 
 // ---- a room ----
@@ -130,11 +180,20 @@ int map_room() {
   return num;
 }
 
+double map_length() {
+  const tv::MapKeyframe* k = odometry->map.keyframes;
+  double length = 0;
+  for (int i = 1; i < kViews; ++i) {
+    length += tv::way_between(k[i - 1].cam_from_world, k[i].cam_from_world);
+  }
+  return length;
+}
+
 // The largest distance of a keyframe from where it is, in the unit that the path's length gives.
 double worst_position() {
   double worst = 0, truth = 0;
   for (int k = 1; k < kViews; ++k) truth += tv::way_between(true_poses[k - 1], true_poses[k]);
-  const double scale = truth / tv::segment_length(odometry->map, 0);
+  const double scale = truth / map_length();
   double first[3];
   tv::centre_of(true_poses[0], first);
   for (int k = 0; k < kViews; ++k) {
@@ -174,9 +233,8 @@ void test_all_keyframes_of_a_segment_are_adjusted_together() {
   TEST_ASSERT_TRUE(worst_position() > 0.04);
   const double before = mean_error();
   TEST_ASSERT_TRUE(before > 2);
-  double factor;
   int steps = 1;
-  while (steps < 12 && tv::adjust_segment(odometry, 0, 1, &factor)) ++steps;
+  while (steps < 12 && tv::adjust_segment(odometry, 0, 1)) ++steps;
   TEST_ASSERT_TRUE(steps < 8);
   TEST_ASSERT_TRUE(worst_position() < 1e-4);
   const double between = mean_error();
@@ -190,17 +248,38 @@ void test_all_keyframes_of_a_segment_are_adjusted_together() {
   TEST_ASSERT_TRUE(worst_position() < 1e-4);
 }
 
-// The path becomes as much longer as the factor says, to what bending changes of it.
-void test_the_factor_is_that_of_the_path() {
+// Each way counts as it is after the steps, and not by what they make of the whole path.
+void test_the_metre_is_that_of_the_ways_as_they_are() {
   map_room();
-  const double before = tv::segment_length(odometry->map, 0);
-  double all = 1;
-  for (int i = 0; i < 5; ++i) {
-    double factor;
-    tv::adjust_segment(odometry, 0, 1, &factor);
-    all *= factor;
+  measure_ways(0.5);
+  for (int k = 1; k < kViews; ++k) {  // as the true path has them
+    const tv::Rigid back = tv::motion_between(true_poses[k - 1], true_poses[k]);
+    for (int c = 0; c < 3; ++c) odometry->map.keyframes[k].way_m[c] = -0.5 * back.t[c];
   }
-  TEST_ASSERT_DOUBLE_WITHIN(0.002, tv::segment_length(odometry->map, 0) / before, all);
+  odometry->scale = tv::MetricScale{};
+  tv::add_ways(odometry, 1);
+  int steps = 0;
+  while (tv::adjust_segment(odometry, 0, 1)) ++steps;
+  TEST_ASSERT_TRUE(steps > 1);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, scale_of_ways(), known_scale());
+  double length = 0;
+  for (int k = 1; k < kViews; ++k) length += tv::way_between(true_poses[k - 1], true_poses[k]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.5 * length / map_length(), known_scale());
+}
+
+// The first keyframe of a flight is the one that the start knew worst: it is not held.
+void test_the_first_keyframe_of_an_upright_segment_finds_its_place() {
+  map_room();
+  tv::Map& map = odometry->map;
+  odometry->is_upright = true;
+  for (int k = 0; k < kViews; ++k) {  // gravity along z, as in the true map
+    for (int r = 0; r < 3; ++r) map.keyframes[k].down[r] = true_poses[k].R[3 * r + 2];
+    map.keyframes[k].down_sigma_rad = 0.01;
+  }
+  map.keyframes[0].cam_from_world.t[0] += 0.3;
+  const tv::Rigid first = map.keyframes[0].cam_from_world;
+  for (int step = 0; step < 4; ++step) tv::adjust_segment(odometry, 0, 1);
+  TEST_ASSERT_TRUE(tv::way_between(first, map.keyframes[0].cam_from_world) > 0.2);
 }
 
 void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
@@ -281,6 +360,54 @@ void test_few_points_close_a_loop_only_twice() {
   TEST_ASSERT_FALSE(tv::is_seen_twice(odometry, frame, end));
 }
 
+void test_a_gross_correction_closes_a_loop_only_twice() {
+  add_keyframes();
+  odometry->median_depth = 2;
+  tv::Frame frame{};
+  frame.number = 100;
+  frame.cam_from_world = tv::kIdentity;
+  tv::LoopEnd end = {0, tv::kIdentity, 1};
+  end.cam_from_world.t[0] = 0.19;
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  end.cam_from_world.t[0] = 0.21;  // more than a tenth of the median depth
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  end.cam_from_world = turned(0.06);
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  // Where the world of another segment lies says nothing, but attitudes give both the same axes.
+  odometry->segment = 1;
+  end.cam_from_world = turned(0.5);
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  odometry->is_upright = true;
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+  end.cam_from_world = turned(0.3);
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 5, 50, 60, end));
+}
+
+void test_few_points_join_upright_segments_only_twice() {
+  add_keyframes();
+  odometry->median_depth = 2;
+  tv::Frame frame{};
+  frame.number = 100;
+  frame.cam_from_world = tv::kIdentity;
+  const tv::LoopEnd end = {0, tv::kIdentity, 1};
+  // Within a segment, after a long path.
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 7.9, 30, 40, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 7.9, 30, 40, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 8, 30, 40, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 8, 30, 41, end));
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 8, 30, 40, end));
+  odometry->segment = 1;
+  odometry->weak_loop.frame = -1;
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 40, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 40, end));
+  odometry->is_upright = true;
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 40, end));
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 0, 30, 40, end));
+}
+
 }  // namespace
 
 extern "C" void setUp(void) {
@@ -300,12 +427,17 @@ extern "C" void tearDown(void) {}
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_the_metre_keeps_its_length_when_a_loop_stretches_the_path);
+  RUN_TEST(test_the_metre_goes_with_a_segment_that_joins_another_one);
+  RUN_TEST(test_a_way_goes_on_over_a_keyframe_that_is_removed);
   RUN_TEST(test_all_keyframes_of_a_segment_are_adjusted_together);
-  RUN_TEST(test_the_factor_is_that_of_the_path);
+  RUN_TEST(test_the_metre_is_that_of_the_ways_as_they_are);
+  RUN_TEST(test_the_first_keyframe_of_an_upright_segment_finds_its_place);
   RUN_TEST(test_a_frame_and_the_measured_way_move_with_their_keyframe);
   RUN_TEST(test_finish_takes_all_steps_that_are_left);
   RUN_TEST(test_the_points_of_the_loops_segment_are_adjusted);
   RUN_TEST(test_small_corrections_are_not_spread);
   RUN_TEST(test_few_points_close_a_loop_only_twice);
+  RUN_TEST(test_a_gross_correction_closes_a_loop_only_twice);
+  RUN_TEST(test_few_points_join_upright_segments_only_twice);
   return UNITY_END();
 }

@@ -109,7 +109,7 @@ void start_anew(tv_odometry* o) {
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
   o->local_id = o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
-  o->is_doubtful = false;
+  o->doubts = 0;
   o->weak_loop.frame = -1;
   o->spread = {0, o->map.sizes.max_points, 0};
   o->check = MapCheck{};

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "geometry/vector3.h"
 #include "odometry/map_window.h"
+#include "odometry/metric.h"
 
 namespace tv {
 namespace {
@@ -22,13 +22,14 @@ WindowSizes sizes_of(const tv_odometry_options& o) {
           22 * o.max_keypoints};
 }
 
-// Adds the keyframes of a segment, all held or all but the first one free. False: there are too
-// many.
+// Adds the keyframes of a segment, all held or all free. False: there are too many. No keyframe is
+// held where gravity is known (else adjust_window holds the first one): one that is can only come
+// to where it belongs when all others move, which the steps do last.
 bool add_segment(const Map& map, int32_t segment, bool fixed, MapWindow* window) {
   for (int32_t k = 0; k < map.num_keyframes; ++k) {
     if (map.keyframes[k].segment != segment) continue;
     if (window->model.num_views == window->sizes.views) return false;
-    add_view(map, k, fixed || window->model.num_views == 0, window);
+    add_view(map, k, fixed, window);
   }
   return true;
 }
@@ -60,20 +61,6 @@ void add_shared_points(const Map& map, MapWindow* window) {
   }
 }
 
-// By which factor the adjusted ways between successive keyframes are longer than those of the map,
-// by least squares.
-double stretch_of(const Map& map, const MapWindow& window) {
-  double product = 0, square = 0;
-  for (int32_t v = 1; v < window.model.num_views; ++v) {
-    const Rigid before = motion_between(map.keyframes[window.keyframes[v - 1]].cam_from_world,
-                                        map.keyframes[window.keyframes[v]].cam_from_world);
-    const Rigid after = motion_between(pose_of(window, v - 1), pose_of(window, v));
-    product += dot(before.t, after.t);
-    square += dot(before.t, before.t);
-  }
-  return square > 0 ? product / square : 1;
-}
-
 }  // namespace
 
 size_t adjust_segment_bytes(const tv_odometry_options& o) {
@@ -81,8 +68,7 @@ size_t adjust_segment_bytes(const tv_odometry_options& o) {
          arena_bytes<MovedKeyframe>(static_cast<size_t>(o.max_keyframes));
 }
 
-bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations, double* factor) {
-  *factor = 1;
+bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations) {
   Arena arena = odometry->whole_scratch;
   Map& map = odometry->map;
   MapWindow window = make_map_window(*odometry, sizes_of(odometry->options), arena);
@@ -97,8 +83,10 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations,
   for (int32_t v = 0; v < window.model.num_views; ++v) {
     moved[window.keyframes[v]] = {pose_of(window, v), 1};
   }
-  *factor = stretch_of(map, window);
+  const bool counts = segment == odometry->segment;
+  if (counts) add_ways(odometry, -1);
   move_keyframes(&map, moved);
+  if (counts) add_ways(odometry, 1);
   keep_positions(window, &map);
   return window.result.final_cost < (1 - kLeastGain) * window.result.initial_cost;
 }

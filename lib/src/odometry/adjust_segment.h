@@ -12,9 +12,8 @@ size_t adjust_segment_bytes(const tv_odometry_options& options);
 
 // Adjusts all keyframes of a segment together, with some of the points that each one sees; the
 // other points move with their keyframes. Nothing changes where there are more than 256. Returns
-// whether another call would change them further; *factor: how much longer the path along them
-// became.
-bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations, double* factor);
+// whether another call would change them further.
+bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations);
 
 // Adjusts the points of a segment from a place of the map on, as many as a window holds, and not
 // its keyframes; then forgets the observations that do not fit. Returns the place of the next one.

@@ -18,12 +18,14 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastKeyframesBetween = 12;
-constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 15;
-// With fewer inliers a loop of the same segment needs another one of the last frames that agrees
-// with it, and most of the matches.
+constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 8;
+// With fewer inliers a loop of the same segment, or between upright ones, needs another one of the
+// last frames that agrees with it, and most of the matches.
 constexpr int32_t kLeastWeakInliers = 24, kMostFramesBetween = 15;
 constexpr double kWeakShare = 0.75, kWeakWay = 0.03, kWeakTurn = 0.015;  // median depths, radians
 constexpr double kLeastWeakPath = 4;                                     // median depths
+// A correction larger than this, in median depths or radians, needs another loop that agrees, too.
+constexpr double kGrossWay = 0.1, kGrossTurn = 0.05;
 
 constexpr double kLargestDrift = 0.05;  // of the path, in position
 constexpr double kLargestShift = 0.15;  // of the median depth, added to it
@@ -97,6 +99,23 @@ bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end) {
   return are_near(expected, end.cam_from_world, kWeakWay * odometry->median_depth, kWeakTurn);
 }
 
+bool is_believed(Odometry* odometry, const Frame& frame, double path, int32_t num_inliers,
+                 int32_t num_matches, const LoopEnd& end) {
+  const bool within = odometry->map.keyframes[end.keyframe].segment == odometry->segment;
+  const double depth = odometry->median_depth;
+  const double turn = turn_between(frame.cam_from_world, end.cam_from_world);
+  // Attitudes give upright segments the same axes.
+  if (!within && odometry->is_upright && turn > kLargestTurn) return false;
+  if (num_inliers >= kLeastInliers) {
+    const double way = way_between(frame.cam_from_world, end.cam_from_world);
+    if (!within || (way <= kGrossWay * depth && turn <= kGrossTurn)) return true;
+  } else if (num_inliers < kWeakShare * num_matches ||
+             !(within ? path >= kLeastWeakPath * depth : odometry->is_upright)) {
+    return false;
+  }
+  return is_seen_twice(odometry, frame, end);
+}
+
 namespace {
 
 bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe, Frame* again,
@@ -142,10 +161,7 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
   end->cam_from_world = fit.cam_from_world;
   end->scale = scale_between(odometry, frame, *again);
   if (!(end->scale > 0 && is_plausible(*odometry, frame, path, *end))) return false;
-  return num_inliers >= kLeastInliers ||
-         (map.keyframes[keyframe].segment == odometry->segment &&
-          num_inliers >= kWeakShare * num_matches &&
-          path >= kLeastWeakPath * odometry->median_depth && is_seen_twice(odometry, frame, *end));
+  return is_believed(odometry, frame, path, num_inliers, num_matches, *end);
 }
 
 // The pose of a keyframe between what the loop's beginning says of it and what its end says.
@@ -253,18 +269,22 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
     const double share = segment == old_segment ? 1 - paths[k] / whole : 1;
     moved[k] = blend(own.cam_from_world, from_end, end.scale, share);
   }
-  const double length = segment_length(map, segment);
+  if (segment == old_segment) add_ways(odometry, -1);
   move_keyframes(&map, moved);
   for (int32_t k = 0; k <= newest; ++k) {
     if (moved[k].scale != 0) map.keyframes[k].segment = old_segment;
   }
-  if (segment == old_segment && length > 0) {
-    stretch_ways(odometry, segment_length(map, segment) / length);
-  }
+  if (segment == old_segment) add_ways(odometry, 1);
   for (int32_t p = 0; p < map.end_points; ++p) {
     if (map.points[p].segment == segment) map.points[p].segment = old_segment;
   }
+  const MetricScale own = odometry->scale;
   enter_segment(odometry, old_segment);
+  if (segment != old_segment) {
+    odometry->scale.product += end.scale * own.product;
+    odometry->scale.square += end.scale * end.scale * own.square;
+    odometry->scale.evidence |= own.evidence;
+  }
   fuse_points(odometry, keyframe, again);
   odometry->weak_loop.frame = -1;
   const bool is_small =
@@ -288,14 +308,12 @@ void spread_loop(Odometry* odometry, Frame* frame) {
   const MapKeyframe& reference = odometry->map.keyframes[k];
   const Rigid before = reference.cam_from_world;
   const Rigid relative = compose(frame->cam_from_world, inverse(before));
-  double factor;
-  if (!adjust_segment(odometry, spread->segment, 1, &factor)) spread->num_steps = 0;
+  if (!adjust_segment(odometry, spread->segment, 1)) spread->num_steps = 0;
   frame->cam_from_world = compose(relative, reference.cam_from_world);
   // So does the beginning of the way that is compared with the velocities.
   double from[3];
   transform(before, odometry->travel.from, from);
   transform(inverse(reference.cam_from_world), from, odometry->travel.from);
-  if (spread->segment == odometry->segment) stretch_ways(odometry, factor);
 }
 
 namespace {
@@ -343,9 +361,7 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
       if (!is_joined) continue;
       close_loop(odometry, k, *again, end);
       adjust_around(odometry, k, kJoinSteps);
-      double factor;
-      adjust_segment(odometry, odometry->segment, kSpreadSteps, &factor);
-      stretch_ways(odometry, factor);
+      adjust_segment(odometry, odometry->segment, kSpreadSteps);
       odometry->spread.num_steps = 0;
       while (is_spreading(*odometry)) spread_loop(odometry, frame);
       remove_lone_points(&map, odometry->scratch);

@@ -21,6 +21,11 @@ struct LoopEnd {
 // place. `frame` has its pose.
 bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end);
 
+// Whether a loop closes: at once, or together with another one that agrees. `path`: the length of
+// the path since the end's keyframe.
+bool is_believed(Odometry* odometry, const Frame& frame, double path, int32_t num_inliers,
+                 int32_t num_matches, const LoopEnd& end);
+
 // Looks for the tracked frame in `count` keyframes that do not share its points. True: *end is
 // known, and `again`, with the frame's keypoints, has the old points that they see.
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end);

@@ -43,6 +43,15 @@ void release_point(Map* map, int32_t point) {
   --map->num_points;
 }
 
+// The way to a keyframe begins where that to the one before it, which is removed, began.
+void join_ways(const MapKeyframe& removed, MapKeyframe* own) {
+  Rigid way = motion_between(removed.cam_from_world, own->cam_from_world);
+  std::copy_n(own->way_m, 3, way.t);
+  transform(way, removed.way_m, own->way_m);
+  const bool is_known = removed.way_variance > 0 && own->way_variance > 0;
+  own->way_variance = is_known ? own->way_variance + removed.way_variance : 0;
+}
+
 }  // namespace
 
 void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
@@ -213,16 +222,6 @@ void move_keyframes(Map* map, const MovedKeyframe* moved) {
   }
 }
 
-double segment_length(const Map& map, int32_t segment) {
-  double length = 0;
-  for (int32_t k = 1; k < map.num_keyframes; ++k) {
-    const MapKeyframe &before = map.keyframes[k - 1], &own = map.keyframes[k];
-    if (before.segment != segment || own.segment != segment) continue;
-    length += way_between(before.cam_from_world, own.cam_from_world);
-  }
-  return length;
-}
-
 void remove_lone_points(Map* map, Arena& scratch) {
   ArenaScope scope(scratch);
   uint8_t* is_removed = arena_alloc<uint8_t>(scratch, as_size(map->end_points));
@@ -254,6 +253,7 @@ void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
     if (own[i].point != kNoPoint) forget_observation(map, keyframe, i);
   }
   map->free_rooms[map->num_free_rooms++] = removed->room;
+  if (keyframe + 1 < map->num_keyframes) join_ways(*removed, removed + 1);
   std::memmove(removed, removed + 1, as_size(map->num_keyframes - keyframe - 1) * sizeof *removed);
   --map->num_keyframes;
 }

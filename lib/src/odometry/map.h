@@ -29,7 +29,10 @@ struct MapKeyframe {
   Rigid cam_from_world;
   double down[3], down_sigma_rad;   // gravity in the camera's frame; sigma 0: not known
   double height_m, height_sigma_m;  // sigma 0: not known
-  double scale;                     // by which loops have multiplied its surroundings since then
+  // The way from the keyframe before, as the velocities say, in the camera's axes, which turn with
+  // the map. Variance 0: not known.
+  double way_m[3], way_variance;
+  double scale;  // by which loops have multiplied its surroundings since then
 };
 
 struct MapPoint {
@@ -146,9 +149,6 @@ struct MovedKeyframe {
 
 // Moves the keyframes, and each point with the keyframe that made it.
 void move_keyframes(Map* map, const MovedKeyframe* moved);
-
-// The length of the path along a segment's keyframes.
-double segment_length(const Map& map, int32_t segment);
 
 // Removes a point from the map and from the keyframes that see it.
 void remove_points(Map* map, const uint8_t* is_removed);

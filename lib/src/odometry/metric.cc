@@ -67,6 +67,29 @@ void add_evidence(double product, double square, double variance, int32_t source
   scale->evidence |= source;
 }
 
+// Adds `sign` times what the way from the keyframe before says of the segment's scale, by least
+// squares of the sensors' way = scale way.
+void add_way(Odometry* odometry, int32_t keyframe, double sign) {
+  const MapKeyframe& own = odometry->map.keyframes[keyframe];
+  const MapKeyframe& before = odometry->map.keyframes[keyframe - 1];
+  if (own.segment != odometry->segment || before.segment != odometry->segment) return;
+  // In the camera's axes, the way back.
+  const Rigid motion = motion_between(before.cam_from_world, own.cam_from_world);
+  const double* back = motion.t;
+  if (own.way_variance > 0) {
+    add_evidence(-sign * dot(own.way_m, back), sign * dot(back, back), own.way_variance,
+                 TV_SCALE_VELOCITY, &odometry->scale);
+  }
+  if (odometry->is_upright && own.height_sigma_m > 0 && before.height_sigma_m > 0) {
+    const double* R = own.cam_from_world.R;
+    const double climb = R[2] * back[0] + R[5] * back[1] + R[8] * back[2];
+    add_evidence(
+        sign * (own.height_m - before.height_m) * climb, sign * climb * climb,
+        own.height_sigma_m * own.height_sigma_m + before.height_sigma_m * before.height_sigma_m,
+        TV_SCALE_HEIGHT, &odometry->scale);
+  }
+}
+
 // Gives the segment the metre as its unit once the scale is known to a tenth.
 void settle_scale(Odometry* odometry, Frame* frame) {
   MetricScale* known = &odometry->scale;
@@ -165,28 +188,23 @@ void change_scale(Odometry* odometry, int32_t from, int32_t to) {
   odometry->num_contrary = 0;
 }
 
+void add_ways(Odometry* odometry, double sign) {
+  for (int32_t k = 1; k < odometry->map.num_keyframes; ++k) add_way(odometry, k, sign);
+}
+
 void measure_scale(Odometry* odometry, Frame* frame) {
   Map& map = odometry->map;
-  const MapKeyframe& newest = map.keyframes[map.num_keyframes - 1];
-  const MapKeyframe& before = map.keyframes[map.num_keyframes - 2];
-  MetricScale* known = &odometry->scale;
-  Travel* travel = &odometry->travel;
-  centre_of(before.cam_from_world, travel->from);  // was adjusted
-  const Ways ways = ways_to(*travel, newest.cam_from_world);
-  if (travel->keyframe_id == before.id && travel->is_known && travel->variance > 0) {
-    // Least squares of travel = scale way, along each axis.
-    add_evidence(ways.product, ways.square, travel->variance, TV_SCALE_VELOCITY, known);
-    const double clear = kClear * travel->bound_m;
-    odometry->velocity_trust += ways.travel_sq > clear * clear;
+  MapKeyframe& newest = map.keyframes[map.num_keyframes - 1];
+  const Travel& travel = odometry->travel;
+  if (travel.keyframe_id == (&newest)[-1].id && travel.is_known && travel.variance > 0) {
+    Rigid turn = newest.cam_from_world;
+    std::fill_n(turn.t, 3, 0.0);
+    transform(turn, travel.way_m, newest.way_m);
+    newest.way_variance = travel.variance;
+    const double clear = kClear * travel.bound_m;
+    odometry->velocity_trust += dot(travel.way_m, travel.way_m) > clear * clear;
   }
-  if (newest.segment == before.segment && odometry->is_upright && newest.height_sigma_m > 0 &&
-      before.height_sigma_m > 0) {
-    const double climb = -ways.way[2];
-    add_evidence((newest.height_m - before.height_m) * climb, climb * climb,
-                 newest.height_sigma_m * newest.height_sigma_m +
-                     before.height_sigma_m * before.height_sigma_m,
-                 TV_SCALE_HEIGHT, known);
-  }
+  add_way(odometry, map.num_keyframes - 1, 1);
   settle_scale(odometry, frame);
   begin_travel(odometry, newest.cam_from_world, newest.id);
 }

@@ -24,7 +24,11 @@ bool is_contrary(const Odometry& odometry, const Frame& frame);
 // metre as its unit once the scale is known to a tenth.
 void measure_scale(Odometry* odometry, Frame* frame);
 
-// The segment's ways became `factor` of what they were, by a loop: so did those of the evidence.
+// Adds what the ways between the segment's keyframes, as they are now, say of the scale, or takes
+// it away with a sign of -1: before and after keyframes move against each other.
+void add_ways(Odometry* odometry, double sign);
+
+// The segment's unit became 1 / factor of what it was.
 void stretch_ways(Odometry* odometry, double factor);
 
 // What is known of the scale is kept, and what was known of the segment's is taken up.

@@ -119,10 +119,10 @@ struct tv_odometry {
   tv::WeakLoop weak_loop;
   tv::Spread spread;
   tv::MapCheck check;
-  // The last keyframe that its own matches with earlier ones confirmed. Doubtful: since then some
-  // saw one plane only, or contradicted the map.
+  // The last keyframe that its own matches with earlier ones confirmed. Doubts: the reasons of the
+  // frames since some saw one plane only, or contradicted the map, or since the segment began.
   int32_t confirmed_id;
-  bool is_doubtful;
+  uint32_t doubts;
   bool is_locating;  // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians

@@ -133,7 +133,7 @@ void remove_unconfirmed(Odometry* odometry) {
     remove_keyframe(&map, map.num_keyframes - 1, map.num_keyframes - 2);
   }
   remove_lone_points(&map, odometry->scratch);
-  odometry->is_doubtful = true;
+  odometry->doubts = TV_REASON_TWO_PLANAR_SOLUTIONS;
   odometry->reference_id = last->id;
 }
 
@@ -160,11 +160,11 @@ bool heed_check(Odometry* odometry) {
   const MapVerdict verdict = verdict_of(odometry->check.vote);
   if (verdict == MapVerdict::kAgrees && odometry->num_contrary == 0) {
     odometry->confirmed_id = odometry->check.keyframe_id;
-    odometry->is_doubtful = false;
+    odometry->doubts = 0;
   } else if (verdict == MapVerdict::kContradicts) {
     remove_unconfirmed(odometry);
   } else if (verdict == MapVerdict::kOnePlane && !is_checking(odometry->check)) {
-    odometry->is_doubtful = true;
+    odometry->doubts = TV_REASON_TWO_PLANAR_SOLUTIONS;
   }
   return verdict != MapVerdict::kContradicts;
 }
@@ -303,7 +303,7 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
     check_next_pair(odometry);
     if (!heed_check(odometry)) return false;
   }
-  if (odometry->is_doubtful) state->reasons |= TV_REASON_TWO_PLANAR_SOLUTIONS;
+  state->reasons |= odometry->doubts;
   odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   return true;
 }
@@ -354,14 +354,14 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
   take_keyframe(*odometry, newest, frame);
   odometry->reference_id = odometry->map.keyframes[newest].id;
   odometry->confirmed_id = odometry->reference_id;
-  odometry->is_doubtful = false;
+  state->reasons = odometry->doubts = TV_REASON_LOW_PARALLAX;
   odometry->check = MapCheck{};
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   measure_depth(odometry, *frame);
   begin_travel(odometry, frame->cam_from_world, odometry->reference_id);
   state->is_keyframe = 1;
-  odometry->status = TV_ODOMETRY_TRACKING;
+  odometry->status = TV_ODOMETRY_WEAK;
   return true;
 }
 

@@ -126,6 +126,8 @@ Json truth_json(const FlightResult& result, bool is_metric) {
   return json;
 }
 
+constexpr double kLeastCloudSine = 0.0261769;  // of 1.5 degrees, the least angle that COLMAP keeps
+
 // The largest standard deviation along a coordinate axis would depend on the axes: the square root
 // of the trace does not.
 float sigma_of(const tv_map_point& point) {
@@ -326,7 +328,22 @@ std::string frames_csv(const Flight& flight) {
   return text;
 }
 
-std::string map_ply(const std::vector<tv_map_point>& points) {
+bool is_in_cloud(const tv_map_point& point) {
+  // The covariance is across^2 I + (along^2 - across^2) r r', for the ray r: the sine of the angle
+  // is across / along.
+  double trace = 0, square = 0;
+  for (int k = 0; k < 9; ++k) {
+    trace += k % 4 == 0 ? point.covariance[k] : 0;
+    square += point.covariance[k] * point.covariance[k];
+  }
+  const double difference = std::sqrt(std::max(0.0, 1.5 * (square - trace * trace / 3)));
+  const double across_sq = (trace - difference) / 3, along_sq = across_sq + difference;
+  return across_sq >= kLeastCloudSine * kLeastCloudSine * along_sq;
+}
+
+std::string map_ply(const std::vector<tv_map_point>& all) {
+  std::vector<tv_map_point> points;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(points), is_in_cloud);
   std::string bytes =
       "ply\nformat binary_little_endian 1.0\ncomment twoview " + std::string(tv_version_string()) +
       "\ncomment the map's world; points of different segments do not compare\n"

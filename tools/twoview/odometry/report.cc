@@ -124,7 +124,7 @@ Json cloud_json(const FlightResult& result) {
   const View view(result.flight->is_upright());
   std::vector<const tv_map_point*> chosen;
   for (const tv_map_point& point : result.points)
-    if (point.segment == result.segment) chosen.push_back(&point);
+    if (point.segment == result.segment && is_in_cloud(point)) chosen.push_back(&point);
   std::string points, colours;
   const size_t step = chosen.size() / kMaxCloudPoints + 1;
   for (size_t i = 0; i < chosen.size(); i += step) {
