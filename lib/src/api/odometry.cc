@@ -125,7 +125,7 @@ void start_anew(tv_odometry* o) {
   o->is_upright = false;
   o->velocity_trust = o->num_contrary = 0;
   o->scale = o->other_scale = MetricScale{};
-  o->last_time_s = 0;
+  o->last_time_s = o->most_m = 0;
 }
 
 void enter_segment(tv_odometry* o, int32_t segment) {

@@ -8,6 +8,7 @@
 #include "api/validate.h"
 #include "api/within.h"
 #include "geometry/essential.h"
+#include "geometry/vector3.h"
 #include "odometry/window.h"
 
 namespace tv {
@@ -61,7 +62,7 @@ bool is_index(int32_t idx, int32_t count) { return idx >= 0 && idx < count; }
 
 // Whether a direction has a length whose square is neither 0 nor infinite.
 bool is_direction(const double v[3]) {
-  const double length_sq = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+  const double length_sq = tv::length_sq_of(v);
   return length_sq > 1e-200 && length_sq < 1e200;
 }
 

@@ -29,10 +29,11 @@ struct MapKeyframe {
   Rigid cam_from_world;
   double down[3], down_sigma_rad;   // gravity in the camera's frame; sigma 0: not known
   double height_m, height_sigma_m;  // sigma 0: not known
+  double scale;                     // by which loops have multiplied its surroundings since then
   // The way from the keyframe before, as the velocities say, in the camera's axes, which turn with
-  // the map. Variance 0: not known.
+  // the map. Variance 0: not known. No part of a map's bytes, which hold time_s to scale as they
+  // are.
   double way_m[3], way_variance;
-  double scale;  // by which loops have multiplied its surroundings since then
 };
 
 struct MapPoint {

@@ -351,6 +351,7 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
     odometry->lost_frames = 1;
     odometry->next_search = map->num_keyframes - 1;
     odometry->confirmed_id = map->keyframes[odometry->next_search].id;
+    odometry->confirmed = Reach{};
     odometry->segment = map->keyframes[odometry->next_search].segment;
     odometry->keyframe_inliers = map->keyframes[odometry->next_search].num_observations;
   }

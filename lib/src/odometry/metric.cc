@@ -19,7 +19,9 @@ constexpr double kLeastChange = 0.002;  // of the scale, for which the map is re
 // their standard deviations, taken as equal errors, and this share of the median depth, which is
 // the map's error. They are clear where they say this many standard deviations.
 constexpr double kLargestShare = 0.25, kBounds = 2, kSeen = 0.003, kClear = 5;
-constexpr double kLargestTilt = 0.1;     // radians, added to three standard deviations
+constexpr double kLargestTilt = 0.1;  // radians, added to three standard deviations
+// What drift may add to where a lost frame is found: median depths, and radians.
+constexpr double kLargestSlip = 0.5, kLargestSwing = 0.375;
 constexpr double kLargestMeasure = 1e7;  // metres, metres per second: above it, no sensor is right
 
 bool is_usable(double sigma) { return sigma >= 1 / kLargestMeasure && sigma <= kLargestMeasure; }
@@ -77,7 +79,7 @@ void add_way(Odometry* odometry, int32_t keyframe, double sign) {
   const Rigid motion = motion_between(before.cam_from_world, own.cam_from_world);
   const double* back = motion.t;
   if (own.way_variance > 0) {
-    add_evidence(-sign * dot(own.way_m, back), sign * dot(back, back), own.way_variance,
+    add_evidence(-sign * dot(own.way_m, back), sign * length_sq_of(back), own.way_variance,
                  TV_SCALE_VELOCITY, &odometry->scale);
   }
   if (odometry->is_upright && own.height_sigma_m > 0 && before.height_sigma_m > 0) {
@@ -172,6 +174,39 @@ void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyfr
   centre_of(cam_from_world, odometry->travel.from);
 }
 
+// Not inlined: smaller.
+__attribute__((noinline)) void measure_reach(const Odometry& odometry, const Frame& frame,
+                                             Reach* reach) {
+  Rigid attitude{};
+  std::copy_n(frame.sensors.world_from_cam, 9, attitude.R);
+  reach->axes = compose(attitude, frame.cam_from_world);
+  reach->attitude_sigma_rad = frame.sensors.attitude_sigma_rad;
+  reach->most_m = odometry.most_m;
+}
+
+void add_reach(Odometry* odometry, const Frame& frame, bool gap) {
+  const Sensors& s = frame.sensors;
+  const double fastest = length_of(s.velocity_m_s) + kBounds * s.velocity_sigma_m_s;
+  const double way_m = fastest * (frame.time_s - odometry->last_time_s);
+  odometry->most_m +=
+      gap || s.velocity_sigma_m_s == 0 ? kLargestMeasure : std::min(way_m, kLargestMeasure);
+}
+
+bool is_reachable(const Odometry& odometry, const Frame& frame) {
+  const Reach& from = odometry.confirmed;
+  Reach now{};
+  measure_reach(odometry, frame, &now);
+  const int32_t k = find_keyframe(odometry.map, odometry.confirmed_id);
+  if (k < 0 || odometry.map.keyframes[k].segment != odometry.segment) return true;
+  const double allowed =
+      (1 + kLargestShare) * (now.most_m - from.most_m) + kLargestSlip * odometry.median_depth;
+  const double way = way_between(odometry.map.keyframes[k].cam_from_world, frame.cam_from_world);
+  if (way > allowed && odometry.scale.source != TV_SCALE_UNIT) return false;
+  const double sigma0 = from.attitude_sigma_rad, sigma1 = now.attitude_sigma_rad;
+  return std::min(sigma0, sigma1) == 0 ||
+         turn_between(from.axes, now.axes) <= kLargestSwing + 3 * (sigma0 + sigma1);
+}
+
 void stretch_ways(Odometry* odometry, double factor) {
   odometry->scale.product *= factor;
   odometry->scale.square *= factor * factor;
@@ -202,7 +237,7 @@ void measure_scale(Odometry* odometry, Frame* frame) {
     transform(turn, travel.way_m, newest.way_m);
     newest.way_variance = travel.variance;
     const double clear = kClear * travel.bound_m;
-    odometry->velocity_trust += dot(travel.way_m, travel.way_m) > clear * clear;
+    odometry->velocity_trust += length_sq_of(travel.way_m) > clear * clear;
   }
   add_way(odometry, map.num_keyframes - 1, 1);
   settle_scale(odometry, frame);

@@ -20,6 +20,16 @@ void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyfr
 // Whether the way of the map since the travel began is another one than that of the velocities.
 bool is_contrary(const Odometry& odometry, const Frame& frame);
 
+// What the sensors say of a frame.
+void measure_reach(const Odometry& odometry, const Frame& frame, Reach* reach);
+
+// The frame follows the one before, at once or after a gap in which the camera may have gone
+// anywhere.
+void add_reach(Odometry* odometry, const Frame& frame, bool gap);
+
+// Whether the sensors allow that a frame that was lost is where it was found. Places look alike.
+bool is_reachable(const Odometry& odometry, const Frame& frame);
+
 // Adds what the newest keyframe and the one before say of the scale, and gives the segment the
 // metre as its unit once the scale is known to a tenth.
 void measure_scale(Odometry* odometry, Frame* frame);

@@ -71,6 +71,15 @@ struct Travel {
   double bound_m;  // its standard deviation if all errors are equal
 };
 
+// What the sensors say of a frame: the turn from the map's axes to those of its attitude, which
+// stays the same (sigma 0: the attitude is not known), and the longest way that the camera may have
+// gone until then, in metres, since the odometry began.
+struct Reach {
+  Rigid axes;
+  double attitude_sigma_rad;
+  double most_m;
+};
+
 // The normal equation of the scale, metres per unit of the map: square scale = product.
 struct MetricScale {
   double product, square, sigma;
@@ -123,7 +132,9 @@ struct tv_odometry {
   // frames since some saw one plane only, or contradicted the map, or since the segment began.
   int32_t confirmed_id;
   uint32_t doubts;
-  bool is_locating;  // a frame of tv_odometry_locate, which does not change the map
+  tv::Reach confirmed;  // of the frame when it was confirmed
+  double most_m;        // the longest way until now
+  bool is_locating;     // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
   double last_time_s;

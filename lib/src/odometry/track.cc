@@ -160,6 +160,7 @@ bool heed_check(Odometry* odometry) {
   const MapVerdict verdict = verdict_of(odometry->check.vote);
   if (verdict == MapVerdict::kAgrees && odometry->num_contrary == 0) {
     odometry->confirmed_id = odometry->check.keyframe_id;
+    measure_reach(*odometry, odometry->frame, &odometry->confirmed);
     odometry->doubts = 0;
   } else if (verdict == MapVerdict::kContradicts) {
     remove_unconfirmed(odometry);
@@ -225,6 +226,9 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, Frame* frame, Pos
     if (num < kLeastInliers || !match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);
     if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < kLeastRelocated)
+      continue;
+    if (!odometry->is_locating && map.keyframes[k].segment == odometry->segment &&
+        !is_reachable(*odometry, *frame))
       continue;
     odometry->reference_id = map.keyframes[k].id;
     return true;
@@ -354,6 +358,7 @@ bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
   take_keyframe(*odometry, newest, frame);
   odometry->reference_id = odometry->map.keyframes[newest].id;
   odometry->confirmed_id = odometry->reference_id;
+  measure_reach(*odometry, *frame, &odometry->confirmed);
   state->reasons = odometry->doubts = TV_REASON_LOW_PARALLAX;
   odometry->check = MapCheck{};
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
@@ -408,6 +413,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   frame->number = odometry->num_frames++;
   frame->time_s = input.time_s;
   read_sensors(input, frame);
+  add_reach(odometry, *frame, input.gap != 0);
   state->num_keypoints = frame->num;
   state->segment = state->reference_id = -1;
 

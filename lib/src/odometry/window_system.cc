@@ -112,7 +112,7 @@ void keep_near(const Window& window, const WindowPose* pose, const WindowPoint& 
                double before_sq, double X[3]) {
   double ray[3];
   ray_of(window, pose, point, X, ray);
-  const double now_sq = dot(ray, ray);
+  const double now_sq = length_sq_of(ray);
   if (now_sq <= before_sq) return;
   const double limit_sq = std::max(before_sq, farthest_sq(window, pose, point, now_sq));
   if (now_sq <= limit_sq) return;
@@ -123,7 +123,7 @@ void keep_near(const Window& window, const WindowPose* pose, const WindowPoint& 
 // Whether a point is as far away as it may go, but for a tenth of the square.
 bool is_far(const Window& window, const WindowPose* pose, const WindowPoint& point,
             const double ray[3]) {
-  const double ray_sq = dot(ray, ray);
+  const double ray_sq = length_sq_of(ray);
   return ray_sq > 0.9 * farthest_sq(window, pose, point, 2.0 * ray_sq);
 }
 
@@ -167,7 +167,7 @@ void solve_point(const EliminatedPoint& e, const double y[3], double step[3]) {
 void eliminate(const Window& window, const WindowPose* pose, const WindowPoint& point,
                const double ray[3], double damping, PointSums* sums, EliminatedPoint* out) {
   const double* V = sums->V;
-  const double length_sq = dot(ray, ray);
+  const double length_sq = length_sq_of(ray);
   const double scale = length_sq > 0.0 ? 1.0 / length_sq : 0.0;
   const double Vr[3] = {(V[0] * ray[0] + V[1] * ray[1]) + V[2] * ray[2],
                         (V[1] * ray[0] + V[3] * ray[1]) + V[4] * ray[2],
@@ -337,7 +337,7 @@ namespace {
 void step_of(const EliminatedPoint& e, const double y[3], const double ray[3], double step[3],
              double* damped) {
   solve_point(e, y, step);
-  const double ray_sq = dot(ray, ray), inward = dot(ray, step);
+  const double ray_sq = length_sq_of(ray), inward = dot(ray, step);
   const double share = ray_sq > 0.0 ? inward / ray_sq : 0.0;
   const double along_sq = share * inward;
   *damped += e.across * (dot(step, step) - along_sq) + e.along * along_sq;
@@ -363,7 +363,7 @@ void joint_step(const Window& window, int p, double next[3], double* damped) {
   ray_of(window, window.pose, point, X, ray);
   step_of(e, y, ray, step, damped);
   for (int i = 0; i < 3; ++i) next[i] = X[i] + step[i];
-  keep_near(window, window.next_pose, point, dot(ray, ray), next);
+  keep_near(window, window.next_pose, point, length_sq_of(ray), next);
 }
 
 // Lowers the cost of a point alone at the next poses, from X. False where a view does not see X.
@@ -383,7 +383,7 @@ bool settle(const Window& window, WindowPoint* point, double X[3], double* sum_s
     eliminate(window, window.next_pose, *point, ray, damping, &sums, &e);
     step_of(e, e.y, ray, step, &damped);
     for (int c = 0; c < 3; ++c) next[c] = X[c] + step[c];
-    keep_near(window, window.next_pose, *point, dot(ray, ray), next);
+    keep_near(window, window.next_pose, *point, length_sq_of(ray), next);
     const bool seen = see_point(window, window.next_pose, *point, next, &cost, &next_sum_sq);
     const bool lower = seen && cost < point->next_cost;
     const bool enough = lower && cost > point->next_cost * kSettled;
