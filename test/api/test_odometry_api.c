@@ -454,6 +454,32 @@ static void test_a_segment_is_weak_until_a_pair_of_keyframes_confirms_it(void) {
   TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
 }
 
+/* Walls look alike: a lost frame is not found where its attitude contradicts the map. */
+static void test_a_lost_frame_is_found_where_its_attitude_allows(void) {
+  static const double level[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0},
+                      turned[9] = {-1, 0, 0, 0, 0, 1, 0, 1, 0};
+  int k;
+  memcpy(frame.world_from_cam, level, sizeof level);
+  frame.attitude_sigma_rad = 0.05;
+  fly(odometry, 3);
+  while (state.status != TV_ODOMETRY_TRACKING && num_flown < MOST_FRAMES) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown++));
+  }
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  for (k = 0; k < 4; ++k) {
+    if (k < 2) {
+      memset(pixels, 99, sizeof pixels); /* two blank pictures */
+    } else {
+      room_flight(num_flown, pixels);
+    }
+    memcpy(frame.world_from_cam, k == 2 ? turned : level, sizeof level);
+    frame.time_s += 1.0 / 30;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+    TEST_ASSERT_EQUAL_INT(k == 3, state.has_pose);
+    TEST_ASSERT_EQUAL_INT(k == 3, state.relocated);
+  }
+}
+
 static void test_finish_adjusts_the_newest_keyframe(void) {
   tv_keyframe tracked, adjusted;
   int32_t newest;
@@ -993,6 +1019,7 @@ int main(void) {
   RUN_TEST(test_the_last_frame_is_shown);
   RUN_TEST(test_a_keyframe_is_adjusted_when_the_next_frame_comes);
   RUN_TEST(test_a_segment_is_weak_until_a_pair_of_keyframes_confirms_it);
+  RUN_TEST(test_a_lost_frame_is_found_where_its_attitude_allows);
   RUN_TEST(test_finish_adjusts_the_newest_keyframe);
   RUN_TEST(test_accessors_refuse_bad_arguments);
   RUN_TEST(test_poses_are_found_again_from_their_keyframes);
