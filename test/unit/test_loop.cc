@@ -33,7 +33,7 @@ void add_keyframes() {
 double path_length() {
   const tv::MapKeyframe* k = odometry->map.keyframes;
   double length = 0;
-  for (int i = 1; i < kNum; ++i) {
+  for (int i = 1; i < odometry->map.num_keyframes; ++i) {
     length += tv::way_between(k[i - 1].cam_from_world, k[i].cam_from_world);
   }
   return length;
@@ -180,20 +180,11 @@ int map_room() {
   return num;
 }
 
-double map_length() {
-  const tv::MapKeyframe* k = odometry->map.keyframes;
-  double length = 0;
-  for (int i = 1; i < kViews; ++i) {
-    length += tv::way_between(k[i - 1].cam_from_world, k[i].cam_from_world);
-  }
-  return length;
-}
-
 // The largest distance of a keyframe from where it is, in the unit that the path's length gives.
 double worst_position() {
   double worst = 0, truth = 0;
   for (int k = 1; k < kViews; ++k) truth += tv::way_between(true_poses[k - 1], true_poses[k]);
-  const double scale = truth / map_length();
+  const double scale = truth / path_length();
   double first[3];
   tv::centre_of(true_poses[0], first);
   for (int k = 0; k < kViews; ++k) {
@@ -264,7 +255,7 @@ void test_the_metre_is_that_of_the_ways_as_they_are() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, scale_of_ways(), known_scale());
   double length = 0;
   for (int k = 1; k < kViews; ++k) length += tv::way_between(true_poses[k - 1], true_poses[k]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.5 * length / map_length(), known_scale());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.5 * length / path_length(), known_scale());
 }
 
 // The first keyframe of a flight is the one that the start knew worst: it is not held.

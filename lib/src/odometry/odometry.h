@@ -132,7 +132,7 @@ struct tv_odometry {
   // frames since some saw one plane only, or contradicted the map, or since the segment began.
   int32_t confirmed_id;
   uint32_t doubts;
-  tv::Reach confirmed;  // of the frame when it was confirmed
+  tv::Reach confirmed;  // what the sensors said when it was confirmed
   double most_m;        // the longest way until now
   bool is_locating;     // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
