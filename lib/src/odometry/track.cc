@@ -223,9 +223,10 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, Frame* frame, Pos
     for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
       if (own[i].point != kNoPoint) points[num++] = own[i].point;
     }
-    if (num < kLeastInliers || !match_and_fit(odometry, points, num, frame, fit)) continue;
+    if (!match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);
-    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < kLeastRelocated)
+    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < kLeastRelocated ||
+        fit->estimate.verdict != TV_VERDICT_OK)
       continue;
     if (!odometry->is_locating && map.keyframes[k].segment == odometry->segment &&
         !is_reachable(*odometry, *frame))
