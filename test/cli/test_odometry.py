@@ -181,6 +181,33 @@ class OdometryTest(CliTest):
         tracks = {(p[0], p[k], p[k + 1]) for p in points.values() for k in range(8, len(p), 2)}
         self.assertEqual(tracks, seen)
 
+    def test_the_cloud_has_what_two_keyframes_see_apart(self):
+        """From the middle of the path there and back: the first keyframe is at no end of it."""
+        source = self.set_folder()
+        order = [8, 9, 10, 9, 8, 7, 6, 5, 4, 3, 2]
+        (source / "frames.txt").write_text("".join(f"{i / FPS:.9f} images/{k:05}.png\n"
+                                                   for i, k in enumerate(order)))
+        self.succeed(self.odometry(source))
+        folder = self.out / "colmap"
+        images = [line.split() for line in (folder / "images.txt").read_text().splitlines()
+                  if not line.startswith("#")][::2]
+        # Turns are below 0.2 degrees, so that the camera is where its translation's opposite is.
+        centres = {head[0]: [-float(t) for t in head[5:8]] for head in images}
+
+        def largest_angle(point):
+            rays = [[float(x) - c for x, c in zip(point[1:4], centres[image])]
+                    for image in point[8::2]]
+            return max(math.acos(min(1, sum(a * b for a, b in zip(one, other)) /
+                                     math.hypot(*one) / math.hypot(*other)))
+                       for one in rays for other in rays)
+
+        angles = [math.degrees(largest_angle(line.split()))
+                  for line in (folder / "points3D.txt").read_text().splitlines()
+                  if not line.startswith("#")]
+        count = int(re.search(rb"element vertex (\d+)", (self.out / "cloud.ply").read_bytes())[1])
+        self.assertEqual(count, sum(angle >= 1.5 for angle in angles))
+        self.assertLess(count, len(angles))
+
     def test_a_run_repeats_and_json_is_the_result(self):
         source = self.set_folder()
         done = self.succeed(self.odometry(source, "--json", "--max-frames", 9))

@@ -266,6 +266,21 @@ const Thumbnail* Flight::thumbnail(int number) const {
   return found == thumbnails_.end() ? nullptr : &found->second;
 }
 
+std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t max_keypoints) {
+  std::vector<FlightKeyframe> keyframes;
+  std::vector<tv_map_observation> seen(static_cast<size_t>(max_keypoints));
+  FlightKeyframe key;
+  tv_keyframe_init(&key.keyframe);
+  for (int32_t idx = 0; tv_odometry_keyframe(odometry, idx, &key.keyframe) == TV_OK; ++idx) {
+    int32_t count = 0;
+    check(tv_odometry_observations(odometry, idx, seen.data(), max_keypoints, &count),
+          "keyframe " + std::to_string(idx));
+    key.observations.assign(seen.begin(), seen.begin() + count);
+    keyframes.push_back(key);
+  }
+  return keyframes;
+}
+
 bool Flight::ended_tracked() const {
   if (frames_.empty()) return false;
   const FlightFrame& last = frames_.back();
@@ -273,20 +288,8 @@ bool Flight::ended_tracked() const {
 }
 
 std::vector<FlightKeyframe> Flight::keyframes() const {
-  std::vector<FlightKeyframe> keyframes(odometry_ ? static_cast<size_t>(state_.num_keyframes) : 0);
-  for (size_t k = 0; k < keyframes.size(); ++k) {
-    FlightKeyframe& key = keyframes[k];
-    const int32_t idx = static_cast<int32_t>(k);
-    tv_keyframe_init(&key.keyframe);
-    check(tv_odometry_keyframe(odometry_, idx, &key.keyframe), "keyframe " + std::to_string(idx));
-    key.observations.resize(static_cast<size_t>(options_.odometry.max_keypoints));
-    int32_t count = 0;
-    check(tv_odometry_observations(odometry_, idx, key.observations.data(),
-                                   static_cast<int32_t>(key.observations.size()), &count),
-          "keyframe " + std::to_string(idx));
-    key.observations.resize(static_cast<size_t>(count));
-  }
-  return keyframes;
+  return odometry_ ? keyframes_of(odometry_, options_.odometry.max_keypoints)
+                   : std::vector<FlightKeyframe>();
 }
 
 std::vector<tv_map_point> Flight::points() const {

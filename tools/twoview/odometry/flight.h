@@ -53,6 +53,9 @@ struct FlightKeyframe {
   std::array<double, 36> covariance{};
 };
 
+// The keyframes of a map in their order. max_keypoints: the odometry's own.
+std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t max_keypoints);
+
 // Fills the covariances of the keyframes, which are all of the odometry's map in their order. It
 // takes about as long as an adjustment each.
 void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes);

@@ -89,12 +89,7 @@ class LoadedMap {
     points_.resize(static_cast<size_t>(options.max_points));
     check(tv_odometry_points(odometry_, points_.data(), options.max_points, &count), paths[0]);
     points_.resize(static_cast<size_t>(count));
-    for (int32_t idx = 0;; ++idx) {
-      FlightKeyframe key;
-      tv_keyframe_init(&key.keyframe);
-      if (tv_odometry_keyframe(odometry_, idx, &key.keyframe) != TV_OK) break;
-      keyframes_.push_back(key);
-    }
+    keyframes_ = keyframes_of(odometry_, options.max_keypoints);
   }
   const tv_camera& camera() const { return camera_; }
   const std::vector<tv_map_point>& points() const { return points_; }
@@ -194,7 +189,7 @@ int map_export(const std::string& path, const std::string& output) {
   files.keep(path);
   FlightResult result;
   result.keyframes = map.keyframes_with_covariances();
-  files.add("cloud.ply", map_ply(map.points()));
+  files.add("cloud.ply", map_ply(cloud_points(map.points(), result.keyframes)));
   files.add("keyframes.txt", keyframes_text(result));
   const std::string covariances = covariances_text(result.keyframes);
   if (!covariances.empty()) files.add("covariances.txt", covariances);

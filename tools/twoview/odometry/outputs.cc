@@ -126,7 +126,8 @@ Json truth_json(const FlightResult& result, bool is_metric) {
   return json;
 }
 
-constexpr double kLeastCloudSine = 0.0261769;  // of 1.5 degrees, the least angle that COLMAP keeps
+constexpr double kMostCloudCosine =
+    0.9996573250;  // of 1.5 degrees, the least angle that COLMAP keeps
 
 // The largest standard deviation along a coordinate axis would depend on the axes: the square root
 // of the trace does not.
@@ -328,22 +329,32 @@ std::string frames_csv(const Flight& flight) {
   return text;
 }
 
-bool is_in_cloud(const tv_map_point& point) {
-  // The covariance is across^2 I + (along^2 - across^2) r r', for the ray r: the sine of the angle
-  // is across / along.
-  double trace = 0, square = 0;
-  for (int k = 0; k < 9; ++k) {
-    trace += k % 4 == 0 ? point.covariance[k] : 0;
-    square += point.covariance[k] * point.covariance[k];
+std::vector<tv_map_point> cloud_points(const std::vector<tv_map_point>& points,
+                                       const std::vector<FlightKeyframe>& keyframes) {
+  std::vector<std::vector<Vector3>> rays(points.size());  // to each point, of length 1
+  for (const FlightKeyframe& key : keyframes) {
+    for (const tv_map_observation& seen : key.observations) {
+      if (seen.idx_point < 0) continue;
+      const size_t point = static_cast<size_t>(seen.idx_point);
+      Vector3 ray;
+      for (size_t k = 0; k < 3; ++k)
+        ray[k] = points[point].position[k] - key.keyframe.world_from_cam_t[k];
+      const double length = norm(ray);
+      for (double& value : ray) value /= length;
+      rays[point].push_back(ray);
+    }
   }
-  const double difference = std::sqrt(std::max(0.0, 1.5 * (square - trace * trace / 3)));
-  const double across_sq = (trace - difference) / 3, along_sq = across_sq + difference;
-  return across_sq >= kLeastCloudSine * kLeastCloudSine * along_sq;
+  std::vector<tv_map_point> chosen;
+  for (size_t k = 0; k < points.size(); ++k) {
+    double cosine = 1;
+    for (const Vector3& one : rays[k])
+      for (const Vector3& other : rays[k]) cosine = std::min(cosine, dot(one, other));
+    if (cosine <= kMostCloudCosine) chosen.push_back(points[k]);
+  }
+  return chosen;
 }
 
-std::string map_ply(const std::vector<tv_map_point>& all) {
-  std::vector<tv_map_point> points;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(points), is_in_cloud);
+std::string map_ply(const std::vector<tv_map_point>& points) {
   std::string bytes =
       "ply\nformat binary_little_endian 1.0\ncomment twoview " + std::string(tv_version_string()) +
       "\ncomment the map's world; points of different segments do not compare\n"

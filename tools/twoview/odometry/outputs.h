@@ -56,12 +56,12 @@ std::string covariances_text(const std::vector<FlightKeyframe>& keyframes);
 std::string frames_csv(const Flight& flight);
 // The words for a frame's reasons: those of the verdict, or "unreadable".
 std::string reasons_text(const FlightFrame& frame);
-// Whether the largest angle between two rays to the point, which its covariance is made of, is at
-// least 1.5 degrees: below that its distance is a guess.
-bool is_in_cloud(const tv_map_point& point);
-// x y z, colour, number of observations, standard deviation of the position, segment, of the points
-// of the cloud.
-std::string map_ply(const std::vector<tv_map_point>& all);
+// The points of the cloud: those that two keyframes see at an angle of at least 1.5 degrees. Below
+// that their distance is a guess.
+std::vector<tv_map_point> cloud_points(const std::vector<tv_map_point>& points,
+                                       const std::vector<FlightKeyframe>& keyframes);
+// x y z, colour, number of observations, standard deviation of the position, segment, of points.
+std::string map_ply(const std::vector<tv_map_point>& points);
 
 // COLMAP's model of one segment as text: cameras.txt, images.txt, points3D.txt.
 struct ColmapModel {

@@ -122,13 +122,13 @@ Json cameras_json(const FlightResult& result, const View& view) {
 
 Json cloud_json(const FlightResult& result) {
   const View view(result.flight->is_upright());
-  std::vector<const tv_map_point*> chosen;
-  for (const tv_map_point& point : result.points)
-    if (point.segment == result.segment && is_in_cloud(point)) chosen.push_back(&point);
+  std::vector<tv_map_point> chosen;
+  for (const tv_map_point& point : cloud_points(result.points, result.keyframes))
+    if (point.segment == result.segment) chosen.push_back(point);
   std::string points, colours;
   const size_t step = chosen.size() / kMaxCloudPoints + 1;
   for (size_t i = 0; i < chosen.size(); i += step) {
-    const tv_map_point& point = *chosen[i];
+    const tv_map_point& point = chosen[i];
     const Vector3 at = view({point.position[0], point.position[1], point.position[2]});
     for (const double value : at) append_float(points, static_cast<float>(value));
     colours.append(3, static_cast<char>(std::clamp(point.grey, 0, 255)));
