@@ -554,26 +554,32 @@ void test_matches_come_with_commas_blanks_and_names() {
 
 bool plain_is(const char* text, const char* expected) { return plain_letters(text) == expected; }
 
-// Of a point 4 m away in a direction that is none of the axes, as tv_odometry_points writes it.
-tv_map_point point_at_angle(double degrees) {
-  const double ray[3] = {1, 2, 2},
-               across = 0.7 / 500 * 4 / 3;  // for each unit of the ray's length 3
-  const double sine = std::sin(degrees * 3.14159265358979323846 / 180), along = across / sine;
+// How many points the cloud has of one, 4 m away, that a keyframe sees straight ahead, and others
+// from so many degrees aside.
+size_t cloud_of(const std::vector<double>& degrees_aside) {
   tv_map_point point{};
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c)
-      point.covariance[3 * r + c] =
-          (along * along - across * across) * ray[r] * ray[c] + (r == c ? 9 * across * across : 0);
-  return point;
+  point.position[2] = 4;
+  std::vector<FlightKeyframe> keyframes(degrees_aside.size() + 1);
+  for (size_t k = 0; k < keyframes.size(); ++k) {
+    const double degrees = k == 0 ? 0 : degrees_aside[k - 1];
+    tv_keyframe_init(&keyframes[k].keyframe);
+    keyframes[k].keyframe.world_from_cam_t[0] =
+        4 * std::tan(degrees * 3.14159265358979323846 / 180);
+    keyframes[k].observations = {{0, 7, 0, 0, 1, 0}, {-1, 8, 0, 0, 1, 0}};
+  }
+  return cloud_points({point}, keyframes).size();
 }
 
 void test_the_cloud_has_the_points_whose_rays_meet_at_an_angle() {
-  TEST_ASSERT_TRUE(is_in_cloud(point_at_angle(90)));
-  TEST_ASSERT_TRUE(is_in_cloud(point_at_angle(1.51)));
-  TEST_ASSERT_FALSE(is_in_cloud(point_at_angle(1.49)));
-  TEST_ASSERT_FALSE(is_in_cloud(point_at_angle(0.1)));
-  const std::string cloud = map_ply({point_at_angle(1), point_at_angle(3), point_at_angle(2)});
-  TEST_ASSERT_TRUE(cloud.find("element vertex 2\n") != std::string::npos);
+  TEST_ASSERT_EQUAL_UINT64(0, cloud_of({}));
+  TEST_ASSERT_EQUAL_UINT64(0, cloud_of({0}));
+  TEST_ASSERT_EQUAL_UINT64(0, cloud_of({1.49}));
+  TEST_ASSERT_EQUAL_UINT64(1, cloud_of({1.51}));
+  TEST_ASSERT_EQUAL_UINT64(1, cloud_of({0.1, 60}));
+  // No ray is 1.5 degrees from the first one.
+  TEST_ASSERT_EQUAL_UINT64(1, cloud_of({0.8, -0.8}));
+  TEST_ASSERT_EQUAL_UINT64(0, cloud_of({0.8, 1.2, -0.2}));
+  TEST_ASSERT_EQUAL_UINT64(0, cloud_points({}, {}).size());
 }
 
 void test_the_font_gets_letters_that_it_has() {
