@@ -131,6 +131,7 @@ void test_a_pipeline_is_a_camera_by_its_name() {
   TEST_ASSERT_TRUE(CameraSource::kind_of("gst:x ! appsink") == CameraSource::Kind::kLive);
   TEST_ASSERT_TRUE(CameraSource::kind_of("v4l2:/dev/video3") == CameraSource::Kind::kLive);
   TEST_ASSERT_TRUE(CameraSource::kind_of("film.avi") == CameraSource::Kind::kFile);
+  std::string refused;
   try {
     CameraSource camera(
         "gst:videotestsrc num-buffers=40 ! video/x-raw,width=96,height=64 ! videoconvert ! "
@@ -145,10 +146,12 @@ void test_a_pipeline_is_a_camera_by_its_name() {
     TEST_ASSERT_EQUAL_INT(TVS_OK, status);
     TEST_ASSERT_EQUAL_INT(kWidth, frame.image.width);
     source.release(source.user, &frame);
-  } catch (const cli::BadInput& e) {  // no GStreamer in this OpenCV, or no such plug-in
-    std::printf("the pipeline: %s\n", e.what());
-    TEST_ASSERT_TRUE(std::string(e.what()).find("gst:") != std::string::npos);
+  } catch (const cli::BadInput& e) {
+    refused = e.what();
   }
+  if (refused.empty()) return;
+  TEST_ASSERT_TRUE(refused.find("gst:") != std::string::npos);
+  TEST_IGNORE_MESSAGE("no GStreamer in this OpenCV, or no gstreamer1.0-plugins-base");
 }
 
 void test_what_does_not_open_is_refused() {
