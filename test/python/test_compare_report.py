@@ -52,6 +52,15 @@ class TestReport(unittest.TestCase):
     def test_holds_the_three_files_and_nothing_else(self):
         self.assertEqual(sorted(os.listdir(self.out)), ["index.html", "pairs.csv", "report.json"])
 
+    def test_large_images_are_said_once_to_be_compared_smaller(self):
+        said = "are compared at 640 pixels a side where the first of their list is above 1241"
+        self.assertEqual(self.done.stderr.count(said), 1, self.done.stderr)
+        out = os.path.join(self.folder.name, "sized")
+        for words in (("--resize", 640), ("--quiet",)):
+            done = self.compare(out, "--systems", "twoview", *words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertNotIn(said, done.stderr)
+
     def test_every_system_is_within_a_degree_of_the_truth_on_an_easy_pair(self):
         from twoview_tools.compare import systems
         for system in systems.SYSTEMS:

@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import formats
 from ..accuracy import datasets
+from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
 from . import cluster, results, systems
 from .arguments import PROGRAM, make_parser
 
@@ -249,6 +250,10 @@ def compare(arguments):
     tasks = read_lists(arguments)
     tasks = thin_out(tasks, arguments.max_pairs)
     hashes = check_images(tasks, arguments.resize is None)
+    if arguments.resize is None and any(t["resize"] for t in tasks) and not arguments.quiet:
+        print(f"{PROGRAM}: images are compared at {RESIZE_LONG_SIDE} pixels a side where the first "
+              f"of their list is above {MAX_NATIVE_SIDE} (--resize 0: as they are)",
+              file=sys.stderr)
     folder = os.path.abspath(arguments.output)
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise BadInput(f"-o: {folder} is a file")
