@@ -226,6 +226,10 @@ class Store:
             os.rmdir(self.folder)
 
 
+def shows_progress(quiet):
+    return not quiet and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+
+
 def run_pairs(tasks, keys, workers, store, quiet):
     """Returns (the results in the order of the tasks, the number of pairs run now). Pairs with a
     stored result are not run again."""
@@ -236,7 +240,7 @@ def run_pairs(tasks, keys, workers, store, quiet):
         print(f"{PROGRAM}: going on: {len(tasks) - len(todo)} of {len(tasks)} pairs are done",
               file=sys.stderr)
     with tqdm(total=len(tasks), initial=len(tasks) - len(todo), unit="pair", smoothing=0.05,
-              disable=quiet or not sys.stderr.isatty(), file=sys.stderr) as bar:
+              disable=not shows_progress(quiet), file=sys.stderr) as bar:
         for number, result in workers.run([tasks[i] for i in todo]):
             index = todo[number]
             store.put(keys[index], result)
