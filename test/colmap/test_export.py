@@ -469,6 +469,23 @@ def test_large_photographs_get_the_advice_to_make_them_smaller(tmp_path, call):
             "2070x48; --resize 1600 is advised"])
 
 
+def test_pictures_that_are_not_read_are_named(photographs, tmp_path, call, refuse):
+    heic = b"\0\0\0\x18ftypheic\0\0\0\0mif1miaf" + bytes(64)
+    (tmp_path / "p.heic").write_bytes(heic)
+    base = ("export", "--database", tmp_path / "x.db", "--images", tmp_path, "--focal-35mm", "28",
+            "--schema", "3.8")
+    refuse(("0 images in it", "p.heic is a HEIC picture, which is not read", "JPEG"), *base)
+    for name in NAMES[:2]:
+        shutil.copy(photographs / "images" / name, tmp_path / name)
+    status, _, err = call(*base)
+    assert status == 0, err
+    assert f"twoview: note: 1 picture of {tmp_path} is left out: p.heic is a HEIC picture" in err
+    (tmp_path / NAMES[0]).write_bytes(heic)
+    (tmp_path / "x.db").unlink()
+    status, _, err = call(*base)
+    assert status == 2 and f"{NAMES[0]} is a HEIC picture" in err
+
+
 def test_bad_arguments_are_one_line(tmp_path, refuse):
     base = ("export", "--database", tmp_path / "x.db", "--images", tmp_path)
     refuse("--orientation", *base, "--orientation", "sideways")

@@ -63,6 +63,8 @@ class FrameSource {
   // The pose of the camera in the frame of the vehicle that the source's truth describes (EuRoC's
   // T_BS), row-major 3 x 4; empty: the truth describes the camera.
   virtual std::optional<std::array<double, 12>> body_from_camera() const { return {}; }
+  // What the user must know of the source, a line without an end; empty where there is nothing.
+  virtual std::string note() const { return ""; }
   // The files that the source reads, which no output may replace.
   virtual std::vector<std::string> files() const { return {}; }
 };

@@ -280,6 +280,7 @@ int odometry(Arguments& a) {
   for (const std::string& name : source->files()) files.keep(name);
   files.keep(a.camera);
   files.keep(truth_file);
+  if (!source->note().empty()) std::fprintf(stderr, "twoview: note: %s\n", source->note().c_str());
   const int wanted = num_wanted(*source, a.flight);
   std::optional<LivePage> live;
   if (a.is_live || a.live_port > 0) {

@@ -58,9 +58,12 @@ class Job:
 def choose_pairs(job):
     """The [Pair] to match, each pair once; all images must exist."""
     if not job.pairs:
-        names = list_images(job.images)
+        names, unread = list_images(job.images)
         if len(names) < 2:
-            raise BadInput(f"{job.images}: {len(names)} images in it, two and more are needed")
+            raise BadInput(f"{job.images}: {len(names)} images in it, two and more are needed"
+                           + (f"; {unread}" if unread else ""))
+        if unread:
+            print(f"twoview: note: {unread}", file=sys.stderr)
         return sequential(names, job.overlap) if job.overlap else exhaustive(names)
     pairs, seen = [], set()
     for pair in read_pairs(job.pairs):

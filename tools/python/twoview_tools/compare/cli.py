@@ -13,6 +13,7 @@ import numpy as np
 from .. import formats
 from ..accuracy import datasets
 from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
+from ..unread import unread_picture
 from . import cluster, results, systems
 from .arguments import PROGRAM, make_parser
 
@@ -128,7 +129,9 @@ def check_images(tasks, default_resize):
         task["resize"] = resize.get(task["set"], 0) if default_resize else task["resize"]
     if bad:
         others = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
-        raise BadInput(f"cannot read the image {bad[0]}{others}")
+        unread = unread_picture(bad[0])
+        why = f": {'the first' if others else 'it'} {unread}" if unread else ""
+        raise BadInput(f"cannot read the image {bad[0]}{others}{why}")
     return hashes
 
 
