@@ -195,6 +195,21 @@ class Exif(cli.CliTest):
                     self.assertEqual(done.stdout.count(b"\nnote  "), 2 if words else 1)
                     self.assertIn(words or b"", done.stdout)
 
+    def test_a_verb_that_does_not_use_it_names_it_in_the_error(self):
+        self.photographs(exif(**film(FOCAL_35MM)))
+        pairs = self.write("pairs.txt", "a.png b.png\n")
+        for words in (("odometry", self.folder, "--fps", "10"), ("undistort", self.a),
+                      ("evaluate", pairs, "--images", self.folder)):
+            with self.subTest(verb=words[0]):
+                done = self.run_program(*words, "-o", self.out)
+                self.assert_refused(done, "--camera", "--focal-35mm 32 (by EXIF)")
+        done = self.run_program("undistort", self.a, "--camera", self.camera, "--focal-35mm", "32",
+                                "-o", self.out)
+        self.assert_refused(done, "give either --camera or --focal-35mm\n")
+        self.a.write_bytes(png(WIDTH, HEIGHT, cli.stereo_pair()[0]))
+        done = self.run_program("undistort", self.a, "-o", self.out)
+        self.assert_refused(done, "give either --camera or --focal-35mm\n")
+
     def test_broken_data_are_no_focal_length(self):
         whole = exif(**film(32), **size(WIDTH, HEIGHT))
         for case, data in (("empty", b""), ("cut", whole[:30]), ("zero", exif(**film(0))),

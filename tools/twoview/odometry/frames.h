@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/matrix.h"
+#include "files/exif.h"
 #include "twoview/camera.h"
 
 namespace cli {
@@ -22,6 +23,7 @@ struct SourceFrame {
   double time_s = 0;
   cv::Mat luma;                           // 8-bit; empty where the frame cannot be read
   std::string problem;                    // why luma is empty
+  ExifFocal exif;                         // of a photograph
   bool gap = false;                       // frames were lost before this one
   std::optional<Matrix3> world_from_cam;  // the vehicle's attitude; the world's z axis points down
   double attitude_sigma_rad = 0;

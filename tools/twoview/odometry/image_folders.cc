@@ -61,7 +61,9 @@ class ImageFolder : public FrameSource {
       frame.name = listed.name;
       frame.time_s = listed.time_s;
       try {
-        frame.luma = load_picture((fs::path(folder_.path) / listed.name).string()).luma;
+        const Picture picture = load_picture((fs::path(folder_.path) / listed.name).string());
+        frame.luma = picture.luma;
+        frame.exif = picture.exif;
       } catch (const BadInput& e) {
         frame.problem = e.what();
       }

@@ -67,6 +67,10 @@ struct Cameras {
                const std::array<double, 9>* K) const {
     const int width = picture.luma.cols, height = picture.luma.rows;
     if (focal_35mm > 0) return film_camera(focal_35mm, width, height);
+    if (!file && set.empty() && !K)
+      throw BadInput("no camera for image " + name +
+                     ": no K on its line and no cameras.yaml beside the list; give --camera or " +
+                     focal_option(picture.exif));
     if (!file) return camera_of_image(set, name, width, height, K);
     const tv_camera camera = file->of(name);
     require_size(camera, file->path, width, height, name);
