@@ -91,6 +91,15 @@ def test_a_pose_prints_readably(pose, scene):
     assert repr(pose) == "<TwoView: calibrated, ok: 200 of 200 matches agree>"
 
 
+def test_ok_without_a_full_pose_is_printed_as_what_is_ok(context, scene, pose):
+    found, _ = tv.estimate_two_view(context, None, None, scene.pixels0, scene.pixels1,
+                                    method=tv.Solver.EIGHT_POINT)
+    assert found.verdict == tv.Verdict.OK and found.R is None
+    assert str(found).startswith("uncalibrated, matches ok, no pose: ")
+    turned = dataclasses.replace(pose, kind=tv.Kind.PANORAMIC, t=None)
+    assert str(turned).startswith("panoramic, rotation ok, no full pose: ")
+
+
 def test_a_refused_pair_prints_its_reasons(context, image, scene):
     found, cloud = tv.reconstruct(context, image, scene.camera, image, scene.camera)
     assert str(found).startswith("no_motion, refused (no_motion")

@@ -66,9 +66,9 @@ def words(flags: Any) -> str:
     return ", ".join(flag.name.lower() for flag in type(flags) if flag in flags)
 
 
-def judged(name: str, verdict: Any, reasons: Any) -> str:
+def judged(name: str, verdict: str, reasons: Any) -> str:
     """For example "calibrated, doubtful (low_parallax)"."""
-    found = f"{name}, {verdict.name.lower()}"
+    found = f"{name}, {verdict}"
     return f"{found} ({words(reasons)})" if reasons else found
 
 

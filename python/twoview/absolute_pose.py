@@ -38,7 +38,8 @@ class AbsolutePose(Record):
 
     def __str__(self) -> str:
         name = "no pose" if self.R is None else "pose"
-        rows = [("", f"{judged(name, self.verdict, self.reasons)}: {self.num_inliers} of "
+        verdict = self.verdict.name.lower()
+        rows = [("", f"{judged(name, verdict, self.reasons)}: {self.num_inliers} of "
                      f"{self.num_matches} points agree")]
         if self.R is not None:
             rows += [("rotation", rotation(self.R)), ("t", vector(self.t) + ", x = R X + t"),

@@ -306,7 +306,12 @@ class TwoView(Record):
     focal_sigma: float
 
     def __str__(self) -> str:
-        rows = [("", f"{judged(self.kind.name.lower(), self.verdict, self.reasons)}: "
+        verdict = self.verdict.name.lower()
+        if self.verdict == Verdict.OK and self.R is None:
+            verdict = "matches ok, no pose"
+        elif self.verdict == Verdict.OK and self.t is None:
+            verdict = "rotation ok, no full pose"
+        rows = [("", f"{judged(self.kind.name.lower(), verdict, self.reasons)}: "
                  f"{self.num_inliers} of {self.num_matches} matches agree")]
         if self.R is not None:
             rows.append(("rotation", rotation(self.R)))

@@ -154,6 +154,12 @@ class CameraFiles(cli.CliTest):
                                         self.write("bad", text), "-o", self.out)
                 self.assert_refused(done, "bad", *words)
 
+    def test_xml_is_said_to_be_read_by_python_only(self):
+        path = self.write("camera.xml", '<?xml version="1.0"?>\n<opencv_storage>\n'
+                          "<image_width>320</image_width>\n</opencv_storage>\n")
+        done = self.run_program("undistort", self.a, "--camera", path, "-o", self.out)
+        self.assert_refused(done, "camera.xml is XML, which only the Python package reads", "YAML")
+
     def test_every_verb_takes_them(self):
         chain = self.write("chain.yaml", kalibr("a b", "none", ()))
         self.succeed(self.reconstruct("--camera", chain, camera=False))

@@ -1,5 +1,6 @@
 """Tests of twoview drone over real sockets, with the drone of `twoview drone simulate`."""
 
+import contextlib
 import json
 import os
 import pathlib
@@ -256,6 +257,26 @@ class Drone(unittest.TestCase):
             recorder.send_signal(signal.SIGINT)
             self.assertEqual(recorder.wait(timeout=10), 0)
         self.assertGreater(self.summary()["navdata_received"], 0)
+
+    def test_progress_is_for_terminals_and_not_a_matter_of_colour(self):
+        with Simulator() as drone:
+            for variables, shown in (({"NO_COLOR": "1", "TERM": "xterm"}, True),
+                                     ({"TERM": "dumb"}, False)):
+                with self.subTest(**variables):
+                    master, slave = pty.openpty()
+                    recorder = subprocess.Popen(
+                        [PROGRAM, "drone", "record", "-o", self.path(variables["TERM"]),
+                         "--duration", "1", *drone.ports()], stdout=slave,
+                        env={**os.environ, **variables})
+                    self.assertEqual(recorder.wait(timeout=20), 0)
+                    os.close(slave)
+                    text = b""
+                    with contextlib.suppress(OSError):  # what is read after the end
+                        while block := os.read(master, 4096):
+                            text += block
+                    os.close(master)
+                    self.assertEqual(b" navdata, " in text and b" reboots " in text, shown, text)
+                    self.assertNotIn(b"\033", text)
 
     def test_a_full_disk_loses_nothing_that_was_recorded(self):
         def small_files():

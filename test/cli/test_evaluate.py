@@ -240,6 +240,22 @@ class Evaluate(cli.CliTest):
         done = self.evaluate(names, "--camera", small, out=self.folder / "new")
         self.assert_refused(done, "small.yaml", "160x120", out=self.folder / "new")
 
+    def test_a_focal_length_stands_in_for_every_camera(self):
+        self.write("set/cameras.yaml", "not: read\n")
+        self.succeed(self.reconstruct("--focal-35mm", "32", camera=False))
+        expected = self.result()
+        half = [v / 2 for v in K[:8]] + [1]
+        for text in ("a.png b.png\n", pair_line(K0=half, K1=half)):
+            found = self.report(text, "--focal-35mm", "32")
+            self.assertEqual(found["options"]["focal_35mm"], 32)
+            for key in ("num_matches", "num_inliers", "verdict", "covariance"):
+                self.assertEqual(found["pairs"][0][key], expected[key], key)
+        new = self.folder / "new"
+        done = self.evaluate(pair_line(), "--focal-35mm", "32", "--camera", self.camera, out=new)
+        self.assert_refused(done, "without a camera file", out=new)
+        done = self.evaluate(pair_line(), "--focal-35mm", "wide", out=new)
+        self.assert_refused(done, "--focal-35mm", "'wide'", out=new)
+
     def test_a_camera_of_another_size_is_told_for_its_pair(self):
         self.write(
             "set/cameras.yaml",

@@ -280,6 +280,21 @@ class OdometryTest(CliTest):
         self.assertEqual(result["num_tracked"], COUNT)
         self.assertLess(result["truth"]["ate_rmse_percent_of_path"], 1)
 
+    def test_large_frames_are_followed_by_the_advice_to_make_them_smaller(self):
+        wide = png(2049, 48, bytes(2049 * 48))
+        for k in range(2):
+            self.write(f"wide/{k}.png", wide)
+        run = ("wide", "--fps", 10, "--focal-35mm", 26)
+        done = self.odometry(*run)
+        note = b"twoview: note: frames above 2048 pixels a side are used as they are: 2049x48; " \
+               b"--resize 1600 is advised\n"
+        self.assertEqual(done.stderr.count(note), 1)
+        for more in (("--resize", 0), ("--resize", 1600)):
+            self.assertNotIn(b"note", self.odometry(*run, *more).stderr)
+        done = self.odometry(*run, "--json")
+        self.assertIn(note, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["options"]["resize"], 0)
+
     def test_options_are_written_and_refused_as_those_of_the_other_verbs(self):
         text = " ".join(self.run_program("odometry", "--help").stdout.decode().split())
         for words in ("--max-points [500, 200000]=20000 most", "--fps [0.001, 10000] frames",

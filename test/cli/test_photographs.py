@@ -195,6 +195,21 @@ class Exif(cli.CliTest):
                     self.assertEqual(done.stdout.count(b"\nnote  "), 2 if words else 1)
                     self.assertIn(words or b"", done.stdout)
 
+    def test_a_verb_that_does_not_use_it_names_it_in_the_error(self):
+        self.photographs(exif(**film(FOCAL_35MM)))
+        pairs = self.write("pairs.txt", "a.png b.png\n")
+        for words in (("odometry", self.folder, "--fps", "10"), ("undistort", self.a),
+                      ("evaluate", pairs, "--images", self.folder)):
+            with self.subTest(verb=words[0]):
+                done = self.run_program(*words, "-o", self.out)
+                self.assert_refused(done, "--camera", "--focal-35mm 32 (by EXIF)")
+        done = self.run_program("undistort", self.a, "--camera", self.camera, "--focal-35mm", "32",
+                                "-o", self.out)
+        self.assert_refused(done, "give either --camera or --focal-35mm\n")
+        self.a.write_bytes(png(WIDTH, HEIGHT, cli.stereo_pair()[0]))
+        done = self.run_program("undistort", self.a, "-o", self.out)
+        self.assert_refused(done, "give either --camera or --focal-35mm\n")
+
     def test_broken_data_are_no_focal_length(self):
         whole = exif(**film(32), **size(WIDTH, HEIGHT))
         for case, data in (("empty", b""), ("cut", whole[:30]), ("zero", exif(**film(0))),
@@ -374,11 +389,30 @@ class Scale(cli.CliTest):
             self.assertIn(b"that both show the scene from a similar distance", done.stdout)
 
 
-class Formats(cli.CliTest):
-    def test_pictures_that_are_not_read_are_named_as_what_they_are(self):
-        def iso(brand):
-            return struct.pack(">I", 24) + b"ftyp" + brand + b"\0\0\0\0mif1miaf" + bytes(64)
+def iso(brand):
+    return struct.pack(">I", 24) + b"ftyp" + brand + b"\0\0\0\0mif1miaf" + bytes(64)
 
+
+class Formats(cli.CliTest):
+    def test_odometry_names_pictures_that_are_not_read(self):
+        run = ("--fps", "10", "--focal-35mm", "26", "-o", self.out)
+        heic = self.write("p.heic", iso(b"heic"))
+        self.assert_refused(self.run_program("odometry", heic, *run), "p.heic is a HEIC picture",
+                            "JPEG")
+        self.write("photos/b.HEIC", iso(b"heix"))
+        self.write("photos/c.avif", iso(b"avif"))
+        self.write("photos/d.heic", b"something else")
+        done = self.run_program("odometry", "photos", *run[2:])
+        self.assert_refused(done, "2 pictures of photos are left out, the first: b.HEIC is a HEIC "
+                            "picture, which is not read")
+        for k, data in enumerate(cli.stereo_pair()):
+            self.write(f"photos/{k}.png", png(WIDTH, HEIGHT, data))
+        done = self.run_program("odometry", "photos", *run, "--json")
+        self.assertIn(b"twoview: note: 2 pictures of photos are left out, the first: b.HEIC is",
+                      done.stderr)
+        self.assertEqual(json.loads(done.stdout)["num_frames"], 2)
+
+    def test_pictures_that_are_not_read_are_named_as_what_they_are(self):
         for name, data, *words in (
                 ("p.heic", iso(b"heic"), "HEIC", "JPEG"), ("p.HEIF", iso(b"mif1"), "HEIC"),
                 ("p.jpg", iso(b"heix"), "HEIC"), ("p.avif", iso(b"avif"), "AVIF", "PNG"),

@@ -353,7 +353,11 @@ class Reconstruct(cli.CliTest):
         self.assertIn("matches.png", self.listing())
         note = "no camera, so no pose: give --camera or --focal-35mm"
         self.assertIn(f"note         {note}\n", done.stdout.decode())
-        self.assertIn(f"<li>{note}</li>", (self.out / "report.html").read_text())
+        page = (self.out / "report.html").read_text()
+        self.assertIn(f"<li>{note}</li>", page)
+        self.assertIn("<tr><th>verdict</th><td>matches ok, no pose</td></tr>", page)
+        self.assertIn(b"matches ok, no pose: fundamental matrix only", done.stdout)
+        self.assertEqual(result["verdict"], "ok")
 
     def test_a_focal_length_of_35mm_film_is_a_pinhole_with_the_same_diagonal(self):
         focal_35mm = FOCAL * math.hypot(36, 24) / math.hypot(WIDTH, HEIGHT)

@@ -222,6 +222,44 @@ class Rerun(cli.CliTest):
         self.assert_refused(self.tool(folder, self.folder / "d.rrd"), "trajectory.txt: line 1")
         self.assertEqual([path.name for path in self.folder.glob("*.rrd*")], [])
 
+    def test_a_verb_without_the_option_names_the_verb_that_does_it(self):
+        for words in (("odometry", self.folder), ("drone", "replay", self.folder)):
+            done = subprocess.run([cli.program(), *words, "--rerun", "x.rrd", "-o", self.out],
+                                  capture_output=True, timeout=120)
+            if b"no option --rerun" not in done.stderr and words[0] == "drone":
+                continue  # a program without the drone's driver
+            self.assert_refused(done, "no option --rerun; twoview rerun DIR FILE.rrd does it "
+                                f"afterwards (see twoview {' '.join(words[:-1])} --help)")
+
+    @NEEDS_RERUN
+    def test_a_recordings_pair_reads_back(self):
+        ports = [word for channel in ("at", "navdata", "video", "control", "recording")
+                 for word in (f"--{channel}-port", "0")]
+        with subprocess.Popen([cli.program(), "drone", "simulate", "--duration", "60", *ports],
+                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                              text=True) as drone:
+            words = drone.stdout.readline().replace(",", "").split()
+            if not words:
+                self.skipTest("no drone simulate in this program")
+            port = {name: words[words.index(name) + 1]
+                    for name in ("commands", "navdata", "video", "control")}
+            subprocess.run(
+                [cli.program(), "drone", "record", "--duration", "3", "-o", self.folder / "flight",
+                 "--quiet", "--host", "127.0.0.1", "--at-port", port["commands"],
+                 "--navdata-port", port["navdata"], "--video-port", port["video"],
+                 "--control-port", port["control"]], check=True, timeout=60)
+            drone.terminate()
+        file = self.folder / "pair.rrd"
+        done = subprocess.run(
+            [cli.program(), "reconstruct", "--recording", self.folder / "flight", "--frames", "0",
+             "3", "--focal-35mm", "30", "--rerun", file, "-o", self.out, "--quiet"],
+            capture_output=True, timeout=120,
+            env={**os.environ, "TWOVIEW_PYTHON": sys.executable})
+        self.assertIn(done.returncode, (0, 3), done.stderr)  # the drone stands still
+        found = read_back(file)
+        self.assertIn(f"| verdict | {self.result()['verdict']} |",
+                      only(found, "/summary", "TextDocument:text"))
+
     def test_a_missing_package_is_one_line_before_anything_is_written(self):
         (self.folder / "empty" / "rerun").mkdir(parents=True)
         (self.folder / "empty" / "rerun" / "__init__.py").write_text(

@@ -3,6 +3,7 @@ interruption."""
 
 import contextlib
 import hashlib
+import json
 import os
 import shutil
 import signal
@@ -450,6 +451,39 @@ def test_a_focal_length_and_a_size_stand_in_for_a_camera_file(photographs, tmp_p
     focal = 28 * np.hypot(WIDTH, HEIGHT) / np.hypot(36, 24) / 2
     np.testing.assert_allclose(camera.params, [focal, focal, half / 2, height / 2], atol=1e-9)
     assert keypoints[:, 0].max() < half and keypoints[:, 1].max() < height
+
+
+def test_large_photographs_get_the_advice_to_make_them_smaller(tmp_path, call):
+    import cv2
+    random = np.random.default_rng(1)
+    for name in "ab":
+        image = random.integers(0, 256, (8, 345), np.uint8)
+        cv2.imwrite(str(tmp_path / f"{name}.png"), cv2.resize(image, (2070, 48)))
+    base = ("export", "--images", tmp_path, "--focal-35mm", "28", "--schema", "3.8", "--json")
+    for number, more in enumerate(((), ("--resize", "0"), ("--resize", "1600"))):
+        status, out, err = call(*base, *more, "--database", tmp_path / f"{number}.db")
+        assert status in (0, 3) and json.loads(out)["images"] == 2, err
+        notes = [line for line in err.splitlines() if "note" in line]
+        assert notes == ([] if more else [
+            "twoview: note: images above 2048 pixels a side are used as they are: a.png is "
+            "2070x48; --resize 1600 is advised"])
+
+
+def test_pictures_that_are_not_read_are_named(photographs, tmp_path, call, refuse):
+    heic = b"\0\0\0\x18ftypheic\0\0\0\0mif1miaf" + bytes(64)
+    (tmp_path / "p.heic").write_bytes(heic)
+    base = ("export", "--database", tmp_path / "x.db", "--images", tmp_path, "--focal-35mm", "28",
+            "--schema", "3.8")
+    refuse(("0 images in it", "p.heic is a HEIC picture, which is not read", "JPEG"), *base)
+    for name in NAMES[:2]:
+        shutil.copy(photographs / "images" / name, tmp_path / name)
+    status, _, err = call(*base)
+    assert status == 0, err
+    assert f"twoview: note: 1 picture of {tmp_path} is left out: p.heic is a HEIC picture" in err
+    (tmp_path / NAMES[0]).write_bytes(heic)
+    (tmp_path / "x.db").unlink()
+    status, _, err = call(*base)
+    assert status == 2 and f"{NAMES[0]} is a HEIC picture" in err
 
 
 def test_bad_arguments_are_one_line(tmp_path, refuse):

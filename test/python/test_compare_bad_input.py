@@ -68,6 +68,16 @@ class TestLists(BadInputTest):
         self.refused(support.run(pairs, "--images", self.folder.name, "-o", self.out), "a.png")
         self.assertFalse(os.path.exists(self.out))
 
+    def test_a_picture_that_is_not_read_is_named_as_what_it_is(self):
+        for name in ("p.heic", "q.heic"):
+            support.write(self.folder.name, name, "\0\0\0\x18ftypheic" + 64 * "\0")
+        for other, words in (("p.heic", ": it is a HEIC picture, which is not read"),
+                             ("q.heic", ", and 1 more: the first is a HEIC picture")):
+            pairs = self.list_of(support.LINE.replace(support.IMAGES[0], "p.heic")
+                                 .replace(support.IMAGES[1], other))
+            done = support.run(pairs, "--images", self.folder.name, "-o", self.out)
+            self.refused(done, "p.heic" + words)
+
     def test_no_folder_of_images(self):
         pairs = self.list_of(support.LINE)
         self.refused(support.run(pairs, "-o", self.out), "images is not a folder")

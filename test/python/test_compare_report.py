@@ -1,10 +1,17 @@
 """Tests of compare_colmap: a whole report, in which every system is within a degree of the truth on
 an easy pair."""
 
+import contextlib
 import csv
+import fcntl
 import json
 import os
+import pty
+import struct
+import subprocess
+import sys
 import tempfile
+import termios
 import unittest
 
 import compare_support as support
@@ -20,6 +27,15 @@ TRIANGULATIONS_AGREE_PX = 0.1
 
 def setUpModule():
     support.skip_without(*support.PEERS)
+
+
+def read_terminal(master):
+    """All that was written to a terminal whose other side is closed."""
+    shown = b""
+    with contextlib.suppress(OSError):  # what is read after the end
+        while block := master.read(4096):
+            shown += block
+    return shown
 
 
 class TestReport(unittest.TestCase):
@@ -51,6 +67,32 @@ class TestReport(unittest.TestCase):
 
     def test_holds_the_three_files_and_nothing_else(self):
         self.assertEqual(sorted(os.listdir(self.out)), ["index.html", "pairs.csv", "report.json"])
+
+    def test_large_images_are_said_once_to_be_compared_smaller(self):
+        said = "are compared at 640 pixels a side where the first of their list is above 1241"
+        self.assertEqual(self.done.stderr.count(said), 1, self.done.stderr)
+        out = os.path.join(self.folder.name, "sized")
+        for words in (("--resize", 640), ("--quiet",)):
+            done = self.compare(out, "--systems", "twoview", *words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertNotIn(said, done.stderr)
+
+    def test_a_terminal_gets_a_line_of_progress_and_a_dumb_one_none(self):
+        for terminal, shown in (("xterm", True), ("dumb", False)):
+            with self.subTest(terminal=terminal):
+                master, slave = pty.openpty()
+                fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("4H", 24, 120, 0, 0))
+                out = os.path.join(self.folder.name, terminal)
+                done = subprocess.run(
+                    [sys.executable, support.PROGRAM, self.pairs, "--images",
+                     os.path.join(FOUNTAIN, "images"), "-o", out, "--systems", "twoview"],
+                    stdout=subprocess.DEVNULL, stderr=slave, env={**os.environ, "TERM": terminal},
+                    timeout=200, check=False)
+                os.close(slave)
+                with open(master, "rb", buffering=0) as other_side:
+                    text = read_terminal(other_side).decode()
+                self.assertEqual(done.returncode, 0, text)
+                self.assertEqual("pair/s" in text or "s/pair" in text, shown, text)
 
     def test_every_system_is_within_a_degree_of_the_truth_on_an_easy_pair(self):
         from twoview_tools.compare import systems

@@ -29,16 +29,16 @@ std::string cut_to_terminal(const std::string& text) {
   return text;
 }
 
-bool shows_progress() { return isatty(STDERR_FILENO) && !is_dumb(); }
-
 }  // namespace
+
+bool shows_progress(int descriptor) { return isatty(descriptor) && !is_dumb(); }
 
 bool takes_colours(int descriptor) {
   const char* const no_colour = std::getenv("NO_COLOR");
   return isatty(descriptor) && !is_dumb() && !(no_colour && *no_colour);
 }
 
-Progress::Progress(bool wanted) : shown_(wanted && shows_progress()) {}
+Progress::Progress(bool wanted) : shown_(wanted && shows_progress(STDERR_FILENO)) {}
 
 Progress::~Progress() {
   if (shown_) std::fputs("\r\033[K", stderr);
@@ -49,7 +49,7 @@ void Progress::tell(const std::string& text) const {
 }
 
 Stopwatch::Stopwatch(bool wanted, const std::string& text) : progress_(wanted) {
-  if (!wanted || !shows_progress()) return;
+  if (!wanted || !shows_progress(STDERR_FILENO)) return;
   thread_ = std::thread([this, text] {
     std::unique_lock<std::mutex> lock(mutex_);
     for (int seconds = 1; !stop_.wait_for(lock, std::chrono::seconds(1), [&] { return stopped_; });

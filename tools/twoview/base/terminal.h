@@ -12,6 +12,10 @@ namespace cli {
 // NO_COLOR is missing or empty.
 bool takes_colours(int descriptor);
 
+// Whether this descriptor takes lines of progress that replace each other: it is a terminal, and
+// TERM is not "dumb". NO_COLOR does not matter here.
+bool shows_progress(int descriptor);
+
 // Shows the progress of long work as one line on stderr: each line replaces the last one, is cut to
 // the terminal's width, and the destructor erases it. Shows nothing unless stderr is a terminal and
 // TERM is not "dumb".

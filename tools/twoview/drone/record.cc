@@ -1,10 +1,13 @@
 // twoview drone record: stores the drone's navdata and live video packets, unchanged.
 
+#include <unistd.h>
+
 #include <memory>
 #include <optional>
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/terminal.h"
 #include "drone/link.h"
 #include "drone/vehicle.h"
 #include "recording/recording.h"
@@ -60,7 +63,7 @@ int record(const Arguments& a) {
     keeping([&] { recording->add_frame(frame); });
   };
   const bool speaks = !a.json && !a.quiet;
-  const bool is_terminal = speaks && stdout_style().bold[0] != '\0';
+  const bool is_terminal = speaks && shows_progress(STDOUT_FILENO);
   const int64_t start = ardrone_now_ns();
   const auto seconds = [start] { return static_cast<double>(ardrone_now_ns() - start) * 1e-9; };
   double next_word = 0;

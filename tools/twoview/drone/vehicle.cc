@@ -1,6 +1,7 @@
 #include "drone/vehicle.h"
 
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -8,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/terminal.h"
 #include "recording/vehicle_recording.h"
 #include "recording/vehicle_session.h"
 #include "sources/camera_source.h"
@@ -160,7 +162,7 @@ void fly_vehicle(const VehicleAddress& vehicle, const LinkListener& listener,
 int record_vehicle(const VehicleAddress& vehicle, const std::string& folder, double seconds,
                    bool json, bool quiet) {
   const bool speaks = !json && !quiet;
-  const bool is_terminal = speaks && stdout_style().bold[0] != '\0';
+  const bool is_terminal = speaks && shows_progress(STDOUT_FILENO);
   std::optional<VehicleRecording> recording;
   LinkListener listener;
   listener.on_imu = [&](const tvs_imu& imu) { recording->add_sample(imu); };

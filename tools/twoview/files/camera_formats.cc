@@ -184,6 +184,11 @@ bool is_colmap(const std::string& text) {
          is_upper_word(lines[0].second[1]);
 }
 
+bool is_xml(const std::string& text) {
+  const size_t first = text.find_first_not_of(" \t\r\n");
+  return first != std::string::npos && text[first] == '<';
+}
+
 NamedCameras colmap_cameras(const std::string& text, const std::string& path) {
   NamedCameras cameras;
   for (const auto& [number, fields] : lines_of(text)) {
@@ -267,6 +272,10 @@ CameraFile parse_camera_file(const std::string& text, const std::string& path) {
     file.is_colmap = true;
     return file;
   }
+  if (is_xml(text))
+    throw BadInput(path +
+                   " is XML, which only the Python package reads (twoview.read_cameras): save the "
+                   "camera as YAML, as OpenCV does in a file that ends in .yaml");
   YAML::Node root;
   try {
     root = parse_yaml(text, path);

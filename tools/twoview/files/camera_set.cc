@@ -95,8 +95,7 @@ tv_camera camera_of_image(const NamedCameras& cameras, const std::string& image_
     require_size(*entry, "in cameras.yaml", width, height, image_name);
     camera = *entry;
   } else if (!K) {
-    throw BadInput("no camera for image " + image_name +
-                   ": no K on its line, no cameras.yaml beside the list, and no --camera");
+    throw BadInput("no camera for image " + image_name);
   }
   camera.width = width;
   camera.height = height;

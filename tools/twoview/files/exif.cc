@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <memory>
 #include <string>
 
@@ -91,6 +92,13 @@ double from_sensor(ExifData* data, double full_width, double full_height) {
 }
 
 }  // namespace
+
+std::string focal_option(const ExifFocal& exif) {
+  if (!(exif.focal_35mm > 0)) return "--focal-35mm";
+  char text[48];
+  std::snprintf(text, sizeof text, "--focal-35mm %.4g (by EXIF)", exif.focal_35mm);
+  return text;
+}
 
 int exif_turn_deg(std::string_view bytes) {
   const Data data = parsed(bytes);

@@ -2,6 +2,7 @@
 // them.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 namespace cli {
@@ -18,6 +19,10 @@ struct ExifFocal {
 // give. There is none where the picture was cropped: where its sides are not in the ratio of
 // PixelXDimension and PixelYDimension, to one per cent. It never fails.
 ExifFocal exif_focal(std::string_view bytes, int width, int height);
+
+// The option that stands in for a camera, with its number where the EXIF data have it:
+// "--focal-35mm" or "--focal-35mm 26 (by EXIF)".
+std::string focal_option(const ExifFocal& exif);
 
 // By how many degrees a viewer turns the picture clockwise, as EXIF's Orientation says: 0, 90, 180
 // or 270; 0 where it is not said. It never fails.

@@ -1,15 +1,14 @@
 #include "files/image_file.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
 #include "base/output.h"
+#include "base/silence.h"
 #include "files/exif.h"
 #include "files/image_header.h"
 
@@ -18,46 +17,19 @@ namespace {
 
 constexpr size_t kMaxFileBytes = size_t{1} << 30;
 
-// Decoders (libpng, libjpeg, libtiff, OpenCV) print messages to stderr, while the program must
-// print one clear line only. During the lifetime of this object stderr (file descriptor 2) is
-// discarded.
-class StderrSilence {
- public:
-  StderrSilence() : saved_(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
-    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-    if (saved_ >= 0 && nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
-    if (nowhere >= 0) ::close(nowhere);
-  }
-  ~StderrSilence() {
-    if (saved_ < 0) return;
-    ::dup2(saved_, STDERR_FILENO);
-    ::close(saved_);
-  }
-  StderrSilence(const StderrSilence&) = delete;
-  StderrSilence& operator=(const StderrSilence&) = delete;
-
- private:
-  int saved_;
-};
-
 std::string size_text(int64_t width, int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
-// What to do about a file that OpenCV does not decode; empty for what is no image.
-std::string foreign_format(std::string_view bytes) {
-  const std::string_view brand = bytes.substr(0, 4096).substr(std::min<size_t>(8, bytes.size()), 4);
-  const bool is_iso_media = bytes.substr(std::min<size_t>(4, bytes.size()), 4) == "ftyp";
-  if (is_iso_media && (brand == "avif" || brand == "avis"))
-    return "is an AVIF picture, which is not read: convert it to PNG or JPEG";
-  for (const char* heic : {"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1"})
-    if (is_iso_media && brand == heic)
-      return "is a HEIC picture, which is not read: convert it to JPEG, or let the phone save JPEG";
-  if (bytes.substr(0, 6) == "GIF87a" || bytes.substr(0, 6) == "GIF89a")
-    return "is a GIF picture, which is not read: convert it to PNG";
+bool is_iso_media(std::string_view bytes) {
+  return bytes.substr(std::min<size_t>(4, bytes.size()), 4) == "ftyp";
+}
+
+// What to do about a film in the place of a picture; empty for what is no film.
+std::string film_instead(std::string_view bytes) {
   const bool is_avi =
       bytes.substr(0, 4) == "RIFF" && bytes.substr(std::min<size_t>(8, bytes.size()), 4) == "AVI ";
-  if (is_iso_media || is_avi || bytes.substr(0, 4) == "\x1a\x45\xdf\xa3")
+  if (is_iso_media(bytes) || is_avi || bytes.substr(0, 4) == "\x1a\x45\xdf\xa3")
     return "is a film: take two of its frames (ffmpeg -i FILM -vf fps=2 frame%03d.png), or give it "
            "to twoview odometry";
   return "";
@@ -74,7 +46,7 @@ cv::Mat decode(const std::string& path, const std::string& bytes) {
   refuse_huge(header.width, header.height);
   cv::Mat pixels;
   try {
-    const StderrSilence silence;
+    const StderrSilence silence;  // libpng, libjpeg, libtiff and OpenCV print messages
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U,
                           // The cast is safe, since imdecode does not write.
                           const_cast<char*>(bytes.data()));
@@ -84,7 +56,8 @@ cv::Mat decode(const std::string& path, const std::string& bytes) {
   }
   if (header.truncated) throw BadInput("image " + path + " is truncated");
   if (pixels.empty()) {
-    const std::string foreign = foreign_format(bytes);
+    std::string foreign = unread_picture(bytes);
+    if (foreign.empty()) foreign = film_instead(bytes);
     if (!foreign.empty()) throw BadInput("image " + path + " " + foreign);
     throw BadInput("image " + path +
                    (header.width > 0 ? " is damaged" : " is no image that can be read"));
@@ -113,6 +86,26 @@ cv::Mat to_8_bits(const cv::Mat& pixels) {
 }
 
 }  // namespace
+
+std::string unread_picture(std::string_view bytes) {
+  if (bytes.substr(0, 6) == "GIF87a" || bytes.substr(0, 6) == "GIF89a")
+    return "is a GIF picture, which is not read: convert it to PNG";
+  if (!is_iso_media(bytes)) return "";
+  const std::string_view brand = bytes.substr(std::min<size_t>(8, bytes.size()), 4);
+  if (brand == "avif" || brand == "avis")
+    return "is an AVIF picture, which is not read: convert it to PNG or JPEG";
+  for (const char* heic : {"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1"})
+    if (brand == heic)
+      return "is a HEIC picture, which is not read: convert it to JPEG, or let the phone save JPEG";
+  return "";
+}
+
+std::string unread_picture_file(const std::string& path) {
+  char head[16] = "";
+  std::ifstream file(path, std::ios::binary);
+  file.read(head, sizeof head);
+  return unread_picture({head, static_cast<size_t>(file.gcount())});
+}
 
 tv_image Picture::view() const {
   return {luma.data, luma.cols, luma.rows, static_cast<int64_t>(luma.step)};

@@ -3,6 +3,7 @@
 
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <string_view>
 
 #include "files/exif.h"
 #include "twoview/image.h"
@@ -38,6 +39,12 @@ Picture load_picture(const std::string& path);
 // Decodes all pixels without conversion: 8 or 16 bits, 1, 3 (BGR) or 4 (BGRA) channels. Throws
 // BadInput like load_picture.
 cv::Mat load_pixels(const std::string& path);
+
+// What a picture of a format that is not read is and what to do about it, such as "is a HEIC
+// picture, which is not read: convert it to JPEG"; empty for what is none of HEIC, AVIF and GIF.
+std::string unread_picture(std::string_view bytes);
+// The same of a file; empty if it cannot be read.
+std::string unread_picture_file(const std::string& path);
 
 // The size to which shrink() brings an image of this size.
 cv::Size shrunk_size(cv::Size size, int longer);

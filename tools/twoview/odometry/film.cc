@@ -5,6 +5,8 @@
 #include <opencv2/videoio.hpp>
 
 #include "base/error.h"
+#include "base/silence.h"
+#include "files/image_file.h"
 #include "odometry/frames.h"
 #include "pair/session.h"
 
@@ -25,9 +27,16 @@ cv::Mat luma_of(const cv::Mat& picture) {
 class Film : public FrameSource {
  public:
   Film(const std::string& file, double fps) : file_(file), fps_(fps) {
-    cv::VideoCapture film(file);
-    if (!film.isOpened())
+    cv::VideoCapture film;
+    {
+      const StderrSilence silence;  // FFmpeg prints messages
+      film.open(file);
+    }
+    if (!film.isOpened()) {
+      const std::string picture = unread_picture_file(file);
+      if (!picture.empty()) throw BadInput(file + " " + picture);
       throw BadInput("cannot read " + file + ": it is no film that OpenCV reads");
+    }
     if (fps_ > 0) return;
     fps_ = film.get(cv::CAP_PROP_FPS);
     if (!(fps_ > 0 && fps_ < 1e5))

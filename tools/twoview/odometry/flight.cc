@@ -94,8 +94,8 @@ void Flight::start(const SourceFrame& first) {
   } else if (options_.camera_file.empty()) {
     const auto camera = source_.camera(frame, frame.luma.cols, frame.luma.rows);
     if (!camera)
-      throw BadInput("--camera is required, or --focal-35mm: " + source_.kind() +
-                     " does not describe its camera");
+      throw BadInput("--camera is required, or " + focal_option(frame.exif) + ": " +
+                     source_.kind() + " does not describe its camera");
     file_camera_ = *camera;
   }
   prepare(frame);

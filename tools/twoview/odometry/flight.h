@@ -104,6 +104,8 @@ class Flight {
   bool is_upright() const { return is_upright_; }
   const tv_odometry_state& state() const { return state_; }
   const tv_camera& camera() const { return camera_; }
+  // The camera of the frames as the source gives them, before they are scaled down.
+  const tv_camera& file_camera() const { return file_camera_; }
   size_t context_bytes() const { return context_bytes_; }
   int num_unreadable() const { return num_unreadable_; }
   const std::string& first_problem() const { return first_problem_; }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/matrix.h"
+#include "files/exif.h"
 #include "twoview/camera.h"
 
 namespace cli {
@@ -22,6 +23,7 @@ struct SourceFrame {
   double time_s = 0;
   cv::Mat luma;                           // 8-bit; empty where the frame cannot be read
   std::string problem;                    // why luma is empty
+  ExifFocal exif;                         // of a photograph
   bool gap = false;                       // frames were lost before this one
   std::optional<Matrix3> world_from_cam;  // the vehicle's attitude; the world's z axis points down
   double attitude_sigma_rad = 0;
@@ -63,6 +65,8 @@ class FrameSource {
   // The pose of the camera in the frame of the vehicle that the source's truth describes (EuRoC's
   // T_BS), row-major 3 x 4; empty: the truth describes the camera.
   virtual std::optional<std::array<double, 12>> body_from_camera() const { return {}; }
+  // What the user must know of the source, a line without an end; empty where there is nothing.
+  virtual std::string note() const { return ""; }
   // The files that the source reads, which no output may replace.
   virtual std::vector<std::string> files() const { return {}; }
 };

@@ -45,6 +45,7 @@ struct Folder {
   std::optional<std::array<double, 12>> body_from_camera;
   std::optional<Measurements> measurements;
   std::vector<std::string> files;
+  std::string note;
 };
 
 class ImageFolder : public FrameSource {
@@ -60,7 +61,9 @@ class ImageFolder : public FrameSource {
       frame.name = listed.name;
       frame.time_s = listed.time_s;
       try {
-        frame.luma = load_picture((fs::path(folder_.path) / listed.name).string()).luma;
+        const Picture picture = load_picture((fs::path(folder_.path) / listed.name).string());
+        frame.luma = picture.luma;
+        frame.exif = picture.exif;
       } catch (const BadInput& e) {
         frame.problem = e.what();
       }
@@ -88,6 +91,7 @@ class ImageFolder : public FrameSource {
     return folder_.body_from_camera;
   }
   std::vector<std::string> files() const override { return folder_.files; }
+  std::string note() const override { return folder_.note; }
 
  private:
   Folder folder_;
@@ -219,24 +223,39 @@ void add_kitti_camera(Folder& folder) {
   throw BadInput(path + ": no line P0");
 }
 
-bool is_image_name(const fs::path& path) {
-  static const std::vector<std::string> kEndings = {".jpg", ".jpeg", ".png",  ".bmp", ".pgm",
-                                                    ".ppm", ".tif",  ".tiff", ".webp"};
+using Endings = std::vector<std::string>;
+const Endings kImages = {".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp"};
+const Endings kUnreadImages = {".heic", ".heif", ".avif", ".gif"};
+
+bool ends_as(const fs::path& path, const Endings& endings) {
   std::string ending = path.extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+  return std::find(endings.begin(), endings.end(), ending) != endings.end();
 }
 
-// The names of a folder's images in the order of their bytes.
-std::vector<std::string> image_names(const fs::path& folder) {
+// The names of a folder's images with one of these endings in the order of their bytes.
+std::vector<std::string> image_names(const fs::path& folder, const Endings& endings = kImages) {
   std::vector<std::string> names;
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
-    if (is_image_name(at->path()) && is_file(at->path()))
+    if (ends_as(at->path(), endings) && is_file(at->path()))
       names.push_back(at->path().filename().string());
   if (error) throw BadInput("cannot read folder " + folder.string() + ": " + error.message());
   std::sort(names.begin(), names.end());
   return names;
+}
+
+// Which pictures of a folder are of formats that are not read; empty if there are none.
+std::string unread_images(const fs::path& folder) {
+  std::vector<std::string> lines;
+  for (const std::string& name : image_names(folder, kUnreadImages)) {
+    const std::string what = unread_picture_file((folder / name).string());
+    if (!what.empty()) lines.push_back(name + " " + what);
+  }
+  if (lines.empty()) return "";
+  if (lines.size() == 1) return "1 picture of " + folder.string() + " is left out: " + lines[0];
+  return std::to_string(lines.size()) + " pictures of " + folder.string() +
+         " are left out, the first: " + lines[0];
 }
 
 void read_kitti(Folder& folder) {
@@ -317,6 +336,9 @@ std::unique_ptr<FrameSource> open_image_folder(const std::string& path, double f
   } else {
     folder.kind = "a folder of images";
     const std::vector<std::string> names = image_names(root);
+    folder.note = unread_images(root);
+    if (names.empty() && !folder.note.empty())
+      throw BadInput(path + " holds no image that is read: " + folder.note);
     if (names.empty())
       throw BadInput(path +
                      " holds neither frames.txt, rgb.txt, mav0/cam0/data.csv, image_0, video.pave "

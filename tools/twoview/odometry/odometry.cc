@@ -41,6 +41,7 @@ struct Arguments {
   double fps = 0, duration = 0;
   bool ignores_imu = false;
   bool is_live = false;
+  bool has_resize = false;  // --resize is given, if only as 0
   int32_t live_port = 0;
   FlightOptions flight;
 #ifdef TWOVIEW_HAS_DRONE
@@ -144,6 +145,15 @@ int num_wanted(const FrameSource& source, const FlightOptions& options) {
   if (all < 0) return options.max_frames > 0 ? options.max_frames : -1;
   const int some = (all + options.every - 1) / options.every;
   return options.max_frames > 0 ? std::min(some, options.max_frames) : some;
+}
+
+// Says that frames above the size that reconstruct takes as it is are tracked as they are.
+void advise_on_size(const Arguments& a, const tv_camera& camera) {
+  if (a.has_resize || std::max(camera.width, camera.height) <= kLargeSide) return;
+  std::fprintf(stderr,
+               "twoview: note: frames above %d pixels a side are used as they are: %dx%d; "
+               "--resize %d is advised\n",
+               kLargeSide, camera.width, camera.height, kUsualSide);
 }
 
 nlohmann::ordered_json options_of(const Arguments& a, const std::string& truth_file) {
@@ -270,6 +280,7 @@ int odometry(Arguments& a) {
   for (const std::string& name : source->files()) files.keep(name);
   files.keep(a.camera);
   files.keep(truth_file);
+  if (!source->note().empty()) std::fprintf(stderr, "twoview: note: %s\n", source->note().c_str());
   const int wanted = num_wanted(*source, a.flight);
   std::optional<LivePage> live;
   if (a.is_live || a.live_port > 0) {
@@ -283,6 +294,7 @@ int odometry(Arguments& a) {
   {
     FlightProgress progress(flight, wanted, !common.quiet);
     flight.track(stop, [&] {
+      if (flight.frames().size() == 1) advise_on_size(a, flight.file_camera());
       progress.show();
       if (live) live->update(flight);
     });
@@ -351,8 +363,8 @@ void add_odometry(CLI::App& program, Run& run) {
   add_number(*verb, "max-points", &o.max_points, 500, 200000, "most points of the map");
   add_number(*verb, "window", &o.window, 3, 20, "keyframes that are adjusted together");
   add_number(*verb, "seed", &o.seed, 0, kLargestSeed, "of the samplers");
-  add_number(*verb, "resize", &a->flight.resize, 0, kMaxSide,
-             "scale frames down to this longer side, pixels; 0: as they are");
+  CLI::Option* resize = add_number(*verb, "resize", &a->flight.resize, 0, kMaxSide,
+                                   "scale frames down to this longer side, pixels; 0: as they are");
   add_kernels(*verb, o.kernels);
 #ifdef TWOVIEW_HAS_DRONE
   verb->add_option("--drone", a->drone.host, "in place of SOURCE: the address of an AR.Drone")
@@ -362,7 +374,10 @@ void add_odometry(CLI::App& program, Run& run) {
   add_duration(*verb, a->duration);
 #endif
   add_common(*verb, a->common, 0, "folder for the results");
-  verb->final_callback([a, &run] { run = [a] { return odometry(*a); }; });
+  verb->final_callback([a, resize, &run] {
+    a->has_resize = resize->count() > 0;
+    run = [a] { return odometry(*a); };
+  });
 }
 
 }  // namespace cli

@@ -189,13 +189,15 @@ std::string camera_table(const Outcome& outcome) {
 
 std::string tables(const Outcome& outcome) {
   const Json& j = outcome.json;
+  Json shown = j;
+  shown["verdict"] = verdict_in_words(outcome.two_view);  // result.json has the library's word
   std::string found;
   for (const char* key :
        {"image_size0", "image_size1", "num_keypoints", "num_matches", "num_inliers", "config",
         "verdict", "reasons", "probability_wrong", "num_points", "num_dense_points",
         "median_parallax_deg", "rms_reprojection_px", "principal_point_shift_px", "scale",
         "scale_sigma", "num_iterations"})
-    found += row(key, j[key]);
+    found += row(key, shown[key]);
   std::string text = table("What was found", found);
   text += camera_table(outcome);
   if (j["truth"].is_object()) text += object_table("Against the truth", j["truth"]);

@@ -17,6 +17,7 @@
 #include "files/pairs_file.h"
 #include "pair/camera_advice.h"
 #include "pair/measures.h"
+#include "pair/options.h"
 #include "pair/reconstruct_pair.h"
 #include "verbs/verbs.h"
 
@@ -31,6 +32,7 @@ constexpr int kThresholdsDeg[] = {5, 10, 20};
 struct Arguments {
   Common common;
   std::string pairs, images, camera;
+  double focal_35mm = 0;
   int max_pairs = 0;
 };
 
@@ -54,14 +56,21 @@ Matrix3 turn_matrix(int quarters) {
   return turn;
 }
 
-// What the cameras of the images are taken from: the file of --camera, else cameras.yaml and K.
+// What the cameras of the images are taken from: the file of --camera, or --focal-35mm, else
+// cameras.yaml and K.
 struct Cameras {
   std::optional<CameraFile> file;
+  double focal_35mm = 0;
   NamedCameras set;
 
   tv_camera of(const std::string& name, const Picture& picture,
                const std::array<double, 9>* K) const {
     const int width = picture.luma.cols, height = picture.luma.rows;
+    if (focal_35mm > 0) return film_camera(focal_35mm, width, height);
+    if (!file && set.empty() && !K)
+      throw BadInput("no camera for image " + name +
+                     ": no K on its line and no cameras.yaml beside the list; give --camera or " +
+                     focal_option(picture.exif));
     if (!file) return camera_of_image(set, name, width, height, K);
     const tv_camera camera = file->of(name);
     require_size(camera, file->path, width, height, name);
@@ -226,6 +235,7 @@ Json report_json(const Arguments& a, const std::vector<PairReport>& reports,
   json["options"] = options_json(options, kAllOptions);
   json["options"]["max_pairs"] = a.max_pairs;
   json["options"]["camera"] = a.camera.empty() ? Json(nullptr) : Json(a.camera);
+  json["options"]["focal_35mm"] = a.focal_35mm > 0 ? Json(a.focal_35mm) : Json(nullptr);
   json["seed"] = options.estimate.seed;
   json["version"] = tv_version_string();
   json["kernels"] = session.get() ? Json(session.kernels()) : Json(nullptr);
@@ -324,21 +334,35 @@ void split_output(const std::string& output, fs::path& folder, std::string& name
   }
 }
 
+Cameras load_cameras(Arguments& a) {
+  Cameras cameras;
+  const fs::path set_path = fs::path(a.pairs).parent_path() / "cameras.yaml";
+  if (!a.camera.empty()) {
+    cameras.file = load_camera_file(a.camera);
+  } else if (a.focal_35mm > 0) {
+    // Such a focal length is known less well than a calibrated one.
+    tv_estimate_options& options = a.common.options.estimate;
+    options.focal_sigma0 = options.focal_sigma1 = kFilm.focal;
+    options.center_sigma0 = options.center_sigma1 = kFilm.center;
+    cameras.focal_35mm = a.focal_35mm;
+  } else if (fs::exists(set_path)) {
+    cameras.set = load_camera_set(set_path.string());
+  }
+  return cameras;
+}
+
 int evaluate(Arguments& a) {
   Common& common = a.common;
   if (common.options.estimate.method == TV_SOLVER_UPRIGHT)
     throw BadInput("--method upright needs gravity, which a list of pairs does not have");
   common.options.settle();
+  if (a.focal_35mm > 0 && !a.camera.empty())
+    throw BadInput("--focal-35mm is for photographs without a camera file");
   if (!fs::is_directory(a.images)) throw BadInput("--images: " + a.images + " is not a folder");
   std::vector<Pair> pairs = load_pairs(a.pairs);
   if (a.max_pairs > 0 && pairs.size() > static_cast<size_t>(a.max_pairs))
     pairs.resize(static_cast<size_t>(a.max_pairs));
-  Cameras cameras;
-  const fs::path cameras_path = fs::path(a.pairs).parent_path() / "cameras.yaml";
-  if (!a.camera.empty())
-    cameras.file = load_camera_file(a.camera);
-  else if (fs::exists(cameras_path))
-    cameras.set = load_camera_set(cameras_path.string());
+  const Cameras cameras = load_cameras(a);
 
   fs::path folder;
   std::string name;
@@ -383,6 +407,7 @@ void add_evaluate(CLI::App& program, Run& run) {
   verb->add_option("--camera", a->camera,
                    "camera file of all images, in place of cameras.yaml and of the Ks in the list")
       ->type_name("FILE");
+  add_focal_35mm(*verb, a->focal_35mm);
   verb->add_option("--max-pairs", a->max_pairs, "take the first N pairs; 0: all")
       ->check([](const std::string& count) {
         return count[0] == '-' ? count + " is negative" : std::string();

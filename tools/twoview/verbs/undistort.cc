@@ -89,8 +89,10 @@ std::vector<std::string> result_names(const std::vector<std::string>& images, bo
 
 // The camera of the images, which are all of one size.
 tv_camera lens_of(const Arguments& a) {
-  if (a.camera.empty() == !(a.focal_35mm > 0))
-    throw BadInput("give either --camera or --focal-35mm");
+  const bool has_focal = a.focal_35mm > 0;
+  if (!a.camera.empty() && has_focal) throw BadInput("give either --camera or --focal-35mm");
+  if (a.camera.empty() && !has_focal)
+    throw BadInput("give either --camera or " + focal_option(load_picture(a.images[0]).exif));
   const std::string name = fs::path(a.images[0]).filename().string();
   if (!a.camera.empty()) return load_camera(a.camera, name);
   const cv::Mat image = load_pixels(a.images[0]);

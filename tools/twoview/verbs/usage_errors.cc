@@ -50,6 +50,12 @@ bool is_option(const std::string& word) {
   return word[1] == '-' ? word.size() > 2 : is_letter(word[1]);
 }
 
+// What does the work of an option that only other verbs have; empty where there is nothing.
+std::string other_verb(const std::string& path, const std::string& option) {
+  const bool has_files = path == "odometry " || path == "drone record " || path == "drone replay ";
+  return has_files && option == "--rerun" ? "; twoview rerun DIR FILE.rrd does it afterwards" : "";
+}
+
 // "a, b or c"
 std::string alternatives(const std::vector<std::string>& names) {
   std::string text;
@@ -118,7 +124,7 @@ std::string usage_error(const CLI::App& program, int argc, const char* const* ar
     const bool is_long = word[1] == '-';  // else its value may follow at once: -oFOLDER
     const std::string name = is_long ? word.substr(0, word.find('=')) : word.substr(0, 2);
     if (std::find(options.begin(), options.end(), name) == options.end())
-      return "no option " + name + suggestion(name, options) + help;
+      return "no option " + name + other_verb(path, name) + suggestion(name, options) + help;
   }
   if (!verbs.empty() && rest == argc)
     return "a verb is required" +

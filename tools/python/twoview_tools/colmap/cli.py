@@ -51,7 +51,7 @@ _longer_side.__name__ = "pixels (0 to 16384)"
 def _add_size_and_focal(parser):
     parser.add_argument("--focal-35mm", type=_focal_35mm, default=0.0, metavar="MM",
                         help="in place of a camera file: the focal length as for 35 mm film")
-    parser.add_argument("--resize", type=_longer_side, default=0, metavar="L",
+    parser.add_argument("--resize", type=_longer_side, metavar="L",
                         help="scale images and cameras down to this longer side, pixels; what is "
                              "written is of such images (default: 0, as they are)")
 
@@ -221,7 +221,7 @@ def _model(arguments):
             f"names"
         )
     pose, model = reconstruct(a.images, names, cameras, *(settings.options_of(a, kind) for kind in (
-        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)), resize=a.resize)
+        tv.FeatureOptions, tv.MatchOptions, tv.EstimateOptions)), resize=a.resize or 0)
     if model is None:
         print(f"twoview: no full pose: {pose.kind.name.lower()}", file=sys.stderr)
         return EXIT_NO_POSE

@@ -2,12 +2,14 @@
 mapper then uses."""
 
 import os
+import sys
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 import twoview as tv
 
+from ..sizes import LARGE_SIDE, USUAL_SIDE
 from . import conventions
 from .cameras import CameraChoice, resized
 from .database import (
@@ -48,15 +50,20 @@ class Job:
     append: bool = False
     quiet: bool = False
     focal_35mm: float = 0  #: makes the cameras, in place of files; 0: not given
-    resize: int = 0  #: longer side to which images and cameras are scaled down; 0: as they are
+    #: longer side to which images and cameras are scaled down; 0: as they are; None: not given,
+    #: which is as 0 with a note where the first image is large
+    resize: Optional[int] = None
 
 
 def choose_pairs(job):
     """The [Pair] to match, each pair once; all images must exist."""
     if not job.pairs:
-        names = list_images(job.images)
+        names, unread = list_images(job.images)
         if len(names) < 2:
-            raise BadInput(f"{job.images}: {len(names)} images in it, two and more are needed")
+            raise BadInput(f"{job.images}: {len(names)} images in it, two and more are needed"
+                           + (f"; {unread}" if unread else ""))
+        if unread:
+            print(f"twoview: note: {unread}", file=sys.stderr)
         return sequential(names, job.overlap) if job.overlap else exhaustive(names)
     pairs, seen = [], set()
     for pair in read_pairs(job.pairs):
@@ -81,12 +88,23 @@ def _intrinsics(job, pairs):
     return dict(sorted(given.items()))
 
 
+def _advise_on_size(job, name):
+    """Says that the images are used as they are, where the first of them, `name`, is large."""
+    height, width = read_luma(os.path.join(job.images, name)).shape
+    if max(width, height) > LARGE_SIDE:
+        print(f"twoview: note: images above {LARGE_SIDE} pixels a side are used as they are: "
+              f"{name} is {width}x{height}; --resize {USUAL_SIDE} is advised", file=sys.stderr)
+
+
 def _describe_images(job, pairs, engine):
     folders = [os.path.dirname(os.path.abspath(job.pairs))] if job.pairs else []
     folders += [job.images, os.path.dirname(os.path.abspath(job.images))]
     choice = CameraChoice(job.cameras, folders, job.focal_35mm)
     views = {}
-    for name, K in progress(_intrinsics(job, pairs).items(), "image", job.quiet):
+    intrinsics = _intrinsics(job, pairs)
+    if job.resize is None and intrinsics:
+        _advise_on_size(job, next(iter(intrinsics)))
+    for name, K in progress(intrinsics.items(), "image", job.quiet):
         luma = read_luma(os.path.join(job.images, name))
         camera = choice.of(name, luma.shape[1], luma.shape[0], K)
         if job.resize:

@@ -5,20 +5,21 @@ import os
 
 import numpy as np
 
+from ..unread import left_out, unread_picture
 from .errors import BadInput
 
 EXTENSIONS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp")
 
 
 def list_images(folder):
-    """The names of the files with one of EXTENSIONS below a folder, sorted, without hidden ones; as
-    in COLMAP, / separates folders."""
+    """(the names of the files with one of EXTENSIONS below a folder, sorted, without hidden ones; a
+    line on pictures of formats that are not read, or ""). As in COLMAP, / separates folders."""
     if not os.path.isdir(folder):
         raise BadInput(f"{folder}: no such folder")
-    names = [os.path.relpath(os.path.join(root, file), folder)
-             for root, _, files in os.walk(folder) for file in files
-             if file.lower().endswith(EXTENSIONS) and not file.startswith(".")]
-    return sorted(name.replace(os.sep, "/") for name in names)
+    names = sorted(os.path.relpath(os.path.join(root, file), folder).replace(os.sep, "/")
+                   for root, _, files in os.walk(folder) for file in files
+                   if not file.startswith("."))
+    return [name for name in names if name.lower().endswith(EXTENSIONS)], left_out(folder, names)
 
 
 def _decode(path):
@@ -34,7 +35,9 @@ def _decode(path):
     except cv2.error:
         image = None
     if image is None:
-        raise BadInput(f"image {path}: not an image that OpenCV reads")
+        unread = unread_picture(path)
+        raise BadInput(f"image {path} {unread}" if unread else
+                       f"image {path}: not an image that OpenCV reads")
     if image.dtype == np.uint16:  # 16-bit samples are divided by 257 and rounded
         image = ((image.astype(np.uint32) + 128) // 257).astype(np.uint8)
     if image.dtype != np.uint8:

@@ -12,6 +12,8 @@ import numpy as np
 
 from .. import formats
 from ..accuracy import datasets
+from ..sizes import MAX_NATIVE_SIDE, RESIZE_LONG_SIDE
+from ..unread import unread_picture
 from . import cluster, results, systems
 from .arguments import PROGRAM, make_parser
 
@@ -127,7 +129,9 @@ def check_images(tasks, default_resize):
         task["resize"] = resize.get(task["set"], 0) if default_resize else task["resize"]
     if bad:
         others = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
-        raise BadInput(f"cannot read the image {bad[0]}{others}")
+        unread = unread_picture(bad[0])
+        why = f": {'the first' if others else 'it'} {unread}" if unread else ""
+        raise BadInput(f"cannot read the image {bad[0]}{others}{why}")
     return hashes
 
 
@@ -225,6 +229,10 @@ class Store:
             os.rmdir(self.folder)
 
 
+def shows_progress(quiet):
+    return not quiet and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+
+
 def run_pairs(tasks, keys, workers, store, quiet):
     """Returns (the results in the order of the tasks, the number of pairs run now). Pairs with a
     stored result are not run again."""
@@ -235,7 +243,7 @@ def run_pairs(tasks, keys, workers, store, quiet):
         print(f"{PROGRAM}: going on: {len(tasks) - len(todo)} of {len(tasks)} pairs are done",
               file=sys.stderr)
     with tqdm(total=len(tasks), initial=len(tasks) - len(todo), unit="pair", smoothing=0.05,
-              disable=quiet or not sys.stderr.isatty(), file=sys.stderr) as bar:
+              disable=not shows_progress(quiet), file=sys.stderr) as bar:
         for number, result in workers.run([tasks[i] for i in todo]):
             index = todo[number]
             store.put(keys[index], result)
@@ -249,6 +257,10 @@ def compare(arguments):
     tasks = read_lists(arguments)
     tasks = thin_out(tasks, arguments.max_pairs)
     hashes = check_images(tasks, arguments.resize is None)
+    if arguments.resize is None and any(t["resize"] for t in tasks) and not arguments.quiet:
+        print(f"{PROGRAM}: images are compared at {RESIZE_LONG_SIDE} pixels a side where the first "
+              f"of their list is above {MAX_NATIVE_SIDE} (--resize 0: as they are)",
+              file=sys.stderr)
     folder = os.path.abspath(arguments.output)
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise BadInput(f"-o: {folder} is a file")
