@@ -30,11 +30,9 @@ constexpr double kGrossWay = 0.1, kGrossTurn = 0.05;
 constexpr double kLargestDrift = 0.05;  // of the path, in position
 constexpr double kLargestShift = 0.15;  // of the median depth, added to it
 constexpr double kLargestTurn = 0.4;    // radians
-// In an upright segment, where only the yaw drifts: radians, for each median depth of the above.
-constexpr double kLargestYaw = 0.2;
 // Cameras farther from each other, in median depths, or turned by more see nothing in common.
 constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
-constexpr double kLeastScale = 0.6875, kLargestScale = 1.5;
+constexpr double kLargestScale = 1.5;
 constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
 // After a loop: steps of the adjustment of all keyframes, one at each frame, and of the points.
 constexpr int32_t kSpreadSteps = 12, kPointSteps = 3;
@@ -50,6 +48,15 @@ void measure_paths(const Map& map, double* lengths) {
     lengths[k] = length;
     if (k > 0) length += way_between(keyframes[k - 1].cam_from_world, keyframes[k].cam_from_world);
   }
+}
+
+// Whether drift can explain where the camera is now and where it must be for a loop.
+bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end) {
+  const Map& map = odometry.map;
+  if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
+  if (!(end.scale < kLargestScale && end.scale > 1 / kLargestScale)) return false;
+  return are_near(frame.cam_from_world, end.cam_from_world,
+                  kLargestDrift * path + kLargestShift * odometry.median_depth, kLargestTurn);
 }
 
 // Whether the frame may see what a keyframe saw, if the drift is as large as it may be after a path
@@ -81,15 +88,6 @@ double scale_between(Odometry* odometry, const Frame& frame, const Frame& again)
 }
 
 }  // namespace
-
-bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end) {
-  const Map& map = odometry.map;
-  if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
-  if (!(end.scale < kLargestScale && end.scale > kLeastScale)) return false;
-  const double way = kLargestDrift * path + kLargestShift * odometry.median_depth;
-  return are_near(frame.cam_from_world, end.cam_from_world, way,
-                  odometry.is_upright ? kLargestYaw / odometry.median_depth * way : kLargestTurn);
-}
 
 bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end) {
   const WeakLoop before = odometry->weak_loop;
@@ -217,6 +215,7 @@ void fuse_points(Odometry* odometry, int32_t keyframe, const Frame& again) {
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end) {
   const Map& map = odometry->map;
   const int32_t last = map.num_keyframes - 1 - kLeastKeyframesBetween;
+  if (map.num_keyframes == 0) return false;
   ArenaScope scope(odometry->scratch);
   double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   measure_paths(map, paths);
