@@ -79,7 +79,7 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations)
   window.max_iterations = max_iterations;
   window.damping = kDamping;
   if (!adjust_map_window(*odometry, &window, arena)) return false;
-  std::fill_n(moved, map.num_keyframes, MovedKeyframe{kIdentity, 0});
+  for (int32_t k = 0; k < map.num_keyframes; ++k) moved[k].scale = 0;
   for (int32_t v = 0; v < window.model.num_views; ++v) {
     moved[window.keyframes[v]] = {pose_of(window, v), 1};
   }

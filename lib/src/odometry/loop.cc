@@ -30,9 +30,11 @@ constexpr double kGrossWay = 0.1, kGrossTurn = 0.05;
 constexpr double kLargestDrift = 0.05;  // of the path, in position
 constexpr double kLargestShift = 0.15;  // of the median depth, added to it
 constexpr double kLargestTurn = 0.4;    // radians
+// In an upright segment, where only the yaw drifts: radians, for each median depth of the above.
+constexpr double kLargestYaw = 0.2;
 // Cameras farther from each other, in median depths, or turned by more see nothing in common.
 constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
-constexpr double kLargestScale = 1.5;
+constexpr double kLeastScale = 0.6875, kLargestScale = 1.5;
 constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
 // After a loop: steps of the adjustment of all keyframes, one at each frame, and of the points.
 constexpr int32_t kSpreadSteps = 12, kPointSteps = 3;
@@ -48,15 +50,6 @@ void measure_paths(const Map& map, double* lengths) {
     lengths[k] = length;
     if (k > 0) length += way_between(keyframes[k - 1].cam_from_world, keyframes[k].cam_from_world);
   }
-}
-
-// Whether drift can explain where the camera is now and where it must be for a loop.
-bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end) {
-  const Map& map = odometry.map;
-  if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
-  if (!(end.scale < kLargestScale && end.scale > 1 / kLargestScale)) return false;
-  return are_near(frame.cam_from_world, end.cam_from_world,
-                  kLargestDrift * path + kLargestShift * odometry.median_depth, kLargestTurn);
 }
 
 // Whether the frame may see what a keyframe saw, if the drift is as large as it may be after a path
@@ -88,6 +81,17 @@ double scale_between(Odometry* odometry, const Frame& frame, const Frame& again)
 }
 
 }  // namespace
+
+bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end) {
+  const Map& map = odometry.map;
+  if (map.keyframes[end.keyframe].segment != odometry.segment) return true;
+  if (!(end.scale < kLargestScale && end.scale > kLeastScale)) return false;
+  const double way = kLargestDrift * path + kLargestShift * odometry.median_depth;
+  return are_near(frame.cam_from_world, end.cam_from_world, way,
+                  odometry.is_upright && !odometry.is_found_again
+                      ? kLargestYaw / odometry.median_depth * way
+                      : kLargestTurn);
+}
 
 bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end) {
   const WeakLoop before = odometry->weak_loop;
@@ -167,8 +171,7 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
 // The pose of a keyframe between what the loop's beginning says of it and what its end says.
 MovedKeyframe blend(const Rigid& from_begin, const Rigid& from_end, double scale, double share) {
   MovedKeyframe moved;
-  const Rigid turn = scaled_motion(motion_between(from_begin, from_end), share);
-  Rigid rotation = turn;
+  Rigid rotation = scaled_motion(motion_between(from_begin, from_end), share);
   for (double& t : rotation.t) t = 0;
   double a[3], b[3];
   centre_of(from_begin, a);
@@ -215,7 +218,6 @@ void fuse_points(Odometry* odometry, int32_t keyframe, const Frame& again) {
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end) {
   const Map& map = odometry->map;
   const int32_t last = map.num_keyframes - 1 - kLeastKeyframesBetween;
-  if (map.num_keyframes == 0) return false;
   ArenaScope scope(odometry->scratch);
   double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   measure_paths(map, paths);
@@ -259,7 +261,7 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   const double whole = std::max(paths[end.keyframe], 1e-12);
   for (int32_t k = 0; k <= newest; ++k) {
     const MapKeyframe& own = map.keyframes[k];
-    moved[k] = {own.cam_from_world, 0};
+    moved[k].scale = 0;
     if (own.segment != segment) continue;
     if (segment == old_segment && k <= end.keyframe) continue;
     // As the loop's end says: the way from the newest keyframe, in the other scale.
@@ -287,6 +289,7 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   }
   fuse_points(odometry, keyframe, again);
   odometry->weak_loop.frame = -1;
+  odometry->is_found_again = false;
   const bool is_small =
       are_near(now, end.cam_from_world, kLeastWay * odometry->median_depth, kLeastTurn);
   if (segment != old_segment || !is_small) odometry->spread = {kSpreadSteps, 0, old_segment};

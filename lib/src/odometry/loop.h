@@ -17,6 +17,10 @@ struct LoopEnd {
   double scale;
 };
 
+// Whether drift over a path of this length can explain where the frame is now and where it must be
+// for a loop.
+bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end);
+
 // Whether a loop that few points speak for agrees with the last such loop, of which it takes the
 // place. `frame` has its pose.
 bool is_seen_twice(Odometry* odometry, const Frame& frame, const LoopEnd& end);

@@ -125,6 +125,7 @@ struct tv_odometry {
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
   int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
   bool closed_loop;          // with it
+  bool is_found_again;       // a lost frame was, and no loop has closed since
   tv::WeakLoop weak_loop;
   tv::Spread spread;
   tv::MapCheck check;

@@ -430,6 +430,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     has_pose = search_map(odometry, was_tracked, frame, &fit);
     state->relocated = has_pose && !was_tracked;
     odometry->num_relocations += state->relocated;
+    odometry->is_found_again |= state->relocated != 0;
   }
   if (has_pose && !finish_tracked(odometry, input, fit, follows, frame, state)) {
     // What the frame was tracked with was wrong.
