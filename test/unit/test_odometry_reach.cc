@@ -5,9 +5,11 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 #include "odometry/map.h"
 #include "odometry/metric.h"
+#include "support/room_scene.h"
 
 namespace {
 
@@ -92,6 +94,34 @@ void test_a_keyframe_of_another_segment_says_nothing() {
   TEST_ASSERT_TRUE(reaches(100, 2, 0));
 }
 
+// A loop that turns much is believed only then (odometry/loop.h, is_plausible).
+void test_a_lost_frame_that_is_found_again_is_remembered() {
+  const tv_camera camera = room_camera();
+  tv_odometry_options options;
+  tv_odometry_options_init(&options);
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
+  static uint8_t pixels[ROOM_WIDTH * ROOM_HEIGHT];
+  const tv_image image = {pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH};
+  tv_odometry_frame frame;
+  tv_odometry_frame_init(&frame);
+  frame.image = image;
+  tv_odometry_state state;
+  tv_odometry_state_init(&state);
+  for (int n = 0; n < 40; ++n) {
+    const bool is_blank = n == 37 || n == 38;
+    room_flight(n, pixels);
+    if (is_blank) std::memset(pixels, 99, sizeof pixels);
+    frame.time_s = n / 30.0;
+    TEST_ASSERT_FALSE(odometry->is_found_again);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+  }
+  TEST_ASSERT_TRUE(state.relocated);
+  TEST_ASSERT_TRUE(odometry->is_found_again);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  TEST_ASSERT_FALSE(odometry->is_found_again);
+}
+
 }  // namespace
 
 extern "C" void setUp(void) {
@@ -109,5 +139,6 @@ int main() {
   RUN_TEST(test_a_lost_frame_is_turned_as_its_attitude_says);
   RUN_TEST(test_the_way_is_not_bounded_without_velocities_or_after_a_gap);
   RUN_TEST(test_a_keyframe_of_another_segment_says_nothing);
+  RUN_TEST(test_a_lost_frame_that_is_found_again_is_remembered);
   return UNITY_END();
 }

@@ -142,7 +142,7 @@ void forget_observation(Map* map, int32_t keyframe, int32_t keypoint);
 void rank_points(const Map& map, int32_t* places, int32_t* ranks);
 
 // The pose that a keyframe is to have, and the factor of the distances of its points; 0 where it
-// stays.
+// stays, and its pose here is not read.
 struct MovedKeyframe {
   Rigid cam_from_world;
   double scale;
