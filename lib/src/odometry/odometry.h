@@ -141,8 +141,8 @@ struct tv_odometry {
   double last_time_s;
   bool is_upright;  // the segment's z axis points along gravity
   tv::Travel travel;
-  // Ways between keyframes that the velocities agreed with, half as many after each removal because
-  // of them; and frames in a row that they contradict while they are trusted so.
+  // Ways between keyframes that the velocities agreed with, a quarter fewer after each removal
+  // because of them; and frames in a row that they contradict while they are trusted so.
   int32_t velocity_trust, num_contrary;
   tv::MetricScale scale;
   // What is known of another segment's scale.

@@ -113,12 +113,16 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
       continue;
     }
     *reasons |= pair.view->reasons;
-    if (pair.view->verdict != TV_VERDICT_OK || !pair.view->has_t ||
-        pair.view->median_parallax_rad < kLeastParallax) {
-      if (pair.view->verdict == TV_VERDICT_OK) *reasons |= TV_REASON_LOW_PARALLAX;
+    if (!pair.view->has_t || pair.view->median_parallax_rad < kLeastParallax) {
+      *reasons |= TV_REASON_LOW_PARALLAX;
+      // Those that follow are nearer still, but for a camera that went to and fro.
+      if (pair.view->median_parallax_rad < kLeastParallax / 2) break;
       continue;
     }
-    if (!make_first_points(odometry, first, frame, pair, image)) continue;
+    if (pair.view->verdict != TV_VERDICT_OK ||
+        !make_first_points(odometry, first, frame, pair, image)) {
+      continue;
+    }
     *reasons = 0;
     odometry->num_starts = 0;
     return true;

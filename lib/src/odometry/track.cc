@@ -148,7 +148,7 @@ bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) 
   odometry->travel.keyframe_id = -1;  // says nothing of the scale
   if (odometry->velocity_trust < kLeastTrust || ++odometry->num_contrary < kMostContrary)
     return true;
-  odometry->velocity_trust /= 2;
+  odometry->velocity_trust -= odometry->velocity_trust / 4;
   if (odometry->scale.source == TV_SCALE_UNIT) remove_segment_points(odometry);
   remove_unconfirmed(odometry);
   return false;
