@@ -1,6 +1,7 @@
 #include "odometry/start.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "odometry/adjust.h"
 #include "odometry/keyframe.h"
@@ -13,7 +14,8 @@ namespace {
 constexpr int32_t kLeastMatches = 30, kLeastPoints = 40;
 constexpr double kLeastParallax = 0.015;  // radians, the median
 constexpr int32_t kLeastTurnInliers = 50;
-constexpr int32_t kFramesBetween = 6;  // between frames that wait
+constexpr int32_t kFramesBetween = 6;      // between frames that wait
+constexpr double kLargestTurnSigma = 0.3;  // of the median parallax, in frames nearer than that
 
 // Matches two frames and estimates the motion between them. False: there are too few matches.
 bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, Pair* pair) {
@@ -25,6 +27,14 @@ bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, 
   int32_t num = 0;
   tv_match(odometry->context, &features0, &features1, nullptr, found, room, &num);
   return estimate_pair(odometry, frame0.keypoints, frame1.keypoints, found, num, pair);
+}
+
+// Whether the rotation is known well enough for the depths of the first points, which are off by
+// the share of its error in the parallax.
+bool is_turn_sure(const tv_two_view& view) {
+  // The variances of the rotation vector: elements 0, 6 and 12 of the 5x5 covariance.
+  const double* c = view.covariance;
+  return std::sqrt(std::max({c[0], c[6], c[12]})) <= kLargestTurnSigma * view.median_parallax_rad;
 }
 
 void drop_start(Odometry* odometry, int n) {
@@ -113,7 +123,10 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
       continue;
     }
     *reasons |= pair.view->reasons;
-    if (!pair.view->has_t || pair.view->median_parallax_rad < kLeastParallax) {
+    // Two frames that lie near each other gain by waiting.
+    const bool is_near = frame->number - first->number < kFramesBetween;
+    if (!pair.view->has_t || pair.view->median_parallax_rad < kLeastParallax ||
+        (is_near && !is_turn_sure(*pair.view))) {
       *reasons |= TV_REASON_LOW_PARALLAX;
       // Those that follow are nearer still, but for a camera that went to and fro.
       if (pair.view->median_parallax_rad < kLeastParallax / 2) break;

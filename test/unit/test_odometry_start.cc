@@ -1,0 +1,94 @@
+// When two frames begin a map (odometry/start.h).
+
+#include <unity.h>
+
+#include <algorithm>
+#include <cstdint>
+
+#include "odometry/search.h"
+#include "odometry/start.h"
+#include "support/random.h"
+
+namespace {
+
+constexpr int32_t kNumPoints = 60;
+
+alignas(64) uint8_t memory[24 << 20];
+tv_odometry* odometry;
+uint8_t pixels[640 * 480];
+const tv_image image = {pixels, 640, 480, 640};
+double points[kNumPoints][3];
+uint8_t descriptors[kNumPoints][TV_DESCRIPTOR_BYTES];
+
+// Points in a box before the camera, 1.35 m wide and high, and 4 to 12 m off.
+void make_points() {
+  uint64_t seed = 7;
+  for (int32_t k = 0; k < kNumPoints; ++k) {
+    points[k][0] = 0.675 * (2 * random_unit(&seed) - 1);
+    points[k][1] = 0.675 * (2 * random_unit(&seed) - 1);
+    points[k][2] = 4 + 8 * random_unit(&seed);
+    for (uint8_t& byte : descriptors[k]) byte = static_cast<uint8_t>(random_int(&seed, 0, 90));
+  }
+}
+
+// What a camera at x metres sees, with errors of up to error_px pixels.
+void see(int32_t number, double x, double error_px, tv::Frame* frame) {
+  uint64_t seed = x > 0 ? 12 : 11;
+  for (int32_t k = 0; k < kNumPoints; ++k) {
+    const double u = 500 * (points[k][0] - x) / points[k][2] + 320;
+    const double v = 500 * points[k][1] / points[k][2] + 240;
+    tv_keypoint keypoint{};
+    keypoint.x = static_cast<float>(u + error_px * (2 * random_unit(&seed) - 1));
+    keypoint.y = static_cast<float>(v + error_px * (2 * random_unit(&seed) - 1));
+    keypoint.size = 9;
+    keypoint.score = 40;
+    frame->keypoints[k] = keypoint;
+    frame->sigmas[k] = 1;
+    std::copy_n(descriptors[k], TV_DESCRIPTOR_BYTES, frame->descriptors + k * TV_DESCRIPTOR_BYTES);
+  }
+  frame->num = kNumPoints;
+  frame->number = number;
+  frame->time_s = number / 30.0;
+  frame->sensors = tv::Sensors{};
+  frame->cam_from_world = tv::kIdentity;
+  tv::forget_points(frame);
+}
+
+// Whether frame 0 and the one of that number, seen from 24 cm beside it, begin a map.
+bool begins(int32_t number, double error_px) {
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  uint32_t reasons = 0;
+  tv::Frame* const frame = &odometry->frame;
+  see(0, 0, error_px, frame);
+  TEST_ASSERT_FALSE(tv::start_map(odometry, frame, image, &reasons));
+  see(number, 0.24, error_px, frame);
+  const bool is_begun = tv::start_map(odometry, frame, image, &reasons);
+  TEST_ASSERT_EQUAL_UINT32(is_begun ? 0 : TV_REASON_LOW_PARALLAX, reasons);
+  return is_begun;
+}
+
+// The field of view is 16 degrees and the parallax 2: a turn looks much like a step.
+void test_near_frames_wait_where_the_turn_is_unsure() {
+  TEST_ASSERT_TRUE(begins(3, 0.05));
+  TEST_ASSERT_TRUE(begins(6, 0.05));
+  TEST_ASSERT_FALSE(begins(5, 0.2));
+  TEST_ASSERT_TRUE(begins(6, 0.2));
+}
+
+}  // namespace
+
+extern "C" void setUp(void) {
+  const tv_camera camera = {TV_CAMERA_PINHOLE, 640, 480, 0, 500, 500, 320, 240, {0}};
+  tv_odometry_options options;
+  tv_odometry_options_init(&options);
+  TEST_ASSERT_EQUAL_INT(TV_OK,
+                        tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
+  make_points();
+}
+extern "C" void tearDown(void) {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_near_frames_wait_where_the_turn_is_unsure);
+  return UNITY_END();
+}
