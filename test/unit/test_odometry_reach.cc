@@ -9,6 +9,7 @@
 
 #include "odometry/map.h"
 #include "odometry/metric.h"
+#include "support/odometry.h"
 #include "support/room_scene.h"
 
 namespace {
@@ -124,13 +125,7 @@ void test_a_lost_frame_that_is_found_again_is_remembered() {
 
 }  // namespace
 
-extern "C" void setUp(void) {
-  const tv_camera camera = {TV_CAMERA_PINHOLE, 640, 480, 0, 500, 500, 320, 240, {0}};
-  tv_odometry_options options;
-  tv_odometry_options_init(&options);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
-}
+extern "C" void setUp(void) { odometry = make_vga_odometry(memory, sizeof memory); }
 extern "C" void tearDown(void) {}
 
 int main() {

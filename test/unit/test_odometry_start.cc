@@ -7,6 +7,7 @@
 
 #include "odometry/search.h"
 #include "odometry/start.h"
+#include "support/odometry.h"
 #include "support/random.h"
 
 namespace {
@@ -78,11 +79,7 @@ void test_near_frames_wait_where_the_turn_is_unsure() {
 }  // namespace
 
 extern "C" void setUp(void) {
-  const tv_camera camera = {TV_CAMERA_PINHOLE, 640, 480, 0, 500, 500, 320, 240, {0}};
-  tv_odometry_options options;
-  tv_odometry_options_init(&options);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
+  odometry = make_vga_odometry(memory, sizeof memory);
   make_points();
 }
 extern "C" void tearDown(void) {}

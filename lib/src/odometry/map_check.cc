@@ -1,8 +1,5 @@
 #include "odometry/map_check.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace tv {
 namespace {
 
@@ -28,11 +25,8 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
   Rigid turn = kIdentity, map_turn = cam1_from_cam0;
   std::copy_n(view.R, 9, turn.R);
   std::fill(map_turn.t, map_turn.t + 3, 0.0);
-  // The variances of the rotation vector: elements 0, 6 and 12 of the 5x5 covariance.
-  const double* c = view.covariance;
-  const double sigma = std::sqrt(std::max({c[0], c[6], c[12]}));
   const double difference = turn_between(map_turn, turn);
-  if (difference <= kTurnSigmas * sigma + kTurnAllowed)
+  if (difference <= kTurnSigmas * turn_sigma_of(view) + kTurnAllowed)
     ++vote->num_agree;
   else
     ++vote->num_disagree;

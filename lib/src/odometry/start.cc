@@ -1,7 +1,6 @@
 #include "odometry/start.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "odometry/adjust.h"
 #include "odometry/keyframe.h"
@@ -32,9 +31,7 @@ bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, 
 // Whether the rotation is known well enough for the depths of the first points, which are off by
 // the share of its error in the parallax.
 bool is_turn_sure(const tv_two_view& view) {
-  // The variances of the rotation vector: elements 0, 6 and 12 of the 5x5 covariance.
-  const double* c = view.covariance;
-  return std::sqrt(std::max({c[0], c[6], c[12]})) <= kLargestTurnSigma * view.median_parallax_rad;
+  return turn_sigma_of(view) <= kLargestTurnSigma * view.median_parallax_rad;
 }
 
 void drop_start(Odometry* odometry, int n) {
