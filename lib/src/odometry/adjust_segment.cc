@@ -61,6 +61,72 @@ void add_shared_points(const Map& map, MapWindow* window) {
   }
 }
 
+// Which views share a point, in a matrix of bytes, 0 or 1.
+struct Sharing {
+  int32_t num_words;  // of a row, eight views each
+  uint64_t* words;
+
+  uint64_t* row(int32_t view) const { return words + num_words * view; }
+  uint8_t* at(int32_t view) const { return reinterpret_cast<uint8_t*>(row(view)); }
+};
+
+// `last` has room for the window's points and observations, and -1 for each of the points.
+Sharing find_sharing(const MapWindow& window, int32_t* last, Arena& arena) {
+  const int32_t num_views = window.model.num_views;
+  Sharing sharing{(num_views + 7) / 8, nullptr};
+  const int32_t size = sharing.num_words * num_views;
+  sharing.words = arena_alloc<uint64_t>(arena, static_cast<size_t>(size));
+  std::fill_n(sharing.words, size, 0);
+  // The observations of a point are a list, from its last one on.
+  int32_t* before = last + window.model.num_points;
+  for (int32_t n = 0; n < window.model.num_observations; ++n) {
+    const tv_observation& o = window.observations[n];
+    before[n] = last[o.idx_point];
+    last[o.idx_point] = n;
+    for (int32_t k = n; k >= 0; k = before[k]) {
+      const int32_t other = window.observations[k].idx_view;
+      sharing.at(o.idx_view)[other] = sharing.at(other)[o.idx_view] = 1;
+    }
+  }
+  return sharing;
+}
+
+// Gives the views a new order, in which fewer blocks of the factor of their system are not zero:
+// next comes always the view that shares a block with the fewest of those that are left (A. George,
+// J. Liu, "The evolution of the minimum degree ordering algorithm", SIAM Review 1989). The first
+// view stays, because it may be held.
+void order_views(const Map& map, MapWindow* window, Arena arena) {
+  const int32_t num = window->model.num_views;
+  const int32_t num_numbers = 2 * num + window->model.num_points + window->model.num_observations;
+  int32_t* keyframes = arena_alloc<int32_t>(arena, static_cast<size_t>(num_numbers));
+  int32_t* rank = keyframes + num;
+  std::fill_n(keyframes, num_numbers, -1);
+  std::copy_n(window->keyframes, num, keyframes);
+  const Sharing sharing = find_sharing(*window, rank + num, arena);
+  window->model.num_views = 0;
+  for (int32_t place = 0, view = 0; place < num; ++place) {
+    uint64_t least = UINT64_MAX;
+    for (int32_t v = 0; v < num && place > 0; ++v) {
+      if (rank[v] >= 0) continue;
+      uint64_t sums = 0;
+      for (int32_t w = 0; w < sharing.num_words; ++w) sums += sharing.row(v)[w];
+      const uint64_t degree = sums * 0x0101010101010101u >> 56;
+      if (degree < least) least = degree, view = v;
+    }
+    rank[view] = place;
+    add_view(map, keyframes[view], false, window);
+    sharing.at(view)[view] = 0;
+    for (int32_t v = 0; v < num; ++v) {
+      if (sharing.at(view)[v] == 0) continue;
+      sharing.at(v)[view] = 0;
+      for (int32_t w = 0; w < sharing.num_words; ++w) sharing.row(v)[w] |= sharing.row(view)[w];
+    }
+  }
+  for (int32_t n = 0; n < window->model.num_observations; ++n) {
+    window->observations[n].idx_view = rank[window->observations[n].idx_view];
+  }
+}
+
 }  // namespace
 
 size_t adjust_segment_bytes(const tv_odometry_options& o) {
@@ -75,6 +141,7 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations)
   if (!add_segment(map, segment, false, &window)) return false;
   add_shared_points(map, &window);
   add_observations(*odometry, &window);
+  order_views(map, &window, arena);
   MovedKeyframe* moved = arena_alloc<MovedKeyframe>(arena, static_cast<size_t>(map.num_keyframes));
   window.max_iterations = max_iterations;
   window.damping = kDamping;

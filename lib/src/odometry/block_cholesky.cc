@@ -76,12 +76,6 @@ bool is_zero(const double* block, int stride) {
 
 }  // namespace
 
-size_t block_matrix_bytes(int num_blocks) {
-  const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
-  return arena_bytes<double>(block_entries(num_blocks)) + 2 * arena_bytes<double>(n) +
-         arena_bytes<Columns>(2 * blocks) + arena_bytes<int32_t>(blocks);
-}
-
 BlockMatrix block_matrix(int num_blocks, Arena& arena) {
   const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
   BlockMatrix A;

@@ -35,7 +35,7 @@ struct BlockMatrix {
   int32_t* below;    // scratch: the blocks of a column that are not zero
 };
 
-size_t block_matrix_bytes(int num_blocks);
+// Uninitialised. A smaller num_blocks may be set afterwards.
 BlockMatrix block_matrix(int num_blocks, Arena& arena);
 
 // How many entries so many rows of blocks have.

@@ -113,12 +113,6 @@ bool fit_matches(Odometry* odometry, int32_t max_iterations, bool refines, doubl
 
 }  // namespace
 
-size_t fit_bytes(int32_t max_keypoints) {
-  const size_t n = static_cast<size_t>(max_keypoints);
-  return arena_bytes<double>(2 * n) + arena_bytes<double>(3 * n) + arena_bytes<float>(n) +
-         arena_bytes<int32_t>(n) + arena_bytes<uint8_t>(n) + absolute_pose_bytes(max_keypoints);
-}
-
 bool search_pose(Odometry* odometry, int32_t max_iterations, double max_error_px, Frame* frame,
                  PoseFit* fit) {
   return fit_matches(odometry, max_iterations, false, max_error_px, frame, fit);

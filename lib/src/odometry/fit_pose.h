@@ -10,9 +10,6 @@ struct PoseFit {
   Rigid cam_from_world;
 };
 
-// How many bytes of scratch each of the following takes, for at most max_keypoints matches.
-size_t fit_bytes(int32_t max_keypoints);
-
 // Each estimates the pose from the keypoints that have a point, and forgets the points farther than
 // max_error_px from their keypoint. False: there is no pose, and the frame is as before.
 

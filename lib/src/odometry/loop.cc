@@ -240,13 +240,6 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
   return found;
 }
 
-size_t close_loop_bytes(const tv_odometry_options& o) {
-  const size_t keyframes = static_cast<size_t>(o.max_keyframes);
-  const size_t points = static_cast<size_t>(o.max_points);
-  return arena_bytes<MovedKeyframe>(keyframes) + arena_bytes<double>(keyframes) +
-         arena_bytes<int32_t>(points) + arena_bytes<uint8_t>(points);
-}
-
 void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;

@@ -34,9 +34,6 @@ bool is_believed(Odometry* odometry, const Frame& frame, double path, int32_t nu
 // known, and `again`, with the frame's keypoints, has the old points that they see.
 bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* again, LoopEnd* end);
 
-// How many bytes of scratch close_loop takes.
-size_t close_loop_bytes(const tv_odometry_options& options);
-
 // Corrects the keyframes and points, roughly: the rest is spread_loop's. `keyframe` has the
 // keypoints of `again`; it is the newest one where it is of the same segment as the loop's end.
 void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);

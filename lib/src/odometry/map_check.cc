@@ -64,11 +64,6 @@ bool is_checking(const MapCheck& check) {
   return check.next < check.num_others && needs_vote(check.vote);
 }
 
-size_t check_bytes(const tv_odometry_options& options) {
-  const size_t n = static_cast<size_t>(options.max_keypoints);
-  return 2 * arena_bytes<tv_keypoint>(n) + arena_bytes<tv_correspondence>(n) + pair_bytes(options);
-}
-
 void check_next_pair(Odometry* odometry) {
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;

@@ -38,7 +38,4 @@ bool is_checking(const MapCheck& check);
 // Matches the next pair, and adds its vote. One a frame, so that no frame takes long.
 void check_next_pair(Odometry* odometry);
 
-// How many bytes of scratch check_next_pair takes.
-size_t check_bytes(const tv_odometry_options& options);
-
 }  // namespace tv

@@ -11,12 +11,6 @@ constexpr int32_t kMostIterations = 2000;
 
 }  // namespace
 
-size_t pair_bytes(const tv_odometry_options& options) {
-  const size_t n = static_cast<size_t>(options.max_keypoints);
-  return 2 * arena_bytes<double>(2 * n) + 3 * arena_bytes<float>(n) + arena_bytes<uint8_t>(n) +
-         arena_bytes<tv_two_view>(1);
-}
-
 tv_features as_features(const tv_keypoint* keypoints, const uint8_t* descriptors, int32_t num) {
   tv_features features;
   tv_features_init(&features);

@@ -15,9 +15,6 @@ struct Pair {
   tv_two_view* view;
 };
 
-// How many bytes of scratch a pair takes.
-size_t pair_bytes(const tv_odometry_options& options);
-
 // The keypoints as the matcher takes them.
 tv_features as_features(const tv_keypoint* keypoints, const uint8_t* descriptors, int32_t num);
 

@@ -308,53 +308,62 @@ void write_results(const Window& window, float* errors_px) {
   }
 }
 
+// What the gathering of the points needs.
+struct Gathering {
+  Camera* cameras;
+  int32_t *order, *begin;
+};
+
+// The arrays of a window of which every view is adjusted.
+__attribute__((noinline)) Gathering take_arrays(Arena& arena, Window* window) {
+  const tv_window& given = window->given;
+  const size_t views = count_of(given.num_views), points = count_of(given.num_points);
+  const size_t observations = count_of(given.num_observations);
+  window->pose = arena_alloc<WindowPose>(arena, views);
+  window->next_pose = arena_alloc<WindowPose>(arena, views);
+  window->block = arena_alloc<int32_t>(arena, views);
+  window->observations = arena_alloc<WindowObservation>(arena, observations);
+  window->slot_block = arena_alloc<int32_t>(arena, observations);
+  window->Z = arena_alloc<Columns>(arena, observations);
+  window->points = arena_alloc<WindowPoint>(arena, points);
+  window->position = arena_alloc<double>(arena, 3 * points);
+  window->next_position = arena_alloc<double>(arena, 3 * points);
+  window->eliminated = arena_alloc<EliminatedPoint>(arena, points);
+  window->system = block_matrix(given.num_views, arena);
+  window->gradient = arena_alloc<double>(arena, kBlock * views);
+  window->step = arena_alloc<double>(arena, kBlock * views);
+  Gathering gathering;
+  gathering.cameras = arena_alloc<Camera>(arena, count_of(given.num_cameras));
+  gathering.order = arena_alloc<int32_t>(arena, observations);
+  gathering.begin = arena_alloc<int32_t>(arena, std::max(views, points) + 1);
+  return gathering;
+}
+
 }  // namespace
 
-size_t window_scratch_bytes(const tv_window& window) {
-  const size_t views = count_of(window.num_views), points = count_of(window.num_points);
-  const size_t observations = count_of(window.num_observations);
-  return arena_bytes<WindowPose>(views) * 2 + arena_bytes<int32_t>(views) +
-         arena_bytes<WindowObservation>(observations) + arena_bytes<int32_t>(observations) +
-         arena_bytes<Columns>(observations) + arena_bytes<WindowPoint>(points) +
-         2 * arena_bytes<double>(3 * points) + arena_bytes<EliminatedPoint>(points) +
-         block_matrix_bytes(window.num_views) + 2 * arena_bytes<double>(kBlock * views) +
-         arena_bytes<Camera>(count_of(window.num_cameras)) + arena_bytes<int32_t>(observations) +
-         arena_bytes<int32_t>(std::max(views, points) + 1);
+size_t window_scratch_bytes(const tv_window& given) {
+  Arena arena = measuring_arena();
+  Window window{given, {}};
+  take_arrays(arena, &window);
+  return arena.used_bytes;
 }
 
 bool adjust_window(const tv_window& given, const tv_window_options& options,
                    const WindowStart& start, Arena& arena, double* covariances, float* errors_px,
                    tv_window_result* result) {
-  const size_t views = count_of(given.num_views), points = count_of(given.num_points);
-  const size_t observations = count_of(given.num_observations);
   Window window{given, options};
-  window.pose = arena_alloc<WindowPose>(arena, views);
-  window.next_pose = arena_alloc<WindowPose>(arena, views);
-  window.block = arena_alloc<int32_t>(arena, views);
-  window.observations = arena_alloc<WindowObservation>(arena, observations);
-  window.slot_block = arena_alloc<int32_t>(arena, observations);
-  window.Z = arena_alloc<Columns>(arena, observations);
-  window.points = arena_alloc<WindowPoint>(arena, points);
-  window.position = arena_alloc<double>(arena, 3 * points);
-  window.next_position = arena_alloc<double>(arena, 3 * points);
-  window.eliminated = arena_alloc<EliminatedPoint>(arena, points);
-  for (size_t v = 0; v < views; ++v) {
+  const Gathering gathering = take_arrays(arena, &window);
+  for (int v = 0; v < given.num_views; ++v) {
     std::memcpy(window.pose[v].R, given.views[v].R, sizeof window.pose[v].R);
     std::memcpy(window.pose[v].t, given.views[v].t, sizeof window.pose[v].t);
     set_centre(&window.pose[v]);
   }
-  {
-    ArenaScope scope(arena);
-    Camera* cameras = arena_alloc<Camera>(arena, count_of(given.num_cameras));
-    for (int k = 0; k < given.num_cameras; ++k) cameras[k] = prepare_camera(given.cameras[k]);
-    int32_t* order = arena_alloc<int32_t>(arena, observations);
-    int32_t* begin = arena_alloc<int32_t>(arena, std::max(views, points) + 1);
-    gather_points(&window, cameras, start.planes, order, begin, result);
+  for (int k = 0; k < given.num_cameras; ++k) {
+    gathering.cameras[k] = prepare_camera(given.cameras[k]);
   }
+  gather_points(&window, gathering.cameras, start.planes, gathering.order, gathering.begin, result);
   choose_views(&window, result);
-  window.system = block_matrix(window.num_blocks, arena);
-  window.gradient = arena_alloc<double>(arena, count_of(kBlock * window.num_blocks));
-  window.step = arena_alloc<double>(arena, count_of(kBlock * window.num_blocks));
+  window.system.num_blocks = window.num_blocks;
   result->num_views = window.num_blocks;
   result->num_points = window.num_points;
   result->num_observations = window.num_observations;
