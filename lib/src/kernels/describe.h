@@ -264,9 +264,13 @@ static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t
                                 _mm_loadu_si128((const __m128i *)far_row), 1);
     product[bin] = _mm256_madd_epi16(both, w);
   }
-  low = _mm256_hadd_epi32(product[0], product[1]);
-  high = _mm256_hadd_epi32(product[2], product[3]);
-  _mm256_storeu_si256((__m256i *)sums, _mm256_hadd_epi32(low, high));
+  /* hadd would take twice as long. */
+  low = _mm256_add_epi32(_mm256_unpacklo_epi32(product[0], product[1]),
+                         _mm256_unpackhi_epi32(product[0], product[1]));
+  high = _mm256_add_epi32(_mm256_unpacklo_epi32(product[2], product[3]),
+                          _mm256_unpackhi_epi32(product[2], product[3]));
+  _mm256_storeu_si256((__m256i *)sums, _mm256_add_epi32(_mm256_unpacklo_epi64(low, high),
+                                                        _mm256_unpackhi_epi64(low, high)));
 #else
   int32_t bin, i;
   for (bin = 0; bin < 8; ++bin) {

@@ -12,6 +12,7 @@ TVK_LEND(average_rows, avx2);
 TVK_LEND(halve_row, avx2);
 TVK_LEND(blur_row, avx2);
 TVK_LEND(pair_rows, avx2);
+TVK_LEND(sample_patch, avx2);
 TVK_LEND(orientation_histogram, avx2);
 TVK_LEND(gradient_histogram, avx2);
 TVK_LEND(quantize_descriptor, avx2);
