@@ -291,12 +291,14 @@ class Endurance(Folder):
         np.testing.assert_allclose(found.truth().positions[59 + 7],
                                    source.truth().positions[59 - 7])
 
-    def test_more_time_at_the_end_is_not_flat(self):
+    def test_more_time_in_a_later_part_is_not_flat(self):
         run = {"truth": {"coverage": 1.0}, "num_keyframes": 9, "num_segments": 1,
                "peak_rss_mib": 50.0}
         flat = [5.0] * 10000
         self.assertTrue(endurance.judged({**run, "times_ms": flat})[0])
         self.assertFalse(endurance.judged({**run, "times_ms": flat[:9000] + [5.6] * 1000})[0])
+        between = flat[:4000] + [5.6] * 1000 + flat[5000:]
+        self.assertFalse(endurance.judged({**run, "times_ms": between})[0])
         self.assertIsNone(endurance.judged({**run, "times_ms": flat[:1999]})[0])
 
 

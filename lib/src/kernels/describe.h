@@ -254,7 +254,7 @@ static void pool_rows(int16_t (*rows)[8][TVK_PATCH_SIDE], int32_t cell, int32_t 
 static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t *sums) {
 #if defined(TVK_AVX2) || defined(TVK_AVX512)
   const __m256i w = _mm256_broadcastsi128_si256(_mm_loadu_si128((const __m128i *)weights));
-  __m256i product[4], low, high;
+  __m256i product[4];
   int32_t bin;
   for (bin = 0; bin < 4; ++bin) {
     const int16_t *near_row = columns + bin * TVK_PATCH_SIDE,
@@ -264,13 +264,7 @@ static void pool_columns(const int16_t *columns, const int16_t *weights, int32_t
                                 _mm_loadu_si128((const __m128i *)far_row), 1);
     product[bin] = _mm256_madd_epi16(both, w);
   }
-  /* hadd would take twice as long. */
-  low = _mm256_add_epi32(_mm256_unpacklo_epi32(product[0], product[1]),
-                         _mm256_unpackhi_epi32(product[0], product[1]));
-  high = _mm256_add_epi32(_mm256_unpacklo_epi32(product[2], product[3]),
-                          _mm256_unpackhi_epi32(product[2], product[3]));
-  _mm256_storeu_si256((__m256i *)sums, _mm256_add_epi32(_mm256_unpacklo_epi64(low, high),
-                                                        _mm256_unpackhi_epi64(low, high)));
+  _mm256_storeu_si256((__m256i *)sums, sums_of_halves(product));
 #else
   int32_t bin, i;
   for (bin = 0; bin < 8; ++bin) {

@@ -27,20 +27,9 @@ static inline __m256i window_word_shares(__m256i fraction) {
   return _mm256_xor_si256(both, _mm256_set1_epi32(127));
 }
 
-/* Of each half: a's numbers 0 and 2, and 1 and 3, added up, with b's after each. */
-static inline __m256i window_halve(__m256i a, __m256i b) {
-  return _mm256_add_epi32(_mm256_unpacklo_epi32(a, b), _mm256_unpackhi_epi32(a, b));
-}
-
-/* The sums of the four numbers of each half of sums[0..3]. */
-static inline __m256i window_quarter(const __m256i sums[4]) {
-  const __m256i low = window_halve(sums[0], sums[1]), high = window_halve(sums[2], sums[3]);
-  return _mm256_add_epi32(_mm256_unpacklo_epi64(low, high), _mm256_unpackhi_epi64(low, high));
-}
-
-/* The sums of the eight numbers of each of sums[0..7]. hadd would take twice as long. */
+/* The sums of the eight numbers of each of sums[0..7]. */
 static inline __m256i window_totals(const __m256i sums[8]) {
-  const __m256i low = window_quarter(sums), high = window_quarter(sums + 4);
+  const __m256i low = sums_of_halves(sums), high = sums_of_halves(sums + 4);
   return _mm256_add_epi32(_mm256_permute2x128_si256(low, high, 0x20),
                           _mm256_permute2x128_si256(low, high, 0x31));
 }

@@ -24,6 +24,18 @@ typedef int16_t words __attribute__((vector_size(2 * TVK_WORDS))); /* arithmetic
 typedef uint16_t unsigned_words __attribute__((vector_size(2 * TVK_WORDS)));
 typedef int16_t unaligned_words __attribute__((vector_size(2 * TVK_WORDS), aligned(2), may_alias));
 
+#if defined(TVK_AVX2) || defined(TVK_AVX512)
+/* In each half of the result: the sums of the four 32-bit numbers of that half of each of
+   vectors[0..3]. Horizontal additions (hadd) take twice as long. */
+static inline __m256i sums_of_halves(const __m256i vectors[4]) {
+  const __m256i low = _mm256_add_epi32(_mm256_unpacklo_epi32(vectors[0], vectors[1]),
+                                       _mm256_unpackhi_epi32(vectors[0], vectors[1]));
+  const __m256i high = _mm256_add_epi32(_mm256_unpacklo_epi32(vectors[2], vectors[3]),
+                                        _mm256_unpackhi_epi32(vectors[2], vectors[3]));
+  return _mm256_add_epi32(_mm256_unpacklo_epi64(low, high), _mm256_unpackhi_epi64(low, high));
+}
+#endif
+
 static inline words words_of(int16_t a) { return (words){0} + a; }
 static inline words words_load(const void *p) { return *(const unaligned_words *)p; }
 static inline void words_store(void *p, words a) { *(unaligned_words *)p = a; }

@@ -45,21 +45,23 @@ def repeat(source_path, folder, num=NUM_FRAMES):
 
 
 def growth(times_ms, num=NUM_COMPARED):
-    """(mean of the first `num` times, mean of the last `num`); (None, None) for fewer than twice as
-    many."""
+    """(mean of the first `num` times, largest mean of `num` that follow each other, in parts of
+    `num`); (None, None) for fewer than twice as many."""
     times = np.asarray(times_ms, float)
     if len(times) < 2 * num:
         return None, None
-    return float(times[:num].mean()), float(times[-num:].mean())
+    means = times[:len(times) // num * num].reshape(-1, num).mean(axis=1)
+    return float(means[0]), float(means.max())
 
 
 def judged(run):
     """(reached, sentence) of the run over repeat()'s folder."""
-    first, last = growth(run["times_ms"])
+    first, most = growth(run["times_ms"])
     if first is None:
         return None, f"CPU time over {NUM_FRAMES} frames: not measured (too few frames)"
-    return last <= GROWTH * first, (
+    return most <= GROWTH * first, (
         f"CPU time flat over {len(run['times_ms'])} frames (at most {100 * (GROWTH - 1):.0f} % "
-        f"more): first {NUM_COMPARED} {first:.2f} ms, last {NUM_COMPARED} {last:.2f} ms a frame; "
+        f"more): first {NUM_COMPARED} {first:.2f} ms, slowest {NUM_COMPARED} {most:.2f} ms a "
+        f"frame, longest frame {max(run['times_ms']):.1f} ms; "
         f"coverage {100 * run['truth']['coverage']:.1f} %, {run['num_keyframes']} keyframes, "
         f"{run['num_segments']} segments, peak memory {run['peak_rss_mib']:.0f} MiB")
