@@ -340,17 +340,21 @@ static void case_window_sums(trial *t) {
   }
 }
 
-static void case_quantize_descriptor(trial *t) {
+static void case_quantize_descriptors(trial *t) {
   static const int32_t highest[6] = {0, 1, 300, 4096, 1 << 18, INT32_MAX};
-  const int32_t high = t->typical ? 1 << 18 : highest[random_int(&t->seed, 0, 5)];
-  const int32_t spikes = random_int(&t->seed, 0, 2) == 0, root = pick(t, 0, 1, 1);
-  int32_t *histogram = INPUT(t, int32_t, TVK_DESCRIPTOR_SIZE), k;
-  uint8_t *descriptor = OUTPUT(t, uint8_t, TVK_DESCRIPTOR_SIZE);
-  for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
-    const int32_t value = random_int(&t->seed, 0, high);
-    histogram[k] = spikes && random_int(&t->seed, 0, 63) > 0 ? 0 : value;
+  const int32_t count = random_int(&t->seed, 1, TVK_QUANTIZED), root = pick(t, 0, 1, 1);
+  int32_t *histograms = INPUT(t, int32_t, count * TVK_DESCRIPTOR_SIZE), n, k;
+  uint8_t *descriptors = OUTPUT(t, uint8_t, count * TVK_DESCRIPTOR_SIZE);
+  for (n = 0; n < count; ++n) {
+    const int32_t high = t->typical ? 1 << 18 : highest[random_int(&t->seed, 0, 5)];
+    const int32_t spikes = random_int(&t->seed, 0, 2) == 0;
+    for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
+      const int32_t value = random_int(&t->seed, 0, high);
+      histograms[n * TVK_DESCRIPTOR_SIZE + k] =
+          spikes && random_int(&t->seed, 0, 63) > 0 ? 0 : value;
+    }
   }
-  REPEAT(t, t->set->quantize_descriptor(histogram, root, descriptor));
+  REPEAT(t, t->set->quantize_descriptors(histograms, count, root, descriptors));
 }
 
 static int is_pattern(const uint8_t *begin, const uint8_t *end) {

@@ -25,7 +25,7 @@ constexpr double kMaxStep = 2.24;
 // by each of these factors (docs/decisions/0018).
 constexpr double kPooledSizes[2] = {0.7, 1.3};
 
-constexpr int32_t kBlock = 32;  // keypoints
+constexpr int32_t kBlock = TVK_QUANTIZED;  // keypoints
 
 // A second peak is a direction of its own if it is above this share of the highest peak (Lowe,
 // section 5).
@@ -100,11 +100,10 @@ Direction direction_of(float angle_rad) {
   return direction;
 }
 
-void describe(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
-              Direction direction, int32_t kind, int32_t pooling, uint8_t* descriptor) {
+void histogram_of(const tvk_table& kernels, const Octaves& octaves, const tv_keypoint& keypoint,
+                  Direction direction, int32_t pooling, int32_t* histogram) {
   constexpr int32_t kPatch = TVK_PATCH_SIDE * TVK_PATCH_SIDE;
   int16_t patches[2 * kPatch + 1];
-  int32_t histogram[TVK_DESCRIPTOR_SIZE];
   const int32_t num_patches = pooling != 0 ? 2 : 1;
   for (int32_t n = 0; n < num_patches; ++n) {
     const double factor = pooling != 0 ? kPooledSizes[n] : 1.0;
@@ -112,7 +111,6 @@ void describe(const tvk_table& kernels, const Octaves& octaves, const tv_keypoin
                   TVK_PATCH_SIDE, patches + n * kPatch);
   }
   kernels.gradient_histogram(patches, num_patches, histogram);
-  kernels.quantize_descriptor(histogram, kind == TV_NORMALISATION_ROOTSIFT, descriptor);
 }
 
 }  // namespace
@@ -160,18 +158,19 @@ int32_t dominant_angles(const tvk_table& kernels, const Octaves& octaves,
 void describe_keypoints(const tvk_table& kernels, const Octaves& octaves,
                         const tv_keypoint* keypoints, int32_t count, int32_t kind, int32_t pooling,
                         uint8_t* descriptors) {
+  const int32_t root = kind == TV_NORMALISATION_ROOTSIFT;
   for (int32_t first = 0; first < count; first += kBlock) {
-    const int32_t end = std::min(first + kBlock, count);
-    // The directions of a block are computed together: each is a long chain of operations, and
-    // those of several keypoints overlap.
+    const int32_t num = std::min(kBlock, count - first);
+    // Directions and bytes are computed for a block at once: both are long chains of operations,
+    // and those of several keypoints overlap.
     Direction directions[kBlock];
-    for (int32_t k = first; k < end; ++k) {
-      directions[k - first] = direction_of(keypoints[k].angle_rad);
+    int32_t histograms[kBlock][TVK_DESCRIPTOR_SIZE];
+    for (int32_t k = 0; k < num; ++k) directions[k] = direction_of(keypoints[first + k].angle_rad);
+    for (int32_t k = 0; k < num; ++k) {
+      histogram_of(kernels, octaves, keypoints[first + k], directions[k], pooling, histograms[k]);
     }
-    for (int32_t k = first; k < end; ++k) {
-      describe(kernels, octaves, keypoints[k], directions[k - first], kind, pooling,
-               descriptors + static_cast<size_t>(k) * TV_DESCRIPTOR_BYTES);
-    }
+    kernels.quantize_descriptors(histograms[0], num, root,
+                                 descriptors + static_cast<size_t>(first) * TV_DESCRIPTOR_BYTES);
   }
 }
 

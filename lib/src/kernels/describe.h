@@ -42,23 +42,19 @@ static const uint16_t orientation_weights[ORIENT_COUNT] = {
     0,    0,    103,  192,  280,  317,  280,  192,  103,       /* */
 };
 
-/* span - x in the lanes where the mask is set, x in the others. */
-static inline words reflect(words x, words mask, int16_t span) {
-  return (x ^ mask) - mask + (words_of(span) & mask);
-}
-
 typedef struct direction_shares {
   words bin;       /* number of the direction's bin, 0..31, clockwise in the image from x */
   words low, high; /* the weighted shares of `bin` and of the next bin */
 } direction_shares;
 
 /* The two bins between which each gradient (u, v) lies, and its shares in them. Reflections at 0,
-   90, 45, 22.5 and 11.25 degrees bring the direction into a single bin; they are then undone on the
-   number of the bin. */
+   90, 45, 22.5 and 11.25 degrees bring the direction between bin 0 and bin 1. Undone on the number
+   of the interval between two bins, each reflection turns over that number's last bits: which
+   reflections there were is the number in Gray code. */
 static direction_shares share_directions(words u, words v, words weights) {
   const words au = words_max(u, -u), av = words_max(v, -v);
   const words left = u<words_of(0), up = v> words_of(0), steep = av > au;
-  words big = words_max(au, av), small = words_min(au, av), bin, is_odd, a, b;
+  words big = words_max(au, av), small = words_min(au, av), interval, is_odd, a, b, swapped;
   const words root_half = words_of((int16_t)46341);
   /* The cosine and sine of 22.5 degrees, times 65536. */
   const words cosine = words_of((int16_t)60547), sine = words_of(25080);
@@ -74,12 +70,9 @@ static direction_shares share_directions(words u, words v, words weights) {
   over11 = small22 < small;
   big = words_max(big, big22);
   small = words_min(small, small22);
-  bin = words_of(2) & over11;
-  bin = reflect(bin, over22, 4);
-  bin = reflect(bin, steep, 8);
-  bin = reflect(bin, left, 16);
-  bin = reflect(bin, up, 0);
-  is_odd = over11 ^ over22 ^ steep ^ left ^ up; /* the gradient lies before `bin`, not after it */
+  interval = (up & words_of(31)) ^ (left & words_of(15)) ^ (steep & words_of(7)) ^
+             (over22 & words_of(3)) ^ (over11 & words_of(1));
+  is_odd = over11 ^ over22 ^ steep ^ left ^ up; /* the reflected gradient's bin 0 is the next one */
   /* The shares are big - small cot(11.25 deg) and small / sin(11.25 deg). */
   b = words_of(5) * small;
   a = words_positive(big - b - words_scale(small, words_of(1796)));
@@ -87,20 +80,51 @@ static direction_shares share_directions(words u, words v, words weights) {
   a = words_scale(a, weights);
   b = words_scale(b, weights);
   /* The number is counted from u so far. u is 45 degrees from x, which is four bins. */
-  shares.bin = (bin + is_odd + words_of(4)) & words_of(TVK_ORIENT_BINS - 1);
-  shares.low = (a & ~is_odd) | (b & is_odd);
-  shares.high = (b & ~is_odd) | (a & is_odd);
+  shares.bin = (interval + words_of(4)) & words_of(TVK_ORIENT_BINS - 1);
+  swapped = (a ^ b) & is_odd;
+  shares.low = a ^ swapped;
+  shares.high = b ^ swapped;
   return shares;
 }
 
-/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. sums[1 + k] is the
-   sum of the shares of bin k in itself (low 16 bits) and in the next one (high 16 bits); sums[0] is
-   that of the last bin. smooth[1 + k] is bin k, repeated around the circle. */
-static void smooth_circle(const uint32_t sums[1 + TVK_ORIENT_BINS], int32_t *smooth) {
+#if defined(TVK_AVX2) || defined(TVK_AVX512)
+/* The values before and after each of those around the circle. */
+static inline void circle_neighbours(const __m256i circle[4], __m256i before[4], __m256i after[4]) {
+  int32_t k;
+  for (k = 0; k < 4; ++k) {
+    const __m256i last = circle[(k + 3) & 3], first = circle[(k + 1) & 3];
+    before[k] = _mm256_alignr_epi8(circle[k], _mm256_permute2x128_si256(last, circle[k], 0x21), 12);
+    after[k] = _mm256_alignr_epi8(_mm256_permute2x128_si256(circle[k], first, 0x21), circle[k], 4);
+  }
+}
+#endif
+
+/* The histogram smoothed by (1 4 6 4 1) around the circle, not divided by 16. sums[k] is the sum of
+   the shares of bin k in itself (low 16 bits) and in the next one (high 16 bits). smooth[1 + k] is
+   bin k, repeated around the circle. */
+static void smooth_circle(const uint32_t sums[TVK_ORIENT_BINS], int32_t *smooth) {
+#if defined(TVK_AVX2) || defined(TVK_AVX512)
+  __m256i circle[4], before[4], after[4];
+  int32_t k, pass;
+  for (k = 0; k < 4; ++k) circle[k] = _mm256_loadu_si256((const __m256i *)(sums + 8 * k));
+  circle_neighbours(circle, before, after);
+  for (k = 0; k < 4; ++k) {
+    circle[k] = _mm256_add_epi32(_mm256_and_si256(circle[k], _mm256_set1_epi32(65535)),
+                                 _mm256_srli_epi32(before[k], 16));
+  }
+  for (pass = 0; pass < 2; ++pass) { /* (1 2 1) twice */
+    circle_neighbours(circle, before, after);
+    for (k = 0; k < 4; ++k) {
+      circle[k] = _mm256_add_epi32(_mm256_add_epi32(before[k], after[k]),
+                                   _mm256_add_epi32(circle[k], circle[k]));
+    }
+  }
+  for (k = 0; k < 4; ++k) _mm256_storeu_si256((__m256i *)(smooth + 1 + 8 * k), circle[k]);
+#else
   int32_t around[TVK_ORIENT_BINS + 4], k; /* around[2 + k] is bin k */
   TVK_ROLLED
   for (k = 0; k < TVK_ORIENT_BINS; ++k) {
-    around[2 + k] = (int32_t)((sums[1 + k] & 65535) + (sums[k] >> 16));
+    around[2 + k] = (int32_t)((sums[k] & 65535) + (sums[(k - 1) & (TVK_ORIENT_BINS - 1)] >> 16));
   }
   memcpy(around, around + TVK_ORIENT_BINS, 2 * sizeof around[0]);
   memcpy(around + 2 + TVK_ORIENT_BINS, around + 2, 2 * sizeof around[0]);
@@ -109,6 +133,7 @@ static void smooth_circle(const uint32_t sums[1 + TVK_ORIENT_BINS], int32_t *smo
     const int32_t *const a = around + k;
     smooth[1 + k] = a[0] + a[4] + 4 * (a[1] + a[3]) + 6 * a[2];
   }
+#endif
   smooth[0] = smooth[TVK_ORIENT_BINS];
   smooth[TVK_ORIENT_BINS + 1] = smooth[1];
 }
@@ -141,7 +166,7 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t
   int16_t u[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED,
       v[ORIENT_COUNT + TVK_PATCH_SIDE] TVK_ALIGNED;
   uint16_t bin[ORIENT_COUNT] TVK_ALIGNED;
-  uint32_t both[ORIENT_COUNT] TVK_ALIGNED, sums[1 + TVK_ORIENT_BINS];
+  uint32_t both[ORIENT_COUNT] TVK_ALIGNED, sums[TVK_ORIENT_BINS];
   int32_t x, y, count = 0;
   memset(tables, 0, sizeof tables);
   for (y = 0; y < ORIENT_ROWS; ++y) {
@@ -163,9 +188,8 @@ static void orientation_histogram(const int16_t *patch, int32_t *smooth, int32_t
   }
   TVK_ROLLED
   for (x = 0; x < TVK_ORIENT_BINS; ++x) {
-    sums[1 + x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
+    sums[x] = tables[0][x] + tables[1][x] + tables[2][x] + tables[3][x];
   }
-  sums[0] = sums[TVK_ORIENT_BINS];
   smooth_circle(sums, smooth);
   find_peaks(smooth, peaks);
 }
@@ -320,34 +344,48 @@ static int32_t clip_values(int16_t *values, int16_t limit) {
     sums += (unsigned_words)clipped;
   }
   words_store(lanes, (words)sums);
+  TVK_ROLLED
   for (k = 0; k < TVK_WORDS; ++k) l1 += lanes[k];
   return l1;
 }
 
-static void quantize_descriptor(const int32_t *histogram, int32_t root, uint8_t *descriptor) {
-  int16_t values[TVK_DESCRIPTOR_SIZE];
-  int32_t l1, k;
-  uint32_t scale;
-  normalise_histogram(histogram, values);
-  l1 = clip_values(values, (int16_t)(0.2f * sqrtf((float)sum_of_squares(values))));
+/* Writes the bytes of clipped values whose sum is l1. */
+static void write_descriptor(const int16_t *values, int32_t l1, int32_t root, uint8_t *descriptor) {
+  int32_t k;
   if (l1 == 0) {
     memset(descriptor, 0, TVK_DESCRIPTOR_SIZE);
-    return;
-  }
-  if (root) {
+  } else if (root) {
     /* The integer is 512^2 times the share of the L1 norm. The square root of an integer is never
        so close to n + 1/2 that its rounding could differ between CPUs. */
-    scale = (1u << 31) / (uint32_t)l1;
+    const uint32_t scale = (1u << 31) / (uint32_t)l1;
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
       const int32_t square = (int32_t)(((uint32_t)values[k] * scale) >> 13);
       const int32_t byte = (int32_t)(sqrtf((float)square) + 0.5f);
       descriptor[k] = (uint8_t)(byte < 255 ? byte : 255);
     }
   } else {
-    scale = (uint32_t)(512.0f * 65536.0f / sqrtf((float)sum_of_squares(values)));
+    const uint32_t scale = (uint32_t)(512.0f * 65536.0f / sqrtf((float)sum_of_squares(values)));
     for (k = 0; k < TVK_DESCRIPTOR_SIZE; ++k) {
       const uint32_t byte = ((uint32_t)values[k] * scale + 32768) >> 16;
       descriptor[k] = (uint8_t)(byte < 255 ? byte : 255);
     }
+  }
+}
+
+/* Step by step for all: the steps of one descriptor wait for each other, and those of several
+   overlap. */
+static void quantize_descriptors(const int32_t *histograms, int32_t count, int32_t root,
+                                 uint8_t *descriptors) {
+  int16_t values[TVK_QUANTIZED][TVK_DESCRIPTOR_SIZE];
+  int32_t sums[TVK_QUANTIZED], n;
+  for (n = 0; n < count; ++n) {
+    normalise_histogram(histograms + n * TVK_DESCRIPTOR_SIZE, values[n]);
+    sums[n] = sum_of_squares(values[n]);
+  }
+  for (n = 0; n < count; ++n) {
+    sums[n] = clip_values(values[n], (int16_t)(0.2f * sqrtf((float)sums[n])));
+  }
+  for (n = 0; n < count; ++n) {
+    write_descriptor(values[n], sums[n], root, descriptors + n * TVK_DESCRIPTOR_SIZE);
   }
 }

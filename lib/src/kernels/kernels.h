@@ -70,6 +70,7 @@ typedef struct tvk_nearest_shape {
 #define TVK_ORIENT_SIDE 12 /* samples along each side of the orientation's patch */
 #define TVK_ORIENT_BINS 32
 #define TVK_DESCRIPTOR_SIZE 128
+#define TVK_QUANTIZED 8 /* descriptors that quantize_descriptors writes at a time, at most */
 
 #define TVK_WINDOW_SIDE 8 /* samples along each side of a window of least-squares matching */
 #define TVK_WINDOW_SAMPLES 64
@@ -179,8 +180,8 @@ typedef struct tvk_triangulate_pair {
    is read after the last patch, and has no effect. A gradient is shared bilinearly between cells,
    and between two directions by decomposition (kernels/describe.h).
 
-   quantize_descriptor: writes the 128 bytes of a histogram by SIFT's normalisation with clipping at
-   0.2, or by RootSIFT's if `root` is not 0.
+   quantize_descriptors: writes the 128 bytes of each of 1 to TVK_QUANTIZED histograms by SIFT's
+   normalisation with clipping at 0.2, or by RootSIFT's if `root` is not 0.
 
    window_template: samples the window that stays, TVK_WINDOW_SIDE samples on a side and one more
    around it, and writes its channels and their products. Sample (i, j) of the 10 x 10 lies at (x +
@@ -267,7 +268,8 @@ typedef struct tvk_triangulate_pair {
      int32_t du_y, int32_t num_rows, int16_t *patch))                                              \
   X(orientation_histogram, void, (const int16_t *patch, int32_t *histogram, int32_t peaks[2]))     \
   X(gradient_histogram, void, (const int16_t *patches, int32_t num_patches, int32_t *histogram))   \
-  X(quantize_descriptor, void, (const int32_t *histogram, int32_t root, uint8_t *descriptor))      \
+  X(quantize_descriptors, void,                                                                    \
+    (const int32_t *histograms, int32_t count, int32_t root, uint8_t *descriptors))                \
   X(window_template, void,                                                                         \
     (const uint8_t *pixels, int64_t stride, int32_t width, int32_t x, int32_t y, int32_t step,     \
      int16_t *channels, int32_t *products))                                                        \

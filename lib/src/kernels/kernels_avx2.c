@@ -15,7 +15,7 @@ TVK_LEND(pair_rows, avx2);
 TVK_LEND(sample_patch, avx2);
 TVK_LEND(orientation_histogram, avx2);
 TVK_LEND(gradient_histogram, avx2);
-TVK_LEND(quantize_descriptor, avx2);
+TVK_LEND(quantize_descriptors, avx2);
 TVK_LEND(window_template, avx2);
 TVK_LEND(window_sums, avx2);
 #include "kernels/kernels_table.h"

@@ -21,7 +21,7 @@
 #define pair_rows tvk_pair_rows_avx2
 #define orientation_histogram tvk_orientation_histogram_avx2
 #define gradient_histogram tvk_gradient_histogram_avx2
-#define quantize_descriptor tvk_quantize_descriptor_avx2
+#define quantize_descriptors tvk_quantize_descriptors_avx2
 #define window_template tvk_window_template_avx2
 #define window_sums tvk_window_sums_avx2
 #include "kernels/kernels_table.h"

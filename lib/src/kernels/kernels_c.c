@@ -7,7 +7,7 @@
 #if defined(__x86_64__)
 TVK_LEND(average_columns, c);
 TVK_LEND(sample_patch, c);
-TVK_LEND(quantize_descriptor, c);
+TVK_LEND(quantize_descriptors, c);
 TVK_LEND(nearest_groups, c);
 TVK_LEND(squared_distances, c);
 TVK_LEND(window_template, c);

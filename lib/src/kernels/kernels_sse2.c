@@ -8,7 +8,7 @@
 /* These kernels are the C set's, which are as fast. */
 #define average_columns tvk_average_columns_c
 #define sample_patch tvk_sample_patch_c
-#define quantize_descriptor tvk_quantize_descriptor_c
+#define quantize_descriptors tvk_quantize_descriptors_c
 #define nearest_groups tvk_nearest_groups_c
 #define squared_distances tvk_squared_distances_c
 #define window_template tvk_window_template_c
