@@ -226,7 +226,7 @@ void test_all_keyframes_of_a_segment_are_adjusted_together() {
   const double before = mean_error();
   TEST_ASSERT_TRUE(before > 2);
   int steps = 1;
-  while (steps < 12 && tv::adjust_segment(odometry, 0, 1)) ++steps;
+  while (steps < 12 && tv::adjust_segment(odometry, 0, 0, 1)) ++steps;
   TEST_ASSERT_TRUE(steps < 8);
   TEST_ASSERT_TRUE(worst_position() < 1e-4);
   const double between = mean_error();
@@ -247,8 +247,24 @@ void test_keyframes_are_adjusted_in_any_order() {
   map_room();
   TEST_ASSERT_TRUE(worst_position() > 0.04);
   int steps = 1;
-  while (steps < 12 && tv::adjust_segment(odometry, 0, 1)) ++steps;
+  while (steps < 12 && tv::adjust_segment(odometry, 0, 0, 1)) ++steps;
   TEST_ASSERT_TRUE(steps < 12);
+  TEST_ASSERT_TRUE(worst_position() < 1e-4);
+}
+
+// The older keyframes stay where they are, and hold the newer ones through the points alone.
+void test_older_keyframes_are_held() {
+  constexpr int kFirst = 16;
+  map_room();
+  tv::Map& map = odometry->map;
+  for (int k = 0; k < kFirst; ++k) map.keyframes[k].cam_from_world = true_poses[k];
+  TEST_ASSERT_TRUE(worst_position() > 0.04);
+  int steps = 1;
+  while (steps < 12 && tv::adjust_segment(odometry, 0, map.keyframes[kFirst].id, 1)) ++steps;
+  TEST_ASSERT_TRUE(steps < 12);
+  for (int k = 0; k < kFirst; ++k) {
+    TEST_ASSERT_EQUAL_MEMORY(&true_poses[k], &map.keyframes[k].cam_from_world, sizeof(tv::Rigid));
+  }
   TEST_ASSERT_TRUE(worst_position() < 1e-4);
 }
 
@@ -263,7 +279,7 @@ void test_the_metre_is_that_of_the_ways_as_they_are() {
   odometry->scale = tv::MetricScale{};
   tv::add_ways(odometry, 1);
   int steps = 0;
-  while (tv::adjust_segment(odometry, 0, 1)) ++steps;
+  while (tv::adjust_segment(odometry, 0, 0, 1)) ++steps;
   TEST_ASSERT_TRUE(steps > 1);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, scale_of_ways(), known_scale());
   double length = 0;
@@ -282,7 +298,7 @@ void test_the_first_keyframe_of_an_upright_segment_finds_its_place() {
   }
   map.keyframes[0].cam_from_world.t[0] += 0.3;
   const tv::Rigid first = map.keyframes[0].cam_from_world;
-  for (int step = 0; step < 4; ++step) tv::adjust_segment(odometry, 0, 1);
+  for (int step = 0; step < 4; ++step) tv::adjust_segment(odometry, 0, 0, 1);
   TEST_ASSERT_TRUE(tv::way_between(first, map.keyframes[0].cam_from_world) > 0.2);
 }
 
@@ -294,7 +310,7 @@ void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
   tv::Frame frame{};
   frame.cam_from_world = reference->cam_from_world;
   tv::centre_of(reference->cam_from_world, odometry->travel.from);
-  odometry->spread = {12, 0, 0};
+  odometry->spread = {12, 0, 0, 0, 0};
   while (odometry->spread.num_steps > 0) tv::spread_loop(odometry, &frame);
   double centre[3];
   tv::centre_of(reference->cam_from_world, centre);
@@ -313,7 +329,7 @@ void test_a_frame_and_the_measured_way_move_with_their_keyframe() {
 void test_finish_takes_all_steps_that_are_left() {
   map_room();
   odometry->reference_id = odometry->map.keyframes[kViews - 1].id;
-  odometry->spread = {12, 0, 0};
+  odometry->spread = {12, 0, 0, 0, 0};
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
   TEST_ASSERT_FALSE(tv::is_spreading(*odometry));
   TEST_ASSERT_TRUE(worst_position() < 1e-4);
@@ -325,7 +341,7 @@ void test_the_points_of_the_loops_segment_are_adjusted() {
   map_room();
   odometry->reference_id = odometry->map.keyframes[kViews - 1].id;
   odometry->segment = 1;
-  odometry->spread = {12, 0, 0};
+  odometry->spread = {12, 0, 0, 0, 0};
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
   TEST_ASSERT_TRUE(mean_error() < 0.02);
 }
@@ -342,6 +358,35 @@ void test_small_corrections_are_not_spread() {
   tv::close_loop(odometry, kNum - 1, nothing, end);
   TEST_ASSERT_TRUE(odometry->spread.num_steps > 0);
   TEST_ASSERT_FALSE(odometry->is_found_again);
+}
+
+// A loop's steps adjust the newest hundred keyframes, and all since the loop before.
+void test_keyframes_from_before_the_last_loop_are_held() {
+  tv::LoopEnd end = {0, tv::kIdentity, 1};
+  end.cam_from_world.t[0] = 5;
+  const tv::Frame nothing{};
+  const int32_t* const num = &odometry->map.num_keyframes;
+  const tv::MapKeyframe* const keyframes = odometry->map.keyframes;
+  for (int i = 0; i < 6; ++i) add_keyframes();
+  tv::close_loop(odometry, *num - 1, nothing, end);
+  TEST_ASSERT_EQUAL_INT(0, odometry->spread.first_id);
+  TEST_ASSERT_EQUAL_INT(keyframes[*num - 1].id, odometry->spread.last_id);
+  const int32_t last_id = odometry->spread.last_id;
+  add_keyframes();
+  end.cam_from_world.t[0] = 10;
+  tv::close_loop(odometry, *num - 1, nothing, end);
+  TEST_ASSERT_EQUAL_INT(keyframes[*num - 100].id, odometry->spread.first_id);
+  TEST_ASSERT_TRUE(odometry->spread.first_id > 0 && odometry->spread.first_id < last_id);
+  // Another segment's loop says nothing of this one's keyframes.
+  odometry->spread.segment = 1;
+  end.cam_from_world.t[0] = 15;
+  tv::close_loop(odometry, *num - 1, nothing, end);
+  TEST_ASSERT_EQUAL_INT(0, odometry->spread.first_id);
+  // The loop before is farther back than a hundred keyframes.
+  odometry->spread.last_id = keyframes[7].id;
+  end.cam_from_world.t[0] = 20;
+  tv::close_loop(odometry, *num - 1, nothing, end);
+  TEST_ASSERT_EQUAL_INT(keyframes[7].id, odometry->spread.first_id);
 }
 
 void test_few_points_close_a_loop_only_twice() {
@@ -458,7 +503,7 @@ extern "C" void setUp(void) {
   tv_odometry_options options;
   tv_odometry_options_init(&options);
   options.max_keypoints = 100;
-  options.max_keyframes = kViews;
+  options.max_keyframes = 8 * kNum;
   options.max_points = 2000;
   TEST_ASSERT_EQUAL_INT(TV_OK,
                         tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
@@ -475,12 +520,14 @@ int main() {
   RUN_TEST(test_a_way_goes_on_over_a_keyframe_that_is_removed);
   RUN_TEST(test_all_keyframes_of_a_segment_are_adjusted_together);
   RUN_TEST(test_keyframes_are_adjusted_in_any_order);
+  RUN_TEST(test_older_keyframes_are_held);
   RUN_TEST(test_the_metre_is_that_of_the_ways_as_they_are);
   RUN_TEST(test_the_first_keyframe_of_an_upright_segment_finds_its_place);
   RUN_TEST(test_a_frame_and_the_measured_way_move_with_their_keyframe);
   RUN_TEST(test_finish_takes_all_steps_that_are_left);
   RUN_TEST(test_the_points_of_the_loops_segment_are_adjusted);
   RUN_TEST(test_small_corrections_are_not_spread);
+  RUN_TEST(test_keyframes_from_before_the_last_loop_are_held);
   RUN_TEST(test_few_points_close_a_loop_only_twice);
   RUN_TEST(test_a_gross_correction_closes_a_loop_only_twice);
   RUN_TEST(test_few_points_join_upright_segments_only_twice);

@@ -111,7 +111,7 @@ void start_anew(tv_odometry* o) {
   o->local_id = o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
   o->doubts = 0;
   o->weak_loop.frame = -1;
-  o->spread = {0, o->map.sizes.max_points, 0};
+  o->spread = {0, o->map.sizes.max_points, 0, 0, 0};
   o->check = MapCheck{};
   o->has_motion = false;
   o->num_frames = o->segment = o->num_segments = 0;

@@ -9,6 +9,9 @@ namespace tv {
 namespace {
 
 constexpr int32_t kMostKeyframes = 256;
+// Of the older keyframes, which are held, so many are enough. With all of them the flights are no
+// better (docs/decisions/0039).
+constexpr int32_t kHeldOneIn = 4;
 // Points are chosen until each keyframe sees its share of the observations divided by this: a point
 // that is chosen for one keyframe has observations in the others.
 constexpr double kOverlap = 1.7;
@@ -22,11 +25,11 @@ WindowSizes sizes_of(const tv_odometry_options& o) {
           22 * o.max_keypoints};
 }
 
-// Adds the keyframes of a segment, all held or all free. False: there are too many. No keyframe is
-// held where gravity is known (else adjust_window holds the first one): one that is can only come
-// to where it belongs when all others move, which the steps do last.
-bool add_segment(const Map& map, int32_t segment, bool fixed, MapWindow* window) {
-  for (int32_t k = 0; k < map.num_keyframes; ++k) {
+// Adds every `step`th of the keyframes begin..end - 1 that are of the segment. False: there are too
+// many.
+bool add_keyframes(const Map& map, int32_t segment, int32_t begin, int32_t end, int32_t step,
+                   bool fixed, MapWindow* window) {
+  for (int32_t k = begin; k < end; k += step) {
     if (map.keyframes[k].segment != segment) continue;
     if (window->model.num_views == window->sizes.views) return false;
     add_view(map, k, fixed, window);
@@ -34,14 +37,17 @@ bool add_segment(const Map& map, int32_t segment, bool fixed, MapWindow* window)
   return true;
 }
 
-// Adds points until each keyframe sees enough of them, those first that most keyframes see.
-void add_shared_points(const Map& map, MapWindow* window) {
+// Adds points until each of the first views, which are free, sees enough of them, those first that
+// most keyframes see.
+void add_shared_points(const Map& map, int32_t num_free, MapWindow* window) {
   const WindowSizes& sizes = window->sizes;
   const int32_t wanted =
       static_cast<int32_t>(sizes.observations / (kOverlap * window->model.num_views));
   int32_t left = sizes.observations;
+  bool sees_enough[kMostKeyframes] = {};
   for (int32_t least = 16; least > 1; least /= 2) {
-    for (int32_t v = 0; v < window->model.num_views; ++v) {
+    for (int32_t v = 0; v < num_free; ++v) {
+      if (sees_enough[v]) continue;
       const MapKeyframe& view = map.keyframes[window->keyframes[v]];
       const MapKeypoint* own = keypoints_of(map, view);
       int32_t seen = 0;
@@ -57,6 +63,7 @@ void add_shared_points(const Map& map, MapWindow* window) {
         left -= num;
         ++seen;
       }
+      sees_enough[v] = seen >= wanted;
     }
   }
 }
@@ -70,9 +77,9 @@ struct Sharing {
   uint8_t* at(int32_t view) const { return reinterpret_cast<uint8_t*>(row(view)); }
 };
 
-// `last` has room for the window's points and observations, and -1 for each of the points.
-Sharing find_sharing(const MapWindow& window, int32_t* last, Arena& arena) {
-  const int32_t num_views = window.model.num_views;
+// Of the first views. `last` has room for the window's points and observations, and -1 for each of
+// the points.
+Sharing find_sharing(const MapWindow& window, int32_t num_views, int32_t* last, Arena& arena) {
   Sharing sharing{(num_views + 7) / 8, nullptr};
   const int32_t size = sharing.num_words * num_views;
   sharing.words = arena_alloc<uint64_t>(arena, static_cast<size_t>(size));
@@ -81,6 +88,7 @@ Sharing find_sharing(const MapWindow& window, int32_t* last, Arena& arena) {
   int32_t* before = last + window.model.num_points;
   for (int32_t n = 0; n < window.model.num_observations; ++n) {
     const tv_observation& o = window.observations[n];
+    if (o.idx_view >= num_views) break;  // observations are in the order of the views
     before[n] = last[o.idx_point];
     last[o.idx_point] = n;
     for (int32_t k = n; k >= 0; k = before[k]) {
@@ -91,18 +99,18 @@ Sharing find_sharing(const MapWindow& window, int32_t* last, Arena& arena) {
   return sharing;
 }
 
-// Gives the views a new order, in which fewer blocks of the factor of their system are not zero:
-// next comes always the view that shares a block with the fewest of those that are left (A. George,
-// J. Liu, "The evolution of the minimum degree ordering algorithm", SIAM Review 1989). The first
-// view stays, because it may be held.
-void order_views(const Map& map, MapWindow* window, Arena arena) {
-  const int32_t num = window->model.num_views;
+// Gives the free views, which are the first ones, a new order, in which fewer blocks of the factor
+// of their system are not zero: next comes always the view that shares a block with the fewest of
+// those that are left (A. George, J. Liu, "The evolution of the minimum degree ordering algorithm",
+// SIAM Review 1989). The first view stays, because it may be held.
+void order_views(const Map& map, int32_t num, MapWindow* window, Arena arena) {
+  const int32_t num_views = window->model.num_views;
   const int32_t num_numbers = 2 * num + window->model.num_points + window->model.num_observations;
   int32_t* keyframes = arena_alloc<int32_t>(arena, static_cast<size_t>(num_numbers));
   int32_t* rank = keyframes + num;
   std::fill_n(keyframes, num_numbers, -1);
   std::copy_n(window->keyframes, num, keyframes);
-  const Sharing sharing = find_sharing(*window, rank + num, arena);
+  const Sharing sharing = find_sharing(*window, num, rank + num, arena);
   window->model.num_views = 0;
   for (int32_t place = 0, view = 0; place < num; ++place) {
     uint64_t least = UINT64_MAX;
@@ -122,8 +130,10 @@ void order_views(const Map& map, MapWindow* window, Arena arena) {
       for (int32_t w = 0; w < sharing.num_words; ++w) sharing.row(v)[w] |= sharing.row(view)[w];
     }
   }
+  window->model.num_views = num_views;
   for (int32_t n = 0; n < window->model.num_observations; ++n) {
-    window->observations[n].idx_view = rank[window->observations[n].idx_view];
+    int32_t* view = &window->observations[n].idx_view;
+    if (*view < num) *view = rank[*view];
   }
 }
 
@@ -134,20 +144,26 @@ size_t adjust_segment_bytes(const tv_odometry_options& o) {
          arena_bytes<MovedKeyframe>(static_cast<size_t>(o.max_keyframes));
 }
 
-bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations) {
+bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32_t max_iterations) {
   Arena arena = odometry->whole_scratch;
   Map& map = odometry->map;
   MapWindow window = make_map_window(*odometry, sizes_of(odometry->options), arena);
-  if (!add_segment(map, segment, false, &window)) return false;
-  add_shared_points(map, &window);
+  const int32_t first = first_from(map, first_id);
+  // None is held of a whole segment where gravity is known (else adjust_window holds the first
+  // one): one that is can only come to where it belongs when all others move, which the steps do
+  // last.
+  if (!add_keyframes(map, segment, first, map.num_keyframes, 1, false, &window)) return false;
+  const int32_t num_free = window.model.num_views;
+  if (!add_keyframes(map, segment, 0, first, kHeldOneIn, true, &window)) return false;
+  add_shared_points(map, num_free, &window);
   add_observations(*odometry, &window);
-  order_views(map, &window, arena);
+  order_views(map, num_free, &window, arena);
   MovedKeyframe* moved = arena_alloc<MovedKeyframe>(arena, static_cast<size_t>(map.num_keyframes));
   window.max_iterations = max_iterations;
   window.damping = kDamping;
   if (!adjust_map_window(*odometry, &window, arena)) return false;
   for (int32_t k = 0; k < map.num_keyframes; ++k) moved[k].scale = 0;
-  for (int32_t v = 0; v < window.model.num_views; ++v) {
+  for (int32_t v = 0; v < num_free; ++v) {
     moved[window.keyframes[v]] = {pose_of(window, v), 1};
   }
   const bool counts = segment == odometry->segment;
@@ -162,7 +178,7 @@ int32_t adjust_points(Odometry* odometry, int32_t segment, int32_t first, int32_
   Arena arena = odometry->whole_scratch;
   const Map& map = odometry->map;
   MapWindow window = make_map_window(*odometry, sizes_of(odometry->options), arena);
-  if (!add_segment(map, segment, true, &window)) return map.end_points;
+  if (!add_keyframes(map, segment, 0, map.num_keyframes, 1, true, &window)) return map.end_points;
   int32_t left = window.sizes.observations, place = first;
   for (; place < map.end_points && window.model.num_points < window.sizes.points; ++place) {
     const MapPoint& point = map.points[place];

@@ -1,4 +1,4 @@
-// Bundle adjustment of all keyframes of a segment, in bounded steps: after a loop, no ten of them
+// Bundle adjustment of many keyframes of a segment, in bounded steps: after a loop, no ten of them
 // can hold it closed. Tests: test/unit/test_loop.cc.
 #pragma once
 
@@ -10,10 +10,11 @@ namespace tv {
 // use it from its beginning: nothing else may be in it.
 size_t adjust_segment_bytes(const tv_odometry_options& options);
 
-// Adjusts all keyframes of a segment together, with some of the points that each one sees; the
-// other points move with their keyframes. Nothing changes where there are more than 256. Returns
-// whether another call would change them further.
-bool adjust_segment(Odometry* odometry, int32_t segment, int32_t max_iterations);
+// Adjusts the keyframes of a segment from this identifier on together, with some of the points that
+// each one sees; the other points move with their keyframes. One in kHeldOneIn of the older
+// keyframes is held. Nothing changes where there are more than 256. Returns whether another call
+// would change them further.
+bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32_t max_iterations);
 
 // Adjusts the points of a segment from a place of the map on, as many as a window holds, and not
 // its keyframes; then forgets the observations that do not fit. Returns the place of the next one.

@@ -36,8 +36,9 @@ constexpr double kLargestYaw = 0.2;
 constexpr double kFarthestSeen = 2, kMostTurned = 1.2;
 constexpr double kLeastScale = 0.6875, kLargestScale = 1.5;
 constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
-// After a loop: steps of the adjustment of all keyframes, one at each frame, and of the points.
-constexpr int32_t kSpreadSteps = 12, kPointSteps = 3;
+// After a loop: steps of the adjustment of many keyframes, one at each frame, and of the points. At
+// least so many of the newest keyframes are adjusted, and all since the loop before.
+constexpr int32_t kSpreadSteps = 12, kPointSteps = 3, kLeastSpread = 100;
 // Smaller corrections are not spread: median depths, radians.
 constexpr double kLeastWay = 0.005, kLeastTurn = 0.005;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
@@ -285,7 +286,12 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   odometry->is_found_again = false;
   const bool is_small =
       are_near(now, end.cam_from_world, kLeastWay * odometry->median_depth, kLeastTurn);
-  if (segment != old_segment || !is_small) odometry->spread = {kSpreadSteps, 0, old_segment};
+  if (segment == old_segment && is_small) return;
+  Spread* spread = &odometry->spread;
+  const bool again_here = segment == old_segment && spread->segment == old_segment;
+  const int32_t first_id = map.keyframes[std::max(newest + 1 - kLeastSpread, 0)].id;
+  *spread = {kSpreadSteps, 0, old_segment, again_here ? std::min(spread->last_id, first_id) : 0,
+             map.keyframes[newest].id};
 }
 
 bool is_spreading(const Odometry& odometry) {
@@ -304,7 +310,7 @@ void spread_loop(Odometry* odometry, Frame* frame) {
   const MapKeyframe& reference = odometry->map.keyframes[k];
   const Rigid before = reference.cam_from_world;
   const Rigid relative = compose(frame->cam_from_world, inverse(before));
-  if (!adjust_segment(odometry, spread->segment, 1)) spread->num_steps = 0;
+  if (!adjust_segment(odometry, spread->segment, spread->first_id, 1)) spread->num_steps = 0;
   frame->cam_from_world = compose(relative, reference.cam_from_world);
   // So does the beginning of the way that is compared with the velocities.
   double from[3];
@@ -357,7 +363,7 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
       if (!is_joined) continue;
       close_loop(odometry, k, *again, end);
       adjust_around(odometry, k, kJoinSteps);
-      adjust_segment(odometry, odometry->segment, kSpreadSteps);
+      adjust_segment(odometry, odometry->segment, 0, kSpreadSteps);
       odometry->spread.num_steps = 0;
       while (is_spreading(*odometry)) spread_loop(odometry, frame);
       remove_lone_points(&map, odometry->scratch);

@@ -24,19 +24,6 @@ size_t num_planes(const MapSizes& sizes) {
   return 2 * as_size(kDescribedKeyframes) * as_size(sizes.max_keypoints);
 }
 
-// The first keyframe whose id is at least this one; num_keyframes where there is none.
-int32_t first_from(const Map& map, int32_t id) {
-  int32_t low = 0, high = map.num_keyframes;
-  while (low < high) {
-    const int32_t middle = (low + high) / 2;
-    if (map.keyframes[middle].id < id)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
-}
-
 void release_point(Map* map, int32_t point) {
   map->points[point].id = -1;
   map->free_points[map->num_free_points++] = point;
@@ -100,6 +87,18 @@ int32_t count_marked(const Map& map, const MapKeyframe& keyframe) {
   int32_t num = 0;
   for (int32_t i = 0; i < keyframe.num_keypoints; ++i) num += is_marked(map, own[i].point);
   return num;
+}
+
+int32_t first_from(const Map& map, int32_t id) {
+  int32_t low = 0, high = map.num_keyframes;
+  while (low < high) {
+    const int32_t middle = (low + high) / 2;
+    if (map.keyframes[middle].id < id)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
 }
 
 int32_t find_keyframe(const Map& map, int32_t id) {

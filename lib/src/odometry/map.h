@@ -113,6 +113,8 @@ inline uint8_t* descriptor_of(const Map& map, int32_t point) {
 
 // The index of the keyframe of this id among the keyframes; -1 where the map has none.
 int32_t find_keyframe(const Map& map, int32_t id);
+// The index of the first keyframe whose id is at least this one; num_keyframes where there is none.
+int32_t first_from(const Map& map, int32_t id);
 
 // A set of points that passes over the map build up and ask for: a bit each, because they go
 // through all keypoints of all keyframes.

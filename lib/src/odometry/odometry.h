@@ -57,9 +57,11 @@ struct WeakLoop {
 
 // What is left to do after a loop, a part at each frame that has no keyframe to adjust.
 struct Spread {
-  int32_t num_steps;   // of the adjustment of all keyframes together
+  int32_t num_steps;   // of the adjustment of many keyframes together
   int32_t next_place;  // then: of the points, from which on they are still to be adjusted
   int32_t segment;     // of the loop
+  int32_t first_id;    // of the keyframes that the steps adjust
+  int32_t last_id;     // of the keyframe that closed the loop
 };
 
 // The way since a frame in metres, in the world's axes, as the velocities say.

@@ -7,30 +7,24 @@ namespace tv {
 bool make_observation(const Camera& camera, const tv_observation& given, const double* plane,
                       WindowObservation* out) {
   if (!all_finite(given.pixel, 2)) return false;
-  const tv_camera& model = camera.model;
-  const double sigma = given.sigma == 0.0f ? 1.0 : static_cast<double>(given.sigma);
-  if (model.model == TV_CAMERA_PINHOLE) {  // the general case, without its square roots
-    const double fx = model.fx / sigma, fy = model.fy / sigma;
-    const double u = (model.cx - given.pixel[0]) / sigma, v = (model.cy - given.pixel[1]) / sigma;
-    const double J[6] = {fx, 0.0, u, 0.0, fy, v};
-    for (int i = 0; i < 6; ++i) out->J[i] = J[i];
-    out->n[0] = out->n[1] = 0.0;
-    out->n[2] = 1.0;
-    return true;
-  }
+  const bool sphere = camera.model.model == TV_CAMERA_KANNALA_BRANDT;
+  const Vec2 given_pixel(given.pixel[0], given.pixel[1]);
   Vec3 ray;
+  if (sphere) {
+    if (!unproject(camera, given_pixel, &ray, nullptr)) return false;
+  } else {
+    Vec2 at;
+    if (plane != nullptr && plane[0] == plane[0])
+      at = Vec2(plane[0], plane[1]);
+    else if (!undistort(camera, given_pixel, &at))
+      return false;
+    ray = Vec3(at[0], at[1], 1.0);
+  }
   Vec2 pixel;
   Mat23 J;
-  if (plane != nullptr && plane[0] == plane[0])
-    ray = ray_through(Vec2(plane[0], plane[1]));
-  else if (!unproject(camera, Vec2(given.pixel[0], given.pixel[1]), &ray, nullptr))
-    return false;
   if (!project(camera, ray, &pixel, &J)) return false;
-  const bool sphere = model.model == TV_CAMERA_KANNALA_BRANDT;
-  // The derivative by a point is in inverse proportion to its depth: at the plane z = 1 it is ray z
-  // times that at the unit ray.
-  const double scale = (sphere ? 1.0 : ray[2]) / sigma;
-  for (int i = 0; i < 6; ++i) out->J[i] = J(i / 3, i % 3) * scale;
+  const double sigma = given.sigma == 0.0f ? 1.0 : static_cast<double>(given.sigma);
+  for (int i = 0; i < 6; ++i) out->J[i] = J(i / 3, i % 3) / sigma;
   for (int i = 0; i < 3; ++i) out->n[i] = sphere ? ray[i] : i == 2 ? 1.0 : 0.0;
   return true;
 }
