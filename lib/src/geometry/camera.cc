@@ -27,7 +27,6 @@ constexpr double kEdgeSlack = 1.0 + 1e-9;
 // The relative size of a Newton step that ends the iteration: convergence is quadratic, so the next
 // step would round to 0.
 constexpr double kConverged = 1e-11;
-constexpr double kNegligible = 1e-16;  // a step that rounds to 0
 
 constexpr int kMaxBisections = 80;
 constexpr int kMaxThirds = 40;
@@ -282,20 +281,16 @@ bool brown_invert_fast(const Camera& camera, const Point2& target, double target
     const double s = brown_radial(camera.model.k, target_sq).s;
     if (s > 0.25) p = {target.x / s, target.y / s};
   }
-  double before = 1e-3;  // the step before; at first so small that only a step below 5e-8 suffices
   for (int i = 0; i < 8; ++i) {
     Point2 step;
     double error_sq;
     if (!(p.x * p.x + p.y * p.y <= limit_sq)) return false;
     if (!brown_newton_step(camera.model.k, target, p, &step, &error_sq)) return false;
     p = {p.x + step.x, p.y + step.y};
-    const double length = std::fabs(step.x) + std::fabs(step.y);
-    // The next step would be this one times the square of the last two steps' ratio.
-    if (length * length * length <= kNegligible * before * before) {
+    if (is_small(step, p)) {
       *out = p;
       return true;
     }
-    before = length;
   }
   return false;
 }

@@ -9,8 +9,8 @@ namespace tv {
 namespace {
 
 constexpr int32_t kMostKeyframes = 256;
-// Of the older keyframes, which are held, so many are enough. With all of them the flights are no
-// better (docs/decisions/0039).
+// Of the older keyframes so many are held. With more of them the others have fewer observations,
+// and their covariance holds the truth less often (docs/decisions/0039).
 constexpr int32_t kHeldOneIn = 4;
 // Points are chosen until each keyframe sees its share of the observations divided by this: a point
 // that is chosen for one keyframe has observations in the others.
@@ -149,9 +149,9 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32
   Map& map = odometry->map;
   MapWindow window = make_map_window(*odometry, sizes_of(odometry->options), arena);
   const int32_t first = first_from(map, first_id);
-  // None is held of a whole segment where gravity is known (else adjust_window holds the first
-  // one): one that is can only come to where it belongs when all others move, which the steps do
-  // last.
+  // From the first keyframe on, none is held where gravity is known (else adjust_window holds the
+  // first one): one that is can only come to where it belongs when all others move, which the steps
+  // do last.
   if (!add_keyframes(map, segment, first, map.num_keyframes, 1, false, &window)) return false;
   const int32_t num_free = window.model.num_views;
   if (!add_keyframes(map, segment, 0, first, kHeldOneIn, true, &window)) return false;

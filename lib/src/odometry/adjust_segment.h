@@ -10,8 +10,8 @@ namespace tv {
 // use it from its beginning: nothing else may be in it.
 size_t adjust_segment_bytes(const tv_odometry_options& options);
 
-// Adjusts the keyframes of a segment from this identifier on together, with some of the points that
-// each one sees; the other points move with their keyframes. One in kHeldOneIn of the older
+// Adjusts together the keyframes of a segment whose id is at least first_id, with some of the
+// points that each one sees; the other points move with their keyframes. One in four of the older
 // keyframes is held. Nothing changes where there are more than 256. Returns whether another call
 // would change them further.
 bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32_t max_iterations);

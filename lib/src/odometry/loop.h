@@ -41,8 +41,9 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
 // Whether a closed loop is still to be spread over the keyframes of its segment.
 bool is_spreading(const Odometry& odometry);
 
-// One more step towards what all keyframes of a closed loop ask for together, and after the last
-// one what all points do. `frame`, whose pose is relative to the reference keyframe, moves with it.
+// One more step towards what the newest keyframes ask for together after a loop (at least a
+// hundred), and after the last one what all points do. `frame`, whose pose is relative to the
+// reference keyframe, moves with it.
 void spread_loop(Odometry* odometry, Frame* frame);
 
 // Looks for the segments of the keyframes from number `first` on in the keyframes before it. Those
