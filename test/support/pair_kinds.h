@@ -95,8 +95,7 @@ struct Maker {
   bool ray_of_random_pixel(Vec2 center, double half_size, Vec2* pixel, Vec3* ray) {
     *pixel = scene::random_pixel(&random, pair->camera[0]);
     if (half_size > 0) {
-      *pixel = center + Vec2(uniform(&random, -half_size, half_size),
-                             uniform(&random, -half_size, half_size));
+      *pixel = center + scene::uniform2(&random, half_size, half_size);
     }
     return tv::unproject(cameras[0], *pixel, ray, nullptr) && (*ray)[2] > 0.3;
   }
@@ -171,15 +170,15 @@ struct Maker {
   bool put_moving_object(int count) {
     const tv_camera& camera = pair->camera[0];
     const double half_size = uniform(&random, 60, 150);
-    const Vec2 center(uniform(&random, half_size, camera.width - half_size),
-                      uniform(&random, half_size, camera.height - half_size));
+    const double y = uniform(&random, half_size, camera.height - half_size);
+    const Vec2 center(uniform(&random, half_size, camera.width - half_size), y);
     const double distance = uniform(&random, 2, 5);
     Vec3 middle;
     if (!tv::unproject(cameras[0], center, &middle, nullptr)) return false;
     middle *= distance;
-    const Mat3 turn =
-        tv::rotation_about(scene::direction(&random), uniform(&random, 5, 20) * tv::kPi / 180);
-    const Vec3 move = uniform(&random, 0.1, 0.4) * distance * scene::direction(&random);
+    const Mat3 turn = scene::rotation(&random, 5 * tv::kPi / 180, 20 * tv::kPi / 180);
+    const Vec3 way = scene::direction(&random);
+    const Vec3 move = uniform(&random, 0.1, 0.4) * distance * way;
     const Mat3 R = pair->R * turn;
     const Vec3 t = pair->R * (middle - turn * middle + move) + pair->t;
     for (int i = 0, tries = 0; i < count; ++tries) {
@@ -204,8 +203,7 @@ struct Maker {
   // corners are in both views, or where more than a quarter of these wrong matches lie within 4
   // pixels of their epipolar lines.
   bool put_lattice(int count) {
-    const Vec3 normal_of_wall =
-        Vec3(uniform(&random, -0.6, 0.6), uniform(&random, -0.3, 0.3), 1).normalized();
+    const Vec3 normal_of_wall = scene::uniform2(&random, 0.6, 0.3).homogeneous().normalized();
     const double distance = uniform(&random, 3, 8);
     const Vec3 u = Vec3(0, 1, 0).cross(normal_of_wall).normalized(), v = normal_of_wall.cross(u);
     // A cell is 14 to 40 px wide in the image.
@@ -237,18 +235,17 @@ struct Maker {
   }
 
   void draw_motion(const Ranges& ranges) {
-    pair->R = tv::rotation_about(scene::direction(&random),
-                                 uniform(&random, 1, ranges.most_rotation_deg) * tv::kPi / 180);
+    pair->R = scene::rotation(&random, tv::kPi / 180, ranges.most_rotation_deg * tv::kPi / 180);
     pair->t = scene::direction(&random);
     if (pair->kind == kPureRotation || pair->kind == kNoMotion) pair->t.setZero();
     if (pair->kind == kNoMotion) pair->R = Mat3::Identity();
     if (pair->kind == kForwardMove || pair->kind == kScaleChange) {
-      pair->R =
-          tv::rotation_about(scene::direction(&random), uniform(&random, 0, 3) * tv::kPi / 180);
+      pair->R = scene::rotation(&random, 0, 3 * tv::kPi / 180);
       pair->t = (Vec3(0, 0, -1) + 0.1 * scene::direction(&random)).normalized();
     }
     const double tilt = uniform(&random, 0, 50) * tv::kPi / 180;
-    const Vec3 axis = Vec3(uniform(&random, -1, 1), uniform(&random, -1, 1), 0).normalized();
+    const Vec2 direction = scene::uniform2(&random, 1, 1);
+    const Vec3 axis = Vec3(direction[0], direction[1], 0).normalized();
     pair->plane = tv::rotation_about(axis, tilt) * Vec3(0, 0, 1) / uniform(&random, 2, 8);
   }
 

@@ -35,11 +35,24 @@ inline double normal(tv::Random* random) {
   return sum;
 }
 
+// Numbers are drawn one by one, because compilers evaluate arguments in orders of their own.
+inline Vec2 uniform2(tv::Random* random, double extent_x, double extent_y) {
+  const double y = uniform(random, -extent_y, extent_y);
+  return Vec2(uniform(random, -extent_x, extent_x), y);
+}
+
 inline Vec3 direction(tv::Random* random) {
   for (;;) {
-    const Vec3 v(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+    const double z = uniform(random, -1, 1);
+    const Vec2 xy = uniform2(random, 1, 1);
+    const Vec3 v(xy[0], xy[1], z);
     if (v.squaredNorm() < 1 && v.squaredNorm() > 0.01) return v.normalized();
   }
+}
+
+inline Mat3 rotation(tv::Random* random, double least_rad, double most_rad) {
+  const double angle = uniform(random, least_rad, most_rad);
+  return tv::rotation_about(direction(random), angle);
 }
 
 inline tv_camera pinhole() {
@@ -85,12 +98,13 @@ struct Scene {
 
 // A random pixel in the inner part of the image.
 inline Vec2 random_pixel(tv::Random* random, const tv_camera& camera) {
-  return Vec2(uniform(random, 5, camera.width - 6), uniform(random, 5, camera.height - 6));
+  const double y = uniform(random, 5, camera.height - 6);
+  return Vec2(uniform(random, 5, camera.width - 6), y);
 }
 
 inline void choose_motion(tv::Random* random, Scene* s) {
   const Kind kind = s->options.kind;
-  s->R = tv::rotation_about(direction(random), uniform(random, 0.02, 0.2));
+  s->R = rotation(random, 0.02, 0.2);
   s->t = direction(random);
   if (kind == Kind::kForward) s->t = Vec3(0.1, -0.05, -1).normalized();
   if (kind == Kind::kRotation || kind == Kind::kStill) s->t.setZero();
@@ -119,7 +133,7 @@ inline void make(const Options& options, Scene* s) {
   choose_motion(&random, s);
   const tv::Camera cameras[2] = {tv::prepare_camera(options.camera[0]),
                                  tv::prepare_camera(options.camera[1])};
-  const Vec3 plane = Vec3(uniform(&random, -0.4, 0.4), uniform(&random, -0.4, 0.4), 1).normalized();
+  const Vec3 plane = uniform2(&random, 0.4, 0.4).homogeneous().normalized();
   const int num_true = static_cast<int>(options.num * options.inlier_share + 0.5);
   int restarts = 0;
   for (int i = 0; i < options.num; ++i) {

@@ -223,7 +223,7 @@ int white(int, int) { return 255; }
 int soft_squares(int x, int y) { return (x % 16 < 8 && y % 16 < 8 ? x * 37 + y * 11 : 0) & 255; }
 
 void test_corners_equal_the_definition_on_a_real_image() {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TWOVIEW_SANITIZED
   // Sanitizers are slow, and every row makes the same memory accesses: a fifth of the rows is
   // enough.
   const int32_t height = real.height / 5;

@@ -12,6 +12,7 @@ namespace {
 
 using scene::uniform;
 using tv::Mat3;
+using tv::Vec2;
 using tv::Vec3;
 
 constexpr uint64_t kSeed = 5;
@@ -24,7 +25,9 @@ struct Sample {
 Sample make_sample(tv::Random* random, const Mat3& R, const Vec3& t) {
   Sample s;
   for (int k = 0; k < 5; ++k) {
-    const Vec3 point(uniform(random, -2, 2), uniform(random, -2, 2), uniform(random, 2, 8));
+    const double depth = uniform(random, 2, 8);
+    const Vec2 xy = scene::uniform2(random, 2, 2);
+    const Vec3 point(xy[0], xy[1], depth);
     s.rays0[k] = point.normalized();
     s.rays1[k] = R * point + t;  // rays of any length are allowed
   }
@@ -62,7 +65,7 @@ void test_the_true_motion_is_among_the_models(void) {
   constexpr int kTrials = 2000;
   int missed = 0, total = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
-    const Mat3 R = tv::rotation_about(scene::direction(&random), uniform(&random, 0, 0.8));
+    const Mat3 R = scene::rotation(&random, 0, 0.8);
     const Sample s = make_sample(&random, R, scene::direction(&random));
     Mat3 models[tv::kMaxRelpose5pt];
     const int count = tv::relpose_5pt(s.rays0, s.rays1, models);
@@ -79,7 +82,7 @@ void test_every_model_satisfies_the_constraints(void) {
   tv::Random random = tv::random_seeded(kSeed + 1);
   int models_seen = 0, poor = 0;
   for (int trial = 0; trial < 1000; ++trial) {
-    const Mat3 R = tv::rotation_about(scene::direction(&random), uniform(&random, 0, 0.8));
+    const Mat3 R = scene::rotation(&random, 0, 0.8);
     Sample s = make_sample(&random, R, scene::direction(&random));
     if (trial % 2 == 1) {  // five wrong matches
       for (int k = 0; k < 5; ++k) s.rays1[k] = scene::direction(&random);

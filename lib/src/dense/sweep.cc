@@ -10,7 +10,7 @@ namespace {
 
 // Costs of a change of parallax along a path, by one step and by more; the latter is lower where
 // the image has an edge.
-constexpr int32_t kSmall = 5, kLeastLarge = 10, kLarge = 48, kEdge = 12;
+constexpr int32_t kLeastLarge = 10, kLarge = 48, kEdge = 12;
 constexpr int16_t kOutside = 15;  // the cost of a pixel outside image 1: that of a chance match
 // The winner's cost is below this share of the cost of any step that is not its neighbour.
 constexpr int32_t kUnique = 97;
