@@ -16,8 +16,6 @@ constexpr int32_t kNumPoints = 60;
 
 alignas(64) uint8_t memory[24 << 20];
 tv_odometry* odometry;
-uint8_t pixels[640 * 480];
-const tv_image image = {pixels, 640, 480, 640};
 double points[kNumPoints][3];
 uint8_t descriptors[kNumPoints][TV_DESCRIPTOR_BYTES];
 
@@ -61,9 +59,9 @@ bool begins(int32_t number, double error_px) {
   uint32_t reasons = 0;
   tv::Frame* const frame = &odometry->frame;
   see(0, 0, error_px, frame);
-  TEST_ASSERT_FALSE(tv::start_map(odometry, frame, image, &reasons));
+  TEST_ASSERT_FALSE(tv::start_map(odometry, frame, &reasons));
   see(number, 0.24, error_px, frame);
-  const bool is_begun = tv::start_map(odometry, frame, image, &reasons);
+  const bool is_begun = tv::start_map(odometry, frame, &reasons);
   TEST_ASSERT_EQUAL_UINT32(is_begun ? 0 : TV_REASON_LOW_PARALLAX, reasons);
   return is_begun;
 }

@@ -74,6 +74,7 @@ void make_frame(const Plan& plan, Arena& arena, Frame* frame) {
   frame->distances = arena_alloc<int32_t>(arena, n);
   frame->cell_items = arena_alloc<int32_t>(arena, n);
   frame->sigmas = arena_alloc<float>(arena, n);
+  frame->greys = arena_alloc<uint8_t>(arena, n);
   frame->cell_starts = arena_alloc<int32_t>(arena, cells + 1);
 }
 
@@ -112,6 +113,7 @@ void start_anew(tv_odometry* o) {
   o->doubts = 0;
   o->weak_loop.frame = -1;
   o->spread = {0, o->map.sizes.max_points, 0, 0, 0};
+  o->took_step = false;
   o->check = MapCheck{};
   o->has_motion = false;
   o->num_frames = o->segment = o->num_segments = 0;

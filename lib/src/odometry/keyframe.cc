@@ -12,7 +12,7 @@ namespace tv {
 namespace {
 
 constexpr double kLeastBaseline = 0.01;  // of the median depth: nearer keyframes make no points
-constexpr int32_t kMostNeighbours = 4;
+constexpr int32_t kMostNeighbours = 4, kNeighboursAtOnce = 2;
 // A point is made where its rays meet at this many times the standard deviation of the attitude:
 // below that, the depths of all points are wrong together.
 constexpr double kLeastTurnSigmas = 5;
@@ -22,13 +22,6 @@ constexpr double kMostTurned = 1.0;  // radians between keyframes that make poin
 constexpr double kNeverRemoved = 1e300, kRarelyRemoved = 1e299;
 // A frame's surroundings are the points of this many keyframes that share at least so many with it.
 constexpr int32_t kSurroundingKeyframes = 12, kLeastShared = 5;
-
-int32_t grey_at(const tv_image& image, const MapKeypoint& keypoint) {
-  const int64_t x = std::min(std::max(static_cast<int32_t>(keypoint.x + 0.5f), 0), image.width - 1);
-  const int64_t y =
-      std::min(std::max(static_cast<int32_t>(keypoint.y + 0.5f), 0), image.height - 1);
-  return image.data[y * image.stride_bytes + x];
-}
 
 // Whether the image of a point lies where a keypoint does, up to the largest error.
 bool is_seen_at(const Odometry& odometry, const MapKeyframe& keyframe, const MapKeypoint& keypoint,
@@ -72,6 +65,7 @@ void make_room(Odometry* odometry, int32_t wanted) {
 int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
   Map& map = odometry->map;
   const int32_t idx = add_keyframe(&map, frame.keypoints, frame.descriptors, frame.num);
+  odometry->next_neighbour = 0;
   MapKeyframe* keyframe = &map.keyframes[idx];
   keyframe->segment = odometry->segment;
   keyframe->frame = frame.number;
@@ -96,7 +90,7 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
 
 int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
                             const int32_t* keypoints0, const int32_t* keypoints1, int32_t num,
-                            double least_angle_rad, const tv_image& image) {
+                            double least_angle_rad, const uint8_t* greys) {
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;
   Map& map = odometry->map;
@@ -149,7 +143,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     for (int c = 0; c < 3; ++c) point->seen_from[c] = static_cast<float>(world_from_cam0.t[c]);
     point->depth_sigma = static_cast<float>(
         std::min(1.0, kTypicalNoise / (camera->fx * static_cast<double>(p.angle_rad))));
-    point->grey = grey_at(image, b);
+    point->grey = greys[keypoints1[k]];
     observe(&map, keyframe0, keypoints0[k], made);
     observe(&map, keyframe1, keypoints1[k], made);
     ++num_made;
@@ -157,7 +151,9 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   return num_made;
 }
 
-void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
+void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool can_wait) {
+  int32_t* next = &odometry->next_neighbour;
+  if (*next == kMostNeighbours) return;
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;
   Map& map = odometry->map;
@@ -180,12 +176,12 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
     if (turn_between(other.cam_from_world, own.cam_from_world) > kMostTurned) continue;
     neighbours[num_neighbours++] = k;
   }
-  begin_check(odometry, own.id);
   MapCheck* check = &odometry->check;
   // The nearest one is left out: from near by, a wrong motion looks like the right one.
   const int32_t first_checked = num_neighbours > 1 ? 1 : 0;
-  for (int32_t i = 0; i < num_neighbours; ++i) {
-    const int32_t k = neighbours[i];
+  for (; *next < num_neighbours; ++*next) {
+    const int32_t i = *next, k = neighbours[i];
+    if (can_wait && i == kNeighboursAtOnce && !is_urgent(check->vote)) return;
     const MapKeyframe& other = map.keyframes[k];
     const tv_features theirs = features_of(map, other, their_room);
     int32_t num_found = 0;
@@ -218,8 +214,10 @@ void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image) {
       }
     }
     triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num,
-                        std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma), image);
+                        std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma),
+                        frame.greys);
   }
+  *next = kMostNeighbours;
 }
 
 void remove_bad_points(Odometry* odometry) {

@@ -8,19 +8,21 @@ namespace tv {
 // Makes the frame a keyframe, with the points that it sees, and returns its index.
 int32_t make_keyframe(Odometry* odometry, const Frame& frame);
 
-// Makes points of the keypoints that match those of earlier keyframes, and begins to check the map
-// by these matches.
-void make_points(Odometry* odometry, int32_t keyframe, const tv_image& image);
+// Makes points of the newest keyframe's keypoints that match those of earlier keyframes, and checks
+// the map by these matches. `frame` became the keyframe. Where it can wait, half of the earlier
+// keyframes are left to the next call, unless the check is urgent.
+void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool can_wait);
 
 // Removes keyframes until there is room for `wanted` more: those between whose neighbours the
 // camera moved and turned least; never the first one of a segment or the one to which poses are
 // relative.
 void make_room(Odometry* odometry, int32_t wanted);
 
-// Makes points of matched pixels of two keyframes. Returns how many.
+// Makes points of matched pixels of two keyframes. `greys` are those of the second one's keypoints.
+// Returns how many points it made.
 int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
                             const int32_t* keypoints0, const int32_t* keypoints1, int32_t num,
-                            double least_angle_rad, const tv_image& image);
+                            double least_angle_rad, const uint8_t* greys);
 
 // Removes points that frames do not find where they must appear.
 void remove_bad_points(Odometry* odometry);

@@ -23,6 +23,7 @@ struct Frame {
   int32_t* points;     // for each keypoint, or kNoPoint
   int32_t* distances;  // of its descriptor to that of the point, squared
   float* sigmas;       // of its pixel, relative to that of a keypoint of the finest level
+  uint8_t* greys;      // of the pixel next to it
   int32_t num;
   int32_t* cell_starts;  // of each cell of the grid, into cell_items; one more at the end
   int32_t* cell_items;
@@ -127,9 +128,11 @@ struct tv_odometry {
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
   int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
   bool closed_loop;          // with it
+  int32_t next_neighbour;    // of it, the first with which no points were made yet
   bool is_found_again;       // a lost frame was, and no loop has closed since
   tv::WeakLoop weak_loop;
   tv::Spread spread;
+  bool took_step;  // of it, before this frame was tracked
   tv::MapCheck check;
   // The last keyframe that its own matches with earlier ones confirmed. Doubts: the reasons of the
   // frames since some saw one plane only, or contradicted the map, or since the segment began.

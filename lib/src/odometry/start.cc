@@ -42,8 +42,7 @@ void drop_start(Odometry* odometry, int n) {
 
 // The two frames as the first keyframes of a segment. False, and no keyframe was made, where too
 // few points lie between them.
-bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pair& pair,
-                       const tv_image& image) {
+bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pair& pair) {
   Map& map = odometry->map;
   // With an attitude, the world is that of the attitude, and upright.
   frame0->cam_from_world = kIdentity;
@@ -66,8 +65,8 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
     keypoints0[num] = pair.matches[k].idx0;
     keypoints1[num++] = pair.matches[k].idx1;
   }
-  int32_t made =
-      triangulate_matches(odometry, first, second, keypoints0, keypoints1, num, kLeastAngle, image);
+  int32_t made = triangulate_matches(odometry, first, second, keypoints0, keypoints1, num,
+                                     kLeastAngle, frame->greys);
   if (made >= kLeastPoints) {
     adjust_around(odometry, second, 20);
     made = map.keyframes[second].num_observations;
@@ -107,7 +106,7 @@ void copy_frame(const Frame& from, Frame* to) {
   forget_points(to);
 }
 
-bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons) {
+bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons) {
   *reasons = 0;
   for (int n = 0; n < odometry->num_starts; ++n) {
     ArenaScope scope(odometry->scratch);
@@ -129,8 +128,7 @@ bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t
       if (pair.view->median_parallax_rad < kLeastParallax / 2) break;
       continue;
     }
-    if (pair.view->verdict != TV_VERDICT_OK ||
-        !make_first_points(odometry, first, frame, pair, image)) {
+    if (pair.view->verdict != TV_VERDICT_OK || !make_first_points(odometry, first, frame, pair)) {
       continue;
     }
     *reasons = 0;

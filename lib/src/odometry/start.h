@@ -8,7 +8,7 @@ namespace tv {
 // Looks for a frame that waits for a second view and with which this frame determines a pose beyond
 // doubt. True: the two are keyframes with points between them, and the frame has its pose. False:
 // the frame may wait itself; *reasons says what was missing.
-bool start_map(Odometry* odometry, Frame* frame, const tv_image& image, uint32_t* reasons);
+bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons);
 
 // Copies a frame's keypoints, which see no point in the copy.
 void copy_frame(const Frame& from, Frame* to);

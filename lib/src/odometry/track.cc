@@ -33,12 +33,20 @@ constexpr int32_t kLostBeforeStart = 8;    // frames
 // wrong where so many frames in a row contradict velocities that are believed.
 constexpr int32_t kLeastTrust = 5, kMostContrary = 5;
 
+uint8_t grey_at(const tv_image& image, const tv_keypoint& keypoint) {
+  const int64_t x = std::min(std::max(static_cast<int32_t>(keypoint.x + 0.5f), 0), image.width - 1);
+  const int64_t y =
+      std::min(std::max(static_cast<int32_t>(keypoint.y + 0.5f), 0), image.height - 1);
+  return image.data[y * image.stride_bytes + x];
+}
+
 void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
   frame->num = 0;
   tv_extract(odometry->context, &image, nullptr, &odometry->features, frame->keypoints,
              frame->descriptors, odometry->options.max_keypoints, &frame->num);
   tv_keypoint_sigmas(frame->keypoints, frame->num, odometry->features.keypoint_size, 1.0,
                      frame->sigmas);
+  for (int32_t k = 0; k < frame->num; ++k) frame->greys[k] = grey_at(image, frame->keypoints[k]);
   make_grid(*odometry, frame);
   frame->has_pose = false;
 }
@@ -172,14 +180,18 @@ bool heed_check(Odometry* odometry) {
 
 // The frame becomes a keyframe, and closes a loop where *end is not null. False: the map is wrong
 // here, and the frame is no keyframe.
-bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const tv_image& image,
-                           const LoopEnd* loop, tv_odometry_state* state) {
+bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop,
+                           tv_odometry_state* state) {
   Map& map = odometry->map;
   Frame* again = &odometry->starts[0];  // of the loop
   const int32_t end_id = loop != nullptr ? map.keyframes[loop->keyframe].id : -1;
   const int32_t next_point_id = map.next_point_id;
   make_room(odometry, 1);
-  make_points(odometry, make_keyframe(odometry, *frame), image);
+  // No frame takes the time of a step after a loop and of all these points.
+  const bool can_wait = odometry->took_step && loop == nullptr;
+  const int32_t keyframe = make_keyframe(odometry, *frame);
+  begin_check(odometry, map.keyframes[keyframe].id);
+  make_points(odometry, keyframe, *frame, can_wait);
   if (!heed_check(odometry)) return false;
   remove_bad_points(odometry);
   const int32_t newest = map.num_keyframes - 1;
@@ -279,8 +291,8 @@ void write_fit(const PoseFit& fit, tv_odometry_state* state) {
 }
 
 // The frame's pose is known: keyframe, loops, scale, state. False: the map is wrong here.
-bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const PoseFit& fit,
-                    bool follows, Frame* frame, tv_odometry_state* state) {
+bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, Frame* frame,
+                    tv_odometry_state* state) {
   odometry->lost_frames = odometry->turned_frames = odometry->num_starts = 0;
   count_found(odometry, *frame);
   measure_depth(odometry, *frame);
@@ -302,8 +314,7 @@ bool finish_tracked(Odometry* odometry, const tv_odometry_frame& input, const Po
   const bool found_loop = odometry->num_contrary == 0 && !is_spreading(*odometry) &&
                           find_loop(odometry, *frame, kLoopKeyframes, &odometry->starts[0], &loop);
   if (is_due || found_loop) {
-    if (!add_frame_as_keyframe(odometry, frame, input.image, found_loop ? &loop : nullptr, state))
-      return false;
+    if (!add_frame_as_keyframe(odometry, frame, found_loop ? &loop : nullptr, state)) return false;
   } else if (is_checking(odometry->check)) {
     check_next_pair(odometry);
     if (!heed_check(odometry)) return false;
@@ -342,12 +353,11 @@ bool follow_turn(Odometry* odometry, Frame* frame) {
 }
 
 // Tries to begin a map, or another segment of it.
-bool begin_segment(Odometry* odometry, const tv_image& image, Frame* frame,
-                   tv_odometry_state* state) {
+bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
   const int32_t segment = odometry->segment;
   const bool is_upright = odometry->is_upright;
   odometry->segment = odometry->num_segments;
-  if (!start_map(odometry, frame, image, &state->reasons)) {
+  if (!start_map(odometry, frame, &state->reasons)) {
     odometry->segment = segment;
     odometry->is_upright = is_upright;
     return false;
@@ -389,6 +399,7 @@ bool finish_keyframe(Odometry* odometry, Frame* frame) {
   const int32_t newest = find_keyframe(odometry->map, odometry->unadjusted_id);
   odometry->unadjusted_id = -1;
   if (newest < 0) return false;
+  make_points(odometry, newest, *frame, false);
   adjust_around(odometry, newest, odometry->closed_loop ? kLoopSteps : kWindowSteps);
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
@@ -406,9 +417,8 @@ void finish_map(Odometry* odometry) {
 
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state) {
   std::swap(odometry->frame, odometry->previous);
-  if (!finish_keyframe(odometry, &odometry->previous) && is_spreading(*odometry)) {
-    spread_loop(odometry, &odometry->previous);
-  }
+  odometry->took_step = !finish_keyframe(odometry, &odometry->previous) && is_spreading(*odometry);
+  if (odometry->took_step) spread_loop(odometry, &odometry->previous);
   Frame* frame = &odometry->frame;
   extract_frame(odometry, input.image, frame);
   frame->number = odometry->num_frames++;
@@ -432,7 +442,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     odometry->num_relocations += state->relocated;
     odometry->is_found_again |= state->relocated != 0;
   }
-  if (has_pose && !finish_tracked(odometry, input, fit, follows, frame, state)) {
+  if (has_pose && !finish_tracked(odometry, fit, follows, frame, state)) {
     // What the frame was tracked with was wrong.
     state->num_inliers = 0;
     state->has_covariance = 0;
@@ -450,7 +460,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     ++odometry->lost_frames;
     if (!has_map || odometry->lost_frames > kLostBeforeStart) {
       uint32_t reasons = state->reasons;
-      if (begin_segment(odometry, input.image, frame, state))
+      if (begin_segment(odometry, frame, state))
         has_pose = true;
       else if (has_pose)
         state->reasons = reasons;
