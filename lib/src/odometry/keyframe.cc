@@ -181,7 +181,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
   const int32_t first_checked = num_neighbours > 1 ? 1 : 0;
   for (; *next < num_neighbours; ++*next) {
     const int32_t i = *next, k = neighbours[i];
-    if (can_wait && i == kNeighboursAtOnce && !is_urgent(check->vote)) return;
+    if (can_wait && i == kNeighboursAtOnce && check->vote.num_disagree == 0) return;
     const MapKeyframe& other = map.keyframes[k];
     const tv_features theirs = features_of(map, other, their_room);
     int32_t num_found = 0;

@@ -10,7 +10,7 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame);
 
 // Makes points of the newest keyframe's keypoints that match those of earlier keyframes, and checks
 // the map by these matches. `frame` became the keyframe. Where it can wait, half of the earlier
-// keyframes are left to the next call, unless the check is urgent.
+// keyframes are left to the next call, unless a pair disagreed.
 void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool can_wait);
 
 // Removes keyframes until there is room for `wanted` more: those between whose neighbours the

@@ -187,8 +187,8 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
   const int32_t end_id = loop != nullptr ? map.keyframes[loop->keyframe].id : -1;
   const int32_t next_point_id = map.next_point_id;
   make_room(odometry, 1);
-  // No frame takes the time of a step after a loop and of all these points.
-  const bool can_wait = odometry->took_step && loop == nullptr;
+  // No frame takes the time of a loop, or of a step after it, and of all these points.
+  const bool can_wait = odometry->took_step || loop != nullptr;
   const int32_t keyframe = make_keyframe(odometry, *frame);
   begin_check(odometry, map.keyframes[keyframe].id);
   make_points(odometry, keyframe, *frame, can_wait);
