@@ -122,6 +122,7 @@ int32_t keyframe_of(const tv_keypoint* keypoints, const tv::Rigid& cam_from_worl
   for (int n = 0; n < kNum; ++n) {
     frame->keypoints[n] = keypoints[n];
     frame->points[n] = tv::kNoPoint;
+    frame->greys[n] = static_cast<uint8_t>(n);
     for (int b = 0; b < TV_DESCRIPTOR_BYTES; ++b) {
       frame->descriptors[n * TV_DESCRIPTOR_BYTES + b] =
           static_cast<uint8_t>(90 * random_unit(&state));
@@ -155,6 +156,53 @@ void test_waiting_pairs_are_estimated_one_a_call() {
   vote = check_of_keyframes(0.2, 3);
   TEST_ASSERT_TRUE(tv::verdict_of(vote) == tv::MapVerdict::kContradicts);
   TEST_ASSERT_FALSE(tv::is_checking(odometry->check));
+}
+
+// Four keyframes that see what keypoints0 are, and the newest one, turned by `angle` too much,
+// whose points are made in one call or begun in one that can wait.
+void begin_points(double angle, bool can_wait) {
+  tv_odometry_reset(odometry);
+  draw(1.5, 0.5);
+  for (int n = 0; n < 4; ++n) keyframe_of(keypoints0, tv::kIdentity);
+  tv::begin_check(odometry, keyframe_of(keypoints1, turned(motion(), angle)));
+  tv::make_points(odometry, 4, odometry->frame, can_wait);
+}
+
+void test_points_that_wait_are_those_of_one_call() {
+  tv::Map& map = odometry->map;
+  static int32_t points[5][kNum];
+  begin_points(0, false);
+  const int32_t num_points = map.num_points;
+  TEST_ASSERT_TRUE(num_points > kNum / 2);
+  for (int k = 0; k < 5; ++k) {
+    TEST_ASSERT_EQUAL_INT(num_points, map.keyframes[k].num_observations);
+    for (int n = 0; n < kNum; ++n) {
+      points[k][n] = tv::keypoints_of(map, map.keyframes[k])[n].point;
+      if (k == 4 && points[k][n] != tv::kNoPoint) {
+        TEST_ASSERT_EQUAL_UINT8(n & 255, map.points[points[k][n]].grey);
+      }
+    }
+  }
+  begin_points(0, true);
+  const int expected[5] = {0, 0, num_points, num_points, num_points};
+  for (int k = 0; k < 5; ++k) {
+    TEST_ASSERT_EQUAL_INT(expected[k], map.keyframes[k].num_observations);
+  }
+  for (int call = 0; call < 2; ++call) {  // after the second one nothing is left
+    tv::make_points(odometry, 4, odometry->frame, false);
+    TEST_ASSERT_EQUAL_INT(num_points, map.num_points);
+    TEST_ASSERT_EQUAL_INT(4, odometry->next_neighbour);
+    for (int k = 0; k < 5; ++k) {
+      for (int n = 0; n < kNum; ++n) {
+        TEST_ASSERT_EQUAL_INT(points[k][n], tv::keypoints_of(map, map.keyframes[k])[n].point);
+      }
+    }
+  }
+}
+
+void test_points_do_not_wait_where_a_pair_disagrees() {
+  begin_points(0.2, true);
+  TEST_ASSERT_EQUAL_INT(2, odometry->check.vote.num_disagree);
 }
 
 void test_a_removed_keyframe_does_not_vote() {
@@ -203,6 +251,8 @@ int main() {
   RUN_TEST(test_a_plane_decides_nothing);
   RUN_TEST(test_few_matches_decide_nothing);
   RUN_TEST(test_waiting_pairs_are_estimated_one_a_call);
+  RUN_TEST(test_points_that_wait_are_those_of_one_call);
+  RUN_TEST(test_points_do_not_wait_where_a_pair_disagrees);
   RUN_TEST(test_a_removed_keyframe_does_not_vote);
   RUN_TEST(test_a_disagreement_lasts_until_a_pair_agrees);
   return UNITY_END();
