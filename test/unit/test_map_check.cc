@@ -162,7 +162,6 @@ void test_waiting_pairs_are_estimated_one_a_call() {
 // whose points are made in one call or begun in one that can wait.
 void begin_points(double angle, bool can_wait) {
   tv_odometry_reset(odometry);
-  draw(1.5, 0.5);
   for (int n = 0; n < 4; ++n) keyframe_of(keypoints0, tv::kIdentity);
   tv::begin_check(odometry, keyframe_of(keypoints1, turned(motion(), angle)));
   tv::make_points(odometry, 4, odometry->frame, can_wait);
@@ -171,6 +170,7 @@ void begin_points(double angle, bool can_wait) {
 void test_points_that_wait_are_those_of_one_call() {
   tv::Map& map = odometry->map;
   static int32_t points[5][kNum];
+  draw(1.5, 0.5);
   begin_points(0, false);
   const int32_t num_points = map.num_points;
   TEST_ASSERT_TRUE(num_points > kNum / 2);
@@ -201,8 +201,22 @@ void test_points_that_wait_are_those_of_one_call() {
 }
 
 void test_points_do_not_wait_where_a_pair_disagrees() {
+  draw(1.5, 0.5);
   begin_points(0.2, true);
   TEST_ASSERT_EQUAL_INT(2, odometry->check.vote.num_disagree);
+}
+
+// Nobody would heed the votes of the points that waited, which are made before a frame is tracked:
+// their pairs are estimated when it was.
+void test_pairs_of_points_that_wait_vote_later() {
+  const tv::MapCheck& check = odometry->check;
+  draw(4, 0.12);
+  begin_points(0, true);
+  TEST_ASSERT_EQUAL_INT(1, check.vote.num_planar);
+  TEST_ASSERT_TRUE(tv::is_urgent(check.vote) && check.num_others == 0);
+  tv::make_points(odometry, 4, odometry->frame, false);
+  TEST_ASSERT_EQUAL_INT(1, check.vote.num_pairs);
+  TEST_ASSERT_EQUAL_INT(2, check.num_others);
 }
 
 void test_a_removed_keyframe_does_not_vote() {
@@ -253,6 +267,7 @@ int main() {
   RUN_TEST(test_waiting_pairs_are_estimated_one_a_call);
   RUN_TEST(test_points_that_wait_are_those_of_one_call);
   RUN_TEST(test_points_do_not_wait_where_a_pair_disagrees);
+  RUN_TEST(test_pairs_of_points_that_wait_vote_later);
   RUN_TEST(test_a_removed_keyframe_does_not_vote);
   RUN_TEST(test_a_disagreement_lasts_until_a_pair_agrees);
   return UNITY_END();

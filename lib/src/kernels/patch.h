@@ -47,6 +47,7 @@ static void sample_turned(const sampled_image *image, int32_t x, int32_t y, int3
   const __m512i i = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
   const __m512i along_x = _mm512_mullo_epi32(i, _mm512_set1_epi32(du_x));
   const __m512i along_y = _mm512_mullo_epi32(i, _mm512_set1_epi32(du_y));
+  /* TVK_ALIGNED is too little: each row is stored as one vector. */
   uint32_t offsets[TVK_PATCH_SIDE][TVK_PATCH_SIDE] __attribute__((aligned(64)));
   int32_t j, k;
   for (j = 0; j < num_rows; ++j) {

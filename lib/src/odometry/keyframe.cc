@@ -177,6 +177,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
     neighbours[num_neighbours++] = k;
   }
   MapCheck* check = &odometry->check;
+  const bool is_first_call = *next == 0;  // after which heed_check follows
   // The nearest one is left out: from near by, a wrong motion looks like the right one.
   const int32_t first_checked = num_neighbours > 1 ? 1 : 0;
   for (; *next < num_neighbours; ++*next) {
@@ -188,7 +189,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
     if (tv_match(odometry->context, &theirs, &mine, nullptr, found, room, &num_found) != TV_OK) {
       continue;
     }
-    if (i == first_checked || (i > first_checked && is_urgent(check->vote))) {
+    if (is_first_call && (i == first_checked || (i > first_checked && is_urgent(check->vote)))) {
       add_vote(odometry, theirs.keypoints, mine.keypoints, found, num_found,
                motion_between(other.cam_from_world, own.cam_from_world), &check->vote);
     } else if (i > first_checked && needs_vote(check->vote)) {
