@@ -16,7 +16,7 @@ target_compile_options(twoview_flags INTERFACE
 if(TWOVIEW_SANITIZE)
   string(REPLACE ";" "," sanitizers "${TWOVIEW_SANITIZE}")
   add_compile_options(-fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
-  # A check of clang's alone, which needs its C++ runtime, and the tests in C have none.
+  # clang's check of calls through pointers needs its C++ runtime, to which tests in C do not link.
   add_compile_options($<$<CXX_COMPILER_ID:Clang>:-fno-sanitize=function>)
   add_link_options(-fsanitize=${sanitizers})
   add_compile_definitions(TWOVIEW_SANITIZED)

@@ -35,7 +35,8 @@ inline double normal(tv::Random* random) {
   return sum;
 }
 
-// Numbers are drawn one by one, because compilers evaluate arguments in orders of their own.
+// A point of the box |x| <= extent_x, |y| <= extent_y. Here and below each number has a statement
+// of its own, because compilers evaluate arguments in different orders.
 inline Vec2 uniform2(tv::Random* random, double extent_x, double extent_y) {
   const double y = uniform(random, -extent_y, extent_y);
   return Vec2(uniform(random, -extent_x, extent_x), y);

@@ -12,6 +12,7 @@ namespace tv {
 namespace {
 
 constexpr double kLeastBaseline = 0.01;  // of the median depth: nearer keyframes make no points
+// A keyframe is matched with so many earlier ones, and at once with so many where it can wait.
 constexpr int32_t kMostNeighbours = 4, kNeighboursAtOnce = 2;
 // A point is made where its rays meet at this many times the standard deviation of the attitude:
 // below that, the depths of all points are wrong together.
@@ -177,7 +178,7 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
     neighbours[num_neighbours++] = k;
   }
   MapCheck* check = &odometry->check;
-  const bool is_first_call = *next == 0;  // after which heed_check follows
+  const bool is_first_call = *next == 0;  // only its votes are heeded at once
   // The nearest one is left out: from near by, a wrong motion looks like the right one.
   const int32_t first_checked = num_neighbours > 1 ? 1 : 0;
   for (; *next < num_neighbours; ++*next) {

@@ -178,7 +178,7 @@ bool heed_check(Odometry* odometry) {
   return verdict != MapVerdict::kContradicts;
 }
 
-// The frame becomes a keyframe, and closes a loop where *end is not null. False: the map is wrong
+// The frame becomes a keyframe, and closes a loop where there is one. False: the map is wrong
 // here, and the frame is no keyframe.
 bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop,
                            tv_odometry_state* state) {
