@@ -88,9 +88,9 @@ float peak_angle(const int32_t* smooth, int32_t bin) {
   const double right = static_cast<double>(smooth[bin + 2]);
   const double curvature = left - 2.0 * middle + right;
   const double shift = curvature < 0.0 ? 0.5 * (left - right) / curvature : 0.0;
-  double turn = (bin + shift) / TVK_ORIENT_BINS;
-  if (turn > 0.5) turn -= 1.0;
-  const float angle_rad = static_cast<float>(turn * 2.0 * kPi);
+  const double turn = (bin + shift) / TVK_ORIENT_BINS;
+  const double nearest_turn = turn - (turn > 0.5 ? 1.0 : 0.0);
+  const float angle_rad = static_cast<float>(nearest_turn * 2.0 * kPi);
   return angle_rad == 0.0f ? 0.0f : angle_rad;
 }
 

@@ -13,10 +13,13 @@ constexpr double kMaxShift = 1.0;
 // The place of the largest of nine determinants around `place`; of equal ones, `place` if it is
 // one of them, else the first in raster order.
 int32_t largest_of_nine(const int32_t* determinants, int32_t place) {
-  int32_t best = place;
+  int32_t best = place, largest = determinants[place];
   for (int32_t v = -kPitch; v <= kPitch; v += kPitch) {
     for (int32_t u = -1; u <= 1; ++u) {
-      if (determinants[place + v + u] > determinants[best]) best = place + v + u;
+      // Without a branch: which one is the largest cannot be predicted.
+      const int32_t determinant = determinants[place + v + u];
+      best = determinant > largest ? place + v + u : best;
+      largest = determinant > largest ? determinant : largest;
     }
   }
   return best;

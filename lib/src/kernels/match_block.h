@@ -11,7 +11,8 @@ typedef struct sampson_block {
 
 static inline lanes gather_lanes(const double *array, const int32_t index[TVK_LANES]) {
 #if defined(TVK_AVX512)
-  return (lanes)_mm512_i32gather_pd(_mm256_loadu_si256((const __m256i *)index), array, 8);
+  return (lanes){array[index[0]], array[index[1]], array[index[2]], array[index[3]],
+                 array[index[4]], array[index[5]], array[index[6]], array[index[7]]};
 #elif defined(TVK_AVX2)
   return (lanes){array[index[0]], array[index[1]], array[index[2]], array[index[3]]};
 #else

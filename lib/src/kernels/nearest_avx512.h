@@ -48,6 +48,7 @@ static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place,
   (void)largest;
   for (i = 0; i < NEAREST_QUERIES; ++i) {
     const uint8_t *const row = ranked(rows, first + i);
+    prefetch_ranked(rows, first + i + NEAREST_QUERIES);
     const prepared_descriptor d = prepare_descriptor(row ? row : none);
     tile->norms[i] = d.norm;
     tile->terms[i] = row ? nearest_term(d.norm, place + i) : NEAREST_FAR;
@@ -64,6 +65,7 @@ static void make_block(const tvk_descriptors *columns, int32_t first, int32_t pl
   for (j = 0; j < NEAREST_COLUMNS; ++j) {
     const uint8_t *const column = ranked(columns, column_rank(first, j));
     const uint8_t *const bytes = column ? column : none;
+    prefetch_ranked(columns, column_rank(first, j + 8));
     const prepared_descriptor d = prepare_descriptor(bytes);
     TVK_ROLLED
     for (k = 0; k < NEAREST_GROUPS; ++k) {
