@@ -161,6 +161,7 @@ bool adjust_segment(Odometry* odometry, int32_t segment, int32_t first_id, int32
   MovedKeyframe* moved = arena_alloc<MovedKeyframe>(arena, static_cast<size_t>(map.num_keyframes));
   window.max_iterations = max_iterations;
   window.damping = kDamping;
+  window.errors = nullptr;  // the points' adjustment that follows measures them
   if (!adjust_map_window(*odometry, &window, arena)) return false;
   for (int32_t k = 0; k < map.num_keyframes; ++k) moved[k].scale = 0;
   for (int32_t v = 0; v < num_free; ++v) {
