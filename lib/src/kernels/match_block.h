@@ -9,6 +9,7 @@ typedef struct sampson_block {
   lanes f0[3], f1[3], J0[6], J1[6];
 } sampson_block;
 
+/* Single loads, which are quicker than AVX-512's gathers on Zen 4: 1 per cent of a pair. */
 static inline lanes gather_lanes(const double *array, const int32_t index[TVK_LANES]) {
 #if defined(TVK_AVX512)
   return (lanes){array[index[0]], array[index[1]], array[index[2]], array[index[3]],

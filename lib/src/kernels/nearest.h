@@ -53,16 +53,6 @@ static inline const uint8_t *ranked(const tvk_descriptors *set, int32_t rank) {
   return rank < set->num ? set->bytes + (size_t)set->order[rank] * TVK_DESCRIPTOR_SIZE : NULL;
 }
 
-/* Asks for the descriptor of a rank before it is read: ranks that follow each other are anywhere in
-   the set. */
-static inline void prefetch_ranked(const tvk_descriptors *set, int32_t rank) {
-  if (rank < set->num) {
-    const uint8_t *const bytes = set->bytes + (size_t)set->order[rank] * TVK_DESCRIPTOR_SIZE;
-    __builtin_prefetch(bytes);
-    __builtin_prefetch(bytes + 64);
-  }
-}
-
 /* The rank of column j of a block whose first column has rank `first`. */
 static inline int32_t column_rank(int32_t first, int32_t j);
 
