@@ -41,15 +41,6 @@ static TVK_NOINLINE prepared_descriptor prepare_descriptor(const uint8_t *bytes)
   return d;
 }
 
-/* Asks for the descriptor of a rank before it is read: ranks that follow each other may be anywhere
-   in the set, and half of prepare_descriptor's time was waiting for them. */
-static inline void prefetch_ranked(const tvk_descriptors *set, int32_t rank) {
-  const uint8_t *const bytes = ranked(set, rank);
-  if (!bytes) return;
-  _mm_prefetch((const char *)bytes, _MM_HINT_T0);
-  _mm_prefetch((const char *)bytes + 64, _MM_HINT_T0);
-}
-
 static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place, int32_t largest,
                       nearest_rows *tile) {
   const uint8_t none[TVK_DESCRIPTOR_SIZE] = {0};
@@ -57,13 +48,21 @@ static void make_rows(const tvk_descriptors *rows, int32_t first, int32_t place,
   (void)largest;
   for (i = 0; i < NEAREST_QUERIES; ++i) {
     const uint8_t *const row = ranked(rows, first + i);
-    prefetch_ranked(rows, first + i + NEAREST_QUERIES);
     const prepared_descriptor d = prepare_descriptor(row ? row : none);
     tile->norms[i] = d.norm;
     tile->terms[i] = row ? nearest_term(d.norm, place + i) : NEAREST_FAR;
     _mm512_storeu_si512(tile->bytes[i], d.low);
     _mm512_storeu_si512(tile->bytes[i] + 64, d.high);
   }
+}
+
+/* Asks for the descriptor of a rank before it is read: ranks that follow each other may be anywhere
+   in the set, and half of prepare_descriptor's time was waiting for them. */
+static inline void prefetch_ranked(const tvk_descriptors *set, int32_t rank) {
+  const uint8_t *const bytes = ranked(set, rank);
+  if (!bytes) return;
+  _mm_prefetch((const char *)bytes, _MM_HINT_T0);
+  _mm_prefetch((const char *)bytes + 64, _MM_HINT_T0);
 }
 
 static void make_block(const tvk_descriptors *columns, int32_t first, int32_t place,
