@@ -454,6 +454,66 @@ static void test_a_segment_is_weak_until_a_pair_of_keyframes_confirms_it(void) {
   TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
 }
 
+/* Shows what a camera in the middle of the room sees that moves to the side, turned around. */
+static void show_other_wall(int n) {
+  const double centre[3] = {0.05 * n - 0.4, 0, 0};
+  room_draw(centre, 3.14159, pixels);
+  frame.time_s += 1.0 / 30;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+}
+
+static void show_nothing(int num) {
+  for (; num > 0; --num) {
+    memset(pixels, 99, sizeof pixels);
+    frame.time_s += 1.0 / 30;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+    TEST_ASSERT_FALSE(state.has_pose);
+  }
+}
+
+/* A segment that nothing has confirmed says nothing of another one, nor this one of it. */
+static void test_doubts_stay_with_their_segment(void) {
+  int k;
+  options.max_keyframes = 2 * KEYFRAMES;
+  begin(0, &odometry);
+  fly(odometry, 3);
+  while (state.status != TV_ODOMETRY_TRACKING && num_flown < MOST_FRAMES) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown++));
+  }
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  show_nothing(12);
+  for (k = 0; k < 20 && state.num_segments < 2; ++k) show_other_wall(k);
+  TEST_ASSERT_EQUAL_INT(2, state.num_segments);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_WEAK, state.status);
+  show_nothing(2);
+  room_flight(num_flown, pixels); /* the confirmed segment again */
+  frame.time_s += 1.0 / 30;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+  TEST_ASSERT_TRUE(state.relocated && state.segment == 0);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  show_nothing(2);
+  show_other_wall(k - 1); /* and the other one */
+  TEST_ASSERT_TRUE(state.relocated && state.segment == 1);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_WEAK, state.status);
+  TEST_ASSERT_EQUAL_UINT32(TV_REASON_LOW_PARALLAX, state.reasons);
+}
+
+/* What the velocity was in a long gap is not known. */
+static void test_velocities_say_nothing_of_a_gap(void) {
+  int k;
+  frame.velocity_sigma_m_s = 0.01;
+  fly(odometry, 3);
+  for (k = 0; k < 2; ++k) { /* the camera goes to the left: without the gap, this is contrary */
+    room_flight(num_flown + k, pixels);
+    frame.velocity_m_s[0] = 10;
+    frame.time_s += 10;
+    frame.gap = k == 0;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+    TEST_ASSERT_TRUE(state.has_pose);
+    TEST_ASSERT_EQUAL_INT(k == 1, (state.reasons & TV_REASON_SECOND_MOTION) != 0);
+  }
+}
+
 /* Walls look alike: a lost frame is not found where its attitude contradicts the map. */
 static void test_a_lost_frame_is_found_where_its_attitude_allows(void) {
   static const double level[9] = {0, 0, 1, 1, 0, 0, 0, 1, 0},
@@ -650,6 +710,27 @@ static void test_a_frame_is_located_without_changing_the_map(void) {
   TEST_ASSERT_EQUAL_INT(TV_ERR_STRUCT_SIZE, tv_odometry_locate(odometry, &frame.image, 0, &found));
 }
 
+/* Neither before the map begins nor later. */
+static void test_frames_go_on_as_if_none_had_been_located(void) {
+  tv_odometry_state found;
+  size_t num;
+  int k;
+  fly(odometry, 4);
+  save(odometry, map, &num_map);
+  begin(1, &other);
+  tv_odometry_state_init(&found);
+  for (k = 0; k < num_flown; ++k) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(other, k));
+    room_flight(k / 2, pixels);
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_locate(other, &frame.image, -1, &found));
+    TEST_ASSERT_EQUAL_INT(state.num_keyframes, found.num_keyframes);
+    TEST_ASSERT_EQUAL_INT(state.num_frames, found.num_frames);
+  }
+  save(other, again, &num);
+  TEST_ASSERT_EQUAL_UINT64(num_map, num);
+  TEST_ASSERT_EQUAL_MEMORY(map, again, num);
+}
+
 static uint64_t count_calls(void *user) { return ++*(uint64_t *)user; }
 
 static void test_the_clock_is_read(void) {
@@ -782,6 +863,10 @@ static void put_seal(size_t num) {
   for (k = 0; k < 4; ++k) altered[12 + k] = (uint8_t)(crc >> (8 * k));
 }
 
+static void put(size_t at, uint64_t number, int width) {
+  for (; width > 0; --width, ++at, number >>= 8) altered[at] = (uint8_t)number;
+}
+
 /* The turn from the map's axes to those of the truth, of a keyframe of a flight that began at frame
    `first` of the room's and has the numbers from `number` on. It is the same for all keyframes of a
    segment. */
@@ -840,6 +925,36 @@ static void test_a_map_that_is_added_joins_where_it_is_seen_again(void) {
   TEST_ASSERT_TRUE(state.has_pose && state.segment == 0);
 }
 
+/* As of another job: what is not written before it is read is an index far outside. */
+static void test_what_the_memory_held_does_not_matter(void) {
+  static uint8_t joined[MAP];
+  int32_t num_joined = 0, k;
+  size_t num_two, num, num_all = 0;
+  uint32_t noise = 1;
+  int n;
+  fly(odometry, KEYFRAMES);
+  save(odometry, map, &num_map);
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  for (k = 6; k < 46; ++k) TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, k));
+  save(odometry, altered, &num_two);
+  options.max_keyframes = 3 * KEYFRAMES;
+  options.max_points = 3 * POINTS;
+  for (n = 0; n < 2; ++n) { /* zeros, then noise */
+    for (k = 0; k < MEMORY; ++k) {
+      noise = noise * 1664525u + 1013904223u;
+      blocks[1][k] = n == 0 ? 0 : (uint8_t)(noise >> 24);
+    }
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_init(&other, &camera, &options, blocks[1], MEMORY));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(other, map, num_map, &num_joined));
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(other, altered, num_two, &num_joined));
+    TEST_ASSERT_EQUAL_INT(1, num_joined);
+    save(other, n == 0 ? joined : again, &num);
+    if (n == 0) num_all = num;
+    TEST_ASSERT_EQUAL_UINT64(num_all, num);
+    TEST_ASSERT_TRUE(n == 0 || memcmp(joined, again, num) == 0);
+  }
+}
+
 static void test_a_map_that_meets_nothing_is_a_segment_of_its_own(void) {
   int32_t num_joined = -1;
   size_t k, num, keyframe;
@@ -860,6 +975,41 @@ static void test_a_map_that_meets_nothing_is_a_segment_of_its_own(void) {
   save(other, again, &k);
   TEST_ASSERT_EQUAL_INT(2, number_at(again + 160, 4));
   TEST_ASSERT_EQUAL_INT(6, number_at(again + 140, 4));
+}
+
+/* The metre belongs to the segment that it was measured in. */
+static void test_a_map_that_is_added_brings_its_own_scale(void) {
+  static const uint64_t hundred = 0x4059000000000000u, percent = 0x3f847ae147ae147bu;
+  int32_t num_joined;
+  size_t k, num, num_all;
+  int metric, n;
+  fly(odometry, 3);
+  save(odometry, map, &num);
+  options.max_keyframes = 2 * KEYFRAMES;
+  for (metric = 0; metric < 2; ++metric) { /* the first map, or the one that is added */
+    const int last = metric == 1 ? TV_SCALE_VELOCITY : TV_SCALE_UNIT;
+    begin(1, &other);
+    for (n = 0; n < 2; ++n) {
+      memcpy(altered, map, num);
+      if (n == metric) {
+        put(176, TV_SCALE_VELOCITY, 4), put(180, TV_SCALE_VELOCITY, 4);
+        put(184, hundred, 8), put(192, hundred, 8), put(200, percent, 8);
+      }
+      for (k = HEADER; n == 1 && k < HEADER + POINT * number_at(map + 136, 4); k += POINT) {
+        memset(altered + k + POINT - TV_DESCRIPTOR_BYTES, (int)(k % 200), TV_DESCRIPTOR_BYTES);
+      }
+      put_seal(num);
+      TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(other, altered, num, &num_joined));
+      TEST_ASSERT_EQUAL_INT(0, num_joined);
+    }
+    save(other, again, &num_all); /* tells the scale of the last segment */
+    TEST_ASSERT_EQUAL_INT(last, number_at(again + 176, 4));
+    TEST_ASSERT_EQUAL_INT(TV_OK, give(other, num_flown - 1));
+    TEST_ASSERT_TRUE(state.has_pose && state.segment == 0);
+    TEST_ASSERT_EQUAL_INT(metric == 0 ? TV_SCALE_VELOCITY : TV_SCALE_UNIT, state.scale_source);
+    save(other, again, &num_all);
+    TEST_ASSERT_EQUAL_INT(last, number_at(again + 176, 4));
+  }
 }
 
 static void test_add_refuses_what_load_refuses(void) {
@@ -951,10 +1101,6 @@ static void expect_sealed(tv_status expected, size_t num) {
   if (expected != TV_OK) expect_unchanged();
 }
 
-static void put(size_t at, uint64_t number, int width) {
-  for (; width > 0; --width, ++at, number >>= 8) altered[at] = (uint8_t)number;
-}
-
 static void test_a_map_of_wrong_content_is_refused(void) {
   static const uint64_t nan = 0x7ff8000000000000u, huge = 0x7fe0000000000000u;
   size_t keyframe, keypoint, k;
@@ -970,6 +1116,7 @@ static void test_a_map_of_wrong_content_is_refused(void) {
     put(k, 0xffffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
   }
   put(176, 4, 4), expect_sealed(TV_ERR_MAP, num_map); /* the scale */
+  put(184, 0x3ff0000000000000u, 8), put(192, 0, 8), expect_sealed(TV_ERR_MAP, num_map);
   put(192, nan, 8), expect_sealed(TV_ERR_MAP, num_map);
   for (k = 136; k < 148; k += 4) { /* one more or one less than there are */
     put(k, number_at(map + k, 4) + 1, 4), expect_sealed(TV_ERR_MAP, num_map);
@@ -984,7 +1131,7 @@ static void test_a_map_of_wrong_content_is_refused(void) {
   put(HEADER + 24, number_at(map + HEADER + POINT + 24, 4), 4), expect_sealed(TV_ERR_MAP, num_map);
   put(HEADER + 28, 1, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(HEADER + 32, 0x80000000u, 4), expect_sealed(TV_ERR_MAP, num_map);
-  put(HEADER + 36, 0x7fffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
+  put(HEADER + 36, 0x3fffffffu, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(HEADER + 40, 1000, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(HEADER + 44, 256, 4), expect_sealed(TV_ERR_MAP, num_map);
   put(HEADER + 48, 0xbf800000u, 4), expect_sealed(TV_ERR_MAP, num_map);
@@ -1053,17 +1200,22 @@ int main(void) {
   RUN_TEST(test_the_last_frame_is_shown);
   RUN_TEST(test_a_keyframe_is_adjusted_when_the_next_frame_comes);
   RUN_TEST(test_a_segment_is_weak_until_a_pair_of_keyframes_confirms_it);
+  RUN_TEST(test_doubts_stay_with_their_segment);
+  RUN_TEST(test_velocities_say_nothing_of_a_gap);
   RUN_TEST(test_a_lost_frame_is_found_where_its_attitude_allows);
   RUN_TEST(test_a_lost_frame_is_found_where_its_pose_is_beyond_doubt);
   RUN_TEST(test_finish_adjusts_the_newest_keyframe);
   RUN_TEST(test_accessors_refuse_bad_arguments);
   RUN_TEST(test_poses_are_found_again_from_their_keyframes);
   RUN_TEST(test_a_frame_is_located_without_changing_the_map);
+  RUN_TEST(test_frames_go_on_as_if_none_had_been_located);
   RUN_TEST(test_the_clock_is_read);
   RUN_TEST(test_the_bytes_are_as_documented);
   RUN_TEST(test_a_loaded_map_is_the_same_and_is_found_again);
   RUN_TEST(test_a_map_that_is_added_joins_where_it_is_seen_again);
+  RUN_TEST(test_what_the_memory_held_does_not_matter);
   RUN_TEST(test_a_map_that_meets_nothing_is_a_segment_of_its_own);
+  RUN_TEST(test_a_map_that_is_added_brings_its_own_scale);
   RUN_TEST(test_add_refuses_what_load_refuses);
   RUN_TEST(test_save_refuses_bad_arguments);
   RUN_TEST(test_a_map_that_is_cut_or_altered_at_any_byte_is_refused);

@@ -234,7 +234,8 @@ TV_API tv_status tv_odometry_finish(tv_odometry *odometry);
    the map began, or of another flight.
    image: as tv_odometry_frame.image. state: as for tv_odometry_track; its status is
    TV_ODOMETRY_TRACKING, TV_ODOMETRY_WEAK or TV_ODOMETRY_LOST. near_id: the id of a keyframe whose
-   surroundings are searched first; -1: no such hint.
+   surroundings are searched first; -1: no such hint. The frames that follow are tracked as if this
+   one had not been looked for.
    Returns TV_ERR_NULL, TV_ERR_STRUCT_SIZE, TV_ERR_CAMERA, TV_ERR_ARGUMENT, TV_ERR_OVERLAP. */
 TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image, int32_t near_id,
                                     tv_odometry_state *state);
@@ -243,7 +244,9 @@ TV_API tv_status tv_odometry_locate(tv_odometry *odometry, const tv_image *image
    tv_odometry_state said of the frame when it was tracked: reference_id, reference_from_cam_R and
    reference_from_cam_t. The keyframe may have been removed from the map since.
    R: room for 9 numbers, row-major; t: room for 3. segment: null, or receives the segment.
-   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (no keyframe has had this id), TV_ERR_OVERLAP. */
+   Returns TV_ERR_NULL, TV_ERR_ARGUMENT (no keyframe has had this id, or no keyframe is left of its
+   segment, or it was removed, and more than 16 times the option max_keyframes since then),
+   TV_ERR_OVERLAP. */
 TV_API tv_status tv_odometry_pose_of(const tv_odometry *odometry, int32_t reference_id,
                                      const double reference_from_cam_R[9],
                                      const double reference_from_cam_t[3], double R[9], double t[3],
@@ -375,9 +378,10 @@ TV_API tv_status tv_odometry_load(tv_odometry *odometry, const uint8_t *bytes, s
 TV_API tv_status tv_odometry_add(tv_odometry *odometry, const uint8_t *bytes, size_t num_bytes,
                                  int32_t *num_joined);
 
-/* Gives the odometry a clock, so that it measures the time of each stage. The clock is called from
-   within tv_odometry_track and tv_odometry_locate with the pointer `user`; both stay valid as long
-   as the odometry is used. A null now_ns removes the clock. Returns TV_ERR_NULL. */
+/* Gives the odometry a clock, so that it measures the time of each stage. The clock is called with
+   the pointer `user` from within tv_odometry_track, tv_odometry_locate, tv_odometry_finish and
+   tv_odometry_add; both stay valid as long as the odometry is used. A null now_ns removes the
+   clock. Returns TV_ERR_NULL. */
 TV_API tv_status tv_odometry_set_clock(tv_odometry *odometry, tv_clock now_ns, void *user);
 
 /* Writes the nanoseconds spent in each tv_stage since the previous call of this function, as

@@ -109,14 +109,15 @@ size_t plan_bytes(const Plan& plan) {
 void start_anew(tv_odometry* o) {
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
-  o->local_id = o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
+  o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
   o->doubts = 0;
+  o->doubtful_segment = -1;
   o->weak_loop.frame = -1;
   o->spread = {0, o->map.sizes.max_points, 0, 0, 0};
   o->took_step = false;
   o->check = MapCheck{};
   o->has_motion = false;
-  o->num_frames = o->segment = o->num_segments = 0;
+  o->num_frames = o->segment = o->num_segments = o->other_segment = 0;
   o->num_relocations = o->num_loops = o->lost_frames = o->turned_frames = o->next_search =
       o->next_loop = 0;
   o->status = TV_ODOMETRY_STARTING;
@@ -133,12 +134,7 @@ void start_anew(tv_odometry* o) {
 void enter_segment(tv_odometry* o, int32_t segment) {
   if (segment != o->segment) change_scale(o, o->segment, segment);
   o->segment = segment;
-  o->is_upright = false;
-  for (int32_t k = 0; k < o->map.num_keyframes; ++k) {
-    if (o->map.keyframes[k].segment != segment) continue;
-    o->is_upright = o->map.keyframes[k].down_sigma_rad > 0;
-    break;
-  }
+  o->is_upright = is_upright(o->map, segment);
 }
 
 // The window that adjust_around and the start's adjustment take has 4 KB for each keypoint and 5
@@ -300,8 +296,8 @@ tv_status tv_odometry_pose_of(const tv_odometry* odometry, int32_t reference_id,
   tv::Rigid pose = tv::rigid_of(reference_from_cam_R, reference_from_cam_t);
   const tv::Map& map = odometry->map;
   int32_t id = reference_id;
-
   int32_t k = tv::find_keyframe(map, id);
+  // One step, but for a map that an earlier version saved.
   for (int32_t steps = 0; k < 0 && steps <= map.num_removed; ++steps) {
     int32_t n = 0;
     while (n < map.num_removed && map.removed[n].id != id) ++n;

@@ -184,8 +184,11 @@ int32_t adjust_points(Odometry* odometry, int32_t segment, int32_t first, int32_
   for (; place < map.end_points && window.model.num_points < window.sizes.points; ++place) {
     const MapPoint& point = map.points[place];
     if (point.id < 0 || point.segment != segment) continue;
+    if (point.num_observations > left) {
+      if (window.model.num_points > 0) break;
+      continue;  // no window has room for it
+    }
     left -= point.num_observations;
-    if (left < 0) break;
     add_map_point(map, place, &window);
   }
   add_observations(*odometry, &window);

@@ -42,8 +42,7 @@ bool gather_matches(Odometry* odometry, double max_error_px, const Frame& frame,
     if (frame.has_pose) {
       double x[3];
       transform(frame.cam_from_world, point.position, x);
-      const double error =
-          depth_error_px(*odometry, point, centre, std::max(x[2], 1e-9)) / kTypicalNoise;
+      const double error = depth_error_px(*odometry, point, centre, x) / kTypicalNoise;
       sigma = std::sqrt(sigma * sigma + error * error);
     }
     sigmas[num] = static_cast<float>(std::min(sigma, 1000.0));

@@ -20,7 +20,7 @@ constexpr double kLeastTurnSigmas = 5;
 constexpr double kLargestSizeRatio = 2.2;
 constexpr double kMostTurned = 1.0;  // radians between keyframes that make points together
 // In place of a gap's length: the first keyframe of a segment, and the last one.
-constexpr double kNeverRemoved = 1e300, kRarelyRemoved = 1e299;
+constexpr double kHardlyEver = 1e300, kRarely = 1e299;
 // A frame's surroundings are the points of this many keyframes that share at least so many with it.
 constexpr int32_t kSurroundingKeyframes = 12, kLeastShared = 5;
 
@@ -51,15 +51,18 @@ void make_room(Odometry* odometry, int32_t wanted) {
           way_between(before.cam_from_world, after.cam_from_world) +
           odometry->median_depth * turn_between(before.cam_from_world, after.cam_from_world);
       if (before.segment != own.segment)
-        gap = kNeverRemoved;
+        gap = kHardlyEver;
       else if (after.segment != own.segment)
-        gap = kRarelyRemoved;
+        gap = kRarely;
       if (best < 0 || gap < least) {
         least = gap;
         best = k;
       }
     }
-    remove_keyframe(&map, best, best - 1);
+    const int32_t segment = map.keyframes[best].segment;
+    int32_t kept = newest_of(map, segment, best);
+    if (kept < 0 && map.keyframes[best + 1].segment == segment) kept = best + 1;
+    remove_keyframe(&map, best, kept);
   }
 }
 
@@ -237,7 +240,7 @@ void remove_bad_points(Odometry* odometry) {
   if (any) remove_points(&map, is_removed);
 }
 
-void list_local_points(Odometry* odometry, int32_t keyframe) {
+int32_t list_points(Odometry* odometry, int32_t keyframe, int32_t* points) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
   int32_t* shared = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
@@ -246,19 +249,23 @@ void list_local_points(Odometry* odometry, int32_t keyframe) {
   const int32_t num_chosen =
       largest(shared, map.num_keyframes, kLeastShared, kSurroundingKeyframes, chosen);
   clear_marks(&map);
-  odometry->num_local_points = 0;
-  odometry->local_id = map.keyframes[keyframe].id;
+  int32_t num = 0;
   for (int32_t n = 0; n < num_chosen; ++n) {
     const MapKeyframe& other = map.keyframes[chosen[n]];
     const MapKeypoint* own = keypoints_of(map, other);
     for (int32_t i = 0; i < other.num_keypoints; ++i) {
       const int32_t p = own[i].point;
       if (p == kNoPoint || is_marked(map, p)) continue;
-      if (odometry->num_local_points == odometry->max_matched) return;
+      if (num == odometry->max_matched) return num;
       mark_point(&map, p);
-      odometry->local_points[odometry->num_local_points++] = p;
+      points[num++] = p;
     }
   }
+  return num;
+}
+
+void list_local_points(Odometry* odometry, int32_t keyframe) {
+  odometry->num_local_points = list_points(odometry, keyframe, odometry->local_points);
 }
 
 }  // namespace tv

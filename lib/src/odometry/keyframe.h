@@ -14,8 +14,8 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame);
 void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool can_wait);
 
 // Removes keyframes until there is room for `wanted` more: those between whose neighbours the
-// camera moved and turned least; never the first one of a segment or the one to which poses are
-// relative.
+// camera moved and turned least; the first and the last one of a segment where there are no others,
+// and never the one to which poses are relative.
 void make_room(Odometry* odometry, int32_t wanted);
 
 // Makes points of matched pixels of two keyframes. `greys` are those of the second one's keypoints.
@@ -27,8 +27,11 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
 // Removes points that frames do not find where they must appear.
 void remove_bad_points(Odometry* odometry);
 
-// Lists the points that are looked for in the next frames: those of the keyframes that share most
-// points with this one.
+// Lists the points around a keyframe, those of the keyframes that share most points with it, at
+// most max_matched. Returns how many they are.
+int32_t list_points(Odometry* odometry, int32_t keyframe, int32_t* points);
+
+// Lists the points around the keyframe that are looked for in the next frames.
 void list_local_points(Odometry* odometry, int32_t keyframe);
 
 }  // namespace tv

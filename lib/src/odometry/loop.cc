@@ -43,13 +43,17 @@ constexpr int32_t kSpreadSteps = 12, kPointSteps = 3, kLeastSpread = 100;
 constexpr double kLeastWay = 0.005, kLeastTurn = 0.005;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
 
-// Writes for each keyframe the length of the path from it to the newest one.
-void measure_paths(const Map& map, double* lengths) {
-  const MapKeyframe* keyframes = map.keyframes;
+// Writes for each keyframe the length of the segment's path since then.
+void measure_paths(const Map& map, int32_t segment, double* lengths) {
+  const MapKeyframe* next = nullptr;
   double length = 0;
   for (int32_t k = map.num_keyframes - 1; k >= 0; --k) {
+    const MapKeyframe& own = map.keyframes[k];
+    if (own.segment == segment) {
+      if (next != nullptr) length += way_between(own.cam_from_world, next->cam_from_world);
+      next = &own;
+    }
     lengths[k] = length;
-    if (k > 0) length += way_between(keyframes[k - 1].cam_from_world, keyframes[k].cam_from_world);
   }
 }
 
@@ -149,19 +153,26 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
       3 * fit.estimate.num_inliers < fit.estimate.num_matches) {
     return false;
   }
-  list_local_points(odometry, keyframe);
+  again->has_pose = true;
   for (int round = 0; round < 2; ++round) {
-    const PointSearch search{odometry->local_points, odometry->num_local_points,
-                             fit.cam_from_world,     round == 0 ? 8.0 : 5.0,
-                             kMaxDistance,           kSearchRatio};
-    find_points(odometry, search, again);
     again->cam_from_world = fit.cam_from_world;
-    again->has_pose = true;
     if (!refine_pose(odometry, 3.0, again, &fit)) return false;
   }
-  again->cam_from_world = fit.cam_from_world;
+  // What was found without the map's help decides. The points around are looked for all the same,
+  // whatever it says: those that are here twice, because the frame sees newer ones in their places,
+  // are found in no other frame, and go.
   const int32_t num_inliers = fit.estimate.num_inliers;
-  if (num_inliers < kLeastWeakInliers || fit.estimate.verdict != TV_VERDICT_OK) return false;
+  const bool is_sure = fit.estimate.verdict == TV_VERDICT_OK;
+  int32_t* around =
+      arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(odometry->max_matched));
+  const int32_t num_around = list_points(odometry, keyframe, around);
+  again->cam_from_world = fit.cam_from_world;
+  const PointSearch search{around,       num_around, fit.cam_from_world, 5.0, kMaxDistance,
+                           kSearchRatio, true};
+  find_points(odometry, search, again);
+  if (num_inliers < kLeastWeakInliers || !is_sure || !refine_pose(odometry, 3.0, again, &fit)) {
+    return false;
+  }
   end->keyframe = keyframe;
   end->cam_from_world = fit.cam_from_world;
   end->scale = scale_between(odometry, frame, *again);
@@ -221,7 +232,7 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
   const int32_t last = map.num_keyframes - 1 - kLeastKeyframesBetween;
   ArenaScope scope(odometry->scratch);
   double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
-  measure_paths(map, paths);
+  measure_paths(map, odometry->segment, paths);
   bool copied = false, found = false;
   for (int32_t tried = 0, n = 0; tried < count && n < map.num_keyframes && !found; ++n) {
     if (odometry->next_loop <= 0 || odometry->next_loop > map.num_keyframes) {
@@ -230,13 +241,10 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
     const int32_t k = --odometry->next_loop;
     if (k > last && map.keyframes[k].segment == odometry->segment) continue;
     if (!may_meet(*odometry, frame, paths[k], k)) continue;
-    if (!copied) copy_frame(frame, again);
+    if (!copied) copy_frame(*odometry, frame, again);
     copied = true;
     ++tried;
     found = meets(odometry, frame, paths[k], k, again, end);
-  }
-  if (odometry->local_id != odometry->reference_id) {
-    list_local_points(odometry, find_keyframe(map, odometry->reference_id));
   }
   return found;
 }
@@ -251,7 +259,7 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
       arena_alloc<MovedKeyframe>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
   const Rigid now = map.keyframes[keyframe].cam_from_world;
   double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
-  measure_paths(map, paths);
+  measure_paths(map, segment, paths);
   const double whole = std::max(paths[end.keyframe], 1e-12);
   for (int32_t k = 0; k <= newest; ++k) {
     const MapKeyframe& own = map.keyframes[k];
@@ -270,6 +278,7 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   for (int32_t k = 0; k <= newest; ++k) {
     if (moved[k].scale != 0) map.keyframes[k].segment = old_segment;
   }
+  if (odometry->doubtful_segment == segment) odometry->doubtful_segment = old_segment;
   if (segment == old_segment) add_ways(odometry, 1);
   for (int32_t p = 0; p < map.end_points; ++p) {
     if (map.points[p].segment == segment) map.points[p].segment = old_segment;
@@ -358,7 +367,7 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
     enter_segment(odometry, map.keyframes[k].segment);
     for (int32_t i = 0; i < first && !is_joined; ++i) {
       LoopEnd end;
-      copy_frame(*frame, again);
+      copy_frame(*odometry, *frame, again);
       is_joined = meets(odometry, *frame, 0, i, again, &end);
       if (!is_joined) continue;
       close_loop(odometry, k, *again, end);

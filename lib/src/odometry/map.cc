@@ -39,7 +39,33 @@ void join_ways(const MapKeyframe& removed, MapKeyframe* own) {
   own->way_variance = is_known ? own->way_variance + removed.way_variance : 0;
 }
 
+// Frames that were relative to a keyframe that is removed, also those of others before it, are
+// relative to one that stays.
+void keep_relation(Map* map, const MapKeyframe& removed, const MapKeyframe& stays) {
+  RemovedKeyframe own{removed.id, stays.id,
+                      motion_between(removed.cam_from_world, stays.cam_from_world),
+                      removed.scale / stays.scale};
+  for (double& t : own.kept_from_removed.t) t /= stays.scale;
+  for (int32_t n = 0; n < map->num_removed; ++n) {
+    RemovedKeyframe& other = map->removed[n];
+    if (other.kept_id != own.id) continue;
+    scale_by(own.scale, other.kept_from_removed.t);
+    other.kept_from_removed = compose(own.kept_from_removed, other.kept_from_removed);
+    other.scale *= own.scale;
+    other.kept_id = own.kept_id;
+  }
+  if (map->num_removed == max_removed(map->sizes)) forget_removed(map, 1);
+  int32_t at = map->num_removed++;
+  for (; at > 0 && map->removed[at - 1].id > own.id; --at) map->removed[at] = map->removed[at - 1];
+  map->removed[at] = own;
+}
+
 }  // namespace
+
+void forget_removed(Map* map, int32_t num) {
+  map->num_removed -= num;
+  std::memmove(map->removed, map->removed + num, as_size(map->num_removed) * sizeof *map->removed);
+}
 
 void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   const size_t points = as_size(sizes.max_points);
@@ -198,9 +224,10 @@ void move_keyframes(Map* map, const MovedKeyframe* moved) {
   for (int32_t p = 0; p < map->end_points; ++p) {
     MapPoint& point = map->points[p];
     if (point.id < 0) continue;
-    // The keyframe that made it, or the next one that is left.
-    const int32_t k = std::min(first_from(*map, point.made_at), map->num_keyframes - 1);
-    if (moved[k].scale == 0) continue;
+    int32_t k = first_from(*map, point.made_at);
+    while (k < map->num_keyframes && map->keyframes[k].segment != point.segment) ++k;
+    if (k == map->num_keyframes) k = newest_of(*map, point.segment, k);
+    if (k < 0 || moved[k].scale == 0) continue;
     const Rigid world_from_cam = inverse(moved[k].cam_from_world);
     double x[3], seen[3];
     const double from[3] = {static_cast<double>(point.seen_from[0]),
@@ -232,21 +259,22 @@ void remove_lone_points(Map* map, Arena& scratch) {
   if (any) remove_points(map, is_removed);
 }
 
+bool is_upright(const Map& map, int32_t segment) {
+  for (int32_t k = 0; k < map.num_keyframes; ++k) {
+    if (map.keyframes[k].segment == segment && map.keyframes[k].down_sigma_rad > 0) return true;
+  }
+  return false;
+}
+
+int32_t newest_of(const Map& map, int32_t segment, int32_t end) {
+  do --end;
+  while (end >= 0 && map.keyframes[end].segment != segment);
+  return end;
+}
+
 void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
   MapKeyframe* removed = &map->keyframes[keyframe];
-  const MapKeyframe& stays = map->keyframes[kept];
-  if (map->num_removed == max_removed(map->sizes)) {
-    std::memmove(map->removed, map->removed + 1,
-                 as_size(map->num_removed - 1) * sizeof *map->removed);
-    --map->num_removed;
-  }
-  int32_t at = map->num_removed++;
-  for (; at > 0 && map->removed[at - 1].id > removed->id; --at) {
-    map->removed[at] = map->removed[at - 1];
-  }
-  Rigid kept_from_removed = motion_between(removed->cam_from_world, stays.cam_from_world);
-  for (double& t : kept_from_removed.t) t /= stays.scale;
-  map->removed[at] = {removed->id, stays.id, kept_from_removed, removed->scale / stays.scale};
+  if (kept >= 0) keep_relation(map, *removed, map->keyframes[kept]);
   MapKeypoint* own = keypoints_of(*map, *removed);
   for (int32_t i = 0; i < removed->num_keypoints; ++i) {
     if (own[i].point != kNoPoint) forget_observation(map, keyframe, i);

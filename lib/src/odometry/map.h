@@ -41,14 +41,14 @@ struct MapPoint {
   int32_t id;  // -1: the place is free
   int32_t segment;
   int32_t num_observations;
-  int32_t num_visible, num_found;  // in frames since it was made
+  int32_t num_visible, num_found;  // in how many searches, and frames, since it was made
   int32_t made_at;                 // the id of the keyframe that made it
   float depth_sigma;               // of the logarithm of its distance from `seen_from`
   float seen_from[3];
   int32_t grey;
 };
 
-// Where a keyframe that was removed lies relative to one that stayed when it was removed.
+// Where a keyframe that was removed lies relative to one that the map has.
 struct RemovedKeyframe {
   int32_t id, kept_id;
   Rigid kept_from_removed;  // cameras, in the unit of the one that was kept when it was made
@@ -150,17 +150,26 @@ struct MovedKeyframe {
   double scale;
 };
 
-// Moves the keyframes, and each point with the keyframe that made it.
+// Moves the keyframes, and each point with the keyframe that made it, or one near it that is left.
 void move_keyframes(Map* map, const MovedKeyframe* moved);
 
-// Removes a point from the map and from the keyframes that see it.
+// Removes the points for whose place is_removed is not 0, also from the keyframes that see them.
 void remove_points(Map* map, const uint8_t* is_removed);
 
 // Removes the points that fewer than two keyframes see. Takes max_points bytes of scratch.
 void remove_lone_points(Map* map, Arena& scratch);
 
-// Removes a keyframe. Its points stay, also those that only one other keyframe sees then. The path
-// of frames that are relative to it continues from the keyframe `kept`.
+// Whether attitudes keep a segment upright.
+bool is_upright(const Map& map, int32_t segment);
+
+// Forgets where the first `num` keyframes that were removed lie.
+void forget_removed(Map* map, int32_t num);
+
+// The newest keyframe of a segment before the place `end`; -1 where there is none.
+int32_t newest_of(const Map& map, int32_t segment, int32_t end);
+
+// Removes a keyframe. Its points stay, also those that only one other keyframe sees then. Frames
+// that are relative to it are relative to the keyframe `kept` from now on; -1: to none.
 void remove_keyframe(Map* map, int32_t keyframe, int32_t kept);
 
 }  // namespace tv

@@ -16,7 +16,7 @@ constexpr bool kLittleEndian = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
 constexpr size_t kUnchecked = 16;  // the checksum is that of the bytes from here on
 // Ranges in which nothing that is computed from the numbers overflows.
 constexpr double kLargest = 1e15;
-constexpr int32_t kMost = 1 << 30;
+constexpr int32_t kMost = 1 << 28;
 constexpr float kLargestPixel = 1e5f, kLargestSize = 4096;
 
 // CRC-32 as of PNG and zlib, four bits at a time.
@@ -74,8 +74,8 @@ struct Header {
   int32_t num_points, num_keyframes, num_removed;
   int32_t next_point_id, next_keyframe_id;
   int32_t num_frames, num_segments, num_relocations, num_loops;
-  int32_t is_upright, scale_source, scale_evidence;
-  double scale_product, scale_square, scale_sigma;
+  int32_t is_upright;
+  MetricScale scale;
 };
 
 void pass_header(Stream* s, Header* h) {
@@ -85,8 +85,8 @@ void pass_header(Stream* s, Header* h) {
   pass(s, &h->num_bytes, &h->num_bytes);
   pass(s, &camera->model, &camera->reserved);
   pass(s, &camera->fx, &camera->k[7]);
-  pass(s, &h->num_points, &h->scale_evidence);
-  pass(s, &h->scale_product, &h->scale_sigma);
+  pass(s, &h->num_points, &h->scale.evidence);
+  pass(s, &h->scale.product, &h->scale.sigma);
 }
 
 void pass_point(Stream* s, MapPoint* p, uint8_t (*descriptor)[TV_DESCRIPTOR_BYTES]) {
@@ -132,9 +132,10 @@ bool is_header(const Header& h) {
   return is_count(h.num_points) && is_count(h.num_keyframes) && is_count(h.num_removed) &&
          is_count(h.next_point_id) && is_count(h.next_keyframe_id) && is_count(h.num_frames) &&
          is_count(h.num_segments) && is_count(h.num_relocations) && is_count(h.num_loops) &&
-         is_index(h.is_upright, 2) && is_index(h.scale_source, 4) &&
-         is_index(h.scale_evidence, 4) && is_measure(h.scale_product, h.scale_square) &&
-         is_measure(0, h.scale_sigma) && tv_camera_check(&h.camera) == TV_OK;
+         is_index(h.is_upright, 2) && is_index(h.scale.source, 4) &&
+         is_index(h.scale.evidence, 4) && is_measure(h.scale.product, h.scale.square) &&
+         (h.scale.square > 0 || h.scale.product == 0) && is_measure(0, h.scale.sigma) &&
+         tv_camera_check(&h.camera) == TV_OK;
 }
 
 bool is_point(const Header& h, const MapPoint& p) {
@@ -171,17 +172,18 @@ tv_camera camera_of(const Odometry& odometry) {
 
 // What the numbers of a map that is added to another one begin with.
 struct Base {
-  int32_t place, point_id, keyframe_id, segment, frame;
+  int32_t point_id, keyframe_id, segment, frame;
 };
 
-// Reads what follows the header, and adds it to `map` if `stores`. False: it is no map. *fits:
-// whether there is room for it.
-bool read_body(const Header& h, Stream* s, bool stores, Map* map, const Base& base, bool* fits) {
+// Reads what follows the header, and adds it to `map` if there is room for the places of its points
+// in `places`; null: it is only checked. False: it is no map. *fits: whether there is room for it.
+bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base& base,
+               bool* fits) {
+  const bool stores = places != nullptr;
   const MapSizes& sizes = map->sizes;
-  *fits = h.num_points <= sizes.max_points - base.place &&
+  *fits = h.num_points <= sizes.max_points - map->num_points &&
           h.num_keyframes <= sizes.max_keyframes - map->num_keyframes &&
-          h.num_removed <= max_removed(sizes) - map->num_removed &&
-          h.next_point_id <= kMost - base.point_id &&
+          h.num_removed <= max_removed(sizes) && h.next_point_id <= kMost - base.point_id &&
           h.next_keyframe_id <= kMost - base.keyframe_id &&
           h.num_segments <= kMost - base.segment && h.num_frames <= kMost - base.frame;
   int32_t last_id = -1;
@@ -195,10 +197,8 @@ bool read_body(const Header& h, Stream* s, bool stores, Map* map, const Base& ba
     point.id += base.point_id;
     point.segment += base.segment;
     point.made_at += base.keyframe_id;
-    const int32_t place = map->end_points++;
-    map->points[place] = point;
-    std::memcpy(descriptor_of(*map, place), descriptor, sizeof descriptor);
-    ++map->num_points;
+    places[n] = add_point(map, point.position, descriptor, point.segment);
+    map->points[places[n]] = point;
   }
   last_id = -1;
   for (int32_t n = 0; n < h.num_keyframes; ++n) {
@@ -224,10 +224,12 @@ bool read_body(const Header& h, Stream* s, bool stores, Map* map, const Base& ba
       if (!stores) continue;
       own[k] = keypoint;
       if (keypoint.point == kNoPoint) continue;
-      observe(map, map->num_keyframes - 1, k, base.place + keypoint.point);
+      observe(map, map->num_keyframes - 1, k, places[keypoint.point]);
     }
   }
   last_id = -1;
+  const int32_t surplus = map->num_removed + h.num_removed - max_removed(sizes);
+  if (stores && surplus > 0) forget_removed(map, surplus);
   for (int32_t n = 0; n < h.num_removed; ++n) {
     RemovedKeyframe removed;
     pass_removed(s, &removed);
@@ -263,12 +265,14 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   h.num_segments = odometry.num_segments;
   h.num_relocations = odometry.num_relocations;
   h.num_loops = odometry.num_loops;
-  h.is_upright = odometry.is_upright;
-  h.scale_source = odometry.scale.source;
-  h.scale_evidence = odometry.scale.evidence;
-  h.scale_product = odometry.scale.product;
-  h.scale_square = odometry.scale.square;
-  h.scale_sigma = odometry.scale.sigma;
+  // Of the last keyframe's segment.
+  const int32_t segment =
+      map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : odometry.segment;
+  h.is_upright = is_upright(map, segment);
+  if (segment == odometry.segment)
+    h.scale = odometry.scale;
+  else if (segment == odometry.other_segment)
+    h.scale = odometry.other_scale;
   Stream s{to, nullptr, 0, 0, false};
   pass_header(&s, &h);
   for (int32_t n = 0; n < map.num_points; ++n) {
@@ -318,32 +322,29 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   Map nothing{};
   nothing.sizes = map->sizes;
   if (!replaces) {
-    base = {map->end_points, map->next_point_id, map->next_keyframe_id, odometry->num_segments,
+    base = {map->next_point_id, map->next_keyframe_id, odometry->num_segments,
             odometry->num_frames};
   }
   bool fits;
-  if (!read_body(h, &s, false, replaces ? &nothing : map, base, &fits)) return TV_ERR_MAP;
+  if (!read_body(h, &s, nullptr, replaces ? &nothing : map, base, &fits)) return TV_ERR_MAP;
   const tv_camera camera = camera_of(*odometry);
   if (std::memcmp(&h.camera, &camera, sizeof camera) != 0) return TV_ERR_CAMERA;
   if (!fits) return TV_ERR_LIMITS;
   if (replaces) start_anew(odometry);
-  const bool is_first = map->num_keyframes == 0;
+  Arena scratch = odometry->scratch;
+  int32_t* places = arena_alloc<int32_t>(scratch, static_cast<size_t>(h.num_points));
   odometry->last_time_s = -HUGE_VAL;  // the next frame may have any time
   s.at = begin;
-  read_body(h, &s, true, map, base, &fits);
-  map->next_point_id += h.next_point_id;
+  read_body(h, &s, places, map, base, &fits);
+  map->next_point_id = base.point_id + h.next_point_id;
   map->next_keyframe_id += h.next_keyframe_id;
   odometry->num_frames += h.num_frames;
   odometry->num_segments += h.num_segments;
   odometry->num_relocations += h.num_relocations;
   odometry->num_loops += h.num_loops;
-  if (is_first) {
-    odometry->is_upright = h.is_upright != 0;
-    odometry->scale.source = h.scale_source;
-    odometry->scale.evidence = h.scale_evidence;
-    odometry->scale.product = h.scale_product;
-    odometry->scale.square = h.scale_square;
-    odometry->scale.sigma = h.scale_sigma;
+  if (h.num_keyframes > 0) {
+    enter_segment(odometry, map->keyframes[map->num_keyframes - 1].segment);
+    odometry->scale = h.scale;
   }
   if (map->num_keyframes > 0) {
     odometry->status = TV_ODOMETRY_LOST;
@@ -352,7 +353,6 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
     odometry->next_search = map->num_keyframes - 1;
     odometry->confirmed_id = map->keyframes[odometry->next_search].id;
     odometry->confirmed = Reach{};
-    odometry->segment = map->keyframes[odometry->next_search].segment;
     odometry->keyframe_inliers = map->keyframes[odometry->next_search].num_observations;
   }
   return TV_OK;

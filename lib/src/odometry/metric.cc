@@ -95,6 +95,7 @@ void add_way(Odometry* odometry, int32_t keyframe, double sign) {
 // Gives the segment the metre as its unit once the scale is known to a tenth.
 void settle_scale(Odometry* odometry, Frame* frame) {
   MetricScale* known = &odometry->scale;
+  if (!(known->square > 0)) return;
   const double variance = known->square / (known->product * known->product);  // relative
   if (!(known->product > 0) || !(variance <= kLargestScaleSigma * kLargestScaleSigma)) return;
   const double scale = known->product / known->square;

@@ -84,9 +84,10 @@ struct Reach {
 };
 
 // The normal equation of the scale, metres per unit of the map: square scale = product.
+// Its numbers follow each other in a map's bytes.
 struct MetricScale {
+  int32_t source, evidence;  // tv_scale_source
   double product, square, sigma;
-  int32_t evidence, source;  // tv_scale_source
 };
 
 inline constexpr int32_t kCellPx = 16;
@@ -113,10 +114,9 @@ struct tv_odometry {
   tv::Frame frame, previous;
   tv::Frame starts[tv::kNumStarts];
   int32_t num_starts;
-  // The points that are looked for in the next frame, and the keyframe whose surroundings they are.
+  // The points that are looked for in the next frame: those around the reference keyframe.
   int32_t* local_points;
   int32_t num_local_points;
-  int32_t local_id;  // of the keyframe around which they were listed
   int32_t reference_id;
   // The motion from the frame before last to the last: cam_from_cam, in motion_s seconds.
   bool has_motion;
@@ -135,12 +135,12 @@ struct tv_odometry {
   bool took_step;  // of it, before this frame was tracked
   tv::MapCheck check;
   // The last keyframe that its own matches with earlier ones confirmed. Doubts: the reasons of the
-  // frames since some saw one plane only, or contradicted the map, or since the segment began.
+  // frames of a segment since some saw one plane only, or contradicted the map, or since it began.
   int32_t confirmed_id;
   uint32_t doubts;
+  int32_t doubtful_segment;
   tv::Reach confirmed;  // what the sensors said when it was confirmed
   double most_m;        // the longest way until now
-  bool is_locating;     // a frame of tv_odometry_locate, which does not change the map
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
   double last_time_s;
@@ -163,7 +163,7 @@ using Odometry = tv_odometry;
 void start_anew(Odometry* odometry);
 
 // The frames that follow belong to this segment: whether it is upright is read from the map, and
-// what was known of the scale of another segment is forgotten.
+// what is known of its scale is taken up.
 void enter_segment(Odometry* odometry, int32_t segment);
 
 // How many bytes of scratch the stages take.

@@ -52,7 +52,7 @@ void forget_points(Frame* frame) {
 }
 
 double depth_error_px(const Odometry& odometry, const MapPoint& point, const double centre[3],
-                      double depth) {
+                      const double x[3]) {
   double ray[3], across[3], moved[3];
   for (int k = 0; k < 3; ++k) {
     moved[k] = centre[k] - static_cast<double>(point.seen_from[k]);
@@ -61,10 +61,11 @@ double depth_error_px(const Odometry& odometry, const MapPoint& point, const dou
   const double length = length_of(ray);
   if (!(length > 0)) return 0;
   cross(ray, moved, across);
-  const double shift = length_of(across) / length;
-  const double error =
-      odometry.camera.model.fx * shift * static_cast<double>(point.depth_sigma) / depth;
-  return std::min(error, kLargestDepthError);
+  const double shift = length_of(across) / length * static_cast<double>(point.depth_sigma);
+  // A fisheye lens sees points beside and behind it, too.
+  const tv_camera& model = odometry.camera.model;
+  const double depth = model.model == TV_CAMERA_KANNALA_BRANDT ? length_of(x) : x[2];
+  return std::min(model.fx * shift / std::max(depth, 1e-9), kLargestDepthError);
 }
 
 int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame) {
@@ -90,8 +91,8 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
     }
     __builtin_prefetch(descriptor_of(map, idx));
     __builtin_prefetch(descriptor_of(map, idx) + TV_DESCRIPTOR_BYTES / 2);
-    if (!odometry->is_locating) ++point.num_visible;
-    const double radius = search.radius_px + 2 * depth_error_px(*odometry, point, centre, x[2]);
+    point.num_visible += search.counts;
+    const double radius = search.radius_px + 2 * depth_error_px(*odometry, point, centre, x);
     const float px = static_cast<float>(pixel.x()), py = static_cast<float>(pixel.y());
     const float near_sq = static_cast<float>(radius * radius);
     const float reach = static_cast<float>(std::max(radius, kComparedRadius));

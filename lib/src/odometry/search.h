@@ -12,13 +12,14 @@ struct PointSearch {
   double radius_px;     // for a point whose place is known exactly
   double max_distance;  // of descriptors, L2
   double ratio;         // of the nearest one's distance to that of the second
+  bool counts;          // the points as visible; not where the pose may still be refused
 };
 
 // Sorts the keypoints of a frame into the cells of its grid.
 void make_grid(const Odometry& odometry, Frame* frame);
 
-// Finds the keypoints that see the points, those excepted that see one already, and returns how
-// many there are then. Counts the points as visible.
+// Finds the keypoints that see the points, and returns how many see one then. A keypoint that sees
+// one already gives it up for one whose descriptor is nearer.
 int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame);
 
 // The nearest descriptors among all points of a list, without regard to place.
@@ -28,8 +29,8 @@ int32_t match_points(Odometry* odometry, const int32_t* points, int32_t num, dou
 void forget_points(Frame* frame);
 
 // By how many pixels the error of a point's depth may move its image, one standard deviation, for a
-// camera at `centre`, from which it is `depth` away.
+// camera at `centre`, in whose frame the point is x.
 double depth_error_px(const Odometry& odometry, const MapPoint& point, const double centre[3],
-                      double depth);
+                      const double x[3]);
 
 }  // namespace tv

@@ -77,6 +77,7 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
   map.free_rooms[map.num_free_rooms++] = map.keyframes[first].room;
   map.num_keyframes -= 2;
   map.next_keyframe_id -= 2;
+  map.next_described = (map.next_described + kDescribedKeyframes - 2) % kDescribedKeyframes;
   return false;
 }
 
@@ -93,7 +94,7 @@ void remove_segment_points(Odometry* odometry) {
   remove_points(&map, is_removed);
 }
 
-void copy_frame(const Frame& from, Frame* to) {
+void copy_frame(const Odometry& odometry, const Frame& from, Frame* to) {
   const size_t n = static_cast<size_t>(from.num);
   std::copy_n(from.keypoints, n, to->keypoints);
   std::copy_n(from.descriptors, n * TV_DESCRIPTOR_BYTES, to->descriptors);
@@ -103,7 +104,7 @@ void copy_frame(const Frame& from, Frame* to) {
   to->time_s = from.time_s;
   to->sensors = from.sensors;
   to->cam_from_world = kIdentity;
-  forget_points(to);
+  make_grid(odometry, to);
 }
 
 bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons) {
@@ -138,7 +139,7 @@ bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons) {
   if (odometry->num_starts == 0 ||
       frame->number - odometry->starts[odometry->num_starts - 1].number >= kFramesBetween) {
     if (odometry->num_starts == kNumStarts) drop_start(odometry, kNumStarts / 2);
-    copy_frame(*frame, &odometry->starts[odometry->num_starts++]);
+    copy_frame(*odometry, *frame, &odometry->starts[odometry->num_starts++]);
   }
   return false;
 }

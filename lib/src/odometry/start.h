@@ -10,8 +10,8 @@ namespace tv {
 // the frame may wait itself; *reasons says what was missing.
 bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons);
 
-// Copies a frame's keypoints, which see no point in the copy.
-void copy_frame(const Frame& from, Frame* to);
+// Copies a frame's keypoints, which see no point in the copy, and makes its grid.
+void copy_frame(const Odometry& odometry, const Frame& from, Frame* to);
 
 // Estimates how the camera turned between two frames from their own matches, for frames that the
 // map does not reach. turn: of cam_from_cam, without a translation.

@@ -32,6 +32,7 @@ constexpr int32_t kLostBeforeStart = 8;    // frames
 // Velocities are believed against the map once so many of its ways agreed with them. The map is
 // wrong where so many frames in a row contradict velocities that are believed.
 constexpr int32_t kLeastTrust = 5, kMostContrary = 5;
+constexpr double kLongestGap = 0.25;  // seconds: over a longer one velocities say no way
 
 uint8_t grey_at(const tv_image& image, const tv_keypoint& keypoint) {
   const int64_t x = std::min(std::max(static_cast<int32_t>(keypoint.x + 0.5f), 0), image.width - 1);
@@ -54,7 +55,7 @@ void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
 // The pose from the points that are looked for around a predicted pose.
 bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const Rigid& predicted,
                   double radius_px, Frame* frame, PoseFit* fit) {
-  PointSearch search{points, num, predicted, radius_px, kMaxDistance, kSearchRatio};
+  PointSearch search{points, num, predicted, radius_px, kMaxDistance, kSearchRatio, true};
   forget_points(frame);
   frame->cam_from_world = predicted;
   frame->has_pose = true;
@@ -66,10 +67,14 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
 }
 
 // The pose is known to a few pixels: looks for all points once more, near where they must be.
-bool refine_track(Odometry* odometry, Frame* frame, PoseFit* fit) {
-  PointSearch search{odometry->local_points, odometry->num_local_points,
-                     fit->cam_from_world,    5.0,
-                     kMaxDistance,           kSearchRatio};
+bool refine_track(Odometry* odometry, bool counts, Frame* frame, PoseFit* fit) {
+  PointSearch search{odometry->local_points,
+                     odometry->num_local_points,
+                     fit->cam_from_world,
+                     5.0,
+                     kMaxDistance,
+                     kSearchRatio,
+                     counts};
   find_points(odometry, search, frame);
   frame->cam_from_world = fit->cam_from_world;
   if (!refine_pose(odometry, 3.0, frame, fit)) return false;
@@ -113,7 +118,7 @@ void count_found(Odometry* odometry, const Frame& frame) {
 
 bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_inliers) {
   const Map& map = odometry.map;
-  const MapKeyframe& last = map.keyframes[map.num_keyframes - 1];
+  const MapKeyframe& last = map.keyframes[newest_of(map, odometry.segment, map.num_keyframes)];
   if (frame.number == last.frame) return false;
   const double moved =
       way_between(last.cam_from_world, frame.cam_from_world) / odometry.median_depth;
@@ -131,18 +136,26 @@ void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
 }
 
-// Removes the keyframes that were made since the last confirmed one, and what only they saw.
-// Frames are doubtful until one is confirmed.
+// Of the frames of this segment until a keyframe is confirmed.
+void doubt(Odometry* odometry, uint32_t reason) {
+  odometry->doubts = reason;
+  odometry->doubtful_segment = odometry->segment;
+}
+
+// Removes the segment's keyframes that were made since the last confirmed one, and what only they
+// saw. Frames are doubtful until one is confirmed.
 void remove_unconfirmed(Odometry* odometry) {
   Map& map = odometry->map;
-  const MapKeyframe* last = map.keyframes + map.num_keyframes - 1;
-  for (; last > map.keyframes; --last) {
-    if (last->id <= odometry->confirmed_id || last->segment != last[-1].segment) break;
-    remove_keyframe(&map, map.num_keyframes - 1, map.num_keyframes - 2);
+  int32_t last = newest_of(map, odometry->segment, map.num_keyframes);
+  while (map.keyframes[last].id > odometry->confirmed_id) {
+    const int32_t before = newest_of(map, odometry->segment, last);
+    if (before < 0) break;
+    remove_keyframe(&map, last, before);
+    last = before;
   }
   remove_lone_points(&map, odometry->scratch);
-  odometry->doubts = TV_REASON_TWO_PLANAR_SOLUTIONS;
-  odometry->reference_id = last->id;
+  doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
+  odometry->reference_id = map.keyframes[last].id;
 }
 
 // Compares the map's way with that of the velocities. False: the map is wrong here, and what was
@@ -169,11 +182,11 @@ bool heed_check(Odometry* odometry) {
   if (verdict == MapVerdict::kAgrees && odometry->num_contrary == 0) {
     odometry->confirmed_id = odometry->check.keyframe_id;
     measure_reach(*odometry, odometry->frame, &odometry->confirmed);
-    odometry->doubts = 0;
+    if (odometry->doubtful_segment == odometry->segment) odometry->doubts = 0;
   } else if (verdict == MapVerdict::kContradicts) {
     remove_unconfirmed(odometry);
   } else if (verdict == MapVerdict::kOnePlane && !is_checking(odometry->check)) {
-    odometry->doubts = TV_REASON_TWO_PLANAR_SOLUTIONS;
+    doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
   }
   return verdict != MapVerdict::kContradicts;
 }
@@ -221,9 +234,10 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
   return true;
 }
 
-// Looks for the frame in the map. True: the frame has its pose, and the keyframe's surroundings are
-// those in which the next frame is looked for.
-bool relocate(Odometry* odometry, int32_t from, int32_t count, Frame* frame, PoseFit* fit) {
+// Looks for the frame in the map, and as a rule only where it may be. True: the frame has its pose,
+// and the keyframe's surroundings are those in which the next frame is looked for.
+bool relocate(Odometry* odometry, int32_t from, int32_t count, bool anywhere, Frame* frame,
+              PoseFit* fit) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
   int32_t* points =
@@ -237,10 +251,10 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, Frame* frame, Pos
     }
     if (!match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);
-    if (!refine_track(odometry, frame, fit) || fit->estimate.num_inliers < kLeastRelocated ||
+    if (!refine_track(odometry, false, frame, fit) || fit->estimate.num_inliers < kLeastRelocated ||
         fit->estimate.verdict != TV_VERDICT_OK)
       continue;
-    if (!odometry->is_locating && map.keyframes[k].segment == odometry->segment &&
+    if (!anywhere && map.keyframes[k].segment == odometry->segment &&
         !is_reachable(*odometry, *frame))
       continue;
     odometry->reference_id = map.keyframes[k].id;
@@ -263,7 +277,7 @@ bool track_map(Odometry* odometry, const tv_odometry_frame& input, Frame* frame,
   return (track_points(odometry, points, num, predicted, 15.0, frame, fit) ||
           track_points(odometry, points, num, predicted, 40.0, frame, fit) ||
           match_and_fit(odometry, points, num, frame, fit)) &&
-         refine_track(odometry, frame, fit);
+         refine_track(odometry, true, frame, fit);
 }
 
 void write_pose(const Odometry& odometry, const Frame& frame, tv_odometry_state* state) {
@@ -290,8 +304,9 @@ void write_fit(const PoseFit& fit, tv_odometry_state* state) {
   state->reasons = fit.estimate.reasons;
 }
 
-// The frame's pose is known: keyframe, loops, scale, state. False: the map is wrong here.
-bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, Frame* frame,
+// The frame's pose is known: keyframe, loops, scale, state. follows: so was that of the frame
+// before. False: the map is wrong here.
+bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool gap, Frame* frame,
                     tv_odometry_state* state) {
   odometry->lost_frames = odometry->turned_frames = odometry->num_starts = 0;
   count_found(odometry, *frame);
@@ -301,10 +316,11 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, Frame*
   if (follows) {
     odometry->motion = motion_between(odometry->previous.cam_from_world, frame->cam_from_world);
     odometry->motion_s = frame->time_s - odometry->previous.time_s;
-    add_travel(odometry, *frame);
-  } else {
-    begin_travel(odometry, frame->cam_from_world, -1);
   }
+  if (follows && !(gap && odometry->motion_s > kLongestGap))
+    add_travel(odometry, *frame);
+  else
+    begin_travel(odometry, frame->cam_from_world, -1);
   if (!heed_velocities(odometry, *frame, &state->reasons)) return false;
   state->attitude_ignored = !check_attitude(*odometry, frame);
   const double* covariance = fit.estimate.covariance;
@@ -319,7 +335,7 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, Frame*
     check_next_pair(odometry);
     if (!heed_check(odometry)) return false;
   }
-  state->reasons |= odometry->doubts;
+  if (odometry->doubtful_segment == odometry->segment) state->reasons |= odometry->doubts;
   odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   return true;
 }
@@ -328,8 +344,10 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, Frame*
 bool search_map(Odometry* odometry, bool is_first, Frame* frame, PoseFit* fit) {
   const Map& map = odometry->map;
   if (is_first) odometry->next_search = map.num_keyframes - 1;
-  if (relocate(odometry, odometry->next_search, kSearchedKeyframes, frame, fit)) {
-    enter_segment(odometry, map.keyframes[find_keyframe(map, odometry->reference_id)].segment);
+  if (relocate(odometry, odometry->next_search, kSearchedKeyframes, false, frame, fit)) {
+    const int32_t segment = map.keyframes[find_keyframe(map, odometry->reference_id)].segment;
+    if (segment != odometry->segment) odometry->check = MapCheck{};
+    enter_segment(odometry, segment);
     return true;
   }
   odometry->next_search = odometry->next_search >= kSearchedKeyframes
@@ -348,6 +366,7 @@ bool follow_turn(Odometry* odometry, Frame* frame) {
   }
   // The camera's centre stays: cam_from_world is the turn after that of the frame before.
   frame->cam_from_world = orthonormalised(compose(turn, odometry->previous.cam_from_world));
+  forget_points(frame);  // those of a pose that was refused
   ++odometry->turned_frames;
   return true;
 }
@@ -370,7 +389,8 @@ bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
   odometry->reference_id = odometry->map.keyframes[newest].id;
   odometry->confirmed_id = odometry->reference_id;
   measure_reach(*odometry, *frame, &odometry->confirmed);
-  state->reasons = odometry->doubts = TV_REASON_LOW_PARALLAX;
+  doubt(odometry, TV_REASON_LOW_PARALLAX);
+  state->reasons = odometry->doubts;
   odometry->check = MapCheck{};
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
@@ -381,7 +401,7 @@ bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
   return true;
 }
 
-void write_counts(const Odometry& odometry, tv_odometry_state* state) {
+__attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometry_state* state) {
   state->status = odometry.status;
   state->num_frames = odometry.num_frames;
   state->num_keyframes = odometry.map.num_keyframes;
@@ -391,6 +411,13 @@ void write_counts(const Odometry& odometry, tv_odometry_state* state) {
   state->num_loops = odometry.num_loops;
   state->scale_source = odometry.scale.source;
   state->scale_sigma = odometry.scale.sigma;
+}
+
+// That of a frame without a pose.
+__attribute__((noinline)) void clear_state(const Frame& frame, tv_odometry_state* state) {
+  *state = tv_odometry_state{};
+  state->num_keypoints = frame.num;
+  state->segment = state->reference_id = -1;
 }
 
 }  // namespace
@@ -425,8 +452,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   frame->time_s = input.time_s;
   read_sensors(input, frame);
   add_reach(odometry, *frame, input.gap != 0);
-  state->num_keypoints = frame->num;
-  state->segment = state->reference_id = -1;
+  clear_state(*frame, state);
 
   ArenaScope scope(odometry->scratch);
   PoseFit& fit = *arena_alloc<PoseFit>(odometry->scratch, 1);
@@ -442,11 +468,11 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
     odometry->num_relocations += state->relocated;
     odometry->is_found_again |= state->relocated != 0;
   }
-  if (has_pose && !finish_tracked(odometry, fit, follows, frame, state)) {
+  if (has_pose && !finish_tracked(odometry, fit, follows, input.gap != 0, frame, state)) {
     // What the frame was tracked with was wrong.
-    state->num_inliers = 0;
-    state->has_covariance = 0;
-    state->reasons = TV_REASON_TWO_PLANAR_SOLUTIONS;
+    const bool is_contrary = (state->reasons & TV_REASON_SECOND_MOTION) != 0;
+    clear_state(*frame, state);
+    state->reasons = is_contrary ? TV_REASON_SECOND_MOTION : TV_REASON_TWO_PLANAR_SOLUTIONS;
     odometry->status = TV_ODOMETRY_LOST;
     odometry->lost_frames = 1;
     odometry->has_motion = has_pose = false;
@@ -465,6 +491,10 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
       else if (has_pose)
         state->reasons = reasons;
     }
+    // The points near the keyframes in which the frame was not found are not those of the next one.
+    if (odometry->status == TV_ODOMETRY_ROTATION) {
+      list_local_points(odometry, find_keyframe(odometry->map, odometry->reference_id));
+    }
   }
   frame->has_pose = has_pose;
   if (has_pose) write_pose(*odometry, *frame, state);
@@ -475,26 +505,23 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
 void locate_frame(Odometry* odometry, const tv_image& image, int32_t near_id,
                   tv_odometry_state* state) {
   const int32_t reference = odometry->reference_id;
-  Frame* frame = &odometry->starts[0];  // has no other use while there is a map
+  Frame* frame = &odometry->previous;  // has no other use until the next frame comes
   extract_frame(odometry, image, frame);
   PoseFit fit;
-  odometry->is_locating = true;
+  clear_state(*frame, state);
+  write_counts(*odometry, state);
   state->status = TV_ODOMETRY_LOST;
-  state->segment = state->reference_id = -1;
-  state->num_keypoints = frame->num;
   const int32_t from = find_keyframe(odometry->map, near_id);
   if (odometry->map.num_keyframes > 0 &&
       relocate(odometry, from >= 0 ? from : odometry->map.num_keyframes - 1,
-               odometry->map.num_keyframes, frame, &fit)) {
+               odometry->map.num_keyframes, true, frame, &fit)) {
     write_fit(fit, state);
     state->status = fit.estimate.reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
     write_pose(*odometry, *frame, state);
   }
-  odometry->is_locating = false;
   odometry->reference_id = reference;
   const int32_t k = find_keyframe(odometry->map, reference);
   if (k >= 0) list_local_points(odometry, k);
-  odometry->num_starts = 0;
 }
 
 }  // namespace tv

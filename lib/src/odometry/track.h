@@ -5,7 +5,7 @@
 
 namespace tv {
 
-// The frame and the state have been checked; *state is zeros but for struct_size.
+// The frame has been checked. Writes all of *state but for struct_size.
 void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry_state* state);
 
 // A keyframe is adjusted when the next frame comes, before that is tracked, so that no frame takes
