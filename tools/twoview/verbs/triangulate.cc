@@ -269,8 +269,8 @@ void add_triangulate(CLI::App& program, Run& run) {
       ->expected(2)
       ->type_name("A B");
   verb->add_option("--pose", a->pose,
-                   "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px is used "
-                   "too, or YAML")
+                   "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px and "
+                   "focal_length.scale are used too, or YAML")
       ->required()
       ->type_name("FILE");
   verb->add_option("--max-error-px", a->max_error_px,
