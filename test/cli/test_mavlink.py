@@ -165,6 +165,7 @@ class Mavlink(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         result = json.loads((output / "result.json").read_text())
         self.assertEqual((result["scale"], result["imu"]["scale_source"]), ("metric", "velocity"))
+        self.assertIn(b"forward; unit: metres\n", (output / "cloud.ply").read_bytes())
         self.assertTrue(result["imu"]["gravity_used"])
         self.assertLess(result["imu"]["rotation_difference_deg"], 0.3)
         baseline = np.linalg.norm(result["t"])

@@ -163,7 +163,9 @@ void make_files(const Outcome& outcome, OutputSet& files) {
                                      : "Each point in its colour in image 0. One baseline is the "
                                        "distance between the cameras.",
                        views_picture(outcome, cloud), false});
-    files.add("cloud.ply", cloud_ply(cloud, outcome.dense.has_value()));
+    files.add("cloud.ply",
+              cloud_ply(cloud, outcome.scale ? "metres" : "the distance of the cameras",
+                        outcome.dense.has_value()));
     files.add("views.png", png_bytes(figures.back().picture));
   }
   figures.push_back({"Matches",

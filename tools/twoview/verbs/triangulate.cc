@@ -245,7 +245,8 @@ int triangulate(Arguments& a) {
   for (const std::string& camera : camera_files) files.keep(camera_path(camera));
   for (const std::string& image : a.images) files.keep(image);
   const Json json = result(a, points, pose, cameras);
-  add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px)), files);
+  add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px), "that of t"),
+            files);
   if (common.json) print(json_text(json));
   const std::string notes = common.note_lines();
   if (common.speaks()) print(notes + summary(json, files));
