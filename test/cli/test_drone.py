@@ -197,6 +197,11 @@ class Drone(unittest.TestCase):
             self.assertEqual(pathlib.Path(self.path("frames"), name).read_bytes(),
                              pathlib.Path(self.path("again"), name).read_bytes())
         pair = reconstruct(self.output, self.path("pair"), "--focal-35mm", "30", "--frames", "0",
+        start = json.loads(run("replay", self.output, "--json", "--duration", "1").stdout)
+        self.assertLessEqual(start["seconds"], 1)
+        for key in ("frames_received", "navdata_received"):
+            self.assertTrue(0 < start[key] < 0.5 * summary[key], (key, start, summary))
+        self.assert_refused(run("replay", self.output, "--duration", "nan"), "--duration")
                            "3", "--resize", "320", "--json")
         self.assertIn(pair.returncode, (0, 3), pair.stderr)
         found = json.loads(pair.stdout)
