@@ -210,6 +210,8 @@ class Drone(unittest.TestCase):
         self.assert_refused(reconstruct(self.output, self.path("none")),
                             "--recording needs --camera, or --focal-35mm")
         with open(self.path("other.yaml"), "w", encoding="utf-8") as file:
+        self.assert_refused(reconstruct(self.output, self.path("none"), "--focal-35mm", "30",
+                                        "--camera-in-body", "nan,0,0"), "--camera-in-body")
             file.write("image_width: 640\nimage_height: 480\n"
                        "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n")
         self.assert_refused(reconstruct(self.output, self.path("none"), "--camera",
