@@ -215,7 +215,9 @@ static void decode_packet(ardrone_session *session, const ardrone_pave_packet *p
 }
 
 static void take_live(ardrone_session *session, const ardrone_pave_packet *packet) {
-  const int is_rejoin = session->video.num_connections > 1 && !session->gate.has_last;
+  /* An advertisement is no picture: where it is left out, none is missing. */
+  const int is_picture = (packet->header.control & ARDRONE_PAVE_ADVERTISEMENT) == 0;
+  const int is_rejoin = is_picture && session->video.num_connections > 1 && !session->gate.has_last;
   const int gate = ardrone_pave_gate_check(&session->gate, &packet->header);
   const tvs_time time = time_of(session, &packet->header);
   ++session->counters.packets;
@@ -226,6 +228,7 @@ static void take_live(ardrone_session *session, const ardrone_pave_packet *packe
   if (session->options.on_packet) {
     session->options.on_packet(session->options.user, packet, &time, gate);
   }
+  if (!is_picture) return;
   if ((gate & (ARDRONE_PAVE_DECODE | ARDRONE_PAVE_REPEAT)) == 0) {
     ++session->counters.packets_skipped;
     if (session->counters.frames_decoded > 0) session->gap = 1;

@@ -165,6 +165,65 @@ static void test_pictures_without_texture_or_overlap_give_no_points(void) {
   TEST_ASSERT_LESS_THAN_INT(50, num);
 }
 
+/* A range of which the wall is at the near end, and each number of steps. */
+static void test_any_number_of_steps_reaches_the_near_end(void) {
+  int32_t steps;
+  options.min_parallax_rad = 0, options.max_parallax_rad = (SHIFT + 1) / 300.0;
+  for (steps = 16; steps <= 24; ++steps) {
+    options.max_steps = steps;
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_dense_size(&camera[0], &camera[1], &options, &size_bytes));
+    TEST_ASSERT_EQUAL_INT(TV_OK, run(MOST));
+    TEST_ASSERT_GREATER_THAN_INT(8000, num);
+  }
+  options.max_parallax_rad = 24.0 / 300, options.max_steps = 23; /* a step is above a pixel wide */
+  memmove(pixels[1], pixels[0], sizeof pixels[1]);
+  for (steps = 0; steps < HEIGHT; ++steps) {
+    memmove(pixels[1] + steps * WIDTH, pixels[0] + steps * WIDTH + 22, WIDTH - 22);
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_dense_size(&camera[0], &camera[1], &options, &size_bytes));
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(MOST));
+  TEST_ASSERT_GREATER_THAN_INT(2000, num);
+}
+
+/* Forward, so that the cells are of different widths in the image: image 1 is image 0 a fifth
+   larger. */
+static void test_room_for_all_gives_all(void) {
+  int32_t all, x, y;
+  for (y = 0; y < HEIGHT; ++y) {
+    for (x = 0; x < WIDTH; ++x) {
+      pixels[1][y * WIDTH + x] =
+          pixels[0][(int32_t)(75.5 + (y - 75) / 1.2) * WIDTH + (int32_t)(100.5 + (x - 100) / 1.2)];
+    }
+  }
+  t[0] = 0, t[2] = -1;
+  options.max_parallax_rad = 0.12;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(MOST));
+  all = num;
+  TEST_ASSERT_GREATER_THAN_INT(1000, all);
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(all));
+  TEST_ASSERT_EQUAL_INT(all, num);
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(all - 1));
+  TEST_ASSERT_LESS_THAN_INT(all, num);
+}
+
+static void test_an_extreme_translation_gives_the_same_pixels(void) {
+  static const double length[] = {1e-320, 1e-170, 1e-99, 1e99, 1e160, 1e307};
+  static float seen[2 * MOST];
+  int32_t i, all;
+  size_t k;
+  TEST_ASSERT_EQUAL_INT(TV_OK, run(MOST));
+  all = num;
+  for (i = 0; i < all; ++i) memcpy(seen + 2 * i, points[i].pixel0, sizeof points[i].pixel0);
+  for (k = 0; k < sizeof length / sizeof length[0]; ++k) {
+    t[0] = -length[k];
+    TEST_ASSERT_EQUAL_INT(TV_OK, run(MOST));
+    TEST_ASSERT_EQUAL_INT(all, num);
+    for (i = 0; i < all; ++i) {
+      TEST_ASSERT_EQUAL_MEMORY(seen + 2 * i, points[i].pixel0, sizeof points[i].pixel0);
+    }
+  }
+}
+
 static void test_bad_options_are_refused(void) {
   struct {
     int32_t cells, steps, reserved;
@@ -302,6 +361,9 @@ int main(void) {
   RUN_TEST(test_the_largest_sigma_is_obeyed);
   RUN_TEST(test_fewer_cells_than_pixels_use_smaller_images);
   RUN_TEST(test_pictures_without_texture_or_overlap_give_no_points);
+  RUN_TEST(test_any_number_of_steps_reaches_the_near_end);
+  RUN_TEST(test_room_for_all_gives_all);
+  RUN_TEST(test_an_extreme_translation_gives_the_same_pixels);
   RUN_TEST(test_bad_options_are_refused);
   RUN_TEST(test_bad_images_cameras_and_poses_are_refused);
   RUN_TEST(test_bad_memory_and_overlaps_are_refused);

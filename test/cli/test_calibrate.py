@@ -401,7 +401,9 @@ class Views(CalibrateTest):
     def test_bad_arguments(self):
         for board in ("9", "9x", "x6", "9x6x", "2x6", "9x101", "-9x6", "9X6", "0x0", ""):
             self.refuse(self.names[0], board=board, words=["--board"])
-        self.refuse(self.names[0], "--square", "0", words=["--square"])
+        for name in ("--square", "--duration"):
+            for value in ("0", "nan", "inf", "1e9"):
+                self.refuse(self.names[0], name, value, words=[name])
         self.refuse(self.names[0], "--model", "pinhole", words=["--model"])
         self.refuse(self.names[0], "--max-views", "2", words=["--max-views"])
         self.refuse("none.png", words=["none.png", "No such file"])

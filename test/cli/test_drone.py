@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 import unittest
 
@@ -196,6 +197,11 @@ class Drone(unittest.TestCase):
         for name in os.listdir(self.path("frames")):
             self.assertEqual(pathlib.Path(self.path("frames"), name).read_bytes(),
                              pathlib.Path(self.path("again"), name).read_bytes())
+        start = json.loads(run("replay", self.output, "--json", "--duration", "1").stdout)
+        self.assertLessEqual(start["seconds"], 1)
+        for key in ("frames_received", "navdata_received"):
+            self.assertTrue(0 < start[key] < 0.5 * summary[key], (key, start, summary))
+        self.assert_refused(run("replay", self.output, "--duration", "nan"), "--duration")
         pair = reconstruct(self.output, self.path("pair"), "--focal-35mm", "30", "--frames", "0",
                            "3", "--resize", "320", "--json")
         self.assertIn(pair.returncode, (0, 3), pair.stderr)
@@ -204,6 +210,8 @@ class Drone(unittest.TestCase):
                          ("focal_35mm", [320, 180]))
         self.assert_refused(reconstruct(self.output, self.path("none")),
                             "--recording needs --camera, or --focal-35mm")
+        self.assert_refused(reconstruct(self.output, self.path("none"), "--focal-35mm", "30",
+                                        "--camera-in-body", "nan,0,0"), "--camera-in-body")
         with open(self.path("other.yaml"), "w", encoding="utf-8") as file:
             file.write("image_width: 640\nimage_height: 480\n"
                        "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n")
@@ -362,6 +370,35 @@ class Drone(unittest.TestCase):
             counts = drone.stop()
         self.assertEqual(counts["take offs"], 1)
         self.assertIn(b"on the ground", shown)
+
+    def test_a_second_ctrl_c_gives_the_terminal_its_mode_back(self):
+        with Simulator() as drone:
+            master, slave = pty.openpty()
+            before = termios.tcgetattr(slave)
+            pilot = subprocess.Popen([PROGRAM, "drone", "fly", "--live", *drone.ports()],
+                                     stdin=slave, stdout=slave, stderr=subprocess.DEVNULL)
+            shown = b""
+
+            def read_until(text, seconds):
+                nonlocal shown
+                end = time.time() + seconds
+                while text not in shown and time.time() < end:
+                    if select.select([master], [], [], 0.05)[0]:
+                        shown += os.read(master, 4096)
+
+            read_until(b"on the ground", 10)
+            self.assertNotEqual(termios.tcgetattr(slave), before)
+            os.write(master, b"t")
+            read_until(b"in the air", 10)
+            self.assertIn(b"in the air", shown)
+            pilot.send_signal(signal.SIGINT)  # it lands, which takes seconds
+            time.sleep(0.3)
+            self.assertIsNone(pilot.poll())
+            pilot.send_signal(signal.SIGINT)
+            self.assertEqual(pilot.wait(timeout=10), -signal.SIGINT)
+            self.assertEqual(termios.tcgetattr(slave), before)
+            os.close(slave)
+            os.close(master)
 
 
 if __name__ == "__main__":

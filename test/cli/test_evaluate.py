@@ -240,6 +240,17 @@ class Evaluate(cli.CliTest):
         done = self.evaluate(names, "--camera", small, out=self.folder / "new")
         self.assert_refused(done, "small.yaml", "160x120", out=self.folder / "new")
 
+    def test_the_calibration_is_as_sure_as_reconstruct_takes_it(self):
+        sure = self.write("sure.yaml", cli.camera_yaml() + "focal_sigma: 0.001\ncenter_sigma: 0\n")
+        covariances = []
+        for options, camera in (((), self.camera), (("--camera", sure), sure)):
+            self.succeed(self.run_program("reconstruct", self.a, self.b, "--camera", camera, "-o",
+                                          self.out))
+            covariances.append(self.result()["covariance"])
+            self.assertEqual(self.report(pair_line(), *options)["pairs"][0]["covariance"],
+                             covariances[-1])
+        self.assertNotEqual(*covariances)
+
     def test_a_focal_length_stands_in_for_every_camera(self):
         self.write("set/cameras.yaml", "not: read\n")
         self.succeed(self.reconstruct("--focal-35mm", "32", camera=False))

@@ -165,6 +165,7 @@ class Mavlink(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         result = json.loads((output / "result.json").read_text())
         self.assertEqual((result["scale"], result["imu"]["scale_source"]), ("metric", "velocity"))
+        self.assertIn(b"forward; unit: metres\n", (output / "cloud.ply").read_bytes())
         self.assertTrue(result["imu"]["gravity_used"])
         self.assertLess(result["imu"]["rotation_difference_deg"], 0.3)
         baseline = np.linalg.norm(result["t"])
@@ -178,6 +179,27 @@ class Mavlink(unittest.TestCase):
         self.assertLess(angle_deg(np.array(result["R"]).reshape(3, 3), b.T @ a), 0.3)
         t = -b.T @ (world.VELOCITY * seconds)
         self.assertLess(np.linalg.norm(np.array(result["t"]) - t), 0.03 * true)
+
+    def test_the_pair_is_chosen_with_the_calibration_that_it_is_estimated_with(self):
+        # A focal length that is off by a third and refined: with the camera taken as exact other
+        # frames, and other inliers of theirs, are the best.
+        output = self.folder / "chosen"
+        result = run("reconstruct", "--recording", self.recording, "--focal-35mm", "20", "-o",
+                     output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = json.loads((output / "result.json").read_text())
+        self.assertNotEqual(result["focal_length"]["scale"], 1)
+        self.assertRegex(result["recording"]["chosen"],
+                         f": {result['num_inliers']} matches agree, "
+                         f"{result['median_parallax_deg']:.1f} deg of parallax")
+
+    def test_the_first_seconds_alone_are_replayed(self):
+        for seconds in (0.5, 1):
+            done = run("drone", "replay", self.recording, "--json", "--duration", seconds)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            played = json.loads(done.stdout)
+            self.assertTrue(0.8 * seconds < played["seconds"] <= seconds, played)
+            self.assertTrue(0 < played["frames_decoded"] <= seconds * world.FPS + 1, played)
 
     @NEEDS_ODOMETRY
     def test_odometry_of_the_recording_is_metric_and_upright(self):

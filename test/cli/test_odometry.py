@@ -181,6 +181,26 @@ class OdometryTest(CliTest):
         tracks = {(p[0], p[k], p[k + 1]) for p in points.values() for k in range(8, len(p), 2)}
         self.assertEqual(tracks, seen)
 
+    def test_a_run_without_a_map_leaves_no_model_of_an_earlier_run(self):
+        self.succeed(self.odometry(self.set_folder()))
+        self.assertTrue((self.out / "colmap" / "images.txt").is_file())
+        still = self.folder / "still"
+        still.mkdir()
+        for i in range(4):
+            (still / f"{i}.png").write_bytes(PICTURES[0])
+        run = (still, "--fps", 10, "--camera", self.camera)
+        self.assertEqual(self.odometry(*run).returncode, 3)
+        self.assertNotIn("colmap", self.listing())
+        # What is not of the model, or is read by the run, stays.
+        (self.out / "colmap").mkdir()
+        (self.out / "colmap" / "mine.txt").write_text("kept")
+        given = self.out / "colmap" / "cameras.txt"
+        given.write_text(f"1 PINHOLE {WIDTH} {HEIGHT} {FOCAL} {FOCAL} {WIDTH / 2} {HEIGHT / 2}\n")
+        (self.out / "colmap" / "images.txt").write_text("old")
+        self.assertEqual(self.odometry(*run[:-1], given).returncode, 3)
+        self.assertEqual(sorted(path.name for path in (self.out / "colmap").iterdir()),
+                         ["cameras.txt", "mine.txt"])
+
     def test_the_cloud_has_what_two_keyframes_see_apart(self):
         """From the middle of the path there and back: the first keyframe is at no end of it."""
         source = self.set_folder()

@@ -186,6 +186,28 @@ class Triangulate(cli.CliTest):
         for value in ("0", "nan", "2e9"):
             self.assert_refused(self.triangulate("--max-error-px", value), "--max-error-px")
 
+    def test_a_refined_focal_length_is_used_and_a_broken_one_refused(self):
+        pose = self.pose.read_text()
+        self.camera.write_text(camera_yaml(fx=FOCAL / 1.25, fy=FOCAL / 1.25))
+        self.pose.write_text(pose + "focal_length: {scale: 1.25, sigma: 0.03, uncertain: true}\n")
+        self.succeed(self.triangulate())
+        self.assert_points(self.rows(self.out / "points.csv"), POINTS)
+        self.camera.write_text(camera_yaml())
+        for given in ("null", "{scale: null}", "{scale: 0}", "{scale: 1}", "{sigma: 0.1}"):
+            with self.subTest(given=given):
+                self.pose.write_text(pose + f"focal_length: {given}\n")
+                self.succeed(self.triangulate())
+                self.assert_points(self.rows(self.out / "points.csv"), POINTS)
+        for given in ("26", "{scale: -1}", "{scale: .nan}", "{scale: wide}"):
+            with self.subTest(given=given):
+                self.pose.write_text(pose + f"focal_length: {given}\n")
+                new = self.folder / "new"
+                self.assert_refused(self.triangulate(out=new), "pose.yaml", "focal_length", out=new)
+
+    def test_the_cloud_tells_its_unit(self):
+        self.succeed(self.triangulate())
+        self.assertIn(b"forward; unit: that of t\n", (self.out / "cloud.ply").read_bytes())
+
     def test_a_rotation_rounded_to_three_digits_is_made_one(self):
         self.pose.write_text("R: [0.995, 0, 0.0998, 0, 1, 0, -0.0998, 0, 0.995]\nt: [-1, 0, 0]\n")
         result = json.loads(self.succeed(self.triangulate("--json")).stdout)

@@ -13,6 +13,12 @@ static int64_t now;
 static int num_recorded_packets, num_recorded_navdata;
 static int num_undecodable; /* packets before the first IDR picture, where decoding begins */
 static int num_navdata, num_frames, num_gaps;
+static ardrone_replay replay;
+/* 1: frames.txt has when each picture was taken, as `twoview drone record` writes it; 0: when its
+   packet came. */
+static int writes_taken;
+static int64_t taken_ns[256]; /* of each picture, by its number, when it was recorded */
+static int64_t worst_ns;      /* the largest difference from that when it was played */
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -43,8 +49,11 @@ static void record_packet(void *user, const ardrone_pave_packet *packet, const t
   (void)user;
   (void)gate;
   fwrite(packet->bytes, 1, packet->size, video_pave);
-  fprintf(frames_txt, "%lld %lld %u %d\n", (long long)now, (long long)time->device_ns,
-          packet->header.frame_number, packet->header.frame_type == ARDRONE_PAVE_IDR);
+  fprintf(frames_txt, "%lld %lld %u %d\n", (long long)(writes_taken ? time->host_ns : now),
+          (long long)time->device_ns, packet->header.frame_number,
+          packet->header.frame_type == ARDRONE_PAVE_IDR);
+  TEST_ASSERT_TRUE(packet->header.frame_number < 256);
+  taken_ns[packet->header.frame_number] = time->host_ns;
   if (num_undecodable == num_recorded_packets && packet->header.frame_type != ARDRONE_PAVE_IDR) {
     ++num_undecodable;
   }
@@ -101,13 +110,17 @@ static void count_frame(void *user, const tvs_frame *frame) {
   (void)user;
   ++num_frames;
   num_gaps += (frame->flags & TVS_FRAME_GAP) != 0;
+  {
+    const int64_t taken = ardrone_replay_host_ns(&replay, frame->time.host_ns);
+    const int64_t off = llabs(taken - taken_ns[frame->number]);
+    if (off > worst_ns) worst_ns = off;
+  }
 }
 
 /* Plays the recording without waiting. Returns the playing time in ms. */
 static int64_t play(void) {
   ardrone_session_options options;
   ardrone_transport transport;
-  static ardrone_replay replay;
   tvs_decoder decoder = mock_decoder_of(&own_decoder);
   ardrone_session *session;
   size_t size;
@@ -115,6 +128,7 @@ static int64_t play(void) {
   const int64_t begin = 77 * MOCK_MS;
   int64_t t = begin;
   num_navdata = num_frames = num_gaps = 0;
+  worst_ns = 0;
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_replay_open(&replay, folder, &transport));
   ardrone_session_options_init(&options);
   options.listen_only = 1;
@@ -146,6 +160,19 @@ static void test_a_recording_plays_back_whole(void) {
   TEST_ASSERT_EQUAL_INT(num_recorded_navdata, num_navdata);
   TEST_ASSERT_EQUAL_INT(num_recorded_packets - num_undecodable, num_frames);
   TEST_ASSERT_EQUAL_INT(0, num_gaps);
+}
+
+/* Whichever of its two times frames.txt has, a picture is of the same instant as when it was
+   recorded, but for the milliseconds in which the first packets find the drone's clock. */
+static void test_a_played_picture_was_taken_when_it_was(void) {
+  TEST_ASSERT_TRUE(worst_ns < 3 * MOCK_MS);
+  writes_taken = 1;
+  make_recording(0);
+  play();
+  TEST_ASSERT_EQUAL_INT(num_recorded_packets - num_undecodable, num_frames);
+  TEST_ASSERT_TRUE(worst_ns < 3 * MOCK_MS);
+  writes_taken = 0;
+  make_recording(0);
 }
 
 /* After the silence the session closes the video stream, and opens it again shortly after the
@@ -225,7 +252,6 @@ static void test_a_recording_cut_at_any_byte(void) {
 }
 
 static void test_a_folder_that_is_no_recording(void) {
-  static ardrone_replay replay;
   ardrone_transport transport;
   TEST_ASSERT_EQUAL_INT(TVS_ERR_IO, ardrone_replay_open(&replay, "/nowhere/at/all", &transport));
   TEST_ASSERT_EQUAL_INT(TVS_ERR_NULL, ardrone_replay_open(&replay, NULL, &transport));
@@ -248,6 +274,7 @@ int main(void) {
   if (!mkdtemp(folder)) return 1;
   make_recording(0);
   RUN_TEST(test_a_recording_plays_back_whole);
+  RUN_TEST(test_a_played_picture_was_taken_when_it_was);
   RUN_TEST(test_a_silence_is_played_over);
   RUN_TEST(test_a_log_is_an_imu_source);
   RUN_TEST(test_a_recording_cut_at_any_byte);

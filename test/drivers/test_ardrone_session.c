@@ -259,6 +259,31 @@ static void test_reading_too_slowly_drops_the_oldest_and_says_so(void) {
   TEST_ASSERT_TRUE(counters.frames_dropped >= 10);
 }
 
+static void test_an_announced_picture_is_not_a_lost_one(void) {
+  ardrone_counters counters;
+  tvs_frame frame;
+  int num = 0, num_gaps = 0;
+  drone.advertises = 1;
+  start_default();
+  run_ms(2000);
+  drone.video_ended = 1; /* a cut, which is one gap */
+  frame.struct_size = sizeof frame;
+  while (now < 6000 * MOCK_MS) {
+    step();
+    while (frames.next(frames.user, &frame) == TVS_OK) {
+      ++num;
+      num_gaps += (frame.flags & TVS_FRAME_GAP) != 0;
+      frames.release(frames.user, &frame);
+    }
+  }
+  TEST_ASSERT_TRUE(num > 50);
+  TEST_ASSERT_EQUAL_INT(1, num_gaps);
+  ardrone_session_counters(session, &counters);
+  TEST_ASSERT_EQUAL_UINT64(1, counters.gaps);
+  TEST_ASSERT_TRUE(counters.packets_skipped < 3 * MOCK_GOP); /* before each first IDR picture */
+  TEST_ASSERT_TRUE(counters.packets > 200);
+}
+
 /* The caller does not step for two seconds; of the pictures that have piled up only the last
    group, from its IDR picture on, is delivered. */
 static void test_the_latency_rule_drops_what_piled_up(void) {
@@ -423,6 +448,7 @@ int main(void) {
   RUN_TEST(test_a_session_without_steps_sends_nothing);
   RUN_TEST(test_video_returns_after_a_cut_and_after_silence);
   RUN_TEST(test_reading_too_slowly_drops_the_oldest_and_says_so);
+  RUN_TEST(test_an_announced_picture_is_not_a_lost_one);
   RUN_TEST(test_the_latency_rule_drops_what_piled_up);
   RUN_TEST(test_ten_minutes_of_a_bad_link);
   RUN_TEST(test_unrelated_clocks_are_mapped_with_an_honest_sigma);

@@ -28,6 +28,7 @@ typedef struct mock_drone {
   int64_t now_ns, boot_ns;
   int32_t lose_permille, double_permille, reorder_permille;
   int navdata_off, video_off, video_refused, deaf; /* each 1 is a fault that is on */
+  int advertises; /* 1: a packet without payload announces each picture */
   /* 1: the clock of the video's time stamps starts at another time than that of navdata */
   int clocks_differ;
   int64_t video_latency_ns;
@@ -143,12 +144,22 @@ static inline void mock_send_frame(mock_drone *d) {
   h.frame_type = number % MOCK_GOP == 1 ? ARDRONE_PAVE_IDR : ARDRONE_PAVE_P;
   memcpy(payload, &number, sizeof number);
   payload[4] = h.frame_type;
-  if (d->stream_end + MOCK_PAYLOAD + 68 > MOCK_STREAM) {
+  if (d->stream_end + MOCK_PAYLOAD + 2 * 68 > MOCK_STREAM) {
     memmove(d->stream, d->stream + d->stream_begin, d->stream_end - d->stream_begin);
     d->stream_end -= d->stream_begin;
     d->stream_begin = 0;
     /* The client has not read: the buffer is full, and this picture is dropped. */
-    if (d->stream_end + MOCK_PAYLOAD + 68 > MOCK_STREAM) return;
+    if (d->stream_end + MOCK_PAYLOAD + 2 * 68 > MOCK_STREAM) return;
+  }
+  if (d->advertises) {
+    ardrone_pave_header announced = h;
+    announced.payload_size = 0;
+    announced.advertised_size = MOCK_PAYLOAD;
+    announced.control = ARDRONE_PAVE_ADVERTISEMENT;
+    TEST_ASSERT_EQUAL_INT(TVS_OK,
+                          ardrone_encode_pave(&announced, payload, d->stream + d->stream_end,
+                                              MOCK_STREAM - d->stream_end, &size));
+    d->stream_end += size;
   }
   TEST_ASSERT_EQUAL_INT(TVS_OK, ardrone_encode_pave(&h, payload, d->stream + d->stream_end,
                                                     MOCK_STREAM - d->stream_end, &size));

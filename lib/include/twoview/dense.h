@@ -29,9 +29,9 @@ typedef struct tv_dense_options {
      at the image's centre, or larger where the grid would have more cells. Time and memory grow in
      proportion. */
   int32_t max_cells;
-  /* The most steps of parallax that are compared for a cell, [16, 512], default 128. A step is as
-     wide as a cell; where the range of parallax has more steps, all cells are larger. Time and
-     memory grow in proportion. */
+  /* The most steps of parallax that are compared for a cell, [16, 512], default 128, rounded down
+     to a multiple of 8. A step is as wide as a cell; where the range of parallax has more steps,
+     all cells are larger. Time and memory grow in proportion. */
   int32_t max_steps;
   /* Must be 0. */
   int32_t reserved;

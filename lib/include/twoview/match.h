@@ -66,10 +66,11 @@ TV_API void tv_match_options_init_sized(tv_match_options *options, size_t struct
    of both counts of features is always enough. *num_correspondences: how many were written; on
    TV_ERR_CAPACITY how many there are. Returns TV_ERR_NULL, TV_ERR_ARGUMENT, TV_ERR_STRUCT_SIZE,
    TV_ERR_LIMITS, TV_ERR_NOT_FINITE, TV_ERR_CAPACITY, TV_ERR_OVERLAP. Time: 128 multiply-adds for
-   each pair of descriptors; at most six times as many, and five distances of keypoints for each
-   pair, where descriptors are equal or neighbourhoods are crowded with similar ones. Source of the
-   neighbourhood: D. Mishkin, J. Matas, M. Perdoch, "MODS: Fast and robust method for two-view
-   matching", CVIU 2015 (first geometrically inconsistent nearest neighbour). */
+   each of the num0 x num1 pairs of descriptors; where descriptors are equal or neighbourhoods are
+   crowded with similar ones, for at most num0 x (2 num0 + 3 num1 + 130) pairs (five times as many
+   for equal large counts), with a distance of keypoints for each. Source of the neighbourhood: D.
+   Mishkin, J. Matas, M. Perdoch, "MODS: Fast and robust method for two-view matching", CVIU 2015
+   (first geometrically inconsistent nearest neighbour). */
 TV_API tv_status tv_match(tv_context *context, const tv_features *features0,
                           const tv_features *features1, const tv_match_options *options,
                           tv_correspondence *correspondences, int32_t cap_correspondences,

@@ -33,6 +33,7 @@ tv_status read_options(const tv_dense_options* given, tv_dense_options* options)
       options->max_parallax_rad <= kPi &&
       (options->max_parallax_rad == 0 || options->max_parallax_rad > options->min_parallax_rad) &&
       options->max_relative_sigma > 0 && options->max_relative_sigma <= 1;
+  options->max_steps &= ~7;  // the matcher takes eight steps at a time
   return valid ? TV_OK : TV_ERR_ARGUMENT;
 }
 
@@ -189,6 +190,7 @@ tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_ca
   // First the points are counted, then as many as there is room for are written. A cell counts as
   // much as it is wide in the image, which is less near an epipole.
   int64_t total = 0;
+  int32_t count = 0;
   tv_dense_point point;
   const auto weight_of = [&](int32_t x) { return 1 + static_cast<int64_t>(sines0[2 * x] * 1000); };
   for (int32_t y = 0; y < grid.height; ++y) {
@@ -196,7 +198,9 @@ tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_ca
       int16_t& step = kept[static_cast<ptrdiff_t>(y) * grid.width + x];
       if (step < 0) continue;
       if (!tv::make_point(scene, x, y, step, &point)) step = -1;
-      if (step >= 0) total += weight_of(x);
+      if (step < 0) continue;
+      total += weight_of(x);
+      ++count;
     }
   }
   int64_t seen = 0;
@@ -206,7 +210,8 @@ tv_status tv_densify(const tv_image* image0, const tv_image* image1, const tv_ca
       const int16_t step = kept[static_cast<ptrdiff_t>(y) * grid.width + x];
       if (step < 0) continue;
       seen += weight_of(x);
-      if (num >= cap_points || seen * cap_points < (num + 1) * total) continue;
+      if (count > cap_points && (num >= cap_points || seen * cap_points < (num + 1) * total))
+        continue;
       if (!tv::make_point(scene, x, y, step, &point)) continue;
       const int32_t u = static_cast<int32_t>(point.pixel0[0] + 0.5f);
       const int32_t v = static_cast<int32_t>(point.pixel0[1] + 0.5f);

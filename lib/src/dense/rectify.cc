@@ -127,10 +127,14 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
                DenseGrid* grid) {
   Mat3 back;
   for (int i = 0; i < 9; ++i) back(i / 3, i % 3) = R(i % 3, i / 3);
-  const Vec3 other = rotate(back, t);
-  grid->length = std::sqrt(dot(t, t));
-  grid->baseline =
-      Vec3(-other[0] / grid->length, -other[1] / grid->length, -other[2] / grid->length);
+  // Squares of an extreme t leave the range of a double.
+  const double largest = std::max(std::max(std::fabs(t[0]), std::fabs(t[1])), std::fabs(t[2]));
+  const double unit = largest > 1e-100 && largest < 1e100 ? 1 : largest;
+  const Vec3 scaled(t[0] / unit, t[1] / unit, t[2] / unit);
+  const Vec3 other = rotate(back, scaled);
+  const double length = std::sqrt(dot(scaled, scaled));
+  grid->length = length * unit;
+  grid->baseline = Vec3(-other[0] / length, -other[1] / length, -other[2] / length);
   const double norm = std::sqrt(dot(grid->baseline, grid->baseline));
   for (int i = 0; i < 3; ++i) grid->baseline[i] /= norm;
   complete_basis(grid->baseline, &grid->side, &grid->up);
@@ -162,7 +166,7 @@ bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const Parall
                max_cells / grid->width);
   grid->first_step = static_cast<int32_t>(range.least / step);
   const int32_t last = static_cast<int32_t>(range.most / step) + 1;
-  grid->num_steps = std::min((last - grid->first_step + 8) / 8 * 8, max_steps / 8 * 8);
+  grid->num_steps = std::min((last - grid->first_step + 8) / 8 * 8, max_steps);
   return grid->height > 0;
 }
 

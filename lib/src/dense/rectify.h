@@ -52,7 +52,8 @@ bool range_of_points(const tv_point* points, int32_t num_points, double pixel_an
 // The angle of a pixel in the middle of the coarser of the two images.
 double pixel_angle_of(const Camera& camera0, const Camera& camera1);
 
-// Makes the grid that covers image 0. Returns false where no ray of it is valid.
+// Makes the grid that covers image 0. max_steps: a multiple of 8. Returns false where no ray of it
+// is valid.
 bool make_grid(const Camera& camera0, const Mat3& R, const Vec3& t, const ParallaxRange& range,
                double pixel_angle, int32_t max_cells, int32_t max_steps, Arena& arena,
                DenseGrid* grid);

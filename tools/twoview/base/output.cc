@@ -201,6 +201,13 @@ std::atomic<bool>& stop_flag() {
   return stop;
 }
 
+std::atomic<void (*)()>& last_call() {
+  static std::atomic<void (*)()> function{nullptr};
+  return function;
+}
+
+void call_at_last_signal(void (*function)()) { last_call() = function; }
+
 const std::atomic<bool>& stop_flag_for_signals() {
   asks_first() = true;
   return stop_flag();
@@ -227,6 +234,7 @@ void clean_up_on_signals() {
     // The newest first: its folder may lie in an older one's.
     std::vector<OutputSet*>& sets = living().sets;
     for (auto set = sets.rbegin(); set != sets.rend(); ++set) (*set)->discard();
+    if (void (*const function)() = last_call()) function();
     ::signal(signal, SIG_DFL);
     sigset_t one;
     sigemptyset(&one);

@@ -61,6 +61,10 @@ void clean_up_on_signals();
 // first such signal only sets the returned flag, and a second one ends the program.
 const std::atomic<bool>& stop_flag_for_signals();
 
+// Sets what is called when a signal ends the program, such as to give the terminal its mode back;
+// null: nothing.
+void call_at_last_signal(void (*function)());
+
 // Reads a whole text or image file, or a pipe to its end. Throws BadInput if it is missing, of
 // another kind, empty, or larger than max_bytes.
 std::string read_file(const std::string& path, size_t max_bytes);

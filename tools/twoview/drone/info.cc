@@ -57,21 +57,19 @@ int info(const Arguments& a) {
   options.full_navdata = 0;
   bool has_config = false, has_failed = false;
   LinkListener listener;
-  Link* the_link = nullptr;
   listener.on_event = [&](ardrone_event event, const std::string&) {
     if (event == ARDRONE_EVENT_CONFIG) has_config = true;
     if (event == ARDRONE_EVENT_READ_FAILED) has_failed = true;
   };
   Link link(a.address, options, listener);
-  the_link = &link;
   bool has_asked = false;
   std::optional<ardrone_navdata> navdata;
   link.run(
       [&] {
-        if (const ardrone_navdata* latest = ardrone_session_navdata(the_link->session()))
+        if (const ardrone_navdata* latest = ardrone_session_navdata(link.session()))
           if (ARDRONE_HAS(latest, ARDRONE_TAG_DEMO)) navdata = *latest;
-        if (!has_asked && ardrone_session_is_up(the_link->session()))
-          has_asked = ardrone_session_read_config(the_link->session()) == TVS_OK;
+        if (!has_asked && ardrone_session_is_up(link.session()))
+          has_asked = ardrone_session_read_config(link.session()) == TVS_OK;
         return (has_config || has_failed) && navdata;
       },
       stop_flag_for_signals(), a.duration);

@@ -1,14 +1,29 @@
 #include "drone/keyboard.h"
 
 #include <poll.h>
+#include <termios.h>
 #include <unistd.h>
 
+#include "base/output.h"
+
 namespace cli {
+namespace {
+
+// The mode of the terminal before. Not the keyboard's own, because a signal restores it, too.
+termios& mode_before() {
+  static termios mode{};
+  return mode;
+}
+
+void restore_mode() { ::tcsetattr(STDIN_FILENO, TCSANOW, &mode_before()); }
+
+}  // namespace
 
 Keyboard::Keyboard() : is_terminal_(::isatty(STDIN_FILENO) != 0) {
   if (!is_terminal_) return;
-  ::tcgetattr(STDIN_FILENO, &before_);
-  termios raw = before_;
+  ::tcgetattr(STDIN_FILENO, &mode_before());
+  call_at_last_signal(restore_mode);
+  termios raw = mode_before();
   raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // ISIG stays: Ctrl-C raises SIGINT
   raw.c_cc[VMIN] = 0;
   raw.c_cc[VTIME] = 0;
@@ -16,7 +31,9 @@ Keyboard::Keyboard() : is_terminal_(::isatty(STDIN_FILENO) != 0) {
 }
 
 Keyboard::~Keyboard() {
-  if (is_terminal_) ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  if (!is_terminal_) return;
+  restore_mode();
+  call_at_last_signal(nullptr);
 }
 
 std::optional<int> Keyboard::read_byte() {

@@ -1,8 +1,6 @@
 // Reads single keys from a terminal without waiting for the end of a line.
 #pragma once
 
-#include <termios.h>
-
 #include <optional>
 
 namespace cli {
@@ -11,7 +9,8 @@ enum Key { kKeyUp = 256, kKeyDown, kKeyRight, kKeyLeft };
 
 class Keyboard {
  public:
-  // Switches stdin out of line mode if it is a terminal; the destructor restores the mode.
+  // Switches stdin out of line mode if it is a terminal; the destructor restores the mode, and so
+  // does a signal that ends the program.
   Keyboard();
   ~Keyboard();
   Keyboard(const Keyboard&) = delete;
@@ -25,7 +24,6 @@ class Keyboard {
  private:
   std::optional<int> read_byte();
   bool is_terminal_, has_ended_ = false;
-  termios before_{};
 };
 
 }  // namespace cli

@@ -15,7 +15,7 @@ namespace {
 
 struct Arguments {
   std::string recording, frames;
-  double speed = 0;
+  double speed = 0, duration = 0;
   bool json = false, quiet = false;
 };
 
@@ -45,7 +45,7 @@ int replay(const Arguments& a) {
   }
   if (is_vehicle_recording(a.recording)) {
     const nlohmann::ordered_json summary =
-        play_vehicle(a.recording, listener, stop_flag_for_signals(), a.speed);
+        play_vehicle(a.recording, listener, stop_flag_for_signals(), a.speed, a.duration);
     if (!failure.empty()) throw BadInput(failure);
     if (a.json) print(summary.dump(2) + "\n");
     if (!a.json && !a.quiet)
@@ -57,7 +57,8 @@ int replay(const Arguments& a) {
                          summary["gaps"].get<unsigned long long>()));
     return 0;
   }
-  const ardrone_counters counters = play(a.recording, listener, stop_flag_for_signals(), a.speed);
+  const ardrone_counters counters =
+      play(a.recording, listener, stop_flag_for_signals(), a.speed, a.duration);
   if (!failure.empty()) throw BadInput(failure);
   const double seconds = last_ns > first_ns ? static_cast<double>(last_ns - first_ns) * 1e-9 : 0.0;
   const nlohmann::ordered_json summary = summary_json(counters, seconds);
@@ -86,6 +87,10 @@ void add_drone_replay(CLI::App& drone, Run& run) {
   verb->add_option("--speed", a->speed, "times as fast as it was; 0: as fast as it can")
       ->check(number_in(0.0, 1000.0))
       ->type_name("FACTOR")
+      ->capture_default_str();
+  verb->add_option("--duration", a->duration, "play the recording's first seconds only; 0: all")
+      ->check(number_in(0.0, 1e7))
+      ->type_name("S")
       ->capture_default_str();
   verb->add_flag("--json", a->json, "print the summary alone, as JSON");
   verb->add_flag("--quiet", a->quiet, "print nothing on stdout");

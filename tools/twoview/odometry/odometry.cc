@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/output.h"
 #include "base/terminal.h"
+#include "files/camera_formats.h"
 #include "odometry/flight.h"
 #include "odometry/live.h"
 #include "odometry/outputs.h"
@@ -278,7 +279,7 @@ int odometry(Arguments& a) {
   const std::atomic<bool>& stop = stop_flag_for_signals();
   OutputSet files(common.output);
   for (const std::string& name : source->files()) files.keep(name);
-  files.keep(a.camera);
+  files.keep(camera_path(a.camera));
   files.keep(truth_file);
   if (!source->note().empty()) std::fprintf(stderr, "twoview: note: %s\n", source->note().c_str());
   const int wanted = num_wanted(*source, a.flight);
@@ -311,16 +312,24 @@ int odometry(Arguments& a) {
   result.json["kernels"] = session.kernels();
   const std::string name = fs::absolute(fs::path(a.source) / "x").parent_path().filename().string();
   make_files(result, a.source.empty() ? source->kind() : name, files);
-  std::optional<OutputSet> colmap;
-  if (!result.keyframes.empty()) {
-    colmap.emplace(files.folder() / "colmap");
-    make_colmap_files(result, *colmap);
+  const bool has_map = !result.keyframes.empty();
+  const fs::path colmap_folder = files.folder() / "colmap";
+  std::optional<OutputSet> colmap;  // without a map, to remove an earlier run's files
+  if (has_map || fs::is_directory(colmap_folder)) {
+    colmap.emplace(colmap_folder);
+    colmap->keep(camera_path(a.camera));
+    if (has_map) make_colmap_files(result, *colmap);
   }
   if (common.json) print(json_text(result.json));
-  if (common.speaks()) print(summary(result, *source, files, colmap.has_value()));
+  if (common.speaks()) print(summary(result, *source, files, has_map));
   files.commit();
   files.remove_others(kFiles);
-  if (colmap) colmap->commit();
+  if (colmap) {
+    colmap->commit();
+    colmap->remove_others(kColmapFiles);
+    std::error_code ignored;
+    if (!has_map) fs::remove(colmap_folder, ignored);  // not where something else is in it
+  }
   if (flight.num_unreadable() > 0)
     std::fprintf(stderr, "twoview: %d frames could not be used, the first: %s\n",
                  flight.num_unreadable(), flight.first_problem().c_str());

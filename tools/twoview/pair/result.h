@@ -36,7 +36,8 @@ struct Outcome {
 };
 
 // The camera that pose and points refer to: the camera file's, with the estimated shift added to
-// the principal point.
+// the principal point, and the focal length multiplied by the factor of the estimate where it was
+// refined.
 tv_camera corrected_camera(const Outcome& outcome, int camera);
 
 // The factor from the unit of the two-view pose and its points to the unit of the outputs: the

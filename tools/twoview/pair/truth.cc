@@ -38,6 +38,18 @@ KnownPose read_pose(const YAML::Node& root, const std::string& path) {
   return pose;
 }
 
+// Reads the factor of the focal length, which `reconstruct` writes into result.json where it was
+// refined; it is optional in other files.
+void read_focal_scale(const YAML::Node& root, const std::string& path, KnownPose& pose) {
+  const YAML::Node focal = root["focal_length"];
+  if (!focal || focal.IsNull()) return;
+  if (!focal.IsMap()) throw BadInput(path + ": focal_length is not a map with scale");
+  if (!focal["scale"] || focal["scale"].IsNull()) return;
+  pose.focal_scale = number_at(focal, "scale", path + ": focal_length");
+  if (pose.focal_scale == 0) pose.focal_scale = 1;
+  if (!(pose.focal_scale > 0)) throw BadInput(path + ": focal_length: scale is not above 0");
+}
+
 // Reads the shift of the principal point, which `reconstruct` writes into result.json; it is
 // optional in other files.
 void read_shift(const YAML::Node& root, const std::string& path, KnownPose& pose) {
@@ -96,6 +108,8 @@ std::vector<double> depth_errors_percent(const Truth& truth, const Picture& pict
 tv_camera KnownPose::corrected(const tv_camera& camera) const {
   tv_camera corrected = camera;
   const double scale = image_width > 0 ? camera.width / image_width : 1;
+  corrected.fx *= focal_scale;
+  corrected.fy *= focal_scale;
   corrected.cx += scale * principal_point_shift_px[0];
   corrected.cy += scale * principal_point_shift_px[1];
   return corrected;
@@ -104,6 +118,7 @@ tv_camera KnownPose::corrected(const tv_camera& camera) const {
 KnownPose load_pose(const std::string& path) {
   const YAML::Node root = parse_yaml(read_file(path, kMaxFileBytes), path);
   KnownPose pose = read_pose(root, path);
+  read_focal_scale(root, path, pose);
   read_shift(root, path, pose);
   read_sizes(root, path, pose);
   const cv::SVD svd(cv::Mat(3, 3, CV_64F, pose.R.data()));

@@ -10,9 +10,10 @@
 
 namespace cli {
 
-// R and t of cam1_from_cam0, read from a YAML or JSON file. If the file is a result.json, the shift
-// of the principal point that its pose was estimated with is read too. R is replaced by the nearest
-// rotation, since the file's numbers may be rounded. Throws BadInput.
+// R and t of cam1_from_cam0, read from a YAML or JSON file. If the file is a result.json, what
+// its pose's camera differs in from the given one is read too: the shift of the principal point and
+// the factor of a refined focal length. R is replaced by the nearest rotation, since the file's
+// numbers may be rounded. Throws BadInput.
 struct KnownPose {
   Matrix3 R{};
   Vector3 t{};
@@ -20,12 +21,14 @@ struct KnownPose {
   // image_width is 0, of a camera with images of any size.
   double principal_point_shift_px[2] = {0, 0};
   double image_width = 0;
+  // The factor of fx and fy.
+  double focal_scale = 1;
   // The sizes of the images that the pose was estimated with (image_size0 and image_size1); 0 where
   // the file does not say.
   int sizes[2][2] = {{0, 0}, {0, 0}};
 
   // The camera that the pose refers to: `camera`, of any image size, with the shift added to its
-  // principal point.
+  // principal point, and its focal length multiplied by the factor.
   tv_camera corrected(const tv_camera& camera) const;
 };
 KnownPose load_pose(const std::string& path);

@@ -30,9 +30,9 @@ struct Replay {
 }  // namespace
 
 ardrone_counters play(const std::string& folder, LinkListener listener,
-                      const std::atomic<bool>& stop, double speed) {
+                      const std::atomic<bool>& stop, double speed, double duration_s) {
   if (is_vehicle_recording(folder)) {
-    play_vehicle(folder, std::move(listener), stop, speed);
+    play_vehicle(folder, std::move(listener), stop, speed, duration_s);
     return {};
   }
   const Decoder decoder;
@@ -57,6 +57,7 @@ ardrone_counters play(const std::string& folder, LinkListener listener,
     const int64_t next = ardrone_replay_next_ns(&replay.files);
     if (next == INT64_MAX) break;
     now = std::max(now, std::min(next, ardrone_session_next_ns(session)));
+    if (duration_s > 0 && static_cast<double>(now - start) > duration_s * 1e9) break;
     if (speed > 0) {
       const int64_t due = began + static_cast<int64_t>(static_cast<double>(now - start) / speed);
       const int64_t wait = due - ardrone_now_ns();

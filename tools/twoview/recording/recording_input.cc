@@ -61,6 +61,8 @@ CameraMount mount_of(const RecordingOptions& options, const std::string& file) {
                                            ? options.camera_in_body
                                            : optional_numbers(root, "camera_in_body", 3, file);
   CameraMount mount;
+  for (const double number : position)
+    if (!std::isfinite(number)) throw BadInput("--camera-in-body is not finite");
   if (!rotation.empty()) {
     require_rotation(rotation, rotation_given ? "--body-from-camera" : file + ": body_from_camera");
     std::copy(rotation.begin(), rotation.end(), mount.body_from_camera.begin());

@@ -172,7 +172,8 @@ bool is_vehicle_recording(const std::string& folder) {
 }
 
 nlohmann::ordered_json play_vehicle(const std::string& folder, LinkListener listener,
-                                    const std::atomic<bool>& stop, double speed) {
+                                    const std::atomic<bool>& stop, double speed,
+                                    double duration_s) {
   Playback playback(folder);
   tvm_session_options options;
   tvm_session_options_init(&options);
@@ -187,6 +188,8 @@ nlohmann::ordered_json play_vehicle(const std::string& folder, LinkListener list
     int64_t next = playback.next_ns();
     // A frame that is due and was not taken waits behind others: it is asked for again later.
     if (next <= playback.now_ns) next = playback.now_ns + 5 * kMs;
+    if (duration_s > 0 && next != INT64_MAX && static_cast<double>(next - begin) > duration_s * 1e9)
+      break;
     if (next != INT64_MAX)
       last = now = std::max(now, next);
     else if ((now += 20 * kMs) > last + 400 * kMs)

@@ -19,10 +19,12 @@ inline constexpr char kNoMavlink[] =
 // Whether a folder holds what `drone record --mavlink` writes.
 bool is_vehicle_recording(const std::string& folder);
 
-// Plays such a recording through MAVLink's driver until its end or until `stop` is set: on_imu and
-// on_frame of the listener are called. Speed 0 is as fast as possible; otherwise it is `speed`
-// times the recorded speed. Returns the summary, as summary.json has it. Throws BadInput.
+// Plays such a recording through MAVLink's driver until its end, until `stop` is set, or its first
+// duration_s seconds (0: all): on_imu and on_frame of the listener are called. Speed 0 is as fast
+// as possible; otherwise it is `speed` times the recorded speed. Returns the summary, as
+// summary.json has it. Throws BadInput.
 nlohmann::ordered_json play_vehicle(const std::string& folder, LinkListener listener,
-                                    const std::atomic<bool>& stop, double speed);
+                                    const std::atomic<bool>& stop, double speed,
+                                    double duration_s = 0);
 
 }  // namespace cli

@@ -12,7 +12,7 @@ bool is_vehicle_recording(const std::string& folder) {
 }
 
 nlohmann::ordered_json play_vehicle(const std::string&, LinkListener, const std::atomic<bool>&,
-                                    double) {
+                                    double, double) {
   throw BadInput(kNoMavlink);
 }
 

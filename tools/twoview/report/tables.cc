@@ -65,15 +65,13 @@ void append_float(std::string& bytes, float value) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(bits >> shift & 255);
 }
 
-std::string cloud_ply(const std::vector<CloudPoint>& cloud, bool with_sigma) {
+std::string cloud_ply(const std::vector<CloudPoint>& cloud, const char* unit, bool with_sigma) {
   std::string bytes =
       "ply\nformat binary_little_endian 1.0\n"
       "comment twoview " +
       std::string(tv_version_string()) +
-      "\n"
-      "comment frame of camera 0: x right, y down, z forward; unit: the distance of the cameras\n"
-      "element vertex " +
-      std::to_string(cloud.size()) +
+      "\ncomment frame of camera 0: x right, y down, z forward; unit: " + unit +
+      "\nelement vertex " + std::to_string(cloud.size()) +
       "\n"
       "property float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n"

@@ -269,7 +269,7 @@ Json calibration_json(const std::vector<BoardView>& views, const Calibration& c,
 }
 
 // The entries focal_sigma and center_sigma of the camera file: what the calibration's own standard
-// deviations are, as load_sigmas reads them.
+// deviations are, as sigmas_from_yaml reads them.
 std::string sigmas_yaml(const Calibration& c) {
   if (c.sigma.size() < 4) return "";
   const double focal = std::max(c.sigma[0] / c.camera.fx, c.sigma[1] / c.camera.fy);
@@ -405,15 +405,11 @@ void add_calibrate(CLI::App& program, Run& run) {
                    : "'" + text + "' is not like 9x6, with 3 to 100 inner corners a side";
       })
       ->type_name("9x6");
-  verb->add_option_function<double>(
-          "--square",
-          [a](double side) {
-            a->board.square = side;
-            a->has_square = true;
-          },
-          "side of a square in metres, the unit of the views' poses; else they are in squares")
-      ->check(CLI::Range(1e-6, 100.0))
-      ->type_name("METRES");
+  add_number(*verb, "square", &a->board.square, 1e-6, 100,
+             "side of a square in metres, the unit of the views' poses; else they are in squares")
+      ->each([a](const std::string&) { a->has_square = true; })
+      ->type_name("METRES")
+      ->default_str("");
   verb->add_option("--model", a->model,
                    "brown-conrady: k1 k2 p1 p2 k3; rational: and k4 k5 k6; "
                    "kannala-brandt: for fisheye lenses")
@@ -422,9 +418,7 @@ void add_calibrate(CLI::App& program, Run& run) {
   verb->add_option("--max-views", a->max_views, "use at most so many, the most different ones")
       ->check(CLI::Range(kMinViews, 200))
       ->capture_default_str();
-  verb->add_option("--duration", a->duration_s, "of a live source, seconds")
-      ->check(CLI::Range(1.0, 3600.0))
-      ->capture_default_str();
+  add_number(*verb, "duration", &a->duration_s, 1, 3600, "of a live source, seconds");
   add_common(*verb, a->common, 0, "folder for camera.yaml, camera_info.yaml and the pictures");
   verb->final_callback([a, &run] { run = [a] { return calibrate(*a); }; });
 }

@@ -334,20 +334,23 @@ void split_output(const std::string& output, fs::path& folder, std::string& name
   }
 }
 
+// Loads the cameras, and sets how sure their calibration is, as `reconstruct` does.
 Cameras load_cameras(Arguments& a) {
   Cameras cameras;
   const fs::path set_path = fs::path(a.pairs).parent_path() / "cameras.yaml";
+  CalibrationSigmas sigmas = kPlainFile;
   if (!a.camera.empty()) {
     cameras.file = load_camera_file(a.camera);
+    sigmas = cameras.file->sigmas;
   } else if (a.focal_35mm > 0) {
-    // Such a focal length is known less well than a calibrated one.
-    tv_estimate_options& options = a.common.options.estimate;
-    options.focal_sigma0 = options.focal_sigma1 = kFilm.focal;
-    options.center_sigma0 = options.center_sigma1 = kFilm.center;
+    sigmas = kFilm;
     cameras.focal_35mm = a.focal_35mm;
   } else if (fs::exists(set_path)) {
     cameras.set = load_camera_set(set_path.string());
   }
+  tv_estimate_options& options = a.common.options.estimate;
+  options.focal_sigma0 = options.focal_sigma1 = sigmas.focal;
+  options.center_sigma0 = options.center_sigma1 = sigmas.center;
   return cameras;
 }
 

@@ -110,19 +110,23 @@ void set_calibration_sigmas(Options& options, const ImageCameras& cameras) {
   }
 }
 
-// Loads the pictures and the cameras, and scales both as --resize says.
+// Loads the pictures and the cameras, scales both as --resize says, and sets the calibration's
+// sigmas.
 ImageCameras load_inputs(Arguments& a, RecordingInput* recording, Session& session,
                          Outcome& outcome) {
   ImageCameras cameras;
   if (recording) {
     const ImageFacts frame{"", recording->width(), recording->height(), {}};
     cameras = a.cameras.cameras_of(frame, frame);
+    // Before load, which estimates pairs of frames to choose one.
+    set_calibration_sigmas(a.common.options, cameras);
     const Progress progress(!a.common.quiet);
     recording->load(cameras[0].camera, session, a.common.options, progress, outcome);
   } else {
     for (int i = 0; i < 2; ++i) outcome.picture[i] = load_picture(a.image[i]);
     note_turns(outcome.picture, a.common);
     cameras = choose_cameras(a, outcome.picture);
+    set_calibration_sigmas(a.common.options, cameras);
   }
   outcome.has_cameras = cameras[0].source != ImageCamera::kNone;
   outcome.has_camera_files = cameras[0].source == ImageCamera::kFile;
@@ -163,7 +167,9 @@ void make_files(const Outcome& outcome, OutputSet& files) {
                                      : "Each point in its colour in image 0. One baseline is the "
                                        "distance between the cameras.",
                        views_picture(outcome, cloud), false});
-    files.add("cloud.ply", cloud_ply(cloud, outcome.dense.has_value()));
+    files.add("cloud.ply",
+              cloud_ply(cloud, outcome.scale ? "metres" : "the distance of the cameras",
+                        outcome.dense.has_value()));
     files.add("views.png", png_bytes(figures.back().picture));
   }
   figures.push_back({"Matches",
@@ -337,7 +343,6 @@ int reconstruct(Arguments& a) {
   Session session(common.options);
   Outcome outcome;
   const ImageCameras cameras = load_inputs(a, recording.get(), session, outcome);
-  set_calibration_sigmas(common.options, cameras);
   if (recording) recording->add_gravity(common.options.estimate);
   const bool has_truth = !a.truth.empty();
   Truth truth;

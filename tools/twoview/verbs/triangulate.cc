@@ -245,7 +245,8 @@ int triangulate(Arguments& a) {
   for (const std::string& camera : camera_files) files.keep(camera_path(camera));
   for (const std::string& image : a.images) files.keep(image);
   const Json json = result(a, points, pose, cameras);
-  add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px)), files);
+  add_files(output, points_csv(points), cloud_ply(cloud(points, a.max_error_px), "that of t"),
+            files);
   if (common.json) print(json_text(json));
   const std::string notes = common.note_lines();
   if (common.speaks()) print(notes + summary(json, files));
@@ -269,8 +270,8 @@ void add_triangulate(CLI::App& program, Run& run) {
       ->expected(2)
       ->type_name("A B");
   verb->add_option("--pose", a->pose,
-                   "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px is used "
-                   "too, or YAML")
+                   "R and t of cam1_from_cam0: result.json, whose principal_point_shift_px and "
+                   "focal_length.scale are used too, or YAML")
       ->required()
       ->type_name("FILE");
   verb->add_option("--max-error-px", a->max_error_px,

@@ -6,6 +6,10 @@
    frames.txt    per packet of video.pave a line: host time ns, device time ns, number, 1 for a key
    frame; where it is missing or ends, the packets' own stamps give the times
 
+   A packet of video.pave is played at its host time. `twoview drone record` writes when the picture
+   was taken (tvs_time.host_ns), which the playing keeps; but the packet came later, so that the
+   attitudes around a picture may be played after it: on_frame then has none of it.
+
    A file that was cut at any byte is read up to its last whole packet. It uses stdio, which uses
    the heap. */
 #ifndef TWOVIEW_DRIVERS_ARDRONE_REPLAY_H
