@@ -180,8 +180,11 @@ def test_aligned_matches_are_those_of_reconstruct(context, image):
     links = tv.match(context, rows0, rows1, keypoints0=points0, keypoints1=points1)
     before = points0.tobytes(), points1.tobytes()
     points1["x"][links["idx1"]] += 0.2
-    moved0, moved1, aligned = tv.align_matches(context, image, shifted, points0, points1, links)
+    moved0, moved1, aligned, factors = tv.align_matches(context, image, shifted, points0, points1,
+                                                        links)
     assert aligned.dtype == bool and aligned.mean() > 0.5
+    assert factors.dtype == np.float32 and (factors[~aligned] == 1).all()
+    assert factors.min() > 0 and np.median(factors[aligned]) < 0.5
     assert points0.tobytes() == before[0] and points1.tobytes() != before[1]
     changed = (moved0 != points0)[links["idx0"]].astype(int) + (moved1 != points1)[links["idx1"]]
     assert (changed == aligned).all()

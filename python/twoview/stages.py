@@ -185,14 +185,16 @@ def match(context: Context, descriptors0: np.ndarray, descriptors1: np.ndarray,
 def align_matches(context: Context, image0: np.ndarray, image1: np.ndarray, keypoints0: np.ndarray,
                   keypoints1: np.ndarray, matches: np.ndarray,
                   size_of_one: float = FeatureOptions.keypoint_size,
-                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """tv_align_matches: one keypoint of each match is moved by the pixels around both.
 
     context: as large as the images. image0, image1: (height, width) uint8, of the keypoints.
     keypoints0, keypoints1: (n0,) and (n1,) of twoview.KEYPOINT, of extract. matches: (m,) of
     twoview.CORRESPONDENCE, of match. size_of_one: the option keypoint_size of extract, pixels.
-    Returns both keypoints, copies in which x and y of the moved ones are new, and which matches
-    were aligned, (m,) bool. reconstruct halves both sigmas (keypoint_sigmas) of an aligned match.
+    Returns both keypoints, copies in which x and y of the moved ones are new, which matches were
+    aligned, (m,) bool, and the factors by which reconstruct multiplies both sigmas
+    (keypoint_sigmas) of each match, (m,) float32: 1 where it was not aligned, else the standard
+    deviation of the aligned position over that of its keypoints.
     Raises TypeError or ValueError for an array that C could not read, TV_ERR_LIMITS for an image
     above the context's limits, TV_ERR_ARGUMENT for an index or a size out of its range,
     TV_ERR_NOT_FINITE for a keypoint that is not finite."""
@@ -205,7 +207,9 @@ def align_matches(context: Context, image0: np.ndarray, image1: np.ndarray, keyp
     context.call("tv_align_matches", *views, ctypes.c_float(size_of_one), _abi.pointer(moved[0]),
                  c_int32(len(moved[0])), _abi.pointer(moved[1]), c_int32(len(moved[1])),
                  _abi.pointer(matches), c_int32(len(matches)), _abi.pointer(aligned))
-    return moved[0], moved[1], aligned.astype(bool)
+    factors = aligned.astype(np.float32) / 128
+    factors[aligned == 0] = 1
+    return moved[0], moved[1], aligned != 0, factors
 
 
 def _are_uncalibrated(camera0: Optional[Camera], camera1: Optional[Camera]) -> bool:

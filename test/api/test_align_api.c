@@ -96,11 +96,10 @@ static void test_matches_of_a_shifted_image_come_nearer_to_the_shift(void) {
   for (k = 0; k < num_matches; ++k) {
     const int32_t i[2] = {matches[k].idx0, matches[k].idx1};
     int changed = 0;
-    TEST_ASSERT_TRUE(aligned[k] == 0 || aligned[k] == 1);
     for (v = 0; v < 2; ++v) {
       changed += moved[v][i[v]].x != found[v][i[v]].x || moved[v][i[v]].y != found[v][i[v]].y;
     }
-    TEST_ASSERT_EQUAL_INT(aligned[k], changed);
+    TEST_ASSERT_EQUAL_INT(aligned[k] != 0, changed);
     if (aligned[k] == 0) continue;
     ++count;
     before +=

@@ -452,13 +452,13 @@ static int is_at(const tv_keypoint *k, const tv_keypoint *l) {
 }
 
 /* With align_matches, only keypoints of matches move, one of each match at most; two matches of one
-   place stay at one place; the estimate is that of the moved positions with halved sigmas; and
-   exchanged views give the same positions. */
+   place stay at one place; the estimate is that of the moved positions with the sigmas that
+   tv_align_matches says; and exchanged views give the same positions. */
 static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
-  static tv_keypoint plain[2][2048], aligned[2][2048];
+  static tv_keypoint plain[2][2048], aligned[2][2048], again[2][2048];
   static double pixels[2][2 * 2048];
   static float ratios[2048], sigmas[2][2048];
-  static uint8_t mask[2048];
+  static uint8_t mask[2048], factors[2048];
   real_pair pair;
   tv_limits limits;
   tv_reconstruct_options options;
@@ -466,7 +466,7 @@ static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
   tv_two_view by_hand;
   api_context b, c;
   int32_t num[2];
-  int v, k, n, moved = 0, expected = 0, twice = 0;
+  int v, k, n, least = 255, most = 0, moved = 0, expected = 0, twice = 0;
   if (!real_pair_load(&pair)) TEST_IGNORE_MESSAGE("no real images");
   limits = limits_of(pair.width, pair.height, 2048);
   b = api_make(&limits);
@@ -488,6 +488,10 @@ static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
   for (v = 0; v < 2; ++v) {
     memcpy(aligned[v], reconstruction.keypoints[v], (size_t)num[v] * sizeof aligned[v][0]);
   }
+  memcpy(again, plain, sizeof again);
+  TEST_ASSERT_EQUAL_INT(
+      TV_OK, tv_align_matches(c.context, &views[0].image, &views[1].image, 4, again[0], num[0],
+                              again[1], num[1], reconstruction.matches, n, factors));
   for (k = 0; k < n; ++k) {
     const int32_t i[2] = {reconstruction.matches[k].idx0, reconstruction.matches[k].idx1};
     int changed[2];
@@ -500,7 +504,12 @@ static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
       sigmas[v][k] = after->size / 4;
     }
     TEST_ASSERT_FALSE(changed[0] && changed[1]);
-    for (v = 0; v < 2 && (changed[0] || changed[1]); ++v) sigmas[v][k] *= 0.5f;
+    TEST_ASSERT_EQUAL_INT(factors[k] != 0, changed[0] || changed[1]);
+    for (v = 0; v < 2 && factors[k] != 0; ++v) sigmas[v][k] *= (float)factors[k] / 128;
+    if (factors[k] != 0) {
+      least = factors[k] < least ? factors[k] : least;
+      most = factors[k] > most ? factors[k] : most;
+    }
     moved += changed[0] || changed[1];
     ratios[k] = reconstruction.matches[k].ratio;
     if (k > 0) {
@@ -515,6 +524,7 @@ static void test_aligned_matches_are_estimated_from_moved_keypoints(void) {
   }
   TEST_ASSERT_GREATER_THAN_INT(0, twice);
   TEST_ASSERT_GREATER_THAN_INT(n / 3, moved);
+  TEST_ASSERT_GREATER_THAN_INT(3 * least, most);
   for (v = 0; v < 2; ++v) {
     for (k = 0; k < num[v]; ++k) {
       expected += memcmp(&plain[v][k], &aligned[v][k], sizeof plain[v][k]) != 0;

@@ -94,6 +94,5 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   FUZZ_REQUIRE(tv_align_matches(context, &images[0], &images[1], options.keypoint_size,
                                 keypoints_of[0], counts[0], keypoints_of[1], counts[1], matches,
                                 count, aligned) == TV_OK);
-  for (int i = 0; i < count; ++i) FUZZ_REQUIRE(aligned[i] <= 1);
   return 0;
 }

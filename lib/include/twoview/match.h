@@ -141,11 +141,13 @@ TV_API tv_status tv_match_guided(tv_context *context, const tv_camera *camera0,
    num_keypoints0 and num_keypoints1; every field is checked as tv_describe checks it. matches:
    num_matches, as tv_match returns them; where a keypoint is part of several matches, they are
    aligned in their order, and exchanged images may give other positions. aligned: room for
-   num_matches bytes; a byte is 1 where the match was aligned. tv_reconstruct halves the sigmas of
-   both keypoints (tv_keypoint_sigmas) of such a match. Returns TV_ERR_NULL, TV_ERR_ARGUMENT (also
-   an index out of its range), TV_ERR_NOT_FINITE, TV_ERR_LIMITS, TV_ERR_OVERLAP; nothing is written
-   then. The context is one made for TV_PURPOSE_EXTRACT. Time: at most four fits of 64 samples a
-   match. docs/algorithms/match.md, docs/decisions/0026-precision.md. */
+   num_matches bytes; a byte is 0 where the match was not aligned, else the standard deviation of
+   the aligned position over that of its keypoints, in 128ths, 1 to 255: the less the pixels differ
+   after the fit and the more texture they have, the smaller it is. tv_reconstruct multiplies the
+   sigmas of both keypoints (tv_keypoint_sigmas) of such a match by byte / 128. Returns TV_ERR_NULL,
+   TV_ERR_ARGUMENT (also an index out of its range), TV_ERR_NOT_FINITE, TV_ERR_LIMITS,
+   TV_ERR_OVERLAP; nothing is written then. The context is one made for TV_PURPOSE_EXTRACT. Time:
+   at most four fits of 64 samples a match. docs/algorithms/match.md. */
 TV_API tv_status tv_align_matches(tv_context *context, const tv_image *image0,
                                   const tv_image *image1, float size_of_one,
                                   tv_keypoint *keypoints0, int32_t num_keypoints0,

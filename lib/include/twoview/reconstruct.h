@@ -65,11 +65,12 @@ typedef struct tv_reconstruct_options {
   /* 1 (default): before the estimate, one keypoint of each match of tv_match is moved to where the
      8 x 8 samples around it fit best to those around the other keypoint, under an affine map, a
      gain and an offset (least-squares matching; A. W. Gruen, South African Journal of
-     Photogrammetry 14(3), 1985), and the sigmas of sigma_by_size are halved for this match. It is
-     moved by at most 1.2 times its size over keypoint_size, in pixels, or not at all where the
-     samples do not fit. 0, and for a caller whose struct ends before this field: no keypoint is
-     moved. 1 takes 0.7 microseconds a match on a desktop CPU, and lowers the median error of poses
-     by a fifth (docs/decisions/0026-precision.md). */
+     Photogrammetry 14(3), 1985), and the sigmas of sigma_by_size are multiplied for this match
+     by what the fit says of its precision (tv_align_matches). It is moved by at most 1.2 times its
+     size over keypoint_size, in pixels, or not at all where the samples do not fit. 0, and for a
+     caller whose struct ends before this field: no keypoint is moved. 1 takes 0.7 microseconds a
+     match on a desktop CPU, and lowers the median error of poses by a fifth
+     (docs/decisions/0026-precision.md). */
   int32_t align_matches;
   /* Must be 0. */
   int32_t reserved;

@@ -32,8 +32,8 @@ struct Results {
   tv_point* points;
   tv_correspondence* more_matches;  // the matches of tv_match and of guided matching together
   uint8_t* more_inlier_mask;
-  // Of each keypoint of view 0, whether its match was aligned. It lies where `points` lies, and is
-  // valid until there are points.
+  // Of each keypoint of view 0, the byte of tv_align_matches of its match, or 0. It lies where
+  // `points` lies, and is valid until there are points.
   uint8_t* aligned;
   // The cameras of the two views, corrected by the present estimate; set for full poses only.
   tv_camera cameras[2];
@@ -107,8 +107,9 @@ void gather_pixels(Results& r, const tv_correspondence* matches, int32_t num_mat
     if (r.pairs.sigmas0 == nullptr) continue;
     r.sigmas[0][k] = sigmas.of(a);
     r.sigmas[1][k] = sigmas.of(b);
-    if (r.aligned[m.idx0] == 0) continue;
-    for (float* of_view : r.sigmas) of_view[k] *= static_cast<float>(kAlignedSigma);
+    const int factor = r.aligned[m.idx0];
+    if (factor == 0) continue;
+    for (float* of_view : r.sigmas) of_view[k] *= static_cast<float>(factor) / kAlignedOne;
   }
 }
 

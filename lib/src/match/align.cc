@@ -31,6 +31,11 @@ constexpr double kMostReach = 64;  // of a window from its middle, in pixels
 constexpr int32_t kLeastWidth = 16;                // of an image, in pixels: kernels.h
 constexpr int64_t kMostStride = int64_t{1} << 23;  // so that the rows of a window fit 32 bits
 
+// The factor of an aligned match's sigmas is the root of kLeastFactor^2 + (kOfDeviation s)^2, where
+// s is the standard deviation of the shift that the pixels allow, over the size. kLeastFactor is
+// for what both windows share: a surface that is no plane, a rolling shutter.
+constexpr double kLeastFactor = 0.15, kOfDeviation = 3.0;
+
 // The units of the kernels: one grey level of a sample, the constant, and a parameter over the
 // factor of its channel.
 constexpr double kGreyLevel = 127.0 * 127.0 / 1024.0, kOne = 4096;
@@ -124,6 +129,22 @@ void solve(const double factor[kParameters][kParameters], double x[kParameters])
   }
 }
 
+// The trace of the first two rows and columns of the inverse of the normal equations: of the
+// shift's covariance, over the variance of a sample.
+double trace_of_shift(const double factor[kParameters][kParameters]) {
+  double trace = 0;
+  for (int p = 0; p < 2; ++p) {
+    double column[kParameters];  // of the inverse of L
+    for (int r = p; r < kParameters; ++r) {
+      double x = r == p;
+      for (int c = p; c < r; ++c) x -= factor[r][c] * column[c];
+      column[r] = x;
+      trace += x * x * factor[r][r];
+    }
+  }
+  return trace;
+}
+
 // map becomes map (identity + change)^-1. False where that is not near enough to the identity.
 bool compose_inverse(const double change[4], Linear* map) {
   const double a = 1 + change[0], b = change[1], c = change[2], d = 1 + change[3];
@@ -144,13 +165,25 @@ bool is_before(const tv_keypoint& a, const tv_keypoint& b) {
   return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
 
+// What align_keypoints returns. alike: the squared correlation of the windows. Their difference,
+// with gain and offset, has 1 / alike - 1 of the template's variance, and is taken for noise.
+// sample: the distance between samples over the size of a keypoint.
+uint8_t factor_of(const Template& t, double alike, double sample) {
+  constexpr double kLeast = kLeastFactor * kAlignedOne, kMost = 255;
+  const double scale = kOfDeviation * kAlignedOne * kOne * kOfShift * sample;
+  const double noise = alike < 1 ? t.determinant / (t.ones * t.ones) * (1 / alike - 1) : 0;
+  const double variance = 0.5 * noise * trace_of_shift(t.factor);  // of one coordinate
+  const double factor = std::sqrt(kLeast * kLeast + scale * scale * variance);
+  return static_cast<uint8_t>((factor < kMost ? factor : kMost) + 0.5);
+}
+
 }  // namespace
 
-bool align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_image& image1,
-                     double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1) {
+uint8_t align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_image& image1,
+                        double size_of_one, tv_keypoint* keypoint0, tv_keypoint* keypoint1) {
   const bool in_order = is_before(*keypoint0, *keypoint1);
-  if (!in_order && !is_before(*keypoint1, *keypoint0)) return false;
-  if (image0.stride_bytes > kMostStride || image1.stride_bytes > kMostStride) return false;
+  if (!in_order && !is_before(*keypoint1, *keypoint0)) return 0;
+  if (image0.stride_bytes > kMostStride || image1.stride_bytes > kMostStride) return 0;
   const tv_keypoint& fixed = in_order ? *keypoint0 : *keypoint1;
   tv_keypoint& moving = in_order ? *keypoint1 : *keypoint0;
   const tv_image& image = in_order ? image1 : image0;
@@ -159,7 +192,7 @@ bool align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_
   Template t;
   if (!make_template(kernels, in_order ? image0 : image1, static_cast<double>(fixed.x),
                      static_cast<double>(fixed.y), step, &t)) {
-    return false;
+    return 0;
   }
   const double moving_step =
       step * static_cast<double>(moving.size) / static_cast<double>(fixed.size);
@@ -171,7 +204,7 @@ bool align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_
   const double start_x = static_cast<double>(moving.x), start_y = static_cast<double>(moving.y);
   double x = start_x, y = start_y, length = 0, first_alike = 0, alike = 0;
   for (int n = 0; n < kSteps; ++n) {
-    if (!is_inside(image, x, y, map, TVK_WINDOW_SIDE)) return false;
+    if (!is_inside(image, x, y, map, TVK_WINDOW_SIDE)) return 0;
     constexpr double kHalf = 0.5 * (TVK_WINDOW_SIDE - 1);
     const double* m = map.m;
     const int32_t q16[4] = {to_q16(m[0]), to_q16(m[1]), to_q16(m[2]), to_q16(m[3])};
@@ -181,7 +214,7 @@ bool align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_
     const double on_one = sums[0], on_w = sums[1];
     const double shared = on_w * t.ones - on_one * t.w_one;
     const double variance = sums[8] * t.ones - on_one * on_one;
-    if (!(shared > kLeastGain * t.determinant)) return false;
+    if (!(shared > kLeastGain * t.determinant)) return 0;
     const double inverse_gain = t.determinant / shared;
     // The squared correlation of the two windows.
     alike = variance > 0 ? shared * shared / (t.determinant * variance) : 0;
@@ -194,11 +227,11 @@ bool align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_
     for (int p = 0; p < kParameters; ++p) {
       change[p] *= inverse_gain * (p < 2 ? kOfShift : kOfLinear);
     }
-    if (!compose_inverse(change + 2, &map)) return false;
+    if (!compose_inverse(change + 2, &map)) return 0;
     double step_x = map.m[0] * change[0] + map.m[1] * change[1];
     double step_y = map.m[2] * change[0] + map.m[3] * change[1];
     length = std::sqrt(step_x * step_x + step_y * step_y) * inverse_step;
-    if (n < 2 && length > kHopeless[n]) return false;
+    if (n < 2 && length > kHopeless[n]) return 0;
     if (length > kLongestStep) {
       step_x *= kLongestStep / length;
       step_y *= kLongestStep / length;
@@ -210,11 +243,11 @@ bool align_keypoints(const tvk_table& kernels, const tv_image& image0, const tv_
   const double shift_sq = (x - start_x) * (x - start_x) + (y - start_y) * (y - start_y);
   const double most = kMostShift * moving_step;
   if (!(length < kLastStep && shift_sq < most * most && alike > first_alike - kLostSimilarity)) {
-    return false;
+    return 0;
   }
   moving.x = static_cast<float>(x);
   moving.y = static_cast<float>(y);
-  return true;
+  return factor_of(t, alike, step * size_of_one / static_cast<double>(fixed.size));
 }
 
 }  // namespace tv

@@ -14,22 +14,22 @@ CONFIDENCE = 0.9999
 MAX_ITERATIONS = 10000
 # OpenGV's own default; with ten times as many it took longer than all other peers
 OPENGV_MAX_ITERATIONS = 1000
-ALIGNED_SIGMA = 0.5  # of an aligned match over that of its keypoints, as in tv_reconstruct
 
 
 class Matches:
     """The matched points of a pair, with the cameras of both views. relative_sizes: None, or for
-    each view the size of each match's keypoint over that of a keypoint of level 0. aligned: None,
-    or which of the matches tv_align_matches aligned."""
+    each view the size of each match's keypoint over that of a keypoint of level 0. sigma_factors:
+    None, or the factor of each match's sigmas by tv_align_matches."""
 
-    relative_sizes = aligned = None  # of matches that an earlier version saved
+    relative_sizes = sigma_factors = None  # of matches that an earlier version saved
 
     def __init__(self, pixels0, pixels1, cameras, sizes, ratios=None, relative_sizes=None,
-                 aligned=None):
+                 sigma_factors=None):
         self.pixels0 = np.asarray(pixels0, float).reshape(-1, 2)
         self.pixels1 = np.asarray(pixels1, float).reshape(-1, 2)
         self.cameras, self.sizes = cameras, sizes  # each a pair: (K, distortion), (width, height)
-        self.ratios, self.relative_sizes, self.aligned = ratios, relative_sizes, aligned
+        self.ratios, self.relative_sizes = ratios, relative_sizes
+        self.sigma_factors = sigma_factors
         self.rays0 = datasets.undistort(self.pixels0, *cameras[0])
         self.rays1 = datasets.undistort(self.pixels1, *cameras[1])
 
@@ -237,9 +237,9 @@ def estimate(context, matches, options=None, seed_step=0):
     sigmas = (None, None)
     if exponent and matches.relative_sizes is not None:
         sigmas = [context.keypoint_sigmas(sizes, exponent) for sizes in matches.relative_sizes]
-        if matches.aligned is not None:
+        if matches.sigma_factors is not None:
             for of_view in sigmas:
-                of_view[matches.aligned] *= np.float32(ALIGNED_SIGMA)
+                of_view *= matches.sigma_factors
     if seed_step:
         default = context.library.estimate_options(wanted).seed
         wanted["seed"] = default + seed_step

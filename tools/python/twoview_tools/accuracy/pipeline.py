@@ -31,27 +31,27 @@ def match_features(context, grays, features, match_options=None, size_of_one=4.0
     """Matches and aligns as tv_reconstruct does. grays: both images; features: (keypoints,
     descriptors, ms) of each; match_options may hold align_matches of tv_reconstruct_options.
     size_of_one: the size of a keypoint of level 0, the feature option keypoint_size. Returns
-    (the keypoints of both images, an array of dtype CORRESPONDENCE, which matches were aligned,
-    ms)."""
+    (the keypoints of both images, an array of dtype CORRESPONDENCE, the factor that the alignment
+    gives each match's sigmas, ms)."""
     start = time.perf_counter()
     wanted = dict(match_options or {})
     align = context.library.take_align_matches(wanted)
     keypoints = [f[0] for f in features]
     links = context.match(features[0][1], features[1][1], wanted, *keypoints)
-    aligned = np.zeros(len(links), bool)
+    factors = np.ones(len(links), np.float32)
     if align:
-        *keypoints, aligned = context.align_matches(*grays, *keypoints, links, size_of_one)
-    return keypoints, links, aligned, 1e3 * (time.perf_counter() - start)
+        *keypoints, factors = context.align_matches(*grays, *keypoints, links, size_of_one)
+    return keypoints, links, factors, 1e3 * (time.perf_counter() - start)
 
 
-def make_matches(features0, features1, links, cameras, sizes, size_of_one, aligned=None):
-    """The estimators.Matches of two images' (keypoints, ..). size_of_one and aligned: as of
+def make_matches(features0, features1, links, cameras, sizes, size_of_one, factors=None):
+    """The estimators.Matches of two images' (keypoints, ..). size_of_one and factors: as of
     match_features."""
     chosen = [f[0][links[i]] for f, i in ((features0, "idx0"), (features1, "idx1"))]
     pixels = [np.column_stack([k["x"], k["y"]]).astype(float) for k in chosen]
     relative = [(k["size"] / size_of_one).astype(float) for k in chosen]
     return estimators.Matches(*pixels, cameras, sizes, links["ratio"].copy(), relative,
-                              aligned)
+                              factors)
 
 
 def match_pairs(context, data, feature_options=None, match_options=None, features=None):
@@ -66,10 +66,10 @@ def match_pairs(context, data, feature_options=None, match_options=None, feature
     for pair in data.pairs:
         both = features[pair.name0], features[pair.name1]
         grays = [data.gray(n)[0] for n in (pair.name0, pair.name1)]
-        keypoints, links, aligned, match_ms = match_features(context, grays, both, match_options,
+        keypoints, links, factors, match_ms = match_features(context, grays, both, match_options,
                                                              size_of_one)
         matches = make_matches(*zip(keypoints), links, (data.camera(pair, 0), data.camera(pair, 1)),
-                               [gray.shape[::-1] for gray in grays], size_of_one, aligned)
+                               [gray.shape[::-1] for gray in grays], size_of_one, factors)
         found.append((matches, {"extract": both[0][2] + both[1][2], "match": match_ms,
                                 "keypoints": (len(both[0][0]) + len(both[1][0])) / 2}))
     return found

@@ -108,8 +108,10 @@ class Context(twoview.Context):
                              **_keywords(self.library.match_options(options)))
 
     def align_matches(self, gray0, gray1, keypoints0, keypoints1, links, size_of_one):
-        """(keypoints 0, keypoints 1, which matches were aligned) of tv_align_matches."""
-        return twoview.align_matches(self, gray0, gray1, keypoints0, keypoints1, links, size_of_one)
+        """(keypoints 0, keypoints 1, factors of each match's sigmas) of tv_align_matches."""
+        moved0, moved1, _, factors = twoview.align_matches(self, gray0, gray1, keypoints0,
+                                                           keypoints1, links, size_of_one)
+        return moved0, moved1, factors
 
     def keypoint_sigmas(self, relative_sizes, exponent):
         """tv_keypoint_sigmas, from the sizes over that of a keypoint of the full image."""

@@ -100,10 +100,10 @@ class Pictures:
         features, grays, cameras = zip(*(self.view(*image) for image in pair))
         sizes = [gray.shape[::-1] for gray in grays]
         size_of_one = self.library.feature_options(self.options[0]).keypoint_size
-        keypoints, links, aligned, _ = pipeline.match_features(
+        keypoints, links, factors, _ = pipeline.match_features(
             self.context, grays, features, self.options[1], size_of_one)
         matches = pipeline.make_matches(*zip(keypoints), links, cameras, sizes, size_of_one,
-                                        aligned)
+                                        factors)
         R, t, inliers, result = estimators.run_twoview(self.context, matches, self.options[2])
         if result.verdict != twoview.Verdict.REFUSED:
             lenses = [twoview_ctypes.make_camera(K, *size, distortion)
