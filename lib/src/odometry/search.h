@@ -12,7 +12,7 @@ struct PointSearch {
   double radius_px;     // for a point whose place is known exactly
   double max_distance;  // of descriptors, L2
   double ratio;         // of the nearest one's distance to that of the second
-  bool counts;          // the points as visible; not where the pose may still be refused
+  bool counts;          // the points as visible; not where the map must stay as it is
 };
 
 // Sorts the keypoints of a frame into the cells of its grid.

@@ -251,8 +251,8 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, bool anywhere, Fr
     }
     if (!match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);
-    if (!refine_track(odometry, false, frame, fit) || fit->estimate.num_inliers < kLeastRelocated ||
-        fit->estimate.verdict != TV_VERDICT_OK)
+    if (!refine_track(odometry, !anywhere, frame, fit) ||
+        fit->estimate.num_inliers < kLeastRelocated || fit->estimate.verdict != TV_VERDICT_OK)
       continue;
     if (!anywhere && map.keyframes[k].segment == odometry->segment &&
         !is_reachable(*odometry, *frame))
