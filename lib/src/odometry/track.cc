@@ -66,7 +66,8 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
   return true;
 }
 
-// The pose is known to a few pixels: looks for all points once more, near where they must be.
+// The pose is known to a few pixels: looks for all points once more, near where they must be, and
+// counts them as looked for if `counts`.
 bool refine_track(Odometry* odometry, bool counts, Frame* frame, PoseFit* fit) {
   PointSearch search{odometry->local_points,
                      odometry->num_local_points,
@@ -136,7 +137,7 @@ void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
 }
 
-// Of the frames of this segment until a keyframe is confirmed.
+// The segment's frames have this reason until one of its keyframes is confirmed.
 void doubt(Odometry* odometry, uint32_t reason) {
   odometry->doubts = reason;
   odometry->doubtful_segment = odometry->segment;
@@ -234,9 +235,10 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
   return true;
 }
 
-// Looks for the frame in the map, and as a rule only where it may be. True: the frame has its pose,
-// and the keyframe's surroundings are those in which the next frame is looked for.
-bool relocate(Odometry* odometry, int32_t from, int32_t count, bool anywhere, Frame* frame,
+// Looks for the frame in the map. True: the frame has its pose, and the keyframe's surroundings are
+// those in which the next frame is looked for. is_locating: it is a frame of tv_odometry_locate,
+// which may be anywhere, and for which no point counts as looked for.
+bool relocate(Odometry* odometry, int32_t from, int32_t count, bool is_locating, Frame* frame,
               PoseFit* fit) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
@@ -251,10 +253,10 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, bool anywhere, Fr
     }
     if (!match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);
-    if (!refine_track(odometry, !anywhere, frame, fit) ||
+    if (!refine_track(odometry, !is_locating, frame, fit) ||
         fit->estimate.num_inliers < kLeastRelocated || fit->estimate.verdict != TV_VERDICT_OK)
       continue;
-    if (!anywhere && map.keyframes[k].segment == odometry->segment &&
+    if (!is_locating && map.keyframes[k].segment == odometry->segment &&
         !is_reachable(*odometry, *frame))
       continue;
     odometry->reference_id = map.keyframes[k].id;
@@ -401,6 +403,7 @@ bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
   return true;
 }
 
+// Not inlined, and neither is the next one: smaller.
 __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometry_state* state) {
   state->status = odometry.status;
   state->num_frames = odometry.num_frames;
@@ -413,7 +416,7 @@ __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometr
   state->scale_sigma = odometry.scale.sigma;
 }
 
-// That of a frame without a pose.
+// Makes it that of a frame without a pose.
 __attribute__((noinline)) void clear_state(const Frame& frame, tv_odometry_state* state) {
   *state = tv_odometry_state{};
   state->num_keypoints = frame.num;
