@@ -13,6 +13,9 @@
 namespace {
 
 using scene::Kind;
+using tv::Mat3;
+using tv::Vec2;
+using tv::Vec3;
 
 constexpr int kCapMatches = 4000;
 tv_context* context;
@@ -247,6 +250,51 @@ void test_a_direction_that_is_stated_to_be_uncertain_is_low_parallax(void) {
   TEST_ASSERT_GREATER_OR_EQUAL_INT(5, uncertain);
 }
 
+// Posts that stand a period apart in rows along x, and the camera moves along the rows. Puts count
+// matches into pair, from `first` on: each of a post and its image after a step of `periods`.
+void put_posts(int first, int count, double periods, const Mat3& R, tv::Random* random) {
+  const tv::Camera camera = tv::prepare_camera(pair.options.camera[0]);
+  for (int i = first; i < first + count;) {
+    const Vec2 p0 = scene::random_pixel(random, pair.options.camera[0]);
+    Vec3 X;
+    if (!tv::unproject(camera, p0, &X, nullptr)) continue;
+    X *= scene::uniform(random, 4, 10) / X[2];
+    Vec2 p1;
+    if (!tv::project(camera, R * (X - periods * Vec3(1, 0, 0)), &p1, nullptr)) continue;
+    for (int k = 0; k < 2; ++k) {
+      pair.pixels[0][2 * i + k] = p0[k] + 0.3 * scene::normal(random);
+      pair.pixels[1][2 * i + k] = p1[k] + 0.3 * scene::normal(random);
+    }
+    ++i;
+  }
+}
+
+// A step of three quarters of a period looks like one of a quarter the other way, if most posts
+// are matched with the next one. The few that are matched with themselves show it.
+void test_matches_that_ask_for_the_opposite_direction_are_repeated_structure(void) {
+  constexpr int kCopies = 80, kSame = 12;
+  const tv_estimate_options options = defaults(TV_SOLVER_FIVE_POINT);
+  for (int trial = 0; trial < 20; ++trial) {
+    tv::Random random = tv::random_seeded(base_seed + 700 + trial);
+    const Mat3 R = scene::rotation(&random, 0, 0.1);
+    pair.options.camera[0] = pair.options.camera[1] = scene::pinhole();
+    put_posts(0, kCopies, -0.25, R, &random);
+    put_posts(kCopies, kSame, 0.75, R, &random);
+    // The same pose without the posts that are matched with themselves: nothing contradicts it.
+    for (int num : {kCopies, kCopies + kSame}) {
+      const tv_two_view r =
+          estimate(pair.options.camera, pair.pixels[0], pair.pixels[1], nullptr, num, options);
+      TEST_ASSERT_TRUE(Eigen::Map<const Vec3>(r.t).dot(R * Vec3(1, 0, 0)) > 0);
+      TEST_ASSERT_EQUAL_HEX32(num == kCopies ? 0 : TV_REASON_REPEATED_STRUCTURE, r.reasons);
+    }
+    // A few wrong matches of small parallax behind the cameras do not: noise alone can make them.
+    put_posts(kCopies, kSame, 0.3, R, &random);
+    const tv_two_view r = estimate(pair.options.camera, pair.pixels[0], pair.pixels[1], nullptr,
+                                   kCopies + kSame, options);
+    TEST_ASSERT_EQUAL_HEX32(0, r.reasons);
+  }
+}
+
 }  // namespace
 
 void setUp(void) { context = estimator::make_context(kCapMatches); }
@@ -265,5 +313,6 @@ int main(void) {
   RUN_TEST(test_degenerate_points_end_and_give_no_pose);
   RUN_TEST(test_covariance_covers_the_error);
   RUN_TEST(test_a_direction_that_is_stated_to_be_uncertain_is_low_parallax);
+  RUN_TEST(test_matches_that_ask_for_the_opposite_direction_are_repeated_structure);
   return UNITY_END();
 }

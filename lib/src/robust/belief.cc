@@ -15,12 +15,12 @@ struct Part {
 };
 
 // scripts/belief --fit prints these lines.
-constexpr double kBias = 8.932;
-constexpr Part kDisagreement = {1.588, -2.052, TV_REASON_LOW_INLIER_RATIO};
-constexpr Part kNoise = {1.661, 0.329, TV_REASON_LOW_INLIER_RATIO};
-constexpr Part kPlaces = {-2.770, 2.996, TV_REASON_TOO_FEW_MATCHES};
-constexpr Part kRegionShift = {0.493, -7.044, TV_REASON_CROWDED_MATCHES};
-constexpr double kAlternative = 1.960;
+constexpr double kBias = 9.609;
+constexpr Part kDisagreement = {1.528, -1.999, TV_REASON_LOW_INLIER_RATIO};
+constexpr Part kNoise = {1.986, 0.398, TV_REASON_LOW_INLIER_RATIO};
+constexpr Part kPlaces = {-3.085, 2.996, TV_REASON_TOO_FEW_MATCHES};
+constexpr Part kRegionShift = {0.510, -7.044, TV_REASON_CROWDED_MATCHES};
+constexpr double kAlternative = 2.114;
 
 // More places than this are no more evidence: what is wrong with a pose that so many agree on is
 // not that they are few.

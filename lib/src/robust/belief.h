@@ -9,7 +9,7 @@
 namespace tv {
 
 // A pose that is believed ("ok") is wrong with at most this probability.
-inline constexpr double kMostProbabilityWrong = 0.16;
+inline constexpr double kMostProbabilityWrong = 0.18;
 
 struct Belief {
   double probability_wrong;

@@ -272,6 +272,42 @@ void measure_inliers(Fit& f) {
   evidence.agreement = agreement_of(f);
 }
 
+// Whether matches contradict the sign of the direction: they lie on their epipolar lines, but
+// behind the cameras, and the opposite direction puts them in front, with a larger parallax than
+// the inliers'. So it is where a structure repeats itself: of two places that look alike the nearer
+// one is matched more often, and the step that it tells is the rest of the period, the other way.
+// Both groups hold only matches whose depth has a sign by more than twice the threshold.
+bool has_opposite_motion(Fit& f) {
+  constexpr int kFewest = 4, kClearDepth = 2;
+  constexpr double kLeastShare = 0.1, kParallaxRatio = 2;
+  constexpr int kChunk = 64;
+  const Pose& pose = f.out->epipolar.pose;
+  Pose opposite = pose;
+  for (int k = 0; k < 3; ++k) opposite.t[k] = -pose.t[k];
+  const double limit_sq = f.threshold * f.threshold;
+  const int n = f.matches.num_unique();
+  double squares[kChunk], opposite_squares[kChunk];
+  // The parallax of the matches in front is written from the beginning of f.values, that of those
+  // behind from its end.
+  int num_front = 0, first_behind = n;
+  for (int first = 0; first < n; first += kChunk) {
+    const int some = std::min(kChunk, n - first);
+    pose_squares(f.matches.pairs, first, some, pose, kClearDepth * f.threshold, squares);
+    pose_squares(f.matches.pairs, first, some, opposite, kClearDepth * f.threshold,
+                 opposite_squares);
+    for (int k = 0; k < some; ++k) {
+      const bool front = squares[k] <= limit_sq, behind = opposite_squares[k] <= limit_sq;
+      if (front == behind) continue;  // off the epipolar line, or at no clear depth
+      f.values[front ? num_front++ : --first_behind] = pseudo_angle(f, first + k);
+    }
+  }
+  const int num_behind = n - first_behind;
+  if (num_behind < kFewest || num_behind < kLeastShare * num_front) return false;
+  const double behind = nth_smallest(f.values + first_behind, num_behind, (num_behind - 1) / 2);
+  const double front = num_front > 0 ? nth_smallest(f.values, num_front, (num_front - 1) / 2) : 0;
+  return angle_of_pseudo(behind) > kParallaxRatio * angle_of_pseudo(front);
+}
+
 // A second model is searched only among the matches that are farther from the first than kClear
 // thresholds, so that it is no part of the first.
 constexpr double kClear = 3;
@@ -338,6 +374,7 @@ void measure_evidence(Fit& f, Arena& arena) {
   if (f.out->has_t) measure_pose(f);
   if (!f.problem.calibrated || evidence.kind == TV_KIND_DEGENERATE) return;
   evidence.has_second_model = has_second_model(f, arena);
+  evidence.has_opposite_motion = f.out->has_t && has_opposite_motion(f);
   measure_lattices(f, arena);
 }
 

@@ -21,6 +21,7 @@ struct Evidence {
   // Calibrated kinds but the degenerate one. Whether matches far from the pair's model have a model
   // of their own (second_model.h), and how far the points lie as on a lattice (lattice.h).
   bool has_second_model = false;
+  bool has_opposite_motion = false;  // matches agree on the opposite direction (a full pose)
   double lattice_share[2] = {0, 0}, lattice_sigmas[2] = {0, 0};
   // The fields from here on are measured of a full pose (calibrated or planar).
   bool has_alternative = false;  // whether a second motion of the plane fits

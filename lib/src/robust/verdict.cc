@@ -91,7 +91,7 @@ uint32_t reasons_of(const Evidence& e) {
   // A second model is the same scene, matched one period of a lattice off, or a motion of its own.
   // The matches on a lattice cannot show which of these models is the scene; the reason is
   // therefore given even where no second model was found.
-  if (on_a_lattice(e)) {
+  if (on_a_lattice(e) || e.has_opposite_motion) {
     reasons |= TV_REASON_REPEATED_STRUCTURE;
   } else if (e.has_second_model) {
     reasons |= TV_REASON_SECOND_MOTION;

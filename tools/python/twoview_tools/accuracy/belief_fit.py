@@ -18,7 +18,7 @@ ENOUGH_PLACES = 20
 SHIFT_DEG = (0.05, 20.0)
 MOST_WEIGHT = 300
 RIDGE = 1.0  # on coefficients of standardised parts
-MOST_PROBABILITY_WRONG = 0.16  # kMostProbabilityWrong of belief.h
+MOST_PROBABILITY_WRONG = 0.18  # kMostProbabilityWrong of belief.h
 # name: the sign of its coefficient
 PARTS = {"disagreement": 1, "noise": 1, "places": -1, "region_shift": 1, "alternative": 1}
 # Reasons that the verdict has for other evidence than probability_wrong
