@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "odometry/adjust.h"
 #include "odometry/adjust_segment.h"
 #include "odometry/keyframe.h"
 #include "odometry/loop.h"
@@ -213,6 +214,49 @@ extern "C" void setUp(void) { begin(TV_CAMERA_PINHOLE); }
 
 extern "C" void tearDown(void) {}
 
+// A map in metres that has shrunk to nine tenths of itself: nothing in its pictures shows it. What
+// velocities say of the ways between its keyframes does, unless the map has no metre.
+void test_velocities_hold_the_scale_of_a_map_in_metres() {
+  constexpr double kShrunk = 0.9, kWay = 0.5;
+  constexpr int kViews = 8, kSeen = 60;
+  const double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  for (int source : {TV_SCALE_UNIT, TV_SCALE_VELOCITY}) {
+    begin(TV_CAMERA_PINHOLE);
+    tv::Map& map = odometry->map;
+    for (int i = 0; i < kSeen; ++i) {
+      const uint8_t descriptor[TV_DESCRIPTOR_BYTES] = {};
+      const double position[3] = {kShrunk * (0.1 * i - 1), kShrunk * (0.3 * (i % 7) - 1),
+                                  kShrunk * (4 + i % 5)};
+      tv::add_point(&map, position, descriptor, 0);
+    }
+    for (int n = 0; n < kViews; ++n) {
+      const int32_t k = add_keyframe(0, 0, kSeen);
+      tv::MapKeyframe& own = map.keyframes[k];
+      std::copy_n(R, 9, own.cam_from_world.R);
+      own.cam_from_world.t[0] = -kShrunk * kWay * n;
+      own.way_m[0] = kWay;
+      own.way_variance = n == 0 ? 0 : 0.02 * 0.02;
+      tv::MapKeypoint* seen = tv::keypoints_of(map, own);
+      for (int i = 0; i < kSeen; ++i) {
+        const double* X = map.points[i].position;
+        seen[i].x = static_cast<float>(320 + 500 * (X[0] + own.cam_from_world.t[0]) / X[2]);
+        seen[i].y = static_cast<float>(240 + 500 * X[1] / X[2]);
+        tv::observe(&map, k, i, i);
+      }
+    }
+    map.keyframes[4].way_m[0] = 5 * kWay;  // a sensor's error: left out
+    odometry->scale.source = source;
+    tv::adjust_around(odometry, kViews - 1, 20);
+    for (int n = 1; n < kViews; ++n) {
+      const double way = map.keyframes[n - 1].cam_from_world.t[0] -
+                         map.keyframes[n].cam_from_world.t[0];
+      TEST_ASSERT_DOUBLE_WITHIN(1e-3, source == TV_SCALE_UNIT ? kShrunk * kWay : kWay, way);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, (source == TV_SCALE_UNIT ? kShrunk : 1) * 4,
+                              map.points[0].position[2]);
+  }
+}
+
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_frames_keep_their_place_over_many_removals);
@@ -222,5 +266,6 @@ int main() {
   RUN_TEST(test_a_point_that_no_window_has_room_for_is_passed_over);
   RUN_TEST(test_a_map_is_added_in_the_places_of_points_that_are_gone);
   RUN_TEST(test_the_error_of_a_depth_is_that_of_a_distance_in_a_fisheye);
+  RUN_TEST(test_velocities_hold_the_scale_of_a_map_in_metres);
   return UNITY_END();
 }

@@ -9,6 +9,10 @@
 namespace tv {
 namespace {
 
+// A window takes the noise of a corner as one pixel, which is twice what it is; so is then that of
+// the velocities.
+constexpr double kNoise = 2;
+constexpr double kLargestShare = 0.5;  // of a way, by which the map may contradict it
 constexpr float kLeastDepthSigma = 0.002f, kLargestDepthSigma = 1.0f;
 
 size_t count_of(int32_t n) { return static_cast<size_t>(n); }
@@ -17,7 +21,7 @@ tv_window largest_window(const WindowSizes& sizes) {
   tv_window window;
   tv_window_init(&window);
   window.num_cameras = 1;
-  window.num_views = window.num_gravity_priors = sizes.views;
+  window.num_views = window.num_gravity_priors = window.num_distance_priors = sizes.views;
   window.num_points = sizes.points;
   window.num_observations = sizes.observations;
   return window;
@@ -35,6 +39,7 @@ void take_arrays(const WindowSizes& sizes, int32_t max_points, Arena& arena, Map
   window->keypoints = arena_alloc<int32_t>(arena, observations);
   window->planes = arena_alloc<double>(arena, 2 * observations);
   window->gravity = arena_alloc<tv_gravity_prior>(arena, views);
+  window->distances = arena_alloc<tv_distance_prior>(arena, views);
   window->errors = arena_alloc<float>(arena, observations);
 }
 
@@ -98,6 +103,27 @@ void measure_depths(const MapWindow& window, Odometry* odometry) {
   }
 }
 
+// What sensors say of a view: gravity, and in a map in metres the length of the way from the keyframe
+// before, if it is in the window, too. Left out are a way within the velocities' noise, which makes
+// it longer, and one that the map's contradicts: it does not drift so much between two keyframes.
+void add_priors(const Odometry& odometry, int32_t view, MapWindow* window) {
+  tv_window& model = window->model;
+  const int32_t k = window->keyframes[view];
+  const MapKeyframe& own = odometry.map.keyframes[k];
+  if (odometry.is_upright && own.down_sigma_rad > 0) {
+    window->gravity[model.num_gravity_priors++] = {
+        view, 0, {own.down[0], own.down[1], own.down[2]}, own.down_sigma_rad};
+  }
+  if (odometry.scale.source == TV_SCALE_UNIT || !(own.way_variance > 0)) return;
+  const double way = length_of(own.way_m), sigma = kNoise * std::sqrt(own.way_variance);
+  const double way_here = way_between(own.cam_from_world, (&own)[-1].cam_from_world);
+  if (!(way > sigma && std::fabs(way_here - way) < kLargestShare * way)) return;
+  for (int32_t v = 0; v < model.num_views; ++v) {
+    if (window->keyframes[v] != k - 1) continue;
+    window->distances[model.num_distance_priors++] = {v, view, way, sigma};
+  }
+}
+
 }  // namespace
 
 size_t map_window_bytes(const tv_odometry_options& options, const WindowSizes& sizes) {
@@ -139,18 +165,12 @@ void add_observations(const Odometry& odometry, MapWindow* window) {
 }
 
 bool adjust_map_window(const Odometry& odometry, MapWindow* window, Arena& arena) {
-  const Map& map = odometry.map;
   tv_window& model = window->model;
-  for (int32_t v = 0; v < model.num_views && odometry.is_upright; ++v) {
-    const MapKeyframe& view = map.keyframes[window->keyframes[v]];
-    if (window->views[v].fixed != 0 || view.down_sigma_rad == 0) continue;
-    tv_gravity_prior* down = &window->gravity[model.num_gravity_priors++];
-    *down = tv_gravity_prior{};
-    down->idx_view = v;
-    std::copy_n(view.down, 3, down->down);
-    down->sigma_rad = view.down_sigma_rad;
+  for (int32_t v = 0; v < model.num_views; ++v) {
+    if (window->views[v].fixed == 0) add_priors(odometry, v, window);
   }
   model.gravity_priors = window->gravity;
+  model.distance_priors = window->distances;
   model.world_down[1] = 0;
   model.world_down[2] = 1;
   model.num_cameras = 1;

@@ -24,6 +24,7 @@ struct MapWindow {
   int32_t* keypoints;         // of each observation
   double* planes;             // two of each observation, as adjust_window takes them
   tv_gravity_prior* gravity;  // room for one of each view
+  tv_distance_prior* distances;
   float* errors;              // of each observation, in pixels, after the adjustment
   double* covariances;        // 36 of each view, or null
   int32_t max_iterations;     // of the adjustment
