@@ -22,7 +22,7 @@ constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 8;
 // With fewer inliers a loop of the same segment, or between upright ones, needs another one of the
 // last frames that agrees with it, and most of the matches.
 constexpr int32_t kLeastWeakInliers = 24, kMostFramesBetween = 15;
-constexpr double kWeakShare = 0.75, kWeakWay = 0.03, kWeakTurn = 0.015;  // median depths, radians
+constexpr double kWeakShare = 0.67, kWeakWay = 0.03, kWeakTurn = 0.015;  // median depths, radians
 constexpr double kLeastWeakPath = 4;                                     // median depths
 // A correction larger than this, in median depths or radians, needs another loop that agrees, too.
 constexpr double kGrossWay = 0.1, kGrossTurn = 0.05;
