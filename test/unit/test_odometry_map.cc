@@ -208,12 +208,6 @@ void test_the_error_of_a_depth_is_that_of_a_distance_in_a_fisheye() {
                             tv::depth_error_px(*odometry, point, centre, ahead));
 }
 
-}  // namespace
-
-extern "C" void setUp(void) { begin(TV_CAMERA_PINHOLE); }
-
-extern "C" void tearDown(void) {}
-
 // A map in metres that has shrunk to nine tenths of itself: nothing in its pictures shows it. What
 // velocities say of the ways between its keyframes does, unless the map has no metre.
 void test_velocities_hold_the_scale_of_a_map_in_metres() {
@@ -248,14 +242,20 @@ void test_velocities_hold_the_scale_of_a_map_in_metres() {
     odometry->scale.source = source;
     tv::adjust_around(odometry, kViews - 1, 20);
     for (int n = 1; n < kViews; ++n) {
-      const double way = map.keyframes[n - 1].cam_from_world.t[0] -
-                         map.keyframes[n].cam_from_world.t[0];
+      const double way =
+          map.keyframes[n - 1].cam_from_world.t[0] - map.keyframes[n].cam_from_world.t[0];
       TEST_ASSERT_DOUBLE_WITHIN(1e-3, source == TV_SCALE_UNIT ? kShrunk * kWay : kWay, way);
     }
     TEST_ASSERT_DOUBLE_WITHIN(0.02, (source == TV_SCALE_UNIT ? kShrunk : 1) * 4,
                               map.points[0].position[2]);
   }
 }
+
+}  // namespace
+
+extern "C" void setUp(void) { begin(TV_CAMERA_PINHOLE); }
+
+extern "C" void tearDown(void) {}
 
 int main() {
   UNITY_BEGIN();

@@ -117,8 +117,8 @@ typedef enum tv_reason {
   TV_REASON_CROWDED_MATCHES = 1 << 7,
   /* The matched pixels of both images lie on a regular lattice, and either most inliers do, too, or
      a second model fits the other matches: the pose may be wrong by one period of a repeated
-     structure. Or at least 4 matches, and a tenth as many as the inliers, agree on the opposite
-     direction, with more than twice the parallax of the inliers. tv_reconstruct gives it, too,
+     structure. Or matches agree on the opposite direction, at least 4 and a tenth as many as the
+     inliers of a clear depth, with more than twice their parallax. tv_reconstruct gives it, too,
      where most inliers have a second place that looks the same. */
   TV_REASON_REPEATED_STRUCTURE = 1 << 8
 } tv_reason;

@@ -103,9 +103,10 @@ void measure_depths(const MapWindow& window, Odometry* odometry) {
   }
 }
 
-// What sensors say of a view: gravity, and in a map in metres the length of the way from the keyframe
-// before, if it is in the window, too. Left out are a way within the velocities' noise, which makes
-// it longer, and one that the map's contradicts: it does not drift so much between two keyframes.
+// What sensors say of a view: gravity, and in a map in metres the length of the way from the
+// keyframe before, if it is in the window, too. Left out are a way within the velocities' noise,
+// which makes it longer, and one that the map's contradicts: it does not drift so much between two
+// keyframes.
 void add_priors(const Odometry& odometry, int32_t view, MapWindow* window) {
   tv_window& model = window->model;
   const int32_t k = window->keyframes[view];
@@ -114,7 +115,10 @@ void add_priors(const Odometry& odometry, int32_t view, MapWindow* window) {
     window->gravity[model.num_gravity_priors++] = {
         view, 0, {own.down[0], own.down[1], own.down[2]}, own.down_sigma_rad};
   }
-  if (odometry.scale.source == TV_SCALE_UNIT || !(own.way_variance > 0)) return;
+  if (odometry.scale.source == TV_SCALE_UNIT || own.segment != odometry.segment || k == 0 ||
+      !(own.way_variance > 0)) {
+    return;
+  }
   const double way = length_of(own.way_m), sigma = kNoise * std::sqrt(own.way_variance);
   const double way_here = way_between(own.cam_from_world, (&own)[-1].cam_from_world);
   if (!(way > sigma && std::fabs(way_here - way) < kLargestShare * way)) return;

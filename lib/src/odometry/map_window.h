@@ -21,14 +21,14 @@ struct MapWindow {
   int32_t* places;   // of each point in the map
   int32_t* numbers;  // of each place in the map: its point here, or -1
   tv_observation* observations;
-  int32_t* keypoints;         // of each observation
-  double* planes;             // two of each observation, as adjust_window takes them
-  tv_gravity_prior* gravity;  // room for one of each view
-  tv_distance_prior* distances;
-  float* errors;              // of each observation, in pixels, after the adjustment
-  double* covariances;        // 36 of each view, or null
-  int32_t max_iterations;     // of the adjustment
-  double damping;             // of its first step (odometry/window.h)
+  int32_t* keypoints;            // of each observation
+  double* planes;                // two of each observation, as adjust_window takes them
+  tv_gravity_prior* gravity;     // room for one of each view
+  tv_distance_prior* distances;  // as many
+  float* errors;                 // of each observation, in pixels, after the adjustment
+  double* covariances;           // 36 of each view, or null
+  int32_t max_iterations;        // of the adjustment
+  double damping;                // of its first step (odometry/window.h)
   tv_window_result result;
 };
 

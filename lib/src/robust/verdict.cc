@@ -90,7 +90,8 @@ uint32_t reasons_of(const Evidence& e) {
   if (e.kind == TV_KIND_NO_MOTION) reasons |= TV_REASON_NO_MOTION;
   // A second model is the same scene, matched one period of a lattice off, or a motion of its own.
   // The matches on a lattice cannot show which of these models is the scene; the reason is
-  // therefore given even where no second model was found.
+  // therefore given even where no second model was found. Matches that agree on the opposite
+  // direction are the rest of a period, too.
   if (on_a_lattice(e) || e.has_opposite_motion) {
     reasons |= TV_REASON_REPEATED_STRUCTURE;
   } else if (e.has_second_model) {
