@@ -484,16 +484,17 @@ void test_few_points_join_upright_segments_only_twice() {
   // Within a segment, after a long path.
   TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 7.9, 30, 40, end));
   TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 7.9, 30, 40, end));
-  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 8, 30, 44, end));
-  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 8, 30, 45, end));
-  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 8, 30, 44, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 8, 30, 40, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 8, 30, 41, end));
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 8, 30, 40, end));
   odometry->segment = 1;
   odometry->weak_loop.frame = -1;
   TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 40, end));
   TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 40, end));
   odometry->is_upright = true;
-  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 40, end));
-  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 0, 30, 40, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 44, end));
+  TEST_ASSERT_FALSE(tv::is_believed(odometry, frame, 0, 30, 45, end));
+  TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 0, 30, 44, end));
 }
 
 }  // namespace

@@ -22,8 +22,9 @@ constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 8;
 // With fewer inliers a loop of the same segment, or between upright ones, needs another one of the
 // last frames that agrees with it, and most of the matches.
 constexpr int32_t kLeastWeakInliers = 24, kMostFramesBetween = 15;
-constexpr double kWeakShare = 0.67, kWeakWay = 0.03, kWeakTurn = 0.015;  // median depths, radians
-constexpr double kLeastWeakPath = 4;                                     // median depths
+constexpr double kWeakShare = 0.75, kJoinShare = 0.67;  // within a segment, between two
+constexpr double kWeakWay = 0.03, kWeakTurn = 0.015;    // median depths, radians
+constexpr double kLeastWeakPath = 4;                    // median depths
 // A correction larger than this, in median depths or radians, needs another loop that agrees, too.
 constexpr double kGrossWay = 0.1, kGrossTurn = 0.05;
 
@@ -118,7 +119,7 @@ bool is_believed(Odometry* odometry, const Frame& frame, double path, int32_t nu
   if (num_inliers >= kLeastInliers) {
     const double way = way_between(frame.cam_from_world, end.cam_from_world);
     if (!within || (way <= kGrossWay * depth && turn <= kGrossTurn)) return true;
-  } else if (num_inliers < kWeakShare * num_matches ||
+  } else if (num_inliers < (within ? kWeakShare : kJoinShare) * num_matches ||
              !(within ? path >= kLeastWeakPath * depth : odometry->is_upright)) {
     return false;
   }
