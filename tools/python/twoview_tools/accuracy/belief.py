@@ -295,7 +295,7 @@ def run(names, num_pairs, num_others, seed=1, jobs=1, library=None, options=({},
 
 # ---- the command ---------------------------------------------------------------------------------
 
-def _read_rows(path):
+def read_rows(path):
     with open(path, encoding="utf-8") as file:
         return [json.loads(line) for line in file]
 
@@ -336,7 +336,7 @@ def main(argv=None):
                             help=f"fields of tv_{stage}_options other than the defaults")
     arguments = parser.parse_args(argv)
     if arguments.read:
-        rows = _read_rows(arguments.read)
+        rows = read_rows(arguments.read)
     else:
         have = truth.posed_sets()
         names = arguments.sets.split(",") if arguments.sets else have
