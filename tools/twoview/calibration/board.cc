@@ -36,6 +36,8 @@ constexpr double kMinMoveShare = 0.015;
 constexpr double kLargerBoardShare = 0.4;
 // The wall-clock limit is this many times the CPU limit, for a busy machine.
 constexpr int kWallPerCpu = 8;
+// CPU limit of the quick search. It finds a board in 2 to 30 ms, or it may search for 4 s.
+constexpr int kQuickSeconds = 1;
 
 double longer_side(cv::Size size) { return std::max(size.width, size.height); }
 
@@ -192,34 +194,31 @@ void look_for_any_board(const cv::Mat& small, cv::Size inner, Found& found) {
   found.reason = holds_ours ? Reason::kOtherBoard : Reason::kPartialBoard;
 }
 
-// OpenCV's fast check rejects most images without a board. Without it, OpenCV 4.6 takes 3 s to
-// reject a board of another size in a 640x480 image.
+// OpenCV's fast check rejects most images without a board. In a 640x480 image with a larger board,
+// OpenCV 4.6 takes 4 s to reject it.
 bool quick_search(const cv::Mat& small, cv::Size inner, Corners& corners) {
   return cv::findChessboardCorners(
       small, inner, corners,
       cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
 }
 
-// Searches with findChessboardCornersSB, which is slower and tolerates more noise and blur.
+// Searches with findChessboardCornersSB, which takes 0.1 s in a 640x480 image and tolerates more
+// noise and blur.
 bool thorough_search(const cv::Mat& small, cv::Size inner, Corners& corners) {
   return cv::findChessboardCornersSB(small, inner, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
 }
 
-Found search(const cv::Mat& luma, cv::Size inner, cv::Size likely_other, Corners& corners) {
+enum class Search { kQuick, kThorough };
+
+Found search(const cv::Mat& luma, cv::Size inner, Search how, Corners& corners) {
   Found found;
   double scale = 1;
   const cv::Mat small = shrunk(luma, kSearchSide, scale);
-  const bool may_be_other = likely_other.area() > 0;
-  bool is_whole = may_be_other && thorough_search(small, inner, corners);
-  if (may_be_other && !is_whole) {
-    Found instead;
-    look_for_any_board(small, inner, instead);
-    if (cv::Size(instead.seen_width, instead.seen_height) == likely_other) return instead;
-  }
-  is_whole =
-      is_whole || quick_search(small, inner, corners) || thorough_search(small, inner, corners);
+  const bool is_whole = how == Search::kQuick ? quick_search(small, inner, corners)
+                                              : thorough_search(small, inner, corners);
   if (!is_whole || corners.size() != static_cast<size_t>(inner.area())) {
     corners.clear();
+    if (how == Search::kQuick) return found;
     if (is_dark(small)) found.reason = Reason::kTooDark;
     look_for_any_board(small, inner, found);
     return found;
@@ -254,8 +253,8 @@ bool write_all(int file, const void* data, size_t size) {
   return true;
 }
 
-[[noreturn]] void search_as_child(int to_parent, const cv::Mat& luma, cv::Size inner,
-                                  cv::Size likely_other, int limit_seconds) {
+[[noreturn]] void search_as_child(int to_parent, const cv::Mat& luma, cv::Size inner, Search how,
+                                  int limit_seconds) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the kernel kills this child if the parent ends
   const rlim_t seconds = static_cast<rlim_t>(limit_seconds);
   const rlimit limit{seconds, seconds + 1}, no_core{0, 0};
@@ -265,7 +264,7 @@ bool write_all(int file, const void* data, size_t size) {
   Corners corners;
   Found found;
   try {
-    found = search(luma, inner, likely_other, corners);
+    found = search(luma, inner, how, corners);
   } catch (const std::exception&) {  // thrown by OpenCV for an image of a few pixels
     found = Found{};
     corners.clear();
@@ -295,7 +294,7 @@ std::string read_until(int from_child, std::chrono::steady_clock::time_point end
 }
 
 // Returns false when the search was ended by its time limit or crashed.
-bool search_in_child(const cv::Mat& luma, cv::Size inner, cv::Size likely_other, int limit_seconds,
+bool search_in_child(const cv::Mat& luma, cv::Size inner, Search how, int limit_seconds,
                      Found& found, Corners& corners) {
   int pipe_ends[2];
   if (::pipe(pipe_ends) != 0) throw BadInput("no pipe: " + std::string(std::strerror(errno)));
@@ -303,7 +302,7 @@ bool search_in_child(const cv::Mat& luma, cv::Size inner, cv::Size likely_other,
   if (child < 0) throw BadInput("no process: " + std::string(std::strerror(errno)));
   if (child == 0) {
     ::close(pipe_ends[0]);
-    search_as_child(pipe_ends[1], luma, inner, likely_other, limit_seconds);
+    search_as_child(pipe_ends[1], luma, inner, how, limit_seconds);
   }
   ::close(pipe_ends[1]);
   const std::string bytes =
@@ -353,13 +352,19 @@ const char* reason_words(Reason reason) {
 }
 
 BoardView find_board(const cv::Mat& luma, const std::string& name, cv::Size inner,
-                     cv::Size likely_other, int limit_seconds) {
+                     bool is_other_likely, int limit_seconds) {
   BoardView view;
   view.name = name;
   view.thumbnail = shrunk(luma, kThumbnailSide, view.thumbnail_scale).clone();
-  Found found;
-  if (!search_in_child(luma, inner, likely_other, limit_seconds, found, view.corners)) {
+  const auto find = [&](Search how, int seconds, Found& found) {
+    if (search_in_child(luma, inner, how, seconds, found, view.corners)) return true;
     view.corners.clear();
+    return false;
+  };
+  Found found;
+  const bool is_found = !is_other_likely && find(Search::kQuick, kQuickSeconds, found) &&
+                        found.reason != Reason::kNoBoard;
+  if (!is_found && !find(Search::kThorough, limit_seconds, found)) {
     view.reason = Reason::kTimeLimit;
     view.detail = std::to_string(limit_seconds) + " s";
     return view;

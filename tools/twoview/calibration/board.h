@@ -40,14 +40,14 @@ struct BoardView {
   bool is_used() const { return reason == Reason::kUsed; }
 };
 
-// Searches an 8-bit image for the whole board. The search runs in a process of its own, which is
-// ended after `limit_seconds` of CPU time (or 8 times as long by the clock), since OpenCV can take
-// minutes on a dark image. `likely_other` is the size of another board that may be in the image: if
-// that one is found and not the requested one, the search ends early. An empty size means none. The
-// corners are ordered so that the square at the first corner is dark, if columns plus rows of inner
-// corners are odd.
+// Searches an 8-bit image for the whole board: quickly, then thoroughly. Each search runs in a
+// process of its own, which is ended after a limit of CPU time (or 8 times as long by the clock),
+// since OpenCV can take minutes on a dark image: 1 s for the quick search, `limit_seconds` for the
+// thorough one. Where another board than the requested one is likely, the quick search is left out:
+// it takes long on such an image and cannot say which board that is. The corners are ordered so
+// that the square at the first corner is dark, if columns plus rows of inner corners are odd.
 BoardView find_board(const cv::Mat& luma, const std::string& name, cv::Size inner,
-                     cv::Size likely_other, int limit_seconds);
+                     bool is_other_likely, int limit_seconds);
 
 // Mark views as blurred, duplicate or surplus, in the order of the views.
 void reject_blurred(std::vector<BoardView>& views);

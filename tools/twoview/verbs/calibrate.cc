@@ -130,12 +130,10 @@ void note_larger_board(const std::vector<BoardView>& views, Common& common) {
               board_name(seen) + "?");
 }
 
-// The other board that at least kTellingViews views show while none shows the requested one; an
-// empty size if there is none. It may be the requested board partly hidden, so later views are
-// still searched for both.
-cv::Size likely_other_board(const std::vector<BoardView>& views) {
-  const auto [seen, times] = other_board(views);
-  return count_of(views, Reason::kUsed) == 0 && times >= kTellingViews ? seen : cv::Size();
+// Whether at least kTellingViews views show one other board while none shows the requested one. It
+// may be the requested board partly hidden.
+bool is_other_board_likely(const std::vector<BoardView>& views) {
+  return count_of(views, Reason::kUsed) == 0 && other_board(views).second >= kTellingViews;
 }
 
 std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
@@ -150,7 +148,7 @@ std::vector<BoardView> find_views(Arguments& a, cv::Size& image) {
     if (image.area() > 0 && luma.size() != image)
       throw BadInput("video " + a.video + " changes its frames' size at " + name);
     image = luma.size();
-    views.push_back(find_board(luma, name, a.board.inner, likely_other_board(views), seconds));
+    views.push_back(find_board(luma, name, a.board.inner, is_other_board_likely(views), seconds));
     if (!views.back().is_used() || !live) return true;
     reject_duplicates(views, image);  // of a live source only different views count
     num_found += views.back().is_used();
