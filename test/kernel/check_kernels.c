@@ -703,6 +703,18 @@ static void case_triangulate(trial *t) {
   TEST_ASSERT_EQUAL_INT(expected, *any);
 }
 
+static void case_subtract_products(trial *t) {
+  const int32_t num_rows = pick(t, 1, 20, 10), num_entries = 18 * num_rows * (num_rows + 1);
+  double *entries = OUTPUT(t, double, num_entries), *columns = INPUT(t, double, 18 * num_rows);
+  int32_t *blocks = INPUT(t, int32_t, num_rows), num = 0, k;
+  for (k = 0; k < num_rows; ++k) {
+    if (t->typical || random_int(&t->seed, 0, 2) > 0) blocks[num++] = k;
+  }
+  for (k = 0; k < num_entries; ++k) entries[k] = 2 * random_unit(&t->seed) - 1;
+  for (k = 0; k < 18 * num_rows; ++k) columns[k] = 2 * random_unit(&t->seed) - 1;
+  REPEAT(t, t->set->subtract_products(entries, columns, blocks, num));
+}
+
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {
   trial t;
   memset(&t, 0, sizeof t);

@@ -343,12 +343,13 @@ Eigen::MatrixXd random_matrix(Random* random, int rows, int columns) {
 void expect_solution(const Eigen::MatrixXd& whole, int blocks, Random* random) {
   const int n = 6 * blocks;
   const Eigen::VectorXd b = random_matrix(random, n, 1);
+  const tvk_table* kernels = tvk_select(TV_KERNELS_AUTO);
   tv::Arena measure = tv::measuring_arena();
-  tv::block_matrix(blocks, measure);
+  tv::block_matrix(blocks, kernels, measure);
   memory.resize(measure.used_bytes + 64);
   void* aligned = memory.data() + (64 - reinterpret_cast<uintptr_t>(memory.data()) % 64) % 64;
   tv::Arena arena = tv::arena_over(aligned, measure.used_bytes);
-  const tv::BlockMatrix A = tv::block_matrix(blocks, arena);
+  const tv::BlockMatrix A = tv::block_matrix(blocks, kernels, arena);
   for (int i = 0; i < n; ++i) {
     A.diagonal[i] = whole(i, i);
     const int row = i / 6;  // the blocks of the diagonal are full

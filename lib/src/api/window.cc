@@ -212,7 +212,8 @@ tv_status tv_adjust_window(const tv_window* window, const tv_window_options* opt
   if (tv::outputs_overlap(arrays, 6, 13)) return TV_ERR_OVERLAP;
   tv::Arena arena = tv::arena_over(memory, needed);
   tv_window_result packed{};
-  if (!tv::adjust_window(w, read, {}, arena, covariances, errors_px, &packed)) {
+  if (!tv::adjust_window(w, read, {tvk_select(TV_KERNELS_AUTO)}, arena, covariances, errors_px,
+                         &packed)) {
     return TV_ERR_NOT_FINITE;
   }
   if (result != nullptr) tv::write_sized(packed, result);

@@ -5,25 +5,6 @@
 namespace tv {
 namespace {
 
-Pair both(double x) { return Pair{x, x}; }
-
-// Subtracts Z_a Z_b' for all b of a row of blocks. The three products are added first, so each
-// entry changes once.
-void subtract_row(const BlockMatrix& A, const Columns* Z, const int32_t* blocks, int a) {
-  const double* za = reinterpret_cast<const double*>(Z[a].at);
-  for (int r = 0; r < kBlock; ++r) {
-    const Pair z0 = both(za[r]), z1 = both(za[kBlock + r]), z2 = both(za[2 * kBlock + r]);
-    double* row = block_at(A, blocks[a], 0) + r * row_entries(blocks[a]);
-    for (int b = 0; b <= a; ++b) {
-      Pair* entry = reinterpret_cast<Pair*>(row + kBlock * blocks[b]);
-      const Pair* zb = Z[b].at;
-      entry[0] -= (z0 * zb[0] + z1 * zb[3]) + z2 * zb[6];
-      entry[1] -= (z0 * zb[1] + z1 * zb[4]) + z2 * zb[7];
-      entry[2] -= (z0 * zb[2] + z1 * zb[5]) + z2 * zb[8];
-    }
-  }
-}
-
 // The factor of a block of the diagonal, in place. Returns how many pivots vanished.
 int factorise_block(double* block, int stride, const double* diagonal, double smallest,
                     double* inverses) {
@@ -76,10 +57,11 @@ bool is_zero(const double* block, int stride) {
 
 }  // namespace
 
-BlockMatrix block_matrix(int num_blocks, Arena& arena) {
+BlockMatrix block_matrix(int num_blocks, const tvk_table* kernels, Arena& arena) {
   const size_t blocks = static_cast<size_t>(num_blocks), n = kBlock * blocks;
   BlockMatrix A;
   A.num_blocks = num_blocks;
+  A.kernels = kernels;
   A.entries = arena_alloc<double>(arena, block_entries(num_blocks));
   A.inverses = arena_alloc<double>(arena, n);
   A.diagonal = arena_alloc<double>(arena, n);
@@ -89,7 +71,7 @@ BlockMatrix block_matrix(int num_blocks, Arena& arena) {
 }
 
 void subtract_products(const BlockMatrix& A, const Columns* Z, const int32_t* blocks, int num) {
-  for (int a = 0; a < num; ++a) subtract_row(A, Z, blocks, a);
+  A.kernels->subtract_products(A.entries, reinterpret_cast<const double*>(Z), blocks, num);
 }
 
 int factorise(const BlockMatrix& A, double smallest) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "base/arena.h"
+#include "kernels/kernels.h"
 
 // Put before a loop of three turns, which is then straight code even where the compiler would leave
 // it.
@@ -28,6 +29,7 @@ struct Columns {
 
 struct BlockMatrix {
   int num_blocks;
+  const tvk_table* kernels;
   double* entries;  // the rows of blocks down to the diagonal, one after the other; 16-byte aligned
   double* inverses;  // of the factor's diagonal, or 0 where a pivot vanished
   double* diagonal;  // of A, which decides when a pivot has vanished
@@ -36,7 +38,7 @@ struct BlockMatrix {
 };
 
 // Uninitialised. A smaller num_blocks may be set afterwards.
-BlockMatrix block_matrix(int num_blocks, Arena& arena);
+BlockMatrix block_matrix(int num_blocks, const tvk_table* kernels, Arena& arena);
 
 // How many entries so many rows of blocks have.
 inline size_t block_entries(int num_blocks) {

@@ -186,8 +186,8 @@ bool adjust_map_window(const Odometry& odometry, MapWindow* window, Arena& arena
   tv_window_options_init(&how);
   how.max_iterations = window->max_iterations;
   how.tolerance = 1e-4;
-  return adjust_window(model, how, {window->planes, window->damping}, arena, window->covariances,
-                       window->errors, &window->result);
+  return adjust_window(model, how, {odometry.kernels, window->planes, window->damping}, arena,
+                       window->covariances, window->errors, &window->result);
 }
 
 Rigid pose_of(const MapWindow& window, int32_t view) {

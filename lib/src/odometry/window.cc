@@ -315,7 +315,8 @@ struct Gathering {
 };
 
 // The arrays of a window of which every view is adjusted.
-__attribute__((noinline)) Gathering take_arrays(Arena& arena, Window* window) {
+__attribute__((noinline)) Gathering take_arrays(const tvk_table* kernels, Arena& arena,
+                                                Window* window) {
   const tv_window& given = window->given;
   const size_t views = count_of(given.num_views), points = count_of(given.num_points);
   const size_t observations = count_of(given.num_observations);
@@ -329,7 +330,7 @@ __attribute__((noinline)) Gathering take_arrays(Arena& arena, Window* window) {
   window->position = arena_alloc<double>(arena, 3 * points);
   window->next_position = arena_alloc<double>(arena, 3 * points);
   window->eliminated = arena_alloc<EliminatedPoint>(arena, points);
-  window->system = block_matrix(given.num_views, arena);
+  window->system = block_matrix(given.num_views, kernels, arena);
   window->gradient = arena_alloc<double>(arena, kBlock * views);
   window->step = arena_alloc<double>(arena, kBlock * views);
   Gathering gathering;
@@ -344,7 +345,7 @@ __attribute__((noinline)) Gathering take_arrays(Arena& arena, Window* window) {
 size_t window_scratch_bytes(const tv_window& given) {
   Arena arena = measuring_arena();
   Window window{given, {}};
-  take_arrays(arena, &window);
+  take_arrays(nullptr, arena, &window);
   return arena.used_bytes;
 }
 
@@ -352,7 +353,7 @@ bool adjust_window(const tv_window& given, const tv_window_options& options,
                    const WindowStart& start, Arena& arena, double* covariances, float* errors_px,
                    tv_window_result* result) {
   Window window{given, options};
-  const Gathering gathering = take_arrays(arena, &window);
+  const Gathering gathering = take_arrays(start.kernels, arena, &window);
   for (int v = 0; v < given.num_views; ++v) {
     std::memcpy(window.pose[v].R, given.views[v].R, sizeof window.pose[v].R);
     std::memcpy(window.pose[v].t, given.views[v].t, sizeof window.pose[v].t);
