@@ -20,8 +20,21 @@ static void centre_at(int n, double centre[3]) { /* of room_flight */
   centre[2] = 0.3 * sin(0.05 * n);
 }
 
+/* Shows a picture of the flight; another room is this one upside down. */
+static void show(int n, int is_another_room) {
+  int k;
+  room_flight(n, pixels);
+  for (k = 0; is_another_room && k < ROOM_WIDTH * ROOM_HEIGHT / 2; ++k) {
+    const uint8_t upper = pixels[k];
+    const int below = (ROOM_HEIGHT - 1 - k / ROOM_WIDTH) * ROOM_WIDTH + k % ROOM_WIDTH;
+    pixels[k] = pixels[below], pixels[below] = upper;
+  }
+  frame.time_s = n / 30.0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+}
+
 /* The frame with the camera's true velocity, each component times a factor. */
-static void give(int n, const double factors[3]) {
+static void give_of(int n, const double factors[3], int is_another_room) {
   const double yaw = 0.12 * sin(0.06 * n), c = cos(yaw), s = sin(yaw);
   double here[3], before[3], v[3];
   int k;
@@ -31,10 +44,10 @@ static void give(int n, const double factors[3]) {
   frame.velocity_m_s[1] = factors[1] * v[1];
   frame.velocity_m_s[2] = factors[2] * (s * v[0] + c * v[2]);
   frame.velocity_sigma_m_s = 0.02;
-  room_flight(n, pixels);
-  frame.time_s = n / 30.0;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+  show(n, is_another_room);
 }
+
+static void give(int n, const double factors[3]) { give_of(n, factors, 0); }
 
 static int is_contrary(void) { return (state.reasons & TV_REASON_SECOND_MOTION) != 0; }
 
@@ -135,18 +148,10 @@ static void test_wrong_velocities_are_not_believed_for_ever(void) {
   TEST_ASSERT_TRUE(is_contrary());
 }
 
-/* Without a velocity; another room is this one upside down. */
+/* Without a velocity. */
 static void give_picture(int n, int is_another_room) {
-  int k;
-  room_flight(n, pixels);
-  for (k = 0; is_another_room && k < ROOM_WIDTH * ROOM_HEIGHT / 2; ++k) {
-    const uint8_t upper = pixels[k];
-    const int below = (ROOM_HEIGHT - 1 - k / ROOM_WIDTH) * ROOM_WIDTH + k % ROOM_WIDTH;
-    pixels[k] = pixels[below], pixels[below] = upper;
-  }
   frame.velocity_sigma_m_s = 0;
-  frame.time_s = n / 30.0;
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+  show(n, is_another_room);
 }
 
 static void test_a_gap_in_the_velocities_contradicts_nothing(void) {
@@ -172,6 +177,35 @@ static void test_the_metre_is_known_again_after_another_segment(void) {
   TEST_ASSERT_EQUAL_DOUBLE(sigma, state.scale_sigma);
 }
 
+/* A segment that velocities contradict before it is in metres was wrong from its start. */
+static void test_a_segment_that_never_agreed_is_removed(void) {
+  const int begin = learn(), num_keyframes = state.num_keyframes;
+  tv_odometry_state of_removed;
+  double R[9], t[3];
+  int32_t segment;
+  int n;
+  for (n = begin; state.segment != 1 && n < begin + 30; ++n) give_of(n, REVERSED, 1);
+  TEST_ASSERT_EQUAL_INT(1, state.segment);
+  TEST_ASSERT_TRUE(state.num_keyframes > num_keyframes);
+  of_removed = state;
+  for (; state.status != TV_ODOMETRY_LOST && n < begin + 60; ++n) give_of(n, REVERSED, 1);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_LOST, state.status);
+  TEST_ASSERT_TRUE(is_contrary());
+  TEST_ASSERT_EQUAL_INT(num_keyframes, state.num_keyframes);
+  TEST_ASSERT_EQUAL_INT(
+      TV_ERR_ARGUMENT,
+      tv_odometry_pose_of(odometry, of_removed.reference_id, of_removed.reference_from_cam_R,
+                          of_removed.reference_from_cam_t, R, t, &segment));
+  /* The map from before is found again, and is in metres. */
+  for (; state.status != TV_ODOMETRY_TRACKING && n < begin + 100; ++n) give(n, RIGHT);
+  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  TEST_ASSERT_EQUAL_INT(0, state.segment);
+  TEST_ASSERT_EQUAL_INT(TV_SCALE_VELOCITY, state.scale_source);
+  /* Another segment may begin, and stay. */
+  for (; state.segment != 2 && n < begin + 160; ++n) give_of(n, RIGHT, 1);
+  TEST_ASSERT_EQUAL_INT(2, state.segment);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_right_velocities_give_the_metre);
@@ -181,5 +215,6 @@ int main(void) {
   RUN_TEST(test_wrong_velocities_are_not_believed_for_ever);
   RUN_TEST(test_a_gap_in_the_velocities_contradicts_nothing);
   RUN_TEST(test_the_metre_is_known_again_after_another_segment);
+  RUN_TEST(test_a_segment_that_never_agreed_is_removed);
   return UNITY_END();
 }

@@ -15,9 +15,12 @@ import struct
 import subprocess
 import time
 import unittest
+from pathlib import Path
 
 from cli_support import CliTest, camera_yaml, main, png, program
 
+SHARED = Path(__file__).resolve().parents[2].parent / "shared"
+DATA = Path(os.environ.get("TWOVIEW_DATA") or SHARED / "data")
 WIDTH, HEIGHT, FOCAL, COUNT = 320, 240, 300.0, 20
 SHIFTS = (9, 4, 7, 3, 5)  # pixels a frame, of each wall
 FPS = 25.0
@@ -131,6 +134,22 @@ class OdometryTest(CliTest):
         self.assertEqual(sum(int(row["is_keyframe"]) for row in rows), result["num_keyframes"])
         for key in ("mean", "median", "p99", "max"):
             self.assertGreater(result["time_ms"][key], 0)
+
+    def test_frames_that_were_followed_by_their_turn_are_found_in_the_finished_map(self):
+        sequence = DATA / "seq_tum_fr1_rpy"
+        if not sequence.is_dir():
+            self.skipTest(f"no {sequence}")
+        self.succeed(self.odometry(sequence, "--max-frames", "300", timeout=120))
+        with open(self.out / "frames.csv", newline="") as file:
+            turned = [row for row in csv.DictReader(file) if row["status"] == "rotation"]
+        self.assertGreaterEqual(len(turned), 2, "while they came, the map did not reach them")
+        self.assertEqual({row["pose"] for row in turned}, {"located"})
+        live, _ = poses(self.out / "live.txt")
+        path, _ = poses(self.out / "trajectory.txt")
+        times = [round(float(row["timestamp"]), 9) for row in turned]
+        self.assertEqual(len({tuple(live[t][:3]) for t in times}), 1, "the position was held")
+        self.assertEqual(len({tuple(path[t][:3]) for t in times}), len(times))
+        self.assertLess(self.result()["truth"]["ate_rmse"], 0.03)
 
     def test_the_cloud_has_the_walls(self):
         self.succeed(self.odometry(self.set_folder()))

@@ -144,19 +144,19 @@ void doubt(Odometry* odometry, uint32_t reason) {
 }
 
 // Removes the segment's keyframes that were made since the last confirmed one, and what only they
-// saw. Frames are doubtful until one is confirmed.
+// saw. Frames are doubtful until one is confirmed. Of a segment that is removed as a whole nothing
+// is left but its number, until the frame is found in another one or begins another.
 void remove_unconfirmed(Odometry* odometry) {
   Map& map = odometry->map;
   int32_t last = newest_of(map, odometry->segment, map.num_keyframes);
-  while (map.keyframes[last].id > odometry->confirmed_id) {
+  while (last >= 0 && map.keyframes[last].id > odometry->confirmed_id) {
     const int32_t before = newest_of(map, odometry->segment, last);
-    if (before < 0) break;
     remove_keyframe(&map, last, before);
     last = before;
   }
   remove_lone_points(&map, odometry->scratch);
   doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
-  odometry->reference_id = map.keyframes[last].id;
+  odometry->reference_id = last >= 0 ? map.keyframes[last].id : -1;
 }
 
 // Compares the map's way with that of the velocities. False: the map is wrong here, and what was
@@ -171,7 +171,7 @@ bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) 
   if (odometry->velocity_trust < kLeastTrust || ++odometry->num_contrary < kMostContrary)
     return true;
   odometry->velocity_trust -= odometry->velocity_trust / 4;
-  if (odometry->scale.source == TV_SCALE_UNIT) remove_segment_points(odometry);
+  if (odometry->scale.source == TV_SCALE_UNIT) odometry->confirmed_id = -1;
   remove_unconfirmed(odometry);
   return false;
 }

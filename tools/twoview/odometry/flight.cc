@@ -198,9 +198,10 @@ void Flight::finish(const std::atomic<bool>& stop) {
     if (frame.reference_id < 0) continue;
     double R[9], t[3];
     const Pose& relative = frame.reference_from_cam;
-    check(tv_odometry_pose_of(odometry_, frame.reference_id, relative.R.data(), relative.t.data(),
-                              R, t, &frame.segment),
-          "frame " + frame.name);
+    const tv_status status = tv_odometry_pose_of(odometry_, frame.reference_id, relative.R.data(),
+                                                 relative.t.data(), R, t, &frame.segment);
+    if (status == TV_ERR_ARGUMENT) continue;  // its segment was wrong, and was removed
+    check(status, "frame " + frame.name);
     frame.pose = pose_of(R, t);
     frame.origin = PoseOrigin::kTracked;
   }
@@ -218,8 +219,11 @@ void Flight::finish(const std::atomic<bool>& stop) {
     frame.pose = pose_of(key.keyframe.world_from_cam_R, key.keyframe.world_from_cam_t);
   }
   if (!source_.can_run_again() || keyframes.empty()) return;
-  for (FlightFrame& frame : frames_)
-    if (frame.origin == PoseOrigin::kNone && !frame.unreadable) missing[frame.index] = &frame;
+  // A frame that was followed by its turn alone has the position of the frame before it.
+  for (FlightFrame& frame : frames_) {
+    const bool is_known = frame.origin != PoseOrigin::kNone && frame.status != TV_ODOMETRY_ROTATION;
+    if (!is_known && !frame.unreadable) missing[frame.index] = &frame;
+  }
   int last = missing.empty() ? -1 : missing.rbegin()->first;
   if (!without_picture.empty()) last = std::max(last, without_picture.rbegin()->first);
   if (last < 0) return;
@@ -256,6 +260,7 @@ void Flight::locate(SourceFrame frame, FlightFrame& record, int32_t near_id) {
   check(tv_odometry_locate(odometry_, &image, near_id, &state), "frame " + frame.name);
   // A weak pose that nothing before or after confirms is not written as known.
   if (state.status != TV_ODOMETRY_TRACKING || !state.has_pose) return;
+  if (record.origin != PoseOrigin::kNone && state.segment != record.segment) return;
   record.origin = PoseOrigin::kLocated;
   record.segment = state.segment;
   record.pose = pose_of(state.world_from_cam_R, state.world_from_cam_t);
