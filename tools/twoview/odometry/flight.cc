@@ -7,6 +7,7 @@
 #include <cstring>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
 
 #include "base/error.h"
 #include "files/camera_formats.h"
@@ -50,6 +51,12 @@ Pose pose_of(const double R[9], const double t[3]) {
 }
 
 }  // namespace
+
+int count_segments(const std::vector<FlightKeyframe>& keyframes) {
+  std::set<int32_t> segments;
+  for (const FlightKeyframe& key : keyframes) segments.insert(key.keyframe.segment);
+  return static_cast<int>(segments.size());
+}
 
 void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes) {
   for (size_t k = 0; k < keyframes.size(); ++k) {

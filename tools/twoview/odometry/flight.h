@@ -56,6 +56,9 @@ struct FlightKeyframe {
 // The keyframes of a map in their order. max_keypoints: the odometry's own.
 std::vector<FlightKeyframe> keyframes_of(const tv_odometry* odometry, int32_t max_keypoints);
 
+// How many segments the keyframes are in: fewer than were begun where some were joined or removed.
+int count_segments(const std::vector<FlightKeyframe>& keyframes);
+
 // Fills the covariances of the keyframes, which are all of the odometry's map in their order. It
 // takes about as long as an adjustment each.
 void add_covariances(tv_odometry* odometry, std::vector<FlightKeyframe>& keyframes);

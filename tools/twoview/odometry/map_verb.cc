@@ -113,12 +113,9 @@ class LoadedMap {
   }
 
   nlohmann::ordered_json json() const {
-    int32_t segments = 0;
     size_t observations = 0;
-    for (const FlightKeyframe& key : keyframes_) {
-      segments = std::max(segments, key.keyframe.segment + 1);
+    for (const FlightKeyframe& key : keyframes_)
       observations += static_cast<size_t>(key.keyframe.num_observations);
-    }
     nlohmann::ordered_json json;
     json["image_size"] = {camera_.width, camera_.height};
     json["camera"] = {{"model", camera_.model}, {"fx", camera_.fx}, {"fy", camera_.fy},
@@ -126,7 +123,7 @@ class LoadedMap {
     json["num_keyframes"] = keyframes_.size();
     json["num_points"] = points_.size();
     json["num_observations"] = observations;
-    json["num_segments"] = segments;
+    json["num_segments"] = count_segments(keyframes_);
     json["seconds"] = keyframes_.empty()
                           ? 0.0
                           : keyframes_.back().keyframe.time_s - keyframes_.front().keyframe.time_s;
@@ -152,12 +149,13 @@ class LoadedMap {
 };
 
 void print_info(const nlohmann::ordered_json& json) {
+  const int segments = json["num_segments"].get<int>();
   print(summary_line("camera", "%d x %d, fx %.6g", json["image_size"][0].get<int>(),
                      json["image_size"][1].get<int>(), json["camera"]["fx"].get<double>()) +
-        summary_line("map", "%d keyframes over %.3f s, %d points, %d observations, %d segments",
+        summary_line("map", "%d keyframes over %.3f s, %d points, %d observations, %d segment%s",
                      json["num_keyframes"].get<int>(), json["seconds"].get<double>(),
-                     json["num_points"].get<int>(), json["num_observations"].get<int>(),
-                     json["num_segments"].get<int>()));
+                     json["num_points"].get<int>(), json["num_observations"].get<int>(), segments,
+                     segments == 1 ? "" : "s"));
 }
 
 int map_info(const std::string& path, bool as_json) {

@@ -225,7 +225,7 @@ Json flight_json(const FlightResult& result) {
   json["num_unreadable"] = flight.num_unreadable();
   json["num_keyframes"] = result.keyframes.size();
   json["num_points"] = result.points.size();
-  json["num_segments"] = state.num_segments;
+  json["num_segments"] = count_segments(result.keyframes);
   json["num_relocalisations"] = state.num_relocations;
   json["num_loops"] = state.num_loops;
   json["num_attitudes_ignored"] = num_ignored;

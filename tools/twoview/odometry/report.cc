@@ -225,7 +225,8 @@ std::string cards(const FlightResult& result) {
                           "of " + std::to_string(j["num_frames"].get<int>()), "frames with a pose");
   text += card(std::to_string(j["num_keyframes"].get<int>()), "", "keyframes");
   text += card(std::to_string(j["num_points"].get<int>()), "", "points in the map");
-  text += card(std::to_string(j["num_segments"].get<int>()), "", "segments");
+  const int segments = j["num_segments"].get<int>();
+  text += card(std::to_string(segments), "", segments == 1 ? "segment" : "segments");
   text += card(std::to_string(j["num_relocalisations"].get<int>()), "", "times found again");
   text += card(std::to_string(j["num_loops"].get<int>()), "", "loops closed");
   text += number_card(j["path_length"], "%.4g", is_metric ? "m" : "",
