@@ -14,6 +14,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
 
 #include "base/error.h"
 #include "odometry/assets.h"
@@ -39,6 +40,25 @@ void append(Json& list, const double* v) {
 
 // Where a frame sees the points of the map, by the ids of the points.
 using Sightings = std::map<int32_t, std::pair<float, float>>;
+
+// Writes the frame's position in the last state of the map, and its segment. False without a pose.
+bool position_of(const Flight& flight, const FlightFrame& frame, double t[3], int32_t* segment) {
+  double R[9];
+  return frame.reference_id >= 0 &&
+         tv_odometry_pose_of(flight.odometry(), frame.reference_id,
+                             frame.reference_from_cam.R.data(), frame.reference_from_cam.t.data(),
+                             R, t, segment) == TV_OK;
+}
+
+// The segment of the newest frame that has a pose in the last state of the map, or -1.
+int32_t newest_segment(const Flight& flight) {
+  const std::vector<FlightFrame>& frames = flight.frames();
+  double t[3];
+  int32_t segment = -1;
+  for (size_t k = frames.size(); k > 0; --k)
+    if (position_of(flight, frames[k - 1], t, &segment)) return segment;
+  return -1;
+}
 
 }  // namespace
 
@@ -183,28 +203,22 @@ void LivePage::update(const Flight& flight) {
   json["num_inliers"] = state.num_inliers;
   json["num_keyframes"] = state.num_keyframes;
   json["num_points"] = state.num_points;
-  json["num_segments"] = state.num_segments;
+  std::set<int32_t> segments;
+  for (const tv_map_point& point : points) segments.insert(point.segment);
+  json["num_segments"] = segments.size();
   json["unit"] = state.scale_source != TV_SCALE_UNIT ? "m" : "";
   json["is_upright"] = flight.is_upright();
   json["width"] = flight.picture().cols;
   json["height"] = flight.picture().rows;
   json["tracks"] = s.tracks(flight, points);
-  // The segment that is flown in now, in the last state of the map.
-  const int32_t segment = state.has_pose != 0 ? state.segment : state.num_segments - 1;
+  const int32_t segment = newest_segment(flight);
   Json path = Json::array(), cloud = Json::array(), grey = Json::array();
   const std::vector<FlightFrame>& frames = flight.frames();
   const size_t step = frames.size() / kMaxPath + 1;
   for (size_t k = (frames.size() - 1) % step; k < frames.size(); k += step) {
-    double R[9], t[3];
+    double t[3];
     int32_t own = -1;
-    const FlightFrame& frame = frames[k];
-    const bool is_known =
-        frame.reference_id >= 0 &&
-        tv_odometry_pose_of(flight.odometry(), frame.reference_id,
-                            frame.reference_from_cam.R.data(), frame.reference_from_cam.t.data(), R,
-                            t, &own) == TV_OK &&
-        own == segment;
-    if (is_known) append(path, t);
+    if (position_of(flight, frames[k], t, &own) && own == segment) append(path, t);
   }
   const size_t every = points.size() / kMaxPoints + 1;
   for (size_t k = 0; k < points.size(); k += every) {
