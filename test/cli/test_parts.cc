@@ -582,6 +582,21 @@ void test_the_cloud_has_the_points_whose_rays_meet_at_an_angle() {
   TEST_ASSERT_EQUAL_UINT64(0, cloud_points({}, {}).size());
 }
 
+int segments_of(std::initializer_list<int> of_keyframes) {
+  std::vector<FlightKeyframe> keyframes;
+  for (const int segment : of_keyframes) {
+    keyframes.emplace_back();
+    keyframes.back().keyframe.segment = segment;
+  }
+  return count_segments(keyframes);
+}
+
+// Others may have been begun: joined to one of these, or removed.
+void test_segments_are_counted_that_have_keyframes() {
+  TEST_ASSERT_EQUAL_INT(0, segments_of({}));
+  TEST_ASSERT_EQUAL_INT(2, segments_of({2, 0, 2}));
+}
+
 void test_the_font_gets_letters_that_it_has() {
   TEST_ASSERT_TRUE(plain_is("left_01 (2).png", "left_01 (2).png"));
   TEST_ASSERT_TRUE(plain_is("\u00dcbung-\u015alask\u0142\u00e9\u00df.png", "Ubung-Slaskles.png"));
@@ -623,6 +638,7 @@ int main() {
   RUN_TEST(test_a_written_camera_reads_back_to_the_same_bits);
   RUN_TEST(test_matches_come_with_commas_blanks_and_names);
   RUN_TEST(test_the_cloud_has_the_points_whose_rays_meet_at_an_angle);
+  RUN_TEST(test_segments_are_counted_that_have_keyframes);
   RUN_TEST(test_the_font_gets_letters_that_it_has);
   return UNITY_END();
 }

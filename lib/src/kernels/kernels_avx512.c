@@ -11,7 +11,7 @@
 #define tvk_transfer_squares_avx512 tvk_transfer_squares_avx2
 #define tvk_transfer_sums_avx512 tvk_transfer_sums_avx2
 
-/* A row of a block is six doubles. */
+/* A row of a block is six doubles, which fill no vector of eight. */
 #define tvk_subtract_products_avx512 tvk_subtract_products_avx2
 
 /* These kernels are other sets', which are as fast, or whose difference does not show in the time
