@@ -205,10 +205,11 @@ double mean_error() {
   int num = 0;
   for (int k = 0; k < kViews; ++k) {
     const tv::MapKeypoint* own = tv::keypoints_of(map, map.keyframes[k]);
+    const int32_t* seen = tv::seen_by(map, map.keyframes[k]);
     for (int i = 0; i < map.keyframes[k].num_keypoints; ++i) {
-      if (own[i].point == tv::kNoPoint) continue;
+      if (seen[i] == tv::kNoPoint) continue;
       double x[3];
-      tv::transform(map.keyframes[k].cam_from_world, map.points[own[i].point].position, x);
+      tv::transform(map.keyframes[k].cam_from_world, map.points[seen[i]].position, x);
       sum += hypot(500 * x[0] / x[2] + 320 - static_cast<double>(own[i].x),
                    500 * x[1] / x[2] + 240 - static_cast<double>(own[i].y));
       ++num;

@@ -177,7 +177,7 @@ void test_points_that_wait_are_those_of_one_call() {
   for (int k = 0; k < 5; ++k) {
     TEST_ASSERT_EQUAL_INT(num_points, map.keyframes[k].num_observations);
     for (int n = 0; n < kNum; ++n) {
-      points[k][n] = tv::keypoints_of(map, map.keyframes[k])[n].point;
+      points[k][n] = tv::seen_by(map, map.keyframes[k])[n];
       if (k == 4 && points[k][n] != tv::kNoPoint) {
         TEST_ASSERT_EQUAL_UINT8(n & 255, map.points[points[k][n]].grey);
       }
@@ -194,7 +194,7 @@ void test_points_that_wait_are_those_of_one_call() {
     TEST_ASSERT_EQUAL_INT(4, odometry->next_neighbour);
     for (int k = 0; k < 5; ++k) {
       for (int n = 0; n < kNum; ++n) {
-        TEST_ASSERT_EQUAL_INT(points[k][n], tv::keypoints_of(map, map.keyframes[k])[n].point);
+        TEST_ASSERT_EQUAL_INT(points[k][n], tv::seen_by(map, map.keyframes[k])[n]);
       }
     }
   }

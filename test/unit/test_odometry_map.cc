@@ -183,10 +183,10 @@ void test_a_map_is_added_in_the_places_of_points_that_are_gone() {
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(odometry, bytes, num, &joined));
   TEST_ASSERT_EQUAL_INT(before + 3, map.num_points);
   for (int k = 1; k < 3; ++k) {
-    const tv::MapKeypoint* own = tv::keypoints_of(map, map.keyframes[k]);
+    const int32_t* seen = tv::seen_by(map, map.keyframes[k]);
     for (int32_t i = 0; i < 3; ++i) {
-      TEST_ASSERT_TRUE(map.points[own[i].point].position[0] == 10 + i);
-      TEST_ASSERT_EQUAL_INT(2, map.points[own[i].point].num_observations);
+      TEST_ASSERT_TRUE(map.points[seen[i]].position[0] == 10 + i);
+      TEST_ASSERT_EQUAL_INT(2, map.points[seen[i]].num_observations);
     }
   }
 }
@@ -230,11 +230,11 @@ void test_velocities_hold_the_scale_of_a_map_in_metres() {
       own.cam_from_world.t[0] = -kShrunk * kWay * n;
       own.way_m[0] = kWay;
       own.way_variance = n == 0 ? 0 : 0.02 * 0.02;
-      tv::MapKeypoint* seen = tv::keypoints_of(map, own);
+      tv::MapKeypoint* keypoints = tv::keypoints_of(map, own);
       for (int i = 0; i < kSeen; ++i) {
         const double* X = map.points[i].position;
-        seen[i].x = static_cast<float>(320 + 500 * (X[0] + own.cam_from_world.t[0]) / X[2]);
-        seen[i].y = static_cast<float>(240 + 500 * X[1] / X[2]);
+        keypoints[i].x = static_cast<float>(320 + 500 * (X[0] + own.cam_from_world.t[0]) / X[2]);
+        keypoints[i].y = static_cast<float>(240 + 500 * X[1] / X[2]);
         tv::observe(&map, k, i, i);
       }
     }

@@ -121,10 +121,11 @@ tv_status tv_odometry_observations(const tv_odometry* odometry, int32_t idx,
   int32_t* ranks;
   tv::points_in_order(*odometry, &ranks);
   const tv::MapKeypoint* own = tv::keypoints_of(map, keyframe);
+  const int32_t* seen = tv::seen_by(map, keyframe);
   for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
-    if (own[k].point == tv::kNoPoint) continue;
+    if (seen[k] == tv::kNoPoint) continue;
     *observations++ = {
-        ranks[own[k].point], k, own[k].x, own[k].y, static_cast<float>(tv::sigma_of(own[k])), 0};
+        ranks[seen[k]], k, own[k].x, own[k].y, static_cast<float>(tv::sigma_of(own[k])), 0};
   }
   return TV_OK;
 }

@@ -1,5 +1,5 @@
-/* The kernel subtract_products of a window's reduced system (odometry/block_cholesky.h): blocks of
-   6x6, each of whose rows is one vector of four and one of two, or three of two. */
+/* Kernels of a window's reduced system (odometry/block_cholesky.h, odometry/window_system.h): blocks
+   of 6x6, each of whose rows is one vector of four and one of two, or three of two. */
 
 #include "kernels/lanes.h"
 
@@ -33,4 +33,61 @@ void TVK_MATCH(subtract_products)(double *entries, const double *columns, const 
       }
     }
   }
+}
+
+/* A row of six numbers: (x cross h, h). */
+typedef struct block_row {
+#if TVK_LANES == 4
+  lanes head;
+  block_pair tail;
+#else
+  block_pair at[3];
+#endif
+} block_row;
+
+static TVK_INLINE block_row row_of(const double *x, const double *h, double numbers[BLOCK_SIDE]) {
+  block_row row;
+  numbers[0] = x[1] * h[2] - x[2] * h[1];
+  numbers[1] = x[2] * h[0] - x[0] * h[2];
+  numbers[2] = x[0] * h[1] - x[1] * h[0];
+  numbers[3] = h[0], numbers[4] = h[1], numbers[5] = h[2];
+#if TVK_LANES == 4
+  row.head = (lanes){numbers[0], numbers[1], numbers[2], numbers[3]};
+  row.tail = (block_pair){numbers[4], numbers[5]};
+#else
+  row.at[0] = (block_pair){numbers[0], numbers[1]};
+  row.at[1] = (block_pair){numbers[2], numbers[3]};
+  row.at[2] = (block_pair){numbers[4], numbers[5]};
+#endif
+  return row;
+}
+
+/* sums += factor0 row0 + factor1 row1 */
+static TVK_INLINE void add_rows(double *sums, double factor0, const block_row *row0, double factor1,
+                                const block_row *row1) {
+#if TVK_LANES == 4
+  lanes_store(sums, lanes_load(sums) + (factor0 * row0->head + factor1 * row1->head));
+  *(block_pair *)(sums + 4) += factor0 * row0->tail + factor1 * row1->tail;
+#else
+  int c;
+  TVK_UNROLL
+  for (c = 0; c < 3; ++c) {
+    *(block_pair *)(sums + 2 * c) += factor0 * row0->at[c] + factor1 * row1->at[c];
+  }
+#endif
+}
+
+void TVK_MATCH(add_view_terms)(const double *part, double *block, int32_t stride, double *gradient,
+                               double *diagonal, double *columns) {
+  const double *x = part, *J = part + 12;
+  double a[BLOCK_SIDE], b[BLOCK_SIDE], g[BLOCK_SIDE];
+  const block_row row0 = row_of(x, part + 3, a), row1 = row_of(x, part + 6, b);
+  int i;
+  row_of(x, part + 9, g);
+  for (i = 0; i < BLOCK_SIDE; ++i) {
+    gradient[i] += g[i];
+    diagonal[i] += a[i] * a[i] + b[i] * b[i];
+    add_rows(block + i * stride, a[i], &row0, b[i], &row1);
+  }
+  for (i = 0; i < 3; ++i) add_rows(columns + BLOCK_SIDE * i, J[i], &row0, J[3 + i], &row1);
 }

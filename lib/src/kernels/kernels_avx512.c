@@ -13,6 +13,7 @@
 
 /* A row of a block is six doubles, which fill no vector of eight. */
 #define tvk_subtract_products_avx512 tvk_subtract_products_avx2
+#define tvk_add_view_terms_avx512 tvk_add_view_terms_avx2
 
 /* These kernels are other sets', which are as fast, or whose difference does not show in the time
    of a pair. */

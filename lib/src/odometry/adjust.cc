@@ -45,9 +45,9 @@ int32_t choose_adjusted(Odometry* odometry, int32_t keyframe, int32_t* shared, i
 void add_points(const Map& map, MapWindow* window) {
   for (int32_t v = window->model.num_views - 1; v >= 0; --v) {
     const MapKeyframe& view = map.keyframes[window->keyframes[v]];
-    const MapKeypoint* own = keypoints_of(map, view);
+    const int32_t* seen = seen_by(map, view);
     for (int32_t i = 0; i < view.num_keypoints; ++i) {
-      const int32_t p = own[i].point;
+      const int32_t p = seen[i];
       if (p == kNoPoint || window->numbers[p] >= 0) continue;
       if (window->model.num_points == window->sizes.points) break;
       add_map_point(map, p, window);

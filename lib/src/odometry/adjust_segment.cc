@@ -49,21 +49,21 @@ void add_shared_points(const Map& map, int32_t num_free, MapWindow* window) {
     for (int32_t v = 0; v < num_free; ++v) {
       if (sees_enough[v]) continue;
       const MapKeyframe& view = map.keyframes[window->keyframes[v]];
-      const MapKeypoint* own = keypoints_of(map, view);
-      int32_t seen = 0;
+      const int32_t* seen = seen_by(map, view);
+      int32_t num_seen = 0;
       for (int32_t i = 0; i < view.num_keypoints; ++i) {
-        seen += own[i].point != kNoPoint && window->numbers[own[i].point] >= 0;
+        num_seen += seen[i] != kNoPoint && window->numbers[seen[i]] >= 0;
       }
-      for (int32_t i = 0; i < view.num_keypoints && seen < wanted; ++i) {
-        const int32_t p = own[i].point;
+      for (int32_t i = 0; i < view.num_keypoints && num_seen < wanted; ++i) {
+        const int32_t p = seen[i];
         if (p == kNoPoint || window->numbers[p] >= 0) continue;
         const int32_t num = map.points[p].num_observations;
         if (num < least || num > left || window->model.num_points == sizes.points) continue;
         add_map_point(map, p, window);
         left -= num;
-        ++seen;
+        ++num_seen;
       }
-      sees_enough[v] = seen >= wanted;
+      sees_enough[v] = num_seen >= wanted;
     }
   }
 }

@@ -102,6 +102,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   const MapKeyframe& k1 = map.keyframes[keyframe1];
   const MapKeypoint* own0 = keypoints_of(map, k0);
   const MapKeypoint* own1 = keypoints_of(map, k1);
+  const int32_t *seen0 = seen_by(map, k0), *seen1 = seen_by(map, k1);
   const size_t n = static_cast<size_t>(num);
   double* pixels0 = arena_alloc<double>(arena, 2 * n);
   double* pixels1 = arena_alloc<double>(arena, 2 * n);
@@ -125,7 +126,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     const tv_point& p = points[k];
     const MapKeypoint& a = own0[keypoints0[k]];
     const MapKeypoint& b = own1[keypoints1[k]];
-    if (a.point != kNoPoint || b.point != kNoPoint) continue;
+    if (seen0[keypoints0[k]] != kNoPoint || seen1[keypoints1[k]] != kNoPoint) continue;
     const double sigma = std::sqrt(0.5 * (sigma_of(a) * sigma_of(a) + sigma_of(b) * sigma_of(b)));
     if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad * sigma ||
         static_cast<double>(p.error_px) > kLargestError * sigma) {
@@ -201,10 +202,11 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
     }
     const MapKeypoint* my_keypoints = keypoints_of(map, own);
     const MapKeypoint* their_keypoints = keypoints_of(map, other);
+    const int32_t *seen = seen_by(map, own), *seen_by_them = seen_by(map, other);
     int32_t num = 0;
     for (int32_t m = 0; m < num_found; ++m) {
       const int32_t a = found[m].idx0, b = found[m].idx1;
-      const int32_t theirs_point = their_keypoints[a].point, point = my_keypoints[b].point;
+      const int32_t theirs_point = seen_by_them[a], point = seen[b];
       if (point == kNoPoint && theirs_point == kNoPoint) {
         keypoints0[num] = a;
         keypoints1[num++] = b;
@@ -252,9 +254,9 @@ int32_t list_points(Odometry* odometry, int32_t keyframe, int32_t* points) {
   int32_t num = 0;
   for (int32_t n = 0; n < num_chosen; ++n) {
     const MapKeyframe& other = map.keyframes[chosen[n]];
-    const MapKeypoint* own = keypoints_of(map, other);
+    const int32_t* seen = seen_by(map, other);
     for (int32_t i = 0; i < other.num_keypoints; ++i) {
-      const int32_t p = own[i].point;
+      const int32_t p = seen[i];
       if (p == kNoPoint || is_marked(map, p)) continue;
       if (num == odometry->max_matched) return num;
       mark_point(&map, p);

@@ -134,16 +134,16 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
   Map& map = odometry->map;
   int32_t* points =
       arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.sizes.max_keypoints));
-  const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
+  const int32_t* seen = seen_by(map, map.keyframes[keyframe]);
   int32_t num = 0, num_known = 0;
   clear_marks(&map);
   for (int32_t k = 0; k < frame.num; ++k) {
     if (frame.points[k] != kNoPoint) mark_point(&map, frame.points[k]);
   }
   for (int32_t i = 0; i < map.keyframes[keyframe].num_keypoints; ++i) {
-    if (own[i].point == kNoPoint) continue;
-    num_known += is_marked(map, own[i].point);
-    points[num++] = own[i].point;
+    if (seen[i] == kNoPoint) continue;
+    num_known += is_marked(map, seen[i]);
+    points[num++] = seen[i];
   }
   if (num < kLeastInliers || 10 * num_known > num) return false;
   again->has_pose = false;
@@ -203,9 +203,9 @@ void fuse_points(Odometry* odometry, int32_t keyframe, const Frame& again) {
   const size_t room = static_cast<size_t>(map.end_points);
   int32_t* instead = arena_alloc<int32_t>(odometry->scratch, room);
   std::fill(instead, instead + room, kNoPoint);
-  const MapKeypoint* own = keypoints_of(map, map.keyframes[keyframe]);
+  const int32_t* own = seen_by(map, map.keyframes[keyframe]);
   for (int32_t i = 0; i < again.num; ++i) {
-    const int32_t old_point = again.points[i], point = own[i].point;
+    const int32_t old_point = again.points[i], point = own[i];
     if (old_point == kNoPoint || old_point == point) continue;
     if (point == kNoPoint)
       observe(&map, keyframe, i, old_point);
@@ -213,9 +213,9 @@ void fuse_points(Odometry* odometry, int32_t keyframe, const Frame& again) {
       instead[point] = old_point;
   }
   for (int32_t k = 0; k < map.num_keyframes; ++k) {
-    MapKeypoint* keypoints = keypoints_of(map, map.keyframes[k]);
+    const int32_t* seen = seen_by(map, map.keyframes[k]);
     for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
-      const int32_t point = keypoints[i].point;
+      const int32_t point = seen[i];
       if (point == kNoPoint || instead[point] == kNoPoint) continue;
       forget_observation(&map, k, i);
       if (instead[instead[point]] == kNoPoint) observe(&map, k, i, instead[point]);
@@ -336,19 +336,20 @@ void copy_keyframe(const Odometry& odometry, int32_t keyframe, Frame* frame) {
   const Map& map = odometry.map;
   const MapKeyframe& from = map.keyframes[keyframe];
   const MapKeypoint* own = keypoints_of(map, from);
+  const int32_t* seen = seen_by(map, from);
   frame->num = from.num_keypoints;
   frame->cam_from_world = from.cam_from_world;
   for (int32_t i = 0; i < frame->num; ++i) {
     frame->keypoints[i] = tv_keypoint{own[i].x, own[i].y, own[i].size, 0, 1, 0};
     frame->sigmas[i] = static_cast<float>(sigma_of(own[i]));
     uint8_t* to = frame->descriptors + static_cast<size_t>(i) * TV_DESCRIPTOR_BYTES;
-    if (own[i].point == kNoPoint)
+    if (seen[i] == kNoPoint)
       std::fill_n(to, TV_DESCRIPTOR_BYTES, uint8_t{0});
     else
-      std::copy_n(descriptor_of(map, own[i].point), TV_DESCRIPTOR_BYTES, to);
+      std::copy_n(descriptor_of(map, seen[i]), TV_DESCRIPTOR_BYTES, to);
   }
   make_grid(odometry, frame);
-  for (int32_t i = 0; i < frame->num; ++i) frame->points[i] = own[i].point;
+  std::copy_n(seen, frame->num, frame->points);
 }
 
 }  // namespace

@@ -72,6 +72,7 @@ void make_map(const MapSizes& sizes, Arena& arena, Map* map) {
   map->sizes = sizes;
   map->keyframes = arena_alloc<MapKeyframe>(arena, as_size(sizes.max_keyframes));
   map->keypoints = arena_alloc<MapKeypoint>(arena, num_map_keypoints(sizes));
+  map->seen = arena_alloc<int32_t>(arena, num_map_keypoints(sizes));
   map->free_rooms = arena_alloc<int32_t>(arena, as_size(sizes.max_keyframes));
   map->points = arena_alloc<MapPoint>(arena, points);
   map->point_descriptors = arena_alloc<uint8_t>(arena, points * TV_DESCRIPTOR_BYTES);
@@ -102,16 +103,16 @@ void clear_map(Map* map) {
 void clear_marks(Map* map) { std::fill_n(map->marks, num_marks(map->sizes), 0u); }
 
 void mark_points_of(Map* map, const MapKeyframe& keyframe) {
-  const MapKeypoint* own = keypoints_of(*map, keyframe);
+  const int32_t* seen = seen_by(*map, keyframe);
   for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
-    if (own[i].point != kNoPoint) mark_point(map, own[i].point);
+    if (seen[i] != kNoPoint) mark_point(map, seen[i]);
   }
 }
 
 int32_t count_marked(const Map& map, const MapKeyframe& keyframe) {
-  const MapKeypoint* own = keypoints_of(map, keyframe);
+  const int32_t* seen = seen_by(map, keyframe);
   int32_t num = 0;
-  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) num += is_marked(map, own[i].point);
+  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) num += is_marked(map, seen[i]);
   return num;
 }
 
@@ -148,8 +149,9 @@ int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* desc
   }
   MapKeypoint* own = keypoints_of(*map, *keyframe);
   for (int32_t k = 0; k < num; ++k) {
-    own[k] = {keypoints[k].x, keypoints[k].y, keypoints[k].size, kNoPoint};
+    own[k] = {keypoints[k].x, keypoints[k].y, keypoints[k].size};
   }
+  std::fill_n(seen_by(*map, *keyframe), num, kNoPoint);
   std::memcpy(descriptors_of(*map, *keyframe), descriptors, as_size(num) * TV_DESCRIPTOR_BYTES);
   std::fill_n(planes_of(*map, *keyframe), 2 * num, __builtin_nan(""));
   return idx;
@@ -175,16 +177,16 @@ int32_t add_point(Map* map, const double position[3], const uint8_t* descriptor,
 }
 
 void observe(Map* map, int32_t keyframe, int32_t keypoint, int32_t point) {
-  keypoints_of(*map, map->keyframes[keyframe])[keypoint].point = point;
+  seen_by(*map, map->keyframes[keyframe])[keypoint] = point;
   ++map->keyframes[keyframe].num_observations;
   ++map->points[point].num_observations;
 }
 
 void forget_observation(Map* map, int32_t keyframe, int32_t keypoint) {
-  MapKeypoint* own = &keypoints_of(*map, map->keyframes[keyframe])[keypoint];
+  int32_t* point = &seen_by(*map, map->keyframes[keyframe])[keypoint];
   --map->keyframes[keyframe].num_observations;
-  --map->points[own->point].num_observations;
-  own->point = kNoPoint;
+  --map->points[*point].num_observations;
+  *point = kNoPoint;
 }
 
 void rank_points(const Map& map, int32_t* places, int32_t* ranks) {
@@ -209,10 +211,17 @@ void rank_points(const Map& map, int32_t* places, int32_t* ranks) {
 }
 
 void remove_points(Map* map, const uint8_t* is_removed) {
-  for (int32_t k = 0; k < map->num_keyframes; ++k) {
-    MapKeypoint* own = keypoints_of(*map, map->keyframes[k]);
+  int32_t num_left = 0;  // observations of them
+  for (int32_t p = 0; p < map->end_points; ++p) {
+    if (is_removed[p] && map->points[p].id >= 0) num_left += map->points[p].num_observations;
+  }
+  // The newest keyframes see most of them.
+  for (int32_t k = map->num_keyframes - 1; k >= 0 && num_left > 0; --k) {
+    const int32_t* seen = seen_by(*map, map->keyframes[k]);
     for (int32_t i = 0; i < map->keyframes[k].num_keypoints; ++i) {
-      if (own[i].point != kNoPoint && is_removed[own[i].point]) forget_observation(map, k, i);
+      if (seen[i] == kNoPoint || !is_removed[seen[i]]) continue;
+      forget_observation(map, k, i);
+      --num_left;
     }
   }
   for (int32_t p = 0; p < map->end_points; ++p) {
@@ -275,9 +284,9 @@ int32_t newest_of(const Map& map, int32_t segment, int32_t end) {
 void remove_keyframe(Map* map, int32_t keyframe, int32_t kept) {
   MapKeyframe* removed = &map->keyframes[keyframe];
   if (kept >= 0) keep_relation(map, *removed, map->keyframes[kept]);
-  MapKeypoint* own = keypoints_of(*map, *removed);
+  const int32_t* seen = seen_by(*map, *removed);
   for (int32_t i = 0; i < removed->num_keypoints; ++i) {
-    if (own[i].point != kNoPoint) forget_observation(map, keyframe, i);
+    if (seen[i] != kNoPoint) forget_observation(map, keyframe, i);
   }
   map->free_rooms[map->num_free_rooms++] = removed->room;
   if (keyframe + 1 < map->num_keyframes) join_ways(*removed, removed + 1);

@@ -17,7 +17,6 @@ inline constexpr float kFinestSize = 4.0f;
 
 struct MapKeypoint {
   float x, y, size;
-  int32_t point;  // its index among the points, or kNoPoint
 };
 
 struct MapKeyframe {
@@ -64,6 +63,7 @@ struct Map {
   MapKeyframe* keyframes;  // in ascending order of id
   int32_t num_keyframes;
   MapKeypoint* keypoints;  // max_keypoints for each room
+  int32_t* seen;           // as many: the index of the point that each keypoint sees, or kNoPoint
   int32_t* free_rooms;
   int32_t num_free_rooms;
   MapPoint* points;
@@ -94,6 +94,13 @@ inline double sigma_of(const MapKeypoint& keypoint) {
 
 inline MapKeypoint* keypoints_of(const Map& map, const MapKeyframe& keyframe) {
   return map.keypoints +
+         static_cast<size_t>(keyframe.room) * static_cast<size_t>(map.sizes.max_keypoints);
+}
+
+// The points that the keypoints of a keyframe see. They lie apart from the rest of the keypoints,
+// because many passes over the whole map read them alone.
+inline int32_t* seen_by(const Map& map, const MapKeyframe& keyframe) {
+  return map.seen +
          static_cast<size_t>(keyframe.room) * static_cast<size_t>(map.sizes.max_keypoints);
 }
 

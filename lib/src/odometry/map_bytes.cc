@@ -104,9 +104,9 @@ void pass_keyframe(Stream* s, MapKeyframe* k) {
   pass(s, &k->time_s, &k->scale);
 }
 
-void pass_keypoint(Stream* s, MapKeypoint* k) {
+void pass_keypoint(Stream* s, MapKeypoint* k, int32_t* seen) {
   pass(s, &k->x, &k->size);
-  pass(s, &k->point, &k->point);
+  pass(s, seen, seen);
 }
 
 void pass_removed(Stream* s, RemovedKeyframe* r) {
@@ -153,9 +153,9 @@ bool is_keyframe(const Header& h, const MapKeyframe& k) {
          is_measure(k.height_m, k.height_sigma_m) && is_scale(k.scale);
 }
 
-bool is_keypoint(const Header& h, const MapKeypoint& k) {
+bool is_keypoint(const Header& h, const MapKeypoint& k, int32_t seen) {
   return std::fabs(k.x) <= kLargestPixel && std::fabs(k.y) <= kLargestPixel && k.size > 0 &&
-         k.size <= kLargestSize && (k.point == kNoPoint || is_index(k.point, h.num_points));
+         k.size <= kLargestSize && (seen == kNoPoint || is_index(seen, h.num_points));
 }
 
 bool is_removed(const Header& h, const RemovedKeyframe& r) {
@@ -208,6 +208,7 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
     last_id = keyframe.id;
     *fits = *fits && keyframe.num_keypoints <= sizes.max_keypoints;
     MapKeypoint* own = nullptr;
+    int32_t* seen = nullptr;
     if (stores) {
       keyframe.room = map->free_rooms[--map->num_free_rooms];
       keyframe.described = -1;
@@ -216,15 +217,17 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
       keyframe.frame += base.frame;
       map->keyframes[map->num_keyframes++] = keyframe;
       own = keypoints_of(*map, keyframe);
+      seen = seen_by(*map, keyframe);
     }
     for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
       MapKeypoint keypoint;
-      pass_keypoint(s, &keypoint);
-      if (s->is_bad || !is_keypoint(h, keypoint)) return false;
+      int32_t point;
+      pass_keypoint(s, &keypoint, &point);
+      if (s->is_bad || !is_keypoint(h, keypoint, point)) return false;
       if (!stores) continue;
       own[k] = keypoint;
-      if (keypoint.point == kNoPoint) continue;
-      observe(map, map->num_keyframes - 1, k, places[keypoint.point]);
+      seen[k] = kNoPoint;
+      if (point != kNoPoint) observe(map, map->num_keyframes - 1, k, places[point]);
     }
   }
   last_id = -1;
@@ -284,11 +287,12 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   for (int32_t n = 0; n < map.num_keyframes; ++n) {
     MapKeyframe keyframe = map.keyframes[n];
     const MapKeypoint* own = keypoints_of(map, keyframe);
+    const int32_t* seen = seen_by(map, keyframe);
     pass_keyframe(&s, &keyframe);
     for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
       MapKeypoint keypoint = own[k];
-      if (keypoint.point != kNoPoint) keypoint.point = ranks[keypoint.point];
-      pass_keypoint(&s, &keypoint);
+      int32_t point = seen[k] == kNoPoint ? kNoPoint : ranks[seen[k]];
+      pass_keypoint(&s, &keypoint, &point);
     }
   }
   for (int32_t n = 0; n < map.num_removed; ++n) {

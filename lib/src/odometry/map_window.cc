@@ -47,14 +47,15 @@ void add_observations_of(const Odometry& odometry, int32_t view, MapWindow* wind
   const Map& map = odometry.map;
   const MapKeyframe& keyframe = map.keyframes[window->keyframes[view]];
   const MapKeypoint* own = keypoints_of(map, keyframe);
+  const int32_t* seen = seen_by(map, keyframe);
   for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
-    if (own[i].point == kNoPoint || window->numbers[own[i].point] < 0) continue;
+    if (seen[i] == kNoPoint || window->numbers[seen[i]] < 0) continue;
     if (window->model.num_observations == window->sizes.observations) return;
     const int32_t n = window->model.num_observations++;
     tv_observation* o = &window->observations[n];
     *o = tv_observation{};
     o->idx_view = view;
-    o->idx_point = window->numbers[own[i].point];
+    o->idx_point = window->numbers[seen[i]];
     o->pixel[0] = static_cast<double>(own[i].x);
     o->pixel[1] = static_cast<double>(own[i].y);
     o->sigma = static_cast<float>(sigma_of(own[i]));

@@ -132,9 +132,8 @@ bool needs_keyframe(const Odometry& odometry, const Frame& frame, int32_t num_in
 // The frame's pose and points are those of the keyframe that was made of it.
 void take_keyframe(const Odometry& odometry, int32_t idx, Frame* frame) {
   const MapKeyframe& keyframe = odometry.map.keyframes[idx];
-  const MapKeypoint* own = keypoints_of(odometry.map, keyframe);
   frame->cam_from_world = keyframe.cam_from_world;
-  for (int32_t k = 0; k < frame->num; ++k) frame->points[k] = own[k].point;
+  std::copy_n(seen_by(odometry.map, keyframe), frame->num, frame->points);
 }
 
 // The segment's frames have this reason until one of its keyframes is confirmed.
@@ -246,10 +245,10 @@ bool relocate(Odometry* odometry, int32_t from, int32_t count, bool is_locating,
       arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.sizes.max_keypoints));
   for (int32_t n = 0; n < count && n < map.num_keyframes; ++n) {
     const int32_t k = (from + map.num_keyframes - n) % map.num_keyframes;
-    const MapKeypoint* own = keypoints_of(map, map.keyframes[k]);
+    const int32_t* seen = seen_by(map, map.keyframes[k]);
     int32_t num = 0;
     for (int32_t i = 0; i < map.keyframes[k].num_keypoints; ++i) {
-      if (own[i].point != kNoPoint) points[num++] = own[i].point;
+      if (seen[i] != kNoPoint) points[num++] = seen[i];
     }
     if (!match_and_fit(odometry, points, num, frame, fit)) continue;
     list_local_points(odometry, k);

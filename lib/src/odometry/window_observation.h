@@ -68,12 +68,14 @@ struct LossCurvature {
   bool averaged;  // instead: all of it, as its mean over all directions
 };
 
-// An observation, linearised. h: d residual / d x, weighed so that h'h is half its Hessian; q: half
-// its gradient by x; Jp: h R, by the point in the world's frame.
+// An observation, linearised, as the kernel add_view_terms takes it. h: d residual / d x, weighed so
+// that h'h is half its Hessian; q: half its gradient by x; Jp: h R, by the point in the world's
+// frame. By the view's (w, v), the derivatives are (x cross h, h).
 struct LinearObservation {
   double x[3];  // the point in the frame of the camera: given
   double h[2][3], q[3], Jp[2][3];
 };
+static_assert(sizeof(LinearObservation) == 18 * sizeof(double), "as kernels.h says");
 
 // Writes h and q. The point is in front of the camera.
 inline void linearise(const tv_window_options& options, const LossCurvature& curvature,
@@ -106,17 +108,6 @@ inline void linearise(const tv_window_options& options, const LossCurvature& cur
     h[0][i] = root * (h[0][i] - r.e[0] * along[i]);
     h[1][i] = root * (h[1][i] - r.e[1] * along[i]);
   }
-}
-
-// The derivative of the residual by (w, v) is (x cross h, h). It is made of pairs, because the CPU
-// cannot load a pair that was just stored as two numbers without delay.
-struct ViewRow {
-  Pair at[kBlockPairs];
-};
-
-inline ViewRow view_row(const double x[3], const double h[3]) {
-  return {{Pair{x[1] * h[2] - x[2] * h[1], x[2] * h[0] - x[0] * h[2]},
-           Pair{x[0] * h[1] - x[1] * h[0], h[0]}, Pair{h[1], h[2]}}};
 }
 
 // A sum of rho. Cauchy's logarithms are taken of products of many arguments, which costs a tenth.

@@ -27,26 +27,6 @@ struct PointSums {
   double V[6], gradient[3];
 };
 
-void add_to_view(const Window& window, int block, const ViewRow rows[2], const ViewRow& gradient) {
-  const int stride = row_entries(block);
-  double* U = block_at(window.system, block, block);
-  Pair* g = reinterpret_cast<Pair*>(window.gradient + kBlock * block);
-  Pair* diagonal = reinterpret_cast<Pair*>(window.system.diagonal + kBlock * block);
-  for (int c = 0; c < kBlockPairs; ++c) {
-    const Pair a = rows[0].at[c], b = rows[1].at[c];
-    g[c] += gradient.at[c];
-    diagonal[c] += a * a + b * b;
-    TV_UNROLL
-    for (int half = 0; half < 2; ++half) {
-      Pair* entry = reinterpret_cast<Pair*>(U + (2 * c + half) * stride);
-      TV_UNROLL
-      for (int k = 0; k < kBlockPairs; ++k) {
-        entry[k] += a[half] * rows[0].at[k] + b[half] * rows[1].at[k];
-      }
-    }
-  }
-}
-
 // Adds an observation to the point's sums; h: its rows by x, for the view's part.
 void add_to_point(const Window& window, const Weighing& weighing, const WindowPose& pose,
                   const WindowObservation& o, const double X[3], PointSums* sums,
@@ -68,16 +48,12 @@ void add_to_point(const Window& window, const Weighing& weighing, const WindowPo
 }
 
 void add_to_slot(const Window& window, const LinearObservation& part, int place, bool same_view) {
-  const ViewRow rows[2] = {view_row(part.x, part.h[0]), view_row(part.x, part.h[1])};
-  add_to_view(window, window.slot_block[place], rows, view_row(part.x, part.q));
-  Pair* W = window.Z[place].at;
-  for (int m = 0; m < 3; ++m) {
-    TV_UNROLL
-    for (int c = 0; c < kBlockPairs; ++c) {
-      const Pair product = part.Jp[0][m] * rows[0].at[c] + part.Jp[1][m] * rows[1].at[c];
-      W[kBlockPairs * m + c] = same_view ? W[kBlockPairs * m + c] + product : product;
-    }
-  }
+  const int block = window.slot_block[place];
+  const BlockMatrix& A = window.system;
+  double* columns = reinterpret_cast<double*>(window.Z[place].at);
+  if (!same_view) std::fill_n(columns, 3 * kBlock, 0.0);
+  A.kernels->add_view_terms(part.x, block_at(A, block, block), row_entries(block),
+                            window.gradient + kBlock * block, A.diagonal + kBlock * block, columns);
 }
 
 // The vector from the first view that sees the point to the point.
