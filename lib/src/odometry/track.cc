@@ -142,6 +142,10 @@ void doubt(Odometry* odometry, uint32_t reason) {
   odometry->doubtful_segment = odometry->segment;
 }
 
+void add_doubts(const Odometry& odometry, tv_odometry_state* state) {
+  if (odometry.doubtful_segment == odometry.segment) state->reasons |= odometry.doubts;
+}
+
 // Removes the segment's keyframes that were made since the last confirmed one, and what only they
 // saw. Frames are doubtful until one is confirmed. Of a segment that is removed as a whole nothing
 // is left but its number, until the frame is found in another one or begins another.
@@ -326,6 +330,9 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
   state->attitude_ignored = !check_attitude(*odometry, frame);
   const double* covariance = fit.estimate.covariance;
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
+  // It was tracked with the map as it was, which a check may confirm now and an adjustment moves
+  // before the next frame.
+  add_doubts(*odometry, state);
   const bool is_due = needs_keyframe(*odometry, *frame, fit.estimate.num_inliers);
   LoopEnd loop;
   const bool found_loop = odometry->num_contrary == 0 && !is_spreading(*odometry) &&
@@ -336,7 +343,7 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
     check_next_pair(odometry);
     if (!heed_check(odometry)) return false;
   }
-  if (odometry->doubtful_segment == odometry->segment) state->reasons |= odometry->doubts;
+  add_doubts(*odometry, state);
   odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   return true;
 }
