@@ -95,32 +95,55 @@ void test_a_keyframe_of_another_segment_says_nothing() {
   TEST_ASSERT_TRUE(reaches(100, 2, 0));
 }
 
-// A loop that turns much is believed only then (odometry/loop.h, is_plausible).
-void test_a_lost_frame_that_is_found_again_is_remembered() {
+// Begins a flight through the room.
+void begin_flight() {
   const tv_camera camera = room_camera();
   tv_odometry_options options;
   tv_odometry_options_init(&options);
   TEST_ASSERT_EQUAL_INT(TV_OK,
                         tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
+}
+
+// Tracks frame n of it, or a grey one in its place.
+tv_odometry_state track(int n, bool is_blank) {
   static uint8_t pixels[ROOM_WIDTH * ROOM_HEIGHT];
-  const tv_image image = {pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH};
+  room_flight(n, pixels);
+  if (is_blank) std::memset(pixels, 99, sizeof pixels);
   tv_odometry_frame frame;
   tv_odometry_frame_init(&frame);
-  frame.image = image;
+  frame.image = {pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH};
+  frame.time_s = n / 30.0;
   tv_odometry_state state;
   tv_odometry_state_init(&state);
-  for (int n = 0; n < 40; ++n) {
-    const bool is_blank = n == 37 || n == 38;
-    room_flight(n, pixels);
-    if (is_blank) std::memset(pixels, 99, sizeof pixels);
-    frame.time_s = n / 30.0;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
+  return state;
+}
+
+// A loop that turns much is believed only then (odometry/loop.h, is_plausible).
+void test_a_lost_frame_that_is_found_again_is_remembered() {
+  begin_flight();
+  for (int n = 0; n < 39; ++n) {
+    track(n, n == 37 || n == 38);
     TEST_ASSERT_FALSE(odometry->is_found_again);
-    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
   }
-  TEST_ASSERT_TRUE(state.relocated);
+  TEST_ASSERT_TRUE(track(39, false).relocated);
   TEST_ASSERT_TRUE(odometry->is_found_again);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
   TEST_ASSERT_FALSE(odometry->is_found_again);
+}
+
+// A frame that a check confirms was tracked before, with the map as it was.
+void test_the_frame_that_ends_a_doubt_is_in_doubt() {
+  begin_flight();
+  int num_ended = 0;
+  for (int n = 0; n < 60; ++n) {
+    const uint32_t doubts = odometry->doubts;
+    const tv_odometry_state state = track(n, false);
+    if (state.status != TV_ODOMETRY_TRACKING && state.status != TV_ODOMETRY_WEAK) continue;
+    TEST_ASSERT_EQUAL_UINT32(doubts, state.reasons & doubts);
+    num_ended += doubts != 0 && odometry->doubts == 0;
+  }
+  TEST_ASSERT_TRUE(num_ended > 0);
 }
 
 }  // namespace
@@ -135,5 +158,6 @@ int main() {
   RUN_TEST(test_the_way_is_not_bounded_without_velocities_or_after_a_gap);
   RUN_TEST(test_a_keyframe_of_another_segment_says_nothing);
   RUN_TEST(test_a_lost_frame_that_is_found_again_is_remembered);
+  RUN_TEST(test_the_frame_that_ends_a_doubt_is_in_doubt);
   return UNITY_END();
 }

@@ -146,6 +146,22 @@ void test_a_residual_is_the_projection_near_its_pixel() {
   }
 }
 
+// What an observation adds to its view: its rows by (w, v) are the columns where J is (1 0 0, 0 1
+// 0).
+struct ViewTerms {
+  double rows[3][6], block[6][6], gradient[6], diagonal[6];
+};
+
+ViewTerms view_terms(tv::LinearObservation part) {
+  ViewTerms terms{};
+  for (int r = 0; r < 2; ++r) {
+    for (int i = 0; i < 3; ++i) part.Jp[r][i] = r == i;
+  }
+  tvk_select(TV_KERNELS_AUTO)
+      ->add_view_terms(part.x, terms.block[0], 6, terms.gradient, terms.diagonal, terms.rows[0]);
+  return terms;
+}
+
 void test_derivatives_of_an_observation_agree_with_differences() {
   Random random(2);
   for (const tv_camera& model : {window_scene::pinhole(), brown(), fisheye()}) {
@@ -192,8 +208,8 @@ void test_derivatives_of_an_observation_agree_with_differences() {
       }
       // By the pose: x -> exp([w]x) x + v.
       tv::linearise(options_of(TV_LOSS_NONE, 1), {0.0, false}, o, &at);
+      const ViewTerms terms = view_terms(at);
       for (int r = 0; r < 2; ++r) {
-        const tv::ViewRow row = tv::view_row(at.x, at.h[r]);
         for (int i = 0; i < 6; ++i) {
           double e_of[2][2];
           for (int side = 0; side < 2; ++side) {
@@ -205,7 +221,18 @@ void test_derivatives_of_an_observation_agree_with_differences() {
             error_sq(o, x, e_of[side]);
           }
           const double difference = (e_of[1][r] - e_of[0][r]) / (2 * kStep);
-          TEST_ASSERT_TRUE(std::fabs(difference - row.at[i / 2][i % 2]) <= 1e-5 * scale * depth);
+          TEST_ASSERT_TRUE(std::fabs(difference - terms.rows[r][i]) <= 1e-5 * scale * depth);
+        }
+      }
+      error_sq(o, at.x, e);
+      for (int i = 0; i < 6; ++i) {
+        const double *a = terms.rows[0], *b = terms.rows[1];
+        const double size = 1e-12 * scale * scale * (1 + depth) * (1 + depth);
+        TEST_ASSERT_DOUBLE_WITHIN(size * (1 + std::sqrt(s)), e[0] * a[i] + e[1] * b[i],
+                                  terms.gradient[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(size, a[i] * a[i] + b[i] * b[i], terms.diagonal[i]);
+        for (int j = 0; j < 6; ++j) {
+          TEST_ASSERT_DOUBLE_WITHIN(size, a[i] * a[j] + b[i] * b[j], terms.block[i][j]);
         }
       }
     }

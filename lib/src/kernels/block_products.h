@@ -1,5 +1,5 @@
-/* Kernels of a window's reduced system (odometry/block_cholesky.h, odometry/window_system.h): blocks
-   of 6x6, each of whose rows is one vector of four and one of two, or three of two. */
+/* Kernels of a window's reduced system (odometry/block_cholesky.h, odometry/window_system.h):
+   blocks of 6x6, each of whose rows is one vector of four and one of two, or three of two. */
 
 #include "kernels/lanes.h"
 

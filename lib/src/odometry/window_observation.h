@@ -68,8 +68,8 @@ struct LossCurvature {
   bool averaged;  // instead: all of it, as its mean over all directions
 };
 
-// An observation, linearised, as the kernel add_view_terms takes it. h: d residual / d x, weighed so
-// that h'h is half its Hessian; q: half its gradient by x; Jp: h R, by the point in the world's
+// An observation, linearised, as the kernel add_view_terms takes it. h: d residual / d x, weighed
+// so that h'h is half its Hessian; q: half its gradient by x; Jp: h R, by the point in the world's
 // frame. By the view's (w, v), the derivatives are (x cross h, h).
 struct LinearObservation {
   double x[3];  // the point in the frame of the camera: given
