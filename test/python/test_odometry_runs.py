@@ -14,8 +14,8 @@ import numpy as np
 
 from twoview_tools import formats
 from twoview_tools.accuracy import datasets
-from twoview_tools.odometry import (cli, endurance, evaluate, faults, flights, mapper, poses, sets,
-                                    surfaces, targets)
+from twoview_tools.odometry import (cli, copies, endurance, evaluate, faults, flights, mapper,
+                                    poses, sets, surfaces, targets)
 
 LIBRARY = os.environ.get("TWOVIEW_LIBRARY", "")
 BUILT = os.path.join(os.path.dirname(os.path.dirname(LIBRARY)), "bin", "twoview_flights")
@@ -130,6 +130,32 @@ class Flights(unittest.TestCase):
         self.assertLess(2 * right, carried(np.eye(3), 0 * t))
         self.assertLess(1.1 * right, carried(R1.T @ R0, -t))
 
+    def test_changed_copies_see_the_same_points(self):
+        def pixels(found, k, world):
+            camera = next(iter(formats.read_camera_set(found.file("cameras.yaml")).values()))
+            truth = found.truth()
+            seen = (world - truth.positions[k]) @ truth.rotations[k]
+            K = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
+            return cv2.projectPoints(seen, np.zeros(3), np.zeros(3), K,
+                                     np.array(datasets.distortion_of(camera)))[0].reshape(-1, 2)
+        world = self.points @ self.truth.rotations[0].T + self.truth.positions[0]
+        moved = {"mirrored": lambda p: [639, 0] + p * [-1, 1],
+                 "upside_down": lambda p: [639, 479] - p,
+                 "half_size": lambda p: (p + 0.5) / 2 - 0.5, "dark": lambda p: p}
+        for kind, expected in moved.items():
+            found = sets.read_set(copies.make(kind, self.folder, self.folder + "+" + kind))
+            for k in range(2):
+                own = world * [-1, 1, 1] if kind == "mirrored" else world
+                away = pixels(found, k, own) - expected(pixels(self.set, k, world))
+                self.assertLess(np.abs(away).max(), 1e-6, kind)
+                now, before = (cv2.imread(os.path.join(s.path, s.names[k]), cv2.IMREAD_GRAYSCALE)
+                               for s in (found, self.set))
+                for x, y in ((100, 51), (400, 300)):
+                    u, v = np.round(expected(np.array([x, y]))).astype(int)
+                    if kind in ("mirrored", "upside_down"):
+                        self.assertEqual(now[v, u], before[y, x], kind)
+            self.assertEqual(found.json("fault.json")["source"], "flight")
+
     def test_the_drones_own_sensors_agree_with_the_truth(self):
         with open(self.set.file("imu.txt"), encoding="ascii") as file:
             lines = [line.split() for line in file if not line.startswith("#")]
@@ -193,6 +219,26 @@ class Faults(Folder):
         seen = (mask[:480] > 0).sum() / (480 * 640)
         self.assertAlmostEqual(seen, faults.PERSON_SHARE, delta=0.03)
         self.assertGreater(grey[mask > 0].std(), 25)  # textured
+
+    def test_copies_keep_the_truth_of_each_picture(self):
+        source = sets.read_set(self.source)
+        true = dict(zip(source.names, source.truth().positions))
+        for kind, count in (("backwards", 60), ("second_half", 30), ("every_second", 30),
+                            ("every_third", 20), ("noisy", 60), ("blurred", 60), ("flicker", 60)):
+            found = sets.read_set(copies.make(kind, self.source, self.path(kind)))
+            self.assertEqual(len(found.times), count)
+            self.assertTrue((np.diff(found.times) > 0).all(), kind)
+            positions = dict(zip(np.round(found.truth().times, 6), found.truth().positions))
+            for time, name in zip(found.times, found.names):
+                path = os.path.join(found.path, name)
+                if os.path.islink(path):
+                    here = true[os.path.relpath(os.path.realpath(path), os.path.realpath(
+                        self.source))]
+                    self.assertLess(np.abs(positions[round(time, 6)] - here).max(), 1e-9, kind)
+        flicker = [self.picture(found, k).mean() / (100 + k) for k in range(60)]
+        self.assertGreater(np.std(flicker), 0.1)
+        with self.assertRaisesRegex(ValueError, "no copy 'fire'"):
+            copies.make("fire", self.source, self.path("x"))
 
     def test_an_unknown_fault_is_refused(self):
         with self.assertRaisesRegex(ValueError, "no fault 'fire'"):

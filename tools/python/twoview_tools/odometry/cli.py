@@ -9,8 +9,8 @@ import sys
 import tempfile
 
 from .. import ROOT
-from . import (endurance, evaluate, faults, flights, instructions, mapper, orbslam, poses, runs,
-               sets, tables, targets, tour)
+from . import (copies, endurance, evaluate, faults, flights, instructions, mapper, orbslam, poses,
+               runs, sets, tables, targets, tour)
 
 FLIGHT_FOLDER = os.path.join(ROOT, ".cache", "flights")
 # The sources that faults are put into: one real and quick, one rendered; and what other_room shows.
@@ -21,6 +21,9 @@ def arguments_of(argv):
     parser = argparse.ArgumentParser(prog="scripts/odometry", description=__doc__)
     parser.add_argument("--sets", help="sets or folders, separated by commas; 'none': no set "
                                        "(default: all sequences of $TWOVIEW_DATA)")
+    parser.add_argument("--copies", nargs="?", const=",".join(copies.KINDS), default="",
+                        metavar="KINDS", help="changed copies of the sets, too: "
+                                              f"{', '.join(copies.KINDS)} (default: all)")
     parser.add_argument("--flights", type=int, default=0, metavar="N",
                         help="render and run the flights of the seeds 0 to N-1 (.cache/flights)")
     parser.add_argument("--half-turns", type=int, default=0, metavar="N",
@@ -59,7 +62,11 @@ def sources_of(arguments, scratch):
     """Yields (kind, label, folder) of everything to run; renders and injects as it goes."""
     if arguments.sets != "none":
         for path in sets.set_paths(arguments.sets):
-            yield "set", os.path.basename(os.path.normpath(path)), path
+            label = os.path.basename(os.path.normpath(path))
+            yield "set", label, path
+            for kind in filter(None, arguments.copies.split(",")):
+                name = f"{label}+{kind}"
+                yield "copy", name, copies.make(kind, path, os.path.join(scratch, "copies", name))
     for seed in range(arguments.flights):
         name = f"flight_{seed:02d}"
         yield "flight", name, flights.render(seed, os.path.join(FLIGHT_FOLDER, name))

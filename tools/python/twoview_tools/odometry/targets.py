@@ -90,7 +90,8 @@ def _flights(runs):
 
 
 def _honesty(runs):
-    for kinds, what in ((("set", "flight"), "sets and flights"), (("fault",), "injected faults")):
+    for kinds, what in ((("set", "flight"), "sets and flights"), (("copy",), "changed copies"),
+                        (("fault",), "injected faults")):
         chosen = [run for run in runs if run["kind"] in kinds and run.get("silent")]
         if not chosen:
             continue
@@ -151,6 +152,6 @@ def _against_peer(runs, peers):
 
 def judge(runs, peers=()):
     """[(True, False or None; sentence)] of the runs (evaluate.evaluate's figures with `label` and
-    `kind` "set", "flight" or "fault") and of a peer's runs over the same sources."""
+    `kind` "set", "copy", "flight" or "fault") and of a peer's runs over the same sources."""
     return [*_sets(runs), *_flights(runs), *_honesty(runs), *_cost(runs),
             *_against_peer(runs, peers)]
