@@ -82,12 +82,20 @@ void TVK_MATCH(add_view_terms)(const double *part, double *block, int32_t stride
   const double *x = part, *J = part + 12;
   double a[BLOCK_SIDE], b[BLOCK_SIDE], g[BLOCK_SIDE];
   const block_row row0 = row_of(x, part + 3, a), row1 = row_of(x, part + 6, b);
+  const block_row of_gradient = row_of(x, part + 9, g);
   int i;
-  row_of(x, part + 9, g);
-  for (i = 0; i < BLOCK_SIDE; ++i) {
-    gradient[i] += g[i];
-    diagonal[i] += a[i] * a[i] + b[i] * b[i];
-    add_rows(block + i * stride, a[i], &row0, b[i], &row1);
+#if TVK_LANES == 4
+  lanes_store(gradient, lanes_load(gradient) + of_gradient.head);
+  *(block_pair *)(gradient + 4) += of_gradient.tail;
+  lanes_store(diagonal, lanes_load(diagonal) + (row0.head * row0.head + row1.head * row1.head));
+  *(block_pair *)(diagonal + 4) += row0.tail * row0.tail + row1.tail * row1.tail;
+#else
+  TVK_UNROLL
+  for (i = 0; i < 3; ++i) {
+    *(block_pair *)(gradient + 2 * i) += of_gradient.at[i];
+    *(block_pair *)(diagonal + 2 * i) += row0.at[i] * row0.at[i] + row1.at[i] * row1.at[i];
   }
+#endif
+  for (i = 0; i < BLOCK_SIDE; ++i) add_rows(block + i * stride, a[i], &row0, b[i], &row1);
   for (i = 0; i < 3; ++i) add_rows(columns + BLOCK_SIDE * i, J[i], &row0, J[3 + i], &row1);
 }

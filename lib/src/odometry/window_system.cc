@@ -47,11 +47,10 @@ void add_to_point(const Window& window, const Weighing& weighing, const WindowPo
   }
 }
 
-void add_to_slot(const Window& window, const LinearObservation& part, int place, bool same_view) {
+void add_to_slot(const Window& window, const LinearObservation& part, int place) {
   const int block = window.slot_block[place];
   const BlockMatrix& A = window.system;
   double* columns = reinterpret_cast<double*>(window.Z[place].at);
-  if (!same_view) std::fill_n(columns, 3 * kBlock, 0.0);
   A.kernels->add_view_terms(part.x, block_at(A, block, block), row_entries(block),
                             window.gradient + kBlock * block, A.diagonal + kBlock * block, columns);
 }
@@ -184,20 +183,21 @@ double add_point(const Window& window, Weighing weighing, int p) {
   PointSums sums{};
   if (point.careful > 0) weighing.curvature.bend = 0.0;
   if (point.careful > 0) --point.careful;
+  // Long before it is added to: the CPU cannot load a vector that was just stored in parts.
+  Columns* Z = window.Z + point.begin;
+  std::fill_n(reinterpret_cast<double*>(Z), 3 * kBlock * point.num_slots, 0.0);
   for (int k = point.begin; k < point.end; ++k) {
     const WindowObservation& o = window.observations[k];
     LinearObservation part;
     add_to_point(window, weighing, window.pose[o.view], o, X, &sums, &part);
     if (o.slot < 0) continue;
-    const bool same_view = k > point.begin && o.view == window.observations[k - 1].view;
-    add_to_slot(window, part, point.begin + o.slot, same_view);
+    add_to_slot(window, part, point.begin + o.slot);
   }
   double ray[3];
   ray_of(window, window.pose, point, X, ray);
   EliminatedPoint& e = window.eliminated[p];
   eliminate(window, window.pose, point, ray, weighing.damping, &sums, &e);
   const int32_t* blocks = window.slot_block + point.begin;
-  Columns* Z = window.Z + point.begin;
   for (int k = 0; k < point.num_slots; ++k) {
     reduce_slot(e, Z[k].at, window.gradient + kBlock * blocks[k]);
   }
