@@ -158,7 +158,8 @@ ViewTerms view_terms(tv::LinearObservation part) {
     for (int i = 0; i < 3; ++i) part.Jp[r][i] = r == i;
   }
   tvk_select(TV_KERNELS_AUTO)
-      ->add_view_terms(part.x, terms.block[0], 6, terms.gradient, terms.diagonal, terms.rows[0]);
+      ->add_view_terms(reinterpret_cast<const double*>(&part), terms.block[0], 6, terms.gradient,
+                       terms.diagonal, terms.rows[0]);
   return terms;
 }
 

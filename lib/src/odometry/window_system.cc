@@ -51,8 +51,9 @@ void add_to_slot(const Window& window, const LinearObservation& part, int place)
   const int block = window.slot_block[place];
   const BlockMatrix& A = window.system;
   double* columns = reinterpret_cast<double*>(window.Z[place].at);
-  A.kernels->add_view_terms(part.x, block_at(A, block, block), row_entries(block),
-                            window.gradient + kBlock * block, A.diagonal + kBlock * block, columns);
+  A.kernels->add_view_terms(reinterpret_cast<const double*>(&part), block_at(A, block, block),
+                            row_entries(block), window.gradient + kBlock * block,
+                            A.diagonal + kBlock * block, columns);
 }
 
 // The vector from the first view that sees the point to the point.
