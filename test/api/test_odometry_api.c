@@ -564,7 +564,7 @@ static void test_a_lost_frame_is_found_where_its_pose_is_beyond_doubt(void) {
   }
   TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
   for (k = 0; k < 4; ++k) {
-    room_flight(num_flown - 1, pixels);
+    room_flight(num_flown - 1, pixels); /* the last frame again */
     if (k < 2) show_window(0, 0);
     if (k == 2) show_window(4, 3); /* 38 points fit */
     frame.time_s += 1.0 / 30;

@@ -146,8 +146,8 @@ void test_a_residual_is_the_projection_near_its_pixel() {
   }
 }
 
-// What an observation adds to its view: its rows by (w, v) are the columns where J is (1 0 0, 0 1
-// 0).
+// What an observation adds to its view. Its rows by (w, v) are what it adds to the columns where
+// its Jp is the identity's first two rows.
 struct ViewTerms {
   double rows[3][6], block[6][6], gradient[6], diagonal[6];
 };

@@ -45,6 +45,7 @@ typedef struct block_row {
 #endif
 } block_row;
 
+/* The row of x and h; `numbers` receives it, too. */
 static TVK_INLINE block_row row_of(const double *x, const double *h, double numbers[BLOCK_SIDE]) {
   block_row row;
   numbers[0] = x[1] * h[2] - x[2] * h[1];

@@ -66,7 +66,10 @@ def sources_of(arguments, scratch):
             yield "set", label, path
             for kind in filter(None, arguments.copies.split(",")):
                 name = f"{label}+{kind}"
-                yield "copy", name, copies.make(kind, path, os.path.join(scratch, "copies", name))
+                folder = copies.make(kind, path, os.path.join(scratch, "copies", name))
+                yield "copy", name, folder
+                if not arguments.keep:  # all of them take gigabytes
+                    shutil.rmtree(folder)
     for seed in range(arguments.flights):
         name = f"flight_{seed:02d}"
         yield "flight", name, flights.render(seed, os.path.join(FLIGHT_FOLDER, name))
@@ -117,7 +120,7 @@ def more_figures(arguments, runs_of, scratch):
     runs_of: [(run, source folder, out)] of the program's own runs with the first seed."""
     if arguments.colmap:
         for run, folder, out in runs_of:
-            if run["kind"] == "fault" or not run.get("num_keyframes") or not run.get("truth"):
+            if run["kind"] in ("fault", "copy") or not run.get("num_keyframes") or not run.get("truth"):
                 continue
             print(f"colmap: {run['label']}", file=sys.stderr, flush=True)
             run["colmap"] = mapper.compare(sets.read_set(folder), out,

@@ -1,6 +1,5 @@
 """Changed copies of a sequence: another motion, light or lens over pictures whose truth is known.
-They show whether a rule that was chosen on the sequences holds beside them. Each is a set folder of
-its own, with fault.json: {kind, source}.
+They show whether a rule that was chosen on the sequences holds beside them.
 
 | kind | what is changed |
 | --- | --- |
@@ -17,32 +16,27 @@ its own, with fault.json: {kind, source}.
 
 What sensors said (imu.txt) is left out: it is of the motion as it was."""
 
-import json
 import os
-import shutil
 from dataclasses import replace
 
 import numpy as np
 
 from .. import formats
 from . import poses
-from .sets import read_set, write_frames
+from .set_writer import SetWriter, read_grey, with_noise
+from .sets import read_set
 
 STEPS = {"backwards": -1, "every_second": 2, "every_third": 3}
 PICTURES = ("dark", "noisy", "blurred", "flicker", "half_size", "mirrored", "upside_down")
 KINDS = ("backwards", "second_half", "every_second", "every_third", *PICTURES)
 
 
-def _with_noise(grey, sigma, random):
-    return np.clip(grey + random.normal(0, sigma, grey.shape), 0, 255).astype(np.uint8)
-
-
 def _picture_of(kind, grey, random):
     import cv2
     if kind == "dark":
-        return _with_noise(grey / 3.0, 2, random)
+        return with_noise(grey / 3.0, 2, random)
     if kind == "noisy":
-        return _with_noise(grey, 8, random)
+        return with_noise(grey, 8, random)
     if kind == "blurred":
         return cv2.GaussianBlur(grey, (0, 0), 1.5)
     if kind == "flicker":
@@ -104,34 +98,20 @@ def _write_camera(path, camera):
 
 def make(kind, source_path, folder, seed=1):
     """Writes the folder of a changed copy, and returns it."""
-    import cv2
     if kind not in KINDS:
         raise ValueError(f"no copy '{kind}'; there are {', '.join(KINDS)}")
     source = read_set(source_path)
-    shutil.rmtree(folder, ignore_errors=True)
-    os.makedirs(os.path.join(folder, "images"))
+    writer = SetWriter(source, folder)
     random = np.random.default_rng([seed, KINDS.index(kind)])
     order = range(len(source.times))[::STEPS.get(kind, 1)]
     if kind == "second_half":
         order = order[len(order) // 2:]
     turned_at = source.times[0] + source.times[-1]
-    times = [turned_at - source.times[k] if kind == "backwards" else source.times[k]
-             for k in order]
-    names = []
-    for n, k in enumerate(order):
-        path = os.path.abspath(os.path.join(source.path, source.names[k]))
-        names.append(f"images/{n:05d}.png" if kind in PICTURES else
-                     f"images/{n:05d}{os.path.splitext(path)[1]}")
-        to = os.path.join(folder, names[-1])
-        if kind not in PICTURES:
-            os.symlink(path, to)
-            continue
-        grey = cv2.imread(path, cv2.IMREAD_GRAYSCALE)
-        if grey is None:
-            raise OSError(f"cannot read {path}")
-        if not cv2.imwrite(to, _picture_of(kind, grey, random), [cv2.IMWRITE_PNG_COMPRESSION, 1]):
-            raise OSError(f"cannot write {to}")
-    write_frames(folder, times, names)
+    for k in order:
+        if kind in PICTURES:
+            writer.make(k, _picture_of(kind, read_grey(source, k), random), ".png")
+        else:
+            writer.keep(k, turned_at - source.times[k] if kind == "backwards" else None)
     cameras = formats.read_camera_set(source.file("cameras.yaml"))
     _write_camera(os.path.join(folder, "cameras.yaml"),
                   _camera_of(kind, next(iter(cameras.values()))))
@@ -139,6 +119,4 @@ def make(kind, source_path, folder, seed=1):
     if truth is not None:
         poses.write_tum(os.path.join(folder, "groundtruth.txt"),
                         _truth_of(kind, truth, turned_at))
-    with open(os.path.join(folder, "fault.json"), "w", encoding="utf-8") as file:
-        json.dump({"kind": kind, "source": source.name}, file)
-    return folder
+    return writer.finish(kind)

@@ -12,63 +12,13 @@ with the truth of the source, and fault.json: {kind, source, intervals, elsewher
 
 Half a turn on the spot is rendered (`twoview_flights --half-turn`)."""
 
-import json
-import os
-import shutil
-
 import numpy as np
 
-from .sets import DESCRIPTIONS, read_set, write_frames
+from .set_writer import SetWriter, read_grey, with_noise
+from .sets import DESCRIPTIONS, read_set
 
 KINDS = ("black", "covered", "other_room", "slow", "dropped", "person")
 PERSON_SHARE = 0.4  # of the picture's area that the figure covers when it is in the middle
-
-
-class _Writer:
-    """The new folder: links to images of the source, and images that are made."""
-
-    def __init__(self, source, folder):
-        self.source, self.folder = source, folder
-        shutil.rmtree(folder, ignore_errors=True)
-        os.makedirs(os.path.join(folder, "images"))
-        self.times, self.names = [], []
-        for name in DESCRIPTIONS:
-            if source.file(name):
-                os.symlink(os.path.abspath(source.file(name)), os.path.join(folder, name))
-
-    def keep(self, k, path=None):
-        """Frame k of the source, or the image at `path` at its time, unharmed."""
-        path = path or os.path.join(self.source.path, self.source.names[k])
-        name = f"images/{k:05d}{os.path.splitext(path)[1]}"
-        os.symlink(os.path.abspath(path), os.path.join(self.folder, name))
-        self._add(k, name)
-
-    def make(self, k, picture):
-        import cv2
-        name = f"images/{k:05d}.jpg"
-        if not cv2.imwrite(os.path.join(self.folder, name), picture,
-                           [cv2.IMWRITE_JPEG_QUALITY, 92]):
-            raise OSError(f"cannot write {self.folder}/{name}")
-        self._add(k, name)
-
-    def _add(self, k, name):
-        self.times.append(self.source.times[k])
-        self.names.append(name)
-
-    def finish(self, kind, intervals, elsewhere=()):
-        write_frames(self.folder, self.times, self.names)
-        with open(os.path.join(self.folder, "fault.json"), "w", encoding="utf-8") as file:
-            json.dump({"kind": kind, "source": self.source.name, "intervals": list(intervals),
-                       "elsewhere": list(elsewhere)}, file, indent=1)
-        return self.folder
-
-
-def _picture(path):
-    import cv2
-    picture = cv2.imread(path, cv2.IMREAD_GRAYSCALE)
-    if picture is None:
-        raise OSError(f"cannot read {path}")
-    return picture
 
 
 def _span(source, start_share, seconds):
@@ -81,16 +31,12 @@ def _span(source, start_share, seconds):
     return set(inside.tolist()), [float(times[inside[0]]), float(times[inside[-1]])]
 
 
-def _noisy(grey, sigma, random):
-    return np.clip(grey + random.normal(0, sigma, np.shape(grey)), 0, 255).astype(np.uint8)
-
-
 def black(source, writer, random, other):
     inside, interval = _span(source, 0.5, 1.0)
-    shape = _picture(os.path.join(source.path, source.names[0])).shape
+    shape = read_grey(source, 0).shape
     for k in range(len(source.times)):
         if k in inside:
-            writer.make(k, _noisy(np.full(shape, 2.0), 1.0, random))
+            writer.make(k, with_noise(np.full(shape, 2.0), 1.0, random))
         else:
             writer.keep(k)
     return [interval], []
@@ -99,7 +45,7 @@ def black(source, writer, random, other):
 def covered(source, writer, random, other):
     import cv2
     inside, interval = _span(source, 0.4, 1.5)
-    shape = _picture(os.path.join(source.path, source.names[0])).shape
+    shape = read_grey(source, 0).shape
     uneven = cv2.resize(random.uniform(10, 60, (3, 4)).astype(np.float32), shape[::-1],
                         interpolation=cv2.INTER_CUBIC)
     for k in range(len(source.times)):
@@ -107,7 +53,7 @@ def covered(source, writer, random, other):
             hand = cv2.warpAffine(uneven, np.float32([[1, 0, random.normal(0, 6)],
                                                       [0, 1, random.normal(0, 6)]]),
                                   shape[::-1], borderMode=cv2.BORDER_REPLICATE)
-            writer.make(k, _noisy(hand, 2.5, random))
+            writer.make(k, with_noise(hand, 2.5, random))
         else:
             writer.keep(k)
     return [interval], []
@@ -119,12 +65,12 @@ def other_room(source, writer, random, other):
     if other is None:
         raise ValueError("other_room needs another set")
     inside, interval = _span(source, 0.5, 1.5)
-    shape = _picture(os.path.join(source.path, source.names[0])).shape
+    shape = read_grey(source, 0).shape
     start = len(other.names) // 3
     for k in range(len(source.times)):
         if k in inside:
-            name = other.names[min(start + k - min(inside), len(other.names) - 1)]
-            picture = _picture(os.path.join(other.path, name))
+            shown = min(start + k - min(inside), len(other.names) - 1)
+            picture = read_grey(other, shown)
             writer.make(k, cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_AREA))
         else:
             writer.keep(k)
@@ -177,14 +123,14 @@ def person(source, writer, random, other):
     """The figure walks through the picture once, from the left edge to the right one, and sways."""
     inside, interval = _span(source, 0.4, 4.0)
     order = sorted(inside)
-    shape = _picture(os.path.join(source.path, source.names[0])).shape
+    shape = read_grey(source, 0).shape
     figure, mask = person_of(shape, random)
     tall, wide = mask.shape
     for k in range(len(source.times)):
         if k not in inside:
             writer.keep(k)
             continue
-        picture = _picture(os.path.join(source.path, source.names[k])).astype(float)
+        picture = read_grey(source, k).astype(float)
         share = order.index(k) / max(len(order) - 1, 1)
         left = int(-wide + share * (shape[1] + wide))
         top = shape[0] - tall + int(0.02 * shape[0] * (1 + np.sin(40 * share)))
@@ -205,7 +151,7 @@ def inject(kind, source_path, folder, other_path=None, seed=1):
         raise ValueError(f"no fault '{kind}'; there are {', '.join(KINDS)}")
     source = read_set(source_path)
     other = read_set(other_path) if other_path else None
-    writer = _Writer(source, folder)
+    writer = SetWriter(source, folder, DESCRIPTIONS)
     random = np.random.default_rng([seed, KINDS.index(kind)])
     intervals, elsewhere = globals()[kind](source, writer, random, other)
     return writer.finish(kind, intervals, elsewhere)
