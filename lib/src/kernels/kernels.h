@@ -256,9 +256,9 @@ typedef struct tvk_triangulate_pair {
    add_view_terms: adds the terms of an observation of an adjusted view to the view's block of that
    matrix, whose rows are `stride` entries apart, to its gradient and its diagonal (6 each), and to
    three columns of 6. The observation is a tv::LinearObservation (odometry/window_observation.h),
-   18 numbers: x, h (2x3), q, J (2x3). With rows a = (x cross h0, h0), b = (x cross h1, h1) and g =
-   (x cross q, q), the block grows by a'a + b'b, the gradient by g, and column i by J0i a + J1i b.
- */
+   18 numbers: x, h (2x3), q, J (2x3). With rows a = (x cross h0, h0), b = (x cross h1, h1) and
+   g = (x cross q, q), the block grows by a'a + b'b, the gradient by g, and column i by
+   J0i a + J1i b. */
 #define TVK_PIXEL_LIST(X)                                                                          \
   X(fast_score_row, void,                                                                          \
     (const uint8_t *const rows[7], int32_t width, int32_t arc, int32_t threshold,                  \

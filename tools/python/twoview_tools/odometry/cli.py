@@ -120,7 +120,9 @@ def more_figures(arguments, runs_of, scratch):
     runs_of: [(run, source folder, out)] of the program's own runs with the first seed."""
     if arguments.colmap:
         for run, folder, out in runs_of:
-            if run["kind"] in ("fault", "copy") or not run.get("num_keyframes") or not run.get("truth"):
+            if run["kind"] in ("fault", "copy"):
+                continue
+            if not run.get("num_keyframes") or not run.get("truth"):
                 continue
             print(f"colmap: {run['label']}", file=sys.stderr, flush=True)
             run["colmap"] = mapper.compare(sets.read_set(folder), out,
