@@ -717,16 +717,16 @@ static void case_subtract_products(trial *t) {
 
 static void case_add_view_terms(trial *t) {
   const int32_t stride = 6 * pick(t, 1, 5, 5);
-  double *part = INPUT(t, double, 18), *block = OUTPUT(t, double, 5 * stride + 6);
+  double *part = INPUT(t, double, 18), *reduced = OUTPUT(t, double, 5 * stride + 6);
   double *gradient = OUTPUT(t, double, 6), *diagonal = OUTPUT(t, double, 6);
   double *columns = OUTPUT(t, double, 18);
   int32_t k;
   for (k = 0; k < 18; ++k) part[k] = 2 * random_unit(&t->seed) - 1;
-  for (k = 0; k < 5 * stride + 6; ++k) block[k] = 2 * random_unit(&t->seed) - 1;
+  for (k = 0; k < 5 * stride + 6; ++k) reduced[k] = 2 * random_unit(&t->seed) - 1;
   for (k = 0; k < 6; ++k) gradient[k] = 2 * random_unit(&t->seed) - 1;
   for (k = 0; k < 6; ++k) diagonal[k] = 2 * random_unit(&t->seed) - 1;
   for (k = 0; k < 18; ++k) columns[k] = 2 * random_unit(&t->seed) - 1;
-  REPEAT(t, t->set->add_view_terms(part, block, stride, gradient, diagonal, columns));
+  REPEAT(t, t->set->add_view_terms(part, reduced, stride, gradient, diagonal, columns));
 }
 
 static trial make_trial(const tvk_table *set, uint64_t seed, int typical, int64_t calls) {
