@@ -244,6 +244,20 @@ void test_a_disagreement_lasts_until_a_pair_agrees() {
   TEST_ASSERT_EQUAL_INT(0, odometry->check.vote.num_disagree);
 }
 
+// Four keyframes in a row: this one and the three before it.
+void test_keyframes_that_no_pair_confirms_are_counted() {
+  odometry->check.vote.num_agree = 1;
+  for (int n = 0; n < 6; ++n) {
+    tv::begin_check(odometry, 4 + n);
+    TEST_ASSERT_EQUAL_INT(n, odometry->check.num_unconfirmed);
+    TEST_ASSERT_EQUAL_INT(n >= 3, tv::is_unconfirmed(odometry->check));
+  }
+  odometry->check.vote.num_agree = 1;
+  TEST_ASSERT_FALSE(tv::is_unconfirmed(odometry->check));
+  tv::begin_check(odometry, 10);
+  TEST_ASSERT_EQUAL_INT(0, odometry->check.num_unconfirmed);
+}
+
 }  // namespace
 
 extern "C" void setUp(void) {
@@ -270,5 +284,6 @@ int main() {
   RUN_TEST(test_pairs_of_points_that_wait_vote_later);
   RUN_TEST(test_a_removed_keyframe_does_not_vote);
   RUN_TEST(test_a_disagreement_lasts_until_a_pair_agrees);
+  RUN_TEST(test_keyframes_that_no_pair_confirms_are_counted);
   return UNITY_END();
 }

@@ -146,6 +146,32 @@ void test_the_frame_that_ends_a_doubt_is_in_doubt() {
   TEST_ASSERT_TRUE(num_ended > 0);
 }
 
+// A keyframe whose last pair decides nothing, as one of the two was removed, after others that
+// nothing confirmed.
+void test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed() {
+  for (const int num_unconfirmed : {2, 3}) {
+    begin_flight();
+    int n = 0;
+    while (track(n, false).status != TV_ODOMETRY_TRACKING) ++n;
+    tv::MapCheck* check = &odometry->check;
+    tv_odometry_state state;
+    do {
+      check->vote = tv::MapVote{};
+      check->num_others = 1;
+      check->next = 0;
+      check->other_ids[0] = 99999;
+      check->num_unconfirmed = num_unconfirmed;
+      state = track(++n, false);
+    } while (state.is_keyframe);
+    TEST_ASSERT_EQUAL_INT(num_unconfirmed < 3 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK,
+                          state.status);
+    TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
+    while (!state.is_keyframe) state = track(++n, false);
+    TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
+    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track(++n, false).status);  // confirmed now
+  }
+}
+
 }  // namespace
 
 extern "C" void setUp(void) { odometry = make_vga_odometry(memory, sizeof memory); }
@@ -159,5 +185,6 @@ int main() {
   RUN_TEST(test_a_keyframe_of_another_segment_says_nothing);
   RUN_TEST(test_a_lost_frame_that_is_found_again_is_remembered);
   RUN_TEST(test_the_frame_that_ends_a_doubt_is_in_doubt);
+  RUN_TEST(test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed);
   return UNITY_END();
 }

@@ -6,7 +6,8 @@ namespace {
 // A map contradicts a pair whose turns differ by more than three standard deviations of the pair's
 // and this angle, in radians. Measured: docs/odometry.md.
 constexpr double kTurnSigmas = 3, kTurnAllowed = 0.026;
-constexpr int32_t kContradicting = 2;  // pairs that disagree
+constexpr int32_t kContradicting = 2;    // pairs that disagree
+constexpr int32_t kMostUnconfirmed = 3;  // keyframes in a row that no pair confirmed
 
 }  // namespace
 
@@ -46,14 +47,20 @@ bool is_urgent(const MapVote& vote) {
   return needs_vote(vote) && vote.num_disagree + vote.num_planar > 0;
 }
 
+bool is_unconfirmed(const MapCheck& check) {
+  return check.vote.num_agree == 0 && check.num_unconfirmed >= kMostUnconfirmed;
+}
+
 void begin_check(Odometry* odometry, int32_t keyframe_id) {
   // A disagreement counts until a pair agrees, or the map was mended.
-  const MapVote& before = odometry->check.vote;
+  const MapVote before = odometry->check.vote;
+  const int32_t num_unconfirmed = before.num_agree == 0 ? odometry->check.num_unconfirmed + 1 : 0;
   const int32_t num_disagree =
       before.num_agree == 0 && before.num_disagree < kContradicting ? before.num_disagree : 0;
   odometry->check = MapCheck{};
   odometry->check.keyframe_id = keyframe_id;
   odometry->check.vote.num_disagree = num_disagree;
+  odometry->check.num_unconfirmed = num_unconfirmed;
 }
 
 void add_pair(MapCheck* check, int32_t other_id) {

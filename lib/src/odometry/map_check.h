@@ -26,6 +26,10 @@ MapVerdict verdict_of(const MapVote& vote);
 // Whether the pairs so far make the map doubtful, so that the next ones should not wait.
 bool is_urgent(const MapVote& vote);
 
+// Whether no pair confirmed this keyframe yet, nor the three before it: what is wrong by less than
+// a pair notices adds up from one to the next.
+bool is_unconfirmed(const MapCheck& check);
+
 // Begins the check of a keyframe.
 void begin_check(Odometry* odometry, int32_t keyframe_id);
 

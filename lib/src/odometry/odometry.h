@@ -46,6 +46,7 @@ struct MapCheck {
   int32_t keyframe_id;
   int32_t other_ids[kMostPairs - 1];
   int32_t num_others, next;
+  int32_t num_unconfirmed;  // keyframes in a row before this one that no pair confirmed
   MapVote vote;
 };
 

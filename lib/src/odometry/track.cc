@@ -191,6 +191,8 @@ bool heed_check(Odometry* odometry) {
     remove_unconfirmed(odometry);
   } else if (verdict == MapVerdict::kOnePlane && !is_checking(odometry->check)) {
     doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
+  } else if (is_unconfirmed(odometry->check)) {
+    doubt(odometry, TV_REASON_LOW_PARALLAX);
   }
   return verdict != MapVerdict::kContradicts;
 }
