@@ -69,6 +69,7 @@ def evaluate(out, source):
     figures = {
         "set": source.name,
         "num_frames": num_frames,
+        "picture_size": source.picture_size(),
         "num_known": len(final),
         "known_share": len(known) / num_frames,
         "num_segments": len(np.unique(final.segments)) if len(final) else 0,

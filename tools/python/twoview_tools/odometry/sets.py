@@ -6,6 +6,7 @@ import os
 import re
 from dataclasses import dataclass, field
 
+from .. import formats
 from ..accuracy.datasets import data_dir
 from . import poses
 
@@ -45,6 +46,14 @@ class SetFolder:
             return None
         with open(path, encoding="utf-8") as file:
             return json.load(file)
+
+    def picture_size(self):
+        """[width, height] of the first camera; None without cameras.yaml."""
+        path = self.file("cameras.yaml")
+        if path is None:
+            return None
+        camera = next(iter(formats.read_camera_set(path).values()))
+        return [camera.width, camera.height]
 
     def truth_sigma(self):
         """Of the set, or of the set that faults were put into: (metres, degrees)."""

@@ -12,7 +12,7 @@ MOST_SEGMENTS = {"hololens_room_seq": 2}
 FLIGHT_ATE_PERCENT, FLIGHT_LOOP_PERCENT, FLIGHT_SCALE = 0.5, 0.2, 0.02
 MAP_MEDIAN_PERCENT, MAP_OUTLIER_PERCENT = 1.0, 2.0
 COVARIANCE = (0.90, 0.98)
-MEAN_MS, MAX_MS, MEMORY_MIB, PEER_TIMES = 5.0, 25.0, 24.0, 10.0
+PICTURE, MEAN_MS, MAX_MS, MEMORY_MIB, PEER_TIMES = [640, 480], 5.0, 25.0, 24.0, 10.0
 
 
 def _ate(figures):
@@ -120,13 +120,16 @@ def _honesty(runs):
 
 
 def _cost(runs):
-    vga = [run for run in runs if run.get("time_ms")]
-    if vga:
-        mean = np.mean([run["time_ms"]["mean"] for run in vga])
-        worst = max(run["time_ms"]["max"] for run in vga)
-        yield bool(mean <= MEAN_MS and worst < MAX_MS), (
-            f"CPU time a frame: mean about {MEAN_MS:.0f} ms, every frame below {MAX_MS:.0f} ms: "
-            f"{mean:.1f} ms, at most {worst:.1f} ms")
+    times = [run["times_ms"] for run in runs
+             if run.get("times_ms") and run.get("picture_size") == PICTURE]
+    if times:
+        mean = np.concatenate(times).mean()
+        yield bool(mean <= MEAN_MS), (f"CPU time a frame of {PICTURE[0]}x{PICTURE[1]}: mean about "
+                                      f"{MEAN_MS:.0f} ms: {mean:.2f} ms")
+    longest = [run["time_ms"]["max"] for run in runs if run.get("time_ms")]
+    if longest:
+        yield max(longest) < MAX_MS, (f"every frame of every size below {MAX_MS:.0f} ms: at most "
+                                      f"{max(longest):.1f} ms")
     sizes = [run["context_bytes"] / 2 ** 20 for run in runs if run.get("context_bytes")]
     if sizes:
         yield max(sizes) <= MEMORY_MIB, (f"memory at most {MEMORY_MIB:.0f} MiB: "
