@@ -172,6 +172,24 @@ void test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed() {
   }
 }
 
+// A keyframe that is put off its place goes back in its adjustment, before the next frame.
+void test_the_frame_after_a_large_adjustment_is_weak() {
+  for (const bool is_large : {false, true}) {
+    begin_flight();
+    int n = 0;
+    while (track(n, false).status != TV_ODOMETRY_TRACKING) ++n;
+    while (!track(++n, false).is_keyframe) continue;
+    tv::Map& map = odometry->map;
+    tv::Rigid* pose = &map.keyframes[map.num_keyframes - 1].cam_from_world;
+    const double path = tv::way_between(map.keyframes[0].cam_from_world, *pose);
+    pose->t[1] += (is_large ? 0.06 : 0.01) * path;
+    tv_odometry_state state = track(++n, false);
+    TEST_ASSERT_EQUAL_INT(is_large ? TV_ODOMETRY_WEAK : TV_ODOMETRY_TRACKING, state.status);
+    TEST_ASSERT_EQUAL_UINT32(is_large ? TV_REASON_LOW_PARALLAX : 0, state.reasons);
+    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track(++n, false).status);
+  }
+}
+
 }  // namespace
 
 extern "C" void setUp(void) { odometry = make_vga_odometry(memory, sizeof memory); }
@@ -186,5 +204,6 @@ int main() {
   RUN_TEST(test_a_lost_frame_that_is_found_again_is_remembered);
   RUN_TEST(test_the_frame_that_ends_a_doubt_is_in_doubt);
   RUN_TEST(test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed);
+  RUN_TEST(test_the_frame_after_a_large_adjustment_is_weak);
   return UNITY_END();
 }

@@ -44,20 +44,6 @@ constexpr int32_t kSpreadSteps = 12, kPointSteps = 3, kLeastSpread = 100;
 constexpr double kLeastWay = 0.005, kLeastTurn = 0.005;
 constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
 
-// Writes for each keyframe the length of the segment's path since then.
-void measure_paths(const Map& map, int32_t segment, double* lengths) {
-  const MapKeyframe* next = nullptr;
-  double length = 0;
-  for (int32_t k = map.num_keyframes - 1; k >= 0; --k) {
-    const MapKeyframe& own = map.keyframes[k];
-    if (own.segment == segment) {
-      if (next != nullptr) length += way_between(own.cam_from_world, next->cam_from_world);
-      next = &own;
-    }
-    lengths[k] = length;
-  }
-}
-
 // Whether the frame may see what a keyframe saw, if the drift is as large as it may be after a path
 // of this length.
 bool may_meet(const Odometry& odometry, const Frame& frame, double path, int32_t keyframe) {
@@ -87,6 +73,19 @@ double scale_between(Odometry* odometry, const Frame& frame, const Frame& again)
 }
 
 }  // namespace
+
+void measure_paths(const Map& map, int32_t segment, double* lengths) {
+  const MapKeyframe* next = nullptr;
+  double length = 0;
+  for (int32_t k = map.num_keyframes - 1; k >= 0; --k) {
+    const MapKeyframe& own = map.keyframes[k];
+    if (own.segment == segment) {
+      if (next != nullptr) length += way_between(own.cam_from_world, next->cam_from_world);
+      next = &own;
+    }
+    lengths[k] = length;
+  }
+}
 
 bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end) {
   const Map& map = odometry.map;

@@ -17,6 +17,9 @@ struct LoopEnd {
   double scale;
 };
 
+// Writes for each keyframe the length of the segment's path since then.
+void measure_paths(const Map& map, int32_t segment, double* lengths);
+
 // Whether drift over a path of this length can explain where the frame is now and where it must be
 // for a loop.
 bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end);

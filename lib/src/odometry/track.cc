@@ -29,6 +29,8 @@ constexpr int32_t kLoopSteps = 8;          // and after a loop
 constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
 constexpr int32_t kMostTurnedFrames = 60;  // of status rotation, in a row
 constexpr int32_t kLostBeforeStart = 8;    // frames
+// An adjustment that moves the camera by this share of the path, or turns it by so many radians.
+constexpr double kJumpShare = 0.03, kJumpTurn = 0.05;
 // Velocities are believed against the map once so many of its ways agreed with them. The map is
 // wrong where so many frames in a row contradict velocities that are believed.
 constexpr int32_t kLeastTrust = 5, kMostContrary = 5;
@@ -177,6 +179,16 @@ bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) 
   if (odometry->scale.source == TV_SCALE_UNIT) odometry->confirmed_id = -1;
   remove_unconfirmed(odometry);
   return false;
+}
+
+// Whether a keyframe's camera is so far from where it was that this is a jump of the path.
+bool is_far_from(Odometry* odometry, const Rigid& before, int32_t keyframe) {
+  ArenaScope scope(odometry->scratch);
+  const Map& map = odometry->map;
+  const MapKeyframe& own = map.keyframes[keyframe];
+  double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  measure_paths(map, own.segment, paths);
+  return !are_near(before, own.cam_from_world, kJumpShare * paths[0], kJumpTurn);
 }
 
 // What the pairs of the newest keyframe say of the map. False: it is wrong here, and what was made
@@ -332,6 +344,8 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
   state->attitude_ignored = !check_attitude(*odometry, frame);
   const double* covariance = fit.estimate.covariance;
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
+  // The map's step since the frame before, which the camera did not take.
+  if (odometry->was_moved_far) state->reasons |= TV_REASON_LOW_PARALLAX;
   // It was tracked with the map as it was, which a check may confirm now and an adjustment moves
   // before the next frame.
   add_doubts(*odometry, state);
@@ -436,9 +450,12 @@ __attribute__((noinline)) void clear_state(const Frame& frame, tv_odometry_state
 bool finish_keyframe(Odometry* odometry, Frame* frame) {
   const int32_t newest = find_keyframe(odometry->map, odometry->unadjusted_id);
   odometry->unadjusted_id = -1;
+  odometry->was_moved_far = false;
   if (newest < 0) return false;
   make_points(odometry, newest, *frame, false);
+  const Rigid before = odometry->map.keyframes[newest].cam_from_world;
   adjust_around(odometry, newest, odometry->closed_loop ? kLoopSteps : kWindowSteps);
+  odometry->was_moved_far = is_far_from(odometry, before, newest);
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   take_keyframe(*odometry, newest, frame);
