@@ -337,13 +337,14 @@ class Endurance(Folder):
                                    source.truth().positions[59 - 7])
 
     def test_more_time_in_a_later_part_is_not_flat(self):
-        def reached(*times):
+        def reached(*times):  # of ways of a thousand frames there and back
             return endurance.judged([{"truth": {"coverage": 1.0}, "num_keyframes": 9,
                                       "num_segments": 1, "peak_rss_mib": 50.0, "times_ms": each}
-                                     for each in times])[0]
+                                     for each in times], 501)[0]
         flat = [5.0] * 10000
         longer = flat[:9000] + [5.6] * 1000
         self.assertTrue(reached(flat))
+        self.assertTrue(reached(([4.0] * 500 + [6.0] * 500) * 10))
         self.assertFalse(reached(longer))
         self.assertFalse(reached(flat[:4000] + [5.6] * 1000 + flat[5000:]))
         self.assertIsNone(reached(flat[:1999]))

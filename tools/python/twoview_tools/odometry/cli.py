@@ -136,7 +136,8 @@ def more_figures(arguments, runs_of, scratch):
                          os.path.join(scratch, "twoview", f"endurance_{k}"), arguments,
                          arguments.seed) for k in range(endurance.NUM_RUNS)]
         failed = [run["error"] for run in again if "error" in run]
-        yield (False, f"endurance: {failed[0]}") if failed else endurance.judged(again)
+        count = len(sets.read_set(flight).names)
+        yield (False, f"endurance: {failed[0]}") if failed else endurance.judged(again, count)
     if arguments.tour:
         print("twoview: tour", file=sys.stderr, flush=True)
         folder = os.path.join(scratch, "tour")

@@ -9,13 +9,18 @@ import numpy as np
 from . import poses
 from .sets import read_set, write_frames
 
-NUM_FRAMES, NUM_COMPARED, NUM_RUNS = 10000, 1000, 3
+NUM_FRAMES, NUM_RUNS = 10000, 3
 GROWTH = 1.10  # of the mean time a frame that counts as flat
+
+
+def period_of(count):
+    """How many frames a way there and back through `count` of them has."""
+    return max(2 * (count - 1), 1)
 
 
 def there_and_back(count, num):
     """The indices of `num` frames of a way there and back through `count` of them."""
-    period = max(2 * (count - 1), 1)
+    period = period_of(count)
     along = np.arange(num) % period
     return np.where(along < count, along, period - along)
 
@@ -44,9 +49,10 @@ def repeat(source_path, folder, num=NUM_FRAMES):
     return folder
 
 
-def growth(times_ms, num=NUM_COMPARED):
+def growth(times_ms, num):
     """(mean of the first `num` times, largest mean of `num` that follow each other, in parts of
-    `num`); (None, None) for fewer than twice as many."""
+    `num`); (None, None) for fewer than twice as many. A way there and back has the same pictures
+    each time; other parts of a flight differ by what they see."""
     times = np.asarray(times_ms, float)
     if len(times) < 2 * num:
         return None, None
@@ -60,16 +66,17 @@ def least_times(runs):
     return np.min([run["times_ms"] for run in runs], axis=0).tolist()
 
 
-def judged(runs):
-    """(reached, sentence) of the runs over repeat()'s folder."""
-    run, times = runs[0], least_times(runs)
-    first, most = growth(times)
+def judged(runs, count):
+    """(reached, sentence) of the runs over repeat()'s folder of a source of `count` frames."""
+    run, times, num = runs[0], least_times(runs), period_of(count)
+    first, most = growth(times, num)
     longest = ", ".join(f"{max(each['times_ms']):.1f}" for each in runs)
     if first is None:
         return None, f"CPU time over {NUM_FRAMES} frames: not measured (too few frames)"
     return most <= GROWTH * first, (
         f"CPU time flat over {len(times)} frames (at most {100 * (GROWTH - 1):.0f} % more), the "
-        f"least of {len(runs)} runs: first {NUM_COMPARED} {first:.2f} ms, slowest {NUM_COMPARED} "
-        f"{most:.2f} ms a frame, longest frame {max(times):.1f} ms (of each run {longest}); "
-        f"coverage {100 * run['truth']['coverage']:.1f} %, {run['num_keyframes']} keyframes, "
-        f"{run['num_segments']} segments, peak memory {run['peak_rss_mib']:.0f} MiB")
+        f"least of {len(runs)} runs: the first way there and back, {num} frames, {first:.2f} ms a "
+        f"frame, the slowest one {most:.2f} ms, longest frame {max(times):.1f} ms (of each run "
+        f"{longest}); coverage {100 * run['truth']['coverage']:.1f} %, "
+        f"{run['num_keyframes']} keyframes, {run['num_segments']} segments, peak memory "
+        f"{run['peak_rss_mib']:.0f} MiB")
