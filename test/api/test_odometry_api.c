@@ -577,6 +577,7 @@ static void test_a_lost_frame_is_found_where_its_pose_is_beyond_doubt(void) {
 
 static void test_finish_adjusts_the_newest_keyframe(void) {
   tv_keyframe tracked, adjusted;
+  tv_odometry_state after;
   int32_t newest;
   tv_keyframe_init(&adjusted);
   TEST_ASSERT_EQUAL_INT(TV_ERR_NULL, tv_odometry_finish(NULL));
@@ -590,10 +591,18 @@ static void test_finish_adjusts_the_newest_keyframe(void) {
   tracked = adjusted;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_finish(odometry));
   TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown));
-  TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, state.status);
+  TEST_ASSERT_TRUE(state.has_pose);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_keyframe(odometry, newest, &adjusted));
   TEST_ASSERT_EQUAL_MEMORY(&tracked.world_from_cam_t, &adjusted.world_from_cam_t,
                            sizeof tracked.world_from_cam_t);
+  after = state;
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  fly_to_a_keyframe(&tracked);
+  TEST_ASSERT_EQUAL_INT(TV_OK, give(odometry, num_flown));
+  TEST_ASSERT_EQUAL_INT(after.status, state.status);
+  TEST_ASSERT_EQUAL_UINT32(after.reasons, state.reasons);
+  TEST_ASSERT_EQUAL_MEMORY(&after.world_from_cam_t, &state.world_from_cam_t,
+                           sizeof after.world_from_cam_t);
 }
 
 static void test_accessors_refuse_bad_arguments(void) {

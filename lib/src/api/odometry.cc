@@ -125,7 +125,7 @@ void start_anew(tv_odometry* o) {
   o->frame.num = o->previous.num = 0;
   o->median_depth = 1;
   o->turn_sigma = 0;
-  o->is_upright = o->is_found_again = false;
+  o->is_upright = o->is_found_again = o->was_moved_far = false;
   o->velocity_trust = o->num_contrary = 0;
   o->scale = o->other_scale = MetricScale{};
   o->last_time_s = o->most_m = 0;

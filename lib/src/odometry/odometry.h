@@ -129,7 +129,7 @@ struct tv_odometry {
   int32_t keyframe_inliers;  // of the frame that became the last keyframe
   int32_t unadjusted_id;     // of the newest keyframe until it is adjusted, else -1
   bool closed_loop;          // with it
-  bool was_moved_far;        // by its adjustment, before this frame was tracked
+  bool was_moved_far;        // by its adjustment, since the last tracked frame
   int32_t next_neighbour;    // of it, the first with which no points were made yet
   bool is_found_again;       // a lost frame was, and no loop has closed since
   tv::WeakLoop weak_loop;

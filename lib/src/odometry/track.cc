@@ -29,7 +29,8 @@ constexpr int32_t kLoopSteps = 8;          // and after a loop
 constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
 constexpr int32_t kMostTurnedFrames = 60;  // of status rotation, in a row
 constexpr int32_t kLostBeforeStart = 8;    // frames
-// An adjustment that moves the camera by this share of the path, or turns it by so many radians.
+// After an adjustment that moves the camera by this share of the path, or turns it by so many
+// radians, the next frame is weak.
 constexpr double kJumpShare = 0.03, kJumpTurn = 0.05;
 // Velocities are believed against the map once so many of its ways agreed with them. The map is
 // wrong where so many frames in a row contradict velocities that are believed.
@@ -346,6 +347,7 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
   // The map's step since the frame before, which the camera did not take.
   if (odometry->was_moved_far) state->reasons |= TV_REASON_LOW_PARALLAX;
+  odometry->was_moved_far = false;
   // It was tracked with the map as it was, which a check may confirm now and an adjustment moves
   // before the next frame.
   add_doubts(*odometry, state);
@@ -450,7 +452,6 @@ __attribute__((noinline)) void clear_state(const Frame& frame, tv_odometry_state
 bool finish_keyframe(Odometry* odometry, Frame* frame) {
   const int32_t newest = find_keyframe(odometry->map, odometry->unadjusted_id);
   odometry->unadjusted_id = -1;
-  odometry->was_moved_far = false;
   if (newest < 0) return false;
   make_points(odometry, newest, *frame, false);
   const Rigid before = odometry->map.keyframes[newest].cam_from_world;
