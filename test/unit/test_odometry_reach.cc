@@ -5,12 +5,11 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 
 #include "odometry/map.h"
 #include "odometry/metric.h"
 #include "support/odometry.h"
-#include "support/room_scene.h"
+#include "support/odometry_flight.h"
 
 namespace {
 
@@ -95,102 +94,17 @@ void test_a_keyframe_of_another_segment_says_nothing() {
   TEST_ASSERT_TRUE(reaches(100, 2, 0));
 }
 
-// Begins a flight through the room.
-void begin_flight() {
-  const tv_camera camera = room_camera();
-  tv_odometry_options options;
-  tv_odometry_options_init(&options);
-  TEST_ASSERT_EQUAL_INT(TV_OK,
-                        tv_odometry_init(&odometry, &camera, &options, memory, sizeof memory));
-}
-
-// Tracks frame n of it, or a grey one in its place.
-tv_odometry_state track(int n, bool is_blank) {
-  static uint8_t pixels[ROOM_WIDTH * ROOM_HEIGHT];
-  room_flight(n, pixels);
-  if (is_blank) std::memset(pixels, 99, sizeof pixels);
-  tv_odometry_frame frame;
-  tv_odometry_frame_init(&frame);
-  frame.image = {pixels, ROOM_WIDTH, ROOM_HEIGHT, ROOM_WIDTH};
-  frame.time_s = n / 30.0;
-  tv_odometry_state state;
-  tv_odometry_state_init(&state);
-  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_track(odometry, &frame, &state));
-  return state;
-}
-
 // A loop that turns much is believed only then (odometry/loop.h, is_plausible).
 void test_a_lost_frame_that_is_found_again_is_remembered() {
-  begin_flight();
+  odometry = begin_room_flight(memory, sizeof memory);
   for (int n = 0; n < 39; ++n) {
-    track(n, n == 37 || n == 38);
+    track_room(odometry, n, n == 37 || n == 38);
     TEST_ASSERT_FALSE(odometry->is_found_again);
   }
-  TEST_ASSERT_TRUE(track(39, false).relocated);
+  TEST_ASSERT_TRUE(track_room(odometry, 39).relocated);
   TEST_ASSERT_TRUE(odometry->is_found_again);
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
   TEST_ASSERT_FALSE(odometry->is_found_again);
-}
-
-// A frame that a check confirms was tracked before, with the map as it was.
-void test_the_frame_that_ends_a_doubt_is_in_doubt() {
-  begin_flight();
-  int num_ended = 0;
-  for (int n = 0; n < 60; ++n) {
-    const uint32_t doubts = odometry->doubts;
-    const tv_odometry_state state = track(n, false);
-    if (state.status != TV_ODOMETRY_TRACKING && state.status != TV_ODOMETRY_WEAK) continue;
-    TEST_ASSERT_EQUAL_UINT32(doubts, state.reasons & doubts);
-    num_ended += doubts != 0 && odometry->doubts == 0;
-  }
-  TEST_ASSERT_TRUE(num_ended > 0);
-}
-
-// A keyframe whose last pair decides nothing, as one of the two was removed, after others that
-// nothing confirmed.
-void test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed() {
-  for (const int num_unconfirmed : {2, 3}) {
-    begin_flight();
-    int n = 0;
-    while (track(n, false).status != TV_ODOMETRY_TRACKING) ++n;
-    tv::MapCheck* check = &odometry->check;
-    tv_odometry_state state;
-    do {
-      check->vote = tv::MapVote{};
-      check->num_others = 1;
-      check->next = 0;
-      check->other_ids[0] = 99999;
-      check->num_unconfirmed = num_unconfirmed;
-      state = track(++n, false);
-    } while (state.is_keyframe);
-    TEST_ASSERT_EQUAL_INT(num_unconfirmed < 3 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK,
-                          state.status);
-    TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
-    while (!state.is_keyframe) state = track(++n, false);
-    TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
-    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track(++n, false).status);  // confirmed now
-  }
-}
-
-// A keyframe that is put off its place goes back in its adjustment, before the next frame or when
-// the caller asks for it.
-void test_the_frame_after_a_large_adjustment_is_weak() {
-  for (int k = 0; k < 4; ++k) {
-    const bool is_large = k % 2 != 0, is_asked_for = k >= 2;
-    begin_flight();
-    int n = 0;
-    while (track(n, false).status != TV_ODOMETRY_TRACKING) ++n;
-    while (!track(++n, false).is_keyframe) continue;
-    tv::Map& map = odometry->map;
-    tv::Rigid* pose = &map.keyframes[map.num_keyframes - 1].cam_from_world;
-    const double path = tv::way_between(map.keyframes[0].cam_from_world, *pose);
-    pose->t[1] += (is_large ? 0.06 : 0.01) * path;
-    if (is_asked_for) tv_odometry_finish(odometry);
-    tv_odometry_state state = track(++n, false);
-    TEST_ASSERT_EQUAL_INT(is_large ? TV_ODOMETRY_WEAK : TV_ODOMETRY_TRACKING, state.status);
-    TEST_ASSERT_EQUAL_UINT32(is_large ? TV_REASON_LOW_PARALLAX : 0, state.reasons);
-    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track(++n, false).status);
-  }
 }
 
 }  // namespace
@@ -205,8 +119,5 @@ int main() {
   RUN_TEST(test_the_way_is_not_bounded_without_velocities_or_after_a_gap);
   RUN_TEST(test_a_keyframe_of_another_segment_says_nothing);
   RUN_TEST(test_a_lost_frame_that_is_found_again_is_remembered);
-  RUN_TEST(test_the_frame_that_ends_a_doubt_is_in_doubt);
-  RUN_TEST(test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed);
-  RUN_TEST(test_the_frame_after_a_large_adjustment_is_weak);
   return UNITY_END();
 }

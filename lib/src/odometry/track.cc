@@ -345,7 +345,7 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
   state->attitude_ignored = !check_attitude(*odometry, frame);
   const double* covariance = fit.estimate.covariance;
   odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
-  // The map's step since the frame before, which the camera did not take.
+  // The path jumps here, because the map was moved since the last tracked frame.
   if (odometry->was_moved_far) state->reasons |= TV_REASON_LOW_PARALLAX;
   odometry->was_moved_far = false;
   // It was tracked with the map as it was, which a check may confirm now and an adjustment moves

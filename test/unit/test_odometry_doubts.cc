@@ -1,0 +1,87 @@
+// When the frames of a flight are "weak" because the map is in doubt (odometry/track.cc,
+// docs/odometry.md, "The map is checked").
+
+#include <unity.h>
+
+#include <cstdint>
+
+#include "odometry/odometry.h"
+#include "support/odometry_flight.h"
+
+namespace {
+
+alignas(64) uint8_t memory[24 << 20];
+tv_odometry* odometry;
+
+// A frame that a check confirms was tracked before, with the map as it was.
+void test_the_frame_that_ends_a_doubt_is_in_doubt() {
+  int num_ended = 0;
+  for (int n = 0; n < 60; ++n) {
+    const uint32_t doubts = odometry->doubts;
+    const tv_odometry_state state = track_room(odometry, n);
+    if (state.status != TV_ODOMETRY_TRACKING && state.status != TV_ODOMETRY_WEAK) continue;
+    TEST_ASSERT_EQUAL_UINT32(doubts, state.reasons & doubts);
+    num_ended += doubts != 0 && odometry->doubts == 0;
+  }
+  TEST_ASSERT_TRUE(num_ended > 0);
+}
+
+// The check of the newest keyframe ends without a decision, because the map does not have the
+// keyframe of its last pair.
+void test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed() {
+  for (const int num_unconfirmed : {2, 3}) {
+    odometry = begin_room_flight(memory, sizeof memory);
+    int n = 0;
+    while (track_room(odometry, n).status != TV_ODOMETRY_TRACKING) ++n;
+    tv::MapCheck* check = &odometry->check;
+    tv_odometry_state state;
+    do {
+      check->vote = tv::MapVote{};
+      check->num_others = 1;
+      check->next = 0;
+      check->other_ids[0] = -1;
+      check->num_unconfirmed = num_unconfirmed;
+      state = track_room(odometry, ++n);
+    } while (state.is_keyframe);
+    TEST_ASSERT_EQUAL_INT(num_unconfirmed < 3 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK,
+                          state.status);
+    TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
+    while (!state.is_keyframe) state = track_room(odometry, ++n);
+    TEST_ASSERT_EQUAL_UINT32(num_unconfirmed < 3 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
+    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track_room(odometry, ++n).status);  // confirmed now
+  }
+}
+
+// A keyframe that is put off its place goes back in its adjustment, before the next frame or when
+// the caller asks for it.
+void test_the_frame_after_a_large_adjustment_is_weak() {
+  for (int k = 0; k < 4; ++k) {
+    const bool is_large = k % 2 != 0, is_asked_for = k >= 2;
+    odometry = begin_room_flight(memory, sizeof memory);
+    int n = 0;
+    while (track_room(odometry, n).status != TV_ODOMETRY_TRACKING) ++n;
+    while (!track_room(odometry, ++n).is_keyframe) continue;
+    tv::Map& map = odometry->map;
+    tv::Rigid* pose = &map.keyframes[map.num_keyframes - 1].cam_from_world;
+    const double path = tv::way_between(map.keyframes[0].cam_from_world, *pose);
+    pose->t[1] += (is_large ? 0.06 : 0.01) * path;
+    if (is_asked_for) tv_odometry_finish(odometry);
+    tv_odometry_state state = track_room(odometry, ++n);
+    TEST_ASSERT_EQUAL_INT(is_large ? TV_ODOMETRY_WEAK : TV_ODOMETRY_TRACKING, state.status);
+    TEST_ASSERT_EQUAL_UINT32(is_large ? TV_REASON_LOW_PARALLAX : 0, state.reasons);
+    TEST_ASSERT_EQUAL_INT(TV_ODOMETRY_TRACKING, track_room(odometry, ++n).status);
+  }
+}
+
+}  // namespace
+
+extern "C" void setUp(void) { odometry = begin_room_flight(memory, sizeof memory); }
+extern "C" void tearDown(void) {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_the_frame_that_ends_a_doubt_is_in_doubt);
+  RUN_TEST(test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed);
+  RUN_TEST(test_the_frame_after_a_large_adjustment_is_weak);
+  return UNITY_END();
+}
