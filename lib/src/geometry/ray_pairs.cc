@@ -25,22 +25,6 @@ double pixel_angle(const RayPairs& pairs, int i) {
   return std::sqrt(0.5 * sum);
 }
 
-// A step near 0.618 n (the golden section) that has no common factor with n. The places (k step)
-// mod n for k = 0, 1, .. then visit all of 0 .. n - 1, and the first few of them, however many, are
-// spread evenly.
-int even_step(int n) {
-  int step = static_cast<int>(0.6180339887498949 * n);
-  for (;; ++step) {
-    int a = n, b = step;
-    while (b > 0) {
-      const int remainder = a % b;
-      a = b;
-      b = remainder;
-    }
-    if (a == 1) return step;
-  }
-}
-
 void set_fast(RayPairs& pairs, int slot, int i) {
   for (int v = 0; v < 2; ++v) {
     if (pairs.on_plane) {
@@ -65,6 +49,19 @@ void set_fast(RayPairs& pairs, int slot, int i) {
 }
 
 }  // namespace
+
+int even_step(int n) {
+  int step = static_cast<int>(0.6180339887498949 * n);
+  for (;; ++step) {
+    int a = n, b = step;
+    while (b > 0) {
+      const int remainder = a % b;
+      a = b;
+      b = remainder;
+    }
+    if (a == 1) return step;
+  }
+}
 
 size_t ray_pairs_bytes(int max_matches) {
   return 19 * arena_bytes<double>(static_cast<size_t>(max_matches)) +

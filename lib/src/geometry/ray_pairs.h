@@ -62,6 +62,11 @@ inline void turn_ray0(const RayPairs& pairs, int i, const Mat3& R, double turned
   for (int r = 0; r < 3; ++r) turned[r] = (R(r, 0) * x + R(r, 1) * y) + R(r, 2) * z;
 }
 
+// A step near 0.618 n (the golden section), n > 0, that has no common factor with n. The places
+// (k step) mod n for k = 0, 1, .. then visit all of 0 .. n - 1, and the first few of them, however
+// many, are spread evenly.
+int even_step(int n);
+
 void set_ray(RayPairs& pairs, int view, int i, const Vec3& ray, const Mat32& jacobian);
 void set_ray(RayPairs& pairs, int view, int i, const double ray[3], const double jacobian[6]);
 // Call this after the last set_ray: it computes pixel_angle of the first num_all matches, which is

@@ -24,16 +24,20 @@ constexpr double kHardlyEver = 1e300, kRarely = 1e299;
 // A frame's surroundings are the points of this many keyframes that share at least so many with it.
 constexpr int32_t kSurroundingKeyframes = 12, kLeastShared = 5;
 
-// Whether the image of a point lies where a keypoint does, up to the largest error.
-bool is_seen_at(const Odometry& odometry, const MapKeyframe& keyframe, const MapKeypoint& keypoint,
-                const MapPoint& point) {
+// The keypoint of a keyframe sees the point from now on if the point's image lies where it does, up
+// to the largest error.
+void observe_if_near(Odometry* odometry, int32_t keyframe, int32_t keypoint, int32_t point) {
+  Map& map = odometry->map;
+  const MapKeypoint& own = keypoints_of(map, map.keyframes[keyframe])[keypoint];
   double x[3];
-  transform(keyframe.cam_from_world, point.position, x);
+  transform(map.keyframes[keyframe].cam_from_world, map.points[point].position, x);
   Vec2 pixel;
-  if (!project(odometry.camera, Vec3(x[0], x[1], x[2]), &pixel, nullptr)) return false;
-  const double dx = pixel.x() - static_cast<double>(keypoint.x);
-  const double dy = pixel.y() - static_cast<double>(keypoint.y);
-  return std::sqrt(dx * dx + dy * dy) <= kLargestError * sigma_of(keypoint);
+  if (!project(odometry->camera, Vec3(x[0], x[1], x[2]), &pixel, nullptr)) return;
+  const double dx = pixel.x() - static_cast<double>(own.x);
+  const double dy = pixel.y() - static_cast<double>(own.y);
+  if (std::sqrt(dx * dx + dy * dy) <= kLargestError * sigma_of(own)) {
+    observe(&map, keyframe, keypoint, point);
+  }
 }
 
 }  // namespace
@@ -93,8 +97,8 @@ int32_t make_keyframe(Odometry* odometry, const Frame& frame) {
 }
 
 int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
-                            const int32_t* keypoints0, const int32_t* keypoints1, int32_t num,
-                            double least_angle_rad, const uint8_t* greys) {
+                            const tv_correspondence* matches, int32_t num, double least_angle_rad,
+                            const uint8_t* greys) {
   ArenaScope scope(odometry->scratch);
   Arena& arena = odometry->scratch;
   Map& map = odometry->map;
@@ -108,10 +112,11 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   double* pixels1 = arena_alloc<double>(arena, 2 * n);
   tv_point* points = arena_alloc<tv_point>(arena, n);
   for (int32_t k = 0; k < num; ++k) {
-    pixels0[2 * k] = static_cast<double>(own0[keypoints0[k]].x);
-    pixels0[2 * k + 1] = static_cast<double>(own0[keypoints0[k]].y);
-    pixels1[2 * k] = static_cast<double>(own1[keypoints1[k]].x);
-    pixels1[2 * k + 1] = static_cast<double>(own1[keypoints1[k]].y);
+    const MapKeypoint &a = own0[matches[k].idx0], &b = own1[matches[k].idx1];
+    pixels0[2 * k] = static_cast<double>(a.x);
+    pixels0[2 * k + 1] = static_cast<double>(a.y);
+    pixels1[2 * k] = static_cast<double>(b.x);
+    pixels1[2 * k + 1] = static_cast<double>(b.y);
   }
   const Rigid cam1_from_cam0 =
       orthonormalised(motion_between(k0.cam_from_world, k1.cam_from_world));
@@ -124,9 +129,9 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
   int32_t num_made = 0;
   for (int32_t k = 0; k < num; ++k) {
     const tv_point& p = points[k];
-    const MapKeypoint& a = own0[keypoints0[k]];
-    const MapKeypoint& b = own1[keypoints1[k]];
-    if (seen0[keypoints0[k]] != kNoPoint || seen1[keypoints1[k]] != kNoPoint) continue;
+    const int32_t idx0 = matches[k].idx0, idx1 = matches[k].idx1;
+    const MapKeypoint &a = own0[idx0], &b = own1[idx1];
+    if (seen0[idx0] != kNoPoint || seen1[idx1] != kNoPoint) continue;
     const double sigma = std::sqrt(0.5 * (sigma_of(a) * sigma_of(a) + sigma_of(b) * sigma_of(b)));
     if (p.status != TV_POINT_OK || static_cast<double>(p.angle_rad) < least_angle_rad * sigma ||
         static_cast<double>(p.error_px) > kLargestError * sigma) {
@@ -139,7 +144,7 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     if (!(ratio < kLargestSizeRatio && ratio > 1 / kLargestSizeRatio)) continue;
     transform(world_from_cam0, p.position, world);
     const uint8_t* descriptor =
-        descriptors_of(map, k1) + static_cast<size_t>(keypoints1[k]) * TV_DESCRIPTOR_BYTES;
+        descriptors_of(map, k1) + static_cast<size_t>(idx1) * TV_DESCRIPTOR_BYTES;
     const int32_t made = add_point(&map, world, descriptor, k1.segment);
     if (made == kNoPoint) break;
     MapPoint* point = &map.points[made];
@@ -148,9 +153,9 @@ int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyfr
     for (int c = 0; c < 3; ++c) point->seen_from[c] = static_cast<float>(world_from_cam0.t[c]);
     point->depth_sigma = static_cast<float>(
         std::min(1.0, kTypicalNoise / (camera->fx * static_cast<double>(p.angle_rad))));
-    point->grey = greys[keypoints1[k]];
-    observe(&map, keyframe0, keypoints0[k], made);
-    observe(&map, keyframe1, keypoints1[k], made);
+    point->grey = greys[idx1];
+    observe(&map, keyframe0, idx0, made);
+    observe(&map, keyframe1, idx1, made);
     ++num_made;
   }
   return num_made;
@@ -166,8 +171,6 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
   const int32_t room = map.sizes.max_keypoints;
   const size_t n = static_cast<size_t>(room);
   tv_correspondence* found = arena_alloc<tv_correspondence>(arena, n);
-  int32_t* keypoints0 = arena_alloc<int32_t>(arena, n);
-  int32_t* keypoints1 = arena_alloc<int32_t>(arena, n);
   const tv_features mine = features_of(map, own, arena_alloc<tv_keypoint>(arena, n));
   tv_keypoint* their_room = arena_alloc<tv_keypoint>(arena, n);
   int32_t neighbours[kMostNeighbours], num_neighbours = 0;
@@ -200,27 +203,20 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
     } else if (i > first_checked && needs_vote(check->vote)) {
       add_pair(check, other.id);
     }
-    const MapKeypoint* my_keypoints = keypoints_of(map, own);
-    const MapKeypoint* their_keypoints = keypoints_of(map, other);
     const int32_t *seen = seen_by(map, own), *seen_by_them = seen_by(map, other);
     int32_t num = 0;
     for (int32_t m = 0; m < num_found; ++m) {
       const int32_t a = found[m].idx0, b = found[m].idx1;
       const int32_t theirs_point = seen_by_them[a], point = seen[b];
       if (point == kNoPoint && theirs_point == kNoPoint) {
-        keypoints0[num] = a;
-        keypoints1[num++] = b;
+        found[num++] = found[m];
       } else if (theirs_point == kNoPoint) {
-        if (is_seen_at(*odometry, other, their_keypoints[a], map.points[point])) {
-          observe(&map, k, a, point);
-        }
+        observe_if_near(odometry, k, a, point);
       } else if (point == kNoPoint) {
-        if (is_seen_at(*odometry, own, my_keypoints[b], map.points[theirs_point])) {
-          observe(&map, keyframe, b, theirs_point);
-        }
+        observe_if_near(odometry, keyframe, b, theirs_point);
       }
     }
-    triangulate_matches(odometry, k, keyframe, keypoints0, keypoints1, num,
+    triangulate_matches(odometry, k, keyframe, found, num,
                         std::max(kLeastAngle, kLeastTurnSigmas * odometry->turn_sigma),
                         frame.greys);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "odometry/odometry.h"
+#include "twoview/match.h"
 
 namespace tv {
 
@@ -18,11 +19,11 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
 // and never the one to which poses are relative.
 void make_room(Odometry* odometry, int32_t wanted);
 
-// Makes points of matched pixels of two keyframes. `greys` are those of the second one's keypoints.
-// Returns how many points it made.
+// Makes points of matched keypoints of two keyframes. `greys` are those of the second one's
+// keypoints. Returns how many points it made.
 int32_t triangulate_matches(Odometry* odometry, int32_t keyframe0, int32_t keyframe1,
-                            const int32_t* keypoints0, const int32_t* keypoints1, int32_t num,
-                            double least_angle_rad, const uint8_t* greys);
+                            const tv_correspondence* matches, int32_t num, double least_angle_rad,
+                            const uint8_t* greys);
 
 // Removes points that frames do not find where they must appear.
 void remove_bad_points(Odometry* odometry);

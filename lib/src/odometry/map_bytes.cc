@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 
 #include "base/math.h"
@@ -17,6 +18,7 @@ constexpr size_t kUnchecked = 16;  // the checksum is that of the bytes from her
 // Ranges in which nothing that is computed from the numbers overflows.
 constexpr double kLargest = 1e15;
 constexpr int32_t kMost = 1 << 28;
+constexpr int kCounts = 4;  // of a Header, from num_frames on
 constexpr float kLargestPixel = 1e5f, kLargestSize = 4096;
 
 // CRC-32 as of PNG and zlib, four bits at a time.
@@ -34,14 +36,14 @@ uint32_t checksum(const uint8_t* bytes, size_t num) {
   return ~crc;
 }
 
-// Numbers go from the map to `to`, or from `from` to the map. Each pass_ function lists the numbers
-// of a struct once for both directions; with neither array they are only counted.
+// Numbers go from the map to `to`, or from `from` to the map. The tables list the numbers of each
+// struct once for both directions; with neither array they are only counted.
 struct Stream {
   uint8_t* to;
   const uint8_t* from;
   size_t at;
   size_t end;   // of `from`
-  bool is_bad;  // `from` has too few bytes, or what must be 0 is not
+  bool is_bad;  // `from` has too few bytes
 };
 
 void pass_numbers(Stream* s, void* numbers, size_t width, size_t bytes) {
@@ -60,12 +62,6 @@ void pass_numbers(Stream* s, void* numbers, size_t width, size_t bytes) {
   s->at += bytes;
 }
 
-// The numbers of one type from `first` to `last`, members that follow each other in their struct.
-template <typename Number>
-void pass(Stream* s, Number* first, Number* last) {
-  pass_numbers(s, first, sizeof(Number), sizeof(Number) * static_cast<size_t>(last + 1 - first));
-}
-
 struct Header {
   uint8_t magic[8];
   uint32_t version, checksum;
@@ -78,79 +74,92 @@ struct Header {
   MetricScale scale;
 };
 
-void pass_header(Stream* s, Header* h) {
-  tv_camera* camera = &h->camera;
-  pass(s, h->magic, h->magic + 7);
-  pass(s, &h->version, &h->checksum);
-  pass(s, &h->num_bytes, &h->num_bytes);
-  pass(s, &camera->model, &camera->reserved);
-  pass(s, &camera->fx, &camera->k[7]);
-  pass(s, &h->num_points, &h->scale.evidence);
-  pass(s, &h->scale.product, &h->scale.sigma);
+// Numbers of one type that follow each other in their struct.
+struct Numbers {
+  uint16_t offset;
+  uint8_t width, count;
+};
+
+constexpr Numbers kOfHeader[] = {
+    {offsetof(Header, magic), 1, 8},        {offsetof(Header, version), 4, 2},
+    {offsetof(Header, num_bytes), 8, 1},    {offsetof(Header, camera.model), 4, 4},
+    {offsetof(Header, camera.fx), 8, 12},   {offsetof(Header, num_points), 4, 12},
+    {offsetof(Header, scale.product), 8, 3}};
+constexpr Numbers kOfPoint[] = {{offsetof(MapPoint, position), 8, 3},
+                                {offsetof(MapPoint, id), 4, 2},
+                                {offsetof(MapPoint, num_visible), 4, 3},
+                                {offsetof(MapPoint, grey), 4, 1},
+                                {offsetof(MapPoint, depth_sigma), 4, 4}};
+constexpr Numbers kOfKeyframe[] = {{offsetof(MapKeyframe, id), 4, 3},
+                                   {offsetof(MapKeyframe, num_keypoints), 4, 1},
+                                   {offsetof(MapKeyframe, time_s), 8, 20}};
+constexpr Numbers kOfRemoved[] = {{offsetof(RemovedKeyframe, id), 4, 2},
+                                  {offsetof(RemovedKeyframe, kept_from_removed), 8, 13}};
+
+void pass_all(Stream* s, void* of_struct, const Numbers* numbers, size_t num) {
+  for (; num > 0; --num, ++numbers) {
+    pass_numbers(s, static_cast<uint8_t*>(of_struct) + numbers->offset, numbers->width,
+                 size_t{numbers->width} * numbers->count);
+  }
 }
 
-void pass_point(Stream* s, MapPoint* p, uint8_t (*descriptor)[TV_DESCRIPTOR_BYTES]) {
-  pass(s, p->position, p->position + 2);
-  pass(s, &p->id, &p->segment);
-  pass(s, &p->num_visible, &p->made_at);
-  pass(s, &p->grey, &p->grey);
-  pass(s, &p->depth_sigma, &p->seen_from[2]);
-  pass(s, *descriptor, *descriptor + TV_DESCRIPTOR_BYTES - 1);
+template <size_t n>
+void pass(Stream* s, void* of_struct, const Numbers (&numbers)[n]) {
+  pass_all(s, of_struct, numbers, n);
 }
 
-void pass_keyframe(Stream* s, MapKeyframe* k) {
-  pass(s, &k->id, &k->frame);
-  pass(s, &k->num_keypoints, &k->num_keypoints);
-  pass(s, &k->time_s, &k->scale);
+void pass_point(Stream* s, MapPoint* point, uint8_t* descriptor) {
+  pass(s, point, kOfPoint);
+  pass_numbers(s, descriptor, 1, TV_DESCRIPTOR_BYTES);
 }
 
-void pass_keypoint(Stream* s, MapKeypoint* k, int32_t* seen) {
-  pass(s, &k->x, &k->size);
-  pass(s, seen, seen);
+void pass_keypoint(Stream* s, MapKeypoint* keypoint, int32_t* seen) {
+  pass_numbers(s, keypoint, 4, 12);
+  pass_numbers(s, seen, 4, 4);
 }
 
-void pass_removed(Stream* s, RemovedKeyframe* r) {
-  pass(s, &r->id, &r->kept_id);
-  pass(s, r->kept_from_removed.R, &r->scale);
-}
-
-bool is_count(int32_t n) { return n >= 0 && n <= kMost; }
 bool is_index(int32_t n, int32_t end) { return n >= 0 && n < end; }
-bool is_length(double x) { return std::fabs(x) <= kLargest; }
-bool is_sigma(double x) { return x >= 0 && x <= kLargest; }
 bool is_measure(double x, double sigma) { return is_finite(x) && is_finite(sigma) && sigma >= 0; }
 bool is_scale(double x) { return x >= 1 / kLargest && x <= kLargest; }
 
-template <typename Number>
-bool are_lengths(const Number (&x)[3]) {
-  return is_length(x[0]) && is_length(x[1]) && is_length(x[2]);
+bool are_counts(const int32_t* first, const int32_t* last) {
+  for (; first <= last; ++first) {
+    if (!is_index(*first, kMost + 1)) return false;
+  }
+  return true;
 }
 
-bool is_pose(const Rigid& pose) { return is_rotation(pose.R) && are_lengths(pose.t); }
+template <typename Number>
+bool are_lengths(const Number* first, const Number* last) {
+  for (; first <= last; ++first) {
+    if (!(std::fabs(static_cast<double>(*first)) <= kLargest)) return false;
+  }
+  return true;
+}
+
+bool is_pose(const Rigid& pose) { return is_rotation(pose.R) && are_lengths(pose.t, pose.t + 2); }
 
 bool is_header(const Header& h) {
-  return is_count(h.num_points) && is_count(h.num_keyframes) && is_count(h.num_removed) &&
-         is_count(h.next_point_id) && is_count(h.next_keyframe_id) && is_count(h.num_frames) &&
-         is_count(h.num_segments) && is_count(h.num_relocations) && is_count(h.num_loops) &&
-         is_index(h.is_upright, 2) && is_index(h.scale.source, 4) &&
-         is_index(h.scale.evidence, 4) && is_measure(h.scale.product, h.scale.square) &&
+  return are_counts(&h.num_points, &h.num_loops) && is_index(h.is_upright, 2) &&
+         is_index(h.scale.source, 4) && is_index(h.scale.evidence, 4) &&
+         is_measure(h.scale.product, h.scale.square) &&
          (h.scale.square > 0 || h.scale.product == 0) && is_measure(0, h.scale.sigma) &&
          tv_camera_check(&h.camera) == TV_OK;
 }
 
 bool is_point(const Header& h, const MapPoint& p) {
   return is_index(p.id, h.next_point_id) && is_index(p.segment, h.num_segments) &&
-         is_count(p.num_visible) && is_count(p.num_found) &&
-         is_index(p.made_at, h.next_keyframe_id) && is_index(p.grey, 256) &&
-         are_lengths(p.position) && is_sigma(static_cast<double>(p.depth_sigma)) &&
-         are_lengths(p.seen_from);
+         are_counts(&p.num_visible, &p.num_found) && is_index(p.made_at, h.next_keyframe_id) &&
+         is_index(p.grey, 256) && are_lengths(p.position, p.position + 2) && p.depth_sigma >= 0 &&
+         are_lengths(&p.depth_sigma, &p.seen_from[2]);
 }
 
 bool is_keyframe(const Header& h, const MapKeyframe& k) {
   return is_index(k.id, h.next_keyframe_id) && is_index(k.segment, h.num_segments) &&
-         is_index(k.frame, h.num_frames) && is_count(k.num_keypoints) && is_finite(k.time_s) &&
-         is_pose(k.cam_from_world) && are_lengths(k.down) && is_sigma(k.down_sigma_rad) &&
-         is_measure(k.height_m, k.height_sigma_m) && is_scale(k.scale);
+         is_index(k.frame, h.num_frames) && are_counts(&k.num_keypoints, &k.num_keypoints) &&
+         is_finite(k.time_s) && is_pose(k.cam_from_world) && k.down_sigma_rad >= 0 &&
+         are_lengths(k.down, &k.down_sigma_rad) && is_measure(k.height_m, k.height_sigma_m) &&
+         is_scale(k.scale);
 }
 
 bool is_keypoint(const Header& h, const MapKeypoint& k, int32_t seen) {
@@ -190,7 +199,7 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
   for (int32_t n = 0; n < h.num_points; ++n) {
     MapPoint point{};
     uint8_t descriptor[TV_DESCRIPTOR_BYTES];
-    pass_point(s, &point, &descriptor);
+    pass_point(s, &point, descriptor);
     if (s->is_bad || !is_point(h, point) || point.id <= last_id) return false;
     last_id = point.id;
     if (!stores) continue;
@@ -203,7 +212,7 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
   last_id = -1;
   for (int32_t n = 0; n < h.num_keyframes; ++n) {
     MapKeyframe keyframe{};
-    pass_keyframe(s, &keyframe);
+    pass(s, &keyframe, kOfKeyframe);
     if (s->is_bad || !is_keyframe(h, keyframe) || keyframe.id <= last_id) return false;
     last_id = keyframe.id;
     *fits = *fits && keyframe.num_keypoints <= sizes.max_keypoints;
@@ -235,7 +244,7 @@ bool read_body(const Header& h, Stream* s, int32_t* places, Map* map, const Base
   if (stores && surplus > 0) forget_removed(map, surplus);
   for (int32_t n = 0; n < h.num_removed; ++n) {
     RemovedKeyframe removed;
-    pass_removed(s, &removed);
+    pass(s, &removed, kOfRemoved);
     if (s->is_bad || !is_removed(h, removed) || removed.id <= last_id) return false;
     last_id = removed.id;
     if (!stores) continue;
@@ -264,10 +273,7 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   h.num_removed = map.num_removed;
   h.next_point_id = map.next_point_id;
   h.next_keyframe_id = map.next_keyframe_id;
-  h.num_frames = odometry.num_frames;
-  h.num_segments = odometry.num_segments;
-  h.num_relocations = odometry.num_relocations;
-  h.num_loops = odometry.num_loops;
+  std::copy_n(&odometry.num_frames, kCounts, &h.num_frames);
   // Of the last keyframe's segment.
   const int32_t segment =
       map.num_keyframes > 0 ? map.keyframes[map.num_keyframes - 1].segment : odometry.segment;
@@ -277,18 +283,18 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   else if (segment == odometry.other_segment)
     h.scale = odometry.other_scale;
   Stream s{to, nullptr, 0, 0, false};
-  pass_header(&s, &h);
+  pass(&s, &h, kOfHeader);
   for (int32_t n = 0; n < map.num_points; ++n) {
     MapPoint point = map.points[places[n]];
     uint8_t descriptor[TV_DESCRIPTOR_BYTES];
     std::memcpy(descriptor, descriptor_of(map, places[n]), sizeof descriptor);
-    pass_point(&s, &point, &descriptor);
+    pass_point(&s, &point, descriptor);
   }
   for (int32_t n = 0; n < map.num_keyframes; ++n) {
     MapKeyframe keyframe = map.keyframes[n];
     const MapKeypoint* own = keypoints_of(map, keyframe);
     const int32_t* seen = seen_by(map, keyframe);
-    pass_keyframe(&s, &keyframe);
+    pass(&s, &keyframe, kOfKeyframe);
     for (int32_t k = 0; k < keyframe.num_keypoints; ++k) {
       MapKeypoint keypoint = own[k];
       int32_t point = seen[k] == kNoPoint ? kNoPoint : ranks[seen[k]];
@@ -297,16 +303,16 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   }
   for (int32_t n = 0; n < map.num_removed; ++n) {
     RemovedKeyframe removed = map.removed[n];
-    pass_removed(&s, &removed);
+    pass(&s, &removed, kOfRemoved);
   }
   const size_t num_bytes = s.at;
   if (to != nullptr) {  // the header again, now that what it tells is known
     h.num_bytes = num_bytes;
     s.at = 0;
-    pass_header(&s, &h);
+    pass(&s, &h, kOfHeader);
     h.checksum = checksum(to + kUnchecked, num_bytes - kUnchecked);
     s.at = 0;
-    pass_header(&s, &h);
+    pass(&s, &h, kOfHeader);
   }
   return num_bytes;
 }
@@ -315,7 +321,7 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   Map* map = &odometry->map;
   Header h;
   Stream s{nullptr, bytes, 0, num_bytes, false};
-  pass_header(&s, &h);
+  pass(&s, &h, kOfHeader);
   if (s.is_bad || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version != kVersion ||
       h.num_bytes != num_bytes ||
       h.checksum != checksum(bytes + kUnchecked, num_bytes - kUnchecked) || !is_header(h)) {
@@ -342,10 +348,7 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   read_body(h, &s, places, map, base, &fits);
   map->next_point_id = base.point_id + h.next_point_id;
   map->next_keyframe_id += h.next_keyframe_id;
-  odometry->num_frames += h.num_frames;
-  odometry->num_segments += h.num_segments;
-  odometry->num_relocations += h.num_relocations;
-  odometry->num_loops += h.num_loops;
+  for (int n = 0; n < kCounts; ++n) (&odometry->num_frames)[n] += (&h.num_frames)[n];
   if (h.num_keyframes > 0) {
     enter_segment(odometry, map->keyframes[map->num_keyframes - 1].segment);
     odometry->scale = h.scale;

@@ -123,7 +123,9 @@ struct tv_odometry {
   bool has_motion;
   tv::Rigid motion;
   double motion_s;
-  int32_t num_frames, segment, num_segments, num_relocations, num_loops;
+  int32_t segment;
+  // These follow each other in a map's bytes, too.
+  int32_t num_frames, num_segments, num_relocations, num_loops;
   int32_t status;
   int32_t lost_frames, turned_frames, next_search, next_loop;
   int32_t keyframe_inliers;  // of the frame that became the last keyframe

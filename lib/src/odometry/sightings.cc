@@ -6,6 +6,7 @@
 
 #include "base/math.h"
 #include "base/order.h"
+#include "geometry/ray_pairs.h"
 #include "geometry/vector3.h"
 
 namespace tv {
@@ -134,19 +135,6 @@ bool set_pixel(const Camera& camera, const double* pixel, double sigma, Sighting
     }
   }
   return is_finite(sum) && sum < 1e20;
-}
-
-// A step near 0.618 n that has no common factor with n (see geometry/ray_pairs.cc).
-int even_step(int n) {
-  for (int step = static_cast<int>(0.6180339887498949 * n);; ++step) {
-    int a = n, b = step;
-    while (b > 0) {
-      const int rest = a % b;
-      a = b;
-      b = rest;
-    }
-    if (a == 1) return step;
-  }
 }
 
 void set_fast(Sightings* s) {

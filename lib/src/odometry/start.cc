@@ -57,16 +57,14 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
   make_room(odometry, 2);
   const int32_t first = make_keyframe(odometry, *frame0);
   const int32_t second = make_keyframe(odometry, *frame);
-  int32_t* keypoints0 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
-  int32_t* keypoints1 = arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(pair.num));
+  tv_correspondence* inliers =
+      arena_alloc<tv_correspondence>(odometry->scratch, static_cast<size_t>(pair.num));
   int32_t num = 0;
   for (int32_t k = 0; k < pair.num; ++k) {
-    if (!pair.is_inlier[k]) continue;
-    keypoints0[num] = pair.matches[k].idx0;
-    keypoints1[num++] = pair.matches[k].idx1;
+    if (pair.is_inlier[k]) inliers[num++] = pair.matches[k];
   }
-  int32_t made = triangulate_matches(odometry, first, second, keypoints0, keypoints1, num,
-                                     kLeastAngle, frame->greys);
+  int32_t made =
+      triangulate_matches(odometry, first, second, inliers, num, kLeastAngle, frame->greys);
   if (made >= kLeastPoints) {
     adjust_around(odometry, second, 20);
     made = map.keyframes[second].num_observations;
