@@ -103,6 +103,7 @@ void pass_all(Stream* s, void* of_struct, const Numbers* numbers, size_t num) {
   }
 }
 
+// All numbers of a struct, by its table.
 template <size_t n>
 void pass(Stream* s, void* of_struct, const Numbers (&numbers)[n]) {
   pass_all(s, of_struct, numbers, n);
