@@ -15,6 +15,9 @@ constexpr double kLeastParallax = 0.015;  // radians, the median
 constexpr int32_t kLeastTurnInliers = 50;
 constexpr int32_t kFramesBetween = 6;      // between frames that wait
 constexpr double kLargestTurnSigma = 0.3;  // of the median parallax, in frames nearer than that
+// While the parallax grew by less than half of what a start needs on average, the frames between
+// two tries double, up to kFramesBetween.
+constexpr double kGrowth = 2;
 
 // Matches two frames and estimates the motion between them. False: there are too few matches.
 bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, Pair* pair) {
@@ -26,6 +29,18 @@ bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, 
   int32_t num = 0;
   tv_match(odometry->context, &features0, &features1, nullptr, found, room, &num);
   return estimate_pair(odometry, frame0.keypoints, frame1.keypoints, found, num, pair);
+}
+
+// The number of the frame that may lie far enough from the first one, if the parallax between them
+// grows kGrowth times as fast as it did up to this frame.
+int32_t next_try_of(const Frame& first, const Frame& frame, double parallax) {
+  const int32_t elapsed = frame.number - first.number;
+  int32_t next = elapsed + 1;
+  while (next < elapsed + std::min(elapsed, kFramesBetween) &&
+         kGrowth * parallax * next < kLeastParallax * elapsed) {
+    ++next;
+  }
+  return first.number + next;
 }
 
 // Whether the rotation is known well enough for the depths of the first points, which are off by
@@ -98,7 +113,7 @@ void copy_frame(const Odometry& odometry, const Frame& from, Frame* to) {
   std::copy_n(from.descriptors, n * TV_DESCRIPTOR_BYTES, to->descriptors);
   std::copy_n(from.sigmas, n, to->sigmas);
   to->num = from.num;
-  to->number = from.number;
+  to->number = to->next_try = from.number;
   to->time_s = from.time_s;
   to->sensors = from.sensors;
   to->cam_from_world = kIdentity;
@@ -111,6 +126,10 @@ bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons) {
     ArenaScope scope(odometry->scratch);
     Pair pair;
     Frame* const first = &odometry->starts[n];
+    if (frame->number < first->next_try) {
+      *reasons |= TV_REASON_LOW_PARALLAX;
+      break;
+    }
     if (!match_frames(odometry, *first, *frame, &pair) || 2 * pair.view->num_inliers < pair.num ||
         pair.view->num_inliers < kLeastMatches) {
       *reasons |= TV_REASON_TOO_FEW_MATCHES;
@@ -123,6 +142,7 @@ bool start_map(Odometry* odometry, Frame* frame, uint32_t* reasons) {
     if (!pair.view->has_t || pair.view->median_parallax_rad < kLeastParallax ||
         (is_near && !is_turn_sure(*pair.view))) {
       *reasons |= TV_REASON_LOW_PARALLAX;
+      first->next_try = next_try_of(*first, *frame, pair.view->median_parallax_rad);
       // Those that follow are nearer still, but for a camera that went to and fro.
       if (pair.view->median_parallax_rad < kLeastParallax / 2) break;
       continue;

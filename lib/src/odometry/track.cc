@@ -32,6 +32,8 @@ constexpr int32_t kLostBeforeStart = 8;    // frames
 // After an adjustment that moves the camera by this share of the path, or turns it by so many
 // radians, the next frame is weak.
 constexpr double kJumpShare = 0.03, kJumpTurn = 0.05;
+// Frames are weak after keyframes whose turns are so uncertain together, in radians.
+constexpr double kMostDrift = 0.026;
 // Velocities are believed against the map once so many of its ways agreed with them. The map is
 // wrong where so many frames in a row contradict velocities that are believed.
 constexpr int32_t kLeastTrust = 5, kMostContrary = 5;
@@ -241,7 +243,10 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
       const int32_t id = map.points[again->points[k]].id;
       if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
+    const Rigid before = map.keyframes[newest].cam_from_world;
     close_loop(odometry, newest, *again, end);
+    if (is_far_from(odometry, before, newest)) state->reasons |= TV_REASON_LOW_PARALLAX;
+    odometry->drift_sq = 0;
     scale_by(end.scale, odometry->motion.t);
     ++odometry->num_loops;
     state->loop_closed = 1;
@@ -249,6 +254,7 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
   take_keyframe(*odometry, newest, frame);
   odometry->unadjusted_id = odometry->reference_id;
   odometry->closed_loop = closes;
+  odometry->drift_sq += odometry->turn_sigma * odometry->turn_sigma;
   state->is_keyframe = 1;
   return true;
 }
@@ -362,6 +368,7 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
     if (!heed_check(odometry)) return false;
   }
   add_doubts(*odometry, state);
+  if (odometry->drift_sq > kMostDrift * kMostDrift) state->reasons |= TV_REASON_LOW_PARALLAX;
   odometry->status = state->reasons == 0 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK;
   return true;
 }
@@ -408,6 +415,7 @@ bool begin_segment(Odometry* odometry, Frame* frame, tv_odometry_state* state) {
     return false;
   }
   change_scale(odometry, segment, odometry->segment);
+  odometry->drift_sq = 0;
   ++odometry->num_segments;
   odometry->lost_frames = odometry->turned_frames = 0;
   const int32_t newest = odometry->map.num_keyframes - 1;
