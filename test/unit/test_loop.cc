@@ -498,6 +498,23 @@ void test_few_points_join_upright_segments_only_twice() {
   TEST_ASSERT_TRUE(tv::is_believed(odometry, frame, 0, 30, 44, end));
 }
 
+// 19 keyframes before it, the path is 1.9 long: 3 % of it are 0.057.
+void test_a_large_correction_is_a_jump() {
+  const double ways[] = {0.05, 0.07, 0, 0}, turns[] = {0, 0, 0.04, 0.06};
+  for (int k = 0; k < 4; ++k) {
+    TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+    odometry->median_depth = 1;
+    odometry->drift_sq = 1;
+    add_keyframes();
+    tv::LoopEnd end = {0, odometry->map.keyframes[kNum - 1].cam_from_world, 1};
+    end.cam_from_world = tv::compose(turned(turns[k]), end.cam_from_world);
+    end.cam_from_world.t[2] += ways[k];
+    const tv::Frame nothing{};
+    TEST_ASSERT_EQUAL(k % 2 != 0, tv::close_loop(odometry, kNum - 1, nothing, end));
+    TEST_ASSERT_EQUAL_DOUBLE(0, odometry->drift_sq);
+  }
+}
+
 }  // namespace
 
 extern "C" void setUp(void) {
@@ -519,6 +536,7 @@ int main() {
   RUN_TEST(test_drift_explains_a_loop_only_within_bounds);
   RUN_TEST(test_the_metre_keeps_its_length_when_a_loop_stretches_the_path);
   RUN_TEST(test_the_metre_goes_with_a_segment_that_joins_another_one);
+  RUN_TEST(test_a_large_correction_is_a_jump);
   RUN_TEST(test_a_way_goes_on_over_a_keyframe_that_is_removed);
   RUN_TEST(test_all_keyframes_of_a_segment_are_adjusted_together);
   RUN_TEST(test_keyframes_are_adjusted_in_any_order);

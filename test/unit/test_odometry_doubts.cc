@@ -3,6 +3,7 @@
 
 #include <unity.h>
 
+#include <cmath>
 #include <cstdint>
 
 #include "odometry/odometry.h"
@@ -73,6 +74,34 @@ void test_the_frame_after_a_large_adjustment_is_weak() {
   }
 }
 
+// A keyframe adds what its attitude is uncertain by, and the segment's first ones are certain.
+void test_frames_are_weak_while_the_keyframes_turns_are_unsure_together() {
+  for (const double drift_deg : {1.4, 1.6}) {
+    odometry = begin_room_flight(memory, sizeof memory);
+    int n = 0;
+    while (track_room(odometry, n).status != TV_ODOMETRY_TRACKING) ++n;
+    double sum_sq = odometry->drift_sq = drift_deg * drift_deg / (57.29578 * 57.29578);
+    for (int num_keyframes = 0; num_keyframes < 3;) {
+      const tv_odometry_state state = track_room(odometry, ++n);
+      if (state.is_keyframe) {
+        ++num_keyframes;
+        double largest_sq = 0;
+        for (int k = 0; k < 3; ++k) largest_sq = fmax(largest_sq, state.covariance[7 * k]);
+        sum_sq += largest_sq;
+      }
+      TEST_ASSERT_DOUBLE_WITHIN(1e-15, sum_sq, odometry->drift_sq);
+      TEST_ASSERT_EQUAL_INT(drift_deg < 1.5 ? TV_ODOMETRY_TRACKING : TV_ODOMETRY_WEAK,
+                            state.status);
+      TEST_ASSERT_EQUAL_UINT32(drift_deg < 1.5 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
+    }
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  odometry->drift_sq = 1;
+  int n = 0;
+  while (!track_room(odometry, n).is_keyframe) ++n;
+  TEST_ASSERT_EQUAL_DOUBLE(0, odometry->drift_sq);
+}
+
 }  // namespace
 
 extern "C" void setUp(void) { odometry = begin_room_flight(memory, sizeof memory); }
@@ -83,5 +112,6 @@ int main() {
   RUN_TEST(test_the_frame_that_ends_a_doubt_is_in_doubt);
   RUN_TEST(test_frames_are_in_doubt_after_keyframes_that_nothing_confirmed);
   RUN_TEST(test_the_frame_after_a_large_adjustment_is_weak);
+  RUN_TEST(test_frames_are_weak_while_the_keyframes_turns_are_unsure_together);
   return UNITY_END();
 }

@@ -74,6 +74,30 @@ void test_near_frames_wait_where_the_turn_is_unsure() {
   TEST_ASSERT_TRUE(begins(6, 0.2));
 }
 
+// Frame 0 is matched with 1, 2, 4, 8 and then each sixth frame while nothing moves. What 8 cm are
+// in six frames may be enough in the next one.
+void test_a_frame_from_which_nothing_moves_is_tried_less_often() {
+  tv::Frame* const frame = &odometry->frame;
+  uint32_t reasons = 0;
+  for (int32_t number = 0; number <= 20; ++number) {
+    see(number, 0, 0.05, frame);
+    TEST_ASSERT_FALSE(tv::start_map(odometry, frame, &reasons));
+    const int32_t expected = number == 0  ? 0
+                             : number < 2 ? 2
+                             : number < 4 ? 4
+                             : number < 8 ? 8
+                                          : 14 + (number - 8) / 6 * 6;
+    TEST_ASSERT_EQUAL_INT32(0, odometry->starts[0].number);
+    TEST_ASSERT_EQUAL_INT32(expected, odometry->starts[0].next_try);
+    TEST_ASSERT_EQUAL(number > 0, (reasons & TV_REASON_LOW_PARALLAX) != 0);
+  }
+  TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  for (int32_t number = 0; number <= 4; ++number) {
+    see(number, number < 3 ? 0 : 0.24, 0.05, frame);
+    TEST_ASSERT_EQUAL(number == 4, tv::start_map(odometry, frame, &reasons));
+  }
+}
+
 }  // namespace
 
 extern "C" void setUp(void) {
@@ -85,5 +109,6 @@ extern "C" void tearDown(void) {}
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_near_frames_wait_where_the_turn_is_unsure);
+  RUN_TEST(test_a_frame_from_which_nothing_moves_is_tried_less_often);
   return UNITY_END();
 }

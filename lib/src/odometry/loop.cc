@@ -17,6 +17,9 @@
 namespace tv {
 namespace {
 
+// A change of the newest keyframe's pose by this share of the path, or by so many radians, is a
+// jump.
+constexpr double kJumpShare = 0.03, kJumpTurn = 0.05;
 constexpr int32_t kLeastKeyframesBetween = 12;
 constexpr int32_t kLeastMatches = 25, kLeastInliers = 50, kLeastCommon = 8;
 // With fewer inliers a loop of the same segment, or between upright ones, needs another one of the
@@ -85,6 +88,15 @@ void measure_paths(const Map& map, int32_t segment, double* lengths) {
     }
     lengths[k] = length;
   }
+}
+
+bool is_jump(Odometry* odometry, const Rigid& before, int32_t keyframe) {
+  ArenaScope scope(odometry->scratch);
+  const Map& map = odometry->map;
+  const MapKeyframe& own = map.keyframes[keyframe];
+  double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
+  measure_paths(map, own.segment, paths);
+  return !are_near(before, own.cam_from_world, kJumpShare * paths[0], kJumpTurn);
 }
 
 bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end) {
@@ -249,7 +261,7 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
   return found;
 }
 
-void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end) {
+bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end) {
   ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
   const int32_t newest = map.num_keyframes - 1;
@@ -293,14 +305,16 @@ void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   fuse_points(odometry, keyframe, again);
   odometry->weak_loop.frame = -1;
   odometry->is_found_again = false;
+  odometry->drift_sq = 0;
   const bool is_small =
       are_near(now, end.cam_from_world, kLeastWay * odometry->median_depth, kLeastTurn);
-  if (segment == old_segment && is_small) return;
+  if (segment == old_segment && is_small) return false;
   Spread* spread = &odometry->spread;
   const bool again_here = segment == old_segment && spread->segment == old_segment;
   const int32_t first_id = map.keyframes[std::max(newest + 1 - kLeastSpread, 0)].id;
   *spread = {kSpreadSteps, 0, old_segment, again_here ? std::min(spread->last_id, first_id) : 0,
              map.keyframes[newest].id};
+  return segment == old_segment && is_jump(odometry, now, keyframe);
 }
 
 bool is_spreading(const Odometry& odometry) {

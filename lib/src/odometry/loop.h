@@ -20,6 +20,9 @@ struct LoopEnd {
 // Writes for each keyframe the length of the segment's path since then.
 void measure_paths(const Map& map, int32_t segment, double* lengths);
 
+// Whether a keyframe is so far from where it was that this is a jump of its segment's path.
+bool is_jump(Odometry* odometry, const Rigid& before, int32_t keyframe);
+
 // Whether drift over a path of this length can explain where the frame is now and where it must be
 // for a loop.
 bool is_plausible(const Odometry& odometry, const Frame& frame, double path, const LoopEnd& end);
@@ -39,7 +42,8 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
 
 // Corrects the keyframes and points, roughly: the rest is spread_loop's. `keyframe` has the
 // keypoints of `again`; it is the newest one where it is of the same segment as the loop's end.
-void close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
+// Returns whether the path jumps.
+bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
 
 // Whether a closed loop is still to be spread over the keyframes of its segment.
 bool is_spreading(const Odometry& odometry);

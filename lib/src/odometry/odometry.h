@@ -29,7 +29,7 @@ struct Frame {
   int32_t* cell_items;
   int32_t number;  // how many frames were given before it
   double time_s;
-  int32_t next_try;  // of a frame that waits for a second view: the number of the one to match it with
+  int32_t next_try;  // where it waits for a second view: the number of the first to match it with
   bool has_pose;
   Rigid cam_from_world;
   Sensors sensors;
@@ -148,7 +148,7 @@ struct tv_odometry {
   double most_m;        // the longest way until now
   double median_depth;
   double turn_sigma;  // the largest standard deviation of the frame's attitude, in radians
-  double drift_sq;    // the sum of its squares over the keyframes since the start or the last loop
+  double drift_sq;    // sum of its squares, of the keyframes since the start or the last loop
   double last_time_s;
   bool is_upright;  // the segment's z axis points along gravity
   tv::Travel travel;

@@ -29,10 +29,7 @@ constexpr int32_t kLoopSteps = 8;          // and after a loop
 constexpr int32_t kLoopKeyframes = 2;      // that are searched for a loop at each frame
 constexpr int32_t kMostTurnedFrames = 60;  // of status rotation, in a row
 constexpr int32_t kLostBeforeStart = 8;    // frames
-// After an adjustment that moves the camera by this share of the path, or turns it by so many
-// radians, the next frame is weak.
-constexpr double kJumpShare = 0.03, kJumpTurn = 0.05;
-// Frames are weak after keyframes whose turns are so uncertain together, in radians.
+// Frames are weak while the keyframes' attitudes are so uncertain together, in radians.
 constexpr double kMostDrift = 0.026;
 // Velocities are believed against the map once so many of its ways agreed with them. The map is
 // wrong where so many frames in a row contradict velocities that are believed.
@@ -184,16 +181,6 @@ bool heed_velocities(Odometry* odometry, const Frame& frame, uint32_t* reasons) 
   return false;
 }
 
-// Whether a keyframe's camera is so far from where it was that this is a jump of the path.
-bool is_far_from(Odometry* odometry, const Rigid& before, int32_t keyframe) {
-  ArenaScope scope(odometry->scratch);
-  const Map& map = odometry->map;
-  const MapKeyframe& own = map.keyframes[keyframe];
-  double* paths = arena_alloc<double>(odometry->scratch, static_cast<size_t>(map.num_keyframes));
-  measure_paths(map, own.segment, paths);
-  return !are_near(before, own.cam_from_world, kJumpShare * paths[0], kJumpTurn);
-}
-
 // What the pairs of the newest keyframe say of the map. False: it is wrong here, and what was made
 // since the last confirmed keyframe is removed.
 bool heed_check(Odometry* odometry) {
@@ -243,10 +230,7 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
       const int32_t id = map.points[again->points[k]].id;
       if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
-    const Rigid before = map.keyframes[newest].cam_from_world;
-    close_loop(odometry, newest, *again, end);
-    if (is_far_from(odometry, before, newest)) state->reasons |= TV_REASON_LOW_PARALLAX;
-    odometry->drift_sq = 0;
+    if (close_loop(odometry, newest, *again, end)) state->reasons |= TV_REASON_LOW_PARALLAX;
     scale_by(end.scale, odometry->motion.t);
     ++odometry->num_loops;
     state->loop_closed = 1;
@@ -464,7 +448,7 @@ bool finish_keyframe(Odometry* odometry, Frame* frame) {
   make_points(odometry, newest, *frame, false);
   const Rigid before = odometry->map.keyframes[newest].cam_from_world;
   adjust_around(odometry, newest, odometry->closed_loop ? kLoopSteps : kWindowSteps);
-  odometry->was_moved_far = is_far_from(odometry, before, newest);
+  odometry->was_moved_far = is_jump(odometry, before, newest);
   odometry->keyframe_inliers = odometry->map.keyframes[newest].num_observations;
   list_local_points(odometry, newest);
   take_keyframe(*odometry, newest, frame);
