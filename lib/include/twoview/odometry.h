@@ -126,10 +126,12 @@ typedef struct tv_odometry_state {
   int32_t status;
   /* The bits of tv_reason that make the frame weak, or that keep the map from starting.
      TV_REASON_LOW_PARALLAX: nothing had confirmed the two keyframes yet that the segment began
-     with, or the last four keyframes, when the frame was tracked; or the map's adjustment since the
-     frame before moved the camera by 3 per cent of the path or 0.05 radians, so that the path jumps
-     here. TV_REASON_SECOND_MOTION: the camera moved otherwise in the map than the velocities say,
-     so that the map may follow something that moves. */
+     with, or the last four keyframes, when the frame was tracked; or a loop at this frame, or the
+     map's adjustment since the frame before, moved the camera by 3 per cent of the path or 0.05
+     radians, so that the path jumps here; or the attitudes of the keyframes since the segment
+     began, or its last loop closed, are uncertain by 1.5 degrees together. TV_REASON_SECOND_MOTION:
+     the camera moved otherwise in the map than the velocities say, so that the map may follow
+     something that moves. */
   uint32_t reasons;
   /* Which segment the pose belongs to, from 0; -1 where no pose is known. A segment is a stretch
      within one frame of coordinates: poses of different segments do not compare. */
