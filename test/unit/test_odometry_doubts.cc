@@ -74,7 +74,7 @@ void test_the_frame_after_a_large_adjustment_is_weak() {
   }
 }
 
-// A keyframe adds what its attitude is uncertain by, and the segment's first ones are certain.
+// A keyframe adds what its attitude is uncertain by; where a segment begins, nothing is.
 void test_frames_are_weak_while_the_keyframes_turns_are_unsure_together() {
   for (const double drift_deg : {1.4, 1.6}) {
     odometry = begin_room_flight(memory, sizeof memory);
@@ -95,7 +95,9 @@ void test_frames_are_weak_while_the_keyframes_turns_are_unsure_together() {
       TEST_ASSERT_EQUAL_UINT32(drift_deg < 1.5 ? 0 : TV_REASON_LOW_PARALLAX, state.reasons);
     }
   }
+  odometry->drift_sq = 1;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_reset(odometry));
+  TEST_ASSERT_EQUAL_DOUBLE(0, odometry->drift_sq);
   odometry->drift_sq = 1;
   int n = 0;
   while (!track_room(odometry, n).is_keyframe) ++n;

@@ -74,8 +74,8 @@ void test_near_frames_wait_where_the_turn_is_unsure() {
   TEST_ASSERT_TRUE(begins(6, 0.2));
 }
 
-// Frame 0 is matched with 1, 2, 4, 8 and then each sixth frame while nothing moves. What 8 cm are
-// in six frames may be enough in the next one.
+// Frame 0 is matched with 1, 2, 4, 8 and then each sixth frame while nothing moves. A step in frame
+// 3 begins a map in frame 4.
 void test_a_frame_from_which_nothing_moves_is_tried_less_often() {
   tv::Frame* const frame = &odometry->frame;
   uint32_t reasons = 0;

@@ -124,7 +124,7 @@ void start_anew(tv_odometry* o) {
   o->frame.has_pose = o->previous.has_pose = false;
   o->frame.num = o->previous.num = 0;
   o->median_depth = 1;
-  o->turn_sigma = 0;
+  o->turn_sigma = o->drift_sq = 0;
   o->is_upright = o->is_found_again = o->was_moved_far = false;
   o->velocity_trust = o->num_contrary = 0;
   o->scale = o->other_scale = MetricScale{};

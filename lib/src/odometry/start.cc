@@ -15,9 +15,7 @@ constexpr double kLeastParallax = 0.015;  // radians, the median
 constexpr int32_t kLeastTurnInliers = 50;
 constexpr int32_t kFramesBetween = 6;      // between frames that wait
 constexpr double kLargestTurnSigma = 0.3;  // of the median parallax, in frames nearer than that
-// While the parallax grew by less than half of what a start needs on average, the frames between
-// two tries double, up to kFramesBetween.
-constexpr double kGrowth = 2;
+constexpr double kGrowth = 2;              // how many times as fast the parallax may go on growing
 
 // Matches two frames and estimates the motion between them. False: there are too few matches.
 bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, Pair* pair) {
@@ -31,8 +29,8 @@ bool match_frames(Odometry* odometry, const Frame& frame0, const Frame& frame1, 
   return estimate_pair(odometry, frame0.keypoints, frame1.keypoints, found, num, pair);
 }
 
-// The number of the frame that may lie far enough from the first one, if the parallax between them
-// grows kGrowth times as fast as it did up to this frame.
+// The number of the next frame to match with the first one: the parallax may be enough there. It
+// is at most as far from this one as this one is from the first, and kFramesBetween.
 int32_t next_try_of(const Frame& first, const Frame& frame, double parallax) {
   const int32_t elapsed = frame.number - first.number;
   int32_t next = elapsed + 1;
