@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <type_traits>
 
 #include "base/math.h"
 #include "geometry/essential.h"
@@ -18,7 +19,7 @@ constexpr size_t kUnchecked = 16;  // the checksum is that of the bytes from her
 // Ranges in which nothing that is computed from the numbers overflows.
 constexpr double kLargest = 1e15;
 constexpr int32_t kMost = 1 << 28;
-constexpr int kCounts = 4;  // of a Header, from num_frames on
+constexpr int kCounts = 4;  // of a Header and of the odometry, from num_frames to num_loops
 constexpr float kLargestPixel = 1e5f, kLargestSize = 4096;
 
 // CRC-32 as of PNG and zlib, four bits at a time.
@@ -80,21 +81,40 @@ struct Numbers {
   uint8_t width, count;
 };
 
+template <typename Member>
+using NumberOf = std::remove_all_extents_t<Member>;
+
+// Those from the one member to the other.
+#define TV_NUMBERS(Struct, first, last)                                              \
+  Numbers {                                                                          \
+    offsetof(Struct, first), sizeof(NumberOf<decltype(Struct{}.first)>),             \
+        (offsetof(Struct, last) + sizeof(Struct{}.last) - offsetof(Struct, first)) / \
+            sizeof(NumberOf<decltype(Struct{}.first)>)                               \
+  }
+
 constexpr Numbers kOfHeader[] = {
-    {offsetof(Header, magic), 1, 8},        {offsetof(Header, version), 4, 2},
-    {offsetof(Header, num_bytes), 8, 1},    {offsetof(Header, camera.model), 4, 4},
-    {offsetof(Header, camera.fx), 8, 12},   {offsetof(Header, num_points), 4, 12},
-    {offsetof(Header, scale.product), 8, 3}};
-constexpr Numbers kOfPoint[] = {{offsetof(MapPoint, position), 8, 3},
-                                {offsetof(MapPoint, id), 4, 2},
-                                {offsetof(MapPoint, num_visible), 4, 3},
-                                {offsetof(MapPoint, grey), 4, 1},
-                                {offsetof(MapPoint, depth_sigma), 4, 4}};
-constexpr Numbers kOfKeyframe[] = {{offsetof(MapKeyframe, id), 4, 3},
-                                   {offsetof(MapKeyframe, num_keypoints), 4, 1},
-                                   {offsetof(MapKeyframe, time_s), 8, 20}};
-constexpr Numbers kOfRemoved[] = {{offsetof(RemovedKeyframe, id), 4, 2},
-                                  {offsetof(RemovedKeyframe, kept_from_removed), 8, 13}};
+    TV_NUMBERS(Header, magic, magic),
+    TV_NUMBERS(Header, version, checksum),
+    TV_NUMBERS(Header, num_bytes, num_bytes),
+    TV_NUMBERS(Header, camera.model, camera.reserved),
+    TV_NUMBERS(Header, camera.fx, camera.k),
+    TV_NUMBERS(Header, num_points, scale.evidence),
+    TV_NUMBERS(Header, scale.product, scale.sigma),
+};
+constexpr Numbers kOfPoint[] = {
+    TV_NUMBERS(MapPoint, position, position),     TV_NUMBERS(MapPoint, id, segment),
+    TV_NUMBERS(MapPoint, num_visible, made_at),   TV_NUMBERS(MapPoint, grey, grey),
+    TV_NUMBERS(MapPoint, depth_sigma, seen_from),
+};
+constexpr Numbers kOfKeyframe[] = {
+    TV_NUMBERS(MapKeyframe, id, frame),
+    TV_NUMBERS(MapKeyframe, num_keypoints, num_keypoints),
+    TV_NUMBERS(MapKeyframe, time_s, scale),
+};
+constexpr Numbers kOfRemoved[] = {
+    TV_NUMBERS(RemovedKeyframe, id, kept_id),
+    TV_NUMBERS(RemovedKeyframe, kept_from_removed.R, scale),
+};
 
 void pass_all(Stream* s, void* of_struct, const Numbers* numbers, size_t num) {
   for (; num > 0; --num, ++numbers) {
@@ -115,8 +135,9 @@ void pass_point(Stream* s, MapPoint* point, uint8_t* descriptor) {
 }
 
 void pass_keypoint(Stream* s, MapKeypoint* keypoint, int32_t* seen) {
-  pass_numbers(s, keypoint, 4, 12);
-  pass_numbers(s, seen, 4, 4);
+  static_assert(sizeof *keypoint == 3 * sizeof keypoint->x, "x, y and size, and nothing else");
+  pass_numbers(s, keypoint, sizeof keypoint->x, sizeof *keypoint);
+  pass_numbers(s, seen, sizeof *seen, sizeof *seen);
 }
 
 bool is_index(int32_t n, int32_t end) { return n >= 0 && n < end; }
@@ -274,6 +295,11 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   h.num_removed = map.num_removed;
   h.next_point_id = map.next_point_id;
   h.next_keyframe_id = map.next_keyframe_id;
+  static_assert(offsetof(Header, num_loops) - offsetof(Header, num_frames) ==
+                        (kCounts - 1) * sizeof h.num_frames &&
+                    offsetof(Odometry, num_loops) - offsetof(Odometry, num_frames) ==
+                        (kCounts - 1) * sizeof h.num_frames,
+                "they follow each other in both");
   std::copy_n(&odometry.num_frames, kCounts, &h.num_frames);
   // Of the last keyframe's segment.
   const int32_t segment =
