@@ -76,6 +76,12 @@ typedef struct tv_odometry_options {
   /* The seed of every sampler. Its default is constant and never the time of day: equal frames give
      equal bytes. */
   uint64_t seed;
+  /* 1 (default): the camera's principal point is moved where many pairs of keyframes agree that it
+     lies elsewhere, by at most 5 per cent of the focal length; 0: the camera is kept as it was
+     given. */
+  int32_t correct_camera;
+  /* Must be 0. */
+  int32_t reserved;
 } tv_odometry_options;
 
 /* Writes the default options into a struct of struct_size bytes; null is allowed. Programs call
@@ -182,6 +188,10 @@ typedef struct tv_odometry_state {
   int32_t reserved2;
   /* The standard deviation of the scale, relative to it; 0 where scale_source is TV_SCALE_UNIT. */
   double scale_sigma;
+  /* By how far the principal point was moved from where it was given, in pixels (x, y): zeros where
+     the camera was not corrected. When it moves, all keyframes turn by about this many pixels, and
+     the path and the map are adjusted in the frames that follow. */
+  double principal_point_shift_px[2];
 } tv_odometry_state;
 
 /* Writes zeros, and the size, into a struct of struct_size bytes; null is allowed. Programs call
@@ -226,6 +236,11 @@ TV_API tv_status tv_odometry_reset(tv_odometry *odometry);
    CPU. */
 TV_API tv_status tv_odometry_track(tv_odometry *odometry, const tv_odometry_frame *frame,
                                    tv_odometry_state *state);
+
+/* Writes the camera as the odometry uses it now: the one that was given, with another principal
+   point where it was corrected. Keyframes, points and the map's bytes are consistent with it.
+   Returns TV_ERR_NULL. */
+TV_API tv_status tv_odometry_camera(const tv_odometry *odometry, tv_camera *camera);
 
 /* Does what tracking left for the frames to come: the adjustment of the newest keyframe, and what a
    closed loop asks of the rest of the map. To be called after the last frame, before poses,

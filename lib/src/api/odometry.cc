@@ -23,7 +23,7 @@ namespace tv {
 namespace {
 
 constexpr tv_odometry_options kDefaults = {
-    sizeof(tv_odometry_options), 1000, 200, 20000, 10, TV_KERNELS_AUTO, 20130814};
+    sizeof(tv_odometry_options), 1000, 200, 20000, 10, TV_KERNELS_AUTO, 20130814, 1, 0};
 // So many times the keypoints of a frame are points of the map that one frame is matched with.
 constexpr int32_t kMatchedFrames = 3;
 constexpr size_t kOdometryBytes = 4096;  // with 64-bit and with 32-bit pointers alike
@@ -48,8 +48,8 @@ tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options,
   const tv_odometry_options& o = plan->options;
   if (!within(o.max_keypoints, 100, 4096) || !within(o.max_keyframes, 8, 2000) ||
       !within(o.max_points, 500, 200000) || !within(o.window, 3, 20) ||
-      !within(o.kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) || !within(camera->width, 32, 16384) ||
-      !within(camera->height, 32, 16384)) {
+      !within(o.kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) || !within(o.correct_camera, 0, 1) ||
+      o.reserved != 0 || !within(camera->width, 32, 16384) || !within(camera->height, 32, 16384)) {
     return TV_ERR_ARGUMENT;
   }
   tv_limits_init(&plan->limits);
@@ -107,6 +107,8 @@ size_t plan_bytes(const Plan& plan) {
 }  // namespace
 
 void start_anew(tv_odometry* o) {
+  o->camera = prepare_camera(o->given_camera);
+  o->camera_evidence = CameraEvidence{};
   clear_map(&o->map);
   o->num_starts = o->num_local_points = 0;
   o->unadjusted_id = o->reference_id = o->confirmed_id = -1;
@@ -212,7 +214,7 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   o->max_matched = plan.limits.max_keypoints;
   o->options = plan.options;
   o->options.struct_size = sizeof(tv_odometry_options);
-  o->camera = tv::prepare_camera(plan.camera);
+  o->given_camera = tv::prepare_camera(plan.camera).model;
   tv_feature_options_init(&o->features);
   o->features.max_keypoints = plan.options.max_keypoints;
   // Measured on the sequences: docs/odometry.md.
@@ -254,6 +256,12 @@ tv_status tv_odometry_track(tv_odometry* odometry, const tv_odometry_frame* fram
   tv_odometry_state packed{};
   tv::track_frame(odometry, input, &packed);
   tv::write_sized(packed, state);
+  return TV_OK;
+}
+
+tv_status tv_odometry_camera(const tv_odometry* odometry, tv_camera* camera) {
+  if (odometry == nullptr || camera == nullptr) return TV_ERR_NULL;
+  *camera = odometry->camera.model;
   return TV_OK;
 }
 

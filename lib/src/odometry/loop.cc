@@ -317,6 +317,13 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   return segment == old_segment && is_jump(odometry, now, keyframe);
 }
 
+void begin_spread(Odometry* odometry) {
+  const Map& map = odometry->map;
+  if (map.num_keyframes == 0) return;
+  odometry->spread = {kSpreadSteps, 0, odometry->segment, 0,
+                      map.keyframes[map.num_keyframes - 1].id};
+}
+
 bool is_spreading(const Odometry& odometry) {
   return odometry.spread.num_steps > 0 || odometry.spread.next_place < odometry.map.end_points;
 }

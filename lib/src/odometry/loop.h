@@ -45,6 +45,9 @@ bool find_loop(Odometry* odometry, const Frame& frame, int32_t count, Frame* aga
 // Returns whether the path jumps.
 bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const LoopEnd& end);
 
+// Begins the adjustment of the whole segment, as after a loop.
+void begin_spread(Odometry* odometry);
+
 // Whether a closed loop is still to be spread over the keyframes of its segment.
 bool is_spreading(const Odometry& odometry);
 

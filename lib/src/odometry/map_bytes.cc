@@ -8,12 +8,13 @@
 
 #include "base/math.h"
 #include "geometry/essential.h"
+#include "odometry/calibration.h"
 
 namespace tv {
 namespace {
 
 constexpr uint8_t kMagic[8] = {'T', 'V', 'M', 'A', 'P', '\r', '\n', 0x1a};
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 constexpr bool kLittleEndian = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
 constexpr size_t kUnchecked = 16;  // the checksum is that of the bytes from here on
 // Ranges in which nothing that is computed from the numbers overflows.
@@ -73,6 +74,7 @@ struct Header {
   int32_t num_frames, num_segments, num_relocations, num_loops;
   int32_t is_upright;
   MetricScale scale;
+  double principal_point[2];  // since version 2: as it was moved; the camera is the given one
 };
 
 // Numbers of one type that follow each other in their struct.
@@ -129,6 +131,16 @@ void pass(Stream* s, void* of_struct, const Numbers (&numbers)[n]) {
   pass_all(s, of_struct, numbers, n);
 }
 
+void pass_header(Stream* s, Header* h) {
+  pass(s, h, kOfHeader);
+  if (h->version > 1) {
+    pass_numbers(s, h->principal_point, sizeof(double), sizeof h->principal_point);
+  } else {
+    h->principal_point[0] = h->camera.cx;
+    h->principal_point[1] = h->camera.cy;
+  }
+}
+
 void pass_point(Stream* s, MapPoint* point, uint8_t* descriptor) {
   pass(s, point, kOfPoint);
   pass_numbers(s, descriptor, 1, TV_DESCRIPTOR_BYTES);
@@ -166,6 +178,7 @@ bool is_header(const Header& h) {
          is_index(h.scale.source, 4) && is_index(h.scale.evidence, 4) &&
          is_measure(h.scale.product, h.scale.square) &&
          (h.scale.square > 0 || h.scale.product == 0) && is_measure(0, h.scale.sigma) &&
+         is_measure(h.principal_point[0], 0) && is_measure(h.principal_point[1], 0) &&
          tv_camera_check(&h.camera) == TV_OK;
 }
 
@@ -194,9 +207,9 @@ bool is_removed(const Header& h, const RemovedKeyframe& r) {
          r.id != r.kept_id && is_pose(r.kept_from_removed) && is_scale(r.scale);
 }
 
-// The camera without the coefficients that its model ignores.
+// The given camera without the coefficients that its model ignores.
 tv_camera camera_of(const Odometry& odometry) {
-  tv_camera camera = odometry.camera.model;
+  tv_camera camera = odometry.given_camera;
   if (camera.model == TV_CAMERA_PINHOLE) std::fill_n(camera.k, 8, 0.0);
   return camera;
 }
@@ -290,6 +303,8 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   std::memcpy(h.magic, kMagic, sizeof kMagic);
   h.version = kVersion;
   h.camera = camera_of(odometry);
+  h.principal_point[0] = odometry.camera.model.cx;
+  h.principal_point[1] = odometry.camera.model.cy;
   h.num_points = map.num_points;
   h.num_keyframes = map.num_keyframes;
   h.num_removed = map.num_removed;
@@ -310,7 +325,7 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   else if (segment == odometry.other_segment)
     h.scale = odometry.other_scale;
   Stream s{to, nullptr, 0, 0, false};
-  pass(&s, &h, kOfHeader);
+  pass_header(&s, &h);
   for (int32_t n = 0; n < map.num_points; ++n) {
     MapPoint point = map.points[places[n]];
     uint8_t descriptor[TV_DESCRIPTOR_BYTES];
@@ -336,10 +351,10 @@ size_t write_map(const Odometry& odometry, uint8_t* to) {
   if (to != nullptr) {  // the header again, now that what it tells is known
     h.num_bytes = num_bytes;
     s.at = 0;
-    pass(&s, &h, kOfHeader);
+    pass_header(&s, &h);
     h.checksum = checksum(to + kUnchecked, num_bytes - kUnchecked);
     s.at = 0;
-    pass(&s, &h, kOfHeader);
+    pass_header(&s, &h);
   }
   return num_bytes;
 }
@@ -348,8 +363,8 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   Map* map = &odometry->map;
   Header h;
   Stream s{nullptr, bytes, 0, num_bytes, false};
-  pass(&s, &h, kOfHeader);
-  if (s.is_bad || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version != kVersion ||
+  pass_header(&s, &h);
+  if (s.is_bad || std::memcmp(h.magic, kMagic, sizeof kMagic) != 0 || h.version - 1 >= kVersion ||
       h.num_bytes != num_bytes ||
       h.checksum != checksum(bytes + kUnchecked, num_bytes - kUnchecked) || !is_header(h)) {
     return TV_ERR_MAP;
@@ -368,11 +383,16 @@ tv_status read_map(const uint8_t* bytes, size_t num_bytes, bool replaces, Odomet
   if (std::memcmp(&h.camera, &camera, sizeof camera) != 0) return TV_ERR_CAMERA;
   if (!fits) return TV_ERR_LIMITS;
   if (replaces) start_anew(odometry);
+  const int32_t num_before = map->num_keyframes;
   Arena scratch = odometry->scratch;
   int32_t* places = arena_alloc<int32_t>(scratch, static_cast<size_t>(h.num_points));
   odometry->last_time_s = -HUGE_VAL;  // the next frame may have any time
   s.at = begin;
   read_body(h, &s, places, map, base, &fits);
+  // Two maps keep the former one's camera.
+  const double own[2] = {odometry->camera.model.cx, odometry->camera.model.cy};
+  move_principal_point(odometry, num_before == 0 ? h.principal_point : own, h.principal_point,
+                       num_before);
   map->next_point_id = base.point_id + h.next_point_id;
   map->next_keyframe_id += h.next_keyframe_id;
   for (int n = 0; n < kCounts; ++n) (&odometry->num_frames)[n] += (&h.num_frames)[n];

@@ -1,5 +1,7 @@
 #include "odometry/map_check.h"
 
+#include "odometry/calibration.h"
+
 namespace tv {
 namespace {
 
@@ -23,6 +25,9 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
     ++vote->num_planar;
   }
   if (view.verdict != TV_VERDICT_OK || !view.has_R || !view.has_covariance) return;
+  if (odometry->options.correct_camera != 0) {
+    add_evidence(view, odometry->camera.model.fx, &odometry->camera_evidence);
+  }
   Rigid turn = kIdentity, map_turn = cam1_from_cam0;
   std::copy_n(view.R, 9, turn.R);
   std::fill(map_turn.t, map_turn.t + 3, 0.0);

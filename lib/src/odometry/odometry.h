@@ -85,6 +85,14 @@ struct Reach {
   double most_m;
 };
 
+// What pairs of keyframes ask for: the normal equation of the shift of the principal point, in
+// pixels, information shift = product, and the sum of the pairs' own shifts in that metric.
+struct CameraEvidence {
+  int32_t num_pairs;
+  int32_t next_num;  // of pairs with which the point is moved again; 0: it was not moved yet
+  double information[3], product[2], square;
+};
+
 // The normal equation of the scale, metres per unit of the map: square scale = product.
 // Its numbers follow each other in a map's bytes.
 struct MetricScale {
@@ -104,7 +112,9 @@ inline constexpr int kNumStarts = 4;  // frames that wait for a second view
 
 struct tv_odometry {
   tv_odometry_options options;
-  tv::Camera camera;
+  tv_camera given_camera;
+  tv::Camera camera;  // the same, with another principal point where it was moved
+  tv::CameraEvidence camera_evidence;
   tv_context* context;  // of the stages that a frame takes through the public functions
   const tvk_table* kernels;
   int32_t max_matched;  // descriptors of one side of a match

@@ -6,6 +6,7 @@
 #include "base/order.h"
 #include "geometry/vector3.h"
 #include "odometry/adjust.h"
+#include "odometry/calibration.h"
 #include "odometry/fit_pose.h"
 #include "odometry/keyframe.h"
 #include "odometry/loop.h"
@@ -430,6 +431,8 @@ __attribute__((noinline)) void write_counts(const Odometry& odometry, tv_odometr
   state->num_loops = odometry.num_loops;
   state->scale_source = odometry.scale.source;
   state->scale_sigma = odometry.scale.sigma;
+  state->principal_point_shift_px[0] = odometry.camera.model.cx - odometry.given_camera.cx;
+  state->principal_point_shift_px[1] = odometry.camera.model.cy - odometry.given_camera.cy;
 }
 
 // Makes it that of a frame without a pose.
@@ -467,6 +470,7 @@ void track_frame(Odometry* odometry, const tv_odometry_frame& input, tv_odometry
   std::swap(odometry->frame, odometry->previous);
   odometry->took_step = !finish_keyframe(odometry, &odometry->previous) && is_spreading(*odometry);
   if (odometry->took_step) spread_loop(odometry, &odometry->previous);
+  correct_camera(odometry, &odometry->previous);
   Frame* frame = &odometry->frame;
   extract_frame(odometry, input.image, frame);
   frame->number = odometry->num_frames++;

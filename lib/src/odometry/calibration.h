@@ -1,0 +1,23 @@
+// The principal point is moved where many pairs of keyframes agree that it lies elsewhere.
+// docs/odometry.md, "The camera is corrected". Tests: test/unit/test_odometry_calibration.cc.
+#pragma once
+
+#include "odometry/odometry.h"
+#include "twoview/two_view.h"
+
+namespace tv {
+
+// Adds what the matches of a pair ask for, if they determine it.
+void add_evidence(const tv_two_view& view, double focal_px, CameraEvidence* evidence);
+
+// Takes the pixel `to` as the principal point from now on, and turns the keyframes from this place
+// of the map on, which were estimated with `from`, so that each sees its points where it saw them,
+// to first order. Returns how they turn.
+Rigid move_principal_point(Odometry* odometry, const double to[2], const double from[2],
+                           int32_t first_keyframe);
+
+// Moves the principal point where the evidence is strong enough, and begins the adjustment of the
+// segment. `frame`, which has its pose in the map, turns with the keyframes.
+void correct_camera(Odometry* odometry, Frame* frame);
+
+}  // namespace tv
