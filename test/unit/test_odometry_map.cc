@@ -160,7 +160,7 @@ void test_a_point_that_no_window_has_room_for_is_passed_over() {
 }
 
 void test_a_map_is_added_in_the_places_of_points_that_are_gone() {
-  static uint8_t bytes[1 << 16], is_removed[kPoints];
+  static uint8_t bytes[1 << 16];
   size_t num;
   tv::Map& map = odometry->map;
   int32_t joined = -1;
@@ -176,8 +176,11 @@ void test_a_map_is_added_in_the_places_of_points_that_are_gone() {
   add_keyframe(0, 0, kKeypoints);
   for (int n = 0; n < kPoints; ++n) add_point(n, 0, 0);
   TEST_ASSERT_EQUAL_INT(TV_ERR_LIMITS, tv_odometry_add(odometry, bytes, num, &joined));
-  for (int n = 0; n < kPoints; ++n) is_removed[n] = n % 7 != 0;
-  tv::remove_points(&map, is_removed);
+  tv::clear_marks(&map);
+  for (int n = 0; n < kPoints; ++n) {
+    if (n % 7 != 0) tv::mark_point(&map, n);
+  }
+  tv::remove_marked_points(&map);
   for (int32_t n = 0; n < kKeypoints && 7 * n < kPoints; ++n) tv::observe(&map, 0, n, 7 * n);
   const int32_t before = map.num_points;
   TEST_ASSERT_EQUAL_INT(TV_OK, tv_odometry_add(odometry, bytes, num, &joined));

@@ -66,15 +66,15 @@ size_t adjust_bytes(const tv_odometry_options& o) {
   return map_window_bytes(o, sizes) +
          2 * arena_bytes<int32_t>(static_cast<size_t>(o.max_keyframes)) +
          arena_bytes<double>(36 * static_cast<size_t>(sizes.views)) +
-         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));  // of remove_lone_points
+         arena_bytes<uint8_t>(static_cast<size_t>(o.max_points));  // to spare
 }
 
 void count_shared(Odometry* odometry, int32_t keyframe, int32_t* shared) {
   Map* map = &odometry->map;
-  clear_marks(map);
-  mark_points_of(map, map->keyframes[keyframe]);
+  const MapKeyframe& own = map->keyframes[keyframe];
+  mark_points(map, seen_by(*map, own), own.num_keypoints);
   std::fill_n(shared, map->num_keyframes, 0);
-  count_marked_of(*map, map->keyframes[keyframe].segment, shared);
+  count_marked_of(*map, own.segment, shared);
   shared[keyframe] = 1 << 30;
 }
 
@@ -142,8 +142,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   }
   add_points(map, &window);
   // The other keyframes that see the points are held.
-  clear_marks(&map);
-  for (int32_t n = 0; n < window.model.num_points; ++n) mark_point(&map, window.places[n]);
+  mark_points(&map, window.places, window.model.num_points);
   count_marked_of(map, segment, shared);
   const int32_t num_held =
       largest(shared, map.num_keyframes, kLeastShared, odometry->options.window, chosen);
@@ -157,7 +156,7 @@ void adjust_around(Odometry* odometry, int32_t keyframe, int32_t max_iterations)
   }
   keep_positions(window, &map);
   drop_outliers(window, odometry);
-  remove_lone_points(&map, odometry->scratch);
+  remove_lone_points(&map);
 }
 
 }  // namespace tv

@@ -224,18 +224,13 @@ void make_points(Odometry* odometry, int32_t keyframe, const Frame& frame, bool 
 }
 
 void remove_bad_points(Odometry* odometry) {
-  ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
-  uint8_t* is_removed =
-      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
-  bool any = false;
+  clear_marks(&map);
   for (int32_t p = 0; p < map.end_points; ++p) {
     const MapPoint& point = map.points[p];
-    is_removed[p] =
-        point.id >= 0 && point.num_visible >= 8 && 4 * point.num_found < point.num_visible;
-    any = any || is_removed[p];
+    if (point.num_visible >= 8 && 4 * point.num_found < point.num_visible) mark_point(&map, p);
   }
-  if (any) remove_points(&map, is_removed);
+  remove_marked_points(&map);
 }
 
 int32_t list_points(Odometry* odometry, int32_t keyframe, int32_t* points) {

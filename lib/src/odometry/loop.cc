@@ -147,10 +147,7 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
       arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(map.sizes.max_keypoints));
   const int32_t* seen = seen_by(map, map.keyframes[keyframe]);
   int32_t num = 0, num_known = 0;
-  clear_marks(&map);
-  for (int32_t k = 0; k < frame.num; ++k) {
-    if (frame.points[k] != kNoPoint) mark_point(&map, frame.points[k]);
-  }
+  mark_points(&map, frame.points, frame.num);
   for (int32_t i = 0; i < map.keyframes[keyframe].num_keypoints; ++i) {
     if (seen[i] == kNoPoint) continue;
     num_known += is_marked(map, seen[i]);
@@ -232,9 +229,11 @@ void fuse_points(Odometry* odometry, int32_t keyframe, const Frame& again) {
       if (instead[instead[point]] == kNoPoint) observe(&map, k, i, instead[point]);
     }
   }
-  uint8_t* is_removed = arena_alloc<uint8_t>(odometry->scratch, room);
-  for (int32_t p = 0; p < map.end_points; ++p) is_removed[p] = instead[p] != kNoPoint;
-  remove_points(&map, is_removed);
+  clear_marks(&map);
+  for (int32_t p = 0; p < map.end_points; ++p) {
+    if (instead[p] != kNoPoint) mark_point(&map, p);
+  }
+  remove_marked_points(&map);
 }
 
 }  // namespace
@@ -397,7 +396,7 @@ int32_t join_segments(Odometry* odometry, int32_t first) {
       adjust_segment(odometry, odometry->segment, 0, kSpreadSteps);
       odometry->spread.num_steps = 0;
       while (is_spreading(*odometry)) spread_loop(odometry, frame);
-      remove_lone_points(&map, odometry->scratch);
+      remove_lone_points(&map);
       ++odometry->num_loops;
       ++num_joined;
     }

@@ -102,10 +102,10 @@ void clear_map(Map* map) {
 
 void clear_marks(Map* map) { std::fill_n(map->marks, num_marks(map->sizes), 0u); }
 
-void mark_points_of(Map* map, const MapKeyframe& keyframe) {
-  const int32_t* seen = seen_by(*map, keyframe);
-  for (int32_t i = 0; i < keyframe.num_keypoints; ++i) {
-    if (seen[i] != kNoPoint) mark_point(map, seen[i]);
+void mark_points(Map* map, const int32_t* points, int32_t num) {
+  clear_marks(map);
+  for (int32_t i = 0; i < num; ++i) {
+    if (points[i] != kNoPoint) mark_point(map, points[i]);
   }
 }
 
@@ -210,22 +210,22 @@ void rank_points(const Map& map, int32_t* places, int32_t* ranks) {
   for (int32_t n = 0; n < num; ++n) ranks[places[n]] = n;
 }
 
-void remove_points(Map* map, const uint8_t* is_removed) {
+void remove_marked_points(Map* map) {
   int32_t num_left = 0;  // observations of them
   for (int32_t p = 0; p < map->end_points; ++p) {
-    if (is_removed[p] && map->points[p].id >= 0) num_left += map->points[p].num_observations;
+    if (is_marked(*map, p) && map->points[p].id >= 0) num_left += map->points[p].num_observations;
   }
   // The newest keyframes see most of them.
   for (int32_t k = map->num_keyframes - 1; k >= 0 && num_left > 0; --k) {
     const int32_t* seen = seen_by(*map, map->keyframes[k]);
     for (int32_t i = 0; i < map->keyframes[k].num_keypoints; ++i) {
-      if (seen[i] == kNoPoint || !is_removed[seen[i]]) continue;
+      if (!is_marked(*map, seen[i])) continue;
       forget_observation(map, k, i);
       --num_left;
     }
   }
   for (int32_t p = 0; p < map->end_points; ++p) {
-    if (is_removed[p] && map->points[p].id >= 0) release_point(map, p);
+    if (is_marked(*map, p) && map->points[p].id >= 0) release_point(map, p);
   }
 }
 
@@ -257,15 +257,12 @@ void move_keyframes(Map* map, const MovedKeyframe* moved) {
   }
 }
 
-void remove_lone_points(Map* map, Arena& scratch) {
-  ArenaScope scope(scratch);
-  uint8_t* is_removed = arena_alloc<uint8_t>(scratch, as_size(map->end_points));
-  bool any = false;
+void remove_lone_points(Map* map) {
+  clear_marks(map);
   for (int32_t p = 0; p < map->end_points; ++p) {
-    is_removed[p] = map->points[p].id >= 0 && map->points[p].num_observations < 2;
-    any = any || is_removed[p];
+    if (map->points[p].num_observations < 2) mark_point(map, p);
   }
-  if (any) remove_points(map, is_removed);
+  remove_marked_points(map);
 }
 
 bool is_upright(const Map& map, int32_t segment) {

@@ -132,7 +132,8 @@ inline void mark_point(Map* map, int32_t point) {
 inline bool is_marked(const Map& map, int32_t point) {
   return (map.marks[1 + (point >> 5)] >> (point & 31) & 1) != 0;
 }
-void mark_points_of(Map* map, const MapKeyframe& keyframe);
+// Marks these points, and no others; kNoPoint may be among them.
+void mark_points(Map* map, const int32_t* points, int32_t num);
 int32_t count_marked(const Map& map, const MapKeyframe& keyframe);
 
 // Adds a keyframe with the keypoints and descriptors of a frame, none of which sees a point, and
@@ -160,11 +161,12 @@ struct MovedKeyframe {
 // Moves the keyframes, and each point with the keyframe that made it, or one near it that is left.
 void move_keyframes(Map* map, const MovedKeyframe* moved);
 
-// Removes the points for whose place is_removed is not 0, also from the keyframes that see them.
-void remove_points(Map* map, const uint8_t* is_removed);
+// Removes the marked points, also from the keyframes that see them. Places that are free may be
+// marked, too.
+void remove_marked_points(Map* map);
 
-// Removes the points that fewer than two keyframes see. Takes max_points bytes of scratch.
-void remove_lone_points(Map* map, Arena& scratch);
+// Removes the points that fewer than two keyframes see.
+void remove_lone_points(Map* map);
 
 // Whether attitudes keep a segment upright.
 bool is_upright(const Map& map, int32_t segment);

@@ -95,14 +95,12 @@ bool make_first_points(Odometry* odometry, Frame* frame0, Frame* frame, const Pa
 }  // namespace
 
 void remove_segment_points(Odometry* odometry) {
-  ArenaScope scope(odometry->scratch);
   Map& map = odometry->map;
-  uint8_t* is_removed =
-      arena_alloc<uint8_t>(odometry->scratch, static_cast<size_t>(map.end_points));
+  clear_marks(&map);
   for (int32_t p = 0; p < map.end_points; ++p) {
-    is_removed[p] = map.points[p].segment == odometry->segment;
+    if (map.points[p].segment == odometry->segment) mark_point(&map, p);
   }
-  remove_points(&map, is_removed);
+  remove_marked_points(&map);
 }
 
 void copy_frame(const Odometry& odometry, const Frame& from, Frame* to) {

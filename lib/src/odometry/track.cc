@@ -160,7 +160,7 @@ void remove_unconfirmed(Odometry* odometry) {
     remove_keyframe(&map, last, before);
     last = before;
   }
-  remove_lone_points(&map, odometry->scratch);
+  remove_lone_points(&map);
   doubt(odometry, TV_REASON_TWO_PLANAR_SOLUTIONS);
   odometry->reference_id = last >= 0 ? map.keyframes[last].id : -1;
 }
