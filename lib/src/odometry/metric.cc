@@ -168,14 +168,15 @@ void add_travel(Odometry* odometry, const Frame& frame) {
   travel->bound_m += sigma;
 }
 
-void begin_travel(Odometry* odometry, const Rigid& cam_from_world, int32_t keyframe_id) {
+// Not inlined, and neither is the next one: smaller.
+__attribute__((noinline)) void begin_travel(Odometry* odometry, const Rigid& cam_from_world,
+                                            int32_t keyframe_id) {
   odometry->travel = Travel{};
   odometry->travel.is_known = true;
   odometry->travel.keyframe_id = keyframe_id;
   centre_of(cam_from_world, odometry->travel.from);
 }
 
-// Not inlined: smaller.
 __attribute__((noinline)) void measure_reach(const Odometry& odometry, const Frame& frame,
                                              Reach* reach) {
   Rigid attitude{};
