@@ -13,13 +13,12 @@
 namespace tv {
 namespace {
 
-// Whether an array has room for `needed` elements. Writes how many that is.
-template <typename Element>
-tv_status check_room(const tv_odometry* odometry, const Element* elements, int32_t cap,
-                     int32_t needed, int32_t* num) {
+// Whether an array of `cap` elements has room for `needed` ones. Writes how many that is.
+tv_status check_room(const tv_odometry* odometry, const void* elements, size_t element_bytes,
+                     int32_t cap, int32_t needed, int32_t* num) {
   if (odometry == nullptr || num == nullptr || (elements == nullptr && cap > 0)) return TV_ERR_NULL;
   if (cap < 0) return TV_ERR_ARGUMENT;
-  if (overlap(elements, static_cast<size_t>(cap) * sizeof *elements, num, sizeof *num)) {
+  if (overlap(elements, static_cast<size_t>(cap) * element_bytes, num, sizeof *num)) {
     return TV_ERR_OVERLAP;
   }
   *num = needed;
@@ -91,7 +90,8 @@ tv_status tv_odometry_covariance(tv_odometry* odometry, int32_t idx, double cova
 tv_status tv_odometry_points(const tv_odometry* odometry, tv_map_point* points, int32_t cap_points,
                              int32_t* num_points) {
   const int32_t needed = odometry != nullptr ? odometry->map.num_points : 0;
-  const tv_status status = tv::check_room(odometry, points, cap_points, needed, num_points);
+  const tv_status status =
+      tv::check_room(odometry, points, sizeof *points, cap_points, needed, num_points);
   if (status != TV_OK) return status;
   int32_t* ranks;
   const int32_t* places = tv::points_in_order(*odometry, &ranks);
@@ -115,8 +115,9 @@ tv_status tv_odometry_observations(const tv_odometry* odometry, int32_t idx,
   const tv::Map& map = odometry->map;
   if (!tv::within(idx, 0, map.num_keyframes - 1)) return TV_ERR_ARGUMENT;
   const tv::MapKeyframe& keyframe = map.keyframes[idx];
-  const tv_status status = tv::check_room(odometry, observations, cap_observations,
-                                          keyframe.num_observations, num_observations);
+  const tv_status status =
+      tv::check_room(odometry, observations, sizeof *observations, cap_observations,
+                     keyframe.num_observations, num_observations);
   if (status != TV_OK) return status;
   int32_t* ranks;
   tv::points_in_order(*odometry, &ranks);
@@ -133,8 +134,8 @@ tv_status tv_odometry_observations(const tv_odometry* odometry, int32_t idx,
 tv_status tv_odometry_last_frame(const tv_odometry* odometry, tv_map_observation* observations,
                                  int32_t cap_observations, int32_t* num_observations) {
   const int32_t needed = odometry != nullptr ? odometry->frame.num : 0;
-  const tv_status status =
-      tv::check_room(odometry, observations, cap_observations, needed, num_observations);
+  const tv_status status = tv::check_room(odometry, observations, sizeof *observations,
+                                          cap_observations, needed, num_observations);
   if (status != TV_OK) return status;
   const tv::Frame& frame = odometry->frame;
   int32_t* ranks;
