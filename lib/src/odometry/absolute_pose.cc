@@ -130,11 +130,7 @@ struct Candidate {
 bool covariance_of(const Candidate& c, const GravitySight& gravity, double covariance[36]) {
   double upper[21];
   for (int k = 0; k < 21; ++k) upper[k] = c.equations.upper[k] / c.variance_px;
-  const Vec3 h = c.pose.R * gravity.in_world;
-  for (int a = 0, slot = 0; a < 3; ++a, slot += 3) {
-    for (int b = a; b < 3; ++b)
-      upper[slot++] += gravity.weight * ((a == b ? 1.0 : 0.0) - h[a] * h[b]);
-  }
+  add_gravity(c.pose.R * gravity.in_world, gravity.weight, upper);
   return invert_symmetric(6, upper, covariance) && all_finite(covariance, 36);
 }
 
@@ -226,8 +222,9 @@ Candidate refined(const Finish& f, const Pose* start) {
   pose_equations(problem, c.pose, &c.equations);
   c.has_covariance = set_variance(f, &c);
   if (!c.has_covariance) c.variance_px = c.scale_px * c.scale_px;
-  c.determined = covariance_of(c, GravitySight{}, c.covariance);
-  GravitySight gravity = f.gravity;
+  GravitySight& gravity = problem.gravity;  // not known up to here
+  c.determined = covariance_of(c, gravity, c.covariance);
+  gravity = f.gravity;
   if (!(gravity.weight > 0)) return c;
   if (c.determined) {
     // Gravity that contradicts the matches counts less (robust/gravity.h).
@@ -237,7 +234,6 @@ Candidate refined(const Finish& f, const Pose* start) {
     c.gravity_sq = std::min(z_sq, 2 * kEvidence);
   }
   problem.scale_px = scale_px;
-  problem.gravity = gravity;
   refine_absolute(problem, kFinalIterations, kFinalGains[1], &c.pose, nullptr);
   c.determined = covariance_of(c, gravity, c.covariance);
   return c;

@@ -116,6 +116,12 @@ double reprojection_sq(const Sighting& s, const Pose& pose) {
   return error_sq == error_sq ? error_sq : kInfinity;
 }
 
+void add_gravity(const Vec3& h, double weight, double upper[21]) {
+  for (int a = 0, slot = 0; a < 3; ++a, slot += 3) {
+    for (int b = a; b < 3; ++b) upper[slot++] += weight * ((a == b ? 1.0 : 0.0) - h[a] * h[b]);
+  }
+}
+
 void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations* e) {
   *e = PoseEquations{};
   const double inverse_sq = 1 / (problem.scale_px * problem.scale_px);
@@ -157,14 +163,11 @@ void pose_equations(const PoseProblem& problem, const Pose& pose, PoseEquations*
   for (int k = 0; k < 21; ++k) e->upper[k] = sums[k][0] + sums[k][1];
   for (int k = 0; k < 6; ++k) e->gradient[k] = sums[21 + k][0] + sums[21 + k][1];
   if (!(problem.gravity.weight > 0)) return;
-  // A turn by w moves h = R in_world by w x h, so that J' J = I - h h' (see robust/gravity.cc).
   const Vec3 h = pose.R * problem.gravity.in_world;
   const Vec3 slope = problem.gravity.in_camera.cross(h);
   const double weight = problem.noise_sq * problem.gravity.weight;
-  for (int a = 0, slot = 0; a < 3; ++a, slot += 3) {
-    e->gradient[a] += weight * slope[a];
-    for (int b = a; b < 3; ++b) e->upper[slot++] += weight * ((a == b ? 1.0 : 0.0) - h[a] * h[b]);
-  }
+  add_gravity(h, weight, e->upper);
+  for (int a = 0; a < 3; ++a) e->gradient[a] += weight * slope[a];
   e->cost += weight * inverse_sq * (h - problem.gravity.in_camera).squaredNorm();
 }
 

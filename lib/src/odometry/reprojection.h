@@ -30,6 +30,10 @@ struct GravitySight {
   Vec3 in_world = Vec3::Zero(), in_camera = Vec3::Zero();
 };
 
+// Adds the information of gravity to the upper triangle of that of a pose. A turn by w moves
+// h = R in_world by w x h, so that J' J = I - h h' (see robust/gravity.cc).
+void add_gravity(const Vec3& h, double weight, double upper[21]);
+
 // What the normal equations are of: the robust loss sum q / (1 + q) with q = |e|^2 / scale^2 (S.
 // Geman, D. McClure, 1987) over the listed matches, and the prior of gravity, whose term is
 // noise_sq weight |R in_world - in_camera|^2 / scale^2.
