@@ -168,14 +168,8 @@ void tv_keyframe_init_sized(tv_keyframe* keyframe, size_t struct_size) {
 }
 
 const char* tv_odometry_status_string(tv_odometry_status status) {
-  switch (static_cast<int>(status)) {
-    case TV_ODOMETRY_STARTING: return "starting";
-    case TV_ODOMETRY_TRACKING: return "tracking";
-    case TV_ODOMETRY_WEAK: return "weak";
-    case TV_ODOMETRY_ROTATION: return "rotation";
-    case TV_ODOMETRY_LOST: return "lost";
-    default: return "unknown";
-  }
+  static constexpr char kNames[][9] = {"starting", "tracking", "weak", "rotation", "lost"};
+  return tv::within(status, 0, TV_ODOMETRY_NUM_STATUSES - 1) ? kNames[status] : "unknown";
 }
 
 tv_status tv_odometry_size(const tv_camera* camera, const tv_odometry_options* options,
