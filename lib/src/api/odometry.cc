@@ -36,34 +36,9 @@ struct Plan {
   size_t context_bytes;
   int32_t columns, rows;
   MapSizes sizes;
+  size_t scratch_bytes;  // beside the context's, which adjust_segment takes, too
+  size_t num_bytes;      // of all
 };
-
-tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options, Plan* plan) {
-  tv_status status = tv_camera_check(camera);
-  if (status != TV_OK) return status;
-  plan->camera = *camera;
-  plan->options = kDefaults;
-  status = read_sized(options, &plan->options);
-  if (status != TV_OK) return status;
-  const tv_odometry_options& o = plan->options;
-  if (!within(o.max_keypoints, 100, 4096) || !within(o.max_keyframes, 8, 2000) ||
-      !within(o.max_points, 500, 200000) || !within(o.window, 3, 20) ||
-      !within(o.kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) || !within(o.correct_camera, 0, 1) ||
-      o.reserved != 0 || !within(camera->width, 32, 16384) || !within(camera->height, 32, 16384)) {
-    return TV_ERR_ARGUMENT;
-  }
-  tv_limits_init(&plan->limits);
-  plan->limits.max_width = camera->width;
-  plan->limits.max_height = camera->height;
-  plan->limits.max_keypoints = kMatchedFrames * o.max_keypoints;
-  plan->limits.max_matches = o.max_keypoints;
-  plan->limits.kernels = o.kernels;
-  plan->limits.purposes = TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE;
-  plan->columns = (camera->width + kCellPx - 1) / kCellPx;
-  plan->rows = (camera->height + kCellPx - 1) / kCellPx;
-  plan->sizes = {o.max_keypoints, o.max_keyframes, o.max_points};
-  return tv_context_size(&plan->limits, &plan->context_bytes);
-}
 
 void make_frame(const Plan& plan, Arena& arena, Frame* frame) {
   const size_t n = static_cast<size_t>(plan.options.max_keypoints);
@@ -91,17 +66,42 @@ size_t local_points_bytes(const Plan& plan) {
   return arena_bytes<int32_t>(static_cast<size_t>(plan.limits.max_keypoints));
 }
 
-// The scratch memory beside the context's, which adjust_segment takes, too.
-size_t own_scratch_bytes(const Plan& plan) {
-  const size_t segment = adjust_segment_bytes(plan.options);
-  const size_t shared = plan.context_bytes - kContextBytes;
-  return std::max(scratch_bytes(plan.options), segment - std::min(segment, shared));
+void measure_plan(Plan* plan) {
+  const size_t segment = adjust_segment_bytes(plan->options);
+  const size_t shared = plan->context_bytes - kContextBytes;
+  plan->scratch_bytes = std::max(scratch_bytes(plan->options), segment - std::min(segment, shared));
+  plan->num_bytes = kOdometryBytes + arena_bytes<uint8_t>(plan->context_bytes) +
+                    map_bytes(plan->sizes) + kNumFrames * frame_bytes(*plan) +
+                    local_points_bytes(*plan) + arena_bytes<uint8_t>(plan->scratch_bytes);
 }
 
-size_t plan_bytes(const Plan& plan) {
-  return kOdometryBytes + arena_bytes<uint8_t>(plan.context_bytes) + map_bytes(plan.sizes) +
-         kNumFrames * frame_bytes(plan) + local_points_bytes(plan) +
-         arena_bytes<uint8_t>(own_scratch_bytes(plan));
+tv_status make_plan(const tv_camera* camera, const tv_odometry_options* options, Plan* plan) {
+  tv_status status = tv_camera_check(camera);
+  if (status != TV_OK) return status;
+  plan->camera = *camera;
+  plan->options = kDefaults;
+  status = read_sized(options, &plan->options);
+  if (status != TV_OK) return status;
+  const tv_odometry_options& o = plan->options;
+  if (!within(o.max_keypoints, 100, 4096) || !within(o.max_keyframes, 8, 2000) ||
+      !within(o.max_points, 500, 200000) || !within(o.window, 3, 20) ||
+      !within(o.kernels, TV_KERNELS_AUTO, TV_KERNELS_NEON) || !within(o.correct_camera, 0, 1) ||
+      o.reserved != 0 || !within(camera->width, 32, 16384) || !within(camera->height, 32, 16384)) {
+    return TV_ERR_ARGUMENT;
+  }
+  tv_limits_init(&plan->limits);
+  plan->limits.max_width = camera->width;
+  plan->limits.max_height = camera->height;
+  plan->limits.max_keypoints = kMatchedFrames * o.max_keypoints;
+  plan->limits.max_matches = o.max_keypoints;
+  plan->limits.kernels = o.kernels;
+  plan->limits.purposes = TV_PURPOSE_EXTRACT | TV_PURPOSE_MATCH | TV_PURPOSE_ESTIMATE;
+  plan->columns = (camera->width + kCellPx - 1) / kCellPx;
+  plan->rows = (camera->height + kCellPx - 1) / kCellPx;
+  plan->sizes = {o.max_keypoints, o.max_keyframes, o.max_points};
+  status = tv_context_size(&plan->limits, &plan->context_bytes);
+  if (status == TV_OK) measure_plan(plan);
+  return status;
 }
 
 }  // namespace
@@ -178,7 +178,7 @@ tv_status tv_odometry_size(const tv_camera* camera, const tv_odometry_options* o
   const tv_status status = tv::make_plan(camera, options, &plan);
   if (status != TV_OK) return status;
   if (size_bytes == nullptr) return TV_ERR_NULL;
-  *size_bytes = tv::plan_bytes(plan);
+  *size_bytes = plan.num_bytes;
   return TV_OK;
 }
 
@@ -189,16 +189,15 @@ tv_status tv_odometry_init(tv_odometry** odometry, const tv_camera* camera,
   if (status != TV_OK) return status;
   if (odometry == nullptr || memory == nullptr) return TV_ERR_NULL;
   if (reinterpret_cast<uintptr_t>(memory) % TV_CONTEXT_ALIGNMENT != 0) return TV_ERR_ALIGNMENT;
-  const size_t needed = tv::plan_bytes(plan);
-  if (size_bytes < needed) return TV_ERR_MEMORY;
+  if (size_bytes < plan.num_bytes) return TV_ERR_MEMORY;
   tv_odometry* o = static_cast<tv_odometry*>(memory);
   *o = tv_odometry{};
   tv::Arena arena = tv::arena_over(static_cast<uint8_t*>(memory) + tv::kOdometryBytes,
-                                   needed - tv::kOdometryBytes);
+                                   plan.num_bytes - tv::kOdometryBytes);
   status = tv_context_init(&o->context, &plan.limits,
                            tv::arena_alloc<uint8_t>(arena, plan.context_bytes), plan.context_bytes);
   if (status != TV_OK) return status;
-  const size_t scratch = tv::own_scratch_bytes(plan);
+  const size_t scratch = plan.scratch_bytes;
   o->scratch = tv::arena_over(tv::arena_alloc<uint8_t>(arena, scratch), scratch);
   // They follow each other.
   uint8_t* begin = o->context->arena.memory;
