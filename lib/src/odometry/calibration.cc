@@ -50,8 +50,7 @@ Rigid move_principal_point(Odometry* odometry, const double to[2], const double 
   for (int32_t k = first_keyframe; k < map.num_keyframes; ++k) {
     MapKeyframe* keyframe = &map.keyframes[k];
     keyframe->cam_from_world = compose(turn, keyframe->cam_from_world);
-    if (keyframe->described < 0) continue;
-    std::fill_n(planes_of(map, *keyframe), 2 * keyframe->num_keypoints, __builtin_nan(""));
+    if (keyframe->described >= 0) forget_planes(map, *keyframe);
   }
   return turn;
 }
@@ -80,7 +79,7 @@ void correct_camera(Odometry* odometry, Frame* frame) {
   const Rigid turn = move_principal_point(odometry, to, from, 0);
   frame->cam_from_world = compose(turn, frame->cam_from_world);
   odometry->weak_loop.frame = -1;
-  begin_spread(odometry);
+  if (odometry->map.num_keyframes > 0) begin_spread(odometry, odometry->segment, 0);
 }
 
 }  // namespace tv

@@ -308,19 +308,16 @@ bool close_loop(Odometry* odometry, int32_t keyframe, const Frame& again, const 
   const bool is_small =
       are_near(now, end.cam_from_world, kLeastWay * odometry->median_depth, kLeastTurn);
   if (segment == old_segment && is_small) return false;
-  Spread* spread = &odometry->spread;
-  const bool again_here = segment == old_segment && spread->segment == old_segment;
+  const Spread& before = odometry->spread;
+  const bool again_here = segment == old_segment && before.segment == old_segment;
   const int32_t first_id = map.keyframes[std::max(newest + 1 - kLeastSpread, 0)].id;
-  *spread = {kSpreadSteps, 0, old_segment, again_here ? std::min(spread->last_id, first_id) : 0,
-             map.keyframes[newest].id};
+  begin_spread(odometry, old_segment, again_here ? std::min(before.last_id, first_id) : 0);
   return segment == old_segment && is_jump(odometry, now, keyframe);
 }
 
-void begin_spread(Odometry* odometry) {
+void begin_spread(Odometry* odometry, int32_t segment, int32_t first_id) {
   const Map& map = odometry->map;
-  if (map.num_keyframes == 0) return;
-  odometry->spread = {kSpreadSteps, 0, odometry->segment, 0,
-                      map.keyframes[map.num_keyframes - 1].id};
+  odometry->spread = {kSpreadSteps, 0, segment, first_id, map.keyframes[map.num_keyframes - 1].id};
 }
 
 bool is_spreading(const Odometry& odometry) {

@@ -133,6 +133,10 @@ int32_t find_keyframe(const Map& map, int32_t id) {
   return low < map.num_keyframes && map.keyframes[low].id == id ? low : -1;
 }
 
+void forget_planes(const Map& map, const MapKeyframe& keyframe) {
+  std::fill_n(planes_of(map, keyframe), 2 * keyframe.num_keypoints, __builtin_nan(""));
+}
+
 int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* descriptors,
                      int32_t num) {
   const int32_t idx = map->num_keyframes++;
@@ -153,7 +157,7 @@ int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* desc
   }
   std::fill_n(seen_by(*map, *keyframe), num, kNoPoint);
   std::memcpy(descriptors_of(*map, *keyframe), descriptors, as_size(num) * TV_DESCRIPTOR_BYTES);
-  std::fill_n(planes_of(*map, *keyframe), 2 * num, __builtin_nan(""));
+  forget_planes(*map, *keyframe);
   return idx;
 }
 

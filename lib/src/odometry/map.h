@@ -136,6 +136,9 @@ inline bool is_marked(const Map& map, int32_t point) {
 void mark_points(Map* map, const int32_t* points, int32_t num);
 int32_t count_marked(const Map& map, const MapKeyframe& keyframe);
 
+// The planes of a keyframe that has its descriptors are computed when they are next used.
+void forget_planes(const Map& map, const MapKeyframe& keyframe);
+
 // Adds a keyframe with the keypoints and descriptors of a frame, none of which sees a point, and
 // returns its index. The map must have room for it.
 int32_t add_keyframe(Map* map, const tv_keypoint* keypoints, const uint8_t* descriptors,
