@@ -32,7 +32,7 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
   std::copy_n(view.R, 9, turn.R);
   std::fill(map_turn.t, map_turn.t + 3, 0.0);
   const double difference = turn_between(map_turn, turn);
-  if (difference <= kTurnSigmas * turn_sigma_of(view) + kTurnAllowed)
+  if (difference <= kTurnSigmas * turn_sigma_of(view.covariance, 5) + kTurnAllowed)
     ++vote->num_agree;
   else
     ++vote->num_disagree;

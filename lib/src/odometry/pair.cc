@@ -71,10 +71,9 @@ bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_k
                               &pairs, &options, pair->view, pair->is_inlier) == TV_OK;
 }
 
-double turn_sigma_of(const tv_two_view& view) {
-  // The variances of the rotation vector: elements 0, 6 and 12 of the 5x5 covariance.
-  const double* c = view.covariance;
-  return std::sqrt(std::max({c[0], c[6], c[12]}));
+double turn_sigma_of(const double* covariance, int num_parameters) {
+  const int next = num_parameters + 1;  // variance on the diagonal
+  return std::sqrt(std::max(std::max(covariance[0], covariance[next]), covariance[2 * next]));
 }
 
 }  // namespace tv

@@ -26,8 +26,8 @@ tv_features features_of(const Map& map, const MapKeyframe& keyframe, tv_keypoint
 bool estimate_pair(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoint* keypoints1,
                    const tv_correspondence* matches, int32_t num, Pair* pair);
 
-// The largest standard deviation of the rotation about an axis, in radians, of a pose that has its
-// covariance; 0 of one that has none.
-double turn_sigma_of(const tv_two_view& view);
+// The largest standard deviation of the rotation about an axis, in radians, of a pose with this
+// covariance of so many parameters, the first of which are the rotation vector; 0 of zeros.
+double turn_sigma_of(const double* covariance, int num_parameters);
 
 }  // namespace tv

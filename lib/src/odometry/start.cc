@@ -44,7 +44,7 @@ int32_t next_try_of(const Frame& first, const Frame& frame, double parallax) {
 // Whether the rotation is known well enough for the depths of the first points, which are off by
 // the share of its error in the parallax.
 bool is_turn_sure(const tv_two_view& view) {
-  return turn_sigma_of(view) <= kLargestTurnSigma * view.median_parallax_rad;
+  return turn_sigma_of(view.covariance, 5) <= kLargestTurnSigma * view.median_parallax_rad;
 }
 
 void drop_start(Odometry* odometry, int n) {

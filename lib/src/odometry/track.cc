@@ -202,7 +202,7 @@ bool heed_check(Odometry* odometry) {
 
 // The frame becomes a keyframe, and closes a loop where there is one. False: the map is wrong
 // here, and the frame is no keyframe.
-bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop,
+bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, LoopEnd* loop,
                            tv_odometry_state* state) {
   Map& map = odometry->map;
   Frame* again = &odometry->starts[0];  // of the loop
@@ -218,12 +218,8 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
   remove_bad_points(odometry);
   const int32_t newest = map.num_keyframes - 1;
   odometry->reference_id = map.keyframes[newest].id;
-  LoopEnd end;
-  if (loop != nullptr) {
-    end = *loop;
-    end.keyframe = find_keyframe(map, end_id);
-  }
-  const bool closes = loop != nullptr && end.keyframe >= 0;
+  if (loop != nullptr) loop->keyframe = find_keyframe(map, end_id);
+  const bool closes = loop != nullptr && loop->keyframe >= 0;
   if (closes) {
     for (int32_t k = 0; k < again->num; ++k) {
       // The point may be gone, and its place taken by a new one.
@@ -231,8 +227,8 @@ bool add_frame_as_keyframe(Odometry* odometry, Frame* frame, const LoopEnd* loop
       const int32_t id = map.points[again->points[k]].id;
       if (id < 0 || id >= next_point_id) again->points[k] = kNoPoint;
     }
-    if (close_loop(odometry, newest, *again, end)) state->reasons |= TV_REASON_LOW_PARALLAX;
-    scale_by(end.scale, odometry->motion.t);
+    if (close_loop(odometry, newest, *again, *loop)) state->reasons |= TV_REASON_LOW_PARALLAX;
+    scale_by(loop->scale, odometry->motion.t);
     ++odometry->num_loops;
     state->loop_closed = 1;
   }
@@ -334,8 +330,7 @@ bool finish_tracked(Odometry* odometry, const PoseFit& fit, bool follows, bool g
     begin_travel(odometry, frame->cam_from_world, -1);
   if (!heed_velocities(odometry, *frame, &state->reasons)) return false;
   state->attitude_ignored = !check_attitude(*odometry, frame);
-  const double* covariance = fit.estimate.covariance;
-  odometry->turn_sigma = std::sqrt(std::max({covariance[0], covariance[7], covariance[14]}));
+  odometry->turn_sigma = turn_sigma_of(fit.estimate.covariance, 6);
   // The path jumps here, because the map was moved since the last tracked frame.
   if (odometry->was_moved_far) state->reasons |= TV_REASON_LOW_PARALLAX;
   odometry->was_moved_far = false;

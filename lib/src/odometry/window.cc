@@ -227,7 +227,8 @@ void hold_free_parameters(const Window& window, bool scale_is_free) {
       const int low = std::min(reference, farthest), high = std::max(reference, farthest);
       distance_term(prior, window.pose[low], window.pose[high], &term);
       const double* entries = A.diagonal + kBlock * window.block[farthest];
-      add_term(window, kHeld * std::max({entries[3], entries[4], entries[5]}), term, low, high);
+      add_term(window, kHeld * std::max(std::max(entries[3], entries[4]), entries[5]), term, low,
+               high);
     }
   }
   if (window.block[reference] < 0 || window.given.num_pose_priors > 0) return;
