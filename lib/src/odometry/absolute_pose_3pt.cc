@@ -134,6 +134,16 @@ struct Triangle {
 
 constexpr int kFrom[3] = {0, 0, 1}, kTo[3] = {1, 2, 2};
 
+void measure_sides(const double points[3][3], double side_sq[3]) {
+  for (int k = 0; k < 3; ++k) {
+    side_sq[k] = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double difference = points[kFrom[k]][c] - points[kTo[k]][c];
+      side_sq[k] += difference * difference;
+    }
+  }
+}
+
 double errors(const Triangle& triangle, const double d[3], double error[3]) {
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
@@ -198,28 +208,21 @@ int absolute_pose_3pt(const double rays_in[3][3], const double points_in[3][3],
                       Pose poses[kMaxAbsolutePose3pt]) {
   // Points 1 and 2 are those of the longest side, by which the other two equations are divided.
   double rays[3][3], points[3][3], side_sq[3];
-  for (int k = 0; k < 3; ++k) {
-    side_sq[k] = 0;
-    for (int c = 0; c < 3; ++c) {
-      const double difference = points_in[kFrom[k]][c] - points_in[kTo[k]][c];
-      side_sq[k] += difference * difference;
-    }
-  }
+  measure_sides(points_in, side_sq);
   int first = 0;
   if (side_sq[0] > side_sq[2] || side_sq[1] > side_sq[2]) first = side_sq[0] > side_sq[1] ? 2 : 1;
-  for (int k = 0; k < 9; ++k) {
-    rays[k / 3][k % 3] = rays_in[(first + k / 3) % 3][k % 3];
-    points[k / 3][k % 3] = points_in[(first + k / 3) % 3][k % 3];
+  for (int k = 0; k < 3; ++k) {
+    const int from = (first + k) % 3;
+    for (int c = 0; c < 3; ++c) {
+      rays[k][c] = rays_in[from][c];
+      points[k][c] = points_in[from][c];
+    }
   }
   double world[3][3];
   if (!frame_of(points, world)) return 0;
   Triangle triangle;
-  for (int k = 0; k < 3; ++k) {
-    triangle.cosine[k] = dot(rays[kFrom[k]], rays[kTo[k]]);
-    // Side 12 is opposite to the first point, 01 to the last, 02 to the middle one.
-    constexpr int kOfPair[3][3] = {{0, 0, 1}, {0, 0, 2}, {1, 2, 0}};
-    triangle.side_sq[k] = side_sq[kOfPair[(first + kFrom[k]) % 3][(first + kTo[k]) % 3]];
-  }
+  measure_sides(points, triangle.side_sq);
+  for (int k = 0; k < 3; ++k) triangle.cosine[k] = dot(rays[kFrom[k]], rays[kTo[k]]);
   const double* c = triangle.cosine;
   const double ratio0 = triangle.side_sq[0] / triangle.side_sq[2];
   const double ratio1 = triangle.side_sq[1] / triangle.side_sq[2];
@@ -257,7 +260,9 @@ int absolute_pose_3pt(const double rays_in[3][3], const double points_in[3][3],
     if (!(d[0] > 0 && d[1] > 0 && d[2] > 0)) continue;
     polish(triangle, d);
     double at[3][3], camera[3][3];
-    for (int k = 0; k < 9; ++k) at[k / 3][k % 3] = d[k / 3] * rays[k / 3][k % 3];
+    for (int k = 0; k < 3; ++k) {
+      for (int i = 0; i < 3; ++i) at[k][i] = d[k] * rays[k][i];
+    }
     if (!(d[0] > 0 && d[1] > 0 && d[2] > 0) || !frame_of(at, camera)) continue;
     Pose& pose = poses[count++];
     for (int r = 0; r < 3; ++r) {
