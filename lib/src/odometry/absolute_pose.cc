@@ -260,23 +260,15 @@ struct Spread {
 __attribute__((noinline)) Spread spread_of(const Finish& f, int count) {
   Spread spread{};
   Mat3 sum = Mat3::Zero();
-  for (int pass = 0; pass < 2; ++pass) {
-    for (int k = 0; k < count; ++k) {
-      const double* point = f.s.all[f.indices[k]].point;
-      for (int i = 0; i < 9; ++i) {
-        const double x = point[i % 3] - spread.mean[i % 3];
-        if (pass == 1) {
-          sum.data()[i] += x * (point[i / 3] - spread.mean[i / 3]);
-        } else if (i < 3) {
-          sum.data()[i] += point[i] / count;
-        }
-      }
-    }
-    if (pass == 1) break;
-    for (int i = 0; i < 3; ++i) {
-      spread.mean[i] = sum.data()[i];
-      sum.data()[i] = 0;
-    }
+  for (int k = 0; k < count; ++k) {
+    const double* point = f.s.all[f.indices[k]].point;
+    for (int i = 0; i < 3; ++i) spread.mean[i] += point[i] / count;
+  }
+  for (int k = 0; k < count; ++k) {
+    const double* point = f.s.all[f.indices[k]].point;
+    double x[3];
+    for (int i = 0; i < 3; ++i) x[i] = point[i] - spread.mean[i];
+    for (int i = 0; i < 9; ++i) sum.data()[i] += x[i % 3] * x[i / 3];
   }
   spread.svd = svd3(sum);
   return spread;

@@ -28,10 +28,7 @@ void add_vote(Odometry* odometry, const tv_keypoint* keypoints0, const tv_keypoi
   if (odometry->options.correct_camera != 0) {
     add_evidence(view, odometry->camera.model.fx, &odometry->camera_evidence);
   }
-  Rigid turn = kIdentity, map_turn = cam1_from_cam0;
-  std::copy_n(view.R, 9, turn.R);
-  std::fill(map_turn.t, map_turn.t + 3, 0.0);
-  const double difference = turn_between(map_turn, turn);
+  const double difference = turn_between(cam1_from_cam0, rigid_of(view.R, view.t));
   if (difference <= kTurnSigmas * turn_sigma_of(view.covariance, 5) + kTurnAllowed)
     ++vote->num_agree;
   else

@@ -84,7 +84,7 @@ bool error_rows(const PoseProblem& problem, int i, const double p[3], ErrorRows*
 int64_t reprojection_cost(const Sightings& s, const Pose& pose, double threshold_px,
                           int64_t bound) {
   float m[12];
-  for (int k = 0; k < 9; ++k) m[k] = static_cast<float>(pose.R(k / 3, k % 3));
+  for (int k = 0; k < 9; ++k) m[k] = static_cast<float>(pose.R.data()[k]);
   for (int k = 0; k < 3; ++k) m[9 + k] = static_cast<float>(pose.t[k]);
   const double inverse = 1 / (threshold_px * threshold_px);
   const float inverse_sq = static_cast<float>(std::min(inverse, 1e30));
