@@ -45,7 +45,7 @@ constexpr int32_t kJoinSteps = 20;  // of the adjustment where two maps meet
 constexpr int32_t kSpreadSteps = 12, kPointSteps = 3, kLeastSpread = 100;
 // Smaller corrections are not spread: median depths, radians.
 constexpr double kLeastWay = 0.005, kLeastTurn = 0.005;
-constexpr double kMaxDistance = 200, kSearchRatio = 0.9, kMatchRatio = 0.87;
+constexpr double kMatchRatio = 0.87;
 
 // Whether the frame may see what a keyframe saw, if the drift is as large as it may be after a path
 // of this length.
@@ -176,8 +176,7 @@ bool meets(Odometry* odometry, const Frame& frame, double path, int32_t keyframe
       arena_alloc<int32_t>(odometry->scratch, static_cast<size_t>(odometry->max_matched));
   const int32_t num_around = list_points(odometry, keyframe, around);
   again->cam_from_world = fit.cam_from_world;
-  const PointSearch search{around,       num_around, fit.cam_from_world, 5.0, kMaxDistance,
-                           kSearchRatio, true};
+  const PointSearch search{around, num_around, fit.cam_from_world, 5.0, true};
   find_points(odometry, search, again);
   if (num_inliers < kLeastWeakInliers || !is_sure || !refine_pose(odometry, 3.0, again, &fit)) {
     return false;

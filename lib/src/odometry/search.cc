@@ -10,7 +10,9 @@ namespace tv {
 namespace {
 
 constexpr int32_t kMostCandidates = 400;
-constexpr int32_t kAhead = 8;  // points: their places in the map are far from each other
+constexpr int32_t kMaxDistance = 200;  // of descriptors, L2
+constexpr double kSearchRatio = 0.9;   // of the nearest one's distance to that of the second
+constexpr int32_t kAhead = 8;          // points: their places in the map are far from each other
 // The keypoints within this radius in pixels are compared: a match is the nearest of them all.
 constexpr double kComparedRadius = 20.0;
 constexpr float kSameCornerSq = 16.0f;       // px^2: nearer keypoints are of the same corner
@@ -72,8 +74,6 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
   Map& map = odometry->map;
   const tv_camera& model = odometry->camera.model;
   const int32_t columns = odometry->grid_columns;
-  const int32_t most_sq = static_cast<int32_t>(search.max_distance * search.max_distance);
-  const double ratio_sq = search.ratio * search.ratio;
   double centre[3];
   centre_of(search.cam_from_world, centre);
   for (int32_t i = 0; i < search.num; ++i) {
@@ -116,7 +116,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
     for (int32_t n = 1; n < num; ++n) {
       if (distances[n] < distances[best]) best = n;
     }
-    if (distances[best] > most_sq) continue;
+    if (distances[best] > kMaxDistance * kMaxDistance) continue;
     const int32_t keypoint = candidates[best];
     const float near_x = frame->keypoints[keypoint].x - px;
     const float near_y = frame->keypoints[keypoint].y - py;
@@ -128,7 +128,7 @@ int32_t find_points(Odometry* odometry, const PointSearch& search, Frame* frame)
       const float dy = other.y - frame->keypoints[keypoint].y;
       if (dx * dx + dy * dy >= kSameCornerSq) second_sq = std::min(second_sq, distances[n]);
     }
-    if (distances[best] > ratio_sq * second_sq) continue;
+    if (distances[best] > kSearchRatio * kSearchRatio * second_sq) continue;
     if (distances[best] >= frame->distances[keypoint]) continue;
     frame->points[keypoint] = idx;
     frame->distances[keypoint] = distances[best];

@@ -8,11 +8,9 @@ namespace tv {
 struct PointSearch {
   const int32_t* points;
   int32_t num;
-  Rigid cam_from_world;
-  double radius_px;     // for a point whose place is known exactly
-  double max_distance;  // of descriptors, L2
-  double ratio;         // of the nearest one's distance to that of the second
-  bool counts;          // the points as visible; not where the map must stay as it is
+  const Rigid& cam_from_world;
+  double radius_px;  // for a point whose place is known exactly
+  bool counts;       // the points as visible; not where the map must stay as it is
 };
 
 // Sorts the keypoints of a frame into the cells of its grid.

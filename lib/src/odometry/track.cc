@@ -19,7 +19,6 @@ namespace tv {
 namespace {
 
 constexpr int32_t kLeastInliers = 20, kLeastRelocated = 30;
-constexpr double kMaxDistance = 200, kSearchRatio = 0.9;
 constexpr int32_t kSearchedKeyframes = 6;  // of a lost frame
 // A frame becomes a keyframe when the camera moved by kFarMoved median depths or turned by
 // kFarTurned radians since the last one, and earlier where few of its points are left.
@@ -58,7 +57,7 @@ void extract_frame(Odometry* odometry, const tv_image& image, Frame* frame) {
 // The pose from the points that are looked for around a predicted pose.
 bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const Rigid& predicted,
                   double radius_px, Frame* frame, PoseFit* fit) {
-  PointSearch search{points, num, predicted, radius_px, kMaxDistance, kSearchRatio, true};
+  const PointSearch search{points, num, predicted, radius_px, true};
   forget_points(frame);
   frame->cam_from_world = predicted;
   frame->has_pose = true;
@@ -72,13 +71,8 @@ bool track_points(Odometry* odometry, const int32_t* points, int32_t num, const 
 // The pose is known to a few pixels: looks for all points once more, near where they must be, and
 // counts them as looked for if `counts`.
 bool refine_track(Odometry* odometry, bool counts, Frame* frame, PoseFit* fit) {
-  PointSearch search{odometry->local_points,
-                     odometry->num_local_points,
-                     fit->cam_from_world,
-                     5.0,
-                     kMaxDistance,
-                     kSearchRatio,
-                     counts};
+  const PointSearch search{odometry->local_points, odometry->num_local_points, fit->cam_from_world,
+                           5.0, counts};
   find_points(odometry, search, frame);
   frame->cam_from_world = fit->cam_from_world;
   if (!refine_pose(odometry, 3.0, frame, fit)) return false;
