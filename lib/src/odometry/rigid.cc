@@ -101,8 +101,8 @@ Rigid scaled_motion(const Rigid& rigid, double factor) {
   const double length = std::sqrt(axis.dot(axis));
   Rigid result = kIdentity;
   if (length > 1e-12) {
-    const Vec3 unit = axis / length;
-    std::copy_n(rotation_about(unit, factor * rotation_angle(rigid)).data(), 9, result.R);
+    axis /= length;
+    std::copy_n(rotation_about(axis, factor * rotation_angle(rigid)).data(), 9, result.R);
   }
   for (int k = 0; k < 3; ++k) result.t[k] = factor * rigid.t[k];
   return result;

@@ -36,10 +36,13 @@ constexpr double kMostDrift = 0.026;
 constexpr int32_t kLeastTrust = 5, kMostContrary = 5;
 constexpr double kLongestGap = 0.25;  // seconds: over a longer one velocities say no way
 
+int32_t nearest_pixel(float x, int32_t size) {
+  return std::min(std::max(static_cast<int32_t>(x + 0.5f), 0), size - 1);
+}
+
 uint8_t grey_at(const tv_image& image, const tv_keypoint& keypoint) {
-  const int64_t x = std::min(std::max(static_cast<int32_t>(keypoint.x + 0.5f), 0), image.width - 1);
-  const int64_t y =
-      std::min(std::max(static_cast<int32_t>(keypoint.y + 0.5f), 0), image.height - 1);
+  const int64_t x = nearest_pixel(keypoint.x, image.width);
+  const int64_t y = nearest_pixel(keypoint.y, image.height);
   return image.data[y * image.stride_bytes + x];
 }
 

@@ -43,13 +43,14 @@ void rotation_vector(const double R[9], double w[3], double jacobian[9]) {
   double square = 1.0 / 12.0;  // the factor of [w]x^2
   for (int i = 0; i < 3; ++i) w[i] = 0.5 * axis[i];
   if (near_half_turn) {
-    // The axis is the longest column of R + R' - (tr R - 1) I = 2 (1 - cos) a a'.
-    const auto entry = [&](int i, int j) {
-      return R[3 * i + j] + R[3 * j + i] - (i == j ? 2.0 * cosine : 0.0);
-    };
+    // The axis is the longest column (or row) of R + R' - (tr R - 1) I = 2 (1 - cos) a a'.
+    double sum[9];
+    for (int i = 0; i < 9; ++i) {
+      sum[i] = R[i] + R[3 * (i % 3) + i / 3] - (i % 4 == 0 ? 2.0 * cosine : 0.0);
+    }
     int longest = 0;
-    for (int i = 1; i < 3; ++i) longest = entry(i, i) > entry(longest, longest) ? i : longest;
-    const double column[3] = {entry(0, longest), entry(1, longest), entry(2, longest)};
+    for (int i = 1; i < 3; ++i) longest = sum[4 * i] > sum[4 * longest] ? i : longest;
+    const double* column = sum + 3 * longest;
     const double scale = (product_of(column, axis) < 0.0 ? -angle : angle) / norm_of(column);
     for (int i = 0; i < 3; ++i) w[i] = column[i] * scale;
   } else if (sine > 0.0) {
